@@ -1,0 +1,2 @@
+//! The `stylet` binary.
+fn main() {}
