@@ -1,1 +1,39 @@
-//! Part of Stylet.
+//! Layered tissue as a needle feels it: the base law of puncture and friction, the effects by
+//! which reality departs from it, and the kinematic replay.
+//!
+//! Pure state machines in SI units: `no_std` (with `alloc` for the lists of layers and effects),
+//! no randomness, no allocation per sample, the same bits on every platform.
+//!
+//! ```
+//! use stylet_tissue::{Law, LawState, Layer, Tissue};
+//!
+//! let gel = Layer {
+//!     name: "gel".into(),
+//!     thickness_m: 0.03,
+//!     stiffness_n_per_m: 40.0,
+//!     friction_ns_per_m2: 9000.0,
+//!     puncture_n: None,
+//! };
+//! let law = Law::base(&Tissue { surface_m: 0.0, layers: vec![gel] });
+//! let mut state = LawState::default();
+//! let force = law.step(&mut state, 0.0, 0.01, 0.002, |_| {});
+//! assert!((force.total_n - (40.0 * 0.01 + 9000.0 * 0.01 * 0.002)).abs() < 1e-12);
+//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+pub mod effect;
+mod effects;
+mod law;
+mod layer;
+mod replay;
+mod slab;
+
+pub use effect::{Effect, Place};
+pub use effects::*;
+pub use law::{Law, LawState, MAX_EFFECTS, Rupture, TissueForce, TooManyEffects};
+pub use layer::{Layer, Tissue};
+pub use replay::replay;
+pub use slab::Slab;

@@ -1,0 +1,140 @@
+//! What an effect is: one departure of reality from the base law, with its place in the chain.
+//!
+//! An effect is configuration only. What it has to remember between samples lives in a
+//! [`Memory`] that the law keeps for it, so that a law can be shared and its state copied.
+//! Every hook has a pass-through default: an effect implements the one of its [`Place`].
+
+use crate::slab::Slab;
+
+/// Velocity below which `sgn` is zero, in m/s (SPEC section 6: 0.01 mm/s everywhere).
+pub const SGN_DEAD_BAND_MPS: f64 = 1e-5;
+
+/// Sign with the dead band of SPEC section 6: −1, 0 or 1.
+#[must_use]
+#[inline]
+pub fn sgn(v_mps: f64) -> f64 {
+    if v_mps > SGN_DEAD_BAND_MPS {
+        1.0
+    } else if v_mps < -SGN_DEAD_BAND_MPS {
+        -1.0
+    } else {
+        0.0
+    }
+}
+
+/// What an effect remembers between samples. Zero at the start of an insertion.
+pub type Memory = [f64; 4];
+
+/// Where in the chain of SPEC section 6 an effect acts. The order of the variants is the order
+/// of the chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Place {
+    /// Changes the layers before the insertion starts.
+    Geometry,
+    /// Changes depth and velocity of the tip relative to the tissue.
+    Kinematics,
+    /// Changes the elastic force as a function of depth.
+    Elastic,
+    /// Changes the elastic force as a function of its history.
+    Relaxation,
+    /// Changes the force at which a layer ruptures.
+    Puncture,
+    /// Changes what happens to the elastic force at a rupture.
+    Release,
+    /// Changes or adds to the friction along the shaft.
+    Friction,
+    /// Adds a force at the tip.
+    Tip,
+    /// Acts between tissue and sensor: arm and tool.
+    Tool,
+    /// Acts in the force sensor.
+    Sensor,
+    /// Acts on the recorded position.
+    Position,
+}
+
+/// What an effect may look at in one sample. Positions and velocities are the tip's, relative to
+/// the tissue, after all kinematic effects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Time since the previous sample in seconds; zero at the first.
+    pub dt_s: f64,
+    /// Tip position in metres.
+    pub z_m: f64,
+    /// Tip velocity in m/s.
+    pub v_mps: f64,
+    /// Number of ruptured layers.
+    pub ruptured: usize,
+}
+
+/// One departure from the base law.
+///
+/// The hooks are called in the order of [`Place`]; each takes the value of the base law (as the
+/// effects before it left it) and returns the new one. A hook that is not overridden passes the
+/// value through.
+pub trait Effect {
+    /// Stable name in snake case, as in every output and in SPEC section 6.
+    fn id(&self) -> &'static str;
+
+    /// Place in the chain.
+    fn place(&self) -> Place;
+
+    /// True when the parameters make the effect vanish: it is then bypassed altogether, so that
+    /// the base law comes back bit for bit.
+    fn is_neutral(&self) -> bool;
+
+    /// [`Place::Geometry`]: moves faces or changes coefficients, once.
+    fn shape(&self, _slabs: &mut [Slab]) {}
+
+    /// [`Place::Kinematics`]: depth and velocity relative to the tissue.
+    fn relative(&self, _time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64) {
+        (z_m, v_mps)
+    }
+
+    /// [`Place::Elastic`]: elastic force in N at indentation `x_m` of a layer of stiffness
+    /// `k_n_per_m`; `force_n` is what the chain made of it so far.
+    fn elastic(&self, _k_n_per_m: f64, _x_m: f64, force_n: f64) -> f64 {
+        force_n
+    }
+
+    /// [`Place::Relaxation`]: the force that is left of the elastic force `elastic_n` given its
+    /// history. Called once per sample and active layer.
+    fn relax(&self, _dt_s: f64, elastic_n: f64, _memory: &mut Memory) -> f64 {
+        elastic_n
+    }
+
+    /// [`Place::Puncture`]: force in N at which the active layer ruptures.
+    fn puncture(&self, threshold_n: f64, _v_mps: f64) -> f64 {
+        threshold_n
+    }
+
+    /// Told of every rupture, with the elastic force that was released (N) and the position of
+    /// the rupture (m). Effects with memory of the layer forget it here.
+    fn on_rupture(&self, _released_n: f64, _z_m: f64, _memory: &mut Memory) {}
+
+    /// [`Place::Friction`]: the velocity that the viscous friction feels, in m/s.
+    fn friction_velocity(&self, v_mps: f64) -> f64 {
+        v_mps
+    }
+
+    /// [`Place::Friction`]: a force in N added to the shaft friction, `inside_m` being the total
+    /// length of needle inside the tissue.
+    fn shaft_force(&self, _moment: &Moment, _inside_m: f64, _memory: &mut Memory) -> f64 {
+        0.0
+    }
+
+    /// [`Place::Release`] and [`Place::Tip`]: a force in N added at the tip.
+    fn tip_force(&self, _moment: &Moment, _slabs: &[Slab], _memory: &mut Memory) -> f64 {
+        0.0
+    }
+
+    /// [`Place::Tool`]: a force in N added between tissue and sensor, from the base's velocity
+    /// (m/s) and acceleration (m/s²).
+    fn tool_force(&self, _v_mps: f64, _a_mps2: f64) -> f64 {
+        0.0
+    }
+}

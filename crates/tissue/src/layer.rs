@@ -1,0 +1,57 @@
+//! Layers and the stack they form.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// One tissue layer of the base law (SPEC section 1; multi-layer model, supplement eq. 4).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Layer {
+    /// What the layer is, for people.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub name: String,
+    /// Thickness `d_i` in metres, positive.
+    pub thickness_m: f64,
+    /// Stiffness `K_i` in N/m, zero or positive: `f_K = K_i (z - s_i)` until the layer ruptures.
+    pub stiffness_n_per_m: f64,
+    /// Viscous friction per metre of needle inside the layer, `b_i` in N s/m², zero or positive.
+    pub friction_ns_per_m2: f64,
+    /// Elastic force `F_i` in N at which the layer ruptures before its far face; absent: only the
+    /// far face ends the layer.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none")
+    )]
+    pub puncture_n: Option<f64>,
+}
+
+/// A stack of layers behind a surface.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Tissue {
+    /// Position of the first layer's front face along the insertion axis, in metres.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub surface_m: f64,
+    /// The layers, in the order in which the needle meets them; at least one.
+    pub layers: Vec<Layer>,
+}
+
+impl Tissue {
+    /// Position of the front face `s_i` of layer `index` (0-based), in metres; with
+    /// `index = layers.len()` the far face of the stack.
+    #[must_use]
+    pub fn front_m(&self, index: usize) -> f64 {
+        self.layers
+            .iter()
+            .take(index)
+            .fold(self.surface_m, |s, layer| s + layer.thickness_m)
+    }
+
+    /// Position of the far face of the last layer, in metres.
+    #[must_use]
+    pub fn end_m(&self) -> f64 {
+        self.front_m(self.layers.len())
+    }
+}

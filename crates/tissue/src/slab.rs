@@ -1,0 +1,59 @@
+//! A layer as the law sees it: faces instead of thicknesses, no names.
+
+use crate::layer::Tissue;
+use alloc::vec::Vec;
+
+/// A layer placed in space. Infinite puncture force means: only the far face ruptures it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slab {
+    /// Front face `s_i` in metres.
+    pub front_m: f64,
+    /// Thickness `d_i` in metres.
+    pub thickness_m: f64,
+    /// Stiffness `K_i` in N/m.
+    pub stiffness_n_per_m: f64,
+    /// Viscous friction per metre `b_i` in N s/m².
+    pub friction_ns_per_m2: f64,
+    /// Puncture force `F_i` in N, or infinity.
+    pub puncture_n: f64,
+}
+
+impl Slab {
+    /// Far face in metres.
+    #[must_use]
+    #[inline]
+    pub fn far_m(&self) -> f64 {
+        self.front_m + self.thickness_m
+    }
+
+    /// Length of needle inside the layer, `l_i = clamp(z - s_i, 0, d_i)`, in metres.
+    #[must_use]
+    #[inline]
+    pub fn inside_m(&self, z_m: f64) -> f64 {
+        let depth = z_m - self.front_m;
+        if depth <= 0.0 {
+            0.0
+        } else if depth >= self.thickness_m {
+            self.thickness_m
+        } else {
+            depth
+        }
+    }
+
+    /// Places the layers of a tissue in space.
+    #[must_use]
+    pub fn stack(tissue: &Tissue) -> Vec<Slab> {
+        tissue
+            .layers
+            .iter()
+            .enumerate()
+            .map(|(i, layer)| Slab {
+                front_m: tissue.front_m(i),
+                thickness_m: layer.thickness_m,
+                stiffness_n_per_m: layer.stiffness_n_per_m,
+                friction_ns_per_m2: layer.friction_ns_per_m2,
+                puncture_n: layer.puncture_n.unwrap_or(f64::INFINITY),
+            })
+            .collect()
+    }
+}
