@@ -55,7 +55,11 @@ impl Rls {
         let step = error * gain;
         self.theta[0] += p0 * step;
         self.theta[1] += p1 * step;
-        self.covariance = [p11 - p0 * p0 * gain, p12 - p0 * p1 * gain, p22 - p1 * p1 * gain];
+        self.covariance = [
+            p11 - p0 * p0 * gain,
+            p12 - p0 * p1 * gain,
+            p22 - p1 * p1 * gain,
+        ];
         if forgetting != 1.0 {
             for entry in &mut self.covariance {
                 *entry /= forgetting;

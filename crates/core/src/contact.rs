@@ -1,0 +1,125 @@
+//! First contact found from the data [D]: bias and noise are learnt in air, contact is declared
+//! when the low-passed force stands out of the noise for several samples, and its position is
+//! traced back along the loading line to zero force.
+
+use crate::config::ContactConfig;
+use crate::filter::Coefficient;
+use crate::line::Line;
+use crate::sample::Sample;
+
+/// What the search knows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ContactSearch {
+    low_pass: Coefficient,
+    elapsed_s: f64,
+    force_n: f64,
+    // Welford's running mean and variance of the force in air.
+    count: f64,
+    mean_n: f64,
+    m2: f64,
+    above: usize,
+    line: Line,
+    first: u64,
+    declared_m: Option<f64>,
+}
+
+/// What the search says after a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Found {
+    /// Still in air.
+    Nothing,
+    /// Contact declared; the position is the present best guess.
+    Provisional { surface_m: f64, first: u64 },
+    /// Contact settled.
+    Settled { surface_m: f64, first: u64 },
+}
+
+impl ContactSearch {
+    pub(crate) fn new(config: &ContactConfig) -> Self {
+        Self {
+            low_pass: Coefficient::new(config.time_constant_s),
+            elapsed_s: 0.0,
+            force_n: 0.0,
+            count: 0.0,
+            mean_n: 0.0,
+            m2: 0.0,
+            above: 0,
+            line: Line::default(),
+            first: 0,
+            declared_m: None,
+        }
+    }
+
+    fn noise_n(&self, config: &ContactConfig) -> f64 {
+        if self.count < 2.0 {
+            return f64::INFINITY;
+        }
+        libm::sqrt(self.m2 / (self.count - 1.0)).max(config.smallest_noise_n)
+    }
+
+    /// Takes sample number `number`.
+    pub(crate) fn update(
+        &mut self,
+        config: &ContactConfig,
+        dt_s: f64,
+        sample: &Sample,
+        number: u64,
+    ) -> Found {
+        self.elapsed_s += dt_s;
+        if self.count == 0.0 && self.declared_m.is_none() {
+            self.force_n = sample.force_n;
+        }
+        self.force_n += self.low_pass.at(dt_s) * (sample.force_n - self.force_n);
+        let noise = self.noise_n(config);
+        let lift = self.force_n - self.mean_n;
+        let learning = self.elapsed_s < config.learn_s || self.count < 10.0;
+        if let Some(declared_m) = self.declared_m {
+            self.line.add(sample.position_m, sample.force_n);
+            let surface_m = self.surface_m(declared_m);
+            let first = self.first;
+            return if (sample.position_m - declared_m).abs() >= config.extrapolate_over_m {
+                Found::Settled { surface_m, first }
+            } else {
+                Found::Provisional { surface_m, first }
+            };
+        }
+        // The loading line begins where the force starts to stand out.
+        if !learning && lift > 2.0 * noise {
+            if self.line.count == 0.0 {
+                self.first = number;
+            }
+            self.line.add(sample.position_m, sample.force_n);
+        } else {
+            self.line = Line::default();
+            self.learn(sample.force_n);
+        }
+        self.above = if !learning && lift > config.noise_sds * noise {
+            self.above + 1
+        } else {
+            0
+        };
+        if self.above < config.samples.max(1) {
+            return Found::Nothing;
+        }
+        self.declared_m = Some(sample.position_m);
+        Found::Provisional {
+            surface_m: self.surface_m(sample.position_m),
+            first: self.first,
+        }
+    }
+
+    fn learn(&mut self, force_n: f64) {
+        self.count += 1.0;
+        let delta = force_n - self.mean_n;
+        self.mean_n += delta / self.count;
+        self.m2 += delta * (force_n - self.mean_n);
+    }
+
+    /// Zero-force end of the loading line, never beyond the declaration and at most 5 mm before.
+    fn surface_m(&self, declared_m: f64) -> f64 {
+        match self.line.reaches(self.mean_n) {
+            Some(at) if self.line.slope() > 0.0 => at.clamp(declared_m - 0.005, declared_m),
+            _ => declared_m,
+        }
+    }
+}

@@ -1,0 +1,463 @@
+//! The online algorithm, one call per sample (SPEC section 5; Ferro et al. 2021, supplement
+//! Fig. 1 and eqs. 1-17).
+
+use crate::compensation::Compensation;
+use crate::config::{Algorithm, Contact, Depths, DropEstimator, EnhanceConfig};
+use crate::contact::{ContactSearch, Found};
+use crate::drop::{Drop, locate};
+use crate::filter::ForceDerivative;
+use crate::guard::MotionGuard;
+use crate::history::History;
+use crate::reweigh::{Rerun, ResetClock, regressor, reweighted_prior};
+use crate::rls::Rls;
+use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
+
+/// The layer being traversed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Traverse {
+    start_m: f64,
+    first: u64,
+    /// Travel and time while the needle moved: their ratio is the mean speed.
+    travel_m: f64,
+    moving_s: f64,
+}
+
+/// A layer that has ruptured and waits for its estimate.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    layer: usize,
+    traverse: Traverse,
+    end: u64,
+    thickness_m: f64,
+    online: [f64; 2],
+    drop: Drop,
+    rerun: Option<Rerun>,
+    drop_n: f64,
+    share: f64,
+}
+
+/// The online core.
+///
+/// Configuration is taken once; [`Enhancer::step`] is then called once per sample. It does not
+/// allocate and does a bounded amount of work: one update, at most
+/// [`DropConfig::replay_per_tick`](crate::config::DropConfig::replay_per_tick) replayed samples, and
+/// on the tick that declares a rupture one look back over at most 256 samples.
+///
+/// The storage `B` holds the raw samples of the layer being traversed, for the re-run after its
+/// rupture: a `Vec<Sample>` or an array. When a layer has more samples than the storage, the
+/// re-run begins at the oldest that is left.
+#[derive(Clone, Debug)]
+pub struct Enhancer<B> {
+    config: EnhanceConfig,
+    history: History<B>,
+    contact: ContactSearch,
+    derivative: ForceDerivative,
+    guard: MotionGuard,
+    compensation: Compensation,
+    rls: Rls,
+    clock: ResetClock,
+    in_contact: bool,
+    traverse: Traverse,
+    pending: Option<Pending>,
+    cusum_n2: f64,
+    derivative_on: bool,
+    waited_m: f64,
+    waited_s: f64,
+    last: Sample,
+    started: bool,
+    out: Output,
+}
+
+impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
+    /// A core with `storage` for the raw samples of a layer. `surface_m` is used when the contact
+    /// is [`Contact::Known`].
+    pub fn new(mut config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
+        if config.algorithm == Algorithm::Literal {
+            config.guard.blind_travel_m = 0.0;
+            config.drop.estimator = DropEstimator::Extremes;
+        }
+        let prior = [config.prior_stiffness, config.prior_friction];
+        Self {
+            history: History::new(storage),
+            contact: ContactSearch::new(&config.contact_search),
+            derivative: ForceDerivative::new(&config.derivative),
+            guard: MotionGuard::new(&config.guard),
+            compensation: Compensation::default(),
+            rls: Rls::new(prior),
+            clock: ResetClock::default(),
+            in_contact: false,
+            traverse: Traverse {
+                start_m: surface_m,
+                ..Traverse::default()
+            },
+            pending: None,
+            cusum_n2: 0.0,
+            derivative_on: false,
+            waited_m: 0.0,
+            waited_s: 0.0,
+            last: Sample::default(),
+            started: false,
+            out: Output::default(),
+            config,
+        }
+    }
+
+    /// The configuration in force.
+    #[must_use]
+    pub fn config(&self) -> &EnhanceConfig {
+        &self.config
+    }
+
+    fn prior(&self) -> [f64; 2] {
+        [self.config.prior_stiffness, self.config.prior_friction]
+    }
+
+    /// Takes one sample. A sample that is not finite or not later than the one before is passed
+    /// over ([`Output::used`] is false).
+    pub fn step(&mut self, sample: Sample) -> Output {
+        self.out.detection = None;
+        self.out.estimate = None;
+        let dt_s = sample.time_s - self.last.time_s;
+        if !sample.is_finite() || (self.started && dt_s <= 0.0) {
+            self.out.used = false;
+            return self.out;
+        }
+        let dt_s = if self.started { dt_s } else { 0.0 };
+        let number = self.history.next();
+        self.history.push(sample);
+        self.guard.update(
+            &self.config.guard,
+            self.config.drop.standstill_mps,
+            dt_s,
+            &sample,
+        );
+        let rate = self.derivative.update(dt_s, sample.force_n);
+        self.touch(dt_s, &sample, number);
+        let before = self.rls;
+        let error_n = self.identify(dt_s, &sample);
+        self.out.error_n = error_n;
+        self.out.reconstructed_n = if self.in_contact {
+            sample.force_n - error_n
+        } else {
+            0.0
+        };
+        let edge = self.switch_derivative(rate);
+        self.advance(dt_s, &sample, before, edge);
+        self.finish(&sample, rate);
+        self.last = sample;
+        self.started = true;
+        self.out
+    }
+
+    /// First contact.
+    fn touch(&mut self, dt_s: f64, sample: &Sample, number: u64) {
+        if self.out.contact_m.is_some() {
+            return;
+        }
+        let (start_m, first, settled) = match self.config.contact {
+            Contact::Known if sample.position_m >= self.traverse.start_m => {
+                (self.traverse.start_m, number, true)
+            }
+            Contact::Known => return,
+            Contact::Detected => {
+                match self
+                    .contact
+                    .update(&self.config.contact_search, dt_s, sample, number)
+                {
+                    Found::Nothing => return,
+                    Found::Provisional { surface_m, first } => (surface_m, first, false),
+                    Found::Settled { surface_m, first } => (surface_m, first, true),
+                }
+            }
+        };
+        if !self.in_contact || settled {
+            self.begin_layer(start_m, first);
+        }
+        self.in_contact = true;
+        if settled {
+            self.out.contact_m = Some(start_m);
+        }
+    }
+
+    fn begin_layer(&mut self, start_m: f64, first: u64) {
+        self.traverse = Traverse {
+            start_m,
+            first,
+            ..Traverse::default()
+        };
+        self.rls = Rls::new(self.prior());
+        self.clock = ResetClock::default();
+        self.cusum_n2 = 0.0;
+    }
+
+    /// One RLS update; returns the innovation.
+    #[inline]
+    fn identify(&mut self, dt_s: f64, sample: &Sample) -> f64 {
+        let depth_m = sample.position_m - self.traverse.start_m;
+        if !self.in_contact || depth_m <= 0.0 {
+            return 0.0;
+        }
+        let v = sample.velocity_mps;
+        if v.abs() >= self.config.drop.standstill_mps {
+            self.traverse.travel_m += v.abs() * dt_s;
+            self.traverse.moving_s += dt_s;
+        }
+        let prior = self.prior();
+        self.clock
+            .tick(&self.config.reset, dt_s, prior, &mut self.rls);
+        let y = sample.force_n - self.compensation.cumulative_ns_per_m() * v;
+        self.rls.update(
+            regressor(self.config.model, depth_m, v),
+            y,
+            self.config.forgetting,
+        )
+    }
+
+    /// Moves the derivative's switch; true on its trailing edge.
+    #[inline]
+    fn switch_derivative(&mut self, rate_n_per_s: f64) -> bool {
+        let config = &self.config.derivative;
+        if !config.enabled {
+            return false;
+        }
+        let rate = match config.sense {
+            crate::config::DerivativeSense::Rise => rate_n_per_s,
+            crate::config::DerivativeSense::Drop => -rate_n_per_s,
+        };
+        let was_on = self.derivative_on;
+        self.derivative_on = if was_on {
+            rate >= config.off_n_per_s
+        } else {
+            rate > config.on_n_per_s
+        };
+        was_on && !self.derivative_on
+    }
+
+    /// The state machine.
+    fn advance(&mut self, dt_s: f64, sample: &Sample, before: Rls, edge: bool) {
+        match self.out.state {
+            State::NoRupture | State::ExpectedRupture => {
+                self.watch(sample, before, edge);
+            }
+            State::DetectedRupture => {
+                self.out.state = State::ForceDropMeasuring;
+                self.waited_m = 0.0;
+                self.waited_s = 0.0;
+                self.measure(dt_s, sample);
+            }
+            State::ForceDropMeasuring => self.measure(dt_s, sample),
+            State::ForceCompensation => self.compensate(dt_s, sample),
+        }
+    }
+
+    /// Looks for a rupture.
+    fn watch(&mut self, sample: &Sample, before: Rls, edge: bool) {
+        if !self.in_contact {
+            return;
+        }
+        let travel_m = sample.position_m - self.traverse.start_m;
+        let armed = self.out.contact_m.is_some()
+            && travel_m >= self.config.guard.blind_travel_m
+            && self.guard.is_quiet();
+        let mut cause = None;
+        if armed {
+            let cusum = &self.config.cusum;
+            let was = self.cusum_n2;
+            let e = self.out.error_n;
+            self.cusum_n2 = (was + e * e - cusum.drift_n2()).max(0.0);
+            let threshold = cusum.threshold_n2();
+            if cusum.enabled && self.cusum_n2 > threshold && was <= threshold {
+                cause = Some(Cause::Cusum);
+            }
+        } else {
+            self.cusum_n2 = 0.0;
+        }
+        if cause.is_none()
+            && armed
+            && edge
+            && self.out.state == State::ExpectedRupture
+            && self.config.derivative.trailing_edge
+            && !self.guard.is_slowing(&self.config.guard)
+        {
+            cause = Some(Cause::DerivativeTrailingEdge);
+        }
+        if cause.is_none()
+            && self
+                .known_thickness_m()
+                .is_some_and(|thickness_m| travel_m >= thickness_m)
+        {
+            cause = Some(Cause::KnownFace);
+        }
+        if let Some(cause) = cause {
+            self.declare(sample, before, cause);
+        } else {
+            self.out.state = if self.derivative_on {
+                State::ExpectedRupture
+            } else {
+                State::NoRupture
+            };
+        }
+    }
+
+    fn known_thickness_m(&self) -> Option<f64> {
+        match &self.config.depths {
+            Depths::Unknown => None,
+            Depths::Known(thicknesses) => thicknesses.get(self.out.ruptures).copied(),
+        }
+    }
+
+    /// A rupture: the traversed layer is set aside, a new one begins.
+    fn declare(&mut self, sample: &Sample, before: Rls, cause: Cause) {
+        let newest = self.history.next().saturating_sub(1);
+        let literal = self.config.algorithm == Algorithm::Literal;
+        let after = if literal || cause == Cause::KnownFace {
+            newest
+        } else {
+            locate(&self.history, self.traverse.first)
+        };
+        let located = self.history.get(after).copied().unwrap_or(*sample);
+        let start_m = self.traverse.start_m;
+        let thickness_m = self
+            .known_thickness_m()
+            .unwrap_or((located.position_m - start_m).max(0.0));
+        self.out.ruptures += 1;
+        self.out.detection = Some(Detection {
+            layer: self.out.ruptures,
+            time_s: sample.time_s,
+            position_m: sample.position_m,
+            located_s: located.time_s,
+            located_m: located.position_m,
+            cause,
+        });
+        self.pending = Some(Pending {
+            layer: self.out.ruptures,
+            traverse: self.traverse,
+            end: after,
+            thickness_m,
+            online: before.theta,
+            drop: Drop::begin(&self.history, self.traverse.first, after),
+            rerun: None,
+            drop_n: 0.0,
+            share: 0.0,
+        });
+        let known = matches!(self.config.depths, Depths::Known(_));
+        let next_start_m = if known {
+            start_m + thickness_m
+        } else {
+            located.position_m
+        };
+        self.begin_layer(next_start_m, after);
+        self.out.state = State::DetectedRupture;
+    }
+
+    /// Counts the travel and time that a waiting state needs; standstill does not count.
+    fn wait(&mut self, dt_s: f64, sample: &Sample) {
+        if sample.velocity_mps.abs() >= self.config.drop.standstill_mps {
+            self.waited_m += sample.velocity_mps.abs() * dt_s;
+            self.waited_s += dt_s;
+        }
+    }
+
+    fn is_reversing(&self, sample: &Sample) -> bool {
+        sample.velocity_mps < -self.config.drop.standstill_mps
+    }
+
+    /// ForceDropMeasuring.
+    fn measure(&mut self, dt_s: f64, sample: &Sample) {
+        self.wait(dt_s, sample);
+        let reversing = self.is_reversing(sample);
+        let over = reversing
+            || self.waited_m >= self.config.drop.travel_m
+            || self.waited_s >= self.config.drop.longest_s;
+        let cumulative = self.compensation.cumulative_ns_per_m();
+        if let Some(pending) = &mut self.pending {
+            if !reversing {
+                pending.drop.add(sample);
+            }
+            if over {
+                let (drop_n, share) = pending.drop.share(&self.config.drop, cumulative);
+                pending.drop_n = drop_n;
+                pending.share = share;
+                pending.rerun = self.config.drop.replay.then(|| {
+                    let t = &pending.traverse;
+                    let mean = t.travel_m / t.moving_s;
+                    let friction = if self.config.drop.reweight {
+                        reweighted_prior(&self.config, share, mean, pending.thickness_m)
+                    } else {
+                        self.config.prior_friction
+                    };
+                    let prior = [self.config.prior_stiffness, friction];
+                    Rerun::new(prior, t.start_m, cumulative, t.first, pending.end)
+                });
+            }
+        }
+        if over {
+            self.out.state = State::ForceCompensation;
+            self.waited_m = 0.0;
+            self.waited_s = 0.0;
+        }
+    }
+
+    /// ForceCompensation: a share of the re-run per tick, then the layer's friction is added.
+    fn compensate(&mut self, dt_s: f64, sample: &Sample) {
+        self.wait(dt_s, sample);
+        if let Some(mut pending) = self.pending.take() {
+            let theta = match &mut pending.rerun {
+                Some(rerun) => rerun.work(&self.config, &self.history),
+                None => Some(pending.online),
+            };
+            match theta {
+                Some(theta) => self.settle(sample, &pending, theta),
+                None => self.pending = Some(pending),
+            }
+        }
+        let over = self.is_reversing(sample)
+            || self.waited_m >= self.config.drop.compensation_travel_m
+            || self.waited_s >= self.config.drop.longest_s / 2.0;
+        if over && self.pending.is_none() {
+            self.cusum_n2 = 0.0;
+            self.out.state = State::NoRupture;
+        }
+    }
+
+    fn settle(&mut self, sample: &Sample, pending: &Pending, theta: [f64; 2]) {
+        let stiffness = theta[0].max(0.0);
+        let friction = theta[1].max(0.0);
+        let added = match self.config.model {
+            crate::config::Model::MultiLayer => friction * pending.thickness_m,
+            crate::config::Model::KelvinVoigt => friction,
+        };
+        let estimate = LayerEstimate {
+            layer: pending.layer,
+            start_m: pending.traverse.start_m,
+            thickness_m: pending.thickness_m,
+            stiffness_n_per_m: stiffness,
+            friction,
+            drop_n: pending.drop_n,
+            elastic_share: pending.share,
+            added_friction_ns_per_m: if self.config.drop.compensate {
+                added
+            } else {
+                0.0
+            },
+            time_s: sample.time_s,
+        };
+        self.compensation.add(estimate);
+        self.out.estimate = Some(estimate);
+    }
+
+    fn finish(&mut self, sample: &Sample, rate: f64) {
+        let v = sample.velocity_mps;
+        let friction = if self.is_reversing(sample) {
+            self.compensation.along_shaft_ns_per_m(sample.position_m)
+        } else {
+            self.compensation.cumulative_ns_per_m()
+        };
+        self.out.enhanced_n = sample.force_n - friction * v;
+        self.out.theta = self.rls.theta;
+        self.out.cusum_n2 = self.cusum_n2;
+        self.out.derivative_n_per_s = rate;
+        self.out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
+        self.out.used = true;
+    }
+}
