@@ -170,8 +170,13 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
                 }
             }
         };
-        if !self.in_contact || settled {
+        if !self.in_contact {
             self.begin_layer(start_m, first);
+        } else if settled {
+            // The start moves by a fraction of a millimetre: the estimate is kept, its covariance is not.
+            self.traverse.start_m = start_m;
+            let prior = self.prior();
+            self.rls.reset_covariance(prior);
         }
         self.in_contact = true;
         if settled {

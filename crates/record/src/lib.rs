@@ -1,1 +1,49 @@
-//! Part of Stylet.
+//! Recordings of needle insertions: samples with units, their ground truth when they were simulated, CSV files
+//! with column maps, and remarks on the quality of the data.
+//!
+//! SI units everywhere; a public field carries its unit as a suffix. Signs: position is positive into the tissue, force
+//! is positive when it resists the insertion.
+//!
+//! ```
+//! use std::path::Path;
+//! use stylet_record::{ReadOptions, read_csv_bytes};
+//!
+//! let text = b"time_s,position_m,force_n\n0.00,0.000,0.0\n0.01,0.002,0.1\n0.02,0.004,0.2\n";
+//! let (recording, notes) = read_csv_bytes(text, Path::new("insertion.csv"), &ReadOptions::default())?;
+//! assert_eq!(recording.len(), 3);
+//! assert!((recording.velocity_mps[1] - 0.2).abs() < 1e-12);
+//! assert!(!recording.velocity_measured);
+//! assert!(notes.is_empty());
+//! # Ok::<(), stylet_record::RecordError>(())
+//! ```
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`recording`] | [`Recording`] and its [`Sample`]s |
+//! | [`truth`] | [`Truth`]: what a simulation knows and a sensor does not |
+//! | [`columns`] | [`ColumnMap`]: names, units and signs of somebody else's log |
+//! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
+//! | [`quality`] | [`QualityNote`]s: gaps, jitter, saturation, spikes, quantisation, mixed-up units |
+//! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
+//! | [`error`] | [`RecordError`]: what, where, and what would be right |
+
+pub mod columns;
+pub mod differentiate;
+pub mod error;
+mod layout;
+pub mod quality;
+pub mod read;
+pub mod recording;
+mod repair;
+mod robust;
+pub mod truth;
+pub mod write;
+
+pub use columns::{Column, ColumnMap};
+pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
+pub use error::RecordError;
+pub use quality::{QualityKind, QualityNote, assess};
+pub use read::{ReadOptions, read_csv, read_csv_bytes};
+pub use recording::{JOINTS, Recording, Sample};
+pub use truth::{TrueRupture, Truth};
+pub use write::write_csv;
