@@ -16,11 +16,7 @@ pub(crate) struct Compensation {
 
 impl Default for Compensation {
     fn default() -> Self {
-        Self {
-            layers: [LayerEstimate::default(); MAX_LAYERS],
-            count: 0,
-            cumulative_ns_per_m: 0.0,
-        }
+        Self { layers: [LayerEstimate::default(); MAX_LAYERS], count: 0, cumulative_ns_per_m: 0.0 }
     }
 }
 
@@ -31,8 +27,7 @@ impl Compensation {
     }
 
     pub(crate) fn add(&mut self, layer: LayerEstimate) {
-        self.cumulative_ns_per_m =
-            (self.cumulative_ns_per_m + layer.added_friction_ns_per_m).max(0.0);
+        self.cumulative_ns_per_m = (self.cumulative_ns_per_m + layer.added_friction_ns_per_m).max(0.0);
         if let Some(slot) = self.layers.get_mut(self.count) {
             *slot = layer;
             self.count += 1;

@@ -78,11 +78,7 @@ pub struct CusumConfig {
 
 impl Default for CusumConfig {
     fn default() -> Self {
-        Self {
-            enabled: true,
-            sigma_ordinary_n: 0.01,
-            sigma_rupture_n: 0.15,
-        }
+        Self { enabled: true, sigma_ordinary_n: 0.01, sigma_rupture_n: 0.15 }
     }
 }
 

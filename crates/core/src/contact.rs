@@ -93,19 +93,12 @@ impl ContactSearch {
             self.line = Line::default();
             self.learn(sample.force_n);
         }
-        self.above = if !learning && lift > config.noise_sds * noise {
-            self.above + 1
-        } else {
-            0
-        };
+        self.above = if !learning && lift > config.noise_sds * noise { self.above + 1 } else { 0 };
         if self.above < config.samples.max(1) {
             return Found::Nothing;
         }
         self.declared_m = Some(sample.position_m);
-        Found::Provisional {
-            surface_m: self.surface_m(sample.position_m),
-            first: self.first,
-        }
+        Found::Provisional { surface_m: self.surface_m(sample.position_m), first: self.first }
     }
 
     fn learn(&mut self, force_n: f64) {

@@ -14,14 +14,9 @@ const EDGE: u64 = 3;
 
 /// Traces a declared rupture back to the steepest fall of the force: the number of the first
 /// sample after the drop. At most [`LOOK_BACK`] samples are looked at, none before `first`.
-pub(crate) fn locate<B: AsRef<[Sample]> + AsMut<[Sample]>>(
-    history: &History<B>,
-    first: u64,
-) -> u64 {
+pub(crate) fn locate<B: AsRef<[Sample]> + AsMut<[Sample]>>(history: &History<B>, first: u64) -> u64 {
     let newest = history.next().saturating_sub(1);
-    let earliest = first
-        .max(history.oldest())
-        .max(newest.saturating_sub(LOOK_BACK));
+    let earliest = first.max(history.oldest()).max(newest.saturating_sub(LOOK_BACK));
     let force = |number: u64| history.get(number).map_or(0.0, |s| s.force_n);
     let mut best = (f64::INFINITY, newest);
     for after in (earliest + EDGE)..=newest {
@@ -64,11 +59,7 @@ impl Drop {
         first: u64,
         after: u64,
     ) -> Self {
-        let mut drop = Drop {
-            highest_n: f64::NEG_INFINITY,
-            lowest_n: f64::INFINITY,
-            ..Drop::default()
-        };
+        let mut drop = Drop { highest_n: f64::NEG_INFINITY, lowest_n: f64::INFINITY, ..Drop::default() };
         let Some(edge) = after.checked_sub(1).and_then(|n| history.get(n)) else {
             return drop;
         };
@@ -105,10 +96,9 @@ impl Drop {
     /// cumulative friction of the layers before.
     pub(crate) fn share(&self, config: &DropConfig, cumulative_ns_per_m: f64) -> (f64, f64) {
         let (top_n, bottom_n) = match config.estimator {
-            DropEstimator::Lines => (
-                self.before.at(self.rupture_m).unwrap_or(0.0),
-                self.after.at(self.rupture_m).unwrap_or(0.0),
-            ),
+            DropEstimator::Lines => {
+                (self.before.at(self.rupture_m).unwrap_or(0.0), self.after.at(self.rupture_m).unwrap_or(0.0))
+            }
             DropEstimator::Extremes => (self.highest_n, self.lowest_n),
         };
         let drop_n = top_n - bottom_n;

@@ -86,10 +86,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             rls: Rls::new(prior),
             clock: ResetClock::default(),
             in_contact: false,
-            traverse: Traverse {
-                start_m: surface_m,
-                ..Traverse::default()
-            },
+            traverse: Traverse { start_m: surface_m, ..Traverse::default() },
             pending: None,
             cusum_n2: 0.0,
             derivative_on: false,
@@ -125,22 +122,13 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         let dt_s = if self.started { dt_s } else { 0.0 };
         let number = self.history.next();
         self.history.push(sample);
-        self.guard.update(
-            &self.config.guard,
-            self.config.drop.standstill_mps,
-            dt_s,
-            &sample,
-        );
+        self.guard.update(&self.config.guard, self.config.drop.standstill_mps, dt_s, &sample);
         let rate = self.derivative.update(dt_s, sample.force_n);
         self.touch(dt_s, &sample, number);
         let before = self.rls;
         let error_n = self.identify(dt_s, &sample);
         self.out.error_n = error_n;
-        self.out.reconstructed_n = if self.in_contact {
-            sample.force_n - error_n
-        } else {
-            0.0
-        };
+        self.out.reconstructed_n = if self.in_contact { sample.force_n - error_n } else { 0.0 };
         let edge = self.switch_derivative(rate);
         self.advance(dt_s, &sample, before, edge);
         self.finish(&sample, rate);
@@ -160,10 +148,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             }
             Contact::Known => return,
             Contact::Detected => {
-                match self
-                    .contact
-                    .update(&self.config.contact_search, dt_s, sample, number)
-                {
+                match self.contact.update(&self.config.contact_search, dt_s, sample, number) {
                     Found::Nothing => return,
                     Found::Provisional { surface_m, first } => (surface_m, first, false),
                     Found::Settled { surface_m, first } => (surface_m, first, true),
@@ -185,11 +170,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     fn begin_layer(&mut self, start_m: f64, first: u64) {
-        self.traverse = Traverse {
-            start_m,
-            first,
-            ..Traverse::default()
-        };
+        self.traverse = Traverse { start_m, first, ..Traverse::default() };
         self.rls = Rls::new(self.prior());
         self.clock = ResetClock::default();
         self.cusum_n2 = 0.0;
@@ -208,14 +189,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             self.traverse.moving_s += dt_s;
         }
         let prior = self.prior();
-        self.clock
-            .tick(&self.config.reset, dt_s, prior, &mut self.rls);
+        self.clock.tick(&self.config.reset, dt_s, prior, &mut self.rls);
         let y = sample.force_n - self.compensation.cumulative_ns_per_m() * v;
-        self.rls.update(
-            regressor(self.config.model, depth_m, v),
-            y,
-            self.config.forgetting,
-        )
+        self.rls.update(regressor(self.config.model, depth_m, v), y, self.config.forgetting)
     }
 
     /// Moves the derivative's switch; true on its trailing edge.
@@ -230,11 +206,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             crate::config::DerivativeSense::Drop => -rate_n_per_s,
         };
         let was_on = self.derivative_on;
-        self.derivative_on = if was_on {
-            rate >= config.off_n_per_s
-        } else {
-            rate > config.on_n_per_s
-        };
+        self.derivative_on = if was_on { rate >= config.off_n_per_s } else { rate > config.on_n_per_s };
         was_on && !self.derivative_on
     }
 
@@ -286,21 +258,13 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         {
             cause = Some(Cause::DerivativeTrailingEdge);
         }
-        if cause.is_none()
-            && self
-                .known_thickness_m()
-                .is_some_and(|thickness_m| travel_m >= thickness_m)
-        {
+        if cause.is_none() && self.known_thickness_m().is_some_and(|thickness_m| travel_m >= thickness_m) {
             cause = Some(Cause::KnownFace);
         }
         if let Some(cause) = cause {
             self.declare(sample, before, cause);
         } else {
-            self.out.state = if self.derivative_on {
-                State::ExpectedRupture
-            } else {
-                State::NoRupture
-            };
+            self.out.state = if self.derivative_on { State::ExpectedRupture } else { State::NoRupture };
         }
     }
 
@@ -322,9 +286,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         };
         let located = self.history.get(after).copied().unwrap_or(*sample);
         let start_m = self.traverse.start_m;
-        let thickness_m = self
-            .known_thickness_m()
-            .unwrap_or((located.position_m - start_m).max(0.0));
+        let thickness_m = self.known_thickness_m().unwrap_or((located.position_m - start_m).max(0.0));
         self.out.ruptures += 1;
         self.out.detection = Some(Detection {
             layer: self.out.ruptures,
@@ -346,11 +308,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             share: 0.0,
         });
         let known = matches!(self.config.depths, Depths::Known(_));
-        let next_start_m = if known {
-            start_m + thickness_m
-        } else {
-            located.position_m
-        };
+        let next_start_m = if known { start_m + thickness_m } else { located.position_m };
         self.begin_layer(next_start_m, after);
         self.out.state = State::DetectedRupture;
     }
@@ -440,11 +398,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             friction,
             drop_n: pending.drop_n,
             elastic_share: pending.share,
-            added_friction_ns_per_m: if self.config.drop.compensate {
-                added
-            } else {
-                0.0
-            },
+            added_friction_ns_per_m: if self.config.drop.compensate { added } else { 0.0 },
             time_s: sample.time_s,
         };
         self.compensation.add(estimate);

@@ -10,11 +10,7 @@ pub(crate) struct Coefficient {
 
 impl Coefficient {
     pub(crate) fn new(time_constant_s: f64) -> Self {
-        Self {
-            time_constant_s,
-            dt_s: 0.0,
-            value: 0.0,
-        }
+        Self { time_constant_s, dt_s: 0.0, value: 0.0 }
     }
 
     #[inline]

@@ -29,13 +29,7 @@ impl MotionGuard {
     }
 
     #[inline]
-    pub(crate) fn update(
-        &mut self,
-        config: &GuardConfig,
-        standstill_mps: f64,
-        dt_s: f64,
-        sample: &Sample,
-    ) {
+    pub(crate) fn update(&mut self, config: &GuardConfig, standstill_mps: f64, dt_s: f64, sample: &Sample) {
         let v = sample.velocity_mps;
         if self.started && dt_s > 0.0 {
             let a = (v - self.velocity_mps) / dt_s;

@@ -28,15 +28,9 @@ pub(crate) fn reweighted_prior(
     let ratio = (1.0 - share) / (share * v2);
     let prior = match config.model {
         Model::MultiLayer => config.prior_stiffness * ratio,
-        Model::KelvinVoigt => {
-            config.prior_stiffness * ratio * (thickness_m / 2.0) * (thickness_m / 2.0)
-        }
+        Model::KelvinVoigt => config.prior_stiffness * ratio * (thickness_m / 2.0) * (thickness_m / 2.0),
     };
-    if prior.is_finite() {
-        prior
-    } else {
-        config.prior_friction
-    }
+    if prior.is_finite() { prior } else { config.prior_friction }
 }
 
 /// When the covariance is to be reset: shared by the online run and the re-run.
@@ -83,13 +77,7 @@ pub(crate) struct Rerun {
 
 impl Rerun {
     /// Over the samples numbered `first..end` of the layer that starts at `start_m`.
-    pub(crate) fn new(
-        prior: [f64; 2],
-        start_m: f64,
-        cumulative_ns_per_m: f64,
-        first: u64,
-        end: u64,
-    ) -> Self {
+    pub(crate) fn new(prior: [f64; 2], start_m: f64, cumulative_ns_per_m: f64, first: u64, end: u64) -> Self {
         Self {
             rls: Rls::new(prior),
             clock: ResetClock::default(),
@@ -109,17 +97,14 @@ impl Rerun {
         history: &History<B>,
     ) -> Option<[f64; 2]> {
         self.next = self.next.max(history.oldest());
-        let stop = self
-            .end
-            .min(self.next + config.drop.replay_per_tick.max(1) as u64);
+        let stop = self.end.min(self.next + config.drop.replay_per_tick.max(1) as u64);
         while self.next < stop {
             if let Some(s) = history.get(self.next) {
                 let dt_s = self.last_s.map_or(0.0, |last| s.time_s - last);
                 self.last_s = Some(s.time_s);
                 let depth_m = s.position_m - self.start_m;
                 if depth_m > 0.0 {
-                    self.clock
-                        .tick(&config.reset, dt_s, self.prior, &mut self.rls);
+                    self.clock.tick(&config.reset, dt_s, self.prior, &mut self.rls);
                     let phi = regressor(config.model, depth_m, s.velocity_mps);
                     let y = s.force_n - self.cumulative_ns_per_m * s.velocity_mps;
                     self.rls.update(phi, y, config.forgetting);

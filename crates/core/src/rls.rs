@@ -18,10 +18,7 @@ impl Rls {
     /// Zero parameters and a diagonal covariance.
     #[must_use]
     pub fn new(prior: [f64; 2]) -> Self {
-        Self {
-            theta: [0.0; 2],
-            covariance: [prior[0], 0.0, prior[1]],
-        }
+        Self { theta: [0.0; 2], covariance: [prior[0], 0.0, prior[1]] }
     }
 
     /// Puts the covariance back to the prior; the parameters stay.
@@ -55,11 +52,7 @@ impl Rls {
         let step = error * gain;
         self.theta[0] += p0 * step;
         self.theta[1] += p1 * step;
-        self.covariance = [
-            p11 - p0 * p0 * gain,
-            p12 - p0 * p1 * gain,
-            p22 - p1 * p1 * gain,
-        ];
+        self.covariance = [p11 - p0 * p0 * gain, p12 - p0 * p1 * gain, p22 - p1 * p1 * gain];
         if forgetting != 1.0 {
             for entry in &mut self.covariance {
                 *entry /= forgetting;

@@ -1,1 +1,12 @@
-//! Part of Stylet.
+//! Scores: what the online algorithm found against what the simulation knows (SPEC section 10).
+#![forbid(unsafe_code)]
+
+mod detection;
+mod offline;
+mod score;
+mod scorer;
+
+pub use detection::{EARLIEST_S, LATEST_S, RuptureScore, match_ruptures};
+pub use offline::{LayerSample, OfflineEstimate, offline};
+pub use score::{Compared, EnhancementScore, LayerScore, Score};
+pub use scorer::{LayerTruth, Moment, Scorer};

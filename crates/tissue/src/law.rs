@@ -26,11 +26,7 @@ pub struct TooManyEffects {
 
 impl core::fmt::Display for TooManyEffects {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(
-            f,
-            "{} effects act on the tissue at once; at most {MAX_EFFECTS} can",
-            self.asked
-        )
+        write!(f, "{} effects act on the tissue at once; at most {MAX_EFFECTS} can", self.asked)
     }
 }
 
@@ -117,34 +113,23 @@ impl Law {
     /// [`TooManyEffects`] when more than [`MAX_EFFECTS`] effects act on the tissue.
     pub fn new(tissue: &Tissue, effects: &[AnyEffect]) -> Result<Self, TooManyEffects> {
         let mut slabs = Slab::stack(tissue);
-        let mut active: Vec<AnyEffect> = effects
-            .iter()
-            .filter(|e| e.place() < Place::Tool && !e.is_neutral())
-            .cloned()
-            .collect();
+        let mut active: Vec<AnyEffect> =
+            effects.iter().filter(|e| e.place() < Place::Tool && !e.is_neutral()).cloned().collect();
         active.sort_by_key(Effect::place);
         for effect in &active {
             effect.shape(&mut slabs);
         }
         active.retain(|e| e.place() > Place::Geometry);
         if active.len() > MAX_EFFECTS {
-            return Err(TooManyEffects {
-                asked: active.len(),
-            });
+            return Err(TooManyEffects { asked: active.len() });
         }
-        Ok(Self {
-            slabs,
-            effects: active,
-        })
+        Ok(Self { slabs, effects: active })
     }
 
     /// The base law alone.
     #[must_use]
     pub fn base(tissue: &Tissue) -> Self {
-        Self {
-            slabs: Slab::stack(tissue),
-            effects: Vec::new(),
-        }
+        Self { slabs: Slab::stack(tissue), effects: Vec::new() }
     }
 
     /// The layers as placed in space, after geometric effects.
@@ -177,13 +162,7 @@ impl Law {
         }
         let dt = time_s - state.time_s;
         let elastic_n = self.load(state, dt, z, v, &mut on_rupture);
-        let moment = Moment {
-            time_s,
-            dt_s: dt,
-            z_m: z,
-            v_mps: v,
-            ruptured: state.ruptured,
-        };
+        let moment = Moment { time_s, dt_s: dt, z_m: z, v_mps: v, ruptured: state.ruptured };
         state.time_s = time_s;
         state.z_m = z;
         state.elastic_n = elastic_n;
@@ -203,11 +182,7 @@ impl Law {
         let mut done = 0.0; // share of the step that the ruptures so far have used up
         while let Some(slab) = self.slabs.get(state.ruptured) {
             let x = z - slab.front_m;
-            let mut elastic = if x > 0.0 {
-                slab.stiffness_n_per_m * x
-            } else {
-                0.0
-            };
+            let mut elastic = if x > 0.0 { slab.stiffness_n_per_m * x } else { 0.0 };
             let mut threshold = slab.puncture_n;
             if !self.effects.is_empty() {
                 let x = x.max(0.0);
@@ -221,17 +196,9 @@ impl Law {
                 return elastic;
             }
             let rupture = self.rupture(state, dt, z, elastic, threshold, done);
-            done = if dt > 0.0 {
-                (rupture.time_s - state.time_s) / dt
-            } else {
-                1.0
-            };
+            done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
             for (memory, effect) in self.effects.iter().enumerate() {
-                effect.on_rupture(
-                    rupture.released_n,
-                    rupture.position_m,
-                    &mut state.memory[memory],
-                );
+                effect.on_rupture(rupture.released_n, rupture.position_m, &mut state.memory[memory]);
             }
             state.ruptured += 1;
             state.elastic_n = 0.0;
@@ -253,28 +220,12 @@ impl Law {
     }
 
     /// When and where within the step the active layer gave way.
-    fn rupture(
-        &self,
-        state: &LawState,
-        dt: f64,
-        z: f64,
-        elastic: f64,
-        threshold: f64,
-        done: f64,
-    ) -> Rupture {
+    fn rupture(&self, state: &LawState, dt: f64, z: f64, elastic: f64, threshold: f64, done: f64) -> Rupture {
         let slab = &self.slabs[state.ruptured];
         let share = |from: f64, to: f64, at: f64| {
-            if to > from {
-                ((at - from) / (to - from)).clamp(0.0, 1.0)
-            } else {
-                1.0
-            }
+            if to > from { ((at - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 }
         };
-        let at_face = if z >= slab.far_m() {
-            share(state.z_m, z, slab.far_m())
-        } else {
-            2.0
-        };
+        let at_face = if z >= slab.far_m() { share(state.z_m, z, slab.far_m()) } else { 2.0 };
         let at_force = if elastic >= threshold {
             // A layer entered within this step starts from its front face, not from the last sample.
             let entry = share(state.z_m, z, slab.front_m);
@@ -289,11 +240,7 @@ impl Law {
             layer: state.ruptured + 1,
             time_s: state.time_s + at * dt,
             position_m: state.z_m + at * (z - state.z_m),
-            released_n: if by_force {
-                threshold.min(elastic)
-            } else {
-                elastic
-            },
+            released_n: if by_force { threshold.min(elastic) } else { elastic },
             by_force,
         }
     }
@@ -346,9 +293,6 @@ impl Law {
 
     #[inline]
     fn at(&self, place: Place) -> impl Iterator<Item = (usize, &AnyEffect)> {
-        self.effects
-            .iter()
-            .enumerate()
-            .filter(move |(_, e)| e.place() == place)
+        self.effects.iter().enumerate().filter(move |(_, e)| e.place() == place)
     }
 }

@@ -19,10 +19,7 @@ pub struct Layer {
     pub friction_ns_per_m2: f64,
     /// Elastic force `F_i` in N at which the layer ruptures before its far face; absent: only the
     /// far face ends the layer.
-    #[cfg_attr(
-        feature = "serde",
-        serde(default, skip_serializing_if = "Option::is_none")
-    )]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub puncture_n: Option<f64>,
 }
 
@@ -43,10 +40,7 @@ impl Tissue {
     /// `index = layers.len()` the far face of the stack.
     #[must_use]
     pub fn front_m(&self, index: usize) -> f64 {
-        self.layers
-            .iter()
-            .take(index)
-            .fold(self.surface_m, |s, layer| s + layer.thickness_m)
+        self.layers.iter().take(index).fold(self.surface_m, |s, layer| s + layer.thickness_m)
     }
 
     /// Position of the far face of the last layer, in metres.

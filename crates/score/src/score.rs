@@ -1,0 +1,118 @@
+//! The score of one run: plain numbers that serialise (SPEC sections 7 and 10).
+
+use crate::detection::RuptureScore;
+use serde::{Deserialize, Serialize};
+
+/// An estimate beside its true value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Compared {
+    /// True value.
+    #[serde(rename = "true")]
+    pub truth: f64,
+    /// The online algorithm's estimate; `null` without one.
+    pub estimated: Option<f64>,
+    /// `|estimated - true| / true`; `null` without an estimate or when the true value is zero.
+    pub relative_error: Option<f64>,
+}
+
+impl Compared {
+    /// Compares; a true value of zero has no relative error.
+    #[must_use]
+    pub fn new(truth: f64, estimated: Option<f64>) -> Self {
+        let relative_error = estimated.filter(|_| truth != 0.0).map(|e| ((e - truth) / truth).abs());
+        Self { truth, estimated, relative_error }
+    }
+}
+
+/// The coefficients of one layer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LayerScore {
+    /// Layer, 1-based.
+    pub layer: usize,
+    /// Stiffness `K_i` in N/m.
+    pub stiffness_n_per_m: Compared,
+    /// Friction `b_i` in N s/m²; a Kelvin-Voigt estimate (N s/m) is divided by the thickness.
+    pub friction_ns_per_m2: Compared,
+    /// Thickness `d_i` in m. A layer that punctures before its far face is found thinner.
+    pub thickness_m: Compared,
+    /// Cumulative friction in N s/m after this layer, against the true `sum b_j l_j` at its rupture.
+    pub cumulative_friction_ns_per_m: Compared,
+    /// Offline least squares over the whole layer, stiffness in N/m.
+    pub offline_stiffness_n_per_m: Option<f64>,
+    /// Offline least squares over the whole layer, friction in N s/m².
+    pub offline_friction_ns_per_m2: Option<f64>,
+    /// Whether the layer's data alone tell stiffness from friction; otherwise the force drop's prior did.
+    pub offline_separable: Option<bool>,
+}
+
+/// How good the enhanced force is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EnhancementScore {
+    /// RMS of `f_enh - (f - D_true v)` over the RMS of the tip force, first contact to deepest point.
+    pub rms_relative: Option<f64>,
+    /// The same up to the instant at which the tip leaves the last layer.
+    pub in_tissue_relative: Option<f64>,
+    /// RMS of `f_enh` over RMS of `f` after the tip has left the last layer; `null` if it never does.
+    pub after_exit_relative: Option<f64>,
+}
+
+/// The whole score of one run of one model on one sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// Every true rupture.
+    pub ruptures: Vec<RuptureScore>,
+    /// True ruptures without a detection.
+    pub missed: usize,
+    /// Detections without a true rupture.
+    #[serde(rename = "false")]
+    pub false_alarms: usize,
+    /// Times of the false detections in seconds.
+    pub false_s: Vec<f64>,
+    /// More than one false detection per true rupture: the hits are chance.
+    pub hits_are_chance: bool,
+    /// Every layer that has ruptured.
+    pub layers: Vec<LayerScore>,
+    /// Cumulative friction `D` in N s/m at the last true rupture.
+    pub cumulative_friction_ns_per_m: Compared,
+    /// True and found position of the first contact in m; `relative_error` is not defined.
+    pub contact_m: Compared,
+    /// Enhanced force against the tip force.
+    pub enhancement: EnhancementScore,
+    /// RMS of the innovation `e` in N, from first contact to the deepest point.
+    pub reconstruction_rms_n: Option<f64>,
+}
+
+impl Score {
+    /// Median detection delay in seconds over the detected ruptures.
+    #[must_use]
+    pub fn median_delay_s(&self) -> Option<f64> {
+        median(self.ruptures.iter().filter_map(|r| r.delay_s))
+    }
+
+    /// Largest relative error of the stiffness over the layers.
+    #[must_use]
+    pub fn worst_stiffness_error(&self) -> Option<f64> {
+        worst(self.layers.iter().map(|l| l.stiffness_n_per_m))
+    }
+
+    /// Largest relative error of the friction over the layers.
+    #[must_use]
+    pub fn worst_friction_error(&self) -> Option<f64> {
+        worst(self.layers.iter().map(|l| l.friction_ns_per_m2))
+    }
+}
+
+fn worst(values: impl Iterator<Item = Compared>) -> Option<f64> {
+    values.filter_map(|c| c.relative_error).max_by(f64::total_cmp)
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => None,
+        n if n % 2 == 1 => Some(sorted[middle]),
+        _ => Some((sorted[middle - 1] + sorted[middle]) / 2.0),
+    }
+}

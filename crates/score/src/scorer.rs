@@ -1,0 +1,184 @@
+//! Scoring as the samples come, so that a sweep needs no copy of the run.
+
+use crate::detection::match_ruptures;
+use crate::score::{Compared, EnhancementScore, LayerScore, Score};
+use stylet_core::config::Model;
+use stylet_core::{Detection, LayerEstimate, Output};
+use stylet_record::TrueRupture;
+
+/// What is true of a layer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerTruth {
+    /// Front face in m.
+    pub front_m: f64,
+    /// Thickness in m.
+    pub thickness_m: f64,
+    /// Stiffness in N/m.
+    pub stiffness_n_per_m: f64,
+    /// Friction in N s/m².
+    pub friction_ns_per_m2: f64,
+}
+
+impl LayerTruth {
+    fn inside_m(&self, z_m: f64) -> f64 {
+        (z_m - self.front_m).clamp(0.0, self.thickness_m)
+    }
+}
+
+/// One sample of truth, beside what the core made of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// True tip position in m.
+    pub position_m: f64,
+    /// Measured force in N.
+    pub force_n: f64,
+    /// True tip force `f - D v` in N.
+    pub tip_n: f64,
+}
+
+/// Sums that the scores are made of.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    samples: f64,
+    tip2: f64,
+    miss2: f64,
+    error2: f64,
+    inside_tip2: f64,
+    inside_miss2: f64,
+    exit_enhanced2: f64,
+    exit_force2: f64,
+}
+
+/// Collects one run.
+#[derive(Clone, Debug)]
+pub struct Scorer {
+    layers: Vec<LayerTruth>,
+    model: Model,
+    ruptures: Vec<TrueRupture>,
+    detections: Vec<Detection>,
+    estimates: Vec<LayerEstimate>,
+    contact_m: Option<f64>,
+    deepest_m: f64,
+    sums: Sums,
+    at_deepest: Sums,
+}
+
+impl Scorer {
+    /// A scorer for a stack of layers and the model that the core runs.
+    #[must_use]
+    pub fn new(layers: Vec<LayerTruth>, model: Model) -> Self {
+        Self {
+            layers,
+            model,
+            ruptures: Vec::new(),
+            detections: Vec::new(),
+            estimates: Vec::new(),
+            contact_m: None,
+            deepest_m: f64::NEG_INFINITY,
+            sums: Sums::default(),
+            at_deepest: Sums::default(),
+        }
+    }
+
+    /// A true rupture.
+    pub fn rupture(&mut self, rupture: TrueRupture) {
+        self.ruptures.push(rupture);
+    }
+
+    /// One sample and the core's output for it.
+    #[inline]
+    pub fn sample(&mut self, moment: &Moment, output: &Output) {
+        self.detections.extend(output.detection);
+        self.estimates.extend(output.estimate);
+        self.contact_m = output.contact_m;
+        let (Some(first), Some(last)) = (self.layers.first(), self.layers.last()) else {
+            return;
+        };
+        let z = moment.position_m;
+        if z < first.front_m {
+            return;
+        }
+        let miss = output.enhanced_n - moment.tip_n;
+        let sums = &mut self.sums;
+        sums.samples += 1.0;
+        sums.tip2 += moment.tip_n * moment.tip_n;
+        sums.miss2 += miss * miss;
+        sums.error2 += output.error_n * output.error_n;
+        if z < last.front_m + last.thickness_m {
+            sums.inside_tip2 += moment.tip_n * moment.tip_n;
+            sums.inside_miss2 += miss * miss;
+        } else {
+            sums.exit_enhanced2 += output.enhanced_n * output.enhanced_n;
+            sums.exit_force2 += moment.force_n * moment.force_n;
+        }
+        // The advance ends at the deepest point; what comes after is not scored.
+        if z >= self.deepest_m {
+            self.deepest_m = z;
+            self.at_deepest = self.sums;
+        }
+    }
+
+    /// The core's detections so far.
+    #[must_use]
+    pub fn detections(&self) -> &[Detection] {
+        &self.detections
+    }
+
+    /// The score of what was collected.
+    #[must_use]
+    pub fn finish(self) -> Score {
+        let (ruptures, is_false) = match_ruptures(&self.ruptures, &self.detections);
+        let false_s: Vec<f64> =
+            self.detections.iter().zip(&is_false).filter(|(_, f)| **f).map(|(d, _)| d.time_s).collect();
+        let layers: Vec<LayerScore> =
+            ruptures.iter().filter_map(|r| self.layer(r.layer, r.true_m, r.detection)).collect();
+        let cumulative = layers.last().map_or(Compared::new(0.0, None), |l| l.cumulative_friction_ns_per_m);
+        let sums = self.at_deepest;
+        let ratio = |over: f64, under: f64| (under > 0.0).then(|| (over / under).sqrt());
+        let missed = ruptures.iter().filter(|r| r.detected_s.is_none()).count();
+        Score {
+            missed,
+            false_alarms: false_s.len(),
+            hits_are_chance: false_s.len() > ruptures.len(),
+            false_s,
+            layers,
+            cumulative_friction_ns_per_m: cumulative,
+            contact_m: Compared {
+                truth: self.layers.first().map_or(0.0, |l| l.front_m),
+                estimated: self.contact_m,
+                relative_error: None,
+            },
+            enhancement: EnhancementScore {
+                rms_relative: ratio(sums.miss2, sums.tip2),
+                in_tissue_relative: ratio(sums.inside_miss2, sums.inside_tip2),
+                after_exit_relative: ratio(sums.exit_enhanced2, sums.exit_force2),
+            },
+            reconstruction_rms_n: ratio(sums.error2, sums.samples),
+            ruptures,
+        }
+    }
+
+    fn layer(&self, number: usize, rupture_m: f64, detection: Option<usize>) -> Option<LayerScore> {
+        let truth = self.layers.get(number.checked_sub(1)?)?;
+        let estimate = detection.and_then(|d| self.estimates.iter().find(|e| e.layer == d));
+        let friction = estimate.map(|e| match self.model {
+            Model::MultiLayer => e.friction,
+            Model::KelvinVoigt => e.friction / e.thickness_m,
+        });
+        let true_cumulative: f64 =
+            self.layers.iter().take(number).map(|l| l.friction_ns_per_m2 * l.inside_m(rupture_m)).sum();
+        let cumulative = estimate.map(|upto| {
+            self.estimates.iter().filter(|e| e.layer <= upto.layer).map(|e| e.added_friction_ns_per_m).sum()
+        });
+        Some(LayerScore {
+            layer: number,
+            stiffness_n_per_m: Compared::new(truth.stiffness_n_per_m, estimate.map(|e| e.stiffness_n_per_m)),
+            friction_ns_per_m2: Compared::new(truth.friction_ns_per_m2, friction),
+            thickness_m: Compared::new(truth.thickness_m, estimate.map(|e| e.thickness_m)),
+            cumulative_friction_ns_per_m: Compared::new(true_cumulative, cumulative),
+            offline_stiffness_n_per_m: None,
+            offline_friction_ns_per_m2: None,
+            offline_separable: None,
+        })
+    }
+}
