@@ -1,0 +1,154 @@
+//! Remarks on the quality of a recording: what the reader of a result should know about its data.
+//!
+//! A note is no error: the recording is used as it is, nothing is corrected. The thresholds stand in [`QualityKind`].
+
+mod timing;
+mod units;
+mod values;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::recording::Recording;
+
+/// What a [`QualityNote`] is about, most consequential first. Serialises in snake case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum QualityKind {
+    /// Rows were dropped because their time stamps ran backward or repeated.
+    /// Numbers: `dropped`, `kept`; `lines` names them.
+    RepairedRows,
+    /// A quantity looks as if it came in another unit: position over more than 2 m, speed above 1 m/s (99th percentile),
+    /// force beyond 500 N, a median interval above 1 s, or a measured velocity that is not the slope of the position.
+    /// Numbers: `value` (what was found) and `limit`.
+    UnitMixUp,
+    /// Intervals over five median intervals. Numbers: `count`, `largest_s`, `at_s` (start of the largest),
+    /// `median_interval_s`.
+    Gaps,
+    /// The force stands still at its extreme: at least two runs of 5 or more equal samples there, holding most of the
+    /// samples at that value, or one run of 20 or more while the needle moves by over 1 % of its range. A force of exactly zero
+    /// (needle in the air, simulated) does not count. Numbers: `value`, `runs`, `samples`, `longest`, `at_s`.
+    Saturation,
+    /// Isolated samples (one or two) of force or position more than 8 robust standard deviations from the median of
+    /// the 11 around them and from the samples on both sides; the first and last 5 samples are not judged. Numbers: `count`, `largest` (distance from the median, SI unit), `at_s`, `robust_sd`.
+    Spikes,
+    /// The intervals, gaps left out, scatter by more than 5 % (standard deviation over median). Numbers: `sd_s`,
+    /// `shortest_s`, `longest_s`, `median_interval_s`.
+    Jitter,
+    /// Force or position takes few values on a grid: fewer than 20 % of the samples are distinct and the steps between the
+    /// values are multiples of the smallest one. Numbers: `smallest_step` (SI unit), `distinct`, `distinct_ratio`.
+    Quantisation,
+}
+
+/// One remark on the quality of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct QualityNote {
+    /// What it is about.
+    pub kind: QualityKind,
+    /// The remark in plain words, with its numbers and what to do about it.
+    pub message: String,
+    /// The numbers by name; names carry their unit, or [`QualityKind`] tells it.
+    pub numbers: BTreeMap<String, f64>,
+    /// Lines of the file (1-based) that the remark is about; only for [`QualityKind::RepairedRows`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<u64>,
+}
+
+impl QualityNote {
+    fn new<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
+        let numbers = numbers
+            .into_iter()
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect();
+        Self {
+            kind,
+            message,
+            numbers,
+            lines: Vec::new(),
+        }
+    }
+}
+
+/// Looks a recording over; the notes are sorted by kind, then by message. No note: nothing was noticed.
+///
+/// Expects what [`Recording::check`] promises; takes `O(n log n)`.
+pub fn assess(recording: &Recording) -> Vec<QualityNote> {
+    if recording.len() < 2 {
+        return Vec::new();
+    }
+    let mut notes = units::unit_mix_ups(recording);
+    notes.extend(timing::gaps(recording));
+    notes.extend(timing::jitter(recording));
+    notes.extend(values::saturation(recording));
+    for (what, unit, values) in [
+        ("force_n", "N", &recording.force_n),
+        ("position_m", "m", &recording.position_m),
+    ] {
+        notes.extend(values::spikes(what, unit, values, &recording.time_s));
+        notes.extend(values::quantisation(what, unit, values));
+    }
+    notes.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| a.message.cmp(&b.message)));
+    notes
+}
+
+/// The note on rows that were dropped; `lines` in the order of the file.
+pub(crate) fn repaired_rows(lines: Vec<u64>, kept: usize) -> QualityNote {
+    const NAMED: usize = 12;
+    let mut named = lines
+        .iter()
+        .take(NAMED)
+        .map(u64::to_string)
+        .collect::<Vec<_>>()
+        .join(", ");
+    if lines.len() > NAMED {
+        named.push_str(&format!(" and {} more", lines.len() - NAMED));
+    }
+    let message = format!(
+        "{} row(s) dropped because their time stamps run backward or repeat, {kept} kept: line(s) {named}",
+        lines.len()
+    );
+    let numbers = [("dropped", lines.len() as f64), ("kept", kept as f64)];
+    QualityNote {
+        lines,
+        ..QualityNote::new(QualityKind::RepairedRows, message, numbers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_serialise_with_kinds_in_snake_case() -> Result<(), serde_json::Error> {
+        let note = repaired_rows(vec![4, 9], 100);
+        let text = serde_json::to_string(&note)?;
+        assert!(
+            text.contains(r#""kind":"repaired_rows""#) && text.contains(r#""lines":[4,9]"#),
+            "{text}"
+        );
+        assert_eq!(serde_json::from_str::<QualityNote>(&text)?, note);
+        assert!(note.message.contains("line(s) 4, 9"), "{}", note.message);
+        Ok(())
+    }
+
+    #[test]
+    fn notes_come_in_the_order_of_their_weight() -> Result<(), crate::RecordError> {
+        // In millimetres, with a gap, irregular.
+        let time_s: Vec<f64> = (0..400)
+            .map(|i| {
+                0.01 * (f64::from(i) + 0.3 * f64::from(i % 3)) + if i > 200 { 1.0 } else { 0.0 }
+            })
+            .collect();
+        let position_m: Vec<f64> = time_s.iter().map(|t| 2.3 * t).collect();
+        let force_n = time_s.iter().map(|t| t * 0.1).collect();
+        let kinds: Vec<QualityKind> = assess(&Recording::new(time_s, position_m, force_n)?)
+            .iter()
+            .map(|note| note.kind)
+            .collect();
+        use QualityKind::{Gaps, Jitter, UnitMixUp};
+        assert_eq!(kinds, [UnitMixUp, UnitMixUp, Gaps, Jitter]);
+        Ok(())
+    }
+}

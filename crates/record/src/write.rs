@@ -1,0 +1,132 @@
+//! CSV out: what [`crate::read_csv`] reads back bit for bit.
+
+use std::io::{BufWriter, Write};
+
+use crate::error::RecordError;
+use crate::layout::joint_torque_name;
+use crate::recording::{JOINTS, Recording, check_length};
+use crate::truth::Truth;
+
+/// Writes a recording as CSV: `time_s,position_m,force_n`, then as far as there are any `velocity_mps`,
+/// `force_virtual_n`, `joint_torque_1_nm` to `joint_torque_7_nm`, the truth as `true_tip_force_n`, `true_elastic_n`, `true_friction_n`,
+/// `true_active_layer`, and the extra columns under their names.
+///
+/// Numbers are decimal, the shortest that mean the same bits; reading gives the same [`Recording`] bit for bit. A velocity
+/// that was differentiated is not written: reading differentiates again, by the same rule. Extra columns are for
+/// people and plots (reading ignores them), so they may hold gaps: `NaN` is written as an empty field.
+///
+/// # Errors
+/// What [`Recording::check`] and [`Truth::check`] find, [`RecordError::LengthMismatch`] and
+/// [`RecordError::BadColumnName`] for extra columns, and [`RecordError::Write`]. Nothing is written
+/// before the data are found to be in order.
+pub fn write_csv(
+    recording: &Recording,
+    truth: Option<&Truth>,
+    extra: &[(&str, &[f64])],
+    output: impl Write,
+) -> Result<(), RecordError> {
+    recording.check()?;
+    let samples = recording.len();
+    if let Some(truth) = truth {
+        truth.check(samples)?;
+    }
+    let mut names = names(recording, truth);
+    for &(name, values) in extra {
+        check_name(name, &names)?;
+        check_length(name, values.len(), samples)?;
+        names.push(name.to_owned());
+    }
+    let mut output = BufWriter::new(output);
+    writeln!(output, "{}", names.join(","))?;
+    let columns = numbers(recording);
+    for index in 0..samples {
+        // `{:?}` is the shortest text that reads back to the same bits; it takes an exponent where that is shorter.
+        write!(output, "{:?}", recording.time_s[index])?;
+        for column in &columns {
+            write!(output, ",{:?}", column[index])?;
+        }
+        for torque in recording.joint_torque_nm.get(index).into_iter().flatten() {
+            write!(output, ",{torque:?}")?;
+        }
+        if let Some(truth) = truth {
+            for value in [
+                truth.tip_force_n[index],
+                truth.elastic_n[index],
+                truth.friction_n[index],
+            ] {
+                write!(output, ",{value:?}")?;
+            }
+            write!(output, ",{}", truth.active_layer[index])?;
+        }
+        for (_, values) in extra {
+            if values[index].is_nan() {
+                write!(output, ",")?;
+            } else {
+                write!(output, ",{:?}", values[index])?;
+            }
+        }
+        writeln!(output)?;
+    }
+    output.flush()?;
+    Ok(())
+}
+
+fn names(recording: &Recording, truth: Option<&Truth>) -> Vec<String> {
+    let mut names = vec![
+        "time_s".to_owned(),
+        "position_m".to_owned(),
+        "force_n".to_owned(),
+    ];
+    if recording.velocity_measured {
+        names.push("velocity_mps".to_owned());
+    }
+    if recording.force_virtual_n.is_some() {
+        names.push("force_virtual_n".to_owned());
+    }
+    if !recording.joint_torque_nm.is_empty() {
+        names.extend((0..JOINTS).map(joint_torque_name));
+    }
+    if truth.is_some() {
+        let truth = [
+            "true_tip_force_n",
+            "true_elastic_n",
+            "true_friction_n",
+            "true_active_layer",
+        ];
+        names.extend(truth.map(str::to_owned));
+    }
+    names
+}
+
+/// The columns after the time and before the torques, in the order of [`names`].
+fn numbers(recording: &Recording) -> Vec<&[f64]> {
+    let mut columns: Vec<&[f64]> = vec![&recording.position_m, &recording.force_n];
+    if recording.velocity_measured {
+        columns.push(&recording.velocity_mps);
+    }
+    if let Some(force_virtual_n) = &recording.force_virtual_n {
+        columns.push(force_virtual_n);
+    }
+    columns
+}
+
+fn check_name(name: &str, taken: &[String]) -> Result<(), RecordError> {
+    let bad = |why| {
+        Err(RecordError::BadColumnName {
+            name: name.to_owned(),
+            why,
+        })
+    };
+    if name.trim().is_empty() {
+        return bad("it is empty");
+    }
+    if name.trim() != name || name.contains([',', ';', '\t', '"', '\n', '\r', '\0']) {
+        return bad("it holds a delimiter, a quotation mark, a line end or spaces around it");
+    }
+    let reads_as_own =
+        name == "velocity_mps" || name == "force_virtual_n" || name.starts_with("joint_torque_");
+    if reads_as_own || taken.iter().any(|existing| existing == name) {
+        return bad("it is the name of another column of recordings");
+    }
+    Ok(())
+}
