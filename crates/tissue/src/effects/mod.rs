@@ -9,7 +9,7 @@ use crate::slab::Slab;
 /// Declares the effect modules and the enum that scenarios write in camel case.
 macro_rules! effects {
     ($($module:ident :: $name:ident),* $(,)?) => {
-        $(mod $module; pub use $module::$name;)*
+        $(mod $module; pub use $module::*;)*
 
         /// Any effect of the library, as a scenario's `effects` list writes it.
         #[derive(Clone, Debug, PartialEq)]
