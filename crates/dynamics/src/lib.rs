@@ -5,7 +5,7 @@
 //!
 //! # fn main() -> Result<(), stylet_dynamics::Error> {
 //! let arm = Arm::new(&panda::with_needle())?;
-//! let observer = ObserverConfig { gain_per_s: Gain::Same(5.0) }.build::<7>()?;
+//! let observer = ObserverConfig { gain_per_s: Gain::Same(5.0) }.build()?;
 //! let mut state = ObserverState::default();
 //!
 //! let at = arm.at(&panda::READY_RAD); // everything below shares the joints' sines and cosines
@@ -22,25 +22,31 @@
 //!
 //! # Frames and signs
 //! - SI units; angles in rad. All rotations map coordinates of the child frame into the parent's.
-//! - *Base frame*: the arm's foot (`panda_link0`), z up when the arm stands on a table; gravity is then [`EARTH_GRAVITY_MPS2`].
-//! - *Link frame* `i`: moves with link `i`, origin on joint `i`, z along the joint's axis. Joint angles turn right-handed about z.
-//! - *Flange*: fixed to the last link (`panda_link8`), z out of the arm. The *tool frame* sits on it, the *tip frame* in the tool frame;
-//!   with [`panda::needle_and_sensor`] the tip's z is the needle's axis, pointing into the tissue.
-//! - A [`Wrench`] is what the surroundings do to the arm: force on the tip and moment about the tip's origin, both in base
-//!   coordinates. The Jacobian maps joint rates to the tip's velocity (rows 0-2, m/s) and angular velocity (rows 3-5, rad/s), also in
-//!   base coordinates.
-//! - Equation of motion: `M(q) qd' + C(q, qd) qd + g(q) = tau - tau_friction + J^T F`. The observer's residual tends to
-//!   `J^T F - tau_friction`. Tissue that resists an insertion along the unit vector `u` pushes with `F = -f u`: the axial force
-//!   of the rest of the project is `f = -wrench.along(u)`.
+//! - *Base frame*: the arm's foot (`panda_link0`), z up when the arm stands on a table; gravity is then
+//!   [`EARTH_GRAVITY_MPS2`].
+//! - *Link frame* `i`: moves with link `i`, origin on joint `i`, z along the joint's axis. Joint angles turn
+//!   right-handed about z.
+//! - *Flange*: fixed to the last link (`panda_link8`), z out of the arm. The *tool frame* sits on it, the
+//!   *tip frame* in the tool frame; with [`panda::needle_and_sensor`] the tip's z is the needle's axis,
+//!   pointing into the tissue.
+//! - A [`Wrench`] is what the surroundings do to the arm: force on the tip and moment about the tip's origin,
+//!   both in base coordinates. The Jacobian maps joint rates to the tip's velocity (rows 0-2, m/s) and
+//!   angular velocity (rows 3-5, rad/s), also in base coordinates.
+//! - Equation of motion: `M(q) qd' + C(q, qd) qd + g(q) = tau - tau_friction + J^T F`. The observer's
+//!   residual tends to `J^T F - tau_friction`. Tissue that resists an insertion along the unit vector `u`
+//!   pushes with `F = -f u`: the axial force of the rest of the project is `f = -wrench.along(u)`.
 //!
 //! # Accuracy and cost
-//! `tests/reference.rs` holds torques, mass matrix, Jacobian and momentum terms against Pinocchio and MuJoCo at 1000 random states;
-//! `examples/time_observer.rs` prints the cost of one observer step. Nothing allocates but the errors of the checks before a
-//! run. Sines and exponentials come from `libm` and all matrices have fixed sizes, so a result has the same bits on every platform.
+//! `tests/reference.rs` holds torques, mass matrix, Jacobian and momentum terms against Pinocchio and MuJoCo
+//! at 1000 random states; `examples/time_observer.rs` prints the cost of one observer step;
+//! `tests/no_allocation.rs` counts allocations (only the error of a failing line check makes one). Sines and
+//! exponentials come from `libm` and all matrices have fixed sizes, so that results do not hang on the
+//! platform's maths library or CPU features.
 //!
 //! # Sources
-//! Featherstone, *Rigid Body Dynamics Algorithms*, Springer 2008 (RBDA). De Luca and Mattone, ICRA 2005, and Haddadin, De Luca and
-//! Albu-Schaeffer, *Robot collisions: a survey on detection, isolation, and identification*, IEEE T-RO 2017 (the observer).
+//! Featherstone, *Rigid Body Dynamics Algorithms*, Springer 2008 (RBDA). De Luca and Mattone, ICRA 2005, and
+//! Haddadin, De Luca and Albu-Schaeffer, *Robot collisions: a survey on detection, isolation, and
+//! identification*, IEEE T-RO 2017 (the observer).
 
 mod arm;
 mod body;

@@ -1,0 +1,54 @@
+//! The joint-space mass matrix, and the motion that torques cause.
+
+use crate::arm::{JointVector, Posture};
+use crate::linear::solve_spd;
+use crate::wrench::Wrench;
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+impl<const N: usize> Posture<'_, N> {
+    /// `M(q)` (kg m^2), symmetric and positive definite.
+    ///
+    /// Composite-rigid-body algorithm (RBDA table 6.2), bodies as mass, first moment and inertia about the
+    /// link's origin.
+    pub fn mass_matrix(&self) -> SMatrix<f64, N, N> {
+        let mut matrix = SMatrix::<f64, N, N>::zeros();
+        let (mut mass, mut first, mut inertia) = (0.0, Vector3::zeros(), Matrix3::zeros());
+        for j in (0..N).rev() {
+            let body = &self.arm.bodies[j];
+            mass += body.mass_kg;
+            first += body.com_m * body.mass_kg;
+            inertia += body.inertia_about_origin_kgm2();
+            // Force and moment about the origin that give all outboard links a unit acceleration of joint j.
+            let mut f = Vector3::new(-first.y, first.x, 0.0);
+            let mut n: Vector3<f64> = inertia.column(2).into();
+            matrix[(j, j)] = n.z;
+            for i in (0..j).rev() {
+                f = self.rotations[i + 1] * f;
+                n = self.rotations[i + 1] * n + self.origin(i + 1).cross(&f);
+                matrix[(i, j)] = n.z;
+                matrix[(j, i)] = n.z;
+            }
+            // The composite body as seen from the link before.
+            let (r, o) = (&self.rotations[j], self.origin(j));
+            let turned = r * first;
+            first = turned + o * mass;
+            let cross = (turned + first) * o.transpose();
+            inertia = r * inertia * r.transpose() + Matrix3::identity() * cross.trace()
+                - (cross + cross.transpose()) * 0.5;
+        }
+        matrix
+    }
+
+    /// Joint accelerations (rad/s^2) under joint torques and a wrench on the tip: `M^-1 (tau - C qd - g + J^T
+    /// F)`.
+    pub fn forward_dynamics(
+        &self,
+        qd_radps: &JointVector<N>,
+        torque_nm: &JointVector<N>,
+        gravity_mps2: &Vector3<f64>,
+        tip: &Wrench,
+    ) -> JointVector<N> {
+        let bias = self.inverse_dynamics(qd_radps, &JointVector::zeros(), gravity_mps2, tip);
+        solve_spd(self.mass_matrix(), torque_nm - bias)
+    }
+}

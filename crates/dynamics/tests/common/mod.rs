@@ -1,0 +1,45 @@
+//! The committed random states, see `reference/make_reference.py`.
+#![allow(dead_code)]
+
+use stylet_dynamics::{JointVector, Wrench};
+
+pub const STATES: usize = 1000;
+
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    pub q: JointVector<7>,
+    pub qd: JointVector<7>,
+    pub qdd: JointVector<7>,
+    pub wrench: Wrench,
+}
+
+pub fn states() -> Vec<State> {
+    let text = include_str!("../../reference/states.csv");
+    let states: Vec<State> = text
+        .lines()
+        .map(|line| {
+            let n: Vec<f64> = line.split(',').map(|field| field.parse().expect("number")).collect();
+            assert_eq!(n.len(), 27);
+            State {
+                q: JointVector::from_column_slice(&n[0..7]),
+                qd: JointVector::from_column_slice(&n[7..14]),
+                qdd: JointVector::from_column_slice(&n[14..21]),
+                wrench: Wrench {
+                    force_n: nalgebra::Vector3::from_column_slice(&n[21..24]),
+                    moment_nm: nalgebra::Vector3::from_column_slice(&n[24..27]),
+                },
+            }
+        })
+        .collect();
+    assert_eq!(states.len(), STATES);
+    states
+}
+
+/// Rows of little-endian f64.
+pub fn rows(bytes: &[u8], width: usize) -> Vec<Vec<f64>> {
+    assert_eq!(bytes.len(), STATES * width * 8);
+    bytes
+        .chunks_exact(width * 8)
+        .map(|row| row.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("8 bytes"))).collect())
+        .collect()
+}
