@@ -167,6 +167,9 @@ pub struct DropConfig {
     pub longest_s: f64,
     /// Travel of ForceCompensation in m; half of the former.
     pub compensation_travel_m: f64,
+    /// ForceCompensation lasts at least this long after the cumulative friction has changed, in s, so
+    /// that the change itself is not taken for a rupture [D].
+    pub settle_s: f64,
     /// Below this speed, in m/s, the needle counts as standing still; 0.05 mm/s.
     pub standstill_mps: f64,
     /// How the drop is measured.
@@ -189,6 +192,7 @@ impl Default for DropConfig {
             travel_m: 0.005,
             longest_s: 5.0,
             compensation_travel_m: 0.0025,
+            settle_s: 0.1,
             standstill_mps: 5e-5,
             estimator: DropEstimator::Lines,
             reweight: true,

@@ -63,6 +63,7 @@ pub struct Enhancer<B> {
     derivative_on: bool,
     waited_m: f64,
     waited_s: f64,
+    settled_for_s: f64,
     last: Sample,
     started: bool,
     out: Output,
@@ -92,6 +93,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             derivative_on: false,
             waited_m: 0.0,
             waited_s: 0.0,
+            settled_for_s: 0.0,
             last: Sample::default(),
             started: false,
             out: Output::default(),
@@ -373,11 +375,14 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
                 Some(theta) => self.settle(sample, &pending, theta),
                 None => self.pending = Some(pending),
             }
+            self.settled_for_s = 0.0;
+        } else {
+            self.settled_for_s += dt_s;
         }
         let over = self.is_reversing(sample)
             || self.waited_m >= self.config.drop.compensation_travel_m
             || self.waited_s >= self.config.drop.longest_s / 2.0;
-        if over && self.pending.is_none() {
+        if over && self.pending.is_none() && self.settled_for_s >= self.config.drop.settle_s {
             self.cusum_n2 = 0.0;
             self.out.state = State::NoRupture;
         }

@@ -1,0 +1,89 @@
+//! Insertions for the core's tests: the tissue law on an ideal motion with white noise.
+#![allow(dead_code)]
+
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use stylet_core::{EnhanceConfig, Enhancer, Output, Sample};
+use stylet_tissue::{Law, LawState, Layer, Rupture, Tissue, TissueForce};
+
+/// The latex stack of SPEC section 8.
+pub fn three_gels() -> Tissue {
+    let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
+        name: String::new(),
+        thickness_m,
+        stiffness_n_per_m,
+        friction_ns_per_m2,
+        puncture_n,
+    };
+    Tissue {
+        surface_m: 0.0,
+        layers: vec![
+            layer(0.0282, 40.0, 9000.0, None),
+            layer(0.0377, 60.0, 12000.0, Some(2.2)),
+            layer(0.0322, 80.0, 16000.0, None),
+        ],
+    }
+}
+
+/// Samples of an insertion, with the true force and ruptures.
+pub struct Insertion {
+    pub samples: Vec<Sample>,
+    pub truth: Vec<TissueForce>,
+    pub ruptures: Vec<Rupture>,
+}
+
+/// Runs the law over a velocity profile, integrated at `sample_hz` from `start_m`.
+pub fn insertion(
+    tissue: &Tissue,
+    start_m: f64,
+    duration_s: f64,
+    sample_hz: f64,
+    noise_n: f64,
+    seed: u64,
+    velocity_mps: impl Fn(f64) -> f64,
+) -> Insertion {
+    let law = Law::base(tissue);
+    let mut state = LawState::default();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut out = Insertion { samples: Vec::new(), truth: Vec::new(), ruptures: Vec::new() };
+    let mut z = start_m;
+    let dt = 1.0 / sample_hz;
+    for k in 0..(duration_s * sample_hz) as usize {
+        let t = k as f64 * dt;
+        let v = velocity_mps(t);
+        let force = law.step(&mut state, t, z, v, |r| out.ruptures.push(r));
+        let w: f64 = StandardNormal.sample(&mut rng);
+        out.samples.push(Sample {
+            time_s: t,
+            position_m: z,
+            velocity_mps: v,
+            force_n: force.total_n + noise_n * w,
+        });
+        out.truth.push(force);
+        z += 0.5 * (v + velocity_mps(t + dt)) * dt;
+    }
+    out
+}
+
+/// The latex stack at the paper's constant 2.3 mm/s.
+pub fn constant(noise_n: f64, seed: u64) -> Insertion {
+    insertion(&three_gels(), -0.005, 50.0, 200.0, noise_n, seed, |_| 0.0023)
+}
+
+/// The latex stack with the paper's sinusoid from rest.
+pub fn sinusoid(noise_n: f64, seed: u64) -> Insertion {
+    let omega = std::f64::consts::TAU * 0.0167;
+    insertion(&three_gels(), -0.005, 15.0, 200.0, noise_n, seed, move |t| 0.12 * omega * (omega * t).sin())
+}
+
+/// Runs the core over samples.
+pub fn enhance(config: &EnhanceConfig, samples: &[Sample]) -> Vec<Output> {
+    let mut core = Enhancer::new(config.clone(), 0.0, vec![Sample::default(); 16384]);
+    samples.iter().map(|s| core.step(*s)).collect()
+}
+
+/// Times of the detections.
+pub fn detections(outputs: &[Output]) -> Vec<f64> {
+    outputs.iter().filter_map(|o| o.detection).map(|d| d.time_s).collect()
+}
