@@ -1,0 +1,85 @@
+//! Promise: rendering is deterministic, small, and survives reports with holes in them.
+
+#[path = "support/synthetic.rs"]
+mod synthetic;
+
+use stylet_report::RunReport;
+use stylet_report::svg::{BarChart, FigureOptions, HeatMap, Theme, bar_chart, figure, heat_map};
+
+#[test]
+fn the_same_report_gives_the_same_bytes() {
+    let (a, b) = (synthetic::synthetic_run(2), synthetic::synthetic_run(2));
+    assert_eq!(a.to_html(), b.to_html());
+    assert_eq!(a.to_svg(&FigureOptions::default()), b.to_svg(&FigureOptions::default()));
+}
+
+#[test]
+fn a_run_of_ten_thousand_samples_stays_below_three_megabytes() {
+    for combinations in [1, 4] {
+        let report = synthetic::synthetic_run(combinations);
+        assert!(report.time_s.len() > 10_000);
+        let size = report.to_html().len();
+        assert!(size < 3_000_000, "{combinations} combinations: {size} bytes");
+    }
+}
+
+#[test]
+fn a_report_survives_serialisation() {
+    let report = synthetic::measured_run();
+    let finite = RunReport { combinations: Vec::new(), ..report };
+    let text = serde_json::to_string(&finite).expect("plain data serialise");
+    let back: RunReport = serde_json::from_str(&text).expect("and come back");
+    assert_eq!(back.provenance, finite.provenance);
+    assert_eq!(back.time_s.len(), finite.time_s.len());
+}
+
+#[test]
+fn an_empty_report_is_a_page_without_charts() {
+    let html = RunReport::default().to_html();
+    assert!(html.contains("Research software, not a medical device"));
+    assert!(!html.contains("class=\"plot\""));
+    assert!(RunReport::default().to_svg(&FigureOptions::default()).starts_with("<svg"));
+}
+
+#[test]
+fn columns_of_unequal_length_and_wild_numbers_do_no_harm() {
+    let mut report = synthetic::synthetic_run(2);
+    report.forces[0].force_n.truncate(17);
+    report.combinations[0].cusum_n2.clear();
+    report.combinations[1].enhanced_force_n = vec![f64::INFINITY; 40_000];
+    report.combinations[1].layers.clear();
+    report.combinations[1].detections.clear();
+    report.combinations[1].derivative_on_n_per_s = Some(f64::NAN);
+    report.combinations[1].cusum_threshold_n2 = Some(0.0);
+    if let Some(truth) = &mut report.truth {
+        truth.layers[1].thickness_m = f64::NAN;
+        truth.ruptures[2].time_s = f64::NAN;
+        truth.layers[2].entered_s = None;
+    }
+    let html = report.to_html();
+    let data =
+        html.split("id=\"data\">").nth(1).and_then(|rest| rest.split("</script>").next()).expect("data");
+    serde_json::from_str::<serde_json::Value>(data).expect("valid JSON whatever the numbers");
+    let svg = report.to_svg(&FigureOptions::default());
+    assert!(!svg.contains("NaN") && !svg.contains("inf"), "an SVG holds finite coordinates");
+}
+
+#[test]
+fn pictures_are_well_formed_in_every_theme() {
+    for theme in [Theme::Auto, Theme::Light, Theme::Dark] {
+        let options = FigureOptions { title: "a < b & \"c\"".into(), theme, ..FigureOptions::default() };
+        let pictures = [
+            synthetic::synthetic_run(1).to_svg(&options),
+            figure(&[], &options),
+            bar_chart(&BarChart::default(), &options),
+            heat_map(&HeatMap::default(), &options),
+        ];
+        for svg in pictures {
+            assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"));
+            assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
+            assert!(svg.contains("a &lt; b &amp; &quot;c&quot;"));
+            assert!(!svg.contains("NaN"));
+            assert_eq!(svg.contains("prefers-color-scheme"), theme == Theme::Auto);
+        }
+    }
+}
