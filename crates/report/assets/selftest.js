@@ -44,7 +44,7 @@ async function dragAndReset(group) {
   await pause();
   const { min, max } = first.u.scales.x, part = (max - min) / (group.extent[1] - group.extent[0]);
   const zoomed = part > 0.48 && part < 0.52 && at([min, max]);
-  const reads = first.curves.length === 0 || first.curves.some(c => c.output.textContent !== "");
+  const lines = first.curves.filter(c => c.show && c.spec.style !== "points"), reads = lines.length === 0 || lines.some(c => c.output.textContent !== "");
   mouse("dblclick", 0.5, over);
   await pause();
   const verdict = !zoomed ? "no zoom" : !reads ? "no values" : !at(group.extent) ? "no reset" : "ok";

@@ -11,6 +11,7 @@ mod synthetic;
 
 use std::collections::HashMap;
 use std::fs;
+use std::io::Write;
 use stylet_report::{Block, Chart, Colour, Page, RunReport, Scale, Section, Series};
 
 /// The attributes of the opening tags that contain `needle`.
@@ -71,6 +72,14 @@ fn check(program: &std::path::Path, scratch: &browser::Scratch, name: &str, page
     }
 }
 
+/// Straight to the terminal: the output of a test that passes is not shown otherwise.
+fn skipped(what: &str) {
+    let _ = writeln!(
+        std::io::stderr(),
+        "SKIPPED: no chromium found: {what} not tested in a browser (set CHROME or install chromium)"
+    );
+}
+
 fn count(pixels: &[[u8; 3]], colour: Colour) -> usize {
     let channel =
         |at: usize| u8::from_str_radix(&colour.light()[at..at + 2], 16).expect("a hexadecimal colour");
@@ -80,8 +89,7 @@ fn count(pixels: &[[u8; 3]], colour: Colour) -> usize {
 
 fn report_is_drawn(name: &str, report: &RunReport) {
     let Some(program) = browser::find() else {
-        println!("SKIPPED: no chromium found: set CHROME or install chromium to test {name} in a browser");
-        eprintln!("SKIPPED: no chromium found: set CHROME or install chromium to test {name} in a browser");
+        skipped(name);
         return;
     };
     let scratch = browser::Scratch::new(name);
@@ -137,7 +145,7 @@ fn the_report_of_measured_data_needs_no_truth() {
 #[test]
 fn odd_pages_are_drawn_too() {
     let Some(program) = browser::find() else {
-        println!("SKIPPED: no chromium found: set CHROME or install chromium to test odd pages in a browser");
+        skipped("odd pages");
         return;
     };
     let x: Vec<f64> = (0..60_000).map(f64::from).collect();
