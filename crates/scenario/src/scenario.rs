@@ -1,0 +1,79 @@
+//! The scenario as one value.
+
+use crate::motion::Motion;
+use crate::robot::Robot;
+use crate::sensor::Sensor;
+use serde::{Deserialize, Serialize};
+use stylet_core::EnhanceConfig;
+use stylet_core::config::Model;
+use stylet_tissue::{AnyEffect, Tissue};
+
+/// Everything that makes an insertion (SPEC section 8). Only `name`, `tissue` and `motion` have to be
+/// given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// What it is, for people.
+    pub name: String,
+    /// Paper and figure, or where the numbers come from.
+    #[serde(default)]
+    pub source: String,
+    /// The layers.
+    pub tissue: Tissue,
+    /// How reality departs from the base law.
+    #[serde(default)]
+    pub effects: Vec<AnyEffect>,
+    /// The motion.
+    pub motion: Motion,
+    /// What carries the needle.
+    #[serde(default)]
+    pub robot: Robot,
+    /// What records the force.
+    #[serde(default)]
+    pub sensor: Sensor,
+    /// The online algorithm.
+    #[serde(default)]
+    pub enhance: EnhanceConfig,
+    /// Further models that are run on the same data.
+    #[serde(default)]
+    pub compare: Vec<Model>,
+    /// Samples per second.
+    #[serde(default = "sample_hz")]
+    pub sample_hz: f64,
+    /// Physics steps per second; a whole multiple of `sample_hz`.
+    #[serde(default = "physics_hz")]
+    pub physics_hz: f64,
+    /// How far the tissue's numbers may be off, relative, 0 to 1: bounds for the diagnosis.
+    #[serde(default = "tolerance")]
+    pub tolerance: f64,
+    /// Seed of every random number.
+    #[serde(default = "seed")]
+    pub seed: u64,
+}
+
+fn sample_hz() -> f64 {
+    200.0
+}
+fn physics_hz() -> f64 {
+    1000.0
+}
+fn tolerance() -> f64 {
+    0.3
+}
+fn seed() -> u64 {
+    1
+}
+
+impl Scenario {
+    /// The models to run: `enhance.model` first, then those of `compare` that differ.
+    #[must_use]
+    pub fn models(&self) -> Vec<Model> {
+        let mut models = vec![self.enhance.model];
+        for model in &self.compare {
+            if !models.contains(model) {
+                models.push(*model);
+            }
+        }
+        models
+    }
+}
