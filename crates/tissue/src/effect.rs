@@ -4,6 +4,7 @@
 //! [`Memory`] that the law keeps for it, so that a law can be shared and its state copied.
 //! Every hook has a pass-through default: an effect implements the one of its [`Place`].
 
+use crate::info::EffectInfo;
 use crate::slab::Slab;
 
 /// Velocity below which `sgn` is zero, in m/s (SPEC section 6: 0.01 mm/s everywhere).
@@ -23,7 +24,7 @@ pub fn sgn(v_mps: f64) -> f64 {
 }
 
 /// What an effect remembers between samples. Zero at the start of an insertion.
-pub type Memory = [f64; 4];
+pub type Memory = [f64; 8];
 
 /// Where in the chain of SPEC section 6 an effect acts. The order of the variants is the order
 /// of the chain.
@@ -65,6 +66,8 @@ pub struct Moment {
     pub dt_s: f64,
     /// Tip position in metres.
     pub z_m: f64,
+    /// Travel of the tip since the previous sample in metres; zero at the first.
+    pub dz_m: f64,
     /// Tip velocity in m/s.
     pub v_mps: f64,
     /// Number of ruptured layers.
@@ -77,15 +80,27 @@ pub struct Moment {
 /// effects before it left it) and returns the new one. A hook that is not overridden passes the
 /// value through.
 pub trait Effect {
+    /// Equation, source, signature and parameters, for listing, validating and fitting.
+    fn info(&self) -> &'static EffectInfo;
+
     /// Stable name in snake case, as in every output and in SPEC section 6.
-    fn id(&self) -> &'static str;
+    fn id(&self) -> &'static str {
+        self.info().id
+    }
 
     /// Place in the chain.
-    fn place(&self) -> Place;
+    fn place(&self) -> Place {
+        self.info().place
+    }
 
     /// True when the parameters make the effect vanish: it is then bypassed altogether, so that
     /// the base law comes back bit for bit.
     fn is_neutral(&self) -> bool;
+
+    /// True when the effect uses its [`Memory`].
+    fn remembers(&self) -> bool {
+        false
+    }
 
     /// [`Place::Geometry`]: moves faces or changes coefficients, once.
     fn shape(&self, _slabs: &mut [Slab]) {}
@@ -112,6 +127,12 @@ pub trait Effect {
         threshold_n
     }
 
+    /// [`Place::Release`]: the part in N of the force released at a rupture that this effect keeps
+    /// back for good; the release effects after it see what is left.
+    fn withheld(&self, _released_n: f64) -> f64 {
+        0.0
+    }
+
     /// Told of every rupture, with the elastic force that was released (N) and the position of
     /// the rupture (m). Effects with memory of the layer forget it here.
     fn on_rupture(&self, _released_n: f64, _z_m: f64, _memory: &mut Memory) {}
@@ -121,10 +142,21 @@ pub trait Effect {
         v_mps
     }
 
+    /// [`Place::Friction`]: the factor on all friction coefficients `b_i` at the tip velocity.
+    fn friction_factor(&self, _v_mps: f64) -> f64 {
+        1.0
+    }
+
     /// [`Place::Friction`]: a force in N added to the shaft friction, `inside_m` being the total
     /// length of needle inside the tissue.
     fn shaft_force(&self, _moment: &Moment, _inside_m: f64, _memory: &mut Memory) -> f64 {
         0.0
+    }
+
+    /// [`Place::Tip`]: true when something of the effect's own breaks with the tip at `z_m`; told to
+    /// the memory, once, before the forces are summed up.
+    fn breaks(&self, _z_m: f64, _slabs: &[Slab], _memory: &mut Memory) -> bool {
+        false
     }
 
     /// [`Place::Release`] and [`Place::Tip`]: a force in N added at the tip.
@@ -137,4 +169,39 @@ pub trait Effect {
     fn tool_force(&self, _v_mps: f64, _a_mps2: f64) -> f64 {
         0.0
     }
+
+    /// [`Place::Sensor`]: what the sensor makes of a force in N at `time_s`, `dt_s` after the sample
+    /// before (zero at the first).
+    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+        force_n
+    }
+
+    /// [`Place::Position`]: recorded position over true position.
+    fn position_factor(&self) -> f64 {
+        1.0
+    }
+}
+
+/// First-order lag `tau y' = x - y` over a step `dt` with `x` linear in between: `(keep, ramp)` such
+/// that `y = keep y0 + (1 - keep) x0 + ramp (x1 - x0)`. Exact, and therefore the same lag at every
+/// sampling rate; with `x` held it is the usual `y += (1 - exp(-dt/tau)) (x - y)`.
+#[must_use]
+pub(crate) fn lag_weights(dt_s: f64, time_constant_s: f64) -> (f64, f64) {
+    let ratio = dt_s / time_constant_s;
+    if !(ratio > 0.0) {
+        return (1.0, 0.0);
+    }
+    if ratio == f64::INFINITY {
+        return (0.0, 1.0);
+    }
+    let lost = -libm::expm1(-ratio);
+    (1.0 - lost, 1.0 - lost / ratio)
+}
+
+/// True when two time steps are the same but for the rounding of time stamps, so that weights
+/// computed for one serve the other (the error is below 1e-10 of a step).
+#[must_use]
+#[inline]
+pub(crate) fn same_step(a_s: f64, b_s: f64) -> bool {
+    (a_s - b_s).abs() <= 1e-10 * a_s
 }

@@ -15,7 +15,7 @@ use crate::slab::Slab;
 use alloc::vec::Vec;
 
 /// How many tissue effects one law can hold.
-pub const MAX_EFFECTS: usize = 8;
+pub const MAX_EFFECTS: usize = 16;
 
 /// More effects than [`MAX_EFFECTS`] were asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,19 +35,35 @@ impl core::error::Error for TooManyEffects {}
 /// The law: configuration only. Step it with a [`LawState`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Law {
-    slabs: Vec<Slab>,
+    pub(crate) slabs: Vec<Slab>,
+    /// In the order of the chain.
     effects: Vec<AnyEffect>,
+    /// Effects of a place are those from its entry to the next one's.
+    first: [u8; PLACES + 1],
+    /// Stiffness in N/m of the needle, infinite when it is rigid.
+    pub(crate) needle_n_per_m: f64,
+    /// Some effect uses its memory.
+    pub(crate) remembers: bool,
+    /// The force may jump where the velocity changes sign.
+    pub(crate) jumps: bool,
 }
+
+/// Places up to and with [`Place::Tip`].
+const PLACES: usize = Place::Tip as usize + 1;
+
+/// What all effects of a law remember.
+pub(crate) type Memories = [Memory; MAX_EFFECTS];
 
 /// What the law remembers between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LawState {
-    ruptured: usize,
+    pub(crate) ruptured: usize,
     started: bool,
-    time_s: f64,
-    z_m: f64,
+    pub(crate) time_s: f64,
+    pub(crate) z_m: f64,
+    pub(crate) v_mps: f64,
     elastic_n: f64,
-    memory: [Memory; MAX_EFFECTS],
+    pub(crate) memory: Memories,
 }
 
 impl Default for LawState {
@@ -57,8 +73,9 @@ impl Default for LawState {
             started: false,
             time_s: 0.0,
             z_m: 0.0,
+            v_mps: 0.0,
             elastic_n: 0.0,
-            memory: [[0.0; 4]; MAX_EFFECTS],
+            memory: [[0.0; 8]; MAX_EFFECTS],
         }
     }
 }
@@ -68,6 +85,19 @@ impl LawState {
     #[must_use]
     pub fn ruptured(&self) -> usize {
         self.ruptured
+    }
+
+    /// Position of the tip relative to the tissue at the last sample, in metres: not the one given
+    /// to [`Law::step`] when the tissue moves or the needle gives.
+    #[must_use]
+    pub fn tip_m(&self) -> f64 {
+        self.z_m
+    }
+
+    /// Velocity of the tip relative to the tissue at the last sample, in m/s.
+    #[must_use]
+    pub fn tip_velocity_mps(&self) -> f64 {
+        self.v_mps
     }
 }
 
@@ -88,6 +118,22 @@ pub struct TissueForce {
     pub tip_n: f64,
     /// Active layer, 1-based; number of layers + 1 after the last rupture.
     pub active_layer: usize,
+}
+
+impl TissueForce {
+    /// The force of a sample that is not finite.
+    fn unknown(active_layer: usize) -> Self {
+        let nan = f64::NAN;
+        Self {
+            total_n: nan,
+            elastic_n: nan,
+            friction_n: nan,
+            tip_extra_n: nan,
+            cumulative_friction_ns_per_m: nan,
+            tip_n: nan,
+            active_layer,
+        }
+    }
 }
 
 /// A layer gave way.
@@ -112,24 +158,42 @@ impl Law {
     /// # Errors
     /// [`TooManyEffects`] when more than [`MAX_EFFECTS`] effects act on the tissue.
     pub fn new(tissue: &Tissue, effects: &[AnyEffect]) -> Result<Self, TooManyEffects> {
-        let mut slabs = Slab::stack(tissue);
+        let mut law = Self::base(tissue);
         let mut active: Vec<AnyEffect> =
             effects.iter().filter(|e| e.place() < Place::Tool && !e.is_neutral()).cloned().collect();
-        active.sort_by_key(Effect::place);
+        active.sort_by_key(|e| (e.place(), e.rank()));
         for effect in &active {
-            effect.shape(&mut slabs);
+            effect.shape(&mut law.slabs);
         }
-        active.retain(|e| e.place() > Place::Geometry);
+        let springs = active.iter().filter_map(|e| match e {
+            AnyEffect::NeedleCompliance(spring) => Some(1.0 / spring.stiffness_n_per_m),
+            _ => None,
+        });
+        law.needle_n_per_m = 1.0 / springs.fold(0.0, |sum, spring| sum + spring);
+        active.retain(|e| e.place() > Place::Geometry && !matches!(e, AnyEffect::NeedleCompliance(_)));
         if active.len() > MAX_EFFECTS {
             return Err(TooManyEffects { asked: active.len() });
         }
-        Ok(Self { slabs, effects: active })
+        for (place, first) in law.first.iter_mut().enumerate() {
+            *first = active.partition_point(|e| (e.place() as usize) < place) as u8;
+        }
+        law.remembers = active.iter().any(Effect::remembers);
+        law.jumps = active.iter().any(|e| e.place() >= Place::Release);
+        law.effects = active;
+        Ok(law)
     }
 
     /// The base law alone.
     #[must_use]
     pub fn base(tissue: &Tissue) -> Self {
-        Self { slabs: Slab::stack(tissue), effects: Vec::new() }
+        Self {
+            slabs: Slab::stack(tissue),
+            effects: Vec::new(),
+            first: [0; PLACES + 1],
+            needle_n_per_m: f64::INFINITY,
+            remembers: false,
+            jumps: false,
+        }
     }
 
     /// The layers as placed in space, after geometric effects.
@@ -141,7 +205,9 @@ impl Law {
     /// Advances to the sample at `time_s` with tip position `z_m` and velocity `v_mps`, reports
     /// ruptures (in order; more than one when a step crosses several faces) and returns the force.
     ///
-    /// Time must not run backwards; a repeated time is a step of zero length.
+    /// Time must not run backwards; a repeated time, or one that does run backwards, is a step of
+    /// zero length. A sample that is not finite gives a force that is not a number and changes
+    /// nothing in the state. Positions of ruptures are relative to the tissue.
     #[inline]
     pub fn step(
         &self,
@@ -151,22 +217,24 @@ impl Law {
         v_mps: f64,
         mut on_rupture: impl FnMut(Rupture),
     ) -> TissueForce {
+        if !(time_s + z_m + v_mps).is_finite() {
+            return TissueForce::unknown(state.ruptured + 1);
+        }
         let (mut z, mut v) = (z_m, v_mps);
         for effect in self.at(Place::Kinematics) {
-            (z, v) = effect.1.relative(time_s, z, v);
+            (z, v) = effect.relative(time_s, z, v);
         }
         if !state.started {
-            state.started = true;
-            state.time_s = time_s;
-            state.z_m = z;
+            *state = LawState { started: true, time_s, z_m: z, v_mps: v, ..*state };
         }
+        let time_s = time_s.max(state.time_s);
         let dt = time_s - state.time_s;
+        if self.needle_n_per_m < f64::INFINITY {
+            return self.step_bending(state, time_s, z, &mut on_rupture);
+        }
         let elastic_n = self.load(state, dt, z, v, &mut on_rupture);
-        let moment = Moment { time_s, dt_s: dt, z_m: z, v_mps: v, ruptured: state.ruptured };
-        state.time_s = time_s;
-        state.z_m = z;
-        state.elastic_n = elastic_n;
-        self.sum_up(state, &moment, elastic_n)
+        self.membrane_breaks(state, z);
+        self.settle(state, time_s, z, v, elastic_n)
     }
 
     /// Elastic force of the active layer, after as many ruptures as this step brings.
@@ -181,73 +249,144 @@ impl Law {
     ) -> f64 {
         let mut done = 0.0; // share of the step that the ruptures so far have used up
         while let Some(slab) = self.slabs.get(state.ruptured) {
-            let x = z - slab.front_m;
-            let mut elastic = if x > 0.0 { slab.stiffness_n_per_m * x } else { 0.0 };
-            let mut threshold = slab.puncture_n;
-            if !self.effects.is_empty() {
-                let x = x.max(0.0);
-                elastic = self.shaped(state, (1.0 - done) * dt, slab, x, elastic);
-                for effect in self.at(Place::Puncture) {
-                    threshold = effect.1.puncture(threshold, v);
+            let elastic = self.elastic(slab, (1.0 - done) * dt, z, &mut state.memory);
+            match self.give_way(state, slab, dt, (z, v), elastic, done) {
+                None => return elastic,
+                Some(rupture) => {
+                    done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
+                    on_rupture(rupture);
                 }
             }
-            let by_force = elastic >= threshold;
-            if !by_force && z < slab.far_m() {
-                return elastic;
-            }
-            let rupture = self.rupture(state, dt, z, elastic, threshold, done);
-            done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
-            for (memory, effect) in self.effects.iter().enumerate() {
-                effect.on_rupture(rupture.released_n, rupture.position_m, &mut state.memory[memory]);
-            }
-            state.ruptured += 1;
-            state.elastic_n = 0.0;
-            on_rupture(rupture);
         }
         0.0
     }
 
-    /// The elastic force as the effects of shape and history leave it.
-    fn shaped(&self, state: &mut LawState, dt: f64, slab: &Slab, x: f64, base: f64) -> f64 {
-        let mut elastic = base;
-        for effect in self.at(Place::Elastic) {
-            elastic = effect.1.elastic(slab.stiffness_n_per_m, x, elastic);
-        }
-        for (index, effect) in self.at(Place::Relaxation) {
-            elastic = effect.relax(dt, elastic, &mut state.memory[index]);
+    /// Elastic force of a layer as the effects of shape and history leave it.
+    #[inline]
+    pub(crate) fn elastic(&self, slab: &Slab, dt: f64, z: f64, memory: &mut Memories) -> f64 {
+        let x = z - slab.front_m;
+        let x = if x > 0.0 { x } else { 0.0 };
+        let mut elastic = slab.stiffness_n_per_m * x;
+        if !self.effects.is_empty() {
+            for effect in self.at(Place::Elastic) {
+                elastic = effect.elastic(slab.stiffness_n_per_m, x, elastic);
+            }
+            for (effect, memory) in self.remembering(Place::Relaxation, memory) {
+                elastic = effect.relax(dt, elastic, memory);
+            }
         }
         elastic
     }
 
-    /// When and where within the step the active layer gave way.
-    fn rupture(&self, state: &LawState, dt: f64, z: f64, elastic: f64, threshold: f64, done: f64) -> Rupture {
-        let slab = &self.slabs[state.ruptured];
+    /// The rupture of the active layer, if its elastic force or the tip's position bring it.
+    /// `done` is the share of the step that is over.
+    #[inline]
+    pub(crate) fn give_way(
+        &self,
+        state: &mut LawState,
+        slab: &Slab,
+        dt: f64,
+        (z, v): (f64, f64),
+        elastic: f64,
+        done: f64,
+    ) -> Option<Rupture> {
+        let mut threshold = slab.puncture_n;
+        for effect in self.at(Place::Puncture) {
+            threshold = effect.puncture(threshold, v);
+        }
+        if !(elastic >= threshold || z >= slab.far_m()) {
+            return None;
+        }
+        let rupture = Self::rupture(state, slab, dt, z, elastic, threshold, done);
+        for (effect, memory) in self.remembering(Place::Relaxation, &mut state.memory) {
+            effect.on_rupture(rupture.released_n, rupture.position_m, memory);
+        }
+        let mut released = rupture.released_n;
+        for (effect, memory) in self.remembering(Place::Release, &mut state.memory) {
+            effect.on_rupture(released, rupture.position_m, memory);
+            released -= effect.withheld(released);
+        }
+        state.ruptured += 1;
+        state.elastic_n = 0.0;
+        Some(rupture)
+    }
+
+    /// When and where within the step the active layer gave way, and what it released.
+    #[cold]
+    fn rupture(
+        state: &LawState,
+        slab: &Slab,
+        dt: f64,
+        z: f64,
+        elastic: f64,
+        threshold: f64,
+        done: f64,
+    ) -> Rupture {
         let share = |from: f64, to: f64, at: f64| {
             if to > from { ((at - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 }
         };
-        let at_face = if z >= slab.far_m() { share(state.z_m, z, slab.far_m()) } else { 2.0 };
+        // A layer entered within this step starts from its front face, not from the last sample.
+        let entry = share(state.z_m, z, slab.front_m);
+        let start = if state.z_m < slab.front_m { entry } else { 0.0 }.max(done);
+        let at_face = if z >= slab.far_m() { share(state.z_m, z, slab.far_m()).max(done) } else { 2.0 };
         let at_force = if elastic >= threshold {
-            // A layer entered within this step starts from its front face, not from the last sample.
-            let entry = share(state.z_m, z, slab.front_m);
-            let start = if state.z_m < slab.front_m { entry } else { 0.0 }.max(done);
             start + (1.0 - start) * share(state.elastic_n, elastic, threshold)
         } else {
             2.0
         };
         let by_force = at_force <= at_face;
-        let at = at_force.min(at_face).max(done);
+        let at = at_force.min(at_face);
         Rupture {
             layer: state.ruptured + 1,
             time_s: state.time_s + at * dt,
             position_m: state.z_m + at * (z - state.z_m),
-            released_n: if by_force { threshold.min(elastic) } else { elastic },
+            released_n: if by_force {
+                threshold.min(elastic)
+            } else {
+                state.elastic_n + (elastic - state.elastic_n) * share(start, 1.0, at)
+            },
             by_force,
         }
     }
 
+    /// Whether something that the layers do not know breaks with the tip at `z`.
+    #[inline]
+    pub(crate) fn membrane_breaks(&self, state: &mut LawState, z: f64) -> bool {
+        let mut any = false;
+        for (effect, memory) in self.remembering(Place::Tip, &mut state.memory) {
+            any |= effect.breaks(z, &self.slabs, memory);
+        }
+        any
+    }
+
+    /// Friction and tip forces at the end of a step, which the state then remembers.
+    #[inline]
+    pub(crate) fn settle(
+        &self,
+        state: &mut LawState,
+        time_s: f64,
+        z: f64,
+        v: f64,
+        elastic_n: f64,
+    ) -> TissueForce {
+        let moment = Moment {
+            time_s,
+            dt_s: time_s - state.time_s,
+            z_m: z,
+            dz_m: z - state.z_m,
+            v_mps: v,
+            ruptured: state.ruptured,
+        };
+        state.time_s = time_s;
+        state.z_m = z;
+        state.v_mps = v;
+        state.elastic_n = elastic_n;
+        self.sum_up(&moment, elastic_n, &mut state.memory)
+    }
+
     /// Friction along the shaft, tip effects, and the ground truth that goes with them.
     #[inline]
-    fn sum_up(&self, state: &mut LawState, moment: &Moment, elastic_n: f64) -> TissueForce {
+    pub(crate) fn sum_up(&self, moment: &Moment, elastic_n: f64, memory: &mut Memories) -> TissueForce {
         let mut inside = 0.0;
         let mut cumulative = 0.0;
         let mut local = 0.0;
@@ -255,30 +394,32 @@ impl Law {
             let length = slab.inside_m(moment.z_m);
             inside += length;
             let share = slab.friction_ns_per_m2 * length;
-            if i < state.ruptured {
+            if i < moment.ruptured {
                 cumulative += share;
             } else {
                 local += share;
             }
         }
         let mut velocity = moment.v_mps;
-        for effect in self.at(Place::Friction) {
-            velocity = effect.1.friction_velocity(velocity);
-        }
-        let mut friction_n = velocity * (cumulative + local);
         let mut tip_extra_n = 0.0;
-        if !self.effects.is_empty() {
-            for (index, effect) in self.effects.iter().enumerate() {
-                let memory = &mut state.memory[index];
-                match effect.place() {
-                    Place::Friction => friction_n += effect.shaft_force(moment, inside, memory),
-                    Place::Release | Place::Tip => {
-                        tip_extra_n += effect.tip_force(moment, &self.slabs, memory);
-                    }
-                    _ => {}
-                }
+        let mut dry_n = 0.0;
+        if self.jumps {
+            let mut factor = 1.0;
+            for (effect, memory) in self.remembering(Place::Release, memory) {
+                tip_extra_n += effect.tip_force(moment, &self.slabs, memory);
             }
+            for (effect, memory) in self.remembering(Place::Friction, memory) {
+                velocity = effect.friction_velocity(velocity);
+                factor *= effect.friction_factor(moment.v_mps);
+                dry_n += effect.shaft_force(moment, inside, memory);
+            }
+            for (effect, memory) in self.remembering(Place::Tip, memory) {
+                tip_extra_n += effect.tip_force(moment, &self.slabs, memory);
+            }
+            cumulative *= factor;
+            local *= factor;
         }
+        let friction_n = velocity * (cumulative + local) + dry_n;
         let total_n = elastic_n + friction_n + tip_extra_n;
         TissueForce {
             total_n,
@@ -287,12 +428,31 @@ impl Law {
             tip_extra_n,
             cumulative_friction_ns_per_m: cumulative,
             tip_n: total_n - cumulative * moment.v_mps,
-            active_layer: state.ruptured + 1,
+            active_layer: moment.ruptured + 1,
         }
     }
 
+    /// The effects of a place.
     #[inline]
-    fn at(&self, place: Place) -> impl Iterator<Item = (usize, &AnyEffect)> {
-        self.effects.iter().enumerate().filter(move |(_, e)| e.place() == place)
+    fn at(&self, place: Place) -> &[AnyEffect] {
+        self.effects.get(self.range(place)).unwrap_or(&[])
+    }
+
+    /// The effects of a place, each with its memory.
+    #[inline]
+    pub(crate) fn remembering<'a>(
+        &'a self,
+        place: Place,
+        memory: &'a mut Memories,
+    ) -> impl Iterator<Item = (&'a AnyEffect, &'a mut Memory)> {
+        let range = self.range(place);
+        let memory = memory.get_mut(range.clone()).unwrap_or(&mut []);
+        self.effects.get(range).unwrap_or(&[]).iter().zip(memory)
+    }
+
+    #[inline]
+    fn range(&self, place: Place) -> core::ops::Range<usize> {
+        let place = (place as usize).min(PLACES - 1);
+        usize::from(self.first[place])..usize::from(self.first[place + 1])
     }
 }

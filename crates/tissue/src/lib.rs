@@ -24,16 +24,21 @@
 
 extern crate alloc;
 
+mod bending;
 pub mod effect;
 mod effects;
+mod info;
 mod law;
 mod layer;
+mod measurement;
 mod replay;
 mod slab;
 
 pub use effect::{Effect, Place};
 pub use effects::*;
+pub use info::{EffectInfo, ParameterError, ParameterInfo, info, library};
 pub use law::{Law, LawState, MAX_EFFECTS, Rupture, TissueForce, TooManyEffects};
 pub use layer::{Layer, Tissue};
+pub use measurement::{Measurement, MeasurementState, Reading};
 pub use replay::replay;
 pub use slab::Slab;

@@ -115,5 +115,5 @@ fn relaxation_follows_the_prony_series_while_the_needle_is_held() {
 fn too_many_effects_are_refused() {
     let one: AnyEffect = CoulombFriction { c_n_per_m: 1.0 }.into();
     let error = Law::new(&tissue(), &vec![one; MAX_EFFECTS + 1]).expect_err("too many");
-    assert!(error.to_string().contains("at most 8"), "{error}");
+    assert!(error.to_string().contains("at most 16"), "{error}");
 }

@@ -1,4 +1,6 @@
+use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, sgn};
+use crate::info::{EffectInfo, ParameterInfo};
 
 /// Dry friction along the shaft: `f_B += c sgn(v) sum l_i`.
 ///
@@ -8,16 +10,35 @@ use crate::effect::{Effect, Memory, Moment, Place, sgn};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct CoulombFriction {
-    /// Friction per metre of needle inside, `c` in N/m, zero or positive. Neutral: 0.
+    /// Friction per metre of needle inside, `c` in N/m, 0 to 10 000. Neutral: 0.
     pub c_n_per_m: f64,
 }
 
-impl Effect for CoulombFriction {
-    fn id(&self) -> &'static str {
-        "coulomb_friction"
+static INFO: EffectInfo = EffectInfo {
+    id: "coulomb_friction",
+    equation: "+ c sgn(v) sum l_i",
+    source: "Okamura, Simone, O'Leary 2004 (Karnopp model, per unit length)",
+    signature: "A plateau that does not depend on speed, with a step at reversal, in proportion to the length inside.",
+    place: Place::Friction,
+    parameters: &[
+        ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside").allowed(0.0, 1e4).search(3.0, 0.05, 100.0).log(),
+    ],
+    larger: None,
+};
+
+impl Described for CoulombFriction {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.c_n_per_m]
     }
-    fn place(&self) -> Place {
-        Place::Friction
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [c_n_per_m] = *values else { return None };
+        Some(Self { c_n_per_m })
+    }
+}
+
+impl Effect for CoulombFriction {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
     }
     fn is_neutral(&self) -> bool {
         self.c_n_per_m == 0.0

@@ -1,4 +1,6 @@
-use crate::effect::{Effect, Memory, Moment, Place};
+use super::Described;
+use crate::effect::{Effect, Memory, Moment, Place, SGN_DEAD_BAND_MPS};
+use crate::info::{EffectInfo, ParameterInfo};
 use crate::slab::Slab;
 
 /// A rupture that does not release everything: a share `rho` of `f_K` at rupture stays as a
@@ -14,21 +16,46 @@ pub struct IncompleteRelease {
     pub fraction: f64,
 }
 
-impl Effect for IncompleteRelease {
-    fn id(&self) -> &'static str {
-        "incomplete_release"
+static INFO: EffectInfo = EffectInfo {
+    id: "incomplete_release",
+    equation: "+ rho f_K(at rupture), constant until the next rupture or reversal",
+    source: "Okamura, Simone, O'Leary 2004 (liver: drop 0.66 N of 2.30 N)",
+    signature: "The force does not fall to the friction line after a puncture, and the rest goes at reversal.",
+    place: Place::Release,
+    parameters: &[
+        ParameterInfo::strength("fraction", "", "share of the elastic force that stays").allowed(0.0, 1.0).search(0.3, 0.01, 0.99),
+    ],
+    larger: None,
+};
+
+impl Described for IncompleteRelease {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.fraction]
     }
-    fn place(&self) -> Place {
-        Place::Release
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [fraction] = *values else { return None };
+        Some(Self { fraction })
+    }
+}
+
+impl Effect for IncompleteRelease {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
     }
     fn is_neutral(&self) -> bool {
         self.fraction == 0.0
+    }
+    fn remembers(&self) -> bool {
+        true
+    }
+    fn withheld(&self, released_n: f64) -> f64 {
+        self.fraction * released_n
     }
     fn on_rupture(&self, released_n: f64, _z_m: f64, memory: &mut Memory) {
         memory[0] = self.fraction * released_n;
     }
     fn tip_force(&self, moment: &Moment, _slabs: &[Slab], memory: &mut Memory) -> f64 {
-        if moment.v_mps < -crate::effect::SGN_DEAD_BAND_MPS {
+        if moment.v_mps < -SGN_DEAD_BAND_MPS {
             memory[0] = 0.0;
         }
         memory[0]

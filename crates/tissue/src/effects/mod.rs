@@ -1,10 +1,31 @@
 //! The effects library: one file per effect.
 //!
 //! [`AnyEffect`] is the closed list that scenarios can name; adding an effect is one file and one
-//! line in the list below.
+//! line in the list below, which stands in the order of the chain.
 
-use crate::effect::{Effect, Memory, Moment, Place};
+use crate::effect::{Effect, Memory, Moment};
+use crate::info::{EffectInfo, ParameterError};
 use crate::slab::Slab;
+use alloc::vec::Vec;
+
+/// What an effect's parameters are as a list of numbers.
+trait Described: Effect + Default {
+    /// The library's entry.
+    fn entry() -> &'static EffectInfo {
+        Self::default().info()
+    }
+
+    /// The parameters, in the order of [`EffectInfo::parameters`].
+    fn values(&self) -> Vec<f64>;
+
+    /// The effect with these parameters; `None` when their number is wrong.
+    fn from_values(values: &[f64]) -> Option<Self>;
+
+    /// Conditions on several parameters together.
+    fn check_together(&self) -> Result<(), ParameterError> {
+        Ok(())
+    }
+}
 
 /// Declares the effect modules and the enum that scenarios write in camel case.
 macro_rules! effects {
@@ -22,61 +43,117 @@ macro_rules! effects {
             fn from(effect: $name) -> Self { Self::$name(effect) }
         })*
 
+        /// The entries of all effects, in the order of the chain.
+        pub(crate) const LIBRARY: &[fn() -> &'static EffectInfo] = &[$($name::entry),*];
+
+        /// The effects by number, in the order of the chain.
+        enum Rank { $($name),* }
+
         impl AnyEffect {
-            fn inner(&self) -> &dyn Effect {
-                match self { $(Self::$name(effect) => effect,)* }
+            /// Position in the chain among all effects of the library.
+            pub(crate) fn rank(&self) -> usize {
+                match self { $(Self::$name(_) => Rank::$name as usize,)* }
             }
+
+            /// The effect of this id with these parameters, in the order of
+            /// [`EffectInfo::parameters`]; `None` for an unknown id or a wrong number of them.
+            #[must_use]
+            pub fn from_parameters(id: &str, values: &[f64]) -> Option<Self> {
+                match id {
+                    $(stringify!($module) => $name::from_values(values).map(Self::$name),)*
+                    _ => None,
+                }
+            }
+
+            /// The parameters, in the order of [`EffectInfo::parameters`].
+            #[must_use]
+            pub fn parameters(&self) -> Vec<f64> {
+                match self { $(Self::$name(effect) => effect.values(),)* }
+            }
+
+            fn check_together(&self) -> Result<(), ParameterError> {
+                match self { $(Self::$name(effect) => effect.check_together(),)* }
+            }
+        }
+
+        effects!(@delegate [$($name)*]
+            fn info() -> &'static EffectInfo;
+            fn is_neutral() -> bool;
+            fn remembers() -> bool;
+            fn shape(slabs: &mut [Slab]) -> ();
+            fn relative(time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64);
+            fn elastic(k_n_per_m: f64, x_m: f64, force_n: f64) -> f64;
+            fn relax(dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64;
+            fn puncture(threshold_n: f64, v_mps: f64) -> f64;
+            fn withheld(released_n: f64) -> f64;
+            fn on_rupture(released_n: f64, z_m: f64, memory: &mut Memory) -> ();
+            fn friction_velocity(v_mps: f64) -> f64;
+            fn friction_factor(v_mps: f64) -> f64;
+            fn shaft_force(moment: &Moment, inside_m: f64, memory: &mut Memory) -> f64;
+            fn breaks(z_m: f64, slabs: &[Slab], memory: &mut Memory) -> bool;
+            fn tip_force(moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64;
+            fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
+            fn sense(time_s: f64, dt_s: f64, force_n: f64, memory: &mut Memory) -> f64;
+            fn position_factor() -> f64;
+        );
+    };
+
+    // Every hook of the trait, passed on to the effect.
+    (@delegate $names:tt $(fn $hook:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
+        impl Effect for AnyEffect {
+            $(effects!(@hook $names $hook [$($argument: $type),*] ($($argument),*) $result);)*
+        }
+    };
+    (@hook [$($name:ident)*] $hook:ident [$($parameters:tt)*] $call:tt $result:ty) => {
+        #[inline]
+        fn $hook(&self, $($parameters)*) -> $result {
+            match self { $(Self::$name(effect) => effect.$hook $call,)* }
         }
     };
 }
 
 effects! {
+    boundary_shift::BoundaryShift,
     respiration::Respiration,
+    needle_compliance::NeedleCompliance,
     nonlinear_elasticity::NonlinearElasticity,
     stress_relaxation::StressRelaxation,
+    rate_dependent_puncture::RateDependentPuncture,
     incomplete_release::IncompleteRelease,
+    soft_boundary::SoftBoundary,
+    power_law_friction::PowerLawFriction,
+    asymmetric_friction::AsymmetricFriction,
     coulomb_friction::CoulombFriction,
+    stribeck_friction::StribeckFriction,
+    presliding_friction::PreslidingFriction,
+    cutting_force::CuttingForce,
+    hidden_membrane::HiddenMembrane,
     tool_inertia::ToolInertia,
+    drive_friction::DriveFriction,
+    force_gain::ForceGain,
+    low_pass_lag::LowPassLag,
+    time_delay::TimeDelay,
+    force_bias::ForceBias,
+    force_drift::ForceDrift,
+    periodic_interference::PeriodicInterference,
+    force_spikes::ForceSpikes,
+    saturation::Saturation,
+    quantisation::Quantisation,
+    position_scale::PositionScale,
 }
 
-impl Effect for AnyEffect {
-    fn id(&self) -> &'static str {
-        self.inner().id()
-    }
-    fn place(&self) -> Place {
-        self.inner().place()
-    }
-    fn is_neutral(&self) -> bool {
-        self.inner().is_neutral()
-    }
-    fn shape(&self, slabs: &mut [Slab]) {
-        self.inner().shape(slabs);
-    }
-    fn relative(&self, time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64) {
-        self.inner().relative(time_s, z_m, v_mps)
-    }
-    fn elastic(&self, k_n_per_m: f64, x_m: f64, force_n: f64) -> f64 {
-        self.inner().elastic(k_n_per_m, x_m, force_n)
-    }
-    fn relax(&self, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64 {
-        self.inner().relax(dt_s, elastic_n, memory)
-    }
-    fn puncture(&self, threshold_n: f64, v_mps: f64) -> f64 {
-        self.inner().puncture(threshold_n, v_mps)
-    }
-    fn on_rupture(&self, released_n: f64, z_m: f64, memory: &mut Memory) {
-        self.inner().on_rupture(released_n, z_m, memory);
-    }
-    fn friction_velocity(&self, v_mps: f64) -> f64 {
-        self.inner().friction_velocity(v_mps)
-    }
-    fn shaft_force(&self, moment: &Moment, inside_m: f64, memory: &mut Memory) -> f64 {
-        self.inner().shaft_force(moment, inside_m, memory)
-    }
-    fn tip_force(&self, moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64 {
-        self.inner().tip_force(moment, slabs, memory)
-    }
-    fn tool_force(&self, v_mps: f64, a_mps2: f64) -> f64 {
-        self.inner().tool_force(v_mps, a_mps2)
+impl AnyEffect {
+    /// Whether every parameter makes sense physically.
+    ///
+    /// # Errors
+    /// [`ParameterError`] with the first parameter that does not.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        for (parameter, value) in self.info().parameters.iter().zip(self.parameters()) {
+            let allowed = (parameter.low, parameter.high);
+            if !(allowed.0 <= value && value <= allowed.1) {
+                return Err(ParameterError { effect: self.id(), path: parameter.path, value, allowed });
+            }
+        }
+        self.check_together()
     }
 }

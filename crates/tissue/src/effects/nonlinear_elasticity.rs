@@ -1,4 +1,6 @@
+use super::Described;
 use crate::effect::{Effect, Place};
+use crate::info::{EffectInfo, ParameterInfo};
 
 /// Tissue that stiffens with indentation: `f_K = K x (1 + kappa x)`.
 ///
@@ -8,16 +10,35 @@ use crate::effect::{Effect, Place};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct NonlinearElasticity {
-    /// Stiffening `kappa` in 1/m. Neutral: 0.
+    /// Stiffening `kappa` in 1/m, -100 to 1000; negative: softening. Neutral: 0.
     pub kappa_per_m: f64,
 }
 
-impl Effect for NonlinearElasticity {
-    fn id(&self) -> &'static str {
-        "nonlinear_elasticity"
+static INFO: EffectInfo = EffectInfo {
+    id: "nonlinear_elasticity",
+    equation: "f_K = K x (1 + kappa x)",
+    source: "Okamura, Simone, O'Leary 2004",
+    signature: "The loading slope grows with depth before each rupture, the same at all speeds.",
+    place: Place::Elastic,
+    parameters: &[
+        ParameterInfo::strength("kappa_per_m", "1/m", "stiffening with indentation").allowed(-100.0, 1000.0).search(10.0, -5.0, 100.0),
+    ],
+    larger: None,
+};
+
+impl Described for NonlinearElasticity {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.kappa_per_m]
     }
-    fn place(&self) -> Place {
-        Place::Elastic
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [kappa_per_m] = *values else { return None };
+        Some(Self { kappa_per_m })
+    }
+}
+
+impl Effect for NonlinearElasticity {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
     }
     fn is_neutral(&self) -> bool {
         self.kappa_per_m == 0.0

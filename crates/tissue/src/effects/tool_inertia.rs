@@ -1,22 +1,44 @@
+use super::Described;
 use crate::effect::{Effect, Place};
+use crate::info::{EffectInfo, ParameterInfo};
 
 /// Mass of the tool beyond the sensor: `+ m a`.
 ///
-/// Signature: spikes at start and stop, also in air, proportional to the acceleration.
+/// Source: needle 0.068 kg, sensor 0.236 kg (laboratory software). Signature: spikes at start and
+/// stop, also in air, proportional to the acceleration.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ToolInertia {
-    /// Mass in kg, zero or positive. Neutral: 0.
+    /// Mass in kg, 0 to 100. Neutral: 0.
     pub mass_kg: f64,
 }
 
-impl Effect for ToolInertia {
-    fn id(&self) -> &'static str {
-        "tool_inertia"
+static INFO: EffectInfo = EffectInfo {
+    id: "tool_inertia",
+    equation: "+ m a",
+    source: "Needle 0.068 kg, sensor 0.236 kg: the laboratory's software",
+    signature: "Spikes at start and stop, also in air, in proportion to the acceleration.",
+    place: Place::Tool,
+    parameters: &[
+        ParameterInfo::strength("mass_kg", "kg", "mass beyond the sensor").allowed(0.0, 100.0).search(0.1, 0.005, 5.0).log(),
+    ],
+    larger: None,
+};
+
+impl Described for ToolInertia {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.mass_kg]
     }
-    fn place(&self) -> Place {
-        Place::Tool
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [mass_kg] = *values else { return None };
+        Some(Self { mass_kg })
+    }
+}
+
+impl Effect for ToolInertia {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
     }
     fn is_neutral(&self) -> bool {
         self.mass_kg == 0.0

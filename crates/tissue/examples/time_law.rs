@@ -1,0 +1,104 @@
+//! Prints how long one sample of the law takes: the base law, each effect alone, three at once.
+//!
+//! `cargo run --release -p stylet-tissue --example time_law`
+
+use std::hint::black_box;
+use std::time::Instant;
+use stylet_tissue::*;
+
+fn tissue() -> Tissue {
+    let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
+        name: String::new(),
+        thickness_m,
+        stiffness_n_per_m,
+        friction_ns_per_m2,
+        puncture_n,
+    };
+    Tissue {
+        surface_m: 0.0,
+        layers: vec![
+            layer(0.0282, 40.0, 9000.0, None),
+            layer(0.0377, 60.0, 12000.0, Some(2.2)),
+            layer(0.0322, 80.0, 16000.0, None),
+        ],
+    }
+}
+
+/// Advance with ripple, hold, retract: 10 000 samples at 200 Hz.
+fn motion() -> Vec<(f64, f64, f64)> {
+    let mut z = -0.005;
+    (0..10_000)
+        .map(|k| {
+            let t = f64::from(k) / 200.0;
+            let v = match k {
+                0..6000 => 0.003 + 0.002 * (2.0 * t).sin(),
+                6000..7000 => 0.0,
+                _ => -0.004,
+            };
+            z += v / 200.0;
+            (t, z, v)
+        })
+        .collect()
+}
+
+/// Nanoseconds per call of the fastest of many runs over the motion.
+fn fastest(mut run: impl FnMut(&[(f64, f64, f64)]) -> f64) -> f64 {
+    let motion = motion();
+    let mut best = f64::INFINITY;
+    for _ in 0..60 {
+        let start = Instant::now();
+        black_box(run(black_box(&motion)));
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best / motion.len() as f64 * 1e9
+}
+
+fn law_ns(effects: &[AnyEffect]) -> Result<f64, TooManyEffects> {
+    let law = Law::new(&tissue(), effects)?;
+    Ok(fastest(|motion| {
+        let mut sum = 0.0;
+        replay(&law, motion.iter().copied(), |_| {}, |force| sum += force.total_n);
+        sum
+    }))
+}
+
+fn chain_ns(effects: &[AnyEffect]) -> f64 {
+    let chain = Measurement::new(effects);
+    fastest(|motion| {
+        let mut state = chain.start(200.0);
+        let mut sum = 0.0;
+        for &(time_s, z, velocity_mps) in motion {
+            let reading = Reading { time_s, velocity_mps, tissue_n: 30.0 * z, ..Reading::default() };
+            sum += chain.step(&mut state, &reading);
+        }
+        sum
+    })
+}
+
+fn main() -> Result<(), TooManyEffects> {
+    println!("{:<36} {:>8}", "", "ns/sample");
+    println!("{:<36} {:>8.1}", "base law", law_ns(&[])?);
+    for entry in library() {
+        let mut variant = Some(entry);
+        while let Some(info) = variant {
+            let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
+            let effect = AnyEffect::from_parameters(info.id, &start);
+            let effects = effect.as_slice();
+            let ns = if info.place < Place::Tool { law_ns(effects)? } else { chain_ns(effects) };
+            let where_ = if info.place < Place::Tool { "" } else { " (chain alone)" };
+            println!("{:<36} {ns:>8.1}", format!("{} x{}{where_}", info.id, info.parameters.len()));
+            variant = info.larger;
+        }
+    }
+    let three = ["stress_relaxation", "coulomb_friction", "incomplete_release"];
+    let three: Vec<AnyEffect> = three
+        .iter()
+        .filter_map(|id| info(id))
+        .filter_map(|info| {
+            let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
+            AnyEffect::from_parameters(info.id, &start)
+        })
+        .collect();
+    println!("{:<36} {:>8.1}", "relaxation + coulomb + release", law_ns(&three)?);
+    Ok(())
+}

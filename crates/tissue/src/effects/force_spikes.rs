@@ -1,0 +1,50 @@
+use super::Described;
+use crate::effect::{Effect, Place};
+use crate::info::{EffectInfo, ParameterInfo};
+
+/// Isolated outlying samples. Only their parameters live here: the drawing is the sensor's, and the
+/// spikes enter the chain with the noise.
+///
+/// Source: lost bits and loose contacts. Signature: single samples far from their neighbours, at any
+/// depth and in air.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ForceSpikes {
+    /// Mean number per second, 0 to 1000. Neutral: 0.
+    pub rate_hz: f64,
+    /// Size of a spike in N, -1000 to 1000. Neutral: 0.
+    pub size_n: f64,
+}
+
+static INFO: EffectInfo = EffectInfo {
+    id: "force_spikes",
+    equation: "+ isolated samples of size_n, rate_hz of them per second",
+    source: "Lost bits and loose contacts",
+    signature: "Single samples far from both neighbours, at any depth and in air.",
+    place: Place::Sensor,
+    parameters: &[
+        ParameterInfo::strength("rate_hz", "Hz", "mean number per second").allowed(0.0, 1000.0).search(0.2, 0.01, 20.0).log(),
+        ParameterInfo::strength("size_n", "N", "size of a spike").allowed(-1000.0, 1000.0).search(1.0, 0.1, 20.0).log(),
+    ],
+    larger: None,
+};
+
+impl Described for ForceSpikes {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.rate_hz, self.size_n]
+    }
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [rate_hz, size_n] = *values else { return None };
+        Some(Self { rate_hz, size_n })
+    }
+}
+
+impl Effect for ForceSpikes {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_neutral(&self) -> bool {
+        self.rate_hz == 0.0 || self.size_n == 0.0
+    }
+}

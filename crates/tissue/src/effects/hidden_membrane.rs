@@ -1,0 +1,80 @@
+use super::Described;
+use crate::effect::{Effect, Memory, Moment, Place};
+use crate::info::{EffectInfo, ParameterInfo};
+use crate::slab::Slab;
+
+/// A membrane that the layers do not know: an elastic element `+ K_m max(0, z - s_1 - z_m)`, gone
+/// when its force reaches `F_m`.
+///
+/// The depth counts from the tissue's surface. The membrane is no layer: its breaking is not reported
+/// as a [`Rupture`](crate::Rupture), the active layer and its elastic force do not change, and
+/// relaxation or soft boundaries do not act on it.
+///
+/// Source: inner structures, vessels and capsules (Okamura et al. 2004, fig. 1). Signature: a peak
+/// and a drop that belong to no boundary.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct HiddenMembrane {
+    /// Depth `z_m` below the surface in metres, 0 to 1.
+    pub depth_m: f64,
+    /// Stiffness `K_m` in N/m, 0 to 1e6. Neutral: 0.
+    pub stiffness_n_per_m: f64,
+    /// Force `F_m` in N at which it breaks, 0 to 100. Neutral: 0.
+    pub puncture_n: f64,
+}
+
+static INFO: EffectInfo = EffectInfo {
+    id: "hidden_membrane",
+    equation: "+ K_m max(0, z - s_1 - z_m) until it reaches F_m, then gone",
+    source: "Inner structures: Okamura, Simone, O'Leary 2004, fig. 1",
+    signature: "A peak and a drop at a depth where no boundary is, once.",
+    place: Place::Tip,
+    parameters: &[
+        ParameterInfo::shape("depth_m", "m", "depth below the surface").allowed(0.0, 1.0).neutral(0.02).search(0.02, 0.001, 0.2),
+        ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness").allowed(0.0, 1e6).search(100.0, 5.0, 5000.0).log(),
+        ParameterInfo::strength("puncture_n", "N", "force at which it breaks").allowed(0.0, 100.0).search(0.5, 0.02, 5.0).log(),
+    ],
+    larger: None,
+};
+
+impl Described for HiddenMembrane {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.depth_m, self.stiffness_n_per_m, self.puncture_n]
+    }
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [depth_m, stiffness_n_per_m, puncture_n] = *values else { return None };
+        Some(Self { depth_m, stiffness_n_per_m, puncture_n })
+    }
+}
+
+impl Effect for HiddenMembrane {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_neutral(&self) -> bool {
+        !(self.stiffness_n_per_m > 0.0 && self.puncture_n > 0.0)
+    }
+    fn remembers(&self) -> bool {
+        true
+    }
+    /// Memory: 1 once broken.
+    fn breaks(&self, z_m: f64, slabs: &[Slab], memory: &mut Memory) -> bool {
+        if memory[0] != 0.0 || self.force(z_m, slabs) < self.puncture_n {
+            return false;
+        }
+        memory[0] = 1.0;
+        true
+    }
+    fn tip_force(&self, moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64 {
+        if memory[0] != 0.0 { 0.0 } else { self.force(moment.z_m, slabs) }
+    }
+}
+
+impl HiddenMembrane {
+    /// Its force in N with the tip at `z_m`, while whole.
+    fn force(&self, z_m: f64, slabs: &[Slab]) -> f64 {
+        let surface = slabs.first().map_or(0.0, |slab| slab.front_m);
+        self.stiffness_n_per_m * (z_m - surface - self.depth_m).max(0.0)
+    }
+}

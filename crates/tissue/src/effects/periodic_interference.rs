@@ -1,0 +1,56 @@
+use super::Described;
+use crate::effect::{Effect, Memory, Place};
+use crate::info::{EffectInfo, ParameterInfo};
+
+/// A tone in the force: `+ A sin(2 pi f t + phase)`, in air too.
+///
+/// Source: mains, drives, stage vibration. Signature: a narrow line in the periodogram in time, the
+/// same in air, in holds and at every depth.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct PeriodicInterference {
+    /// Amplitude `A` in N, 0 to 100. Neutral: 0.
+    pub amplitude_n: f64,
+    /// Frequency in Hz, 0 to 1e5.
+    pub frequency_hz: f64,
+    /// Phase at time zero in radians.
+    pub phase_rad: f64,
+}
+
+static INFO: EffectInfo = EffectInfo {
+    id: "periodic_interference",
+    equation: "+ A sin(2 pi f t + phase), in air too",
+    source: "Mains, drives, stage vibration",
+    signature: "A narrow line in time, the same in air, in holds and at every depth.",
+    place: Place::Sensor,
+    parameters: &[
+        ParameterInfo::strength("amplitude_n", "N", "amplitude").allowed(0.0, 100.0).search(0.05, 0.002, 2.0).log(),
+        ParameterInfo::shape("frequency_hz", "Hz", "frequency").allowed(0.0, 1e5).neutral(5.0).search(5.0, 0.05, 100.0).log(),
+        ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(0.0, -core::f64::consts::PI, core::f64::consts::PI),
+    ],
+    larger: None,
+};
+
+impl Described for PeriodicInterference {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.amplitude_n, self.frequency_hz, self.phase_rad]
+    }
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [amplitude_n, frequency_hz, phase_rad] = *values else { return None };
+        Some(Self { amplitude_n, frequency_hz, phase_rad })
+    }
+}
+
+impl Effect for PeriodicInterference {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_neutral(&self) -> bool {
+        self.amplitude_n == 0.0
+    }
+    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+        let angle = core::f64::consts::TAU * self.frequency_hz * time_s + self.phase_rad;
+        force_n + self.amplitude_n * libm::sin(angle)
+    }
+}

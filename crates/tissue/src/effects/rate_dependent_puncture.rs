@@ -1,0 +1,54 @@
+use super::Described;
+use crate::effect::{Effect, Place};
+use crate::info::{EffectInfo, ParameterInfo};
+
+/// Puncture force that depends on speed: `F_i -> F_i max(0.1, 1 + alpha ln(abs(v)/v0))`,
+/// `v0 = 1 mm/s`, `abs(v)` at least 0.1 mm/s.
+///
+/// Source: van Gerwen, Dankelman, van den Dobbelsteen 2012 (living tissue: falls with speed).
+/// Signature: the peak changes with speed while the loading curve does not.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct RateDependentPuncture {
+    /// Change per factor e in speed, `alpha`, -2 to 2. Neutral: 0.
+    pub alpha: f64,
+}
+
+static INFO: EffectInfo = EffectInfo {
+    id: "rate_dependent_puncture",
+    equation: "F_i -> F_i max(0.1, 1 + alpha ln(|v|/v0)), v0 = 1 mm/s, |v| at least 0.1 mm/s",
+    source: "van Gerwen, Dankelman, van den Dobbelsteen 2012",
+    signature: "The peak before a puncture changes with speed while the loading curve does not.",
+    place: Place::Puncture,
+    parameters: &[
+        ParameterInfo::strength("alpha", "", "change of the puncture force per factor e in speed").allowed(-2.0, 2.0).search(0.1, -0.5, 0.5),
+    ],
+    larger: None,
+};
+
+impl Described for RateDependentPuncture {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.alpha]
+    }
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [alpha] = *values else { return None };
+        Some(Self { alpha })
+    }
+}
+
+impl Effect for RateDependentPuncture {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_neutral(&self) -> bool {
+        self.alpha == 0.0
+    }
+    fn puncture(&self, threshold_n: f64, v_mps: f64) -> f64 {
+        if threshold_n == f64::INFINITY {
+            return threshold_n;
+        }
+        let speed = v_mps.abs().max(1e-4) / 1e-3;
+        threshold_n * (1.0 + self.alpha * libm::log(speed)).max(0.1)
+    }
+}

@@ -1,0 +1,141 @@
+//! What is known about each effect, for listing (`stylet effects`), validating and fitting.
+
+use crate::effect::Place;
+use crate::effects::LIBRARY;
+
+/// One effect of the library: what it says, where it comes from and how it shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct EffectInfo {
+    /// Stable name in snake case.
+    pub id: &'static str,
+    /// The equation, in the symbols of SPEC section 1.
+    pub equation: &'static str,
+    /// Who described it, or where it was measured.
+    pub source: &'static str,
+    /// How it is recognised in a recording.
+    pub signature: &'static str,
+    /// Place in the chain.
+    pub place: Place,
+    /// Its parameters, in the order of [`AnyEffect::parameters`](crate::AnyEffect::parameters).
+    pub parameters: &'static [ParameterInfo],
+    /// The same effect with more terms, if there is such a variant.
+    pub larger: Option<&'static EffectInfo>,
+}
+
+/// One parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ParameterInfo {
+    /// Path from the effect, as in outputs: `c_n_per_m`, `terms.0.fraction`.
+    pub path: &'static str,
+    /// Unit; empty for a ratio or a number.
+    pub unit: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Smallest value that makes sense physically.
+    pub low: f64,
+    /// Largest value that makes sense physically.
+    pub high: f64,
+    /// Value at which the effect vanishes, all strengths being at theirs. For a parameter that is
+    /// not a strength just a valid value.
+    pub neutral: f64,
+    /// True when this parameter says how strong the effect is; false for one that only shapes it
+    /// (a frequency, a time constant, a depth).
+    pub strength: bool,
+    /// Where a fit may start: a typical value.
+    pub start: f64,
+    /// Where a fit should look, for forces of 0.5-6 N, layers of 5-80 mm and 0.5-13 mm/s.
+    pub search: (f64, f64),
+    /// True when the search should go in the logarithm.
+    pub log: bool,
+    /// True when only whole numbers make sense.
+    pub whole: bool,
+}
+
+impl ParameterInfo {
+    /// A parameter that says how strong the effect is.
+    pub(crate) const fn strength(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+        Self {
+            path,
+            unit,
+            meaning,
+            low: 0.0,
+            high: f64::INFINITY,
+            neutral: 0.0,
+            strength: true,
+            start: 1.0,
+            search: (0.0, 1.0),
+            log: false,
+            whole: false,
+        }
+    }
+
+    /// A parameter that only shapes the effect.
+    pub(crate) const fn shape(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+        Self { strength: false, ..Self::strength(path, unit, meaning) }
+    }
+
+    /// Physical range, both ends included.
+    pub(crate) const fn allowed(self, low: f64, high: f64) -> Self {
+        Self { low, high, ..self }
+    }
+
+    /// Neutral value.
+    pub(crate) const fn neutral(self, neutral: f64) -> Self {
+        Self { neutral, ..self }
+    }
+
+    /// Typical value and range of a fit.
+    pub(crate) const fn search(self, start: f64, low: f64, high: f64) -> Self {
+        Self { start, search: (low, high), ..self }
+    }
+
+    /// To be searched in the logarithm.
+    pub(crate) const fn log(self) -> Self {
+        Self { log: true, ..self }
+    }
+
+    /// Whole numbers only.
+    pub(crate) const fn whole(self) -> Self {
+        Self { whole: true, ..self }
+    }
+}
+
+/// A parameter outside its physical range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterError {
+    /// Effect, by its id.
+    pub effect: &'static str,
+    /// Path of the parameter.
+    pub path: &'static str,
+    /// The value that was given.
+    pub value: f64,
+    /// What would be right, both ends included.
+    pub allowed: (f64, f64),
+}
+
+impl core::fmt::Display for ParameterError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { effect, path, value, allowed: (low, high) } = self;
+        write!(f, "{effect}: {path} is {value}; ")?;
+        if *high == f64::INFINITY {
+            write!(f, "it must be at least {low}")
+        } else {
+            write!(f, "it must lie between {low} and {high}")
+        }
+    }
+}
+
+impl core::error::Error for ParameterError {}
+
+/// All effects in the order of the chain, one entry per row of SPEC section 6.
+pub fn library() -> impl Iterator<Item = &'static EffectInfo> {
+    LIBRARY.iter().map(|entry| entry())
+}
+
+/// The entry of one effect.
+#[must_use]
+pub fn info(id: &str) -> Option<&'static EffectInfo> {
+    library().find(|entry| entry.id == id)
+}
