@@ -1,11 +1,31 @@
-//! The scenario: what is inserted into what, how, and what listens.
+//! The scenario: what is inserted into what, how, and what listens (SPEC section 8).
+//!
+//! ```
+//! let text = r#"Scenario(
+//!     name: "one gel",
+//!     tissue: (layers: [(thickness_m: 0.03, stiffness_n_per_m: 40.0, friction_ns_per_m2: 9000.0)]),
+//!     motion: Constant(start_m: -0.005, velocity_mps: 0.0023, duration_s: 20.0),
+//! )"#;
+//! let scenario = stylet_scenario::Scenario::parse("gel.ron", text)?;
+//! assert_eq!(scenario.sample_hz, 200.0);
+//! # Ok::<(), stylet_scenario::InputError>(())
+//! ```
 #![forbid(unsafe_code)]
 
+mod enhance_file;
+mod error;
+mod load;
+mod locate;
 mod motion;
 mod robot;
 mod scenario;
 mod sensor;
+mod validate;
+mod validate_enhance;
 
+pub use enhance_file::EnhanceFile;
+pub use error::{InputError, closest};
+pub use load::{Problem, load, parse, read_text, ron_options};
 pub use motion::{FROM_REST_RAD, Motion, MotionPlan, MotionPoint, Segment};
 pub use robot::{ArmConfig, Robot};
 pub use scenario::Scenario;

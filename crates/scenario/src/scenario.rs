@@ -1,9 +1,13 @@
 //! The scenario as one value.
 
+use crate::error::InputError;
+use crate::load::{Problem, parse, read_text};
 use crate::motion::Motion;
 use crate::robot::Robot;
 use crate::sensor::Sensor;
+use crate::validate;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::Model;
 use stylet_tissue::{AnyEffect, Tissue};
@@ -75,5 +79,43 @@ impl Scenario {
             }
         }
         models
+    }
+}
+
+impl Scenario {
+    /// Loads and checks a scenario file.
+    ///
+    /// # Errors
+    /// [`InputError`] with file, line, column, what is wrong and what would be right.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        Self::parse(&path.display().to_string(), &read_text(path)?)
+    }
+
+    /// Parses and checks a scenario; `file` is named in errors.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`].
+    pub fn parse(file: &str, text: &str) -> Result<Self, InputError> {
+        let scenario: Self = parse(file, text)?;
+        scenario.check().map_err(|problem| problem.in_file(file, text))?;
+        Ok(scenario)
+    }
+
+    /// Checks every number's range.
+    ///
+    /// # Errors
+    /// The first [`Problem`], with the field's path.
+    pub fn check(&self) -> Result<(), Problem> {
+        validate::scenario(self)
+    }
+
+    /// The scenario with every default written out.
+    ///
+    /// # Errors
+    /// When a value cannot be written as RON, which no checked scenario holds.
+    pub fn to_ron(&self) -> Result<String, ron::Error> {
+        let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(8);
+        let body = crate::load::ron_options().to_string_pretty(self, pretty)?;
+        Ok(format!("Scenario{body}\n"))
     }
 }

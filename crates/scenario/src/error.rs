@@ -1,0 +1,73 @@
+//! What is wrong with an input file, where, and what would be right.
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+
+/// An input file that cannot be used. The message names file, line and column, what is wrong and
+/// what would be right; rendered by `miette` it shows the place in the source.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+#[error("{place}: {what}")]
+#[diagnostic(code(stylet::input))]
+pub struct InputError {
+    /// File, and line and column when they are known: `name.ron:12:5`.
+    pub place: String,
+    /// What is wrong and what would be right.
+    pub what: String,
+    /// Line and column, from 1.
+    pub position: Option<(usize, usize)>,
+    #[source_code]
+    source_code: Option<NamedSource<String>>,
+    #[label("here")]
+    span: Option<SourceSpan>,
+}
+
+impl InputError {
+    /// An error about a whole file.
+    #[must_use]
+    pub fn file(file: &str, what: impl Into<String>) -> Self {
+        Self { place: file.to_owned(), what: what.into(), position: None, source_code: None, span: None }
+    }
+
+    /// An error about the bytes `start..end` of a file's text.
+    #[must_use]
+    pub fn at(file: &str, text: &str, start: usize, end: usize, what: impl Into<String>) -> Self {
+        let start = floor_char_boundary(text, start);
+        let end = floor_char_boundary(text, end.max(start));
+        let before = &text[..start];
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+        Self {
+            place: format!("{file}:{line}:{column}"),
+            what: what.into(),
+            position: Some((line, column)),
+            source_code: Some(NamedSource::new(file, text.to_owned())),
+            span: Some(SourceSpan::new(start.into(), end - start)),
+        }
+    }
+}
+
+fn floor_char_boundary(text: &str, index: usize) -> usize {
+    let mut index = index.min(text.len());
+    while !text.is_char_boundary(index) {
+        index -= 1;
+    }
+    index
+}
+
+/// Byte offset of a line and column (both from 1, columns in characters).
+pub(crate) fn offset(text: &str, line: usize, column: usize) -> usize {
+    let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+    let rest = &text[start.min(text.len())..];
+    start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
+}
+
+/// The known name closest to a misspelt one, when it is close enough to be meant.
+#[must_use]
+pub fn closest<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
+    let lower = wrong.to_lowercase();
+    known
+        .iter()
+        .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), *k))
+        .min()
+        .filter(|(distance, k)| *distance <= 2 + k.len() / 5)
+        .map(|(_, k)| k)
+}

@@ -1,0 +1,196 @@
+//! Ranges: what a scenario must satisfy beyond its syntax. RON reads `NaN`, `-inf` and turns `1e400`
+//! into infinity, so every number is checked.
+
+use crate::load::Problem;
+use crate::motion::{Motion, Segment};
+use crate::scenario::Scenario;
+use crate::sensor::{ForceTorque, Sensor};
+use crate::validate_enhance::enhance;
+
+/// More samples than this are refused: a mistyped rate or duration.
+const MOST_SAMPLES: f64 = 5e7;
+
+pub(crate) type Checked = Result<(), Problem>;
+
+pub(crate) fn check(path: impl Into<String>, value: f64, ok: bool, right: &str) -> Checked {
+    if ok && value.is_finite() { Ok(()) } else { Err(Problem::new(path, format!("is {value}; {right}"))) }
+}
+
+pub(crate) fn positive(path: impl Into<String>, value: f64, unit: &str) -> Checked {
+    check(path, value, value > 0.0, &format!("it must be a positive number of {unit}"))
+}
+
+pub(crate) fn not_negative(path: impl Into<String>, value: f64, unit: &str) -> Checked {
+    check(path, value, value >= 0.0, &format!("it must be zero or a positive number of {unit}"))
+}
+
+pub(crate) fn finite(path: impl Into<String>, value: f64, unit: &str) -> Checked {
+    check(path, value, true, &format!("it must be a finite number of {unit}"))
+}
+
+/// Checks a scenario; the first problem found.
+pub(crate) fn scenario(s: &Scenario) -> Checked {
+    if s.name.trim().is_empty() {
+        return Err(Problem::new("name", "is empty; say what the scenario is"));
+    }
+    tissue(s)?;
+    for (i, effect) in s.effects.iter().enumerate() {
+        effect_in_range(i, effect)?;
+    }
+    check("sample_hz", s.sample_hz, s.sample_hz > 0.0, "it must be positive, for example 200.0")?;
+    check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
+    let steps = s.physics_hz / s.sample_hz;
+    if steps < 1.0 - 1e-9 || (steps - steps.round()).abs() > 1e-9 * steps {
+        let nearest = steps.round().max(1.0) * s.sample_hz;
+        return Err(Problem::new(
+            "physics_hz",
+            format!(
+                "is {}, which is not a whole multiple of sample_hz {}; the nearest is {nearest}",
+                s.physics_hz, s.sample_hz
+            ),
+        ));
+    }
+    check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
+    motion(s)?;
+    sensors(&s.sensor)?;
+    enhance("enhance", &s.enhance)
+}
+
+fn tissue(s: &Scenario) -> Checked {
+    finite("tissue.surface_m", s.tissue.surface_m, "metres")?;
+    if s.tissue.layers.is_empty() {
+        return Err(Problem::new("tissue.layers", "has no layer; give at least one"));
+    }
+    for (i, layer) in s.tissue.layers.iter().enumerate() {
+        let at = |field: &str| format!("tissue.layers[{i}].{field}");
+        positive(at("thickness_m"), layer.thickness_m, "metres")?;
+        check(
+            at("thickness_m"),
+            layer.thickness_m,
+            layer.thickness_m <= 1.0,
+            "a layer is at most 1 m thick; is this in millimetres?",
+        )?;
+        not_negative(at("stiffness_n_per_m"), layer.stiffness_n_per_m, "N/m")?;
+        not_negative(at("friction_ns_per_m2"), layer.friction_ns_per_m2, "N s/m²")?;
+        if let Some(force) = layer.puncture_n {
+            positive(at("puncture_n"), force, "N")?;
+        }
+    }
+    Ok(())
+}
+
+fn effect_in_range(index: usize, effect: &stylet_tissue::AnyEffect) -> Checked {
+    let _ = (index, effect);
+    Ok(())
+}
+
+fn speed(path: impl Into<String> + Clone, value: f64) -> Checked {
+    finite(path.clone(), value, "m/s")?;
+    check(path, value, value.abs() <= 1.0, "speeds are at most 1 m/s; is this in mm/s?")
+}
+
+fn motion(s: &Scenario) -> Checked {
+    match &s.motion {
+        Motion::Constant { start_m, velocity_mps, duration_s } => {
+            finite("motion.start_m", *start_m, "metres")?;
+            speed("motion.velocity_mps", *velocity_mps)?;
+            positive("motion.duration_s", *duration_s, "seconds")?;
+        }
+        Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, phase_rad, duration_s } => {
+            finite("motion.start_m", *start_m, "metres")?;
+            positive("motion.amplitude_m", *amplitude_m, "metres")?;
+            frequency("motion.frequency_hz".to_owned(), *frequency_hz, s.sample_hz)?;
+            finite("motion.phase_rad", *phase_rad, "radians")?;
+            positive("motion.duration_s", *duration_s, "seconds")?;
+            speed("motion.amplitude_m", amplitude_m * frequency_hz * core::f64::consts::TAU)?;
+        }
+        Motion::Program { start_m, segments } => {
+            finite("motion.start_m", *start_m, "metres")?;
+            if segments.is_empty() {
+                return Err(Problem::new("motion.segments", "is empty; give at least one segment"));
+            }
+            for (i, segment) in segments.iter().enumerate() {
+                let at = |field: &str| format!("motion.segments[{i}].{field}");
+                positive(at("duration_s"), segment.duration_s(), "seconds")?;
+                match *segment {
+                    Segment::Move { velocity_mps, .. } => speed(at("velocity_mps"), velocity_mps)?,
+                    Segment::Hold { .. } => {}
+                    Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, .. } => {
+                        speed(at("velocity_mps"), velocity_mps)?;
+                        speed(at("amplitude_mps"), amplitude_mps)?;
+                        frequency(at("frequency_hz"), frequency_hz, s.sample_hz)?;
+                    }
+                }
+            }
+        }
+        Motion::Recorded => {}
+    }
+    reaches(s)
+}
+
+fn frequency(path: String, value: f64, sample_hz: f64) -> Checked {
+    check(
+        path,
+        value,
+        value > 0.0 && value < sample_hz / 2.0,
+        &format!("it must lie between 0 and half of sample_hz, {} Hz", sample_hz / 2.0),
+    )
+}
+
+/// The motion must be short enough to store and must come to the tissue.
+fn reaches(s: &Scenario) -> Checked {
+    let Some(plan) = s.motion.plan() else {
+        return Ok(());
+    };
+    let samples = plan.duration_s() * s.sample_hz;
+    if samples > MOST_SAMPLES {
+        return Err(Problem::new(
+            "motion",
+            format!(
+                "makes {samples:.3e} samples at {} Hz; at most {MOST_SAMPLES:.0e} are simulated",
+                s.sample_hz
+            ),
+        ));
+    }
+    if samples < 2.0 {
+        return Err(Problem::new(
+            "motion",
+            format!("lasts {} s, less than two samples at {} Hz", plan.duration_s(), s.sample_hz),
+        ));
+    }
+    let furthest_m = plan.furthest_m(s.sample_hz);
+    if furthest_m <= s.tissue.surface_m {
+        return Err(Problem::new(
+            "motion",
+            format!(
+                "never reaches the tissue: the tip comes to {furthest_m:.4} m and the surface lies at {} m; \
+                 start nearer, move longer, or move the other way",
+                s.tissue.surface_m
+            ),
+        ));
+    }
+    Ok(())
+}
+
+fn sensors(sensor: &Sensor) -> Checked {
+    match sensor {
+        Sensor::ForceTorque(config) => force_torque("sensor", config),
+        Sensor::Virtual(config) => positive("sensor.gain_per_s", config.gain_per_s, "1/s"),
+        Sensor::Both { force_torque: config, virtual_sensor } => {
+            force_torque("sensor.force_torque", config)?;
+            positive("sensor.virtual_sensor.gain_per_s", virtual_sensor.gain_per_s, "1/s")
+        }
+    }
+}
+
+fn force_torque(at: &str, c: &ForceTorque) -> Checked {
+    not_negative(format!("{at}.noise_n"), c.noise_n, "N")?;
+    check(format!("{at}.ar1"), c.ar1, c.ar1 > -1.0 && c.ar1 < 1.0, "it must lie between -1 and 1")?;
+    finite(format!("{at}.bias_n"), c.bias_n, "N")?;
+    finite(format!("{at}.drift_n_per_s"), c.drift_n_per_s, "N/s")?;
+    not_negative(format!("{at}.quantisation_n"), c.quantisation_n, "N")?;
+    match c.range_n {
+        Some(range) => positive(format!("{at}.range_n"), range, "N"),
+        None => Ok(()),
+    }
+}

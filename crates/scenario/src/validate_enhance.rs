@@ -1,0 +1,78 @@
+//! Ranges of the online algorithm's configuration.
+
+use crate::load::Problem;
+use crate::validate::{Checked, check, finite, not_negative, positive};
+use stylet_core::config::{Depths, EnhanceConfig, Reset};
+
+/// Checks a configuration whose fields stand at `at` in the file; an empty `at` is the top.
+pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
+    let path = |field: &str| if at.is_empty() { field.to_owned() } else { format!("{at}.{field}") };
+    match c.reset {
+        Reset::Frequency { hz } => positive(path("reset.hz"), hz, "Hz")?,
+        Reset::Trace { below } => positive(path("reset.below"), below, "covariance units")?,
+        Reset::Ruptures => {}
+    }
+    if let Depths::Known(thicknesses) = &c.depths {
+        if thicknesses.is_empty() {
+            return Err(Problem::new(path("depths"), "is empty; give one thickness in metres per layer"));
+        }
+        for (i, d) in thicknesses.iter().enumerate() {
+            positive(format!("{}[{i}]", path("depths")), *d, "metres")?;
+        }
+    }
+    check(
+        path("forgetting"),
+        c.forgetting,
+        c.forgetting > 0.0 && c.forgetting <= 1.0,
+        "it must lie above 0 and be at most 1",
+    )?;
+    positive(path("prior_stiffness"), c.prior_stiffness, "(N/m)²")?;
+    positive(path("prior_friction"), c.prior_friction, "friction units squared")?;
+    let s = &c.cusum;
+    positive(path("cusum.sigma_ordinary_n"), s.sigma_ordinary_n, "N")?;
+    check(
+        path("cusum.sigma_rupture_n"),
+        s.sigma_rupture_n,
+        s.sigma_rupture_n > s.sigma_ordinary_n,
+        &format!("it must be larger than sigma_ordinary_n, {}", s.sigma_ordinary_n),
+    )?;
+    let d = &c.derivative;
+    positive(path("derivative.on_n_per_s"), d.on_n_per_s, "N/s")?;
+    check(
+        path("derivative.off_n_per_s"),
+        d.off_n_per_s,
+        d.off_n_per_s < d.on_n_per_s,
+        &format!("it must be smaller than on_n_per_s, {}", d.on_n_per_s),
+    )?;
+    positive(path("derivative.force_time_constant_s"), d.force_time_constant_s, "seconds")?;
+    positive(path("derivative.derivative_time_constant_s"), d.derivative_time_constant_s, "seconds")?;
+    let d = &c.drop;
+    positive(path("drop.travel_m"), d.travel_m, "metres")?;
+    positive(path("drop.longest_s"), d.longest_s, "seconds")?;
+    not_negative(path("drop.compensation_travel_m"), d.compensation_travel_m, "metres")?;
+    not_negative(path("drop.settle_s"), d.settle_s, "seconds")?;
+    positive(path("drop.standstill_mps"), d.standstill_mps, "m/s")?;
+    let [low, high] = d.share_limits;
+    check(
+        format!("{}[0]", path("drop.share_limits")),
+        low,
+        low > 0.0 && low < high && high < 1.0,
+        "the two limits must satisfy 0 < low < high < 1",
+    )?;
+    finite(format!("{}[1]", path("drop.share_limits")), high, "share")?;
+    if d.replay_per_tick == 0 {
+        return Err(Problem::new(path("drop.replay_per_tick"), "is 0; it must be at least 1"));
+    }
+    let k = &c.contact_search;
+    positive(path("contact_search.time_constant_s"), k.time_constant_s, "seconds")?;
+    positive(path("contact_search.noise_sds"), k.noise_sds, "standard deviations")?;
+    not_negative(path("contact_search.smallest_noise_n"), k.smallest_noise_n, "N")?;
+    not_negative(path("contact_search.learn_s"), k.learn_s, "seconds")?;
+    not_negative(path("contact_search.extrapolate_over_m"), k.extrapolate_over_m, "metres")?;
+    let g = &c.guard;
+    not_negative(path("guard.blind_travel_m"), g.blind_travel_m, "metres")?;
+    positive(path("guard.acceleration_time_constant_s"), g.acceleration_time_constant_s, "seconds")?;
+    positive(path("guard.sudden_mps2"), g.sudden_mps2, "m/s²")?;
+    not_negative(path("guard.rest_s"), g.rest_s, "seconds")?;
+    not_negative(path("guard.slowing_per_s"), g.slowing_per_s, "1/s")
+}

@@ -1,0 +1,168 @@
+//! What the online core made of a recording: every output as a column, and the offline estimate
+//! beside it.
+
+use crate::offline::{LayerSample, OfflineEstimate, offline};
+use crate::score::Score;
+use crate::scorer::{LayerTruth, Moment, Scorer};
+use stylet_core::config::{EnhanceConfig, Model};
+use stylet_core::{Detection, Enhancer, LayerEstimate, Sample, State};
+use stylet_record::{Recording, Truth};
+
+/// Samples of a layer that the core keeps for its re-run.
+pub const STORAGE_SAMPLES: usize = 16_384;
+
+/// The core's outputs over a recording, one value per sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Enhanced force in N.
+    pub enhanced_n: Vec<f64>,
+    /// Reconstructed force in N.
+    pub reconstructed_n: Vec<f64>,
+    /// Innovation in N.
+    pub error_n: Vec<f64>,
+    /// Stiffness estimate in N/m; not a number before contact.
+    pub stiffness_n_per_m: Vec<f64>,
+    /// Friction estimate in the model's unit; not a number before contact.
+    pub friction: Vec<f64>,
+    /// Cumulative friction in N s/m.
+    pub cumulative_friction_ns_per_m: Vec<f64>,
+    /// CUSUM in N².
+    pub cusum_n2: Vec<f64>,
+    /// Force derivative in N/s.
+    pub derivative_n_per_s: Vec<f64>,
+    /// State.
+    pub state: Vec<State>,
+    /// Declared ruptures.
+    pub detections: Vec<Detection>,
+    /// Estimates of the traversed layers.
+    pub estimates: Vec<LayerEstimate>,
+    /// Position of the first contact in m.
+    pub contact_m: Option<f64>,
+    /// Time at which the needle was first at that position, in s.
+    pub contact_s: Option<f64>,
+    /// Samples that the core passed over.
+    pub unused: usize,
+}
+
+impl Trace {
+    /// Runs a core over the columns of a recording; `force_n` is the sensor's column. `each` sees
+    /// every sample with the core's output.
+    #[must_use]
+    pub fn record(
+        recording: &Recording,
+        force_n: &[f64],
+        config: &EnhanceConfig,
+        surface_m: f64,
+        mut each: impl FnMut(usize, &stylet_core::Output),
+    ) -> Self {
+        let mut core = Enhancer::new(config.clone(), surface_m, vec![Sample::default(); STORAGE_SAMPLES]);
+        let mut trace = Trace::default();
+        for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
+            let out = core.step(Sample {
+                time_s: s.time_s,
+                position_m: s.position_m,
+                velocity_mps: s.velocity_mps,
+                force_n,
+            });
+            each(index, &out);
+            let touched = out.theta != [0.0, 0.0];
+            trace.enhanced_n.push(out.enhanced_n);
+            trace.reconstructed_n.push(out.reconstructed_n);
+            trace.error_n.push(out.error_n);
+            trace.stiffness_n_per_m.push(if touched { out.theta[0] } else { f64::NAN });
+            trace.friction.push(if touched { out.theta[1] } else { f64::NAN });
+            trace.cumulative_friction_ns_per_m.push(out.cumulative_friction_ns_per_m);
+            trace.cusum_n2.push(out.cusum_n2);
+            trace.derivative_n_per_s.push(out.derivative_n_per_s);
+            trace.state.push(out.state);
+            trace.detections.extend(out.detection);
+            trace.estimates.extend(out.estimate);
+            trace.contact_m = out.contact_m;
+            trace.unused += usize::from(!out.used);
+        }
+        trace.contact_s =
+            trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
+        trace
+    }
+
+    /// Offline estimate of the layer between `start_m` and `end_m`, whose samples are those before
+    /// `until_s`, given the cumulative friction of the layers before and the elastic share and mean
+    /// speed that decide the split when the data do not.
+    fn offline(
+        recording: &Recording,
+        force_n: &[f64],
+        span: (f64, f64, f64),
+        cumulative_ns_per_m: f64,
+        estimate: Option<&LayerEstimate>,
+    ) -> Option<OfflineEstimate> {
+        let (start_m, end_m, until_s) = span;
+        let inside = || {
+            recording.samples().zip(force_n).filter(move |(s, _)| {
+                s.position_m > start_m && s.position_m < end_m && s.time_s < until_s && s.velocity_mps > 0.0
+            })
+        };
+        let (count, speeds) = inside().fold((0.0, 0.0), |(n, sum), (s, _)| (n + 1.0, sum + s.velocity_mps));
+        let speed_mps: f64 = speeds / count;
+        let share = estimate.map_or(0.5, |e| e.elastic_share);
+        let ratio = ((1.0 - share) / share).sqrt() / speed_mps;
+        offline(
+            inside().map(|(s, f)| LayerSample {
+                depth_m: s.position_m - start_m,
+                velocity_mps: s.velocity_mps,
+                force_n: f - cumulative_ns_per_m * s.velocity_mps,
+            }),
+            ratio,
+        )
+    }
+}
+
+/// Runs the core over a simulated recording and scores it against the truth.
+#[must_use]
+pub fn score_run(
+    recording: &Recording,
+    force_n: &[f64],
+    truth: &Truth,
+    layers: &[LayerTruth],
+    config: &EnhanceConfig,
+) -> (Trace, Score) {
+    let mut scorer = Scorer::new(layers.to_vec(), config.model);
+    for rupture in &truth.ruptures {
+        scorer.rupture(*rupture);
+    }
+    let surface_m = layers.first().map_or(0.0, |l| l.front_m);
+    let trace = Trace::record(recording, force_n, config, surface_m, |index, out| {
+        scorer.sample(
+            &Moment {
+                position_m: recording.position_m[index],
+                force_n: force_n[index],
+                tip_n: truth.tip_force_n[index],
+            },
+            out,
+        );
+    });
+    let mut score = scorer.finish();
+    let mut cumulative = 0.0;
+    for index in 0..score.layers.len() {
+        let rupture = score.ruptures[index];
+        let Some(layer) = layers.get(rupture.layer - 1) else { continue };
+        let estimate = rupture.detection.and_then(|d| trace.estimates.iter().find(|e| e.layer == d));
+        let span = (layer.front_m, rupture.true_m, rupture.true_s);
+        if let Some(found) = Trace::offline(recording, force_n, span, cumulative, estimate) {
+            cumulative += found.friction_ns_per_m2.max(0.0) * (rupture.true_m - layer.front_m);
+            let slot = &mut score.layers[index];
+            slot.offline_stiffness_n_per_m = Some(found.stiffness_n_per_m);
+            slot.offline_friction_ns_per_m2 = Some(found.friction_ns_per_m2);
+            slot.offline_separable = Some(found.separable);
+        }
+    }
+    (trace, score)
+}
+
+/// Short name of a model, as in `paper/ml/force_torque`.
+#[must_use]
+pub fn model_name(model: Model) -> &'static str {
+    match model {
+        Model::KelvinVoigt => "kv",
+        Model::MultiLayer => "ml",
+    }
+}
