@@ -12,7 +12,7 @@ use crate::effect::{Moment, SGN_DEAD_BAND_MPS, sgn};
 use crate::law::{Law, LawState, Rupture, TissueForce};
 
 /// Largest surplus in metres that counts as balance.
-const TOLERANCE_M: f64 = 1e-14;
+const TOLERANCE_M: f64 = 1e-13;
 
 /// Evaluations of the law per search at most.
 const MAX_TRIALS: usize = 80;
@@ -123,17 +123,21 @@ impl Law {
 
     /// How fast the surplus rises with the unknown by stiffness and viscous friction alone.
     fn slope(&self, state: &LawState, step: &Step, u: f64) -> f64 {
-        let (z, _) = step.tip(u);
-        let stiffness = match self.slabs.get(state.ruptured) {
-            Some(slab) if z >= slab.front_m => slab.stiffness_n_per_m,
-            _ => 0.0,
-        };
-        let by_depth = 1.0 + stiffness / self.needle_n_per_m;
-        if step.dt == 0.0 {
-            return by_depth;
+        let (z, v) = step.tip(u);
+        let mut friction = 0.0;
+        let mut by_depth = 0.0;
+        for (i, slab) in self.slabs.iter().enumerate() {
+            let inside = slab.inside_m(z);
+            friction += slab.friction_ns_per_m2 * inside;
+            if inside > 0.0 && inside < slab.thickness_m {
+                by_depth += slab.friction_ns_per_m2 * v;
+            }
+            if i == state.ruptured && inside > 0.0 {
+                by_depth += slab.stiffness_n_per_m;
+            }
         }
-        let friction: f64 = self.slabs.iter().map(|slab| slab.friction_ns_per_m2 * slab.inside_m(z)).sum();
-        step.dt * by_depth + friction / self.needle_n_per_m
+        let by_depth = 1.0 + by_depth.max(0.0) / self.needle_n_per_m;
+        if step.dt > 0.0 { step.dt * by_depth + friction / self.needle_n_per_m } else { by_depth }
     }
 
     /// Solves `z_tip + f/k_s - z = 0` with the layers as they are.

@@ -54,6 +54,6 @@ impl Effect for PowerLawFriction {
     }
     fn friction_velocity(&self, v_mps: f64) -> f64 {
         let sign = sgn(v_mps);
-        if sign == 0.0 { 0.0 } else { sign * 1e-3 * libm::pow(v_mps.abs() / 1e-3, self.exponent) }
+        if sign == 0.0 { 0.0 } else { sign * 1e-3 * libm::exp(self.exponent * libm::log(v_mps.abs() / 1e-3)) }
     }
 }

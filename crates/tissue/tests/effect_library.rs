@@ -1,0 +1,220 @@
+//! Promise: the library describes every effect of SPEC section 6 completely and truly, a neutral
+//! effect leaves the base law bit for bit on any motion, and all of them together stay finite.
+
+mod common;
+use common::*;
+use proptest::prelude::*;
+use stylet_tissue::*;
+
+const SPEC_SECTION_6: [&str; 27] = [
+    "nonlinear_elasticity",
+    "stress_relaxation",
+    "coulomb_friction",
+    "stribeck_friction",
+    "presliding_friction",
+    "asymmetric_friction",
+    "power_law_friction",
+    "cutting_force",
+    "incomplete_release",
+    "rate_dependent_puncture",
+    "hidden_membrane",
+    "boundary_shift",
+    "soft_boundary",
+    "respiration",
+    "needle_compliance",
+    "tool_inertia",
+    "drive_friction",
+    "force_gain",
+    "low_pass_lag",
+    "time_delay",
+    "force_bias",
+    "force_drift",
+    "periodic_interference",
+    "saturation",
+    "quantisation",
+    "position_scale",
+    "force_spikes",
+];
+
+#[test]
+fn the_library_holds_every_row_of_the_specification_once_in_the_order_of_the_chain() {
+    let mut ids: Vec<&str> = library().map(|info| info.id).collect();
+    let places: Vec<Place> = library().map(|info| info.place).collect();
+    assert!(places.is_sorted(), "{places:?}");
+    let mut spec = SPEC_SECTION_6;
+    ids.sort_unstable();
+    spec.sort_unstable();
+    assert_eq!(ids, spec);
+    assert!(info("coulomb_friction").is_some() && info("magic").is_none());
+}
+
+#[test]
+fn every_parameter_has_a_typical_value_inside_its_search_range_inside_its_allowed_range() {
+    for effect in typical_effects() {
+        let info = effect.info();
+        assert!(
+            !info.equation.is_empty() && !info.source.is_empty() && info.signature.ends_with('.'),
+            "{info:?}"
+        );
+        assert!(info.parameters.iter().any(|p| p.strength), "{} has no strength", info.id);
+        for p in info.parameters {
+            let (low, high) = p.search;
+            let name = format!("{}.{}", info.id, p.path);
+            assert!(p.low <= low && low < high && high <= p.high, "{name}: {p:?}");
+            assert!(low <= p.start && p.start <= high, "{name}: {p:?}");
+            assert!(p.low <= p.neutral && p.neutral <= p.high, "{name}: {p:?}");
+            assert!(!p.log || low > 0.0, "{name}: logarithm of {low}");
+        }
+    }
+}
+
+#[test]
+fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
+    for effect in typical_effects() {
+        let info = effect.info();
+        assert_eq!(effect.id(), info.id);
+        assert_eq!(effect.place(), info.place);
+        assert!(!effect.is_neutral(), "{effect:?}");
+        effect.check().expect("typical values are allowed");
+        let values = effect.parameters();
+        assert_eq!(values.len(), info.parameters.len());
+        assert_eq!(AnyEffect::from_parameters(info.id, &values), Some(effect.clone()));
+        assert_eq!(AnyEffect::from_parameters(info.id, &[0.1; 9]), None);
+        // The strengths alone make it vanish, whatever the shape.
+        let strengths_off: Vec<f64> =
+            info.parameters.iter().map(|p| if p.strength { p.neutral } else { p.start }).collect();
+        let all_off: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
+        for values in [strengths_off, all_off] {
+            let neutral = AnyEffect::from_parameters(info.id, &values).expect("right number");
+            assert!(neutral.is_neutral(), "{neutral:?}");
+            neutral.check().expect("neutral values are allowed");
+        }
+    }
+    assert_eq!(AnyEffect::from_parameters("magic", &[1.0]), None);
+}
+
+#[test]
+fn a_parameter_out_of_range_is_named_with_what_would_be_right() {
+    let refuse = |effect: AnyEffect| effect.check().expect_err("out of range");
+    let error = refuse(CoulombFriction { c_n_per_m: -1.0 }.into());
+    assert_eq!((error.effect, error.path, error.value), ("coulomb_friction", "c_n_per_m", -1.0));
+    assert!(error.to_string().contains("between 0 and 10000"), "{error}");
+    assert_eq!(refuse(NeedleCompliance { stiffness_n_per_m: 0.0 }.into()).path, "stiffness_n_per_m");
+    assert_eq!(refuse(ForceBias { force_n: f64::NAN }.into()).path, "force_n");
+    let stribeck = StribeckFriction { c_n_per_m: 5.0, c_static_n_per_m: 4.0, v_stribeck_mps: 1e-3 };
+    assert_eq!(refuse(stribeck.into()).allowed.0, 5.0);
+    let term = |fraction| PronyTerm { fraction, time_constant_s: 1.0 };
+    assert_eq!(
+        refuse(StressRelaxation { terms: vec![term(0.6), term(0.6)] }.into()).path,
+        "terms.1.fraction"
+    );
+    assert_eq!(refuse(StressRelaxation { terms: vec![term(0.1); 3] }.into()).path, "terms");
+    assert_eq!(refuse(BoundaryShift { layer: 0, shift_m: 0.001 }.into()).path, "layer");
+}
+
+fn neutral_effects() -> Vec<AnyEffect> {
+    let off = |effect: AnyEffect| {
+        let info = effect.info();
+        let values: Vec<f64> =
+            info.parameters.iter().map(|p| if p.strength { p.neutral } else { p.start }).collect();
+        AnyEffect::from_parameters(info.id, &values).expect("right number")
+    };
+    typical_effects().into_iter().map(off).collect()
+}
+
+fn bits(forces: &[TissueForce]) -> Vec<u64> {
+    forces
+        .iter()
+        .flat_map(|f| [f.total_n, f.tip_n, f.cumulative_friction_ns_per_m])
+        .map(f64::to_bits)
+        .collect()
+}
+
+prop_compose! {
+    fn any_motion()(
+        start in -0.01f64..0.001, mean in 0.0005f64..0.013, ripple in 0.0f64..0.013, hz in 0.05f64..2.0, rate in 20.0f64..500.0,
+    ) -> Vec<Sample> {
+        ripple_hold_retract(start, mean, ripple, hz, rate)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn each_neutral_effect_leaves_the_base_law_bit_for_bit(motion in any_motion()) {
+        let base = bits(&run(&three_gels(), &[], &motion).0);
+        for effect in neutral_effects() {
+            let with = bits(&run(&three_gels(), std::slice::from_ref(&effect), &motion).0);
+            prop_assert!(base == with, "{:?}", effect);
+        }
+        prop_assert_eq!(&base, &bits(&run(&three_gels(), &neutral_effects(), &motion).0));
+        let chain = Measurement::new(&neutral_effects());
+        prop_assert!(chain.is_plain());
+        let mut state = chain.start(200.0);
+        for (k, &(time_s, z, velocity_mps)) in motion.iter().enumerate() {
+            let tissue_n = f64::from_bits(base[3 * k]);
+            let reading = Reading { time_s, velocity_mps, acceleration_mps2: 1.0, tissue_n, noise_n: 0.0 };
+            prop_assert_eq!(chain.step(&mut state, &reading).to_bits(), base[3 * k]);
+            prop_assert_eq!(chain.position(z).to_bits(), z.to_bits());
+        }
+    }
+
+    /// All at once, at a random strength each: finite, bounded, the same twice, in any order.
+    #[test]
+    fn all_effects_together_are_finite_and_deterministic(
+        motion in any_motion(), shares in proptest::collection::vec(0.0f64..1.0, 80), turn in 0usize..20,
+    ) {
+        let mut shares = shares.into_iter();
+        let mut effects: Vec<AnyEffect> = library()
+            .map(|info| {
+                let values: Vec<f64> = info.parameters.iter().map(|p| {
+                    let share = shares.next().unwrap_or(0.5);
+                    let (low, high) = p.search;
+                    if p.whole { 1.0 } else if p.log { low * (high / low).powf(share) } else { low + share * (high - low) }
+                }).collect();
+                AnyEffect::from_parameters(info.id, &values).expect("right number")
+            })
+            .collect();
+        let (forces, ruptures) = run(&three_gels(), &effects, &motion);
+        for f in &forces {
+            prop_assert!(f.total_n.is_finite() && f.total_n.abs() < 1e4, "{:?}", f);
+            prop_assert!((f.elastic_n + f.friction_n + f.tip_extra_n - f.total_n).abs() < 1e-6 * (1.0 + f.total_n.abs()), "{:?}", f);
+        }
+        prop_assert!(ruptures.windows(2).all(|w| w[0].layer < w[1].layer && w[0].time_s <= w[1].time_s));
+        let again = run(&three_gels(), &effects, &motion);
+        prop_assert_eq!(&bits(&forces), &bits(&again.0));
+        effects.rotate_left(turn);
+        let turned = run(&three_gels(), &effects, &motion);
+        prop_assert_eq!(bits(&forces), bits(&turned.0));
+    }
+}
+
+#[test]
+fn every_typical_effect_of_the_tissue_changes_the_force() {
+    let base = forces(&three_gels(), &[], &usual_motion());
+    for effect in typical_effects().into_iter().filter(|e| e.place() < Place::Tool) {
+        let changed = forces(&three_gels(), std::slice::from_ref(&effect), &usual_motion());
+        assert!(worst(&base, &changed) > 0.02, "{effect:?} changes the force by {}", worst(&base, &changed));
+    }
+}
+
+#[test]
+fn a_sample_that_is_not_a_number_has_no_force_and_leaves_no_trace() {
+    let effects: Vec<AnyEffect> =
+        typical_effects().into_iter().filter(|e| e.id() != "stress_relaxation").collect();
+    let law = Law::new(&three_gels(), &effects).expect("few effects");
+    let mut state = LawState::default();
+    for (k, (t, z, v)) in usual_motion().into_iter().enumerate() {
+        if k % 100 == 50 {
+            let before = state;
+            for broken in [(f64::NAN, z, v), (t, f64::NAN, v), (t, z, f64::INFINITY)] {
+                let force = law.step(&mut state, broken.0, broken.1, broken.2, |_| {});
+                assert!(force.total_n.is_nan());
+            }
+            assert_eq!(before, state);
+        }
+        assert!(law.step(&mut state, t, z, v, |_| {}).total_n.is_finite());
+    }
+    assert_eq!(state.ruptured(), 2, "the motion went through layers");
+}
