@@ -1,1 +1,36 @@
-//! Part of Stylet.
+//! The `stylet` command line: arguments, terminal output, exit codes.
+#![forbid(unsafe_code)]
+
+mod args;
+mod enhance;
+pub mod exit;
+mod hash;
+mod output;
+mod picture;
+mod run;
+mod terminal;
+
+use args::{Cli, Command};
+use clap::Parser;
+use exit::Failure;
+use std::process::ExitCode;
+
+/// Runs the command line and returns the exit code (see [`exit`]).
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    // A panic is a bug: it ends with the code for internal errors, not with an abort of its own.
+    let outcome = std::panic::catch_unwind(|| match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Enhance(args) => enhance::enhance(args),
+    })
+    .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
+    match outcome {
+        Ok(()) => ExitCode::from(exit::DONE),
+        Err(failure) => {
+            let code = failure.code();
+            eprintln!("{:?}", miette::Report::new(failure));
+            code
+        }
+    }
+}

@@ -1,2 +1,7 @@
 //! The `stylet` binary.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    stylet_cli::main()
+}

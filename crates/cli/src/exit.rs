@@ -1,0 +1,63 @@
+//! How a command ends: exit codes, and errors that say what, where and what would be right.
+
+use miette::Diagnostic;
+use std::process::ExitCode;
+
+/// Exit code: the command did what it was asked.
+pub const DONE: u8 = 0;
+/// Exit code: a gate or a check failed.
+pub const CHECK_FAILED: u8 = 1;
+/// Exit code: the input is wrong; the message names file, line and field.
+pub const INPUT_WRONG: u8 = 2;
+/// Exit code: an internal error; please report it.
+pub const INTERNAL: u8 = 3;
+
+/// Why a command ended early.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum Failure {
+    /// A scenario or configuration is wrong.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Input(Box<stylet_scenario::InputError>),
+    /// A recording is wrong.
+    #[error(transparent)]
+    Recording(#[from] stylet_record::RecordError),
+    /// The scenario asks for what cannot be simulated.
+    #[error("{file}: {why}")]
+    Simulate {
+        /// Scenario file.
+        file: String,
+        /// Reason and remedy.
+        why: stylet_testbed::SimulateError,
+    },
+    /// The output cannot be written.
+    #[error("{path}: cannot be written: {why}; nothing was changed there")]
+    Output {
+        /// File or folder.
+        path: String,
+        /// What the system says.
+        why: std::io::Error,
+    },
+    /// A mistake of ours.
+    #[error("internal error: {0}; please report it")]
+    Internal(String),
+}
+
+impl From<stylet_scenario::InputError> for Failure {
+    fn from(error: stylet_scenario::InputError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+impl Failure {
+    /// The exit code that goes with it.
+    #[must_use]
+    pub fn code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Failure::Input(_) | Failure::Recording(_) | Failure::Simulate { .. } | Failure::Output { .. } => {
+                INPUT_WRONG
+            }
+            Failure::Internal(_) => INTERNAL,
+        })
+    }
+}

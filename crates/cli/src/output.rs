@@ -1,0 +1,56 @@
+//! Writing results so that nothing half-written is ever left behind: every file is written beside
+//! its place under another name and moved there when all are complete.
+
+use crate::exit::Failure;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Files of one output folder, waiting to be written together.
+#[derive(Debug, Default)]
+pub struct Output {
+    files: Vec<(&'static str, Vec<u8>)>,
+}
+
+impl Output {
+    /// Adds a file.
+    pub fn add(&mut self, name: &'static str, content: impl Into<Vec<u8>>) {
+        self.files.push((name, content.into()));
+    }
+
+    /// Writes all files into `folder`, which is made when it does not exist. Files of the same names
+    /// are replaced, others are left alone.
+    ///
+    /// # Errors
+    /// [`Failure::Output`]; the folder is then as it was before.
+    pub fn write(&self, folder: &Path) -> Result<(), Failure> {
+        let failed = |why| Failure::Output { path: folder.display().to_string(), why };
+        let existed = folder.exists();
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let result = self.write_beside(folder);
+        if result.is_err() && !existed {
+            // Only an empty folder goes: what was made above and nothing else.
+            let _ = std::fs::remove_dir(folder);
+        }
+        result.map_err(failed)
+    }
+
+    fn write_beside(&self, folder: &Path) -> io::Result<()> {
+        let beside: Vec<(PathBuf, PathBuf)> = self
+            .files
+            .iter()
+            .map(|(name, _)| (folder.join(format!(".{name}.{}.part", std::process::id())), folder.join(name)))
+            .collect();
+        let written = beside
+            .iter()
+            .zip(&self.files)
+            .try_for_each(|((part, _), (_, content))| std::fs::write(part, content));
+        let moved =
+            written.and_then(|()| beside.iter().try_for_each(|(part, place)| std::fs::rename(part, place)));
+        if moved.is_err() {
+            for (part, _) in &beside {
+                let _ = std::fs::remove_file(part);
+            }
+        }
+        moved
+    }
+}
