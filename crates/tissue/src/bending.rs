@@ -8,8 +8,10 @@
 //! the tip jumps. Where the force jumps at the dead band of `sgn` (dry friction), the solution may
 //! lie in the jump: the tip sticks and friction is what the spring asks for.
 
-use crate::effect::{Moment, SGN_DEAD_BAND_MPS, sgn};
-use crate::law::{Law, LawState, Rupture, TissueForce};
+use crate::effect::{SGN_DEAD_BAND_MPS, sgn};
+use crate::force::{Rupture, TissueForce};
+use crate::law::Law;
+use crate::state::LawState;
 
 /// Largest surplus in metres that counts as balance.
 const TOLERANCE_M: f64 = 1e-13;
@@ -25,6 +27,8 @@ const SLIDING_MPS: f64 = SGN_DEAD_BAND_MPS * (1.0 + 1e-9);
 struct Balance {
     z: f64,
     v: f64,
+    /// The force there, when it could be told without the effects' remembering anything.
+    force: Option<TissueForce>,
     /// Force in N when the tip sticks: the spring's, somewhere in the jump of the law's.
     stuck_n: Option<f64>,
 }
@@ -79,20 +83,25 @@ impl Law {
             // Every turn but the last breaks a layer or a membrane, so there are few.
             let left = (1.0 - done) * dt;
             let step = Step { dt, left, base_m, from_m: state.z_m, v_before: state.v_mps };
-            let Balance { z, v, stuck_n } = self.balance(state, step);
+            let Balance { z, v, force, stuck_n } = self.balance(state, step);
             if self.membrane_breaks(state, z) {
                 continue;
             }
             let mut elastic = 0.0;
             if let Some(slab) = self.slabs.get(state.ruptured) {
-                elastic = self.elastic(slab, left, z, &mut state.memory);
+                elastic = match force {
+                    Some(force) => force.elastic_n,
+                    None => self.elastic(slab, left, z, &mut state.memory),
+                };
                 if let Some(rupture) = self.give_way(state, slab, dt, (z, v), elastic, done) {
                     done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
                     on_rupture(rupture);
                     continue;
                 }
             }
-            let mut force = self.settle(state, time_s, z, v, elastic);
+            let moment = state.moment(time_s, z, v);
+            state.remember(&moment, elastic);
+            let mut force = force.unwrap_or_else(|| self.sum_up(&moment, elastic, &mut state.memory));
             if let Some(total_n) = stuck_n {
                 let missing = total_n - force.total_n;
                 force.friction_n += missing;
@@ -104,21 +113,13 @@ impl Law {
     }
 
     /// Force at a trial position of the tip, with nothing breaking and nothing remembered.
-    fn trial(&self, state: &mut LawState, step: &Step, u: f64) -> f64 {
+    fn trial(&self, state: &mut LawState, step: &Step, u: f64) -> TissueForce {
         let (z_m, v_mps) = step.tip(u);
         let elastic = match self.slabs.get(state.ruptured) {
             Some(slab) => self.elastic(slab, step.left, z_m, &mut state.memory),
             None => 0.0,
         };
-        let moment = Moment {
-            time_s: state.time_s + step.dt,
-            dt_s: step.dt,
-            z_m,
-            dz_m: z_m - step.from_m,
-            v_mps,
-            ruptured: state.ruptured,
-        };
-        self.sum_up(&moment, elastic, &mut state.memory).total_n
+        self.sum_up(&state.moment(state.time_s + step.dt, z_m, v_mps), elastic, &mut state.memory)
     }
 
     /// How fast the surplus rises with the unknown by stiffness and viscous friction alone.
@@ -143,10 +144,10 @@ impl Law {
     /// Solves `z_tip + f/k_s - z = 0` with the layers as they are.
     fn balance(&self, state: &mut LawState, step: Step) -> Balance {
         let memory = self.remembers.then_some(state.memory);
-        let mut u = if step.dt > 0.0 { step.v_before } else { step.base_m };
+        let mut u = if step.dt > 0.0 { step.v_before + state.dv_mps } else { step.base_m };
         let (mut low, mut high) = (None, None); // the bracket: surplus negative, positive
         let mut before: Option<(f64, f64)> = None;
-        let mut best = (u, f64::INFINITY);
+        let mut best = (u, f64::INFINITY, None);
         let smallest = if step.dt > 0.0 { 2e-9 * SGN_DEAD_BAND_MPS } else { TOLERANCE_M };
         let mut stuck = false;
         for turn in 0..MAX_TRIALS {
@@ -154,9 +155,9 @@ impl Law {
             if let Some(memory) = &memory {
                 state.memory = *memory;
             }
-            let surplus = step.tip(u).0 + force / self.needle_n_per_m - step.base_m;
+            let surplus = step.tip(u).0 + force.total_n / self.needle_n_per_m - step.base_m;
             if surplus.abs() < best.1 {
-                best = (u, surplus.abs());
+                best = (u, surplus.abs(), Some(force));
             }
             if surplus.abs() <= TOLERANCE_M {
                 break;
@@ -166,7 +167,7 @@ impl Law {
                 && f64::abs(high - low) <= smallest
             {
                 stuck = true;
-                best.0 = if low.abs() < high.abs() { low } else { high };
+                best = (if low.abs() < high.abs() { low } else { high }, 0.0, None);
                 break;
             }
             let secant = before.map(|(at, was)| (surplus - was) / (u - at));
@@ -193,6 +194,7 @@ impl Law {
             u = next;
         }
         let (z, v) = step.tip(best.0);
-        Balance { z, v, stuck_n: stuck.then_some((step.base_m - z) * self.needle_n_per_m) }
+        let force = best.2.filter(|_| memory.is_none());
+        Balance { z, v, force, stuck_n: stuck.then_some((step.base_m - z) * self.needle_n_per_m) }
     }
 }

@@ -188,7 +188,7 @@ pub trait Effect {
 #[must_use]
 pub(crate) fn lag_weights(dt_s: f64, time_constant_s: f64) -> (f64, f64) {
     let ratio = dt_s / time_constant_s;
-    if !(ratio > 0.0) {
+    if ratio <= 0.0 || ratio.is_nan() {
         return (1.0, 0.0);
     }
     if ratio == f64::INFINITY {

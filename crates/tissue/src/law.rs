@@ -7,11 +7,16 @@
 //!   `f_K` is gone at once;
 //! - friction `f_B = v sum_i b_i l_i`, `l_i = clamp(z - s_i, 0, d_i)`;
 //! - `f = f_K + f_B`; a ruptured layer stays ruptured when the needle comes back.
+//!
+//! Effects stand in the order of the chain, and each place of the chain knows its range of them, so
+//! that a hook asks only those that answer it.
 
 use crate::AnyEffect;
 use crate::effect::{Effect, Memory, Moment, Place};
+use crate::force::{Rupture, TissueForce};
 use crate::layer::Tissue;
 use crate::slab::Slab;
+use crate::state::{LawState, Memories};
 use alloc::vec::Vec;
 
 /// How many tissue effects one law can hold.
@@ -50,106 +55,6 @@ pub struct Law {
 
 /// Places up to and with [`Place::Tip`].
 const PLACES: usize = Place::Tip as usize + 1;
-
-/// What all effects of a law remember.
-pub(crate) type Memories = [Memory; MAX_EFFECTS];
-
-/// What the law remembers between samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LawState {
-    pub(crate) ruptured: usize,
-    started: bool,
-    pub(crate) time_s: f64,
-    pub(crate) z_m: f64,
-    pub(crate) v_mps: f64,
-    elastic_n: f64,
-    pub(crate) memory: Memories,
-}
-
-impl Default for LawState {
-    fn default() -> Self {
-        Self {
-            ruptured: 0,
-            started: false,
-            time_s: 0.0,
-            z_m: 0.0,
-            v_mps: 0.0,
-            elastic_n: 0.0,
-            memory: [[0.0; 8]; MAX_EFFECTS],
-        }
-    }
-}
-
-impl LawState {
-    /// Number of layers that have ruptured so far.
-    #[must_use]
-    pub fn ruptured(&self) -> usize {
-        self.ruptured
-    }
-
-    /// Position of the tip relative to the tissue at the last sample, in metres: not the one given
-    /// to [`Law::step`] when the tissue moves or the needle gives.
-    #[must_use]
-    pub fn tip_m(&self) -> f64 {
-        self.z_m
-    }
-
-    /// Velocity of the tip relative to the tissue at the last sample, in m/s.
-    #[must_use]
-    pub fn tip_velocity_mps(&self) -> f64 {
-        self.v_mps
-    }
-}
-
-/// The force of one sample, with its ground truth.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TissueForce {
-    /// Whole force at the needle's base, `f`, in N; positive resists insertion.
-    pub total_n: f64,
-    /// Elastic force `f_K` of the active layer in N.
-    pub elastic_n: f64,
-    /// Friction `f_B` along the whole shaft in N.
-    pub friction_n: f64,
-    /// Other forces at the tip (effects: cutting, incomplete release, ...) in N.
-    pub tip_extra_n: f64,
-    /// Cumulative friction of the ruptured layers, `D = sum b_j l_j`, in N s/m.
-    pub cumulative_friction_ns_per_m: f64,
-    /// What the tip feels, `f - D v`, in N: what enhancement is after.
-    pub tip_n: f64,
-    /// Active layer, 1-based; number of layers + 1 after the last rupture.
-    pub active_layer: usize,
-}
-
-impl TissueForce {
-    /// The force of a sample that is not finite.
-    fn unknown(active_layer: usize) -> Self {
-        let nan = f64::NAN;
-        Self {
-            total_n: nan,
-            elastic_n: nan,
-            friction_n: nan,
-            tip_extra_n: nan,
-            cumulative_friction_ns_per_m: nan,
-            tip_n: nan,
-            active_layer,
-        }
-    }
-}
-
-/// A layer gave way.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rupture {
-    /// Layer, 1-based.
-    pub layer: usize,
-    /// Instant in seconds, interpolated between the two samples around it.
-    pub time_s: f64,
-    /// Tip position at that instant in metres.
-    pub position_m: f64,
-    /// Elastic force that was released, in N.
-    pub released_n: f64,
-    /// True when the puncture force was reached, false when the far face was.
-    pub by_force: bool,
-}
 
 impl Law {
     /// The law of a tissue with effects. Neutral effects and those that act outside the tissue
@@ -359,28 +264,11 @@ impl Law {
         any
     }
 
-    /// Friction and tip forces at the end of a step, which the state then remembers.
+    /// Friction and tip forces at the end of a step, which the state remembers.
     #[inline]
-    pub(crate) fn settle(
-        &self,
-        state: &mut LawState,
-        time_s: f64,
-        z: f64,
-        v: f64,
-        elastic_n: f64,
-    ) -> TissueForce {
-        let moment = Moment {
-            time_s,
-            dt_s: time_s - state.time_s,
-            z_m: z,
-            dz_m: z - state.z_m,
-            v_mps: v,
-            ruptured: state.ruptured,
-        };
-        state.time_s = time_s;
-        state.z_m = z;
-        state.v_mps = v;
-        state.elastic_n = elastic_n;
+    fn settle(&self, state: &mut LawState, time_s: f64, z: f64, v: f64, elastic_n: f64) -> TissueForce {
+        let moment = state.moment(time_s, z, v);
+        state.remember(&moment, elastic_n);
         self.sum_up(&moment, elastic_n, &mut state.memory)
     }
 

@@ -1,5 +1,6 @@
 //! Layered tissue as a needle feels it: the base law of puncture and friction, the effects by
-//! which reality departs from it, and the kinematic replay.
+//! which reality departs from it, the chain from the tissue's force to the recorded one, and the
+//! kinematic replay.
 //!
 //! Pure state machines in SI units: `no_std` (with `alloc` for the lists of layers and effects),
 //! no randomness, no allocation per sample, the same bits on every platform.
@@ -27,18 +28,22 @@ extern crate alloc;
 mod bending;
 pub mod effect;
 mod effects;
+mod force;
 mod info;
 mod law;
 mod layer;
 mod measurement;
 mod replay;
 mod slab;
+mod state;
 
 pub use effect::{Effect, Place};
 pub use effects::*;
+pub use force::{Rupture, TissueForce};
 pub use info::{EffectInfo, ParameterError, ParameterInfo, info, library};
-pub use law::{Law, LawState, MAX_EFFECTS, Rupture, TissueForce, TooManyEffects};
+pub use law::{Law, MAX_EFFECTS, TooManyEffects};
 pub use layer::{Layer, Tissue};
 pub use measurement::{Measurement, MeasurementState, Reading};
 pub use replay::replay;
 pub use slab::Slab;
+pub use state::LawState;

@@ -146,7 +146,7 @@ impl Measurement {
     pub fn is_plain(&self) -> bool {
         self.tool.is_empty()
             && self.before_delay.is_empty()
-            && !(self.delay_s > 0.0)
+            && self.delay_s <= 0.0
             && self.before_noise.is_empty()
             && self.after_noise.is_empty()
     }

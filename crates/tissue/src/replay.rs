@@ -1,6 +1,8 @@
 //! The kinematic replay: recorded or ideal motion fed to the law, no rigid bodies.
 
-use crate::law::{Law, LawState, Rupture, TissueForce};
+use crate::force::{Rupture, TissueForce};
+use crate::law::Law;
+use crate::state::LawState;
 
 /// Feeds `(time_s, z_m, v_mps)` samples to a law and calls `sink` with each force.
 ///

@@ -44,7 +44,7 @@ impl Effect for LowPassLag {
         &INFO
     }
     fn is_neutral(&self) -> bool {
-        !(self.time_constant_s > 0.0)
+        self.time_constant_s <= 0.0
     }
     fn remembers(&self) -> bool {
         true

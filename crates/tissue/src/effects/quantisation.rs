@@ -41,7 +41,7 @@ impl Effect for Quantisation {
         &INFO
     }
     fn is_neutral(&self) -> bool {
-        !(self.step_n > 0.0)
+        self.step_n <= 0.0
     }
     fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
         libm::round(force_n / self.step_n) * self.step_n

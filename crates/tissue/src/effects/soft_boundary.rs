@@ -46,7 +46,7 @@ impl Effect for SoftBoundary {
         &INFO
     }
     fn is_neutral(&self) -> bool {
-        !(self.width_m > 0.0)
+        self.width_m <= 0.0
     }
     fn remembers(&self) -> bool {
         true

@@ -102,7 +102,7 @@ impl Effect for StressRelaxation {
     fn relax(&self, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64 {
         let [q1, q2, before, ..] = *memory;
         memory[2] = elastic_n;
-        if !(dt_s > 0.0) || (elastic_n == 0.0 && before == 0.0 && q1 == 0.0 && q2 == 0.0) {
+        if dt_s <= 0.0 || (elastic_n == 0.0 && before == 0.0 && q1 == 0.0 && q2 == 0.0) {
             return elastic_n - q1 - q2;
         }
         if !same_step(dt_s, memory[3]) {

@@ -42,6 +42,6 @@ impl Effect for TimeDelay {
         &INFO
     }
     fn is_neutral(&self) -> bool {
-        !(self.delay_s > 0.0)
+        self.delay_s <= 0.0
     }
 }

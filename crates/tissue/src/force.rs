@@ -1,0 +1,51 @@
+//! What the law says about one sample: forces with their ground truth, and ruptures.
+
+/// The force of one sample, with its ground truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TissueForce {
+    /// Whole force at the needle's base, `f`, in N; positive resists insertion.
+    pub total_n: f64,
+    /// Elastic force `f_K` of the active layer in N.
+    pub elastic_n: f64,
+    /// Friction `f_B` along the whole shaft in N.
+    pub friction_n: f64,
+    /// Other forces at the tip (effects: cutting, incomplete release, ...) in N.
+    pub tip_extra_n: f64,
+    /// Cumulative friction of the ruptured layers, `D = sum b_j l_j`, in N s/m.
+    pub cumulative_friction_ns_per_m: f64,
+    /// What the tip feels, `f - D v`, in N: what enhancement is after.
+    pub tip_n: f64,
+    /// Active layer, 1-based; number of layers + 1 after the last rupture.
+    pub active_layer: usize,
+}
+
+impl TissueForce {
+    /// The force of a sample that is not finite.
+    pub(crate) fn unknown(active_layer: usize) -> Self {
+        let nan = f64::NAN;
+        Self {
+            total_n: nan,
+            elastic_n: nan,
+            friction_n: nan,
+            tip_extra_n: nan,
+            cumulative_friction_ns_per_m: nan,
+            tip_n: nan,
+            active_layer,
+        }
+    }
+}
+
+/// A layer gave way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rupture {
+    /// Layer, 1-based.
+    pub layer: usize,
+    /// Instant in seconds, interpolated between the two samples around it.
+    pub time_s: f64,
+    /// Tip position at that instant in metres, relative to the tissue.
+    pub position_m: f64,
+    /// Elastic force that was released, in N.
+    pub released_n: f64,
+    /// True when the puncture force was reached, false when the far face was.
+    pub by_force: bool,
+}

@@ -1,0 +1,80 @@
+//! What the law remembers between samples.
+
+use crate::effect::{Memory, Moment};
+use crate::law::MAX_EFFECTS;
+
+/// What all effects of a law remember.
+pub(crate) type Memories = [Memory; MAX_EFFECTS];
+
+/// What the law remembers between samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LawState {
+    pub(crate) ruptured: usize,
+    pub(crate) started: bool,
+    pub(crate) time_s: f64,
+    pub(crate) z_m: f64,
+    pub(crate) v_mps: f64,
+    /// Change of the velocity in the last step; only a needle that gives asks for it.
+    pub(crate) dv_mps: f64,
+    pub(crate) elastic_n: f64,
+    pub(crate) memory: Memories,
+}
+
+impl Default for LawState {
+    fn default() -> Self {
+        Self {
+            ruptured: 0,
+            started: false,
+            time_s: 0.0,
+            z_m: 0.0,
+            v_mps: 0.0,
+            dv_mps: 0.0,
+            elastic_n: 0.0,
+            memory: [[0.0; 8]; MAX_EFFECTS],
+        }
+    }
+}
+
+impl LawState {
+    /// Number of layers that have ruptured so far.
+    #[must_use]
+    pub fn ruptured(&self) -> usize {
+        self.ruptured
+    }
+
+    /// Position of the tip relative to the tissue at the last sample, in metres: not the one given
+    /// to [`Law::step`](crate::Law::step) when the tissue moves or the needle gives.
+    #[must_use]
+    pub fn tip_m(&self) -> f64 {
+        self.z_m
+    }
+
+    /// Velocity of the tip relative to the tissue at the last sample, in m/s.
+    #[must_use]
+    pub fn tip_velocity_mps(&self) -> f64 {
+        self.v_mps
+    }
+
+    /// What effects may look at in the sample that follows.
+    #[inline]
+    pub(crate) fn moment(&self, time_s: f64, z_m: f64, v_mps: f64) -> Moment {
+        Moment {
+            time_s,
+            dt_s: time_s - self.time_s,
+            z_m,
+            dz_m: z_m - self.z_m,
+            v_mps,
+            ruptured: self.ruptured,
+        }
+    }
+
+    /// Makes a sample the last one.
+    #[inline]
+    pub(crate) fn remember(&mut self, moment: &Moment, elastic_n: f64) {
+        self.time_s = moment.time_s;
+        self.z_m = moment.z_m;
+        self.dv_mps = moment.v_mps - self.v_mps;
+        self.v_mps = moment.v_mps;
+        self.elastic_n = elastic_n;
+    }
+}

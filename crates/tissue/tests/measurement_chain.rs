@@ -1,0 +1,147 @@
+//! Promise: the recorded force is the tissue's force through tool and sensor in the order of SPEC
+//! section 6, at any sampling, without allocation per sample.
+
+mod common;
+use common::*;
+use proptest::prelude::*;
+use stylet_tissue::*;
+
+/// Records a force given as a function of time, sampled at `times`.
+fn record(effects: &[AnyEffect], times: &[f64], force: impl Fn(f64) -> f64) -> Vec<f64> {
+    let chain = Measurement::new(effects);
+    let mut state = chain.start(times.len() as f64 / (times[times.len() - 1] - times[0]));
+    times
+        .iter()
+        .map(|&time_s| {
+            chain.step(&mut state, &Reading { time_s, tissue_n: force(time_s), ..Reading::default() })
+        })
+        .collect()
+}
+
+fn regular(rate: f64, seconds: f64) -> Vec<f64> {
+    (0..=(rate * seconds) as usize).map(|k| k as f64 / rate).collect()
+}
+
+#[test]
+fn tool_effects_follow_the_bases_motion_in_air_too() {
+    let chain =
+        Measurement::new(&[ToolInertia { mass_kg: 0.3 }.into(), DriveFriction { force_n: 0.5 }.into()]);
+    let mut state = chain.start(200.0);
+    for (v, a, expected) in [(0.002, 1.0, 0.8), (-0.002, -1.0, -0.8), (0.0, 2.0, 0.6), (1e-5, 0.0, 0.0)] {
+        let reading = Reading { velocity_mps: v, acceleration_mps2: a, ..Reading::default() };
+        near(chain.step(&mut state, &reading), expected, 1e-15);
+    }
+}
+
+#[test]
+fn each_effect_of_the_sensor_is_its_equation() {
+    let times = regular(100.0, 2.0);
+    let force = |t: f64| 3.0 * (2.0 * t).sin();
+    type Expected<'a> = &'a dyn Fn(f64, f64) -> f64; // of force and time
+    let checks: [(AnyEffect, Expected); 6] = [
+        (ForceGain { eps: 0.1 }.into(), &|f, _| 1.1 * f),
+        (ForceBias { force_n: -0.2 }.into(), &|f, _| f - 0.2),
+        (ForceDrift { rate_n_per_s: 0.05 }.into(), &|f, t| f + 0.05 * t),
+        (PeriodicInterference { amplitude_n: 0.3, frequency_hz: 7.0, phase_rad: 0.5 }.into(), &|f, t| {
+            f + 0.3 * (std::f64::consts::TAU * 7.0 * t + 0.5).sin()
+        }),
+        (Saturation { limit_n: 1.5 }.into(), &|f, _| f.clamp(-1.5, 1.5)),
+        (Quantisation { step_n: 0.25 }.into(), &|f, _| (f / 0.25).round() * 0.25),
+    ];
+    for (effect, expected) in checks {
+        for (&t, f) in times.iter().zip(record(std::slice::from_ref(&effect), &times, force)) {
+            near(f, expected(force(t), t), 1e-12);
+        }
+    }
+}
+
+#[test]
+fn the_lag_is_first_order_exactly_at_any_sampling() {
+    let tau = 0.2;
+    let lag = [LowPassLag { time_constant_s: tau }.into()];
+    for rate in [4.0, 30.0, 1000.0] {
+        let times = regular(rate, 3.0);
+        // A ramp from rest.
+        for (&t, f) in times.iter().zip(record(&lag, &times, |t| 2.0 * t)) {
+            near(f, 2.0 * (t - tau * (1.0 - (-t / tau).exp())), 1e-12);
+        }
+    }
+    // After a jump, held: y += (1 - exp(-dt/tau)) (f - y) from the sample behind the jump on.
+    let times = regular(50.0, 2.0);
+    let y = record(&lag, &times, |t| if t < 1.0 { 0.0 } else { 1.0 });
+    for k in 51..times.len() {
+        near(y[k], y[k - 1] + (1.0 - (-0.02f64 / tau).exp()) * (1.0 - y[k - 1]), 1e-12);
+    }
+    near(record(&lag, &times, |_| 3.0)[0], 3.0, 0.0);
+}
+
+#[test]
+fn a_delay_is_exact_for_a_force_that_is_linear_between_samples() {
+    let delay = [TimeDelay { delay_s: 0.0337 }.into()];
+    for rate in [20.0, 30.0, 200.0, 1234.5] {
+        let times = regular(rate, 2.0);
+        for (&t, f) in times.iter().zip(record(&delay, &times, |t| 1.0 + 2.0 * t)) {
+            near(f, 1.0 + 2.0 * (t - 0.0337).max(0.0), 1e-12);
+        }
+    }
+    // Two delays add up; irregular samples; a history too short gives the oldest it has.
+    let two = [TimeDelay { delay_s: 0.02 }.into(), TimeDelay { delay_s: 0.0137 }.into()];
+    let mut times = regular(100.0, 1.0);
+    times.iter_mut().enumerate().for_each(|(k, t)| *t += 0.004 * (k as f64 * 1.7).sin());
+    let chain = Measurement::new(&two);
+    let mut state = chain.start(200.0);
+    let mut short = chain.start(1.0);
+    for (k, &t) in times.iter().enumerate() {
+        let reading = Reading { time_s: t, tissue_n: t, ..Reading::default() };
+        near(chain.step(&mut state, &reading), (t - 0.0337).max(times[0]), 1e-12);
+        near(chain.step(&mut short, &reading), (t - 0.0337).max(times[k.saturating_sub(3)]), 1e-12);
+    }
+}
+
+#[test]
+fn the_order_is_the_specifications_whatever_the_order_of_the_list() {
+    let mut effects: Vec<AnyEffect> = vec![
+        Quantisation { step_n: 0.5 }.into(),
+        Saturation { limit_n: 4.2 }.into(),
+        ForceBias { force_n: 1.0 }.into(),
+        ForceGain { eps: 1.0 }.into(),
+        ToolInertia { mass_kg: 1.0 }.into(),
+        ForceSpikes { rate_hz: 1.0, size_n: 5.0 }.into(),
+    ];
+    for _ in 0..effects.len() {
+        effects.rotate_left(1);
+        let chain = Measurement::new(&effects);
+        let mut state = chain.start(200.0);
+        let mut at = |tissue_n, acceleration_mps2, noise_n| {
+            chain.step(&mut state, &Reading { tissue_n, acceleration_mps2, noise_n, ..Reading::default() })
+        };
+        near(at(1.0, 0.1, 0.0), 3.0, 1e-12); // (1 + 0.1) 2 + 1 = 3.2 -> 3.0
+        near(at(1.0, 0.1, 0.2), 3.5, 1e-12); // the noise is rounded as well
+        near(at(3.0, 0.0, 9.0), 4.0, 1e-12); // cut at 4.2, then rounded
+    }
+}
+
+#[test]
+fn recorded_positions_are_scaled_and_can_be_scaled_back() {
+    let chain = Measurement::new(&[PositionScale { eps: -0.02 }.into()]);
+    near(chain.position(0.1), 0.098, 1e-15);
+    near(chain.true_position(chain.position(0.0437)), 0.0437, 1e-15);
+    assert!(chain.is_plain(), "positions do not touch the force");
+}
+
+proptest! {
+    /// Lag and delay together at a random jitter stay within the force's range: no overshoot.
+    #[test]
+    fn lag_and_delay_never_leave_the_range_of_the_force(
+        steps in proptest::collection::vec((0.0f64..0.05, -5.0f64..5.0), 2..300), tau in 0.0f64..1.0, delay in 0.0f64..0.3,
+    ) {
+        let chain = Measurement::new(&[LowPassLag { time_constant_s: tau }.into(), TimeDelay { delay_s: delay }.into()]);
+        let mut state = chain.start(200.0);
+        let mut time_s = 0.0;
+        for (dt, tissue_n) in steps {
+            time_s += dt;
+            let f = chain.step(&mut state, &Reading { time_s, tissue_n, ..Reading::default() });
+            prop_assert!(f.abs() <= 5.0 + 1e-12);
+        }
+    }
+}

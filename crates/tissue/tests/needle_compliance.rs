@@ -1,0 +1,216 @@
+//! Promise: a needle that gives is `z_tip = z - f/k_s` to the last digit at every sample, springs in
+//! series in the simple case, a tip that jumps at a rupture and sticks at a reversal, always finite.
+
+mod common;
+use common::*;
+use proptest::prelude::*;
+use stylet_tissue::*;
+
+fn spring(stiffness_n_per_m: f64) -> AnyEffect {
+    NeedleCompliance { stiffness_n_per_m }.into()
+}
+
+fn constant(v: f64, rate: f64, seconds: f64) -> Vec<Sample> {
+    (0..(seconds * rate) as usize).map(|k| k as f64 / rate).map(|t| (t, v * t, v)).collect()
+}
+
+/// Forces and tip positions.
+fn bend(
+    tissue: &Tissue,
+    effects: &[AnyEffect],
+    motion: &[Sample],
+) -> (Vec<TissueForce>, Vec<f64>, Vec<Rupture>) {
+    let law = Law::new(tissue, effects).expect("few effects");
+    let (mut state, mut forces, mut tips, mut ruptures) = (LawState::default(), vec![], vec![], vec![]);
+    for &(t, z, v) in motion {
+        forces.push(law.step(&mut state, t, z, v, |r| ruptures.push(r)));
+        tips.push(state.tip_m());
+    }
+    (forces, tips, ruptures)
+}
+
+#[test]
+fn an_elastic_tissue_and_a_needle_are_springs_in_series() {
+    let (k, ks) = (200.0, 600.0);
+    for effects in [vec![spring(ks)], vec![spring(2.0 * ks), spring(2.0 * ks)]] {
+        let (f, tips, _) = bend(&block(k, 0.0), &effects, &constant(0.003, 200.0, 5.0));
+        for ((force, tip), (_, z, _)) in f.iter().zip(&tips).zip(constant(0.003, 200.0, 5.0)) {
+            near(force.total_n, k * ks / (k + ks) * z, 1e-10);
+            near(*tip, z * ks / (k + ks), 1e-13);
+        }
+    }
+}
+
+#[test]
+fn a_viscous_tissue_relaxes_the_needle_exponentially_in_a_hold() {
+    // In a uniform tissue behind a long friction layer: f = K x + b l v; with l fixed by a layer
+    // that the tip has left, z_tip' = (k_s (z - z_tip))/D.
+    let (ks, b, d) = (1000.0, 9000.0, 0.02);
+    let tissue = tissue(&[layer(d, 0.0, b, None)]);
+    let mut motion: Vec<Sample> = constant(0.005, 1000.0, 10.0);
+    motion.extend((0..4000).map(|k| (10.0 + f64::from(k) / 1000.0, 0.05, 0.0)));
+    let (f, tips, _) = bend(&tissue, &[spring(ks)], &motion);
+    let tau = b * d / ks;
+    near(f[9999].total_n, b * d * 0.005, 1e-9);
+    let start = f[10_000].total_n;
+    for k in (10_000..14_000).step_by(100) {
+        let t = (k - 10_000) as f64 / 1000.0;
+        // Backward Euler of the spec's v_tip, exactly, and the exponential in the limit.
+        near(f[k].total_n, start * (1.0 + 0.001 / tau).powi(-(k as i32 - 10_000)), 1e-9);
+        near(f[k].total_n, start * (-t / tau).exp(), 3e-3 * start);
+        near(tips[k], 0.05 - f[k].total_n / ks, 1e-12);
+    }
+}
+
+#[test]
+fn the_solution_converges_to_the_differential_equation_for_elastic_and_viscous_loading() {
+    // K z + b z z' = k_s (z_base - z) with a base that speeds up and slows down, integrated finely
+    // by an independent method (RK4).
+    let (k, b, ks) = (100.0, 9000.0, 500.0);
+    let base = |t: f64| 0.004 * t + 0.002 * (1.0 - (1.5 * t).cos());
+    let slope = |t: f64, z: f64| (ks * (base(t) - z) - k * z) / (b * z);
+    // Near contact z = c t with K c t + b c^2 t = k_s (v - c) t.
+    let c = (-(k + ks) + ((k + ks) * (k + ks) + 4.0 * b * ks * 0.004).sqrt()) / (2.0 * b);
+    let (mut t, mut z, h) = (1e-4, 1e-4 * c, 1e-5);
+    while t < 4.0 - 0.5 * h {
+        let k1 = slope(t, z);
+        let k2 = slope(t + h / 2.0, z + h / 2.0 * k1);
+        let k3 = slope(t + h / 2.0, z + h / 2.0 * k2);
+        let k4 = slope(t + h, z + h * k3);
+        z += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+        t += h;
+    }
+    let error = |rate: usize| {
+        let motion: Vec<Sample> =
+            (0..=4 * rate).map(|k| k as f64 / rate as f64).map(|t| (t, base(t), 0.0)).collect();
+        let (_, tips, _) = bend(&block(k, b), &[spring(ks)], &motion);
+        (tips[4 * rate] - z).abs()
+    };
+    let (coarse, fine) = (error(200), error(2000));
+    assert!(coarse < 1e-5 && coarse > 1e-8, "{coarse:e}");
+    near(coarse / fine, 10.0, 0.5); // first order, as the specification's v_tip is
+}
+
+#[test]
+fn at_a_rupture_the_tip_jumps_although_the_base_does_not() {
+    let (k, ks) = (100.0, 400.0);
+    let tissue = tissue(&[layer(0.05, k, 0.0, Some(1.0)), layer(0.05, 50.0, 0.0, None)]);
+    let (f, tips, ruptures) = bend(&tissue, &[spring(ks)], &constant(0.002, 200.0, 20.0));
+    assert_eq!(ruptures.len(), 1);
+    // Puncture at a tip depth of 10 mm, the base being 1 N / k_s further.
+    near(ruptures[0].position_m, 0.01, 1e-9);
+    near(ruptures[0].time_s, (0.01 + 1.0 / ks) / 0.002, 1e-9);
+    let at = (ruptures[0].time_s * 200.0).ceil() as usize;
+    near(tips[at] - tips[at - 1], 1.0 / ks, 2e-5);
+    near(f[at].total_n, 0.0, 1e-12);
+    near(f[at - 1].total_n, 1.0, 2e-3);
+}
+
+#[test]
+fn the_jump_carries_the_tip_through_a_thin_layer_too() {
+    let tissue = tissue(&[
+        layer(0.01, 300.0, 0.0, None),
+        layer(0.002, 100.0, 0.0, None),
+        layer(0.05, 100.0, 0.0, None),
+    ]);
+    let (f, tips, ruptures) = bend(&tissue, &[spring(300.0)], &constant(0.002, 200.0, 12.0));
+    assert_eq!(ruptures.iter().map(|r| r.layer).collect::<Vec<_>>(), [1, 2]);
+    assert!(ruptures[1].time_s - ruptures[0].time_s <= 0.005);
+    for (k, force) in f.iter().enumerate() {
+        near(tips[k], 0.002 * (k as f64 / 200.0) - force.total_n / 300.0, 1e-12);
+    }
+}
+
+#[test]
+fn with_dry_friction_the_tip_sticks_at_a_reversal_until_the_spring_has_turned_around() {
+    let (c, ks, depth) = (20.0, 1000.0, 0.02);
+    let tissue = tissue(&[layer(depth, 0.0, 0.0, None)]);
+    let mut motion = constant(0.005, 200.0, 8.0);
+    let last = motion[motion.len() - 1].1;
+    motion.extend((1..=400).map(|k| (8.0 + f64::from(k - 1) / 200.0, last - 1e-5 * f64::from(k), -0.002)));
+    let (f, tips, _) = bend(&tissue, &[CoulombFriction { c_n_per_m: c }.into(), spring(ks)], &motion);
+    let turn = 1599;
+    near(f[turn].total_n, c * depth, 1e-9);
+    // The base comes back 2 c l / k_s = 0.8 mm (80 samples) before the tip slides again. The dead
+    // band lets the tip creep by 0.01 mm/s meanwhile.
+    for k in 1..75 {
+        let force = f[turn + k].total_n;
+        near(force, c * depth - ks * 1e-5 * k as f64, ks * 1e-5 * 0.005 * k as f64 + 1e-9);
+        near(tips[turn + k], tips[turn], 1e-5 * 0.005 * k as f64 + 1e-12);
+    }
+    near(f[turn + 90].total_n, -c * depth, 1e-9);
+    for (&(_, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
+        near(*tip, z - force.total_n / ks, 1e-12);
+        near(force.elastic_n + force.friction_n + force.tip_extra_n, force.total_n, 1e-12);
+    }
+}
+
+#[test]
+fn a_membrane_breaks_under_a_needle_that_gives_and_the_balance_holds_afterwards() {
+    let membrane = HiddenMembrane { depth_m: 0.01, stiffness_n_per_m: 500.0, puncture_n: 0.5 };
+    let motion = constant(0.002, 200.0, 12.0);
+    let (f, tips, ruptures) = bend(&block(20.0, 0.0), &[membrane.into(), spring(200.0)], &motion);
+    assert!(ruptures.is_empty());
+    let peak = f.iter().map(|f| f.tip_extra_n).fold(0.0, f64::max);
+    assert!(peak > 0.49 && peak < 0.5, "{peak}");
+    for (&(_, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
+        near(*tip, z - force.total_n / 200.0, 1e-12);
+    }
+}
+
+#[test]
+fn a_very_stiff_needle_is_a_rigid_one() {
+    let motion = usual_motion();
+    // The tip's velocity is a backward difference: give the rigid law the same one.
+    let mut same = motion.clone();
+    for k in 1..same.len() {
+        same[k].2 = (motion[k].1 - motion[k - 1].1) / (motion[k].0 - motion[k - 1].0);
+    }
+    let stiff = forces(&three_gels(), &[spring(1e9)], &motion);
+    assert!(worst(&stiff, &forces(&three_gels(), &[], &same)) < 1e-3);
+}
+
+#[test]
+fn a_needle_that_starts_inside_the_tissue_and_a_repeated_time_stamp_are_in_balance() {
+    let motion =
+        [(0.0, 0.01, 0.0), (0.0, 0.01, 0.0), (0.005, 0.01, 0.0), (0.005, 0.012, 0.0), (0.01, 0.012, 0.0)];
+    let (f, tips, _) = bend(&block(100.0, 0.0), &[spring(100.0)], &motion);
+    for (&(_, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
+        near(*tip, z / 2.0, 1e-12);
+        near(force.total_n, 50.0 * z, 1e-10);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Any needle, with the effects that make the balance hardest: in balance wherever the force
+    /// is a rising function of depth and speed, finite and bounded everywhere.
+    #[test]
+    fn the_balance_is_found_for_any_needle(
+        log_ks in 1.0f64..6.0, rate in 20.0f64..2000.0, mean in 0.0005f64..0.013, ripple in 0.0f64..0.013,
+        c in 0.0f64..30.0, c_extra in 0.0f64..30.0, cut in 0.0f64..1.0, rho in 0.0f64..1.0, g in 0.0f64..0.9,
+    ) {
+        let ks = 10f64.powf(log_ks);
+        let motion = ripple_hold_retract(-0.002, mean, ripple, 0.7, rate);
+        let rising: Vec<AnyEffect> = vec![
+            spring(ks),
+            CoulombFriction { c_n_per_m: c }.into(),
+            CuttingForce { force_n: cut }.into(),
+            StressRelaxation { terms: vec![PronyTerm { fraction: g, time_constant_s: 0.5 }] }.into(),
+            PreslidingFriction { c_n_per_m: c, delta_m: 1e-3 }.into(),
+            AsymmetricFriction { eps: 0.3 }.into(),
+        ];
+        let (f, tips, _) = bend(&three_gels(), &rising, &motion);
+        for (&(_, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
+            prop_assert!((tip - z + force.total_n / ks).abs() < 1e-11, "{} {} {:?}", tip, z, force);
+        }
+        let mut falling = rising;
+        falling.push(StribeckFriction { c_n_per_m: c, c_static_n_per_m: c + c_extra, v_stribeck_mps: 1e-3 }.into());
+        falling.push(IncompleteRelease { fraction: rho }.into());
+        falling.push(SoftBoundary { width_m: 0.003 }.into());
+        falling.push(NonlinearElasticity { kappa_per_m: -10.0 }.into());
+        let (f, _, _) = bend(&three_gels(), &falling, &motion);
+        prop_assert!(f.iter().all(|f| f.total_n.is_finite() && f.total_n.abs() < 100.0));
+    }
+}
