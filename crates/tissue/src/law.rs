@@ -51,6 +51,8 @@ pub struct Law {
     pub(crate) remembers: bool,
     /// The force may jump where the velocity changes sign.
     pub(crate) jumps: bool,
+    /// Nothing but the base law: rigid needle, no effect.
+    plain: bool,
 }
 
 /// Places up to and with [`Place::Tip`].
@@ -84,6 +86,7 @@ impl Law {
         }
         law.remembers = active.iter().any(Effect::remembers);
         law.jumps = active.iter().any(|e| e.place() >= Place::Release);
+        law.plain = active.is_empty() && law.needle_n_per_m == f64::INFINITY;
         law.effects = active;
         Ok(law)
     }
@@ -98,6 +101,7 @@ impl Law {
             needle_n_per_m: f64::INFINITY,
             remembers: false,
             jumps: false,
+            plain: true,
         }
     }
 
@@ -125,19 +129,91 @@ impl Law {
         if !(time_s + z_m + v_mps).is_finite() {
             return TissueForce::unknown(state.ruptured + 1);
         }
+        if self.plain {
+            self.step_plain(state, time_s, z_m, v_mps, &mut on_rupture)
+        } else {
+            self.step_with_effects(state, time_s, z_m, v_mps, &mut on_rupture)
+        }
+    }
+
+    /// The base law alone: the same operations as with effects, with nothing asked of the chain.
+    #[inline]
+    fn step_plain(
+        &self,
+        state: &mut LawState,
+        time_s: f64,
+        z: f64,
+        v: f64,
+        on_rupture: &mut impl FnMut(Rupture),
+    ) -> TissueForce {
+        if !state.started {
+            state.begin(time_s, z, v);
+        }
+        let time_s = if time_s > state.time_s { time_s } else { state.time_s };
+        let mut elastic_n = 0.0;
+        let mut done = 0.0;
+        while let Some(slab) = self.slabs.get(state.ruptured) {
+            let x = z - slab.front_m;
+            elastic_n = slab.stiffness_n_per_m * if x > 0.0 { x } else { 0.0 };
+            if elastic_n < slab.puncture_n && z < slab.far_m() {
+                break;
+            }
+            let dt = time_s - state.time_s;
+            let rupture = Self::rupture(state, slab, dt, z, elastic_n, slab.puncture_n, done);
+            done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
+            state.ruptured += 1;
+            state.elastic_n = 0.0;
+            elastic_n = 0.0;
+            on_rupture(rupture);
+        }
+        state.time_s = time_s;
+        state.z_m = z;
+        state.v_mps = v;
+        state.elastic_n = elastic_n;
+        let (behind, ahead) = self.slabs.split_at(state.ruptured.min(self.slabs.len()));
+        let along = |slabs: &[Slab]| {
+            let mut sum = 0.0;
+            for slab in slabs {
+                sum += slab.friction_ns_per_m2 * slab.inside_m(z);
+            }
+            sum
+        };
+        let (cumulative, local) = (along(behind), along(ahead));
+        let friction_n = v * (cumulative + local);
+        let total_n = elastic_n + friction_n;
+        TissueForce {
+            total_n,
+            elastic_n,
+            friction_n,
+            tip_extra_n: 0.0,
+            cumulative_friction_ns_per_m: cumulative,
+            tip_n: total_n - cumulative * v,
+            active_layer: state.ruptured + 1,
+        }
+    }
+
+    /// The law with its effects.
+    fn step_with_effects(
+        &self,
+        state: &mut LawState,
+        time_s: f64,
+        z_m: f64,
+        v_mps: f64,
+        on_rupture: &mut impl FnMut(Rupture),
+    ) -> TissueForce {
         let (mut z, mut v) = (z_m, v_mps);
         for effect in self.at(Place::Kinematics) {
             (z, v) = effect.relative(time_s, z, v);
         }
         if !state.started {
-            *state = LawState { started: true, time_s, z_m: z, v_mps: v, ..*state };
+            state.begin(time_s, z, v);
         }
         let time_s = time_s.max(state.time_s);
         let dt = time_s - state.time_s;
         if self.needle_n_per_m < f64::INFINITY {
-            return self.step_bending(state, time_s, z, &mut on_rupture);
+            return self.step_bending(state, time_s, z, on_rupture);
         }
-        let elastic_n = self.load(state, dt, z, v, &mut on_rupture);
+        let elastic_n = self.load(state, dt, z, v, on_rupture);
         self.membrane_breaks(state, z);
         self.settle(state, time_s, z, v, elastic_n)
     }

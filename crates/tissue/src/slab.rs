@@ -31,13 +31,9 @@ impl Slab {
     #[inline]
     pub fn inside_m(&self, z_m: f64) -> f64 {
         let depth = z_m - self.front_m;
-        if depth <= 0.0 {
-            0.0
-        } else if depth >= self.thickness_m {
-            self.thickness_m
-        } else {
-            depth
-        }
+        // Written so that it compiles to a maximum and a minimum, without branches.
+        let inside = if depth > 0.0 { depth } else { 0.0 };
+        if inside < self.thickness_m { inside } else { self.thickness_m }
     }
 
     /// Places the layers of a tissue in space.

@@ -55,6 +55,15 @@ impl LawState {
         self.v_mps
     }
 
+    /// Begins with the first sample.
+    #[cold]
+    pub(crate) fn begin(&mut self, time_s: f64, z_m: f64, v_mps: f64) {
+        self.started = true;
+        self.time_s = time_s;
+        self.z_m = z_m;
+        self.v_mps = v_mps;
+    }
+
     /// What effects may look at in the sample that follows.
     #[inline]
     pub(crate) fn moment(&self, time_s: f64, z_m: f64, v_mps: f64) -> Moment {
