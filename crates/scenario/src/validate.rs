@@ -80,8 +80,16 @@ fn tissue(s: &Scenario) -> Checked {
 }
 
 fn effect_in_range(index: usize, effect: &stylet_tissue::AnyEffect) -> Checked {
-    let _ = (index, effect);
-    Ok(())
+    effect.check().map_err(|error| {
+        // `terms.0.fraction` in outputs is `terms[0].fraction` in the file.
+        let path = error.path.split('.').fold(String::new(), |path, part| match part.parse::<usize>() {
+            Ok(index) => format!("{path}[{index}]"),
+            Err(_) => format!("{path}.{part}"),
+        });
+        let (low, high) = error.allowed;
+        let right = format!("is {}; {} must lie between {low} and {high}", error.value, error.effect);
+        Problem::new(format!("effects[{index}]{path}"), right)
+    })
 }
 
 fn speed(path: impl Into<String> + Clone, value: f64) -> Checked {
