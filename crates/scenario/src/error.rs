@@ -60,14 +60,19 @@ pub(crate) fn offset(text: &str, line: usize, column: usize) -> usize {
     start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
 }
 
-/// The known name closest to a misspelt one, when it is close enough to be meant.
+/// The known name closest to a misspelt one, when it is close enough to be meant: few letters
+/// differ, or one is the other without its unit.
 #[must_use]
 pub fn closest<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
     let lower = wrong.to_lowercase();
+    let mut longer = known.iter().filter(|k| lower.len() > 2 && k.to_lowercase().starts_with(&lower));
+    if let (Some(only), None) = (longer.next(), longer.next()) {
+        return Some(only);
+    }
     known
         .iter()
         .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), *k))
         .min()
-        .filter(|(distance, k)| *distance <= 2 + k.len() / 5)
+        .filter(|(distance, k)| *distance <= 1 + k.len() / 5)
         .map(|(_, k)| k)
 }

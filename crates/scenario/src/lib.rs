@@ -14,19 +14,25 @@
 
 mod enhance_file;
 mod error;
+mod explain;
 mod load;
-mod locate;
 mod motion;
+mod outline;
+mod plan;
 mod robot;
 mod scenario;
 mod sensor;
+mod tokens;
 mod validate;
+mod validate_effects;
 mod validate_enhance;
+mod validate_motion;
 
 pub use enhance_file::EnhanceFile;
 pub use error::{InputError, closest};
 pub use load::{Problem, load, parse, read_text, ron_options};
-pub use motion::{FROM_REST_RAD, Motion, MotionPlan, MotionPoint, Segment};
+pub use motion::{FROM_REST_RAD, Motion, MotionPoint, Segment};
+pub use plan::MotionPlan;
 pub use robot::{ArmConfig, Robot};
 pub use scenario::Scenario;
 pub use sensor::{ForceTorque, Sensor, VirtualSensor};
