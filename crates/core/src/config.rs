@@ -199,7 +199,7 @@ impl Default for DropConfig {
             replay: true,
             compensate: true,
             share_limits: [0.01, 0.99],
-            replay_per_tick: 32,
+            replay_per_tick: 128,
         }
     }
 }
