@@ -125,15 +125,18 @@ proptest! {
     }
 
     #[test]
-    fn the_deepest_position_is_found_to_within_a_sample(motion in prop_oneof![single(), program().prop_map(|(m, _)| m)]) {
+    fn the_deepest_position_is_reached_and_never_passed(
+        motion in prop_oneof![single(), program().prop_map(|(m, _)| m)],
+    ) {
         let plan = motion.plan().unwrap();
-        let found = plan.furthest_m(200.0);
         let n = 20_000;
-        let deepest = (0..=n)
+        let seen = (0..=n)
             .map(|k| plan.at(plan.duration_s() * f64::from(k) / f64::from(n)).position_m)
             .fold(f64::NEG_INFINITY, f64::max);
-        // 0.7 m/s at most, for up to one and a half samples.
-        prop_assert!((found - deepest).abs() < 0.7 * 1.5 / 200.0, "{found} against {deepest}");
+        // Between two of the instants, at 0.7 m/s at most.
+        let between = 0.7 * plan.duration_s() / f64::from(n);
+        let deepest = plan.deepest_m();
+        prop_assert!(deepest >= seen - 1e-12 && deepest <= seen + between, "{deepest} against {seen}");
     }
 }
 
@@ -198,5 +201,5 @@ fn holding_and_retracting_is_holding_and_retracting() {
     assert_eq!(plan.at(12.0).velocity_mps, 0.0);
     assert!((plan.at(10.0).position_m - 0.018).abs() < 1e-15);
     assert!((plan.at(20.0).position_m + 0.005).abs() < 1e-15);
-    assert!((plan.furthest_m(200.0) - 0.018).abs() < 1e-15);
+    assert!((plan.deepest_m() - 0.018).abs() < 1e-15);
 }

@@ -107,7 +107,7 @@ fn every_scenario_begins_in_air_and_reaches_the_tissue() {
         let scenario = load(name);
         let plan = scenario.motion.plan().unwrap();
         assert!(plan.at(0.0).position_m < scenario.tissue.surface_m, "{name} begins inside the tissue");
-        assert!(plan.furthest_m(scenario.sample_hz) > scenario.tissue.surface_m, "{name}");
+        assert!(plan.deepest_m() > scenario.tissue.surface_m, "{name}");
     }
 }
 
