@@ -38,10 +38,10 @@ fn a_wrong_scenario_is_refused_with_its_place_and_remedy() {
         ("backwards", "velocity_mps: 0.0023", "velocity_mps: -0.0023", &["never reaches the tissue"]),
         ("millimetres", "velocity_mps: 0.0023", "velocity_mps: 2.3", &["mm/s"]),
         ("variant", "motion: Constant", "motion: Constat", &["`Constat`", "`Constant`"]),
-        ("text", "thickness_m: 0.0282", "thickness_m: \"thin\"", &["not valid here"]),
+        ("text", "thickness_m: 0.0282", "thickness_m: \"thin\"", &["thickness_m", "a number"]),
         ("rates", "physics_hz: 1000.0", "physics_hz: 1050.0", &["whole multiple", "1000"]),
         ("noise", "ar1: 0.0", "ar1: 1.0", &["ar1", "between -1 and 1"]),
-        ("bracket", "layers: [", "layers: ", &["not valid here"]),
+        ("bracket", "layers: [", "layers: ", &["tissue.layers", "square brackets"]),
     ];
     let scratch = Scratch::new("bad-scenario");
     let out = scratch.path().join("out");
@@ -65,7 +65,7 @@ fn a_scenario_without_layers_is_refused() {
     refused(
         &["run", file.to_str().expect("a path"), "--out", out.to_str().expect("a path")],
         &out,
-        &["none.ron:3:18", "at least one"],
+        &["none.ron:3:19", "at least one"],
     );
 }
 
@@ -75,9 +75,9 @@ fn what_is_not_a_scenario_file_is_refused() {
     let out = scratch.path().join("out");
     let cases = [
         (scratch.file("empty.ron", ""), "is empty"),
-        (scratch.file("binary.ron", [0u8, 159, 146, 150, 255]), "not a text file"),
+        (scratch.file("binary.ron", [0u8, 159, 146, 150, 255]), "binary file"),
         (scratch.path().to_path_buf(), "is a directory"),
-        (scratch.path().join("nowhere.ron"), "cannot be read"),
+        (scratch.path().join("nowhere.ron"), "no such file"),
     ];
     for (file, word) in cases {
         let file = file.to_str().expect("a path");
@@ -119,7 +119,7 @@ fn a_wrong_configuration_or_column_map_is_refused() {
     let data =
         scratch.file("d.csv", "time_s,position_m,force_n\n0.00,0.000,0.1\n0.01,0.001,0.2\n0.02,0.002,0.3\n");
     let (data, folder) = (data.to_str().expect("a path"), out.to_str().expect("a path"));
-    let config = scratch.file("c.ron", "Enhance(\n  enhance: (cusum: (sigma_ordinary_n: 0.2)),\n)");
+    let config = scratch.file("c.ron", "Enhance(\n  cusum: (sigma_ordinary_n: 0.2),\n)");
     refused(
         &["enhance", data, "--config", config.to_str().expect("a path"), "--out", folder],
         &out,
@@ -136,7 +136,7 @@ fn a_wrong_configuration_or_column_map_is_refused() {
     refused(
         &["enhance", data, "--columns", map.to_str().expect("a path"), "--out", folder],
         &out,
-        &["d.csv", "`t`"],
+        &["d.csv", "no column \"t\"", "\"time_s\""],
     );
 }
 
