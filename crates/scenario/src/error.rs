@@ -1,6 +1,7 @@
 //! What is wrong with an input file, where, and what would be right.
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
+use std::sync::Arc;
 
 /// An input file that cannot be used. The message names file, line and column, what is wrong and
 /// what would be right; rendered by `miette` it shows the place in the source.
@@ -15,7 +16,7 @@ pub struct InputError {
     /// Line and column, from 1.
     pub position: Option<(usize, usize)>,
     #[source_code]
-    source_code: Option<NamedSource<String>>,
+    source_code: Option<Arc<NamedSource<String>>>,
     #[label("here")]
     span: Option<SourceSpan>,
 }
@@ -39,7 +40,7 @@ impl InputError {
             place: format!("{file}:{line}:{column}"),
             what: what.into(),
             position: Some((line, column)),
-            source_code: Some(NamedSource::new(file, text.to_owned())),
+            source_code: Some(Arc::new(NamedSource::new(file, text.to_owned()))),
             span: Some(SourceSpan::new(start.into(), end - start)),
         }
     }

@@ -47,6 +47,11 @@ impl Place<'_> {
     /// Bytes to underline, and the message.
     fn explain(&self, code: &Error) -> (usize, usize, String) {
         let here = |what: String| (self.start, self.end, what);
+        if self.outline.entries.is_empty() {
+            return here(
+                "holds nothing but comments; a RON file begins like `Scenario(name: \"...\", ...)`".into(),
+            );
+        }
         match code {
             Error::NoSuchStructField { expected, found, outer } => here(format!(
                 "unknown field `{found}`{}; {}",
@@ -99,7 +104,9 @@ impl Place<'_> {
                 here("a string begins and never ends; close it with a double quote".into())
             }
             Error::TrailingCharacters => {
-                here("text behind the end; the file ends with the bracket that closes the first one".into())
+                let (start, end) = self.next_token();
+                let what = "text behind the end; the file ends with the bracket that closes the first one";
+                (start, end, what.to_owned())
             }
             Error::ExceededRecursionLimit => here("brackets are nested too deeply; remove some".into()),
             other => here(format!("not valid here: {}", decapitalised(&other.to_string()))),
@@ -154,8 +161,22 @@ impl Place<'_> {
                 };
                 (token.start, token.end, what)
             }
-            _ => self.wrong("a list of fields in brackets, `(field: value, ...)`,"),
+            _ => self
+                .stray_bracket()
+                .unwrap_or_else(|| self.wrong("fields in brackets, `(field: value, ...)`,")),
         }
+    }
+
+    /// A closing bracket where a value is expected: the one before it is missing.
+    fn stray_bracket(&self) -> Option<(usize, usize, String)> {
+        let (start, end) = self.next_token();
+        let found = self.text.get(start..end).filter(|t| matches!(*t, ")" | "]" | "}"))?;
+        let path = self.outline.around(self.start).map_or("", |e| e.path.as_str());
+        let inside = if path.is_empty() { String::new() } else { format!("{path}: ") };
+        let what = format!(
+            "{inside}`{found}` closes another bracket than the one that is open; close that one first"
+        );
+        Some((start, end, what))
     }
 
     fn comma(&self) -> (usize, usize, String) {
@@ -174,11 +195,15 @@ impl Place<'_> {
             let what = "this string runs over several lines; is its closing double quote missing?";
             return (string.start, string.start + 1, what.to_owned());
         }
-        let rest = rest.trim_start();
-        let word = tokens(rest).first().map_or(0, |t| t.end);
-        let start = self.text.len() - rest.len();
-        let what = format!("a comma or a closing bracket is expected before `{}`", &rest[..word]);
-        (start, start + word, what)
+        let (start, end) = self.next_token();
+        let what = format!("a comma or a closing bracket is expected before `{}`", &self.text[start..end]);
+        (start, end, what)
+    }
+
+    /// Bytes of the first token from here on.
+    fn next_token(&self) -> (usize, usize) {
+        let token = self.text.get(self.start..).and_then(|rest| tokens(rest).first().copied());
+        token.map_or((self.start, self.end), |t| (self.start + t.start, self.start + t.end))
     }
 
     /// The text ends too early.

@@ -12,6 +12,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod describe;
 mod enhance_file;
 mod error;
 mod explain;
@@ -28,6 +29,7 @@ mod validate_effects;
 mod validate_enhance;
 mod validate_motion;
 
+pub use describe::describe;
 pub use enhance_file::EnhanceFile;
 pub use error::{InputError, closest};
 pub use load::{Problem, load, parse, read_text, ron_options};

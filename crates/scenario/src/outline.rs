@@ -125,9 +125,9 @@ impl Outline {
         }
     }
 
-    /// The value at a path; `None` when the text does not hold it (a default).
+    /// The value at a path, `Some(...)` included; `None` when the text does not hold it (a default).
     pub(crate) fn locate(&self, path: &str) -> Option<&Entry> {
-        self.entries.iter().rfind(|entry| entry.path == path)
+        self.entries.iter().find(|entry| entry.path == path)
     }
 
     /// The innermost value around a place, its field name included.
@@ -168,7 +168,7 @@ Scenario(
     fn a_path_leads_to_its_value_past_comments_and_strings() {
         assert_eq!(text_at("tissue.layers[0].thickness_m"), Some("0.01"));
         assert_eq!(text_at("tissue.layers[1].thickness_m"), Some("-2.5e-3"));
-        assert_eq!(text_at("tissue.layers[1].puncture_n"), Some("2.2"));
+        assert_eq!(text_at("tissue.layers[1].puncture_n"), Some("Some(2.2)"));
         assert_eq!(text_at("motion.velocity_mps"), Some("0.0023"));
         assert_eq!(text_at("motion"), Some("Constant(start_m: -0.005, velocity_mps: 0.0023)"));
         assert_eq!(text_at("maybe.inner"), Some("7"));

@@ -2,8 +2,6 @@
 //! into infinity, so every number is checked.
 
 use crate::load::Problem;
-use crate::motion::Motion;
-use crate::robot::Robot;
 use crate::scenario::Scenario;
 use crate::sensor::{ForceTorque, Sensor};
 use crate::validate_effects::effects;
@@ -41,14 +39,14 @@ pub(crate) fn scenario(s: &Scenario) -> Checked {
     if steps < 1.0 - 1e-9 || (steps - steps.round()).abs() > 1e-9 * steps {
         let nearest = steps.round().max(1.0) * s.sample_hz;
         let what = format!(
-            "is {}, which is not a whole multiple of sample_hz, {}; the nearest is {nearest}",
+            "is {}, which is not a whole multiple of sample_hz {}; the nearest is {nearest}",
             s.physics_hz, s.sample_hz
         );
         return Err(Problem::new("physics_hz", what).with("sample_hz"));
     }
     check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
     motion(s)?;
-    sensors(s)?;
+    sensors(&s.sensor)?;
     enhance("enhance", &s.enhance)
 }
 
@@ -75,13 +73,8 @@ fn tissue(s: &Scenario) -> Checked {
     Ok(())
 }
 
-fn sensors(s: &Scenario) -> Checked {
-    let has_torques = matches!(s.robot, Robot::Arm(_)) || s.motion == Motion::Recorded;
-    if !has_torques && !matches!(s.sensor, Sensor::ForceTorque(_)) {
-        let what = "listens to joint torques, which only an arm has; write `robot: Arm()`, or use `ForceTorque(...)`";
-        return Err(Problem::new("sensor", what).with("robot"));
-    }
-    match &s.sensor {
+fn sensors(sensor: &Sensor) -> Checked {
+    match sensor {
         Sensor::ForceTorque(config) => force_torque("sensor", config),
         Sensor::Virtual(config) => positive("sensor.gain_per_s", config.gain_per_s, "1/s"),
         Sensor::Both { force_torque: config, virtual_sensor } => {

@@ -103,10 +103,10 @@ fn reaches(s: &Scenario) -> Checked {
     if furthest_m > surface_m {
         return Ok(());
     }
-    let missing_m = surface_m - furthest_m;
+    let missing_mm = (surface_m - furthest_m) * 1e3;
     let what = format!(
-        "never reaches the tissue: the tip comes to {furthest_m:.6} m and the surface lies at {surface_m} m, \
-         {missing_m:.6} m further; start nearer, move longer, or move the other way"
+        "never reaches the tissue: the tip comes to {furthest_m:.4} m and the surface lies at {surface_m} m, \
+         {missing_mm:.3} mm further; start nearer, move longer, or move the other way"
     );
     Err(Problem::new("motion", what))
 }
