@@ -19,6 +19,7 @@ pub enum Model {
 /// When the covariance goes back to its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Reset {
     /// At a constant frequency [S sec. II].
     Frequency {
