@@ -1,4 +1,4 @@
-//! First contact found from the data [D]: bias and noise are learnt in air, contact is declared
+//! First contact found from the data \[D\]: bias and noise are learnt in air, contact is declared
 //! when the low-passed force stands out of the noise for several samples, and its position is
 //! traced back along the loading line to zero force.
 

@@ -5,7 +5,7 @@ use crate::history::History;
 use crate::line::Line;
 use crate::sample::Sample;
 
-/// Travel either side of the rupture over which the straight lines are fitted, in m [D].
+/// Travel either side of the rupture over which the straight lines are fitted, in m \[D\].
 const LINE_TRAVEL_M: f64 = 0.001;
 /// Samples looked at before the rupture: bounds the work of the tick that declares it.
 const LOOK_BACK: u64 = 256;

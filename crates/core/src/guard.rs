@@ -1,4 +1,4 @@
-//! What is not a rupture [D]: reversal, hold, a sudden change of the commanded speed, and travel
+//! What is not a rupture \[D\]: reversal, hold, a sudden change of the commanded speed, and travel
 //! over ground where the needle has already been.
 
 use crate::config::GuardConfig;

@@ -16,8 +16,8 @@ pub(crate) fn regressor(model: Model, depth_m: f64, velocity_mps: f64) -> [f64; 
 }
 
 /// Prior variance of the friction that makes elastic and viscous force at the rupture stand in the
-/// measured proportion: `sK (1 - kappa)/(kappa v²)` for the multi-layer model [S (17)],
-/// `sK (d/2)² (1 - kappa)/(kappa v²)` for Kelvin-Voigt [L].
+/// measured proportion: `sK (1 - kappa)/(kappa v²)` for the multi-layer model \[S (17)\],
+/// `sK (d/2)² (1 - kappa)/(kappa v²)` for Kelvin-Voigt \[L\].
 pub(crate) fn reweighted_prior(
     config: &EnhanceConfig,
     share: f64,
