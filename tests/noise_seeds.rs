@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use stylet_core::config::{Contact, EnhanceConfig, Model};
 use stylet_scenario::{Motion, Scenario, Sensor};
 use stylet_score::{LayerTruth, Score, score_run};
-use stylet_testbed::{ForceSensor, Simulation, simulate};
+use stylet_testbed::{InsertionSample, Measuring, Simulation, simulate};
+use stylet_tissue::TissueForce;
 
 const SEEDS: u64 = 200;
 
@@ -33,9 +34,20 @@ fn scores(scenario: &Scenario, config: &EnhanceConfig) -> Vec<Score> {
         })
         .collect();
     let noisy = |seed: u64| -> Vec<f64> {
-        let mut sensor = ForceSensor::new(sensor, seed);
+        let mut measuring = Measuring::new(&scenario.effects, sensor, seed, scenario.sample_hz);
         let Simulation { recording, truth, .. } = &once;
-        recording.time_s.iter().zip(&truth.tissue_force_n).map(|(t, f)| sensor.measure(*t, *f)).collect()
+        let samples = recording.samples().zip(&truth.tissue_force_n);
+        samples
+            .map(|(s, &total_n)| {
+                measuring.measure(&InsertionSample {
+                    time_s: s.time_s,
+                    position_m: s.position_m,
+                    velocity_mps: s.velocity_mps,
+                    acceleration_mps2: 0.0,
+                    force: TissueForce { total_n, ..TissueForce::default() },
+                })
+            })
+            .collect()
     };
     assert_eq!(noisy(1), once.recording.force_n, "drawing the noise apart must change nothing");
     (1..=SEEDS)

@@ -10,6 +10,6 @@ mod simulate;
 mod slide;
 
 pub use insertion::{InsertionSample, Rates, on_slide, replayed};
-pub use sensor::{ForceSensor, Measuring, Noise};
+pub use sensor::{Measuring, Noise};
 pub use simulate::{SimulateError, Simulation, rates, simulate};
 pub use slide::{NEEDLE_LENGTH_M, NEEDLE_MASS_KG, Slide};
