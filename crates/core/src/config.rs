@@ -249,6 +249,9 @@ pub struct GuardConfig {
     pub acceleration_time_constant_s: f64,
     /// A sudden change of speed: acceleration above this, in m/s².
     pub sudden_mps2: f64,
+    /// Ground is old where the tip is this far above its deepest point, in m: more than the noise of
+    /// the position.
+    pub old_ground_m: f64,
     /// Detection rests this long after a sudden change, a reversal or a hold, in s.
     pub rest_s: f64,
     /// A trailing edge does not count while the speed falls faster than this share per second.
@@ -261,6 +264,7 @@ impl Default for GuardConfig {
             blind_travel_m: 0.002,
             acceleration_time_constant_s: 0.01,
             sudden_mps2: 0.05,
+            old_ground_m: 1e-4,
             rest_s: 0.25,
             slowing_per_s: 0.1,
         }
