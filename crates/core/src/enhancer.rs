@@ -113,13 +113,20 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
 
     /// Takes one sample. A sample that is not finite or not later than the one before is passed
     /// over ([`Output::used`] is false).
+    #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
+        *self.step_by_ref(sample)
+    }
+
+    /// As [`Enhancer::step`], without copying the output: for callers who look at a few fields of
+    /// millions of samples.
+    pub fn step_by_ref(&mut self, sample: Sample) -> &Output {
         self.out.detection = None;
         self.out.estimate = None;
         let dt_s = sample.time_s - self.last.time_s;
         if !sample.is_finite() || (self.started && dt_s <= 0.0) {
             self.out.used = false;
-            return self.out;
+            return &self.out;
         }
         let dt_s = if self.started { dt_s } else { 0.0 };
         let number = self.history.next();
@@ -136,10 +143,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         self.finish(&sample, rate);
         self.last = sample;
         self.started = true;
-        self.out
+        &self.out
     }
 
     /// First contact.
+    #[inline]
     fn touch(&mut self, dt_s: f64, sample: &Sample, number: u64) {
         if self.out.contact_m.is_some() {
             return;
@@ -213,6 +221,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// The state machine.
+    #[inline]
     fn advance(&mut self, dt_s: f64, sample: &Sample, before: Rls, edge: bool) {
         match self.out.state {
             State::NoRupture | State::ExpectedRupture => {
@@ -230,6 +239,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Looks for a rupture.
+    #[inline]
     fn watch(&mut self, sample: &Sample, before: Rls, edge: bool) {
         if !self.in_contact {
             return;
@@ -270,6 +280,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
+    #[inline]
     fn known_thickness_m(&self) -> Option<f64> {
         match &self.config.depths {
             Depths::Unknown => None,
@@ -278,6 +289,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// A rupture: the traversed layer is set aside, a new one begins.
+    #[cold]
     fn declare(&mut self, sample: &Sample, before: Rls, cause: Cause) {
         let newest = self.history.next().saturating_sub(1);
         let literal = self.config.algorithm == Algorithm::Literal;
@@ -316,6 +328,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Counts the travel and time that a waiting state needs; standstill does not count.
+    #[inline]
     fn wait(&mut self, dt_s: f64, sample: &Sample) {
         if sample.velocity_mps.abs() >= self.config.drop.standstill_mps {
             self.waited_m += sample.velocity_mps.abs() * dt_s;
@@ -328,6 +341,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// ForceDropMeasuring.
+    #[inline]
     fn measure(&mut self, dt_s: f64, sample: &Sample) {
         self.wait(dt_s, sample);
         let reversing = self.is_reversing(sample);
@@ -364,6 +378,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// ForceCompensation: a share of the re-run per tick, then the layer's friction is added.
+    #[inline]
     fn compensate(&mut self, dt_s: f64, sample: &Sample) {
         self.wait(dt_s, sample);
         if let Some(mut pending) = self.pending.take() {
@@ -388,6 +403,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
+    #[cold]
     fn settle(&mut self, sample: &Sample, pending: &Pending, theta: [f64; 2]) {
         let stiffness = theta[0].max(0.0);
         let friction = theta[1].max(0.0);
@@ -410,6 +426,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         self.out.estimate = Some(estimate);
     }
 
+    #[inline]
     fn finish(&mut self, sample: &Sample, rate: f64) {
         let v = sample.velocity_mps;
         let friction = if self.is_reversing(sample) {

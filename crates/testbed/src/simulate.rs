@@ -61,7 +61,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
             remedy: "use sensor: ForceTorque(...)",
         });
     };
-    let mut measuring = Measuring::new(&scenario.effects, sensor, seed);
+    let mut measuring = Measuring::new(&scenario.effects, sensor, scenario.sample_hz, seed);
     let rates = rates(scenario, plan.duration_s());
     let mut ruptures = Vec::new();
     let mut columns = Columns::with_capacity(rates.samples, scenario.tissue.surface_m);
@@ -73,7 +73,10 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
             by_force: r.by_force,
         });
     };
-    let sink = |s: &InsertionSample| columns.push(s, measuring.measure(s));
+    let sink = |s: &InsertionSample| {
+        let recorded_n = measuring.measure(s);
+        columns.push(s, [measuring.position(s.position_m), measuring.position(s.velocity_mps), recorded_n]);
+    };
     match scenario.robot {
         Robot::Slide => on_slide(&plan, &law, &rates, on_rupture, sink),
         Robot::Replay => replayed(&plan, &law, &rates, on_rupture, sink),
@@ -109,10 +112,11 @@ impl Columns {
         Self { recording, truth: Truth::default(), surface_m }
     }
 
-    fn push(&mut self, s: &InsertionSample, recorded_n: f64) {
+    /// A sample, and the position (m), velocity (m/s) and force (N) recorded of it.
+    fn push(&mut self, s: &InsertionSample, [position_m, velocity_mps, recorded_n]: [f64; 3]) {
         self.recording.time_s.push(s.time_s);
-        self.recording.position_m.push(s.position_m);
-        self.recording.velocity_mps.push(s.velocity_mps);
+        self.recording.position_m.push(position_m);
+        self.recording.velocity_mps.push(velocity_mps);
         self.recording.force_n.push(recorded_n);
         let truth = &mut self.truth;
         truth.tip_force_n.push(s.force.tip_n);
