@@ -9,8 +9,15 @@ mod design;
 mod distribution;
 mod draw;
 mod field;
+pub mod gate;
+mod page;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod row;
 mod run;
+pub mod shard;
+pub mod stats;
+mod summary;
 mod sweep;
 pub mod trial;
 
@@ -18,6 +25,10 @@ pub use design::{Design, SOBOL_DIMENSIONS, Sampling, trial_seed};
 pub use distribution::{Distribution, normal_quantile};
 pub use draw::{DrawError, Drawer, Drawn};
 pub use field::Field;
+pub use page::{MapRow, map_rows, map_svg, page};
+#[cfg(feature = "parquet")]
+pub use parquet::parquet;
 pub use row::{Columns, Row, csv};
 pub use run::{TrialError, rows, rows_with};
+pub use summary::{Explained, Outcome, ScoreSummary, Summary, WorstTrial, failed, summarise, value};
 pub use sweep::{Overrides, RandomEffect, Sweep, SweepFile, Vary};

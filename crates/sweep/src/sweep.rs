@@ -156,6 +156,23 @@ impl Sweep {
         self.file.vary.len() + self.file.effects.len()
     }
 
+    /// The sweep as a file over `scenario.ron` beside it, with the overrides.
+    #[must_use]
+    pub fn to_ron(&self) -> String {
+        let file = SweepFile { scenario: PathBuf::from("scenario.ron"), ..self.file.clone() };
+        let pretty = Default::default();
+        let body = stylet_scenario::ron_options().to_string_pretty(&file, pretty).unwrap_or_default();
+        format!("Sweep{body}\n")
+    }
+
+    /// The scenario of [`Sweep::to_ron`]: the sweep's without the sweep's effects.
+    #[must_use]
+    pub fn scenario(&self) -> Scenario {
+        let mut scenario = self.template.clone();
+        scenario.effects.truncate(self.own_effects);
+        scenario
+    }
+
     /// SHA-256 over all that the results depend on: resolved scenario, sweep, seed, trials, version.
     #[must_use]
     pub fn identity(&self) -> String {
