@@ -89,7 +89,7 @@ impl Parts {
         let mut core = Enhancer::new(self.scenario.enhance.clone(), 0.0, storage);
         let mut sum = 0.0;
         for (s, tip_n) in self.samples.iter().zip(&self.tips) {
-            let out = core.step_by_ref(*s);
+            let out = core.step_brief(*s);
             sum += out.enhanced_n;
             if let Some(scorer) = &mut scorer {
                 scorer.sample(&Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n }, out);
@@ -113,9 +113,9 @@ fn shares(sweep: &Sweep) -> f64 {
     let parts = Parts::new(sweep.template.clone());
     let mut storage = vec![Sample::default(); parts.count];
     let per_sample = |seconds: f64| seconds / parts.count as f64 * 1e9;
-    let law = per_sample(best(300, || drop(black_box(parts.law()))));
-    let noise = per_sample(best(300, || drop(black_box(parts.noise()))));
-    let core = per_sample(best(300, || drop(black_box(parts.core(&mut storage, None)))));
+    let law = per_sample(best(300, || { black_box(parts.law()); }));
+    let noise = per_sample(best(300, || { black_box(parts.noise()); }));
+    let core = per_sample(best(300, || { black_box(parts.core(&mut storage, None)); }));
     let scored = per_sample(best(300, || {
         let mut scorer = parts.scorer();
         black_box(parts.core(&mut storage, Some(&mut scorer)));

@@ -115,12 +115,21 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// over ([`Output::used`] is false).
     #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
-        *self.step_by_ref(sample)
+        self.step_brief(sample);
+        let out = &mut self.out;
+        out.reconstructed_n = if self.in_contact { self.last.force_n - out.error_n } else { 0.0 };
+        out.theta = self.rls.theta;
+        out.cusum_n2 = self.cusum_n2;
+        out.derivative_n_per_s = self.derivative.value_n_per_s();
+        out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
+        self.out
     }
 
-    /// As [`Enhancer::step`], without copying the output: for callers who look at a few fields of
-    /// millions of samples.
-    pub fn step_by_ref(&mut self, sample: Sample) -> &Output {
+    /// As [`Enhancer::step`] for callers who look at a few fields of millions of samples: nothing is
+    /// copied, and of the output only enhanced force, innovation, state, ruptures, contact, detection,
+    /// estimate and `used` are kept up to date. Inlined, so that the sample stays in registers.
+    #[inline(always)]
+    pub fn step_brief(&mut self, sample: Sample) -> &Output {
         self.out.detection = None;
         self.out.estimate = None;
         let dt_s = sample.time_s - self.last.time_s;
@@ -137,10 +146,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         let before = self.rls;
         let error_n = self.identify(dt_s, &sample);
         self.out.error_n = error_n;
-        self.out.reconstructed_n = if self.in_contact { sample.force_n - error_n } else { 0.0 };
         let edge = self.switch_derivative(rate);
         self.advance(dt_s, &sample, before, edge);
-        self.finish(&sample, rate);
+        self.finish(&sample);
         self.last = sample;
         self.started = true;
         &self.out
@@ -427,7 +435,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     #[inline]
-    fn finish(&mut self, sample: &Sample, rate: f64) {
+    fn finish(&mut self, sample: &Sample) {
         let v = sample.velocity_mps;
         let friction = if self.is_reversing(sample) {
             self.compensation.along_shaft_ns_per_m(sample.position_m)
@@ -435,10 +443,6 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             self.compensation.cumulative_ns_per_m()
         };
         self.out.enhanced_n = sample.force_n - friction * v;
-        self.out.theta = self.rls.theta;
-        self.out.cusum_n2 = self.cusum_n2;
-        self.out.derivative_n_per_s = rate;
-        self.out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
         self.out.used = true;
     }
 }

@@ -57,9 +57,45 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> History<B> {
     }
 }
 
+impl<B: AsRef<[Sample]> + AsMut<[Sample]>> History<B> {
+    /// The samples from number `from` up to, not including, `to`, as far as they follow one another in
+    /// storage; empty when the first is gone or has not come yet.
+    #[inline]
+    pub(crate) fn run(&self, from: u64, to: u64) -> &[Sample] {
+        let storage = self.storage.as_ref();
+        let (Some(ago), true) = (self.next.checked_sub(from), to > from) else { return &[] };
+        if ago == 0 || ago > storage.len() as u64 {
+            return &[];
+        }
+        let ago = ago as usize;
+        let index = if ago <= self.slot { self.slot - ago } else { self.slot + storage.len() - ago };
+        let count = (to.min(self.next) - from) as usize;
+        storage.get(index..(index + count).min(storage.len())).unwrap_or(&[])
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_run_of_samples_is_what_asking_one_by_one_gives() {
+        let mut history = History::new(alloc::vec![Sample::default(); 7]);
+        for number in 0..30_u64 {
+            history.push(Sample { time_s: number as f64, ..Sample::default() });
+            for from in 0..=number + 1 {
+                for to in from..=number + 2 {
+                    let run = history.run(from, to);
+                    let held = history.get(from).is_some() && to > from;
+                    assert_eq!(run.is_empty(), !held, "{from} to {to} of {number}");
+                    for (k, sample) in run.iter().enumerate() {
+                        assert_eq!(Some(sample), history.get(from + k as u64));
+                        assert!(from + (k as u64) < to);
+                    }
+                }
+            }
+        }
+    }
 
     #[test]
     fn the_ring_holds_the_newest_samples_by_their_numbers() {

@@ -251,7 +251,8 @@ pub fn changes(old: &Baseline, new: &Baseline) -> Vec<String> {
     for (name, now) in new {
         match old.get(name) {
             None => lines.push(format!("+ {name}: {} (new)", show(now))),
-            Some(before) if before.value != now.value => {
+            // A number read back from a file may differ in its last bit.
+            Some(before) if (before.value - now.value).abs() > 1e-12 * now.value.abs() => {
                 let share = if before.value != 0.0 {
                     format!(" ({:+.1} %)", 100.0 * (now.value - before.value) / before.value.abs())
                 } else {

@@ -132,7 +132,10 @@ fn table(outcome: &Outcome) -> Table {
                     Cell::text(e.quantity.clone()),
                     Cell::number(or_dash(e.first_order)),
                     Cell::number(or_dash(e.rank_correlation)),
-                    Cell::number(or_dash(e.p_value)),
+                    Cell::number(match e.p_value {
+                        Some(p) if p < 1e-15 => "< 1e-15".to_owned(),
+                        p => or_dash(p),
+                    }),
                 ]
             })
             .collect(),
@@ -248,6 +251,9 @@ pub fn map_rows(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Vec<MapRow> {
         .filter_map(|quantity| {
             let bins = bins(sweep, columns, rows, quantity);
             let (first, last) = (bins.first()?, bins.last()?);
+            if first.middle == last.middle {
+                return None; // a constant
+            }
             let path = name(sweep, quantity);
             Some(MapRow {
                 name: format!("{path}  {} … {}", significant(first.middle, 2), significant(last.middle, 2)),

@@ -5,8 +5,8 @@ use stylet_core::{Enhancer, Sample};
 use stylet_record::TrueRupture;
 use stylet_scenario::{Scenario, Sensor};
 use stylet_score::{LayerTruth, Moment, STORAGE_SAMPLES, Score, Scorer};
-use stylet_testbed::{Measuring, SimulateError, rates, replayed};
-use stylet_tissue::{Law, Rupture};
+use stylet_testbed::{Measuring, SimulateError, rates};
+use stylet_tissue::{Law, LawState, Rupture};
 
 /// What a thread keeps from trial to trial.
 #[derive(Debug, Default)]
@@ -50,19 +50,20 @@ pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, Simu
     let mut core = Enhancer::new(scenario.enhance.clone(), surface_m, storage);
     let mut scorer = Scorer::new(layers, scenario.enhance.model);
     let mut ruptures: Vec<Rupture> = Vec::with_capacity(law.slabs().len());
-    replayed(
-        &plan,
-        &law,
-        &rates,
-        |rupture| ruptures.push(rupture),
-        |s| {
-            let force_n = measuring.measure(s);
-            let position_m = measuring.position(s.position_m);
-            let velocity_mps = measuring.position(s.velocity_mps);
-            let out = core.step_by_ref(Sample { time_s: s.time_s, position_m, velocity_mps, force_n });
-            scorer.sample(&Moment { position_m, force_n, tip_n: s.force.tip_n }, out);
-        },
-    );
+    let mut state = LawState::default();
+    // The kinematic replay of `stylet_testbed::replayed`, with nothing but the forces that are needed
+    // handed on: a sample's ground truth never goes through memory.
+    for k in 0..rates.samples {
+        let time_s = k as f64 / rates.sample_hz;
+        let at = plan.at(time_s);
+        let force = law.step(&mut state, time_s, at.position_m, at.velocity_mps, |r| ruptures.push(r));
+        let (total_n, tip_n) = (force.total_n, force.tip_n);
+        let force_n = measuring.measure_force(time_s, &at, total_n);
+        let position_m = measuring.position(at.position_m);
+        let velocity_mps = measuring.position(at.velocity_mps);
+        let out = core.step_brief(Sample { time_s, position_m, velocity_mps, force_n });
+        scorer.sample(&Moment { position_m, force_n, tip_n }, out);
+    }
     for r in ruptures {
         scorer.rupture(TrueRupture {
             layer: r.layer,

@@ -7,7 +7,7 @@ use crate::insertion::InsertionSample;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
-use stylet_scenario::ForceTorque;
+use stylet_scenario::{ForceTorque, MotionPoint};
 use stylet_tissue::{AnyEffect, Effect, Measurement, MeasurementState, Reading};
 
 /// Stream of the generator from which the force/torque sensor draws.
@@ -147,20 +147,28 @@ impl Measuring {
     /// The reading for one sample, in N.
     #[inline]
     pub fn measure(&mut self, sample: &InsertionSample) -> f64 {
-        if self.plain {
-            return self.sensor.measure(sample.time_s, sample.force.total_n);
-        }
-        self.measure_through_effects(sample)
+        let InsertionSample { time_s, position_m, velocity_mps, acceleration_mps2, .. } = *sample;
+        let at = MotionPoint { position_m, velocity_mps, acceleration_mps2 };
+        self.measure_force(time_s, &at, sample.force.total_n)
     }
 
-    fn measure_through_effects(&mut self, sample: &InsertionSample) -> f64 {
+    /// The reading, in N, of the tissue's force `tissue_n` (N) at `time_s` with the needle at `at`.
+    #[inline]
+    pub fn measure_force(&mut self, time_s: f64, at: &MotionPoint, tissue_n: f64) -> f64 {
+        if self.plain {
+            return self.sensor.measure(time_s, tissue_n);
+        }
+        self.measure_through_effects(time_s, at, tissue_n)
+    }
+
+    fn measure_through_effects(&mut self, time_s: f64, at: &MotionPoint, tissue_n: f64) -> f64 {
         let spike_n = self.spikes.as_mut().map_or(0.0, Spikes::draw);
         let reading = Reading {
-            time_s: sample.time_s,
-            velocity_mps: sample.velocity_mps,
-            acceleration_mps2: sample.acceleration_mps2,
-            tissue_n: sample.force.total_n,
-            noise_n: self.sensor.added(sample.time_s) + spike_n,
+            time_s,
+            velocity_mps: at.velocity_mps,
+            acceleration_mps2: at.acceleration_mps2,
+            tissue_n,
+            noise_n: self.sensor.added(time_s) + spike_n,
         };
         let force_n = self.chain.step(&mut self.state, &reading);
         self.sensor.ends(force_n)
