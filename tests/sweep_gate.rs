@@ -1,0 +1,86 @@
+//! Promise: `stylet gate` ends with 1 for a worsened algorithm and with 0 for the shipped one,
+//! whatever the seed; it says what changed and writes JUnit and JSON.
+
+mod support;
+
+use std::fs;
+use support::{Scratch, root, said, stylet};
+
+fn gates() -> String {
+    root().join("scenarios/gates/ci.ron").to_str().expect("a path").to_owned()
+}
+
+#[test]
+fn the_shipped_gates_pass_on_the_committed_baseline_and_on_ten_other_seeds() {
+    let output = stylet(&["gate", &gates()]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{text}{}", said(&output));
+    assert!(text.contains("No number differs"), "update the baseline with --update: {text}");
+    for seed in 11..=20 {
+        let output = stylet(&["gate", &gates(), "--seed", &seed.to_string()]);
+        assert!(output.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&output.stdout));
+    }
+}
+
+#[test]
+fn with_cusum_off_the_gate_fails_and_says_where() {
+    let scratch = Scratch::new("gate");
+    let scenario =
+        fs::read_to_string(root().join("scenarios/three_layer_latex_constant.ron")).expect("a scenario");
+    let worse = scenario.replace("enhance: (", "enhance: (cusum: (enabled: false), ");
+    assert_ne!(scenario, worse);
+    scratch.file("worse.ron", worse);
+    let text = "Gates([(run: \"worse.ron\", seeds: 50, expect: [(score: \"missed\", at_most: 0.0), \
+                (score: \"enhancement.rms_relative\", statistic: P95, at_most: 0.35)])])";
+    let file = scratch.file("gates.ron", text);
+    let (file, junit, json) =
+        (file.to_str().expect("a path"), scratch.path().join("j.xml"), scratch.path().join("j.json"));
+    let output = stylet(&[
+        "gate",
+        file,
+        "--update",
+        "--junit",
+        junit.to_str().expect("a path"),
+        "--json",
+        json.to_str().expect("a path"),
+    ]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}{}", said(&output));
+    assert!(text.contains("FAIL missed"), "{text}");
+    assert!(scratch.path().join("gates.baseline.json").exists());
+    let junit = fs::read_to_string(junit).expect("JUnit");
+    assert!(junit.contains("<failure message=\"missed"), "{junit}");
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(json).expect("JSON")).expect("JSON");
+    assert_eq!(json[0]["passed"], false);
+
+    // Against the baseline of the worse one the good one differs, readably.
+    fs::write(scratch.path().join("worse.ron"), scenario).expect("it can be written");
+    let output = stylet(&["gate", file]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("~ worse.ron missed Total:") && text.contains("-> 0"), "{text}");
+}
+
+#[test]
+fn wrong_gates_are_refused_with_their_place() {
+    let scratch = Scratch::new("bad-gates");
+    let scenario = root().join("scenarios/three_layer_latex_constant.ron");
+    let good = format!(
+        "Gates([\n  (run: \"{}\", seeds: 4, expect: [\n    (score: \"missed\", at_most: 9.0),\n  ]),\n])",
+        scenario.display()
+    );
+    for (from, to, words) in [
+        ("\"missed\"", "\"mised\"", &["3:13", "did you mean `missed`"][..]),
+        (", at_most: 9.0", "", &["3:5", "no bound"]),
+        ("at_most: 9.0", "at_most: NaN", &["3:5", "finite"]),
+        ("seeds: 4", "seeds: 0", &["2:", "between 1"]),
+        ("seeds: 4", "seeds: 4, sweep: \"x.ron\"", &["2:3", "one of `run` and `sweep`"]),
+    ] {
+        let file = scratch.file("g.ron", good.replacen(from, to, 1));
+        let output = stylet(&["gate", file.to_str().expect("a path")]);
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        for word in words {
+            assert!(said(&output).contains(word), "{to} does not say {word}: {}", said(&output));
+        }
+    }
+}
