@@ -113,9 +113,15 @@ fn shares(sweep: &Sweep) -> f64 {
     let parts = Parts::new(sweep.template.clone());
     let mut storage = vec![Sample::default(); parts.count];
     let per_sample = |seconds: f64| seconds / parts.count as f64 * 1e9;
-    let law = per_sample(best(300, || { black_box(parts.law()); }));
-    let noise = per_sample(best(300, || { black_box(parts.noise()); }));
-    let core = per_sample(best(300, || { black_box(parts.core(&mut storage, None)); }));
+    let law = per_sample(best(300, || {
+        black_box(parts.law());
+    }));
+    let noise = per_sample(best(300, || {
+        black_box(parts.noise());
+    }));
+    let core = per_sample(best(300, || {
+        black_box(parts.core(&mut storage, None));
+    }));
     let scored = per_sample(best(300, || {
         let mut scorer = parts.scorer();
         black_box(parts.core(&mut storage, Some(&mut scorer)));

@@ -18,7 +18,10 @@ const GOOD: &str = r#"Sweep(
 )"#;
 
 fn good() -> String {
-    GOOD.replace("SCENARIO", root().join("scenarios/three_layer_latex_constant.ron").to_str().expect("a path"))
+    GOOD.replace(
+        "SCENARIO",
+        root().join("scenarios/three_layer_latex_constant.ron").to_str().expect("a path"),
+    )
 }
 
 fn text(path: &Path) -> String {
@@ -28,10 +31,25 @@ fn text(path: &Path) -> String {
 #[test]
 fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
     let cases: [(&str, &str, &str, &[&str]); 17] = [
-        ("misspelt", "sensor.noise_n", "sensor.noize_n", &["5:16", "`noize_n`", "did you mean `noise_n`", "`ar1`", "`range_n`"]),
+        (
+            "misspelt",
+            "sensor.noise_n",
+            "sensor.noize_n",
+            &["5:16", "`noize_n`", "did you mean `noise_n`", "`ar1`", "`range_n`"],
+        ),
         ("section", "sensor.noise_n", "sensors.noise_n", &["5:16", "did you mean `sensor`", "`motion`"]),
-        ("index", "sensor.noise_n", "tissue.layers[3].stiffness_n_per_m", &["5:16", "3 entries", "[0] to [2]"]),
-        ("no_index", "sensor.noise_n", "tissue.layers.stiffness_n_per_m", &["5:16", "tissue.layers[0].stiffness_n_per_m"]),
+        (
+            "index",
+            "sensor.noise_n",
+            "tissue.layers[3].stiffness_n_per_m",
+            &["5:16", "3 entries", "[0] to [2]"],
+        ),
+        (
+            "no_index",
+            "sensor.noise_n",
+            "tissue.layers.stiffness_n_per_m",
+            &["5:16", "tissue.layers[0].stiffness_n_per_m"],
+        ),
         ("group", "sensor.noise_n", "enhance.cusum", &["5:16", "`sigma_rupture_n`"]),
         ("name", "sensor.noise_n", "enhance.model", &["5:16", "`MultiLayer`", "only numbers"]),
         ("variant", "sensor.noise_n", "motion.amplitude_m", &["5:16", "`velocity_mps`"]),
@@ -68,7 +86,9 @@ fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
 #[test]
 fn draws_that_no_scenario_allows_are_redrawn_and_hopeless_ones_are_reported() {
     let scratch = Scratch::new("redraw");
-    let wide = good().replace("Uniform(0.01, 0.02)", "Normal(mean: 0.0, sd: 0.02)").replace("trials: 6", "trials: 40");
+    let wide = good()
+        .replace("Uniform(0.01, 0.02)", "Normal(mean: 0.0, sd: 0.02)")
+        .replace("trials: 6", "trials: 40");
     let file = scratch.file("wide.ron", wide);
     let out = text(&scratch.path().join("out"));
     let output = stylet(&["sweep", &text(&file), "--quiet", "--out", &out]);

@@ -62,7 +62,8 @@ fn any_split_into_shards_in_any_order_gives_the_bytes_of_the_sequential_run() {
     for of in [1, 3, 8, 50] {
         let out = scratch.path().join(format!("{of}"));
         for shard in (1..=of).rev() {
-            let arguments = ["sweep", "run-shard", &format!("{shard}/{of}"), &text(&noise()), "--trials", "50"];
+            let arguments =
+                ["sweep", "run-shard", &format!("{shard}/{of}"), &text(&noise()), "--trials", "50"];
             let folder = text(&out);
             let output = stylet(&[&arguments[..], &["--threads", "1", "--out", &folder]].concat());
             assert!(output.status.success(), "{}", said(&output));
@@ -140,12 +141,16 @@ fn a_trial_replayed_alone_has_the_scores_of_its_row() {
             ("false", &score["false"]),
             ("enhancement.rms_relative", &score["enhancement"]["rms_relative"]),
             ("reconstruction_rms_n", &score["reconstruction_rms_n"]),
-            ("layers[1].stiffness_n_per_m.relative_error", &score["layers"][1]["stiffness_n_per_m"]["relative_error"]),
+            (
+                "layers[1].stiffness_n_per_m.relative_error",
+                &score["layers"][1]["stiffness_n_per_m"]["relative_error"],
+            ),
         ] {
             let found: f64 = row[column(name)].parse().unwrap_or(f64::NAN);
             let expected = value.as_f64().unwrap_or(f64::NAN);
             // The JSON reader rounds the last bit; the rest is the same.
-            let same = (found - expected).abs() <= 1e-15 * found.abs() || (found.is_nan() && expected.is_nan());
+            let same =
+                (found - expected).abs() <= 1e-15 * found.abs() || (found.is_nan() && expected.is_nan());
             assert!(same, "trial {trial}, {name}: {found} and {expected}");
             compared += usize::from(!found.is_nan());
         }

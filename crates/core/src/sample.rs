@@ -19,7 +19,8 @@ impl Sample {
     #[inline]
     pub fn is_finite(&self) -> bool {
         // A finite sum has finite terms only; the terms are asked one by one when it is not.
-        (self.time_s + self.position_m + self.velocity_mps + self.force_n).is_finite() || self.each_is_finite()
+        (self.time_s + self.position_m + self.velocity_mps + self.force_n).is_finite()
+            || self.each_is_finite()
     }
 
     #[cold]

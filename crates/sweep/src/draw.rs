@@ -25,7 +25,9 @@ pub struct Drawn {
 
 /// Every draw of a trial was out of range.
 #[derive(Clone, Debug, thiserror::Error)]
-#[error("trial {trial}: {ATTEMPTS} draws in a row make no scenario; the last: {why}; narrow the distributions")]
+#[error(
+    "trial {trial}: {ATTEMPTS} draws in a row make no scenario; the last: {why}; narrow the distributions"
+)]
 pub struct DrawError {
     /// Number of the trial.
     pub trial: u64,

@@ -68,7 +68,10 @@ impl Field {
                     let count = items.len();
                     place = items.get_mut(*index).ok_or_else(|| match count {
                         0 => format!("`{so_far}` is empty; there is no entry [{index}]"),
-                        _ => format!("`{so_far}` has {count} entries, [0] to [{}]; there is no [{index}]", count - 1),
+                        _ => format!(
+                            "`{so_far}` has {count} entries, [0] to [{}]; there is no [{index}]",
+                            count - 1
+                        ),
                     })?;
                     so_far.push_str(&format!("[{index}]"));
                 }
@@ -80,7 +83,9 @@ impl Field {
                     if !fields.contains_key(name) {
                         let mut known: Vec<String> = fields.keys().cloned().collect();
                         let optional = known_here(scenario, &steps[..depth]);
-                        known.extend(optional.iter().filter(|k| !fields.contains_key(*k)).cloned().collect::<Vec<_>>());
+                        known.extend(
+                            optional.iter().filter(|k| !fields.contains_key(*k)).cloned().collect::<Vec<_>>(),
+                        );
                         if !(last && optional.contains(name)) {
                             return Err(unknown(name, &so_far, &known));
                         }
@@ -100,12 +105,17 @@ impl Field {
             Value::Bool(_) => Kind::Switch,
             Value::Object(fields) => {
                 let names: Vec<String> = content(fields).keys().cloned().collect();
-                return Err(format!("`{path}` is not a number but holds fields: {}; name one of them", list(&names)));
+                return Err(format!(
+                    "`{path}` is not a number but holds fields: {}; name one of them",
+                    list(&names)
+                ));
             }
             Value::Array(items) => {
                 return Err(format!("`{path}` is a list of {}; name an entry, `{path}[0]`", items.len()));
             }
-            Value::String(text) => return Err(format!("`{path}` is `{text}`, a name; only numbers can be drawn")),
+            Value::String(text) => {
+                return Err(format!("`{path}` is `{text}`, a name; only numbers can be drawn"));
+            }
             Value::Null => return Err(format!("`{path}` has no value that could be drawn")),
         };
         let field = Self { path: path.to_owned(), steps, kind };
@@ -175,7 +185,10 @@ pub fn set(scenario: &mut Scenario, fields: &[Field], values: &[f64]) -> Result<
     Ok(())
 }
 
-fn changed<T: serde::Serialize + DeserializeOwned>(section: &T, fields: &[(&Field, f64)]) -> Result<T, String> {
+fn changed<T: serde::Serialize + DeserializeOwned>(
+    section: &T,
+    fields: &[(&Field, f64)],
+) -> Result<T, String> {
     let mut tree = serde_json::to_value(section).map_err(|e| e.to_string())?;
     for (field, value) in fields {
         let mut place = &mut tree;

@@ -120,7 +120,10 @@ pub fn load(path: &Path, seed: Option<u64>) -> Result<Vec<Ready>, InputError> {
     let file: GatesFile = parse(&shown, &text)?;
     let beside = path.parent().unwrap_or(Path::new(""));
     if file.0.is_empty() {
-        return Err(InputError::file(&shown, "holds no gate; write Gates([(run: \"...\", seeds: 200, expect: [...])])"));
+        return Err(InputError::file(
+            &shown,
+            "holds no gate; write Gates([(run: \"...\", seeds: 200, expect: [...])])",
+        ));
     }
     let place = |problem: Problem| problem.in_file(&shown, &text);
     let mut ready = Vec::with_capacity(file.0.len());
@@ -160,7 +163,8 @@ pub fn load(path: &Path, seed: Option<u64>) -> Result<Vec<Ready>, InputError> {
             let at = |field: &str| format!("[{i}].expect[{j}]{field}");
             if columns.score(&e.score).is_none() {
                 let known: Vec<&str> = columns.scores.iter().map(String::as_str).collect();
-                let near = closest(&e.score, &known).map_or(String::new(), |n| format!("; did you mean `{n}`?"));
+                let near =
+                    closest(&e.score, &known).map_or(String::new(), |n| format!("; did you mean `{n}`?"));
                 let what = format!("there is no score `{}`{near} Known: {}", e.score, known.join(", "));
                 return Err(place(Problem::new(at(".score"), what)));
             }

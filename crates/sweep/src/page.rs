@@ -6,7 +6,8 @@ use crate::summary::{Outcome, Summary, failed, value};
 use crate::sweep::Sweep;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
 use stylet_report::{
-    Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile, significant,
+    Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile,
+    significant,
 };
 
 /// Bins of a drawn quantity in pictures.
@@ -30,7 +31,8 @@ pub fn page(sweep: &Sweep, columns: &Columns, rows: &[Row], summary: &Summary) -
         .fact("version", summary.version.clone())
         .fact("identity", summary.identity.chars().take(16).collect::<String>());
     if summary.redrawn > 0 {
-        page = page.fact("redrawn", format!("{} trials, their first draw being out of range", summary.redrawn));
+        page =
+            page.fact("redrawn", format!("{} trials, their first draw being out of range", summary.redrawn));
     }
     page.section(Section::new("Rates").block(Block::Scorecard(tiles(summary))))
         .section(worst(summary))
@@ -54,18 +56,25 @@ fn tiles(s: &Summary) -> Scorecard {
         rate("insertions with a false alarm", &s.trials_with_false),
         Tile::new("false alarms", s.false_alarms.to_string(), format!("beside {} ruptures", s.ruptures)),
     ];
-    for (score, label) in [("enhancement.rms_relative", "enhanced force off by"), ("reconstruction_rms_n", "reconstruction")] {
+    for (score, label) in
+        [("enhancement.rms_relative", "enhanced force off by"), ("reconstruction_rms_n", "reconstruction")]
+    {
         if let Some(found) = s.scores.iter().find(|f| f.score == score) {
             let unit = if score.ends_with("_n") { " N" } else { "" };
             let show = |x: f64| if unit.is_empty() { percent(x) } else { significant(x, 3) + unit };
-            tiles.push(Tile::new(label, show(found.median.value), format!("median; p95 {}", show(found.p95.value))));
+            tiles.push(Tile::new(
+                label,
+                show(found.median.value),
+                format!("median; p95 {}", show(found.p95.value)),
+            ));
         }
     }
     Scorecard { title: String::new(), tiles }
 }
 
 fn worst(s: &Summary) -> Section {
-    let mut headers = vec!["trial".to_owned(), "missed".to_owned(), "false".to_owned(), "enhancement".to_owned()];
+    let mut headers =
+        vec!["trial".to_owned(), "missed".to_owned(), "false".to_owned(), "enhancement".to_owned()];
     // Wide tables help nobody: the strongest quantities come first in `explained`.
     let shown: Vec<usize> = match s.explained.first() {
         Some(outcome) => {
@@ -145,7 +154,8 @@ fn table(outcome: &Outcome) -> Table {
 
 fn scores(s: &Summary) -> Table {
     let cell = |x: f64| Cell::number(significant(x, 3));
-    let range = |i: &Interval| Cell::number(format!("{} to {}", significant(i.low, 3), significant(i.high, 3)));
+    let range =
+        |i: &Interval| Cell::number(format!("{} to {}", significant(i.low, 3), significant(i.high, 3)));
     Table {
         title: "Medians and 95th percentiles with their 95 % intervals between order statistics".to_owned(),
         headers: ["score", "trials", "median", "interval", "p95", "interval", "worst", "in trial"]
@@ -185,10 +195,8 @@ fn bins(sweep: &Sweep, columns: &Columns, rows: &[Row], quantity: usize) -> Vec<
         .and_then(|f| f.effect())
         .and_then(|e| e.checked_sub(sweep.own_effects))
         .map(|e| sweep.fields.len() + e);
-    let mut kept: Vec<&Row> = rows
-        .iter()
-        .filter(|r| switch.is_none_or(|s| r.values.get(s).is_some_and(|on| *on > 0.0)))
-        .collect();
+    let mut kept: Vec<&Row> =
+        rows.iter().filter(|r| switch.is_none_or(|s| r.values.get(s).is_some_and(|on| *on > 0.0))).collect();
     kept.sort_by(|a, b| a.values[quantity].total_cmp(&b.values[quantity]).then(a.trial.cmp(&b.trial)));
     let size = kept.len().div_ceil(BINS).max(1);
     kept.chunks(size)
@@ -274,7 +282,8 @@ fn name(sweep: &Sweep, quantity: usize) -> String {
         }
         None => {
             let path = field.path();
-            let short = ["tissue.", "enhance.", "motion.", "sensor."].iter().find_map(|p| path.strip_prefix(p));
+            let short =
+                ["tissue.", "enhance.", "motion.", "sensor."].iter().find_map(|p| path.strip_prefix(p));
             short.unwrap_or(path).to_owned()
         }
     }

@@ -23,7 +23,9 @@ pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError>
         } else {
             (Physical::DOUBLE, Repetition::OPTIONAL)
         };
-        fields.push(Arc::new(Type::primitive_type_builder(name, physical).with_repetition(repetition).build()?));
+        fields.push(Arc::new(
+            Type::primitive_type_builder(name, physical).with_repetition(repetition).build()?,
+        ));
     }
     let schema = Arc::new(Type::group_type_builder("trials").with_fields(fields).build()?);
     let properties = Arc::new(WriterProperties::builder().set_created_by("stylet".to_owned()).build());
@@ -34,8 +36,7 @@ pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError>
     while let Some(mut column) = group.next_column()? {
         if index < 3 {
             // Seeds keep their 64 bits: those beyond the signed range come out negative.
-            let whole: Vec<i64> =
-                rows.iter().map(|r| [r.trial, r.seed, r.redrawn][index] as i64).collect();
+            let whole: Vec<i64> = rows.iter().map(|r| [r.trial, r.seed, r.redrawn][index] as i64).collect();
             column.typed::<Int64Type>().write_batch(&whole, None, None)?;
         } else if let ColumnWriter::DoubleColumnWriter(typed) = column.untyped() {
             let all = || rows.iter().map(|r| r.values.get(index - 3).copied().unwrap_or(f64::NAN));

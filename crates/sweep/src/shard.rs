@@ -44,7 +44,9 @@ pub enum ShardError {
         why: io::Error,
     },
     /// It is not there.
-    #[error("{path}: shard {shard} of {of} is missing; make it with: stylet sweep run-shard {shard}/{of} ...")]
+    #[error(
+        "{path}: shard {shard} of {of} is missing; make it with: stylet sweep run-shard {shard}/{of} ..."
+    )]
     Missing {
         /// File.
         path: String,
@@ -60,7 +62,9 @@ pub enum ShardError {
         path: String,
     },
     /// It belongs to another sweep or version.
-    #[error("{path}: belongs to another {what}: {found} instead of {expected}; remove it and run the shard again")]
+    #[error(
+        "{path}: belongs to another {what}: {found} instead of {expected}; remove it and run the shard again"
+    )]
     Foreign {
         /// File.
         path: String,
@@ -96,7 +100,8 @@ impl std::str::FromStr for ShardNumber {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("`{text}` is not a shard; write one like 3/8, counted from 1");
         let (shard, of) = text.split_once('/').ok_or_else(wrong)?;
-        let (shard, of) = (shard.trim().parse().map_err(|_| wrong())?, of.trim().parse().map_err(|_| wrong())?);
+        let (shard, of) =
+            (shard.trim().parse().map_err(|_| wrong())?, of.trim().parse().map_err(|_| wrong())?);
         if shard == 0 || shard > of { Err(wrong()) } else { Ok(Self { shard, of }) }
     }
 }
@@ -179,7 +184,12 @@ pub fn write(
 ///
 /// # Errors
 /// [`ShardError`] that names the file.
-pub fn read(sweep: &Sweep, columns: &Columns, number: ShardNumber, out: &Path) -> Result<Vec<Row>, ShardError> {
+pub fn read(
+    sweep: &Sweep,
+    columns: &Columns,
+    number: ShardNumber,
+    out: &Path,
+) -> Result<Vec<Row>, ShardError> {
     let path = number.path(out);
     let shown = path.display().to_string();
     let damaged = |why: &str| ShardError::Damaged { path: shown.clone(), why: why.to_owned() };
@@ -190,7 +200,8 @@ pub fn read(sweep: &Sweep, columns: &Columns, number: ShardNumber, out: &Path) -
         _ => damaged(&why.to_string()),
     })?;
     let end = bytes.iter().position(|b| *b == b'\n').ok_or_else(|| damaged("it has no header"))?;
-    let found: Header = serde_json::from_slice(&bytes[..end]).map_err(|_| damaged("its header is unreadable"))?;
+    let found: Header =
+        serde_json::from_slice(&bytes[..end]).map_err(|_| damaged("its header is unreadable"))?;
     let body = &bytes[end + 1..];
     let expected = header(sweep, columns, number, found.sha256.clone());
     let foreign = |what, found: String, expected: String| {

@@ -203,7 +203,8 @@ fn in_sweep(problem: &Problem, own: usize, index: usize) -> Problem {
 /// The scenario as the kinematic replay runs it: no rigid bodies, one model, the force/torque sensor.
 fn as_replayed(mut scenario: Scenario) -> Result<Scenario, Problem> {
     if scenario.motion.plan().is_none() {
-        let what = "has the motion `Recorded`; a sweep needs one that it can carry out, for example Constant(...)";
+        let what =
+            "has the motion `Recorded`; a sweep needs one that it can carry out, for example Constant(...)";
         return Err(Problem::new("scenario", what));
     }
     if !matches!(scenario.sensor, Sensor::ForceTorque(_)) {

@@ -49,16 +49,33 @@ fn moments_are_those_of_the_textbook() {
             [(Sampling::Random, 4.0 / 90.0), (Sampling::LatinHypercube, 0.003), (Sampling::Sobol, 0.003)]
         {
             let found = moments(&with, sampling);
-            assert!((found.0 - mean).abs() < share * sd, "{with:?} {sampling:?}: mean {} not {mean}", found.0);
-            assert!((found.1 - sd).abs() < 2.0 * share * sd, "{with:?} {sampling:?}: sd {} not {sd}", found.1);
+            assert!(
+                (found.0 - mean).abs() < share * sd,
+                "{with:?} {sampling:?}: mean {} not {mean}",
+                found.0
+            );
+            assert!(
+                (found.1 - sd).abs() < 2.0 * share * sd,
+                "{with:?} {sampling:?}: sd {} not {sd}",
+                found.1
+            );
         }
     }
 }
 
 #[test]
 fn the_normal_quantile_is_the_inverse_of_the_normal_distribution() {
-    for (u, x) in [(0.5, 0.0), (0.975, 1.959_963_984_540_054), (0.001, -3.090_232_306_167_813), (1e-10, -6.361_340_902_404)] {
-        assert!((stylet_sweep::normal_quantile(u) - x).abs() < 1e-9, "{u}: {}", stylet_sweep::normal_quantile(u));
+    for (u, x) in [
+        (0.5, 0.0),
+        (0.975, 1.959_963_984_540_054),
+        (0.001, -3.090_232_306_167_813),
+        (1e-10, -6.361_340_902_404),
+    ] {
+        assert!(
+            (stylet_sweep::normal_quantile(u) - x).abs() < 1e-9,
+            "{u}: {}",
+            stylet_sweep::normal_quantile(u)
+        );
     }
 }
 

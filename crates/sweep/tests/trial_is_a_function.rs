@@ -13,7 +13,8 @@ fn scenario() -> Scenario {
 }
 
 fn sweep(paths: &[(&str, Distribution)], trials: u64) -> Sweep {
-    let vary = paths.iter().map(|(path, with)| Vary { path: (*path).to_owned(), with: with.clone() }).collect();
+    let vary =
+        paths.iter().map(|(path, with)| Vary { path: (*path).to_owned(), with: with.clone() }).collect();
     let file = SweepFile {
         scenario: "x.ron".into(),
         trials,

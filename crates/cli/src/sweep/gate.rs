@@ -66,7 +66,9 @@ fn read(path: &Path) -> Result<Option<Baseline>, Failure> {
     if !path.exists() {
         return Ok(None);
     }
-    let wrong = |why: String| Failure::Check(format!("{}: is no baseline: {why}; write it anew with --update", path.display()));
+    let wrong = |why: String| {
+        Failure::Check(format!("{}: is no baseline: {why}; write it anew with --update", path.display()))
+    };
     let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
     serde_json::from_slice(&bytes).map(Some).map_err(|e| wrong(e.to_string()))
 }

@@ -58,7 +58,9 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Res
 
 fn whole(args: &SweepArgs) -> Result<(), Failure> {
     let Some(file) = &args.sweep else {
-        return Err(Failure::Check("no sweep file is given; try stylet sweep scenarios/sweeps/noise.ron".into()));
+        return Err(Failure::Check(
+            "no sweep file is given; try stylet sweep scenarios/sweeps/noise.ron".into(),
+        ));
     };
     let sweep = Sweep::load(file, Overrides { trials: args.trials, seed: args.seed })?;
     let columns = Columns::new(&sweep);
@@ -66,7 +68,8 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     begin(&sweep, &columns, &out, of, args.resume)?;
     let progress = Progress::new(sweep.trials(), args.quiet);
-    let rows = with_threads(args.threads.unwrap_or(0), || all_shards(&sweep, &columns, &out, of, &progress))??;
+    let rows =
+        with_threads(args.threads.unwrap_or(0), || all_shards(&sweep, &columns, &out, of, &progress))??;
     progress.finish();
     conclude(&sweep, &columns, &rows, &out, args.quiet)
 }
@@ -87,7 +90,10 @@ fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool) ->
     {
         // A shard of another split is foreign, whatever it holds.
         shard::read(sweep, columns, ShardNumber { shard: 1, of: *split }, out)?;
-        let what = format!("{}: is split into {split} shards, not {of}; finish it with: stylet sweep merge", out.display());
+        let what = format!(
+            "{}: is split into {split} shards, not {of}; finish it with: stylet sweep merge",
+            out.display()
+        );
         return Err(Failure::Check(what));
     }
     files::inputs(sweep)?.write(out)

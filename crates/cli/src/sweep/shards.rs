@@ -24,7 +24,13 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
     let start = Instant::now();
     with_threads(1, || rows(&sweep, &columns, 0..probe, &|_| {}))??;
     let per_trial = start.elapsed().as_secs_f64() / probe as f64;
-    println!("{}: {} trials in {} shards, identity {}", sweep.name, sweep.trials(), args.shards, sweep.identity());
+    println!(
+        "{}: {} trials in {} shards, identity {}",
+        sweep.name,
+        sweep.trials(),
+        args.shards,
+        sweep.identity()
+    );
     for shard in 1..=args.shards {
         let range = ShardNumber { shard, of: args.shards }.range(sweep.trials());
         println!("{shard}/{}\ttrials {} to {}", args.shards, range.start, range.end);
