@@ -32,7 +32,12 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
     let mut originals = Vec::new();
     for name in ["three_layer_latex_constant.ron", "three_layer_latex_sinusoidal.ron"] {
         let scenario = fs::read_to_string(root().join("scenarios").join(name)).expect("a scenario");
-        let worse = scenario.replace("enhance: (", "enhance: (cusum: (enabled: false), ");
+        // Either the scenario has a part on the algorithm, or all of it is defaults.
+        let off = "cusum: (enabled: false)";
+        let mut worse = scenario.replace("enhance: (", &format!("enhance: ({off}, "));
+        if worse == scenario {
+            worse = scenario.replace("    sensor: ", &format!("    enhance: ({off}),\n    sensor: "));
+        }
         assert_ne!(scenario, worse);
         scratch.file(name, worse);
         originals.push((name, scenario));
