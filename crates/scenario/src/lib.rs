@@ -12,21 +12,28 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod arm_line;
 mod enhance_file;
 mod error;
+mod joint_friction;
 mod load;
 mod locate;
 mod motion;
+mod observer_gain;
 mod robot;
 mod scenario;
 mod sensor;
 mod validate;
+mod validate_arm;
 mod validate_enhance;
 
 pub use enhance_file::EnhanceFile;
 pub use error::{InputError, closest};
 pub use load::{Problem, load, parse, read_text, ron_options};
 pub use motion::{FROM_REST_RAD, Motion, MotionPlan, MotionPoint, Segment};
-pub use robot::{ArmConfig, Robot};
+pub use arm_line::{Approach, ArmLine};
+pub use joint_friction::{ArmFriction, CoulombViscous, Sigmoid};
+pub use observer_gain::ObserverGain;
+pub use robot::{ArmConfig, ArmController, Robot};
 pub use scenario::Scenario;
-pub use sensor::{ForceTorque, Sensor, VirtualSensor};
+pub use sensor::{ForceTorque, Sensor, VirtualSensor, WrenchFrom, ZeroWindow};
