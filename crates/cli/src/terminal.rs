@@ -6,6 +6,7 @@ use std::fmt::Write;
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
+use stylet_testbed::Simulation;
 
 fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "-".to_owned())
@@ -24,6 +25,9 @@ pub fn scorecard(scenario: &Scenario, finished: &Finished, hash: &str) -> String
         significant(recording.duration_s(), 3),
         scenario.seed
     );
+    if let Some(note) = virtual_note(&finished.simulation) {
+        let _ = writeln!(out, "{note}");
+    }
     for ran in &finished.ran {
         let Some(score) = &ran.score else { continue };
         let _ = writeln!(out, "\n{}", ran.name);
@@ -32,6 +36,19 @@ pub fn scorecard(scenario: &Scenario, finished: &Finished, hash: &str) -> String
         summary(&mut out, score);
     }
     out
+}
+
+/// How far the virtual sensor is off, in a sentence.
+#[must_use]
+pub fn virtual_note(simulation: &Simulation) -> Option<String> {
+    simulation.virtual_error.map(|error| {
+        format!(
+            "The virtual sensor lags by {} s; it is off by {} N (rms), by {} N beside its lag.",
+            significant(error.lag_s, 3),
+            significant(error.rms_n, 3),
+            significant(error.beside_lag_rms_n, 3)
+        )
+    })
 }
 
 fn ruptures(out: &mut String, scenario: &Scenario, score: &Score, trace: &Trace) {

@@ -13,6 +13,7 @@ mod insertion;
 mod sensor;
 mod simulate;
 mod slide;
+mod virtual_error;
 mod virtual_sensor;
 
 pub use arm::{NotAChain, RapierArm};
@@ -23,4 +24,5 @@ pub use insertion::{InsertionSample, Rates, on_slide, replayed};
 pub use sensor::{ForceSensor, Measuring, Noise};
 pub use simulate::{Reading, SimulateError, Simulation, rates, simulate};
 pub use slide::{NEEDLE_LENGTH_M, NEEDLE_MASS_KG, Slide};
+pub use virtual_error::VirtualError;
 pub use virtual_sensor::{AxialObserver, TorqueSensors};

@@ -4,6 +4,7 @@ use crate::arm_insertion::{ArmRecord, ArmSetup, on_arm};
 use crate::arm_rig::ArmError;
 use crate::insertion::{InsertionSample, Rates, on_slide, replayed};
 use crate::sensor::Measuring;
+use crate::virtual_error::VirtualError;
 use stylet_record::{Recording, TrueRupture, Truth};
 use stylet_scenario::{ForceTorque, Problem, Robot, Scenario, Sensor};
 use stylet_tissue::{Effect, Law, Place, Rupture, Slab, TooManyEffects};
@@ -46,6 +47,8 @@ pub struct Simulation {
     pub slabs: Vec<Slab>,
     /// The sensors that recorded, force/torque first.
     pub readings: Vec<Reading>,
+    /// How far the virtual sensor is off, and how late.
+    pub virtual_error: Option<VirtualError>,
 }
 
 /// The force of one sensor, as an online algorithm hears it.
@@ -124,8 +127,11 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     }
     columns.truth.ruptures = ruptures;
     let mut recording = columns.recording;
+    let zeroed_s = arm.as_ref().map_or(0.0, |arm| arm.zeroed_s);
     let readings = readings(&mut recording, arm, &scenario.sensor);
-    Ok(Simulation { recording, truth: columns.truth, slabs: law.slabs().to_vec(), readings })
+    let virtual_error = VirtualError::of(&recording, &columns.truth, zeroed_s);
+    let slabs = law.slabs().to_vec();
+    Ok(Simulation { recording, truth: columns.truth, slabs, readings, virtual_error })
 }
 
 /// Puts what the arm recorded into the recording, and lists what the sensors say.
