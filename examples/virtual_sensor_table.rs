@@ -120,7 +120,9 @@ fn main() -> Result<(), Failure> {
         })?;
 
         println!("\n{}, {seeds} seeds\n", base.name);
-        println!("  sensor   friction, zeroed  off mN  missed      95 %       false alarms       95 %    delay ms");
+        println!(
+            "  sensor   friction, zeroed  off mN  missed      95 %       false alarms       95 %    delay ms"
+        );
         for setting in &settings {
             let setting = setting.lock().map_err(|e| e.to_string())?;
             let of = |sensor: &str| -> Vec<&Score> {

@@ -91,7 +91,10 @@ impl ArmConfig {
                     Error::JointLimit { .. } => "move more slowly or start from other joint angles",
                     _ => "start nearer to the middle of the arm's reach, or move less far",
                 };
-                Problem::new(self.blame(), format!("the arm cannot carry the needle {way}: {error}; {remedy}"))
+                Problem::new(
+                    self.blame(),
+                    format!("the arm cannot carry the needle {way}: {error}; {remedy}"),
+                )
             })
         };
         let forward = follow(high, &near, "to the end of the motion")?;
@@ -181,9 +184,7 @@ fn approach(
             let duration_s = LEAST_APPROACH_S.max(settle_s + average_s);
             (Approach { duration_s, velocity_mps: 0.0 }, Some((-average_s, 0.0)))
         }
-        ZeroWindow::Never => {
-            (Approach { duration_s: LEAST_APPROACH_S.max(settle_s), ..still }, None)
-        }
+        ZeroWindow::Never => (Approach { duration_s: LEAST_APPROACH_S.max(settle_s), ..still }, None),
     }
 }
 

@@ -27,12 +27,12 @@ mod validate;
 mod validate_arm;
 mod validate_enhance;
 
+pub use arm_line::{Approach, ArmLine};
 pub use enhance_file::EnhanceFile;
 pub use error::{InputError, closest};
+pub use joint_friction::{ArmFriction, CoulombViscous, Sigmoid};
 pub use load::{Problem, load, parse, read_text, ron_options};
 pub use motion::{FROM_REST_RAD, Motion, MotionPlan, MotionPoint, Segment};
-pub use arm_line::{Approach, ArmLine};
-pub use joint_friction::{ArmFriction, CoulombViscous, Sigmoid};
 pub use observer_gain::ObserverGain;
 pub use robot::{ArmConfig, ArmController, Robot};
 pub use scenario::Scenario;

@@ -73,7 +73,12 @@ fn ranges(arm: &ArmConfig, physics_hz: f64) -> Checked {
 fn friction(friction: &ArmFriction) -> Checked {
     let at = |i: usize, field: &str| format!("robot.joint_friction.joints[{i}].{field}");
     let opposing = |path: String, value: f64, unit: &str| {
-        check(path, value, value >= 0.0, &format!("it must be zero or a positive number of {unit}: friction opposes the motion"))
+        check(
+            path,
+            value,
+            value >= 0.0,
+            &format!("it must be zero or a positive number of {unit}: friction opposes the motion"),
+        )
     };
     match friction {
         ArmFriction::None | ArmFriction::Measured | ArmFriction::MeasuredDirectional => {}
@@ -91,10 +96,7 @@ fn friction(friction: &ArmFriction) -> Checked {
             }
         }
     }
-    friction
-        .laws(1.0)
-        .validate()
-        .map_err(|error| Problem::new("robot.joint_friction", error.to_string()))
+    friction.laws(1.0).validate().map_err(|error| Problem::new("robot.joint_friction", error.to_string()))
 }
 
 /// Checks a virtual sensor whose fields stand at `at`.

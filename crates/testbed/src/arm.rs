@@ -61,7 +61,9 @@ impl RapierArm {
                 body = body.joined(&model.tool.payload.seen_from(&tool));
             }
             let handle = world.insert_body(
-                RigidBodyBuilder::dynamic().additional_mass_properties(mass_properties(&body)).can_sleep(false),
+                RigidBodyBuilder::dynamic()
+                    .additional_mass_properties(mass_properties(&body))
+                    .can_sleep(false),
             );
             let locked = JointAxesMask::all() & !JointAxesMask::ANG_Z;
             let joint = GenericJointBuilder::new(locked).local_frame1(pose(&link.placement)).build();

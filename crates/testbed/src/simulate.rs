@@ -144,8 +144,7 @@ fn readings(recording: &mut Recording, arm: Option<ArmRecord>, sensor: &Sensor) 
     recording.joint_torque_nm = arm.joint_torque_nm;
     if sensor.virtual_sensor().is_some() {
         let heard = recording.time_s.iter().zip(&arm.virtual_n);
-        let force_n =
-            heard.map(|(t, f)| if *t < arm.zeroed_s - 1e-9 { f64::NAN } else { *f }).collect();
+        let force_n = heard.map(|(t, f)| if *t < arm.zeroed_s - 1e-9 { f64::NAN } else { *f }).collect();
         readings.push(Reading { sensor: "virtual", force_n });
         if sensor.force_torque().is_none() {
             recording.force_n.clone_from(&arm.virtual_n);

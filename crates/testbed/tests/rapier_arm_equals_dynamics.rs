@@ -49,8 +49,7 @@ fn rapier_gives_the_accelerations_of_the_dynamics_crate_under_torques_gravity_an
             let at = arm.at(&q);
             body.step(&at.link_poses(), &torque, &at.tip().position_m, &push);
             let (q_after, qd_after) = body.joints();
-            let expected =
-                at.forward_dynamics(&qd, &torque, &EARTH_GRAVITY_MPS2, &Wrench::pure_force(push));
+            let expected = at.forward_dynamics(&qd, &torque, &EARTH_GRAVITY_MPS2, &Wrench::pure_force(push));
             worst = worst.max(((qd_after - qd) / dt - expected).amax());
             size = size.max(expected.amax());
             assert!((q_after - q - qd_after * dt).amax() < 1e-12, "semi-implicit step");
