@@ -6,15 +6,17 @@
 
 mod support {
     pub mod bare;
+    pub mod peers;
 }
 
 use criterion::{Criterion, Throughput};
 use std::hint::black_box;
 use std::time::Instant;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use stylet_tissue::{Law, LawState, Layer, Tissue};
 use stylet_testbed::{Noise, Slide};
+use stylet_tissue::{Law, LawState, Layer, Tissue};
 use support::bare::{BareCore, BareLaw};
+use support::peers;
 
 const SAMPLES: usize = 10_000;
 const SAMPLE_HZ: f64 = 200.0;
@@ -147,6 +149,23 @@ fn in_turns(mut ours: impl FnMut() -> f64, mut bare: impl FnMut() -> f64) -> (f6
     (median(|p| p.0), median(|p| p.1))
 }
 
+/// padasip's RLS alone, on the first layer's samples, beside the whole core.
+fn python_peer(data: &[Sample], core_ns: f64) {
+    let file = std::env::temp_dir().join(format!("stylet-bench-{}.csv", std::process::id()));
+    let rows: String = data
+        .iter()
+        .filter(|s| s.position_m > 0.0)
+        .map(|s| format!("{},{},{}\n", s.position_m, s.velocity_mps, s.force_n))
+        .collect();
+    if std::fs::write(&file, rows).is_ok()
+        && let Some(seconds) = peers::number("rls_padasip.py", &[&file])
+    {
+        let ns = seconds * 1e9;
+        println!("padasip RLS alone: {ns:.0} ns per sample, {:.0} times the whole core", ns / core_ns);
+    }
+    let _ = std::fs::remove_file(&file);
+}
+
 fn main() {
     let law = Law::base(&tissue());
     let data = samples();
@@ -172,6 +191,7 @@ fn main() {
     println!("base law: {ours:.1} ns per sample, bare loop {bare:.1} ns, ratio {:.2}", ours / bare);
     let (ours, bare) = in_turns(|| our_core(black_box(&data), &mut storage), || bare_core(black_box(&data)));
     println!("core: {ours:.1} ns per sample, bare loop {bare:.1} ns, ratio {:.2}", ours / bare);
+    python_peer(&data, ours);
     let (ours, _) = in_turns(noise, || 0.0);
     println!("noise: {ours:.1} ns per sample");
     let start = Instant::now();

@@ -59,7 +59,7 @@ A column map for a log in microseconds and millimetres:
   Columns(time: (name: \"time\", scale: 1e-6), position: (name: \"pz\", scale: 1e-3),
           force: (name: \"fz\"))
 
-A configuration: Enhance(enhance: (cusum: (sigma_rupture_n: 0.1), model: MultiLayer)).
+A configuration: Enhance(cusum: (sigma_rupture_n: 0.1), model: MultiLayer).
 A scenario file serves too: its `enhance` part and its surface are used.")]
 pub struct EnhanceArgs {
     /// Recording (CSV with header).

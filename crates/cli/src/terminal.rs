@@ -91,7 +91,7 @@ fn layers(out: &mut String, score: &Score) {
             "    {name:<12} {:>8} {:>8} {:>8} {:>8}",
             significant(c.truth, 4),
             or_dash(c.estimated.map(|x| significant(x, 4))),
-            or_dash(c.relative_error.map(|e| percent(e))),
+            or_dash(c.relative_error.map(percent)),
             or_dash(offline.map(|x| significant(x, 4))),
         );
     };
@@ -111,7 +111,7 @@ fn layers(out: &mut String, score: &Score) {
 }
 
 fn summary(out: &mut String, score: &Score) {
-    let share = |value: Option<f64>| or_dash(value.map(|x| percent(x)));
+    let share = |value: Option<f64>| or_dash(value.map(percent));
     let _ = writeln!(
         out,
         "  enhanced force  off by {} of the tip force (rms); {} before the exit; after the exit {} of the force is left",

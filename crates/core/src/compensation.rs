@@ -12,11 +12,17 @@ pub(crate) struct Compensation {
     layers: [LayerEstimate; MAX_LAYERS],
     count: usize,
     cumulative_ns_per_m: f64,
+    end_m: f64,
 }
 
 impl Default for Compensation {
     fn default() -> Self {
-        Self { layers: [LayerEstimate::default(); MAX_LAYERS], count: 0, cumulative_ns_per_m: 0.0 }
+        Self {
+            layers: [LayerEstimate::default(); MAX_LAYERS],
+            count: 0,
+            cumulative_ns_per_m: 0.0,
+            end_m: f64::NEG_INFINITY,
+        }
     }
 }
 
@@ -27,6 +33,7 @@ impl Compensation {
     }
 
     pub(crate) fn add(&mut self, layer: LayerEstimate) {
+        self.end_m = self.end_m.max(layer.start_m + layer.thickness_m);
         self.cumulative_ns_per_m = (self.cumulative_ns_per_m + layer.added_friction_ns_per_m).max(0.0);
         if let Some(slot) = self.layers.get_mut(self.count) {
             *slot = layer;
@@ -37,9 +44,16 @@ impl Compensation {
         }
     }
 
+    /// Friction of the compensated layers with the tip at `z_m`: all of it beyond their end, the part
+    /// that is around the shaft before, as on the way back or when going in again.
+    #[inline]
+    pub(crate) fn around_shaft_ns_per_m(&self, z_m: f64) -> f64 {
+        if z_m >= self.end_m { self.cumulative_ns_per_m } else { self.along_shaft_ns_per_m(z_m) }
+    }
+
     /// `sum b_i l_i(z)`: the part of the compensated layers that is still around the shaft, with
     /// each layer's friction spread evenly over its thickness.
-    pub(crate) fn along_shaft_ns_per_m(&self, z_m: f64) -> f64 {
+    fn along_shaft_ns_per_m(&self, z_m: f64) -> f64 {
         self.layers[..self.count]
             .iter()
             .map(|layer| {

@@ -1,7 +1,7 @@
 //! Configuration of the online core: plain data with `Default`, every number with unit and source.
 //!
-//! [S] is the supplement of Ferro, Gaz, Anzidei, Vendittelli 2021, [L] the tuning published with
-//! the authors' laboratory software (facts only), [D] a completion derived for this project.
+//! \[S\] is the supplement of Ferro, Gaz, Anzidei, Vendittelli 2021, \[L\] the tuning published with
+//! the authors' laboratory software (facts only), \[D\] a completion derived for this project.
 
 use alloc::vec::Vec;
 
@@ -9,9 +9,9 @@ use alloc::vec::Vec;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Model {
-    /// Kelvin-Voigt, `phi = [dz, v]` [S (3)]; its `b` is in N s/m.
+    /// Kelvin-Voigt, `phi = [dz, v]` \[S (3)\]; its `b` is in N s/m.
     KelvinVoigt,
-    /// Multi-layer, `phi = [dz, dz v]` [S (4)]; its `b` is in N s/m².
+    /// Multi-layer, `phi = [dz, dz v]` \[S (4)\]; its `b` is in N s/m².
     #[default]
     MultiLayer,
 }
@@ -19,18 +19,19 @@ pub enum Model {
 /// When the covariance goes back to its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Reset {
-    /// At a constant frequency [S sec. II].
+    /// At a constant frequency \[S sec. II\].
     Frequency {
-        /// Resets per second, positive; 40 [S], also 6.66 [L].
+        /// Resets per second, positive; 40 \[S\], also 6.66 \[L\].
         hz: f64,
     },
-    /// Whenever the trace of the covariance has fallen below a threshold [S sec. II, refs 12, 13].
+    /// Whenever the trace of the covariance has fallen below a threshold \[S sec. II, refs 12, 13\].
     Trace {
         /// Threshold on `trace P`, positive.
         below: f64,
     },
-    /// Only at contact and at detected ruptures [S Figs 10-12].
+    /// Only at contact and at detected ruptures \[S Figs 10-12\].
     Ruptures,
 }
 
@@ -70,9 +71,9 @@ pub enum Depths {
 pub struct CusumConfig {
     /// Off: no alarm.
     pub enabled: bool,
-    /// Standard deviation of the error in ordinary insertion, `s0` in N; 0.01 [L].
+    /// Standard deviation of the error in ordinary insertion, `s0` in N; 0.01 \[L\].
     pub sigma_ordinary_n: f64,
-    /// Standard deviation of the error after a rupture, `s1` in N; 0.15, 0.03-0.15 [L].
+    /// Standard deviation of the error after a rupture, `s1` in N; 0.15, 0.03-0.15 \[L\].
     pub sigma_rupture_n: f64,
 }
 
@@ -102,14 +103,14 @@ impl CusumConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DerivativeSense {
-    /// The rising signal: loading [L].
+    /// The rising signal: loading \[L\].
     #[default]
     Rise,
-    /// The falling signal: the drop itself [S (1)].
+    /// The falling signal: the drop itself \[S (1)\].
     Drop,
 }
 
-/// The force-derivative condition [S (1)].
+/// The force-derivative condition \[S (1)\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -118,15 +119,15 @@ pub struct DerivativeConfig {
     pub enabled: bool,
     /// Loading or drop.
     pub sense: DerivativeSense,
-    /// Switches on above this, `beta` in N/s; 0.075, 0.05-0.15 [L].
+    /// Switches on above this, `beta` in N/s; 0.075, 0.05-0.15 \[L\].
     pub on_n_per_s: f64,
-    /// Switches off below this, in N/s; -0.03 [L].
+    /// Switches off below this, in N/s; -0.03 \[L\].
     pub off_n_per_s: f64,
-    /// Time constant of the force's low-pass in s; `a_f = 0.01` at 200 Hz [L].
+    /// Time constant of the force's low-pass in s; `a_f = 0.01` at 200 Hz \[L\].
     pub force_time_constant_s: f64,
-    /// Time constant of the derivative's low-pass in s; `a_d = 0.1` at 200 Hz [L].
+    /// Time constant of the derivative's low-pass in s; `a_d = 0.1` at 200 Hz \[L\].
     pub derivative_time_constant_s: f64,
-    /// Whether switching off counts as a detection [S sec. I; off in L].
+    /// Whether switching off counts as a detection \[S sec. I; off in L\].
     pub trailing_edge: bool,
 }
 
@@ -149,10 +150,10 @@ impl Default for DerivativeConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DropEstimator {
-    /// Straight lines over 1 mm either side, evaluated at the rupture [D]: less biased by noise.
+    /// Straight lines over 1 mm either side, evaluated at the rupture \[D\]: less biased by noise.
     #[default]
     Lines,
-    /// Maximum of the window before, minimum of the window after [L].
+    /// Maximum of the window before, minimum of the window after \[L\].
     Extremes,
 }
 
@@ -161,20 +162,20 @@ pub enum DropEstimator {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct DropConfig {
-    /// Travel of ForceDropMeasuring in m; 0.005 [L].
+    /// Travel of ForceDropMeasuring in m; 0.005 \[L\].
     pub travel_m: f64,
-    /// Longest time in ForceDropMeasuring in s, not counting standstill; 5 [L].
+    /// Longest time in ForceDropMeasuring in s, not counting standstill; 5 \[L\].
     pub longest_s: f64,
     /// Travel of ForceCompensation in m; half of the former.
     pub compensation_travel_m: f64,
     /// ForceCompensation lasts at least this long after the cumulative friction has changed, in s, so
-    /// that the change itself is not taken for a rupture [D].
+    /// that the change itself is not taken for a rupture \[D\].
     pub settle_s: f64,
     /// Below this speed, in m/s, the needle counts as standing still; 0.05 mm/s.
     pub standstill_mps: f64,
     /// How the drop is measured.
     pub estimator: DropEstimator,
-    /// Off: the prior is not re-weighted by the drop (ablation of [S Figs 13-15]).
+    /// Off: the prior is not re-weighted by the drop (ablation of \[S Figs 13-15\]).
     pub reweight: bool,
     /// Off: the layer's samples are not replayed; the online estimate at the rupture is kept.
     pub replay: bool,
@@ -199,12 +200,12 @@ impl Default for DropConfig {
             replay: true,
             compensate: true,
             share_limits: [0.01, 0.99],
-            replay_per_tick: 32,
+            replay_per_tick: 128,
         }
     }
 }
 
-/// Finding the first contact in the data [D].
+/// Finding the first contact in the data \[D\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -237,7 +238,7 @@ impl Default for ContactConfig {
     }
 }
 
-/// What is not a rupture [D].
+/// What is not a rupture \[D\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -248,6 +249,9 @@ pub struct GuardConfig {
     pub acceleration_time_constant_s: f64,
     /// A sudden change of speed: acceleration above this, in m/s².
     pub sudden_mps2: f64,
+    /// Ground is old where the tip is this far above its deepest point, in m: more than the noise of
+    /// the position.
+    pub old_ground_m: f64,
     /// Detection rests this long after a sudden change, a reversal or a hold, in s.
     pub rest_s: f64,
     /// A trailing edge does not count while the speed falls faster than this share per second.
@@ -260,6 +264,7 @@ impl Default for GuardConfig {
             blind_travel_m: 0.002,
             acceleration_time_constant_s: 0.01,
             sudden_mps2: 0.05,
+            old_ground_m: 1e-4,
             rest_s: 0.25,
             slowing_per_s: 0.1,
         }
@@ -270,7 +275,7 @@ impl Default for GuardConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Algorithm {
-    /// The paper's, with the completions marked [D].
+    /// The paper's, with the completions marked \[D\].
     #[default]
     Paper,
     /// The paper's to the letter: no blind travel after contact, no motion guards, drop by
@@ -293,11 +298,11 @@ pub struct EnhanceConfig {
     pub contact: Contact,
     /// What is known of the layers' depths.
     pub depths: Depths,
-    /// RLS forgetting factor `lambda`, 0 to 1; 1 [S].
+    /// RLS forgetting factor `lambda`, 0 to 1; 1 \[S\].
     pub forgetting: f64,
-    /// Prior variance of the stiffness, `sK` in (N/m)²; 1e6 [L].
+    /// Prior variance of the stiffness, `sK` in (N/m)²; 1e6 \[L\].
     pub prior_stiffness: f64,
-    /// Prior variance of the friction, `sB` in the square of its unit; 1e6 [L].
+    /// Prior variance of the friction, `sB` in the square of its unit; 1e6 \[L\].
     pub prior_friction: f64,
     /// CUSUM.
     pub cusum: CusumConfig,

@@ -1,4 +1,4 @@
-//! First contact found from the data [D]: bias and noise are learnt in air, contact is declared
+//! First contact found from the data \[D\]: bias and noise are learnt in air, contact is declared
 //! when the low-passed force stands out of the noise for several samples, and its position is
 //! traced back along the loading line to zero force.
 
@@ -7,10 +7,14 @@ use crate::filter::Coefficient;
 use crate::line::Line;
 use crate::sample::Sample;
 
+/// Time over which bias and noise in air are forgotten, in s.
+const FORGET_S: f64 = 5.0;
+
 /// What the search knows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactSearch {
     low_pass: Coefficient,
+    forget: Coefficient,
     elapsed_s: f64,
     force_n: f64,
     // Welford's running mean and variance of the force in air.
@@ -38,6 +42,7 @@ impl ContactSearch {
     pub(crate) fn new(config: &ContactConfig) -> Self {
         Self {
             low_pass: Coefficient::new(config.time_constant_s),
+            forget: Coefficient::new(FORGET_S),
             elapsed_s: 0.0,
             force_n: 0.0,
             count: 0.0,
@@ -75,7 +80,7 @@ impl ContactSearch {
         let learning = self.elapsed_s < config.learn_s || self.count < 10.0;
         if let Some(declared_m) = self.declared_m {
             self.line.add(sample.position_m, sample.force_n);
-            let surface_m = self.surface_m(declared_m);
+            let surface_m = self.surface_m(config, declared_m);
             let first = self.first;
             return if (sample.position_m - declared_m).abs() >= config.extrapolate_over_m {
                 Found::Settled { surface_m, first }
@@ -91,25 +96,37 @@ impl ContactSearch {
             self.line.add(sample.position_m, sample.force_n);
         } else {
             self.line = Line::default();
-            self.learn(sample.force_n);
+            self.learn(dt_s, learning, sample.force_n);
         }
         self.above = if !learning && lift > config.noise_sds * noise { self.above + 1 } else { 0 };
         if self.above < config.samples.max(1) {
             return Found::Nothing;
         }
         self.declared_m = Some(sample.position_m);
-        Found::Provisional { surface_m: self.surface_m(sample.position_m), first: self.first }
+        Found::Provisional { surface_m: self.surface_m(config, sample.position_m), first: self.first }
     }
 
-    fn learn(&mut self, force_n: f64) {
-        self.count += 1.0;
+    /// Bias and noise: by Welford's recursion at first, then slowly forgetting, so that a drift in air
+    /// is followed and a loading line is not.
+    fn learn(&mut self, dt_s: f64, learning: bool, force_n: f64) {
+        if learning {
+            self.count += 1.0;
+            let delta = force_n - self.mean_n;
+            self.mean_n += delta / self.count;
+            self.m2 += delta * (force_n - self.mean_n);
+            return;
+        }
+        let share = self.forget.at(dt_s);
         let delta = force_n - self.mean_n;
-        self.mean_n += delta / self.count;
-        self.m2 += delta * (force_n - self.mean_n);
+        self.mean_n += share * delta;
+        self.m2 += share * ((self.count - 1.0) * delta * delta - self.m2);
     }
 
-    /// Zero-force end of the loading line, never beyond the declaration and at most 5 mm before.
-    fn surface_m(&self, declared_m: f64) -> f64 {
+    /// Zero-force end of the loading line (where contact was declared, when nothing is extrapolated), never beyond the declaration and at most 5 mm before.
+    fn surface_m(&self, config: &ContactConfig, declared_m: f64) -> f64 {
+        if config.extrapolate_over_m <= 0.0 {
+            return declared_m;
+        }
         match self.line.reaches(self.mean_n) {
             Some(at) if self.line.slope() > 0.0 => at.clamp(declared_m - 0.005, declared_m),
             _ => declared_m,

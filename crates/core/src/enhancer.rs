@@ -8,7 +8,7 @@ use crate::drop::{Drop, locate};
 use crate::filter::ForceDerivative;
 use crate::guard::MotionGuard;
 use crate::history::History;
-use crate::reweigh::{Rerun, ResetClock, regressor, reweighted_prior};
+use crate::reweigh::{Rerun, ResetClock, regressor, relative_noise, reweighted_prior};
 use crate::rls::Rls;
 use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
 
@@ -17,6 +17,10 @@ use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
 struct Traverse {
     start_m: f64,
     first: u64,
+    /// No rupture is declared within the blind travel from here.
+    blind_from_m: f64,
+    /// Number of the sample that crossed the known far face.
+    crossed: Option<u64>,
     /// Travel and time while the needle moved: their ratio is the mean speed.
     travel_m: f64,
     moving_s: f64,
@@ -60,6 +64,9 @@ pub struct Enhancer<B> {
     traverse: Traverse,
     pending: Option<Pending>,
     cusum_n2: f64,
+    /// Numbers of the samples at which detection was last off, and at which the CUSUM was last zero.
+    off_until: u64,
+    zero_until: u64,
     derivative_on: bool,
     waited_m: f64,
     waited_s: f64,
@@ -75,6 +82,10 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     pub fn new(mut config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
         if config.algorithm == Algorithm::Literal {
             config.guard.blind_travel_m = 0.0;
+            config.guard.rest_s = 0.0;
+            config.guard.slowing_per_s = f64::INFINITY;
+            config.contact_search.extrapolate_over_m = 0.0;
+            config.drop.settle_s = 0.0;
             config.drop.estimator = DropEstimator::Extremes;
         }
         let prior = [config.prior_stiffness, config.prior_friction];
@@ -90,6 +101,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             traverse: Traverse { start_m: surface_m, ..Traverse::default() },
             pending: None,
             cusum_n2: 0.0,
+            off_until: 0,
+            zero_until: 0,
             derivative_on: false,
             waited_m: 0.0,
             waited_s: 0.0,
@@ -117,7 +130,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         self.out.detection = None;
         self.out.estimate = None;
         let dt_s = sample.time_s - self.last.time_s;
-        if !sample.is_finite() || (self.started && dt_s <= 0.0) {
+        if !sample.is_usable() || (self.started && dt_s <= 0.0) {
             self.out.used = false;
             return self.out;
         }
@@ -158,10 +171,16 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             }
         };
         if !self.in_contact {
-            self.begin_layer(start_m, first);
+            // A needle that is known to start inside the tissue is blind from where it starts.
+            let blind_from_m = match self.config.contact {
+                Contact::Known => sample.position_m,
+                Contact::Detected => start_m,
+            };
+            self.begin_layer(start_m, blind_from_m, first);
         } else if settled {
             // The start moves by a fraction of a millimetre: the estimate is kept, its covariance is not.
             self.traverse.start_m = start_m;
+            self.traverse.blind_from_m = start_m;
             let prior = self.prior();
             self.rls.reset_covariance(prior);
         }
@@ -171,8 +190,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
-    fn begin_layer(&mut self, start_m: f64, first: u64) {
-        self.traverse = Traverse { start_m, first, ..Traverse::default() };
+    fn begin_layer(&mut self, start_m: f64, blind_from_m: f64, first: u64) {
+        self.traverse = Traverse { start_m, blind_from_m, first, ..Traverse::default() };
         self.rls = Rls::new(self.prior());
         self.clock = ResetClock::default();
         self.cusum_n2 = 0.0;
@@ -192,8 +211,17 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
         let prior = self.prior();
         self.clock.tick(&self.config.reset, dt_s, prior, &mut self.rls);
-        let y = sample.force_n - self.compensation.cumulative_ns_per_m() * v;
-        self.rls.update(regressor(self.config.model, depth_m, v), y, self.config.forgetting)
+        let y = sample.force_n - self.compensation.around_shaft_ns_per_m(sample.position_m) * v;
+        let phi = regressor(self.config.model, depth_m, v);
+        let noise = relative_noise(dt_s);
+        let error_n = self.rls.update_with_noise(phi, y, self.config.forgetting, noise);
+        if !self.rls.is_finite() {
+            self.rls = Rls::new(prior);
+        }
+        if self.traverse.crossed.is_none() && self.known_thickness_m().is_some_and(|d| depth_m >= d) {
+            self.traverse.crossed = Some(self.history.next().saturating_sub(1));
+        }
+        error_n
     }
 
     /// Moves the derivative's switch; true on its trailing edge.
@@ -234,9 +262,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         if !self.in_contact {
             return;
         }
-        let travel_m = sample.position_m - self.traverse.start_m;
         let armed = self.out.contact_m.is_some()
-            && travel_m >= self.config.guard.blind_travel_m
+            && sample.position_m - self.traverse.blind_from_m >= self.config.guard.blind_travel_m
             && self.guard.is_quiet();
         let mut cause = None;
         if armed {
@@ -248,8 +275,13 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             if cusum.enabled && self.cusum_n2 > threshold && was <= threshold {
                 cause = Some(Cause::Cusum);
             }
+            if was == 0.0 {
+                self.zero_until = self.history.next().saturating_sub(1);
+            }
         } else {
             self.cusum_n2 = 0.0;
+            self.zero_until = self.history.next();
+            self.off_until = self.zero_until;
         }
         if cause.is_none()
             && armed
@@ -260,7 +292,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         {
             cause = Some(Cause::DerivativeTrailingEdge);
         }
-        if cause.is_none() && self.known_thickness_m().is_some_and(|thickness_m| travel_m >= thickness_m) {
+        if cause.is_none() && self.traverse.crossed.is_some() {
             cause = Some(Cause::KnownFace);
         }
         if let Some(cause) = cause {
@@ -281,10 +313,16 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     fn declare(&mut self, sample: &Sample, before: Rls, cause: Cause) {
         let newest = self.history.next().saturating_sub(1);
         let literal = self.config.algorithm == Algorithm::Literal;
-        let after = if literal || cause == Cause::KnownFace {
-            newest
-        } else {
-            locate(&self.history, self.traverse.first)
+        let after = match cause {
+            _ if literal => newest,
+            Cause::KnownFace => self.traverse.crossed.unwrap_or(newest),
+            // The alarm came of what was added since the sum was last zero.
+            Cause::Cusum => self.located_from(self.zero_until.saturating_sub(4)),
+            // The filters of the derivative are late by about a second at most.
+            Cause::DerivativeTrailingEdge => {
+                let second = 1.0 / (sample.time_s - self.last.time_s).max(1e-9);
+                self.located_from(self.off_until.max(newest.saturating_sub(second as u64)))
+            }
         };
         let located = self.history.get(after).copied().unwrap_or(*sample);
         let start_m = self.traverse.start_m;
@@ -311,8 +349,12 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         });
         let known = matches!(self.config.depths, Depths::Known(_));
         let next_start_m = if known { start_m + thickness_m } else { located.position_m };
-        self.begin_layer(next_start_m, after);
+        self.begin_layer(next_start_m, next_start_m, after);
         self.out.state = State::DetectedRupture;
+    }
+
+    fn located_from(&self, number: u64) -> u64 {
+        locate(&self.history, number.max(self.traverse.first))
     }
 
     /// Counts the travel and time that a waiting state needs; standstill does not count.
@@ -352,7 +394,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
                         self.config.prior_friction
                     };
                     let prior = [self.config.prior_stiffness, friction];
-                    Rerun::new(prior, t.start_m, cumulative, t.first, pending.end)
+                    Rerun::new(prior, t.start_m, t.first, pending.end)
                 });
             }
         }
@@ -368,7 +410,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         self.wait(dt_s, sample);
         if let Some(mut pending) = self.pending.take() {
             let theta = match &mut pending.rerun {
-                Some(rerun) => rerun.work(&self.config, &self.history),
+                Some(rerun) => rerun.work(&self.config, &self.history, &self.compensation, pending.online),
                 None => Some(pending.online),
             };
             match theta {
@@ -407,16 +449,15 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             time_s: sample.time_s,
         };
         self.compensation.add(estimate);
+        // The estimate of the layer being traversed was made with the old friction: let it move.
+        let prior = self.prior();
+        self.rls.reset_covariance(prior);
         self.out.estimate = Some(estimate);
     }
 
     fn finish(&mut self, sample: &Sample, rate: f64) {
         let v = sample.velocity_mps;
-        let friction = if self.is_reversing(sample) {
-            self.compensation.along_shaft_ns_per_m(sample.position_m)
-        } else {
-            self.compensation.cumulative_ns_per_m()
-        };
+        let friction = self.compensation.around_shaft_ns_per_m(sample.position_m);
         self.out.enhanced_n = sample.force_n - friction * v;
         self.out.theta = self.rls.theta;
         self.out.cusum_n2 = self.cusum_n2;

@@ -24,7 +24,7 @@ impl Coefficient {
     }
 }
 
-/// Filtered force derivative [S (1)]: low-pass, difference quotient, low-pass.
+/// Filtered force derivative \[S (1)\]: low-pass, difference quotient, low-pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceDerivative {
     force: Coefficient,

@@ -1,16 +1,28 @@
-//! What is not a rupture [D]: reversal, hold, a sudden change of the commanded speed, and travel
+//! What is not a rupture \[D\]: reversal, hold, a sudden change of the commanded speed, and travel
 //! over ground where the needle has already been.
+//!
+//! Position and velocity may be noisy: velocity is smoothed before it is judged, a change of speed is
+//! sudden only when it stands out of the acceleration's own scatter, and ground counts as old only
+//! when the tip is clearly above its deepest point.
 
 use crate::config::GuardConfig;
 use crate::filter::Coefficient;
 use crate::sample::Sample;
 
+/// Time over which the scatter of the acceleration is learnt, in s.
+const SCATTER_S: f64 = 2.0;
+/// How far the acceleration must stand out of its scatter to be a sudden change.
+const SCATTERS: f64 = 6.0;
+
 /// Watches the motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotionGuard {
     low_pass: Coefficient,
+    scatter: Coefficient,
+    raw_mps: f64,
     velocity_mps: f64,
     acceleration_mps2: f64,
+    scatter_mps2_squared: f64,
     rest_s: f64,
     deepest_m: f64,
     started: bool,
@@ -20,8 +32,11 @@ impl MotionGuard {
     pub(crate) fn new(config: &GuardConfig) -> Self {
         Self {
             low_pass: Coefficient::new(config.acceleration_time_constant_s),
+            scatter: Coefficient::new(SCATTER_S),
+            raw_mps: 0.0,
             velocity_mps: 0.0,
             acceleration_mps2: 0.0,
+            scatter_mps2_squared: 0.0,
             rest_s: 0.0,
             deepest_m: f64::NEG_INFINITY,
             started: false,
@@ -31,20 +46,37 @@ impl MotionGuard {
     #[inline]
     pub(crate) fn update(&mut self, config: &GuardConfig, standstill_mps: f64, dt_s: f64, sample: &Sample) {
         let v = sample.velocity_mps;
+        let sudden_mps2 = config.sudden_mps2;
+        let mut sudden = false;
         if self.started && dt_s > 0.0 {
-            let a = (v - self.velocity_mps) / dt_s;
-            self.acceleration_mps2 += self.low_pass.at(dt_s) * (a - self.acceleration_mps2);
+            let a = (v - self.raw_mps) / dt_s;
+            let share = self.low_pass.at(dt_s);
+            self.velocity_mps += share * (v - self.velocity_mps);
+            self.acceleration_mps2 += share * (a - self.acceleration_mps2);
+            let size = self.acceleration_mps2 * self.acceleration_mps2;
+            let limit = (SCATTERS * SCATTERS * self.scatter_mps2_squared).max(sudden_mps2 * sudden_mps2);
+            sudden = size > limit;
+            // One jump teaches little: it counts at most as what was just bearable.
+            self.scatter_mps2_squared +=
+                self.scatter.at(dt_s) * (size.min(limit) - self.scatter_mps2_squared);
+        } else {
+            self.velocity_mps = v;
         }
         self.started = true;
-        self.velocity_mps = v;
+        self.raw_mps = v;
         self.rest_s -= dt_s;
-        let new_ground = sample.position_m >= self.deepest_m;
-        if new_ground {
+        if sample.position_m > self.deepest_m {
             self.deepest_m = sample.position_m;
         }
-        if v < standstill_mps || !new_ground || self.acceleration_mps2.abs() > config.sudden_mps2 {
+        if sudden || self.velocity_mps < standstill_mps || self.is_old_ground(config, sample.position_m) {
             self.rest_s = config.rest_s;
         }
+    }
+
+    /// True where the tip is clearly above its deepest point.
+    #[inline]
+    pub(crate) fn is_old_ground(&self, config: &GuardConfig, position_m: f64) -> bool {
+        position_m < self.deepest_m - config.old_ground_m
     }
 
     /// True while a change of force may be a rupture.

@@ -1,6 +1,7 @@
 //! A posteriori re-estimation of a traversed layer: the RLS runs again over the layer's raw
 //! samples with the prior that the force drop suggests, a few samples per tick.
 
+use crate::compensation::Compensation;
 use crate::config::{EnhanceConfig, Model, Reset};
 use crate::history::History;
 use crate::rls::Rls;
@@ -16,8 +17,8 @@ pub(crate) fn regressor(model: Model, depth_m: f64, velocity_mps: f64) -> [f64; 
 }
 
 /// Prior variance of the friction that makes elastic and viscous force at the rupture stand in the
-/// measured proportion: `sK (1 - kappa)/(kappa v²)` for the multi-layer model [S (17)],
-/// `sK (d/2)² (1 - kappa)/(kappa v²)` for Kelvin-Voigt [L].
+/// measured proportion: `sK (1 - kappa)/(kappa v²)` for the multi-layer model \[S (17)\],
+/// `sK (d/2)² (1 - kappa)/(kappa v²)` for Kelvin-Voigt \[L\].
 pub(crate) fn reweighted_prior(
     config: &EnhanceConfig,
     share: f64,
@@ -31,6 +32,16 @@ pub(crate) fn reweighted_prior(
         Model::KelvinVoigt => config.prior_stiffness * ratio * (thickness_m / 2.0) * (thickness_m / 2.0),
     };
     if prior.is_finite() { prior } else { config.prior_friction }
+}
+
+/// Interval in s at which a sample weighs as much as in the paper's 200 Hz.
+const ORDINARY_INTERVAL_S: f64 = 0.005;
+
+/// Noise variance of a sample after `dt_s`, relative to one at 200 Hz: samples that come faster weigh
+/// less, so that the prior means the same at every sampling rate \\[D\\].
+#[inline]
+pub(crate) fn relative_noise(dt_s: f64) -> f64 {
+    if dt_s > 0.0 { ORDINARY_INTERVAL_S / dt_s } else { 1.0 }
 }
 
 /// When the covariance is to be reset: shared by the online run and the re-run.
@@ -48,7 +59,8 @@ impl ResetClock {
                 self.since_s += dt_s;
                 // Half an interval of grace, so that rounding in the time stamps cannot add one.
                 if (self.since_s + 0.5 * dt_s) * hz >= 1.0 {
-                    self.since_s = 0.0;
+                    // The phase is kept: between samples the resets average to the frequency.
+                    self.since_s = (self.since_s - 1.0 / hz).max(-dt_s);
                     rls.reset_covariance(prior);
                 }
             }
@@ -69,32 +81,35 @@ pub(crate) struct Rerun {
     clock: ResetClock,
     prior: [f64; 2],
     start_m: f64,
-    cumulative_ns_per_m: f64,
     next: u64,
     end: u64,
     last_s: Option<f64>,
+    used: bool,
 }
 
 impl Rerun {
     /// Over the samples numbered `first..end` of the layer that starts at `start_m`.
-    pub(crate) fn new(prior: [f64; 2], start_m: f64, cumulative_ns_per_m: f64, first: u64, end: u64) -> Self {
+    pub(crate) fn new(prior: [f64; 2], start_m: f64, first: u64, end: u64) -> Self {
         Self {
             rls: Rls::new(prior),
             clock: ResetClock::default(),
             prior,
             start_m,
-            cumulative_ns_per_m,
             next: first,
             end,
             last_s: None,
+            used: false,
         }
     }
 
-    /// Does at most `config.drop.replay_per_tick` samples; the parameters when it is through.
+    /// Does at most `config.drop.replay_per_tick` samples. When it is through, the parameters, or
+    /// `online` when the samples are gone or spoilt.
     pub(crate) fn work<B: AsRef<[Sample]> + AsMut<[Sample]>>(
         &mut self,
         config: &EnhanceConfig,
         history: &History<B>,
+        compensation: &Compensation,
+        online: [f64; 2],
     ) -> Option<[f64; 2]> {
         self.next = self.next.max(history.oldest());
         let stop = self.end.min(self.next + config.drop.replay_per_tick.max(1) as u64);
@@ -106,12 +121,14 @@ impl Rerun {
                 if depth_m > 0.0 {
                     self.clock.tick(&config.reset, dt_s, self.prior, &mut self.rls);
                     let phi = regressor(config.model, depth_m, s.velocity_mps);
-                    let y = s.force_n - self.cumulative_ns_per_m * s.velocity_mps;
-                    self.rls.update(phi, y, config.forgetting);
+                    let y = s.force_n - compensation.around_shaft_ns_per_m(s.position_m) * s.velocity_mps;
+                    self.rls.update_with_noise(phi, y, config.forgetting, relative_noise(dt_s));
+                    self.used = true;
                 }
             }
             self.next += 1;
         }
-        (self.next >= self.end).then_some(self.rls.theta)
+        let found = if self.used && self.rls.is_finite() { self.rls.theta } else { online };
+        (self.next >= self.end).then_some(found)
     }
 }

@@ -27,6 +27,14 @@ impl Rls {
         self.covariance = [prior[0], 0.0, prior[1]];
     }
 
+    /// True while parameters and covariance are numbers.
+    #[must_use]
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        (self.theta[0] + self.theta[1] + self.covariance[0] + self.covariance[1] + self.covariance[2])
+            .is_finite()
+    }
+
     /// Trace of the covariance.
     #[must_use]
     #[inline]
@@ -44,11 +52,18 @@ impl Rls {
     /// Takes one measurement and returns the innovation, the error before the update.
     #[inline]
     pub fn update(&mut self, phi: [f64; 2], y: f64, forgetting: f64) -> f64 {
+        self.update_with_noise(phi, y, forgetting, 1.0)
+    }
+
+    /// As [`Rls::update`] for a measurement whose noise variance is `noise` times the ordinary one:
+    /// the gain's denominator becomes `lambda noise + phi'P phi`.
+    #[inline]
+    pub fn update_with_noise(&mut self, phi: [f64; 2], y: f64, forgetting: f64, noise: f64) -> f64 {
         let [p11, p12, p22] = self.covariance;
         let error = y - self.predict(phi);
         let p0 = p11 * phi[0] + p12 * phi[1];
         let p1 = p12 * phi[0] + p22 * phi[1];
-        let gain = 1.0 / (forgetting + phi[0] * p0 + phi[1] * p1);
+        let gain = 1.0 / (forgetting * noise + phi[0] * p0 + phi[1] * p1);
         let step = error * gain;
         self.theta[0] += p0 * step;
         self.theta[1] += p1 * step;

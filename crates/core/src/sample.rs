@@ -14,13 +14,16 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// True when every field is a finite number.
+    /// True when every field is a number that a needle can have: positions within a kilometre,
+    /// speeds below 1 km/s, forces below 1 MN. Anything else is a fault of the logging and would
+    /// spoil the estimates for good.
     #[must_use]
-    pub fn is_finite(&self) -> bool {
+    #[inline]
+    pub fn is_usable(&self) -> bool {
         self.time_s.is_finite()
-            && self.position_m.is_finite()
-            && self.velocity_mps.is_finite()
-            && self.force_n.is_finite()
+            && self.position_m.abs() < 1e3
+            && self.velocity_mps.abs() < 1e3
+            && self.force_n.abs() < 1e6
     }
 }
 
@@ -156,7 +159,7 @@ pub struct Output {
     pub detection: Option<Detection>,
     /// The layer whose estimate became available at this sample.
     pub estimate: Option<LayerEstimate>,
-    /// False when the sample was not used (not finite, or not later than the one before): the
+    /// False when the sample was not used (not usable, or not later than the one before): the
     /// other fields then repeat the previous output.
     pub used: bool,
 }

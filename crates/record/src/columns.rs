@@ -37,34 +37,18 @@ fn one() -> f64 {
 impl Column {
     /// The column of that name, already in SI units.
     pub fn si(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            scale: 1.0,
-            offset: 0.0,
-        }
+        Self { name: name.into(), scale: 1.0, offset: 0.0 }
     }
 
     /// The column of that name, to be multiplied by `scale`.
     pub fn scaled(name: impl Into<String>, scale: f64) -> Self {
-        Self {
-            name: name.into(),
-            scale,
-            offset: 0.0,
-        }
+        Self { name: name.into(), scale, offset: 0.0 }
     }
 
     /// `scale * raw + offset`. Neutral numbers leave every bit alone (also the sign of a negative zero).
     pub fn apply(&self, raw: f64) -> f64 {
-        let scaled = if self.scale == 1.0 {
-            raw
-        } else {
-            self.scale * raw
-        };
-        if self.offset == 0.0 {
-            scaled
-        } else {
-            scaled + self.offset
-        }
+        let scaled = if self.scale == 1.0 { raw } else { self.scale * raw };
+        if self.offset == 0.0 { scaled } else { scaled + self.offset }
     }
 }
 
@@ -111,36 +95,18 @@ impl ColumnMap {
     pub fn check(&self) -> Result<(), RecordError> {
         let required = [
             (Some(&self.time), ["time.name", "time.scale", "time.offset"]),
-            (
-                Some(&self.position),
-                ["position.name", "position.scale", "position.offset"],
-            ),
-            (
-                Some(&self.force),
-                ["force.name", "force.scale", "force.offset"],
-            ),
-            (
-                self.velocity.as_ref(),
-                ["velocity.name", "velocity.scale", "velocity.offset"],
-            ),
+            (Some(&self.position), ["position.name", "position.scale", "position.offset"]),
+            (Some(&self.force), ["force.name", "force.scale", "force.offset"]),
+            (self.velocity.as_ref(), ["velocity.name", "velocity.scale", "velocity.offset"]),
             (
                 self.force_virtual.as_ref(),
-                [
-                    "force_virtual.name",
-                    "force_virtual.scale",
-                    "force_virtual.offset",
-                ],
+                ["force_virtual.name", "force_virtual.scale", "force_virtual.offset"],
             ),
         ];
         for (column, [name, scale, offset]) in required {
             let Some(column) = column else { continue };
             let bad = |field, value, must_be| {
-                Err(RecordError::BadColumnMap {
-                    field,
-                    column: column.name.clone(),
-                    value,
-                    must_be,
-                })
+                Err(RecordError::BadColumnMap { field, column: column.name.clone(), value, must_be })
             };
             if column.name.trim().is_empty() {
                 return Err(RecordError::EmptyColumnName { field: name });
@@ -153,11 +119,7 @@ impl ColumnMap {
                 );
             }
             if !column.offset.is_finite() {
-                return bad(
-                    offset,
-                    column.offset,
-                    "finite, in the SI unit of the quantity",
-                );
+                return bad(offset, column.offset, "finite, in the SI unit of the quantity");
             }
         }
         if self.time.scale < 0.0 {
@@ -195,62 +157,30 @@ mod tests {
 
     #[test]
     fn a_misspelt_field_of_a_map_is_refused() {
-        let text =
-            r#"Columns(time: (name: "t", scales: 1.0), position: (name: "p"), force: (name: "f"))"#;
-        let message = ron::from_str::<ColumnMap>(text)
-            .expect_err("scales")
-            .to_string();
+        let text = r#"Columns(time: (name: "t", scales: 1.0), position: (name: "p"), force: (name: "f"))"#;
+        let message = ron::from_str::<ColumnMap>(text).expect_err("scales").to_string();
         assert!(message.contains("scales"), "{message}");
     }
 
     #[test]
     fn a_scale_that_cannot_be_meant_is_refused_with_its_place() {
-        for (scale, words) in [
-            (0.0, "not zero"),
-            (f64::NAN, "finite"),
-            (f64::INFINITY, "finite"),
-        ] {
-            let map = ColumnMap {
-                force: Column::scaled("fz", scale),
-                ..ColumnMap::default()
-            };
+        for (scale, words) in [(0.0, "not zero"), (f64::NAN, "finite"), (f64::INFINITY, "finite")] {
+            let map = ColumnMap { force: Column::scaled("fz", scale), ..ColumnMap::default() };
             let message = map.check().expect_err("a bad scale").to_string();
             assert!(
-                message.contains("force.scale")
-                    && message.contains("\"fz\"")
-                    && message.contains(words),
+                message.contains("force.scale") && message.contains("\"fz\"") && message.contains(words),
                 "{message}"
             );
         }
-        let map = ColumnMap {
-            time: Column::scaled("t", -1.0),
-            ..ColumnMap::default()
-        };
-        assert!(
-            map.check()
-                .expect_err("time backward")
-                .to_string()
-                .contains("must be positive")
-        );
-        let map = ColumnMap {
-            position: Column::si(" "),
-            ..ColumnMap::default()
-        };
-        assert!(
-            map.check()
-                .expect_err("no name")
-                .to_string()
-                .contains("position.name is empty")
-        );
+        let map = ColumnMap { time: Column::scaled("t", -1.0), ..ColumnMap::default() };
+        assert!(map.check().expect_err("time backward").to_string().contains("must be positive"));
+        let map = ColumnMap { position: Column::si(" "), ..ColumnMap::default() };
+        assert!(map.check().expect_err("no name").to_string().contains("position.name is empty"));
     }
 
     #[test]
     fn the_offset_is_added_after_scaling_and_a_negative_scale_flips_the_sign() {
-        let column = Column {
-            name: "fz".to_owned(),
-            scale: -2.0,
-            offset: 0.5,
-        };
+        let column = Column { name: "fz".to_owned(), scale: -2.0, offset: 0.5 };
         assert_eq!(column.apply(3.0), -5.5);
         assert!(Column::si("f").apply(-0.0).is_sign_negative());
     }

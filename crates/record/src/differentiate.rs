@@ -65,14 +65,7 @@ pub fn differentiate(time_s: &[f64], position_m: &[f64], half_width_s: f64) -> V
         let slope = if end - first >= 3 {
             sums.slope()
         } else {
-            Sums::over(
-                time_s,
-                position_m,
-                centre.saturating_sub(1),
-                (centre + 2).min(count),
-                centre,
-            )
-            .slope()
+            Sums::over(time_s, position_m, centre.saturating_sub(1), (centre + 2).min(count), centre).slope()
         };
         velocity_mps.push(slope);
     }
@@ -93,15 +86,7 @@ struct Sums {
 
 impl Sums {
     fn anchored_at(anchor_s: f64, anchor_m: f64) -> Self {
-        Self {
-            anchor_s,
-            anchor_m,
-            n: 0.0,
-            t: 0.0,
-            tt: 0.0,
-            z: 0.0,
-            tz: 0.0,
-        }
+        Self { anchor_s, anchor_m, n: 0.0, t: 0.0, tt: 0.0, z: 0.0, tz: 0.0 }
     }
 
     fn over(time_s: &[f64], position_m: &[f64], first: usize, end: usize, centre: usize) -> Self {
@@ -145,9 +130,7 @@ mod tests {
     fn scatter(count: usize) -> Vec<f64> {
         let mut state: u64 = 0x9E37_79B9_7F4A_7C15;
         let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         (0..count).map(|_| next()).collect()
@@ -160,27 +143,19 @@ mod tests {
     /// Root mean square of the derivative of `sin(2 pi f t)` over that of the exact one, edges left out.
     fn gain(frequency_hz: f64, half_width_s: f64) -> f64 {
         let time_s = times(40_000, 0.001);
-        let position_m: Vec<f64> = time_s
-            .iter()
-            .map(|t| (TAU * frequency_hz * t).sin())
-            .collect();
+        let position_m: Vec<f64> = time_s.iter().map(|t| (TAU * frequency_hz * t).sin()).collect();
         let velocity = differentiate(&time_s, &position_m, half_width_s);
         let square = |values: &[f64]| values[500..39_500].iter().map(|v| v * v).sum::<f64>();
-        let exact: Vec<f64> = time_s
-            .iter()
-            .map(|t| TAU * frequency_hz * (TAU * frequency_hz * t).cos())
-            .collect();
+        let exact: Vec<f64> =
+            time_s.iter().map(|t| TAU * frequency_hz * (TAU * frequency_hz * t).cos()).collect();
         (square(&velocity) / square(&exact)).sqrt()
     }
 
     #[test]
     fn straight_motion_has_its_speed_at_every_irregular_sample() {
         let jitter = scatter(5000);
-        let time_s: Vec<f64> = jitter
-            .iter()
-            .enumerate()
-            .map(|(i, j)| 1e4 + 0.005 * (i as f64 + 0.9 * j))
-            .collect();
+        let time_s: Vec<f64> =
+            jitter.iter().enumerate().map(|(i, j)| 1e4 + 0.005 * (i as f64 + 0.9 * j)).collect();
         let position_m: Vec<f64> = time_s.iter().map(|t| 0.0023 * (t - 1e4) - 0.005).collect();
         for speed in differentiate(&time_s, &position_m, DEFAULT_HALF_WIDTH_S) {
             assert!((speed - 0.0023).abs() < 1e-11, "{speed}");
@@ -208,22 +183,14 @@ mod tests {
     #[test]
     fn noise_passes_with_the_documented_gain() {
         let position_m = scatter(200_000);
-        let sd = |values: &[f64]| {
-            (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
-        };
-        for (half_width_s, gains) in [
-            (0.02, [31.6, 25.8, 13.2]),
-            (0.05, [9.5, 7.2, 3.4]),
-            (0.1, [3.6, 2.6, 1.2]),
-        ] {
+        let sd = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+        for (half_width_s, gains) in
+            [(0.02, [31.6, 25.8, 13.2]), (0.05, [9.5, 7.2, 3.4]), (0.1, [3.6, 2.6, 1.2])]
+        {
             for (interval_s, documented) in [0.01, 0.005, 0.001].into_iter().zip(gains) {
-                let velocity =
-                    differentiate(&times(200_000, interval_s), &position_m, half_width_s);
+                let velocity = differentiate(&times(200_000, interval_s), &position_m, half_width_s);
                 let found = sd(&velocity[200..199_800]) / sd(&position_m);
-                assert!(
-                    (found / documented - 1.0).abs() < 0.05,
-                    "{half_width_s} {interval_s}: {found} /s"
-                );
+                assert!((found / documented - 1.0).abs() < 0.05, "{half_width_s} {interval_s}: {found} /s");
             }
         }
     }
@@ -231,27 +198,17 @@ mod tests {
     #[test]
     fn running_sums_equal_a_direct_fit_of_each_window() {
         let jitter = scatter(3000);
-        let mut time_s: Vec<f64> = jitter
-            .iter()
-            .enumerate()
-            .map(|(i, j)| 0.002 * (i as f64 + 0.9 * j))
-            .collect();
+        let mut time_s: Vec<f64> =
+            jitter.iter().enumerate().map(|(i, j)| 0.002 * (i as f64 + 0.9 * j)).collect();
         time_s.iter_mut().skip(1500).for_each(|t| *t += 0.7);
-        let position_m: Vec<f64> = time_s
-            .iter()
-            .zip(&jitter)
-            .map(|(t, j)| 0.05 * (3.0 * t).sin() + 1e-4 * j)
-            .collect();
+        let position_m: Vec<f64> =
+            time_s.iter().zip(&jitter).map(|(t, j)| 0.05 * (3.0 * t).sin() + 1e-4 * j).collect();
         let fast = differentiate(&time_s, &position_m, 0.05);
         for centre in 0..time_s.len() {
             let first = time_s.partition_point(|&t| time_s[centre] - t > 0.05 * (1.0 + RIM));
             let end = time_s.partition_point(|&t| t - time_s[centre] <= 0.05 * (1.0 + RIM));
             let direct = Sums::over(&time_s, &position_m, first, end, centre).slope();
-            assert!(
-                (fast[centre] - direct).abs() < 1e-11,
-                "{centre}: {} {direct}",
-                fast[centre]
-            );
+            assert!((fast[centre] - direct).abs() < 1e-11, "{centre}: {} {direct}", fast[centre]);
         }
     }
 
@@ -259,15 +216,8 @@ mod tests {
     fn sparse_samples_use_their_neighbours() {
         let time_s = times(10, 1.0);
         let position_m: Vec<f64> = time_s.iter().map(|t| 0.001 * t).collect();
-        assert!(
-            differentiate(&time_s, &position_m, 0.05)
-                .iter()
-                .all(|v| (v - 0.001).abs() < 1e-15)
-        );
-        assert_eq!(
-            differentiate(&[0.0, 2.0], &[0.0, 1.0], 0.05),
-            vec![0.5, 0.5]
-        );
+        assert!(differentiate(&time_s, &position_m, 0.05).iter().all(|v| (v - 0.001).abs() < 1e-15));
+        assert_eq!(differentiate(&[0.0, 2.0], &[0.0, 1.0], 0.05), vec![0.5, 0.5]);
         assert_eq!(differentiate(&[0.0], &[1.0], 0.05), vec![0.0]);
     }
 }

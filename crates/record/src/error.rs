@@ -33,12 +33,7 @@ pub enum RecordError {
 
     /// Not UTF-8, or zero bytes in it.
     #[error("{}: not a text file in UTF-8: {what} at byte {byte} (line {line}); export the data as CSV text in UTF-8", path.display())]
-    NotText {
-        path: PathBuf,
-        byte: usize,
-        line: u64,
-        what: &'static str,
-    },
+    NotText { path: PathBuf, byte: usize, line: u64, what: &'static str },
 
     /// A column is needed and the header has no such name.
     #[error(
@@ -56,48 +51,28 @@ pub enum RecordError {
 
     /// A column that is read has a name that occurs more than once.
     #[error("{}: line {line}: the header names the column \"{column}\" twice; rename the one that is not meant", path.display())]
-    AmbiguousColumn {
-        path: PathBuf,
-        line: u64,
-        column: String,
-    },
+    AmbiguousColumn { path: PathBuf, line: u64, column: String },
 
     /// A field that should be a number is not.
     #[error(
         "{}: line {line}, column \"{column}\": {} is not a number; {remedy}",
         path.display(), shown(text)
     )]
-    NotANumber {
-        path: PathBuf,
-        line: u64,
-        column: String,
-        text: String,
-        remedy: &'static str,
-    },
+    NotANumber { path: PathBuf, line: u64, column: String, text: String, remedy: &'static str },
 
     /// NaN, infinity, or a number that overflows once scaled.
     #[error(
         "{}: line {line}, column \"{column}\": {} is not a finite number; remove the row or correct the value (and the column map's scale, if any)",
         path.display(), shown(text)
     )]
-    NotFinite {
-        path: PathBuf,
-        line: u64,
-        column: String,
-        text: String,
-    },
+    NotFinite { path: PathBuf, line: u64, column: String, text: String },
 
     /// A row with more or fewer fields than the header.
     #[error(
         "{}: line {line}: the row has {found} fields, the header has {expected}; complete or remove the row (the last line of an interrupted log is often cut short)",
         path.display()
     )]
-    RaggedRow {
-        path: PathBuf,
-        line: u64,
-        found: usize,
-        expected: usize,
-    },
+    RaggedRow { path: PathBuf, line: u64, found: usize, expected: usize },
 
     /// Time runs backward.
     #[error(
@@ -118,38 +93,19 @@ pub enum RecordError {
         "{}: line {line}, column \"{column}\": the time stamp {time_s} s repeats that of line {previous_line}; time must increase from row to row: drop such rows with --repair",
         path.display()
     )]
-    RepeatedTime {
-        path: PathBuf,
-        line: u64,
-        column: String,
-        time_s: f64,
-        previous_line: u64,
-    },
+    RepeatedTime { path: PathBuf, line: u64, column: String, time_s: f64, previous_line: u64 },
 
     /// Too short to have a velocity.
     #[error("{}: {samples} sample(s) by line {line}; a recording needs at least 2 samples with different time stamps", path.display())]
-    TooFewSamples {
-        path: PathBuf,
-        line: u64,
-        samples: usize,
-    },
+    TooFewSamples { path: PathBuf, line: u64, samples: usize },
 
     /// The table itself defeats the CSV reader.
     #[error("{}: line {line}: {message}; correct the row (a quotation mark left open?)", path.display())]
-    BadTable {
-        path: PathBuf,
-        line: u64,
-        message: String,
-    },
+    BadTable { path: PathBuf, line: u64, message: String },
 
     /// A number in a column map is out of range.
     #[error("column map: {field} = {value} for the column \"{column}\"; it must be {must_be}")]
-    BadColumnMap {
-        field: &'static str,
-        column: String,
-        value: f64,
-        must_be: &'static str,
-    },
+    BadColumnMap { field: &'static str, column: String, value: f64, must_be: &'static str },
 
     /// A name in a column map is empty.
     #[error("column map: {field} is empty; it must be a name in the header of the file")]
@@ -159,29 +115,17 @@ pub enum RecordError {
     #[error(
         "column {column} has {found} values and the recording {expected} samples; each column needs one value per sample"
     )]
-    LengthMismatch {
-        column: String,
-        found: usize,
-        expected: usize,
-    },
+    LengthMismatch { column: String, found: usize, expected: usize },
 
     /// A value in memory is NaN or infinite.
     #[error("column {column}: the value at index {index} is {value}; every value must be finite")]
-    NotFiniteAt {
-        column: String,
-        index: usize,
-        value: f64,
-    },
+    NotFiniteAt { column: String, index: usize, value: f64 },
 
     /// Time in memory does not increase.
     #[error(
         "column time_s: {time_s} s at index {index} follows {previous_s} s; time must increase from sample to sample"
     )]
-    TimeNotIncreasing {
-        index: usize,
-        time_s: f64,
-        previous_s: f64,
-    },
+    TimeNotIncreasing { index: usize, time_s: f64, previous_s: f64 },
 
     /// Fewer than two samples in memory.
     #[error("{samples} sample(s) given; a recording needs at least 2")]
@@ -192,9 +136,7 @@ pub enum RecordError {
     BadColumnName { name: String, why: &'static str },
 
     /// The destination refuses the text.
-    #[error(
-        "the recording cannot be written ({0}); check that the destination exists and has room"
-    )]
+    #[error("the recording cannot be written ({0}); check that the destination exists and has room")]
     Write(#[from] io::Error),
 }
 
@@ -212,12 +154,7 @@ fn shown(text: &str) -> String {
 
 fn list(names: &[String]) -> String {
     const MOST: usize = 40;
-    let mut text = names
-        .iter()
-        .take(MOST)
-        .map(|name| format!("\"{name}\""))
-        .collect::<Vec<_>>()
-        .join(", ");
+    let mut text = names.iter().take(MOST).map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
     if names.len() > MOST {
         text.push_str(&format!(" and {} more", names.len() - MOST));
     }
@@ -225,7 +162,5 @@ fn list(names: &[String]) -> String {
 }
 
 fn did_you_mean(suggestion: Option<&str>) -> String {
-    suggestion
-        .map(|name| format!("; the closest is \"{name}\""))
-        .unwrap_or_default()
+    suggestion.map(|name| format!("; the closest is \"{name}\"")).unwrap_or_default()
 }

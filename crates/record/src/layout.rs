@@ -52,10 +52,7 @@ pub(crate) fn read_layout(
     line: u64,
     map: Option<&ColumnMap>,
 ) -> Result<Layout, RecordError> {
-    let first_line = text
-        .split(|byte| matches!(byte, b'\n' | b'\r'))
-        .next()
-        .unwrap_or_default();
+    let first_line = text.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();
     let mut candidates = DELIMITERS;
     candidates.sort_by_key(|delimiter| {
         std::cmp::Reverse(first_line.iter().filter(|byte| *byte == delimiter).count())
@@ -65,40 +62,24 @@ pub(crate) fn read_layout(
         let names = header_names(text, delimiter, path, line)?;
         match locate(&names, path, line, map) {
             Ok(sources) => {
-                return Ok(Layout {
-                    delimiter,
-                    width: names.len(),
-                    sources,
-                });
+                return Ok(Layout { delimiter, width: names.len(), sources });
             }
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }
     // The most frequent delimiter was tried first: its complaint is the one that makes sense.
-    Err(first_error.unwrap_or_else(|| RecordError::EmptyFile {
-        path: path.to_owned(),
-    }))
+    Err(first_error.unwrap_or_else(|| RecordError::EmptyFile { path: path.to_owned() }))
 }
 
-fn header_names(
-    text: &[u8],
-    delimiter: u8,
-    path: &Path,
-    line: u64,
-) -> Result<Vec<String>, RecordError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(delimiter)
-        .from_reader(text);
+fn header_names(text: &[u8], delimiter: u8, path: &Path, line: u64) -> Result<Vec<String>, RecordError> {
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).delimiter(delimiter).from_reader(text);
     let mut header = csv::StringRecord::new();
-    reader
-        .read_record(&mut header)
-        .map_err(|error| RecordError::BadTable {
-            path: path.to_owned(),
-            line,
-            message: error.to_string(),
-        })?;
+    reader.read_record(&mut header).map_err(|error| RecordError::BadTable {
+        path: path.to_owned(),
+        line,
+        message: error.to_string(),
+    })?;
     Ok(header.iter().map(|name| name.trim().to_owned()).collect())
 }
 
@@ -110,10 +91,7 @@ fn locate(
 ) -> Result<Vec<Source>, RecordError> {
     let mut sources = Vec::new();
     for Wanted { role, column, what } in wanted(names, map) {
-        let mut places = names
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| *name == column.name.trim());
+        let mut places = names.iter().enumerate().filter(|(_, name)| *name == column.name.trim());
         let Some((index, _)) = places.next() else {
             return Err(RecordError::MissingColumn {
                 path: path.to_owned(),
@@ -125,17 +103,9 @@ fn locate(
             });
         };
         if places.next().is_some() {
-            return Err(RecordError::AmbiguousColumn {
-                path: path.to_owned(),
-                line,
-                column: column.name,
-            });
+            return Err(RecordError::AmbiguousColumn { path: path.to_owned(), line, column: column.name });
         }
-        sources.push(Source {
-            role,
-            index,
-            column,
-        });
+        sources.push(Source { role, index, column });
     }
     Ok(sources)
 }
@@ -144,39 +114,19 @@ fn wanted(names: &[String], map: Option<&ColumnMap>) -> Vec<Wanted> {
     if let Some(map) = map {
         let required = [
             (Role::Time, Some(&map.time), "the column map's time"),
-            (
-                Role::Position,
-                Some(&map.position),
-                "the column map's position",
-            ),
+            (Role::Position, Some(&map.position), "the column map's position"),
             (Role::Force, Some(&map.force), "the column map's force"),
-            (
-                Role::Velocity,
-                map.velocity.as_ref(),
-                "the column map's velocity",
-            ),
-            (
-                Role::ForceVirtual,
-                map.force_virtual.as_ref(),
-                "the column map's virtual force",
-            ),
+            (Role::Velocity, map.velocity.as_ref(), "the column map's velocity"),
+            (Role::ForceVirtual, map.force_virtual.as_ref(), "the column map's virtual force"),
         ];
         return required
             .into_iter()
             .filter_map(|(role, column, what)| {
-                column.map(|column| Wanted {
-                    role,
-                    column: column.clone(),
-                    what,
-                })
+                column.map(|column| Wanted { role, column: column.clone(), what })
             })
             .collect();
     }
-    let own = |role, name: &str, what| Wanted {
-        role,
-        column: Column::si(name),
-        what,
-    };
+    let own = |role, name: &str, what| Wanted { role, column: Column::si(name), what };
     let mut wanted = vec![
         own(Role::Time, "time_s", "time in seconds"),
         own(Role::Position, "position_m", "tip position in metres"),
@@ -187,11 +137,7 @@ fn wanted(names: &[String], map: Option<&ColumnMap>) -> Vec<Wanted> {
         wanted.push(own(Role::Velocity, "velocity_mps", "tip velocity in m/s"));
     }
     if has("force_virtual_n") {
-        wanted.push(own(
-            Role::ForceVirtual,
-            "force_virtual_n",
-            "virtual force in newtons",
-        ));
+        wanted.push(own(Role::ForceVirtual, "force_virtual_n", "virtual force in newtons"));
     }
     if (0..JOINTS).any(|joint| has(&joint_torque_name(joint))) {
         for joint in 0..JOINTS {
@@ -213,27 +159,17 @@ pub(crate) fn joint_torque_name(joint: usize) -> String {
 /// The existing name that was probably meant, if any is near.
 fn closest(wanted: &str, names: &[String]) -> Option<String> {
     let target = wanted.to_lowercase();
-    let stem = target
-        .rsplit_once('_')
-        .map_or(target.as_str(), |(stem, _unit)| stem);
+    let stem = target.rsplit_once('_').map_or(target.as_str(), |(stem, _unit)| stem);
     let farthest = (target.chars().count() / 3).max(2);
     names
         .iter()
         .filter(|name| !name.is_empty())
         .map(|name| {
             let candidate = name.to_lowercase();
-            let same_quantity = candidate.starts_with(stem)
-                || (candidate.len() >= 3 && stem.starts_with(&candidate));
-            let distance =
-                edit_distance(&target, &candidate).min(1 + edit_distance(stem, &candidate));
-            (
-                if same_quantity {
-                    distance.min(farthest)
-                } else {
-                    distance
-                },
-                name,
-            )
+            let same_quantity =
+                candidate.starts_with(stem) || (candidate.len() >= 3 && stem.starts_with(&candidate));
+            let distance = edit_distance(&target, &candidate).min(1 + edit_distance(stem, &candidate));
+            (if same_quantity { distance.min(farthest) } else { distance }, name)
         })
         .filter(|(distance, _)| *distance <= farthest)
         .min_by_key(|(distance, _)| *distance)
@@ -266,22 +202,10 @@ mod tests {
 
     #[test]
     fn a_near_spelling_is_suggested_and_a_far_one_is_not() {
-        assert_eq!(
-            closest("time_s", &names("Time_s,fz")),
-            Some("Time_s".to_owned())
-        );
-        assert_eq!(
-            closest("time_s", &names("timestamp_ns,fz")),
-            Some("timestamp_ns".to_owned())
-        );
-        assert_eq!(
-            closest("position_m", &names("t,pos,fz")),
-            Some("pos".to_owned())
-        );
-        assert_eq!(
-            closest("force_n", &names("fz,px,forse_n")),
-            Some("forse_n".to_owned())
-        );
+        assert_eq!(closest("time_s", &names("Time_s,fz")), Some("Time_s".to_owned()));
+        assert_eq!(closest("time_s", &names("timestamp_ns,fz")), Some("timestamp_ns".to_owned()));
+        assert_eq!(closest("position_m", &names("t,pos,fz")), Some("pos".to_owned()));
+        assert_eq!(closest("force_n", &names("fz,px,forse_n")), Some("forse_n".to_owned()));
         assert_eq!(closest("force_n", &names("fz,px,py")), None);
     }
 

@@ -58,16 +58,8 @@ pub struct QualityNote {
 
 impl QualityNote {
     fn new<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
-        let numbers = numbers
-            .into_iter()
-            .map(|(name, value)| (name.to_owned(), value))
-            .collect();
-        Self {
-            kind,
-            message,
-            numbers,
-            lines: Vec::new(),
-        }
+        let numbers = numbers.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        Self { kind, message, numbers, lines: Vec::new() }
     }
 }
 
@@ -82,10 +74,9 @@ pub fn assess(recording: &Recording) -> Vec<QualityNote> {
     notes.extend(timing::gaps(recording));
     notes.extend(timing::jitter(recording));
     notes.extend(values::saturation(recording));
-    for (what, unit, values) in [
-        ("force_n", "N", &recording.force_n),
-        ("position_m", "m", &recording.position_m),
-    ] {
+    for (what, unit, values) in
+        [("force_n", "N", &recording.force_n), ("position_m", "m", &recording.position_m)]
+    {
         notes.extend(values::spikes(what, unit, values, &recording.time_s));
         notes.extend(values::quantisation(what, unit, values));
     }
@@ -96,12 +87,7 @@ pub fn assess(recording: &Recording) -> Vec<QualityNote> {
 /// The note on rows that were dropped; `lines` in the order of the file.
 pub(crate) fn repaired_rows(lines: Vec<u64>, kept: usize) -> QualityNote {
     const NAMED: usize = 12;
-    let mut named = lines
-        .iter()
-        .take(NAMED)
-        .map(u64::to_string)
-        .collect::<Vec<_>>()
-        .join(", ");
+    let mut named = lines.iter().take(NAMED).map(u64::to_string).collect::<Vec<_>>().join(", ");
     if lines.len() > NAMED {
         named.push_str(&format!(" and {} more", lines.len() - NAMED));
     }
@@ -110,10 +96,7 @@ pub(crate) fn repaired_rows(lines: Vec<u64>, kept: usize) -> QualityNote {
         lines.len()
     );
     let numbers = [("dropped", lines.len() as f64), ("kept", kept as f64)];
-    QualityNote {
-        lines,
-        ..QualityNote::new(QualityKind::RepairedRows, message, numbers)
-    }
+    QualityNote { lines, ..QualityNote::new(QualityKind::RepairedRows, message, numbers) }
 }
 
 #[cfg(test)]
@@ -124,10 +107,7 @@ mod tests {
     fn notes_serialise_with_kinds_in_snake_case() -> Result<(), serde_json::Error> {
         let note = repaired_rows(vec![4, 9], 100);
         let text = serde_json::to_string(&note)?;
-        assert!(
-            text.contains(r#""kind":"repaired_rows""#) && text.contains(r#""lines":[4,9]"#),
-            "{text}"
-        );
+        assert!(text.contains(r#""kind":"repaired_rows""#) && text.contains(r#""lines":[4,9]"#), "{text}");
         assert_eq!(serde_json::from_str::<QualityNote>(&text)?, note);
         assert!(note.message.contains("line(s) 4, 9"), "{}", note.message);
         Ok(())
@@ -137,16 +117,12 @@ mod tests {
     fn notes_come_in_the_order_of_their_weight() -> Result<(), crate::RecordError> {
         // In millimetres, with a gap, irregular.
         let time_s: Vec<f64> = (0..400)
-            .map(|i| {
-                0.01 * (f64::from(i) + 0.3 * f64::from(i % 3)) + if i > 200 { 1.0 } else { 0.0 }
-            })
+            .map(|i| 0.01 * (f64::from(i) + 0.3 * f64::from(i % 3)) + if i > 200 { 1.0 } else { 0.0 })
             .collect();
         let position_m: Vec<f64> = time_s.iter().map(|t| 2.3 * t).collect();
         let force_n = time_s.iter().map(|t| t * 0.1).collect();
-        let kinds: Vec<QualityKind> = assess(&Recording::new(time_s, position_m, force_n)?)
-            .iter()
-            .map(|note| note.kind)
-            .collect();
+        let kinds: Vec<QualityKind> =
+            assess(&Recording::new(time_s, position_m, force_n)?).iter().map(|note| note.kind).collect();
         use QualityKind::{Gaps, Jitter, UnitMixUp};
         assert_eq!(kinds, [UnitMixUp, UnitMixUp, Gaps, Jitter]);
         Ok(())

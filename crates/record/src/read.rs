@@ -40,18 +40,11 @@ pub fn read_csv(
 ) -> Result<(Recording, Vec<QualityNote>), RecordError> {
     let path = path.as_ref();
     if path.is_dir() {
-        return Err(RecordError::IsDirectory {
-            path: path.to_owned(),
-        });
+        return Err(RecordError::IsDirectory { path: path.to_owned() });
     }
     let bytes = fs::read(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => RecordError::NoSuchFile {
-            path: path.to_owned(),
-        },
-        _ => RecordError::Unreadable {
-            path: path.to_owned(),
-            source,
-        },
+        io::ErrorKind::NotFound => RecordError::NoSuchFile { path: path.to_owned() },
+        _ => RecordError::Unreadable { path: path.to_owned(), source },
     })?;
     read_csv_bytes(&bytes, path, options)
 }
@@ -69,49 +62,23 @@ pub fn read_csv_bytes(
         map.check()?;
     }
     check_text(bytes, path)?;
-    let start = if bytes.starts_with(b"\xEF\xBB\xBF") {
-        3
-    } else {
-        0
-    };
-    let Some(header) = bytes[start..]
-        .iter()
-        .position(|byte| !byte.is_ascii_whitespace())
-    else {
-        return Err(RecordError::EmptyFile {
-            path: path.to_owned(),
-        });
+    let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+    let Some(header) = bytes[start..].iter().position(|byte| !byte.is_ascii_whitespace()) else {
+        return Err(RecordError::EmptyFile { path: path.to_owned() });
     };
     // Tabs and spaces before the first name belong to the header line.
     let header = start + header;
-    let header = bytes[..header]
-        .iter()
-        .rposition(|byte| matches!(byte, b'\n' | b'\r'))
-        .map_or(start, |end| end + 1);
-    let place = Place {
-        bytes,
-        path,
-        header,
-    };
-    let layout = read_layout(
-        &bytes[header..],
-        path,
-        place.line(header),
-        options.columns.as_ref(),
-    )?;
+    let header =
+        bytes[..header].iter().rposition(|byte| matches!(byte, b'\n' | b'\r')).map_or(start, |end| end + 1);
+    let place = Place { bytes, path, header };
+    let layout = read_layout(&bytes[header..], path, place.line(header), options.columns.as_ref())?;
     let mut rows = Rows::read(&place, &layout, options.repair)?;
     let dropped_lines = rows.repair(&place);
     let mut recording = rows.into_recording(&place, &layout)?;
     if !recording.velocity_measured {
-        recording.velocity_mps = differentiate(
-            &recording.time_s,
-            &recording.position_m,
-            DEFAULT_HALF_WIDTH_S,
-        );
-        check_finite(
-            "velocity_mps (differentiated from the position)",
-            &recording.velocity_mps,
-        )?;
+        recording.velocity_mps =
+            differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
+        check_finite("velocity_mps (differentiated from the position)", &recording.velocity_mps)?;
     }
     let mut notes = assess(&recording);
     if !dropped_lines.is_empty() {
@@ -130,11 +97,7 @@ struct Place<'a> {
 impl Place<'_> {
     /// Line (1-based) of the row that begins at or, after blank lines, behind the byte.
     fn line(&self, byte: usize) -> u64 {
-        let byte = byte
-            + self.bytes[byte..]
-                .iter()
-                .take_while(|byte| matches!(byte, b'\n' | b'\r'))
-                .count();
+        let byte = byte + self.bytes[byte..].iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).count();
         1 + line_ends(self.bytes, 0, byte)
     }
 
@@ -142,11 +105,8 @@ impl Place<'_> {
     fn lines(&self, offsets: impl Iterator<Item = usize>) -> Vec<u64> {
         let (mut line, mut from) = (1, 0);
         let next = |byte: usize| {
-            let byte = byte
-                + self.bytes[byte..]
-                    .iter()
-                    .take_while(|byte| matches!(byte, b'\n' | b'\r'))
-                    .count();
+            let byte =
+                byte + self.bytes[byte..].iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).count();
             line += line_ends(self.bytes, from, byte);
             from = byte;
             line
@@ -162,19 +122,13 @@ impl Place<'_> {
 /// Line ends in `bytes[from..to]`: LF, CRLF, or a CR alone. A range that begins at the start of a row is exact.
 fn line_ends(bytes: &[u8], from: usize, to: usize) -> u64 {
     let alone = |index: usize| bytes.get(index + 1) != Some(&b'\n');
-    (from..to)
-        .filter(|&index| bytes[index] == b'\n' || (bytes[index] == b'\r' && alone(index)))
-        .count() as u64
+    (from..to).filter(|&index| bytes[index] == b'\n' || (bytes[index] == b'\r' && alone(index))).count()
+        as u64
 }
 
 fn check_text(bytes: &[u8], path: &Path) -> Result<(), RecordError> {
     let bad = |byte: usize, what| {
-        Err(RecordError::NotText {
-            path: path.to_owned(),
-            byte,
-            line: 1 + line_ends(bytes, 0, byte),
-            what,
-        })
+        Err(RecordError::NotText { path: path.to_owned(), byte, line: 1 + line_ends(bytes, 0, byte), what })
     };
     if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
         return bad(0, "a UTF-16 byte order mark");
@@ -183,10 +137,7 @@ fn check_text(bytes: &[u8], path: &Path) -> Result<(), RecordError> {
         return bad(0, "the head of a ZIP archive (a spreadsheet?)");
     }
     // Zero bytes are valid UTF-8; whichever trouble comes first is named.
-    let zero = bytes
-        .iter()
-        .position(|&byte| byte == 0)
-        .unwrap_or(bytes.len());
+    let zero = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
     match std::str::from_utf8(&bytes[..zero]) {
         Err(error) => bad(error.valid_up_to(), "an invalid UTF-8 sequence"),
         Ok(_) if zero < bytes.len() => bad(zero, "a zero byte"),
@@ -213,16 +164,13 @@ impl Rows {
         let mut offsets: Vec<usize> = Vec::new();
         let mut header_passed = false;
         loop {
-            let offset = place.header
-                + usize::try_from(reader.position().byte()).unwrap_or(usize::MAX - place.header);
-            let more =
-                reader
-                    .read_byte_record(&mut row)
-                    .map_err(|error| RecordError::BadTable {
-                        path: place.path(),
-                        line: place.line(offset),
-                        message: error.to_string(),
-                    })?;
+            let offset =
+                place.header + usize::try_from(reader.position().byte()).unwrap_or(usize::MAX - place.header);
+            let more = reader.read_byte_record(&mut row).map_err(|error| RecordError::BadTable {
+                path: place.path(),
+                line: place.line(offset),
+                message: error.to_string(),
+            })?;
             if !more {
                 break;
             }
@@ -242,30 +190,16 @@ impl Rows {
                 });
             }
             for (column, source) in columns.iter_mut().zip(&layout.sources) {
-                column.push(number(
-                    place,
-                    offset,
-                    source,
-                    row.get(source.index).unwrap_or_default(),
-                )?);
+                column.push(number(place, offset, source, row.get(source.index).unwrap_or_default())?);
             }
             if !repair {
                 let previous_offset = offsets.last().copied().unwrap_or_default();
-                check_time(
-                    place,
-                    &layout.sources[0].column,
-                    &columns[0],
-                    offset,
-                    previous_offset,
-                )?;
+                check_time(place, &layout.sources[0].column, &columns[0], offset, previous_offset)?;
             }
             offsets.push(offset);
         }
         if offsets.is_empty() {
-            return Err(RecordError::HeaderOnly {
-                path: place.path(),
-                line: place.line(place.header),
-            });
+            return Err(RecordError::HeaderOnly { path: place.path(), line: place.line(place.header) });
         }
         Ok(Self { columns, offsets })
     }
@@ -289,11 +223,7 @@ impl Rows {
         let samples = self.offsets.len();
         if samples < 2 {
             let line = place.line(self.offsets.last().copied().unwrap_or(place.header));
-            return Err(RecordError::TooFewSamples {
-                path: place.path(),
-                line,
-                samples,
-            });
+            return Err(RecordError::TooFewSamples { path: place.path(), line, samples });
         }
         let mut recording = Recording::default();
         for (source, values) in layout.sources.iter().zip(self.columns) {
@@ -318,12 +248,7 @@ impl Rows {
     }
 }
 
-fn number(
-    place: &Place<'_>,
-    offset: usize,
-    source: &Source,
-    field: &[u8],
-) -> Result<f64, RecordError> {
+fn number(place: &Place<'_>, offset: usize, source: &Source, field: &[u8]) -> Result<f64, RecordError> {
     // The whole file was checked to be UTF-8; a delimiter cannot split a character.
     let text = std::str::from_utf8(field).unwrap_or_default().trim();
     let Ok(raw) = text.parse::<f64>() else {
@@ -374,20 +299,7 @@ fn check_time(
     let (path, column) = (place.path(), column.name.clone());
     let (line, previous_line) = (place.line(offset), place.line(previous_offset));
     if time_s == previous_s {
-        return Err(RecordError::RepeatedTime {
-            path,
-            line,
-            column,
-            time_s,
-            previous_line,
-        });
+        return Err(RecordError::RepeatedTime { path, line, column, time_s, previous_line });
     }
-    Err(RecordError::BackwardTime {
-        path,
-        line,
-        column,
-        time_s,
-        previous_s,
-        previous_line,
-    })
+    Err(RecordError::BackwardTime { path, line, column, time_s, previous_s, previous_line })
 }

@@ -54,25 +54,13 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Recording::check`].
-    pub fn new(
-        time_s: Vec<f64>,
-        position_m: Vec<f64>,
-        force_n: Vec<f64>,
-    ) -> Result<Self, RecordError> {
+    pub fn new(time_s: Vec<f64>, position_m: Vec<f64>, force_n: Vec<f64>) -> Result<Self, RecordError> {
         // Checked before differentiating, which asks for increasing time; the velocity's length is right by construction.
-        let mut recording = Self {
-            velocity_mps: vec![0.0; time_s.len()],
-            time_s,
-            position_m,
-            force_n,
-            ..Self::default()
-        };
+        let mut recording =
+            Self { velocity_mps: vec![0.0; time_s.len()], time_s, position_m, force_n, ..Self::default() };
         recording.check()?;
-        recording.velocity_mps = differentiate(
-            &recording.time_s,
-            &recording.position_m,
-            DEFAULT_HALF_WIDTH_S,
-        );
+        recording.velocity_mps =
+            differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
         check_finite("velocity_mps (differentiated)", &recording.velocity_mps)?;
         Ok(recording)
     }
@@ -87,14 +75,8 @@ impl Recording {
         velocity_mps: Vec<f64>,
         force_n: Vec<f64>,
     ) -> Result<Self, RecordError> {
-        let recording = Self {
-            time_s,
-            position_m,
-            force_n,
-            velocity_mps,
-            velocity_measured: true,
-            ..Self::default()
-        };
+        let recording =
+            Self { time_s, position_m, force_n, velocity_mps, velocity_measured: true, ..Self::default() };
         recording.check()?;
         Ok(recording)
     }
@@ -127,11 +109,7 @@ impl Recording {
             for (joint, &value) in torques.iter().enumerate() {
                 if !value.is_finite() {
                     let column = format!("joint_torque_{}_nm", joint + 1);
-                    return Err(RecordError::NotFiniteAt {
-                        column,
-                        index,
-                        value,
-                    });
+                    return Err(RecordError::NotFiniteAt { column, index, value });
                 }
             }
         }
@@ -157,21 +135,13 @@ impl Recording {
 
     /// The samples in the order of time.
     pub fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
-        let motion = self
-            .time_s
-            .iter()
-            .zip(&self.position_m)
-            .zip(&self.velocity_mps);
-        motion
-            .zip(&self.force_n)
-            .map(
-                |(((&time_s, &position_m), &velocity_mps), &force_n)| Sample {
-                    time_s,
-                    position_m,
-                    velocity_mps,
-                    force_n,
-                },
-            )
+        let motion = self.time_s.iter().zip(&self.position_m).zip(&self.velocity_mps);
+        motion.zip(&self.force_n).map(|(((&time_s, &position_m), &velocity_mps), &force_n)| Sample {
+            time_s,
+            position_m,
+            velocity_mps,
+            force_n,
+        })
     }
 
     /// From the first to the last sample (s); 0 without samples.
@@ -184,12 +154,7 @@ impl Recording {
 
     /// Median interval between samples (s): robust against gaps. `NaN` with fewer than two samples.
     pub fn median_interval_s(&self) -> f64 {
-        median(
-            self.time_s
-                .windows(2)
-                .map(|pair| pair[1] - pair[0])
-                .collect(),
-        )
+        median(self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect())
     }
 
     /// Typical sampling rate (Hz): the inverse of the median interval. `NaN` with fewer than two samples.
@@ -202,21 +167,15 @@ pub(crate) fn check_length(column: &str, found: usize, expected: usize) -> Resul
     if found == expected {
         return Ok(());
     }
-    Err(RecordError::LengthMismatch {
-        column: column.to_owned(),
-        found,
-        expected,
-    })
+    Err(RecordError::LengthMismatch { column: column.to_owned(), found, expected })
 }
 
 pub(crate) fn check_finite(column: &str, values: &[f64]) -> Result<(), RecordError> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(index) => Err(RecordError::NotFiniteAt {
-            column: column.to_owned(),
-            index,
-            value: values[index],
-        }),
+        Some(index) => {
+            Err(RecordError::NotFiniteAt { column: column.to_owned(), index, value: values[index] })
+        }
     }
 }
 
@@ -229,33 +188,17 @@ mod tests {
         let mut time_s: Vec<f64> = (0..100).map(|i| f64::from(i) * 0.005).collect();
         time_s.extend((0..100).map(|i| 3.0 + f64::from(i) * 0.005));
         let recording = Recording::new(time_s, vec![0.0; 200], vec![0.0; 200])?;
-        assert!(
-            (recording.sample_hz() - 200.0).abs() < 1e-6,
-            "{}",
-            recording.sample_hz()
-        );
+        assert!((recording.sample_hz() - 200.0).abs() < 1e-6, "{}", recording.sample_hz());
         assert!((recording.duration_s() - 3.495).abs() < 1e-12);
         Ok(())
     }
 
     #[test]
     fn samples_pair_what_belongs_to_one_instant() -> Result<(), RecordError> {
-        let recording = Recording::with_velocity(
-            vec![0.0, 1.0],
-            vec![0.1, 0.2],
-            vec![0.3, 0.4],
-            vec![5.0, 6.0],
-        )?;
+        let recording =
+            Recording::with_velocity(vec![0.0, 1.0], vec![0.1, 0.2], vec![0.3, 0.4], vec![5.0, 6.0])?;
         let last = recording.samples().last();
-        assert_eq!(
-            last,
-            Some(Sample {
-                time_s: 1.0,
-                position_m: 0.2,
-                velocity_mps: 0.4,
-                force_n: 6.0
-            })
-        );
+        assert_eq!(last, Some(Sample { time_s: 1.0, position_m: 0.2, velocity_mps: 0.4, force_n: 6.0 }));
         assert!(recording.velocity_measured);
         Ok(())
     }
@@ -266,22 +209,13 @@ mod tests {
             let message = result.map(|_| ()).expect_err("must be refused").to_string();
             assert!(message.contains(words), "{message}");
         };
-        says(
-            Recording::new(vec![0.0], vec![0.0], vec![0.0]),
-            "at least 2",
-        );
-        says(
-            Recording::new(vec![0.0, 1.0], vec![0.0], vec![0.0; 2]),
-            "position_m has 1 values",
-        );
+        says(Recording::new(vec![0.0], vec![0.0], vec![0.0]), "at least 2");
+        says(Recording::new(vec![0.0, 1.0], vec![0.0], vec![0.0; 2]), "position_m has 1 values");
         says(
             Recording::new(vec![0.0, 1.0], vec![0.0, f64::NAN], vec![0.0; 2]),
             "position_m: the value at index 1",
         );
-        says(
-            Recording::new(vec![0.0, 0.0], vec![0.0; 2], vec![0.0; 2]),
-            "time must increase",
-        );
+        says(Recording::new(vec![0.0, 0.0], vec![0.0; 2], vec![0.0; 2]), "time must increase");
         says(
             Recording::new(vec![0.0, 1e-300], vec![0.0, 1e300], vec![0.0; 2]),
             "velocity_mps (differentiated)",
@@ -291,9 +225,7 @@ mod tests {
     #[test]
     fn an_empty_recording_has_no_rate_and_does_not_panic() {
         let empty = Recording::default();
-        assert!(
-            empty.is_empty() && empty.median_interval_s().is_nan() && empty.sample_hz().is_nan()
-        );
+        assert!(empty.is_empty() && empty.median_interval_s().is_nan() && empty.sample_hz().is_nan());
         assert_eq!(empty.samples().count(), 0);
     }
 }

@@ -36,12 +36,7 @@ pub(crate) fn rows_to_keep(time_s: &[f64]) -> Option<Vec<bool>> {
 
 /// The values of the rows that are kept.
 pub(crate) fn kept<T: Copy>(values: &[T], keep: &[bool]) -> Vec<T> {
-    values
-        .iter()
-        .zip(keep)
-        .filter(|(_, keep)| **keep)
-        .map(|(value, _)| *value)
-        .collect()
+    values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
 }
 
 #[cfg(test)]
@@ -56,14 +51,8 @@ mod tests {
 
     #[test]
     fn a_repeated_stamp_and_a_step_back_lose_the_later_row() {
-        assert_eq!(
-            rows_to_keep(&[0.0, 1.0, 1.0, 2.0]),
-            Some(vec![true, true, false, true])
-        );
-        assert_eq!(
-            rows_to_keep(&[0.0, 1.0, 2.0, 1.5, 3.0]),
-            Some(vec![true, true, true, false, true])
-        );
+        assert_eq!(rows_to_keep(&[0.0, 1.0, 1.0, 2.0]), Some(vec![true, true, false, true]));
+        assert_eq!(rows_to_keep(&[0.0, 1.0, 2.0, 1.5, 3.0]), Some(vec![true, true, true, false, true]));
         assert_eq!(rows_to_keep(&[0.0, 1.0, 2.0]), None);
     }
 
@@ -74,14 +63,8 @@ mod tests {
 
     #[test]
     fn of_two_runs_in_one_file_the_longer_stays_and_of_equal_ones_the_first() {
-        assert_eq!(
-            rows_to_keep(&[0.0, 1.0, 0.0, 1.0]),
-            Some(vec![true, true, false, false])
-        );
-        assert_eq!(
-            rows_to_keep(&[5.0, 6.0, 0.0, 1.0, 2.0]),
-            Some(vec![false, false, true, true, true])
-        );
+        assert_eq!(rows_to_keep(&[0.0, 1.0, 0.0, 1.0]), Some(vec![true, true, false, false]));
+        assert_eq!(rows_to_keep(&[5.0, 6.0, 0.0, 1.0, 2.0]), Some(vec![false, false, true, true, true]));
     }
 
     proptest! {

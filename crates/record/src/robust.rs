@@ -25,11 +25,7 @@ pub(crate) fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
 
 /// Smallest and largest value; `(NaN, NaN)` for no values.
 pub(crate) fn extremes(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::NAN, f64::NAN), |(low, high), &value| {
-            (low.min(value), high.max(value))
-        })
+    values.iter().fold((f64::NAN, f64::NAN), |(low, high), &value| (low.min(value), high.max(value)))
 }
 
 #[cfg(test)]

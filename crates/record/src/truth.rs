@@ -66,10 +66,7 @@ impl Truth {
             ("true_elastic_n", &self.elastic_n),
             ("true_friction_n", &self.friction_n),
             ("true_tissue_force_n", &self.tissue_force_n),
-            (
-                "true_cumulative_friction_ns_per_m",
-                &self.cumulative_friction_ns_per_m,
-            ),
+            ("true_cumulative_friction_ns_per_m", &self.cumulative_friction_ns_per_m),
         ] {
             check_length(name, values.len(), samples)?;
             check_finite(name, values)?;
@@ -84,18 +81,8 @@ mod tests {
 
     #[test]
     fn ground_truth_of_another_length_than_the_recording_is_refused() {
-        let truth = Truth {
-            active_layer: vec![1; 3],
-            tip_force_n: vec![0.0; 2],
-            ..Truth::default()
-        };
-        let message = truth
-            .check(3)
-            .expect_err("two values for three samples")
-            .to_string();
-        assert!(
-            message.contains("true_tip_force_n has 2 values and the recording 3 samples"),
-            "{message}"
-        );
+        let truth = Truth { active_layer: vec![1; 3], tip_force_n: vec![0.0; 2], ..Truth::default() };
+        let message = truth.check(3).expect_err("two values for three samples").to_string();
+        assert!(message.contains("true_tip_force_n has 2 values and the recording 3 samples"), "{message}");
     }
 }

@@ -49,11 +49,7 @@ pub fn write_csv(
             write!(output, ",{torque:?}")?;
         }
         if let Some(truth) = truth {
-            for value in [
-                truth.tip_force_n[index],
-                truth.elastic_n[index],
-                truth.friction_n[index],
-            ] {
+            for value in [truth.tip_force_n[index], truth.elastic_n[index], truth.friction_n[index]] {
                 write!(output, ",{value:?}")?;
             }
             write!(output, ",{}", truth.active_layer[index])?;
@@ -72,11 +68,7 @@ pub fn write_csv(
 }
 
 fn names(recording: &Recording, truth: Option<&Truth>) -> Vec<String> {
-    let mut names = vec![
-        "time_s".to_owned(),
-        "position_m".to_owned(),
-        "force_n".to_owned(),
-    ];
+    let mut names = vec!["time_s".to_owned(), "position_m".to_owned(), "force_n".to_owned()];
     if recording.velocity_measured {
         names.push("velocity_mps".to_owned());
     }
@@ -87,12 +79,7 @@ fn names(recording: &Recording, truth: Option<&Truth>) -> Vec<String> {
         names.extend((0..JOINTS).map(joint_torque_name));
     }
     if truth.is_some() {
-        let truth = [
-            "true_tip_force_n",
-            "true_elastic_n",
-            "true_friction_n",
-            "true_active_layer",
-        ];
+        let truth = ["true_tip_force_n", "true_elastic_n", "true_friction_n", "true_active_layer"];
         names.extend(truth.map(str::to_owned));
     }
     names
@@ -111,12 +98,7 @@ fn numbers(recording: &Recording) -> Vec<&[f64]> {
 }
 
 fn check_name(name: &str, taken: &[String]) -> Result<(), RecordError> {
-    let bad = |why| {
-        Err(RecordError::BadColumnName {
-            name: name.to_owned(),
-            why,
-        })
-    };
+    let bad = |why| Err(RecordError::BadColumnName { name: name.to_owned(), why });
     if name.trim().is_empty() {
         return bad("it is empty");
     }

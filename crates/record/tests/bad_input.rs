@@ -8,9 +8,7 @@ use stylet_record::{Column, ColumnMap, ReadOptions, RecordError, read_csv, read_
 const HEADER: &str = "time_s,position_m,force_n\n";
 
 fn refusal_with(bytes: &[u8], options: &ReadOptions) -> RecordError {
-    read_csv_bytes(bytes, Path::new("logs/run7.csv"), options)
-        .map(|_| ())
-        .expect_err("must be refused")
+    read_csv_bytes(bytes, Path::new("logs/run7.csv"), options).map(|_| ()).expect_err("must be refused")
 }
 
 fn refusal(bytes: &[u8]) -> RecordError {
@@ -28,32 +26,19 @@ fn says(error: &RecordError, words: &[&str]) {
 
 #[test]
 fn a_path_to_nowhere_asks_to_check_the_path() {
-    let error = read_csv("no/such/recording.csv", &ReadOptions::default())
-        .map(|_| ())
-        .expect_err("no file");
+    let error = read_csv("no/such/recording.csv", &ReadOptions::default()).map(|_| ()).expect_err("no file");
     let message = error.to_string();
     assert!(matches!(error, RecordError::NoSuchFile { .. }), "{message}");
-    assert!(
-        message.contains("no/such/recording.csv: no such file; check the path"),
-        "{message}"
-    );
+    assert!(message.contains("no/such/recording.csv: no such file; check the path"), "{message}");
 }
 
 #[test]
 fn a_folder_is_not_a_recording() {
     let folder = env!("CARGO_MANIFEST_DIR");
-    let error = read_csv(folder, &ReadOptions::default())
-        .map(|_| ())
-        .expect_err("a folder");
+    let error = read_csv(folder, &ReadOptions::default()).map(|_| ()).expect_err("a folder");
     let message = error.to_string();
-    assert!(
-        matches!(error, RecordError::IsDirectory { .. }),
-        "{message}"
-    );
-    assert!(
-        message.contains(folder) && message.contains("name one CSV file inside it"),
-        "{message}"
-    );
+    assert!(matches!(error, RecordError::IsDirectory { .. }), "{message}");
+    assert!(message.contains(folder) && message.contains("name one CSV file inside it"), "{message}");
 }
 
 #[test]
@@ -61,10 +46,7 @@ fn an_empty_file_is_told_what_a_recording_needs() {
     for nothing in [&b""[..], b"\n\r\n  \n", b"\xEF\xBB\xBF"] {
         let error = refusal(nothing);
         assert!(matches!(error, RecordError::EmptyFile { .. }));
-        says(
-            &error,
-            &["the file is empty", "a header line and at least 2 rows"],
-        );
+        says(&error, &["the file is empty", "a header line and at least 2 rows"]);
     }
 }
 
@@ -79,15 +61,9 @@ fn a_header_without_rows_is_named_with_its_line() {
 fn a_single_sample_has_no_velocity() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n");
     says(&error, &["1 sample(s) by line 2", "at least 2 samples"]);
-    let repair = ReadOptions {
-        repair: true,
-        ..ReadOptions::default()
-    };
+    let repair = ReadOptions { repair: true, ..ReadOptions::default() };
     let error = refusal_with(b"time_s,position_m,force_n\n0,0,0\n0,0,0\n0,0,0\n", &repair);
-    assert!(
-        matches!(error, RecordError::TooFewSamples { samples: 1, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, RecordError::TooFewSamples { samples: 1, .. }), "{error}");
 }
 
 #[test]
@@ -100,14 +76,8 @@ fn a_binary_file_is_told_the_byte_where_text_ends() {
         &refusal(b"time_s,position_m,force_n\n0,0,\0\n"),
         &["a zero byte at byte 30 (line 2)", "export the data as CSV"],
     );
-    says(
-        &refusal(b"\xFF\xFEt\0i\0m\0e\0"),
-        &["UTF-16 byte order mark at byte 0 (line 1)", "export"],
-    );
-    says(
-        &refusal(b"PK\x03\x04rest"),
-        &["a spreadsheet?", "byte 0", "export"],
-    );
+    says(&refusal(b"\xFF\xFEt\0i\0m\0e\0"), &["UTF-16 byte order mark at byte 0 (line 1)", "export"]);
+    says(&refusal(b"PK\x03\x04rest"), &["a spreadsheet?", "byte 0", "export"]);
 }
 
 #[test]
@@ -133,29 +103,15 @@ fn a_column_of_the_map_that_the_file_lacks_is_named_with_its_quantity() {
         force: Column::si("Fz"),
         ..ColumnMap::default()
     };
-    let options = ReadOptions {
-        columns: Some(map),
-        repair: false,
-    };
+    let options = ReadOptions { columns: Some(map), repair: false };
     let error = refusal_with(b"time;pz;fz\n0;0;0\n1;1;1\n", &options);
-    says(
-        &error,
-        &[
-            "\"Fz\" (the column map's force)",
-            "\"time\", \"pz\", \"fz\"",
-            "the closest is \"fz\"",
-        ],
-    );
+    says(&error, &["\"Fz\" (the column map's force)", "\"time\", \"pz\", \"fz\"", "the closest is \"fz\""]);
 }
 
 #[test]
 fn six_joint_torques_are_one_too_few() {
-    let text =
-        "time_s,position_m,force_n,joint_torque_1_nm,joint_torque_2_nm\n0,0,0,1,1\n1,1,1,1,1\n";
-    says(
-        &refusal(text.as_bytes()),
-        &["\"joint_torque_3_nm\"", "all seven joints or none"],
-    );
+    let text = "time_s,position_m,force_n,joint_torque_1_nm,joint_torque_2_nm\n0,0,0,1,1\n1,1,1,1,1\n";
+    says(&refusal(text.as_bytes()), &["\"joint_torque_3_nm\"", "all seven joints or none"]);
 }
 
 #[test]
@@ -169,30 +125,18 @@ fn text_in_a_number_is_shown_with_line_column_and_remedy() {
     let row = |field: &str| refusal(format!("{HEADER}0,0,0\n\n1,{field},0\n").as_bytes());
     says(
         &row("fast"),
-        &[
-            "line 4, column \"position_m\"",
-            "\"fast\" is not a number",
-            "write a decimal number such as",
-        ],
+        &["line 4, column \"position_m\"", "\"fast\" is not a number", "write a decimal number such as"],
     );
     says(
         &row(""),
-        &[
-            "line 4, column \"position_m\"",
-            "an empty field",
-            "fill in the value or remove the row",
-        ],
+        &["line 4, column \"position_m\"", "an empty field", "fill in the value or remove the row"],
     );
     says(&row("1_000"), &["line 4", "\"1_000\" is not a number"]);
     says(&row(&"x".repeat(5000)), &["xxx\"... is not a number"]);
     let decimal_comma = refusal(b"time_s;position_m;force_n\n0,01;0;0\n");
     says(
         &decimal_comma,
-        &[
-            "line 2, column \"time_s\"",
-            "\"0,01\"",
-            "decimal point instead of the decimal comma",
-        ],
+        &["line 2, column \"time_s\"", "\"0,01\"", "decimal point instead of the decimal comma"],
     );
 }
 
@@ -200,29 +144,13 @@ fn text_in_a_number_is_shown_with_line_column_and_remedy() {
 fn numbers_that_are_not_finite_are_refused() {
     for text in ["NaN", "nan", "inf", "-inf", "Infinity", "1e999"] {
         let error = refusal(format!("{HEADER}0,0,0\r\n1,0,{text}\r\n").as_bytes());
-        assert!(
-            matches!(error, RecordError::NotFinite { line: 3, .. }),
-            "{error}"
-        );
-        says(
-            &error,
-            &[
-                "line 3, column \"force_n\"",
-                text,
-                "remove the row or correct the value",
-            ],
-        );
+        assert!(matches!(error, RecordError::NotFinite { line: 3, .. }), "{error}");
+        says(&error, &["line 3, column \"force_n\"", text, "remove the row or correct the value"]);
     }
-    let huge = ColumnMap {
-        force: Column::scaled("force_n", 1e300),
-        ..ColumnMap::default()
-    };
+    let huge = ColumnMap { force: Column::scaled("force_n", 1e300), ..ColumnMap::default() };
     let error = refusal_with(
         b"time_s,position_m,force_n\n0,0,1e300\n1,1,1\n",
-        &ReadOptions {
-            columns: Some(huge),
-            repair: false,
-        },
+        &ReadOptions { columns: Some(huge), repair: false },
     );
     says(&error, &["line 2", "1e300", "the column map's scale"]);
 }
@@ -230,14 +158,7 @@ fn numbers_that_are_not_finite_are_refused() {
 #[test]
 fn a_row_cut_short_or_too_long_is_named_with_both_counts() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n1,0.0\n");
-    says(
-        &error,
-        &[
-            "line 3",
-            "the row has 2 fields, the header has 3",
-            "complete or remove the row",
-        ],
-    );
+    says(&error, &["line 3", "the row has 2 fields, the header has 3", "complete or remove the row"]);
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n1,0,0,0");
     says(&error, &["line 3", "the row has 4 fields"]);
 }
@@ -251,61 +172,23 @@ fn an_open_quotation_mark_does_not_swallow_the_file_in_silence() {
 #[test]
 fn time_that_runs_backward_is_named_with_both_lines() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n0.2,0,0\n\n0.1,0,0\n");
-    assert!(
-        matches!(
-            error,
-            RecordError::BackwardTime {
-                line: 5,
-                previous_line: 3,
-                ..
-            }
-        ),
-        "{error}"
-    );
-    says(
-        &error,
-        &[
-            "line 5, column \"time_s\"",
-            "0.1 s after 0.2 s on line 3",
-            "--repair",
-        ],
-    );
+    assert!(matches!(error, RecordError::BackwardTime { line: 5, previous_line: 3, .. }), "{error}");
+    says(&error, &["line 5, column \"time_s\"", "0.1 s after 0.2 s on line 3", "--repair"]);
 }
 
 #[test]
 fn a_repeated_time_stamp_is_named_with_both_lines() {
     let error = refusal(b"time_s,position_m,force_n\r\n0,0,0\r\n0.2,0,0\r\n0.2,0,0\r\n");
-    assert!(
-        matches!(
-            error,
-            RecordError::RepeatedTime {
-                line: 4,
-                previous_line: 3,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, RecordError::RepeatedTime { line: 4, previous_line: 3, .. }), "{error}");
     says(&error, &["line 4", "repeats that of line 3", "--repair"]);
 }
 
 #[test]
 fn a_scale_of_zero_is_refused_before_the_file_is_looked_at() {
-    let map = ColumnMap {
-        position: Column::scaled("pz", 0.0),
-        ..ColumnMap::default()
-    };
-    let message = refusal_with(
-        b"",
-        &ReadOptions {
-            columns: Some(map),
-            repair: false,
-        },
-    )
-    .to_string();
+    let map = ColumnMap { position: Column::scaled("pz", 0.0), ..ColumnMap::default() };
+    let message = refusal_with(b"", &ReadOptions { columns: Some(map), repair: false }).to_string();
     assert!(
-        message
-            .contains("position.scale = 0 for the column \"pz\"; it must be finite and not zero"),
+        message.contains("position.scale = 0 for the column \"pz\"; it must be finite and not zero"),
         "{message}"
     );
 }

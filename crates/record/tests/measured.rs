@@ -7,8 +7,7 @@ use stylet_record::{Column, ColumnMap, QualityKind, ReadOptions, RecordError, re
 
 fn folder() -> PathBuf {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/measured");
-    PathBuf::from(std::env::var_os("STYLET_MEASURED").unwrap_or_else(|| beside.into()))
-        .join("needle_phantom")
+    PathBuf::from(std::env::var_os("STYLET_MEASURED").unwrap_or_else(|| beside.into())).join("needle_phantom")
 }
 
 #[test]
@@ -32,22 +31,11 @@ fn every_measured_insertion_reads_with_its_column_map() -> Result<(), RecordErro
         force: Column::si("fz"),
         ..ColumnMap::default()
     };
-    let options = ReadOptions {
-        columns: Some(map),
-        repair: false,
-    };
+    let options = ReadOptions { columns: Some(map), repair: false };
     for file in &files {
         let (recording, notes) = read_csv(file, &options)?;
-        let deepest_m = recording
-            .position_m
-            .iter()
-            .copied()
-            .fold(f64::MIN, f64::max);
-        let fastest_mps = recording
-            .velocity_mps
-            .iter()
-            .copied()
-            .fold(f64::MIN, f64::max);
+        let deepest_m = recording.position_m.iter().copied().fold(f64::MIN, f64::max);
+        let fastest_mps = recording.velocity_mps.iter().copied().fold(f64::MIN, f64::max);
         println!(
             "{}: {} samples, {:.1} Hz, to {:.1} mm, at most {:.2} mm/s",
             file.file_name().unwrap_or_default().display(),
@@ -56,26 +44,19 @@ fn every_measured_insertion_reads_with_its_column_map() -> Result<(), RecordErro
             deepest_m * 1e3,
             fastest_mps * 1e3
         );
-        notes
-            .iter()
-            .for_each(|note| println!("    {:?}: {}", note.kind, note.message));
+        notes.iter().for_each(|note| println!("    {:?}: {}", note.kind, note.message));
         assert!(
             (70.0..=110.0).contains(&recording.sample_hz()),
             "nominally 100 Hz, a little slower on a busy machine"
         );
         assert!(deepest_m < 0.0255, "the protocol pushes by 25 mm");
+        assert!(fastest_mps < 0.03, "slow insertions, fast retraction at most");
         assert!(
-            fastest_mps < 0.03,
-            "slow insertions, fast retraction at most"
+            notes
+                .iter()
+                .all(|note| note.kind != QualityKind::UnitMixUp && note.kind != QualityKind::Saturation)
         );
-        assert!(notes.iter().all(
-            |note| note.kind != QualityKind::UnitMixUp && note.kind != QualityKind::Saturation
-        ));
     }
-    assert!(
-        !files.is_empty(),
-        "the folder {} holds no CSV file",
-        folder.display()
-    );
+    assert!(!files.is_empty(), "the folder {} holds no CSV file", folder.display());
     Ok(())
 }

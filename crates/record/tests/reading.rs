@@ -7,14 +7,10 @@ use std::time::Instant;
 
 use proptest::prelude::*;
 use stylet_record::{
-    Column, ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording,
-    read_csv_bytes,
+    Column, ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv_bytes,
 };
 
-fn read_with(
-    text: &[u8],
-    options: &ReadOptions,
-) -> Result<(Recording, Vec<QualityNote>), RecordError> {
+fn read_with(text: &[u8], options: &ReadOptions) -> Result<(Recording, Vec<QualityNote>), RecordError> {
     read_csv_bytes(text, Path::new("run.csv"), options)
 }
 
@@ -40,12 +36,7 @@ fn all_dialects_give_the_same_numbers() -> Result<(), RecordError> {
         b"note, with commas; time_s; position_m; force_n\na;0;0.001;1\nb;0.5;0.002;2\nc;1;0.003;-3\n",
     ];
     for dialect in dialects {
-        assert_eq!(
-            read(dialect)?,
-            plain,
-            "{}",
-            String::from_utf8_lossy(dialect)
-        );
+        assert_eq!(read(dialect)?, plain, "{}", String::from_utf8_lossy(dialect));
     }
     Ok(())
 }
@@ -59,10 +50,7 @@ fn optional_columns_are_read_when_they_are_there() -> Result<(), RecordError> {
     assert!(recording.velocity_measured);
     assert_eq!(recording.velocity_mps, [9.0, 9.0]);
     assert_eq!(recording.force_virtual_n, Some(vec![0.5, 0.6]));
-    assert_eq!(
-        recording.joint_torque_nm[1],
-        [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.5]
-    );
+    assert_eq!(recording.joint_torque_nm[1], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.5]);
     Ok(())
 }
 
@@ -70,46 +58,25 @@ fn optional_columns_are_read_when_they_are_there() -> Result<(), RecordError> {
 fn a_column_map_turns_a_foreign_log_into_si_units() -> Result<(), RecordError> {
     let map = ColumnMap {
         time: Column::scaled("time", 1e-6),
-        position: Column {
-            name: "pz".to_owned(),
-            scale: -1e-3,
-            offset: 0.25,
-        },
+        position: Column { name: "pz".to_owned(), scale: -1e-3, offset: 0.25 },
         force: Column::si("fz"),
         velocity: None,
         force_virtual: None,
     };
-    let text =
-        b"time,fx,fz,pz,velocity_mps\n0,9,1.5,250,7\n10000,9,2.5,249.98,7\n20000,9,3.5,249.96,7\n";
-    let (recording, _) = read_with(
-        text,
-        &ReadOptions {
-            columns: Some(map),
-            repair: false,
-        },
-    )?;
+    let text = b"time,fx,fz,pz,velocity_mps\n0,9,1.5,250,7\n10000,9,2.5,249.98,7\n20000,9,3.5,249.96,7\n";
+    let (recording, _) = read_with(text, &ReadOptions { columns: Some(map), repair: false })?;
     assert!((recording.sample_hz() - 100.0).abs() < 1e-9);
     assert_eq!(recording.position_m[0], 0.0);
     assert!((recording.position_m[2] - 4e-5).abs() < 1e-15);
-    assert!(
-        !recording.velocity_measured,
-        "a map names everything that is read"
-    );
+    assert!(!recording.velocity_measured, "a map names everything that is read");
     assert!((recording.velocity_mps[1] - 0.002).abs() < 1e-12);
     Ok(())
 }
 
 #[test]
 fn repair_drops_bad_time_stamps_and_names_their_lines() -> Result<(), RecordError> {
-    let text =
-        b"time_s,position_m,force_n\n\n0,0,1\n0.1,0,2\n0.1,0,99\n\n0.2,0,3\n0.15,0,99\n0.3,0,4\n";
-    let (recording, notes) = read_with(
-        text,
-        &ReadOptions {
-            repair: true,
-            ..ReadOptions::default()
-        },
-    )?;
+    let text = b"time_s,position_m,force_n\n\n0,0,1\n0.1,0,2\n0.1,0,99\n\n0.2,0,3\n0.15,0,99\n0.3,0,4\n";
+    let (recording, notes) = read_with(text, &ReadOptions { repair: true, ..ReadOptions::default() })?;
     assert_eq!(recording.force_n, [1.0, 2.0, 3.0, 4.0]);
     assert_eq!(notes[0].kind, QualityKind::RepairedRows);
     assert_eq!(notes[0].lines, [5, 8]);
@@ -124,13 +91,7 @@ fn repair_drops_bad_time_stamps_and_names_their_lines() -> Result<(), RecordErro
 #[test]
 fn repair_leaves_a_sound_recording_alone() -> Result<(), RecordError> {
     let text = b"time_s,position_m,force_n\n0,0,1\n0.1,0,2\n0.2,0,3\n";
-    let (recording, notes) = read_with(
-        text,
-        &ReadOptions {
-            repair: true,
-            ..ReadOptions::default()
-        },
-    )?;
+    let (recording, notes) = read_with(text, &ReadOptions { repair: true, ..ReadOptions::default() })?;
     assert_eq!((recording, notes), (read(text)?, vec![]));
     Ok(())
 }

@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use stylet_record::{
-    JOINTS, ReadOptions, RecordError, Recording, Truth, read_csv_bytes, write_csv,
-};
+use stylet_record::{JOINTS, ReadOptions, RecordError, Recording, Truth, read_csv_bytes, write_csv};
 
 fn written(
     recording: &Recording,
@@ -18,20 +16,9 @@ fn written(
 }
 
 fn bits(recording: &Recording) -> Vec<u64> {
-    let columns = [
-        &recording.time_s,
-        &recording.position_m,
-        &recording.force_n,
-        &recording.velocity_mps,
-    ];
-    let numbers = columns
-        .into_iter()
-        .flatten()
-        .chain(recording.force_virtual_n.iter().flatten());
-    numbers
-        .chain(recording.joint_torque_nm.iter().flatten())
-        .map(|value| value.to_bits())
-        .collect()
+    let columns = [&recording.time_s, &recording.position_m, &recording.force_n, &recording.velocity_mps];
+    let numbers = columns.into_iter().flatten().chain(recording.force_virtual_n.iter().flatten());
+    numbers.chain(recording.joint_torque_nm.iter().flatten()).map(|value| value.to_bits()).collect()
 }
 
 /// Any finite number: denormal, huge, negative zero.
@@ -41,14 +28,7 @@ fn finite() -> impl Strategy<Value = f64> {
 }
 
 fn recordings() -> impl Strategy<Value = Recording> {
-    let row = (
-        finite(),
-        finite(),
-        finite(),
-        finite(),
-        finite(),
-        prop::array::uniform7(finite()),
-    );
+    let row = (finite(), finite(), finite(), finite(), finite(), prop::array::uniform7(finite()));
     (prop::collection::vec(row, 2..30), any::<[bool; 3]>()).prop_filter_map(
         "two instants",
         |(mut rows, [measured, virtual_force, arm])| {
@@ -58,29 +38,15 @@ fn recordings() -> impl Strategy<Value = Recording> {
             let force_n: Vec<f64> = rows.iter().map(|row| row.2).collect();
             let recording = if measured {
                 let position_m = rows.iter().map(|row| row.1).collect();
-                Recording::with_velocity(
-                    time_s,
-                    position_m,
-                    rows.iter().map(|row| row.3).collect(),
-                    force_n,
-                )
+                Recording::with_velocity(time_s, position_m, rows.iter().map(|row| row.3).collect(), force_n)
             } else {
                 // Positions and instants of a size whose slope is finite.
                 let instants = (0..rows.len()).map(|i| i as f64 * 0.013).collect();
-                Recording::new(
-                    instants,
-                    rows.iter().map(|row| row.1.sin() * 0.1).collect(),
-                    force_n,
-                )
+                Recording::new(instants, rows.iter().map(|row| row.1.sin() * 0.1).collect(), force_n)
             };
             let mut recording = recording.ok()?;
-            recording.force_virtual_n =
-                virtual_force.then(|| rows.iter().map(|row| row.4).collect());
-            recording.joint_torque_nm = if arm {
-                rows.iter().map(|row| row.5).collect()
-            } else {
-                vec![]
-            };
+            recording.force_virtual_n = virtual_force.then(|| rows.iter().map(|row| row.4).collect());
+            recording.joint_torque_nm = if arm { rows.iter().map(|row| row.5).collect() } else { vec![] };
             Some(recording)
         },
     )
@@ -115,28 +81,18 @@ proptest! {
 
 #[test]
 fn the_header_names_everything_that_was_given() -> Result<(), RecordError> {
-    let mut recording = Recording::with_velocity(
-        vec![0.0, 0.1],
-        vec![0.0, 1e-7],
-        vec![0.0, 2.5],
-        vec![-0.0, 1.0],
-    )?;
+    let mut recording =
+        Recording::with_velocity(vec![0.0, 0.1], vec![0.0, 1e-7], vec![0.0, 2.5], vec![-0.0, 1.0])?;
     recording.joint_torque_nm = vec![[0.5; JOINTS]; 2];
     let estimate = [f64::NAN, 7.0];
-    let text = String::from_utf8(written(
-        &recording,
-        Some(&truth_for(2)),
-        &[("f_enh_n", &estimate)],
-    )?);
+    let text = String::from_utf8(written(&recording, Some(&truth_for(2)), &[("f_enh_n", &estimate)])?);
     assert_eq!(
         text.as_deref(),
-        Ok(
-            "time_s,position_m,force_n,velocity_mps,joint_torque_1_nm,joint_torque_2_nm,joint_torque_3_nm,\
+        Ok("time_s,position_m,force_n,velocity_mps,joint_torque_1_nm,joint_torque_2_nm,joint_torque_3_nm,\
             joint_torque_4_nm,joint_torque_5_nm,joint_torque_6_nm,joint_torque_7_nm,true_tip_force_n,true_elastic_n,\
             true_friction_n,true_active_layer,f_enh_n\n\
             0.0,0.0,-0.0,0.0,0.5,0.5,0.5,0.5,0.5,0.5,0.5,0.25,0.125,0.1,2,\n\
-            0.1,1e-7,1.0,2.5,0.5,0.5,0.5,0.5,0.5,0.5,0.5,0.25,0.125,0.1,2,7.0\n"
-        )
+            0.1,1e-7,1.0,2.5,0.5,0.5,0.5,0.5,0.5,0.5,0.5,0.25,0.125,0.1,2,7.0\n")
     );
     Ok(())
 }
@@ -147,26 +103,14 @@ fn nothing_is_written_of_data_that_are_not_in_order() -> Result<(), RecordError>
     let mut torn = sound.clone();
     torn.force_n.pop();
     let mut bytes = Vec::new();
-    let refusal =
-        |result: Result<(), RecordError>| result.expect_err("must be refused").to_string();
+    let refusal = |result: Result<(), RecordError>| result.expect_err("must be refused").to_string();
     assert!(refusal(write_csv(&torn, None, &[], &mut bytes)).contains("force_n has 1 values"));
     assert!(
         refusal(write_csv(&sound, Some(&truth_for(3)), &[], &mut bytes))
             .contains("true_active_layer has 3 values")
     );
-    assert!(
-        refusal(write_csv(&sound, None, &[("e", &[1.0])], &mut bytes))
-            .contains("column e has 1 values")
-    );
-    for name in [
-        "",
-        "a,b",
-        "force_n",
-        "velocity_mps",
-        "joint_torque_1_nm",
-        "x\n",
-        " x",
-    ] {
+    assert!(refusal(write_csv(&sound, None, &[("e", &[1.0])], &mut bytes)).contains("column e has 1 values"));
+    for name in ["", "a,b", "force_n", "velocity_mps", "joint_torque_1_nm", "x\n", " x"] {
         let message = refusal(write_csv(&sound, None, &[(name, &[1.0, 2.0])], &mut bytes));
         assert!(message.contains("choose another name"), "{message}");
     }
@@ -186,12 +130,7 @@ fn a_full_disk_is_reported() -> Result<(), RecordError> {
         }
     }
     let recording = Recording::new(vec![0.0, 0.1], vec![0.0, 0.1], vec![0.0, 1.0])?;
-    let message = write_csv(&recording, None, &[], Full)
-        .expect_err("full")
-        .to_string();
-    assert!(
-        message.contains("cannot be written (no space left)"),
-        "{message}"
-    );
+    let message = write_csv(&recording, None, &[], Full).expect_err("full").to_string();
+    assert!(message.contains("cannot be written (no space left)"), "{message}");
     Ok(())
 }

@@ -2,7 +2,8 @@
 //! zeroed; everything that can be checked before a run.
 
 use crate::load::Problem;
-use crate::motion::{MotionPlan, MotionPoint};
+use crate::motion::MotionPoint;
+use crate::plan::MotionPlan;
 use crate::robot::ArmConfig;
 use crate::sensor::{VirtualSensor, ZeroWindow};
 use nalgebra::{Matrix3, Vector3};

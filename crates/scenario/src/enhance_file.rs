@@ -2,15 +2,24 @@
 
 use crate::error::InputError;
 use crate::load::{parse, read_text};
+use crate::outline::Outline;
 use crate::scenario::Scenario;
+use crate::validate::finite;
 use crate::validate_enhance::enhance;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_core::EnhanceConfig;
+use stylet_core::config::{
+    Algorithm, Contact, ContactConfig, CusumConfig, Depths, DerivativeConfig, DropConfig, GuardConfig, Model,
+    Reset,
+};
 
-/// `Enhance(...)`: where the surface is, and the core's configuration.
+/// Where the surface is, and the core's configuration.
+///
+/// In a file it is written flat, `Enhance(surface_m: 0.01, contact: Known, model: MultiLayer)`; a
+/// scenario file serves as well.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename = "Enhance", default, deny_unknown_fields)]
+#[serde(from = "Flat", into = "Flat")]
 pub struct EnhanceFile {
     /// Position of the surface in m, for `contact: Known`.
     pub surface_m: f64,
@@ -24,14 +33,132 @@ impl EnhanceFile {
     /// # Errors
     /// [`InputError`] with file, line and column.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        let file = path.display().to_string();
-        let text = read_text(path)?;
-        if text.contains("tissue") {
-            let scenario = Scenario::parse(&file, &text)?;
-            return Ok(Self { surface_m: scenario.tissue.surface_m, enhance: scenario.enhance });
+        Self::parse(&path.display().to_string(), &read_text(path)?)
+    }
+
+    /// Parses and checks either kind of file; `file` is named in errors.
+    ///
+    /// # Errors
+    /// As [`EnhanceFile::load`].
+    pub fn parse(file: &str, text: &str) -> Result<Self, InputError> {
+        if is_scenario(text) {
+            let Scenario { tissue, enhance, .. } = Scenario::parse(file, text)?;
+            return Ok(Self { surface_m: tissue.surface_m, enhance });
         }
-        let loaded: Self = parse(&file, &text)?;
-        enhance("enhance", &loaded.enhance).map_err(|p| p.in_file(&file, &text))?;
+        let loaded: Self = parse(file, text)?;
+        finite("surface_m", loaded.surface_m, "metres")
+            .and_then(|()| enhance("", &loaded.enhance))
+            .map_err(|problem| problem.in_file(file, text))?;
         Ok(loaded)
+    }
+}
+
+/// By its name, or by the fields that only a scenario has.
+fn is_scenario(text: &str) -> bool {
+    let outline = Outline::new(text);
+    let named = outline.entries.first().is_some_and(|whole| text[whole.start..].starts_with("Scenario"));
+    named || ["tissue", "motion"].into_iter().any(|field| outline.locate(field).is_some())
+}
+
+/// The form in the file: the fields of [`EnhanceConfig`] and the surface side by side.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Enhance", default, deny_unknown_fields)]
+struct Flat {
+    surface_m: f64,
+    algorithm: Algorithm,
+    model: Model,
+    reset: Reset,
+    contact: Contact,
+    depths: Depths,
+    forgetting: f64,
+    prior_stiffness: f64,
+    prior_friction: f64,
+    cusum: CusumConfig,
+    derivative: DerivativeConfig,
+    drop: DropConfig,
+    contact_search: ContactConfig,
+    guard: GuardConfig,
+}
+
+impl Default for Flat {
+    fn default() -> Self {
+        EnhanceFile::default().into()
+    }
+}
+
+macro_rules! convert {
+    ($($field:ident),*) => {
+        impl From<Flat> for EnhanceFile {
+            fn from(Flat { surface_m, $($field),* }: Flat) -> Self {
+                Self { surface_m, enhance: EnhanceConfig { $($field),* } }
+            }
+        }
+
+        impl From<EnhanceFile> for Flat {
+            fn from(EnhanceFile { surface_m, enhance: EnhanceConfig { $($field),* } }: EnhanceFile) -> Self {
+                Self { surface_m, $($field),* }
+            }
+        }
+    };
+}
+
+convert!(
+    algorithm,
+    model,
+    reset,
+    contact,
+    depths,
+    forgetting,
+    prior_stiffness,
+    prior_friction,
+    cusum,
+    derivative,
+    drop,
+    contact_search,
+    guard
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_enhance_file_is_flat_and_reads_back() {
+        let text =
+            "Enhance(surface_m: 0.01, contact: Known, model: KelvinVoigt, cusum: (sigma_ordinary_n: 0.02))";
+        let file = EnhanceFile::parse("e.ron", text).expect("it is right");
+        assert_eq!((file.surface_m, file.enhance.model), (0.01, Model::KelvinVoigt));
+        assert_eq!(file.enhance.cusum.sigma_ordinary_n, 0.02);
+        assert_eq!(file.enhance.guard, GuardConfig::default());
+        let written = crate::ron_options().to_string(&file).expect("it can be written");
+        assert_eq!(EnhanceFile::parse("e.ron", &written).expect("it reads back"), file);
+        assert_eq!(EnhanceFile::parse("e.ron", "()").expect("all defaults"), EnhanceFile::default());
+    }
+
+    #[test]
+    fn a_scenario_serves_as_an_enhance_file() {
+        let text = r#"(name: "x", tissue: (surface_m: 0.02, layers: [(thickness_m: 0.03, stiffness_n_per_m: 40.0,
+            friction_ns_per_m2: 9000.0)]), motion: Recorded, enhance: (forgetting: 0.99))"#;
+        let file = EnhanceFile::parse("s.ron", text).expect("it is right");
+        assert_eq!((file.surface_m, file.enhance.forgetting), (0.02, 0.99));
+    }
+
+    #[test]
+    fn what_is_wrong_in_an_enhance_file_is_said_with_its_place() {
+        for (text, expected) in [
+            (
+                "Enhance(forgetting: 1.5)",
+                "e.ron:1:21: forgetting: is 1.5; it must lie above 0 and be at most 1",
+            ),
+            ("Enhance(surface_m: NaN)", "e.ron:1:20: surface_m: is NaN"),
+            (
+                "Enhance(\n  modl: MultiLayer)",
+                "e.ron:2:3: unknown field `modl` of `Enhance`; did you mean `model`?",
+            ),
+            ("Enhanc()", "e.ron:1:1: this is a `Enhanc`, where a `Enhance` is expected"),
+        ] {
+            let said = EnhanceFile::parse("e.ron", text).expect_err(text).to_string();
+            assert!(said.starts_with(expected), "{said}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! What is wrong with an input file, where, and what would be right.
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
+use std::sync::Arc;
 
 /// An input file that cannot be used. The message names file, line and column, what is wrong and
 /// what would be right; rendered by `miette` it shows the place in the source.
@@ -15,7 +16,7 @@ pub struct InputError {
     /// Line and column, from 1.
     pub position: Option<(usize, usize)>,
     #[source_code]
-    source_code: Option<NamedSource<String>>,
+    source_code: Option<Arc<NamedSource<String>>>,
     #[label("here")]
     span: Option<SourceSpan>,
 }
@@ -39,7 +40,7 @@ impl InputError {
             place: format!("{file}:{line}:{column}"),
             what: what.into(),
             position: Some((line, column)),
-            source_code: Some(NamedSource::new(file, text.to_owned())),
+            source_code: Some(Arc::new(NamedSource::new(file, text.to_owned()))),
             span: Some(SourceSpan::new(start.into(), end - start)),
         }
     }
@@ -60,14 +61,19 @@ pub(crate) fn offset(text: &str, line: usize, column: usize) -> usize {
     start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
 }
 
-/// The known name closest to a misspelt one, when it is close enough to be meant.
+/// The known name closest to a misspelt one, when it is close enough to be meant: few letters
+/// differ, or one is the other without its unit.
 #[must_use]
 pub fn closest<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
     let lower = wrong.to_lowercase();
+    let mut longer = known.iter().filter(|k| lower.len() > 2 && k.to_lowercase().starts_with(&lower));
+    if let (Some(only), None) = (longer.next(), longer.next()) {
+        return Some(only);
+    }
     known
         .iter()
         .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), *k))
         .min()
-        .filter(|(distance, k)| *distance <= 2 + k.len() / 5)
+        .filter(|(distance, k)| *distance <= 1 + k.len() / 5)
         .map(|(_, k)| k)
 }

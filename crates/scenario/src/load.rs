@@ -1,11 +1,17 @@
 //! Reading RON files: every failure becomes an [`InputError`] with its place.
 
-use crate::error::{InputError, closest, offset};
-use crate::locate::locate;
-use ron::error::{Error, SpannedError};
+use crate::error::InputError;
+use crate::explain::explain;
+use crate::outline::Outline;
 use ron::extensions::Extensions;
 use serde::de::DeserializeOwned;
+use std::io::Read;
 use std::path::Path;
+
+/// Longer files, in bytes, are not read.
+const LONGEST: u64 = 4 << 20;
+
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// The RON dialect of Stylet's files: `Some` may be left out, effects and sensors are written with
 /// one pair of brackets.
@@ -20,6 +26,8 @@ pub fn ron_options() -> ron::Options {
 pub struct Problem {
     /// Path such as `tissue.layers[1].thickness_m`.
     pub path: String,
+    /// Another field that is part of the problem, shown when the first is a default.
+    pub with: Option<String>,
     /// What is wrong and what would be right.
     pub what: String,
 }
@@ -27,25 +35,37 @@ pub struct Problem {
 impl Problem {
     /// A problem with the field at `path`.
     pub fn new(path: impl Into<String>, what: impl Into<String>) -> Self {
-        Self { path: path.into(), what: what.into() }
+        Self { path: path.into(), with: None, what: what.into() }
     }
 
-    /// The problem as an error that shows its place in `text`.
+    /// The problem lies as much with the field at `path`.
+    #[must_use]
+    pub fn with(self, path: impl Into<String>) -> Self {
+        Self { with: Some(path.into()), ..self }
+    }
+
+    /// The problem as an error that shows its place in `text`; only the path when the text does not
+    /// hold the field.
     #[must_use]
     pub fn in_file(&self, file: &str, text: &str) -> InputError {
-        let mut path = self.path.as_str();
-        loop {
-            if let Some((start, end)) = locate(text, path) {
-                return InputError::at(file, text, start, end, format!("{}: {}", self.path, self.what));
-            }
-            // The field itself may be a default: show what holds it.
-            match path.rfind(['.', '[']) {
-                Some(cut) => path = &path[..cut],
-                None => return InputError::file(file, format!("{}: {}", self.path, self.what)),
-            }
+        let outline = Outline::new(text);
+        let what =
+            if self.path.is_empty() { self.what.clone() } else { format!("{}: {}", self.path, self.what) };
+        let entry = outline.locate(&self.path).or_else(|| outline.locate(self.with.as_ref()?));
+        match entry {
+            Some(entry) => InputError::at(file, text, entry.start, entry.end, what),
+            None => InputError::file(file, what),
         }
     }
 }
+
+impl core::fmt::Display for Problem {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}: {}", self.path, self.what)
+    }
+}
+
+impl core::error::Error for Problem {}
 
 /// Reads a text file, refusing what is not one.
 ///
@@ -56,28 +76,52 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
     if path.is_dir() {
         return Err(InputError::file(&file, "is a directory; name a RON file in it"));
     }
-    let bytes = std::fs::read(path).map_err(|e| {
-        let remedy =
-            if e.kind() == std::io::ErrorKind::NotFound { "; check the spelling of the path" } else { "" };
-        InputError::file(&file, format!("cannot be read: {e}{remedy}"))
-    })?;
-    match String::from_utf8(bytes) {
-        Ok(text) if text.trim().is_empty() => {
-            Err(InputError::file(&file, "is empty; a RON file begins like `Scenario(name: \"...\", ...)`"))
-        }
-        Ok(text) if text.contains('\0') => Err(InputError::file(
-            &file,
-            "is not a text file (it holds a zero byte); a RON file is UTF-8 text",
-        )),
-        Ok(text) => Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text)),
-        Err(e) => Err(InputError::file(
-            &file,
-            format!(
-                "is not a text file (byte {} is not UTF-8); a RON file is UTF-8 text",
-                e.utf8_error().valid_up_to() + 1
-            ),
-        )),
+    let unreadable = |e: &std::io::Error| {
+        let remedy = match e.kind() {
+            std::io::ErrorKind::NotFound => {
+                "there is no such file; check the spelling of the path".to_owned()
+            }
+            std::io::ErrorKind::PermissionDenied => {
+                "cannot be read: permission denied; make it readable".to_owned()
+            }
+            _ => format!("cannot be read: {e}"),
+        };
+        InputError::file(&file, remedy)
+    };
+    let opened = std::fs::File::open(path).map_err(|e| unreadable(&e))?;
+    let mut bytes = Vec::new();
+    opened.take(LONGEST + 1).read_to_end(&mut bytes).map_err(|e| unreadable(&e))?;
+    if bytes.len() as u64 > LONGEST {
+        let what = format!("is longer than {} MB; RON files here are a few kB of text", LONGEST >> 20);
+        return Err(InputError::file(&file, what));
     }
+    text(&file, bytes)
+}
+
+/// The bytes of a file as text.
+fn text(file: &str, mut bytes: Vec<u8>) -> Result<String, InputError> {
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    if bytes.contains(&0) {
+        let what = "is a binary file (it holds zero bytes); a RON file is UTF-8 text";
+        return Err(InputError::file(file, what));
+    }
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let good = String::from_utf8_lossy(&e.as_bytes()[..e.utf8_error().valid_up_to()]);
+        InputError::at(
+            file,
+            &good,
+            good.len(),
+            good.len(),
+            "is not UTF-8 text from here on; save it as UTF-8",
+        )
+    })?;
+    if text.trim().is_empty() {
+        let what = "is empty; a RON file begins like `Scenario(name: \"...\", ...)`";
+        return Err(InputError::file(file, what));
+    }
+    Ok(text)
 }
 
 /// Parses RON text; `file` is named in errors.
@@ -85,7 +129,7 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
 /// # Errors
 /// [`InputError`] with line and column.
 pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputError> {
-    ron_options().from_str(text).map_err(|error| describe(file, text, &error))
+    ron_options().from_str(text).map_err(|error| explain(file, text, &error))
 }
 
 /// Reads and parses a RON file.
@@ -94,58 +138,4 @@ pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputErro
 /// As [`read_text`] and [`parse`].
 pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
     parse(&path.display().to_string(), &read_text(path)?)
-}
-
-fn list(names: &[&str]) -> String {
-    names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
-}
-
-fn suggestion(found: &str, expected: &[&str]) -> String {
-    let known = list(expected);
-    match closest(found, expected) {
-        Some(near) => format!("did you mean `{near}`? Known: {known}"),
-        None => format!("known: {known}"),
-    }
-}
-
-fn describe(file: &str, text: &str, error: &SpannedError) -> InputError {
-    let mut start = offset(text, error.span.start.line, error.span.start.col);
-    let mut end = offset(text, error.span.end.line, error.span.end.col);
-    // The wrong name itself is underlined, not what stands behind it.
-    let mut underline = |name: &str| {
-        let upto = end.max(start).min(text.len());
-        if let Some(at) = text.get(..upto).and_then(|t| t.rfind(name)) {
-            (start, end) = (at, at + name.len());
-        }
-    };
-    let within = |outer: &Option<String>| outer.as_ref().map_or(String::new(), |o| format!(" of `{o}`"));
-    let what = match &error.code {
-        Error::NoSuchStructField { expected, found, outer } => {
-            underline(found);
-            format!("unknown field `{found}`{}; {}", within(outer), suggestion(found, expected))
-        }
-        Error::NoSuchEnumVariant { expected, found, outer } => {
-            underline(found);
-            format!("unknown name `{found}`{}; {}", within(outer), suggestion(found, expected))
-        }
-        Error::MissingStructField { field, outer } => {
-            format!("missing field `{field}`{}; add `{field}: ...` inside these brackets", within(outer))
-        }
-        Error::DuplicateStructField { field, outer } => {
-            underline(field);
-            format!("field `{field}`{} is given twice; keep one", within(outer))
-        }
-        Error::ExpectedDifferentStructName { expected, found } => {
-            underline(found);
-            format!("this is a `{found}`, where a `{expected}` is expected")
-        }
-        other => {
-            let mut message = other.to_string();
-            if let Some(first) = message.get(..1).map(str::to_lowercase) {
-                message.replace_range(..1, &first);
-            }
-            format!("not valid here: {message}")
-        }
-    };
-    InputError::at(file, text, start, end, what)
 }

@@ -1,5 +1,6 @@
-//! Motions of the needle: what a scenario writes, and the plan that says where the tip is at any time.
+//! Motions of the needle as a scenario writes them.
 
+use crate::plan::MotionPlan;
 use serde::{Deserialize, Serialize};
 
 /// Default phase of a sinusoid in radians: -90 degrees, from rest.
@@ -89,7 +90,7 @@ impl Segment {
     }
 
     /// Displacement, velocity and acceleration `t` seconds after the segment's start.
-    fn at(&self, t: f64) -> MotionPoint {
+    pub(crate) fn at(&self, t: f64) -> MotionPoint {
         match *self {
             Segment::Move { velocity_mps, .. } => {
                 MotionPoint { position_m: velocity_mps * t, velocity_mps, acceleration_mps2: 0.0 }
@@ -106,6 +107,29 @@ impl Segment {
             }
         }
     }
+
+    /// Deepest displacement from the segment's start in m, the start included.
+    pub(crate) fn furthest_m(&self) -> f64 {
+        let end = self.duration_s();
+        let deepest = self.at(end).position_m.max(0.0);
+        let Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, .. } = *self else {
+            return deepest;
+        };
+        if amplitude_mps.abs() <= velocity_mps.abs() {
+            return deepest; // never turns
+        }
+        // Turns from advance to retraction where sin = -v/a; the deepest of these turns is in the
+        // first or in the last period.
+        let turn = libm::asin(-velocity_mps / amplitude_mps);
+        let turn = if amplitude_mps > 0.0 { core::f64::consts::PI - turn } else { turn };
+        let period = 1.0 / frequency_hz;
+        let first = (turn / core::f64::consts::TAU).rem_euclid(1.0) * period;
+        let last = first + libm::floor((end - first) / period) * period;
+        [first, last]
+            .into_iter()
+            .filter(|t| (0.0..=end).contains(t))
+            .fold(deepest, |z, t| z.max(self.at(t).position_m))
+    }
 }
 
 /// Where the tip is and how it moves at one instant.
@@ -119,86 +143,10 @@ pub struct MotionPoint {
     pub acceleration_mps2: f64,
 }
 
-/// A motion made ready to be asked for any instant.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MotionPlan {
-    motion: Motion,
-    /// For a program: (start time, start position) of each segment, and of the end.
-    starts: Vec<(f64, f64)>,
-    duration_s: f64,
-}
-
 impl Motion {
     /// The plan of the motion; `None` for [`Motion::Recorded`], which has none of its own.
     #[must_use]
     pub fn plan(&self) -> Option<MotionPlan> {
-        let mut starts = Vec::new();
-        let duration_s = match self {
-            Motion::Constant { duration_s, .. } | Motion::Sinusoidal { duration_s, .. } => *duration_s,
-            Motion::Program { start_m, segments } => {
-                let (mut t, mut z) = (0.0, *start_m);
-                for segment in segments {
-                    starts.push((t, z));
-                    t += segment.duration_s();
-                    z += segment.at(segment.duration_s()).position_m;
-                }
-                starts.push((t, z));
-                t
-            }
-            Motion::Recorded => return None,
-        };
-        Some(MotionPlan { motion: self.clone(), starts, duration_s })
-    }
-}
-
-impl MotionPlan {
-    /// Duration in s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    /// The tip at `time_s`. Before the start and after the end the motion is continued.
-    #[must_use]
-    #[inline]
-    pub fn at(&self, time_s: f64) -> MotionPoint {
-        match &self.motion {
-            Motion::Constant { start_m, velocity_mps, .. } => MotionPoint {
-                position_m: start_m + velocity_mps * time_s,
-                velocity_mps: *velocity_mps,
-                acceleration_mps2: 0.0,
-            },
-            Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, phase_rad, .. } => {
-                let omega = core::f64::consts::TAU * frequency_hz;
-                let angle = omega * time_s + phase_rad;
-                let sin = libm::sin(angle);
-                MotionPoint {
-                    position_m: start_m + amplitude_m * (sin - libm::sin(*phase_rad)),
-                    velocity_mps: amplitude_m * omega * libm::cos(angle),
-                    acceleration_mps2: -amplitude_m * omega * omega * sin,
-                }
-            }
-            Motion::Program { start_m, segments } => {
-                let index = self.starts.partition_point(|(t, _)| *t <= time_s).saturating_sub(1);
-                let (Some(segment), Some((t, z))) = (
-                    segments.get(index).or(segments.last()),
-                    self.starts.get(index.min(segments.len().saturating_sub(1))),
-                ) else {
-                    return MotionPoint { position_m: *start_m, ..MotionPoint::default() };
-                };
-                let point = segment.at(time_s - t);
-                MotionPoint { position_m: z + point.position_m, ..point }
-            }
-            Motion::Recorded => MotionPoint::default(),
-        }
-    }
-
-    /// Deepest position of the tip in m, looked for at `sample_hz`.
-    #[must_use]
-    pub fn furthest_m(&self, sample_hz: f64) -> f64 {
-        let samples = (self.duration_s * sample_hz).round() as usize;
-        (0..samples.max(1))
-            .map(|k| self.at(k as f64 / sample_hz).position_m)
-            .fold(f64::NEG_INFINITY, f64::max)
+        MotionPlan::new(self)
     }
 }

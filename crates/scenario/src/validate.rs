@@ -2,14 +2,12 @@
 //! into infinity, so every number is checked.
 
 use crate::load::Problem;
-use crate::motion::{Motion, Segment};
 use crate::scenario::Scenario;
 use crate::sensor::{ForceTorque, Sensor};
 use crate::validate_arm;
+use crate::validate_effects::effects;
 use crate::validate_enhance::enhance;
-
-/// More samples than this are refused: a mistyped rate or duration.
-const MOST_SAMPLES: f64 = 5e7;
+use crate::validate_motion::motion;
 
 pub(crate) type Checked = Result<(), Problem>;
 
@@ -35,21 +33,17 @@ pub(crate) fn scenario(s: &Scenario) -> Checked {
         return Err(Problem::new("name", "is empty; say what the scenario is"));
     }
     tissue(s)?;
-    for (i, effect) in s.effects.iter().enumerate() {
-        effect_in_range(i, effect)?;
-    }
+    effects(s)?;
     check("sample_hz", s.sample_hz, s.sample_hz > 0.0, "it must be positive, for example 200.0")?;
     check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
     let steps = s.physics_hz / s.sample_hz;
     if steps < 1.0 - 1e-9 || (steps - steps.round()).abs() > 1e-9 * steps {
         let nearest = steps.round().max(1.0) * s.sample_hz;
-        return Err(Problem::new(
-            "physics_hz",
-            format!(
-                "is {}, which is not a whole multiple of sample_hz {}; the nearest is {nearest}",
-                s.physics_hz, s.sample_hz
-            ),
-        ));
+        let what = format!(
+            "is {}, which is not a whole multiple of sample_hz {}; the nearest is {nearest}",
+            s.physics_hz, s.sample_hz
+        );
+        return Err(Problem::new("physics_hz", what).with("sample_hz"));
     }
     check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
     motion(s)?;
@@ -80,107 +74,6 @@ fn tissue(s: &Scenario) -> Checked {
         if let Some(force) = layer.puncture_n {
             positive(at("puncture_n"), force, "N")?;
         }
-    }
-    Ok(())
-}
-
-fn effect_in_range(index: usize, effect: &stylet_tissue::AnyEffect) -> Checked {
-    effect.check().map_err(|error| {
-        // `terms.0.fraction` in outputs is `terms[0].fraction` in the file.
-        let path = error.path.split('.').fold(String::new(), |path, part| match part.parse::<usize>() {
-            Ok(index) => format!("{path}[{index}]"),
-            Err(_) => format!("{path}.{part}"),
-        });
-        let (low, high) = error.allowed;
-        let right = format!("is {}; {} must lie between {low} and {high}", error.value, error.effect);
-        Problem::new(format!("effects[{index}]{path}"), right)
-    })
-}
-
-fn speed(path: impl Into<String> + Clone, value: f64) -> Checked {
-    finite(path.clone(), value, "m/s")?;
-    check(path, value, value.abs() <= 1.0, "speeds are at most 1 m/s; is this in mm/s?")
-}
-
-fn motion(s: &Scenario) -> Checked {
-    match &s.motion {
-        Motion::Constant { start_m, velocity_mps, duration_s } => {
-            finite("motion.start_m", *start_m, "metres")?;
-            speed("motion.velocity_mps", *velocity_mps)?;
-            positive("motion.duration_s", *duration_s, "seconds")?;
-        }
-        Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, phase_rad, duration_s } => {
-            finite("motion.start_m", *start_m, "metres")?;
-            positive("motion.amplitude_m", *amplitude_m, "metres")?;
-            frequency("motion.frequency_hz".to_owned(), *frequency_hz, s.sample_hz)?;
-            finite("motion.phase_rad", *phase_rad, "radians")?;
-            positive("motion.duration_s", *duration_s, "seconds")?;
-            speed("motion.amplitude_m", amplitude_m * frequency_hz * core::f64::consts::TAU)?;
-        }
-        Motion::Program { start_m, segments } => {
-            finite("motion.start_m", *start_m, "metres")?;
-            if segments.is_empty() {
-                return Err(Problem::new("motion.segments", "is empty; give at least one segment"));
-            }
-            for (i, segment) in segments.iter().enumerate() {
-                let at = |field: &str| format!("motion.segments[{i}].{field}");
-                positive(at("duration_s"), segment.duration_s(), "seconds")?;
-                match *segment {
-                    Segment::Move { velocity_mps, .. } => speed(at("velocity_mps"), velocity_mps)?,
-                    Segment::Hold { .. } => {}
-                    Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, .. } => {
-                        speed(at("velocity_mps"), velocity_mps)?;
-                        speed(at("amplitude_mps"), amplitude_mps)?;
-                        frequency(at("frequency_hz"), frequency_hz, s.sample_hz)?;
-                    }
-                }
-            }
-        }
-        Motion::Recorded => {}
-    }
-    reaches(s)
-}
-
-fn frequency(path: String, value: f64, sample_hz: f64) -> Checked {
-    check(
-        path,
-        value,
-        value > 0.0 && value < sample_hz / 2.0,
-        &format!("it must lie between 0 and half of sample_hz, {} Hz", sample_hz / 2.0),
-    )
-}
-
-/// The motion must be short enough to store and must come to the tissue.
-fn reaches(s: &Scenario) -> Checked {
-    let Some(plan) = s.motion.plan() else {
-        return Ok(());
-    };
-    let samples = plan.duration_s() * s.sample_hz;
-    if samples > MOST_SAMPLES {
-        return Err(Problem::new(
-            "motion",
-            format!(
-                "makes {samples:.3e} samples at {} Hz; at most {MOST_SAMPLES:.0e} are simulated",
-                s.sample_hz
-            ),
-        ));
-    }
-    if samples < 2.0 {
-        return Err(Problem::new(
-            "motion",
-            format!("lasts {} s, less than two samples at {} Hz", plan.duration_s(), s.sample_hz),
-        ));
-    }
-    let furthest_m = plan.furthest_m(s.sample_hz);
-    if furthest_m <= s.tissue.surface_m {
-        return Err(Problem::new(
-            "motion",
-            format!(
-                "never reaches the tissue: the tip comes to {furthest_m:.4} m and the surface lies at {} m; \
-                 start nearer, move longer, or move the other way",
-                s.tissue.surface_m
-            ),
-        ));
     }
     Ok(())
 }

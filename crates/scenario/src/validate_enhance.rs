@@ -1,7 +1,7 @@
 //! Ranges of the online algorithm's configuration.
 
 use crate::load::Problem;
-use crate::validate::{Checked, check, finite, not_negative, positive};
+use crate::validate::{Checked, check, not_negative, positive};
 use stylet_core::config::{Depths, EnhanceConfig, Reset};
 
 /// Checks a configuration whose fields stand at `at` in the file; an empty `at` is the top.
@@ -35,7 +35,8 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
         s.sigma_rupture_n,
         s.sigma_rupture_n > s.sigma_ordinary_n,
         &format!("it must be larger than sigma_ordinary_n, {}", s.sigma_ordinary_n),
-    )?;
+    )
+    .map_err(|p| p.with(path("cusum.sigma_ordinary_n")))?;
     let d = &c.derivative;
     positive(path("derivative.on_n_per_s"), d.on_n_per_s, "N/s")?;
     check(
@@ -43,7 +44,8 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
         d.off_n_per_s,
         d.off_n_per_s < d.on_n_per_s,
         &format!("it must be smaller than on_n_per_s, {}", d.on_n_per_s),
-    )?;
+    )
+    .map_err(|p| p.with(path("derivative.on_n_per_s")))?;
     positive(path("derivative.force_time_constant_s"), d.force_time_constant_s, "seconds")?;
     positive(path("derivative.derivative_time_constant_s"), d.derivative_time_constant_s, "seconds")?;
     let d = &c.drop;
@@ -52,20 +54,24 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
     not_negative(path("drop.compensation_travel_m"), d.compensation_travel_m, "metres")?;
     not_negative(path("drop.settle_s"), d.settle_s, "seconds")?;
     positive(path("drop.standstill_mps"), d.standstill_mps, "m/s")?;
+    for (i, share) in d.share_limits.into_iter().enumerate() {
+        let inside = share > 0.0 && share < 1.0;
+        check(format!("{}[{i}]", path("drop.share_limits")), share, inside, "it must lie between 0 and 1")?;
+    }
     let [low, high] = d.share_limits;
-    check(
-        format!("{}[0]", path("drop.share_limits")),
-        low,
-        low > 0.0 && low < high && high < 1.0,
-        "the two limits must satisfy 0 < low < high < 1",
-    )?;
-    finite(format!("{}[1]", path("drop.share_limits")), high, "share")?;
+    if low >= high {
+        let what = format!("is ({low}, {high}); the first must be smaller than the second");
+        return Err(Problem::new(path("drop.share_limits"), what));
+    }
     if d.replay_per_tick == 0 {
         return Err(Problem::new(path("drop.replay_per_tick"), "is 0; it must be at least 1"));
     }
     let k = &c.contact_search;
     positive(path("contact_search.time_constant_s"), k.time_constant_s, "seconds")?;
     positive(path("contact_search.noise_sds"), k.noise_sds, "standard deviations")?;
+    if k.samples == 0 {
+        return Err(Problem::new(path("contact_search.samples"), "is 0; it must be at least 1"));
+    }
     not_negative(path("contact_search.smallest_noise_n"), k.smallest_noise_n, "N")?;
     not_negative(path("contact_search.learn_s"), k.learn_s, "seconds")?;
     not_negative(path("contact_search.extrapolate_over_m"), k.extrapolate_over_m, "metres")?;

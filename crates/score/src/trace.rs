@@ -105,14 +105,16 @@ impl Trace {
         let speed_mps: f64 = speeds / count;
         let share = estimate.map_or(0.5, |e| e.elastic_share);
         let ratio = ((1.0 - share) / share).sqrt() / speed_mps;
-        offline(
+        let found = offline(
             inside().map(|(s, f)| LayerSample {
                 depth_m: s.position_m - start_m,
                 velocity_mps: s.velocity_mps,
                 force_n: f - cumulative_ns_per_m * s.velocity_mps,
             }),
             ratio,
-        )
+        );
+        // Without a measured drop nothing can split what the data do not separate.
+        found.filter(|f| f.separable || estimate.is_some())
     }
 }
 

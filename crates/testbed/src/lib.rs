@@ -21,7 +21,7 @@ pub use arm_insertion::{ArmRecord, ArmSetup, on_arm};
 pub use arm_rig::{ArmError, ArmMoment, ArmRig};
 pub use control::LineControl;
 pub use insertion::{InsertionSample, Rates, on_slide, replayed};
-pub use sensor::{ForceSensor, Measuring, Noise};
+pub use sensor::{Measuring, Noise};
 pub use simulate::{Reading, SimulateError, Simulation, rates, simulate};
 pub use slide::{NEEDLE_LENGTH_M, NEEDLE_MASS_KG, Slide};
 pub use virtual_error::VirtualError;

@@ -1,16 +1,21 @@
 //! The force/torque sensor: from the force at the needle's base to the number that is recorded.
 //!
-//! Order of the chain (SPEC section 6): bias and drift, noise, saturation, quantisation.
+//! The chain of SPEC section 6 is `stylet_tissue::Measurement`; what is random is drawn here.
 
 use crate::insertion::InsertionSample;
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use stylet_scenario::ForceTorque;
-use stylet_tissue::{AnyEffect, Effect, Place};
+use stylet_tissue::{
+    AnyEffect, Effect, ForceBias, ForceDrift, Measurement, MeasurementState, Quantisation, Reading,
+    Saturation,
+};
 
 /// Stream of the generator from which the force/torque sensor draws.
 const NOISE_STREAM: u64 = 1;
+/// First of the streams from which spikes are drawn.
+const SPIKES_STREAM: u64 = 1000;
 
 /// White or first-order autoregressive Gaussian noise with a given marginal standard deviation.
 #[derive(Debug)]
@@ -46,55 +51,85 @@ impl Noise {
     }
 }
 
-/// A force/torque sensor at work.
+/// Isolated outlying samples: at each sample, with the effect's rate, a spike of its size and of
+/// either sign.
 #[derive(Debug)]
-pub struct ForceSensor {
-    config: ForceTorque,
-    noise: Noise,
+struct Spikes {
+    generator: ChaCha8Rng,
+    chance: f64,
+    size_n: f64,
 }
 
-impl ForceSensor {
-    /// A sensor that draws its noise from `seed`.
-    #[must_use]
-    pub fn new(config: &ForceTorque, seed: u64) -> Self {
-        Self { noise: Noise::new(seed, NOISE_STREAM, config.noise_n, config.ar1), config: config.clone() }
-    }
-
-    /// What the sensor reports at `time_s` for a force of `force_n`, in N.
-    #[inline]
-    pub fn measure(&mut self, time_s: f64, force_n: f64) -> f64 {
-        let c = &self.config;
-        let mut reading = force_n + c.bias_n + c.drift_n_per_s * time_s + self.noise.draw();
-        if let Some(limit) = c.range_n {
-            reading = reading.clamp(-limit, limit);
-        }
-        if c.quantisation_n > 0.0 {
-            reading = libm::rint(reading / c.quantisation_n) * c.quantisation_n;
-        }
-        reading
+impl Spikes {
+    fn draw(&mut self) -> f64 {
+        let hit = self.generator.random::<f64>() < self.chance;
+        let sign = if self.generator.random::<bool>() { 1.0 } else { -1.0 };
+        if hit { sign * self.size_n } else { 0.0 }
     }
 }
 
-/// The measuring end of an insertion: what arm and tool add, then the sensor.
+/// The measuring end of an insertion: what arm and tool add, then the force/torque sensor with its
+/// effects, noise and limits, in the order of SPEC section 6.
 #[derive(Debug)]
 pub struct Measuring {
-    tool: Vec<AnyEffect>,
-    sensor: ForceSensor,
+    chain: Measurement,
+    state: MeasurementState,
+    noise: Noise,
+    spikes: Vec<Spikes>,
 }
 
 impl Measuring {
-    /// Tool effects of a scenario in front of a force/torque sensor.
+    /// The tool, sensor and position effects of a scenario together with the sensor's own bias,
+    /// drift, noise, range and quantisation. Noise and spikes are drawn from `seed`, for samples at
+    /// `sample_hz`.
     #[must_use]
-    pub fn new(effects: &[AnyEffect], sensor: &ForceTorque, seed: u64) -> Self {
-        let tool = effects.iter().filter(|e| e.place() == Place::Tool && !e.is_neutral()).cloned().collect();
-        Self { tool, sensor: ForceSensor::new(sensor, seed) }
+    pub fn new(effects: &[AnyEffect], sensor: &ForceTorque, seed: u64, sample_hz: f64) -> Self {
+        let mut chain: Vec<AnyEffect> = vec![
+            ForceBias { force_n: sensor.bias_n }.into(),
+            ForceDrift { rate_n_per_s: sensor.drift_n_per_s }.into(),
+            Saturation { limit_n: sensor.range_n.unwrap_or(f64::INFINITY) }.into(),
+            Quantisation { step_n: sensor.quantisation_n }.into(),
+        ];
+        chain.extend_from_slice(effects);
+        let chain = Measurement::new(&chain);
+        let spikes = effects.iter().filter_map(|effect| match effect {
+            AnyEffect::ForceSpikes(spikes) if !effect.is_neutral() => Some(spikes),
+            _ => None,
+        });
+        let spikes = spikes
+            .zip(SPIKES_STREAM..)
+            .map(|(spikes, stream)| {
+                let mut generator = ChaCha8Rng::seed_from_u64(seed);
+                generator.set_stream(stream);
+                Spikes { generator, chance: spikes.rate_hz / sample_hz, size_n: spikes.size_n }
+            })
+            .collect();
+        Self {
+            state: chain.start(sample_hz),
+            chain,
+            noise: Noise::new(seed, NOISE_STREAM, sensor.noise_n, sensor.ar1),
+            spikes,
+        }
     }
 
     /// The reading for one sample, in N.
     #[inline]
     pub fn measure(&mut self, sample: &InsertionSample) -> f64 {
-        let tool: f64 =
-            self.tool.iter().map(|e| e.tool_force(sample.velocity_mps, sample.acceleration_mps2)).sum();
-        self.sensor.measure(sample.time_s, sample.force.total_n + tool)
+        let spikes: f64 = self.spikes.iter_mut().map(Spikes::draw).sum();
+        let reading = Reading {
+            time_s: sample.time_s,
+            velocity_mps: sample.velocity_mps,
+            acceleration_mps2: sample.acceleration_mps2,
+            tissue_n: sample.force.total_n,
+            noise_n: self.noise.draw() + spikes,
+        };
+        self.chain.step(&mut self.state, &reading)
+    }
+
+    /// The recorded position (m) or velocity (m/s) for a true one.
+    #[must_use]
+    #[inline]
+    pub fn position(&self, true_m: f64) -> f64 {
+        self.chain.position(true_m)
     }
 }

@@ -93,7 +93,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
             &without
         }
     };
-    let mut measuring = Measuring::new(&scenario.effects, sensor, seed);
+    let mut measuring = Measuring::new(&scenario.effects, sensor, seed, scenario.sample_hz);
     let rates = rates(scenario, plan.duration_s());
     let mut ruptures = Vec::new();
     let mut columns = Columns::with_capacity(rates.samples, scenario.tissue.surface_m);
@@ -105,7 +105,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
             by_force: r.by_force,
         });
     };
-    let sink = |s: &InsertionSample| columns.push(s, measuring.measure(s));
+    let sink = |s: &InsertionSample| columns.push(s, &mut measuring);
     let mut arm = None;
     match &scenario.robot {
         Robot::Arm(config) => {
@@ -175,11 +175,11 @@ impl Columns {
         Self { recording, truth: Truth::default(), surface_m }
     }
 
-    fn push(&mut self, s: &InsertionSample, recorded_n: f64) {
+    fn push(&mut self, s: &InsertionSample, measuring: &mut Measuring) {
         self.recording.time_s.push(s.time_s);
-        self.recording.position_m.push(s.position_m);
-        self.recording.velocity_mps.push(s.velocity_mps);
-        self.recording.force_n.push(recorded_n);
+        self.recording.position_m.push(measuring.position(s.position_m));
+        self.recording.velocity_mps.push(measuring.position(s.velocity_mps));
+        self.recording.force_n.push(measuring.measure(s));
         let truth = &mut self.truth;
         truth.tip_force_n.push(s.force.tip_n);
         truth.elastic_n.push(s.force.elastic_n);

@@ -11,10 +11,7 @@ const JITTER: f64 = 0.05;
 
 pub(super) fn gaps(recording: &Recording) -> Option<QualityNote> {
     let median_s = recording.median_interval_s();
-    let starts = recording
-        .time_s
-        .windows(2)
-        .filter(|pair| pair[1] - pair[0] > GAP_INTERVALS * median_s);
+    let starts = recording.time_s.windows(2).filter(|pair| pair[1] - pair[0] > GAP_INTERVALS * median_s);
     let (mut count, mut largest_s, mut at_s) = (0_u32, 0.0, 0.0);
     for pair in starts {
         count += 1;
@@ -47,12 +44,7 @@ pub(super) fn jitter(recording: &Recording) -> Option<QualityNote> {
         .collect();
     let count = intervals.len() as f64;
     let mean_s = intervals.iter().sum::<f64>() / count;
-    let sd_s = (intervals
-        .iter()
-        .map(|interval| (interval - mean_s).powi(2))
-        .sum::<f64>()
-        / count)
-        .sqrt();
+    let sd_s = (intervals.iter().map(|interval| (interval - mean_s).powi(2)).sum::<f64>() / count).sqrt();
     let (shortest_s, longest_s) = extremes(&intervals);
     (sd_s > JITTER * median_s).then(|| {
         let message = format!(
@@ -94,8 +86,7 @@ mod tests {
         let note = gaps(&recording).expect("two gaps");
         assert_eq!(note.numbers["count"], 2.0);
         assert!(
-            (note.numbers["largest_s"] - 0.41).abs() < 1e-9
-                && (note.numbers["at_s"] - 0.70).abs() < 1e-9
+            (note.numbers["largest_s"] - 0.41).abs() < 1e-9 && (note.numbers["at_s"] - 0.70).abs() < 1e-9
         );
         assert!(note.message.contains("2 gap(s)"), "{}", note.message);
         assert_eq!(jitter(&recording), None, "gaps are not jitter");
@@ -104,19 +95,12 @@ mod tests {
 
     #[test]
     fn scattered_intervals_are_noted_from_five_percent() -> Result<(), RecordError> {
-        let scattered = |share: f64| {
-            (0..300)
-                .map(|i| 0.01 * (f64::from(i) + share * f64::from(i % 2)))
-                .collect()
-        };
+        let scattered =
+            |share: f64| (0..300).map(|i| 0.01 * (f64::from(i) + share * f64::from(i % 2))).collect();
         // Alternating intervals 0.01 (1 +- share): the standard deviation is the share, over a median of 1 - share or more.
         assert_eq!(jitter(&sampled_at(scattered(0.03))?), None);
         let note = jitter(&sampled_at(scattered(0.2))?).expect("20 %");
-        assert!(
-            (note.numbers["sd_s"] - 0.002).abs() < 1e-4,
-            "{}",
-            note.message
-        );
+        assert!((note.numbers["sd_s"] - 0.002).abs() < 1e-4, "{}", note.message);
         Ok(())
     }
 }

@@ -36,10 +36,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
             "the position ranges over {travel_m:.4} m: it looks like millimetres; give a column map with position scale 1e-3"
         ),
     );
-    let speed_mps = quantile(
-        recording.velocity_mps.iter().map(|v| v.abs()).collect(),
-        PERCENTILE,
-    );
+    let speed_mps = quantile(recording.velocity_mps.iter().map(|v| v.abs()).collect(), PERCENTILE);
     beyond(
         speed_mps,
         FASTEST_MPS,
@@ -48,10 +45,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
          too short by its unit"
         ),
     );
-    let force_n = quantile(
-        recording.force_n.iter().map(|f| f.abs()).collect(),
-        PERCENTILE,
-    );
+    let force_n = quantile(recording.force_n.iter().map(|f| f.abs()).collect(), PERCENTILE);
     beyond(
         force_n,
         STRONGEST_N,
@@ -77,11 +71,7 @@ fn velocity_against_position(recording: &Recording) -> Option<QualityNote> {
     if !recording.velocity_measured {
         return None;
     }
-    let slope = differentiate(
-        &recording.time_s,
-        &recording.position_m,
-        DEFAULT_HALF_WIDTH_S,
-    );
+    let slope = differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
     let (mut together, mut alone) = (0.0, 0.0);
     for (slope, velocity) in slope.iter().zip(&recording.velocity_mps) {
         together += slope * velocity;
@@ -106,18 +96,11 @@ mod tests {
         let time_s: Vec<f64> = (0..300).map(|i| f64::from(i) * 0.01).collect();
         let force_n = time_s.iter().map(|t| t * force).collect();
         let position_m = time_s.iter().map(|t| 0.005 * t * position).collect();
-        Recording::new(
-            time_s.iter().map(|t| t * time).collect(),
-            position_m,
-            force_n,
-        )
+        Recording::new(time_s.iter().map(|t| t * time).collect(), position_m, force_n)
     }
 
     fn remarks(recording: &Recording) -> String {
-        unit_mix_ups(recording)
-            .into_iter()
-            .map(|note| note.message + "\n")
-            .collect()
+        unit_mix_ups(recording).into_iter().map(|note| note.message + "\n").collect()
     }
 
     #[test]
@@ -139,27 +122,15 @@ mod tests {
     }
 
     #[test]
-    fn a_velocity_of_the_wrong_sign_or_unit_is_named_and_a_noisy_one_is_not()
-    -> Result<(), RecordError> {
+    fn a_velocity_of_the_wrong_sign_or_unit_is_named_and_a_noisy_one_is_not() -> Result<(), RecordError> {
         let si = insertion(1.0, 1.0, 1.0)?;
         let measured = |factor: f64| {
-            let velocity_mps = si
-                .velocity_mps
-                .iter()
-                .enumerate()
-                .map(|(i, v)| v * factor + 0.002 * ((i % 2) as f64 - 0.5));
-            Recording {
-                velocity_mps: velocity_mps.collect(),
-                velocity_measured: true,
-                ..si.clone()
-            }
+            let velocity_mps =
+                si.velocity_mps.iter().enumerate().map(|(i, v)| v * factor + 0.002 * ((i % 2) as f64 - 0.5));
+            Recording { velocity_mps: velocity_mps.collect(), velocity_measured: true, ..si.clone() }
         };
         assert_eq!(remarks(&measured(1.0)), "");
-        assert!(
-            remarks(&measured(-1.0)).contains("-1.0"),
-            "{}",
-            remarks(&measured(-1.0))
-        );
+        assert!(remarks(&measured(-1.0)).contains("-1.0"), "{}", remarks(&measured(-1.0)));
         assert!(remarks(&measured(60.0)).contains("times the slope of the position"));
         Ok(())
     }

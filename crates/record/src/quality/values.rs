@@ -26,8 +26,7 @@ pub(super) fn saturation(recording: &Recording) -> Vec<QualityNote> {
 fn saturated_at(recording: &Recording, which: &str, value: f64) -> Option<QualityNote> {
     let force_n = &recording.force_n;
     let (low_m, high_m) = extremes(&recording.position_m);
-    let (mut runs, mut samples, mut all, mut longest, mut at_s, mut moved) =
-        (0_u32, 0, 0, 0, 0.0, false);
+    let (mut runs, mut samples, mut all, mut longest, mut at_s, mut moved) = (0_u32, 0, 0, 0, 0.0, false);
     let mut start = 0;
     for run in force_n.chunk_by(|a, b| a == b) {
         let end = start + run.len();
@@ -75,32 +74,20 @@ const STEPS: f64 = 4.0;
 /// A longer deviation is a movement, not a spike.
 const LONGEST_SPIKE: usize = 2;
 
-pub(super) fn spikes(
-    what: &str,
-    unit: &str,
-    values: &[f64],
-    time_s: &[f64],
-) -> Option<QualityNote> {
+pub(super) fn spikes(what: &str, unit: &str, values: &[f64], time_s: &[f64]) -> Option<QualityNote> {
     if values.len() < 2 * SIDE + 1 {
         return None;
     }
-    let away: Vec<f64> = (0..values.len())
-        .map(|index| values[index] - local_median(values, index))
-        .collect();
+    let away: Vec<f64> = (0..values.len()).map(|index| values[index] - local_median(values, index)).collect();
     let sd_of_noise = 1.4826 * median(away.iter().map(|away| away.abs()).collect());
     let range = quantile(values.to_vec(), 0.95) - quantile(values.to_vec(), 0.05);
     let robust_sd = sd_of_noise.max(LEAST_SD * range);
     let limit = SPIKE_SD * robust_sd;
     let (mut count, mut largest, mut at_s) = (0_u32, 0.0_f64, 0.0);
     let mut start = 0;
-    for run in
-        away.chunk_by(|a, b| (a.abs() > limit) == (b.abs() > limit) && (a > &0.0) == (b > &0.0))
-    {
+    for run in away.chunk_by(|a, b| (a.abs() > limit) == (b.abs() > limit) && (a > &0.0) == (b > &0.0)) {
         let end = start + run.len();
-        if run[0].abs() > limit
-            && run.len() <= LONGEST_SPIKE
-            && stands_out(values, start, end, limit)
-        {
+        if run[0].abs() > limit && run.len() <= LONGEST_SPIKE && stands_out(values, start, end, limit) {
             count += run.len() as u32;
             for (index, away) in (start..end).zip(run) {
                 if away.abs() > largest.abs() {
@@ -129,24 +116,13 @@ fn stands_out(values: &[f64], start: usize, end: usize, limit: f64) -> bool {
         return false;
     }
     let (before, after) = (&values[start - SIDE..start], &values[end..end + SIDE]);
-    let step = median(
-        before
-            .windows(2)
-            .chain(after.windows(2))
-            .map(|pair| (pair[1] - pair[0]).abs())
-            .collect(),
-    );
-    let (before, after) = (
-        median(before[SIDE - 3..].to_vec()),
-        median(after[..3].to_vec()),
-    );
+    let step =
+        median(before.windows(2).chain(after.windows(2)).map(|pair| (pair[1] - pair[0]).abs()).collect());
+    let (before, after) = (median(before[SIDE - 3..].to_vec()), median(after[..3].to_vec()));
     let limit = limit.max(STEPS * step).max((after - before).abs());
     let run = &values[start..end];
-    run.iter()
-        .all(|value| value - before > limit && value - after > limit)
-        || run
-            .iter()
-            .all(|value| before - value > limit && after - value > limit)
+    run.iter().all(|value| value - before > limit && value - after > limit)
+        || run.iter().all(|value| before - value > limit && after - value > limit)
 }
 
 /// Median of the eleven samples around the index (at the ends: of the eleven nearest the end).
@@ -187,10 +163,7 @@ pub(super) fn quantisation(what: &str, unit: &str, values: &[f64]) -> Option<Qua
     }
     let steps: Vec<f64> = distinct.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let (step, _) = extremes(&steps);
-    let on_grid = steps
-        .iter()
-        .filter(|&&wide| (wide / step - (wide / step).round()).abs() < 0.02)
-        .count();
+    let on_grid = steps.iter().filter(|&&wide| (wide / step - (wide / step).round()).abs() < 0.02).count();
     (on_grid as f64 >= ON_GRID * steps.len() as f64).then(|| {
         let message = format!(
             "{what}: the values come in steps of {step:.4e} {unit} ({} different ones in {} samples); smaller changes \
@@ -216,32 +189,18 @@ mod tests {
     fn force_n() -> Vec<f64> {
         let mut state = 1_u64;
         let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
-        let noise =
-            |uniform: &mut dyn FnMut() -> f64| (0..12).map(|_| uniform()).sum::<f64>() * 0.01;
+        let noise = |uniform: &mut dyn FnMut() -> f64| (0..12).map(|_| uniform()).sum::<f64>() * 0.01;
         let load = |t: f64| {
-            if t < 6.0 {
-                t * 0.8
-            } else {
-                2.4 + (t - 6.0) * 0.3
-            }
+            if t < 6.0 { t * 0.8 } else { 2.4 + (t - 6.0) * 0.3 }
         };
-        time_s()
-            .into_iter()
-            .map(|t| load(t) + noise(&mut uniform))
-            .collect()
+        time_s().into_iter().map(|t| load(t) + noise(&mut uniform)).collect()
     }
 
     fn recording(force_n: Vec<f64>) -> Result<Recording, RecordError> {
-        Recording::new(
-            time_s(),
-            time_s().iter().map(|t| t * 0.002).collect(),
-            force_n,
-        )
+        Recording::new(time_s(), time_s().iter().map(|t| t * 0.002).collect(), force_n)
     }
 
     #[test]
@@ -272,11 +231,7 @@ mod tests {
         let notes = saturation(&recording(clipped)?);
         assert_eq!(notes.len(), 1);
         assert_eq!(notes[0].numbers["value"], 3.0);
-        assert!(
-            notes[0].message.contains("largest value 3.0000 N"),
-            "{}",
-            notes[0].message
-        );
+        assert!(notes[0].message.contains("largest value 3.0000 N"), "{}", notes[0].message);
         Ok(())
     }
 
@@ -288,24 +243,13 @@ mod tests {
         force_n[701] -= 1.0;
         let note = spikes("force_n", "N", &force_n, &time_s()).expect("three spiked samples");
         assert_eq!(note.numbers["count"], 3.0);
-        assert!(
-            (note.numbers["at_s"] - 3.0).abs() < 1e-9,
-            "{}",
-            note.message
-        );
+        assert!((note.numbers["at_s"] - 3.0).abs() < 1e-9, "{}", note.message);
     }
 
     #[test]
     fn a_coarse_converter_shows_its_step() {
-        let coarse: Vec<f64> = force_n()
-            .iter()
-            .map(|f| (f / 0.05).round() * 0.05)
-            .collect();
+        let coarse: Vec<f64> = force_n().iter().map(|f| (f / 0.05).round() * 0.05).collect();
         let note = quantisation("force_n", "N", &coarse).expect("steps of 0.05 N");
-        assert!(
-            (note.numbers["smallest_step"] - 0.05).abs() < 1e-9,
-            "{}",
-            note.message
-        );
+        assert!((note.numbers["smallest_step"] - 0.05).abs() < 1e-9, "{}", note.message);
     }
 }

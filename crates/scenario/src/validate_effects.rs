@@ -1,0 +1,79 @@
+//! Ranges of the effects' parameters, as the library of effects states them.
+
+use crate::load::Problem;
+use crate::scenario::Scenario;
+use crate::validate::Checked;
+use stylet_tissue::{AnyEffect, Effect, Law, ParameterError};
+
+/// Checks the effects of a scenario.
+pub(crate) fn effects(s: &Scenario) -> Checked {
+    for (i, effect) in s.effects.iter().enumerate() {
+        let at = format!("effects[{i}]");
+        finite(&at, effect)?;
+        effect.check().map_err(|error| problem(&at, effect, &error))?;
+        if let AnyEffect::BoundaryShift(shift) = effect
+            && shift.layer >= s.tissue.layers.len()
+        {
+            let layers = s.tissue.layers.len();
+            let what = if layers < 2 {
+                "names a face between two layers, but there is only one layer; leave the effect out"
+                    .to_owned()
+            } else {
+                format!(
+                    "is {}; it must lie between 1 and {}: the face is the one behind this layer",
+                    shift.layer,
+                    layers - 1
+                )
+            };
+            return Err(Problem::new(format!("{at}.layer"), what));
+        }
+    }
+    Law::new(&s.tissue, &s.effects)
+        .map(drop)
+        .map_err(|e| Problem::new("effects", format!("{e}; leave some out")))
+}
+
+/// The library's `terms.0.fraction` as it stands in the file: `terms[0].fraction`.
+fn path(at: &str, path: &str) -> String {
+    let mut written = at.to_owned();
+    for part in path.split('.') {
+        if part.bytes().all(|c| c.is_ascii_digit()) {
+            written.push_str(&format!("[{part}]"));
+        } else {
+            written.push('.');
+            written.push_str(part);
+        }
+    }
+    written
+}
+
+fn unit(effect: &AnyEffect, parameter: &str) -> String {
+    let unit = effect.info().parameters.iter().find(|p| p.path == parameter).map_or("", |p| p.unit);
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+/// Ranges that are open to above let infinity pass.
+fn finite(at: &str, effect: &AnyEffect) -> Checked {
+    for (parameter, value) in effect.info().parameters.iter().zip(effect.parameters()) {
+        if !value.is_finite() {
+            let what = format!("is {value}; it must be a finite number, for example {}", parameter.start);
+            return Err(Problem::new(path(at, parameter.path), what));
+        }
+    }
+    Ok(())
+}
+
+fn problem(at: &str, effect: &AnyEffect, error: &ParameterError) -> Problem {
+    let ParameterError { path: parameter, value, allowed: (low, high), .. } = error;
+    let what = if *parameter == "terms" {
+        format!("has {value} terms; give one or two, `(fraction: 0.3, time_constant_s: 2.7)`")
+    } else {
+        let unit = unit(effect, parameter);
+        if *high == f64::INFINITY {
+            format!("is {value}; it must be at least {low}{unit}")
+        } else {
+            format!("is {value}; it must lie between {low} and {high}{unit}")
+        }
+    };
+    Problem::new(path(at, parameter), what)
+}

@@ -1,0 +1,112 @@
+//! Ranges of a motion, and whether it comes to the tissue.
+
+use crate::load::Problem;
+use crate::motion::{Motion, Segment};
+use crate::scenario::Scenario;
+use crate::validate::{Checked, check, finite, positive};
+
+/// More samples, or a thousand times more physics steps, are refused: a mistyped rate or duration.
+const MOST_SAMPLES: f64 = 5e7;
+const MOST_STEPS: f64 = 1e9;
+
+/// Speeds above this, in m/s, are taken for mm/s.
+const FASTEST_MPS: f64 = 1.0;
+
+pub(crate) fn motion(s: &Scenario) -> Checked {
+    match &s.motion {
+        Motion::Constant { start_m, velocity_mps, duration_s } => {
+            finite("motion.start_m", *start_m, "metres")?;
+            speed("motion.velocity_mps", *velocity_mps)?;
+            positive("motion.duration_s", *duration_s, "seconds")?;
+        }
+        Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, phase_rad, duration_s } => {
+            finite("motion.start_m", *start_m, "metres")?;
+            positive("motion.amplitude_m", *amplitude_m, "metres")?;
+            frequency("motion.frequency_hz".to_owned(), *frequency_hz, s.sample_hz)?;
+            finite("motion.phase_rad", *phase_rad, "radians")?;
+            positive("motion.duration_s", *duration_s, "seconds")?;
+            let fastest_mps = amplitude_m * frequency_hz * core::f64::consts::TAU;
+            if fastest_mps > FASTEST_MPS {
+                let what = format!(
+                    "is {amplitude_m}, which at {frequency_hz} Hz makes {fastest_mps:.3} m/s; speeds are at most \
+                     {FASTEST_MPS} m/s; is this in millimetres?"
+                );
+                return Err(Problem::new("motion.amplitude_m", what));
+            }
+        }
+        Motion::Program { start_m, segments } => {
+            finite("motion.start_m", *start_m, "metres")?;
+            if segments.is_empty() {
+                let what =
+                    "is empty; give at least one, for example `Move(velocity_mps: 0.0023, duration_s: 20.0)`";
+                return Err(Problem::new("motion.segments", what));
+            }
+            for (i, segment) in segments.iter().enumerate() {
+                one_segment(&format!("motion.segments[{i}]"), segment, s.sample_hz)?;
+            }
+        }
+        Motion::Recorded => {}
+    }
+    reaches(s)
+}
+
+fn one_segment(at: &str, segment: &Segment, sample_hz: f64) -> Checked {
+    positive(format!("{at}.duration_s"), segment.duration_s(), "seconds")?;
+    match *segment {
+        Segment::Move { velocity_mps, .. } => speed(format!("{at}.velocity_mps"), velocity_mps),
+        Segment::Hold { .. } => Ok(()),
+        Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, .. } => {
+            speed(format!("{at}.velocity_mps"), velocity_mps)?;
+            speed(format!("{at}.amplitude_mps"), amplitude_mps)?;
+            frequency(format!("{at}.frequency_hz"), frequency_hz, sample_hz)
+        }
+    }
+}
+
+fn speed(path: impl Into<String>, value: f64) -> Checked {
+    let right = format!("speeds are at most {FASTEST_MPS} m/s; is this in mm/s?");
+    check(path, value, value.abs() <= FASTEST_MPS, &right)
+}
+
+fn frequency(path: String, value: f64, sample_hz: f64) -> Checked {
+    let right = format!("it must lie between 0 and half of sample_hz, {} Hz", sample_hz / 2.0);
+    check(path, value, value > 0.0 && value < sample_hz / 2.0, &right)
+}
+
+/// The motion must be short enough to store and must come to the tissue.
+fn reaches(s: &Scenario) -> Checked {
+    let Some(plan) = s.motion.plan() else {
+        return Ok(());
+    };
+    let (seconds, samples) = (plan.duration_s(), plan.duration_s() * s.sample_hz);
+    if samples > MOST_SAMPLES {
+        let what = format!(
+            "makes {samples:.3e} samples in {seconds} s at {} Hz; at most {MOST_SAMPLES:.0e} are simulated: \
+             shorten it or lower sample_hz",
+            s.sample_hz
+        );
+        return Err(Problem::new("motion", what));
+    }
+    if samples < 2.0 {
+        let what = format!("lasts {seconds} s, less than two samples at {} Hz; make it longer", s.sample_hz);
+        return Err(Problem::new("motion", what));
+    }
+    if seconds * s.physics_hz > MOST_STEPS {
+        let what = format!(
+            "is {}, which makes {:.3e} steps in {seconds} s; at most {MOST_STEPS:.0e} are simulated: lower it",
+            s.physics_hz,
+            seconds * s.physics_hz
+        );
+        return Err(Problem::new("physics_hz", what));
+    }
+    let (furthest_m, surface_m) = (plan.deepest_m(), s.tissue.surface_m);
+    if furthest_m > surface_m {
+        return Ok(());
+    }
+    let missing_mm = (surface_m - furthest_m) * 1e3;
+    let what = format!(
+        "never reaches the tissue: the tip comes to {furthest_m:.4} m and the surface lies at {surface_m} m, \
+         {missing_mm:.3} mm further; start nearer, move longer, or move the other way"
+    );
+    Err(Problem::new("motion", what))
+}

@@ -1,0 +1,71 @@
+//! Promise: the core runs on really measured insertions: it finds the skin's puncture where the force
+//! drops, and nothing in air.
+//!
+//! The recordings have no licence and stay outside the repository. They are read from the folder
+//! `STYLET_MEASURED`, by default `../shared/measured` beside the checkout; without it these tests say
+//! loudly that they were skipped.
+
+mod support;
+
+use std::io::Write;
+use std::path::PathBuf;
+use support::{Scratch, said, stylet};
+
+const MAP: &str = r#"Columns(
+    time: (name: "time", scale: 1e-6),
+    position: (name: "pz", scale: 1e-3),
+    force: (name: "fz", scale: 1.0),
+)"#;
+
+fn measured(test: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("STYLET_MEASURED")
+        .map_or_else(|| support::root().join("../shared/measured"), PathBuf::from);
+    let folder = folder.join("needle_phantom");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    let _ = writeln!(
+        std::io::stderr(),
+        "SKIPPED: {test}: no measured recordings in {}; set STYLET_MEASURED to the folder that holds them",
+        folder.display()
+    );
+    None
+}
+
+fn enhance(scratch: &Scratch, data: &std::path::Path) -> serde_json::Value {
+    let map = scratch.file("map.ron", MAP);
+    let out = scratch.path().join("out");
+    let path = |p: &std::path::Path| p.to_str().expect("a path").to_owned();
+    let output = stylet(&["enhance", &path(data), "--columns", &path(&map), "--out", &path(&out)]);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(out.join("report.html").exists());
+    let json = std::fs::read_to_string(out.join("enhance.json")).expect("results");
+    serde_json::from_str(&json).expect("JSON")
+}
+
+#[test]
+fn the_skins_puncture_is_found_in_every_measured_run() {
+    let Some(folder) = measured("the_skins_puncture_is_found_in_every_measured_run") else { return };
+    let scratch = Scratch::new("measured");
+    let mut runs = 0;
+    for speed in 1..=3 {
+        for run in 1..=5 {
+            let result = enhance(&scratch, &folder.join(format!("skin-on-muscle_{speed}mmps_run{run}.csv")));
+            let ruptures = result["found"][0]["ruptures"].as_array().expect("ruptures");
+            let depths: Vec<f64> = ruptures.iter().filter_map(|r| r["located_m"].as_f64()).collect();
+            println!("{speed} mm/s run {run}: ruptures at {depths:.4?} m");
+            assert!(depths.iter().any(|z| (0.012..0.020).contains(z)), "{speed} mm/s run {run}: {depths:?}");
+            assert!(depths.len() <= 4, "{speed} mm/s run {run}: {depths:?}");
+            runs += 1;
+        }
+    }
+    assert_eq!(runs, 15);
+}
+
+#[test]
+fn nothing_is_found_in_air() {
+    let Some(folder) = measured("nothing_is_found_in_air") else { return };
+    let result = enhance(&Scratch::new("air"), &folder.join("air_blank.csv"));
+    assert_eq!(result["found"][0]["ruptures"].as_array().map(Vec::len), Some(0));
+    assert!(result["found"][0]["contact_m"].is_null());
+}
