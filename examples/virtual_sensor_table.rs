@@ -14,12 +14,14 @@ use stylet_testbed::simulate;
 const SCALES: [f64; 5] = [0.0, 0.1, 0.25, 0.5, 1.0];
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
+/// A sensor's name and its score.
+type Scored = (&'static str, Score);
 
 /// One line of the table: a scenario with its friction and the seeds' scores per sensor.
 struct Setting {
     scenario: Scenario,
     label: String,
-    scores: Vec<(&'static str, Score)>,
+    scores: Vec<Scored>,
     off_n: Vec<f64>,
 }
 
@@ -36,7 +38,7 @@ fn setting(base: &Scenario, scale: f64, zero: ZeroWindow, label: &str) -> Settin
 }
 
 /// Simulates one seed and scores both sensors.
-fn one(scenario: &Scenario, seed: u64) -> Result<(Vec<(&'static str, Score)>, f64), Failure> {
+fn one(scenario: &Scenario, seed: u64) -> Result<(Vec<Scored>, f64), Failure> {
     let simulation = simulate(scenario, seed)?;
     let layers: Vec<LayerTruth> = simulation
         .slabs

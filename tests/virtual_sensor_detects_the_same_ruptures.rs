@@ -1,6 +1,7 @@
 //! Promise (the paper's claim): at the clean setting liver and abdomen show the same two ruptures by
 //! force/torque sensor and by virtual sensor, without false alarms. And its limit: where the joints rub
-//! as measured on a Panda and the residual is not zeroed in motion, the claim does not hold.
+//! as measured on a Panda, the motion starts from rest and the residual is zeroed before it, the claim
+//! does not hold.
 //!
 //! The table with all steps in between: `cargo run --release --example virtual_sensor_table`.
 
@@ -62,20 +63,22 @@ fn liver_and_abdomen_show_two_ruptures_each_by_both_sensors() {
 }
 
 #[test]
-fn joint_friction_of_the_measured_size_hides_the_livers_ruptures_from_a_sensor_zeroed_at_rest() {
-    let mut scenario = Scenario::load(&path(FILES[0])).expect("valid");
+fn joint_friction_drowns_the_abdomens_ruptures_in_false_alarms_when_the_sensor_is_zeroed_at_rest() {
+    let mut scenario = Scenario::load(&path(FILES[1])).expect("valid");
     if let Robot::Arm(arm) = &mut scenario.robot {
         arm.joint_friction = ArmFriction::MeasuredDirectional;
     }
-    let missed = |scenario: &Scenario, sensor: &str| -> usize {
-        scores(scenario, 1).iter().filter(|(s, _)| *s == sensor).map(|(_, score)| score.missed).sum()
+    let wrong = |scenario: &Scenario, sensor: &str| -> (usize, usize) {
+        let scores = scores(scenario, 1);
+        let score = &scores.iter().find(|(s, _)| *s == sensor).expect("it recorded").1;
+        (score.missed, score.false_alarms)
     };
-    assert_eq!(missed(&scenario, "virtual"), 0, "zeroed in motion, steady friction goes with the zero");
+    assert_eq!(wrong(&scenario, "virtual"), (0, 0), "zeroed in motion, steady friction goes with the zero");
     if let Sensor::Both { virtual_sensor, .. } = &mut scenario.sensor {
         virtual_sensor.zero = ZeroWindow::AtRest { average_s: 0.5 };
     }
-    assert_eq!(missed(&scenario, "virtual"), 2);
-    assert_eq!(missed(&scenario, "force_torque"), 0, "the force/torque sensor does not feel the joints");
+    assert!(wrong(&scenario, "virtual").1 > 5, "{:?}", wrong(&scenario, "virtual"));
+    assert_eq!(wrong(&scenario, "force_torque"), (0, 0), "the force/torque sensor does not feel the joints");
 }
 
 #[test]

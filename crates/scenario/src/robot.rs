@@ -6,6 +6,7 @@ use stylet_dynamics::{ArmModel, panda};
 
 /// The robot of a scenario.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant, reason = "there is one per scenario")]
 pub enum Robot {
     /// A velocity-controlled axial slide, simulated as a rigid body.
     #[default]
