@@ -14,7 +14,7 @@ use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::Scenario;
 use stylet_score::{LayerTruth, Score, model_name, score_run};
-use stylet_testbed::{Simulation, simulate};
+use stylet_testbed::{Reading, Simulation, VirtualError, simulate};
 
 /// `score.json` of a run.
 #[derive(Serialize)]
@@ -23,23 +23,40 @@ struct ScoreFile<'a> {
     seed: u64,
     hash: &'a str,
     version: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    virtual_sensor: Option<VirtualScore>,
     #[serde(flatten)]
     one: Option<&'a Score>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     runs: BTreeMap<&'a str, &'a Score>,
 }
 
+/// The virtual sensor against the true force.
+#[derive(Serialize)]
+struct VirtualScore {
+    lag_s: f64,
+    rms_n: f64,
+    beside_lag_rms_n: f64,
+}
+
+impl From<VirtualError> for VirtualScore {
+    fn from(error: VirtualError) -> Self {
+        let VirtualError { lag_s, rms_n, beside_lag_rms_n } = error;
+        Self { lag_s, rms_n, beside_lag_rms_n }
+    }
+}
+
 /// Everything that one run made.
 pub struct Finished {
     /// What was simulated.
     pub simulation: Simulation,
-    /// What the core made of it, per model.
+    /// What the core made of it, per model and sensor.
     pub ran: Vec<Ran>,
     /// The layers as the law has them.
     pub layers: Vec<LayerTruth>,
 }
 
-/// Simulates a scenario and runs the core on it, once per model.
+/// Simulates a scenario and runs the core on it, once per model and sensor.
 ///
 /// # Errors
 /// [`Failure::Simulate`] when the scenario cannot be simulated.
@@ -56,23 +73,24 @@ pub fn finish(scenario: &Scenario, file: &str, models: &[Model]) -> Result<Finis
             friction_ns_per_m2: s.friction_ns_per_m2,
         })
         .collect();
-    let ran = models
-        .iter()
-        .map(|&model| {
-            let mut config = scenario.enhance.clone();
-            config.model = model;
-            let recording = &simulation.recording;
-            let (trace, score) =
-                score_run(recording, &recording.force_n, &simulation.truth, &layers, &config);
-            Ran {
-                name: format!("paper/{}/force_torque", model_name(model)),
-                sensor: "force_torque",
-                config,
-                trace,
-                score: Some(score),
-            }
-        })
-        .collect();
+    let listen = |model: Model, reading: &Reading| {
+        let mut config = match reading.sensor {
+            "virtual" => scenario.enhance_for_virtual().clone(),
+            _ => scenario.enhance.clone(),
+        };
+        config.model = model;
+        let (trace, score) =
+            score_run(&simulation.recording, &reading.force_n, &simulation.truth, &layers, &config);
+        Ran {
+            name: format!("paper/{}/{}", model_name(model), reading.sensor),
+            sensor: reading.sensor,
+            config,
+            trace,
+            score: Some(score),
+        }
+    };
+    let pairs = models.iter().flat_map(|model| simulation.readings.iter().map(|r| (*model, r)));
+    let ran = pairs.map(|(model, reading)| listen(model, reading)).collect();
     Ok(Finished { simulation, ran, layers })
 }
 
@@ -118,8 +136,8 @@ fn results(scenario: &Scenario, file: &str, finished: &Finished) -> Result<(Outp
         env!("CARGO_PKG_VERSION"),
         scenario.to_ron().map_err(|e| internal(&e))?
     );
-    let forces =
-        vec![ForceTrace { sensor: "force_torque".to_owned(), force_n: simulation.recording.force_n.clone() }];
+    let forces = simulation.readings.iter().map(|reading| force_trace(reading, &simulation.recording));
+    let forces = forces.collect();
     let report = RunReport {
         title: scenario.name.clone(),
         source: scenario.source.clone(),
@@ -131,6 +149,7 @@ fn results(scenario: &Scenario, file: &str, finished: &Finished) -> Result<(Outp
             version: env!("CARGO_PKG_VERSION").to_owned(),
             hash: hash.clone(),
         },
+        notes: terminal::virtual_note(simulation).into_iter().collect(),
         truth: Some(picture::truth(&simulation.truth, scenario, layers)),
         ..picture::report(&simulation.recording, forces, ran)
     };
@@ -140,6 +159,7 @@ fn results(scenario: &Scenario, file: &str, finished: &Finished) -> Result<(Outp
         seed: scenario.seed,
         hash: &hash,
         version: env!("CARGO_PKG_VERSION"),
+        virtual_sensor: simulation.virtual_error.map(VirtualScore::from),
         one: ran.first().filter(|_| !several).and_then(|r| r.score.as_ref()),
         runs: ran
             .iter()
@@ -156,6 +176,15 @@ fn results(scenario: &Scenario, file: &str, finished: &Finished) -> Result<(Outp
     output.add("figure.svg", report.to_svg(&FigureOptions::default()));
     output.add("report.html", report.to_html());
     Ok((output, report))
+}
+
+/// What a sensor recorded; in the picture also before it was zeroed.
+fn force_trace(reading: &Reading, recording: &Recording) -> ForceTrace {
+    let recorded = match (reading.sensor, &recording.force_virtual_n) {
+        ("virtual", Some(force_n)) => force_n,
+        _ => &reading.force_n,
+    };
+    ForceTrace { sensor: reading.sensor.to_owned(), force_n: recorded.clone() }
 }
 
 fn recording_csv(recording: &Recording, simulation: &Simulation, ran: &[Ran]) -> Result<Vec<u8>, Failure> {

@@ -8,6 +8,7 @@ use std::io::Write as _;
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
+use stylet_testbed::Simulation;
 
 /// Prints to standard output. A reader that has gone away, as in `stylet run ... | head`, is no error.
 ///
@@ -40,6 +41,9 @@ pub fn scorecard(scenario: &Scenario, finished: &Finished, hash: &str) -> String
         significant(recording.duration_s(), 3),
         scenario.seed
     );
+    if let Some(note) = virtual_note(&finished.simulation) {
+        let _ = writeln!(out, "{note}");
+    }
     for ran in &finished.ran {
         let Some(score) = &ran.score else { continue };
         let _ = writeln!(out, "\n{}", ran.name);
@@ -48,6 +52,19 @@ pub fn scorecard(scenario: &Scenario, finished: &Finished, hash: &str) -> String
         summary(&mut out, score);
     }
     out
+}
+
+/// How far the virtual sensor is off, in a sentence.
+#[must_use]
+pub fn virtual_note(simulation: &Simulation) -> Option<String> {
+    simulation.virtual_error.map(|error| {
+        format!(
+            "The virtual sensor lags by {} s; it is off by {} N (rms), by {} N beside its lag.",
+            significant(error.lag_s, 3),
+            significant(error.rms_n, 3),
+            significant(error.beside_lag_rms_n, 3)
+        )
+    })
 }
 
 fn ruptures(out: &mut String, scenario: &Scenario, score: &Score, trace: &Trace) {

@@ -22,7 +22,21 @@ const NOT_WRITTEN: &[(&str, &str)] = &[
     ("motion", "required"),
     ("motion/Sinusoidal.phase_rad", "-1.5707963267948966"),
     ("sensor/ForceTorque.range_n", "none"),
+    ("robot/Arm.start_rad", "ready pose, needle straight down"),
+    ("robot/Arm.tip_m", "where start_rad puts it"),
+    ("robot/Arm.direction", "the needle's axis at start_rad"),
+    ("robot/Arm.controller.natural_frequency_radps", "50.0"),
+    ("robot/Arm.controller.elbow_damping_per_s", "20.0"),
+    ("robot/Arm.controller.disturbance_gain_per_s", "50.0"),
+    ("robot/Arm.joint_friction", "None"),
+    ("robot/Arm.friction_scale", "1.0"),
+    ("robot/Arm.payload_error_kg", "0.0"),
+    ("robot/Arm.link_mass_error", "0.0"),
     ("sensor/Virtual.gain_per_s", "5.0"),
+    ("sensor/Virtual.torque_noise_nm", "0.02"),
+    ("sensor/Virtual.zero", "BeforeContact(lead_s: 0.8, average_s: 0.5)"),
+    ("sensor/Virtual.wrench", "Full"),
+    ("enhance_virtual", "as enhance"),
 ];
 
 const ROWS: &[Row] = &[
@@ -64,6 +78,46 @@ const ROWS: &[Row] = &[
     ("motion/Program.segments[]/Ripple.frequency_hz", "Hz", "above 0, below sample_hz/2", "frequency"),
     ("motion/Program.segments[]/Ripple.duration_s", "s", "above 0", "duration"),
     ("robot", "", "Slide, Replay, Arm(...)", "what carries the needle"),
+    (
+        "robot/Arm.start_rad",
+        "rad",
+        "seven, within the joints' limits",
+        "joint angles near which the start pose is looked for",
+    ),
+    ("robot/Arm.tip_m", "m", "reachable", "tip at the motion's start in the arm's base frame, z up"),
+    ("robot/Arm.direction", "", "not all zero", "insertion direction in the base frame, of any length"),
+    (
+        "robot/Arm.controller.natural_frequency_radps",
+        "rad/s",
+        "above 0, up to half of physics_hz",
+        "of the tip's error",
+    ),
+    (
+        "robot/Arm.controller.elbow_damping_per_s",
+        "1/s",
+        "0 to half of physics_hz",
+        "of motion that leaves the tip alone",
+    ),
+    (
+        "robot/Arm.controller.disturbance_gain_per_s",
+        "1/s",
+        "0 to half of physics_hz",
+        "of the force that is fed forward",
+    ),
+    (
+        "robot/Arm.joint_friction",
+        "",
+        "None, Measured, MeasuredDirectional, PerJoint(joints), Sigmoid(joints)",
+        "what the virtual sensor takes for an external force",
+    ),
+    ("robot/Arm.friction_scale", "", ">= 0", "multiplies the joint friction"),
+    (
+        "robot/Arm.payload_error_kg",
+        "kg",
+        "above minus the payload",
+        "what the virtual sensor adds to the payload's mass",
+    ),
+    ("robot/Arm.link_mass_error", "", "-0.5 to 0.5", "what it adds to the links' masses, relative"),
     ("sensor", "", "ForceTorque, Virtual, Both(force_torque, virtual_sensor)", "what records the force"),
     ("sensor/ForceTorque.noise_n", "N", ">= 0", "standard deviation of the noise"),
     ("sensor/ForceTorque.ar1", "", "above -1, below 1", "pole of the noise per sample; 0 is white"),
@@ -71,7 +125,15 @@ const ROWS: &[Row] = &[
     ("sensor/ForceTorque.drift_n_per_s", "N/s", "finite", "drift"),
     ("sensor/ForceTorque.quantisation_n", "N", ">= 0", "smallest step; 0 is none"),
     ("sensor/ForceTorque.range_n", "N", "above 0", "readings end at plus and minus this"),
-    ("sensor/Virtual.gain_per_s", "1/s", "above 0", "gain of the momentum observer"),
+    ("sensor/Virtual.gain_per_s", "1/s", ">= 0.1, one or seven", "gain of the momentum observer"),
+    ("sensor/Virtual.torque_noise_nm", "N m", ">= 0", "white noise of each joint torque per physics step"),
+    (
+        "sensor/Virtual.zero",
+        "",
+        "BeforeContact(lead_s, average_s), AtRest(average_s), Never",
+        "when the residual is averaged and taken as zero",
+    ),
+    ("sensor/Virtual.wrench", "", "Full, Point", "force and moment at the tip, or force alone"),
     ("enhance.algorithm", "", "Paper, Literal", "with or without the completions of the paper"),
     ("enhance.model", "", "MultiLayer, KelvinVoigt", "regressor"),
     ("enhance.reset", "", "Frequency, Trace, Ruptures", "when the covariance goes back to its prior"),
@@ -115,6 +177,12 @@ const ROWS: &[Row] = &[
     ("enhance.guard.old_ground_m", "m", ">= 0", "ground is old this far above the deepest point"),
     ("enhance.guard.rest_s", "s", ">= 0", "detection rests after it"),
     ("enhance.guard.slowing_per_s", "1/s", ">= 0", "no trailing edge while slowing faster"),
+    (
+        "enhance_virtual",
+        "",
+        "fields of enhance",
+        "the online algorithm on the virtual sensor's force; its model is that of enhance",
+    ),
     ("compare", "", "list of models", "further models on the same data"),
     ("sample_hz", "Hz", "above 0", "samples per second"),
     ("physics_hz", "Hz", "positive; rounded up to a whole multiple of sample_hz", "physics steps per second"),
@@ -201,7 +269,7 @@ mod tests {
         }
         // What stands in the table and not in the resolved scenario belongs to a list, a variant or `None`.
         for (path, ..) in ROWS.iter().filter(|row| !row.0.contains(['/', '['])) {
-            assert!(outline.locate(path).is_some(), "`{path}` does not exist");
+            assert!(*path == "enhance_virtual" || outline.locate(path).is_some(), "`{path}` does not exist");
         }
     }
 
@@ -218,7 +286,7 @@ mod tests {
         ] {
             assert!(table.contains(row), "{row}\n{table}");
         }
-        assert_eq!(crate::VirtualSensor::default().gain_per_s, 5.0);
+        assert_eq!(crate::VirtualSensor::default().gain_per_s, crate::ObserverGain::Same(5.0));
         assert_eq!(crate::FROM_REST_RAD.to_string(), "-1.5707963267948966");
     }
 }

@@ -12,12 +12,15 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod arm_line;
 mod describe;
 mod enhance_file;
 mod error;
 mod explain;
+mod joint_friction;
 mod load;
 mod motion;
+mod observer_gain;
 mod outline;
 mod plan;
 mod robot;
@@ -25,16 +28,20 @@ mod scenario;
 mod sensor;
 mod tokens;
 mod validate;
+mod validate_arm;
 mod validate_effects;
 mod validate_enhance;
 mod validate_motion;
 
+pub use arm_line::{Approach, ArmLine};
 pub use describe::describe;
 pub use enhance_file::EnhanceFile;
 pub use error::{InputError, closest};
+pub use joint_friction::{ArmFriction, CoulombViscous, Sigmoid};
 pub use load::{Problem, load, parse, read_text, ron_options};
 pub use motion::{FROM_REST_RAD, Motion, MotionPoint, Segment};
+pub use observer_gain::ObserverGain;
 pub use plan::MotionPlan;
-pub use robot::{ArmConfig, Robot};
+pub use robot::{ArmConfig, ArmController, Robot};
 pub use scenario::Scenario;
-pub use sensor::{ForceTorque, Sensor, VirtualSensor};
+pub use sensor::{ForceTorque, Sensor, VirtualSensor, WrenchFrom, ZeroWindow};

@@ -38,6 +38,10 @@ pub struct Scenario {
     /// The online algorithm.
     #[serde(default)]
     pub enhance: EnhanceConfig,
+    /// The online algorithm on the virtual sensor's force, whose lag smears what happens at a rupture;
+    /// as `enhance` when left out. Its model is that of `enhance`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub enhance_virtual: Option<EnhanceConfig>,
     /// Further models that are run on the same data.
     #[serde(default)]
     pub compare: Vec<Model>,
@@ -79,6 +83,12 @@ impl Scenario {
             }
         }
         models
+    }
+
+    /// The online algorithm for the virtual sensor's force.
+    #[must_use]
+    pub fn enhance_for_virtual(&self) -> &EnhanceConfig {
+        self.enhance_virtual.as_ref().unwrap_or(&self.enhance)
     }
 }
 

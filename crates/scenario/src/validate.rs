@@ -4,6 +4,7 @@
 use crate::load::Problem;
 use crate::scenario::Scenario;
 use crate::sensor::{ForceTorque, Sensor};
+use crate::validate_arm;
 use crate::validate_effects::effects;
 use crate::validate_enhance::enhance;
 use crate::validate_motion::motion;
@@ -37,7 +38,11 @@ pub(crate) fn scenario(s: &Scenario) -> Checked {
     check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
     check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
     motion(s)?;
-    sensors(&s.sensor)?;
+    sensors(&s.sensor, s.physics_hz)?;
+    validate_arm::robot(s)?;
+    if let Some(config) = &s.enhance_virtual {
+        enhance("enhance_virtual", config)?;
+    }
     enhance("enhance", &s.enhance)
 }
 
@@ -64,13 +69,13 @@ fn tissue(s: &Scenario) -> Checked {
     Ok(())
 }
 
-fn sensors(sensor: &Sensor) -> Checked {
+fn sensors(sensor: &Sensor, physics_hz: f64) -> Checked {
     match sensor {
         Sensor::ForceTorque(config) => force_torque("sensor", config),
-        Sensor::Virtual(config) => positive("sensor.gain_per_s", config.gain_per_s, "1/s"),
+        Sensor::Virtual(config) => validate_arm::virtual_sensor("sensor", config, physics_hz),
         Sensor::Both { force_torque: config, virtual_sensor } => {
             force_torque("sensor.force_torque", config)?;
-            positive("sensor.virtual_sensor.gain_per_s", virtual_sensor.gain_per_s, "1/s")
+            validate_arm::virtual_sensor("sensor.virtual_sensor", virtual_sensor, physics_hz)
         }
     }
 }

@@ -9,7 +9,9 @@ use stylet_core::config::{
     Algorithm, Contact, ContactConfig, CusumConfig, Depths, DerivativeConfig, DerivativeSense, DropConfig,
     DropEstimator, GuardConfig, Model, Reset,
 };
-use stylet_scenario::{ArmConfig, ForceTorque, Motion, Robot, Scenario, Segment, Sensor, VirtualSensor};
+use stylet_scenario::{
+    ArmConfig, ForceTorque, Motion, ObserverGain, Robot, Scenario, Segment, Sensor, VirtualSensor,
+};
 use stylet_tissue::{AnyEffect, Layer, Tissue, library};
 
 /// Text of any kind: quotes, backslashes, line ends, brackets, other scripts.
@@ -122,7 +124,12 @@ fn robot() -> impl Strategy<Value = Robot> {
 
 /// Sensors with the robots that can carry them: the virtual one listens to an arm.
 fn robot_and_sensor() -> impl Strategy<Value = (Robot, Sensor)> {
-    let virtual_sensor = || (0.5..50.0).prop_map(|gain_per_s| VirtualSensor { gain_per_s });
+    let virtual_sensor = || {
+        (0.5..50.0).prop_map(|gain| VirtualSensor {
+            gain_per_s: ObserverGain::Same(gain),
+            ..VirtualSensor::default()
+        })
+    };
     let arm = || Just(Robot::Arm(ArmConfig::default()));
     prop_oneof![
         (robot(), force_torque().prop_map(Sensor::ForceTorque)),
@@ -164,6 +171,7 @@ fn detection() -> impl Strategy<Value = (CusumConfig, DerivativeConfig, GuardCon
             old_ground_m: blind_travel_m / 20.0,
             rest_s,
             slowing_per_s,
+            ..GuardConfig::default()
         },
     );
     (cusum, derivative, guard)
@@ -273,6 +281,7 @@ fn scenario() -> impl Strategy<Value = Scenario> {
                     robot,
                     sensor,
                     enhance,
+                    enhance_virtual: None,
                     compare,
                     sample_hz,
                     physics_hz: sample_hz * f64::from(steps),

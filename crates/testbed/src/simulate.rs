@@ -1,10 +1,13 @@
 //! A whole scenario: motion, robot, tissue and sensors make a recording with its ground truth.
 
+use crate::arm_insertion::{ArmRecord, ArmSetup, on_arm};
+use crate::arm_rig::ArmError;
 use crate::insertion::{InsertionSample, Rates, on_slide, replayed};
 use crate::sensor::Measuring;
+use crate::virtual_error::VirtualError;
 use stylet_record::{Recording, TrueRupture, Truth};
-use stylet_scenario::{Robot, Scenario, Sensor};
-use stylet_tissue::{Law, Rupture, Slab, TooManyEffects};
+use stylet_scenario::{ForceTorque, Problem, Robot, Scenario, Sensor};
+use stylet_tissue::{Effect, Law, Place, Rupture, Slab, TooManyEffects};
 
 /// Why a scenario cannot be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -17,6 +20,12 @@ pub enum SimulateError {
     /// Too many effects at once.
     #[error(transparent)]
     Effects(#[from] TooManyEffects),
+    /// The scenario's numbers do not fit; a checked scenario has none of these.
+    #[error("{}: {}", .0.path, .0.what)]
+    Problem(Problem),
+    /// The arm cannot carry the needle.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
     /// A part of the scenario that this version cannot simulate.
     #[error("{what} cannot be simulated by this version; {remedy}")]
     NotSupported {
@@ -36,6 +45,19 @@ pub struct Simulation {
     pub truth: Truth,
     /// The layers as the law placed them.
     pub slabs: Vec<Slab>,
+    /// The sensors that recorded, force/torque first.
+    pub readings: Vec<Reading>,
+    /// How far the virtual sensor is off, and how late.
+    pub virtual_error: Option<VirtualError>,
+}
+
+/// The force of one sensor, as an online algorithm hears it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// `force_torque` or `virtual`.
+    pub sensor: &'static str,
+    /// Axial force in N, one value per sample; not a number as long as the sensor is not zeroed.
+    pub force_n: Vec<f64>,
 }
 
 /// How a scenario is sampled.
@@ -55,11 +77,21 @@ pub fn rates(scenario: &Scenario, duration_s: f64) -> Rates {
 pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
     let law = Law::new(&scenario.tissue, &scenario.effects)?;
-    let Sensor::ForceTorque(sensor) = &scenario.sensor else {
-        return Err(SimulateError::NotSupported {
-            what: "a virtual sensor",
-            remedy: "use sensor: ForceTorque(...)",
-        });
+    let without = ForceTorque { noise_n: 0.0, ..ForceTorque::default() };
+    let sensor = match scenario.sensor.force_torque() {
+        Some(sensor) => sensor,
+        None => {
+            let beside = |e: &stylet_tissue::AnyEffect| {
+                matches!(e.place(), Place::Tool | Place::Sensor) && !e.is_neutral()
+            };
+            if scenario.effects.iter().any(beside) {
+                return Err(SimulateError::NotSupported {
+                    what: "an effect of tool or force/torque sensor with `sensor: Virtual`",
+                    remedy: "use sensor: Both(...), or give the arm friction and model errors instead",
+                });
+            }
+            &without
+        }
     };
     let mut measuring = Measuring::new(&scenario.effects, sensor, seed, scenario.sample_hz);
     let rates = rates(scenario, plan.duration_s());
@@ -74,22 +106,56 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         });
     };
     let sink = |s: &InsertionSample| columns.push(s, &mut measuring);
-    match scenario.robot {
-        Robot::Slide => on_slide(&plan, &law, &rates, on_rupture, sink),
-        Robot::Replay => replayed(&plan, &law, &rates, on_rupture, sink),
-        Robot::Arm(_) => {
+    let mut arm = None;
+    match &scenario.robot {
+        Robot::Arm(config) => {
+            let sensor = scenario.sensor.virtual_sensor();
+            let line = config
+                .line(&plan, scenario.tissue.surface_m, scenario.sample_hz, sensor)
+                .map_err(SimulateError::Problem)?;
+            let setup = ArmSetup { config, line: &line, sensor, seed };
+            arm = Some(on_arm(&plan, &law, &rates, &setup, on_rupture, sink)?);
+        }
+        _ if scenario.sensor.virtual_sensor().is_some() => {
             return Err(SimulateError::NotSupported {
-                what: "robot: Arm",
-                remedy: "use robot: Slide or robot: Replay",
+                what: "a virtual sensor without an arm",
+                remedy: "use robot: Arm()",
             });
         }
+        Robot::Slide => on_slide(&plan, &law, &rates, on_rupture, sink),
+        Robot::Replay => replayed(&plan, &law, &rates, on_rupture, sink),
     }
     // Where the needle was recorded at that instant: the law's own position is relative to the tissue.
     for rupture in &mut ruptures {
         rupture.position_m = columns.recorded_m(rupture.time_s).unwrap_or(rupture.position_m);
     }
     columns.truth.ruptures = ruptures;
-    Ok(Simulation { recording: columns.recording, truth: columns.truth, slabs: law.slabs().to_vec() })
+    let mut recording = columns.recording;
+    let zeroed_s = arm.as_ref().map_or(0.0, |arm| arm.zeroed_s);
+    let readings = readings(&mut recording, arm, &scenario.sensor);
+    let virtual_error = VirtualError::of(&recording, &columns.truth, zeroed_s);
+    let slabs = law.slabs().to_vec();
+    Ok(Simulation { recording, truth: columns.truth, slabs, readings, virtual_error })
+}
+
+/// Puts what the arm recorded into the recording, and lists what the sensors say.
+fn readings(recording: &mut Recording, arm: Option<ArmRecord>, sensor: &Sensor) -> Vec<Reading> {
+    let mut readings = Vec::new();
+    if sensor.force_torque().is_some() {
+        readings.push(Reading { sensor: "force_torque", force_n: recording.force_n.clone() });
+    }
+    let Some(arm) = arm else { return readings };
+    recording.joint_torque_nm = arm.joint_torque_nm;
+    if sensor.virtual_sensor().is_some() {
+        let heard = recording.time_s.iter().zip(&arm.virtual_n);
+        let force_n = heard.map(|(t, f)| if *t < arm.zeroed_s - 1e-9 { f64::NAN } else { *f }).collect();
+        readings.push(Reading { sensor: "virtual", force_n });
+        if sensor.force_torque().is_none() {
+            recording.force_n.clone_from(&arm.virtual_n);
+        }
+        recording.force_virtual_n = Some(arm.virtual_n);
+    }
+    readings
 }
 
 /// Recording and truth as they grow.

@@ -1,0 +1,137 @@
+//! An insertion carried out by the arm.
+
+use crate::arm_rig::{ArmError, ArmRig};
+use crate::insertion::{InsertionSample, Rates};
+use stylet_dynamics::{Error, JointVector};
+use stylet_scenario::{ArmConfig, ArmLine, MotionPlan, VirtualSensor};
+use stylet_tissue::{Law, LawState, Rupture};
+
+/// Arm, line and virtual sensor of an insertion.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmSetup<'a> {
+    /// The arm.
+    pub config: &'a ArmConfig,
+    /// Its way, as [`ArmConfig::line`] found it.
+    pub line: &'a ArmLine,
+    /// The virtual sensor, if it records.
+    pub sensor: Option<&'a VirtualSensor>,
+    /// Seed of the joint torques' noise.
+    pub seed: u64,
+}
+
+/// What the arm recorded, one value per sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ArmRecord {
+    /// Measured joint torques, N m.
+    pub joint_torque_nm: Vec<[f64; 7]>,
+    /// Axial force of the virtual sensor, N; empty without one.
+    pub virtual_n: Vec<f64>,
+    /// From when on the virtual sensor is zeroed, s: an online algorithm listens from then on.
+    pub zeroed_s: f64,
+    /// Largest distance of the tip from the line, m.
+    pub off_line_m: f64,
+}
+
+/// The arm: rapier carries it, the law is stepped with every physics step on the tip's actual position
+/// and velocity, and its force acts on the tip. The virtual sensor's observer runs at physics rate
+/// from the beginning of the approach.
+///
+/// # Errors
+/// [`ArmError`] when the arm leaves its limits.
+pub fn on_arm(
+    plan: &MotionPlan,
+    law: &Law,
+    rates: &Rates,
+    setup: &ArmSetup<'_>,
+    mut on_rupture: impl FnMut(Rupture),
+    mut sink: impl FnMut(&InsertionSample),
+) -> Result<ArmRecord, ArmError> {
+    let ArmSetup { config, line, sensor, seed } = *setup;
+    let steps = rates.steps_per_sample.max(1) as i64;
+    let physics_hz = rates.sample_hz * steps as f64;
+    let before = (line.approach.duration_s * physics_hz).ceil() as i64;
+    let start_m = plan.at(0.0).position_m;
+    let first = line.plan_at(plan, -(before as f64) / physics_hz);
+    let mut rig = ArmRig::new(config, sensor, line, &first, start_m, 1.0 / physics_hz, seed)?;
+
+    let mut zero = Zeroing::new(line.zero_s, physics_hz);
+    let mut record = ArmRecord { zeroed_s: zero.until_s(physics_hz), ..ArmRecord::default() };
+    let mut state = LawState::default();
+    let mut before_mps = first.velocity_mps;
+    for k in -before..rates.samples as i64 * steps {
+        let time_s = k as f64 / physics_hz;
+        let on_the_way = |reason: Error| ArmError::OnTheWay { time_s, reason };
+        let sampled = k >= 0 && k % steps == 0;
+        let mut force = None;
+        let moment = rig
+            .step(&line.plan_at(plan, time_s), sampled, |position_m, velocity_mps| {
+                if k < 0 {
+                    return 0.0;
+                }
+                let felt = law.step(&mut state, time_s, position_m, velocity_mps, &mut on_rupture);
+                force = Some(felt);
+                felt.total_n
+            })
+            .map_err(on_the_way)?;
+        if let (true, Some(force)) = (sampled, force) {
+            record.joint_torque_nm.push(moment.joint_torque_nm.into());
+            record.virtual_n.extend(moment.virtual_n);
+            record.off_line_m = record.off_line_m.max(moment.off_line_m);
+            zero.keep(&moment.q_rad);
+            sink(&InsertionSample {
+                time_s: (k / steps) as f64 / rates.sample_hz,
+                position_m: moment.position_m,
+                velocity_mps: moment.velocity_mps,
+                acceleration_mps2: (moment.velocity_mps - before_mps) * physics_hz,
+                force,
+            });
+        }
+        before_mps = moment.velocity_mps;
+        zero.step(k, &mut rig, &mut record.virtual_n).map_err(on_the_way)?;
+    }
+    Ok(record)
+}
+
+/// Averages the residual over a window and takes it as zero, from the beginning of the recording on.
+struct Zeroing {
+    /// First and last step of the window.
+    window: Option<(i64, i64)>,
+    /// Joint angles of the samples that were recorded before the zero was known.
+    waiting: Vec<JointVector<7>>,
+}
+
+impl Zeroing {
+    fn new(zero_s: Option<(f64, f64)>, physics_hz: f64) -> Self {
+        let step = |t: f64| (t * physics_hz).round() as i64;
+        let window = zero_s.map(|(from, until)| (step(from), step(until).max(step(from) + 1)));
+        Self { window, waiting: Vec::new() }
+    }
+
+    fn until_s(&self, physics_hz: f64) -> f64 {
+        self.window.map_or(0.0, |(_, until)| (until as f64 / physics_hz).max(0.0))
+    }
+
+    fn keep(&mut self, q_rad: &JointVector<7>) {
+        if self.window.is_some() {
+            self.waiting.push(*q_rad);
+        }
+    }
+
+    /// After step `k`.
+    fn step(&mut self, k: i64, rig: &mut ArmRig, recorded_n: &mut [f64]) -> Result<(), Error> {
+        let Some((from, until)) = self.window else { return Ok(()) };
+        if k == from
+            && let Some(observer) = rig.observer_mut()
+        {
+            observer.begin_zero();
+        }
+        if k == until {
+            self.window = None;
+            let zero = rig.observer_mut().map(|observer| observer.finish_zero()).transpose()?;
+            for (value, q) in recorded_n.iter_mut().zip(self.waiting.drain(..)) {
+                *value -= zero.map_or(0.0, |zero| rig.axial_of(&q, &zero));
+            }
+        }
+        Ok(())
+    }
+}

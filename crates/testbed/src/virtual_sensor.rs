@@ -1,0 +1,132 @@
+//! The virtual sensor: the force at the needle's tip from the arm's joint torques.
+
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use stylet_dynamics::friction::JointFriction;
+use stylet_dynamics::{
+    Arm, EARTH_GRAVITY_MPS2, Error, JointVector, MomentumTerms, Observer, ObserverConfig, ObserverState,
+    Posture,
+};
+use stylet_scenario::{ArmConfig, VirtualSensor, WrenchFrom};
+
+/// Stream of the generator from which the joint torques' noise is drawn.
+const NOISE_STREAM: u64 = 2;
+/// Damping of the pseudo-inverse: costs a millionth of a force.
+const DAMPING: f64 = 1e-3;
+
+/// Joint torques as the arm measures them.
+///
+/// The motors' inner loops overcome the joints' friction: the links are driven by the commanded
+/// torque alone and the motors give `friction(qd)` more, which the torque sensors contain. For the
+/// same motion the residual of an observer is the same as if the friction acted on the links and the
+/// motors gave the commanded torque; but friction applied to the links at 1 kHz is stiff (see
+/// `stylet_dynamics::friction::SmoothSign::width_radps`).
+#[derive(Debug)]
+pub struct TorqueSensors {
+    friction: JointFriction<7>,
+    noise_nm: f64,
+    generator: ChaCha8Rng,
+}
+
+impl TorqueSensors {
+    /// Sensors with the arm's friction and white noise of standard deviation `noise_nm` from `seed`.
+    #[must_use]
+    pub fn new(arm: &ArmConfig, noise_nm: f64, seed: u64) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(NOISE_STREAM);
+        Self { friction: arm.joint_friction.laws(arm.friction_scale), noise_nm, generator }
+    }
+
+    /// What they read (N m) while `driving_nm` drives the links at joint rates `qd_radps`.
+    #[inline]
+    pub fn read(&mut self, driving_nm: &JointVector<7>, qd_radps: &JointVector<7>) -> JointVector<7> {
+        let mut reading = driving_nm + self.friction.torques(qd_radps);
+        if self.noise_nm > 0.0 {
+            for torque in &mut reading {
+                let unit: f64 = StandardNormal.sample(&mut self.generator);
+                *torque += self.noise_nm * unit;
+            }
+        }
+        reading
+    }
+}
+
+/// A momentum observer with the model that it believes, and the direction in which its force counts.
+///
+/// `r = G (p - p(0) - int(tau + C^T qd - g + r) ds)` once per physics step; wrench `= pinv(J^T) r`, less
+/// the value of `r` in the air; axial force `f = -F . u` (SPEC section 4; `stylet_dynamics::Observer`).
+#[derive(Debug)]
+pub struct AxialObserver {
+    /// When it differs from the arm as it is.
+    believed: Option<Arm<7>>,
+    observer: Observer<7>,
+    state: ObserverState<7>,
+    wrench: WrenchFrom,
+}
+
+impl AxialObserver {
+    /// An observer for an arm.
+    ///
+    /// # Errors
+    /// When a gain or the believed model is out of range.
+    pub fn new(arm: &ArmConfig, sensor: &VirtualSensor) -> Result<Self, Error> {
+        let wrong = arm.payload_error_kg != 0.0 || arm.link_mass_error != 0.0;
+        Ok(Self {
+            believed: if wrong { Some(Arm::new(&arm.believed_model())?) } else { None },
+            observer: ObserverConfig { gain_per_s: sensor.gain_per_s.into() }.build()?,
+            state: ObserverState::default(),
+            wrench: sensor.wrench,
+        })
+    }
+
+    /// One physics step: `terms` of the arm as it is at the present state, joint torques (N m) read over
+    /// the step of `dt_s` that led here.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    #[inline]
+    pub fn step(
+        &mut self,
+        (q_rad, qd_radps): (&JointVector<7>, &JointVector<7>),
+        terms: &MomentumTerms<7>,
+        torque_nm: &JointVector<7>,
+        dt_s: f64,
+    ) -> Result<(), Error> {
+        let terms = match &self.believed {
+            None => *terms,
+            Some(arm) => arm.at(q_rad).momentum_terms(qd_radps, &EARTH_GRAVITY_MPS2),
+        };
+        self.observer.step(&mut self.state, &terms, torque_nm, dt_s)?;
+        Ok(())
+    }
+
+    /// From now on the residual is averaged...
+    pub fn begin_zero(&mut self) {
+        self.state.begin_offset();
+    }
+
+    /// ...and the average is taken as zero; what that means in joint torques (N m).
+    ///
+    /// # Errors
+    /// When nothing was averaged.
+    pub fn finish_zero(&mut self) -> Result<JointVector<7>, Error> {
+        self.state.finish_offset()
+    }
+
+    /// Axial force (N) along `direction`, positive when it resists the insertion, of the residual.
+    #[must_use]
+    pub fn axial_n(&self, at: &Posture<'_, 7>, direction: &Vector3<f64>) -> f64 {
+        self.axial_of(at, direction, &self.state.residual_nm())
+    }
+
+    /// The same of given external joint torques (N m).
+    #[must_use]
+    pub fn axial_of(&self, at: &Posture<'_, 7>, direction: &Vector3<f64>, torque_nm: &JointVector<7>) -> f64 {
+        match self.wrench {
+            WrenchFrom::Full => -at.tip_wrench(torque_nm, DAMPING).along(direction),
+            WrenchFrom::Point => -at.tip_point_force(torque_nm, DAMPING).dot(direction),
+        }
+    }
+}
