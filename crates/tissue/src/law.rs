@@ -12,6 +12,7 @@
 //! that a hook asks only those that answer it.
 
 use crate::AnyEffect;
+use crate::breaking::{Breaking, ByLaw, Strain};
 use crate::effect::{Effect, Memory, Moment, Place};
 use crate::force::{Rupture, TissueForce};
 use crate::layer::Tissue;
@@ -120,7 +121,20 @@ impl Law {
         time_s: f64,
         z_m: f64,
         v_mps: f64,
-        mut on_rupture: impl FnMut(Rupture),
+        on_rupture: impl FnMut(Rupture),
+    ) -> TissueForce {
+        self.advance(state, time_s, z_m, v_mps, &mut ByLaw(on_rupture))
+    }
+
+    /// [`Law::step`] with somebody who decides on ruptures.
+    #[inline]
+    pub(crate) fn advance(
+        &self,
+        state: &mut LawState,
+        time_s: f64,
+        z_m: f64,
+        v_mps: f64,
+        breaking: &mut impl Breaking,
     ) -> TissueForce {
         if !(time_s + z_m + v_mps).is_finite() {
             return TissueForce::unknown(state.ruptured + 1);
@@ -135,31 +149,23 @@ impl Law {
         let time_s = time_s.max(state.time_s);
         let dt = time_s - state.time_s;
         if self.needle_n_per_m < f64::INFINITY {
-            return self.step_bending(state, time_s, z, &mut on_rupture);
+            return self.step_bending(state, time_s, z, breaking);
         }
-        let elastic_n = self.load(state, dt, z, v, &mut on_rupture);
+        let elastic_n = self.load(state, dt, z, v, breaking);
         self.membrane_breaks(state, z);
         self.settle(state, time_s, z, v, elastic_n)
     }
 
     /// Elastic force of the active layer, after as many ruptures as this step brings.
     #[inline]
-    fn load(
-        &self,
-        state: &mut LawState,
-        dt: f64,
-        z: f64,
-        v: f64,
-        on_rupture: &mut impl FnMut(Rupture),
-    ) -> f64 {
+    fn load(&self, state: &mut LawState, dt: f64, z: f64, v: f64, breaking: &mut impl Breaking) -> f64 {
         let mut done = 0.0; // share of the step that the ruptures so far have used up
         while let Some(slab) = self.slabs.get(state.ruptured) {
             let elastic = self.elastic(slab, (1.0 - done) * dt, z, &mut state.memory);
-            match self.give_way(state, slab, dt, (z, v), elastic, done) {
+            match self.give_way(state, slab, dt, (z, v), elastic, done, breaking) {
                 None => return elastic,
                 Some(rupture) => {
                     done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
-                    on_rupture(rupture);
                 }
             }
         }
@@ -186,6 +192,7 @@ impl Law {
     /// The rupture of the active layer, if its elastic force or the tip's position bring it.
     /// `done` is the share of the step that is over.
     #[inline]
+    #[allow(clippy::too_many_arguments, reason = "one step, taken apart")]
     pub(crate) fn give_way(
         &self,
         state: &mut LawState,
@@ -194,12 +201,20 @@ impl Law {
         (z, v): (f64, f64),
         elastic: f64,
         done: f64,
+        breaking: &mut impl Breaking,
     ) -> Option<Rupture> {
         let mut threshold = slab.puncture_n;
         for effect in self.at(Place::Puncture) {
             threshold = effect.puncture(threshold, v);
         }
-        if !(elastic >= threshold || z >= slab.far_m()) {
+        let strain = Strain {
+            layer: state.ruptured + 1,
+            elastic_n: elastic,
+            puncture_n: threshold,
+            tip_m: z,
+            far_m: slab.far_m(),
+        };
+        if !breaking.breaks(&strain) {
             return None;
         }
         let rupture = Self::rupture(state, slab, dt, z, elastic, threshold, done);
@@ -213,6 +228,7 @@ impl Law {
         }
         state.ruptured += 1;
         state.elastic_n = 0.0;
+        breaking.broken(rupture);
         Some(rupture)
     }
 
