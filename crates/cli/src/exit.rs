@@ -38,6 +38,12 @@ pub enum Failure {
         /// What the system says.
         why: std::io::Error,
     },
+    /// Recordings and scenario do not belong together.
+    #[error(transparent)]
+    Diagnose(#[from] stylet_diagnose::DiagnoseError),
+    /// An argument names what there is not.
+    #[error("{0}")]
+    Argument(String),
     /// A mistake of ours.
     #[error("internal error: {0}; please report it")]
     Internal(String),
@@ -54,7 +60,7 @@ impl Failure {
     #[must_use]
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Failure::Input(_) | Failure::Recording(_) | Failure::Simulate { .. } | Failure::Output { .. } => {
+            Failure::Input(_) | Failure::Recording(_) | Failure::Simulate { .. } | Failure::Output { .. } | Failure::Diagnose(_) | Failure::Argument(_) => {
                 INPUT_WRONG
             }
             Failure::Internal(_) => INTERNAL,

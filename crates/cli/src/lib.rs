@@ -2,6 +2,10 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod benchmark;
+mod diagnose;
+mod diagnose_report;
+mod effects;
 mod enhance;
 pub mod exit;
 mod hash;
@@ -23,6 +27,9 @@ pub fn main() -> ExitCode {
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Enhance(args) => enhance::enhance(args),
+        Command::Diagnose(args) => diagnose::diagnose(args),
+        Command::Effects(args) => effects::effects(args),
+        Command::Benchmark(args) => benchmark::benchmark(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
     match outcome {

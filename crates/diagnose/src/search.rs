@@ -191,7 +191,8 @@ impl Search {
                 chosen.push(s);
             }
         }
-        let fits: Vec<Option<(Fit, Vec<Vec<usize>>)>> = chosen
+        // Two turns for all; the rest only for those that may still win.
+        let begun: Vec<Option<(Fit, Data, Vec<Vec<usize>>)>> = chosen
             .par_iter()
             .map(|s| {
                 let shifted = shift(&data, &s.start);
@@ -202,9 +203,23 @@ impl Search {
                 };
                 let mut model = stood.model.with(s.start.choice.clone());
                 seed_punctures(&mut model, &there);
-                let f = fit(&model, &there, 7, 0.1)?;
-                Some((f, shifted.ruptures))
+                let f = fit(&model, &there, 2, 0.1)?;
+                Some((f, there, shifted.ruptures))
             })
+            .collect();
+        let mut begun: Vec<(Fit, Data, Vec<Vec<usize>>)> = begun.into_iter().flatten().collect();
+        begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
+        let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
+        let mut kept = 0;
+        begun.retain(|b| {
+            let gain = stood.nats - b.0.nats;
+            let keep = kept < 4 || (kept < 16 && gain > 0.3 * lead - 100.0);
+            kept += usize::from(keep);
+            keep
+        });
+        let fits: Vec<Option<(Fit, Vec<Vec<usize>>)>> = begun
+            .par_iter()
+            .map(|(f, there, ruptures)| Some((fit(&f.model, there, 6, 0.1)?, ruptures.clone())))
             .collect();
         let mut best: Vec<(Fit, Vec<Vec<usize>>)> = Vec::new();
         for found in fits.into_iter().flatten() {
@@ -221,6 +236,11 @@ impl Search {
             .map(|b| (b.0.model.names().last().copied().unwrap_or(""), stood.nats - b.0.nats))
             .collect();
         best.truncate(FINALISTS);
+        let lead = best.first().map_or(0.0, |b| stood.nats - b.0.nats);
+        best.retain(|b| {
+            let gain = stood.nats - b.0.nats;
+            gain > 0.5 * lead - 40.0 && gain > -400.0
+        });
         let mut finalists: Vec<(Model, Vec<Vec<usize>>)> =
             best.into_iter().map(|(f, r)| (f.model, r)).collect();
         for start in self.fast_lines(standing, &data) {
@@ -267,11 +287,15 @@ impl Search {
         let before = self.data.noise;
         self.data.noise = noise.unwrap_or(before);
         let data = &self.data;
+        let first = rivals[0].fined();
         let rescored: Vec<Option<Candidate>> = rivals
             .par_iter()
             .map(|r| {
                 let mut there = Data { ruptures: r.ruptures.clone(), ..data.clone() };
-                let f = refine(&r.model, &mut there, 1, 3, false)?;
+                if r.fined() > first + 60.0 {
+                    return Some(Candidate { nats: nats(&r.model, &there), ..r.clone() });
+                }
+                let f = refine(&r.model, &mut there, 1, 2, false)?;
                 Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
             })
             .collect();
@@ -309,8 +333,11 @@ impl Search {
     /// best rivals.
     fn refit_standing(&self, standing: &Candidate, rivals: &[Candidate]) -> Candidate {
         let count = standing.model.effects.len();
+        // A gain of thousands is no failure of the optimiser.
+        let ahead = rivals.first().map_or(0.0, |r| standing.nats - r.nats);
+        let more = if ahead > 2000.0 { 0 } else { 2 };
         let roads: Vec<(Model, Vec<Vec<usize>>)> = std::iter::once((standing.model.clone(), standing.ruptures.clone()))
-            .chain(rivals.iter().take(3).map(|r| {
+            .chain(rivals.iter().take(more).map(|r| {
                 let mut model = r.model.clone();
                 model.effects.truncate(count);
                 (model, r.ruptures.clone())
@@ -320,7 +347,7 @@ impl Search {
             .par_iter()
             .map(|(model, ruptures)| {
                 let mut there = Data { ruptures: ruptures.clone(), ..self.data.clone() };
-                let f = refine(model, &mut there, 1, 4, false)?;
+                let f = refine(model, &mut there, 1, 3, false)?;
                 Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
             })
             .collect();

@@ -7,7 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
-use stylet_tissue::{AnyEffect, Effect, Law, LawState, Layer, Measurement, Reading, Tissue};
+use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissue};
 
 /// Samples per second of the recordings.
 pub const SAMPLE_HZ: f64 = 200.0;
@@ -241,10 +241,4 @@ pub fn case(drawn: &Drawn) -> Case {
     }
     let _ = rng.next_u64();
     Case { believed: scenario(), truth, recordings, ruptures }
-}
-
-/// Whether an effect acts where random numbers are drawn.
-#[must_use]
-pub fn is_random(effect: &AnyEffect) -> bool {
-    effect.id() == "force_spikes"
 }

@@ -7,7 +7,7 @@ pub const OUTSIDE: [&str; 8] = [
     "steps_in_bias",
     "chirp",
     "friction_fades_with_time",
-    "wandering",
+    "slack_on_return",
     "force_with_acceleration_squared",
     "corrugated_friction",
 ];
@@ -21,15 +21,15 @@ pub struct Outside {
     pub u: [f64; 4],
     /// Size in N.
     pub size_n: f64,
+    /// Deepest position so far.
     walk: f64,
-    seed: u64,
 }
 
 impl Outside {
     /// An effect of this kind.
     #[must_use]
     pub fn new(kind: usize, u: [f64; 4], size_n: f64) -> Self {
-        Self { kind: kind % OUTSIDE.len(), u, size_n, walk: 0.0, seed: (u[0] * 1e15) as u64 | 1 }
+        Self { kind: kind % OUTSIDE.len(), u, size_n, walk: 0.0 }
     }
 
     /// The force at an instant, `inside` being the length of needle in tissue (m), every millisecond.
@@ -52,10 +52,8 @@ impl Outside {
             3 => (tau * (0.05 + 0.4 * u[0]) * t * (1.0 + t / (20.0 + 20.0 * u[1]))).sin(),
             4 => 20.0 * inside * (v / 3e-3).tanh() * (-t / (6.0 + 8.0 * u[0])).exp(),
             5 => {
-                self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                let white = (self.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-                self.walk += 0.001 / (1.0 + 2.0 * u[1]) * (-self.walk) + 0.08 * white;
-                self.walk
+                self.walk = self.walk.max(z);
+                -2.0 * ((self.walk - z) / (0.002 + 0.004 * u[0])).min(1.0)
             }
             6 => (a / 5e-3).abs().min(3.0) * (v / 3e-3).abs(),
             _ if z > 0.0 => v / 3e-3 * (tau * z / (0.006 + 0.012 * u[0])).sin() * inside / 0.05,
