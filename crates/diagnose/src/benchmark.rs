@@ -1,7 +1,7 @@
 //! The examination: diagnoses drawn cases and compares with what was hidden.
 
 use crate::diagnose::{Evidence, Options, diagnose};
-use crate::fit::{Data, Residuals, residuals};
+use crate::fit::Data;
 use crate::held_out::{free_residual, rms};
 use crate::hidden::{self, Drawn, Kind, Size, Sketch};
 use crate::model::{Choice, Model};
@@ -10,7 +10,6 @@ use crate::refine::refine;
 use crate::search::{Candidate, Search, Settings};
 use crate::track::Track;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 use std::time::Instant;
 use stylet_tissue::{AnyEffect, Effect};
 
@@ -76,12 +75,12 @@ fn size_of(search: &Search, base: &Candidate, clean: &[Vec<f64>], drawn: &Drawn)
         .zip(clean)
         .map(|(t, f)| Track { f: f.clone(), used: vec![true; f.len()], ..t.clone() })
         .collect();
-    let data = Data { tracks: Arc::new(tracks), ..search.data_of(base) };
-    let mut r = Residuals::default();
-    if !residuals(&base.model, &data, &mut r) {
-        return 0.0;
+    let (mut square, mut n) = (0.0, 0.0);
+    for track in &tracks {
+        square += free_residual(&base.model, track).iter().map(|e| e * e).sum::<f64>();
+        n += track.len() as f64;
     }
-    let mut square = r.e.iter().map(|e| e * e).sum::<f64>() / r.e.len().max(1) as f64;
+    let mut square = square / f64::max(n, 1.0);
     for e in &drawn.effects {
         if let AnyEffect::ForceSpikes(s) = e {
             square += s.rate_hz / hidden::SAMPLE_HZ * s.size_n * s.size_n;

@@ -182,8 +182,11 @@ fn step(stage: &crate::search::Stage) -> EvidenceStep {
 /// A cause with its class, confidence and intervals.
 fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role, f64, f64)]>) -> Cause {
     let choice = &best.model.effects[index];
-    let last = index + 1 == best.model.effects.len();
-    let own = best.fined();
+    // Rivals that stand on the same other effects.
+    let others = &best.model.names()[..best.model.effects.len() - 1];
+    let last = index + 1 == best.model.effects.len()
+        && search.rivals.first().is_some_and(|r| r.model.names().starts_with(others) && r.model.effects.len() == others.len() + 1);
+    let own = search.reference;
     let name_of = |c: &Candidate| c.model.names().last().copied().unwrap_or("").to_owned();
     let mut weights = 0.0;
     let mut equivalent = Vec::new();

@@ -4,6 +4,7 @@
 pub mod air;
 pub mod benchmark;
 mod check;
+pub mod curves;
 mod diagnose;
 mod error;
 pub mod fit;

@@ -116,7 +116,7 @@ impl<'a> Look<'a> {
             return Some(nothing);
         }
         let scale = if amount < 0.0 { amount.clamp(-5.0, -0.2) } else { amount.clamp(0.2, 5.0) };
-        if info.id != "power_law_friction" && info.id != "needle_compliance" && info.id != "hidden_membrane" {
+        if !matches!(info.id, "power_law_friction" | "rate_dependent_puncture" | "boundary_shift" | "position_scale") && info.id != "needle_compliance" && info.id != "hidden_membrane" {
             for (value, p) in start.choice.values.iter_mut().zip(info.parameters) {
                 let scalable = p.strength && !matches!(info.id, "low_pass_lag" | "time_delay" | "soft_boundary");
                 if scalable {

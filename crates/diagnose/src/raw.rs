@@ -102,7 +102,9 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
             let (before, after) = (f[i] - f[i - 1], f[i] - f[i + 1]);
             let both = before.abs().min(after.abs()) > 0.7 * SPIKE_SD * sd && before * after > 0.0;
             let level = (f[i - 1] - f[i + 1]).abs() < 0.5 * s.abs();
-            if s.abs() > SPIKE_SD * sd && both && level && !exclude[i] {
+            let v = &recording.velocity_mps;
+            let moves = (v[i + 1] - v[i - 1]).abs() > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
+            if !moves && s.abs() > SPIKE_SD * sd && both && level && !exclude[i] {
                 exclude[i] = true;
                 count += 1;
                 size += s.abs();

@@ -135,17 +135,18 @@ fn walk_stepped(model: &mut Model, data: &Data) {
 /// Fits a model and moves its ruptures in turn.
 #[must_use]
 pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide: bool) -> Option<Fit> {
+    let enough = if turns < 6 { 0.2 } else { 0.02 };
     let mut model = model.clone();
     seed_punctures(&mut model, data);
     walk_stepped(&mut model, data);
-    let mut best = fit(&model, data, turns, 0.02)?;
+    let mut best = fit(&model, data, turns, enough)?;
     for round in 0..rounds {
         let mut there = data.clone();
         let moved = retime(&best.model, &mut there, wide && round == 0);
         let mut next = best.model.clone();
         walk_stepped(&mut next, &there);
         seed_punctures(&mut next, &there);
-        let Some(new) = fit(&next, &there, turns, 0.02) else { break };
+        let Some(new) = fit(&next, &there, turns, enough) else { break };
         let gained = best.nats - new.nats;
         if gained > 0.0 {
             *data = there;

@@ -101,6 +101,8 @@ pub struct Search {
     pub q: usize,
     /// Largest force.
     pub force_n: f64,
+    /// Fined nats of the effect taken last, under the noise by which its rivals were judged.
+    pub reference: f64,
 }
 
 impl Search {
@@ -131,7 +133,7 @@ impl Search {
         let fitted = refine(&fitted.model, &mut data, 1, 4, false)?;
         let base =
             Candidate { model: fitted.model, ruptures: data.ruptures.clone(), nats: fitted.nats };
-        Some(Self { settings, best: base.clone(), base, rivals: Vec::new(), stages: Vec::new(), air, q, force_n, data })
+        Some(Self { settings, best: base.clone(), base, rivals: Vec::new(), stages: Vec::new(), air, q, force_n, data, reference: 0.0 })
     }
 
     /// The data with a candidate's ruptures.
@@ -165,10 +167,13 @@ impl Search {
 
     /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened.
     fn contest(&self, standing: &Candidate) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
+        let clock = std::time::Instant::now();
+        let tick = |what: &str| { if std::env::var_os("T").is_some() { eprintln!("{what} {:.3}", clock.elapsed().as_secs_f64()); } };
         let data = self.data_of(standing);
         let coarse = data.blocks(self.q, data.noise.blocks(self.q));
         let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
         let hints = self.hints(standing, &data);
+        tick("hints");
         let taken = standing.model.names();
         let all: Vec<Start> = starts::all(&hints)
             .into_iter()
@@ -178,13 +183,18 @@ impl Search {
             })
             .collect();
         let seen = looks(&stood.model, &data, &coarse, self.q, &all);
+        tick("looks");
         // The two best starts of each effect, three of those with several basins.
         let mut chosen: Vec<&Seen> = Vec::new();
         let mut order: Vec<&Seen> = seen.iter().collect();
         order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         for s in order {
             let id = s.start.choice.info.id;
-            let most = if matches!(id, "hidden_membrane" | "respiration" | "boundary_shift" | "low_pass_lag" | "soft_boundary") { 3 } else { 2 };
+            let most = match id {
+                "boundary_shift" | "rate_dependent_puncture" | "position_scale" => 8,
+                "hidden_membrane" | "respiration" | "low_pass_lag" | "soft_boundary" => 3,
+                _ => 2,
+            };
             if chosen.iter().filter(|c| c.start.choice.info.id == id).count() < most
                 && (s.gain > 1.0 || moves_events(id))
             {
@@ -207,6 +217,7 @@ impl Search {
                 Some((f, there, shifted.ruptures))
             })
             .collect();
+        tick(&format!("begun {}", chosen.len()));
         let mut begun: Vec<(Fit, Data, Vec<Vec<usize>>)> = begun.into_iter().flatten().collect();
         begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
         let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
@@ -221,6 +232,7 @@ impl Search {
             .par_iter()
             .map(|(f, there, ruptures)| Some((fit(&f.model, there, 6, 0.1)?, ruptures.clone())))
             .collect();
+        tick(&format!("fits {:?}", begun.iter().map(|b| *b.0.model.names().last().unwrap_or(&"")).collect::<Vec<_>>()));
         let mut best: Vec<(Fit, Vec<Vec<usize>>)> = Vec::new();
         for found in fits.into_iter().flatten() {
             let id = found.0.model.names().last().copied();
@@ -239,13 +251,17 @@ impl Search {
         let lead = best.first().map_or(0.0, |b| stood.nats - b.0.nats);
         best.retain(|b| {
             let gain = stood.nats - b.0.nats;
-            gain > 0.5 * lead - 40.0 && gain > -400.0
+            gain > 0.5 * lead - 40.0 && (gain > 2.5 || (gain > -400.0 && lead > 50.0))
         });
         let mut finalists: Vec<(Model, Vec<Vec<usize>>)> =
             best.into_iter().map(|(f, r)| (f.model, r)).collect();
+        if lead > 30.0 && !taken.contains(&"needle_compliance") {
+            finalists.extend(self.springs(standing, &data).map(|s| (standing.model.with(s), standing.ruptures.clone())));
+        }
         for start in self.fast_lines(standing, &data) {
             finalists.push((standing.model.with(start.choice), standing.ruptures.clone()));
         }
+        tick("lines");
         let mut rivals: Vec<Candidate> = finalists
             .par_iter()
             .map(|(model, ruptures)| {
@@ -254,13 +270,14 @@ impl Search {
                     model.names().last().copied().unwrap_or(""),
                     "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration"
                 );
-                let f = refine(model, &mut there, if wide { 3 } else { 1 }, 4, wide)?;
+                let f = refine(model, &mut there, if wide { 3 } else { 2 }, 5, wide)?;
                 Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
             })
             .collect::<Vec<_>>()
             .into_iter()
             .flatten()
             .collect();
+        tick(&format!("finals {:?}", rivals.iter().map(|b| *b.model.names().last().unwrap_or(&"")).collect::<Vec<_>>()));
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         // The same effect from two roads.
         let mut names: Vec<&str> = Vec::new();
@@ -295,7 +312,7 @@ impl Search {
                 if r.fined() > first + 60.0 {
                     return Some(Candidate { nats: nats(&r.model, &there), ..r.clone() });
                 }
-                let f = refine(&r.model, &mut there, 1, 2, false)?;
+                let f = refine(&r.model, &mut there, 0, 3, false)?;
                 Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
             })
             .collect();
@@ -310,7 +327,7 @@ impl Search {
             self.stages.push(stage);
             return false;
         };
-        let best = simplest(&rivals, &best, self.settings);
+        let best = self.polished(&simplest(&rivals, &best, self.settings));
         let extra = best.model.extra() - standing.model.extra();
         stage.needed = self.settings.needed(extra);
         let gain = standing.nats - best.nats;
@@ -320,6 +337,7 @@ impl Search {
         }
         if taken {
             stage.taken = best.model.names().last().copied();
+            self.reference = best.fined();
             self.best = best;
             self.rivals = rivals;
         } else {
@@ -335,7 +353,7 @@ impl Search {
         let count = standing.model.effects.len();
         // A gain of thousands is no failure of the optimiser.
         let ahead = rivals.first().map_or(0.0, |r| standing.nats - r.nats);
-        let more = if ahead > 2000.0 { 0 } else { 2 };
+        let more = if (4.0..2000.0).contains(&ahead) { 2 } else { 0 };
         let roads: Vec<(Model, Vec<Vec<usize>>)> = std::iter::once((standing.model.clone(), standing.ruptures.clone()))
             .chain(rivals.iter().take(more).map(|r| {
                 let mut model = r.model.clone();
@@ -347,7 +365,7 @@ impl Search {
             .par_iter()
             .map(|(model, ruptures)| {
                 let mut there = Data { ruptures: ruptures.clone(), ..self.data.clone() };
-                let f = refine(model, &mut there, 1, 3, false)?;
+                let f = refine(model, &mut there, 1, 2, false)?;
                 Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
             })
             .collect();
@@ -362,9 +380,21 @@ impl Search {
             let Some(first) = rivals.first() else { continue };
             let first = simplest(&rivals, first, self.settings);
             if first.fined() < self.best.fined() - 0.5 {
+                self.reference = first.fined();
                 self.best = first;
                 self.rivals = rivals;
             }
+        }
+    }
+
+    /// The candidate fitted to the end.
+    fn polished(&self, candidate: &Candidate) -> Candidate {
+        let mut there = self.data_of(candidate);
+        match refine(&candidate.model, &mut there, 3, 8, true) {
+            Some(f) if f.nats < candidate.nats => {
+                Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats }
+            }
+            _ => candidate.clone(),
         }
     }
 
@@ -429,6 +459,21 @@ impl Search {
             from = to;
         }
         sum
+    }
+
+    /// The best of some springs, at full rate: averages blur how the tip jumps.
+    fn springs(&self, standing: &Candidate, data: &Data) -> Option<Choice> {
+        let info = stylet_tissue::info("needle_compliance")?;
+        let tried: Vec<Option<(f64, f64)>> = [150.0, 500.0, 1500.0, 5000.0, 15e3, 50e3, 150e3]
+            .par_iter()
+            .map(|k| {
+                let mut model = standing.model.with(Choice::new(info, &[*k]));
+                seed_punctures(&mut model, data);
+                Some((nats(&model, data), *k))
+            })
+            .collect();
+        let best = tried.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Choice::new(info, &[best.1]))
     }
 
     /// Interferences too fast for averages.

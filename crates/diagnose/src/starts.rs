@@ -66,8 +66,9 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
             [5e-5, 2e-4, 6e-4, 2e-3, 6e-3].iter().map(|d| plain(&[3.0, *d])).collect()
         }
         "power_law_friction" => each(&[0.7, 1.3]),
-        "asymmetric_friction" | "position_scale" => each(&[0.02, -0.02]),
-        "rate_dependent_puncture" => each(&[0.1, -0.1]),
+        "asymmetric_friction" => each(&[0.02, -0.02]),
+        "position_scale" => each(&[0.02, -0.02, 0.08, -0.08]),
+        "rate_dependent_puncture" => each(&[0.05, 0.15, 0.3, -0.05, -0.15, -0.3]),
         "hidden_membrane" => {
             let mut starts = Vec::new();
             for at in &hints.drops_m {
@@ -79,7 +80,7 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
             starts
         }
         "boundary_shift" => (1..hints.layers)
-            .flat_map(|i| [plain(&[i as f64, 0.002]), plain(&[i as f64, -0.002])])
+            .flat_map(|i| [0.002, -0.002, 0.007, -0.007].map(|d| plain(&[i as f64, d])))
             .collect(),
         "soft_boundary" => [0.5e-3, 2e-3, 5e-3]
             .iter()

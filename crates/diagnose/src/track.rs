@@ -50,6 +50,7 @@ impl Track {
             track.used.push(!exclude.get(i).copied().unwrap_or(false));
         }
         track.a = slope(&track.t, &track.v);
+        track.leave_out_jumps();
         track.find_restarts();
         track
     }
@@ -64,6 +65,26 @@ impl Track {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
+    }
+
+    /// Where the velocity jumps the acceleration is anybody's guess: it is taken from around, and the
+    /// samples there are not compared.
+    fn leave_out_jumps(&mut self) {
+        let n = self.len();
+        let raw = self.a.clone();
+        for i in 0..n {
+            let (from, to) = (i.saturating_sub(3), (i + 4).min(n));
+            let mut around = [0.0; 7];
+            around[..to - from].copy_from_slice(&raw[from..to]);
+            let around = &mut around[..to - from];
+            around.sort_unstable_by(f64::total_cmp);
+            let middle = around[around.len() / 2];
+            let spread = around[around.len() * 3 / 4] - around[around.len() / 4];
+            if (raw[i] - middle).abs() > 0.02 + 4.0 * middle.abs() + 8.0 * spread {
+                self.a[i] = middle;
+                self.used[i] = false;
+            }
+        }
     }
 
     fn find_restarts(&mut self) {
