@@ -9,7 +9,7 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::outcome::Verdict;
 use stylet_diagnose::{Diagnosis, Evidence, Options};
-use stylet_record::{ReadOptions, read_csv};
+use stylet_record::{QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -27,7 +27,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let options = ReadOptions { columns, repair: args.repair };
     let mut evidence = Vec::new();
     for path in &args.data {
-        let (recording, notes) = read_csv(path, &options)?;
+        let (recording, notes) = read_with_holes(path, &options)?;
         evidence.push(Evidence { name: name_of(path, &args.data), recording, notes });
     }
     let talk = !args.quiet && std::io::stderr().is_terminal();
@@ -59,6 +59,38 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         println!("\nReport: {}", folder.join("report.html").display());
     }
     Ok(())
+}
+
+/// Reads a recording; rows with a value that is no finite number are cut out and reported.
+fn read_with_holes(path: &Path, options: &ReadOptions) -> Result<(Recording, Vec<QualityNote>), RecordError> {
+    let error = match read_csv(path, options) {
+        Err(error @ RecordError::NotFinite { .. }) => error,
+        other => return other,
+    };
+    let Ok(text) = std::fs::read_to_string(path) else { return Err(error) };
+    let hole = |line: &&str| {
+        line.split([',', ';', '\t']).any(|x| {
+            let x = x.trim().trim_matches('"');
+            x.parse::<f64>().is_ok_and(|x| !x.is_finite())
+        })
+    };
+    let kept: Vec<&str> = text.lines().filter(|l| !hole(l)).collect();
+    let (all, left) = (text.lines().count(), kept.len());
+    if left < 3 {
+        return Err(error);
+    }
+    let (recording, mut notes) = read_csv_bytes((kept.join("\n") + "\n").as_bytes(), path, options)?;
+    let message = format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
+    notes.insert(
+        0,
+        QualityNote {
+            kind: QualityKind::Gaps,
+            message,
+            numbers: [("count".to_owned(), (all - left) as f64)].into_iter().collect(),
+            lines: text.lines().enumerate().filter(|(_, l)| hole(l)).take(100).map(|(k, _)| k as u64 + 1).collect(),
+        },
+    );
+    Ok((recording, notes))
 }
 
 /// The file's name, with its folder when names repeat.

@@ -23,6 +23,13 @@ fn main() {
         scatter: 0.0,
         velocity_noise_mps: 0.0,
     };
+    let drawn = match args.get(5).and_then(|s| s.parse().ok()) {
+        Some(index) => {
+            let seed = args.get(6).and_then(|s| s.parse().ok()).unwrap_or(1);
+            Drawn { effects: drawn.effects, ..hidden::sketch_of(seed, index, hidden::Kind::Single, index).drawn }
+        }
+        None => drawn,
+    };
     let case = hidden::case(&drawn);
     println!("samples {:?}", case.recordings.iter().map(|r| r.len()).collect::<Vec<_>>());
     println!("true ruptures {:?}", case.ruptures);

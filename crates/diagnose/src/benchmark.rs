@@ -193,7 +193,7 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
     }
     let after_true = (square / n.max(1.0_f64)).sqrt();
     let (before, after) = (d.gain.rmse_before_n, d.gain.rmse_after_n);
-    let gain = (before - after_true > 1e-9).then(|| (before - after) / (before - after_true));
+    let gain = (before - after_true > 0.03 * before).then(|| (before - after) / (before - after_true));
     let truth_nats = if right || sketch.kind == Kind::Outside || drawn.effects.is_empty() {
         None
     } else {

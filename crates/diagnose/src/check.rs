@@ -2,6 +2,7 @@
 
 use crate::diagnose::Evidence;
 use crate::error::DiagnoseError;
+use stylet_record::{QualityKind, QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_tissue::{Law, replay};
 
@@ -85,4 +86,15 @@ fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<(), Diag
         return wrong(format!("the force is {ratio:.1e} of what the scenario expects: is it in kilonewtons?"), 1e3);
     }
     Ok(())
+}
+
+/// A remark on samples that are not finite: they are cut out.
+pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
+    let bad: Vec<usize> = (0..r.len())
+        .filter(|&i| !(r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite())
+        .collect();
+    let first = *bad.first()?;
+    let message = format!("{} sample(s) are not finite numbers, the first is number {}: they were cut out", bad.len(), first + 1);
+    let numbers = [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
+    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new() })
 }

@@ -68,6 +68,7 @@ pub fn diagnose(
     let mut notes: Vec<Vec<QualityNote>> = Vec::new();
     for e in evidence {
         let mut own = e.notes.clone();
+        own.extend(crate::check::holes(&e.recording));
         for note in assess(&e.recording) {
             if !own.contains(&note) {
                 own.push(note);
@@ -99,7 +100,7 @@ pub fn diagnose(
     let mut from_raw = raw_causes(&raw, noise.marginal_n);
     let verdict = if dominated {
         Verdict::Unknown
-    } else if causes.iter().any(|c| !c.equivalent.is_empty()) {
+    } else if causes.iter().any(|c: &Cause| c.equivalent.iter().any(|e| !nests(e, &c.effect))) {
         Verdict::Ambiguous
     } else if causes.is_empty() && from_raw.is_empty() {
         Verdict::None
@@ -124,7 +125,7 @@ pub fn diagnose(
         }
     } else {
         progress("leaving one recording out");
-        gain(&search, &shown, names)
+        gain(&search, &shown, &raw, names)
     };
     let invisible = if options.brief { Vec::new() } else { visible::invisible(&search, &shown) };
     let advice = visible::advice(&causes, &invisible);
@@ -194,9 +195,11 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
         if last { search.rivals.iter().filter(|r| name_of(r) != choice.info.id).collect() } else { Vec::new() };
     for rival in rivals {
         let behind = rival.fined() - own;
-        weights += (-behind.max(-3.0)).exp();
-        let nested = nests(&name_of(rival), choice.info.id);
-        if behind < CLASS_NATS && !nested {
+        // A larger model that holds the one named is no rival of it.
+        if !nests(&name_of(rival), choice.info.id) {
+            weights += (-behind.max(-3.0)).exp();
+        }
+        if behind < CLASS_NATS {
             equivalent.push(name_of(rival));
         }
     }
@@ -271,8 +274,16 @@ fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
     causes
 }
 
-fn gain(search: &Search, shown: &Candidate, names: Vec<String>) -> Gain {
-    let each = held_out::gain(search, &search.base, shown);
+fn gain(search: &Search, shown: &Candidate, raw: &raw::Raw, names: Vec<String>) -> Gain {
+    let mut shown = shown.clone();
+    // What the raw numbers showed is simulated too.
+    if let Some(limit_n) = raw.limit_n {
+        shown.model.given.push(stylet_tissue::Saturation { limit_n }.into());
+    }
+    if let Some(step_n) = raw.step_n {
+        shown.model.given.push(stylet_tissue::Quantisation { step_n }.into());
+    }
+    let each = held_out::gain(search, &search.base, &shown);
     let pooled = |pick: fn(&held_out::Before) -> f64| {
         let n: f64 = each.iter().map(|e| e.samples as f64).sum();
         (each.iter().map(|e| pick(e).powi(2) * e.samples as f64).sum::<f64>() / n.max(1.0)).sqrt()

@@ -23,9 +23,9 @@ pub struct Event {
 }
 
 /// Relative uncertainty of an elastic force at rupture beyond sampling.
-const FORCE_FLOOR: f64 = 3e-4;
+const FORCE_FLOOR: f64 = 5e-5;
 /// Uncertainty of a position in m beyond sampling.
-const POSITION_FLOOR_M: f64 = 2e-6;
+const POSITION_FLOOR_M: f64 = 1e-6;
 
 /// Strain before and at the rupture of one layer.
 #[derive(Clone, Copy)]

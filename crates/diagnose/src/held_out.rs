@@ -71,7 +71,7 @@ pub fn gain(search: &Search, base: &Candidate, best: &Candidate) -> Vec<Before> 
         .map(|left| {
             let track = &search.data.tracks[left];
             let before = one(&base.model, &base.ruptures, left);
-            let after = if best.model.effects.is_empty() {
+            let after = if best.model.effects.is_empty() && best.model.given.len() == base.model.given.len() {
                 before.clone()
             } else {
                 one(&best.model, &best.ruptures, left)

@@ -115,7 +115,11 @@ impl<'a> Look<'a> {
         if amount < 0.0 && !signed {
             return Some(nothing);
         }
-        let scale = if amount < 0.0 { amount.clamp(-5.0, -0.2) } else { amount.clamp(0.2, 5.0) };
+        let scale = if amount < 0.0 { amount.clamp(-5.0, -0.01) } else { amount.clamp(0.01, 5.0) };
+        if info.id == "power_law_friction" {
+            let value = &mut start.choice.values[0];
+            *value = (1.0 + (*value - 1.0) * scale).clamp(0.2, 2.0);
+        }
         if !matches!(info.id, "power_law_friction" | "rate_dependent_puncture" | "boundary_shift" | "position_scale") && info.id != "needle_compliance" && info.id != "hidden_membrane" {
             for (value, p) in start.choice.values.iter_mut().zip(info.parameters) {
                 let scalable = p.strength && !matches!(info.id, "low_pass_lag" | "time_delay" | "soft_boundary");
@@ -146,5 +150,79 @@ impl<'a> Look<'a> {
         start.choice.values[2] = libm::atan2(cos, sin);
         start.quadrature = false;
         Some(Seen { start, gain, visible: nothing.visible })
+    }
+
+    /// The best places for a membrane that breaks at `z_b` after `w` of travel: its force has a short support
+    /// (the first passage of the last `w` before `z_b`), so that a fine grid is cheap. Returns (depth below the
+    /// surface at which it begins, depth at which it breaks, slope in N/m, gain in nats), best first, apart by
+    /// more than 1 mm.
+    #[must_use]
+    pub fn membranes(&self, surface_m: f64, depth_m: f64) -> Vec<[f64; 4]> {
+        let [a1, a2] = self.data.noise.a;
+        let inverse = 1.0 / self.data.noise.innovation_n;
+        let mut found: Vec<[f64; 4]> = Vec::new();
+        let mut firsts: Vec<Vec<usize>> = Vec::new(); // per track: samples that reach deeper than all before
+        for track in self.data.tracks.iter() {
+            let mut deepest = f64::NEG_INFINITY;
+            firsts.push(
+                (0..track.len())
+                    .filter(|&i| {
+                        let new = track.z[i] > deepest;
+                        deepest = deepest.max(track.z[i]);
+                        new
+                    })
+                    .collect(),
+            );
+        }
+        let steps = (depth_m / 1.5e-4) as usize;
+        for w in [0.4e-3, 0.8e-3, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3] {
+            for k in 4..steps {
+                let breaks = surface_m + 1.5e-4 * k as f64;
+                let begins = breaks - w;
+                if begins < surface_m {
+                    continue;
+                }
+                let (mut dd, mut dr) = (0.0, 0.0);
+                let mut dq = vec![0.0; self.q.len()];
+                let mut offset = 0;
+                for (track, first) in self.data.tracks.iter().zip(&firsts) {
+                    let from = first.partition_point(|i| track.z[*i] <= begins);
+                    let to = first.partition_point(|i| track.z[*i] < breaks);
+                    if from < to {
+                        let (from, to) = (first[from], first[to - 1] + 1);
+                        let force = |i: usize| {
+                            if i < from || i >= to { 0.0 } else { (track.z[i] - begins).max(0.0) }
+                        };
+                        for i in from..(to + 2).min(track.len()) {
+                            if !track.used[i] || track.restart[i] {
+                                continue;
+                            }
+                            let d = -(force(i) - a1 * force(i - 1) - a2 * force(i - 2)) * inverse * self.root[offset + i];
+                            dd += d * d;
+                            dr += d * self.r[offset + i];
+                            for (sum, u) in dq.iter_mut().zip(&self.q) {
+                                *sum += d * u[offset + i];
+                            }
+                        }
+                    }
+                    offset += track.len();
+                }
+                let left = dd - dq.iter().map(|x| x * x).sum::<f64>();
+                if left > 1e-6 * dd && dr < 0.0 {
+                    found.push([begins - surface_m, breaks - surface_m, -dr / left, 0.5 * dr * dr / left]);
+                }
+            }
+        }
+        found.sort_by(|a, b| b[3].total_cmp(&a[3]));
+        let mut apart: Vec<[f64; 4]> = Vec::new();
+        for f in found {
+            if apart.iter().all(|a| (a[1] - f[1]).abs() > 1e-3) {
+                apart.push(f);
+            }
+            if apart.len() == 5 {
+                break;
+            }
+        }
+        apart
     }
 }

@@ -154,26 +154,51 @@ impl Search {
             progress(&format!("looking for effect {}", self.best.model.effects.len() + 1));
             let standing = self.best.clone();
             let taken = self.stage(&standing);
-            if !taken {
+            if !taken || self.hopeless(2.0) {
                 break;
             }
         }
-        if self.best.model.effects.len() > 1 {
+        if self.best.model.effects.len() > 1 && !self.hopeless(0.3) {
             progress("pruning");
             self.exchange();
             self.prune();
+        }
+        self.settle_base();
+    }
+
+    /// Whether structure remains that is larger by `ratio` than what the effects taken explain: no
+    /// further effect of the library will make a cause of them.
+    fn hopeless(&self, ratio: f64) -> bool {
+        let data = self.data_of(&self.best);
+        let left = crate::leftover::test(&self.best.model, &data);
+        let base = nats(&self.base.model, &self.data_of(&self.base));
+        left.p_value < 1e-20 && left.nats > ratio * (base - self.best.nats)
+    }
+
+    /// The base model once more under the final noise; effects that then gain too little go.
+    fn settle_base(&mut self) {
+        if self.best.model.effects.is_empty() {
+            self.base = self.best.clone();
+            return;
+        }
+        let rivals = [self.best.clone()];
+        let base = Candidate { nats: nats(&self.base.model, &self.data_of(&self.base)), ..self.base.clone() };
+        self.base = self.refit_standing(&base, &rivals);
+        if self.base.nats - self.best.nats < self.settings.needed(self.best.model.extra()) {
+            self.best = self.base.clone();
+            self.rivals.clear();
         }
     }
 
     /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened.
     fn contest(&self, standing: &Candidate) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
-        let clock = std::time::Instant::now();
-        let tick = |what: &str| { if std::env::var_os("T").is_some() { eprintln!("{what} {:.3}", clock.elapsed().as_secs_f64()); } };
-        let data = self.data_of(standing);
+                let data = self.data_of(standing);
         let coarse = data.blocks(self.q, data.noise.blocks(self.q));
         let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
-        let hints = self.hints(standing, &data);
-        tick("hints");
+        let mut hints = self.hints(standing, &data);
+        if let Some(look) = Look::new(&stood.model, &coarse) {
+            hints.membranes = look.membranes(stood.model.assumed.surface_m, hints.depth_m);
+        }
         let taken = standing.model.names();
         let all: Vec<Start> = starts::all(&hints)
             .into_iter()
@@ -183,7 +208,6 @@ impl Search {
             })
             .collect();
         let seen = looks(&stood.model, &data, &coarse, self.q, &all);
-        tick("looks");
         // The two best starts of each effect, three of those with several basins.
         let mut chosen: Vec<&Seen> = Vec::new();
         let mut order: Vec<&Seen> = seen.iter().collect();
@@ -217,7 +241,6 @@ impl Search {
                 Some((f, there, shifted.ruptures))
             })
             .collect();
-        tick(&format!("begun {}", chosen.len()));
         let mut begun: Vec<(Fit, Data, Vec<Vec<usize>>)> = begun.into_iter().flatten().collect();
         begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
         let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
@@ -232,7 +255,6 @@ impl Search {
             .par_iter()
             .map(|(f, there, ruptures)| Some((fit(&f.model, there, 6, 0.1)?, ruptures.clone())))
             .collect();
-        tick(&format!("fits {:?}", begun.iter().map(|b| *b.0.model.names().last().unwrap_or(&"")).collect::<Vec<_>>()));
         let mut best: Vec<(Fit, Vec<Vec<usize>>)> = Vec::new();
         for found in fits.into_iter().flatten() {
             let id = found.0.model.names().last().copied();
@@ -255,13 +277,12 @@ impl Search {
         });
         let mut finalists: Vec<(Model, Vec<Vec<usize>>)> =
             best.into_iter().map(|(f, r)| (f.model, r)).collect();
-        if lead > 30.0 && !taken.contains(&"needle_compliance") {
-            finalists.extend(self.springs(standing, &data).map(|s| (standing.model.with(s), standing.ruptures.clone())));
+        for c in self.sharp(standing, &data, lead > 30.0) {
+            finalists.push((standing.model.with(c), standing.ruptures.clone()));
         }
         for start in self.fast_lines(standing, &data) {
             finalists.push((standing.model.with(start.choice), standing.ruptures.clone()));
         }
-        tick("lines");
         let mut rivals: Vec<Candidate> = finalists
             .par_iter()
             .map(|(model, ruptures)| {
@@ -277,7 +298,6 @@ impl Search {
             .into_iter()
             .flatten()
             .collect();
-        tick(&format!("finals {:?}", rivals.iter().map(|b| *b.model.names().last().unwrap_or(&"")).collect::<Vec<_>>()));
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         // The same effect from two roads.
         let mut names: Vec<&str> = Vec::new();
@@ -432,8 +452,6 @@ impl Search {
         let spectrum = self.spectrum(standing, data);
         hints.lines_hz = peaks(&spectrum.0, &spectrum.1, 0.04, 5).into_iter().map(|p| p.0).collect();
         hints.breath_hz = (0..40).map(|k| 0.05 + 0.02 * f64::from(k)).collect();
-        let end = depth_m.min(standing.model.assumed.end_m() - surface + 0.005);
-        hints.drops_m = (1..).map(|k| 0.002 * f64::from(k)).take_while(|d| *d < end).collect();
         hints
     }
 
@@ -461,19 +479,41 @@ impl Search {
         sum
     }
 
-    /// The best of some springs, at full rate: averages blur how the tip jumps.
-    fn springs(&self, standing: &Candidate, data: &Data) -> Option<Choice> {
-        let info = stylet_tissue::info("needle_compliance")?;
-        let tried: Vec<Option<(f64, f64)>> = [150.0, 500.0, 1500.0, 5000.0, 15e3, 50e3, 150e3]
+    /// Effects that show in the few samples after a rupture, which averages blur: a look at full rate.
+    fn sharp(&self, standing: &Candidate, data: &Data, springs: bool) -> Vec<Choice> {
+        const TRIED: [(&str, &[f64]); 4] = [
+            ("low_pass_lag", &[3e-4, 1e-3, 3e-3, 1e-2]),
+            ("time_delay", &[3e-4, 1e-3, 3e-3]),
+            ("soft_boundary", &[1e-5, 5e-5, 2e-4]),
+            ("needle_compliance", &[150.0, 500.0, 1500.0, 5000.0, 15e3, 50e3, 150e3]),
+        ];
+        let taken = standing.model.names();
+        let stood = nats(&standing.model, data);
+        let tried: Vec<(&'static str, f64)> = TRIED
+            .iter()
+            .filter(|(id, _)| !taken.contains(id) && (springs || *id != "needle_compliance"))
+            .flat_map(|(id, values)| values.iter().map(|v| (*id, *v)))
+            .collect();
+        let found: Vec<Option<(f64, &'static str, f64)>> = tried
             .par_iter()
-            .map(|k| {
-                let mut model = standing.model.with(Choice::new(info, &[*k]));
-                seed_punctures(&mut model, data);
-                Some((nats(&model, data), *k))
+            .map(|&(id, value)| {
+                let mut model = standing.model.with(choice(id, &[value])?);
+                if id == "needle_compliance" {
+                    seed_punctures(&mut model, data);
+                }
+                Some((nats(&model, data), id, value))
             })
             .collect();
-        let best = tried.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Choice::new(info, &[best.1]))
+        let mut best: Vec<(f64, &'static str, f64)> = Vec::new();
+        for f in found.into_iter().flatten() {
+            match best.iter_mut().find(|b| b.1 == f.1) {
+                Some(b) if f.0 < b.0 => *b = f,
+                Some(_) => {}
+                None => best.push(f),
+            }
+        }
+        best.retain(|b| b.0 < stood - 3.0 || (springs && b.1 == "needle_compliance"));
+        best.iter().filter_map(|b| choice(b.1, &[b.2])).collect()
     }
 
     /// Interferences too fast for averages.

@@ -33,6 +33,8 @@ pub struct Hints {
     pub depth_m: f64,
     /// Depths (m) at which the residual falls although no layer ruptured.
     pub drops_m: Vec<f64>,
+    /// Membranes that a fine grid suggests, as `Look::membranes` gives them.
+    pub membranes: Vec<[f64; 4]>,
     /// Largest force in N.
     pub force_n: f64,
 }
@@ -70,7 +72,11 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
         "position_scale" => each(&[0.02, -0.02, 0.08, -0.08]),
         "rate_dependent_puncture" => each(&[0.05, 0.15, 0.3, -0.05, -0.15, -0.3]),
         "hidden_membrane" => {
-            let mut starts = Vec::new();
+            let mut starts: Vec<Start> = hints
+                .membranes
+                .iter()
+                .map(|[begins, breaks, k, _]| plain(&[*begins, k.clamp(2.0, 2e4), k.clamp(2.0, 2e4) * (breaks - begins)]))
+                .collect();
             for at in &hints.drops_m {
                 for (k, f) in [(60.0, 0.1), (60.0, 0.3), (250.0, 0.3), (250.0, 0.9)] {
                     starts.push(plain(&[at - f / k, k, f]));

@@ -79,7 +79,7 @@ impl Track {
             let around = &mut around[..to - from];
             around.sort_unstable_by(f64::total_cmp);
             let middle = around[around.len() / 2];
-            let spread = around[around.len() * 3 / 4] - around[around.len() / 4];
+            let spread = if around.len() < 7 { 0.0 } else { around[4] - around[2] };
             if (raw[i] - middle).abs() > 0.02 + 4.0 * middle.abs() + 8.0 * spread {
                 self.a[i] = middle;
                 self.used[i] = false;

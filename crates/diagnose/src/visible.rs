@@ -26,6 +26,7 @@ pub fn invisible(search: &Search, shown: &Candidate) -> Vec<String> {
             .map(|k| 0.01 * f64::from(k))
             .take_while(|d| *d < shown.model.assumed.end_m() - shown.model.assumed.surface_m)
             .collect(),
+        membranes: Vec::new(),
         force_n: search.force_n,
     };
     let entries: Vec<&'static EffectInfo> = library()
