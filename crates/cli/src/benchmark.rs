@@ -21,8 +21,10 @@ pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
 }
 
 fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
-    let folder =
-        args.out.clone().unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}", args.seed)));
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}", args.seed)));
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let path = folder.join("cases.jsonl");
@@ -30,7 +32,10 @@ fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     if let Ok(file) = std::fs::File::open(&path) {
         // A line that was cut off when the run was stopped is run again.
         done.extend(
-            std::io::BufReader::new(file).lines().map_while(Result::ok).filter_map(|l| serde_json::from_str(&l).ok()),
+            std::io::BufReader::new(file)
+                .lines()
+                .map_while(Result::ok)
+                .filter_map(|l| serde_json::from_str(&l).ok()),
         );
     }
     let missing: Vec<u64> = (0..args.cases).filter(|i| !done.iter().any(|d| d.index == *i)).collect();

@@ -9,7 +9,9 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::outcome::Verdict;
 use stylet_diagnose::{Diagnosis, Evidence, Options};
-use stylet_record::{QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes};
+use stylet_record::{
+    QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes,
+};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -50,7 +52,8 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     output.add("diagnosis.json", json);
     output.add("extended.ron", ron);
     let folder = args.out.clone().unwrap_or_else(|| {
-        let stem = args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
+        let stem =
+            args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
         PathBuf::from("stylet-out").join(format!("{stem}-diagnosis"))
     });
     output.write(&folder)?;
@@ -80,14 +83,21 @@ fn read_with_holes(path: &Path, options: &ReadOptions) -> Result<(Recording, Vec
         return Err(error);
     }
     let (recording, mut notes) = read_csv_bytes((kept.join("\n") + "\n").as_bytes(), path, options)?;
-    let message = format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
+    let message =
+        format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
     notes.insert(
         0,
         QualityNote {
             kind: QualityKind::Gaps,
             message,
             numbers: [("count".to_owned(), (all - left) as f64)].into_iter().collect(),
-            lines: text.lines().enumerate().filter(|(_, l)| hole(l)).take(100).map(|(k, _)| k as u64 + 1).collect(),
+            lines: text
+                .lines()
+                .enumerate()
+                .filter(|(_, l)| hole(l))
+                .take(100)
+                .map(|(k, _)| k as u64 + 1)
+                .collect(),
         },
     );
     Ok((recording, notes))
@@ -106,11 +116,16 @@ fn name_of(path: &Path, all: &[PathBuf]) -> String {
 pub fn sentence(d: &Diagnosis) -> String {
     let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
     match d.verdict {
-        Verdict::None => "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned(),
+        Verdict::None => {
+            "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned()
+        }
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &stylet_diagnose::outcome::Cause| {
-                std::iter::once(c.effect.as_str()).chain(c.equivalent.iter().map(String::as_str)).collect::<Vec<_>>().join(" or ")
+                std::iter::once(c.effect.as_str())
+                    .chain(c.equivalent.iter().map(String::as_str))
+                    .collect::<Vec<_>>()
+                    .join(" or ")
             };
             format!(
                 "The simulation lacks {}: these recordings cannot tell them apart.",
@@ -118,7 +133,11 @@ pub fn sentence(d: &Diagnosis) -> String {
             )
         }
         Verdict::Unknown => {
-            let on = if d.leftover.depends_on.is_empty() { String::new() } else { format!(" (it depends on {})", d.leftover.depends_on.join(", ")) };
+            let on = if d.leftover.depends_on.is_empty() {
+                String::new()
+            } else {
+                format!(" (it depends on {})", d.leftover.depends_on.join(", "))
+            };
             format!("The data hold structure that no effect of the library explains{on}.")
         }
     }
@@ -143,7 +162,11 @@ fn summary(d: &Diagnosis) -> String {
         }
     }
     let g = &d.gain;
-    let what = if g.held_out { "on recordings left out of the fit" } else { "on the one recording, which was also fitted" };
+    let what = if g.held_out {
+        "on recordings left out of the fit"
+    } else {
+        "on the one recording, which was also fitted"
+    };
     let _ = writeln!(
         out,
         "\n  residual {what}: {} N before, {} N after, noise {} N",

@@ -3,13 +3,13 @@
 use crate::args::DiagnoseArgs;
 use crate::diagnose::sentence;
 use std::fmt::Write as _;
+use stylet_diagnose::Examined;
 use stylet_diagnose::curves::{Curves, binned, by_layer_and_phase, correlations, curves, shown};
 use stylet_diagnose::outcome::{Diagnosis, Verdict};
-use stylet_diagnose::Examined;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
 use stylet_report::{
-    Block, Cell, Chart, Code, Colour, Level, LineStyle, MarkerSet, Page, Scale, Scorecard, Section, Series, Side, Status,
-    SvgImage, Table, Text, Tile, significant,
+    Block, Cell, Chart, Code, Colour, Level, LineStyle, MarkerSet, Page, Scale, Scorecard, Section, Series,
+    Side, Status, SvgImage, Table, Text, Tile, significant,
 };
 use stylet_scenario::Scenario;
 use stylet_tissue::Slab;
@@ -49,12 +49,21 @@ fn verdict(d: &Diagnosis) -> Section {
     };
     let mut tiles = vec![Tile::new("Verdict", word, sentence(d))];
     for c in &d.causes {
-        let parameters = c.parameters.iter().map(|(p, e)| format!("{p} = {}", number(e.value))).collect::<Vec<_>>().join(", ");
+        let parameters = c
+            .parameters
+            .iter()
+            .map(|(p, e)| format!("{p} = {}", number(e.value)))
+            .collect::<Vec<_>>()
+            .join(", ");
         let mut name = c.effect.clone();
         if !c.equivalent.is_empty() {
             let _ = write!(name, " (or {})", c.equivalent.join(", "));
         }
-        tiles.push(Tile::new("Cause", name, format!("{parameters}; confidence {}", significant(c.confidence, 2))));
+        tiles.push(Tile::new(
+            "Cause",
+            name,
+            format!("{parameters}; confidence {}", significant(c.confidence, 2)),
+        ));
     }
     let g = &d.gain;
     let what = if g.held_out { "left-out recordings" } else { "the fitted recording" };
@@ -68,11 +77,15 @@ fn verdict(d: &Diagnosis) -> Section {
         Tile::new(
             "Left over",
             if d.leftover.p_value < 1e-3 { "structure" } else { "noise" },
-            format!("p = {} that the residual is the same in several recordings by chance", significant(d.leftover.p_value, 2)),
+            format!(
+                "p = {} that the residual is the same in several recordings by chance",
+                significant(d.leftover.p_value, 2)
+            ),
         )
         .status(status),
     );
-    let mut section = Section::new("Verdict").block(Block::Scorecard(Scorecard { title: String::new(), tiles }));
+    let mut section =
+        Section::new("Verdict").block(Block::Scorecard(Scorecard { title: String::new(), tiles }));
     for a in &d.advice {
         section = section.block(Block::Text(Text { paragraphs: vec![a.clone()], status: Status::Warn }));
     }
@@ -92,7 +105,16 @@ fn equation(examined: &Examined) -> Section {
                 .parameters
                 .iter()
                 .filter_map(|p| c.parameters.get(p.path).map(|e| (p, e)))
-                .map(|(p, e)| format!("{} = {} {} ({} to {})", p.path, number(e.value), p.unit, number(e.low), number(e.high)))
+                .map(|(p, e)| {
+                    format!(
+                        "{} = {} {} ({} to {})",
+                        p.path,
+                        number(e.value),
+                        p.unit,
+                        number(e.low),
+                        number(e.high)
+                    )
+                })
                 .collect();
             let _ = writeln!(text, "{}", numbers.join("\n         "));
         }
@@ -115,7 +137,9 @@ fn equation(examined: &Examined) -> Section {
     let table = Table {
         title: "Base parameters, re-fitted within the scenario's tolerance".to_owned(),
         groups: Vec::new(),
-        headers: ["", "parameter", "assumed", "fitted", "95 % interval", "change"].map(str::to_owned).to_vec(),
+        headers: ["", "parameter", "assumed", "fitted", "95 % interval", "change"]
+            .map(str::to_owned)
+            .to_vec(),
         rows,
     };
     Section::new("The extended model")
@@ -133,7 +157,11 @@ fn gain(d: &Diagnosis, all: &[Curves]) -> Section {
             vec![
                 Cell::text(name.clone()),
                 Cell::number(significant(*before, 3)),
-                Cell::number(significant(*after, 3)).status(Status::at_most(*after, 1.15 * g.floor_n, 2.0 * g.floor_n)),
+                Cell::number(significant(*after, 3)).status(Status::at_most(
+                    *after,
+                    1.15 * g.floor_n,
+                    2.0 * g.floor_n,
+                )),
                 Cell::number(significant(g.floor_n, 3)),
             ]
         })
@@ -163,9 +191,17 @@ fn gain(d: &Diagnosis, all: &[Curves]) -> Section {
                 .caption("Measured, and as base law and extended model have it.")
                 .group(name.clone())
                 .height(300)
-                .with_series(Series::line("measured", Colour::Grey, c.time_s.clone(), c.force_n.clone()).width(3.0))
-                .with_series(Series::line("base law", Colour::Vermillion, c.time_s.clone(), minus(&c.base_n)).width(1.1))
-                .with_series(Series::line("extended model", Colour::Blue, c.time_s.clone(), minus(&c.extended_n)).width(1.3))
+                .with_series(
+                    Series::line("measured", Colour::Grey, c.time_s.clone(), c.force_n.clone()).width(3.0),
+                )
+                .with_series(
+                    Series::line("base law", Colour::Vermillion, c.time_s.clone(), minus(&c.base_n))
+                        .width(1.1),
+                )
+                .with_series(
+                    Series::line("extended model", Colour::Blue, c.time_s.clone(), minus(&c.extended_n))
+                        .width(1.3),
+                )
                 .with_markers(ruptures),
         );
     }
@@ -182,7 +218,8 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
          propose causes; the likelihood below decides.",
     );
     let names = &d.gain.recordings;
-    let mut time = Chart::new("Residual against time", "Time (s)", "Residual (N)").height(260).with_level(zero());
+    let mut time =
+        Chart::new("Residual against time", "Time (s)", "Residual (N)").height(260).with_level(zero());
     let mut depth = Chart::new("Residual against depth", "Depth (mm)", "Residual (N)")
         .caption("Means over 60 bins of depth, advance and retraction apart (retraction dotted).")
         .height(260)
@@ -193,22 +230,27 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
         .with_level(zero());
     for (k, (c, name)) in all.iter().zip(names).enumerate() {
         let colour = Colour::nth(k);
-        time = time.with_series(Series::line(name.clone(), colour, c.time_s.clone(), c.base_n.clone()).width(1.0));
-        let pick = |keep: &dyn Fn(usize) -> bool| -> Vec<bool> { (0..c.used.len()).map(|i| c.used[i] && keep(i)).collect() };
+        time = time
+            .with_series(Series::line(name.clone(), colour, c.time_s.clone(), c.base_n.clone()).width(1.0));
+        let pick = |keep: &dyn Fn(usize) -> bool| -> Vec<bool> {
+            (0..c.used.len()).map(|i| c.used[i] && keep(i)).collect()
+        };
         let mm: Vec<f64> = c.position_m.iter().map(|z| z * 1e3).collect();
         let mmps: Vec<f64> = c.velocity_mps.iter().map(|v| v * 1e3).collect();
         let (x, y) = binned(&mm, &c.base_n, &pick(&|i| c.velocity_mps[i] >= -1e-5), 60);
         depth = depth.with_series(Series::line(name.clone(), colour, x, y));
         let (x, y) = binned(&mm, &c.base_n, &pick(&|i| c.velocity_mps[i] < -1e-5), 60);
         if !x.is_empty() {
-            depth = depth.with_series(Series::line(format!("{name}, back"), colour, x, y).styled(LineStyle::Dotted));
+            depth = depth
+                .with_series(Series::line(format!("{name}, back"), colour, x, y).styled(LineStyle::Dotted));
         }
         let (x, y) = binned(&mmps, &c.base_n, &pick(&|i| c.position_m[i] > 0.0), 60);
         velocity = velocity.with_series(Series::points(name.clone(), colour, x, y));
     }
     section = section.chart(time).chart(depth).chart(velocity);
     let layers = examined.search.base.model.assumed.layers.len();
-    let (before, after) = (by_layer_and_phase(all, |c| &c.base_n, layers), by_layer_and_phase(all, |c| &c.extended_n, layers));
+    let (before, after) =
+        (by_layer_and_phase(all, |c| &c.base_n, layers), by_layer_and_phase(all, |c| &c.extended_n, layers));
     let rows = before
         .iter()
         .zip(&after)
@@ -221,7 +263,11 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
             };
             let mut row = vec![Cell::text(name)];
             for (b, a) in b.iter().zip(a) {
-                row.push(Cell::number(significant(*b, 3)).status(Status::at_most(*b, 1.3 * d.noise.sd_n, 3.0 * d.noise.sd_n)));
+                row.push(Cell::number(significant(*b, 3)).status(Status::at_most(
+                    *b,
+                    1.3 * d.noise.sd_n,
+                    3.0 * d.noise.sd_n,
+                )));
                 row.push(Cell::number(significant(*a, 3)));
             }
             row
@@ -229,7 +275,12 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
         .collect();
     section = section.table(Table {
         title: "Root mean square by layer and phase (N): base law, extended model".to_owned(),
-        groups: vec![(String::new(), 1), ("advance".to_owned(), 2), ("hold".to_owned(), 2), ("retraction".to_owned(), 2)],
+        groups: vec![
+            (String::new(), 1),
+            ("advance".to_owned(), 2),
+            ("hold".to_owned(), 2),
+            ("retraction".to_owned(), 2),
+        ],
         headers: ["", "base", "extended", "base", "extended", "base", "extended"].map(str::to_owned).to_vec(),
         rows,
     });
@@ -242,7 +293,9 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
         rows: cb
             .iter()
             .zip(&ca)
-            .map(|((name, b), (_, a))| vec![Cell::text(*name), Cell::number(format!("{b:+.3}")), Cell::number(format!("{a:+.3}"))])
+            .map(|((name, b), (_, a))| {
+                vec![Cell::text(*name), Cell::number(format!("{b:+.3}")), Cell::number(format!("{a:+.3}"))]
+            })
             .collect(),
     });
     let search = &examined.search;
@@ -287,7 +340,8 @@ fn evidence(d: &Diagnosis) -> Section {
          effect is taken when it is the best and gains more than was needed on clean data.",
     );
     for (k, step) in d.evidence.iter().enumerate() {
-        let stood = if step.standing.is_empty() { "the base law".to_owned() } else { step.standing.join(" + ") };
+        let stood =
+            if step.standing.is_empty() { "the base law".to_owned() } else { step.standing.join(" + ") };
         let end = match &step.taken {
             Some(taken) => format!("taken: {taken}"),
             None => "nothing was taken".to_owned(),
@@ -316,7 +370,10 @@ fn evidence(d: &Diagnosis) -> Section {
             width_px: 960.0,
             theme: Theme::Auto,
         };
-        let markup = bar_chart(&BarChart { label: "nats gained (in brackets: numbers fitted)".to_owned(), bars }, &options);
+        let markup = bar_chart(
+            &BarChart { label: "nats gained (in brackets: numbers fitted)".to_owned(), bars },
+            &options,
+        );
         section = section.block(Block::Svg(SvgImage { description: options.title, markup }));
     }
     section
@@ -358,7 +415,11 @@ fn unseen(d: &Diagnosis) -> Section {
         .iter()
         .map(|id| {
             let info = stylet_tissue::info(id);
-            vec![Cell::text(id.clone()), Cell::text(info.map_or("", |i| i.equation)), Cell::text(info.map_or("", |i| i.signature))]
+            vec![
+                Cell::text(id.clone()),
+                Cell::text(info.map_or("", |i| i.equation)),
+                Cell::text(info.map_or("", |i| i.signature)),
+            ]
         })
         .collect();
     Section::new("What these recordings cannot show").table(Table {
@@ -370,10 +431,15 @@ fn unseen(d: &Diagnosis) -> Section {
 }
 
 fn quality(d: &Diagnosis) -> Section {
-    let rows = d.data_quality.iter().map(|q| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())]).collect();
+    let rows = d
+        .data_quality
+        .iter()
+        .map(|q| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())])
+        .collect();
     let section = Section::new("Data quality");
     if d.data_quality.is_empty() {
-        return section.text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
+        return section
+            .text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
     }
     section.table(Table {
         title: String::new(),

@@ -4,7 +4,9 @@ use crate::args::EffectsArgs;
 use crate::exit::Failure;
 use std::fmt::Write as _;
 use stylet_report::significant;
-use stylet_tissue::{AnyEffect, EffectInfo, Law, LawState, Layer, Measurement, Reading, Tissue, info, library};
+use stylet_tissue::{
+    AnyEffect, EffectInfo, Law, LawState, Layer, Measurement, Reading, Tissue, info, library,
+};
 
 /// The command.
 ///
@@ -16,7 +18,9 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
             for entry in library() {
                 println!("{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
             }
-            println!("stylet effects NAME shows one: its parameters, its source, what it does to an insertion.");
+            println!(
+                "stylet effects NAME shows one: its parameters, its source, what it does to an insertion."
+            );
             Ok(())
         }
         Some(name) => match info(name) {
@@ -28,7 +32,9 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
                 let known: Vec<&str> = library().map(|e| e.id).collect();
                 let hint = stylet_scenario::closest(name, &known)
                     .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                Err(Failure::Argument(format!("there is no effect `{name}`{hint} `stylet effects` lists them")))
+                Err(Failure::Argument(format!(
+                    "there is no effect `{name}`{hint} `stylet effects` lists them"
+                )))
             }
         },
     }
@@ -36,7 +42,11 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
 
 fn one(entry: &EffectInfo) -> String {
     let mut out = String::new();
-    let _ = writeln!(out, "{}\n\n  {}\n\n  source     {}\n  signature  {}\n", entry.id, entry.equation, entry.source, entry.signature);
+    let _ = writeln!(
+        out,
+        "{}\n\n  {}\n\n  source     {}\n  signature  {}\n",
+        entry.id, entry.equation, entry.source, entry.signature
+    );
     for p in entry.parameters {
         let unit = if p.unit.is_empty() { "-" } else { p.unit };
         let _ = writeln!(
@@ -84,7 +94,11 @@ fn force(effects: &[AnyEffect]) -> Vec<f64> {
     };
     let tissue = Tissue {
         surface_m: 0.0,
-        layers: vec![layer(0.015, 60.0, 6000.0, None), layer(0.02, 90.0, 9000.0, Some(1.4)), layer(0.03, 70.0, 7000.0, None)],
+        layers: vec![
+            layer(0.015, 60.0, 6000.0, None),
+            layer(0.02, 90.0, 9000.0, Some(1.4)),
+            layer(0.03, 70.0, 7000.0, None),
+        ],
     };
     let Ok(law) = Law::new(&tissue, effects) else { return Vec::new() };
     let chain = Measurement::new(effects);
@@ -93,7 +107,10 @@ fn force(effects: &[AnyEffect]) -> Vec<f64> {
         .into_iter()
         .map(|[t, z, v, a]| {
             let tissue_n = law.step(&mut state, t, z, v, |_| {}).total_n;
-            chain.step(&mut measuring, &Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n: 0.0 })
+            chain.step(
+                &mut measuring,
+                &Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n: 0.0 },
+            )
         })
         .collect()
 }

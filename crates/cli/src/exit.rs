@@ -60,9 +60,12 @@ impl Failure {
     #[must_use]
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Failure::Input(_) | Failure::Recording(_) | Failure::Simulate { .. } | Failure::Output { .. } | Failure::Diagnose(_) | Failure::Argument(_) => {
-                INPUT_WRONG
-            }
+            Failure::Input(_)
+            | Failure::Recording(_)
+            | Failure::Simulate { .. }
+            | Failure::Output { .. }
+            | Failure::Diagnose(_)
+            | Failure::Argument(_) => INPUT_WRONG,
             Failure::Internal(_) => INTERNAL,
         })
     }

@@ -24,7 +24,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (k, r) in case.recordings.iter().enumerate() {
         let mut csv = Vec::new();
         stylet_record::write_csv(r, None, &[], &mut csv)?;
-        std::fs::write(dir.join(format!("{}.csv", ["constant", "sinusoid", "program_1", "program_2"][k % 4])), csv)?;
+        std::fs::write(
+            dir.join(format!("{}.csv", ["constant", "sinusoid", "program_1", "program_2"][k % 4])),
+            csv,
+        )?;
     }
     Ok(())
 }

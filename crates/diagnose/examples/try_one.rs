@@ -26,7 +26,10 @@ fn main() {
     let drawn = match args.get(5).and_then(|s| s.parse().ok()) {
         Some(index) => {
             let seed = args.get(6).and_then(|s| s.parse().ok()).unwrap_or(1);
-            Drawn { effects: drawn.effects, ..hidden::sketch_of(seed, index, hidden::Kind::Single, index).drawn }
+            Drawn {
+                effects: drawn.effects,
+                ..hidden::sketch_of(seed, index, hidden::Kind::Single, index).drawn
+            }
         }
         None => drawn,
     };
@@ -39,22 +42,37 @@ fn main() {
         println!("no base fit");
         return;
     };
-    println!("base {:.2} s, nats {:.1} of {}", start.elapsed().as_secs_f64(), search.base.nats, search.data.samples());
+    println!(
+        "base {:.2} s, nats {:.1} of {}",
+        start.elapsed().as_secs_f64(),
+        search.base.nats,
+        search.data.samples()
+    );
     println!("ruptures      {:?}", search.base.ruptures);
     println!("noise {:?} air {:?}", search.data.noise, search.air);
     for (l, (fitted, truth)) in search.base.model.tissue.layers.iter().zip(&case.truth.layers).enumerate() {
         println!(
             "  layer {l}: K {:.3} ({:.3}) b {:.1} ({:.1}) F {:?} ({:?})",
-            fitted.stiffness_n_per_m, truth.stiffness_n_per_m, fitted.friction_ns_per_m2, truth.friction_ns_per_m2,
-            fitted.puncture_n, truth.puncture_n
+            fitted.stiffness_n_per_m,
+            truth.stiffness_n_per_m,
+            fitted.friction_ns_per_m2,
+            truth.friction_ns_per_m2,
+            fitted.puncture_n,
+            truth.puncture_n
         );
     }
     search.run(|_| {});
     println!("search {:.2} s", start.elapsed().as_secs_f64());
     for s in &search.stages {
         println!("stage on {:?}: needed {:.1} taken {:?}", s.stood, s.needed, s.taken);
-        println!("  screened {:?}", s.screened.iter().map(|(n, g)| format!("{n} {g:.1}")).collect::<Vec<_>>());
-        println!("  rivals {:?}", s.rivals.iter().map(|(n, g, p)| format!("{n} {g:.1} ({p})")).collect::<Vec<_>>());
+        println!(
+            "  screened {:?}",
+            s.screened.iter().map(|(n, g)| format!("{n} {g:.1}")).collect::<Vec<_>>()
+        );
+        println!(
+            "  rivals {:?}",
+            s.rivals.iter().map(|(n, g, p)| format!("{n} {g:.1} ({p})")).collect::<Vec<_>>()
+        );
     }
     for e in &search.best.model.effects {
         println!("{} {:?}", e.info.id, e.values);

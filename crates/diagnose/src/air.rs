@@ -12,8 +12,7 @@ const NEAR_M: f64 = 0.3e-3;
 #[must_use]
 pub fn noise(tracks: &[Track], surface_m: f64, least_n: f64) -> Option<Noise> {
     for clear in [CLEAR_M, NEAR_M] {
-        let runs: Vec<(Track, Vec<f64>)> =
-            tracks.iter().filter_map(|t| run(t, surface_m - clear)).collect();
+        let runs: Vec<(Track, Vec<f64>)> = tracks.iter().filter_map(|t| run(t, surface_m - clear)).collect();
         let parts: Vec<(&Track, &[f64])> = runs.iter().map(|(t, e)| (t, e.as_slice())).collect();
         let samples: usize = parts.iter().map(|p| p.1.len()).sum();
         if samples >= 200 {
@@ -62,15 +61,13 @@ fn detrend(t: &[f64], e: &mut [f64]) {
 /// Power at a frequency, by Goertzel's recursion.
 #[must_use]
 pub fn power(e: &[f64], cycles_per_sample: f64) -> f64 {
-    let (sin, cos) = libm::sincos(core::f64::consts::TAU * cycles_per_sample);
-    let c = 2.0 * cos;
+    let c = 2.0 * libm::cos(core::f64::consts::TAU * cycles_per_sample);
     let (mut s1, mut s2) = (0.0, 0.0);
     for x in e {
         let s = x + c * s1 - s2;
         s2 = s1;
         s1 = s;
     }
-    let _ = sin;
     (s1 * s1 + s2 * s2 - c * s1 * s2) / e.len() as f64
 }
 

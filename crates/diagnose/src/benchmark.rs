@@ -63,7 +63,8 @@ fn strength(drawn: &Drawn) -> Option<f64> {
     let case = hidden::case(drawn);
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
     let clean = hidden::clean_force(drawn);
-    let search = Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, Settings::default())?;
+    let search =
+        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, Settings::default())?;
     Some(size_of(&search, &search.base, &clean, drawn))
 }
 
@@ -173,7 +174,11 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
                 high += turn;
             }
             let size = if p.unit == "rad" { 1.0 } else { truth.abs().max(1e-12) };
-            errors.push((format!("{}.{}", effect.id(), p.path), (value - truth).abs() / size, low <= truth && truth <= high));
+            errors.push((
+                format!("{}.{}", effect.id(), p.path),
+                (value - truth).abs() / size,
+                low <= truth && truth <= high,
+            ));
         }
     }
     // What the truth would leave, and by how much it beats the base.
@@ -203,7 +208,11 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
     Some(Result {
         index,
         kind: sketch.kind,
-        hidden: if let Some(o) = &drawn.outside { vec![hidden::OUTSIDE[o.kind].to_owned()] } else { hidden_ids },
+        hidden: if let Some(o) = &drawn.outside {
+            vec![hidden::OUTSIDE[o.kind].to_owned()]
+        } else {
+            hidden_ids
+        },
         values: drawn.effects.iter().map(AnyEffect::parameters).collect(),
         strength,
         size: Size::of(strength),
@@ -232,7 +241,12 @@ fn wilson(right: usize, of: usize) -> String {
     let (n, p, z) = (of as f64, right as f64 / of as f64, 1.96);
     let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
     let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    format!("{right}/{of} = {:.1} % ({:.1} to {:.1})", 100.0 * p, 100.0 * (middle - half), 100.0 * (middle + half))
+    format!(
+        "{right}/{of} = {:.1} % ({:.1} to {:.1})",
+        100.0 * p,
+        100.0 * (middle - half),
+        100.0 * (middle + half)
+    )
 }
 
 fn quantile(x: &mut [f64], q: f64) -> f64 {
@@ -263,12 +277,22 @@ pub fn summary(cases: &[Result]) -> String {
             .collect();
         line(&mut out, &format!("one effect, {size:?}: named, or in its class"), single);
     }
-    line(&mut out, "force_gain: listed as invisible", of(Kind::Single).filter(|c| c.hidden == ["force_gain"]).collect());
+    line(
+        &mut out,
+        "force_gain: listed as invisible",
+        of(Kind::Single).filter(|c| c.hidden == ["force_gain"]).collect(),
+    );
     line(&mut out, "two effects, both named", of(Kind::Two).collect());
     for size in [Size::Strong, Size::Medium, Size::Faint] {
         let outside: Vec<&Result> = of(Kind::Outside).filter(|c| c.size == size).collect();
-        let named = outside.iter().filter(|c| matches!(c.verdict, Verdict::Named | Verdict::Ambiguous)).count();
-        let _ = writeln!(out, "{:<44} {}", format!("outside the library, {size:?}: wrongly named"), wilson(named, outside.len()));
+        let named =
+            outside.iter().filter(|c| matches!(c.verdict, Verdict::Named | Verdict::Ambiguous)).count();
+        let _ = writeln!(
+            out,
+            "{:<44} {}",
+            format!("outside the library, {size:?}: wrongly named"),
+            wilson(named, outside.len())
+        );
         line(&mut out, &format!("outside the library, {size:?}: unknown"), outside);
     }
     let strong = || of(Kind::Single).filter(|c| c.size == Size::Strong && c.right);
@@ -280,9 +304,15 @@ pub fn summary(cases: &[Result]) -> String {
         100.0 * quantile(&mut errors, 0.9)
     );
     for size in [Size::Strong, Size::Medium, Size::Faint] {
-        let held: Vec<bool> =
-            of(Kind::Single).filter(|c| c.size == size && c.right).flat_map(|c| c.errors.iter().map(|e| e.2)).collect();
-        let _ = writeln!(out, "95 % intervals, {size:?}: hold the truth in {}", wilson(held.iter().filter(|h| **h).count(), held.len()));
+        let held: Vec<bool> = of(Kind::Single)
+            .filter(|c| c.size == size && c.right)
+            .flat_map(|c| c.errors.iter().map(|e| e.2))
+            .collect();
+        let _ = writeln!(
+            out,
+            "95 % intervals, {size:?}: hold the truth in {}",
+            wilson(held.iter().filter(|h| **h).count(), held.len())
+        );
     }
     let mut by_parameter: BTreeMap<&str, (usize, usize, f64)> = BTreeMap::new();
     for e in of(Kind::Single).filter(|c| c.right).flat_map(|c| &c.errors) {
@@ -295,23 +325,46 @@ pub fn summary(cases: &[Result]) -> String {
         let _ = writeln!(out, "    {name:<48} held {held}/{all}, worst error {:.2} %", 100.0 * worst);
     }
     let mut gains: Vec<f64> = strong().filter_map(|c| c.gain).collect();
-    let _ = writeln!(out, "held-out gain over the possible one, strong: p10 {:.4}, median {:.4}", quantile(&mut gains, 0.1), quantile(&mut gains, 0.5));
+    let _ = writeln!(
+        out,
+        "held-out gain over the possible one, strong: p10 {:.4}, median {:.4}",
+        quantile(&mut gains, 0.1),
+        quantile(&mut gains, 0.5)
+    );
     let worse = of(Kind::Clean).filter(|c| c.rms_n[1] > 1.01 * c.rms_n[0]).count();
-    let _ = writeln!(out, "clean data, worse than the base by more than 1 %: {}", wilson(worse, of(Kind::Clean).count()));
+    let _ = writeln!(
+        out,
+        "clean data, worse than the base by more than 1 %: {}",
+        wilson(worse, of(Kind::Clean).count())
+    );
     let mut seconds: Vec<f64> = cases.iter().map(|c| c.seconds).collect();
-    let _ = writeln!(out, "seconds per case (cases run side by side): median {:.2}, p90 {:.2}", quantile(&mut seconds, 0.5), quantile(&mut seconds, 0.9));
+    let _ = writeln!(
+        out,
+        "seconds per case (cases run side by side): median {:.2}, p90 {:.2}",
+        quantile(&mut seconds, 0.5),
+        quantile(&mut seconds, 0.9)
+    );
     // Confidence.
     let _ = writeln!(out, "\nconfidence against truth (one effect):");
     for (lo, hi) in [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)] {
-        let bin: Vec<&Result> = of(Kind::Single)
-            .filter(|c| c.confidence.first().is_some_and(|p| *p >= lo && *p < hi))
-            .collect();
-        let first = bin.iter().filter(|c| c.named.first().and_then(|n| n.first()) == c.hidden.first()).count();
-        let _ = writeln!(out, "    said {lo:.2} to {:.2}: the first named is it in {}", hi.min(1.0), wilson(first, bin.len()));
+        let bin: Vec<&Result> =
+            of(Kind::Single).filter(|c| c.confidence.first().is_some_and(|p| *p >= lo && *p < hi)).collect();
+        let first =
+            bin.iter().filter(|c| c.named.first().and_then(|n| n.first()) == c.hidden.first()).count();
+        let _ = writeln!(
+            out,
+            "    said {lo:.2} to {:.2}: the first named is it in {}",
+            hi.min(1.0),
+            wilson(first, bin.len())
+        );
     }
     // Power.
-    let _ = writeln!(out, "\npower (named or in its class, by strength in noise sd) and the smallest strength from which 80 % are named:");
-    let mut names: Vec<&str> = of(Kind::Single).filter_map(|c| c.hidden.first().map(String::as_str)).collect();
+    let _ = writeln!(
+        out,
+        "\npower (named or in its class, by strength in noise sd) and the smallest strength from which 80 % are named:"
+    );
+    let mut names: Vec<&str> =
+        of(Kind::Single).filter_map(|c| c.hidden.first().map(String::as_str)).collect();
     names.sort_unstable();
     names.dedup();
     for name in names {
@@ -331,7 +384,10 @@ pub fn summary(cases: &[Result]) -> String {
         let _ = writeln!(
             out,
             "    {name:<26} strong {:>6}  medium {:>6}  faint {:>6}  below {:>6}  80 % from {least:.2} sd",
-            per(Size::Strong), per(Size::Medium), per(Size::Faint), per(Size::Below)
+            per(Size::Strong),
+            per(Size::Medium),
+            per(Size::Faint),
+            per(Size::Below)
         );
     }
     // Confusion.

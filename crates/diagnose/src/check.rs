@@ -22,7 +22,11 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Di
         let usable: Vec<usize> = usable.collect();
         let name = || e.name.clone();
         if usable.len() < LEAST_SAMPLES {
-            return Err(DiagnoseError::TooShort { name: name(), samples: usable.len(), least: LEAST_SAMPLES });
+            return Err(DiagnoseError::TooShort {
+                name: name(),
+                samples: usable.len(),
+                least: LEAST_SAMPLES,
+            });
         }
         let deepest_m = usable.iter().fold(f64::NEG_INFINITY, |m, &i| m.max(r.position_m[i]));
         let lowest_m = usable.iter().fold(f64::INFINITY, |m, &i| m.min(r.position_m[i]));
@@ -80,10 +84,16 @@ fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<(), Diag
         );
     }
     if correlation.abs() > 0.5 && ratio > 100.0 {
-        return wrong(format!("the force is {ratio:.0} times what the scenario expects: is it in millinewtons?"), 1e-3);
+        return wrong(
+            format!("the force is {ratio:.0} times what the scenario expects: is it in millinewtons?"),
+            1e-3,
+        );
     }
     if correlation.abs() > 0.5 && ratio < 0.01 {
-        return wrong(format!("the force is {ratio:.1e} of what the scenario expects: is it in kilonewtons?"), 1e3);
+        return wrong(
+            format!("the force is {ratio:.1e} of what the scenario expects: is it in kilonewtons?"),
+            1e3,
+        );
     }
     Ok(())
 }
@@ -94,7 +104,12 @@ pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
         .filter(|&i| !(r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite())
         .collect();
     let first = *bad.first()?;
-    let message = format!("{} sample(s) are not finite numbers, the first is number {}: they were cut out", bad.len(), first + 1);
-    let numbers = [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
+    let message = format!(
+        "{} sample(s) are not finite numbers, the first is number {}: they were cut out",
+        bad.len(),
+        first + 1
+    );
+    let numbers =
+        [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
     Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new() })
 }

@@ -94,9 +94,7 @@ pub fn by_layer_and_phase(curves: &[Curves], pick: fn(&Curves) -> &[f64], layers
             sums[row][phase].1 += 1.0;
         }
     }
-    sums.iter()
-        .map(|row| row.map(|(s, n)| if n < 20.0 { f64::NAN } else { (s / n).sqrt() }))
-        .collect()
+    sums.iter().map(|row| row.map(|(s, n)| if n < 20.0 { f64::NAN } else { (s / n).sqrt() })).collect()
 }
 
 /// Mean of a residual in bins of an abscissa: bin middles and means.
@@ -104,7 +102,7 @@ pub fn by_layer_and_phase(curves: &[Curves], pick: fn(&Curves) -> &[f64], layers
 pub fn binned(x: &[f64], e: &[f64], used: &[bool], bins: usize) -> (Vec<f64>, Vec<f64>) {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     let wide = (high - low) / bins as f64;
-    if !(wide > 0.0) {
+    if wide.is_nan() || wide <= 0.0 {
         return (Vec::new(), Vec::new());
     }
     let mut sums = vec![(0.0, 0.0); bins];
@@ -122,7 +120,11 @@ pub fn binned(x: &[f64], e: &[f64], used: &[bool], bins: usize) -> (Vec<f64>, Ve
 
 /// Correlations of a residual with what was done: name and coefficient.
 #[must_use]
-pub fn correlations(curves: &[Curves], pick: fn(&Curves) -> &[f64], slabs: &[Slab]) -> Vec<(&'static str, f64)> {
+pub fn correlations(
+    curves: &[Curves],
+    pick: fn(&Curves) -> &[f64],
+    slabs: &[Slab],
+) -> Vec<(&'static str, f64)> {
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); 7];
     let mut e = Vec::new();
     for c in curves {
@@ -130,7 +132,9 @@ pub fn correlations(curves: &[Curves], pick: fn(&Curves) -> &[f64], slabs: &[Sla
             let (z, v) = (c.position_m[i], c.velocity_mps[i]);
             let inside: f64 = slabs.iter().map(|s| s.inside_m(z)).sum();
             let sign = stylet_tissue::effect::sgn(v);
-            for (column, x) in columns.iter_mut().zip([c.time_s[i], z, v, sign, inside * v, inside * sign, c.force_n[i]]) {
+            for (column, x) in
+                columns.iter_mut().zip([c.time_s[i], z, v, sign, inside * v, inside * sign, c.force_n[i]])
+            {
                 column.push(x);
             }
             e.push(pick(c)[i]);
@@ -141,12 +145,20 @@ pub fn correlations(curves: &[Curves], pick: fn(&Curves) -> &[f64], slabs: &[Sla
         x.iter().map(|x| x - mean).collect::<Vec<_>>()
     };
     let e = centred(&e);
-    ["time", "depth", "velocity", "direction", "length inside x velocity", "length inside x direction", "force"]
-        .into_iter()
-        .zip(&columns)
-        .map(|(name, x)| {
-            let x = centred(x);
-            (name, dot(&x, &e) / (dot(&x, &x) * dot(&e, &e)).sqrt().max(1e-300))
-        })
-        .collect()
+    [
+        "time",
+        "depth",
+        "velocity",
+        "direction",
+        "length inside x velocity",
+        "length inside x direction",
+        "force",
+    ]
+    .into_iter()
+    .zip(&columns)
+    .map(|(name, x)| {
+        let x = centred(x);
+        (name, dot(&x, &e) / (dot(&x, &x) * dot(&e, &e)).sqrt().max(1e-300))
+    })
+    .collect()
 }

@@ -8,8 +8,8 @@ use crate::outcome::*;
 use crate::raw;
 use crate::refine::covariance_diagonal;
 use crate::search::{Candidate, Search, Settings};
-use crate::visible;
 use crate::track::Track;
+use crate::visible;
 use std::collections::BTreeMap;
 use stylet_record::{QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
@@ -80,15 +80,17 @@ pub fn diagnose(
     let raw = raw::look(&recordings, &notes);
     let tracks: Vec<Track> = recordings.iter().zip(&raw.exclude).map(|(r, x)| Track::new(r, x)).collect();
     progress("fitting the base law");
-    let mut search = Search::base(&scenario.tissue, scenario.tolerance, &scenario.effects, tracks, options.search)
-        .ok_or(DiagnoseError::NoFit)?;
+    let mut search =
+        Search::base(&scenario.tissue, scenario.tolerance, &scenario.effects, tracks, options.search)
+            .ok_or(DiagnoseError::NoFit)?;
     search.run(&mut progress);
     progress("judging");
     let best = search.best.clone();
     let data = search.data_of(&best);
     let left = leftover::test(&best.model, &data);
     let explained = search.base.nats - best.nats;
-    let dominated = left.p_value < LEFTOVER_P && left.nats > DOMINATES * explained.max(0.0) && left.nats > 8.0;
+    let dominated =
+        left.p_value < LEFTOVER_P && left.nats > DOMINATES * explained.max(0.0) && left.nats > 8.0;
 
     let mut causes = Vec::new();
     let spread = if options.brief { None } else { covariance_diagonal(&best.model, &data) };
@@ -112,7 +114,12 @@ pub fn diagnose(
         causes.clear();
     }
     causes.append(&mut from_raw);
-    let verdict = if verdict == Verdict::Unknown { causes.clear(); verdict } else { verdict };
+    let verdict = if verdict == Verdict::Unknown {
+        causes.clear();
+        verdict
+    } else {
+        verdict
+    };
     let names: Vec<String> = evidence.iter().map(|e| e.name.clone()).collect();
     let gain = if options.brief {
         Gain {
@@ -169,7 +176,12 @@ fn step(stage: &crate::search::Stage) -> EvidenceStep {
     for (name, gain) in &stage.screened {
         if !rivals.iter().any(|r| r.effect == *name) {
             let parameters = stylet_tissue::info(name).map_or(0, |i| i.parameters.len());
-            rivals.push(Rival { effect: (*name).to_owned(), gain_nats: *gain, parameters, screened_only: true });
+            rivals.push(Rival {
+                effect: (*name).to_owned(),
+                gain_nats: *gain,
+                parameters,
+                screened_only: true,
+            });
         }
     }
     EvidenceStep {
@@ -186,13 +198,18 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
     // Rivals that stand on the same other effects.
     let others = &best.model.names()[..best.model.effects.len() - 1];
     let last = index + 1 == best.model.effects.len()
-        && search.rivals.first().is_some_and(|r| r.model.names().starts_with(others) && r.model.effects.len() == others.len() + 1);
+        && search.rivals.first().is_some_and(|r| {
+            r.model.names().starts_with(others) && r.model.effects.len() == others.len() + 1
+        });
     let own = search.reference;
     let name_of = |c: &Candidate| c.model.names().last().copied().unwrap_or("").to_owned();
     let mut weights = 0.0;
     let mut equivalent = Vec::new();
-    let rivals: Vec<&Candidate> =
-        if last { search.rivals.iter().filter(|r| name_of(r) != choice.info.id).collect() } else { Vec::new() };
+    let rivals: Vec<&Candidate> = if last {
+        search.rivals.iter().filter(|r| name_of(r) != choice.info.id).collect()
+    } else {
+        Vec::new()
+    };
     for rival in rivals {
         let behind = rival.fined() - own;
         // A larger model that holds the one named is no rival of it.
@@ -208,6 +225,11 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
         let value = choice.values[k];
         let role = Role::Effect { effect: index, parameter: k };
         let sd = spread.and_then(|s| s.iter().find(|x| x.0 == role)).map_or(f64::NAN, |x| x.2) * WIDEN * 1.96;
+        let sd = if choice.info.id == "hidden_membrane" && k == 0 {
+            membrane_depth_sd(choice, index, spread) * WIDEN * 1.96
+        } else {
+            sd
+        };
         let (low, high) = if p.whole || !sd.is_finite() {
             (value, value)
         } else if in_logarithm(choice.info, k) {
@@ -235,6 +257,22 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
     }
 }
 
+/// Uncertainty in m of the depth at which a membrane begins: where it breaks is known to the travel of
+/// one sample, the rest is its stretch `F_m/K_m` (their errors taken as independent, which is wide).
+fn membrane_depth_sd(
+    choice: &crate::model::Choice,
+    index: usize,
+    spread: Option<&[(Role, f64, f64)]>,
+) -> f64 {
+    const BREAK_SD_M: f64 = 5e-6;
+    let relative = |parameter: usize| {
+        let role = Role::Effect { effect: index, parameter };
+        spread.and_then(|s| s.iter().find(|x| x.0 == role)).map_or(f64::NAN, |x| x.2)
+    };
+    let stretch_m = choice.values[2] / choice.values[1];
+    libm::hypot(BREAK_SD_M, stretch_m * libm::hypot(relative(1), relative(2)))
+}
+
 /// Whether the larger effect holds the smaller one as a special case.
 fn nests(larger: &str, smaller: &str) -> bool {
     matches!((larger, smaller), ("stribeck_friction" | "presliding_friction", "coulomb_friction"))
@@ -247,7 +285,10 @@ fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
         let parameters = numbers
             .iter()
             .map(|(path, value, sd)| {
-                ((*path).to_owned(), Estimate { value: *value, low: (value - 1.96 * sd).max(0.0), high: value + 1.96 * sd })
+                (
+                    (*path).to_owned(),
+                    Estimate { value: *value, low: (value - 1.96 * sd).max(0.0), high: value + 1.96 * sd },
+                )
             })
             .collect();
         causes.push(Cause {
@@ -268,7 +309,10 @@ fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
         let rate = count as f64 / seconds.max(1e-9);
         add(
             "force_spikes",
-            &[("rate_hz", rate, rate / (count as f64).sqrt()), ("size_n", size, 1.5 * noise_n / (count as f64).sqrt())],
+            &[
+                ("rate_hz", rate, rate / (count as f64).sqrt()),
+                ("size_n", size, 1.5 * noise_n / (count as f64).sqrt()),
+            ],
         );
     }
     causes
@@ -328,13 +372,13 @@ fn extended(scenario: &Scenario, shown: &Candidate, causes: &[Cause]) -> Scenari
     out.effects.extend(rounded(&shown.model).effects.iter().filter_map(crate::model::Choice::effect));
     for cause in causes.iter().filter(|c| crate::starts::FROM_THE_RAW_DATA.contains(&c.effect.as_str())) {
         if let Some(info) = stylet_tissue::info(&cause.effect) {
-            let values: Vec<f64> =
-                info.parameters.iter().map(|p| cause.parameters.get(p.path).map_or(p.start, |e| e.value)).collect();
+            let values: Vec<f64> = info
+                .parameters
+                .iter()
+                .map(|p| cause.parameters.get(p.path).map_or(p.start, |e| e.value))
+                .collect();
             out.effects.extend(AnyEffect::from_parameters(info.id, &values));
         }
-    }
-    if let stylet_scenario::Sensor::ForceTorque(sensor) = &mut out.sensor {
-        let _ = sensor;
     }
     out
 }

@@ -155,8 +155,7 @@ pub fn jacobian(
                 for (c, (new, old)) in column.iter_mut().zip(work.w.iter().zip(&at.w)) {
                     *c = (new - old) * inverse;
                 }
-                for (c, (new, old)) in
-                    column[at.w.len()..].iter_mut().zip(work.events.iter().zip(&at.events))
+                for (c, (new, old)) in column[at.w.len()..].iter_mut().zip(work.events.iter().zip(&at.events))
                 {
                     *c = (new.u - old.u) * inverse;
                 }
@@ -171,7 +170,8 @@ pub fn jacobian(
 #[must_use]
 pub fn normal(model: &Model, jac: &Jacobian, at: &Residuals) -> (Vec<Vec<f64>>, Vec<f64>) {
     let m = jac.slots.len();
-    let root: Vec<f64> = at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).map(|w| weight(w).sqrt()).collect();
+    let root: Vec<f64> =
+        at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).map(|w| weight(w).sqrt()).collect();
     let r: Vec<f64> =
         at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).zip(&root).map(|(w, s)| w * s).collect();
     let weighted: Vec<Vec<f64>> =
@@ -219,7 +219,7 @@ pub fn solve(h: &[Vec<f64>], g: &[f64]) -> Option<Vec<f64>> {
             let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
             let rest = h[i][j] - sum;
             if i == j {
-                if !(rest > 1e-14 * h[i][i].abs()) {
+                if rest.is_nan() || rest <= 1e-14 * h[i][i].abs() {
                     return None;
                 }
                 l[i][i] = rest.sqrt();
@@ -304,7 +304,9 @@ fn step(slots: &[Slot], p: &[f64], h: &[Vec<f64>], g: &[f64], lambda: f64) -> Op
         }
         let sub: Vec<Vec<f64>> = index
             .iter()
-            .map(|&i| index.iter().map(|&j| if i == j { h[i][i] * (1.0 + lambda) } else { h[i][j] }).collect())
+            .map(|&i| {
+                index.iter().map(|&j| if i == j { h[i][i] * (1.0 + lambda) } else { h[i][j] }).collect()
+            })
             .collect();
         let right: Vec<f64> = index.iter().map(|&i| -g[i]).collect();
         let d = solve(&sub, &right)?;

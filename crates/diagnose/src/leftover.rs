@@ -20,7 +20,8 @@ pub struct Leftover {
     pub nats: f64,
 }
 
-const FEATURES: [&str; 6] = ["depth", "time", "velocity", "phase_and_depth", "travel_since_reversal", "depth_and_velocity"];
+const FEATURES: [&str; 6] =
+    ["depth", "time", "velocity", "phase_and_depth", "travel_since_reversal", "depth_and_velocity"];
 
 /// Upper tail of the normal distribution.
 #[must_use]

@@ -1,7 +1,7 @@
 //! A linear look at many starts: how much would the objective gain if the start's change of the force,
 //! less what the parameters already fitted can imitate, were added in the right amount.
 
-use crate::fit::{Data, Residuals, dot, jacobian, normal, residuals, solve};
+use crate::fit::{Data, Residuals, dot, jacobian, residuals, solve};
 use crate::model::Model;
 use crate::starts::Start;
 
@@ -46,7 +46,6 @@ impl<'a> Look<'a> {
             })
             .collect();
         let r: Vec<f64> = all().zip(&root).map(|(w, s)| w * s).collect();
-        let _ = normal;
         // Gram-Schmidt with the prior's pull as one further row per base number.
         let m = jac.slots.len();
         let mut q: Vec<Vec<f64>> = Vec::new();
@@ -120,9 +119,15 @@ impl<'a> Look<'a> {
             let value = &mut start.choice.values[0];
             *value = (1.0 + (*value - 1.0) * scale).clamp(0.2, 2.0);
         }
-        if !matches!(info.id, "power_law_friction" | "rate_dependent_puncture" | "boundary_shift" | "position_scale") && info.id != "needle_compliance" && info.id != "hidden_membrane" {
+        if !matches!(
+            info.id,
+            "power_law_friction" | "rate_dependent_puncture" | "boundary_shift" | "position_scale"
+        ) && info.id != "needle_compliance"
+            && info.id != "hidden_membrane"
+        {
             for (value, p) in start.choice.values.iter_mut().zip(info.parameters) {
-                let scalable = p.strength && !matches!(info.id, "low_pass_lag" | "time_delay" | "soft_boundary");
+                let scalable =
+                    p.strength && !matches!(info.id, "low_pass_lag" | "time_delay" | "soft_boundary");
                 if scalable {
                     *value = (*value * scale).clamp(p.low, p.high.min(p.search.1));
                 }
@@ -197,7 +202,9 @@ impl<'a> Look<'a> {
                             if !track.used[i] || track.restart[i] {
                                 continue;
                             }
-                            let d = -(force(i) - a1 * force(i - 1) - a2 * force(i - 2)) * inverse * self.root[offset + i];
+                            let d = -(force(i) - a1 * force(i - 1) - a2 * force(i - 2))
+                                * inverse
+                                * self.root[offset + i];
                             dd += d * d;
                             dr += d * self.r[offset + i];
                             for (sum, u) in dq.iter_mut().zip(&self.q) {

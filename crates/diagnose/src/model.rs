@@ -142,13 +142,7 @@ impl Model {
             .iter()
             .map(|e| if let AnyEffect::TimeDelay(delay) = e { delay.delay_s } else { 0.0 })
             .sum();
-        Some(Compiled {
-            law,
-            to_true: chain.true_position(1.0),
-            measures: !chain.is_plain(),
-            chain,
-            delay_s,
-        })
+        Some(Compiled { law, to_true: chain.true_position(1.0), measures: !chain.is_plain(), chain, delay_s })
     }
 
     /// The numbers that are fitted.

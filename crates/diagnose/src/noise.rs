@@ -32,7 +32,8 @@ impl Noise {
         let mut rows: Vec<[f64; 3]> = Vec::new();
         for (r, (track, e)) in parts.iter().enumerate() {
             for i in 2..track.len() {
-                if track.used[i] && !track.restart[i] && chosen(r, i) && chosen(r, i - 1) && chosen(r, i - 2) {
+                if track.used[i] && !track.restart[i] && chosen(r, i) && chosen(r, i - 1) && chosen(r, i - 2)
+                {
                     rows.push([e[i], e[i - 1], e[i - 2]]);
                 }
             }

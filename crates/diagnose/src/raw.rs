@@ -24,7 +24,8 @@ const SPIKE_SD: f64 = 6.5;
 /// Looks the raw forces over.
 #[must_use]
 pub fn look(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Raw {
-    let mut raw = Raw { exclude: recordings.iter().map(|r| vec![false; r.len()]).collect(), ..Raw::default() };
+    let mut raw =
+        Raw { exclude: recordings.iter().map(|r| vec![false; r.len()]).collect(), ..Raw::default() };
     raw.step_n = step(recordings, notes);
     raw.limit_n = limit(recordings, raw.step_n);
     if let Some(limit) = raw.limit_n {
@@ -103,7 +104,8 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
             let both = before.abs().min(after.abs()) > 0.7 * SPIKE_SD * sd && before * after > 0.0;
             let level = (f[i - 1] - f[i + 1]).abs() < 0.5 * s.abs();
             let v = &recording.velocity_mps;
-            let moves = (v[i + 1] - v[i - 1]).abs() > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
+            let moves = (v[i + 1] - v[i - 1]).abs()
+                > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
             if !moves && s.abs() > SPIKE_SD * sd && both && level && !exclude[i] {
                 exclude[i] = true;
                 count += 1;

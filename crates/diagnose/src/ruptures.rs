@@ -30,7 +30,8 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<usize>> {
             break;
         }
     }
-    let friction: Vec<(Vec<f64>, &Track)> = tracks.iter().map(|t| (without_friction(&model.tissue, t), t)).collect();
+    let friction: Vec<(Vec<f64>, &Track)> =
+        tracks.iter().map(|t| (without_friction(&model.tissue, t), t)).collect();
     paths
         .iter()
         .zip(&friction)
@@ -128,7 +129,8 @@ fn refit(model: &mut Model, tracks: &[Track], paths: &[Vec<usize>]) {
             for (l, slab) in slabs.iter().enumerate() {
                 row[l] = if l == active { slab.stiffness_n_per_m * (z - slab.front_m).max(0.0) } else { 0.0 };
                 row[layers + l] = slab.friction_ns_per_m2 * slab.inside_m(z) * v;
-                predicted += row[l] * model.tissue.layers[l].stiffness_n_per_m / slab.stiffness_n_per_m.max(1e-12)
+                predicted += row[l] * model.tissue.layers[l].stiffness_n_per_m
+                    / slab.stiffness_n_per_m.max(1e-12)
                     + row[layers + l] * model.tissue.layers[l].friction_ns_per_m2
                         / slab.friction_ns_per_m2.max(1e-12);
             }

@@ -6,7 +6,7 @@ use crate::fit::{Data, Fit, Residuals, fit, objective, residuals};
 use crate::look::{Look, Seen};
 use crate::model::{Choice, Model};
 use crate::noise::{Noise, median};
-use crate::refine::{refine, retime, seed_punctures};
+use crate::refine::{refine, seed_punctures};
 use crate::ruptures;
 use crate::spectrum::{peaks, periodogram};
 use crate::starts::{self, Hints, Start};
@@ -81,6 +81,9 @@ pub struct Stage {
     pub taken: Option<&'static str>,
 }
 
+/// A fit under way on averages: the fit, its data, the ruptures at full rate.
+type Begun = (Fit, Data, Vec<Vec<usize>>);
+
 /// Everything that the search works on and finds.
 pub struct Search {
     /// Full-rate data with the noise as known so far and the base model's ruptures.
@@ -131,9 +134,19 @@ impl Search {
             data.noise = own_noise(&fitted.model, &data, least).unwrap_or(noise);
         }
         let fitted = refine(&fitted.model, &mut data, 1, 4, false)?;
-        let base =
-            Candidate { model: fitted.model, ruptures: data.ruptures.clone(), nats: fitted.nats };
-        Some(Self { settings, best: base.clone(), base, rivals: Vec::new(), stages: Vec::new(), air, q, force_n, data, reference: 0.0 })
+        let base = Candidate { model: fitted.model, ruptures: data.ruptures.clone(), nats: fitted.nats };
+        Some(Self {
+            settings,
+            best: base.clone(),
+            base,
+            rivals: Vec::new(),
+            stages: Vec::new(),
+            air,
+            q,
+            force_n,
+            data,
+            reference: 0.0,
+        })
     }
 
     /// The data with a candidate's ruptures.
@@ -192,7 +205,7 @@ impl Search {
 
     /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened.
     fn contest(&self, standing: &Candidate) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
-                let data = self.data_of(standing);
+        let data = self.data_of(standing);
         let coarse = data.blocks(self.q, data.noise.blocks(self.q));
         let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
         let mut hints = self.hints(standing, &data);
@@ -226,7 +239,7 @@ impl Search {
             }
         }
         // Two turns for all; the rest only for those that may still win.
-        let begun: Vec<Option<(Fit, Data, Vec<Vec<usize>>)>> = chosen
+        let begun: Vec<Option<Begun>> = chosen
             .par_iter()
             .map(|s| {
                 let shifted = shift(&data, &s.start);
@@ -241,7 +254,7 @@ impl Search {
                 Some((f, there, shifted.ruptures))
             })
             .collect();
-        let mut begun: Vec<(Fit, Data, Vec<Vec<usize>>)> = begun.into_iter().flatten().collect();
+        let mut begun: Vec<Begun> = begun.into_iter().flatten().collect();
         begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
         let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
         let mut kept = 0;
@@ -314,7 +327,8 @@ impl Search {
     fn stage(&mut self, standing: &Candidate) -> bool {
         let (mut rivals, screened) = self.contest(standing);
         let stood = standing.model.names();
-        let mut stage = Stage { stood, screened, rivals: Vec::new(), needed: self.settings.needed(1), taken: None };
+        let mut stage =
+            Stage { stood, screened, rivals: Vec::new(), needed: self.settings.needed(1), taken: None };
         if rivals.is_empty() {
             self.stages.push(stage);
             return false;
@@ -374,13 +388,14 @@ impl Search {
         // A gain of thousands is no failure of the optimiser.
         let ahead = rivals.first().map_or(0.0, |r| standing.nats - r.nats);
         let more = if (4.0..2000.0).contains(&ahead) { 2 } else { 0 };
-        let roads: Vec<(Model, Vec<Vec<usize>>)> = std::iter::once((standing.model.clone(), standing.ruptures.clone()))
-            .chain(rivals.iter().take(more).map(|r| {
-                let mut model = r.model.clone();
-                model.effects.truncate(count);
-                (model, r.ruptures.clone())
-            }))
-            .collect();
+        let roads: Vec<(Model, Vec<Vec<usize>>)> =
+            std::iter::once((standing.model.clone(), standing.ruptures.clone()))
+                .chain(rivals.iter().take(more).map(|r| {
+                    let mut model = r.model.clone();
+                    model.effects.truncate(count);
+                    (model, r.ruptures.clone())
+                }))
+                .collect();
         let fits: Vec<Option<Candidate>> = roads
             .par_iter()
             .map(|(model, ruptures)| {
@@ -389,13 +404,18 @@ impl Search {
                 Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
             })
             .collect();
-        fits.into_iter().flatten().min_by(|a, b| a.nats.total_cmp(&b.nats)).unwrap_or_else(|| standing.clone())
+        fits.into_iter()
+            .flatten()
+            .min_by(|a, b| a.nats.total_cmp(&b.nats))
+            .unwrap_or_else(|| standing.clone())
     }
 
     /// With several effects: each in turn is taken out and contested anew.
     fn exchange(&mut self) {
         for index in 0..self.best.model.effects.len() {
-            let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures) else { continue };
+            let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures) else {
+                continue;
+            };
             let (rivals, _) = self.contest(&without);
             let Some(first) = rivals.first() else { continue };
             let first = simplest(&rivals, first, self.settings);
@@ -430,7 +450,10 @@ impl Search {
             let mut least: Option<(f64, Candidate)> = None;
             for index in 0..self.best.model.effects.len() {
                 let extra = self.best.model.extra() - self.best.model.without(index).extra();
-                let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures) else { continue };
+                let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures)
+                else {
+                    continue;
+                };
                 let spare = without.nats - self.best.nats - self.settings.needed(extra);
                 if spare < 0.0 && least.as_ref().is_none_or(|l| spare < l.0) {
                     least = Some((spare, without));
@@ -534,7 +557,10 @@ impl Search {
 
 /// Whether an effect shows in the instants of ruptures, where a linear look sees little.
 fn moves_events(id: &str) -> bool {
-    matches!(id, "boundary_shift" | "position_scale" | "rate_dependent_puncture" | "needle_compliance" | "respiration")
+    matches!(
+        id,
+        "boundary_shift" | "position_scale" | "rate_dependent_puncture" | "needle_compliance" | "respiration"
+    )
 }
 
 /// Looks at all starts, in parallel; those that come with other instants of rupture on data of their own.
@@ -599,10 +625,8 @@ pub fn own_noise(model: &Model, data: &Data, least_n: f64) -> Option<Noise> {
 
 /// White noise from the differences of neighbouring samples.
 fn rough(tracks: &[Track], least_n: f64) -> Noise {
-    let mut d: Vec<f64> = tracks
-        .iter()
-        .flat_map(|t| t.f.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
-        .collect();
+    let mut d: Vec<f64> =
+        tracks.iter().flat_map(|t| t.f.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs())).collect();
     Noise::white((median(&mut d) * 1.4826 / 6.0_f64.sqrt()).max(least_n))
 }
 
@@ -639,9 +663,4 @@ pub fn nats(model: &Model, data: &Data) -> f64 {
 #[must_use]
 pub fn choice(id: &str, values: &[f64]) -> Option<Choice> {
     stylet_tissue::info(id).map(|info| Choice::new(info, values))
-}
-
-/// Moves the ruptures of a candidate's data (for callers outside the search).
-pub fn settle(model: &Model, data: &mut Data) {
-    retime(model, data, true);
 }

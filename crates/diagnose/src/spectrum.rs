@@ -44,9 +44,7 @@ pub fn periodogram(w: &[f64], sample_hz: f64, length: usize) -> (Vec<f64>, Vec<f
     re.resize(size, 0.0);
     transform(&mut re, &mut im);
     let n = w.len().max(1) as f64;
-    (0..size / 2)
-        .map(|k| (k as f64 * sample_hz / size as f64, (re[k] * re[k] + im[k] * im[k]) / n))
-        .unzip()
+    (0..size / 2).map(|k| (k as f64 * sample_hz / size as f64, (re[k] * re[k] + im[k] * im[k]) / n)).unzip()
 }
 
 /// The highest separate peaks above `low_hz`: (frequency, value).

@@ -64,9 +64,7 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
             .iter()
             .flat_map(|v| [plain(&[2.0, 6.0, *v]), plain(&[0.3, 4.0, *v])])
             .collect(),
-        "presliding_friction" => {
-            [5e-5, 2e-4, 6e-4, 2e-3, 6e-3].iter().map(|d| plain(&[3.0, *d])).collect()
-        }
+        "presliding_friction" => [5e-5, 2e-4, 6e-4, 2e-3, 6e-3].iter().map(|d| plain(&[3.0, *d])).collect(),
         "power_law_friction" => each(&[0.7, 1.3]),
         "asymmetric_friction" => each(&[0.02, -0.02]),
         "position_scale" => each(&[0.02, -0.02, 0.08, -0.08]),
@@ -75,7 +73,9 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
             let mut starts: Vec<Start> = hints
                 .membranes
                 .iter()
-                .map(|[begins, breaks, k, _]| plain(&[*begins, k.clamp(2.0, 2e4), k.clamp(2.0, 2e4) * (breaks - begins)]))
+                .map(|[begins, breaks, k, _]| {
+                    plain(&[*begins, k.clamp(2.0, 2e4), k.clamp(2.0, 2e4) * (breaks - begins)])
+                })
                 .collect();
             for at in &hints.drops_m {
                 for (k, f) in [(60.0, 0.1), (60.0, 0.3), (250.0, 0.3), (250.0, 0.9)] {
@@ -90,9 +90,7 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
             .collect(),
         "soft_boundary" => [0.5e-3, 2e-3, 5e-3]
             .iter()
-            .flat_map(|w| {
-                [Start { lead_m: 0.5 * w, ..plain(&[*w]) }, plain(&[*w])]
-            })
+            .flat_map(|w| [Start { lead_m: 0.5 * w, ..plain(&[*w]) }, plain(&[*w])])
             .collect(),
         "low_pass_lag" => [0.01, 0.04, 0.12, 0.3]
             .iter()
@@ -101,16 +99,12 @@ pub fn of(info: &'static EffectInfo, hints: &Hints) -> Vec<Start> {
         // The replay itself moves the ruptures back by the delay.
         "time_delay" => each(&[0.01, 0.03, 0.08, 0.2]),
         "needle_compliance" => each(&[200.0, 800.0, 3000.0]),
-        "respiration" => hints
-            .breath_hz
-            .iter()
-            .map(|f| Start { quadrature: true, ..plain(&[2e-4, *f, 0.0]) })
-            .collect(),
-        "periodic_interference" => hints
-            .lines_hz
-            .iter()
-            .map(|f| Start { quadrature: true, ..plain(&[0.01, *f, 0.0]) })
-            .collect(),
+        "respiration" => {
+            hints.breath_hz.iter().map(|f| Start { quadrature: true, ..plain(&[2e-4, *f, 0.0]) }).collect()
+        }
+        "periodic_interference" => {
+            hints.lines_hz.iter().map(|f| Start { quadrature: true, ..plain(&[0.01, *f, 0.0]) }).collect()
+        }
         "force_drift" => each(&[0.002]),
         _ => vec![plain(&info.parameters.iter().map(|p| p.start).collect::<Vec<_>>())],
     }

@@ -70,7 +70,13 @@ pub fn advice(causes: &[Cause], invisible: &[String]) -> Vec<String> {
             cause.equivalent.join(", ")
         ));
     }
-    let friction = ["coulomb_friction", "stribeck_friction", "presliding_friction", "power_law_friction", "asymmetric_friction"];
+    let friction = [
+        "coulomb_friction",
+        "stribeck_friction",
+        "presliding_friction",
+        "power_law_friction",
+        "asymmetric_friction",
+    ];
     if invisible.iter().any(|i| friction.contains(&i.as_str())) {
         advice.push(
             "Laws of friction do not show at one constant speed: vary the speed within each layer, and retract.".to_owned(),

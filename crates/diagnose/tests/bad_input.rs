@@ -83,7 +83,11 @@ fn a_hole_in_a_recording_does_not_break_the_fit() {
     })
     .expect("a diagnosis");
     assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
-    assert!(found.data_quality.iter().any(|q| q.note.message.contains("not finite")), "{:?}", found.data_quality);
+    assert!(
+        found.data_quality.iter().any(|q| q.note.message.contains("not finite")),
+        "{:?}",
+        found.data_quality
+    );
 }
 
 #[test]
@@ -112,17 +116,21 @@ fn recordings_at_different_rates_are_fitted_together() {
         .into_iter()
         .map(|(name, recording)| Evidence { name: name.to_owned(), recording, notes: Vec::new() })
         .collect();
-    let found = diagnose(&case.believed, &evidence, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+    let found =
+        diagnose(&case.believed, &evidence, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
     assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
 }
 
 #[test]
 fn the_same_bytes_for_any_number_of_threads() {
     let case = case();
-    let evidence = [Evidence { name: "a.csv".to_owned(), recording: case.recordings[0].clone(), notes: Vec::new() }];
+    let evidence =
+        [Evidence { name: "a.csv".to_owned(), recording: case.recordings[0].clone(), notes: Vec::new() }];
     let json = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let found = pool.install(|| diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis));
+        let found = pool.install(|| {
+            diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis)
+        });
         serde_json::to_string(&found.expect("a diagnosis")).expect("JSON")
     };
     assert_eq!(json(1), json(3));

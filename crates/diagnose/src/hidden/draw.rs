@@ -3,7 +3,7 @@
 use super::motion::{Motions, Path, paths};
 use super::outside::Outside;
 use rand::rngs::ChaCha8Rng;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
@@ -105,9 +105,8 @@ fn prepare(drawn: &Drawn) -> Hidden {
         layer.friction_ns_per_m2 *= off();
         let factor = off();
         // Below the far face, so that the membrane of the layer gives way by force.
-        layer.puncture_n = layer
-            .puncture_n
-            .map(|f| (f * factor).min(0.97 * layer.stiffness_n_per_m * layer.thickness_m));
+        layer.puncture_n =
+            layer.puncture_n.map(|f| (f * factor).min(0.97 * layer.stiffness_n_per_m * layer.thickness_m));
     }
     let mut u = || rng.random::<f64>();
     let paths = paths(drawn.motions, &mut u);
@@ -141,10 +140,9 @@ fn simulate(
     for k in 0..n * STEPS {
         let t = k as f64 * dt;
         let [z, v, a] = path.at(t + phase_s);
-        let sample = k / STEPS;
         let force = law.step(&mut state, t, z, v, |r| {
             if let Some(slot) = ruptures.get_mut(r.layer - 1) {
-                *slot = (k + STEPS - 1) / STEPS;
+                *slot = k.div_ceil(STEPS);
             }
         });
         let mut tissue_n = force.total_n;
@@ -152,14 +150,8 @@ fn simulate(
             tissue_n += o.force(t, z, v, a, z.clamp(0.0, end));
         }
         if k % STEPS == 0 {
-            let reading = Reading {
-                time_s: t,
-                velocity_mps: v,
-                acceleration_mps2: a,
-                tissue_n,
-                noise_n: noise(),
-            };
-            let _ = sample;
+            let reading =
+                Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n: noise() };
             out[0].push(t);
             out[1].push(chain.position(z));
             out[2].push(chain.position(v));
@@ -239,6 +231,5 @@ pub fn case(drawn: &Drawn) -> Case {
             ruptures.push(r);
         }
     }
-    let _ = rng.next_u64();
     Case { believed: scenario(), truth, recordings, ruptures }
 }

@@ -10,5 +10,5 @@ mod plan;
 
 pub use draw::{Case, Drawn, SAMPLE_HZ, case, clean_force, library_ids, scenario};
 pub use motion::Motions;
-pub use plan::{Kind, Size, Sketch, largest_force, scaled, sketch, sketch_of};
 pub use outside::{OUTSIDE, Outside};
+pub use plan::{Kind, Size, Sketch, largest_force, scaled, sketch, sketch_of};

@@ -63,10 +63,15 @@ pub fn paths(which: Motions, u: &mut dyn FnMut() -> f64) -> Vec<Path> {
     let depth = 0.103;
     let start = -0.005;
     let constant = |v: f64, back: f64| {
-        Path::Pieces(start, vec![[(depth - start) / v, v, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [back, -v * 1.5, 0.0, 0.0]])
+        Path::Pieces(
+            start,
+            vec![[(depth - start) / v, v, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [back, -v * 1.5, 0.0, 0.0]],
+        )
     };
     match which {
-        Motions::Constant => (0..4).map(|_| Path::Pieces(start, vec![[(depth - start) / 0.0023, 0.0023, 0.0, 0.0]])).collect(),
+        Motions::Constant => {
+            (0..4).map(|_| Path::Pieces(start, vec![[(depth - start) / 0.0023, 0.0023, 0.0, 0.0]])).collect()
+        }
         Motions::One => vec![program(&mut between, start, depth)],
         Motions::Rich => {
             let v = between(0.0021, 0.0035);

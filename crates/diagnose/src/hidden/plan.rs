@@ -167,7 +167,9 @@ pub fn scaled(effect: &AnyEffect, factor: f64, largest_n: f64) -> Option<AnyEffe
         "hidden_membrane" => v[2] = (v[2] * factor.sqrt().clamp(0.3, 3.0)).min(3.0),
         "boundary_shift" => v[1] = (v[1] * factor).clamp(-0.012, 0.012),
         "needle_compliance" => v[0] = (v[0] / factor).clamp(80.0, 2e4),
-        "saturation" => v[0] = largest_n * (1.0 - (1.0 - v[0] / largest_n).max(0.02) * factor.sqrt()).clamp(0.25, 0.995),
+        "saturation" => {
+            v[0] = largest_n * (1.0 - (1.0 - v[0] / largest_n).max(0.02) * factor.sqrt()).clamp(0.25, 0.995)
+        }
         "force_spikes" => v[1] *= factor,
         "incomplete_release" => v[0] = (v[0] * factor).min(0.9),
         "asymmetric_friction" => v[0] = (v[0] * factor).clamp(-0.8, 0.8),
