@@ -55,15 +55,11 @@ fn verdict(d: &Diagnosis) -> Section {
             .map(|(p, e)| format!("{p} = {}", number(e.value)))
             .collect::<Vec<_>>()
             .join(", ");
-        let mut name = c.effect.clone();
+        let mut detail = format!("{parameters}; confidence {}", significant(c.confidence, 2));
         if !c.equivalent.is_empty() {
-            let _ = write!(name, " (or {})", c.equivalent.join(", "));
+            let _ = write!(detail, "; as good: {}", c.equivalent.join(", "));
         }
-        tiles.push(Tile::new(
-            "Cause",
-            name,
-            format!("{parameters}; confidence {}", significant(c.confidence, 2)),
-        ));
+        tiles.push(Tile::new("Cause", c.effect.replace('_', " "), detail));
     }
     let g = &d.gain;
     let what = if g.held_out { "left-out recordings" } else { "the fitted recording" };

@@ -92,6 +92,10 @@ pub fn diagnose(
     let dominated =
         left.p_value < LEFTOVER_P && left.nats > DOMINATES * explained.max(0.0) && left.nats > 8.0;
 
+    // A step of the recorded force beyond the noise makes the residual a function of the motion by itself.
+    let coarse_steps = raw.step_n.is_some_and(|step| step > 1.5 * search.data.noise.marginal_n);
+    let dominated = dominated && !coarse_steps;
+
     let mut causes = Vec::new();
     let spread = if options.brief { None } else { covariance_diagonal(&best.model, &data) };
     for index in 0..best.model.effects.len() {
@@ -274,7 +278,7 @@ fn membrane_depth_sd(
 }
 
 /// Whether the larger effect holds the smaller one as a special case.
-fn nests(larger: &str, smaller: &str) -> bool {
+pub(crate) fn nests(larger: &str, smaller: &str) -> bool {
     matches!((larger, smaller), ("stribeck_friction" | "presliding_friction", "coulomb_friction"))
 }
 

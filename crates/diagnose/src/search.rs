@@ -542,7 +542,13 @@ impl Search {
     /// Interferences too fast for averages.
     fn fast_lines(&self, standing: &Candidate, data: &Data) -> Vec<Start> {
         let (f, p) = self.spectrum(standing, data);
-        let lines = peaks(&f, &p, FAST_HZ, 1);
+        // Not beside a line that stands already.
+        let near = |hz: f64| {
+            let lines = standing.model.effects.iter().filter(|e| e.info.id == "periodic_interference");
+            lines.map(|e| e.values[1]).any(|own| (own - hz).abs() < 0.2)
+        };
+        let mut lines = peaks(&f, &p, FAST_HZ, 9);
+        lines.retain(|l| !near(l.0));
         let Some(&(frequency, value)) = lines.first() else { return Vec::new() };
         if value < 14.0 {
             return Vec::new();

@@ -62,12 +62,21 @@ pub fn invisible(search: &Search, shown: &Candidate) -> Vec<String> {
 #[must_use]
 pub fn advice(causes: &[Cause], invisible: &[String]) -> Vec<String> {
     let mut advice = Vec::new();
-    for cause in causes.iter().filter(|c| !c.equivalent.is_empty()) {
+    for cause in causes {
+        let apart: Vec<&str> = cause
+            .equivalent
+            .iter()
+            .filter(|e| !crate::diagnose::nests(e, &cause.effect))
+            .map(String::as_str)
+            .collect();
+        if apart.is_empty() {
+            continue;
+        }
         advice.push(format!(
             "{} and {} explain these recordings equally well. A motion with a rippled speed, a hold inside every layer and a \
              retraction tells most of them apart.",
             cause.effect,
-            cause.equivalent.join(", ")
+            apart.join(", ")
         ));
     }
     let friction = [
