@@ -28,6 +28,12 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Hold scores against bounds, for CI.
     Gate(GateArgs),
+    /// Compare measured data with a scenario: what is wrong, why, and how much better it gets.
+    Diagnose(DiagnoseArgs),
+    /// List the effects by which reality departs from the base law, or show one.
+    Effects(EffectsArgs),
+    /// Examine a part of Stylet on many drawn cases.
+    Benchmark(BenchmarkArgs),
 }
 
 /// Arguments of `stylet run`.
@@ -89,4 +95,70 @@ pub struct EnhanceArgs {
     /// Print nothing but errors.
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Arguments of `stylet diagnose`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet diagnose scenario.ron --data a.csv b.csv c.csv --out out/diagnosis
+  stylet diagnose scenario.ron --data log1.csv log2.csv --columns map.ron
+
+The folder then holds report.html, diagnosis.json and extended.ron: the scenario with re-fitted
+parameters and the effects that were found, ready for `stylet run` (give it a motion if the scenario
+says `Recorded`). The exit code is 0 whatever the verdict, 2 when the input is wrong.")]
+pub struct DiagnoseArgs {
+    /// Scenario: what the simulation believes (RON).
+    pub scenario: PathBuf,
+    /// Recordings (CSV with header); several motions tell more than one.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    pub data: Vec<PathBuf>,
+    /// Column map for foreign logs (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and say which.
+    #[arg(long)]
+    pub repair: bool,
+    /// Folder for the results [default: stylet-out/<scenario>-diagnosis].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Arguments of `stylet effects`.
+#[derive(Debug, Args)]
+pub struct EffectsArgs {
+    /// Effect to show, by its id; all are listed without it.
+    pub name: Option<String>,
+}
+
+/// Arguments of `stylet benchmark`.
+#[derive(Debug, Args)]
+pub struct BenchmarkArgs {
+    /// What to examine.
+    #[command(subcommand)]
+    pub what: BenchmarkWhat,
+}
+
+/// What can be examined.
+#[derive(Debug, Subcommand)]
+pub enum BenchmarkWhat {
+    /// Hide effects in generated data, diagnose them, and write confusion matrix, power and calibration.
+    Diagnose(BenchmarkDiagnoseArgs),
+}
+
+/// Arguments of `stylet benchmark diagnose`.
+#[derive(Debug, Args)]
+pub struct BenchmarkDiagnoseArgs {
+    /// Number of cases. Of twenty, eight are clean, eight hide one effect, two hide two, two one outside the library.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    pub cases: u64,
+    /// Seed of the drawing.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Folder: cases.jsonl (one line per case; cases in it are not run again) and summary.txt
+    /// [default: stylet-out/benchmark-diagnose-<seed>].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }

@@ -49,6 +49,12 @@ pub enum Failure {
         /// All bounds.
         of: usize,
     },
+    /// Recordings and scenario do not belong together.
+    #[error(transparent)]
+    Diagnose(#[from] stylet_diagnose::DiagnoseError),
+    /// An argument names what there is not.
+    #[error("{0}")]
+    Argument(String),
     /// A mistake of ours.
     #[error("internal error: {0}; please report it")]
     Internal(String),
@@ -69,7 +75,9 @@ impl Failure {
             | Failure::Recording(_)
             | Failure::Simulate { .. }
             | Failure::Output { .. }
-            | Failure::Check(_) => INPUT_WRONG,
+            | Failure::Check(_)
+            | Failure::Diagnose(_)
+            | Failure::Argument(_) => INPUT_WRONG,
             Failure::Gate { .. } => CHECK_FAILED,
             Failure::Internal(_) => INTERNAL,
         })

@@ -2,6 +2,10 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod benchmark;
+mod diagnose;
+mod diagnose_report;
+mod effects;
 mod enhance;
 pub mod exit;
 mod hash;
@@ -27,6 +31,9 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => sweep::sweep(args),
         Command::Replay(args) => sweep::replay(args),
         Command::Gate(args) => sweep::gate(args),
+        Command::Diagnose(args) => diagnose::diagnose(args),
+        Command::Effects(args) => effects::effects(args),
+        Command::Benchmark(args) => benchmark::benchmark(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
     match outcome {

@@ -8,8 +8,9 @@
 //! the tip jumps. Where the force jumps at the dead band of `sgn` (dry friction), the solution may
 //! lie in the jump: the tip sticks and friction is what the spring asks for.
 
+use crate::breaking::Breaking;
 use crate::effect::{SGN_DEAD_BAND_MPS, sgn};
-use crate::force::{Rupture, TissueForce};
+use crate::force::TissueForce;
 use crate::law::Law;
 use crate::state::LawState;
 
@@ -75,7 +76,7 @@ impl Law {
         state: &mut LawState,
         time_s: f64,
         base_m: f64,
-        on_rupture: &mut impl FnMut(Rupture),
+        breaking: &mut impl Breaking,
     ) -> TissueForce {
         let dt = time_s - state.time_s;
         let mut done = 0.0; // share of the step that the ruptures so far have used up
@@ -93,9 +94,8 @@ impl Law {
                     Some(force) => force.elastic_n,
                     None => self.elastic(slab, left, z, &mut state.memory),
                 };
-                if let Some(rupture) = self.give_way(state, slab, dt, (z, v), elastic, done) {
+                if let Some(rupture) = self.give_way(state, slab, dt, (z, v), elastic, done, breaking) {
                     done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
-                    on_rupture(rupture);
                     continue;
                 }
             }

@@ -12,6 +12,7 @@
 //! that a hook asks only those that answer it.
 
 use crate::AnyEffect;
+use crate::breaking::{Breaking, ByLaw, Strain};
 use crate::effect::{Effect, Memory, Moment, Place};
 use crate::force::{Rupture, TissueForce};
 use crate::layer::Tissue;
@@ -126,14 +127,40 @@ impl Law {
         v_mps: f64,
         mut on_rupture: impl FnMut(Rupture),
     ) -> TissueForce {
+        if self.plain && (time_s + z_m + v_mps).is_finite() {
+            return self.step_plain(state, time_s, z_m, v_mps, &mut on_rupture);
+        }
+        self.advance(state, time_s, z_m, v_mps, &mut ByLaw(on_rupture))
+    }
+
+    /// [`Law::step`] with somebody who decides on ruptures.
+    #[inline]
+    pub(crate) fn advance(
+        &self,
+        state: &mut LawState,
+        time_s: f64,
+        z_m: f64,
+        v_mps: f64,
+        breaking: &mut impl Breaking,
+    ) -> TissueForce {
         if !(time_s + z_m + v_mps).is_finite() {
             return TissueForce::unknown(state.ruptured + 1);
         }
-        if self.plain {
-            self.step_plain(state, time_s, z_m, v_mps, &mut on_rupture)
-        } else {
-            self.step_with_effects(state, time_s, z_m, v_mps, &mut on_rupture)
+        let (mut z, mut v) = (z_m, v_mps);
+        for effect in self.at(Place::Kinematics) {
+            (z, v) = effect.relative(time_s, z, v);
         }
+        if !state.started {
+            state.begin(time_s, z, v);
+        }
+        let time_s = time_s.max(state.time_s);
+        let dt = time_s - state.time_s;
+        if self.needle_n_per_m < f64::INFINITY {
+            return self.step_bending(state, time_s, z, breaking);
+        }
+        let elastic_n = self.load(state, dt, z, v, breaking);
+        self.membrane_breaks(state, z);
+        self.settle(state, time_s, z, v, elastic_n)
     }
 
     /// The base law alone: the same operations as with effects, with nothing asked of the chain.
@@ -192,50 +219,16 @@ impl Law {
         }
     }
 
-    /// The law with its effects.
-    fn step_with_effects(
-        &self,
-        state: &mut LawState,
-        time_s: f64,
-        z_m: f64,
-        v_mps: f64,
-        on_rupture: &mut impl FnMut(Rupture),
-    ) -> TissueForce {
-        let (mut z, mut v) = (z_m, v_mps);
-        for effect in self.at(Place::Kinematics) {
-            (z, v) = effect.relative(time_s, z, v);
-        }
-        if !state.started {
-            state.begin(time_s, z, v);
-        }
-        let time_s = time_s.max(state.time_s);
-        let dt = time_s - state.time_s;
-        if self.needle_n_per_m < f64::INFINITY {
-            return self.step_bending(state, time_s, z, on_rupture);
-        }
-        let elastic_n = self.load(state, dt, z, v, on_rupture);
-        self.membrane_breaks(state, z);
-        self.settle(state, time_s, z, v, elastic_n)
-    }
-
     /// Elastic force of the active layer, after as many ruptures as this step brings.
     #[inline]
-    fn load(
-        &self,
-        state: &mut LawState,
-        dt: f64,
-        z: f64,
-        v: f64,
-        on_rupture: &mut impl FnMut(Rupture),
-    ) -> f64 {
+    fn load(&self, state: &mut LawState, dt: f64, z: f64, v: f64, breaking: &mut impl Breaking) -> f64 {
         let mut done = 0.0; // share of the step that the ruptures so far have used up
         while let Some(slab) = self.slabs.get(state.ruptured) {
             let elastic = self.elastic(slab, (1.0 - done) * dt, z, &mut state.memory);
-            match self.give_way(state, slab, dt, (z, v), elastic, done) {
+            match self.give_way(state, slab, dt, (z, v), elastic, done, breaking) {
                 None => return elastic,
                 Some(rupture) => {
                     done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
-                    on_rupture(rupture);
                 }
             }
         }
@@ -262,6 +255,7 @@ impl Law {
     /// The rupture of the active layer, if its elastic force or the tip's position bring it.
     /// `done` is the share of the step that is over.
     #[inline]
+    #[allow(clippy::too_many_arguments, reason = "one step, taken apart")]
     pub(crate) fn give_way(
         &self,
         state: &mut LawState,
@@ -270,12 +264,20 @@ impl Law {
         (z, v): (f64, f64),
         elastic: f64,
         done: f64,
+        breaking: &mut impl Breaking,
     ) -> Option<Rupture> {
         let mut threshold = slab.puncture_n;
         for effect in self.at(Place::Puncture) {
             threshold = effect.puncture(threshold, v);
         }
-        if !(elastic >= threshold || z >= slab.far_m()) {
+        let strain = Strain {
+            layer: state.ruptured + 1,
+            elastic_n: elastic,
+            puncture_n: threshold,
+            tip_m: z,
+            far_m: slab.far_m(),
+        };
+        if !breaking.breaks(&strain) {
             return None;
         }
         let rupture = Self::rupture(state, slab, dt, z, elastic, threshold, done);
@@ -289,6 +291,7 @@ impl Law {
         }
         state.ruptured += 1;
         state.elastic_n = 0.0;
+        breaking.broken(rupture);
         Some(rupture)
     }
 

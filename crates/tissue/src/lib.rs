@@ -26,6 +26,7 @@
 extern crate alloc;
 
 mod bending;
+mod breaking;
 pub mod effect;
 mod effects;
 mod force;
@@ -37,6 +38,7 @@ mod replay;
 mod slab;
 mod state;
 
+pub use breaking::Strain;
 pub use effect::{Effect, Place};
 pub use effects::*;
 pub use force::{Rupture, TissueForce};

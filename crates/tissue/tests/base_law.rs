@@ -149,3 +149,37 @@ fn a_state_can_be_copied_and_continued() {
     }
     assert_eq!(state.ruptured(), 2, "the copy was taken before a rupture that really came");
 }
+
+#[test]
+fn imposed_ruptures_at_the_law_s_own_instants_give_the_same_bits() {
+    let layer = |d: f64, k: f64, f: Option<f64>| stylet_tissue::Layer {
+        name: String::new(),
+        thickness_m: d,
+        stiffness_n_per_m: k,
+        friction_ns_per_m2: 9e3,
+        puncture_n: f,
+    };
+    let tissue = stylet_tissue::Tissue {
+        surface_m: 0.0,
+        layers: vec![layer(0.01, 40.0, None), layer(0.02, 60.0, Some(0.6)), layer(0.01, 80.0, None)],
+    };
+    for spring in [f64::INFINITY, 900.0] {
+        let effects = [
+            stylet_tissue::NeedleCompliance { stiffness_n_per_m: spring }.into(),
+            stylet_tissue::IncompleteRelease { fraction: 0.3 }.into(),
+        ];
+        let law = stylet_tissue::Law::new(&tissue, &effects).expect("two effects");
+        let (mut free, mut imposed) = Default::default();
+        let mut strained = 0;
+        for i in 0..12_000 {
+            let (t, v) = (f64::from(i) * 0.002, 0.002);
+            let z = v * t - 0.001;
+            let expected = law.step(&mut free, t, z, v, |_| {});
+            let found = law.step_imposed(&mut imposed, t, z, v, free.ruptured(), |strain| {
+                strained += usize::from(strain.breaks());
+            });
+            assert_eq!(expected, found, "sample {i}");
+        }
+        assert_eq!((free.ruptured(), strained), (3, 3));
+    }
+}

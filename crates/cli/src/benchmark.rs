@@ -1,0 +1,68 @@
+//! `stylet benchmark`: examinations at scale.
+
+use crate::args::{BenchmarkArgs, BenchmarkDiagnoseArgs, BenchmarkWhat};
+use crate::exit::Failure;
+use rayon::prelude::*;
+use std::io::{BufRead, Write};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use stylet_diagnose::benchmark::{Result as Case, run, summary};
+use stylet_diagnose::hidden::sketch;
+use stylet_diagnose::search::Settings;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
+    match &args.what {
+        BenchmarkWhat::Diagnose(args) => diagnose(args),
+    }
+}
+
+fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}", args.seed)));
+    let failed = |why| Failure::Output { path: folder.display().to_string(), why };
+    std::fs::create_dir_all(&folder).map_err(failed)?;
+    let path = folder.join("cases.jsonl");
+    let mut done: Vec<Case> = Vec::new();
+    if let Ok(file) = std::fs::File::open(&path) {
+        // A line that was cut off when the run was stopped is run again.
+        done.extend(
+            std::io::BufReader::new(file)
+                .lines()
+                .map_while(Result::ok)
+                .filter_map(|l| serde_json::from_str(&l).ok()),
+        );
+    }
+    let missing: Vec<u64> = (0..args.cases).filter(|i| !done.iter().any(|d| d.index == *i)).collect();
+    let kept: String = done.iter().filter_map(|d| serde_json::to_string(d).ok()).map(|l| l + "\n").collect();
+    std::fs::write(&path, kept).map_err(failed)?;
+    let file = std::fs::OpenOptions::new().append(true).open(&path).map_err(failed)?;
+    let file = Mutex::new((file, done.len()));
+    let new: Vec<Option<Case>> = missing
+        .par_iter()
+        .map(|&index| {
+            let case = run(index, &sketch(args.seed, index), Settings::default())?;
+            if let (Ok(mut file), Ok(line)) = (file.lock(), serde_json::to_string(&case)) {
+                let _ = writeln!(file.0, "{line}");
+                file.1 += 1;
+                if file.1 % 20 == 0 {
+                    eprintln!("  {} of {} cases", file.1, args.cases);
+                }
+            }
+            Some(case)
+        })
+        .collect();
+    done.extend(new.into_iter().flatten());
+    done.retain(|d| d.index < args.cases);
+    done.sort_by_key(|d| d.index);
+    let text = summary(&done);
+    std::fs::write(folder.join("summary.txt"), &text).map_err(failed)?;
+    print!("{text}");
+    println!("\nCases: {}", path.display());
+    Ok(())
+}

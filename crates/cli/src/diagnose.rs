@@ -1,0 +1,192 @@
+//! `stylet diagnose`: compare what a scenario believes with what was measured.
+
+use crate::args::DiagnoseArgs;
+use crate::diagnose_report;
+use crate::exit::Failure;
+use crate::output::Output;
+use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use stylet_diagnose::outcome::Verdict;
+use stylet_diagnose::{Diagnosis, Evidence, Options};
+use stylet_record::{
+    QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes,
+};
+use stylet_report::significant;
+use stylet_scenario::Scenario;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
+    let internal = |e: &dyn std::fmt::Display| Failure::Internal(e.to_string());
+    let scenario = Scenario::load(&args.scenario)?;
+    let columns = match &args.columns {
+        Some(path) => Some(stylet_scenario::load(path)?),
+        None => None,
+    };
+    let options = ReadOptions { columns, repair: args.repair };
+    let mut evidence = Vec::new();
+    for path in &args.data {
+        let (recording, notes) = read_with_holes(path, &options)?;
+        evidence.push(Evidence { name: name_of(path, &args.data), recording, notes });
+    }
+    let talk = !args.quiet && std::io::stderr().is_terminal();
+    let examined = stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |what| {
+        if talk {
+            eprintln!("  {what} ...");
+        }
+    })?;
+    let d = &examined.diagnosis;
+    let mut json = serde_json::to_vec_pretty(d).map_err(|e| internal(&e))?;
+    json.push(b'\n');
+    let ron = format!(
+        "// {} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
+        args.scenario.display(),
+        env!("CARGO_PKG_VERSION"),
+        examined.extended.to_ron().map_err(|e| internal(&e))?
+    );
+    let mut output = Output::default();
+    output.add("report.html", diagnose_report::page(&scenario, args, &examined).to_html());
+    output.add("diagnosis.json", json);
+    output.add("extended.ron", ron);
+    let folder = args.out.clone().unwrap_or_else(|| {
+        let stem =
+            args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
+        PathBuf::from("stylet-out").join(format!("{stem}-diagnosis"))
+    });
+    output.write(&folder)?;
+    if !args.quiet {
+        print!("{}", summary(d));
+        println!("\nReport: {}", folder.join("report.html").display());
+    }
+    Ok(())
+}
+
+/// Reads a recording; rows with a value that is no finite number are cut out and reported.
+fn read_with_holes(path: &Path, options: &ReadOptions) -> Result<(Recording, Vec<QualityNote>), RecordError> {
+    let error = match read_csv(path, options) {
+        Err(error @ RecordError::NotFinite { .. }) => error,
+        other => return other,
+    };
+    let Ok(text) = std::fs::read_to_string(path) else { return Err(error) };
+    let hole = |line: &&str| {
+        line.split([',', ';', '\t']).any(|x| {
+            let x = x.trim().trim_matches('"');
+            x.parse::<f64>().is_ok_and(|x| !x.is_finite())
+        })
+    };
+    let kept: Vec<&str> = text.lines().filter(|l| !hole(l)).collect();
+    let (all, left) = (text.lines().count(), kept.len());
+    if left < 3 {
+        return Err(error);
+    }
+    let (recording, mut notes) = read_csv_bytes((kept.join("\n") + "\n").as_bytes(), path, options)?;
+    let message =
+        format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
+    notes.insert(
+        0,
+        QualityNote {
+            kind: QualityKind::Gaps,
+            message,
+            numbers: [("count".to_owned(), (all - left) as f64)].into_iter().collect(),
+            lines: text
+                .lines()
+                .enumerate()
+                .filter(|(_, l)| hole(l))
+                .take(100)
+                .map(|(k, _)| k as u64 + 1)
+                .collect(),
+        },
+    );
+    Ok((recording, notes))
+}
+
+/// The file's name, with its folder when names repeat.
+fn name_of(path: &Path, all: &[PathBuf]) -> String {
+    let repeated = all.iter().filter(|p| p.file_name() == path.file_name()).count() > 1;
+    match path.file_name() {
+        Some(name) if !repeated => name.to_string_lossy().into_owned(),
+        _ => path.display().to_string(),
+    }
+}
+
+/// The verdict in a sentence.
+pub fn sentence(d: &Diagnosis) -> String {
+    let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
+    match d.verdict {
+        Verdict::None => {
+            "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned()
+        }
+        Verdict::Named => format!("The simulation lacks {}.", names()),
+        Verdict::Ambiguous => {
+            let class = |c: &stylet_diagnose::outcome::Cause| {
+                std::iter::once(c.effect.as_str())
+                    .chain(c.equivalent.iter().map(String::as_str))
+                    .collect::<Vec<_>>()
+                    .join(" or ")
+            };
+            format!(
+                "The simulation lacks {}: these recordings cannot tell them apart.",
+                d.causes.iter().map(class).collect::<Vec<_>>().join(", and ")
+            )
+        }
+        Verdict::Unknown => {
+            let on = if d.leftover.depends_on.is_empty() {
+                String::new()
+            } else {
+                format!(" (it depends on {})", d.leftover.depends_on.join(", "))
+            };
+            format!("The data hold structure that no effect of the library explains{on}.")
+        }
+    }
+}
+
+fn summary(d: &Diagnosis) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "{}", sentence(d));
+    for c in &d.causes {
+        let _ = writeln!(out, "\n  {}, confidence {}", c.effect, significant(c.confidence, 3));
+        for (path, e) in &c.parameters {
+            let _ = writeln!(
+                out,
+                "    {path} = {} (95 %: {} to {})",
+                significant(e.value, 4),
+                significant(e.low, 4),
+                significant(e.high, 4)
+            );
+        }
+        if !c.equivalent.is_empty() {
+            let _ = writeln!(out, "    as good: {}", c.equivalent.join(", "));
+        }
+    }
+    let g = &d.gain;
+    let what = if g.held_out {
+        "on recordings left out of the fit"
+    } else {
+        "on the one recording, which was also fitted"
+    };
+    let _ = writeln!(
+        out,
+        "\n  residual {what}: {} N before, {} N after, noise {} N",
+        significant(g.rmse_before_n, 3),
+        significant(g.rmse_after_n, 3),
+        significant(g.floor_n, 3)
+    );
+    if d.leftover.p_value < 1e-3 {
+        let _ = writeln!(
+            out,
+            "  what remains still depends on {} (p = {:.1e})",
+            d.leftover.depends_on.join(", "),
+            d.leftover.p_value
+        );
+    }
+    if !d.invisible.is_empty() {
+        let _ = writeln!(out, "  these recordings cannot show: {}", d.invisible.join(", "));
+    }
+    for q in &d.data_quality {
+        let _ = writeln!(out, "  note: {}: {}", q.recording, q.note.message);
+    }
+    out
+}

@@ -1,0 +1,463 @@
+//! The report of a diagnosis: what was measured, what the base law cannot say, why, and what it gains.
+
+use crate::args::DiagnoseArgs;
+use crate::diagnose::sentence;
+use std::fmt::Write as _;
+use stylet_diagnose::Examined;
+use stylet_diagnose::curves::{Curves, binned, by_layer_and_phase, correlations, curves, shown};
+use stylet_diagnose::outcome::{Diagnosis, Verdict};
+use stylet_report::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
+use stylet_report::{
+    Block, Cell, Chart, Code, Colour, Level, LineStyle, MarkerSet, Page, Scale, Scorecard, Section, Series,
+    Side, Status, SvgImage, Table, Text, Tile, significant,
+};
+use stylet_scenario::Scenario;
+use stylet_tissue::Slab;
+
+/// The page.
+pub fn page(scenario: &Scenario, args: &DiagnoseArgs, examined: &Examined) -> Page {
+    let d = &examined.diagnosis;
+    let all = curves(examined);
+    let samples: usize = all.iter().map(|c| c.time_s.len()).sum();
+    Page::new(format!("Diagnosis: {}", scenario.name))
+        .subtitle(sentence(d))
+        .fact("scenario", args.scenario.display().to_string())
+        .fact("recordings", d.gain.recordings.join(", "))
+        .fact("samples", samples.to_string())
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(verdict(d))
+        .section(equation(examined))
+        .section(gain(d, &all))
+        .section(residual(d, examined, &all))
+        .section(evidence(d))
+        .section(remains(d, &all))
+        .section(unseen(d))
+        .section(quality(d))
+        .section(repeat(args, examined))
+}
+
+fn number(x: f64) -> String {
+    significant(x, 4)
+}
+
+fn verdict(d: &Diagnosis) -> Section {
+    let word = match d.verdict {
+        Verdict::None => "none",
+        Verdict::Named => "named",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Unknown => "unknown",
+    };
+    let mut tiles = vec![Tile::new("Verdict", word, sentence(d))];
+    for c in &d.causes {
+        let parameters = c
+            .parameters
+            .iter()
+            .map(|(p, e)| format!("{p} = {}", number(e.value)))
+            .collect::<Vec<_>>()
+            .join(", ");
+        let mut detail = format!("{parameters}; confidence {}", significant(c.confidence, 2));
+        if !c.equivalent.is_empty() {
+            let _ = write!(detail, "; as good: {}", c.equivalent.join(", "));
+        }
+        tiles.push(Tile::new("Cause", c.effect.replace('_', " "), detail));
+    }
+    let g = &d.gain;
+    let what = if g.held_out { "left-out recordings" } else { "the fitted recording" };
+    tiles.push(Tile::new(
+        "Residual",
+        format!("{} → {} N", significant(g.rmse_before_n, 3), significant(g.rmse_after_n, 3)),
+        format!("root mean square on {what}; the noise is {} N", significant(g.floor_n, 3)),
+    ));
+    let status = if d.leftover.p_value < 1e-3 { Status::Warn } else { Status::Good };
+    tiles.push(
+        Tile::new(
+            "Left over",
+            if d.leftover.p_value < 1e-3 { "structure" } else { "noise" },
+            format!(
+                "p = {} that the residual is the same in several recordings by chance",
+                significant(d.leftover.p_value, 2)
+            ),
+        )
+        .status(status),
+    );
+    let mut section =
+        Section::new("Verdict").block(Block::Scorecard(Scorecard { title: String::new(), tiles }));
+    for a in &d.advice {
+        section = section.block(Block::Text(Text { paragraphs: vec![a.clone()], status: Status::Warn }));
+    }
+    section
+}
+
+/// The extended law in the notation of SPEC section 1.
+fn equation(examined: &Examined) -> Section {
+    let d = &examined.diagnosis;
+    let mut text = String::from(
+        "f   = f_K + f_B            until layer a = r + 1 ruptures: f_K >= F_a, or z >= s_a + d_a\nf_K = K_a max(0, z - s_a)\nf_B = v sum_i b_i l_i,      l_i = clamp(z - s_i, 0, d_i)\n",
+    );
+    for c in &d.causes {
+        if let Some(info) = stylet_tissue::info(&c.effect) {
+            let _ = write!(text, "\n{}:\n    {}\n    with ", c.effect, info.equation);
+            let numbers: Vec<String> = info
+                .parameters
+                .iter()
+                .filter_map(|p| c.parameters.get(p.path).map(|e| (p, e)))
+                .map(|(p, e)| {
+                    format!(
+                        "{} = {} {} ({} to {})",
+                        p.path,
+                        number(e.value),
+                        p.unit,
+                        number(e.low),
+                        number(e.high)
+                    )
+                })
+                .collect();
+            let _ = writeln!(text, "{}", numbers.join("\n         "));
+        }
+    }
+    let rows = d
+        .base_parameters
+        .iter()
+        .map(|b| {
+            vec![
+                Cell::text(format!("layer {}", b.layer)),
+                Cell::text(b.name.clone()),
+                Cell::number(number(b.assumed)),
+                Cell::number(number(b.value)),
+                Cell::number(format!("{} to {}", number(b.low), number(b.high))),
+                Cell::number(format!("{:+.1} %", 100.0 * (b.value / b.assumed - 1.0)))
+                    .status(if b.at_bound { Status::Warn } else { Status::Plain }),
+            ]
+        })
+        .collect();
+    let table = Table {
+        title: "Base parameters, re-fitted within the scenario's tolerance".to_owned(),
+        groups: Vec::new(),
+        headers: ["", "parameter", "assumed", "fitted", "95 % interval", "change"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows,
+    };
+    Section::new("The extended model")
+        .block(Block::Code(Code { title: "equation".to_owned(), text, folded: false }))
+        .table(table)
+}
+
+fn gain(d: &Diagnosis, all: &[Curves]) -> Section {
+    let g = &d.gain;
+    let rows = g
+        .recordings
+        .iter()
+        .zip(&g.each_n)
+        .map(|(name, (before, after))| {
+            vec![
+                Cell::text(name.clone()),
+                Cell::number(significant(*before, 3)),
+                Cell::number(significant(*after, 3)).status(Status::at_most(
+                    *after,
+                    1.15 * g.floor_n,
+                    2.0 * g.floor_n,
+                )),
+                Cell::number(significant(g.floor_n, 3)),
+            ]
+        })
+        .collect();
+    let title = if g.held_out {
+        "Each recording predicted by models fitted to the others, with the law's own ruptures (N)"
+    } else {
+        "The one recording, which was also fitted, with the law's own ruptures (N)"
+    };
+    let mut section = Section::new("Before and after").table(Table {
+        title: title.to_owned(),
+        groups: Vec::new(),
+        headers: ["", "base law, re-fitted", "extended model", "noise"].map(str::to_owned).to_vec(),
+        rows,
+    });
+    for (c, name) in all.iter().zip(&g.recordings).take(8) {
+        let ruptures = MarkerSet {
+            name: "ruptures in the data".to_owned(),
+            colour: Colour::Grey,
+            style: LineStyle::Dashed,
+            side: Side::Right,
+            marks: c.ruptures_s.iter().enumerate().map(|(k, t)| (*t, format!("layer {}", k + 1))).collect(),
+        };
+        let minus = |e: &[f64]| c.force_n.iter().zip(e).map(|(f, e)| f - e).collect::<Vec<_>>();
+        section = section.chart(
+            Chart::new(name.clone(), "Time (s)", "Force (N)")
+                .caption("Measured, and as base law and extended model have it.")
+                .group(name.clone())
+                .height(300)
+                .with_series(
+                    Series::line("measured", Colour::Grey, c.time_s.clone(), c.force_n.clone()).width(3.0),
+                )
+                .with_series(
+                    Series::line("base law", Colour::Vermillion, c.time_s.clone(), minus(&c.base_n))
+                        .width(1.1),
+                )
+                .with_series(
+                    Series::line("extended model", Colour::Blue, c.time_s.clone(), minus(&c.extended_n))
+                        .width(1.3),
+                )
+                .with_markers(ruptures),
+        );
+    }
+    section
+}
+
+fn zero() -> Level {
+    Level { y: 0.0, label: String::new(), colour: Colour::Grey, style: LineStyle::Solid }
+}
+
+fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
+    let mut section = Section::new("What the base law cannot say").text(
+        "The residual of the re-fitted base law: measured less predicted force, ruptures taken where the data show them. These pictures \
+         propose causes; the likelihood below decides.",
+    );
+    let names = &d.gain.recordings;
+    let mut time =
+        Chart::new("Residual against time", "Time (s)", "Residual (N)").height(260).with_level(zero());
+    let mut depth = Chart::new("Residual against depth", "Depth (mm)", "Residual (N)")
+        .caption("Means over 60 bins of depth, advance and retraction apart (retraction dotted).")
+        .height(260)
+        .with_level(zero());
+    let mut velocity = Chart::new("Residual against velocity", "Velocity (mm/s)", "Residual (N)")
+        .caption("Means over 60 bins of velocity, with the needle in the tissue.")
+        .height(260)
+        .with_level(zero());
+    for (k, (c, name)) in all.iter().zip(names).enumerate() {
+        let colour = Colour::nth(k);
+        time = time
+            .with_series(Series::line(name.clone(), colour, c.time_s.clone(), c.base_n.clone()).width(1.0));
+        let pick = |keep: &dyn Fn(usize) -> bool| -> Vec<bool> {
+            (0..c.used.len()).map(|i| c.used[i] && keep(i)).collect()
+        };
+        let mm: Vec<f64> = c.position_m.iter().map(|z| z * 1e3).collect();
+        let mmps: Vec<f64> = c.velocity_mps.iter().map(|v| v * 1e3).collect();
+        let (x, y) = binned(&mm, &c.base_n, &pick(&|i| c.velocity_mps[i] >= -1e-5), 60);
+        depth = depth.with_series(Series::line(name.clone(), colour, x, y));
+        let (x, y) = binned(&mm, &c.base_n, &pick(&|i| c.velocity_mps[i] < -1e-5), 60);
+        if !x.is_empty() {
+            depth = depth
+                .with_series(Series::line(format!("{name}, back"), colour, x, y).styled(LineStyle::Dotted));
+        }
+        let (x, y) = binned(&mmps, &c.base_n, &pick(&|i| c.position_m[i] > 0.0), 60);
+        velocity = velocity.with_series(Series::points(name.clone(), colour, x, y));
+    }
+    section = section.chart(time).chart(depth).chart(velocity);
+    let layers = examined.search.base.model.assumed.layers.len();
+    let (before, after) =
+        (by_layer_and_phase(all, |c| &c.base_n, layers), by_layer_and_phase(all, |c| &c.extended_n, layers));
+    let rows = before
+        .iter()
+        .zip(&after)
+        .enumerate()
+        .map(|(k, (b, a))| {
+            let name = match k {
+                0 => "in air".to_owned(),
+                k if k > layers => "behind the last layer".to_owned(),
+                k => format!("layer {k}"),
+            };
+            let mut row = vec![Cell::text(name)];
+            for (b, a) in b.iter().zip(a) {
+                row.push(Cell::number(significant(*b, 3)).status(Status::at_most(
+                    *b,
+                    1.3 * d.noise.sd_n,
+                    3.0 * d.noise.sd_n,
+                )));
+                row.push(Cell::number(significant(*a, 3)));
+            }
+            row
+        })
+        .collect();
+    section = section.table(Table {
+        title: "Root mean square by layer and phase (N): base law, extended model".to_owned(),
+        groups: vec![
+            (String::new(), 1),
+            ("advance".to_owned(), 2),
+            ("hold".to_owned(), 2),
+            ("retraction".to_owned(), 2),
+        ],
+        headers: ["", "base", "extended", "base", "extended", "base", "extended"].map(str::to_owned).to_vec(),
+        rows,
+    });
+    let slabs = Slab::stack(&examined.search.base.model.tissue);
+    let (cb, ca) = (correlations(all, |c| &c.base_n, &slabs), correlations(all, |c| &c.extended_n, &slabs));
+    section = section.table(Table {
+        title: "Correlation of the residual with what was done".to_owned(),
+        groups: Vec::new(),
+        headers: ["", "base law", "extended model"].map(str::to_owned).to_vec(),
+        rows: cb
+            .iter()
+            .zip(&ca)
+            .map(|((name, b), (_, a))| {
+                vec![Cell::text(*name), Cell::number(format!("{b:+.3}")), Cell::number(format!("{a:+.3}"))]
+            })
+            .collect(),
+    });
+    let search = &examined.search;
+    let (f, base) = search.spectrum(&search.base, &search.data_of(&search.base));
+    let best = shown(examined);
+    let (_, after) = search.spectrum(best, &search.data_of(best));
+    let keep: Vec<usize> = thin(&f, &base);
+    let pick = |x: &[f64]| keep.iter().map(|k| x[*k]).collect::<Vec<_>>();
+    let spectrum = Chart::new("Periodogram of the whitened residual", "log10 of frequency (Hz)", "Nats explained by a sinusoid")
+        .caption("Noise of the estimated colour stands at the number of recordings; the highest of each fiftieth of a decade is drawn.")
+        .height(240);
+    let log: Vec<f64> = pick(&f).iter().map(|f| f.log10()).collect();
+    section.chart(Chart {
+        scale: Scale::Log,
+        ..spectrum
+            .with_series(Series::line("base law", Colour::Vermillion, log.clone(), pick(&base)))
+            .with_series(Series::line("extended model", Colour::Blue, log, pick(&after)))
+    })
+}
+
+/// The highest value of each fiftieth of a decade.
+fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
+    let mut kept: Vec<(i64, usize)> = Vec::new();
+    for (k, f) in f.iter().enumerate().filter(|(_, f)| **f > 0.01) {
+        let bin = (f.log10() * 50.0).floor() as i64;
+        match kept.last_mut() {
+            Some((last, best)) if *last == bin => {
+                if value[k] > value[*best] {
+                    *best = k;
+                }
+            }
+            _ => kept.push((bin, k)),
+        }
+    }
+    kept.into_iter().map(|k| k.1).collect()
+}
+
+fn evidence(d: &Diagnosis) -> Section {
+    let mut section = Section::new("Evidence").text(
+        "At each step every effect of the library was added to what stood and fitted together with all base parameters. The bars are the \
+         logarithm of the likelihood that it gains, in nats, after the noise's colour was taken out; pale: compared on averages at 50 Hz only. An \
+         effect is taken when it is the best and gains more than was needed on clean data.",
+    );
+    for (k, step) in d.evidence.iter().enumerate() {
+        let stood =
+            if step.standing.is_empty() { "the base law".to_owned() } else { step.standing.join(" + ") };
+        let end = match &step.taken {
+            Some(taken) => format!("taken: {taken}"),
+            None => "nothing was taken".to_owned(),
+        };
+        let bars: Vec<Bar> = step
+            .rivals
+            .iter()
+            .take(14)
+            .map(|r| Bar {
+                name: format!("{} ({})", r.effect, r.parameters),
+                value: r.gain_nats.max(0.0),
+                interval: None,
+                colour: match (&step.taken, r.screened_only) {
+                    (Some(t), _) if *t == r.effect => Colour::Blue,
+                    (_, true) => Colour::Grey,
+                    _ => Colour::SkyBlue,
+                },
+            })
+            .collect();
+        if bars.is_empty() {
+            continue;
+        }
+        let options = FigureOptions {
+            title: format!("Step {}: beyond {stood}", k + 1),
+            subtitle: format!("needed: {} nats; {end}", significant(step.needed_nats, 3)),
+            width_px: 960.0,
+            theme: Theme::Auto,
+        };
+        let markup = bar_chart(
+            &BarChart { label: "nats gained (in brackets: numbers fitted)".to_owned(), bars },
+            &options,
+        );
+        section = section.block(Block::Svg(SvgImage { description: options.title, markup }));
+    }
+    section
+}
+
+fn remains(d: &Diagnosis, all: &[Curves]) -> Section {
+    let text = if d.leftover.p_value < 1e-3 {
+        format!(
+            "The residual of the extended model is still predictable: it depends on {} (p = {}; {} nats).",
+            d.leftover.depends_on.join(", "),
+            significant(d.leftover.p_value, 2),
+            significant(d.leftover.nats, 3)
+        )
+    } else {
+        format!(
+            "Nothing that is the same in several recordings remains (p = {}). The noise: {} N, autoregressive coefficients {} and {} per sample, {}.",
+            significant(d.leftover.p_value, 2),
+            significant(d.noise.sd_n, 3),
+            significant(d.noise.ar[0], 3),
+            significant(d.noise.ar[1], 3),
+            if d.noise.from_air { "checked in air" } else { "without air to check it in" }
+        )
+    };
+    let mut chart = Chart::new("What the extended model leaves", "Depth (mm)", "Residual (N)")
+        .caption("Means over 60 bins of depth.")
+        .height(240)
+        .with_level(zero());
+    for (k, (c, name)) in all.iter().zip(&d.gain.recordings).enumerate() {
+        let mm: Vec<f64> = c.position_m.iter().map(|z| z * 1e3).collect();
+        let (x, y) = binned(&mm, &c.extended_n, &c.used, 60);
+        chart = chart.with_series(Series::line(name.clone(), Colour::nth(k), x, y));
+    }
+    Section::new("What remains").text(text).chart(chart)
+}
+
+fn unseen(d: &Diagnosis) -> Section {
+    let rows = d
+        .invisible
+        .iter()
+        .map(|id| {
+            let info = stylet_tissue::info(id);
+            vec![
+                Cell::text(id.clone()),
+                Cell::text(info.map_or("", |i| i.equation)),
+                Cell::text(info.map_or("", |i| i.signature)),
+            ]
+        })
+        .collect();
+    Section::new("What these recordings cannot show").table(Table {
+        title: "Effects that other base parameters imitate to within the noise".to_owned(),
+        groups: Vec::new(),
+        headers: ["effect", "equation", "how it would show"].map(str::to_owned).to_vec(),
+        rows,
+    })
+}
+
+fn quality(d: &Diagnosis) -> Section {
+    let rows = d
+        .data_quality
+        .iter()
+        .map(|q| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())])
+        .collect();
+    let section = Section::new("Data quality");
+    if d.data_quality.is_empty() {
+        return section
+            .text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
+    }
+    section.table(Table {
+        title: String::new(),
+        groups: Vec::new(),
+        headers: ["recording", "remark"].map(str::to_owned).to_vec(),
+        rows,
+    })
+}
+
+fn repeat(args: &DiagnoseArgs, examined: &Examined) -> Section {
+    let mut command = format!("stylet diagnose {} --data", args.scenario.display());
+    for path in &args.data {
+        let _ = write!(command, " {}", path.display());
+    }
+    if let Some(columns) = &args.columns {
+        let _ = write!(command, " --columns {}", columns.display());
+    }
+    Section::new("Repeat")
+        .block(Block::Code(Code { title: "command".to_owned(), text: command, folded: false }))
+        .block(Block::Code(Code {
+            title: "extended.ron".to_owned(),
+            text: examined.extended.to_ron().unwrap_or_default(),
+            folded: true,
+        }))
+}

@@ -1,0 +1,36 @@
+//! Examines drawn cases of one kind and prints each:
+//! `cargo run --release -p stylet-diagnose --example examine -- single 0 54 [seed]`
+use rayon::prelude::*;
+use stylet_diagnose::benchmark::run;
+use stylet_diagnose::hidden::{Kind, sketch_of};
+use stylet_diagnose::search::Settings;
+
+fn main() {
+    let args: Vec<String> = std::env::args().collect();
+    let kind = match args.get(1).map(String::as_str) {
+        Some("clean") => Kind::Clean,
+        Some("two") => Kind::Two,
+        Some("outside") => Kind::Outside,
+        _ => Kind::Single,
+    };
+    let number = |k: usize, default: u64| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
+    let (from, to, seed) = (number(2, 0), number(3, 27), number(4, 1));
+    let indices: Vec<u64> = (from..to).collect();
+    let results: Vec<_> = indices
+        .par_iter()
+        .map(|&i| {
+            let r = run(i, &sketch_of(seed, i, kind, i), Settings::default());
+            if let Some(r) = &r {
+                println!(
+                    "{:>3} {} {:?} {:.2} sd ar {} {:?}: {:?} {:?} truth {:?} gain {:?} rms {:.4?} left {:.1e} {:.0} expl {:.0} err {:?} {:.1} s",
+                    i, if r.right { "ok  " } else { "MISS" }, r.hidden, r.strength, r.ar, r.values, r.verdict, r.named,
+                    r.truth_nats.map(f64::round), r.gain.map(|g| (g * 1e3).round() / 1e3), r.rms_n, r.leftover.0, r.leftover.1, r.explained,
+                    r.errors.iter().map(|e| format!("{} {:.4}{}", e.0.rsplit('.').next().unwrap_or(""), e.1, if e.2 { "" } else { "!" })).collect::<Vec<_>>(), r.seconds
+                );
+            }
+            r
+        })
+        .collect();
+    let done: Vec<_> = results.into_iter().flatten().collect();
+    println!("right {} of {}", done.iter().filter(|r| r.right).count(), done.len());
+}

@@ -1,0 +1,409 @@
+//! The examination: diagnoses drawn cases and compares with what was hidden.
+
+use crate::diagnose::{Evidence, Options, diagnose};
+use crate::fit::Data;
+use crate::held_out::{free_residual, rms};
+use crate::hidden::{self, Drawn, Kind, Size, Sketch};
+use crate::model::{Choice, Model};
+use crate::outcome::Verdict;
+use crate::refine::refine;
+use crate::search::{Candidate, Search, Settings};
+use crate::track::Track;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+use stylet_tissue::{AnyEffect, Effect};
+
+/// What came of one case.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Result {
+    /// Index of the case.
+    pub index: u64,
+    /// Kind.
+    pub kind: Kind,
+    /// What was hidden.
+    pub hidden: Vec<String>,
+    /// Its parameters.
+    pub values: Vec<Vec<f64>>,
+    /// Its strength in noise standard deviations after re-fitting the base.
+    pub strength: f64,
+    /// Class of the strength.
+    pub size: Size,
+    /// Pole of the noise.
+    pub ar: f64,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What was named, with its class.
+    pub named: Vec<Vec<String>>,
+    /// Confidence of each.
+    pub confidence: Vec<f64>,
+    /// Invisible effects.
+    pub invisible: Vec<String>,
+    /// Whether it was right.
+    pub right: bool,
+    /// Nats by which the true model beats the base (NaN when not worked out).
+    pub truth_nats: Option<f64>,
+    /// Relative errors of the parameters of the truth, when named, and whether the interval holds it.
+    pub errors: Vec<(String, f64, bool)>,
+    /// Held-out gain over the possible one.
+    pub gain: Option<f64>,
+    /// Residual before, after, with the truth (N).
+    pub rms_n: [f64; 3],
+    /// Leftover p-value and nats.
+    pub leftover: (f64, f64),
+    /// Nats explained.
+    pub explained: f64,
+    /// Seconds.
+    pub seconds: f64,
+    /// Samples.
+    pub samples: usize,
+}
+
+/// Strength of what is hidden after re-fitting the base law.
+fn strength(drawn: &Drawn) -> Option<f64> {
+    let case = hidden::case(drawn);
+    let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
+    let clean = hidden::clean_force(drawn);
+    let search =
+        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, Settings::default())?;
+    Some(size_of(&search, &search.base, &clean, drawn))
+}
+
+fn size_of(search: &Search, base: &Candidate, clean: &[Vec<f64>], drawn: &Drawn) -> f64 {
+    let tracks: Vec<Track> = search
+        .data
+        .tracks
+        .iter()
+        .zip(clean)
+        .map(|(t, f)| Track { f: f.clone(), used: vec![true; f.len()], ..t.clone() })
+        .collect();
+    let (mut square, mut n) = (0.0, 0.0);
+    for track in &tracks {
+        square += free_residual(&base.model, track).iter().map(|e| e * e).sum::<f64>();
+        n += track.len() as f64;
+    }
+    let mut square = square / f64::max(n, 1.0);
+    for e in &drawn.effects {
+        if let AnyEffect::ForceSpikes(s) = e {
+            square += s.rate_hz / hidden::SAMPLE_HZ * s.size_n * s.size_n;
+        }
+    }
+    square.sqrt() / drawn.noise_n
+}
+
+/// Draws the strengths that a sketch aims at.
+#[must_use]
+pub fn aim(sketch: &Sketch) -> Drawn {
+    let mut drawn = sketch.drawn.clone();
+    if drawn.effects.is_empty() {
+        return drawn;
+    }
+    let target = sketch.target / (drawn.effects.len() as f64).sqrt();
+    let largest = hidden::largest_force(&drawn);
+    let all = drawn.effects.clone();
+    let mut made = Vec::new();
+    for effect in all {
+        let mut e = effect;
+        if e.id() == "force_gain" {
+            made.push(e);
+            continue;
+        }
+        for _ in 0..4 {
+            let one = Drawn { effects: vec![e.clone()], ..drawn.clone() };
+            let Some(s) = strength(&one) else { break };
+            let factor = target / s.max(1e-3);
+            if (0.8..1.25).contains(&factor) {
+                break;
+            }
+            let Some(next) = hidden::scaled(&e, factor.clamp(0.02, 30.0), largest) else { break };
+            e = next;
+        }
+        made.push(e);
+    }
+    drawn.effects = made;
+    drawn
+}
+
+/// Runs one case.
+#[must_use]
+pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
+    let drawn = aim(sketch);
+    let case = hidden::case(&drawn);
+    let evidence: Vec<Evidence> = case
+        .recordings
+        .iter()
+        .enumerate()
+        .map(|(k, r)| Evidence { name: format!("{k}.csv"), recording: r.clone(), notes: Vec::new() })
+        .collect();
+    let start = Instant::now();
+    let examined =
+        diagnose(&case.believed, &evidence, &Options { search: settings, brief: false }, |_| {}).ok()?;
+    let seconds = start.elapsed().as_secs_f64();
+    let (d, search) = (&examined.diagnosis, &examined.search);
+    let clean = hidden::clean_force(&drawn);
+    let strength = size_of(search, &search.base, &clean, &drawn);
+    let hidden_ids: Vec<String> = drawn.effects.iter().map(|e| e.id().to_owned()).collect();
+    let named: Vec<Vec<String>> = d
+        .causes
+        .iter()
+        .map(|c| std::iter::once(c.effect.clone()).chain(c.equivalent.iter().cloned()).collect())
+        .collect();
+    let right = match sketch.kind {
+        Kind::Clean => d.verdict == Verdict::None,
+        Kind::Outside => d.verdict == Verdict::Unknown,
+        _ if hidden_ids == ["force_gain"] => {
+            d.invisible.contains(&hidden_ids[0]) && d.verdict == Verdict::None
+        }
+        _ => {
+            named.len() == hidden_ids.len()
+                && hidden_ids.iter().all(|h| named.iter().any(|class| class.contains(h)))
+        }
+    };
+    let mut errors = Vec::new();
+    for effect in &drawn.effects {
+        let Some(cause) = d.causes.iter().find(|c| c.effect == effect.id()) else { continue };
+        for (p, truth) in effect.info().parameters.iter().zip(effect.parameters()) {
+            let Some(found) = cause.parameters.get(p.path) else { continue };
+            if p.whole {
+                continue;
+            }
+            let (mut value, mut low, mut high) = (found.value, found.low, found.high);
+            if p.unit == "rad" {
+                let turn = ((truth - value) / core::f64::consts::TAU).round() * core::f64::consts::TAU;
+                value += turn;
+                low += turn;
+                high += turn;
+            }
+            let size = if p.unit == "rad" { 1.0 } else { truth.abs().max(1e-12) };
+            errors.push((
+                format!("{}.{}", effect.id(), p.path),
+                (value - truth).abs() / size,
+                low <= truth && truth <= high,
+            ));
+        }
+    }
+    // What the truth would leave, and by how much it beats the base.
+    let choices: Vec<Choice> = drawn.effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+    let truth = Model {
+        tissue: case.truth.clone(),
+        assumed: case.believed.tissue.clone(),
+        tolerance: case.believed.tolerance,
+        given: Vec::new(),
+        effects: choices,
+    };
+    let (mut square, mut n) = (0.0, 0.0);
+    for track in search.data.tracks.iter() {
+        let e = rms(track, &free_residual(&truth, track));
+        square += e * e * track.len() as f64;
+        n += track.len() as f64;
+    }
+    let after_true = (square / n.max(1.0_f64)).sqrt();
+    let (before, after) = (d.gain.rmse_before_n, d.gain.rmse_after_n);
+    let gain = (before - after_true > 0.03 * before).then(|| (before - after) / (before - after_true));
+    let truth_nats = if right || sketch.kind == Kind::Outside || drawn.effects.is_empty() {
+        None
+    } else {
+        let mut data = Data { ruptures: case.ruptures.clone(), ..search.data.clone() };
+        refine(&truth, &mut data, 1, 4, false).map(|f| search.base.nats - f.nats)
+    };
+    Some(Result {
+        index,
+        kind: sketch.kind,
+        hidden: if let Some(o) = &drawn.outside {
+            vec![hidden::OUTSIDE[o.kind].to_owned()]
+        } else {
+            hidden_ids
+        },
+        values: drawn.effects.iter().map(AnyEffect::parameters).collect(),
+        strength,
+        size: Size::of(strength),
+        ar: drawn.ar[0],
+        verdict: d.verdict,
+        named,
+        confidence: d.causes.iter().map(|c| c.confidence).collect(),
+        invisible: d.invisible.clone(),
+        right,
+        truth_nats,
+        errors,
+        gain,
+        rms_n: [before, after, after_true],
+        leftover: (d.leftover.p_value, d.leftover.nats),
+        explained: search.base.nats - search.best.nats,
+        seconds,
+        samples: search.data.samples(),
+    })
+}
+
+/// Wilson's 95 % interval of a rate, in per cent.
+fn wilson(right: usize, of: usize) -> String {
+    if of == 0 {
+        return "-".to_owned();
+    }
+    let (n, p, z) = (of as f64, right as f64 / of as f64, 1.96);
+    let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+    let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+    format!(
+        "{right}/{of} = {:.1} % ({:.1} to {:.1})",
+        100.0 * p,
+        100.0 * (middle - half),
+        100.0 * (middle + half)
+    )
+}
+
+fn quantile(x: &mut [f64], q: f64) -> f64 {
+    if x.is_empty() {
+        return f64::NAN;
+    }
+    x.sort_unstable_by(f64::total_cmp);
+    x[((x.len() - 1) as f64 * q).round() as usize]
+}
+
+/// Rates, confusion matrix, power and calibration of examined cases, as text.
+#[must_use]
+pub fn summary(cases: &[Result]) -> String {
+    use std::collections::BTreeMap;
+    use std::fmt::Write as _;
+    let mut out = String::new();
+    let line = |out: &mut String, name: &str, chosen: Vec<&Result>| {
+        let right = chosen.iter().filter(|c| c.right).count();
+        let _ = writeln!(out, "{name:<44} {}", wilson(right, chosen.len()));
+    };
+    let of = |kind: Kind| cases.iter().filter(move |c| c.kind == kind);
+    let _ = writeln!(out, "{} cases\n", cases.len());
+    line(&mut out, "clean, called clean", of(Kind::Clean).collect());
+    for size in [Size::Strong, Size::Medium, Size::Faint] {
+        let single: Vec<&Result> = of(Kind::Single)
+            .filter(|c| c.size == size && c.hidden != ["force_gain"])
+            .filter(|c| size != Size::Faint || c.right || c.truth_nats.is_none_or(|n| n > 20.0))
+            .collect();
+        line(&mut out, &format!("one effect, {size:?}: named, or in its class"), single);
+    }
+    line(
+        &mut out,
+        "force_gain: listed as invisible",
+        of(Kind::Single).filter(|c| c.hidden == ["force_gain"]).collect(),
+    );
+    line(&mut out, "two effects, both named", of(Kind::Two).collect());
+    for size in [Size::Strong, Size::Medium, Size::Faint] {
+        let outside: Vec<&Result> = of(Kind::Outside).filter(|c| c.size == size).collect();
+        let named =
+            outside.iter().filter(|c| matches!(c.verdict, Verdict::Named | Verdict::Ambiguous)).count();
+        let _ = writeln!(
+            out,
+            "{:<44} {}",
+            format!("outside the library, {size:?}: wrongly named"),
+            wilson(named, outside.len())
+        );
+        line(&mut out, &format!("outside the library, {size:?}: unknown"), outside);
+    }
+    let strong = || of(Kind::Single).filter(|c| c.size == Size::Strong && c.right);
+    let mut errors: Vec<f64> = strong().flat_map(|c| c.errors.iter().map(|e| e.1)).collect();
+    let _ = writeln!(
+        out,
+        "\nparameter error, strong: median {:.3} %, p90 {:.3} %",
+        100.0 * quantile(&mut errors, 0.5),
+        100.0 * quantile(&mut errors, 0.9)
+    );
+    for size in [Size::Strong, Size::Medium, Size::Faint] {
+        let held: Vec<bool> = of(Kind::Single)
+            .filter(|c| c.size == size && c.right)
+            .flat_map(|c| c.errors.iter().map(|e| e.2))
+            .collect();
+        let _ = writeln!(
+            out,
+            "95 % intervals, {size:?}: hold the truth in {}",
+            wilson(held.iter().filter(|h| **h).count(), held.len())
+        );
+    }
+    let mut by_parameter: BTreeMap<&str, (usize, usize, f64)> = BTreeMap::new();
+    for e in of(Kind::Single).filter(|c| c.right).flat_map(|c| &c.errors) {
+        let slot = by_parameter.entry(&e.0).or_default();
+        slot.0 += usize::from(e.2);
+        slot.1 += 1;
+        slot.2 = slot.2.max(e.1);
+    }
+    for (name, (held, all, worst)) in by_parameter {
+        let _ = writeln!(out, "    {name:<48} held {held}/{all}, worst error {:.2} %", 100.0 * worst);
+    }
+    let mut gains: Vec<f64> = strong().filter_map(|c| c.gain).collect();
+    let _ = writeln!(
+        out,
+        "held-out gain over the possible one, strong: p10 {:.4}, median {:.4}",
+        quantile(&mut gains, 0.1),
+        quantile(&mut gains, 0.5)
+    );
+    let worse = of(Kind::Clean).filter(|c| c.rms_n[1] > 1.01 * c.rms_n[0]).count();
+    let _ = writeln!(
+        out,
+        "clean data, worse than the base by more than 1 %: {}",
+        wilson(worse, of(Kind::Clean).count())
+    );
+    let mut seconds: Vec<f64> = cases.iter().map(|c| c.seconds).collect();
+    let _ = writeln!(
+        out,
+        "seconds per case (cases run side by side): median {:.2}, p90 {:.2}",
+        quantile(&mut seconds, 0.5),
+        quantile(&mut seconds, 0.9)
+    );
+    // Confidence.
+    let _ = writeln!(out, "\nconfidence against truth (one effect):");
+    for (lo, hi) in [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)] {
+        let bin: Vec<&Result> =
+            of(Kind::Single).filter(|c| c.confidence.first().is_some_and(|p| *p >= lo && *p < hi)).collect();
+        let first =
+            bin.iter().filter(|c| c.named.first().and_then(|n| n.first()) == c.hidden.first()).count();
+        let _ = writeln!(
+            out,
+            "    said {lo:.2} to {:.2}: the first named is it in {}",
+            hi.min(1.0),
+            wilson(first, bin.len())
+        );
+    }
+    // Power.
+    let _ = writeln!(
+        out,
+        "\npower (named or in its class, by strength in noise sd) and the smallest strength from which 80 % are named:"
+    );
+    let mut names: Vec<&str> =
+        of(Kind::Single).filter_map(|c| c.hidden.first().map(String::as_str)).collect();
+    names.sort_unstable();
+    names.dedup();
+    for name in names {
+        let mut own: Vec<&Result> = of(Kind::Single).filter(|c| c.hidden == [name]).collect();
+        own.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+        let (mut right, mut least) = (0, f64::NAN);
+        for (k, c) in own.iter().enumerate() {
+            right += usize::from(c.right);
+            if right as f64 >= 0.8 * (k + 1) as f64 {
+                least = c.strength;
+            }
+        }
+        let per = |size: Size| {
+            let of_size: Vec<&&Result> = own.iter().filter(|c| c.size == size).collect();
+            format!("{}/{}", of_size.iter().filter(|c| c.right).count(), of_size.len())
+        };
+        let _ = writeln!(
+            out,
+            "    {name:<26} strong {:>6}  medium {:>6}  faint {:>6}  below {:>6}  80 % from {least:.2} sd",
+            per(Size::Strong),
+            per(Size::Medium),
+            per(Size::Faint),
+            per(Size::Below)
+        );
+    }
+    // Confusion.
+    let _ = writeln!(out, "\nconfusion: hidden -> said (cases)");
+    let mut matrix: BTreeMap<(String, String), usize> = BTreeMap::new();
+    for c in cases.iter().filter(|c| c.kind != Kind::Two) {
+        let hidden = c.hidden.first().cloned().unwrap_or_else(|| "(clean)".to_owned());
+        let said = match c.verdict {
+            Verdict::None => "none".to_owned(),
+            Verdict::Unknown => "unknown".to_owned(),
+            _ => c.named.iter().map(|n| n.join("|")).collect::<Vec<_>>().join(" + "),
+        };
+        *matrix.entry((hidden, said)).or_default() += 1;
+    }
+    for ((hidden, said), n) in matrix {
+        let _ = writeln!(out, "    {hidden:<34} -> {said:<60} {n}");
+    }
+    out
+}

@@ -1,0 +1,115 @@
+//! Whether the recordings can belong to the scenario at all.
+
+use crate::diagnose::Evidence;
+use crate::error::DiagnoseError;
+use stylet_record::{QualityKind, QualityNote, Recording};
+use stylet_scenario::Scenario;
+use stylet_tissue::{Law, replay};
+
+/// Fewest samples of a recording.
+const LEAST_SAMPLES: usize = 50;
+
+/// Checks reach, units and signs.
+pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), DiagnoseError> {
+    if evidence.is_empty() {
+        return Err(DiagnoseError::NoRecording);
+    }
+    let (surface_m, end_m) = (scenario.tissue.surface_m, scenario.tissue.end_m());
+    for e in evidence {
+        let r = &e.recording;
+        let usable = (0..r.len())
+            .filter(|&i| (r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite());
+        let usable: Vec<usize> = usable.collect();
+        let name = || e.name.clone();
+        if usable.len() < LEAST_SAMPLES {
+            return Err(DiagnoseError::TooShort {
+                name: name(),
+                samples: usable.len(),
+                least: LEAST_SAMPLES,
+            });
+        }
+        let deepest_m = usable.iter().fold(f64::NEG_INFINITY, |m, &i| m.max(r.position_m[i]));
+        let lowest_m = usable.iter().fold(f64::INFINITY, |m, &i| m.min(r.position_m[i]));
+        let depth_m = end_m - surface_m;
+        // The smallest depth of any use: a hundredth of the first layer.
+        let first_m = scenario.tissue.layers.first().map_or(depth_m, |l| l.thickness_m);
+        if deepest_m - surface_m > 20.0 * depth_m {
+            let scale = if deepest_m > 2e4 * depth_m { 1e-6 } else { 1e-3 };
+            let unit = if scale == 1e-3 { "millimetres" } else { "micrometres" };
+            return Err(DiagnoseError::PositionUnit { name: name(), deepest: deepest_m, end_m, unit, scale });
+        }
+        if deepest_m - surface_m < 0.01 * first_m {
+            let remedy = if -lowest_m > surface_m + 0.1 * depth_m {
+                "the position runs the other way: positive is into the tissue, give a column map with a negative scale"
+            } else if deepest_m - lowest_m > 1e-9 && deepest_m - lowest_m < 2e-3 * depth_m {
+                "its whole travel is a thousandth of the tissue: is the position in kilometres, or scaled twice?"
+            } else {
+                "is this the right scenario, and does position zero mean the same in both?"
+            };
+            return Err(DiagnoseError::NeverReaches { name: name(), deepest_m, surface_m, remedy });
+        }
+        force(scenario, e, &usable)?;
+    }
+    Ok(())
+}
+
+/// Compares the size and sign of the measured force with the believed law's.
+fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<(), DiagnoseError> {
+    let r = &e.recording;
+    let Ok(law) = Law::new(&scenario.tissue, &scenario.effects) else { return Ok(()) };
+    let mut believed = Vec::with_capacity(usable.len());
+    replay(
+        &law,
+        usable.iter().map(|&i| (r.time_s[i], r.position_m[i], r.velocity_mps[i])),
+        |_| {},
+        |f| believed.push(f.total_n),
+    );
+    let mean: f64 = usable.iter().map(|&i| r.force_n[i]).sum::<f64>() / usable.len() as f64;
+    let expected: f64 = believed.iter().sum::<f64>() / believed.len() as f64;
+    let (mut ff, mut bb, mut fb) = (0.0, 0.0, 0.0);
+    for (&i, b) in usable.iter().zip(&believed) {
+        let (f, b) = (r.force_n[i] - mean, b - expected);
+        ff += f * f;
+        bb += b * b;
+        fb += f * b;
+    }
+    let (measured, law_n) = (ff.sqrt(), bb.sqrt());
+    let correlation = fb / (measured * law_n).max(1e-300);
+    let ratio = measured / law_n.max(1e-300);
+    let wrong = |what: String, scale: f64| Err(DiagnoseError::Force { name: e.name.clone(), what, scale });
+    if correlation < -0.5 {
+        return wrong(
+            "the force runs the other way: it should be positive when it resists the insertion".to_owned(),
+            -1.0,
+        );
+    }
+    if correlation.abs() > 0.5 && ratio > 100.0 {
+        return wrong(
+            format!("the force is {ratio:.0} times what the scenario expects: is it in millinewtons?"),
+            1e-3,
+        );
+    }
+    if correlation.abs() > 0.5 && ratio < 0.01 {
+        return wrong(
+            format!("the force is {ratio:.1e} of what the scenario expects: is it in kilonewtons?"),
+            1e3,
+        );
+    }
+    Ok(())
+}
+
+/// A remark on samples that are not finite: they are cut out.
+pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
+    let bad: Vec<usize> = (0..r.len())
+        .filter(|&i| !(r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite())
+        .collect();
+    let first = *bad.first()?;
+    let message = format!(
+        "{} sample(s) are not finite numbers, the first is number {}: they were cut out",
+        bad.len(),
+        first + 1
+    );
+    let numbers =
+        [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
+    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new() })
+}

@@ -1,0 +1,330 @@
+//! The fit: whitened robust least squares by Levenberg-Marquardt within bounds.
+//!
+//! Objective in nats: `sum rho(w_i) + sum rho(u_j) + sum p_k^2/2`, with `w` the whitened residuals, `u`
+//! the rupture events, `p` the base parameters' departure from what was assumed in units of the
+//! tolerance, and `rho` Huber's loss (`w^2/2` up to 3, linear beyond).
+
+use crate::forward::{self, Event};
+use crate::model::{Model, Role, Slot};
+use crate::noise::Noise;
+use crate::track::Track;
+use std::sync::Arc;
+
+/// Where Huber's loss turns linear, in standard deviations.
+pub const HUBER: f64 = 3.0;
+
+/// Huber's loss.
+#[must_use]
+#[inline]
+pub fn rho(w: f64) -> f64 {
+    let size = w.abs();
+    if size <= HUBER { 0.5 * w * w } else { HUBER * (size - 0.5 * HUBER) }
+}
+
+/// Its weight.
+#[inline]
+fn weight(w: f64) -> f64 {
+    let size = w.abs();
+    if size <= HUBER { 1.0 } else { HUBER / size }
+}
+
+/// The data of a fit: tracks, where layers ruptured in each, the noise.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// The recordings.
+    pub tracks: Arc<Vec<Track>>,
+    /// Per recording and layer the sample at which it has ruptured.
+    pub ruptures: Vec<Vec<usize>>,
+    /// The noise.
+    pub noise: Noise,
+}
+
+impl Data {
+    /// Samples in all.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.tracks.iter().map(Track::len).sum()
+    }
+
+    /// The same in blocks of `q`; `scale` is the noise there.
+    #[must_use]
+    pub fn blocks(&self, q: usize, noise: Noise) -> Self {
+        let (tracks, ruptures): (Vec<Track>, _) =
+            self.tracks.iter().zip(&self.ruptures).map(|(track, r)| track.blocks(q, r)).unzip();
+        Self { tracks: Arc::new(tracks), ruptures, noise }
+    }
+}
+
+/// A prediction for all recordings, one after another.
+#[derive(Clone, Debug, Default)]
+pub struct Residuals {
+    /// Recorded force less the predicted one in N.
+    pub e: Vec<f64>,
+    /// Whitened.
+    pub w: Vec<f64>,
+    /// Rupture events, recordings by layers.
+    pub events: Vec<Event>,
+    scratch: Vec<Event>,
+}
+
+/// Replays a model over all recordings; false when it cannot be replayed.
+pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
+    let Some(compiled) = model.compile() else { return false };
+    let n = data.samples();
+    out.e.resize(n, 0.0);
+    out.w.resize(n, 0.0);
+    out.events.clear();
+    let mut from = 0;
+    for (track, ruptures) in data.tracks.iter().zip(&data.ruptures) {
+        let to = from + track.len();
+        let e = &mut out.e[from..to];
+        forward::imposed(&compiled, track, ruptures, e, &mut out.scratch);
+        for (e, f) in e.iter_mut().zip(&track.f) {
+            *e = f - *e;
+        }
+        data.noise.whiten(track, e, &mut out.w[from..to]);
+        out.events.extend_from_slice(&out.scratch);
+        from = to;
+    }
+    out.w.iter().all(|w| w.is_finite())
+}
+
+/// The objective of a replayed model, in nats.
+#[must_use]
+pub fn objective(model: &Model, r: &Residuals) -> f64 {
+    let samples: f64 = r.w.iter().map(|w| rho(*w)).sum();
+    let events: f64 = r.events.iter().map(|e| rho(e.u)).sum();
+    samples + events + prior(model)
+}
+
+/// Nats of the base parameters' departure from what was assumed.
+fn prior(model: &Model) -> f64 {
+    model
+        .slots()
+        .iter()
+        .filter(|slot| matches!(slot.role, Role::Base { .. }))
+        .map(|slot| {
+            let x = (model.get(slot) - 1.0) / model.tolerance;
+            0.5 * x * x
+        })
+        .sum()
+}
+
+/// A fitted model.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model at its best.
+    pub model: Model,
+    /// Its objective in nats.
+    pub nats: f64,
+}
+
+/// Columns of the Jacobian: change of whitened residuals and events per unit of each number.
+pub struct Jacobian {
+    /// The numbers.
+    pub slots: Vec<Slot>,
+    /// One column per number: samples, then events.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// Numeric Jacobian at a model whose residuals are `at`.
+pub fn jacobian(
+    model: &Model,
+    data: &Data,
+    at: &Residuals,
+    work: &mut Residuals,
+    keep: Option<&Jacobian>,
+) -> Jacobian {
+    let slots = model.slots();
+    let p = model.vector(&slots);
+    let mut trial = model.clone();
+    let mut columns = Vec::with_capacity(slots.len());
+    for (j, slot) in slots.iter().enumerate() {
+        if let (Some(keep), Role::Base { .. }) = (keep, slot.role) {
+            columns.push(keep.columns[j].clone());
+            continue;
+        }
+        let mut column = vec![0.0; at.w.len() + at.events.len()];
+        if !slot.stepped {
+            let mut q = p.clone();
+            let step = if q[j] + slot.step > slot.high { -slot.step } else { slot.step };
+            q[j] += step;
+            trial.set(&slots, &q);
+            if residuals(&trial, data, work) {
+                let inverse = 1.0 / step;
+                for (c, (new, old)) in column.iter_mut().zip(work.w.iter().zip(&at.w)) {
+                    *c = (new - old) * inverse;
+                }
+                for (c, (new, old)) in column[at.w.len()..].iter_mut().zip(work.events.iter().zip(&at.events))
+                {
+                    *c = (new.u - old.u) * inverse;
+                }
+            }
+        }
+        columns.push(column);
+    }
+    Jacobian { slots, columns }
+}
+
+/// Normal equations with Huber's weights and the prior: `(J'WJ, J'Wr)`.
+#[must_use]
+pub fn normal(model: &Model, jac: &Jacobian, at: &Residuals) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let m = jac.slots.len();
+    let root: Vec<f64> =
+        at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).map(|w| weight(w).sqrt()).collect();
+    let r: Vec<f64> =
+        at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).zip(&root).map(|(w, s)| w * s).collect();
+    let weighted: Vec<Vec<f64>> =
+        jac.columns.iter().map(|c| c.iter().zip(&root).map(|(x, s)| x * s).collect()).collect();
+    let mut h = vec![vec![0.0; m]; m];
+    let mut g = vec![0.0; m];
+    for i in 0..m {
+        g[i] = dot(&weighted[i], &r);
+        for j in 0..=i {
+            h[i][j] = dot(&weighted[i], &weighted[j]);
+            h[j][i] = h[i][j];
+        }
+    }
+    let sd = model.tolerance;
+    for (i, slot) in jac.slots.iter().enumerate() {
+        if matches!(slot.role, Role::Base { .. }) {
+            h[i][i] += 1.0 / (sd * sd);
+            g[i] += (model.get(slot) - 1.0) / (sd * sd);
+        }
+    }
+    (h, g)
+}
+
+/// Scalar product, in eight lanes so that it runs in vector registers with the same bits everywhere.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a8.zip(b8) {
+        for k in 0..8 {
+            lanes[k] += x[k] * y[k];
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// Solves a symmetric positive system by Cholesky; `None` when it is not positive.
+#[must_use]
+pub fn solve(h: &[Vec<f64>], g: &[f64]) -> Option<Vec<f64>> {
+    let n = g.len();
+    let mut l = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let rest = h[i][j] - sum;
+            if i == j {
+                if rest.is_nan() || rest <= 1e-14 * h[i][i].abs() {
+                    return None;
+                }
+                l[i][i] = rest.sqrt();
+            } else {
+                l[i][j] = rest / l[j][j];
+            }
+        }
+    }
+    let mut x = g.to_vec();
+    for i in 0..n {
+        let sum: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
+        x[i] = (x[i] - sum) / l[i][i];
+    }
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|k| l[k][i] * x[k]).sum();
+        x[i] = (x[i] - sum) / l[i][i];
+    }
+    Some(x)
+}
+
+/// Fits a model from where it stands: at most `turns` steps, until a step gains less than `enough`
+/// nats.
+#[must_use]
+pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit> {
+    let mut at = Residuals::default();
+    let mut work = Residuals::default();
+    let mut best = model.clone();
+    {
+        let slots = best.slots();
+        let p = best.vector(&slots);
+        best.set(&slots, &p);
+    }
+    if !residuals(&best, data, &mut at) {
+        return None;
+    }
+    let mut nats = objective(&best, &at);
+    let mut lambda = 1e-4;
+    let mut last: Option<Jacobian> = None;
+    for turn in 0..turns {
+        // The force is nearly linear in the base parameters: their columns serve for three turns.
+        let keep = if turn % 3 == 0 { None } else { last.as_ref() };
+        let jac = jacobian(&best, data, &at, &mut work, keep);
+        let p = best.vector(&jac.slots);
+        let (h, g) = normal(&best, &jac, &at);
+        let mut gained = 0.0;
+        for _ in 0..6 {
+            let Some(q) = step(&jac.slots, &p, &h, &g, lambda) else {
+                lambda = (lambda * 10.0).max(1e-3);
+                continue;
+            };
+            let mut trial = best.clone();
+            trial.set(&jac.slots, &q);
+            if residuals(&trial, data, &mut work) {
+                let value = objective(&trial, &work);
+                if value < nats {
+                    gained = nats - value;
+                    nats = value;
+                    best = trial;
+                    std::mem::swap(&mut at, &mut work);
+                    lambda = (lambda * 0.1).max(1e-9);
+                    break;
+                }
+            }
+            lambda = (lambda * 10.0).max(1e-3);
+        }
+        last = Some(jac);
+        if gained < enough {
+            break;
+        }
+    }
+    Some(Fit { model: best, nats })
+}
+
+/// One step within the bounds: numbers at a bound that want beyond it stay there.
+fn step(slots: &[Slot], p: &[f64], h: &[Vec<f64>], g: &[f64], lambda: f64) -> Option<Vec<f64>> {
+    let n = p.len();
+    let mut free: Vec<bool> = slots.iter().enumerate().map(|(i, s)| !s.stepped && h[i][i] > 0.0).collect();
+    for _ in 0..4 {
+        let index: Vec<usize> = (0..n).filter(|i| free[*i]).collect();
+        if index.is_empty() {
+            return None;
+        }
+        let sub: Vec<Vec<f64>> = index
+            .iter()
+            .map(|&i| {
+                index.iter().map(|&j| if i == j { h[i][i] * (1.0 + lambda) } else { h[i][j] }).collect()
+            })
+            .collect();
+        let right: Vec<f64> = index.iter().map(|&i| -g[i]).collect();
+        let d = solve(&sub, &right)?;
+        let mut out = p.to_vec();
+        let mut blocked = false;
+        for (&i, d) in index.iter().zip(&d) {
+            let want = p[i] + d;
+            out[i] = want.clamp(slots[i].low, slots[i].high);
+            let stuck = (p[i] <= slots[i].low && want < slots[i].low)
+                || (p[i] >= slots[i].high && want > slots[i].high);
+            if stuck {
+                free[i] = false;
+                blocked = true;
+            }
+        }
+        if !blocked {
+            return Some(out);
+        }
+    }
+    None
+}

@@ -1,0 +1,148 @@
+//! The forward model: the tissue law replayed over a measured motion, then the measuring chain.
+//!
+//! With ruptures imposed where the data show them the force is smooth in nearly every parameter, and
+//! each rupture adds one event: how far the law is from rupturing there by itself. With free ruptures
+//! the law decides, as in any simulation.
+
+use crate::model::Compiled;
+use crate::track::{NEVER, Track};
+use stylet_tissue::{LawState, MeasurementState, Reading};
+
+/// What a layer's rupture says of the law: its strain at the instant that the data show.
+#[derive(Clone, Copy, Debug)]
+pub struct Event {
+    /// Distance from rupture in standard deviations of what sampling leaves open; positive: the law
+    /// would have ruptured before, negative: not yet.
+    pub u: f64,
+    /// The same by the puncture force alone; NaN without one.
+    pub by_force: f64,
+    /// Elastic force in N half-way between the last sample before the rupture and the first after.
+    pub elastic_n: f64,
+    /// Ratio of the actual puncture force (speed) to the layer's own.
+    pub ratio: f64,
+}
+
+/// Relative uncertainty of an elastic force at rupture beyond sampling.
+const FORCE_FLOOR: f64 = 5e-5;
+/// Uncertainty of a position in m beyond sampling.
+const POSITION_FLOOR_M: f64 = 1e-6;
+
+/// Strain before and at the rupture of one layer.
+#[derive(Clone, Copy)]
+struct Strained {
+    force_before: f64,
+    force_at: f64,
+    place_before: f64,
+    place_at: f64,
+    elastic_before: f64,
+    elastic_at: f64,
+    puncture: f64,
+    seen: bool,
+}
+
+const UNSEEN: Strained = Strained {
+    force_before: f64::NEG_INFINITY,
+    force_at: f64::NEG_INFINITY,
+    place_before: f64::NEG_INFINITY,
+    place_at: f64::NEG_INFINITY,
+    elastic_before: 0.0,
+    elastic_at: 0.0,
+    puncture: f64::INFINITY,
+    seen: false,
+};
+
+impl Strained {
+    fn event(&self, ruptured: bool, own_puncture: f64) -> Event {
+        let ratio = if self.puncture.is_finite() { self.puncture / own_puncture } else { 1.0 };
+        let spread = |lo: f64, hi: f64, floor: f64| {
+            let half = 0.5 * (hi - lo).abs();
+            (half * half / 3.0 + floor * floor).sqrt()
+        };
+        let floor = FORCE_FLOOR * self.puncture.min(1e3) + 1e-5;
+        if !ruptured {
+            // Nothing is known but that it did not happen.
+            let step = (self.elastic_at - self.elastic_before).abs();
+            let by_force = self.force_before.max(self.force_at) / (floor + step);
+            let u = by_force.max(self.place_before.max(self.place_at) / 1e-5).max(0.0);
+            return Event { u, by_force: f64::NAN, elastic_n: self.elastic_at, ratio };
+        }
+        let mid = |lo: f64, hi: f64| 0.5 * (lo + hi);
+        let by_force = if self.puncture.is_finite() {
+            let before = self.force_before.max(-1e3);
+            mid(before, self.force_at) / spread(before, self.force_at, floor)
+        } else {
+            f64::NAN
+        };
+        let before = self.place_before.max(self.place_at - 1e-2);
+        let by_place = mid(before, self.place_at) / spread(before, self.place_at, POSITION_FLOOR_M);
+        let u = if by_force.is_nan() { by_place } else { by_force.max(by_place) };
+        Event { u, by_force, elastic_n: mid(self.elastic_before, self.elastic_at), ratio }
+    }
+}
+
+/// Replays with imposed ruptures (`ruptures[i]`: the sample at which layer `i` has given way in the
+/// recorded force, or [`NEVER`]); writes the recorded force that the model predicts and one event per
+/// layer.
+pub fn imposed(
+    model: &Compiled,
+    track: &Track,
+    ruptures: &[usize],
+    out: &mut [f64],
+    events: &mut Vec<Event>,
+) {
+    let lead = (model.delay_s * track.sample_hz).round() as usize;
+    let mut strained = [UNSEEN; 16];
+    let mut state = LawState::default();
+    let mut chain = if model.measures { Some(model.chain.start(track.sample_hz * 4.0)) } else { None };
+    let mut done = 0;
+    for i in 0..track.len() {
+        while done < ruptures.len() && ruptures[done] != NEVER && i + lead >= ruptures[done] {
+            done += 1;
+        }
+        let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
+        let force = model.law.step_imposed(&mut state, t, z, v, done, |s| {
+            let Some(mine) = strained.get_mut(s.layer - 1) else { return };
+            mine.elastic_before = if mine.seen { mine.elastic_at } else { 0.0 };
+            mine.force_before = mine.force_before.max(mine.force_at);
+            mine.place_before = mine.place_before.max(mine.place_at);
+            mine.elastic_at = s.elastic_n;
+            mine.force_at = s.elastic_n - s.puncture_n;
+            mine.place_at = s.tip_m - s.far_m;
+            mine.puncture = s.puncture_n;
+            mine.seen = true;
+        });
+        out[i] = match &mut chain {
+            None => force.total_n,
+            Some(chain) => measure(model, chain, track, i, force.total_n),
+        };
+    }
+    events.clear();
+    for (layer, slab) in model.law.slabs().iter().enumerate().take(strained.len()) {
+        let ruptured = ruptures.get(layer).is_some_and(|r| *r != NEVER);
+        events.push(strained[layer].event(ruptured, slab.puncture_n));
+    }
+}
+
+fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usize, tissue_n: f64) -> f64 {
+    let reading = Reading {
+        time_s: track.t[i],
+        velocity_mps: track.v[i] * model.to_true,
+        acceleration_mps2: track.a[i] * model.to_true,
+        tissue_n,
+        noise_n: 0.0,
+    };
+    model.chain.step(chain, &reading)
+}
+
+/// Replays with the law's own ruptures; returns the instants (s) at which layers gave way.
+pub fn free(model: &Compiled, track: &Track, out: &mut [f64]) -> Vec<f64> {
+    let mut state = LawState::default();
+    let mut chain = model.chain.start(track.sample_hz);
+    let mut instants = Vec::new();
+    for i in 0..track.len() {
+        let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
+        let force = model.law.step(&mut state, t, z, v, |r| instants.push(r.time_s));
+        out[i] = measure(model, &mut chain, track, i, force.total_n);
+    }
+    instants
+}

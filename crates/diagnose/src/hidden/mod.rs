@@ -1,0 +1,14 @@
+//! Cases with something hidden in them, for examining the diagnosis.
+//!
+//! The drawing knows the tissue law and the measuring chain and nothing of the diagnosis: it steps the
+//! law at 1 kHz from a phase of its own and keeps every fifth sample.
+
+mod draw;
+mod motion;
+mod outside;
+mod plan;
+
+pub use draw::{Case, Drawn, SAMPLE_HZ, case, clean_force, library_ids, scenario};
+pub use motion::Motions;
+pub use outside::{OUTSIDE, Outside};
+pub use plan::{Kind, Size, Sketch, largest_force, scaled, sketch, sketch_of};

@@ -1,0 +1,199 @@
+//! Which cases an examination consists of: a pure function of seed and index.
+
+use super::draw::{Drawn, case};
+use super::motion::Motions;
+use super::outside::Outside;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use stylet_tissue::{AnyEffect, EffectInfo};
+
+/// What kind of case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Nothing hidden.
+    Clean,
+    /// One effect of the library.
+    Single,
+    /// Two of them.
+    Two,
+    /// One outside the library.
+    Outside,
+}
+
+/// Strength aimed at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Size {
+    /// At least 5 noise standard deviations after re-fitting the base.
+    Strong,
+    /// 0.5 to 5.
+    Medium,
+    /// 0.15 to 0.5.
+    Faint,
+    /// Less.
+    Below,
+}
+
+impl Size {
+    /// The class of a strength.
+    #[must_use]
+    pub fn of(strength: f64) -> Self {
+        match strength {
+            s if s >= 5.0 => Size::Strong,
+            s if s >= 0.5 => Size::Medium,
+            s if s >= 0.15 => Size::Faint,
+            _ => Size::Below,
+        }
+    }
+}
+
+/// A case before its strength is known.
+#[derive(Clone, Debug)]
+pub struct Sketch {
+    /// Kind.
+    pub kind: Kind,
+    /// Strength aimed at.
+    pub target: f64,
+    /// What is drawn.
+    pub drawn: Drawn,
+}
+
+/// The sketch of a case. Of twenty cases eight are clean, eight have one effect, two have two, two one
+/// outside the library.
+#[must_use]
+pub fn sketch(seed: u64, index: u64) -> Sketch {
+    let kind = match index % 20 {
+        0..8 => Kind::Clean,
+        8..16 => Kind::Single,
+        16..18 => Kind::Two,
+        _ => Kind::Outside,
+    };
+    sketch_of(seed, index, kind, index / 20 * 8 + index % 20)
+}
+
+/// The sketch of a case of a given kind; `turn` goes round the effects and the sizes.
+#[must_use]
+pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(index + 1);
+    let ar = [0.0, 0.5, 0.9][rng.random_range(0..3)];
+    let size = match kind {
+        Kind::Two => 0,
+        Kind::Outside => (turn % 3).min(2),
+        _ => (turn / 27) % 3,
+    };
+    let mut between = |lo: f64, hi: f64| lo + (hi - lo) * rng.random::<f64>();
+    let target = match size {
+        0 => between(5.5_f64.ln(), 12.0_f64.ln()).exp(),
+        1 => between(0.6_f64.ln(), 4.0_f64.ln()).exp(),
+        _ => between(0.18_f64.ln(), 0.45_f64.ln()).exp(),
+    };
+    let mut drawn = Drawn {
+        seed: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ index.wrapping_mul(0xbf58_476d_1ce4_e5b9),
+        effects: Vec::new(),
+        outside: None,
+        noise_n: 0.02,
+        ar: [ar, 0.0],
+        off: 0.15,
+        motions: Motions::Rich,
+        scatter: 0.0,
+        velocity_noise_mps: 0.0,
+    };
+    let entries: Vec<&'static EffectInfo> = stylet_tissue::library().collect();
+    let fitted: Vec<&'static EffectInfo> = entries.iter().copied().filter(|i| i.id != "force_gain").collect();
+    match kind {
+        Kind::Clean => {}
+        Kind::Single => {
+            let info = entries[(turn % entries.len() as u64) as usize];
+            drawn.effects.extend(draw_effect(info, &mut between));
+        }
+        Kind::Two => {
+            let first = fitted[between(0.0, fitted.len() as f64 - 1e-9) as usize];
+            let mut second = first;
+            while second.id == first.id {
+                second = fitted[between(0.0, fitted.len() as f64 - 1e-9) as usize];
+            }
+            drawn.effects.extend(draw_effect(first, &mut between));
+            drawn.effects.extend(draw_effect(second, &mut between));
+        }
+        Kind::Outside => {
+            let kind = (turn / 3) as usize;
+            let u = [between(0.0, 1.0), between(0.0, 1.0), between(0.0, 1.0), between(0.0, 1.0)];
+            drawn.outside = Some(Outside::new(kind, u, 0.02 * target));
+        }
+    }
+    Sketch { kind, target, drawn }
+}
+
+/// An effect with shapes drawn over plausible ranges and a first strength.
+fn draw_effect(info: &EffectInfo, between: &mut dyn FnMut(f64, f64) -> f64) -> Option<AnyEffect> {
+    let log = |between: &mut dyn FnMut(f64, f64) -> f64, lo: f64, hi: f64| between(lo.ln(), hi.ln()).exp();
+    let sign = if between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
+    let values: Vec<f64> = match info.id {
+        "stress_relaxation" => vec![0.3, log(between, 0.2, 8.0)],
+        "stribeck_friction" => vec![3.0, 3.0 * between(1.8, 3.5), log(between, 0.6e-3, 3e-3)],
+        "presliding_friction" => vec![4.0, log(between, 2e-4, 3e-3)],
+        "power_law_friction" => vec![if sign < 0.0 { 0.7 } else { 1.3 }],
+        "hidden_membrane" => vec![between(0.008, 0.085), log(between, 80.0, 400.0), 0.5],
+        "boundary_shift" => vec![if between(0.0, 1.0) < 0.5 { 1.0 } else { 2.0 }, sign * 0.002],
+        "respiration" => vec![0.001, between(0.15, 0.4), between(-3.0, 3.0)],
+        "periodic_interference" => vec![0.03, log(between, 0.5, 40.0), between(-3.0, 3.0)],
+        "needle_compliance" => vec![800.0],
+        "saturation" => vec![3.0],
+        "force_spikes" => vec![between(0.2, 1.0), 1.0],
+        "nonlinear_elasticity" => vec![5.0],
+        "position_scale" | "asymmetric_friction" => vec![sign * 0.03],
+        "rate_dependent_puncture" => vec![sign * 0.08],
+        "force_bias" | "force_drift" | "force_gain" => vec![sign * info.parameters[0].start],
+        _ => info.parameters.iter().map(|p| p.start).collect(),
+    };
+    AnyEffect::from_parameters(info.id, &values)
+}
+
+/// The effect stronger by a factor.
+#[must_use]
+pub fn scaled(effect: &AnyEffect, factor: f64, largest_n: f64) -> Option<AnyEffect> {
+    use stylet_tissue::Effect;
+    let mut v = effect.parameters();
+    let id = effect.id();
+    match id {
+        "stribeck_friction" => {
+            v[0] *= factor;
+            v[1] *= factor;
+        }
+        "stress_relaxation" => v[0] = (v[0] * factor).min(0.8),
+        "power_law_friction" => v[0] = 1.0 + ((v[0] - 1.0) * factor).clamp(-0.7, 0.8),
+        "hidden_membrane" => v[2] = (v[2] * factor.sqrt().clamp(0.3, 3.0)).min(3.0),
+        "boundary_shift" => v[1] = (v[1] * factor).clamp(-0.012, 0.012),
+        "needle_compliance" => v[0] = (v[0] / factor).clamp(80.0, 2e4),
+        "saturation" => {
+            v[0] = largest_n * (1.0 - (1.0 - v[0] / largest_n).max(0.02) * factor.sqrt()).clamp(0.25, 0.995)
+        }
+        "force_spikes" => v[1] *= factor,
+        "incomplete_release" => v[0] = (v[0] * factor).min(0.9),
+        "asymmetric_friction" => v[0] = (v[0] * factor).clamp(-0.8, 0.8),
+        "position_scale" => v[0] = (v[0] * factor).clamp(-0.15, 0.15),
+        "rate_dependent_puncture" => v[0] = (v[0] * factor).clamp(-0.3, 0.3),
+        "force_gain" => v[0] = (v[0] * factor).clamp(-0.2, 0.2),
+        "respiration" => v[0] = (v[0] * factor).min(0.012),
+        "soft_boundary" => v[0] = (v[0] * factor).min(0.015),
+        "low_pass_lag" => v[0] = (v[0] * factor).min(0.6),
+        "time_delay" => v[0] = (v[0] * factor).min(0.4),
+        "nonlinear_elasticity" => v[0] = (v[0] * factor).min(60.0),
+        "tool_inertia" => v[0] = (v[0] * factor).min(5.0),
+        _ => v[0] *= factor,
+    }
+    AnyEffect::from_parameters(id, &v)
+}
+
+/// Largest force of a case, for placing a saturation.
+#[must_use]
+pub fn largest_force(drawn: &Drawn) -> f64 {
+    let mut plain = drawn.clone();
+    plain.effects.retain(|e| {
+        use stylet_tissue::Effect;
+        e.id() != "saturation"
+    });
+    case(&plain).recordings.iter().flat_map(|r| &r.force_n).fold(0.0_f64, |m, f| m.max(f.abs()))
+}

@@ -1,0 +1,126 @@
+//! What remains: is the residual of a model still predictable?
+//!
+//! Whitened residuals are averaged in bins of depth, time, speed, phase and travel since reversal; what
+//! is the same in several recordings is no noise. The cross-recording statistic
+//! `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero whatever the noise's colour, since the noises of two
+//! recordings know nothing of each other.
+
+use crate::fit::{Data, Residuals, residuals};
+use crate::model::Model;
+use crate::track::Track;
+
+/// Structure that a model leaves.
+#[derive(Clone, Debug, Default)]
+pub struct Leftover {
+    /// Smallest p-value over the features, times their number.
+    pub p_value: f64,
+    /// Features by which the residual is predictable, strongest first: name, p-value, nats.
+    pub depends_on: Vec<(String, f64, f64)>,
+    /// Nats of the strongest.
+    pub nats: f64,
+}
+
+const FEATURES: [&str; 6] =
+    ["depth", "time", "velocity", "phase_and_depth", "travel_since_reversal", "depth_and_velocity"];
+
+/// Upper tail of the normal distribution.
+#[must_use]
+pub fn tail(z: f64) -> f64 {
+    0.5 * libm::erfc(z / core::f64::consts::SQRT_2)
+}
+
+/// Bin of every sample of a track by a feature.
+fn bins(feature: usize, track: &Track, deepest: f64) -> Vec<usize> {
+    let depth = |z: f64, n: f64| ((z / deepest.max(1e-9) * n).floor().clamp(-1.0, n) + 1.0) as usize;
+    let speed = |v: f64| ((v * 1e3 * 2.0).round().clamp(-16.0, 16.0) + 16.0) as usize;
+    let phase = |v: f64| if v > 1e-5 { 2 } else { usize::from(v < -1e-5) };
+    let mut since = 0.0;
+    let mut sign = 0.0;
+    (0..track.len())
+        .map(|i| {
+            let (z, v) = (track.z[i], track.v[i]);
+            match feature {
+                0 => depth(z, 80.0),
+                1 => ((track.t[i] - track.t[0]) / 0.5) as usize,
+                2 => speed(v),
+                3 => phase(v) * 32 + depth(z, 30.0),
+                4 => {
+                    let s = stylet_tissue::effect::sgn(v);
+                    if s != 0.0 && s != sign {
+                        sign = s;
+                        since = 0.0;
+                    }
+                    if i > 0 {
+                        since += (z - track.z[i - 1]).abs();
+                    }
+                    (if sign < 0.0 { 64 } else { 0 }) + ((since * 2e3) as usize).min(63)
+                }
+                _ => speed(v) / 2 * 24 + depth(z, 20.0),
+            }
+        })
+        .collect()
+}
+
+/// Tests what a model leaves.
+#[must_use]
+pub fn test(model: &Model, data: &Data) -> Leftover {
+    let mut r = Residuals::default();
+    if !residuals(model, data, &mut r) {
+        return Leftover { p_value: 1.0, ..Leftover::default() };
+    }
+    let deepest = data.tracks.iter().flat_map(|t| &t.z).fold(0.0_f64, |m, z| m.max(*z));
+    let mut found: Vec<(String, f64, f64)> = Vec::new();
+    for (feature, name) in FEATURES.iter().enumerate() {
+        let (p, nats) = structure(feature, data, &r.w, deepest);
+        found.push(((*name).to_owned(), (p * FEATURES.len() as f64).min(1.0), nats));
+    }
+    found.sort_by(|a, b| a.1.total_cmp(&b.1).then(b.2.total_cmp(&a.2)));
+    let p_value = found.first().map_or(1.0, |f| f.1);
+    found.retain(|f| f.1 < 1e-3);
+    let nats = found.iter().fold(0.0_f64, |m, f| m.max(f.2));
+    Leftover { p_value, depends_on: found, nats }
+}
+
+/// p-value and nats of one feature.
+fn structure(feature: usize, data: &Data, w: &[f64], deepest: f64) -> (f64, f64) {
+    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new(); // per recording and bin: sum, count
+    let mut from = 0;
+    for track in data.tracks.iter() {
+        // A single recording is compared with itself: every other half second.
+        let halves = if data.tracks.len() == 1 { 2 } else { 1 };
+        let mut sums = vec![vec![(0.0, 0.0); 800]; halves];
+        for (i, bin) in bins(feature, track, deepest).into_iter().enumerate() {
+            if track.used[i] {
+                let half = if halves == 2 { ((track.t[i] - track.t[0]) / 0.25) as usize % 2 } else { 0 };
+                if let Some(slot) = sums[half].get_mut(bin) {
+                    slot.0 += w[from + i].clamp(-4.0, 4.0);
+                    slot.1 += 1.0;
+                }
+            }
+        }
+        parts.extend(sums);
+        from += track.len();
+    }
+    let (mut t, mut variance, mut pooled, mut used) = (0.0, 0.0, 0.0, 0.0);
+    for bin in 0..800 {
+        let z: Vec<(f64, f64)> = parts.iter().map(|p| p[bin]).filter(|s| s.1 >= 8.0).collect();
+        let all: (f64, f64) = z.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        if all.1 > 0.0 {
+            pooled += all.0 * all.0 / all.1;
+            used += 1.0;
+        }
+        for (k, a) in z.iter().enumerate() {
+            for b in &z[..k] {
+                t += a.0 * b.0 / (a.1 * b.1).sqrt();
+                // Under the null a product of independent values; their sizes as observed would hide a strong
+                // structure, so unit variance is the floor and the ceiling is a mild excess.
+                variance += 1.0;
+            }
+        }
+    }
+    if variance == 0.0 {
+        return (1.0, 0.0);
+    }
+    let z = t / f64::sqrt(variance);
+    (tail(z), 0.5 * (pooled - used))
+}

@@ -1,0 +1,166 @@
+//! What a diagnosis says: `diagnosis.json` (SPEC section 7).
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use stylet_record::QualityNote;
+
+/// The verdict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The simulation agrees with the data.
+    None,
+    /// One or more causes.
+    Named,
+    /// One class of effects that these data cannot tell apart.
+    Ambiguous,
+    /// Structure that no effect of the library explains.
+    Unknown,
+}
+
+/// A value with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// One cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Effects that explain the data as well, to within 3 nats.
+    pub equivalent: Vec<String>,
+    /// Probability that it is this one of the rivals tried.
+    pub confidence: f64,
+    /// Parameters by their paths.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Nats that it gains.
+    pub gain_nats: f64,
+}
+
+/// A base parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BaseParameter {
+    /// Layer, 1-based.
+    pub layer: usize,
+    /// Field of the layer.
+    pub name: String,
+    /// What the scenario assumed.
+    pub assumed: f64,
+    /// Fitted value.
+    pub value: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Whether the assumed value lies outside the interval.
+    pub changed: bool,
+    /// Whether the value stands at a bound of the tolerance.
+    pub at_bound: bool,
+}
+
+/// The gain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gain {
+    /// Whether the recordings took no part in the fit.
+    pub held_out: bool,
+    /// The recordings.
+    pub recordings: Vec<String>,
+    /// Root mean square of the re-fitted base law's residual in N.
+    pub rmse_before_n: f64,
+    /// Of the extended model's.
+    pub rmse_after_n: f64,
+    /// Standard deviation of the noise.
+    pub floor_n: f64,
+    /// Per recording: before and after in N.
+    pub each_n: Vec<(f64, f64)>,
+}
+
+/// What remains.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftoverReport {
+    /// p-value of the strongest structure, corrected for looking at several.
+    pub p_value: f64,
+    /// What the residual still depends on.
+    pub depends_on: Vec<String>,
+    /// Nats that the strongest dependence explains.
+    pub nats: f64,
+}
+
+/// One rival of a step of the search.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rival {
+    /// Effect.
+    pub effect: String,
+    /// Nats gained over the model that stood.
+    pub gain_nats: f64,
+    /// Numbers fitted.
+    pub parameters: usize,
+    /// True when compared on averages only.
+    pub screened_only: bool,
+}
+
+/// One step of the search.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EvidenceStep {
+    /// Effects that stood.
+    pub standing: Vec<String>,
+    /// Rivals, best first.
+    pub rivals: Vec<Rival>,
+    /// Nats that the best needed.
+    pub needed_nats: f64,
+    /// The effect taken.
+    pub taken: Option<String>,
+}
+
+/// The noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoiseReport {
+    /// Standard deviation in N.
+    pub sd_n: f64,
+    /// Autoregressive coefficients per sample.
+    pub ar: [f64; 2],
+    /// Whether there was enough air before the tissue to tell it from the law's errors.
+    pub from_air: bool,
+}
+
+/// A remark on the data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Recording.
+    pub recording: String,
+    /// Remark.
+    #[serde(flatten)]
+    pub note: QualityNote,
+}
+
+/// The diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Causes, strongest first.
+    pub causes: Vec<Cause>,
+    /// Base parameters as fitted.
+    pub base_parameters: Vec<BaseParameter>,
+    /// Effects that this experiment cannot show.
+    pub invisible: Vec<String>,
+    /// Gain.
+    pub gain: Gain,
+    /// What remains.
+    pub leftover: LeftoverReport,
+    /// Data quality.
+    pub data_quality: Vec<Quality>,
+    /// What was tried.
+    pub evidence: Vec<EvidenceStep>,
+    /// Noise.
+    pub noise: NoiseReport,
+    /// What would split an ambiguous class or show what is invisible.
+    pub advice: Vec<String>,
+}

@@ -1,0 +1,117 @@
+//! What the raw numbers say before any law: saturation, quantisation, spikes.
+
+use crate::noise::median;
+use stylet_record::{QualityKind, QualityNote, Recording};
+
+/// What was found in the raw force.
+#[derive(Clone, Debug, Default)]
+pub struct Raw {
+    /// Samples per recording that cannot be compared: saturated or spikes.
+    pub exclude: Vec<Vec<bool>>,
+    /// Range of the sensor in N, if it was reached.
+    pub limit_n: Option<f64>,
+    /// Step of the recorded force in N.
+    pub step_n: Option<f64>,
+    /// Spikes: how many, mean size in N, seconds recorded.
+    pub spikes: Option<(usize, f64, f64)>,
+}
+
+/// Fewest equal extremes that make a saturation.
+const EXTREMES: usize = 6;
+/// A spike stands out of its neighbours by so many robust standard deviations.
+const SPIKE_SD: f64 = 6.5;
+
+/// Looks the raw forces over.
+#[must_use]
+pub fn look(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Raw {
+    let mut raw =
+        Raw { exclude: recordings.iter().map(|r| vec![false; r.len()]).collect(), ..Raw::default() };
+    raw.step_n = step(recordings, notes);
+    raw.limit_n = limit(recordings, raw.step_n);
+    if let Some(limit) = raw.limit_n {
+        for (exclude, recording) in raw.exclude.iter_mut().zip(recordings) {
+            for (x, f) in exclude.iter_mut().zip(&recording.force_n) {
+                *x |= f.abs() >= limit * (1.0 - 1e-9);
+            }
+        }
+    }
+    raw.spikes = spikes(recordings, &mut raw.exclude, raw.step_n.unwrap_or(0.0));
+    raw
+}
+
+/// The step on which all forces lie.
+fn step(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Option<f64> {
+    let mut steps: Vec<f64> = notes
+        .iter()
+        .flatten()
+        .filter(|n| n.kind == QualityKind::Quantisation && n.message.starts_with("force_n"))
+        .filter_map(|n| n.numbers.get("smallest_step").copied())
+        .filter(|s| *s > 0.0)
+        .collect();
+    if 2 * steps.len() < recordings.len().max(1) {
+        return None;
+    }
+    let rough = median(&mut steps);
+    // The step from all levels at once: level number against value, by least squares through zero.
+    let (mut nf, mut nn) = (0.0, 0.0);
+    for f in recordings.iter().flat_map(|r| &r.force_n) {
+        let n = (f / rough).round();
+        nf += n * f;
+        nn += n * n;
+    }
+    let fine = if nn > 0.0 { nf / nn } else { rough };
+    Some(if (fine / rough - 1.0).abs() < 0.02 { fine } else { rough })
+}
+
+/// The level at which the force stops.
+fn limit(recordings: &[&Recording], step: Option<f64>) -> Option<f64> {
+    let all = || recordings.iter().flat_map(|r| &r.force_n);
+    let most = all().fold(0.0_f64, |m, f| m.max(f.abs()));
+    if most <= 0.0 {
+        return None;
+    }
+    let at = all().filter(|f| f.abs() >= most * (1.0 - 1e-9)).count();
+    let expected = match step {
+        None => 0,
+        // On a grid several samples share the last level; below the limit they thin out.
+        Some(step) => {
+            let level = |k: f64| all().filter(|f| (f.abs() - (most - k * step)).abs() < 0.25 * step).count();
+            3 * level(1.0).max(level(2.0)).max(2)
+        }
+    };
+    (at >= EXTREMES && at > expected).then_some(most)
+}
+
+/// Isolated samples that stand out of both neighbours.
+fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Option<(usize, f64, f64)> {
+    let (mut count, mut size, mut seconds) = (0, 0.0, 0.0);
+    for (recording, exclude) in recordings.iter().zip(exclude) {
+        let f = &recording.force_n;
+        seconds += recording.duration_s();
+        if f.len() < 12 {
+            continue;
+        }
+        let away = |i: usize| {
+            let mut around = [f[i - 2], f[i - 1], f[i + 1], f[i + 2]];
+            around.sort_unstable_by(f64::total_cmp);
+            f[i] - 0.5 * (around[1] + around[2])
+        };
+        let mut sizes: Vec<f64> = (2..f.len() - 2).map(|i| away(i).abs()).collect();
+        let sd = (median(&mut sizes) * 1.4826).max(step).max(1e-12);
+        for i in 2..f.len() - 2 {
+            let s = away(i);
+            let (before, after) = (f[i] - f[i - 1], f[i] - f[i + 1]);
+            let both = before.abs().min(after.abs()) > 0.7 * SPIKE_SD * sd && before * after > 0.0;
+            let level = (f[i - 1] - f[i + 1]).abs() < 0.5 * s.abs();
+            let v = &recording.velocity_mps;
+            let moves = (v[i + 1] - v[i - 1]).abs()
+                > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
+            if !moves && s.abs() > SPIKE_SD * sd && both && level && !exclude[i] {
+                exclude[i] = true;
+                count += 1;
+                size += s.abs();
+            }
+        }
+    }
+    (count >= 2).then(|| (count, size / count.max(1) as f64, seconds))
+}

@@ -1,0 +1,137 @@
+//! Promise: recordings that cannot belong to the scenario are refused with a message that says what is
+//! wrong and what would be right; a hole in a recording is no reason to refuse it.
+
+use stylet_diagnose::hidden::{self, Drawn, Motions};
+use stylet_diagnose::{DiagnoseError, Diagnosis, Evidence, Options, Verdict, diagnose};
+use stylet_record::Recording;
+
+fn case() -> hidden::Case {
+    hidden::case(&Drawn {
+        seed: 3,
+        effects: Vec::new(),
+        outside: None,
+        noise_n: 0.02,
+        ar: [0.0; 2],
+        off: 0.1,
+        motions: Motions::One,
+        scatter: 0.0,
+        velocity_noise_mps: 0.0,
+    })
+}
+
+fn with(change: impl Fn(&mut Recording)) -> Result<Diagnosis, DiagnoseError> {
+    let case = case();
+    let mut recording = case.recordings[0].clone();
+    change(&mut recording);
+    let evidence = [Evidence { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
+    diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis)
+}
+
+fn message(change: impl Fn(&mut Recording)) -> String {
+    with(change).err().map(|e| e.to_string()).unwrap_or_default()
+}
+
+#[test]
+fn a_needle_that_never_reaches_the_tissue_is_refused() {
+    let text = message(|r| r.position_m.iter_mut().for_each(|z| *z -= 0.2));
+    assert!(text.contains("a.csv") && text.contains("never reaches the tissue"), "{text}");
+}
+
+#[test]
+fn positions_in_millimetres_are_recognised() {
+    let text = message(|r| r.position_m.iter_mut().for_each(|z| *z *= 1e3));
+    assert!(text.contains("millimetres") && text.contains("0.001"), "{text}");
+}
+
+#[test]
+fn forces_in_millinewtons_and_of_the_wrong_sign_are_recognised() {
+    let text = message(|r| r.force_n.iter_mut().for_each(|f| *f *= 1e3));
+    assert!(text.contains("millinewtons") && text.contains("0.001"), "{text}");
+    let text = message(|r| r.force_n.iter_mut().for_each(|f| *f *= -1.0));
+    assert!(text.contains("runs the other way") && text.contains("-1"), "{text}");
+}
+
+#[test]
+fn positions_of_the_wrong_sign_are_recognised() {
+    let text = message(|r| r.position_m.iter_mut().for_each(|z| *z = -*z - 0.02));
+    assert!(text.contains("runs the other way"), "{text}");
+}
+
+#[test]
+fn one_sample_or_none_that_is_a_number_is_too_little() {
+    let text = message(|r| {
+        for c in [&mut r.time_s, &mut r.position_m, &mut r.velocity_mps, &mut r.force_n] {
+            c.truncate(1);
+        }
+    });
+    assert!(text.contains("1 usable sample"), "{text}");
+    let text = message(|r| r.force_n.iter_mut().for_each(|f| *f = f64::NAN));
+    assert!(text.contains("0 usable sample"), "{text}");
+    let none = diagnose(&case().believed, &[], &Options::default(), |_| {});
+    assert!(matches!(none.err(), Some(DiagnoseError::NoRecording)));
+}
+
+#[test]
+fn a_hole_in_a_recording_does_not_break_the_fit() {
+    let found = with(|r| {
+        for i in 3000..3100 {
+            r.force_n[i] = f64::NAN;
+        }
+        for c in [&mut r.time_s, &mut r.position_m, &mut r.velocity_mps, &mut r.force_n] {
+            c.drain(4500..4620);
+        }
+    })
+    .expect("a diagnosis");
+    assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
+    assert!(
+        found.data_quality.iter().any(|q| q.note.message.contains("not finite")),
+        "{:?}",
+        found.data_quality
+    );
+}
+
+#[test]
+fn recordings_at_different_rates_are_fitted_together() {
+    let case = hidden::case(&Drawn {
+        seed: 4,
+        effects: Vec::new(),
+        outside: None,
+        noise_n: 0.02,
+        ar: [0.0; 2],
+        off: 0.1,
+        motions: Motions::Rich,
+        scatter: 0.0,
+        velocity_noise_mps: 0.0,
+    });
+    let one = case.recordings[0].clone();
+    let mut half = case.recordings[2].clone();
+    for c in [&mut half.time_s, &mut half.position_m, &mut half.velocity_mps, &mut half.force_n] {
+        let mut keep = false;
+        c.retain(|_| {
+            keep = !keep;
+            keep
+        });
+    }
+    let evidence: Vec<Evidence> = [("a.csv", one), ("b.csv", half)]
+        .into_iter()
+        .map(|(name, recording)| Evidence { name: name.to_owned(), recording, notes: Vec::new() })
+        .collect();
+    let found =
+        diagnose(&case.believed, &evidence, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+    assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let case = case();
+    let evidence =
+        [Evidence { name: "a.csv".to_owned(), recording: case.recordings[0].clone(), notes: Vec::new() }];
+    let json = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let found = pool.install(|| {
+            diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis)
+        });
+        serde_json::to_string(&found.expect("a diagnosis")).expect("JSON")
+    };
+    assert_eq!(json(1), json(3));
+}

@@ -1,0 +1,91 @@
+//! Promise: an effect that was hidden in data is found, clean data are called clean, an effect that the
+//! library lacks is called unknown, and an experiment that cannot show an effect says so. A handful of
+//! cases; `stylet benchmark diagnose --cases N --seed S` examines as many as you like and prints the
+//! same table.
+
+use stylet_diagnose::benchmark::{Result, run, summary};
+use stylet_diagnose::hidden::{self, Drawn, Kind, Motions, Size, sketch_of};
+use stylet_diagnose::search::Settings;
+use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
+use stylet_tissue::AnyEffect;
+
+fn examine(kind: Kind, turns: &[u64]) -> Vec<Result> {
+    turns.iter().filter_map(|&turn| run(turn, &sketch_of(7, turn, kind, turn), Settings::default())).collect()
+}
+
+#[test]
+fn hidden_effects_are_named_and_clean_data_are_called_clean() {
+    let mut cases = examine(Kind::Clean, &[0, 1, 2]);
+    // Cutting force, coulomb friction, stress relaxation; drive friction medium; force bias faint.
+    cases.extend(examine(Kind::Single, &[13, 10, 4, 27 + 16, 54 + 20]));
+    let table = summary(&cases);
+    println!("{table}");
+    assert_eq!(cases.len(), 8);
+    assert!(cases.iter().all(|c| c.right), "{table}");
+    // The cases did hide something that mattered.
+    assert!(cases.iter().any(|c| c.size == Size::Strong) && cases.iter().any(|c| c.size == Size::Faint));
+}
+
+#[test]
+fn an_effect_outside_the_library_is_called_unknown() {
+    let cases = examine(Kind::Outside, &[11]);
+    assert!(cases.iter().all(|c| c.right && c.verdict == Verdict::Unknown), "{}", summary(&cases));
+    assert_eq!(cases.len(), 1);
+}
+
+fn drawn(motions: Motions, effects: Vec<AnyEffect>) -> Drawn {
+    Drawn {
+        seed: 5,
+        effects,
+        outside: None,
+        noise_n: 0.02,
+        ar: [0.5, 0.0],
+        off: 0.15,
+        motions,
+        scatter: 0.0,
+        velocity_noise_mps: 0.0,
+    }
+}
+
+fn evidence(case: &hidden::Case) -> Vec<Evidence> {
+    let named = |(k, r): (usize, &stylet_record::Recording)| Evidence {
+        name: format!("{k}.csv"),
+        recording: r.clone(),
+        notes: Vec::new(),
+    };
+    case.recordings.iter().enumerate().map(named).collect()
+}
+
+#[test]
+fn at_one_constant_speed_dry_friction_is_invisible_and_nothing_is_accused() {
+    let coulomb = stylet_tissue::CoulombFriction { c_n_per_m: 2.0 };
+    let case = hidden::case(&drawn(Motions::Constant, vec![coulomb.into()]));
+    let found = diagnose(&case.believed, &evidence(&case), &Options::default(), |_| {})
+        .expect("a diagnosis")
+        .diagnosis;
+    assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
+    for id in ["coulomb_friction", "power_law_friction", "force_gain"] {
+        assert!(found.invisible.iter().any(|i| i == id), "{id} not in {:?}", found.invisible);
+    }
+    assert!(!found.advice.is_empty());
+}
+
+#[test]
+fn the_extended_scenario_simulates_and_the_verdict_serialises() {
+    let drift = stylet_tissue::ForceDrift { rate_n_per_s: 0.01 };
+    let case = hidden::case(&drawn(Motions::One, vec![drift.into()]));
+    let examined =
+        diagnose(&case.believed, &evidence(&case), &Options::default(), |_| {}).expect("a diagnosis");
+    let text = examined.extended.to_ron().expect("RON");
+    let again = stylet_scenario::Scenario::parse("extended.ron", &text).expect("a valid scenario");
+    assert!(
+        again
+            .effects
+            .iter()
+            .any(|e| matches!(e, AnyEffect::ForceDrift(d) if (d.rate_n_per_s - 0.01).abs() < 5e-4)),
+        "{text}"
+    );
+    let json = serde_json::to_string(&examined.diagnosis).expect("JSON");
+    assert!(json.contains(r#""verdict":"named""#) && json.contains("rate_n_per_s"), "{json}");
+    assert!(!examined.diagnosis.gain.held_out, "one recording cannot be left out");
+}
