@@ -1,5 +1,6 @@
 //! What can be typed.
 
+use crate::sweep::args::{GateArgs, ReplayArgs, SweepArgs};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -21,6 +22,12 @@ pub enum Command {
     Run(RunArgs),
     /// Run the online algorithm on a measured recording.
     Enhance(EnhanceArgs),
+    /// Thousands of insertions with drawn quantities: rates, intervals, what explains the failures.
+    Sweep(SweepArgs),
+    /// Run one trial of a sweep again, with a full report.
+    Replay(ReplayArgs),
+    /// Hold scores against bounds, for CI.
+    Gate(GateArgs),
 }
 
 /// Arguments of `stylet run`.

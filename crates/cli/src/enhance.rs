@@ -2,10 +2,10 @@
 
 use crate::args::EnhanceArgs;
 use crate::exit::Failure;
-use crate::hash;
 use crate::output::Output;
 use crate::picture::{self, Ran};
 use crate::run::default_folder;
+use crate::{hash, terminal};
 use serde::Serialize;
 use std::fmt::Write;
 use stylet_core::LayerEstimate;
@@ -80,8 +80,11 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.data));
     output.write(&folder)?;
     if !args.quiet {
-        print!("{}", summary(args, &recording, &notes, &ran, &hash));
-        println!("\nReport: {}", folder.join("report.html").display());
+        terminal::say(&format!(
+            "{}\nReport: {}\n",
+            summary(args, &recording, &notes, &ran, &hash),
+            folder.join("report.html").display()
+        ))?;
     }
     Ok(())
 }

@@ -38,6 +38,17 @@ pub enum Failure {
         /// What the system says.
         why: std::io::Error,
     },
+    /// What was asked for cannot be done with what was given; the sentence says why and what would.
+    #[error("{0}")]
+    Check(String),
+    /// Bounds of a gate do not hold.
+    #[error("{failed} of {of} bounds do not hold")]
+    Gate {
+        /// Bounds that do not hold.
+        failed: usize,
+        /// All bounds.
+        of: usize,
+    },
     /// A mistake of ours.
     #[error("internal error: {0}; please report it")]
     Internal(String),
@@ -54,9 +65,12 @@ impl Failure {
     #[must_use]
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Failure::Input(_) | Failure::Recording(_) | Failure::Simulate { .. } | Failure::Output { .. } => {
-                INPUT_WRONG
-            }
+            Failure::Input(_)
+            | Failure::Recording(_)
+            | Failure::Simulate { .. }
+            | Failure::Output { .. }
+            | Failure::Check(_) => INPUT_WRONG,
+            Failure::Gate { .. } => CHECK_FAILED,
             Failure::Internal(_) => INTERNAL,
         })
     }

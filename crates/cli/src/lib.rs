@@ -8,6 +8,7 @@ mod hash;
 mod output;
 mod picture;
 mod run;
+mod sweep;
 mod terminal;
 
 use args::{Cli, Command};
@@ -23,6 +24,9 @@ pub fn main() -> ExitCode {
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Enhance(args) => enhance::enhance(args),
+        Command::Sweep(args) => sweep::sweep(args),
+        Command::Replay(args) => sweep::replay(args),
+        Command::Gate(args) => sweep::gate(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
     match outcome {

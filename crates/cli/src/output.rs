@@ -24,14 +24,28 @@ impl Output {
     /// [`Failure::Output`]; the folder is then as it was before.
     pub fn write(&self, folder: &Path) -> Result<(), Failure> {
         let failed = |why| Failure::Output { path: folder.display().to_string(), why };
-        let existed = folder.exists();
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        let result = self.write_beside(folder);
-        if result.is_err() && !existed {
-            // Only an empty folder goes: what was made above and nothing else.
-            let _ = std::fs::remove_dir(folder);
+        // What is made here goes again when the writing fails.
+        let made: Vec<&Path> =
+            folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).collect();
+        let result = self
+            .no_folder_in_the_way(folder)
+            .and_then(|()| std::fs::create_dir_all(folder))
+            .and_then(|()| self.write_beside(folder));
+        if result.is_err() {
+            for folder in made {
+                // Only empty folders go.
+                let _ = std::fs::remove_dir(folder);
+            }
         }
         result.map_err(failed)
+    }
+
+    /// A file cannot take the place of a folder of the same name.
+    fn no_folder_in_the_way(&self, folder: &Path) -> io::Result<()> {
+        match self.files.iter().map(|(name, _)| folder.join(name)).find(|place| place.is_dir()) {
+            Some(place) => Err(io::Error::other(format!("{} is a folder", place.display()))),
+            None => Ok(()),
+        }
     }
 
     fn write_beside(&self, folder: &Path) -> io::Result<()> {

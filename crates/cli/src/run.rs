@@ -112,8 +112,11 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let (output, report) = results(&scenario, &file, &finished)?;
     output.write(&folder)?;
     if !args.quiet {
-        print!("{}", terminal::scorecard(&scenario, &finished, &report.provenance.hash));
-        println!("\nReport: {}", folder.join("report.html").display());
+        terminal::say(&format!(
+            "{}\nReport: {}\n",
+            terminal::scorecard(&scenario, &finished, &report.provenance.hash),
+            folder.join("report.html").display()
+        ))?;
     }
     Ok(())
 }

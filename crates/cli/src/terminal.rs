@@ -1,12 +1,28 @@
 //! The scorecard on the terminal.
 
+use crate::exit::Failure;
 use crate::picture::name_of;
 use crate::run::Finished;
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
 use stylet_testbed::Simulation;
+
+/// Prints to standard output. A reader that has gone away, as in `stylet run ... | head`, is no error.
+///
+/// # Errors
+/// [`Failure::Output`] when standard output cannot be written.
+pub fn say(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(why) if why.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::Output { path: "standard output".to_owned(), why })
+        }
+        _ => Ok(()),
+    }
+}
 
 fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "-".to_owned())

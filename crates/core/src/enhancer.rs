@@ -126,13 +126,29 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
 
     /// Takes one sample. A sample that is not finite or not later than the one before is passed
     /// over ([`Output::used`] is false).
+    #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
+        self.step_brief(sample);
+        let out = &mut self.out;
+        out.reconstructed_n = if self.in_contact { self.last.force_n - out.error_n } else { 0.0 };
+        out.theta = self.rls.theta;
+        out.cusum_n2 = self.cusum_n2;
+        out.derivative_n_per_s = self.derivative.value_n_per_s();
+        out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
+        self.out
+    }
+
+    /// As [`Enhancer::step`] for callers who look at a few fields of millions of samples: nothing is
+    /// copied, and of the output only enhanced force, innovation, state, ruptures, contact, detection,
+    /// estimate and `used` are kept up to date. Inlined, so that the sample stays in registers.
+    #[inline(always)]
+    pub fn step_brief(&mut self, sample: Sample) -> &Output {
         self.out.detection = None;
         self.out.estimate = None;
         let dt_s = sample.time_s - self.last.time_s;
         if !sample.is_usable() || (self.started && dt_s <= 0.0) {
             self.out.used = false;
-            return self.out;
+            return &self.out;
         }
         let dt_s = if self.started { dt_s } else { 0.0 };
         let number = self.history.next();
@@ -143,16 +159,16 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         let before = self.rls;
         let error_n = self.identify(dt_s, &sample);
         self.out.error_n = error_n;
-        self.out.reconstructed_n = if self.in_contact { sample.force_n - error_n } else { 0.0 };
         let edge = self.switch_derivative(rate);
         self.advance(dt_s, &sample, before, edge);
-        self.finish(&sample, rate);
+        self.finish(&sample);
         self.last = sample;
         self.started = true;
-        self.out
+        &self.out
     }
 
     /// First contact.
+    #[inline]
     fn touch(&mut self, dt_s: f64, sample: &Sample, number: u64) {
         if self.out.contact_m.is_some() {
             return;
@@ -241,6 +257,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// The state machine.
+    #[inline]
     fn advance(&mut self, dt_s: f64, sample: &Sample, before: Rls, edge: bool) {
         match self.out.state {
             State::NoRupture | State::ExpectedRupture => {
@@ -258,6 +275,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Looks for a rupture.
+    #[inline]
     fn watch(&mut self, sample: &Sample, before: Rls, edge: bool) {
         if !self.in_contact {
             return;
@@ -302,6 +320,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
+    #[inline]
     fn known_thickness_m(&self) -> Option<f64> {
         match &self.config.depths {
             Depths::Unknown => None,
@@ -310,6 +329,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// A rupture: the traversed layer is set aside, a new one begins.
+    #[cold]
     fn declare(&mut self, sample: &Sample, before: Rls, cause: Cause) {
         let newest = self.history.next().saturating_sub(1);
         let literal = self.config.algorithm == Algorithm::Literal;
@@ -358,6 +378,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Counts the travel and time that a waiting state needs; standstill does not count.
+    #[inline]
     fn wait(&mut self, dt_s: f64, sample: &Sample) {
         if sample.velocity_mps.abs() >= self.config.drop.standstill_mps {
             self.waited_m += sample.velocity_mps.abs() * dt_s;
@@ -370,6 +391,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// ForceDropMeasuring.
+    #[inline]
     fn measure(&mut self, dt_s: f64, sample: &Sample) {
         self.wait(dt_s, sample);
         let reversing = self.is_reversing(sample);
@@ -406,6 +428,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// ForceCompensation: a share of the re-run per tick, then the layer's friction is added.
+    #[inline]
     fn compensate(&mut self, dt_s: f64, sample: &Sample) {
         self.wait(dt_s, sample);
         if let Some(mut pending) = self.pending.take() {
@@ -430,6 +453,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
+    #[cold]
     fn settle(&mut self, sample: &Sample, pending: &Pending, theta: [f64; 2]) {
         let stiffness = theta[0].max(0.0);
         let friction = theta[1].max(0.0);
@@ -455,14 +479,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         self.out.estimate = Some(estimate);
     }
 
-    fn finish(&mut self, sample: &Sample, rate: f64) {
+    #[inline]
+    fn finish(&mut self, sample: &Sample) {
         let v = sample.velocity_mps;
         let friction = self.compensation.around_shaft_ns_per_m(sample.position_m);
         self.out.enhanced_n = sample.force_n - friction * v;
-        self.out.theta = self.rls.theta;
-        self.out.cusum_n2 = self.cusum_n2;
-        self.out.derivative_n_per_s = rate;
-        self.out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
         self.out.used = true;
     }
 }

@@ -45,6 +45,11 @@ impl ForceDerivative {
         }
     }
 
+    /// The derivative in N/s after the last sample.
+    pub(crate) fn value_n_per_s(&self) -> f64 {
+        self.value_n_per_s
+    }
+
     /// Takes a sample and returns the derivative in N/s.
     #[inline]
     pub(crate) fn update(&mut self, dt_s: f64, force_n: f64) -> f64 {

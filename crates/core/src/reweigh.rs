@@ -114,21 +114,33 @@ impl Rerun {
         self.next = self.next.max(history.oldest());
         let stop = self.end.min(self.next + config.drop.replay_per_tick.max(1) as u64);
         while self.next < stop {
-            if let Some(s) = history.get(self.next) {
-                let dt_s = self.last_s.map_or(0.0, |last| s.time_s - last);
-                self.last_s = Some(s.time_s);
-                let depth_m = s.position_m - self.start_m;
-                if depth_m > 0.0 {
-                    self.clock.tick(&config.reset, dt_s, self.prior, &mut self.rls);
-                    let phi = regressor(config.model, depth_m, s.velocity_mps);
-                    let y = s.force_n - compensation.around_shaft_ns_per_m(s.position_m) * s.velocity_mps;
-                    self.rls.update_with_noise(phi, y, config.forgetting, relative_noise(dt_s));
-                    self.used = true;
-                }
+            let run = history.run(self.next, stop);
+            if run.is_empty() {
+                self.next = stop; // what is not there cannot be run again
+                break;
             }
-            self.next += 1;
+            self.next += run.len() as u64;
+            self.learn(config, compensation, run);
         }
         let found = if self.used && self.rls.is_finite() { self.rls.theta } else { online };
         (self.next >= self.end).then_some(found)
+    }
+
+    fn learn(&mut self, config: &EnhanceConfig, compensation: &Compensation, run: &[Sample]) {
+        let (mut rls, mut clock, mut last_s) = (self.rls, self.clock, self.last_s);
+        self.used |= !run.is_empty();
+        let forgetting = config.forgetting;
+        for s in run {
+            let dt_s = last_s.map_or(0.0, |last| s.time_s - last);
+            last_s = Some(s.time_s);
+            let depth_m = s.position_m - self.start_m;
+            if depth_m > 0.0 {
+                clock.tick(&config.reset, dt_s, self.prior, &mut rls);
+                let phi = regressor(config.model, depth_m, s.velocity_mps);
+                let y = s.force_n - compensation.around_shaft_ns_per_m(s.position_m) * s.velocity_mps;
+                rls.update_with_noise(phi, y, forgetting, relative_noise(dt_s));
+            }
+        }
+        (self.rls, self.clock, self.last_s) = (rls, clock, last_s);
     }
 }

@@ -174,12 +174,7 @@ const ROWS: &[Row] = &[
     ("enhance.guard.blind_travel_m", "m", ">= 0", "no rupture within it after contact or rupture"),
     ("enhance.guard.acceleration_time_constant_s", "s", "above 0", "smoothing of the acceleration"),
     ("enhance.guard.sudden_mps2", "m/s²", "above 0", "a sudden change of speed"),
-    (
-        "enhance.guard.old_ground_m",
-        "m",
-        ">= 0",
-        "further back than this from the deepest point is ground already travelled",
-    ),
+    ("enhance.guard.old_ground_m", "m", ">= 0", "ground is old this far above the deepest point"),
     ("enhance.guard.rest_s", "s", ">= 0", "detection rests after it"),
     ("enhance.guard.slowing_per_s", "1/s", ">= 0", "no trailing edge while slowing faster"),
     (
@@ -190,7 +185,7 @@ const ROWS: &[Row] = &[
     ),
     ("compare", "", "list of models", "further models on the same data"),
     ("sample_hz", "Hz", "above 0", "samples per second"),
-    ("physics_hz", "Hz", "whole multiple of sample_hz", "physics steps per second"),
+    ("physics_hz", "Hz", "positive; rounded up to a whole multiple of sample_hz", "physics steps per second"),
     ("tolerance", "", "above 0, below 1", "how far the tissue's numbers may be off, relative"),
     ("seed", "", "whole number", "seed of every random number"),
 ];

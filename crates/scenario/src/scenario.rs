@@ -48,7 +48,7 @@ pub struct Scenario {
     /// Samples per second.
     #[serde(default = "sample_hz")]
     pub sample_hz: f64,
-    /// Physics steps per second; a whole multiple of `sample_hz`.
+    /// Physics steps per second; rounded up to a whole multiple of `sample_hz`.
     #[serde(default = "physics_hz")]
     pub physics_hz: f64,
     /// How far the tissue's numbers may be off, relative, 0 to 1: bounds for the diagnosis.

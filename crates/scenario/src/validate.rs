@@ -36,15 +36,6 @@ pub(crate) fn scenario(s: &Scenario) -> Checked {
     effects(s)?;
     check("sample_hz", s.sample_hz, s.sample_hz > 0.0, "it must be positive, for example 200.0")?;
     check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
-    let steps = s.physics_hz / s.sample_hz;
-    if steps < 1.0 - 1e-9 || (steps - steps.round()).abs() > 1e-9 * steps {
-        let nearest = steps.round().max(1.0) * s.sample_hz;
-        let what = format!(
-            "is {}, which is not a whole multiple of sample_hz {}; the nearest is {nearest}",
-            s.physics_hz, s.sample_hz
-        );
-        return Err(Problem::new("physics_hz", what).with("sample_hz"));
-    }
     check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
     motion(s)?;
     sensors(&s.sensor, s.physics_hz)?;

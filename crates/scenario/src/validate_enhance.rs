@@ -9,7 +9,15 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
     let path = |field: &str| if at.is_empty() { field.to_owned() } else { format!("{at}.{field}") };
     match c.reset {
         Reset::Frequency { hz } => positive(path("reset.hz"), hz, "Hz")?,
-        Reset::Trace { below } => positive(path("reset.below"), below, "covariance units")?,
+        Reset::Trace { below } => {
+            let prior = c.prior_stiffness + c.prior_friction;
+            check(
+                path("reset.below"),
+                below,
+                below > 0.0 && below < prior,
+                &format!("it must lie between 0 and the trace of the prior, {prior:e}"),
+            )?;
+        }
         Reset::Ruptures => {}
     }
     if let Depths::Known(thicknesses) = &c.depths {
@@ -79,6 +87,7 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
     not_negative(path("guard.blind_travel_m"), g.blind_travel_m, "metres")?;
     positive(path("guard.acceleration_time_constant_s"), g.acceleration_time_constant_s, "seconds")?;
     positive(path("guard.sudden_mps2"), g.sudden_mps2, "m/s²")?;
+    not_negative(path("guard.old_ground_m"), g.old_ground_m, "metres")?;
     not_negative(path("guard.rest_s"), g.rest_s, "seconds")?;
     not_negative(path("guard.slowing_per_s"), g.slowing_per_s, "1/s")
 }

@@ -168,6 +168,7 @@ fn detection() -> impl Strategy<Value = (CusumConfig, DerivativeConfig, GuardCon
             blind_travel_m,
             acceleration_time_constant_s: time,
             sudden_mps2,
+            old_ground_m: blind_travel_m / 20.0,
             rest_s,
             slowing_per_s,
             ..GuardConfig::default()

@@ -59,8 +59,12 @@ pub struct Scorer {
     estimates: Vec<LayerEstimate>,
     contact_m: Option<f64>,
     deepest_m: f64,
+    /// Front of the first and far face of the last layer in m; the front is infinite without layers.
+    front_m: f64,
+    far_m: f64,
     sums: Sums,
-    at_deepest: Sums,
+    /// The sums at the deepest point, set aside when the needle turns back.
+    at_deepest: Option<Sums>,
 }
 
 impl Scorer {
@@ -68,6 +72,8 @@ impl Scorer {
     #[must_use]
     pub fn new(layers: Vec<LayerTruth>, model: Model) -> Self {
         Self {
+            front_m: layers.first().map_or(f64::INFINITY, |l| l.front_m),
+            far_m: layers.last().map_or(f64::INFINITY, |l| l.front_m + l.thickness_m),
             layers,
             model,
             ruptures: Vec::new(),
@@ -76,7 +82,7 @@ impl Scorer {
             contact_m: None,
             deepest_m: f64::NEG_INFINITY,
             sums: Sums::default(),
-            at_deepest: Sums::default(),
+            at_deepest: None,
         }
     }
 
@@ -88,15 +94,21 @@ impl Scorer {
     /// One sample and the core's output for it.
     #[inline]
     pub fn sample(&mut self, moment: &Moment, output: &Output) {
-        self.detections.extend(output.detection);
-        self.estimates.extend(output.estimate);
+        if output.detection.is_some() || output.estimate.is_some() {
+            self.detections.extend(output.detection);
+            self.estimates.extend(output.estimate);
+        }
         self.contact_m = output.contact_m;
-        let (Some(first), Some(last)) = (self.layers.first(), self.layers.last()) else {
-            return;
-        };
         let z = moment.position_m;
-        if z < first.front_m {
+        if z < self.front_m {
             return;
+        }
+        // The advance ends at the deepest point; what comes after is not scored.
+        if z >= self.deepest_m {
+            self.deepest_m = z;
+            self.at_deepest = None;
+        } else if self.at_deepest.is_none() {
+            self.at_deepest = Some(self.sums);
         }
         let miss = output.enhanced_n - moment.tip_n;
         let sums = &mut self.sums;
@@ -104,17 +116,12 @@ impl Scorer {
         sums.tip2 += moment.tip_n * moment.tip_n;
         sums.miss2 += miss * miss;
         sums.error2 += output.error_n * output.error_n;
-        if z < last.front_m + last.thickness_m {
+        if z < self.far_m {
             sums.inside_tip2 += moment.tip_n * moment.tip_n;
             sums.inside_miss2 += miss * miss;
         } else {
             sums.exit_enhanced2 += output.enhanced_n * output.enhanced_n;
             sums.exit_force2 += moment.force_n * moment.force_n;
-        }
-        // The advance ends at the deepest point; what comes after is not scored.
-        if z >= self.deepest_m {
-            self.deepest_m = z;
-            self.at_deepest = self.sums;
         }
     }
 
@@ -133,7 +140,7 @@ impl Scorer {
         let layers: Vec<LayerScore> =
             ruptures.iter().filter_map(|r| self.layer(r.layer, r.true_m, r.detection)).collect();
         let cumulative = layers.last().map_or(Compared::new(0.0, None), |l| l.cumulative_friction_ns_per_m);
-        let sums = self.at_deepest;
+        let sums = self.at_deepest.unwrap_or(self.sums);
         let ratio = |over: f64, under: f64| (under > 0.0).then(|| (over / under).sqrt());
         let missed = ruptures.iter().filter(|r| r.detected_s.is_none()).count();
         Score {

@@ -8,8 +8,8 @@ use stylet_core::config::{EnhanceConfig, Model};
 use stylet_core::{Detection, Enhancer, LayerEstimate, Sample, State};
 use stylet_record::{Recording, Truth};
 
-/// Samples of a layer that the core keeps for its re-run.
-pub const STORAGE_SAMPLES: usize = 16_384;
+/// Most samples that the core keeps for its re-run; a recording with fewer is kept whole.
+pub const STORAGE_SAMPLES: usize = 1 << 18;
 
 /// The core's outputs over a recording, one value per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,7 +55,11 @@ impl Trace {
         surface_m: f64,
         mut each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
-        let mut core = Enhancer::new(config.clone(), surface_m, vec![Sample::default(); STORAGE_SAMPLES]);
+        let mut core = Enhancer::new(
+            config.clone(),
+            surface_m,
+            vec![Sample::default(); recording.len().min(STORAGE_SAMPLES)],
+        );
         let mut trace = Trace::default();
         for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
             let out = core.step(Sample {

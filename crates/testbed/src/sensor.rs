@@ -6,7 +6,7 @@ use crate::insertion::InsertionSample;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
-use stylet_scenario::ForceTorque;
+use stylet_scenario::{ForceTorque, MotionPoint};
 use stylet_tissue::{
     AnyEffect, Effect, ForceBias, ForceDrift, Measurement, MeasurementState, Quantisation, Reading,
     Saturation,
@@ -17,14 +17,21 @@ const NOISE_STREAM: u64 = 1;
 /// First of the streams from which spikes are drawn.
 const SPIKES_STREAM: u64 = 1000;
 
+/// Standard normal numbers drawn at once: the generator's state stays in registers, and a sample
+/// then costs a look-up.
+const BLOCK: usize = 64;
+
 /// White or first-order autoregressive Gaussian noise with a given marginal standard deviation.
 #[derive(Debug)]
 pub struct Noise {
     generator: ChaCha8Rng,
+    normals: [f64; BLOCK],
+    used: usize,
     sd_n: f64,
     pole: f64,
     innovation: f64,
-    value: Option<f64>,
+    last: f64,
+    started: bool,
 }
 
 impl Noise {
@@ -34,20 +41,39 @@ impl Noise {
     pub fn new(seed: u64, stream: u64, sd_n: f64, pole: f64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream);
-        Self { generator, sd_n, pole, innovation: libm::sqrt(1.0 - pole * pole), value: None }
+        Self {
+            generator,
+            normals: [0.0; BLOCK],
+            used: BLOCK,
+            sd_n,
+            pole,
+            innovation: libm::sqrt(1.0 - pole * pole),
+            last: 0.0,
+            started: false,
+        }
     }
 
     /// The next value in N.
     #[inline]
     pub fn draw(&mut self) -> f64 {
-        let w: f64 = StandardNormal.sample(&mut self.generator);
-        let unit = match self.value {
-            // The first value is drawn from the stationary distribution.
-            None => w,
-            Some(last) => self.pole * last + self.innovation * w,
-        };
-        self.value = Some(unit);
+        if self.used >= BLOCK {
+            self.refill();
+        }
+        let w = self.normals[self.used];
+        self.used += 1;
+        // The first value is drawn from the stationary distribution.
+        let unit = if self.started { self.pole * self.last + self.innovation * w } else { w };
+        self.started = true;
+        self.last = unit;
         self.sd_n * unit
+    }
+
+    #[inline(never)]
+    fn refill(&mut self) {
+        for normal in &mut self.normals {
+            *normal = StandardNormal.sample(&mut self.generator);
+        }
+        self.used = 0;
     }
 }
 
@@ -76,6 +102,8 @@ pub struct Measuring {
     state: MeasurementState,
     noise: Noise,
     spikes: Vec<Spikes>,
+    /// Nothing but noise.
+    plain: bool,
 }
 
 impl Measuring {
@@ -96,7 +124,7 @@ impl Measuring {
             AnyEffect::ForceSpikes(spikes) if !effect.is_neutral() => Some(spikes),
             _ => None,
         });
-        let spikes = spikes
+        let spikes: Vec<Spikes> = spikes
             .zip(SPIKES_STREAM..)
             .map(|(spikes, stream)| {
                 let mut generator = ChaCha8Rng::seed_from_u64(seed);
@@ -106,6 +134,7 @@ impl Measuring {
             .collect();
         Self {
             state: chain.start(sample_hz),
+            plain: chain.is_plain() && spikes.is_empty(),
             chain,
             noise: Noise::new(seed, NOISE_STREAM, sensor.noise_n, sensor.ar1),
             spikes,
@@ -115,12 +144,27 @@ impl Measuring {
     /// The reading for one sample, in N.
     #[inline]
     pub fn measure(&mut self, sample: &InsertionSample) -> f64 {
+        let InsertionSample { time_s, position_m, velocity_mps, acceleration_mps2, .. } = *sample;
+        let at = MotionPoint { position_m, velocity_mps, acceleration_mps2 };
+        self.measure_force(time_s, &at, sample.force.total_n)
+    }
+
+    /// The reading, in N, of the tissue's force `tissue_n` (N) at `time_s` with the needle at `at`.
+    #[inline]
+    pub fn measure_force(&mut self, time_s: f64, at: &MotionPoint, tissue_n: f64) -> f64 {
+        if self.plain {
+            return tissue_n + self.noise.draw();
+        }
+        self.measure_through_effects(time_s, at, tissue_n)
+    }
+
+    fn measure_through_effects(&mut self, time_s: f64, at: &MotionPoint, tissue_n: f64) -> f64 {
         let spikes: f64 = self.spikes.iter_mut().map(Spikes::draw).sum();
         let reading = Reading {
-            time_s: sample.time_s,
-            velocity_mps: sample.velocity_mps,
-            acceleration_mps2: sample.acceleration_mps2,
-            tissue_n: sample.force.total_n,
+            time_s,
+            velocity_mps: at.velocity_mps,
+            acceleration_mps2: at.acceleration_mps2,
+            tissue_n,
             noise_n: self.noise.draw() + spikes,
         };
         self.chain.step(&mut self.state, &reading)

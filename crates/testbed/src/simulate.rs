@@ -65,7 +65,7 @@ pub struct Reading {
 pub fn rates(scenario: &Scenario, duration_s: f64) -> Rates {
     Rates {
         sample_hz: scenario.sample_hz,
-        steps_per_sample: (scenario.physics_hz / scenario.sample_hz).round().max(1.0) as usize,
+        steps_per_sample: (scenario.physics_hz / scenario.sample_hz - 1e-9).ceil().max(1.0) as usize,
         samples: (duration_s * scenario.sample_hz).round().max(2.0) as usize,
     }
 }
@@ -125,6 +125,10 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         Robot::Slide => on_slide(&plan, &law, &rates, on_rupture, sink),
         Robot::Replay => replayed(&plan, &law, &rates, on_rupture, sink),
     }
+    // Where the needle was recorded at that instant: the law's own position is relative to the tissue.
+    for rupture in &mut ruptures {
+        rupture.position_m = columns.recorded_m(rupture.time_s).unwrap_or(rupture.position_m);
+    }
     columns.truth.ruptures = ruptures;
     let mut recording = columns.recording;
     let zeroed_s = arm.as_ref().map_or(0.0, |arm| arm.zeroed_s);
@@ -173,6 +177,18 @@ impl Columns {
             column.reserve_exact(samples);
         }
         Self { recording, truth: Truth::default(), surface_m }
+    }
+
+    /// Recorded position at an instant, in m, interpolated between the samples around it.
+    fn recorded_m(&self, time_s: f64) -> Option<f64> {
+        let (times, positions) = (&self.recording.time_s, &self.recording.position_m);
+        let after = times.partition_point(|t| *t < time_s);
+        let (Some(t1), Some(z1)) = (times.get(after), positions.get(after)) else {
+            return positions.last().copied();
+        };
+        let before = after.checked_sub(1)?;
+        let (t0, z0) = (times[before], positions[before]);
+        Some(z0 + (z1 - z0) * (time_s - t0) / (t1 - t0))
     }
 
     fn push(&mut self, s: &InsertionSample, measuring: &mut Measuring) {

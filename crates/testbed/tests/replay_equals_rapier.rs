@@ -1,8 +1,9 @@
 //! Promise: the kinematic replay and the rapier run give the same tissue force for the same position
 //! and velocity, and the slide follows its command and feels the tissue.
 
-use stylet_testbed::{NEEDLE_MASS_KG, Slide};
-use stylet_tissue::{Law, LawState, Layer, PronyTerm, StressRelaxation, Tissue, TissueForce, replay};
+use stylet_scenario::{Motion, Segment};
+use stylet_testbed::{InsertionSample, NEEDLE_MASS_KG, Rates, Slide, on_slide, replayed};
+use stylet_tissue::{Law, LawState, Layer, PronyTerm, StressRelaxation, Tissue, replay};
 
 const DT_S: f64 = 1e-3;
 
@@ -40,25 +41,59 @@ fn command(t: f64) -> (f64, f64) {
 #[test]
 fn replay_and_rapier_give_the_same_force_for_the_same_motion_bit_for_bit() {
     let law = law();
-    let mut state = LawState::default();
-    let mut slide = Slide::new(command(0.0).0, command(0.0).1, DT_S);
-    let mut motion = Vec::new();
-    let mut forces: Vec<TissueForce> = Vec::new();
+    let program = Motion::Program {
+        start_m: -0.005,
+        segments: vec![
+            Segment::Ripple {
+                velocity_mps: 0.003,
+                amplitude_mps: 0.001,
+                frequency_hz: 0.5,
+                duration_s: 40.0,
+            },
+            Segment::Hold { duration_s: 2.0 },
+            Segment::Move { velocity_mps: -0.004, duration_s: 10.0 },
+        ],
+    };
+    let plan = program.plan().expect("a motion of its own");
+    // Every physics step is a sample, so that the replay can be given all that the law was given.
+    let rates = Rates { sample_hz: 1000.0, steps_per_sample: 1, samples: 52_000 };
     let mut ruptures = 0;
-    for k in 0..50_000 {
-        let t = f64::from(k) * DT_S;
-        let (z, v) = slide.tip();
-        let force = law.step(&mut state, t, z, v, |_| ruptures += 1);
-        motion.push((t, z, v));
-        forces.push(force);
-        let (z, v) = command(t + DT_S);
-        slide.step(z, v, force.total_n);
-    }
-    let mut replayed = Vec::new();
-    replay(&law, motion, |_| {}, |f| replayed.push(f));
-    assert_eq!(forces, replayed);
+    let mut carried: Vec<InsertionSample> = Vec::new();
+    on_slide(&plan, &law, &rates, |_| ruptures += 1, |s| carried.push(*s));
+    let mut forces = Vec::new();
+    replay(
+        &law,
+        carried.iter().map(|s| (s.time_s, s.position_m, s.velocity_mps)),
+        |_| {},
+        |f| forces.push(f),
+    );
+    assert!(carried.iter().map(|s| s.force).eq(forces.iter().copied()));
     assert_eq!(ruptures, 3, "the run must really have had its ruptures");
     assert!(forces.iter().any(|f| f.total_n < -1.0), "the run must really have been pulled back");
+    let commanded = carried.iter().filter(|s| s.position_m == plan.at(s.time_s).position_m).count();
+    assert!(commanded < carried.len() / 2, "the slide must really move under load, not where it is told to");
+}
+
+#[test]
+fn the_kinematic_replay_is_where_the_motion_commands_it_and_close_to_the_slide() {
+    let law = law();
+    let plan = Motion::Constant { start_m: -0.005, velocity_mps: 0.0023, duration_s: 46.0 }
+        .plan()
+        .expect("a motion");
+    let rates = Rates { sample_hz: 200.0, steps_per_sample: 5, samples: 9200 };
+    let (mut ideal, mut carried) = (Vec::new(), Vec::new());
+    replayed(
+        &plan,
+        &law,
+        &rates,
+        |r| ideal.push(r.time_s),
+        |s| assert_eq!(s.position_m, plan.at(s.time_s).position_m),
+    );
+    on_slide(&plan, &law, &rates, |r| carried.push(r.time_s), |_| {});
+    assert_eq!((ideal.len(), carried.len()), (3, 3));
+    for (a, b) in ideal.iter().zip(&carried) {
+        assert!((a - b).abs() < 0.02, "ruptures by replay {ideal:?}, on the slide {carried:?}");
+    }
 }
 
 #[test]

@@ -1,0 +1,177 @@
+//! What a trial of a sweep costs: ns per sample and the share of law, noise, core and score; one
+//! against two threads; the cost per insertion from 100 to 100 000 trials; memory; and the pure NumPy
+//! version of the same trial beside it.
+//!
+//! Run with `cargo bench --bench sweep`; `STYLET_BENCH_TRIALS` sets the largest sweep (default
+//! 100 000). The best of several passes is printed, so that other load on the machine counts little.
+
+mod support {
+    pub mod peers;
+}
+
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+use stylet_core::{Enhancer, Sample};
+use stylet_scenario::{MotionPlan, Scenario};
+use stylet_score::{LayerTruth, Moment, Scorer};
+use stylet_sweep::{Columns, Overrides, Sweep, rows_with, trial};
+use stylet_testbed::Noise;
+use stylet_tissue::{Law, LawState};
+use support::peers;
+
+fn sweep(trials: u64) -> Sweep {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/sweeps/noise.ron");
+    Sweep::load(&file, Overrides { trials: Some(trials), seed: None }).expect("the shipped sweep")
+}
+
+/// Fastest of several passes, in seconds.
+fn best(passes: usize, mut work: impl FnMut()) -> f64 {
+    (0..passes)
+        .map(|_| {
+            let start = Instant::now();
+            work();
+            start.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The parts of a trial, each alone over the same samples.
+struct Parts {
+    scenario: Scenario,
+    plan: MotionPlan,
+    law: Law,
+    count: usize,
+    samples: Vec<Sample>,
+    tips: Vec<f64>,
+}
+
+impl Parts {
+    fn new(scenario: Scenario) -> Self {
+        let plan = scenario.motion.plan().expect("a motion");
+        let law = Law::new(&scenario.tissue, &scenario.effects).expect("a law");
+        let count = (plan.duration_s() * scenario.sample_hz) as usize;
+        let mut parts = Self { scenario, plan, law, count, samples: Vec::new(), tips: Vec::new() };
+        let mut noise = Noise::new(1, 1, 0.02, 0.0);
+        let mut state = LawState::default();
+        for k in 0..count {
+            let t = k as f64 / parts.scenario.sample_hz;
+            let at = parts.plan.at(t);
+            let force = parts.law.step(&mut state, t, at.position_m, at.velocity_mps, |_| {});
+            parts.tips.push(force.tip_n);
+            parts.samples.push(Sample {
+                time_s: t,
+                position_m: at.position_m,
+                velocity_mps: at.velocity_mps,
+                force_n: force.total_n + noise.draw(),
+            });
+        }
+        parts
+    }
+
+    fn law(&self) -> f64 {
+        let mut state = LawState::default();
+        let mut sum = 0.0;
+        for k in 0..self.count {
+            let t = k as f64 / self.scenario.sample_hz;
+            let at = self.plan.at(t);
+            sum += self.law.step(&mut state, t, at.position_m, at.velocity_mps, |_| {}).total_n;
+        }
+        sum
+    }
+
+    fn noise(&self) -> f64 {
+        let mut noise = Noise::new(1, 1, 0.02, 0.0);
+        (0..self.count).map(|_| noise.draw()).sum()
+    }
+
+    fn core(&self, storage: &mut [Sample], mut scorer: Option<&mut Scorer>) -> f64 {
+        let mut core = Enhancer::new(self.scenario.enhance.clone(), 0.0, storage);
+        let mut sum = 0.0;
+        for (s, tip_n) in self.samples.iter().zip(&self.tips) {
+            let out = core.step_brief(*s);
+            sum += out.enhanced_n;
+            if let Some(scorer) = &mut scorer {
+                scorer.sample(&Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n }, out);
+            }
+        }
+        sum
+    }
+
+    fn scorer(&self) -> Scorer {
+        let truth = |s: &stylet_tissue::Slab| LayerTruth {
+            front_m: s.front_m,
+            thickness_m: s.thickness_m,
+            stiffness_n_per_m: s.stiffness_n_per_m,
+            friction_ns_per_m2: s.friction_ns_per_m2,
+        };
+        Scorer::new(self.law.slabs().iter().map(truth).collect(), self.scenario.enhance.model)
+    }
+}
+
+fn shares(sweep: &Sweep) -> f64 {
+    let parts = Parts::new(sweep.template.clone());
+    let mut storage = vec![Sample::default(); parts.count];
+    let per_sample = |seconds: f64| seconds / parts.count as f64 * 1e9;
+    let law = per_sample(best(300, || {
+        black_box(parts.law());
+    }));
+    let noise = per_sample(best(300, || {
+        black_box(parts.noise());
+    }));
+    let core = per_sample(best(300, || {
+        black_box(parts.core(&mut storage, None));
+    }));
+    let scored = per_sample(best(300, || {
+        let mut scorer = parts.scorer();
+        black_box(parts.core(&mut storage, Some(&mut scorer)));
+        black_box(scorer.finish());
+    }));
+    let mut workspace = trial::Workspace::default();
+    let whole = per_sample(best(300, || drop(black_box(trial::run(&parts.scenario, &mut workspace)))));
+    println!("one trial of {} samples, each part alone:", parts.count);
+    for (name, ns) in [("law and motion", law), ("noise", noise), ("core", core), ("score", scored - core)] {
+        println!("  {name:<15} {ns:>6.1} ns per sample, {:>4.0} % of the whole", 100.0 * ns / whole);
+    }
+    println!("  {:<15} {whole:>6.1} ns per sample", "whole trial");
+    whole
+}
+
+fn timed(trials: u64, threads: usize, passes: usize) -> f64 {
+    let sweep = sweep(trials);
+    let columns = Columns::new(&sweep);
+    best(passes, || {
+        let rows = rows_with(&sweep, &columns, 0..trials, threads, &|_| {}).expect("it runs");
+        assert_eq!(rows.len() as u64, trials);
+    })
+}
+
+fn main() {
+    let one = sweep(1);
+    let whole_ns = shares(&one);
+    let samples = 10_000.0;
+
+    let (single, double) = (timed(1000, 1, 5), timed(1000, 2, 5));
+    println!(
+        "1000 trials: {single:.3} s on one thread, {double:.3} s on two, ratio {:.2}; {:.1} ns per sample and thread",
+        single / double,
+        single / 1000.0 / samples * 1e9
+    );
+    let most: u64 = std::env::var("STYLET_BENCH_TRIALS").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000);
+    for trials in [100, 1000, 10_000, 100_000_u64].into_iter().filter(|n| *n <= most) {
+        let passes = (20_000 / trials).clamp(1, 10) as usize;
+        let seconds = timed(trials, 2, passes);
+        println!(
+            "{trials:>7} trials on 2 threads: {seconds:>7.3} s, {:.1} us per insertion, {:.1} ns per sample",
+            seconds / trials as f64 * 1e6,
+            seconds / trials as f64 / samples * 1e9
+        );
+    }
+    if let Ok(usage) = nix::sys::resource::getrusage(nix::sys::resource::UsageWho::RUSAGE_SELF) {
+        println!("memory: at most {:.0} MB", usage.max_rss() as f64 / 1024.0);
+    }
+    if let Some(seconds) = peers::number("trial_numpy.py", &[]) {
+        let ns = seconds / samples * 1e9;
+        println!("pure NumPy trial: {ns:.0} ns per sample, {:.0} times ours", ns / whole_ns);
+    }
+}

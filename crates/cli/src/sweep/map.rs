@@ -1,0 +1,26 @@
+//! `stylet sweep map`: the robustness map of several sweeps.
+
+use super::args::MapArgs;
+use super::progress::Progress;
+use super::with_threads;
+use crate::exit::Failure;
+use stylet_sweep::{Columns, Overrides, Sweep, map_rows, map_svg, rows};
+
+/// The command.
+pub fn map(args: &MapArgs) -> Result<(), Failure> {
+    let overrides = Overrides { trials: args.trials, seed: None };
+    let sweeps: Vec<Sweep> =
+        args.sweeps.iter().map(|file| Sweep::load(file, overrides)).collect::<Result<_, _>>()?;
+    let progress = Progress::new(sweeps.iter().map(Sweep::trials).sum(), false);
+    let mut map = Vec::new();
+    for sweep in &sweeps {
+        let columns = Columns::new(sweep);
+        let rows = with_threads(0, || rows(sweep, &columns, 0..sweep.trials(), &|n| progress.advance(n)))??;
+        map.extend(map_rows(sweep, &columns, &rows));
+    }
+    progress.finish();
+    let failed = |why| Failure::Output { path: args.svg.display().to_string(), why };
+    std::fs::write(&args.svg, map_svg(&map)).map_err(failed)?;
+    println!("{}", args.svg.display());
+    Ok(())
+}

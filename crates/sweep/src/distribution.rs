@@ -1,0 +1,158 @@
+//! How a quantity is distributed. Every distribution is drawn by its quantile function, so that
+//! plain random, Latin hypercube and Sobol points serve alike.
+
+use serde::{Deserialize, Serialize};
+use stylet_scenario::Problem;
+
+/// A distribution in the unit of the field that it is drawn for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Distribution {
+    /// Every value between the two is as likely as any other.
+    Uniform(f64, f64),
+    /// The logarithm is uniform between the two, which are positive.
+    LogUniform(f64, f64),
+    /// Gaussian.
+    Normal {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        sd: f64,
+    },
+    /// The logarithm is Gaussian.
+    LogNormal {
+        /// Median, positive.
+        median: f64,
+        /// Standard deviation of the natural logarithm.
+        sd_log: f64,
+    },
+    /// Rises from `min` to `mode` and falls to `max`.
+    Triangular {
+        /// Smallest value.
+        min: f64,
+        /// Most likely value.
+        mode: f64,
+        /// Largest value.
+        max: f64,
+    },
+    /// One of the values, each as likely as any other.
+    Choice(Vec<f64>),
+}
+
+impl Distribution {
+    /// Checks the parameters; `path` is where the distribution stands.
+    ///
+    /// # Errors
+    /// [`Problem`] with what would be right.
+    pub fn check(&self, path: &str) -> Result<(), Problem> {
+        let fail = |what: String| Err(Problem::new(path, what));
+        let numbers: Vec<f64> = match self {
+            Self::Uniform(a, b) | Self::LogUniform(a, b) => vec![*a, *b],
+            Self::Normal { mean, sd } => vec![*mean, *sd],
+            Self::LogNormal { median, sd_log } => vec![*median, *sd_log],
+            Self::Triangular { min, mode, max } => vec![*min, *mode, *max],
+            Self::Choice(values) => values.clone(),
+        };
+        if let Some(wrong) = numbers.iter().find(|x| !x.is_finite()) {
+            return fail(format!("holds {wrong}; every number must be finite"));
+        }
+        match self {
+            Self::Uniform(min, max) | Self::LogUniform(min, max) if max < min => fail(format!(
+                "goes from {min} to {max}: the largest value is smaller than the smallest; swap them"
+            )),
+            Self::LogUniform(min, _) if *min <= 0.0 => {
+                fail(format!("begins at {min}; a logarithm needs a smallest value above zero"))
+            }
+            Self::Normal { sd, .. } if *sd < 0.0 => fail(format!("has sd {sd}; it must be zero or positive")),
+            Self::LogNormal { median, .. } if *median <= 0.0 => {
+                fail(format!("has median {median}; it must be above zero"))
+            }
+            Self::LogNormal { sd_log, .. } if *sd_log < 0.0 => {
+                fail(format!("has sd_log {sd_log}; it must be zero or positive"))
+            }
+            Self::Triangular { min, mode, max } if !(min <= mode && mode <= max) => {
+                fail(format!("has min {min}, mode {mode}, max {max}; they must stand in this order"))
+            }
+            Self::Choice(values) if values.is_empty() => fail("offers no value; give at least one".into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// The value below which a share `u` of the draws lies, `0 < u < 1`.
+    #[must_use]
+    pub fn quantile(&self, u: f64) -> f64 {
+        match self {
+            Self::Uniform(min, max) => min + (max - min) * u,
+            Self::LogUniform(min, max) => {
+                let (low, high) = (libm::log(*min), libm::log(*max));
+                libm::exp(low + (high - low) * u).clamp(*min, *max)
+            }
+            Self::Normal { mean, sd } => mean + sd * normal_quantile(u),
+            Self::LogNormal { median, sd_log } => median * libm::exp(sd_log * normal_quantile(u)),
+            Self::Triangular { min, mode, max } => {
+                let width = max - min;
+                if width <= 0.0 {
+                    return *min;
+                }
+                let rising = (mode - min) / width;
+                if u < rising {
+                    min + libm::sqrt(u * width * (mode - min))
+                } else {
+                    max - libm::sqrt((1.0 - u) * width * (max - mode))
+                }
+            }
+            Self::Choice(values) => {
+                let index = (u * values.len() as f64) as usize;
+                values.get(index.min(values.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
+            }
+        }
+    }
+}
+
+/// Quantile of the standard normal distribution: Acklam's rational approximation, then one step of
+/// Halley's method on `erfc`, which leaves an error below 1e-13.
+#[must_use]
+pub fn normal_quantile(u: f64) -> f64 {
+    const A: [f64; 6] = [
+        -3.969_683_028_665_376e1,
+        2.209_460_984_245_205e2,
+        -2.759_285_104_469_687e2,
+        1.383_577_518_672_69e2,
+        -3.066_479_806_614_716e1,
+        2.506_628_277_459_239,
+    ];
+    const B: [f64; 5] = [
+        -5.447_609_879_822_406e1,
+        1.615_858_368_580_409e2,
+        -1.556_989_798_598_866e2,
+        6.680_131_188_771_972e1,
+        -1.328_068_155_288_572e1,
+    ];
+    const C: [f64; 6] = [
+        -7.784_894_002_430_293e-3,
+        -3.223_964_580_411_365e-1,
+        -2.400_758_277_161_838,
+        -2.549_732_539_343_734,
+        4.374_664_141_464_968,
+        2.938_163_982_698_783,
+    ];
+    const D: [f64; 4] =
+        [7.784_695_709_041_462e-3, 3.224_671_290_700_398e-1, 2.445_134_137_142_996, 3.754_408_661_907_416];
+    let horner = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, k| sum * x + k);
+    let tail = |p: f64| {
+        let q = libm::sqrt(-2.0 * libm::log(p));
+        horner(&C, q) / (horner(&D, q) * q + 1.0)
+    };
+    let x = if u < 0.02425 {
+        tail(u)
+    } else if u > 1.0 - 0.02425 {
+        -tail(1.0 - u)
+    } else {
+        let q = u - 0.5;
+        let r = q * q;
+        horner(&A, r) * q / (horner(&B, r) * r + 1.0)
+    };
+    let error = 0.5 * libm::erfc(-x / core::f64::consts::SQRT_2) - u;
+    let step = error * libm::sqrt(core::f64::consts::TAU) * libm::exp(0.5 * x * x);
+    x - step / (1.0 + 0.5 * x * step)
+}

@@ -1,0 +1,310 @@
+//! `report.html`: the summary as a page, and the robustness map as a picture.
+
+use crate::row::{Columns, Row};
+use crate::stats::{Interval, wilson};
+use crate::summary::{Outcome, Summary, failed, value};
+use crate::sweep::Sweep;
+use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
+use stylet_report::{
+    Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile,
+    significant,
+};
+
+/// Bins of a drawn quantity in pictures.
+const BINS: usize = 10;
+
+fn percent(x: f64) -> String {
+    stylet_report::percent(x)
+}
+
+fn between(i: &Interval) -> String {
+    format!("95 % interval {} to {}", percent(i.low), percent(i.high))
+}
+
+/// The page of a sweep.
+#[must_use]
+pub fn page(sweep: &Sweep, columns: &Columns, rows: &[Row], summary: &Summary) -> Page {
+    let mut page = Page::new(format!("Sweep: {}", summary.sweep))
+        .subtitle(format!("{} trials of {}", summary.trials, summary.scenario))
+        .fact("seed", summary.seed.to_string())
+        .fact("sampling", summary.sampling.clone())
+        .fact("version", summary.version.clone())
+        .fact("identity", summary.identity.chars().take(16).collect::<String>());
+    if summary.redrawn > 0 {
+        page =
+            page.fact("redrawn", format!("{} trials, their first draw being out of range", summary.redrawn));
+    }
+    page.section(Section::new("Rates").block(Block::Scorecard(tiles(summary))))
+        .section(worst(summary))
+        .section(explained(&summary.explained))
+        .section(against(sweep, columns, rows))
+        .section(Section::new("Scores").table(scores(summary)))
+        .section(Section::new("How it was drawn").block(Block::Code(Code {
+            title: "sweep".to_owned(),
+            text: sweep.to_ron(),
+            folded: true,
+        })))
+}
+
+fn tiles(s: &Summary) -> Scorecard {
+    let rate = |label: &str, i: &Interval| {
+        Tile::new(label, percent(i.value), between(i)).status(Status::at_most(i.value, 0.01, 0.05))
+    };
+    let mut tiles = vec![
+        rate("insertions with an error", &s.failed),
+        rate("ruptures missed", &s.missed),
+        rate("insertions with a false alarm", &s.trials_with_false),
+        Tile::new("false alarms", s.false_alarms.to_string(), format!("beside {} ruptures", s.ruptures)),
+    ];
+    for (score, label) in
+        [("enhancement.rms_relative", "enhanced force off by"), ("reconstruction_rms_n", "reconstruction")]
+    {
+        if let Some(found) = s.scores.iter().find(|f| f.score == score) {
+            let unit = if score.ends_with("_n") { " N" } else { "" };
+            let show = |x: f64| if unit.is_empty() { percent(x) } else { significant(x, 3) + unit };
+            tiles.push(Tile::new(
+                label,
+                show(found.median.value),
+                format!("median; p95 {}", show(found.p95.value)),
+            ));
+        }
+    }
+    Scorecard { title: String::new(), tiles }
+}
+
+fn worst(s: &Summary) -> Section {
+    let mut headers =
+        vec!["trial".to_owned(), "missed".to_owned(), "false".to_owned(), "enhancement".to_owned()];
+    // Wide tables help nobody: the strongest quantities come first in `explained`.
+    let shown: Vec<usize> = match s.explained.first() {
+        Some(outcome) => {
+            outcome.by.iter().take(6).filter_map(|e| s.drawn.iter().position(|d| *d == e.quantity)).collect()
+        }
+        None => (0..s.drawn.len().min(6)).collect(),
+    };
+    headers.extend(shown.iter().map(|i| s.drawn[*i].clone()));
+    headers.push("see it".to_owned());
+    let rows = s
+        .worst
+        .iter()
+        .map(|w| {
+            let mut row = vec![
+                Cell::text(w.trial.to_string()),
+                Cell::number(w.missed.to_string()),
+                Cell::number(w.false_alarms.to_string()),
+                Cell::number(w.enhancement.map_or("-".to_owned(), percent)),
+            ];
+            row.extend(shown.iter().map(|i| Cell::number(significant(w.drawn[*i], 4))));
+            row.push(Cell::text(w.replay.clone()));
+            row
+        })
+        .collect();
+    Section::new("Worst trials").table(Table { headers, rows, ..Table::default() })
+}
+
+fn explained(outcomes: &[Outcome]) -> Section {
+    let mut section = Section::new("What explains the outcomes");
+    if outcomes.is_empty() {
+        return section;
+    }
+    section = section.text(
+        "First-order Sobol index: the share of an outcome's variance that the mean over everything else, given one \
+         quantity, explains; estimated from this sample in groups of equal size along the quantity, chance taken off. \
+         Rank correlation: Spearman's, with its two-sided p-value. An index well above the squared correlation means a \
+         dependence that is not monotonic; indices that sum to far less than one mean interactions or noise.",
+    );
+    for outcome in outcomes {
+        let bars = outcome.by.iter().take(12).filter_map(|e| {
+            let value = e.first_order?;
+            Some(Bar { name: e.quantity.clone(), value, interval: None, colour: Colour::Blue })
+        });
+        let chart = BarChart { label: "first-order Sobol index".to_owned(), bars: bars.collect() };
+        let title = outcome.outcome.clone();
+        let options = FigureOptions { title: title.clone(), ..FigureOptions::default() };
+        section = section
+            .block(Block::Svg(SvgImage { description: title.clone(), markup: bar_chart(&chart, &options) }))
+            .table(table(outcome));
+    }
+    section
+}
+
+fn table(outcome: &Outcome) -> Table {
+    let or_dash = |x: Option<f64>| x.map_or("-".to_owned(), |x| significant(x, 3));
+    Table {
+        title: outcome.outcome.clone(),
+        headers: ["quantity", "first-order index", "rank correlation", "p-value"].map(str::to_owned).to_vec(),
+        rows: outcome
+            .by
+            .iter()
+            .map(|e| {
+                vec![
+                    Cell::text(e.quantity.clone()),
+                    Cell::number(or_dash(e.first_order)),
+                    Cell::number(or_dash(e.rank_correlation)),
+                    Cell::number(match e.p_value {
+                        Some(p) if p < 1e-15 => "< 1e-15".to_owned(),
+                        p => or_dash(p),
+                    }),
+                ]
+            })
+            .collect(),
+        ..Table::default()
+    }
+}
+
+fn scores(s: &Summary) -> Table {
+    let cell = |x: f64| Cell::number(significant(x, 3));
+    let range =
+        |i: &Interval| Cell::number(format!("{} to {}", significant(i.low, 3), significant(i.high, 3)));
+    Table {
+        title: "Medians and 95th percentiles with their 95 % intervals between order statistics".to_owned(),
+        headers: ["score", "trials", "median", "interval", "p95", "interval", "worst", "in trial"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: s
+            .scores
+            .iter()
+            .map(|x| {
+                vec![
+                    Cell::text(x.score.clone()),
+                    Cell::number(x.trials.to_string()),
+                    cell(x.median.value),
+                    range(&x.median),
+                    cell(x.p95.value),
+                    range(&x.p95),
+                    cell(x.worst),
+                    Cell::number(x.worst_trial.to_string()),
+                ]
+            })
+            .collect(),
+        ..Table::default()
+    }
+}
+
+/// One bin of a drawn quantity.
+struct Bin {
+    middle: f64,
+    failed: Interval,
+}
+
+/// Rows in groups of equal size along a drawn quantity; those of an effect that is off are left out.
+fn bins(sweep: &Sweep, columns: &Columns, rows: &[Row], quantity: usize) -> Vec<Bin> {
+    let switch = sweep
+        .fields
+        .get(quantity)
+        .and_then(|f| f.effect())
+        .and_then(|e| e.checked_sub(sweep.own_effects))
+        .map(|e| sweep.fields.len() + e);
+    let mut kept: Vec<&Row> =
+        rows.iter().filter(|r| switch.is_none_or(|s| r.values.get(s).is_some_and(|on| *on > 0.0))).collect();
+    kept.sort_by(|a, b| a.values[quantity].total_cmp(&b.values[quantity]).then(a.trial.cmp(&b.trial)));
+    let size = kept.len().div_ceil(BINS).max(1);
+    kept.chunks(size)
+        .map(|chunk| {
+            let hits = chunk.iter().filter(|r| failed(columns, r)).count() as f64;
+            Bin { middle: chunk[chunk.len() / 2].values[quantity], failed: wilson(hits, chunk.len() as f64) }
+        })
+        .collect()
+}
+
+/// The share of failed insertions against every quantity that explains something.
+fn against(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Section {
+    let mut section = Section::new("Failures and errors along the drawn quantities");
+    for (index, quantity) in columns.drawn.iter().take(sweep.fields.len()).enumerate().take(12) {
+        let bins = bins(sweep, columns, rows, index);
+        if bins.len() < 2 {
+            continue;
+        }
+        let x: Vec<f64> = bins.iter().map(|b| b.middle).collect();
+        let line = |f: fn(&Bin) -> f64| bins.iter().map(f).map(|y| 100.0 * y).collect::<Vec<_>>();
+        let mut chart = Chart::new(
+            format!("Insertions with an error, along {quantity}"),
+            quantity.clone(),
+            "insertions (%)",
+        )
+        .with_series(Series::line("share", Colour::Vermillion, x.clone(), line(|b| b.failed.value)))
+        .with_series(Series::line("95 % low", Colour::Grey, x.clone(), line(|b| b.failed.low)).width(1.0))
+        .with_series(Series::line("95 % high", Colour::Grey, x, line(|b| b.failed.high)).width(1.0));
+        chart.y_range = Some((0.0, 100.0));
+        section = section.chart(chart);
+    }
+    let shown: Vec<&Row> = rows.iter().take(2000).collect();
+    if let Some(first) = columns.drawn.first() {
+        let mut pairs: Vec<(f64, f64)> =
+            shown.iter().map(|r| (r.values[0], value(columns, r, "enhancement.rms_relative"))).collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let (x, y) = pairs.into_iter().unzip();
+        let mut chart = Chart::new("Enhancement error", first.clone(), "relative error")
+            .caption("Enhanced force against the true tip force, one point per trial, at most 2000.")
+            .with_series(Series::points("trials", Colour::Blue, x, y).width(2.0));
+        chart.scale = stylet_report::Scale::Log;
+        section = section.chart(chart);
+    }
+    section
+}
+
+/// A row of the robustness map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapRow {
+    /// Sweep and quantity with its range.
+    pub name: String,
+    /// Share of failed insertions per tenth of the draws, in %.
+    pub failed_percent: Vec<f64>,
+}
+
+/// Rows of the robustness map that a sweep gives: one per drawn quantity.
+#[must_use]
+pub fn map_rows(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Vec<MapRow> {
+    (0..sweep.fields.len())
+        .filter_map(|quantity| {
+            let bins = bins(sweep, columns, rows, quantity);
+            let (first, last) = (bins.first()?, bins.last()?);
+            if first.middle == last.middle {
+                return None; // a constant
+            }
+            let path = name(sweep, quantity);
+            Some(MapRow {
+                name: format!("{path}  {} … {}", significant(first.middle, 2), significant(last.middle, 2)),
+                failed_percent: bins.iter().map(|b| (100.0 * b.failed.value).round()).collect(),
+            })
+        })
+        .collect()
+}
+
+/// A quantity as people read it: an effect's by the effect's name.
+fn name(sweep: &Sweep, quantity: usize) -> String {
+    use stylet_tissue::Effect;
+    let Some(field) = sweep.fields.get(quantity) else { return String::new() };
+    match field.effect().and_then(|e| sweep.template.effects.get(e)) {
+        Some(effect) => {
+            let last = field.path().rsplit('.').next().unwrap_or_default();
+            format!("{} {last}", effect.id())
+        }
+        None => {
+            let path = field.path();
+            let short =
+                ["tissue.", "enhance.", "motion.", "sensor."].iter().find_map(|p| path.strip_prefix(p));
+            short.unwrap_or(path).to_owned()
+        }
+    }
+}
+
+/// The robustness map as SVG.
+#[must_use]
+pub fn map_svg(rows: &[MapRow]) -> String {
+    let map = HeatMap {
+        row_label: String::new(),
+        column_label: "tenth of the drawn values, from the smallest to the largest".to_owned(),
+        rows: rows.iter().map(|r| r.name.clone()).collect(),
+        columns: (1..=BINS).map(|i| i.to_string()).collect(),
+        values: rows.iter().map(|r| r.failed_percent.clone()).collect(),
+    };
+    heat_map(
+        &map,
+        &FigureOptions {
+            title: "Where the algorithm fails".to_owned(),
+            subtitle: "insertions with a missed or a false rupture, in %; blank: none".to_owned(),
+            ..FigureOptions::default()
+        },
+    )
+}

@@ -1,0 +1,117 @@
+//! Promise: a trial is a function of sweep, seed and its number alone; paths set exactly the field
+//! that they name; a trial has the scores of the ordinary run of its scenario.
+
+use std::path::Path;
+use stylet_scenario::{Motion, Robot, Scenario, Sensor};
+use stylet_score::{LayerTruth, score_run};
+use stylet_sweep::{Columns, Distribution, Drawer, Sampling, Sweep, SweepFile, Vary, rows_with, trial};
+use stylet_testbed::simulate;
+
+fn scenario() -> Scenario {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/three_layer_latex_constant.ron");
+    Scenario::load(&file).expect("the shipped scenario")
+}
+
+fn sweep(paths: &[(&str, Distribution)], trials: u64) -> Sweep {
+    let vary =
+        paths.iter().map(|(path, with)| Vary { path: (*path).to_owned(), with: with.clone() }).collect();
+    let file = SweepFile {
+        scenario: "x.ron".into(),
+        trials,
+        sampling: Sampling::Random,
+        seed: 3,
+        vary,
+        effects: Vec::new(),
+    };
+    Sweep::new("test".to_owned(), file, scenario()).expect("a good sweep")
+}
+
+#[test]
+fn paths_set_the_field_that_they_name_and_no_other() {
+    let exact = |x: f64| Distribution::Choice(vec![x]);
+    let paths = [
+        ("tissue.layers[1].stiffness_n_per_m", 61.5),
+        ("tissue.layers[0].puncture_n", 1.25),
+        ("tissue.surface_m", 0.001),
+        ("motion.velocity_mps", 0.0031),
+        ("sensor.noise_n", 0.013),
+        ("sensor.range_n", 7.5),
+        ("enhance.cusum.sigma_rupture_n", 0.11),
+        ("enhance.cusum.enabled", 0.0),
+        ("enhance.reset.hz", 20.0),
+        ("enhance.contact_search.samples", 7.0),
+        ("sample_hz", 100.0),
+    ];
+    let all: Vec<(&str, Distribution)> = paths.iter().map(|(p, x)| (*p, exact(*x))).collect();
+    let sweep = sweep(&all, 1);
+    let drawn = Drawer::new(&sweep).draw(0).expect("a valid draw");
+    let mut expected = scenario();
+    expected.robot = Robot::Replay;
+    expected.seed = drawn.seed;
+    expected.tissue.layers[1].stiffness_n_per_m = 61.5;
+    expected.tissue.layers[0].puncture_n = Some(1.25);
+    expected.tissue.surface_m = 0.001;
+    if let Motion::Constant { velocity_mps, .. } = &mut expected.motion {
+        *velocity_mps = 0.0031;
+    }
+    if let Sensor::ForceTorque(sensor) = &mut expected.sensor {
+        sensor.noise_n = 0.013;
+        sensor.range_n = Some(7.5);
+    }
+    expected.enhance.cusum.sigma_rupture_n = 0.11;
+    expected.enhance.cusum.enabled = false;
+    expected.enhance.reset = stylet_core::config::Reset::Frequency { hz: 20.0 };
+    expected.enhance.contact_search.samples = 7;
+    expected.sample_hz = 100.0;
+    assert_eq!(drawn.scenario, expected);
+    assert_eq!(drawn.values, paths.map(|(_, x)| x));
+}
+
+#[test]
+fn a_trial_does_not_depend_on_the_others_nor_on_how_they_are_split() {
+    let sweep = sweep(&[("sensor.noise_n", Distribution::LogUniform(0.005, 0.1))], 40);
+    let columns = Columns::new(&sweep);
+    let all = rows_with(&sweep, &columns, 0..40, 2, &|_| {}).expect("it runs");
+    let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(x, y)| x.to_bits() == y.to_bits());
+    for range in [0..1, 7..8, 13..40, 39..40] {
+        let part = rows_with(&sweep, &columns, range.clone(), 1, &|_| {}).expect("it runs");
+        for (row, whole) in part.iter().zip(&all[range.start as usize..range.end as usize]) {
+            assert_eq!((row.trial, row.seed), (whole.trial, whole.seed));
+            assert!(same(&row.values, &whole.values));
+        }
+    }
+    let mut seeds: Vec<u64> = all.iter().map(|r| r.seed).collect();
+    seeds.sort_unstable();
+    seeds.dedup();
+    assert_eq!(seeds.len(), 40, "every trial has noise of its own");
+}
+
+#[test]
+fn a_trial_has_the_scores_of_the_ordinary_run() {
+    let sweep = sweep(&[("sensor.noise_n", Distribution::Uniform(0.0, 0.05))], 4);
+    let drawer = Drawer::new(&sweep);
+    let mut workspace = trial::Workspace::default();
+    for k in 0..4 {
+        let scenario = drawer.draw(k).expect("a valid draw").scenario;
+        let ours = trial::run(&scenario, &mut workspace).expect("it runs");
+        let run = simulate(&scenario, scenario.seed).expect("it runs");
+        let layers: Vec<LayerTruth> = run
+            .slabs
+            .iter()
+            .map(|s| LayerTruth {
+                front_m: s.front_m,
+                thickness_m: s.thickness_m,
+                stiffness_n_per_m: s.stiffness_n_per_m,
+                friction_ns_per_m2: s.friction_ns_per_m2,
+            })
+            .collect();
+        let (_, mut score) =
+            score_run(&run.recording, &run.recording.force_n, &run.truth, &layers, &scenario.enhance);
+        for layer in &mut score.layers {
+            layer.offline_stiffness_n_per_m = None;
+            layer.offline_friction_ns_per_m2 = None;
+            layer.offline_separable = None;
+        }
+        assert_eq!(ours, score);
+    }
+}
