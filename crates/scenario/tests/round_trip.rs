@@ -171,7 +171,6 @@ fn detection() -> impl Strategy<Value = (CusumConfig, DerivativeConfig, GuardCon
             old_ground_m: blind_travel_m / 20.0,
             rest_s,
             slowing_per_s,
-            ..GuardConfig::default()
         },
     );
     (cusum, derivative, guard)
