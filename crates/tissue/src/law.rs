@@ -133,8 +133,9 @@ impl Law {
         self.advance(state, time_s, z_m, v_mps, &mut ByLaw(on_rupture))
     }
 
-    /// [`Law::step`] with somebody who decides on ruptures.
-    #[inline]
+    /// [`Law::step`] with somebody who decides on ruptures. Kept out of line, so that the base law
+    /// alone stays small enough to be inlined.
+    #[inline(never)]
     pub(crate) fn advance(
         &self,
         state: &mut LawState,
