@@ -127,7 +127,8 @@ pub struct Jacobian {
     pub columns: Vec<Vec<f64>>,
 }
 
-/// Numeric Jacobian at a model whose residuals are `at`.
+/// Jacobian at a model whose residuals are `at`; the columns of the base parameters are those of `keep`
+/// if given.
 pub fn jacobian(
     model: &Model,
     data: &Data,
@@ -136,14 +137,39 @@ pub fn jacobian(
     keep: Option<&Jacobian>,
 ) -> Jacobian {
     let slots = model.slots();
+    let base = |s: &Slot| matches!(s.role, Role::Base { .. });
+    let known = match keep {
+        Some(keep) => Some(
+            keep.columns.iter().zip(&keep.slots).filter(|(_, s)| base(s)).map(|(c, _)| c.clone()).collect(),
+        ),
+        None => crate::columns::base(model, data, at, &slots),
+    };
+    differences(model, data, at, work, slots, known)
+}
+
+/// The Jacobian with one replay for every number.
+#[cfg(test)]
+pub(crate) fn jacobian_by_differences(
+    model: &Model,
+    data: &Data,
+    at: &Residuals,
+    work: &mut Residuals,
+) -> Jacobian {
+    differences(model, data, at, work, model.slots(), None)
+}
+
+fn differences(
+    model: &Model,
+    data: &Data,
+    at: &Residuals,
+    work: &mut Residuals,
+    slots: Vec<Slot>,
+    known: Option<Vec<Vec<f64>>>,
+) -> Jacobian {
     let p = model.vector(&slots);
     let mut trial = model.clone();
-    let mut columns = Vec::with_capacity(slots.len());
-    for (j, slot) in slots.iter().enumerate() {
-        if let (Some(keep), Role::Base { .. }) = (keep, slot.role) {
-            columns.push(keep.columns[j].clone());
-            continue;
-        }
+    let mut columns = known.unwrap_or_default();
+    for (j, slot) in slots.iter().enumerate().skip(columns.len()) {
         let mut column = vec![0.0; at.w.len() + at.events.len()];
         if !slot.stepped {
             let mut q = p.clone();

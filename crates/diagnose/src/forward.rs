@@ -6,7 +6,7 @@
 
 use crate::model::Compiled;
 use crate::track::{NEVER, Track};
-use stylet_tissue::{LawState, MeasurementState, Reading};
+use stylet_tissue::{LawState, MeasurementState, Reading, Strain, TissueForce};
 
 /// What a layer's rupture says of the law: its strain at the instant that the data show.
 #[derive(Clone, Copy, Debug)]
@@ -14,12 +14,13 @@ pub struct Event {
     /// Distance from rupture in standard deviations of what sampling leaves open; positive: the law
     /// would have ruptured before, negative: not yet.
     pub u: f64,
-    /// The same by the puncture force alone; NaN without one.
-    pub by_force: f64,
     /// Elastic force in N half-way between the last sample before the rupture and the first after.
     pub elastic_n: f64,
     /// Ratio of the actual puncture force (speed) to the layer's own.
     pub ratio: f64,
+    /// What it was worked out from.
+    strained: Strained,
+    ruptured: bool,
 }
 
 /// Relative uncertainty of an elastic force at rupture beyond sampling.
@@ -28,8 +29,8 @@ const FORCE_FLOOR: f64 = 5e-5;
 const POSITION_FLOOR_M: f64 = 1e-6;
 
 /// Strain before and at the rupture of one layer.
-#[derive(Clone, Copy)]
-struct Strained {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Strained {
     force_before: f64,
     force_at: f64,
     place_before: f64,
@@ -52,6 +53,32 @@ const UNSEEN: Strained = Strained {
 };
 
 impl Strained {
+    fn note(&mut self, s: &Strain) {
+        self.elastic_before = if self.seen { self.elastic_at } else { 0.0 };
+        self.force_before = self.force_before.max(self.force_at);
+        self.place_before = self.place_before.max(self.place_at);
+        self.elastic_at = s.elastic_n;
+        self.force_at = s.elastic_n - s.puncture_n;
+        self.place_at = s.tip_m - s.far_m;
+        self.puncture = s.puncture_n;
+        self.seen = true;
+    }
+
+    /// The same with the elastic force and the puncture force changed by these shares.
+    fn changed(&self, elastic: f64, puncture: f64) -> Self {
+        let by = |elastic_n: f64| {
+            elastic * elastic_n - if self.puncture.is_finite() { puncture * self.puncture } else { 0.0 }
+        };
+        Self {
+            force_before: self.force_before + by(self.elastic_before),
+            force_at: self.force_at + by(self.elastic_at),
+            elastic_before: self.elastic_before * (1.0 + elastic),
+            elastic_at: self.elastic_at * (1.0 + elastic),
+            puncture: self.puncture * (1.0 + puncture),
+            ..*self
+        }
+    }
+
     fn event(&self, ruptured: bool, own_puncture: f64) -> Event {
         let ratio = if self.puncture.is_finite() { self.puncture / own_puncture } else { 1.0 };
         let spread = |lo: f64, hi: f64, floor: f64| {
@@ -59,12 +86,13 @@ impl Strained {
             (half * half / 3.0 + floor * floor).sqrt()
         };
         let floor = FORCE_FLOOR * self.puncture.min(1e3) + 1e-5;
+        let event = Event { u: 0.0, elastic_n: self.elastic_at, ratio, strained: *self, ruptured };
         if !ruptured {
             // Nothing is known but that it did not happen.
             let step = (self.elastic_at - self.elastic_before).abs();
             let by_force = self.force_before.max(self.force_at) / (floor + step);
             let u = by_force.max(self.place_before.max(self.place_at) / 1e-5).max(0.0);
-            return Event { u, by_force: f64::NAN, elastic_n: self.elastic_at, ratio };
+            return Event { u, ..event };
         }
         let mid = |lo: f64, hi: f64| 0.5 * (lo + hi);
         let by_force = if self.puncture.is_finite() {
@@ -76,7 +104,79 @@ impl Strained {
         let before = self.place_before.max(self.place_at - 1e-2);
         let by_place = mid(before, self.place_at) / spread(before, self.place_at, POSITION_FLOOR_M);
         let u = if by_force.is_nan() { by_place } else { by_force.max(by_place) };
-        Event { u, by_force, elastic_n: mid(self.elastic_before, self.elastic_at), ratio }
+        Event { u, elastic_n: mid(self.elastic_before, self.elastic_at), ..event }
+    }
+}
+
+impl Event {
+    /// Its distance from rupture were the elastic force and the puncture force larger by these shares.
+    #[must_use]
+    pub fn u_at(&self, elastic: f64, puncture: f64) -> f64 {
+        let own = self.strained.puncture / self.ratio;
+        self.strained.changed(elastic, puncture).event(self.ruptured, own * (1.0 + puncture)).u
+    }
+}
+
+/// Most layers that a replay keeps events of.
+const LAYERS: usize = 16;
+
+/// A replay with imposed ruptures under way; a clone goes on from the same instant.
+#[derive(Clone)]
+pub(crate) struct Replay {
+    pub(crate) state: LawState,
+    chain: Option<MeasurementState>,
+    strained: [Strained; LAYERS],
+    done: usize,
+}
+
+impl Replay {
+    /// Before the first sample.
+    pub(crate) fn start(model: &Compiled, track: &Track) -> Self {
+        Self {
+            state: LawState::default(),
+            chain: model.measures.then(|| model.chain.start(track.sample_hz * 4.0)),
+            strained: [UNSEEN; LAYERS],
+            done: 0,
+        }
+    }
+
+    /// The tissue's force at sample `i`, to be called in order.
+    #[inline]
+    pub(crate) fn tissue(
+        &mut self,
+        model: &Compiled,
+        track: &Track,
+        ruptures: &[usize],
+        i: usize,
+    ) -> TissueForce {
+        let lead = model.lead(track);
+        while self.done < ruptures.len() && ruptures[self.done] != NEVER && i + lead >= ruptures[self.done] {
+            self.done += 1;
+        }
+        let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
+        let strained = &mut self.strained;
+        model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| {
+            if let Some(mine) = strained.get_mut(s.layer - 1) {
+                mine.note(&s);
+            }
+        })
+    }
+
+    /// The recorded force at sample `i`, to be called in order.
+    #[inline]
+    pub(crate) fn step(&mut self, model: &Compiled, track: &Track, ruptures: &[usize], i: usize) -> f64 {
+        let tissue_n = self.tissue(model, track, ruptures, i).total_n;
+        match &mut self.chain {
+            None => tissue_n,
+            Some(chain) => measure(model, chain, track, i, tissue_n),
+        }
+    }
+
+    /// The event of a layer (0-based).
+    pub(crate) fn event(&self, model: &Compiled, ruptures: &[usize], layer: usize) -> Event {
+        let ruptured = ruptures.get(layer).is_some_and(|r| *r != NEVER);
+        let own = model.law.slabs().get(layer).map_or(f64::INFINITY, |s| s.puncture_n);
+        self.strained.get(layer).unwrap_or(&UNSEEN).event(ruptured, own)
     }
 }
 
@@ -90,37 +190,12 @@ pub fn imposed(
     out: &mut [f64],
     events: &mut Vec<Event>,
 ) {
-    let lead = (model.delay_s * track.sample_hz).round() as usize;
-    let mut strained = [UNSEEN; 16];
-    let mut state = LawState::default();
-    let mut chain = if model.measures { Some(model.chain.start(track.sample_hz * 4.0)) } else { None };
-    let mut done = 0;
-    for i in 0..track.len() {
-        while done < ruptures.len() && ruptures[done] != NEVER && i + lead >= ruptures[done] {
-            done += 1;
-        }
-        let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
-        let force = model.law.step_imposed(&mut state, t, z, v, done, |s| {
-            let Some(mine) = strained.get_mut(s.layer - 1) else { return };
-            mine.elastic_before = if mine.seen { mine.elastic_at } else { 0.0 };
-            mine.force_before = mine.force_before.max(mine.force_at);
-            mine.place_before = mine.place_before.max(mine.place_at);
-            mine.elastic_at = s.elastic_n;
-            mine.force_at = s.elastic_n - s.puncture_n;
-            mine.place_at = s.tip_m - s.far_m;
-            mine.puncture = s.puncture_n;
-            mine.seen = true;
-        });
-        out[i] = match &mut chain {
-            None => force.total_n,
-            Some(chain) => measure(model, chain, track, i, force.total_n),
-        };
+    let mut replay = Replay::start(model, track);
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = replay.step(model, track, ruptures, i);
     }
     events.clear();
-    for (layer, slab) in model.law.slabs().iter().enumerate().take(strained.len()) {
-        let ruptured = ruptures.get(layer).is_some_and(|r| *r != NEVER);
-        events.push(strained[layer].event(ruptured, slab.puncture_n));
-    }
+    events.extend((0..model.law.slabs().len().min(LAYERS)).map(|l| replay.event(model, ruptures, l)));
 }
 
 fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usize, tissue_n: f64) -> f64 {

@@ -10,6 +10,7 @@
 //! | [`ruptures`] | where each layer ruptured in the data: law-guided Viterbi path, then the edge of the drop |
 //! | [`air`], [`noise`] | autoregressive noise (order two at most) before contact; whitening |
 //! | [`model`], [`forward`] | base parameters and effects as one vector; the replay with imposed or free ruptures, and one event per rupture |
+//! | [`columns`] | the slopes of the base parameters from one replay |
 //! | [`fit`], [`refine`] | bounded Levenberg-Marquardt on Huber's loss; ruptures moved to where a model wants them |
 //! | [`starts`], [`look`] | where fits begin; a linear look that ranks starts and tells what is invisible |
 //! | [`search`] | forward selection, every rival with the base re-fitted; exchange, pruning |
@@ -23,6 +24,7 @@
 pub mod air;
 pub mod benchmark;
 mod check;
+pub mod columns;
 pub mod curves;
 mod diagnose;
 mod error;

@@ -88,6 +88,15 @@ pub struct Compiled {
     pub measures: bool,
 }
 
+impl Compiled {
+    /// Samples by which a rupture of the tissue comes before the drop of the recorded force.
+    #[must_use]
+    #[inline]
+    pub fn lead(&self, track: &crate::track::Track) -> usize {
+        (self.delay_s * track.sample_hz).round() as usize
+    }
+}
+
 impl Model {
     /// The base model.
     #[must_use]

@@ -2,43 +2,83 @@
 //! the ruptures say, a membrane where it breaks.
 
 use crate::fit::{Data, Fit, Residuals, fit, objective, residuals, rho};
-use crate::forward::{self, Event};
-use crate::model::{Model, Role};
+use crate::forward::Replay;
+use crate::model::{Compiled, Model, Role};
 use crate::noise::{Noise, median};
 use crate::track::{NEVER, Track};
 
-/// Nats of one recording.
-fn nats(
-    model: &Model,
-    track: &Track,
-    ruptures: &[usize],
-    noise: &Noise,
-    buffers: &mut (Vec<f64>, Vec<f64>, Vec<Event>),
-) -> f64 {
-    let Some(compiled) = model.compile() else { return f64::INFINITY };
-    let (e, w, events) = buffers;
-    e.resize(track.len(), 0.0);
-    w.resize(track.len(), 0.0);
-    forward::imposed(&compiled, track, ruptures, e, events);
-    for (e, f) in e.iter_mut().zip(&track.f) {
-        *e = f - *e;
+/// Seconds of a recording before a rupture that a move of it may reach back to.
+const BEFORE_S: f64 = 1.3;
+/// Seconds after it in which a move shows.
+const AFTER_S: f64 = 2.0;
+
+/// A piece of a recording around the rupture of one layer, replayed again and again from its start.
+struct Window<'a> {
+    model: &'a Compiled,
+    track: &'a Track,
+    noise: &'a Noise,
+    layer: usize,
+    from: usize,
+    to: usize,
+    start: Replay,
+    e: Vec<f64>,
+}
+
+impl<'a> Window<'a> {
+    fn new(
+        model: &'a Compiled,
+        track: &'a Track,
+        noise: &'a Noise,
+        ruptures: &[usize],
+        layer: usize,
+    ) -> Self {
+        let at = ruptures[layer].min(track.len());
+        let lead = model.lead(track);
+        let before = (BEFORE_S * track.sample_hz) as usize + lead;
+        let from = at.saturating_sub(before);
+        let to = (at + (AFTER_S * track.sample_hz) as usize).min(track.len());
+        let mut start = Replay::start(model, track);
+        for i in 0..from {
+            start.step(model, track, ruptures, i);
+        }
+        Self { model, track, noise, layer, from, to, start, e: vec![0.0; to - from] }
     }
-    noise.whiten(track, e, w);
-    w.iter().map(|w| rho(*w)).sum::<f64>() + events.iter().map(|e| rho(e.u)).sum::<f64>()
+
+    /// Where a rupture may be moved to.
+    fn holds(&self, at: usize) -> bool {
+        at > self.from + self.model.lead(self.track) + 3 && at + 3 < self.to
+    }
+
+    fn nats(&mut self, ruptures: &[usize]) -> f64 {
+        let mut replay = self.start.clone();
+        for (e, i) in self.e.iter_mut().zip(self.from..self.to) {
+            *e = self.track.f[i] - replay.step(self.model, self.track, ruptures, i);
+        }
+        let mut nats = 0.0;
+        for k in 2..self.e.len() {
+            nats += rho(self.noise.one(self.track, self.from + k, [self.e[k], self.e[k - 1], self.e[k - 2]]));
+        }
+        let layers = self.layer..(self.layer + 2).min(ruptures.len());
+        nats + layers
+            .filter(|l| ruptures[*l] != NEVER && ruptures[*l] < self.to)
+            .map(|l| rho(replay.event(self.model, ruptures, l).u))
+            .sum::<f64>()
+    }
 }
 
 /// Moves every rupture to the sample where this model fits best, by steps that double and halve. True
 /// when one moved.
 pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
+    let Some(compiled) = model.compile() else { return false };
     let mut moved = false;
     let tracks = data.tracks.clone();
-    let mut buffers = (Vec::new(), Vec::new(), Vec::new());
     for (track, ruptures) in tracks.iter().zip(&mut data.ruptures) {
-        let mut best = nats(model, track, ruptures, &data.noise, &mut buffers);
         for layer in 0..ruptures.len() {
             if ruptures[layer] == NEVER {
                 continue;
             }
+            let mut window = Window::new(&compiled, track, &data.noise, ruptures, layer);
+            let mut best = window.nats(ruptures);
             let steps: &[i64] = if wide { &[1, 3, 9, 27, 81] } else { &[1, 4] };
             for sign in [-1_i64, 1] {
                 let mut step = steps.len();
@@ -52,9 +92,9 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
                         .get(layer + 1)
                         .filter(|r| **r != NEVER)
                         .map_or(track.len() as i64 - 1, |r| *r as i64);
-                    if to >= low && to <= high {
+                    if to >= low && to <= high && window.holds(to as usize) {
                         let was = std::mem::replace(&mut ruptures[layer], to as usize);
-                        let value = nats(model, track, ruptures, &data.noise, &mut buffers);
+                        let value = window.nats(ruptures);
                         if value < best - 1e-9 {
                             best = value;
                             moved = true;
@@ -77,6 +117,7 @@ pub fn seed_punctures(model: &mut Model, data: &Data) {
         return;
     }
     let layers = model.assumed.layers.len();
+    let events_alone = crate::columns::are_linear(model);
     for layer in 0..layers {
         let Some(assumed) = model.assumed.layers[layer].puncture_n else { continue };
         let mut forces: Vec<f64> = data
@@ -91,9 +132,23 @@ pub fn seed_punctures(model: &mut Model, data: &Data) {
             continue;
         }
         let (low, high) = (assumed * (1.0 - model.tolerance), assumed * (1.0 + model.tolerance));
-        let before = objective(model, &r);
         let mut trial = model.clone();
-        trial.tissue.layers[layer].puncture_n = Some(median(&mut forces).clamp(low, high));
+        let new = median(&mut forces).clamp(low, high);
+        let old = model.tissue.layers[layer].puncture_n.unwrap_or(assumed);
+        trial.tissue.layers[layer].puncture_n = Some(new);
+        if events_alone {
+            // Nothing but the layer's events and the prior change.
+            let share = new / old - 1.0;
+            let own = || r.events.iter().skip(layer).step_by(layers);
+            let events: f64 = own().map(|e| rho(e.u_at(0.0, share)) - rho(e.u)).sum();
+            let sd = model.tolerance * assumed;
+            let drawn = 0.5 * (((new - assumed) / sd).powi(2) - ((old - assumed) / sd).powi(2));
+            if events + drawn < 0.0 {
+                *model = trial;
+            }
+            continue;
+        }
+        let before = objective(model, &r);
         let mut with = Residuals::default();
         if residuals(&trial, data, &mut with) && objective(&trial, &with) < before {
             *model = trial;
