@@ -127,6 +127,7 @@ pub(crate) struct Replay {
     chain: Option<MeasurementState>,
     strained: [Strained; LAYERS],
     done: usize,
+    lead: usize,
 }
 
 impl Replay {
@@ -137,6 +138,7 @@ impl Replay {
             chain: model.measures.then(|| model.chain.start(track.sample_hz * 4.0)),
             strained: [UNSEEN; LAYERS],
             done: 0,
+            lead: model.lead(track),
         }
     }
 
@@ -149,8 +151,7 @@ impl Replay {
         ruptures: &[usize],
         i: usize,
     ) -> TissueForce {
-        let lead = model.lead(track);
-        while self.done < ruptures.len() && ruptures[self.done] != NEVER && i + lead >= ruptures[self.done] {
+        while self.done < ruptures.len() && ruptures[self.done] != NEVER && i + self.lead >= ruptures[self.done] {
             self.done += 1;
         }
         let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);

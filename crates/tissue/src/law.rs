@@ -333,7 +333,8 @@ impl Law {
             2.0
         };
         let by_force = at_force <= at_face;
-        let at = at_force.min(at_face);
+        // Imposed ruptures may come without either: at the end of the step.
+        let at = at_force.min(at_face).min(1.0);
         Rupture {
             layer: state.ruptured + 1,
             time_s: state.time_s + at * dt,
