@@ -33,8 +33,9 @@ fn weight(w: f64) -> f64 {
 pub struct Data {
     /// The recordings.
     pub tracks: Arc<Vec<Track>>,
-    /// Per recording and layer the sample at which it has ruptured.
-    pub ruptures: Vec<Vec<usize>>,
+    /// Per recording and layer the time (s) at which the recorded force shows its rupture, or
+    /// [`NEVER`](crate::track::NEVER).
+    pub ruptures: Vec<Vec<f64>>,
     /// The noise.
     pub noise: Noise,
 }
@@ -49,9 +50,8 @@ impl Data {
     /// The same in blocks of `q`; `scale` is the noise there.
     #[must_use]
     pub fn blocks(&self, q: usize, noise: Noise) -> Self {
-        let (tracks, ruptures): (Vec<Track>, _) =
-            self.tracks.iter().zip(&self.ruptures).map(|(track, r)| track.blocks(q, r)).unzip();
-        Self { tracks: Arc::new(tracks), ruptures, noise }
+        let tracks = self.tracks.iter().zip(&self.ruptures).map(|(track, r)| track.blocks(q, r)).collect();
+        Self { tracks: Arc::new(tracks), ruptures: self.ruptures.clone(), noise }
     }
 }
 
@@ -79,9 +79,7 @@ pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
         let to = from + track.len();
         let e = &mut out.e[from..to];
         forward::imposed(&compiled, track, ruptures, e, &mut out.scratch);
-        for (e, f) in e.iter_mut().zip(&track.f) {
-            *e = f - *e;
-        }
+        forward::departures(track, ruptures, &data.noise, 0, e);
         data.noise.whiten(track, e, &mut out.w[from..to]);
         out.events.extend_from_slice(&out.scratch);
         from = to;

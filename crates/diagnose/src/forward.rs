@@ -5,6 +5,7 @@
 //! the law decides, as in any simulation.
 
 use crate::model::Compiled;
+use crate::noise::Noise;
 use crate::track::{NEVER, Track};
 use stylet_tissue::{LawState, MeasurementState, Reading, Strain, TissueForce};
 
@@ -127,7 +128,7 @@ pub(crate) struct Replay {
     chain: Option<MeasurementState>,
     strained: [Strained; LAYERS],
     done: usize,
-    lead: usize,
+    before: Option<(f64, f64, f64)>,
 }
 
 impl Replay {
@@ -138,7 +139,7 @@ impl Replay {
             chain: model.measures.then(|| model.chain.start(track.sample_hz * 4.0)),
             strained: [UNSEEN; LAYERS],
             done: 0,
-            lead: model.lead(track),
+            before: None,
         }
     }
 
@@ -148,24 +149,59 @@ impl Replay {
         &mut self,
         model: &Compiled,
         track: &Track,
-        ruptures: &[usize],
+        ruptures: &[f64],
         i: usize,
     ) -> TissueForce {
-        while self.done < ruptures.len() && ruptures[self.done] != NEVER && i + self.lead >= ruptures[self.done] {
+        let now = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
+        while let Some(&at) = ruptures.get(self.done).filter(|r| **r - model.delay_s <= now.0) {
+            if model.feels_instants {
+                self.rupture(model, track, i, now, at - model.delay_s);
+            }
             self.done += 1;
         }
-        let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
+        self.before = Some(now);
         let strained = &mut self.strained;
-        model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| {
+        model.law.step_imposed(&mut self.state, now.0, now.1, now.2, self.done, |s| {
             if let Some(mine) = strained.get_mut(s.layer - 1) {
                 mine.note(&s);
             }
         })
     }
 
+    /// A rupture between the sample before and sample `i`, at its instant: law and chain see the force
+    /// just before and just after it.
+    #[cold]
+    fn rupture(&mut self, model: &Compiled, track: &Track, i: usize, now: (f64, f64, f64), at_s: f64) {
+        let before = self.before.unwrap_or(now);
+        // What the strain would have been at the sample, had nothing happened.
+        let mut peek = self.state;
+        let (strained, done) = (&mut self.strained, self.done);
+        model.law.step_imposed(&mut peek, now.0, now.1, now.2, done, |s| {
+            if let Some(mine) = strained.get_mut(s.layer - 1) {
+                mine.note(&s);
+            }
+        });
+        let span = now.0 - before.0;
+        let share = if span > 0.0 { ((at_s - before.0) / span).clamp(0.0, 1.0) } else { 1.0 };
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        let (t, z, v) = (mix(before.0, now.0), mix(before.1, now.1), mix(before.2, now.2));
+        let a = track.a[i] * model.to_true;
+        for done in [done, done + 1] {
+            let force = model.law.step_imposed(&mut self.state, t, z, v, done, |_| {});
+            if let Some(chain) = &mut self.chain {
+                let (tissue_n, velocity_mps) = (force.total_n, v);
+                model.chain.step(
+                    chain,
+                    &Reading { time_s: t, velocity_mps, acceleration_mps2: a, tissue_n, noise_n: 0.0 },
+                );
+            }
+        }
+        self.before = Some((t, z, v));
+    }
+
     /// The recorded force at sample `i`, to be called in order.
     #[inline]
-    pub(crate) fn step(&mut self, model: &Compiled, track: &Track, ruptures: &[usize], i: usize) -> f64 {
+    pub(crate) fn step(&mut self, model: &Compiled, track: &Track, ruptures: &[f64], i: usize) -> f64 {
         let tissue_n = self.tissue(model, track, ruptures, i).total_n;
         match &mut self.chain {
             None => tissue_n,
@@ -174,29 +210,51 @@ impl Replay {
     }
 
     /// The event of a layer (0-based).
-    pub(crate) fn event(&self, model: &Compiled, ruptures: &[usize], layer: usize) -> Event {
+    pub(crate) fn event(&self, model: &Compiled, ruptures: &[f64], layer: usize) -> Event {
         let ruptured = ruptures.get(layer).is_some_and(|r| *r != NEVER);
         let own = model.law.slabs().get(layer).map_or(f64::INFINITY, |s| s.puncture_n);
         self.strained.get(layer).unwrap_or(&UNSEEN).event(ruptured, own)
     }
 }
 
-/// Replays with imposed ruptures (`ruptures[i]`: the sample at which layer `i` has given way in the
-/// recorded force, or [`NEVER`]); writes the recorded force that the model predicts and one event per
+/// Replays with imposed ruptures (`ruptures[i]`: the time (s) at which the recorded force shows the rupture of
+/// layer `i`, or [`NEVER`]); writes the recorded force that the model predicts and one event per
 /// layer.
-pub fn imposed(
-    model: &Compiled,
-    track: &Track,
-    ruptures: &[usize],
-    out: &mut [f64],
-    events: &mut Vec<Event>,
-) {
+pub fn imposed(model: &Compiled, track: &Track, ruptures: &[f64], out: &mut [f64], events: &mut Vec<Event>) {
     let mut replay = Replay::start(model, track);
     for (i, out) in out.iter_mut().enumerate() {
         *out = replay.step(model, track, ruptures, i);
     }
     events.clear();
     events.extend((0..model.law.slabs().len().min(LAYERS)).map(|l| replay.event(model, ruptures, l)));
+}
+
+/// How much of a departure counts at the sample of a drop, in standard deviations of the noise.
+const MIXED_SD: f64 = 3.0;
+
+/// Turns predicted forces into recorded less predicted ones. The first sample after a rupture may have
+/// seen the force from before and after it, whatever the sensor does between samples: between the two
+/// predictions it counts for little. `e` begins at sample `from`.
+pub(crate) fn departures(track: &Track, ruptures: &[f64], noise: &Noise, from: usize, e: &mut [f64]) {
+    let mixed: Vec<(usize, f64)> = ruptures
+        .iter()
+        .filter_map(|r| track.first_from(*r).checked_sub(from))
+        .filter(|k| (1..e.len()).contains(k))
+        .map(|k| (k, mixed(track.f[from + k], e[k - 1], e[k], noise)))
+        .collect();
+    for (e, f) in e.iter_mut().zip(&track.f[from..]) {
+        *e = f - *e;
+    }
+    for (k, departure) in mixed {
+        e[k] = departure;
+    }
+}
+
+/// The departure of a sample between two predictions.
+pub(crate) fn mixed(f: f64, before: f64, after: f64, noise: &Noise) -> f64 {
+    let beyond = f - f.clamp(before.min(after), before.max(after));
+    let e = f - after;
+    beyond + (e - beyond).clamp(-MIXED_SD * noise.marginal_n, MIXED_SD * noise.marginal_n)
 }
 
 fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usize, tissue_n: f64) -> f64 {
@@ -210,15 +268,18 @@ fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usi
     model.chain.step(chain, &reading)
 }
 
-/// Replays with the law's own ruptures; returns the instants (s) at which layers gave way.
+/// Replays with the law's own ruptures; returns the instants (s) at which the recorded force shows them.
 pub fn free(model: &Compiled, track: &Track, out: &mut [f64]) -> Vec<f64> {
     let mut state = LawState::default();
-    let mut chain = model.chain.start(track.sample_hz);
-    let mut instants = Vec::new();
+    let mut instants = vec![NEVER; model.law.slabs().len()];
     for i in 0..track.len() {
         let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
-        let force = model.law.step(&mut state, t, z, v, |r| instants.push(r.time_s));
-        out[i] = measure(model, &mut chain, track, i, force.total_n);
+        model.law.step(&mut state, t, z, v, |r| {
+            if let Some(instant) = instants.get_mut(r.layer - 1) {
+                *instant = r.time_s + model.delay_s;
+            }
+        });
     }
+    imposed(model, track, &instants, out, &mut Vec::new());
     instants
 }

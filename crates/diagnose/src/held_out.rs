@@ -31,8 +31,7 @@ pub fn free_residual(model: &Model, track: &Track) -> Vec<f64> {
     let instants = forward::free(&compiled, track, &mut out);
     let mut e: Vec<f64> = track.f.iter().zip(&out).map(|(f, p)| f - p).collect();
     for instant in instants {
-        let delayed = instant + compiled.delay_s;
-        let k = track.t.partition_point(|t| *t < delayed);
+        let k = track.first_from(instant);
         for i in k.saturating_sub(FORGIVEN)..(k + FORGIVEN + 1).min(track.len()) {
             for j in i.saturating_sub(FORGIVEN)..(i + FORGIVEN + 1).min(track.len()) {
                 let other = track.f[i] - out[j];
@@ -62,7 +61,7 @@ pub fn rms(track: &Track, e: &[f64]) -> f64 {
 #[must_use]
 pub fn gain(search: &Search, base: &Candidate, best: &Candidate) -> Vec<Before> {
     let n = search.data.tracks.len();
-    let one = |model: &Model, ruptures: &[Vec<usize>], left: usize| -> Vec<f64> {
+    let one = |model: &Model, ruptures: &[Vec<f64>], left: usize| -> Vec<f64> {
         let model = if n < 2 { model.clone() } else { without(search, model, ruptures, left) };
         free_residual(&model, &search.data.tracks[left])
     };
@@ -81,7 +80,7 @@ pub fn gain(search: &Search, base: &Candidate, best: &Candidate) -> Vec<Before> 
         .collect()
 }
 
-fn without(search: &Search, model: &Model, ruptures: &[Vec<usize>], left: usize) -> Model {
+fn without(search: &Search, model: &Model, ruptures: &[Vec<f64>], left: usize) -> Model {
     let others = |k: &usize| *k != left;
     let n = search.data.tracks.len();
     let data = Data {

@@ -86,15 +86,8 @@ pub struct Compiled {
     pub delay_s: f64,
     /// The chain changes the force.
     pub measures: bool,
-}
-
-impl Compiled {
-    /// Samples by which a rupture of the tissue comes before the drop of the recorded force.
-    #[must_use]
-    #[inline]
-    pub fn lead(&self, track: &crate::track::Track) -> usize {
-        (self.delay_s * track.sample_hz).round() as usize
-    }
+    /// The instant of a rupture between two samples matters afterwards.
+    pub feels_instants: bool,
 }
 
 impl Model {
@@ -151,7 +144,19 @@ impl Model {
             .iter()
             .map(|e| if let AnyEffect::TimeDelay(delay) = e { delay.delay_s } else { 0.0 })
             .sum();
-        Some(Compiled { law, to_true: chain.true_position(1.0), measures: !chain.is_plain(), chain, delay_s })
+        let feels_instants = effects.iter().any(|e| {
+            matches!(
+                e,
+                AnyEffect::StressRelaxation(_)
+                    | AnyEffect::NeedleCompliance(_)
+                    | AnyEffect::LowPassLag(_)
+                    | AnyEffect::TimeDelay(_)
+                    | AnyEffect::SoftBoundary(_)
+                    | AnyEffect::IncompleteRelease(_)
+            )
+        });
+        let (to_true, measures) = (chain.true_position(1.0), !chain.is_plain());
+        Some(Compiled { law, to_true, measures, chain, delay_s, feels_instants })
     }
 
     /// The numbers that are fitted.

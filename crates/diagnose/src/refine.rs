@@ -2,7 +2,7 @@
 //! the ruptures say, a membrane where it breaks.
 
 use crate::fit::{Data, Fit, Residuals, fit, objective, residuals, rho};
-use crate::forward::Replay;
+use crate::forward::{self, Replay};
 use crate::model::{Compiled, Model, Role};
 use crate::noise::{Noise, median};
 use crate::track::{NEVER, Track};
@@ -25,51 +25,55 @@ struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    fn new(
-        model: &'a Compiled,
-        track: &'a Track,
-        noise: &'a Noise,
-        ruptures: &[usize],
-        layer: usize,
-    ) -> Self {
-        let at = ruptures[layer].min(track.len());
-        let lead = model.lead(track);
-        let before = (BEFORE_S * track.sample_hz) as usize + lead;
-        let from = at.saturating_sub(before);
-        let to = (at + (AFTER_S * track.sample_hz) as usize).min(track.len());
+    fn new(model: &'a Compiled, track: &'a Track, noise: &'a Noise, ruptures: &[f64], layer: usize) -> Self {
+        let from = track.first_from(ruptures[layer] - BEFORE_S - model.delay_s);
+        let to = track.first_from(ruptures[layer] + AFTER_S);
         let mut start = Replay::start(model, track);
         for i in 0..from {
             start.step(model, track, ruptures, i);
         }
-        Self { model, track, noise, layer, from, to, start, e: vec![0.0; to - from] }
+        Self { model, track, noise, layer, from, to, start, e: vec![0.0; to.saturating_sub(from)] }
     }
 
     /// Where a rupture may be moved to.
-    fn holds(&self, at: usize) -> bool {
-        at > self.from + self.model.lead(self.track) + 3 && at + 3 < self.to
+    fn holds(&self, at_s: f64) -> bool {
+        let at = self.track.first_from(at_s - self.model.delay_s);
+        at > self.from + 3 && self.track.first_from(at_s) + 3 < self.to
     }
 
-    fn nats(&mut self, ruptures: &[usize]) -> f64 {
+    fn nats(&mut self, ruptures: &[f64]) -> f64 {
         let mut replay = self.start.clone();
         for (e, i) in self.e.iter_mut().zip(self.from..self.to) {
-            *e = self.track.f[i] - replay.step(self.model, self.track, ruptures, i);
+            *e = replay.step(self.model, self.track, ruptures, i);
         }
+        forward::departures(self.track, ruptures, self.noise, self.from, &mut self.e);
         let mut nats = 0.0;
         for k in 2..self.e.len() {
             nats += rho(self.noise.one(self.track, self.from + k, [self.e[k], self.e[k - 1], self.e[k - 2]]));
         }
         let layers = self.layer..(self.layer + 2).min(ruptures.len());
         nats + layers
-            .filter(|l| ruptures[*l] != NEVER && ruptures[*l] < self.to)
+            .filter(|l| self.track.first_from(ruptures[*l]) < self.to)
             .map(|l| rho(replay.event(self.model, ruptures, l).u))
             .sum::<f64>()
     }
 }
 
-/// Moves every rupture to the sample where this model fits best, by steps that double and halve. True
+/// Steps in samples by which ruptures are moved: at first, later, and for models that feel where
+/// between two samples a rupture is.
+const WIDE: [f64; 5] = [1.0, 3.0, 9.0, 27.0, 81.0];
+const NARROW: [f64; 2] = [1.0, 4.0];
+const BETWEEN: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
+
+/// Moves every rupture to the instant where this model fits best, by steps that double and halve. True
 /// when one moved.
 pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
     let Some(compiled) = model.compile() else { return false };
+    let mut steps: Vec<f64> = Vec::new();
+    if compiled.feels_instants {
+        steps.extend(BETWEEN);
+    }
+    steps.extend(if wide { &WIDE[..] } else { &NARROW[..] });
     let mut moved = false;
     let tracks = data.tracks.clone();
     for (track, ruptures) in tracks.iter().zip(&mut data.ruptures) {
@@ -79,21 +83,18 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
             }
             let mut window = Window::new(&compiled, track, &data.noise, ruptures, layer);
             let mut best = window.nats(ruptures);
-            let steps: &[i64] = if wide { &[1, 3, 9, 27, 81] } else { &[1, 4] };
-            for sign in [-1_i64, 1] {
+            let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
+            let end = track.t.last().copied().unwrap_or(0.0);
+            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end);
+            for sign in [-1.0, 1.0] {
                 let mut step = steps.len();
                 let mut turns = 0;
                 // From the widest step that helps to the narrowest.
                 while step > 0 && turns < 30 {
                     turns += 1;
-                    let to = ruptures[layer] as i64 + sign * steps[step - 1];
-                    let low = if layer > 0 { ruptures[layer - 1] as i64 } else { 1 };
-                    let high = ruptures
-                        .get(layer + 1)
-                        .filter(|r| **r != NEVER)
-                        .map_or(track.len() as i64 - 1, |r| *r as i64);
-                    if to >= low && to <= high && window.holds(to as usize) {
-                        let was = std::mem::replace(&mut ruptures[layer], to as usize);
+                    let to = ruptures[layer] + sign * steps[step - 1] / track.sample_hz;
+                    if to >= low && to <= high && window.holds(to) {
+                        let was = std::mem::replace(&mut ruptures[layer], to);
                         let value = window.nats(ruptures);
                         if value < best - 1e-9 {
                             best = value;

@@ -10,14 +10,17 @@ use crate::model::Model;
 use crate::track::{NEVER, Track};
 use stylet_tissue::{Slab, Tissue};
 
+/// No sample.
+const NONE: usize = usize::MAX;
+
 /// Samples per second of the first pass.
 const COARSE_HZ: f64 = 50.0;
 
 /// Finds the ruptures in every recording and first values of stiffness and friction.
 #[must_use]
-pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<usize>> {
+pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<f64>> {
     let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / COARSE_HZ).round().max(1.0) as usize;
-    let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[]).0).collect();
+    let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[])).collect();
     let range = coarse.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
     let mut paths: Vec<Vec<usize>> = Vec::new();
     for turn in 0..5 {
@@ -39,12 +42,12 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<usize>> {
             let mut previous = 0;
             path.iter()
                 .map(|&r| {
-                    if r == NEVER {
+                    if r == NONE {
                         return NEVER;
                     }
                     let at = edge(force, track, (r * q).min(track.len() - 1), 2 * q).max(previous);
                     previous = at;
-                    at
+                    track.before(at)
                 })
                 .collect()
         })
@@ -97,7 +100,7 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
         }
     }
     let mut state = (0..states).min_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
-    let mut out = vec![NEVER; slabs.len()];
+    let mut out = vec![NONE; slabs.len()];
     for i in (0..n).rev() {
         let came = usize::from(from[i * states + state]);
         if came < state {

@@ -52,8 +52,8 @@ impl Settings {
 pub struct Candidate {
     /// The model.
     pub model: Model,
-    /// Ruptures per recording and layer.
-    pub ruptures: Vec<Vec<usize>>,
+    /// Instants (s) of ruptures per recording and layer.
+    pub ruptures: Vec<Vec<f64>>,
     /// Objective in nats.
     pub nats: f64,
 }
@@ -82,7 +82,7 @@ pub struct Stage {
 }
 
 /// A fit under way on averages: the fit, its data, the ruptures at full rate.
-type Begun = (Fit, Data, Vec<Vec<usize>>);
+type Begun = (Fit, Data, Vec<Vec<f64>>);
 
 /// Everything that the search works on and finds.
 pub struct Search {
@@ -264,11 +264,11 @@ impl Search {
             kept += usize::from(keep);
             keep
         });
-        let fits: Vec<Option<(Fit, Vec<Vec<usize>>)>> = begun
+        let fits: Vec<Option<(Fit, Vec<Vec<f64>>)>> = begun
             .par_iter()
             .map(|(f, there, ruptures)| Some((fit(&f.model, there, 6, 0.1)?, ruptures.clone())))
             .collect();
-        let mut best: Vec<(Fit, Vec<Vec<usize>>)> = Vec::new();
+        let mut best: Vec<(Fit, Vec<Vec<f64>>)> = Vec::new();
         for found in fits.into_iter().flatten() {
             let id = found.0.model.names().last().copied();
             match best.iter_mut().find(|b| b.0.model.names().last().copied() == id) {
@@ -288,7 +288,7 @@ impl Search {
             let gain = stood.nats - b.0.nats;
             gain > 0.5 * lead - 40.0 && (gain > 2.5 || (gain > -400.0 && lead > 50.0))
         });
-        let mut finalists: Vec<(Model, Vec<Vec<usize>>)> =
+        let mut finalists: Vec<(Model, Vec<Vec<f64>>)> =
             best.into_iter().map(|(f, r)| (f.model, r)).collect();
         for c in self.sharp(standing, &data, lead > 30.0) {
             finalists.push((standing.model.with(c), standing.ruptures.clone()));
@@ -388,7 +388,7 @@ impl Search {
         // A gain of thousands is no failure of the optimiser.
         let ahead = rivals.first().map_or(0.0, |r| standing.nats - r.nats);
         let more = if (4.0..2000.0).contains(&ahead) { 2 } else { 0 };
-        let roads: Vec<(Model, Vec<Vec<usize>>)> =
+        let roads: Vec<(Model, Vec<Vec<f64>>)> =
             std::iter::once((standing.model.clone(), standing.ruptures.clone()))
                 .chain(rivals.iter().take(more).map(|r| {
                     let mut model = r.model.clone();
@@ -438,7 +438,7 @@ impl Search {
         }
     }
 
-    fn refitted(&self, model: &Model, ruptures: &[Vec<usize>]) -> Option<Candidate> {
+    fn refitted(&self, model: &Model, ruptures: &[Vec<f64>]) -> Option<Candidate> {
         let mut there = Data { ruptures: ruptures.to_vec(), ..self.data.clone() };
         let f = refine(model, &mut there, 2, 5, true)?;
         Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
@@ -598,13 +598,16 @@ fn shift(data: &Data, start: &Start) -> Data {
         return out;
     }
     for (track, ruptures) in data.tracks.iter().zip(&mut out.ruptures) {
-        let mut previous = 1;
+        let mut previous = track.before(1);
         for r in ruptures.iter_mut().filter(|r| **r != NEVER) {
-            let by = (start.lead_s * track.sample_hz).round() as usize;
-            let mut at = r.saturating_sub(by);
-            let edge = track.z[*r] - start.lead_m;
-            while start.lead_m > 0.0 && at > 1 && track.z[at - 1] > edge {
-                at -= 1;
+            let mut at = *r - start.lead_s;
+            if start.lead_m > 0.0 {
+                let mut k = track.first_from(*r).min(track.len() - 1);
+                let edge = track.z[k] - start.lead_m;
+                while k > 1 && track.z[k - 1] > edge {
+                    k -= 1;
+                }
+                at = track.before(k);
             }
             *r = at.max(previous);
             previous = *r;

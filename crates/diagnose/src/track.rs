@@ -3,8 +3,8 @@
 
 use stylet_record::Recording;
 
-/// A layer that never ruptured.
-pub const NEVER: usize = usize::MAX;
+/// The instant (s) of a rupture that never was.
+pub const NEVER: f64 = f64::INFINITY;
 
 /// Columns of one recording, at its own rate or averaged in blocks.
 #[derive(Clone, Debug, Default)]
@@ -87,6 +87,19 @@ impl Track {
         }
     }
 
+    /// The first sample at `time_s` or later.
+    #[must_use]
+    pub fn first_from(&self, time_s: f64) -> usize {
+        self.t.partition_point(|t| *t < time_s)
+    }
+
+    /// The instant in the middle between sample `i` and the one before.
+    #[must_use]
+    pub fn before(&self, i: usize) -> f64 {
+        let Some(&t) = self.t.get(i) else { return NEVER };
+        0.5 * (t + if i > 0 { self.t[i - 1] } else { t - 1.0 / self.sample_hz })
+    }
+
     fn find_restarts(&mut self) {
         let long = 1.8 / self.sample_hz;
         self.restart = (0..self.len())
@@ -100,25 +113,21 @@ impl Track {
             .collect();
     }
 
-    /// Averages over blocks of `q` samples. The samples before and at each of `breaks` stay alone, so
+    /// Averages over blocks of `q` samples. The samples before and at each of `breaks` (s) stay alone, so
     /// that an instant between them stays where it was; pieces that are not whole blocks are replayed
-    /// but not compared. Returns the track and the places of `breaks` in it.
+    /// but not compared.
     #[must_use]
-    pub fn blocks(&self, q: usize, breaks: &[usize]) -> (Self, Vec<usize>) {
+    pub fn blocks(&self, q: usize, breaks: &[f64]) -> Self {
         let n = self.len();
         let mut edges: Vec<usize> = Vec::new();
-        for &b in breaks.iter().filter(|b| **b < n) {
+        for b in breaks.iter().map(|b| self.first_from(*b)).filter(|b| *b < n) {
             edges.extend([b.saturating_sub(1), b, b + 1]);
         }
         edges.extend([0, n]);
         edges.sort_unstable();
         edges.dedup();
         let mut out = Self { sample_hz: self.sample_hz / q as f64, ..Self::default() };
-        let mut places = vec![NEVER; breaks.len()];
         for pair in edges.windows(2) {
-            for (place, _) in places.iter_mut().zip(breaks).filter(|(_, b)| **b == pair[0]) {
-                *place = out.len();
-            }
             let mut from = pair[0];
             while from < pair[1] {
                 let to = (from + q).min(pair[1]);
@@ -133,7 +142,7 @@ impl Track {
             }
         }
         out.find_restarts();
-        (out, places)
+        out
     }
 }
 
