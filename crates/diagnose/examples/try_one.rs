@@ -77,5 +77,32 @@ fn main() {
     for e in &search.best.model.effects {
         println!("{} {:?}", e.info.id, e.values);
     }
+    let choices: Vec<_> = drawn
+        .effects
+        .iter()
+        .map(|e| {
+            use stylet_tissue::Effect;
+            stylet_diagnose::model::Choice::new(e.info(), &e.parameters())
+        })
+        .collect();
+    let mut truth = search.base.model.clone();
+    truth.tissue = case.truth.clone();
+    truth.effects = choices;
+    let mut data = search.data.clone();
+    data.ruptures = case.ruptures.clone();
+    println!("truth as drawn {:.1}", stylet_diagnose::search::nats(&truth, &data));
+    if let Some(f) = stylet_diagnose::refine::refine(&truth, &mut data, 3, 8, false) {
+        println!(
+            "truth refined {:.1}: {:?} {:?}",
+            f.nats,
+            f.model.effects.iter().map(|e| &e.values).collect::<Vec<_>>(),
+            data.ruptures
+        );
+        println!("  K {:?}", f.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>());
+    }
+    println!(
+        "found K {:?}",
+        search.best.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>()
+    );
     println!("nats {:.1}; ruptures {:?}", search.best.nats, search.best.ruptures);
 }

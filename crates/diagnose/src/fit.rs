@@ -79,7 +79,7 @@ pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
         let to = from + track.len();
         let e = &mut out.e[from..to];
         forward::imposed(&compiled, track, ruptures, e, &mut out.scratch);
-        forward::departures(track, ruptures, &data.noise, 0, e);
+        forward::departures(&compiled, track, ruptures, &data.noise, 0, e);
         data.noise.whiten(track, e, &mut out.w[from..to]);
         out.events.extend_from_slice(&out.scratch);
         from = to;
@@ -282,9 +282,10 @@ pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit>
     let mut nats = objective(&best, &at);
     let mut lambda = 1e-4;
     let mut last: Option<Jacobian> = None;
+    let linear = crate::columns::are_linear(model);
     for turn in 0..turns {
-        // The force is nearly linear in the base parameters: their columns serve for three turns.
-        let keep = if turn % 3 == 0 { None } else { last.as_ref() };
+        // Where the columns of the base parameters cost a replay each, they serve for three turns.
+        let keep = if turn % 3 == 0 || linear { None } else { last.as_ref() };
         let jac = jacobian(&best, data, &at, &mut work, keep);
         let p = best.vector(&jac.slots);
         let (h, g) = normal(&best, &jac, &at);

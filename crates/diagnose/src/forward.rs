@@ -128,6 +128,7 @@ pub(crate) struct Replay {
     chain: Option<MeasurementState>,
     strained: [Strained; LAYERS],
     done: usize,
+    kink: usize,
     before: Option<(f64, f64, f64)>,
 }
 
@@ -139,6 +140,7 @@ impl Replay {
             chain: model.measures.then(|| model.chain.start(track.sample_hz * 4.0)),
             strained: [UNSEEN; LAYERS],
             done: 0,
+            kink: 0,
             before: None,
         }
     }
@@ -155,9 +157,13 @@ impl Replay {
         let now = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
         while let Some(&at) = ruptures.get(self.done).filter(|r| **r - model.delay_s <= now.0) {
             if model.feels_instants {
+                self.kinks(model, track, i, at - model.delay_s);
                 self.rupture(model, track, i, now, at - model.delay_s);
             }
             self.done += 1;
+        }
+        if model.feels_instants {
+            self.kinks(model, track, i, NEVER);
         }
         self.before = Some(now);
         let strained = &mut self.strained;
@@ -166,6 +172,38 @@ impl Replay {
                 mine.note(&s);
             }
         })
+    }
+
+    /// Jumps of the velocity between the sample before and sample `i`, as far as they come before `until_s`.
+    #[inline]
+    fn kinks(&mut self, model: &Compiled, track: &Track, i: usize, until_s: f64) {
+        while let Some(kink) = track.kinks.get(self.kink).filter(|k| k.sample <= i && k.t < until_s) {
+            self.kink += 1;
+            if kink.sample == i {
+                let z = kink.z * model.to_true;
+                for v in kink.v {
+                    self.between(model, track, i, (kink.t, z, v * model.to_true), self.done);
+                }
+            }
+        }
+    }
+
+    /// Law and chain at an instant between the sample before and sample `i`.
+    fn between(
+        &mut self,
+        model: &Compiled,
+        track: &Track,
+        i: usize,
+        (time_s, z, velocity_mps): (f64, f64, f64),
+        done: usize,
+    ) {
+        let force = model.law.step_imposed(&mut self.state, time_s, z, velocity_mps, done, |_| {});
+        if let Some(chain) = &mut self.chain {
+            let (tissue_n, acceleration_mps2) = (force.total_n, track.a[i] * model.to_true);
+            let reading = Reading { time_s, velocity_mps, acceleration_mps2, tissue_n, noise_n: 0.0 };
+            model.chain.step(chain, &reading);
+        }
+        self.before = Some((time_s, z, velocity_mps));
     }
 
     /// A rupture between the sample before and sample `i`, at its instant: law and chain see the force
@@ -185,18 +223,9 @@ impl Replay {
         let share = if span > 0.0 { ((at_s - before.0) / span).clamp(0.0, 1.0) } else { 1.0 };
         let mix = |a: f64, b: f64| a + share * (b - a);
         let (t, z, v) = (mix(before.0, now.0), mix(before.1, now.1), mix(before.2, now.2));
-        let a = track.a[i] * model.to_true;
         for done in [done, done + 1] {
-            let force = model.law.step_imposed(&mut self.state, t, z, v, done, |_| {});
-            if let Some(chain) = &mut self.chain {
-                let (tissue_n, velocity_mps) = (force.total_n, v);
-                model.chain.step(
-                    chain,
-                    &Reading { time_s: t, velocity_mps, acceleration_mps2: a, tissue_n, noise_n: 0.0 },
-                );
-            }
+            self.between(model, track, i, (t, z, v), done);
         }
-        self.before = Some((t, z, v));
     }
 
     /// The recorded force at sample `i`, to be called in order.
@@ -232,16 +261,42 @@ pub fn imposed(model: &Compiled, track: &Track, ruptures: &[f64], out: &mut [f64
 /// How much of a departure counts at the sample of a drop, in standard deviations of the noise.
 const MIXED_SD: f64 = 3.0;
 
-/// Turns predicted forces into recorded less predicted ones. The first sample after a rupture may have
-/// seen the force from before and after it, whatever the sensor does between samples: between the two
-/// predictions it counts for little. `e` begins at sample `from`.
-pub(crate) fn departures(track: &Track, ruptures: &[f64], noise: &Noise, from: usize, e: &mut [f64]) {
-    let mixed: Vec<(usize, f64)> = ruptures
-        .iter()
-        .filter_map(|r| track.first_from(*r).checked_sub(from))
-        .filter(|k| (1..e.len()).contains(k))
-        .map(|k| (k, mixed(track.f[from + k], e[k - 1], e[k], noise)))
-        .collect();
+/// Turns predicted forces into recorded less predicted ones. A sample at which the force jumps may have
+/// seen it from before and after, whatever the sensor does between samples: between the predictions it
+/// counts for little. That is the first one after a rupture, and with a delay also those at which jumps of
+/// the velocity arrive. `e` begins at sample `from`.
+pub(crate) fn departures(
+    model: &Compiled,
+    track: &Track,
+    ruptures: &[f64],
+    noise: &Noise,
+    from: usize,
+    e: &mut [f64],
+) {
+    let least = MIXED_SD * noise.marginal_n;
+    let mut mixed: Vec<(usize, f64)> = Vec::new();
+    let mut note = |k: usize, after: bool| {
+        let Some(k) = k.checked_sub(from).filter(|k| *k > 0 && k + 1 < e.len()) else { return };
+        let (mut lo, mut hi) = (e[k - 1].min(e[k]), e[k - 1].max(e[k]));
+        if after {
+            (lo, hi) = (lo.min(e[k + 1]), hi.max(e[k + 1]));
+        }
+        let f = track.f[from + k];
+        let beyond = f - f.clamp(lo, hi);
+        mixed.push((k, beyond + (f - e[k] - beyond).clamp(-least, least)));
+    };
+    let delayed = track.kinks.iter().map(|k| k.t).filter(|_| model.delay_s > 0.0);
+    for at in ruptures.iter().copied().chain(delayed.map(|t| t + model.delay_s)).filter(|t| t.is_finite()) {
+        let k = track.first_from(at);
+        note(k, false);
+        if model.delay_s > 0.0
+            && k > 0
+            && k < track.len()
+            && at - track.t[k - 1] < NEAR * (track.t[k] - track.t[k - 1])
+        {
+            note(k - 1, true);
+        }
+    }
     for (e, f) in e.iter_mut().zip(&track.f[from..]) {
         *e = f - *e;
     }
@@ -250,12 +305,8 @@ pub(crate) fn departures(track: &Track, ruptures: &[f64], noise: &Noise, from: u
     }
 }
 
-/// The departure of a sample between two predictions.
-pub(crate) fn mixed(f: f64, before: f64, after: f64, noise: &Noise) -> f64 {
-    let beyond = f - f.clamp(before.min(after), before.max(after));
-    let e = f - after;
-    beyond + (e - beyond).clamp(-MIXED_SD * noise.marginal_n, MIXED_SD * noise.marginal_n)
-}
+/// A delayed jump so near (share of a sample) after a sample may already show there.
+const NEAR: f64 = 0.3;
 
 fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usize, tissue_n: f64) -> f64 {
     let reading = Reading {

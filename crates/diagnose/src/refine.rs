@@ -46,7 +46,7 @@ impl<'a> Window<'a> {
         for (e, i) in self.e.iter_mut().zip(self.from..self.to) {
             *e = replay.step(self.model, self.track, ruptures, i);
         }
-        forward::departures(self.track, ruptures, self.noise, self.from, &mut self.e);
+        forward::departures(self.model, self.track, ruptures, self.noise, self.from, &mut self.e);
         let mut nats = 0.0;
         for k in 2..self.e.len() {
             nats += rho(self.noise.one(self.track, self.from + k, [self.e[k], self.e[k - 1], self.e[k - 2]]));

@@ -63,6 +63,34 @@ fn without_friction(tissue: &Tissue, track: &Track) -> Vec<f64> {
     (0..track.len()).map(|i| track.f[i] - friction(&slabs, track.z[i], track.v[i])).collect()
 }
 
+/// What a rupture costs where the force does not drop: more than any misfit of a law that lacks an effect.
+const WITHOUT_DROP: f64 = 1e5;
+/// Samples of the first pass on each side of a drop.
+const DROP_SIDE: usize = 3;
+/// Share of the largest force that is a full drop.
+const DROP_SHARE: f64 = 0.03;
+
+/// How much of a clear drop the force shows at each sample, 0 (less than half of one) to 1. Friction changes with the velocity, and how
+/// much is not known yet: half of what is believed counts against.
+fn drops(slabs: &[Slab], track: &Track) -> Vec<f64> {
+    let n = track.len();
+    let range = track.f.iter().fold(1e-9_f64, |m, f| m.max(f.abs()));
+    let viscous: Vec<f64> = (0..n).map(|i| friction(slabs, track.z[i], track.v[i])).collect();
+    let mean = |x: &[f64], from: usize| x[from..from + DROP_SIDE].iter().sum::<f64>() / DROP_SIDE as f64;
+    let span = |x: &[f64]| {
+        let (lo, hi) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        hi - lo
+    };
+    let mut out = vec![0.0; n];
+    for i in DROP_SIDE..n.saturating_sub(DROP_SIDE) {
+        let drop = |x: &[f64]| mean(x, i - DROP_SIDE) - mean(x, i + 1);
+        let free = drop(&track.f) - drop(&viscous);
+        let doubt = 0.5 * span(&viscous[i - DROP_SIDE..i + 1 + DROP_SIDE]);
+        out[i] = (2.0 * (free - doubt) / (DROP_SHARE * range) - 1.0).clamp(0.0, 1.0);
+    }
+    out
+}
+
 /// The best path: per layer the sample at which it has ruptured.
 fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
     let slabs = Slab::stack(tissue);
@@ -73,6 +101,7 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
         *c = f64::INFINITY;
     }
     let mut from: Vec<u8> = vec![0; n * states];
+    let drops = drops(&slabs, track);
     let mut deepest = f64::NEG_INFINITY;
     for i in 0..n {
         let free = track.f[i] - friction(&slabs, track.z[i], track.v[i]);
@@ -85,8 +114,9 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
                 let slab = &slabs[s - 1];
                 let elastic = slab.stiffness_n_per_m * (deepest - slab.front_m).max(0.0);
                 let share = (elastic / slab.puncture_n).max((deepest - slab.front_m) / slab.thickness_m);
-                if share > 0.4 && cost[s - 1] < best {
-                    best = cost[s - 1];
+                let here = cost[s - 1] + WITHOUT_DROP * (1.0 - drops[i]);
+                if share > 0.4 && here < best {
+                    best = here;
                     came = s - 1;
                 }
             }

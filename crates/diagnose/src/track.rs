@@ -25,6 +25,21 @@ pub struct Track {
     pub restart: Vec<bool>,
     /// Samples per second.
     pub sample_hz: f64,
+    /// Where the velocity jumps between two samples.
+    pub kinks: Vec<Kink>,
+}
+
+/// A jump of the velocity between two samples; where, the positions tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kink {
+    /// The sample after it.
+    pub sample: usize,
+    /// Time in s.
+    pub t: f64,
+    /// Recorded position in m.
+    pub z: f64,
+    /// Velocities in m/s before and after.
+    pub v: [f64; 2],
 }
 
 impl Track {
@@ -50,6 +65,7 @@ impl Track {
             track.used.push(!exclude.get(i).copied().unwrap_or(false));
         }
         track.a = slope(&track.t, &track.v);
+        track.find_kinks();
         track.leave_out_jumps();
         track.find_restarts();
         track
@@ -65,6 +81,23 @@ impl Track {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
+    }
+
+    /// A jump is a change of velocity many times that of the steps before and after.
+    fn find_kinks(&mut self) {
+        const LEAST_MPS: f64 = 2e-4;
+        for i in 2..self.len().saturating_sub(1) {
+            let (v0, v1) = (self.v[i - 1], self.v[i]);
+            let jump = (v1 - v0).abs();
+            let around = (self.v[i - 1] - self.v[i - 2]).abs().max((self.v[i + 1] - self.v[i]).abs());
+            let (dt, dz) = (self.t[i] - self.t[i - 1], self.z[i] - self.z[i - 1]);
+            if jump < LEAST_MPS || jump < 5.0 * around || dt <= 0.0 || dt * self.sample_hz > 1.5 {
+                continue;
+            }
+            let share = ((dz / dt - v1) / (v0 - v1)).clamp(0.0, 1.0);
+            let (t, z) = (self.t[i - 1] + share * dt, self.z[i - 1] + share * dt * v0);
+            self.kinks.push(Kink { sample: i, t, z, v: [v0, v1] });
+        }
     }
 
     /// Where the velocity jumps the acceleration is anybody's guess: it is taken from around, and the
