@@ -129,7 +129,12 @@ mod tests {
         let case = hidden::case(&hidden::sketch_of(3, 1, Kind::Clean, 1).drawn);
         let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
         let noise = Noise::of([0.5, 0.1], 0.02);
-        let data = Data { tracks: Arc::new(tracks), ruptures: case.ruptures.clone(), noise };
+        let data = Data {
+            tracks: Arc::new(tracks),
+            ruptures: case.ruptures.clone(),
+            allowed: Arc::default(),
+            noise,
+        };
         let plain = Model::base(&case.believed.tissue, 0.3, &[]);
         for (id, values) in [
             ("", vec![]),

@@ -36,6 +36,8 @@ pub struct Data {
     /// Per recording and layer the time (s) at which the recorded force shows its rupture, or
     /// [`NEVER`](crate::track::NEVER).
     pub ruptures: Vec<Vec<f64>>,
+    /// Per recording and layer where a rupture may be moved to (s, s).
+    pub allowed: Arc<Vec<Vec<(f64, f64)>>>,
     /// The noise.
     pub noise: Noise,
 }
@@ -51,7 +53,12 @@ impl Data {
     #[must_use]
     pub fn blocks(&self, q: usize, noise: Noise) -> Self {
         let tracks = self.tracks.iter().zip(&self.ruptures).map(|(track, r)| track.blocks(q, r)).collect();
-        Self { tracks: Arc::new(tracks), ruptures: self.ruptures.clone(), noise }
+        Self {
+            tracks: Arc::new(tracks),
+            ruptures: self.ruptures.clone(),
+            allowed: self.allowed.clone(),
+            noise,
+        }
     }
 }
 

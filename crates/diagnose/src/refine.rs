@@ -76,16 +76,19 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
     steps.extend(if wide { &WIDE[..] } else { &NARROW[..] });
     let mut moved = false;
     let tracks = data.tracks.clone();
-    for (track, ruptures) in tracks.iter().zip(&mut data.ruptures) {
+    for (k, (track, ruptures)) in tracks.iter().zip(&mut data.ruptures).enumerate() {
         for layer in 0..ruptures.len() {
             if ruptures[layer] == NEVER {
                 continue;
             }
             let mut window = Window::new(&compiled, track, &data.noise, ruptures, layer);
             let mut best = window.nats(ruptures);
+            let allowed = data.allowed.get(k).and_then(|a| a.get(layer)).copied();
+            let allowed = allowed.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
             let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
             let end = track.t.last().copied().unwrap_or(0.0);
-            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end);
+            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end).min(allowed.1);
+            let low = low.max(allowed.0);
             for sign in [-1.0, 1.0] {
                 let mut step = steps.len();
                 let mut turns = 0;

@@ -16,9 +16,18 @@ const NONE: usize = usize::MAX;
 /// Samples per second of the first pass.
 const COARSE_HZ: f64 = 50.0;
 
-/// Finds the ruptures in every recording and first values of stiffness and friction.
+/// Instants (s) of ruptures, per recording and layer.
+pub type Instants = Vec<Vec<f64>>;
+/// Where each may be moved to (s, s).
+pub type Allowed = Vec<Vec<(f64, f64)>>;
+
+/// How far (s) a rupture at a clear drop may be moved: no law that lacks an effect drags it away.
+const CLEAR_S: f64 = 0.12;
+
+/// Finds the ruptures in every recording, how far they may be moved, and first values of stiffness and
+/// friction.
 #[must_use]
-pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<f64>> {
+pub fn find(model: &mut Model, tracks: &[Track]) -> (Instants, Allowed) {
     let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / COARSE_HZ).round().max(1.0) as usize;
     let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[])).collect();
     let range = coarse.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
@@ -35,7 +44,7 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<f64>> {
     }
     let friction: Vec<(Vec<f64>, &Track)> =
         tracks.iter().map(|t| (without_friction(&model.tissue, t), t)).collect();
-    paths
+    let instants: Instants = paths
         .iter()
         .zip(&friction)
         .map(|(path, (force, track))| {
@@ -51,7 +60,29 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<f64>> {
                 })
                 .collect()
         })
-        .collect()
+        .collect();
+    let slabs = Slab::stack(&model.tissue);
+    let allowed =
+        coarse
+            .iter()
+            .zip(&paths)
+            .zip(&instants)
+            .map(|((track, path), instants)| {
+                let drops = drops(&slabs, track);
+                let clear = |r: usize| drops.get(r).is_some_and(|d| *d >= 1.0);
+                path.iter()
+                    .zip(instants)
+                    .map(|(&r, &at)| {
+                        if clear(r) {
+                            (at - CLEAR_S, at + CLEAR_S)
+                        } else {
+                            (f64::NEG_INFINITY, f64::INFINITY)
+                        }
+                    })
+                    .collect()
+            })
+            .collect();
+    (instants, allowed)
 }
 
 fn friction(slabs: &[Slab], z: f64, v: f64) -> f64 {
@@ -86,9 +117,15 @@ fn drops(slabs: &[Slab], track: &Track) -> Vec<f64> {
         let drop = |x: &[f64]| mean(x, i - DROP_SIDE) - mean(x, i + 1);
         let free = drop(&track.f) - drop(&viscous);
         let doubt = 0.5 * span(&viscous[i - DROP_SIDE..i + 1 + DROP_SIDE]);
-        out[i] = (2.0 * (free - doubt) / (DROP_SHARE * range) - 1.0).clamp(0.0, 1.0);
+        out[i] = (2.0 * (free - doubt) / (DROP_SHARE * range) - 1.0).max(0.0);
     }
-    out
+    // A drop serves one rupture: only its peak stays.
+    let reach = 2 * DROP_SIDE;
+    let peak = |i: usize| {
+        let (from, to) = (i.saturating_sub(reach), (i + reach + 1).min(n));
+        (from..to).all(|j| if j < i { out[j] < out[i] } else { out[j] <= out[i] })
+    };
+    (0..n).map(|i| if out[i] > 0.0 && peak(i) { out[i].min(1.0) } else { 0.0 }).collect()
 }
 
 /// The best path: per layer the sample at which it has ruptured.

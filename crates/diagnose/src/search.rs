@@ -121,11 +121,11 @@ impl Search {
         let mut model = Model::base(tissue, tolerance, given);
         let force_n = tracks.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
         let least = 1e-4 * force_n.max(1e-9);
-        let found = ruptures::find(&mut model, &tracks);
+        let (found, allowed) = ruptures::find(&mut model, &tracks);
         let air = air::noise(&tracks, tissue.surface_m, least);
         let noise = air.unwrap_or_else(|| rough(&tracks, least));
         let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / SCREEN_HZ).round().max(1.0) as usize;
-        let mut data = Data { tracks: Arc::new(tracks), ruptures: found, noise };
+        let mut data = Data { tracks: Arc::new(tracks), ruptures: found, allowed: Arc::new(allowed), noise };
         seed_punctures(&mut model, &data);
         let coarse = data.blocks(q, noise.blocks(q));
         let first = fit(&model, &coarse, 8, 0.1)?;
