@@ -183,7 +183,9 @@ impl Model {
                     Slot { role, low: 1e-4, high: 1.0, step: 1e-5, stepped: true }
                 } else if in_logarithm(choice.info, parameter) {
                     let (low, high) = ((from / 10.0).max(p.low), (to * 10.0).min(p.high));
-                    Slot { role, low: low.max(1e-12).ln(), high: high.ln(), step: 2e-3, stepped: false }
+                    // A frequency is told by the phase at the end of a recording.
+                    let step = if p.unit == "Hz" { 2e-5 / choice.values[parameter].max(1e-3) } else { 2e-3 };
+                    Slot { role, low: low.max(1e-12).ln(), high: high.ln(), step, stepped: false }
                 } else if choice.info.id.ends_with("phase_rad") || p.unit == "rad" {
                     Slot { role, low: -100.0, high: 100.0, step: 1e-3, stepped: false }
                 } else {

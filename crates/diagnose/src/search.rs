@@ -8,7 +8,7 @@ use crate::model::{Choice, Model};
 use crate::noise::{Noise, median};
 use crate::refine::{refine, seed_punctures};
 use crate::ruptures;
-use crate::spectrum::{peaks, periodogram};
+use crate::spectrum::{peaks, periodogram, sharpen};
 use crate::starts::{self, Hints, Start};
 use crate::track::{NEVER, Track};
 use rayon::prelude::*;
@@ -473,9 +473,28 @@ impl Search {
         let depth_m = (deepest - surface).max(0.0);
         let mut hints = Hints { layers, depth_m, force_n: self.force_n, ..Hints::default() };
         let spectrum = self.spectrum(standing, data);
-        hints.lines_hz = peaks(&spectrum.0, &spectrum.1, 0.04, 5).into_iter().map(|p| p.0).collect();
-        hints.breath_hz = (0..40).map(|k| 0.05 + 0.02 * f64::from(k)).collect();
+        let mut lines: Vec<f64> = peaks(&spectrum.0, &spectrum.1, 0.04, 5)
+            .into_iter()
+            .map(|p| p.0)
+            .filter(|f| *f <= FAST_HZ)
+            .collect();
+        self.sharpen(standing, data, &mut lines);
+        hints.lines_hz = lines;
+        hints.breath_hz = (0..64).map(|k| 0.05 + 0.0125 * f64::from(k)).collect();
         hints
+    }
+
+    /// Frequencies of peaks as exactly as all recordings together tell them.
+    fn sharpen(&self, of: &Candidate, data: &Data, lines_hz: &mut [f64]) {
+        let mut r = Residuals::default();
+        if lines_hz.is_empty() || !residuals(&of.model, data, &mut r) {
+            return;
+        }
+        let limit = 6.0 * data.noise.marginal_n;
+        r.e.iter_mut().for_each(|e| *e = e.clamp(-limit, limit));
+        let span = |t: &Track| t.t.last().zip(t.t.first()).map_or(0.0, |(b, a)| b - a);
+        let span_s = data.tracks.iter().map(span).fold(1e-3, f64::max);
+        lines_hz.par_iter_mut().for_each(|f| *f = sharpen(&data.tracks, &r.e, *f, span_s));
     }
 
     /// Periodogram of the whitened residuals, summed over the recordings.
@@ -553,7 +572,9 @@ impl Search {
         if value < 14.0 {
             return Vec::new();
         }
-        let hints = Hints { lines_hz: vec![frequency], ..Hints::default() };
+        let mut frequency = [frequency];
+        self.sharpen(standing, data, &mut frequency);
+        let hints = Hints { lines_hz: frequency.to_vec(), ..Hints::default() };
         let Some(info) = stylet_tissue::info("periodic_interference") else { return Vec::new() };
         let Some(look) = Look::new(&standing.model, data) else { return Vec::new() };
         let mut work = Residuals::default();
