@@ -18,7 +18,7 @@ fn main() {
     };
     let case = hidden::case(&drawn);
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
-    let Some(search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, Settings::default()) else {
+    let Some(search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, 0.0, Settings::default()) else {
         return;
     };
     let mut truth = search.base.model.clone();

@@ -38,7 +38,8 @@ fn main() {
     println!("true ruptures {:?}", case.ruptures);
     let start = Instant::now();
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
-    let Some(mut search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, Settings::default()) else {
+    let Some(mut search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, 0.0, Settings::default())
+    else {
         println!("no base fit");
         return;
     };

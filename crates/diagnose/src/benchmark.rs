@@ -64,7 +64,7 @@ fn strength(drawn: &Drawn) -> Option<f64> {
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
     let clean = hidden::clean_force(drawn);
     let search =
-        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, Settings::default())?;
+        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, 0.0, Settings::default())?;
     Some(size_of(&search, &search.base, &clean, drawn))
 }
 

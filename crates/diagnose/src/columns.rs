@@ -96,6 +96,12 @@ pub fn base(model: &Model, data: &Data, at: &Residuals, slots: &[Slot]) -> Optio
                         );
                     }
                 }
+                if data.dead_n > 0.0 {
+                    raw.iter_mut()
+                        .zip(&at.e[from..to])
+                        .filter(|(_, e)| **e == 0.0)
+                        .for_each(|(x, _)| *x = 0.0);
+                }
                 data.noise.whiten(track, raw, &mut columns[j][from..to]);
             }
             let Some(event) = at.events.get(k * layers + layer) else { continue };
@@ -133,6 +139,7 @@ mod tests {
             tracks: Arc::new(tracks),
             ruptures: case.ruptures.clone(),
             allowed: Arc::default(),
+            dead_n: 0.0,
             noise,
         };
         let plain = Model::base(&case.believed.tissue, 0.3, &[]);

@@ -80,9 +80,15 @@ pub fn diagnose(
     let raw = raw::look(&recordings, &notes);
     let tracks: Vec<Track> = recordings.iter().zip(&raw.exclude).map(|(r, x)| Track::new(r, x)).collect();
     progress("fitting the base law");
-    let mut search =
-        Search::base(&scenario.tissue, scenario.tolerance, &scenario.effects, tracks, options.search)
-            .ok_or(DiagnoseError::NoFit)?;
+    let mut search = Search::base(
+        &scenario.tissue,
+        scenario.tolerance,
+        &scenario.effects,
+        tracks,
+        raw.step_n.unwrap_or(0.0),
+        options.search,
+    )
+    .ok_or(DiagnoseError::NoFit)?;
     search.run(&mut progress);
     progress("judging");
     let best = search.best.clone();
@@ -93,7 +99,7 @@ pub fn diagnose(
         left.p_value < LEFTOVER_P && left.nats > DOMINATES * explained.max(0.0) && left.nats > 8.0;
 
     // A step of the recorded force beyond the noise makes the residual a function of the motion by itself.
-    let coarse_steps = raw.step_n.is_some_and(|step| step > 1.5 * search.data.noise.marginal_n);
+    let coarse_steps = search.data.dead_n > 0.0;
     let dominated = dominated && !coarse_steps;
 
     let mut causes = Vec::new();

@@ -38,6 +38,8 @@ pub struct Data {
     pub ruptures: Vec<Vec<f64>>,
     /// Per recording and layer where a rupture may be moved to (s, s).
     pub allowed: Arc<Vec<Vec<(f64, f64)>>>,
+    /// Half a step of the recorded force in N where that hides the noise: departures within it do not count.
+    pub dead_n: f64,
     /// The noise.
     pub noise: Noise,
 }
@@ -57,6 +59,7 @@ impl Data {
             tracks: Arc::new(tracks),
             ruptures: self.ruptures.clone(),
             allowed: self.allowed.clone(),
+            dead_n: self.dead_n,
             noise,
         }
     }
@@ -87,11 +90,20 @@ pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
         let e = &mut out.e[from..to];
         forward::imposed(&compiled, track, ruptures, e, &mut out.scratch);
         forward::departures(&compiled, track, ruptures, &data.noise, 0, e);
+        dead_zone(data.dead_n, e);
         data.noise.whiten(track, e, &mut out.w[from..to]);
         out.events.extend_from_slice(&out.scratch);
         from = to;
     }
     out.w.iter().all(|w| w.is_finite())
+}
+
+/// Takes what rounding may have done off every departure.
+#[inline]
+pub(crate) fn dead_zone(half_step_n: f64, e: &mut [f64]) {
+    if half_step_n > 0.0 {
+        e.iter_mut().for_each(|e| *e -= e.clamp(-half_step_n, half_step_n));
+    }
 }
 
 /// The objective of a replayed model, in nats.

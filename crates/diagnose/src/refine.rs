@@ -1,7 +1,7 @@
 //! From a coarse fit to one at full rate: ruptures where this model wants them, puncture forces where
 //! the ruptures say, a membrane where it breaks.
 
-use crate::fit::{Data, Fit, Residuals, fit, objective, residuals, rho};
+use crate::fit::{Data, Fit, Residuals, dead_zone, fit, objective, residuals, rho};
 use crate::forward::{self, Replay};
 use crate::model::{Compiled, Model, Role};
 use crate::noise::{Noise, median};
@@ -17,6 +17,7 @@ struct Window<'a> {
     model: &'a Compiled,
     track: &'a Track,
     noise: &'a Noise,
+    dead_n: f64,
     layer: usize,
     from: usize,
     to: usize,
@@ -25,14 +26,15 @@ struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    fn new(model: &'a Compiled, track: &'a Track, noise: &'a Noise, ruptures: &[f64], layer: usize) -> Self {
+    fn new(model: &'a Compiled, track: &'a Track, data: &'a Data, ruptures: &[f64], layer: usize) -> Self {
         let from = track.first_from(ruptures[layer] - BEFORE_S - model.delay_s);
         let to = track.first_from(ruptures[layer] + AFTER_S);
         let mut start = Replay::start(model, track);
         for i in 0..from {
             start.step(model, track, ruptures, i);
         }
-        Self { model, track, noise, layer, from, to, start, e: vec![0.0; to.saturating_sub(from)] }
+        let (noise, dead_n) = (&data.noise, data.dead_n);
+        Self { model, track, noise, dead_n, layer, from, to, start, e: vec![0.0; to.saturating_sub(from)] }
     }
 
     /// Where a rupture may be moved to.
@@ -47,6 +49,7 @@ impl<'a> Window<'a> {
             *e = replay.step(self.model, self.track, ruptures, i);
         }
         forward::departures(self.model, self.track, ruptures, self.noise, self.from, &mut self.e);
+        dead_zone(self.dead_n, &mut self.e);
         let mut nats = 0.0;
         for k in 2..self.e.len() {
             nats += rho(self.noise.one(self.track, self.from + k, [self.e[k], self.e[k - 1], self.e[k - 2]]));
@@ -76,12 +79,13 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
     steps.extend(if wide { &WIDE[..] } else { &NARROW[..] });
     let mut moved = false;
     let tracks = data.tracks.clone();
+    let whole = Data { ruptures: Vec::new(), ..data.clone() };
     for (k, (track, ruptures)) in tracks.iter().zip(&mut data.ruptures).enumerate() {
         for layer in 0..ruptures.len() {
             if ruptures[layer] == NEVER {
                 continue;
             }
-            let mut window = Window::new(&compiled, track, &data.noise, ruptures, layer);
+            let mut window = Window::new(&compiled, track, &whole, ruptures, layer);
             let mut best = window.nats(ruptures);
             let allowed = data.allowed.get(k).and_then(|a| a.get(layer)).copied();
             let allowed = allowed.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));

@@ -19,6 +19,8 @@ use stylet_tissue::{AnyEffect, Tissue};
 const SCREEN_HZ: f64 = 50.0;
 /// Rivals fitted at full rate.
 const FINALISTS: usize = 6;
+/// A step of the recorded force of so many standard deviations of the noise hides it.
+pub const COARSE_STEP: f64 = 1.5;
 /// Above this frequency (Hz) an interference is not fitted on averages.
 const FAST_HZ: f64 = 6.0;
 
@@ -116,6 +118,7 @@ impl Search {
         tolerance: f64,
         given: &[AnyEffect],
         tracks: Vec<Track>,
+        step_n: f64,
         settings: Settings,
     ) -> Option<Self> {
         let mut model = Model::base(tissue, tolerance, given);
@@ -124,8 +127,17 @@ impl Search {
         let (found, allowed) = ruptures::find(&mut model, &tracks);
         let air = air::noise(&tracks, tissue.surface_m, least);
         let noise = air.unwrap_or_else(|| rough(&tracks, least));
+        // Rounding to steps beyond the noise is no noise: it repeats itself wherever the force does.
+        let coarse = step_n > COARSE_STEP * noise.marginal_n;
+        let (air, noise, dead_n) = if coarse {
+            let white = Noise::white(0.25 * step_n);
+            (Some(white), white, 0.5 * step_n)
+        } else {
+            (air, noise, 0.0)
+        };
         let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / SCREEN_HZ).round().max(1.0) as usize;
-        let mut data = Data { tracks: Arc::new(tracks), ruptures: found, allowed: Arc::new(allowed), noise };
+        let mut data =
+            Data { tracks: Arc::new(tracks), ruptures: found, allowed: Arc::new(allowed), dead_n, noise };
         seed_punctures(&mut model, &data);
         let coarse = data.blocks(q, noise.blocks(q));
         let first = fit(&model, &coarse, 8, 0.1)?;
@@ -334,7 +346,9 @@ impl Search {
             return false;
         }
         // The noise as the best model leaves it, for all rivals alike.
-        let noise = own_noise(&rivals[0].model, &self.data_of(&rivals[0]), self.least_n());
+        let noise = (self.data.dead_n == 0.0)
+            .then(|| own_noise(&rivals[0].model, &self.data_of(&rivals[0]), self.least_n()))
+            .flatten();
         let before = self.data.noise;
         self.data.noise = noise.unwrap_or(before);
         let data = &self.data;
