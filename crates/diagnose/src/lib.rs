@@ -6,6 +6,7 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`raw`] | saturation, quantisation, spikes: read off the raw force, named without a law |
+//! | [`velocity`] | velocity from positions, with its jumps at their instants |
 //! | [`track`] | columns made ready for thousands of replays; averages over blocks |
 //! | [`ruptures`] | where each layer ruptured in the data: law-guided Viterbi path, then the edge of the drop |
 //! | [`air`], [`noise`] | autoregressive noise (order two at most) before contact; whitening |
@@ -44,6 +45,7 @@ pub mod search;
 pub mod spectrum;
 pub mod starts;
 pub mod track;
+pub mod velocity;
 pub mod visible;
 
 pub use diagnose::{CLASS_NATS, Evidence, Examined, Options, diagnose};

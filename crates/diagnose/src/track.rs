@@ -1,6 +1,8 @@
 //! A recording made ready for thousands of replays: columns, what is used of them, where the noise's
 //! memory begins anew.
 
+use crate::noise::median;
+use crate::velocity::velocity;
 use stylet_record::Recording;
 
 /// The instant (s) of a rupture that never was.
@@ -64,8 +66,8 @@ impl Track {
             track.f.push(row.3);
             track.used.push(!exclude.get(i).copied().unwrap_or(false));
         }
+        track.take_velocity(recording.velocity_measured);
         track.a = slope(&track.t, &track.v);
-        track.find_kinks();
         track.leave_out_jumps();
         track.find_restarts();
         track
@@ -83,20 +85,15 @@ impl Track {
         self.t.is_empty()
     }
 
-    /// A jump is a change of velocity many times that of the steps before and after.
-    fn find_kinks(&mut self) {
-        const LEAST_MPS: f64 = 2e-4;
-        for i in 2..self.len().saturating_sub(1) {
-            let (v0, v1) = (self.v[i - 1], self.v[i]);
-            let jump = (v1 - v0).abs();
-            let around = (self.v[i - 1] - self.v[i - 2]).abs().max((self.v[i + 1] - self.v[i]).abs());
-            let (dt, dz) = (self.t[i] - self.t[i - 1], self.z[i] - self.z[i - 1]);
-            if jump < LEAST_MPS || jump < 5.0 * around || dt <= 0.0 || dt * self.sample_hz > 1.5 {
-                continue;
-            }
-            let share = ((dz / dt - v1) / (v0 - v1)).clamp(0.0, 1.0);
-            let (t, z) = (self.t[i - 1] + share * dt, self.z[i - 1] + share * dt * v0);
-            self.kinks.push(Kink { sample: i, t, z, v: [v0, v1] });
+    /// The velocity that the positions tell, where they tell it better than what was recorded.
+    fn take_velocity(&mut self, recorded: bool) {
+        let told = velocity(&self.t, &self.z);
+        let mut d: Vec<f64> =
+            self.v.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
+        let noise_mps = median(&mut d) * 1.4826 / 20.0_f64.sqrt();
+        if !recorded || told.noise_mps < 1e-5 || told.noise_mps < noise_mps {
+            self.v = told.v;
+            self.kinks = told.kinks;
         }
     }
 
@@ -113,7 +110,7 @@ impl Track {
             around.sort_unstable_by(f64::total_cmp);
             let middle = around[around.len() / 2];
             let spread = if around.len() < 7 { 0.0 } else { around[4] - around[2] };
-            if (raw[i] - middle).abs() > 0.02 + 4.0 * middle.abs() + 8.0 * spread {
+            if (raw[i] - middle).abs() > 0.002 + 0.2 * middle.abs() + 8.0 * spread {
                 self.a[i] = middle;
                 self.used[i] = false;
             }
