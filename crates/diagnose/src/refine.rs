@@ -43,7 +43,7 @@ impl<'a> Window<'a> {
         at > self.from + 3 && self.track.first_from(at_s) + 3 < self.to
     }
 
-    fn nats(&mut self, ruptures: &[f64]) -> f64 {
+    fn nats(&mut self, ruptures: &[f64], events: bool) -> f64 {
         let mut replay = self.start.clone();
         for (e, i) in self.e.iter_mut().zip(self.from..self.to) {
             *e = replay.step(self.model, self.track, ruptures, i);
@@ -54,7 +54,7 @@ impl<'a> Window<'a> {
         for k in 2..self.e.len() {
             nats += rho(self.noise.one(self.track, self.from + k, [self.e[k], self.e[k - 1], self.e[k - 2]]));
         }
-        let layers = self.layer..(self.layer + 2).min(ruptures.len());
+        let layers = self.layer..(self.layer + 2).min(if events { ruptures.len() } else { 0 });
         nats + layers
             .filter(|l| self.track.first_from(ruptures[*l]) < self.to)
             .map(|l| rho(replay.event(self.model, ruptures, l).u))
@@ -68,9 +68,9 @@ const WIDE: [f64; 5] = [1.0, 3.0, 9.0, 27.0, 81.0];
 const NARROW: [f64; 2] = [1.0, 4.0];
 const BETWEEN: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
 
-/// Moves every rupture to the instant where this model fits best, by steps that double and halve. True
-/// when one moved.
-pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
+/// Moves every rupture to the instant where this model fits best, by steps that double and halve; with
+/// `events` as far as the law's own rupture is near. True when one moved.
+pub fn retime(model: &Model, data: &mut Data, wide: bool, events: bool) -> bool {
     let Some(compiled) = model.compile() else { return false };
     let mut steps: Vec<f64> = Vec::new();
     if compiled.feels_instants {
@@ -86,7 +86,7 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
                 continue;
             }
             let mut window = Window::new(&compiled, track, &whole, ruptures, layer);
-            let mut best = window.nats(ruptures);
+            let mut best = window.nats(ruptures, events);
             let allowed = data.allowed.get(k).and_then(|a| a.get(layer)).copied();
             let allowed = allowed.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
             let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
@@ -102,7 +102,7 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
                     let to = ruptures[layer] + sign * steps[step - 1] / track.sample_hz;
                     if to >= low && to <= high && window.holds(to) {
                         let was = std::mem::replace(&mut ruptures[layer], to);
-                        let value = window.nats(ruptures);
+                        let value = window.nats(ruptures, events);
                         if value < best - 1e-9 {
                             best = value;
                             moved = true;
@@ -203,13 +203,27 @@ pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide:
     seed_punctures(&mut model, data);
     walk_stepped(&mut model, data);
     let mut best = fit(&model, data, turns, enough)?;
+    let feels = model.compile().is_some_and(|m| m.feels_instants);
     for round in 0..rounds {
-        let mut there = data.clone();
-        let moved = retime(&best.model, &mut there, wide && round == 0);
-        let mut next = best.model.clone();
-        walk_stepped(&mut next, &there);
-        seed_punctures(&mut next, &there);
-        let Some(new) = fit(&next, &there, turns, enough) else { break };
+        let again = |events: bool| {
+            let mut there = data.clone();
+            let moved = retime(&best.model, &mut there, wide && round == 0, events);
+            let mut next = best.model.clone();
+            walk_stepped(&mut next, &there);
+            seed_punctures(&mut next, &there);
+            Some((fit(&next, &there, turns, enough)?, there, moved))
+        };
+        let Some((mut new, mut there, mut moved)) = again(true) else { break };
+        // A puncture force and all the instants that it sets hold one another in place: where the force itself
+        // tells the instants, they go first and the puncture force follows.
+        if wide
+            && round == 0
+            && feels
+            && let Some(other) = again(false)
+            && other.0.nats < new.nats
+        {
+            (new, there, moved) = other;
+        }
         let gained = best.nats - new.nats;
         if gained > 0.0 {
             *data = there;

@@ -22,7 +22,7 @@ pub type Instants = Vec<Vec<f64>>;
 pub type Allowed = Vec<Vec<(f64, f64)>>;
 
 /// How far (s) a rupture at a clear drop may be moved: no law that lacks an effect drags it away.
-const CLEAR_S: f64 = 0.12;
+const CLEAR_S: f64 = 0.4;
 
 /// Finds the ruptures in every recording, how far they may be moved, and first values of stiffness and
 /// friction.

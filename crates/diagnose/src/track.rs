@@ -44,6 +44,9 @@ pub struct Kink {
     pub v: [f64; 2],
 }
 
+/// A sample so near (share of a step) to a jump of the velocity is not compared.
+const AT_A_JUMP: f64 = 0.02;
+
 impl Track {
     /// The track of a recording; samples that are not finite are left out, samples with `exclude` set
     /// are replayed but not compared.
@@ -67,8 +70,6 @@ impl Track {
             track.used.push(!exclude.get(i).copied().unwrap_or(false));
         }
         track.take_velocity(recording.velocity_measured);
-        track.a = slope(&track.t, &track.v);
-        track.leave_out_jumps();
         track.find_restarts();
         track
     }
@@ -91,10 +92,18 @@ impl Track {
         let mut d: Vec<f64> =
             self.v.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
         let noise_mps = median(&mut d) * 1.4826 / 20.0_f64.sqrt();
-        if !recorded || told.noise_mps < 1e-5 || told.noise_mps < noise_mps {
-            self.v = told.v;
-            self.kinks = told.kinks;
+        if recorded && told.noise_mps >= 1e-5 && told.noise_mps >= noise_mps {
+            self.a = slope(&self.t, &self.v);
+            self.leave_out_jumps();
+            return;
         }
+        // A sample at the very instant of a jump has either velocity.
+        for kink in &told.kinks {
+            for i in kink.sample.saturating_sub(1)..=kink.sample {
+                self.used[i] &= (self.t[i] - kink.t).abs() * self.sample_hz > AT_A_JUMP;
+            }
+        }
+        (self.v, self.a, self.kinks) = (told.v, told.a, told.kinks);
     }
 
     /// Where the velocity jumps the acceleration is anybody's guess: it is taken from around, and the

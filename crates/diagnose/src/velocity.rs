@@ -24,6 +24,8 @@ pub struct Velocity {
     pub noise_mps: f64,
     /// Jumps.
     pub kinks: Vec<Kink>,
+    /// Acceleration in m/s², never across a jump.
+    pub a: Vec<f64>,
 }
 
 /// The velocity of positions `z` (m) at times `t` (s).
@@ -31,7 +33,7 @@ pub struct Velocity {
 pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
     let n = t.len().min(z.len());
     if n < 8 {
-        return Velocity { v: vec![0.0; n], noise_mps: f64::INFINITY, kinks: Vec::new() };
+        return Velocity { v: vec![0.0; n], a: vec![0.0; n], noise_mps: f64::INFINITY, kinks: Vec::new() };
     }
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
@@ -68,7 +70,15 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
             v[i] = slope_at(&t[lo..hi], &z[lo..hi], t[i]);
         }
     }
-    Velocity { v, noise_mps: noise_m * gain(half), kinks }
+    let mut a = vec![0.0; n];
+    for piece in edges.windows(2) {
+        let last = piece[1] - 1;
+        for i in piece[0]..piece[1] {
+            let (lo, hi) = (i.saturating_sub(1).max(piece[0]), (i + 1).min(last));
+            a[i] = if t[hi] > t[lo] { (v[hi] - v[lo]) / (t[hi] - t[lo]) } else { 0.0 };
+        }
+    }
+    Velocity { v, noise_mps: noise_m * gain(half), kinks, a }
 }
 
 /// Standard deviation of positions about a smooth course, by their third differences.
