@@ -77,13 +77,26 @@ fn main() {
     // The truth under the search's noise, and the search's model without its last effect.
     let mut there = Data { ruptures: data.ruptures.clone(), ..search.data.clone() };
     if let Some(f) = refine(&fit.model, &mut there, 3, 8, true) {
-        println!("truth under this noise: {:.1} {:?} F {:?} K {:?}", f.nats, f.model.effects.iter().map(|e| &e.values).collect::<Vec<_>>(), f.model.tissue.layers.iter().map(|l| l.puncture_n).collect::<Vec<_>>(), f.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>());
+        println!(
+            "truth under this noise: {:.1} {:?} F {:?} K {:?}",
+            f.nats,
+            f.model.effects.iter().map(|e| &e.values).collect::<Vec<_>>(),
+            f.model.tissue.layers.iter().map(|l| l.puncture_n).collect::<Vec<_>>(),
+            f.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>()
+        );
         println!("ruptures {:?}", there.ruptures);
     }
     for (k, e) in search.best.model.effects.iter().enumerate() {
         let mut there = search.data_of(&search.best);
         if let Some(f) = refine(&search.best.model.without(k), &mut there, 4, 8, true) {
-            println!("without {}: {:.1} {:?} F {:?} K {:?}", e.info.id, f.nats, f.model.effects.iter().map(|e| &e.values).collect::<Vec<_>>(), f.model.tissue.layers.iter().map(|l| l.puncture_n).collect::<Vec<_>>(), f.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>());
+            println!(
+                "without {}: {:.1} {:?} F {:?} K {:?}",
+                e.info.id,
+                f.nats,
+                f.model.effects.iter().map(|e| &e.values).collect::<Vec<_>>(),
+                f.model.tissue.layers.iter().map(|l| l.puncture_n).collect::<Vec<_>>(),
+                f.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>()
+            );
             println!("ruptures {:?}", there.ruptures);
         }
     }

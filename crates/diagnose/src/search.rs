@@ -24,6 +24,18 @@ pub const COARSE_STEP: f64 = 1.5;
 /// Above this frequency (Hz) an interference is not fitted on averages.
 const FAST_HZ: f64 = 6.0;
 
+/// How far (s) the base law may move a rupture at a clear drop.
+const BASE_MOVES_S: f64 = 0.12;
+
+/// A range about the same middle, no wider than `half` to each side.
+fn narrowed((low, high): (f64, f64), half: f64) -> (f64, f64) {
+    if !low.is_finite() || !high.is_finite() {
+        return (low, high);
+    }
+    let middle = 0.5 * (low + high);
+    (low.max(middle - half), high.min(middle + half))
+}
+
 /// Settings of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -136,8 +148,10 @@ impl Search {
             (air, noise, 0.0)
         };
         let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / SCREEN_HZ).round().max(1.0) as usize;
+        // The base law, which lacks whatever it lacks, moves ruptures but little.
+        let near = allowed.iter().map(|a| a.iter().map(|a| narrowed(*a, BASE_MOVES_S)).collect()).collect();
         let mut data =
-            Data { tracks: Arc::new(tracks), ruptures: found, allowed: Arc::new(allowed), dead_n, noise };
+            Data { tracks: Arc::new(tracks), ruptures: found, allowed: Arc::new(near), dead_n, noise };
         seed_punctures(&mut model, &data);
         let coarse = data.blocks(q, noise.blocks(q));
         let first = fit(&model, &coarse, 8, 0.1)?;
@@ -146,6 +160,7 @@ impl Search {
             data.noise = own_noise(&fitted.model, &data, least).unwrap_or(noise);
         }
         let fitted = refine(&fitted.model, &mut data, 1, 4, false)?;
+        data.allowed = Arc::new(allowed);
         let base = Candidate { model: fitted.model, ruptures: data.ruptures.clone(), nats: fitted.nats };
         Some(Self {
             settings,
