@@ -142,7 +142,7 @@ mod tests {
         let data = Data {
             tracks: Arc::new(tracks),
             ruptures: case.ruptures.clone(),
-            allowed: Arc::default(),
+            reach: Arc::default(),
             dead_n: 0.0,
             noise,
         };

@@ -36,8 +36,8 @@ pub struct Data {
     /// Per recording and layer the time (s) at which the recorded force shows its rupture, or
     /// [`NEVER`](crate::track::NEVER).
     pub ruptures: Vec<Vec<f64>>,
-    /// Per recording and layer where a rupture may be moved to (s, s).
-    pub allowed: Arc<Vec<Vec<(f64, f64)>>>,
+    /// Per recording and layer how far (s) a rupture may be moved at a time.
+    pub reach: Arc<Vec<Vec<f64>>>,
     /// Half a step of the recorded force in N where that hides the noise: departures within it do not count.
     pub dead_n: f64,
     /// The noise.
@@ -58,7 +58,7 @@ impl Data {
         Self {
             tracks: Arc::new(tracks),
             ruptures: self.ruptures.clone(),
-            allowed: self.allowed.clone(),
+            reach: self.reach.clone(),
             dead_n: self.dead_n,
             noise,
         }

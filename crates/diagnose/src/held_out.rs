@@ -86,7 +86,7 @@ fn without(search: &Search, model: &Model, ruptures: &[Vec<f64>], left: usize) -
     let data = Data {
         tracks: Arc::new((0..n).filter(others).map(|k| search.data.tracks[k].clone()).collect()),
         ruptures: (0..n).filter(others).map(|k| ruptures[k].clone()).collect(),
-        allowed: Arc::new(Vec::new()),
+        reach: Arc::new(Vec::new()),
         dead_n: search.data.dead_n,
         noise: search.data.noise,
     };

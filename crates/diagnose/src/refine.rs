@@ -87,12 +87,12 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool, events: bool) -> bool 
             }
             let mut window = Window::new(&compiled, track, &whole, ruptures, layer);
             let mut best = window.nats(ruptures, events);
-            let allowed = data.allowed.get(k).and_then(|a| a.get(layer)).copied();
-            let allowed = allowed.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+            let reach = data.reach.get(k).and_then(|a| a.get(layer)).copied().unwrap_or(f64::INFINITY);
+            let (first, last) = (ruptures[layer] - reach, ruptures[layer] + reach);
             let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
             let end = track.t.last().copied().unwrap_or(0.0);
-            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end).min(allowed.1);
-            let low = low.max(allowed.0);
+            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end).min(last);
+            let low = low.max(first);
             for sign in [-1.0, 1.0] {
                 let mut step = steps.len();
                 let mut turns = 0;
@@ -203,7 +203,6 @@ pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide:
     seed_punctures(&mut model, data);
     walk_stepped(&mut model, data);
     let mut best = fit(&model, data, turns, enough)?;
-    let feels = model.compile().is_some_and(|m| m.feels_instants);
     for round in 0..rounds {
         let again = |events: bool| {
             let mut there = data.clone();
@@ -218,7 +217,6 @@ pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide:
         // tells the instants, they go first and the puncture force follows.
         if wide
             && round == 0
-            && feels
             && let Some(other) = again(false)
             && other.0.nats < new.nats
         {

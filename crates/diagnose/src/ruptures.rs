@@ -16,18 +16,24 @@ const NONE: usize = usize::MAX;
 /// Samples per second of the first pass.
 const COARSE_HZ: f64 = 50.0;
 
-/// Instants (s) of ruptures, per recording and layer.
-pub type Instants = Vec<Vec<f64>>;
-/// Where each may be moved to (s, s).
-pub type Allowed = Vec<Vec<(f64, f64)>>;
+/// Where the layers ruptured in the data.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Instants (s) per recording and layer.
+    pub instants: Vec<Vec<f64>>,
+    /// How far (s) each may be moved at a time: infinitely, but for those at clear drops.
+    pub reach: Vec<Vec<f64>>,
+    /// Per recording the instants (s) of clear drops that no rupture took.
+    pub spare: Vec<Vec<f64>>,
+}
 
-/// How far (s) a rupture at a clear drop may be moved: no law that lacks an effect drags it away.
+/// How far (s) a rupture at a clear drop may be moved at a time: no law that lacks an effect drags it away.
 const CLEAR_S: f64 = 0.4;
 
 /// Finds the ruptures in every recording, how far they may be moved, and first values of stiffness and
 /// friction.
 #[must_use]
-pub fn find(model: &mut Model, tracks: &[Track]) -> (Instants, Allowed) {
+pub fn find(model: &mut Model, tracks: &[Track]) -> Found {
     let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / COARSE_HZ).round().max(1.0) as usize;
     let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[])).collect();
     let range = coarse.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
@@ -44,7 +50,7 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> (Instants, Allowed) {
     }
     let friction: Vec<(Vec<f64>, &Track)> =
         tracks.iter().map(|t| (without_friction(&model.tissue, t), t)).collect();
-    let instants: Instants = paths
+    let instants: Vec<Vec<f64>> = paths
         .iter()
         .zip(&friction)
         .map(|(path, (force, track))| {
@@ -62,27 +68,18 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> (Instants, Allowed) {
         })
         .collect();
     let slabs = Slab::stack(&model.tissue);
-    let allowed =
-        coarse
-            .iter()
-            .zip(&paths)
-            .zip(&instants)
-            .map(|((track, path), instants)| {
-                let drops = drops(&slabs, track);
-                let clear = |r: usize| drops.get(r).is_some_and(|d| *d >= 1.0);
-                path.iter()
-                    .zip(instants)
-                    .map(|(&r, &at)| {
-                        if clear(r) {
-                            (at - CLEAR_S, at + CLEAR_S)
-                        } else {
-                            (f64::NEG_INFINITY, f64::INFINITY)
-                        }
-                    })
-                    .collect()
-            })
-            .collect();
-    (instants, allowed)
+    let mut found = Found { instants, ..Found::default() };
+    for (k, (track, path)) in coarse.iter().zip(&paths).enumerate() {
+        let drops = drops(&slabs, track);
+        let clear = |r: usize| drops.get(r).is_some_and(|d| *d >= 1.0);
+        found.reach.push(path.iter().map(|&r| if clear(r) { CLEAR_S } else { f64::INFINITY }).collect());
+        let taken = |i: usize| path.iter().any(|r| r.abs_diff(i) <= 2 * DROP_SIDE);
+        let spare = (0..track.len()).filter(|i| clear(*i) && !taken(*i));
+        let (force, fine) = &friction[k];
+        let at = |i: usize| fine.before(edge(force, fine, (i * q).min(fine.len() - 1), 2 * q));
+        found.spare.push(spare.map(at).collect());
+    }
+    found
 }
 
 fn friction(slabs: &[Slab], z: f64, v: f64) -> f64 {
@@ -165,6 +162,11 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
             cost[s] = best + misfit + 0.02 * late * late;
             from[i * states + s] = came as u8;
         }
+    }
+    // A layer far behind the tip has ruptured, drop or none.
+    for (s, cost) in cost.iter_mut().enumerate() {
+        let whole = slabs.iter().skip(s).filter(|slab| deepest > slab.far_m() + 0.2 * slab.thickness_m);
+        *cost += WITHOUT_DROP * whole.count() as f64;
     }
     let mut state = (0..states).min_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
     let mut out = vec![NONE; slabs.len()];

@@ -27,13 +27,9 @@ const FAST_HZ: f64 = 6.0;
 /// How far (s) the base law may move a rupture at a clear drop.
 const BASE_MOVES_S: f64 = 0.12;
 
-/// A range about the same middle, no wider than `half` to each side.
-fn narrowed((low, high): (f64, f64), half: f64) -> (f64, f64) {
-    if !low.is_finite() || !high.is_finite() {
-        return (low, high);
-    }
-    let middle = 0.5 * (low + high);
-    (low.max(middle - half), high.min(middle + half))
+/// The reach of the base law.
+fn least_reach(reach_s: f64) -> f64 {
+    if reach_s.is_finite() { reach_s.min(BASE_MOVES_S) } else { reach_s }
 }
 
 /// Settings of the search.
@@ -120,6 +116,8 @@ pub struct Search {
     pub force_n: f64,
     /// Fined nats of the effect taken last, under the noise by which its rivals were judged.
     pub reference: f64,
+    /// Per recording the instants (s) of clear drops that no layer's rupture took.
+    pub spare: Vec<Vec<f64>>,
 }
 
 impl Search {
@@ -136,7 +134,7 @@ impl Search {
         let mut model = Model::base(tissue, tolerance, given);
         let force_n = tracks.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
         let least = 1e-4 * force_n.max(1e-9);
-        let (found, allowed) = ruptures::find(&mut model, &tracks);
+        let found = ruptures::find(&mut model, &tracks);
         let air = air::noise(&tracks, tissue.surface_m, least);
         let noise = air.unwrap_or_else(|| rough(&tracks, least));
         // Rounding to steps beyond the noise is no noise: it repeats itself wherever the force does.
@@ -149,9 +147,9 @@ impl Search {
         };
         let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / SCREEN_HZ).round().max(1.0) as usize;
         // The base law, which lacks whatever it lacks, moves ruptures but little.
-        let near = allowed.iter().map(|a| a.iter().map(|a| narrowed(*a, BASE_MOVES_S)).collect()).collect();
+        let near = found.reach.iter().map(|r| r.iter().map(|r| least_reach(*r)).collect()).collect();
         let mut data =
-            Data { tracks: Arc::new(tracks), ruptures: found, allowed: Arc::new(near), dead_n, noise };
+            Data { tracks: Arc::new(tracks), ruptures: found.instants, reach: Arc::new(near), dead_n, noise };
         seed_punctures(&mut model, &data);
         let coarse = data.blocks(q, noise.blocks(q));
         let first = fit(&model, &coarse, 8, 0.1)?;
@@ -160,7 +158,7 @@ impl Search {
             data.noise = own_noise(&fitted.model, &data, least).unwrap_or(noise);
         }
         let fitted = refine(&fitted.model, &mut data, 1, 4, false)?;
-        data.allowed = Arc::new(allowed);
+        data.reach = Arc::new(found.reach);
         let base = Candidate { model: fitted.model, ruptures: data.ruptures.clone(), nats: fitted.nats };
         Some(Self {
             settings,
@@ -173,6 +171,7 @@ impl Search {
             force_n,
             data,
             reference: 0.0,
+            spare: found.spare,
         })
     }
 
@@ -282,6 +281,9 @@ impl Search {
             })
             .collect();
         let mut begun: Vec<Begun> = begun.into_iter().flatten().collect();
+        if !taken.contains(&"hidden_membrane") {
+            begun.extend(self.exchanged(&stood.model, &data));
+        }
         begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
         let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
         let mut kept = 0;
@@ -348,6 +350,66 @@ impl Search {
             new
         });
         (rivals, screened)
+    }
+
+    /// Membranes at drops that were taken for a layer's rupture, with that layer's at a drop that nobody took.
+    fn exchanged(&self, stood: &Model, data: &Data) -> Vec<Begun> {
+        let mut tried: Vec<(Choice, Data)> = Vec::new();
+        let surface = stood.assumed.surface_m;
+        for layer in 0..stood.assumed.layers.len() {
+            let Some(other) = self.exchange_drops(data, layer) else { continue };
+            // Where the membrane broke, and what it let go.
+            let (mut depths, mut forces) = (Vec::new(), Vec::new());
+            for (track, ruptures) in data.tracks.iter().zip(&data.ruptures) {
+                let k = track.first_from(ruptures[layer]);
+                if (4..track.len().saturating_sub(4)).contains(&k) {
+                    depths.push(track.z[k] - surface);
+                    forces.push(track.f[k - 3] - track.f[k + 2]);
+                }
+            }
+            let (breaks, force) = (median(&mut depths), median(&mut forces).max(0.02));
+            let there = Data { ruptures: other, ..data.clone() };
+            for stretch in [1e-3, 4e-3, 12e-3] {
+                let values = [breaks - stretch, force / stretch, force];
+                if let Some(choice) = choice("hidden_membrane", &values).filter(|_| values[0] > 0.0) {
+                    tried.push((choice, there.clone()));
+                }
+            }
+        }
+        let fits: Vec<Option<Begun>> = tried
+            .into_par_iter()
+            .map(|(choice, there)| {
+                let coarse = there.blocks(self.q, there.noise.blocks(self.q));
+                let mut model = stood.with(choice);
+                seed_punctures(&mut model, &coarse);
+                Some((fit(&model, &coarse, 4, 0.1)?, coarse, there.ruptures))
+            })
+            .collect();
+        fits.into_iter().flatten().collect()
+    }
+
+    /// The ruptures with those of one layer at spare drops, the same depth in every recording; `None` when
+    /// there are none.
+    fn exchange_drops(&self, data: &Data, layer: usize) -> Option<Vec<Vec<f64>>> {
+        const SAME_DEPTH_M: f64 = 2e-3;
+        let mut depth: Option<f64> = None;
+        let mut out = Vec::new();
+        for ((track, ruptures), spare) in data.tracks.iter().zip(&data.ruptures).zip(&self.spare) {
+            let mut new = ruptures.clone();
+            let after = if layer > 0 { ruptures[layer - 1] } else { f64::NEG_INFINITY };
+            let before = ruptures.get(layer + 1).copied().unwrap_or(NEVER);
+            let z = |t: f64| track.z.get(track.first_from(t)).copied().unwrap_or(f64::INFINITY);
+            let free = spare.iter().copied().filter(|t| *t > after && *t < before);
+            let nearest = match depth {
+                None => free.min_by(|a, b| a.total_cmp(b)),
+                Some(d) => free.min_by(|a, b| (z(*a) - d).abs().total_cmp(&(z(*b) - d).abs())),
+            };
+            let at = nearest.filter(|t| depth.is_none_or(|d: f64| (z(*t) - d).abs() < SAME_DEPTH_M))?;
+            depth = depth.or(Some(z(at)));
+            new[layer] = at;
+            out.push(new);
+        }
+        (!out.is_empty()).then_some(out)
     }
 
     /// One step of the forward selection; true when an effect was taken.
