@@ -193,6 +193,9 @@ impl Search {
             progress(&format!("looking for effect {}", self.best.model.effects.len() + 1));
             let standing = self.best.clone();
             let taken = self.stage(&standing);
+            if taken {
+                self.enlarge();
+            }
             if !taken || self.hopeless(2.0) {
                 break;
             }
@@ -203,6 +206,28 @@ impl Search {
             self.prune();
         }
         self.settle_base();
+    }
+
+    /// Effects with a larger variant (a second time constant) get it when it gains what its numbers must.
+    fn enlarge(&mut self) {
+        for index in 0..self.best.model.effects.len() {
+            let own = self.best.model.effects[index].clone();
+            let (Some(larger), &[fraction, tau]) = (own.info.larger, own.values.as_slice()) else { continue };
+            let found: Vec<Option<Candidate>> = [8.0, 3.0, 0.3, 0.12]
+                .par_iter()
+                .map(|ratio| {
+                    let mut model = self.best.model.clone();
+                    let mut terms = [[0.7 * fraction, tau], [0.3 * fraction, ratio * tau]];
+                    terms.sort_by(|a, b| a[1].total_cmp(&b[1]));
+                    model.effects[index] = Choice::new(larger, terms.as_flattened());
+                    self.refitted(&model, &self.best.ruptures)
+                })
+                .collect();
+            let best = found.into_iter().flatten().min_by(|a, b| a.nats.total_cmp(&b.nats));
+            if let Some(best) = best.filter(|b| self.best.nats - b.nats > self.settings.needed(2)) {
+                self.best = best;
+            }
+        }
     }
 
     /// Whether structure remains that is larger by `ratio` than what the effects taken explain: no
@@ -633,6 +658,12 @@ impl Search {
                 let mut model = standing.model.with(choice(id, &[value])?);
                 if id == "needle_compliance" {
                     seed_punctures(&mut model, data);
+                }
+                if id == "soft_boundary" {
+                    // What a narrow boundary does lies within a sample of the rupture.
+                    let mut there = data.clone();
+                    crate::refine::retime(&model, &mut there, false, true);
+                    return Some((nats(&model, &there), id, value));
                 }
                 Some((nats(&model, data), id, value))
             })
