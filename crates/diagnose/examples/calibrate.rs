@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use stylet_diagnose::hidden::{self, Kind};
 use stylet_diagnose::search::{Search, Settings};
 use stylet_diagnose::starts::FROM_THE_RAW_DATA;
+use stylet_diagnose::thresholds::LEAST;
 use stylet_diagnose::track::Track;
 
 /// Clean cases that may be accused.
@@ -43,7 +44,7 @@ fn main() {
         gains.sort_unstable_by(f64::total_cmp);
         let q = |p: f64| gains[((gains.len() - 1) as f64 * p).round() as usize];
         // The tail of a likelihood ratio falls as exp(-x), a little slower with several numbers.
-        let needed = q(0.9) + (0.1 / each).ln() + 1.0;
+        let needed = (q(0.9) + (0.1 / each).ln() + 1.0).max(q(1.0) + 1.0).max(LEAST);
         println!("    (\"{id}\", {needed:.1}), // {:.1} {:.1} {:.1} {:.1}", q(0.5), q(0.9), q(0.99), q(1.0));
     }
 }

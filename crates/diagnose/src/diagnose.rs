@@ -288,7 +288,7 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
         .map(|r| r.1)
         .next_back();
     let gain_nats = without.unwrap_or(search.base.nats - best.nats);
-    let alarm = (-(gain_nats - search.settings.threshold).max(0.0)).exp() * 0.01;
+    let alarm = (-(gain_nats - search.settings.needed(choice.info.id)).max(0.0)).exp() * 0.01;
     Cause {
         effect: choice.info.id.to_owned(),
         equivalent,

@@ -15,6 +15,7 @@
 //! | [`fit`], [`refine`] | bounded Levenberg-Marquardt on Huber's loss; ruptures moved to where a model wants them |
 //! | [`starts`], [`look`] | where fits begin; a linear look that ranks starts and tells what is invisible |
 //! | [`search`] | forward selection, every rival with the base re-fitted; exchange, pruning |
+//! | [`thresholds`] | what each effect must gain, calibrated on clean data |
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
 //! | [`held_out`] | the gain on recordings left out of the fit |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
@@ -44,6 +45,7 @@ pub mod ruptures;
 pub mod search;
 pub mod spectrum;
 pub mod starts;
+pub mod thresholds;
 pub mod track;
 pub mod velocity;
 pub mod visible;

@@ -10,6 +10,7 @@ use crate::refine::{refine, seed_punctures};
 use crate::ruptures;
 use crate::spectrum::{peaks, periodogram, sharpen};
 use crate::starts::{self, Hints, Start};
+use crate::thresholds;
 use crate::track::{NEVER, Track};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -35,25 +36,23 @@ fn least_reach(reach_s: f64) -> f64 {
 /// Settings of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Nats that a first parameter must gain.
-    pub threshold: f64,
-    /// Nats for each further one.
-    pub per_parameter: f64,
+    /// Nats that every effect must gain beyond [`thresholds::needed`].
+    pub margin: f64,
     /// Most effects at once.
     pub most: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { threshold: 10.0, per_parameter: 2.0, most: 3 }
+        Self { margin: 0.0, most: 3 }
     }
 }
 
 impl Settings {
-    /// Nats that an effect of so many parameters must gain.
+    /// Nats that an effect must gain.
     #[must_use]
-    pub fn needed(&self, parameters: usize) -> f64 {
-        self.threshold + self.per_parameter * parameters.saturating_sub(1) as f64
+    pub fn needed(&self, id: &str) -> f64 {
+        thresholds::needed(id) + self.margin
     }
 }
 
@@ -224,7 +223,9 @@ impl Search {
                 })
                 .collect();
             let best = found.into_iter().flatten().min_by(|a, b| a.nats.total_cmp(&b.nats));
-            if let Some(best) = best.filter(|b| self.best.nats - b.nats > self.settings.needed(2)) {
+            if let Some(best) =
+                best.filter(|b| self.best.nats - b.nats > thresholds::SECOND_TERM + self.settings.margin)
+            {
                 self.best = best;
             }
         }
@@ -248,7 +249,9 @@ impl Search {
         let rivals = [self.best.clone()];
         let base = Candidate { nats: nats(&self.base.model, &self.data_of(&self.base)), ..self.base.clone() };
         self.base = self.refit_standing(&base, &rivals);
-        if self.base.nats - self.best.nats < self.settings.needed(self.best.model.extra()) {
+        let names = self.best.model.names();
+        let needed = names.iter().map(|id| self.settings.needed(id)).fold(0.0, f64::max);
+        if self.base.nats - self.best.nats < needed {
             self.best = self.base.clone();
             self.rivals.clear();
         }
@@ -441,8 +444,7 @@ impl Search {
     fn stage(&mut self, standing: &Candidate) -> bool {
         let (mut rivals, screened) = self.contest(standing);
         let stood = standing.model.names();
-        let mut stage =
-            Stage { stood, screened, rivals: Vec::new(), needed: self.settings.needed(1), taken: None };
+        let mut stage = Stage { stood, screened, rivals: Vec::new(), needed: thresholds::LEAST, taken: None };
         if rivals.is_empty() {
             self.stages.push(stage);
             return false;
@@ -477,9 +479,8 @@ impl Search {
             self.stages.push(stage);
             return false;
         };
-        let best = self.polished(&simplest(&rivals, &best, self.settings));
-        let extra = best.model.extra() - standing.model.extra();
-        stage.needed = self.settings.needed(extra);
+        let best = self.polished(&simplest(&rivals, &best));
+        stage.needed = self.settings.needed(best.model.names().last().copied().unwrap_or(""));
         let gain = standing.nats - best.nats;
         let taken = gain > stage.needed;
         if standing.model.effects.is_empty() {
@@ -534,7 +535,7 @@ impl Search {
             };
             let (rivals, _) = self.contest(&without);
             let Some(first) = rivals.first() else { continue };
-            let first = simplest(&rivals, first, self.settings);
+            let first = simplest(&rivals, first);
             if first.fined() < self.best.fined() - 0.5 {
                 self.reference = first.fined();
                 self.best = first;
@@ -565,12 +566,12 @@ impl Search {
         while self.best.model.effects.len() > 1 {
             let mut least: Option<(f64, Candidate)> = None;
             for index in 0..self.best.model.effects.len() {
-                let extra = self.best.model.extra() - self.best.model.without(index).extra();
+                let id = self.best.model.effects[index].info.id;
                 let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures)
                 else {
                     continue;
                 };
-                let spare = without.nats - self.best.nats - self.settings.needed(extra);
+                let spare = without.nats - self.best.nats - self.settings.needed(id);
                 if spare < 0.0 && least.as_ref().is_none_or(|l| spare < l.0) {
                     least = Some((spare, without));
                 }
@@ -783,7 +784,7 @@ fn rough(tracks: &[Track], least_n: f64) -> Noise {
 }
 
 /// Nested models: the simplest wins unless the larger gains what its further numbers must.
-fn simplest(rivals: &[Candidate], best: &Candidate, settings: Settings) -> Candidate {
+fn simplest(rivals: &[Candidate], best: &Candidate) -> Candidate {
     const NESTED: [(&str, &str); 3] = [
         ("stribeck_friction", "coulomb_friction"),
         ("presliding_friction", "coulomb_friction"),
@@ -795,7 +796,7 @@ fn simplest(rivals: &[Candidate], best: &Candidate, settings: Settings) -> Candi
             let small = rivals.iter().find(|r| r.model.names().last().copied() == Some(smaller));
             if let Some(small) = small.filter(|_| larger != "hidden_membrane") {
                 let more = best.model.extra() - small.model.extra();
-                if small.nats - best.nats < 3.0 + settings.per_parameter * more as f64 {
+                if small.nats - best.nats < 3.0 + 2.0 * more as f64 {
                     return small.clone();
                 }
             }
