@@ -136,13 +136,15 @@ impl Search {
         let force_n = tracks.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
         let least = 1e-4 * force_n.max(1e-9);
         let found = ruptures::find(&mut model, &tracks);
-        let air = air::noise(&tracks, tissue.surface_m, least);
+        let air = air::noise(&tracks, tissue.surface_m, least, 0.0);
         let noise = air.unwrap_or_else(|| rough(&tracks, least));
         // Rounding to steps beyond the noise is no noise: it repeats itself wherever the force does.
         let coarse = step_n > COARSE_STEP * noise.marginal_n;
         let (air, noise, dead_n) = if coarse {
-            let white = Noise::white(0.25 * step_n);
-            (Some(white), white, 0.5 * step_n)
+            let dead_n = 0.5 * step_n;
+            let beyond = air::noise(&tracks, tissue.surface_m, least, dead_n);
+            let noise = beyond.filter(|n| n.marginal_n > 0.5 * dead_n).unwrap_or(Noise::white(0.5 * dead_n));
+            (Some(noise), noise, dead_n)
         } else {
             (air, noise, 0.0)
         };
