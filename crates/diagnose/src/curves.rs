@@ -70,7 +70,7 @@ pub fn curves(examined: &Examined) -> Vec<Curves> {
             position_m: t.z.clone(),
             velocity_mps: t.v.clone(),
             force_n: t.f.clone(),
-            free_n: free_residual(&best.model, t),
+            free_n: free_residual(&best.model, t, &search.data.noise),
             base_n,
             extended_n,
             used: t.used.clone(),

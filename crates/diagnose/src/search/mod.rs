@@ -22,8 +22,9 @@ use stylet_tissue::{AnyEffect, Tissue};
 const SCREEN_HZ: f64 = 50.0;
 /// Rivals fitted at full rate.
 const FINALISTS: usize = 6;
-/// A step of the recorded force of so many standard deviations of the noise hides it.
-pub const COARSE_STEP: f64 = 1.5;
+/// A step of the recorded force of so many standard deviations of what is recorded in air hides the noise. Below,
+/// the noise makes the rounding independent of the force (Widrow 1961), and it counts as noise.
+pub const COARSE_STEP: f64 = 3.0;
 /// Above this frequency (Hz) an interference is not fitted on averages.
 const FAST_HZ: f64 = 6.0;
 
