@@ -28,6 +28,8 @@ pub const COARSE_STEP: f64 = 3.0;
 /// Above this frequency (Hz) an interference is not fitted on averages.
 const FAST_HZ: f64 = 6.0;
 
+/// Nats more that every effect must gain when rounding hides the noise: what is left then has no known colour.
+const ROUNDED: f64 = 25.0;
 /// How far (s) the base law may move a rupture at a clear drop.
 const BASE_MOVES_S: f64 = 0.12;
 
@@ -162,6 +164,8 @@ impl Search {
             data.noise = own_noise(&fitted.model, &data, least).unwrap_or(noise);
         }
         let fitted = refine(&fitted.model, &mut data, 1, 4, false)?;
+        let margin = settings.margin + if dead_n > 0.0 { ROUNDED } else { 0.0 };
+        let settings = Settings { margin, ..settings };
         data.reach = Arc::new(found.reach);
         let base = Candidate { model: fitted.model, ruptures: data.ruptures.clone(), nats: fitted.nats };
         Some(Self {
