@@ -144,7 +144,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         if out.used {
             out.reconstructed_n = if self.in_contact { sample.force_n - out.error_n } else { 0.0 };
         }
-        out.theta = self.rls.theta;
+        out.theta = if self.rls.is_finite() { self.rls.theta } else { [0.0; 2] };
         out.cusum_n2 = self.cusum_n2;
         out.derivative_n_per_s = self.front.derivative_n_per_s();
         out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
@@ -156,27 +156,30 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// estimate and `used` are kept up to date.
     #[inline]
     pub fn step_brief(&mut self, sample: Sample) -> &Output {
-        let seen = self.front.look(&self.config, sample);
+        let mut seen = Seen::default();
+        self.front.look(&self.config, sample, &mut seen);
         self.take(sample, seen);
         &self.out
     }
 
-    /// As [`Enhancer::step_brief`] for many samples at hand; `hear` is told the output for each.
+    /// As [`Enhancer::step_brief`] for many samples at hand; `hear` is told the output for each, and the
+    /// last is returned.
     ///
     /// The samples are looked at ahead of the estimator, a block at a time, which is faster than one after
     /// the other and gives the same bits.
     #[inline]
-    pub fn run(&mut self, samples: &[Sample], mut hear: impl FnMut(&Output)) {
+    pub fn run(&mut self, samples: &[Sample], mut hear: impl FnMut(&Output)) -> &Output {
         let mut seen = [Seen::default(); BLOCK];
         for block in samples.chunks(BLOCK) {
             for (seen, sample) in seen.iter_mut().zip(block) {
-                *seen = self.front.look(&self.config, *sample);
+                self.front.look(&self.config, *sample, seen);
             }
             for (seen, sample) in seen.iter().zip(block) {
                 self.take(*sample, *seen);
                 hear(&self.out);
             }
         }
+        &self.out
     }
 
     /// What the estimator makes of a sample.
@@ -184,21 +187,28 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     fn take(&mut self, sample: Sample, seen: Seen) {
         self.out.detection = None;
         self.out.estimate = None;
-        self.out.used = seen.used;
-        if !seen.used {
+        self.out.used = seen.used();
+        if !seen.used() {
             return;
         }
         let number = self.history.next();
         self.history.push(sample);
         self.touch(seen.dt_s, sample, number);
         let before = self.rls.theta;
-        self.out.error_n = self.identify(seen.dt_s, sample);
+        let v = sample.velocity_mps;
+        // What is left of the force without the friction of the layers traversed so far.
+        let left_n = sample.force_n - self.compensation.around_shaft_ns_per_m(sample.position_m) * v;
+        self.out.error_n = self.identify(seen.dt_s, sample, left_n);
         self.advance(sample, seen, before);
-        self.finish(sample);
+        self.out.enhanced_n = left_n;
+        if self.out.estimate.is_some() {
+            let friction = self.compensation.around_shaft_ns_per_m(sample.position_m);
+            self.out.enhanced_n = sample.force_n - friction * v;
+        }
     }
 
     /// First contact.
-    #[inline]
+    #[inline(always)]
     fn touch(&mut self, dt_s: f64, sample: Sample, number: u64) {
         if self.out.contact_m.is_some() {
             return;
@@ -244,8 +254,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// One RLS update; returns the innovation.
-    #[inline]
-    fn identify(&mut self, dt_s: f64, sample: Sample) -> f64 {
+    #[inline(always)]
+    fn identify(&mut self, dt_s: f64, sample: Sample, left_n: f64) -> f64 {
         let depth_m = sample.position_m - self.traverse.start_m;
         if !self.in_contact || depth_m <= 0.0 {
             return 0.0;
@@ -257,12 +267,13 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
         let prior = self.prior();
         self.clock.tick(&self.config.reset, dt_s, prior, &mut self.rls);
-        let y = sample.force_n - self.compensation.around_shaft_ns_per_m(sample.position_m) * v;
         let phi = regressor(self.config.model, depth_m, v);
         let noise = relative_noise(dt_s);
-        let error_n = self.rls.update_with_noise(phi, y, self.config.forgetting, noise);
-        if !self.rls.is_finite() {
+        let mut error_n = self.rls.update_with_noise(phi, left_n, self.config.forgetting, noise);
+        if !error_n.is_finite() {
+            // The estimate has overflowed, as a forgetting factor below one makes it in the end.
             self.rls = Rls::new(prior);
+            error_n = self.rls.update_with_noise(phi, left_n, self.config.forgetting, noise);
         }
         if self.traverse.crossed.is_none() && self.known_thickness_m().is_some_and(|d| depth_m >= d) {
             self.traverse.crossed = Some(self.history.next().saturating_sub(1));
@@ -271,7 +282,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// The state machine.
-    #[inline]
+    #[inline(always)]
     fn advance(&mut self, sample: Sample, seen: Seen, before: [f64; 2]) {
         let dt_s = seen.dt_s;
         match self.out.state {
@@ -290,14 +301,14 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Looks for a rupture.
-    #[inline]
+    #[inline(always)]
     fn watch(&mut self, sample: Sample, seen: Seen, before: [f64; 2]) {
         if !self.in_contact {
             return;
         }
         let armed = self.out.contact_m.is_some()
             && sample.position_m - self.traverse.blind_from_m >= self.config.guard.blind_travel_m
-            && seen.quiet;
+            && seen.quiet();
         let mut cause = None;
         if armed {
             let was = self.cusum_n2;
@@ -317,7 +328,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
         if cause.is_none()
             && armed
-            && seen.edge
+            && seen.edge()
             && self.out.state == State::ExpectedRupture
         {
             cause = Some(Cause::DerivativeTrailingEdge);
@@ -328,7 +339,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         if let Some(cause) = cause {
             self.declare(sample, seen.dt_s, before, cause);
         } else {
-            self.out.state = if seen.derivative_on { State::ExpectedRupture } else { State::NoRupture };
+            self.out.state = if seen.derivative_on() { State::ExpectedRupture } else { State::NoRupture };
         }
     }
 
@@ -489,12 +500,5 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         let prior = self.prior();
         self.rls.reset_covariance(prior);
         self.out.estimate = Some(estimate);
-    }
-
-    #[inline]
-    fn finish(&mut self, sample: Sample) {
-        let v = sample.velocity_mps;
-        let friction = self.compensation.around_shaft_ns_per_m(sample.position_m);
-        self.out.enhanced_n = sample.force_n - friction * v;
     }
 }

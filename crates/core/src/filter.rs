@@ -45,17 +45,18 @@ impl ForceDerivative {
         self.value_n_per_s
     }
 
-    /// Takes a sample, `dt_s` after the one before (zero: the first), with the coefficients of the two
-    /// low-passes, and returns the derivative in N/s.
+    /// The first sample.
+    pub(crate) fn begin(&mut self, force_n: f64) {
+        self.force_n = force_n;
+    }
+
+    /// Takes a sample, `dt_s` after the one before, with the coefficients of the two low-passes, and
+    /// returns the derivative in N/s.
     #[inline]
     pub(crate) fn update(&mut self, dt_s: f64, [a_force, a_derivative]: [f64; 2], force_n: f64) -> f64 {
-        if dt_s > 0.0 {
-            let step = a_force * (force_n - self.force_n);
-            self.force_n += step;
-            self.value_n_per_s += a_derivative * (step / dt_s - self.value_n_per_s);
-        } else {
-            self.force_n = force_n;
-        }
+        let step = a_force * (force_n - self.force_n);
+        self.force_n += step;
+        self.value_n_per_s += a_derivative * (step / dt_s - self.value_n_per_s);
         self.value_n_per_s
     }
 }

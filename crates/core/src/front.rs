@@ -11,14 +11,38 @@ use crate::sample::Sample;
 pub(crate) struct Seen {
     /// Time since the sample before in s; zero at the first.
     pub(crate) dt_s: f64,
+    flags: u64,
+}
+
+impl Seen {
+    const USED: u64 = 1;
+    const QUIET: u64 = 2;
+    const DERIVATIVE_ON: u64 = 4;
+    const EDGE: u64 = 8;
+
     /// False when the sample is to be passed over; the rest is then empty.
-    pub(crate) used: bool,
+    #[inline(always)]
+    pub(crate) fn used(self) -> bool {
+        self.flags & Self::USED != 0
+    }
+
     /// A change of force may be a rupture.
-    pub(crate) quiet: bool,
+    #[inline(always)]
+    pub(crate) fn quiet(self) -> bool {
+        self.flags & Self::QUIET != 0
+    }
+
     /// The force derivative's switch.
-    pub(crate) derivative_on: bool,
+    #[inline(always)]
+    pub(crate) fn derivative_on(self) -> bool {
+        self.flags & Self::DERIVATIVE_ON != 0
+    }
+
     /// Its trailing edge, where it tells a rupture.
-    pub(crate) edge: bool,
+    #[inline(always)]
+    pub(crate) fn edge(self) -> bool {
+        self.flags & Self::EDGE != 0
+    }
 }
 
 /// Looks at the samples before the estimator does.
@@ -29,8 +53,8 @@ pub(crate) struct Front {
     derivative: ForceDerivative,
     guard: MotionGuard,
     derivative_on: bool,
+    /// Time of the last sample that was used in s; minus infinity before the first.
     last_s: f64,
-    started: bool,
 }
 
 impl Front {
@@ -45,8 +69,7 @@ impl Front {
             derivative: ForceDerivative::default(),
             guard: MotionGuard::default(),
             derivative_on: false,
-            last_s: 0.0,
-            started: false,
+            last_s: f64::NEG_INFINITY,
         }
     }
 
@@ -55,26 +78,43 @@ impl Front {
         self.derivative.value_n_per_s()
     }
 
+    /// Looks at a sample and writes down what it sees.
     #[inline(always)]
-    pub(crate) fn look(&mut self, config: &EnhanceConfig, sample: Sample) -> Seen {
+    pub(crate) fn look(&mut self, config: &EnhanceConfig, sample: Sample, seen: &mut Seen) {
         let dt_s = sample.time_s - self.last_s;
-        if !sample.is_usable() || (self.started && dt_s <= 0.0) {
-            return Seen::default();
+        // Also false for times that are not finite, and before the first sample.
+        if !(dt_s > 0.0 && dt_s < f64::MAX && sample.is_in_range()) {
+            return self.look_aside(config, sample, seen);
         }
-        let dt_s = if self.started { dt_s } else { 0.0 };
         self.last_s = sample.time_s;
-        self.started = true;
         let [motion, scatter, force, derivative] = *self.coefficients.at(dt_s);
         self.guard.update(&config.guard, config.drop.standstill_mps, dt_s, [motion, scatter], sample);
         let rate = self.derivative.update(dt_s, [force, derivative], sample.force_n);
         let edge = self.switch(config, rate);
-        Seen {
-            dt_s,
-            used: true,
-            quiet: self.guard.is_quiet(),
-            derivative_on: self.derivative_on,
-            edge: edge && config.derivative.trailing_edge && !self.guard.is_slowing(&config.guard),
+        seen.dt_s = dt_s;
+        seen.flags = Seen::USED
+            | if self.guard.is_quiet() { Seen::QUIET } else { 0 }
+            | if self.derivative_on { Seen::DERIVATIVE_ON } else { 0 };
+        if edge && config.derivative.trailing_edge && !self.guard.is_slowing(&config.guard) {
+            seen.flags |= Seen::EDGE;
         }
+    }
+
+    /// The first sample, and those that cannot be used.
+    #[cold]
+    #[inline(never)]
+    fn look_aside(&mut self, config: &EnhanceConfig, sample: Sample, seen: &mut Seen) {
+        *seen = Seen::default();
+        if self.last_s > f64::NEG_INFINITY || !sample.is_usable() {
+            return;
+        }
+        self.last_s = sample.time_s;
+        self.guard.begin(&config.guard, config.drop.standstill_mps, sample);
+        self.derivative.begin(sample.force_n);
+        self.switch(config, 0.0);
+        seen.flags = Seen::USED
+            | if self.guard.is_quiet() { Seen::QUIET } else { 0 }
+            | if self.derivative_on { Seen::DERIVATIVE_ON } else { 0 };
     }
 
     /// Moves the derivative's switch; true on its trailing edge.

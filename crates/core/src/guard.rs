@@ -22,6 +22,8 @@ pub(crate) struct MotionGuard {
     scatter_mps2_squared: f64,
     rest_s: f64,
     deepest_m: f64,
+    /// Filtered speed and speed are the same, and there never was any acceleration.
+    even: bool,
 }
 
 impl Default for MotionGuard {
@@ -33,13 +35,20 @@ impl Default for MotionGuard {
             scatter_mps2_squared: 0.0,
             rest_s: 0.0,
             deepest_m: f64::NEG_INFINITY,
+            even: false,
         }
     }
 }
 
 impl MotionGuard {
-    /// Takes a sample, `dt_s` after the one before (zero: the first), with the coefficients of the
-    /// motion's low-pass and of the scatter's.
+    /// The first sample.
+    pub(crate) fn begin(&mut self, config: &GuardConfig, standstill_mps: f64, sample: Sample) {
+        self.velocity_mps = sample.velocity_mps;
+        self.settle(config, standstill_mps, false, sample);
+    }
+
+    /// Takes a sample, `dt_s` after the one before, with the coefficients of the motion's low-pass and of
+    /// the scatter's.
     #[inline]
     pub(crate) fn update(
         &mut self,
@@ -49,25 +58,35 @@ impl MotionGuard {
         [low_pass, scatter]: [f64; 2],
         sample: Sample,
     ) {
-        let v = sample.velocity_mps;
-        let mut sudden = false;
-        if dt_s > 0.0 {
-            let a = (v - self.raw_mps) / dt_s;
-            self.velocity_mps += low_pass * (v - self.velocity_mps);
-            self.acceleration_mps2 += low_pass * (a - self.acceleration_mps2);
-            let size = self.acceleration_mps2 * self.acceleration_mps2;
-            let scattered = SCATTERS * SCATTERS * self.scatter_mps2_squared;
-            let least = config.sudden_mps2 * config.sudden_mps2;
-            let limit = if scattered > least { scattered } else { least };
-            sudden = size > limit;
-            // One jump teaches little: it counts at most as what was just bearable.
-            let bearable = if sudden { limit } else { size };
-            self.scatter_mps2_squared += scatter * (bearable - self.scatter_mps2_squared);
-        } else {
-            self.velocity_mps = v;
-        }
-        self.raw_mps = v;
         self.rest_s -= dt_s;
+        // A needle that goes on as evenly as it did leaves all filters where they are.
+        let even = self.even && sample.velocity_mps == self.raw_mps;
+        let sudden = !even && self.filter(config, dt_s, low_pass, scatter, sample.velocity_mps);
+        self.settle(config, standstill_mps, sudden, sample);
+    }
+
+    /// Smooths the motion; true where the speed changes suddenly.
+    #[inline]
+    fn filter(&mut self, config: &GuardConfig, dt_s: f64, low_pass: f64, scatter: f64, v: f64) -> bool {
+        let a = (v - self.raw_mps) / dt_s;
+        self.velocity_mps += low_pass * (v - self.velocity_mps);
+        self.acceleration_mps2 += low_pass * (a - self.acceleration_mps2);
+        let size = self.acceleration_mps2 * self.acceleration_mps2;
+        let scattered = SCATTERS * SCATTERS * self.scatter_mps2_squared;
+        let least = config.sudden_mps2 * config.sudden_mps2;
+        let limit = if scattered > least { scattered } else { least };
+        let sudden = size > limit;
+        // One jump teaches little: it counts at most as what was just bearable.
+        let bearable = if sudden { limit } else { size };
+        self.scatter_mps2_squared += scatter * (bearable - self.scatter_mps2_squared);
+        self.even = self.velocity_mps == v && self.acceleration_mps2 == 0.0 && self.scatter_mps2_squared == 0.0;
+        sudden
+    }
+
+    /// Whether detection rests after this sample.
+    #[inline]
+    fn settle(&mut self, config: &GuardConfig, standstill_mps: f64, sudden: bool, sample: Sample) {
+        self.raw_mps = sample.velocity_mps;
         if sample.position_m > self.deepest_m {
             self.deepest_m = sample.position_m;
         }

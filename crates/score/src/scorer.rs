@@ -107,16 +107,15 @@ impl Scorer {
         self.ruptures.push(rupture);
     }
 
-    /// What happened at a sample: contact, a detection, a layer's estimate. To be told of every sample.
-    #[inline]
+    /// What happened at a sample: a detection, a layer's estimate. Samples where nothing did may be left out.
     pub fn event(&mut self, output: &Output) {
-        if output.detection.is_some() || output.estimate.is_some() {
-            self.detections.extend(output.detection);
-            self.estimates.extend(output.estimate);
-        }
-        if output.contact_m.is_some() {
-            self.contact_m = output.contact_m;
-        }
+        self.detections.extend(output.detection);
+        self.estimates.extend(output.estimate);
+    }
+
+    /// The position in m at which the core has found contact, if it has.
+    pub fn contact(&mut self, contact_m: Option<f64>) {
+        self.contact_m = contact_m;
     }
 
     /// One sample and what the core made of it.

@@ -138,6 +138,7 @@ pub fn score_run(
     let surface_m = layers.first().map_or(0.0, |l| l.front_m);
     let trace = Trace::record(recording, force_n, config, surface_m, |index, out| {
         scorer.event(out);
+        scorer.contact(out.contact_m);
         scorer.sample(
             &Moment {
                 position_m: recording.position_m[index],

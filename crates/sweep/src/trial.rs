@@ -78,12 +78,15 @@ impl Block {
     #[inline(never)]
     fn enhance(&mut self, core: &mut Enhancer<&mut [Sample]>, scorer: &mut Scorer) {
         let mut heard = self.heard.iter_mut();
-        core.run(self.samples.get(..self.count).unwrap_or(&[]), |out| {
+        let out = core.run(self.samples.get(..self.count).unwrap_or(&[]), |out| {
             if let Some(heard) = heard.next() {
                 *heard = out.into();
             }
-            scorer.event(out);
+            if out.detection.is_some() || out.estimate.is_some() {
+                scorer.event(out);
+            }
         });
+        scorer.contact(out.contact_m);
     }
 
     /// How far that is from the truth.

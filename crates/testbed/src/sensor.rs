@@ -67,14 +67,19 @@ impl Noise {
 
     #[inline(never)]
     fn refill(&mut self) {
-        for normal in &mut self.values_n {
-            *normal = StandardNormal.sample(&mut self.generator);
-        }
+        let mut values = self.values_n.iter_mut();
         let mut last = self.last;
-        for value in &mut self.values_n {
+        if !self.started {
             // The first value is drawn from the stationary distribution.
-            last = if self.started { self.pole * last + self.innovation * *value } else { *value };
             self.started = true;
+            last = StandardNormal.sample(&mut self.generator);
+            if let Some(first) = values.next() {
+                *first = self.sd_n * last;
+            }
+        }
+        for value in values {
+            let normal: f64 = StandardNormal.sample(&mut self.generator);
+            last = self.pole * last + self.innovation * normal;
             *value = self.sd_n * last;
         }
         self.last = last;
