@@ -62,13 +62,7 @@ impl ContactSearch {
     }
 
     /// Takes sample number `number`.
-    pub(crate) fn update(
-        &mut self,
-        config: &ContactConfig,
-        dt_s: f64,
-        sample: Sample,
-        number: u64,
-    ) -> Found {
+    pub(crate) fn update(&mut self, config: &ContactConfig, dt_s: f64, sample: Sample, number: u64) -> Found {
         self.elapsed_s += dt_s;
         let [low_pass, forget] = *self.coefficients.at(dt_s);
         if self.count == 0.0 && self.declared_m.is_none() {

@@ -326,11 +326,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             self.zero_until = self.history.next();
             self.off_until = self.zero_until;
         }
-        if cause.is_none()
-            && armed
-            && seen.edge()
-            && self.out.state == State::ExpectedRupture
-        {
+        if cause.is_none() && armed && seen.edge() && self.out.state == State::ExpectedRupture {
             cause = Some(Cause::DerivativeTrailingEdge);
         }
         if cause.is_none() && self.traverse.crossed.is_some() {

@@ -79,7 +79,8 @@ impl MotionGuard {
         // One jump teaches little: it counts at most as what was just bearable.
         let bearable = if sudden { limit } else { size };
         self.scatter_mps2_squared += scatter * (bearable - self.scatter_mps2_squared);
-        self.even = self.velocity_mps == v && self.acceleration_mps2 == 0.0 && self.scatter_mps2_squared == 0.0;
+        self.even =
+            self.velocity_mps == v && self.acceleration_mps2 == 0.0 && self.scatter_mps2_squared == 0.0;
         sudden
     }
 

@@ -43,8 +43,10 @@ impl Block {
     #[inline(never)]
     fn place(&mut self, plan: &MotionPlan, measuring: &Measuring, rates: &Rates, first: usize) {
         self.count = BLOCK.min(rates.samples - first);
-        for (k, (point, sample)) in (first..rates.samples).zip(self.points.iter_mut().zip(&mut self.samples)) {
-            let time_s = k as f64 / rates.sample_hz;
+        for (k, (point, sample)) in (first..rates.samples).zip(self.points.iter_mut().zip(&mut self.samples))
+        {
+            // Signed, because that is one instruction: a number of samples never needs the last bit.
+            let time_s = k as i64 as f64 / rates.sample_hz;
             *point = plan.at(time_s);
             sample.time_s = time_s;
             sample.position_m = measuring.position(point.position_m);
@@ -93,7 +95,8 @@ impl Block {
     #[inline(never)]
     fn score(&self, scorer: &mut Scorer) {
         let truth = self.points.iter().zip(&self.tip_n);
-        for ((sample, heard), (at, tip_n)) in self.samples.iter().zip(&self.heard).zip(truth).take(self.count) {
+        for ((sample, heard), (at, tip_n)) in self.samples.iter().zip(&self.heard).zip(truth).take(self.count)
+        {
             let moment = Moment { position_m: at.position_m, force_n: sample.force_n, tip_n: *tip_n };
             scorer.sample(&moment, heard);
         }
