@@ -116,10 +116,7 @@ pub struct MergeArgs {
     /// Which sweep.
     #[command(flatten)]
     pub which: Which,
-    /// Folder with the shards [default: stylet-out/<sweep>].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Where the results go.
+    /// Where the shards are and the results go.
     #[command(flatten)]
     pub results: Results,
 }
