@@ -152,6 +152,12 @@ fn cpu_s() -> f64 {
     })
 }
 
+/// What `work` gives, and the processor time in s that it took.
+fn with_cpu<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let before = cpu_s();
+    (work(), cpu_s() - before)
+}
+
 fn timed(trials: u64, threads: usize, passes: usize) -> f64 {
     let sweep = sweep(trials);
     let columns = Columns::new(&sweep);
@@ -168,18 +174,25 @@ fn main() {
     let whole_ns = shares(&one);
     let samples = 10_000.0;
 
-    let (single, double) = (timed(1000, 1, 5), timed(1000, 2, 5));
+    let (single, single_cpu) = with_cpu(|| timed(1000, 1, 5));
+    let (double, double_cpu) = with_cpu(|| timed(1000, 2, 5));
     println!(
         "1000 trials: {single:.3} s on one thread, {double:.3} s on two, ratio {:.2}; {:.1} ns per sample and thread",
         single / double,
         single / 1000.0 / samples * 1e9
     );
+    // On a machine with other load two threads do not get two cores; what the threads cost each other
+    // shows in the processor time all the same.
+    println!(
+        "  processor time of five passes: {single_cpu:.3} s on one thread, {double_cpu:.3} s on two: \
+         with a core for each thread the ratio would be {:.2}",
+        2.0 * single_cpu / double_cpu
+    );
     let most: u64 = std::env::var("STYLET_BENCH_TRIALS").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000);
     for trials in [100, 1000, 10_000, 100_000_u64].into_iter().filter(|n| *n <= most) {
         let passes = (20_000 / trials).clamp(1, 10) as usize;
-        let before = cpu_s();
-        let seconds = timed(trials, 2, passes);
-        let cpu = (cpu_s() - before) / (passes as f64 * trials as f64);
+        let (seconds, cpu) = with_cpu(|| timed(trials, 2, passes));
+        let cpu = cpu / (passes as f64 * trials as f64);
         println!(
             "{trials:>7} trials on 2 threads: {seconds:>7.3} s, {:.1} us per insertion, {:.1} ns per sample; \
              processor time {:.1} us per insertion, {:.1} ns per sample",
