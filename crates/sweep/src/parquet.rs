@@ -56,7 +56,7 @@ pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError>
 mod tests {
     use super::*;
     use crate::{Overrides, Sweep, rows_with};
-    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::file::reader::SerializedFileReader;
     use parquet::record::Field;
     use std::path::Path;
 
