@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::time::Instant;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 use stylet_testbed::{Noise, Slide};
-use stylet_tissue::{Law, LawState, Layer, Tissue};
+use stylet_tissue::{Law, LawState, Tissue};
 use support::bare::{BareCore, BareLaw};
 use support::peers;
 
@@ -22,24 +22,6 @@ const SAMPLES: usize = 10_000;
 const SAMPLE_HZ: f64 = 200.0;
 const SPEED_MPS: f64 = 0.0023;
 const START_M: f64 = -0.005;
-
-fn tissue() -> Tissue {
-    let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
-        name: String::new(),
-        thickness_m,
-        stiffness_n_per_m,
-        friction_ns_per_m2,
-        puncture_n,
-    };
-    Tissue {
-        surface_m: 0.0,
-        layers: vec![
-            layer(0.0282, 40.0, 9000.0, None),
-            layer(0.0377, 60.0, 12000.0, Some(2.2)),
-            layer(0.0322, 80.0, 16000.0, None),
-        ],
-    }
-}
 
 fn motion(k: usize) -> (f64, f64) {
     let t = k as f64 / SAMPLE_HZ;
@@ -108,7 +90,7 @@ fn noise() -> f64 {
 fn slide(steps: usize) -> f64 {
     let dt = 1e-3;
     let mut slide = Slide::new(START_M, SPEED_MPS, dt);
-    let law = Law::base(&tissue());
+    let law = Law::base(&Tissue::three_gels());
     let mut state = LawState::default();
     let mut sum = 0.0;
     for k in 0..steps {
@@ -122,7 +104,7 @@ fn slide(steps: usize) -> f64 {
 }
 
 fn samples() -> Vec<Sample> {
-    let law = Law::base(&tissue());
+    let law = Law::base(&Tissue::three_gels());
     let mut state = LawState::default();
     let mut noise = Noise::new(1, 1, 0.02, 0.0);
     (0..SAMPLES)
@@ -167,7 +149,7 @@ fn python_peer(data: &[Sample], core_ns: f64) {
 }
 
 fn main() {
-    let law = Law::base(&tissue());
+    let law = Law::base(&Tissue::three_gels());
     let data = samples();
     let mut storage = vec![Sample::default(); 16384];
 

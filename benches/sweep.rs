@@ -1,9 +1,10 @@
 //! What a trial of a sweep costs: ns per sample and the share of law, noise, core and score; one
-//! against two threads; the cost per insertion from 100 to 100 000 trials; memory; and the pure NumPy
-//! version of the same trial beside it.
+//! against two threads; the cost per insertion from 100 to 100 000 trials, 10 000 among them; memory; and
+//! the pure NumPy version of the same trial beside it. The load of the machine is printed first.
 //!
-//! Run with `cargo bench --bench sweep`; `STYLET_BENCH_TRIALS` sets the largest sweep (default
-//! 100 000). The best of several passes is printed, so that other load on the machine counts little.
+//! Run with `cargo bench --bench sweep` (NumPy: `bash benches/peers/setup.sh` once before);
+//! `STYLET_BENCH_TRIALS` sets the largest sweep (default 100 000). The best of several passes is printed,
+//! so that other load on the machine counts little.
 
 mod support {
     pub mod peers;
@@ -14,7 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 use stylet_core::{Enhancer, Sample};
 use stylet_scenario::{MotionPlan, Scenario};
-use stylet_score::{LayerTruth, Moment, Scorer};
+use stylet_score::{Heard, LayerTruth, Moment, Scorer};
 use stylet_sweep::{Columns, Overrides, Sweep, rows_with, trial};
 use stylet_testbed::Noise;
 use stylet_tissue::{Law, LawState};
@@ -70,13 +71,13 @@ impl Parts {
     }
 
     fn law(&self) -> f64 {
-        let mut state = LawState::default();
-        let mut sum = 0.0;
-        for k in 0..self.count {
-            let t = k as f64 / self.scenario.sample_hz;
+        let moments = (0..self.count).map(|k| {
+            let t = k as i64 as f64 / self.scenario.sample_hz;
             let at = self.plan.at(t);
-            sum += self.law.step(&mut state, t, at.position_m, at.velocity_mps, |_| {}).total_n;
-        }
+            [t, at.position_m, at.velocity_mps]
+        });
+        let mut sum = 0.0;
+        self.law.run(&mut LawState::default(), moments, |_| {}, |force| sum += force.total_n);
         sum
     }
 
@@ -85,17 +86,20 @@ impl Parts {
         (0..self.count).map(|_| noise.draw()).sum()
     }
 
-    fn core(&self, storage: &mut [Sample], mut scorer: Option<&mut Scorer>) -> f64 {
+    fn core(&self, storage: &mut [Sample]) -> Vec<Heard> {
         let mut core = Enhancer::new(self.scenario.enhance.clone(), 0.0, storage);
-        let mut sum = 0.0;
-        for (s, tip_n) in self.samples.iter().zip(&self.tips) {
-            let out = core.step_brief(*s);
-            sum += out.enhanced_n;
-            if let Some(scorer) = &mut scorer {
-                scorer.sample(&Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n }, out);
-            }
+        let mut heard = Vec::with_capacity(self.count);
+        core.run(&self.samples, |out| heard.push(out.into()));
+        heard
+    }
+
+    fn score(&self, heard: &[Heard]) {
+        let mut scorer = self.scorer();
+        for ((s, tip_n), heard) in self.samples.iter().zip(&self.tips).zip(heard) {
+            let moment = Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n };
+            scorer.sample(&moment, heard);
         }
-        sum
+        black_box(scorer.finish());
     }
 
     fn scorer(&self) -> Scorer {
@@ -120,20 +124,22 @@ fn shares(sweep: &Sweep) -> f64 {
         black_box(parts.noise());
     }));
     let core = per_sample(best(300, || {
-        black_box(parts.core(&mut storage, None));
+        black_box(parts.core(&mut storage));
     }));
-    let scored = per_sample(best(300, || {
-        let mut scorer = parts.scorer();
-        black_box(parts.core(&mut storage, Some(&mut scorer)));
-        black_box(scorer.finish());
-    }));
+    let heard = parts.core(&mut storage);
+    let score = per_sample(best(300, || parts.score(&heard)));
     let mut workspace = trial::Workspace::default();
     let whole = per_sample(best(300, || drop(black_box(trial::run(&parts.scenario, &mut workspace)))));
     println!("one trial of {} samples, each part alone:", parts.count);
-    for (name, ns) in [("law and motion", law), ("noise", noise), ("core", core), ("score", scored - core)] {
+    for (name, ns) in [("law and motion", law), ("noise", noise), ("core", core), ("score", score)] {
         println!("  {name:<15} {ns:>6.1} ns per sample, {:>4.0} % of the whole", 100.0 * ns / whole);
     }
     println!("  {:<15} {whole:>6.1} ns per sample", "whole trial");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/three_layer_latex_sinusoidal.ron");
+    let swinging = Scenario::load(&file).expect("the shipped scenario");
+    let samples = swinging.motion.plan().expect("a motion").duration_s() * swinging.sample_hz;
+    let seconds = best(300, || drop(black_box(trial::run(&swinging, &mut workspace))));
+    println!("  {:<15} {:>6.1} ns per sample", "on a sinusoid", seconds / samples * 1e9);
     whole
 }
 
@@ -146,6 +152,12 @@ fn cpu_s() -> f64 {
     })
 }
 
+/// What `work` gives, and the processor time in s that it took.
+fn with_cpu<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let before = cpu_s();
+    (work(), cpu_s() - before)
+}
+
 fn timed(trials: u64, threads: usize, passes: usize) -> f64 {
     let sweep = sweep(trials);
     let columns = Columns::new(&sweep);
@@ -156,22 +168,31 @@ fn timed(trials: u64, threads: usize, passes: usize) -> f64 {
 }
 
 fn main() {
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    println!("load of the machine before: {}", load.trim());
     let one = sweep(1);
     let whole_ns = shares(&one);
     let samples = 10_000.0;
 
-    let (single, double) = (timed(1000, 1, 5), timed(1000, 2, 5));
+    let (single, single_cpu) = with_cpu(|| timed(1000, 1, 5));
+    let (double, double_cpu) = with_cpu(|| timed(1000, 2, 5));
     println!(
         "1000 trials: {single:.3} s on one thread, {double:.3} s on two, ratio {:.2}; {:.1} ns per sample and thread",
         single / double,
         single / 1000.0 / samples * 1e9
     );
+    // On a machine with other load two threads do not get two cores; what the threads cost each other
+    // shows in the processor time all the same.
+    println!(
+        "  processor time of five passes: {single_cpu:.3} s on one thread, {double_cpu:.3} s on two: \
+         with a core for each thread the ratio would be {:.2}",
+        2.0 * single_cpu / double_cpu
+    );
     let most: u64 = std::env::var("STYLET_BENCH_TRIALS").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000);
     for trials in [100, 1000, 10_000, 100_000_u64].into_iter().filter(|n| *n <= most) {
         let passes = (20_000 / trials).clamp(1, 10) as usize;
-        let before = cpu_s();
-        let seconds = timed(trials, 2, passes);
-        let cpu = (cpu_s() - before) / (passes as f64 * trials as f64);
+        let (seconds, cpu) = with_cpu(|| timed(trials, 2, passes));
+        let cpu = cpu / (passes as f64 * trials as f64);
         println!(
             "{trials:>7} trials on 2 threads: {seconds:>7.3} s, {:.1} us per insertion, {:.1} ns per sample; \
              processor time {:.1} us per insertion, {:.1} ns per sample",

@@ -195,3 +195,52 @@ fn a_file_size_limit_or_an_unwritable_folder_is_told_and_nothing_is_lost() {
     assert!(said(&output).contains("cannot be written"), "{}", said(&output));
     assert_eq!(fs::read_to_string(&blocked).expect("the file"), "precious");
 }
+
+/// `stylet` as somebody whom the system lets write only where the permissions say so: root may write
+/// anywhere, so root becomes nobody. `None` when nobody cannot start the binary.
+fn unprivileged(arguments: &[&str]) -> Option<std::process::Output> {
+    use std::os::unix::process::CommandExt;
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
+    command.args(arguments).env("NO_COLOR", "1");
+    if nix::unistd::geteuid().is_root() {
+        command.uid(65534).gid(65534);
+    }
+    command.output().ok()
+}
+
+#[test]
+fn a_read_only_folder_is_told_and_its_shards_are_kept_for_the_next_attempt() {
+    use std::os::unix::fs::PermissionsExt;
+    let scratch = Scratch::new("read-only");
+    let out = shards(&scratch, "out", &[]);
+    let whole = shards(&scratch, "whole", &[]);
+    fs::remove_file(out.join("shards/000002-of-000002.shard")).expect("it goes");
+    let first = out.join("shards/000001-of-000002.shard");
+    let before = fs::read(&first).expect("a shard");
+    let permit = |mode| {
+        for folder in [out.join("shards"), out.clone()] {
+            fs::set_permissions(folder, fs::Permissions::from_mode(mode)).expect("they are ours");
+        }
+    };
+    permit(0o555);
+    let (file, folder) = (text(&scratch.path().join("sweep.ron")), text(&out));
+    let second = ["sweep", "run-shard", "2/2", &file, "--out", &folder];
+    let Some(output) = unprivileged(&second) else {
+        permit(0o755);
+        println!("SKIPPED: nobody may not start the binary here, and root may write to read-only folders");
+        return;
+    };
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    for word in ["cannot be written", "000002-of-000002.shard", "finished shards are kept"] {
+        assert!(said(&output).contains(word), "it does not say {word}: {}", said(&output));
+    }
+    let sweep = unprivileged(&["sweep", &file, "--out", &text(&out.join("deeper"))]).expect("it starts");
+    assert_eq!(sweep.status.code(), Some(2), "{}", said(&sweep));
+    assert!(said(&sweep).contains("cannot be written"), "{}", said(&sweep));
+    assert_eq!(fs::read(&first).expect("it is still there"), before);
+    permit(0o755);
+    assert!(stylet(&second).status.success());
+    assert!(merge(&scratch, &out).status.success() && merge(&scratch, &whole).status.success());
+    let table = |folder: &Path| fs::read(folder.join("trials.csv")).expect("a table");
+    assert_eq!(table(&out), table(&whole));
+}

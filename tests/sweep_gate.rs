@@ -16,7 +16,8 @@ fn the_shipped_gates_pass_on_the_committed_baseline_and_on_ten_other_seeds() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{text}{}", said(&output));
     assert!(text.contains("No number differs"), "update the baseline with --update: {text}");
-    for seed in 11..=20 {
+    // None of these seeds had been looked at when the bounds were set.
+    for seed in 21..=30 {
         let output = stylet(&["gate", &gates(), "--seed", &seed.to_string()]);
         assert!(output.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&output.stdout));
     }

@@ -1,12 +1,13 @@
 //! Promise: a sweep gives the same bytes for any number of threads, for any split into shards, and
-//! after being killed at any time and resumed. A trial run again alone has the scores of its row.
+//! after being killed at any time or ended by Ctrl-C, and resumed. A trial run again alone has the scores of its row.
 
 mod support;
 
 use std::fs;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use support::{Scratch, root, said, stylet};
 
 const FILES: [&str; 5] = ["trials.csv", "summary.json", "report.html", "sweep.ron", "scenario.ron"];
@@ -104,6 +105,35 @@ fn a_sweep_killed_at_any_time_goes_on_and_ends_with_the_same_bytes() {
     assert!(killed > 0, "no kill met a running sweep");
     let resumed = sweep(&out, &[&trials[..], &["--resume"]].concat());
     assert_same(&whole, &resumed, "after kills");
+}
+
+#[test]
+fn a_sweep_ended_by_ctrl_c_goes_on_and_ends_with_the_same_bytes() {
+    let scratch = Scratch::new("sweep-ctrl-c");
+    let trials = ["--trials", "6000"];
+    let whole = sweep(&scratch.path().join("whole"), &trials);
+    let out = scratch.path().join("ended");
+    // Through `env`, because a shell without a terminal hands SIGINT down as ignored.
+    let mut child = Command::new("env")
+        .args(["--default-signal=INT", env!("CARGO_BIN_EXE_stylet"), "sweep", &text(&noise())])
+        .args(["--threads", "1", "--out", &text(&out)])
+        .args(trials)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let shards = || fs::read_dir(out.join("shards")).map_or(0, Iterator::count);
+    let deadline = Instant::now() + Duration::from_secs(120);
+    while shards() < 2 && Instant::now() < deadline && child.try_wait().expect("a state").is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let pid = nix::unistd::Pid::from_raw(i32::try_from(child.id()).expect("a process id"));
+    nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGINT).expect("it is running");
+    let status = child.wait().expect("it ends");
+    assert_eq!(status.signal(), Some(2), "ended by SIGINT: {status}");
+    assert!(shards() >= 1 && !out.join("trials.csv").exists(), "in the middle, with whole shards left");
+    let resumed = sweep(&out, &[&trials[..], &["--resume"]].concat());
+    assert_same(&whole, &resumed, "after Ctrl-C");
 }
 
 #[test]

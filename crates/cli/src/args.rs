@@ -36,6 +36,17 @@ pub enum Command {
     Benchmark(BenchmarkArgs),
 }
 
+/// Where results go and what is said meanwhile: the same for every command that makes a folder.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Results {
+    /// Folder for the results [default: stylet-out/<name of the input>; for `replay` DIR/trial-<TRIAL>].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
 /// Arguments of `stylet run`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -48,18 +59,15 @@ and scenario.ron with every default written out.")]
 pub struct RunArgs {
     /// Scenario file (RON).
     pub scenario: PathBuf,
-    /// Folder for the results [default: stylet-out/<scenario>].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
     /// Seed of the noise, in place of the scenario's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
     /// Run both the multi-layer and the Kelvin-Voigt model on the same data.
     #[arg(long)]
     pub compare: bool,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
 }
 
 /// Arguments of `stylet enhance`.
@@ -89,12 +97,9 @@ pub struct EnhanceArgs {
     /// Run both the multi-layer and the Kelvin-Voigt model.
     #[arg(long)]
     pub compare: bool,
-    /// Folder for the results [default: stylet-out/<recording>].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
 }
 
 /// Arguments of `stylet diagnose`.
@@ -118,12 +123,9 @@ pub struct DiagnoseArgs {
     /// Drop rows with backward or repeated time stamps, and say which.
     #[arg(long)]
     pub repair: bool,
-    /// Folder for the results [default: stylet-out/<scenario>-diagnosis].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
 }
 
 /// Arguments of `stylet effects`.
@@ -161,4 +163,16 @@ pub struct BenchmarkDiagnoseArgs {
     /// [default: stylet-out/benchmark-diagnose-<seed>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// No argument is there twice, no default is out of its range: what clap checks in debug builds only.
+    #[test]
+    fn the_arguments_of_all_commands_fit_together() {
+        Cli::command().debug_assert();
+    }
 }

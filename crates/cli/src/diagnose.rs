@@ -32,7 +32,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         let (recording, notes) = read_with_holes(path, &options)?;
         evidence.push(Evidence { name: name_of(path, &args.data), recording, notes });
     }
-    let talk = !args.quiet && std::io::stderr().is_terminal();
+    let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let examined = stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |what| {
         if talk {
             eprintln!("  {what} ...");
@@ -51,13 +51,13 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     output.add("report.html", diagnose_report::page(&scenario, args, &examined).to_html());
     output.add("diagnosis.json", json);
     output.add("extended.ron", ron);
-    let folder = args.out.clone().unwrap_or_else(|| {
+    let folder = args.results.out.clone().unwrap_or_else(|| {
         let stem =
             args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
         PathBuf::from("stylet-out").join(format!("{stem}-diagnosis"))
     });
     output.write(&folder)?;
-    if !args.quiet {
+    if !args.results.quiet {
         print!("{}", summary(d));
         println!("\nReport: {}", folder.join("report.html").display());
     }

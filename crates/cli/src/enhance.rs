@@ -77,9 +77,9 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     }
     let ran: Vec<Ran> = models.iter().map(|&model| listen(&recording, &config, model)).collect();
     let (output, hash) = results(args, &config, &recording, &notes, &ran)?;
-    let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.data));
+    let folder = args.results.out.clone().unwrap_or_else(|| default_folder(&args.data));
     output.write(&folder)?;
-    if !args.quiet {
+    if !args.results.quiet {
         terminal::say(&format!(
             "{}\nReport: {}\n",
             summary(args, &recording, &notes, &ran, &hash),

@@ -108,10 +108,10 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         scenario.compare = vec![Model::MultiLayer, Model::KelvinVoigt];
     }
     let finished = finish(&scenario, &file, &scenario.models())?;
-    let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.scenario));
+    let folder = args.results.out.clone().unwrap_or_else(|| default_folder(&args.scenario));
     let (output, report) = results(&scenario, &file, &finished)?;
     output.write(&folder)?;
-    if !args.quiet {
+    if !args.results.quiet {
         terminal::say(&format!(
             "{}\nReport: {}\n",
             terminal::scorecard(&scenario, &finished, &report.provenance.hash),

@@ -53,6 +53,8 @@ impl Compensation {
 
     /// `sum b_i l_i(z)`: the part of the compensated layers that is still around the shaft, with
     /// each layer's friction spread evenly over its thickness.
+    #[cold]
+    #[inline(never)]
     fn along_shaft_ns_per_m(&self, z_m: f64) -> f64 {
         self.layers[..self.count]
             .iter()

@@ -3,7 +3,7 @@
 //! traced back along the loading line to zero force.
 
 use crate::config::ContactConfig;
-use crate::filter::Coefficient;
+use crate::filter::Coefficients;
 use crate::line::Line;
 use crate::sample::Sample;
 
@@ -13,8 +13,8 @@ const FORGET_S: f64 = 5.0;
 /// What the search knows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactSearch {
-    low_pass: Coefficient,
-    forget: Coefficient,
+    /// Of the low-pass on the force, and of what is forgotten of bias and noise.
+    coefficients: Coefficients<2>,
     elapsed_s: f64,
     force_n: f64,
     // Welford's running mean and variance of the force in air.
@@ -41,8 +41,7 @@ pub(crate) enum Found {
 impl ContactSearch {
     pub(crate) fn new(config: &ContactConfig) -> Self {
         Self {
-            low_pass: Coefficient::new(config.time_constant_s),
-            forget: Coefficient::new(FORGET_S),
+            coefficients: Coefficients::new([config.time_constant_s, FORGET_S]),
             elapsed_s: 0.0,
             force_n: 0.0,
             count: 0.0,
@@ -63,18 +62,13 @@ impl ContactSearch {
     }
 
     /// Takes sample number `number`.
-    pub(crate) fn update(
-        &mut self,
-        config: &ContactConfig,
-        dt_s: f64,
-        sample: &Sample,
-        number: u64,
-    ) -> Found {
+    pub(crate) fn update(&mut self, config: &ContactConfig, dt_s: f64, sample: Sample, number: u64) -> Found {
         self.elapsed_s += dt_s;
+        let [low_pass, forget] = *self.coefficients.at(dt_s);
         if self.count == 0.0 && self.declared_m.is_none() {
             self.force_n = sample.force_n;
         }
-        self.force_n += self.low_pass.at(dt_s) * (sample.force_n - self.force_n);
+        self.force_n += low_pass * (sample.force_n - self.force_n);
         let noise = self.noise_n(config);
         let lift = self.force_n - self.mean_n;
         let learning = self.elapsed_s < config.learn_s || self.count < 10.0;
@@ -96,7 +90,7 @@ impl ContactSearch {
             self.line.add(sample.position_m, sample.force_n);
         } else {
             self.line = Line::default();
-            self.learn(dt_s, learning, sample.force_n);
+            self.learn(forget, learning, sample.force_n);
         }
         self.above = if !learning && lift > config.noise_sds * noise { self.above + 1 } else { 0 };
         if self.above < config.samples.max(1) {
@@ -108,7 +102,7 @@ impl ContactSearch {
 
     /// Bias and noise: by Welford's recursion at first, then slowly forgetting, so that a drift in air
     /// is followed and a loading line is not.
-    fn learn(&mut self, dt_s: f64, learning: bool, force_n: f64) {
+    fn learn(&mut self, share: f64, learning: bool, force_n: f64) {
         if learning {
             self.count += 1.0;
             let delta = force_n - self.mean_n;
@@ -116,7 +110,6 @@ impl ContactSearch {
             self.m2 += delta * (force_n - self.mean_n);
             return;
         }
-        let share = self.forget.at(dt_s);
         let delta = force_n - self.mean_n;
         self.mean_n += share * delta;
         self.m2 += share * ((self.count - 1.0) * delta * delta - self.m2);

@@ -1,66 +1,62 @@
 //! First-order low-passes whose coefficients follow the sampling interval.
 
-/// Coefficient `1 - exp(-dt/tau)`, recomputed only when the interval changes.
+/// Coefficients of low-passes that are fed at the same instants: one look at the interval serves all.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Coefficient {
-    time_constant_s: f64,
+pub(crate) struct Coefficients<const N: usize> {
+    time_constants_s: [f64; N],
     dt_s: f64,
-    value: f64,
+    values: [f64; N],
 }
 
-impl Coefficient {
-    pub(crate) fn new(time_constant_s: f64) -> Self {
-        Self { time_constant_s, dt_s: 0.0, value: 0.0 }
+impl<const N: usize> Coefficients<N> {
+    pub(crate) fn new(time_constants_s: [f64; N]) -> Self {
+        Self { time_constants_s, dt_s: 0.0, values: [0.0; N] }
     }
 
+    /// `1 - exp(-dt/tau)` of each, recomputed only when the interval changes.
     #[inline]
-    pub(crate) fn at(&mut self, dt_s: f64) -> f64 {
+    pub(crate) fn at(&mut self, dt_s: f64) -> &[f64; N] {
         // Time stamps carry rounding: intervals equal to a billionth of themselves are the same.
         if (dt_s - self.dt_s).abs() > 1e-9 * dt_s {
-            self.dt_s = dt_s;
-            self.value = 1.0 - libm::exp(-dt_s / self.time_constant_s);
+            self.change(dt_s);
         }
-        self.value
+        &self.values
+    }
+
+    #[cold]
+    fn change(&mut self, dt_s: f64) {
+        self.dt_s = dt_s;
+        for (value, tau_s) in self.values.iter_mut().zip(self.time_constants_s) {
+            *value = 1.0 - libm::exp(-dt_s / tau_s);
+        }
     }
 }
 
 /// Filtered force derivative \[S (1)\]: low-pass, difference quotient, low-pass.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ForceDerivative {
-    force: Coefficient,
-    derivative: Coefficient,
     force_n: f64,
     value_n_per_s: f64,
-    started: bool,
 }
 
 impl ForceDerivative {
-    pub(crate) fn new(config: &crate::config::DerivativeConfig) -> Self {
-        Self {
-            force: Coefficient::new(config.force_time_constant_s),
-            derivative: Coefficient::new(config.derivative_time_constant_s),
-            force_n: 0.0,
-            value_n_per_s: 0.0,
-            started: false,
-        }
-    }
-
     /// The derivative in N/s after the last sample.
     pub(crate) fn value_n_per_s(&self) -> f64 {
         self.value_n_per_s
     }
 
-    /// Takes a sample and returns the derivative in N/s.
+    /// The first sample.
+    pub(crate) fn begin(&mut self, force_n: f64) {
+        self.force_n = force_n;
+    }
+
+    /// Takes a sample, `dt_s` after the one before, with the coefficients of the two low-passes, and
+    /// returns the derivative in N/s.
     #[inline]
-    pub(crate) fn update(&mut self, dt_s: f64, force_n: f64) -> f64 {
-        if !self.started {
-            self.started = true;
-            self.force_n = force_n;
-        } else if dt_s > 0.0 {
-            let step = self.force.at(dt_s) * (force_n - self.force_n);
-            self.force_n += step;
-            self.value_n_per_s += self.derivative.at(dt_s) * (step / dt_s - self.value_n_per_s);
-        }
+    pub(crate) fn update(&mut self, dt_s: f64, [a_force, a_derivative]: [f64; 2], force_n: f64) -> f64 {
+        let step = a_force * (force_n - self.force_n);
+        self.force_n += step;
+        self.value_n_per_s += a_derivative * (step / dt_s - self.value_n_per_s);
         self.value_n_per_s
     }
 }

@@ -6,65 +6,88 @@
 //! when the tip is clearly above its deepest point.
 
 use crate::config::GuardConfig;
-use crate::filter::Coefficient;
 use crate::sample::Sample;
 
 /// Time over which the scatter of the acceleration is learnt, in s.
-const SCATTER_S: f64 = 2.0;
+pub(crate) const SCATTER_S: f64 = 2.0;
 /// How far the acceleration must stand out of its scatter to be a sudden change.
 const SCATTERS: f64 = 6.0;
 
 /// Watches the motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotionGuard {
-    low_pass: Coefficient,
-    scatter: Coefficient,
     raw_mps: f64,
     velocity_mps: f64,
     acceleration_mps2: f64,
     scatter_mps2_squared: f64,
     rest_s: f64,
     deepest_m: f64,
-    started: bool,
+    /// Filtered speed and speed are the same, and there never was any acceleration.
+    even: bool,
 }
 
-impl MotionGuard {
-    pub(crate) fn new(config: &GuardConfig) -> Self {
+impl Default for MotionGuard {
+    fn default() -> Self {
         Self {
-            low_pass: Coefficient::new(config.acceleration_time_constant_s),
-            scatter: Coefficient::new(SCATTER_S),
             raw_mps: 0.0,
             velocity_mps: 0.0,
             acceleration_mps2: 0.0,
             scatter_mps2_squared: 0.0,
             rest_s: 0.0,
             deepest_m: f64::NEG_INFINITY,
-            started: false,
+            even: false,
         }
     }
+}
 
+impl MotionGuard {
+    /// The first sample.
+    pub(crate) fn begin(&mut self, config: &GuardConfig, standstill_mps: f64, sample: Sample) {
+        self.velocity_mps = sample.velocity_mps;
+        self.settle(config, standstill_mps, false, sample);
+    }
+
+    /// Takes a sample, `dt_s` after the one before, with the coefficients of the motion's low-pass and of
+    /// the scatter's.
     #[inline]
-    pub(crate) fn update(&mut self, config: &GuardConfig, standstill_mps: f64, dt_s: f64, sample: &Sample) {
-        let v = sample.velocity_mps;
-        let sudden_mps2 = config.sudden_mps2;
-        let mut sudden = false;
-        if self.started && dt_s > 0.0 {
-            let a = (v - self.raw_mps) / dt_s;
-            let share = self.low_pass.at(dt_s);
-            self.velocity_mps += share * (v - self.velocity_mps);
-            self.acceleration_mps2 += share * (a - self.acceleration_mps2);
-            let size = self.acceleration_mps2 * self.acceleration_mps2;
-            let limit = (SCATTERS * SCATTERS * self.scatter_mps2_squared).max(sudden_mps2 * sudden_mps2);
-            sudden = size > limit;
-            // One jump teaches little: it counts at most as what was just bearable.
-            self.scatter_mps2_squared +=
-                self.scatter.at(dt_s) * (size.min(limit) - self.scatter_mps2_squared);
-        } else {
-            self.velocity_mps = v;
-        }
-        self.started = true;
-        self.raw_mps = v;
+    pub(crate) fn update(
+        &mut self,
+        config: &GuardConfig,
+        standstill_mps: f64,
+        dt_s: f64,
+        [low_pass, scatter]: [f64; 2],
+        sample: Sample,
+    ) {
         self.rest_s -= dt_s;
+        // A needle that goes on as evenly as it did leaves all filters where they are.
+        let even = self.even && sample.velocity_mps == self.raw_mps;
+        let sudden = !even && self.filter(config, dt_s, low_pass, scatter, sample.velocity_mps);
+        self.settle(config, standstill_mps, sudden, sample);
+    }
+
+    /// Smooths the motion; true where the speed changes suddenly.
+    #[inline]
+    fn filter(&mut self, config: &GuardConfig, dt_s: f64, low_pass: f64, scatter: f64, v: f64) -> bool {
+        let a = (v - self.raw_mps) / dt_s;
+        self.velocity_mps += low_pass * (v - self.velocity_mps);
+        self.acceleration_mps2 += low_pass * (a - self.acceleration_mps2);
+        let size = self.acceleration_mps2 * self.acceleration_mps2;
+        let scattered = SCATTERS * SCATTERS * self.scatter_mps2_squared;
+        let least = config.sudden_mps2 * config.sudden_mps2;
+        let limit = if scattered > least { scattered } else { least };
+        let sudden = size > limit;
+        // One jump teaches little: it counts at most as what was just bearable.
+        let bearable = if sudden { limit } else { size };
+        self.scatter_mps2_squared += scatter * (bearable - self.scatter_mps2_squared);
+        self.even =
+            self.velocity_mps == v && self.acceleration_mps2 == 0.0 && self.scatter_mps2_squared == 0.0;
+        sudden
+    }
+
+    /// Whether detection rests after this sample.
+    #[inline]
+    fn settle(&mut self, config: &GuardConfig, standstill_mps: f64, sudden: bool, sample: Sample) {
+        self.raw_mps = sample.velocity_mps;
         if sample.position_m > self.deepest_m {
             self.deepest_m = sample.position_m;
         }

@@ -26,6 +26,7 @@ mod contact;
 mod drop;
 mod enhancer;
 mod filter;
+mod front;
 mod guard;
 mod history;
 mod line;

@@ -20,10 +20,13 @@ impl Sample {
     #[must_use]
     #[inline]
     pub fn is_usable(&self) -> bool {
-        self.time_s.is_finite()
-            && self.position_m.abs() < 1e3
-            && self.velocity_mps.abs() < 1e3
-            && self.force_n.abs() < 1e6
+        self.time_s.is_finite() && self.is_in_range()
+    }
+
+    /// Position, velocity and force alone.
+    #[inline]
+    pub(crate) fn is_in_range(&self) -> bool {
+        self.position_m.abs() < 1e3 && self.velocity_mps.abs() < 1e3 && self.force_n.abs() < 1e6
     }
 }
 

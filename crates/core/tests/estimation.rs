@@ -7,6 +7,7 @@ mod support;
 use proptest::prelude::*;
 use stylet_core::config::{DropConfig, Model, Reset};
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Rls, Sample};
+use stylet_tissue::Tissue;
 use support::{constant, enhance, sinusoid};
 
 fn estimates(config: &EnhanceConfig, samples: &[Sample]) -> Vec<LayerEstimate> {
@@ -118,7 +119,7 @@ proptest! {
 
 #[test]
 fn kelvin_voigt_and_multi_layer_reset_only_at_ruptures_agree_on_a_layer_without_friction() {
-    let mut tissue = support::three_gels();
+    let mut tissue = Tissue::three_gels();
     tissue.layers.truncate(1);
     tissue.layers[0].friction_ns_per_m2 = 0.0;
     let data = support::insertion(&tissue, -0.005, 20.0, 200.0, 0.0, 1, |_| 0.0023);

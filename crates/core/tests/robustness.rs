@@ -8,7 +8,8 @@ use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stylet_core::config::{Contact, Depths, Reset};
 use stylet_core::{EnhanceConfig, LayerEstimate, Output, Sample};
-use support::{Insertion, constant, detections, enhance, insertion, three_gels};
+use stylet_tissue::Tissue;
+use support::{Insertion, constant, detections, enhance, insertion};
 
 fn estimates(outputs: &[Output]) -> Vec<LayerEstimate> {
     outputs.iter().filter_map(|o| o.estimate).collect()
@@ -26,7 +27,7 @@ fn noise_on_position_and_velocity_hides_no_rupture() {
     for (hz, z_sd, v_sd) in
         [(200.0, 5e-6, 0.0), (1000.0, 1e-6, 0.0), (200.0, 2e-6, 2e-4), (1000.0, 0.0, 2.5e-4)]
     {
-        let data = insertion(&three_gels(), -0.005, 50.0, hz, 0.01, 1, |_| 0.0023);
+        let data = insertion(&Tissue::three_gels(), -0.005, 50.0, hz, 0.01, 1, |_| 0.0023);
         let mut rng = ChaCha8Rng::seed_from_u64(9);
         let mut draw = |sd: f64| {
             let w: f64 = StandardNormal.sample(&mut rng);
@@ -49,7 +50,7 @@ fn noise_on_position_and_velocity_hides_no_rupture() {
 #[test]
 fn a_short_way_in_air_is_enough_to_find_the_contact() {
     for (start_m, v) in [(-0.0006, 0.0023), (-0.0003, 0.0023), (0.0, 0.0023), (-0.005, 0.015)] {
-        let data = insertion(&three_gels(), start_m, 0.115 / v, 200.0, 0.01, 1, move |_| v);
+        let data = insertion(&Tissue::three_gels(), start_m, 0.115 / v, 200.0, 0.01, 1, move |_| v);
         let outputs = enhance(&EnhanceConfig::default(), &data.samples);
         let contact = outputs.last().and_then(|o| o.contact_m);
         assert!(
@@ -64,8 +65,9 @@ fn a_short_way_in_air_is_enough_to_find_the_contact() {
 fn the_estimates_mean_the_same_at_every_sampling_rate() {
     let omega = std::f64::consts::TAU * 0.0167;
     for hz in [50.0, 100.0, 200.0, 1000.0, 5000.0] {
-        let data =
-            insertion(&three_gels(), -0.005, 15.0, hz, 0.0, 1, move |t| 0.12 * omega * (omega * t).sin());
+        let data = insertion(&Tissue::three_gels(), -0.005, 15.0, hz, 0.0, 1, move |t| {
+            0.12 * omega * (omega * t).sin()
+        });
         let mut core =
             stylet_core::Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 1 << 17]);
         let outputs: Vec<Output> = data.samples.iter().map(|s| core.step(*s)).collect();
@@ -80,7 +82,7 @@ fn the_estimates_mean_the_same_at_every_sampling_rate() {
 fn resets_come_at_their_frequency_also_where_it_does_not_divide_the_sampling_rate() {
     // At 100 Hz a reset at 40 Hz comes after two and three samples in turn: the estimate must differ
     // from one reset every second sample.
-    let data = insertion(&three_gels(), -0.005, 12.0, 100.0, 0.01, 1, |_| 0.0023);
+    let data = insertion(&Tissue::three_gels(), -0.005, 12.0, 100.0, 0.01, 1, |_| 0.0023);
     let with = |hz| {
         let config = EnhanceConfig { reset: Reset::Frequency { hz }, ..EnhanceConfig::default() };
         enhance(&config, &data.samples).last().map(|o| o.theta)
@@ -104,14 +106,14 @@ fn a_sample_that_cannot_be_changes_nothing() {
 #[test]
 fn a_needle_known_to_start_inside_the_tissue_is_not_a_rupture() {
     let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::default() };
-    let data = insertion(&three_gels(), 0.01, 45.0, 200.0, 0.01, 1, |_| 0.0023);
+    let data = insertion(&Tissue::three_gels(), 0.01, 45.0, 200.0, 0.01, 1, |_| 0.0023);
     assert_three("starting 10 mm inside", &data, &detections(&enhance(&config, &data.samples)));
 }
 
 #[test]
 fn going_in_again_is_compensated_by_the_friction_around_the_shaft_only() {
     let v = |t: f64| if (35.0..45.0).contains(&t) { -0.004 } else { 0.0023 };
-    let data = insertion(&three_gels(), -0.005, 75.0, 200.0, 0.0, 1, v);
+    let data = insertion(&Tissue::three_gels(), -0.005, 75.0, 200.0, 0.0, 1, v);
     let outputs = enhance(&EnhanceConfig::default(), &data.samples);
     // Two layers are through at 35 s; on the way back and in again only friction acts until the third.
     let worst =
@@ -122,7 +124,7 @@ fn going_in_again_is_compensated_by_the_friction_around_the_shaft_only() {
 
 #[test]
 fn known_depths_end_a_layer_at_its_face_at_the_latest() {
-    let mut tissue = three_gels();
+    let mut tissue = Tissue::three_gels();
     for layer in &mut tissue.layers {
         // No drop to be seen: nothing but the known depths can tell.
         layer.stiffness_n_per_m = 0.0;

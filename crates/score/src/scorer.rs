@@ -36,6 +36,22 @@ pub struct Moment {
     pub tip_n: f64,
 }
 
+/// What the core made of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Heard {
+    /// Enhanced force in N.
+    pub enhanced_n: f64,
+    /// Innovation in N.
+    pub error_n: f64,
+}
+
+impl From<&Output> for Heard {
+    #[inline]
+    fn from(output: &Output) -> Self {
+        Self { enhanced_n: output.enhanced_n, error_n: output.error_n }
+    }
+}
+
 /// Sums that the scores are made of.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -91,14 +107,20 @@ impl Scorer {
         self.ruptures.push(rupture);
     }
 
-    /// One sample and the core's output for it.
+    /// What happened at a sample: a detection, a layer's estimate. Samples where nothing did may be left out.
+    pub fn event(&mut self, output: &Output) {
+        self.detections.extend(output.detection);
+        self.estimates.extend(output.estimate);
+    }
+
+    /// The position in m at which the core has found contact, if it has.
+    pub fn contact(&mut self, contact_m: Option<f64>) {
+        self.contact_m = contact_m;
+    }
+
+    /// One sample and what the core made of it.
     #[inline]
-    pub fn sample(&mut self, moment: &Moment, output: &Output) {
-        if output.detection.is_some() || output.estimate.is_some() {
-            self.detections.extend(output.detection);
-            self.estimates.extend(output.estimate);
-        }
-        self.contact_m = output.contact_m;
+    pub fn sample(&mut self, moment: &Moment, output: &Heard) {
         let z = moment.position_m;
         if z < self.front_m {
             return;

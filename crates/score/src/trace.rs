@@ -137,13 +137,15 @@ pub fn score_run(
     }
     let surface_m = layers.first().map_or(0.0, |l| l.front_m);
     let trace = Trace::record(recording, force_n, config, surface_m, |index, out| {
+        scorer.event(out);
+        scorer.contact(out.contact_m);
         scorer.sample(
             &Moment {
                 position_m: recording.position_m[index],
                 force_n: force_n[index],
                 tip_n: truth.tip_force_n[index],
             },
-            out,
+            &out.into(),
         );
     });
     let mut score = scorer.finish();

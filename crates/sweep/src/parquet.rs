@@ -51,3 +51,53 @@ pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError>
     writer.close()?;
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Overrides, Sweep, rows_with};
+    use parquet::file::reader::SerializedFileReader;
+    use parquet::record::Field;
+    use std::path::Path;
+
+    /// What is written is read back by the library's reader: names, whole numbers, values to the bit, nulls.
+    #[test]
+    fn the_table_that_is_written_is_the_one_that_is_read() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/sweeps/noise.ron");
+        let sweep =
+            Sweep::load(&file, Overrides { trials: Some(12), seed: None }).expect("the shipped sweep");
+        let columns = Columns::new(&sweep);
+        let rows = rows_with(&sweep, &columns, 0..12, 1, &|_| {}).expect("it runs");
+        let bytes = parquet(&columns, &rows).expect("it is written");
+        assert_eq!(bytes, parquet(&columns, &rows).expect("it is written"), "the same bytes");
+
+        let place = std::env::temp_dir().join(format!("stylet-{}.parquet", std::process::id()));
+        std::fs::write(&place, &bytes).expect("a scratch file");
+        let reader = SerializedFileReader::new(std::fs::File::open(&place).expect("it is there"));
+        let read: Vec<_> =
+            reader.expect("it is Parquet").into_iter().map(|row| row.expect("a row")).collect();
+        std::fs::remove_file(&place).expect("it goes");
+
+        assert_eq!(read.len(), rows.len());
+        let (mut numbers, mut nulls) = (0, 0);
+        for (read, row) in read.iter().zip(&rows) {
+            let names: Vec<&str> = read.get_column_iter().map(|(name, _)| name.as_str()).collect();
+            assert_eq!(names, columns.names().collect::<Vec<_>>());
+            let whole = [row.trial, row.seed, row.redrawn].map(|x| Field::Long(x as i64));
+            for (k, (_, field)) in read.get_column_iter().enumerate() {
+                match field {
+                    Field::Double(x) => {
+                        assert_eq!(x.to_bits(), row.values[k - 3].to_bits());
+                        numbers += 1;
+                    }
+                    Field::Null => {
+                        assert!(row.values[k - 3].is_nan());
+                        nulls += 1;
+                    }
+                    other => assert_eq!(*other, whole[k]),
+                }
+            }
+        }
+        assert!(numbers > 100 && nulls > 0, "both kinds were there: {numbers} numbers, {nulls} nulls");
+    }
+}

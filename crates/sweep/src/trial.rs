@@ -1,12 +1,107 @@
-//! One trial: law, sensor, core and score, sample by sample; nothing is stored but the ring of raw
-//! samples that the core asks for, and nothing is allocated per sample.
+//! One trial: law, sensor, core and score, a block of samples at a time; nothing is stored but the ring
+//! of raw samples that the core asks for, and nothing is allocated per sample.
+//!
+//! A block goes through each of the four before the next block begins: four short loops, each with its
+//! own recursion, cost a processor less than one long loop that runs all of them.
 
 use stylet_core::{Enhancer, Sample};
 use stylet_record::TrueRupture;
-use stylet_scenario::{Scenario, Sensor};
-use stylet_score::{LayerTruth, Moment, STORAGE_SAMPLES, Score, Scorer};
-use stylet_testbed::{Measuring, SimulateError, rates};
+use stylet_scenario::{MotionPlan, MotionPoint, Scenario, Sensor};
+use stylet_score::{Heard, LayerTruth, Moment, STORAGE_SAMPLES, Score, Scorer};
+use stylet_testbed::{Measuring, Rates, SimulateError, rates};
 use stylet_tissue::{Law, LawState, Rupture};
+
+/// Samples in a block: few enough to stay in the fastest memory.
+const BLOCK: usize = 64;
+
+/// A block of samples on its way from motion to score. Its steps are kept apart by the compiler, too: each
+/// has the processor's registers for itself.
+struct Block {
+    count: usize,
+    points: [MotionPoint; BLOCK],
+    total_n: [f64; BLOCK],
+    tip_n: [f64; BLOCK],
+    samples: [Sample; BLOCK],
+    heard: [Heard; BLOCK],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            points: [MotionPoint::default(); BLOCK],
+            total_n: [0.0; BLOCK],
+            tip_n: [0.0; BLOCK],
+            samples: [Sample::default(); BLOCK],
+            heard: [Heard::default(); BLOCK],
+        }
+    }
+}
+
+impl Block {
+    /// Where the needle is, and where it is recorded to be, from sample number `first` on.
+    #[inline(never)]
+    fn place(&mut self, plan: &MotionPlan, measuring: &Measuring, rates: &Rates, first: usize) {
+        self.count = BLOCK.min(rates.samples - first);
+        for (k, (point, sample)) in (first..rates.samples).zip(self.points.iter_mut().zip(&mut self.samples))
+        {
+            // Signed, because that is one instruction: a number of samples never needs the last bit.
+            let time_s = k as i64 as f64 / rates.sample_hz;
+            *point = plan.at(time_s);
+            sample.time_s = time_s;
+            sample.position_m = measuring.position(point.position_m);
+            sample.velocity_mps = measuring.position(point.velocity_mps);
+        }
+    }
+
+    /// The tissue's force.
+    #[inline(never)]
+    fn load(&mut self, law: &Law, state: &mut LawState, on_rupture: impl FnMut(Rupture)) {
+        let moments = self.samples.iter().zip(&self.points).take(self.count);
+        let moments = moments.map(|(s, at)| [s.time_s, at.position_m, at.velocity_mps]);
+        let mut forces = self.total_n.iter_mut().zip(&mut self.tip_n);
+        law.run(state, moments, on_rupture, |force| {
+            if let Some((total_n, tip_n)) = forces.next() {
+                (*total_n, *tip_n) = (force.total_n, force.tip_n);
+            }
+        });
+    }
+
+    /// The sensor's reading.
+    #[inline(never)]
+    fn measure(&mut self, measuring: &mut Measuring) {
+        let truth = self.points.iter().zip(&self.total_n);
+        for (sample, (at, total_n)) in self.samples.iter_mut().zip(truth).take(self.count) {
+            sample.force_n = measuring.measure_force(sample.time_s, at, *total_n);
+        }
+    }
+
+    /// What the core makes of it.
+    #[inline(never)]
+    fn enhance(&mut self, core: &mut Enhancer<&mut [Sample]>, scorer: &mut Scorer) {
+        let mut heard = self.heard.iter_mut();
+        let out = core.run(self.samples.get(..self.count).unwrap_or(&[]), |out| {
+            if let Some(heard) = heard.next() {
+                *heard = out.into();
+            }
+            if out.detection.is_some() || out.estimate.is_some() {
+                scorer.event(out);
+            }
+        });
+        scorer.contact(out.contact_m);
+    }
+
+    /// How far that is from the truth.
+    #[inline(never)]
+    fn score(&self, scorer: &mut Scorer) {
+        let truth = self.points.iter().zip(&self.tip_n);
+        for ((sample, heard), (at, tip_n)) in self.samples.iter().zip(&self.heard).zip(truth).take(self.count)
+        {
+            let moment = Moment { position_m: at.position_m, force_n: sample.force_n, tip_n: *tip_n };
+            scorer.sample(&moment, heard);
+        }
+    }
+}
 
 /// What a thread keeps from trial to trial.
 #[derive(Debug, Default)]
@@ -51,18 +146,13 @@ pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, Simu
     let mut scorer = Scorer::new(layers, scenario.enhance.model);
     let mut ruptures: Vec<Rupture> = Vec::with_capacity(law.slabs().len());
     let mut state = LawState::default();
-    // The kinematic replay of `stylet_testbed::replayed`, with nothing but the forces that are needed
-    // handed on: a sample's ground truth never goes through memory.
-    for k in 0..rates.samples {
-        let time_s = k as f64 / rates.sample_hz;
-        let at = plan.at(time_s);
-        let force = law.step(&mut state, time_s, at.position_m, at.velocity_mps, |r| ruptures.push(r));
-        let (total_n, tip_n) = (force.total_n, force.tip_n);
-        let force_n = measuring.measure_force(time_s, &at, total_n);
-        let position_m = measuring.position(at.position_m);
-        let velocity_mps = measuring.position(at.velocity_mps);
-        let out = core.step_brief(Sample { time_s, position_m, velocity_mps, force_n });
-        scorer.sample(&Moment { position_m, force_n, tip_n }, out);
+    let mut block = Block::default();
+    for first in (0..rates.samples).step_by(BLOCK) {
+        block.place(&plan, &measuring, &rates, first);
+        block.load(&law, &mut state, |r| ruptures.push(r));
+        block.measure(&mut measuring);
+        block.enhance(&mut core, &mut scorer);
+        block.score(&mut scorer);
     }
     for r in ruptures {
         scorer.rupture(TrueRupture {

@@ -17,15 +17,16 @@ const NOISE_STREAM: u64 = 1;
 /// First of the streams from which spikes are drawn.
 const SPIKES_STREAM: u64 = 1000;
 
-/// Standard normal numbers drawn at once: the generator's state stays in registers, and a sample
-/// then costs a look-up.
+/// Values drawn at once: the states of generator and recursion stay in registers, and a sample then
+/// costs a look-up.
 const BLOCK: usize = 64;
 
 /// White or first-order autoregressive Gaussian noise with a given marginal standard deviation.
 #[derive(Debug)]
 pub struct Noise {
     generator: ChaCha8Rng,
-    normals: [f64; BLOCK],
+    /// Drawn ahead, in N.
+    values_n: [f64; BLOCK],
     used: usize,
     sd_n: f64,
     pole: f64,
@@ -43,7 +44,7 @@ impl Noise {
         generator.set_stream(stream);
         Self {
             generator,
-            normals: [0.0; BLOCK],
+            values_n: [0.0; BLOCK],
             used: BLOCK,
             sd_n,
             pole,
@@ -59,20 +60,29 @@ impl Noise {
         if self.used >= BLOCK {
             self.refill();
         }
-        let w = self.normals[self.used];
+        let value_n = self.values_n[self.used];
         self.used += 1;
-        // The first value is drawn from the stationary distribution.
-        let unit = if self.started { self.pole * self.last + self.innovation * w } else { w };
-        self.started = true;
-        self.last = unit;
-        self.sd_n * unit
+        value_n
     }
 
     #[inline(never)]
     fn refill(&mut self) {
-        for normal in &mut self.normals {
-            *normal = StandardNormal.sample(&mut self.generator);
+        let mut values = self.values_n.iter_mut();
+        let mut last = self.last;
+        if !self.started {
+            // The first value is drawn from the stationary distribution.
+            self.started = true;
+            last = StandardNormal.sample(&mut self.generator);
+            if let Some(first) = values.next() {
+                *first = self.sd_n * last;
+            }
         }
+        for value in values {
+            let normal: f64 = StandardNormal.sample(&mut self.generator);
+            last = self.pole * last + self.innovation * normal;
+            *value = self.sd_n * last;
+        }
+        self.last = last;
         self.used = 0;
     }
 }

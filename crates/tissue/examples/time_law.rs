@@ -6,24 +6,6 @@ use std::hint::black_box;
 use std::time::Instant;
 use stylet_tissue::*;
 
-fn tissue() -> Tissue {
-    let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
-        name: String::new(),
-        thickness_m,
-        stiffness_n_per_m,
-        friction_ns_per_m2,
-        puncture_n,
-    };
-    Tissue {
-        surface_m: 0.0,
-        layers: vec![
-            layer(0.0282, 40.0, 9000.0, None),
-            layer(0.0377, 60.0, 12000.0, Some(2.2)),
-            layer(0.0322, 80.0, 16000.0, None),
-        ],
-    }
-}
-
 /// Advance with ripple, hold, retract: 10 000 samples at 200 Hz.
 fn motion() -> Vec<(f64, f64, f64)> {
     let mut z = -0.005;
@@ -54,7 +36,7 @@ fn fastest(mut run: impl FnMut(&[(f64, f64, f64)]) -> f64) -> f64 {
 }
 
 fn law_ns(effects: &[AnyEffect]) -> Result<f64, TooManyEffects> {
-    let law = Law::new(&tissue(), effects)?;
+    let law = Law::new(&Tissue::three_gels(), effects)?;
     Ok(fastest(|motion| {
         let mut sum = 0.0;
         replay(&law, motion.iter().copied(), |_| {}, |force| sum += force.total_n);

@@ -146,6 +146,27 @@ impl Law {
         self.advance(state, time_s, z_m, v_mps, &mut ByLaw(on_rupture))
     }
 
+    /// [`Law::step`] for many samples, each `[time_s, z_m, v_mps]`; `hear` is told the force of each.
+    #[inline]
+    pub fn run(
+        &self,
+        state: &mut LawState,
+        samples: impl Iterator<Item = [f64; 3]>,
+        mut on_rupture: impl FnMut(Rupture),
+        mut hear: impl FnMut(&TissueForce),
+    ) {
+        if !self.plain {
+            return samples.for_each(|[t, z, v]| hear(&self.step(state, t, z, v, &mut on_rupture)));
+        }
+        for [time_s, z_m, v_mps] in samples {
+            if (time_s + z_m + v_mps).is_finite() {
+                hear(&self.step_plain(state, time_s, z_m, v_mps, &mut on_rupture));
+            } else {
+                hear(&TissueForce::unknown(state.ruptured + 1));
+            }
+        }
+    }
+
     /// [`Law::step`] with somebody who decides on ruptures. Kept out of line, so that the base law
     /// alone stays small enough to be inlined.
     #[inline(never)]

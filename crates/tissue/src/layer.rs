@@ -36,6 +36,27 @@ pub struct Tissue {
 }
 
 impl Tissue {
+    /// The paper's phantom of Fig. 12: three layers of isinglass gel (25, 50 and 70 %), 98.1 mm in all, latex
+    /// around the second, which gives way at 2.2 N.
+    #[must_use]
+    pub fn three_gels() -> Self {
+        let layer = |name: &str, thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
+            name: name.into(),
+            thickness_m,
+            stiffness_n_per_m,
+            friction_ns_per_m2,
+            puncture_n,
+        };
+        Self {
+            surface_m: 0.0,
+            layers: alloc::vec![
+                layer("isinglass 25 %", 0.0282, 40.0, 9000.0, None),
+                layer("isinglass 50 % in latex", 0.0377, 60.0, 12000.0, Some(2.2)),
+                layer("isinglass 70 %", 0.0322, 80.0, 16000.0, None),
+            ],
+        }
+    }
+
     /// Position of the front face `s_i` of layer `index` (0-based), in metres; with
     /// `index = layers.len()` the far face of the stack.
     #[must_use]

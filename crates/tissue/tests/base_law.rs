@@ -13,17 +13,6 @@ fn layer(
     Layer { name: String::new(), thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n }
 }
 
-fn three_gels() -> Tissue {
-    Tissue {
-        surface_m: 0.0,
-        layers: vec![
-            layer(0.0282, 40.0, 9000.0, None),
-            layer(0.0377, 60.0, 12000.0, Some(2.2)),
-            layer(0.0322, 80.0, 16000.0, None),
-        ],
-    }
-}
-
 fn insert(tissue: &Tissue, motion: &[(f64, f64, f64)]) -> (Vec<TissueForce>, Vec<Rupture>) {
     let mut ruptures = Vec::new();
     let mut forces = Vec::new();
@@ -37,7 +26,7 @@ fn constant(start_m: f64, v_mps: f64, sample_hz: f64, samples: usize) -> Vec<(f6
 
 #[test]
 fn force_in_each_layer_is_its_own_spring_plus_the_friction_of_all_layers_around_the_shaft() {
-    let (forces, _) = insert(&three_gels(), &constant(-0.005, 0.0023, 200.0, 10_000));
+    let (forces, _) = insert(&Tissue::three_gels(), &constant(-0.005, 0.0023, 200.0, 10_000));
     let v = 0.0023;
     let at = |z: f64| forces[((z + 0.005) / v * 200.0).round() as usize];
     let near = |a: f64, b: f64| assert!((a - b).abs() < 2e-3, "{a} against {b}");
@@ -51,7 +40,7 @@ fn force_in_each_layer_is_its_own_spring_plus_the_friction_of_all_layers_around_
 
 #[test]
 fn a_layer_ruptures_at_its_puncture_force_or_at_its_far_face_whichever_comes_first() {
-    let (_, ruptures) = insert(&three_gels(), &constant(-0.005, 0.0023, 200.0, 10_000));
+    let (_, ruptures) = insert(&Tissue::three_gels(), &constant(-0.005, 0.0023, 200.0, 10_000));
     let found: Vec<(usize, bool)> = ruptures.iter().map(|r| (r.layer, r.by_force)).collect();
     assert_eq!(found, [(1, false), (2, true), (3, false)]);
     let expected_m = [0.0282, 0.0282 + 2.2 / 60.0, 0.0981];
@@ -78,7 +67,7 @@ fn on_the_way_back_a_ruptured_layer_gives_friction_only() {
 
 #[test]
 fn a_step_across_several_faces_reports_every_rupture_in_order() {
-    let (forces, ruptures) = insert(&three_gels(), &[(0.0, -0.01, 1.0), (0.2, 0.19, 1.0)]);
+    let (forces, ruptures) = insert(&Tissue::three_gels(), &[(0.0, -0.01, 1.0), (0.2, 0.19, 1.0)]);
     assert_eq!(ruptures.iter().map(|r| r.layer).collect::<Vec<_>>(), [1, 2, 3]);
     assert!(ruptures.windows(2).all(|w| w[0].time_s < w[1].time_s), "{ruptures:?}");
     for (r, z) in ruptures.iter().zip([0.0282, 0.0282 + 2.2 / 60.0, 0.0981]) {
@@ -93,7 +82,7 @@ proptest! {
     #[test]
     fn force_is_linear_in_the_coefficients(power in -3i32..4, v in 1e-4f64..0.01) {
         let s = f64::from(power).exp2();
-        let base = three_gels();
+        let base = Tissue::three_gels();
         let mut scaled = base.clone();
         for l in &mut scaled.layers {
             l.stiffness_n_per_m *= s;
@@ -113,7 +102,7 @@ proptest! {
     #[test]
     fn tip_force_and_cumulative_friction_add_up(v in 1e-4f64..0.02, start in -0.01f64..0.0) {
         let motion = constant(start, v, 200.0, 3000);
-        let (forces, _) = insert(&three_gels(), &motion);
+        let (forces, _) = insert(&Tissue::three_gels(), &motion);
         for f in &forces {
             prop_assert!((f.tip_n + f.cumulative_friction_ns_per_m * v - f.total_n).abs() < 1e-12);
             prop_assert!((f.elastic_n + f.friction_n - f.total_n).abs() < 1e-12);
@@ -124,8 +113,8 @@ proptest! {
     #[test]
     fn rupture_instants_do_not_depend_on_the_sampling(rate in 20.0f64..2000.0) {
         let samples = (48.0 * rate) as usize;
-        let (_, coarse) = insert(&three_gels(), &constant(-0.005, 0.0023, rate, samples));
-        let (_, fine) = insert(&three_gels(), &constant(-0.005, 0.0023, 1000.0, 48_000));
+        let (_, coarse) = insert(&Tissue::three_gels(), &constant(-0.005, 0.0023, rate, samples));
+        let (_, fine) = insert(&Tissue::three_gels(), &constant(-0.005, 0.0023, 1000.0, 48_000));
         prop_assert_eq!(coarse.len(), 3);
         for (a, b) in coarse.iter().zip(&fine) {
             prop_assert!((a.time_s - b.time_s).abs() < 1e-9, "{:?} {:?}", a, b);
@@ -135,7 +124,7 @@ proptest! {
 
 #[test]
 fn a_state_can_be_copied_and_continued() {
-    let law = Law::base(&three_gels());
+    let law = Law::base(&Tissue::three_gels());
     let motion = constant(-0.005, 0.0023, 200.0, 8000);
     let mut state = LawState::default();
     for &(t, z, v) in &motion[..4000] {

@@ -1,8 +1,27 @@
 //! Arguments of `stylet sweep`, `stylet replay` and `stylet gate`.
 
+use crate::args::Results;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
+use stylet_sweep::Overrides;
 use stylet_sweep::shard::ShardNumber;
+
+/// How much is drawn, and from which seed.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Draws {
+    /// Number of trials, in place of the file's.
+    #[arg(long, value_name = "N")]
+    pub trials: Option<u64>,
+    /// Seed of all draws, in place of the file's.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+}
+
+impl From<Draws> for Overrides {
+    fn from(draws: Draws) -> Self {
+        Self { trials: draws.trials, seed: draws.seed }
+    }
+}
 
 /// Arguments of `stylet sweep`.
 #[derive(Debug, Args)]
@@ -23,24 +42,18 @@ pub struct SweepArgs {
     pub command: Option<SweepCommand>,
     /// Sweep file (RON).
     pub sweep: Option<PathBuf>,
-    /// Number of trials, in place of the file's.
-    #[arg(long, value_name = "N")]
-    pub trials: Option<u64>,
-    /// Seed of all draws, in place of the file's.
-    #[arg(long, value_name = "S")]
-    pub seed: Option<u64>,
+    /// What is drawn.
+    #[command(flatten)]
+    pub draws: Draws,
     /// Threads [default: one per core].
     #[arg(long, value_name = "T")]
     pub threads: Option<usize>,
-    /// Folder for the results [default: stylet-out/<sweep>].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
     /// Go on where an interrupted sweep stopped.
     #[arg(long)]
     pub resume: bool,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
 }
 
 /// The parts of a sweep that is spread over machines.
@@ -61,12 +74,9 @@ pub enum SweepCommand {
 pub struct Which {
     /// Sweep file (RON).
     pub sweep: PathBuf,
-    /// Number of trials, in place of the file's.
-    #[arg(long, value_name = "N")]
-    pub trials: Option<u64>,
-    /// Seed of all draws, in place of the file's.
-    #[arg(long, value_name = "S")]
-    pub seed: Option<u64>,
+    /// What is drawn.
+    #[command(flatten)]
+    pub draws: Draws,
 }
 
 /// Arguments of `stylet sweep plan`.
@@ -106,12 +116,9 @@ pub struct MergeArgs {
     /// Which sweep.
     #[command(flatten)]
     pub which: Which,
-    /// Folder with the shards [default: stylet-out/<sweep>].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// Where the shards are and the results go.
+    #[command(flatten)]
+    pub results: Results,
 }
 
 /// Arguments of `stylet sweep map`.
@@ -140,12 +147,9 @@ pub struct ReplayArgs {
     pub dir: PathBuf,
     /// Number of the trial, from 0.
     pub trial: u64,
-    /// Folder for the report [default: DIR/trial-<TRIAL>].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
 }
 
 /// Arguments of `stylet gate`.

@@ -1,10 +1,10 @@
-//! `stylet sweep map`: the robustness map of several sweeps.
+//! `stylet sweep map`: the robustness map of several sweeps, as a table on the terminal and as SVG.
 
 use super::args::MapArgs;
 use super::progress::Progress;
 use super::with_threads;
 use crate::exit::Failure;
-use stylet_sweep::{Columns, Overrides, Sweep, map_rows, map_svg, rows};
+use stylet_sweep::{Columns, MapRow, Overrides, Sweep, map_rows, map_svg, rows};
 
 /// The command.
 pub fn map(args: &MapArgs) -> Result<(), Failure> {
@@ -16,9 +16,17 @@ pub fn map(args: &MapArgs) -> Result<(), Failure> {
     for sweep in &sweeps {
         let columns = Columns::new(sweep);
         let rows = with_threads(0, || rows(sweep, &columns, 0..sweep.trials(), &|n| progress.advance(n)))??;
-        map.extend(map_rows(sweep, &columns, &rows));
+        map.push((sweep.name.clone(), map_rows(sweep, &columns, &rows)));
     }
     progress.finish();
+    for (name, rows) in &map {
+        println!("{name}");
+        for row in rows {
+            let cells: String = row.failed_percent.iter().map(|percent| format!("{percent:>4}")).collect();
+            println!("  {:<62}{cells} %", row.name);
+        }
+    }
+    let map: Vec<MapRow> = map.into_iter().flat_map(|(_, rows)| rows).collect();
     let failed = |why| Failure::Output { path: args.svg.display().to_string(), why };
     std::fs::write(&args.svg, map_svg(&map)).map_err(failed)?;
     println!("{}", args.svg.display());

@@ -19,7 +19,7 @@ use progress::Progress;
 use std::path::{Path, PathBuf};
 use stylet_report::{percent, significant};
 use stylet_sweep::shard::{self, ShardError, ShardNumber};
-use stylet_sweep::{Columns, Overrides, Row, Summary, Sweep, rows};
+use stylet_sweep::{Columns, Row, Summary, Sweep, rows};
 
 /// Trials of a shard when `stylet sweep` splits the work itself: what a kill can cost at most.
 const SHARD_TRIALS: u64 = 1024;
@@ -62,16 +62,16 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
             "no sweep file is given; try stylet sweep scenarios/sweeps/noise.ron".into(),
         ));
     };
-    let sweep = Sweep::load(file, Overrides { trials: args.trials, seed: args.seed })?;
+    let sweep = Sweep::load(file, args.draws.into())?;
     let columns = Columns::new(&sweep);
-    let out = args.out.clone().unwrap_or_else(|| default_folder(file));
+    let out = args.results.out.clone().unwrap_or_else(|| default_folder(file));
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     begin(&sweep, &columns, &out, of, args.resume)?;
-    let progress = Progress::new(sweep.trials(), args.quiet);
+    let progress = Progress::new(sweep.trials(), args.results.quiet);
     let rows =
         with_threads(args.threads.unwrap_or(0), || all_shards(&sweep, &columns, &out, of, &progress))??;
     progress.finish();
-    conclude(&sweep, &columns, &rows, &out, args.quiet)
+    conclude(&sweep, &columns, &rows, &out, args.results.quiet)
 }
 
 /// Makes the folder and writes the sweep into it; refuses to mix with what is unfinished there.

@@ -1,7 +1,7 @@
 //! `stylet replay`: one trial of a sweep with a full report.
 
 use super::args::ReplayArgs;
-use crate::args::RunArgs;
+use crate::args::{Results, RunArgs};
 use crate::exit::Failure;
 use crate::output::Output;
 use stylet_sweep::{Drawer, Overrides, Sweep};
@@ -22,16 +22,15 @@ pub fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         return Err(Failure::Check(what));
     }
     let drawn = Drawer::new(&sweep).draw(args.trial).map_err(|e| Failure::Check(e.to_string()))?;
-    let out = args.out.clone().unwrap_or_else(|| args.dir.join(format!("trial-{}", args.trial)));
+    let out = args.results.out.clone().unwrap_or_else(|| args.dir.join(format!("trial-{}", args.trial)));
     let mut output = Output::default();
     let text = drawn.scenario.to_ron().map_err(|e| Failure::Internal(e.to_string()))?;
     output.add("scenario.ron", text);
     output.write(&out)?;
     crate::run::run(&RunArgs {
         scenario: out.join("scenario.ron"),
-        out: Some(out),
         seed: None,
         compare: false,
-        quiet: args.quiet,
+        results: Results { out: Some(out), quiet: args.results.quiet },
     })
 }

@@ -6,13 +6,13 @@ use crate::exit::Failure;
 use std::time::Instant;
 use stylet_report::significant;
 use stylet_sweep::shard::{self, ShardNumber};
-use stylet_sweep::{Columns, Overrides, Sweep, rows};
+use stylet_sweep::{Columns, Sweep, rows};
 
 /// Trials that the plan runs to see how long one takes.
 const PROBE: u64 = 32;
 
 fn load(which: &Which) -> Result<(Sweep, Columns), Failure> {
-    let sweep = Sweep::load(&which.sweep, Overrides { trials: which.trials, seed: which.seed })?;
+    let sweep = Sweep::load(&which.sweep, which.draws.into())?;
     let columns = Columns::new(&sweep);
     Ok((sweep, columns))
 }
@@ -61,12 +61,12 @@ pub fn run_shard(args: &RunShardArgs) -> Result<(), Failure> {
 /// `stylet sweep merge`.
 pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     let (sweep, columns) = load(&args.which)?;
-    let out = folder(args.out.as_ref(), &args.which.sweep);
+    let out = folder(args.results.out.as_ref(), &args.which.sweep);
     let of = shard::split_of(&out)?;
     let mut all = Vec::new();
     for shard in 1..=of {
         all.extend(shard::read(&sweep, &columns, ShardNumber { shard, of }, &out)?);
     }
     files::inputs(&sweep)?.write(&out)?;
-    conclude(&sweep, &columns, &all, &out, args.quiet)
+    conclude(&sweep, &columns, &all, &out, args.results.quiet)
 }

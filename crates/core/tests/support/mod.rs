@@ -5,26 +5,7 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stylet_core::{EnhanceConfig, Enhancer, Output, Sample};
-use stylet_tissue::{Law, LawState, Layer, Rupture, Tissue, TissueForce};
-
-/// The latex stack of SPEC section 8.
-pub fn three_gels() -> Tissue {
-    let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
-        name: String::new(),
-        thickness_m,
-        stiffness_n_per_m,
-        friction_ns_per_m2,
-        puncture_n,
-    };
-    Tissue {
-        surface_m: 0.0,
-        layers: vec![
-            layer(0.0282, 40.0, 9000.0, None),
-            layer(0.0377, 60.0, 12000.0, Some(2.2)),
-            layer(0.0322, 80.0, 16000.0, None),
-        ],
-    }
-}
+use stylet_tissue::{Law, LawState, Rupture, Tissue, TissueForce};
 
 /// Samples of an insertion, with the true force and ruptures.
 pub struct Insertion {
@@ -68,13 +49,15 @@ pub fn insertion(
 
 /// The latex stack at the paper's constant 2.3 mm/s.
 pub fn constant(noise_n: f64, seed: u64) -> Insertion {
-    insertion(&three_gels(), -0.005, 50.0, 200.0, noise_n, seed, |_| 0.0023)
+    insertion(&Tissue::three_gels(), -0.005, 50.0, 200.0, noise_n, seed, |_| 0.0023)
 }
 
 /// The latex stack with the paper's sinusoid from rest.
 pub fn sinusoid(noise_n: f64, seed: u64) -> Insertion {
     let omega = std::f64::consts::TAU * 0.0167;
-    insertion(&three_gels(), -0.005, 15.0, 200.0, noise_n, seed, move |t| 0.12 * omega * (omega * t).sin())
+    insertion(&Tissue::three_gels(), -0.005, 15.0, 200.0, noise_n, seed, move |t| {
+        0.12 * omega * (omega * t).sin()
+    })
 }
 
 /// Runs the core over samples.

@@ -1,0 +1,85 @@
+//! Promise: many samples at once give the bits that they give one by one, wherever they are cut into
+//! blocks, with samples among them that cannot be used.
+
+mod support;
+
+use stylet_core::{EnhanceConfig, Enhancer, Output, Sample};
+
+/// What is kept up to date sample by sample, as bits.
+type Kept = (u64, u64, String);
+
+fn kept(out: &Output) -> Kept {
+    let rest = format!(
+        "{:?} {} {:?} {:?} {:?} {}",
+        out.state, out.ruptures, out.contact_m, out.detection, out.estimate, out.used
+    );
+    (out.enhanced_n.to_bits(), out.error_n.to_bits(), rest)
+}
+
+fn core() -> Enhancer<Vec<Sample>> {
+    Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 10_000])
+}
+
+/// Spoils some samples: not a number, not later than the one before, beyond what a needle can have.
+fn spoilt(mut samples: Vec<Sample>) -> Vec<Sample> {
+    for (k, sample) in samples.iter_mut().enumerate() {
+        match k % 997 {
+            0 => sample.time_s = f64::NAN,
+            200 => sample.force_n = f64::INFINITY,
+            400 => sample.time_s -= 1.0,
+            600 => sample.position_m = 2e3,
+            800 => sample.time_s = f64::INFINITY,
+            _ => {}
+        }
+    }
+    samples
+}
+
+#[test]
+fn samples_at_once_give_the_bits_of_samples_one_by_one() {
+    for samples in [support::constant(0.02, 1).samples, support::sinusoid(0.02, 2).samples] {
+        for samples in [samples.clone(), spoilt(samples)] {
+            let mut one_by_one = core();
+            let expected: Vec<Kept> = samples.iter().map(|s| kept(&one_by_one.step(*s))).collect();
+            for cut in [1, 7, 64, 65, 1000, samples.len()] {
+                let mut at_once = core();
+                let mut found = Vec::new();
+                for piece in samples.chunks(cut) {
+                    let last = kept(at_once.run(piece, |out| found.push(kept(out))));
+                    assert_eq!(Some(&last), found.last());
+                }
+                assert_eq!(found, expected, "in pieces of {cut}");
+            }
+            let ruptures = expected.last().map(|(_, _, rest)| rest.split(' ').nth(1) != Some("0"));
+            assert_eq!(ruptures, Some(true), "the run must really have had its ruptures");
+        }
+    }
+}
+
+#[test]
+fn an_estimate_that_overflows_starts_anew_and_no_output_is_spoilt() {
+    // Forgetting without resets blows the covariance up while the needle stands still.
+    let config = EnhanceConfig {
+        forgetting: 0.5,
+        reset: stylet_core::config::Reset::Ruptures,
+        ..EnhanceConfig::default()
+    };
+    let mut core = Enhancer::new(config, 0.0, vec![Sample::default(); 10_000]);
+    let mut anew = 0;
+    let mut before = [0.0; 2];
+    for k in 0..20_000 {
+        let time_s = f64::from(k) / 200.0;
+        let moving = time_s.min(10.0);
+        let out = core.step(Sample {
+            time_s,
+            position_m: -0.005 + 0.002 * moving,
+            velocity_mps: if time_s < 10.0 { 0.002 } else { 0.0 },
+            force_n: 40.0 * (0.002 * moving - 0.005).max(0.0),
+        });
+        let numbers = [out.enhanced_n, out.error_n, out.theta[0], out.theta[1], out.reconstructed_n];
+        assert!(numbers.iter().all(|x| x.is_finite()), "at {time_s} s: {numbers:?}");
+        anew += usize::from(out.theta == [0.0; 2] && before != [0.0; 2]);
+        before = out.theta;
+    }
+    assert!(anew > 0, "the estimate must really have overflowed");
+}
