@@ -16,8 +16,8 @@ const REST_MPS: f64 = 1e-4;
 ///
 /// from the puncture of the layer on: before it the shaft does not touch the layer. At the puncture
 /// `w` starts from `share kept f_K`, so that the layer releases no more than what friction cannot hold
-/// (`kept` 1) or than tears (`kept` below 1). Below 0.1 mm/s `S_i` stays as it last was. When the tip
-/// comes back to `release_m` beyond the layer's front face the layer lets go: `w = 0`.
+/// (`kept` 1) or than tears (`kept` below 1). When the speed changes, `S_i` follows over the travel
+/// `delta` in which the contact renews itself, and not at all below 0.1 mm/s. When the tip comes back to `release_m` beyond the layer's front face the layer lets go: `w = 0`.
 ///
 /// Branches of one layer add up; the shares of a layer that are left to no branch remain the base law's
 /// `b_i l_i phi(v)`. Integrated exactly for a velocity that is constant within the step.
@@ -130,7 +130,10 @@ impl Effect for ViscoelasticPresliding {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
         let [mut w, mut limit, step, keep, ramp, ..] = *memory;
         if limit == 0.0 || moment.v_mps.abs() >= REST_MPS {
-            limit = self.share * slab.friction_ns_per_m2 * slab.thickness_m * sliding_mps.abs();
+            let steady = self.share * slab.friction_ns_per_m2 * slab.thickness_m * sliding_mps.abs();
+            let fresh = limit == 0.0 || moment.ruptured < self.layer;
+            let renewed = if fresh { 1.0 } else { -libm::expm1(-moment.dz_m.abs() / self.delta_m) };
+            limit += (steady - limit) * renewed;
             memory[1] = limit;
         }
         if moment.ruptured < self.layer {
