@@ -11,6 +11,8 @@ pub mod exit;
 mod hash;
 mod output;
 mod picture;
+mod repeats;
+mod repeats_report;
 mod run;
 mod sweep;
 mod terminal;

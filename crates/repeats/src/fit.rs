@@ -110,7 +110,14 @@ fn prior(own: &[f64], spread: &Spread) -> f64 {
 
 /// Fits a form to runs, from `x` and the runs' own numbers where they are known.
 #[must_use]
-pub fn fit(shape: &Shape, x: Vec<f64>, own: Option<&[Own]>, runs: &[&Run], spread: Spread, effort: Effort) -> Option<Fit> {
+pub fn fit(
+    shape: &Shape,
+    x: Vec<f64>,
+    own: Option<&[Own]>,
+    runs: &[&Run],
+    spread: Spread,
+    effort: Effort,
+) -> Option<Fit> {
     let mut spread = spread;
     let mut own: Vec<[f64; OWN]> = match own {
         Some(own) => own.iter().map(|o| [o.shift_m, o.friction_log]).collect(),
@@ -125,7 +132,8 @@ pub fn fit(shape: &Shape, x: Vec<f64>, own: Option<&[Own]>, runs: &[&Run], sprea
         }
         (cost, replays) = minimise(shape, &mut x, &mut own, runs, &spread, effort.steps)?;
     }
-    let mean = replays.iter().map(|r| crate::stats::rms(&r.e).powi(2)).sum::<f64>() / runs.len().max(1) as f64;
+    let mean =
+        replays.iter().map(|r| crate::stats::rms(&r.e).powi(2)).sum::<f64>() / runs.len().max(1) as f64;
     Some(Fit {
         shape: shape.clone(),
         x,
@@ -152,7 +160,13 @@ fn respread(own: &[[f64; OWN]], replays: &[Replay], old: Spread) -> Spread {
     }
 }
 
-fn evaluate(shape: &Shape, x: &[f64], own: &[[f64; OWN]], runs: &[&Run], spread: &Spread) -> Option<(f64, Vec<Replay>)> {
+fn evaluate(
+    shape: &Shape,
+    x: &[f64],
+    own: &[[f64; OWN]],
+    runs: &[&Run],
+    spread: &Spread,
+) -> Option<(f64, Vec<Replay>)> {
     let replays: Option<Vec<Replay>> = runs
         .par_iter()
         .zip(own)
@@ -181,7 +195,14 @@ struct Normal {
     g: Vec<f64>,
 }
 
-fn normal(shape: &Shape, x: &[f64], own: &[f64; OWN], run: &Run, at: &Replay, spread: &Spread) -> Option<Normal> {
+fn normal(
+    shape: &Shape,
+    x: &[f64],
+    own: &[f64; OWN],
+    run: &Run,
+    at: &Replay,
+    spread: &Spread,
+) -> Option<Normal> {
     let numbers = shape.numbers();
     let size = x.len() + OWN;
     let n = at.e.len();
@@ -207,7 +228,10 @@ fn normal(shape: &Shape, x: &[f64], own: &[f64; OWN], run: &Run, at: &Replay, sp
     let weights: Vec<f64> = at
         .e
         .iter()
-        .map(|e| scale * if e.abs() <= HUBER * spread.residual_n { 1.0 } else { HUBER * spread.residual_n / e.abs() })
+        .map(|e| {
+            scale
+                * if e.abs() <= HUBER * spread.residual_n { 1.0 } else { HUBER * spread.residual_n / e.abs() }
+        })
         .collect();
     let mut h = vec![0.0; size * size];
     let mut g = vec![0.0; size];
@@ -275,7 +299,10 @@ fn minimise(
         }
         // What stands at a bound and wants beyond stays there.
         let fixed: Vec<bool> = (0..size)
-            .map(|k| k < shared && ((x[k] <= numbers[k].low && g[k] > 0.0) || (x[k] >= numbers[k].high && g[k] < 0.0)))
+            .map(|k| {
+                k < shared
+                    && ((x[k] <= numbers[k].low && g[k] > 0.0) || (x[k] >= numbers[k].high && g[k] < 0.0))
+            })
             .collect();
         let mut better = false;
         for _ in 0..7 {
@@ -283,7 +310,8 @@ fn minimise(
                 damping *= 10.0;
                 continue;
             };
-            let nx: Vec<f64> = (0..shared).map(|k| (x[k] - step[k]).clamp(numbers[k].low, numbers[k].high)).collect();
+            let nx: Vec<f64> =
+                (0..shared).map(|k| (x[k] - step[k]).clamp(numbers[k].low, numbers[k].high)).collect();
             let nown: Vec<[f64; OWN]> = own
                 .iter()
                 .enumerate()
@@ -311,7 +339,14 @@ fn minimise(
 }
 
 /// Solves `(H + damping D) step = g` by Cholesky; fixed numbers do not move.
-fn solve(h: &[f64], g: &[f64], fixed: &[bool], size: usize, damping: f64, numbers: &[crate::shape::Number]) -> Option<Vec<f64>> {
+fn solve(
+    h: &[f64],
+    g: &[f64],
+    fixed: &[bool],
+    size: usize,
+    damping: f64,
+    numbers: &[crate::shape::Number],
+) -> Option<Vec<f64>> {
     let mut a = h.to_vec();
     let mut b = g.to_vec();
     for k in 0..size {

@@ -8,7 +8,14 @@ use stylet_tissue::{Law, LawState};
 /// law. `at_rupture` takes per layer the elastic force in N at its rupture (zero: it did not).
 ///
 /// False when the law cannot be built or its force is not finite.
-pub fn imposed(shape: &Shape, x: &[f64], own: &Own, data: &Columns, force: &mut Vec<f64>, at_rupture: &mut Vec<f64>) -> bool {
+pub fn imposed(
+    shape: &Shape,
+    x: &[f64],
+    own: &Own,
+    data: &Columns,
+    force: &mut Vec<f64>,
+    at_rupture: &mut Vec<f64>,
+) -> bool {
     let (tissue, effects) = shape.tissue(x, own);
     let Ok(law) = Law::new(&tissue, &effects) else { return false };
     let mut state = LawState::default();

@@ -14,11 +14,10 @@ pub fn frame(believed: &Tissue, runs: &[&Run]) -> Frame {
         if all.is_empty() { None } else { Some(median(&mut all)) }
     };
     let contact = of(&|run| Some(run.contact_m)).unwrap_or(believed.surface_m);
-    let deepest = of(&|run| run.recording.position_m.iter().copied().reduce(f64::max)).unwrap_or(contact + 0.01);
-    let force_n = runs
-        .iter()
-        .flat_map(|run| run.recording.force_n.iter())
-        .fold(0.0_f64, |most, f| most.max(f.abs()));
+    let deepest =
+        of(&|run| run.recording.position_m.iter().copied().reduce(f64::max)).unwrap_or(contact + 0.01);
+    let force_n =
+        runs.iter().flat_map(|run| run.recording.force_n.iter()).fold(0.0_f64, |most, f| most.max(f.abs()));
     let mut fronts_m = Vec::with_capacity(layers);
     let mut loads = Vec::with_capacity(layers);
     for i in 0..layers {

@@ -54,11 +54,18 @@ pub fn without(all: &Fit, runs: &[&Run], out: &[usize], effort: Effort) -> Optio
 
 /// Predicts every run by laws fitted without its group. Returns the fits too, one per group.
 #[must_use]
-pub fn leave_out(all: &Fit, runs: &[&Run], groups: &[Vec<usize>], effort: Effort) -> Vec<(Option<(Fit, Population)>, Vec<(usize, LeftOut, Prediction)>)> {
+pub fn leave_out(
+    all: &Fit,
+    runs: &[&Run],
+    groups: &[Vec<usize>],
+    effort: Effort,
+) -> Vec<(Option<(Fit, Population)>, Vec<(usize, LeftOut, Prediction)>)> {
     groups
         .par_iter()
         .map(|group| {
-            let Some((fitted, population)) = without(all, runs, group, effort) else { return (None, Vec::new()) };
+            let Some((fitted, population)) = without(all, runs, group, effort) else {
+                return (None, Vec::new());
+            };
             let predicted = group
                 .iter()
                 .map(|i| {

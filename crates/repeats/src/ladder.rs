@@ -13,7 +13,7 @@ const GENERAL: [&str; 5] =
 /// An ingredient has to lower the error on runs left out by this share.
 pub const LEAST_GAIN: f64 = 0.01;
 /// One that raises the error by less than this share when it is taken away again is not kept.
-pub const LEAST_LOSS: f64 = 0.005;
+pub const LEAST_LOSS: f64 = 0.02;
 /// At most so many.
 const MOST: usize = 12;
 
@@ -108,7 +108,7 @@ fn candidates(shape: &Shape, runs: &[&Run]) -> Vec<Ingredient> {
         Ingredient::PowerLaw,
     ];
     if ruptures {
-        all.extend([Ingredient::Deeper, Ingredient::Presliding, Ingredient::OwnCreep, Ingredient::Indentation]);
+        all.extend([Ingredient::Deeper, Ingredient::Presliding, Ingredient::Indentation]);
         if several {
             all.push(Ingredient::RatePuncture);
         }
@@ -159,7 +159,13 @@ pub fn climb(frame: Frame, runs: &[&Run], mut progress: impl FnMut(&str)) -> Opt
         fits.sort_by(|a, b| a.0.error_n.total_cmp(&b.0.error_n));
         let mut taken = None;
         for (tried, fitted) in fits.iter().take(4) {
-            progress(&fits.iter().take(9).map(|t| format!("{} {:.3} ", t.0.ingredient.label(), t.0.error_n)).collect::<String>());
+            progress(
+                &fits
+                    .iter()
+                    .take(9)
+                    .map(|t| format!("{} {:.3} ", t.0.ingredient.label(), t.0.error_n))
+                    .collect::<String>(),
+            );
             let Some(fitted) = best_of(&fitted.shape, fitted, runs, settle) else { continue };
             let Some(error) = gain::quick(&fitted, runs, &folds, again) else { continue };
             progress(&format!("  {} {:.4}", tried.ingredient.label(), error));

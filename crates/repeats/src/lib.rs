@@ -2,14 +2,17 @@
 //! insertion is predicted.
 #![forbid(unsafe_code)]
 
+pub mod dataset;
 pub mod events;
 pub mod fit;
 pub mod forward;
 pub mod frame;
 pub mod gain;
+pub mod instrument;
 pub mod ladder;
 pub mod population;
 pub mod predict;
 pub mod run;
 pub mod shape;
 pub mod stats;
+pub mod study;

@@ -69,7 +69,11 @@ impl Population {
                 .map(|(run, at)| (libm::log(run.speed_mps.max(1e-4) / REFERENCE_MPS), at[layer].max(1e-3)))
                 .collect()
         };
-        let alpha = if shape.has(Ingredient::RatePuncture) { rate(&(0..shape.layers()).map(forces).collect::<Vec<_>>()) } else { 0.0 };
+        let alpha = if shape.has(Ingredient::RatePuncture) {
+            rate(&(0..shape.layers()).map(forces).collect::<Vec<_>>())
+        } else {
+            0.0
+        };
         let layers = (0..shape.layers())
             .map(|i| {
                 let logs: Vec<f64> =
@@ -96,6 +100,17 @@ impl Population {
         }
     }
 
+    /// A population put together from layers that were measured alone.
+    #[must_use]
+    pub fn composed(
+        layers: Vec<LayerScatter>,
+        shift_sd_m: f64,
+        friction_sd: f64,
+        residual_n: [f64; 4],
+    ) -> Self {
+        Self { shift_sd_m, friction_sd, alpha: 0.0, layers, residual_n, mean: [0.0; 2] }
+    }
+
     /// `count` insertions drawn from the population: points of the Halton sequence through the
     /// quantiles of normal distributions, the same every time.
     #[must_use]
@@ -112,11 +127,15 @@ impl Population {
                 let friction_log = self.mean[1] + self.friction_sd * normal_quantile(share());
                 let mut own = Own { shift_m, friction_log, ..Own::default() };
                 for layer in &self.layers {
-                    let (which, force, release) = (share(), normal_quantile(share()), normal_quantile(share()));
+                    let (which, force, release) =
+                        (share(), normal_quantile(share()), normal_quantile(share()));
                     let shows = layer.drops.0 as f64 > which * layer.drops.1 as f64;
                     own.drops.push(shows);
                     own.puncture_n.push(
-                        layer.puncture_log.filter(|_| shows).map(|mean| libm::exp(mean + layer.puncture_sd * force)),
+                        layer
+                            .puncture_log
+                            .filter(|_| shows)
+                            .map(|mean| libm::exp(mean + layer.puncture_sd * force)),
                     );
                     own.releases_m.push(layer.release_m.map(|z| z + layer.release_sd_m * release));
                 }

@@ -57,8 +57,11 @@ impl Run {
         let releases_m = (0..layers)
             .map(|i| if found.len() == layers || i == 0 { found.get(i).map(|r| r.position_m) } else { None })
             .collect();
-        let mut speeds: Vec<f64> =
-            recording.velocity_mps[phases.start..=phases.deepest].iter().copied().filter(|v| *v > 0.0).collect();
+        let mut speeds: Vec<f64> = recording.velocity_mps[phases.start..=phases.deepest]
+            .iter()
+            .copied()
+            .filter(|v| *v > 0.0)
+            .collect();
         let speed_mps = crate::stats::median(&mut speeds);
         let contact_m = events::contact_m(&recording, &phases);
         let thin = thinned(&recording, &ruptures);

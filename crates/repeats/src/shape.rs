@@ -6,8 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 use stylet_tissue::{
-    AnyEffect, DeepIndentation, EffectInfo, Layer, LayerStiffening, NonlinearElasticity, PowerLawFriction, PronyTerm,
-    RateDependentPuncture, StressRelaxation, Tissue, ViscoelasticPresliding,
+    AnyEffect, DeepIndentation, EffectInfo, Layer, LayerStiffening, NonlinearElasticity, PowerLawFriction,
+    PronyTerm, RateDependentPuncture, StressRelaxation, Tissue, ViscoelasticPresliding,
 };
 
 /// Speed at which sliding friction is stated (m/s).
@@ -34,8 +34,6 @@ pub enum Ingredient {
     PowerLaw,
     /// Punctured layers hold the shaft, are dragged along, and let go; every layer ruptures where the data show it.
     Presliding,
-    /// Dragged tissue creeps otherwise than pressed tissue relaxes.
-    OwnCreep,
     /// Layers yield to force, not to the tip's depth.
     Indentation,
     /// Deeper layers than the first rupture where the force drops. This is the base law's own; without it they
@@ -56,7 +54,7 @@ impl Ingredient {
             Self::PerLayer => "layer_stiffening",
             Self::Relaxation | Self::SecondTerm => "stress_relaxation",
             Self::PowerLaw => "power_law_friction",
-            Self::Presliding | Self::OwnCreep => "viscoelastic_presliding",
+            Self::Presliding => "viscoelastic_presliding",
             Self::Indentation => "deep_indentation",
             Self::Deeper => "puncture",
             Self::RatePuncture => "rate_dependent_puncture",
@@ -69,7 +67,6 @@ impl Ingredient {
     pub fn label(self) -> String {
         match self {
             Self::SecondTerm => "stress_relaxation (second term)".to_owned(),
-            Self::OwnCreep => "viscoelastic_presliding (creep of its own)".to_owned(),
             Self::Deeper => "rupture of deeper layers (base law)".to_owned(),
             other => other.id().to_owned(),
         }
@@ -81,7 +78,6 @@ impl Ingredient {
         match self {
             Self::PerLayer => Some(Self::Nonlinear),
             Self::SecondTerm => Some(Self::Relaxation),
-            Self::OwnCreep => Some(Self::Presliding),
             _ => None,
         }
     }
@@ -112,7 +108,15 @@ impl Number {
     }
     fn log(name: String, low: f64, high: f64, start: f64) -> Self {
         let start = libm::log(start.clamp(low, high));
-        Self { name, low: libm::log(low), high: libm::log(high), start, scale: 0.3, log: true, stepped: false }
+        Self {
+            name,
+            low: libm::log(low),
+            high: libm::log(high),
+            start,
+            scale: 0.3,
+            log: true,
+            stepped: false,
+        }
     }
     /// A value of the vector in its own unit.
     #[must_use]
@@ -252,17 +256,16 @@ impl Shape {
         }
         if self.has(Ingredient::Relaxation) {
             let two = self.has(Ingredient::SecondTerm);
-            out.push(Number::linear("terms.0.fraction".to_owned(), 0.0, 0.6, 0.3, 0.1));
-            let (low, high, start) = if two { (0.05, 2.0, 0.4) } else { (0.05, 40.0, 2.0) };
-            out.push(Number::log("terms.0.time_constant_s".to_owned(), low, high, start));
-            if two {
-                out.push(Number::linear("terms.1.fraction".to_owned(), 0.0, 0.39, 0.2, 0.1));
-                out.push(Number::log("terms.1.time_constant_s".to_owned(), 1.5, 40.0, 4.0));
+            let times: &[(f64, f64, f64)] =
+                if two { &[(0.05, 2.0, 0.4), (1.5, 60.0, 4.0)] } else { &[(0.05, 60.0, 2.0)] };
+            for (j, (low, high, start)) in times.iter().enumerate() {
+                out.push(Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, 0.2, 0.1));
+                out.push(Number::log(format!("terms.{j}.time_constant_s"), *low, *high, *start));
+                if self.has(Ingredient::Presliding) {
+                    // Of the dragged tissue, as a share of what the terms before leave.
+                    out.push(Number::linear(format!("terms.{j}.dragged"), 0.0, 0.95, 0.4, 0.1));
+                }
             }
-        }
-        if self.has(Ingredient::OwnCreep) {
-            out.push(Number::linear("drag.0.fraction".to_owned(), 0.0, 0.95, 0.4, 0.1));
-            out.push(Number::log("drag.0.time_constant_s".to_owned(), 0.1, 40.0, 3.0));
         }
         if self.has(Ingredient::PowerLaw) {
             out.push(Number::linear("exponent".to_owned(), -0.5, 1.5, 0.2, 0.1));
@@ -274,7 +277,12 @@ impl Shape {
                 let (low, high) = (p.search.0.max(p.low), p.search.1.min(p.high));
                 out.push(if p.log && low > 0.0 {
                     // A fit begins where the effect is weak.
-                    Number::log(name, low, high, if p.strength { low + 0.05 * (p.start - low) } else { p.start })
+                    Number::log(
+                        name,
+                        low,
+                        high,
+                        if p.strength { low + 0.05 * (p.start - low) } else { p.start },
+                    )
                 } else {
                     let start = if p.strength { p.neutral } else { p.start };
                     Number::linear(name, low, high, start, 0.1 * (high - low))
@@ -322,15 +330,18 @@ impl Shape {
             layers.push(LayerNumbers { front_m, load_n, curvature, sliding_n, yield_n, delta_m, kept });
         }
         let mut terms = Vec::new();
+        let mut creep = Vec::new();
         if self.has(Ingredient::Relaxation) {
-            terms.push(PronyTerm { fraction: next(), time_constant_s: libm::exp(next()) });
-            if self.has(Ingredient::SecondTerm) {
-                terms.push(PronyTerm { fraction: next(), time_constant_s: libm::exp(next()) });
+            let mut left = 1.0;
+            for _ in 0..if self.has(Ingredient::SecondTerm) { 2 } else { 1 } {
+                let term = PronyTerm { fraction: next(), time_constant_s: libm::exp(next()) };
+                if presliding {
+                    let fraction = left * next();
+                    left -= fraction;
+                    creep.push(PronyTerm { fraction, ..term });
+                }
+                terms.push(term);
             }
-        }
-        let mut creep = terms.clone();
-        if self.has(Ingredient::OwnCreep) {
-            creep = vec![PronyTerm { fraction: next(), time_constant_s: libm::exp(next()) }];
         }
         let mut effects: Vec<AnyEffect> = Vec::new();
         if self.has(Ingredient::PowerLaw) {
@@ -360,7 +371,8 @@ impl Shape {
         }
         let kappa = |i: usize| {
             let c = if self.has(Ingredient::PerLayer) { layers[i].curvature } else { layers[0].curvature };
-            let reference = if self.has(Ingredient::PerLayer) { self.frame.loads[i].1 } else { self.frame.loads[0].1 };
+            let reference =
+                if self.has(Ingredient::PerLayer) { self.frame.loads[i].1 } else { self.frame.loads[0].1 };
             c / ((1.0 - c) * reference)
         };
         let common = if self.has(Ingredient::Nonlinear) { kappa(0).min(KAPPA_MOST) } else { 0.0 };
@@ -384,7 +396,8 @@ impl Shape {
                 thickness_m,
                 stiffness_n_per_m: n.load_n / (reference * (1.0 + own_kappa * reference)),
                 friction_ns_per_m2: n.sliding_n / (thickness_m * REFERENCE_MPS),
-                puncture_n: Some(own.puncture_n.get(i).copied().flatten().unwrap_or(n.yield_n)).filter(|f| f.is_finite()),
+                puncture_n: Some(own.puncture_n.get(i).copied().flatten().unwrap_or(n.yield_n))
+                    .filter(|f| f.is_finite()),
             });
             if presliding {
                 let kept = if own.drops.get(i).copied().unwrap_or(true) { n.kept } else { 1.0 };
