@@ -46,5 +46,6 @@ pub fn frame(believed: &Tissue, runs: &[&Run]) -> Frame {
         fronts_m.push(front);
     }
     let unseen = (0..layers).map(|i| runs.iter().any(|run| run.ruptures[i].is_none())).collect();
-    Frame { believed: believed.clone(), fronts_m, loads, force_n, unseen }
+    let several_speeds = crate::gain::speeds(runs).len() > 1;
+    Frame { believed: believed.clone(), fronts_m, loads, force_n, several_speeds, unseen }
 }

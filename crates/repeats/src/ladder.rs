@@ -102,7 +102,6 @@ fn candidates(shape: &Shape, runs: &[&Run]) -> Vec<Ingredient> {
     let ruptures = runs.iter().any(|run| run.ruptures.iter().any(Option::is_some));
     let mut all = vec![
         Ingredient::Nonlinear,
-        Ingredient::PerLayer,
         Ingredient::Relaxation,
         Ingredient::SecondTerm,
         Ingredient::PowerLaw,
@@ -123,7 +122,7 @@ fn candidates(shape: &Shape, runs: &[&Run]) -> Vec<Ingredient> {
     all.retain(|i| {
         !shape.has(*i)
             && i.needs().is_none_or(|n| shape.has(n))
-            && !(matches!(i, Ingredient::PerLayer | Ingredient::Deeper) && shape.layers() < 2)
+            && !(*i == Ingredient::Deeper && shape.layers() < 2)
             && !(*i == Ingredient::Deeper && shape.has(Ingredient::Presliding))
             // With presliding the layers hold the released force themselves.
             && !(i.id() == "incomplete_release" && shape.has(Ingredient::Presliding))

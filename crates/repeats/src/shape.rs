@@ -22,10 +22,8 @@ const NEVER_S: f64 = 1e6;
 /// One thing by which the law departs from the base law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ingredient {
-    /// Layers stiffen with indentation, all alike.
+    /// Layers stiffen with indentation, each in its own way.
     Nonlinear,
-    /// Each layer stiffens in its own way.
-    PerLayer,
     /// One term of stress relaxation, of tissue that is pressed as of tissue that is dragged.
     Relaxation,
     /// A second term.
@@ -51,7 +49,6 @@ impl Ingredient {
     pub fn id(self) -> &'static str {
         match self {
             Self::Nonlinear => "nonlinear_elasticity",
-            Self::PerLayer => "layer_stiffening",
             Self::Relaxation | Self::SecondTerm => "stress_relaxation",
             Self::PowerLaw => "power_law_friction",
             Self::Presliding => "viscoelastic_presliding",
@@ -76,7 +73,6 @@ impl Ingredient {
     #[must_use]
     pub fn needs(self) -> Option<Self> {
         match self {
-            Self::PerLayer => Some(Self::Nonlinear),
             Self::SecondTerm => Some(Self::Relaxation),
             _ => None,
         }
@@ -136,6 +132,8 @@ pub struct Frame {
     pub loads: Vec<(f64, f64)>,
     /// Largest force seen (N).
     pub force_n: f64,
+    /// Whether the runs have several speeds.
+    pub several_speeds: bool,
     /// Per layer whether some run shows no drop, so that the law has to say when it ruptures.
     pub unseen: Vec<bool>,
 }
@@ -235,7 +233,7 @@ impl Shape {
             out.push(Number::linear(format!("layer.{layer}.front_m"), low, high, likely, 5e-4));
             let (load, _) = self.frame.loads[i];
             out.push(Number::log(format!("layer.{layer}.load_n"), 1e-3 * load, most, load));
-            if (i == 0 && self.has(Ingredient::Nonlinear)) || self.has(Ingredient::PerLayer) {
+            if self.has(Ingredient::Nonlinear) {
                 let start = if i == 0 { 0.7 } else { 0.5 };
                 out.push(Number::linear(format!("layer.{layer}.curvature"), -0.3, 0.97, start, 0.2));
             }
@@ -268,7 +266,9 @@ impl Shape {
             }
         }
         if self.has(Ingredient::PowerLaw) {
-            out.push(Number::linear("exponent".to_owned(), -0.5, 1.5, 0.2, 0.1));
+            // With one speed nothing tells how friction depends on it: as dry friction then, not at all.
+            let (low, high) = if self.frame.several_speeds { (-0.7, 1.5) } else { (0.0, 0.0) };
+            out.push(Number::linear("exponent".to_owned(), low, high, 0.2, 0.1));
         }
         for ingredient in &self.with {
             let Ingredient::General(info) = ingredient else { continue };
@@ -318,8 +318,7 @@ impl Shape {
         for i in 0..count {
             let front_m = next() + if i == 0 { own.shift_m } else { 0.0 };
             let load_n = libm::exp(next());
-            let curved = (i == 0 && self.has(Ingredient::Nonlinear)) || self.has(Ingredient::PerLayer);
-            let curvature = if curved { next() } else { 0.0 };
+            let curvature = if self.has(Ingredient::Nonlinear) { next() } else { 0.0 };
             let sliding_n = libm::exp(next() + own.friction_log);
             let yield_n = if self.yields(i) { libm::exp(next()) } else { f64::INFINITY };
             let (mut delta_m, mut kept) = (0.0, 1.0);
@@ -369,12 +368,7 @@ impl Shape {
         if self.alpha != 0.0 {
             effects.push(RateDependentPuncture { alpha: self.alpha }.into());
         }
-        let kappa = |i: usize| {
-            let c = if self.has(Ingredient::PerLayer) { layers[i].curvature } else { layers[0].curvature };
-            let reference =
-                if self.has(Ingredient::PerLayer) { self.frame.loads[i].1 } else { self.frame.loads[0].1 };
-            c / ((1.0 - c) * reference)
-        };
+        let kappa = |i: usize| layers[i].curvature / ((1.0 - layers[i].curvature) * self.frame.loads[i].1);
         let common = if self.has(Ingredient::Nonlinear) { kappa(0).min(KAPPA_MOST) } else { 0.0 };
         if common != 0.0 {
             effects.push(NonlinearElasticity { kappa_per_m: common }.into());
@@ -386,7 +380,7 @@ impl Shape {
                 Some(deeper) => (deeper.front_m - n.front_m).max(1e-4),
                 None => believed.thickness_m.max(0.08),
             };
-            let own_kappa = if self.has(Ingredient::PerLayer) { kappa(i) } else { common };
+            let own_kappa = kappa(i);
             if own_kappa != common {
                 effects.push(LayerStiffening { layer: i + 1, kappa_per_m: own_kappa - common }.into());
             }

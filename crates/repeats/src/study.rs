@@ -335,8 +335,34 @@ fn told(fit: &Fit, population: &Population) -> Vec<Told> {
         }
         *k += 1;
     }
+    // What belongs to a cause although another effect carries it.
+    let mut term = 0;
+    for effect in &effects {
+        match effect {
+            AnyEffect::LayerStiffening(own) => {
+                let all = out.iter().find(|t| t.owner == "nonlinear_elasticity").map_or(0.0, |t| t.value);
+                out.push(Told {
+                    owner: "nonlinear_elasticity".to_owned(),
+                    path: format!("layer.{}.kappa_per_m", own.layer),
+                    value: all + own.kappa_per_m,
+                });
+            }
+            AnyEffect::ViscoelasticPresliding(branch) if branch.layer == 1 && branch.time_constant_s < LONGEST_S => {
+                out.push(Told {
+                    owner: "stress_relaxation".to_owned(),
+                    path: format!("terms.{term}.dragged_fraction"),
+                    value: branch.share,
+                });
+                term += 1;
+            }
+            _ => {}
+        }
+    }
     out
 }
+
+/// A branch that creeps more slowly does not creep (s).
+const LONGEST_S: f64 = 1e5;
 
 /// Values with their 95 % intervals by the jackknife over runs (Quenouille, Tukey): how the numbers
 /// change when runs are left out, which counts what one law cannot say about all of them.
@@ -708,7 +734,7 @@ pub fn compose(
             .with
             .iter()
             .copied()
-            .filter(|k| !matches!(k, Ingredient::PerLayer | Ingredient::Deeper | Ingredient::RatePuncture))
+            .filter(|k| !matches!(k, Ingredient::Deeper | Ingredient::RatePuncture))
             .collect();
         let start: Vec<f64> = shape.numbers().iter().map(|n| n.start).collect();
         let fitted = crate::fit::fit(
@@ -749,10 +775,6 @@ pub fn compose(
     let mut shape = study.ladder.best.shape.clone();
     shape.frame = frame;
     shape.alpha = 0.0;
-    // Alone, each layer has its own curvature.
-    if shape.has(Ingredient::Nonlinear) && !shape.has(Ingredient::PerLayer) {
-        shape.with.push(Ingredient::PerLayer);
-    }
     shape.with.retain(|k| !matches!(k, Ingredient::RatePuncture));
     let x = shape
         .numbers()
