@@ -177,7 +177,7 @@ fn summary(study: &Study) -> String {
     );
     for b in &r.bought {
         let without =
-            b.without_n.map_or("not needed in the end".to_owned(), |e| format!("{e:.3} without it"));
+            b.without_n.map_or("-".to_owned(), |e| format!("{e:.3} without it"));
         let _ = writeln!(out, "    + {:<38} {:.3}   ({without})", b.step, b.left_out_n);
     }
     for c in &d.causes {

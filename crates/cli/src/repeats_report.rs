@@ -66,14 +66,12 @@ fn bars(study: &Study) -> Vec<Bar> {
     let bar = |name: String, value: f64, colour| Bar { name, value, interval: None, colour };
     let mut bars = vec![bar("base law".to_owned(), study.ladder.base_left_out_n, Colour::Vermillion)];
     for b in &study.repeats.bought {
-        let name = if b.without_n.is_some() {
-            format!("+ {}", b.step)
-        } else {
-            format!("+ {} (later dropped)", b.step)
-        };
+        let name = format!("+ {}", b.step);
         bars.push(bar(name, b.left_out_n, Colour::Blue));
     }
-    bars.push(bar("extended law".to_owned(), study.ladder.left_out_n, Colour::Green));
+    if let Some(last) = bars.last_mut().filter(|_| !study.repeats.bought.is_empty()) {
+        last.colour = Colour::Green;
+    }
     if let Some(floor) = study.repeats.mean.floor_n {
         bars.push(bar("mean of the other runs".to_owned(), floor, Colour::Grey));
     }
@@ -95,7 +93,7 @@ fn causes(study: &Study) -> Section {
     let mut section = Section::new("The causes, in the order of what they buy").text(
         "At each step every candidate was added to what stood, fitted together with everything else to all runs, and the one whose mean \
          prediction was best was fitted again without each fifth of the runs; it was taken when those were predicted better by 1 %. In the end \
-         whatever could go without losing 2 % went.",
+         whatever could go without losing 2 % went. The bars show what stayed, from the base law on in the order of what each buys.",
     );
     section = section.block(Block::Svg(SvgImage {
         description: "Error on runs left out after each step".to_owned(),
@@ -133,6 +131,7 @@ fn causes(study: &Study) -> Section {
         let rows = step
             .tried
             .iter()
+            .take(6)
             .map(|t| {
                 vec![
                     Cell::text(t.ingredient.label()),

@@ -52,6 +52,9 @@ pub struct Ladder {
     pub best: Fit,
     /// Error of the extended law on left-out runs (N).
     pub left_out_n: f64,
+    /// The ingredients that stayed, in the order of what each buys from the base law on, with the error on
+    /// left-out runs (N) after it.
+    pub path: Vec<(Ingredient, f64)>,
     /// Per ingredient the error on left-out runs (N) without it.
     pub without: Vec<(Ingredient, f64)>,
 }
@@ -61,6 +64,33 @@ pub struct Ladder {
 pub fn refit(shape: &Shape, from: &Fit, runs: &[&Run], effort: Effort) -> Option<Fit> {
     let x = shape.start_from(&from.shape.numbers(), &from.x);
     fit(shape, x, Some(&from.own), runs, from.spread, effort)
+}
+
+/// From the base law to the extended one, each time by what then buys most.
+fn path(base: &Fit, best: &Fit, left_out_n: f64, runs: &[&Run], folds: &[Vec<usize>]) -> Vec<(Ingredient, f64)> {
+    let effort = Effort { steps: 15, rounds: 1 };
+    let mut standing = base.clone();
+    let mut out: Vec<(Ingredient, f64)> = Vec::new();
+    loop {
+        let left: Vec<Ingredient> =
+            best.shape.with.iter().copied().filter(|i| !standing.shape.has(*i)).collect();
+        if let [last] = left[..] {
+            out.push((last, left_out_n));
+            return out;
+        }
+        let next = left
+            .par_iter()
+            .filter(|i| i.needs().is_none_or(|n| standing.shape.has(n)))
+            .filter_map(|i| {
+                let fitted = best_of(&standing.shape.plus(*i), &standing, runs, effort)?;
+                let error = gain::quick(&fitted, runs, folds, Effort { steps: 3, rounds: 1 })?;
+                Some((*i, fitted, error))
+            })
+            .min_by(|a, b| a.2.total_cmp(&b.2));
+        let Some((ingredient, fitted, error)) = next else { return out };
+        out.push((ingredient, error));
+        standing = fitted;
+    }
 }
 
 /// The better of a fit from where another stands and of one from scratch.
@@ -203,5 +233,6 @@ pub fn climb(frame: Frame, runs: &[&Run], mut progress: impl FnMut(&str)) -> Opt
             _ => break rest.into_iter().map(|(ingredient, _, error)| (ingredient, error)).collect(),
         }
     };
-    Some(Ladder { base, base_left_out_n, steps, best: standing, left_out_n, without })
+    let path = path(&base, &standing, left_out_n, runs, &folds);
+    Some(Ladder { base, base_left_out_n, steps, best: standing, left_out_n, path, without })
 }

@@ -254,14 +254,14 @@ impl Shape {
         }
         if self.has(Ingredient::Relaxation) {
             let two = self.has(Ingredient::SecondTerm);
-            let times: &[(f64, f64, f64)] =
-                if two { &[(0.05, 2.0, 0.4), (1.5, 60.0, 4.0)] } else { &[(0.05, 60.0, 2.0)] };
-            for (j, (low, high, start)) in times.iter().enumerate() {
-                out.push(Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, 0.2, 0.1));
-                out.push(Number::log(format!("terms.{j}.time_constant_s"), *low, *high, *start));
+            // A second term begins weak and fast, so that a fit begins where the one-term law stands.
+            let starts: &[(f64, f64, f64)] = if two { &[(0.2, 0.4, 2.0), (0.05, 0.05, 0.3)] } else { &[(0.2, 0.4, 2.0)] };
+            for (j, (fraction, dragged, time)) in starts.iter().enumerate() {
+                out.push(Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, *fraction, 0.1));
+                out.push(Number::log(format!("terms.{j}.time_constant_s"), 0.05, 60.0, *time));
                 if self.has(Ingredient::Presliding) {
                     // Of the dragged tissue, as a share of what the terms before leave.
-                    out.push(Number::linear(format!("terms.{j}.dragged"), 0.0, 0.95, 0.4, 0.1));
+                    out.push(Number::linear(format!("terms.{j}.dragged"), 0.0, 0.95, *dragged, 0.1));
                 }
             }
         }

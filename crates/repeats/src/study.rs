@@ -47,7 +47,7 @@ pub struct Bought {
     pub step: String,
     /// Error on left-out runs after it (N).
     pub left_out_n: f64,
-    /// Error on left-out runs of the extended law without it (N); none where it was taken away again.
+    /// Error on left-out runs of the extended law without it (N).
     pub without_n: Option<f64>,
 }
 
@@ -290,12 +290,12 @@ fn mean_report(speeds: &[AtSpeed]) -> MeanReport {
 
 fn bought(ladder: &Ladder) -> Vec<Bought> {
     ladder
-        .steps
+        .path
         .iter()
-        .filter_map(|step| {
-            let taken = step.taken?;
-            let without_n = ladder.without.iter().find(|(i, _)| *i == taken).map(|w| w.1);
-            Some(Bought { step: taken.label(), left_out_n: step.left_out_n, without_n })
+        .map(|(ingredient, left_out_n)| Bought {
+            step: ingredient.label(),
+            left_out_n: *left_out_n,
+            without_n: ladder.without.iter().find(|(i, _)| i == ingredient).map(|w| w.1),
         })
         .collect()
 }
@@ -411,7 +411,6 @@ fn diagnosis(
         }
     }
     ids.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-    let total = (ladder.base_left_out_n - ladder.left_out_n).max(1e-12);
     let causes: Vec<Cause> = ids
         .iter()
         .map(|id| Cause {
@@ -430,7 +429,6 @@ fn diagnosis(
             gain_nats: nats(ladder, id),
         })
         .collect();
-    let _ = total;
     let base_parameters = estimates
         .iter()
         .filter_map(|(t, low, high)| {
