@@ -14,6 +14,7 @@ mod picture;
 mod repeats;
 mod repeats_report;
 mod run;
+mod specimens;
 mod sweep;
 mod terminal;
 

@@ -33,6 +33,9 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     };
     let layers = set.tissue.layers.len();
     let runs = set.runs(&files, layers)?;
+    if !set.split_by.is_empty() {
+        return crate::specimens::diagnose(args, &set, &runs);
+    }
     if runs.len() < FEWEST {
         return Err(DatasetError::TooLittle(format!(
             "{} recording(s): repeats are told from the law with {FEWEST} or more; without --repeats single recordings are diagnosed",
@@ -176,8 +179,7 @@ fn summary(study: &Study) -> String {
         "base law", study.ladder.base_left_out_n
     );
     for b in &r.bought {
-        let without =
-            b.without_n.map_or("-".to_owned(), |e| format!("{e:.3} without it"));
+        let without = b.without_n.map_or("-".to_owned(), |e| format!("{e:.3} without it"));
         let _ = writeln!(out, "    + {:<38} {:.3}   ({without})", b.step, b.left_out_n);
     }
     for c in &d.causes {

@@ -10,6 +10,10 @@ const WINDOW_S: f64 = 0.06;
 const SHARE: f64 = 0.06;
 /// and this many standard deviations of the noise.
 const NOISES: f64 = 12.0;
+/// Share of a drop that two neighbouring intervals hold.
+const SUDDEN: f64 = 0.7;
+/// A fall that goes on by this share in as much time again is no drop.
+const GOES_ON: f64 = 0.2;
 /// The first layer's drop is at least this share of the largest one: what comes before is a crackle.
 const FIRST: f64 = 0.4;
 /// Travel (m) within which steps on the way back belong to one release.
@@ -83,6 +87,13 @@ fn window(t: &[f64], i: usize) -> usize {
     j
 }
 
+/// Whether most of a fall happens between three neighbouring samples and it is over then (`after` is what falls in
+/// as much time again). Relaxation after a stop falls fast too, but goes on.
+fn sudden(f: &[f64], after: f64) -> bool {
+    let fall = f[0] - f[f.len() - 1];
+    after < GOES_ON * fall && f.windows(3).map(|w| w[0] - w[2]).fold(0.0, f64::max) > SUDDEN * fall
+}
+
 /// Sudden falls of the force until the way back begins.
 #[must_use]
 pub fn drops(recording: &Recording, phases: &Phases) -> Vec<Drop> {
@@ -95,7 +106,8 @@ pub fn drops(recording: &Recording, phases: &Phases) -> Vec<Drop> {
         if j >= f.len() || i >= phases.back {
             return out;
         }
-        if f[i] - f[j] > least {
+        let after = f[j] - f[(j + (j - i)).min(f.len() - 1)];
+        if f[i] - f[j] > least && sudden(&f[i..=j], after) {
             let at = (i..j).max_by(|a, b| (f[*a] - f[a + 1]).total_cmp(&(f[*b] - f[b + 1]))).unwrap_or(i) + 1;
             let end = window(t, at).min(f.len() - 1);
             let size_n = f[at.saturating_sub(4)] - f[at + (end - at).min(5)];

@@ -67,7 +67,13 @@ pub fn refit(shape: &Shape, from: &Fit, runs: &[&Run], effort: Effort) -> Option
 }
 
 /// From the base law to the extended one, each time by what then buys most.
-fn path(base: &Fit, best: &Fit, left_out_n: f64, runs: &[&Run], folds: &[Vec<usize>]) -> Vec<(Ingredient, f64)> {
+fn path(
+    base: &Fit,
+    best: &Fit,
+    left_out_n: f64,
+    runs: &[&Run],
+    folds: &[Vec<usize>],
+) -> Vec<(Ingredient, f64)> {
     let effort = Effort { steps: 15, rounds: 1 };
     let mut standing = base.clone();
     let mut out: Vec<(Ingredient, f64)> = Vec::new();
@@ -130,12 +136,8 @@ pub fn folds(runs: &[&Run]) -> Vec<Vec<usize>> {
 fn candidates(shape: &Shape, runs: &[&Run]) -> Vec<Ingredient> {
     let several = gain::speeds(runs).len() > 1;
     let ruptures = runs.iter().any(|run| run.ruptures.iter().any(Option::is_some));
-    let mut all = vec![
-        Ingredient::Nonlinear,
-        Ingredient::Relaxation,
-        Ingredient::SecondTerm,
-        Ingredient::PowerLaw,
-    ];
+    let mut all =
+        vec![Ingredient::Nonlinear, Ingredient::Relaxation, Ingredient::SecondTerm, Ingredient::PowerLaw];
     if ruptures {
         all.extend([Ingredient::Deeper, Ingredient::Presliding, Ingredient::Indentation]);
         if several {

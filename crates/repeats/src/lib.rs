@@ -14,5 +14,6 @@ pub mod population;
 pub mod predict;
 pub mod run;
 pub mod shape;
+pub mod specimens;
 pub mod stats;
 pub mod study;

@@ -4,7 +4,7 @@ use crate::events::{self, Phases};
 use stylet_record::{QualityNote, Recording};
 
 /// Interval (s) between the samples that a fit looks at.
-const FIT_INTERVAL_S: f64 = 0.05;
+const FIT_INTERVAL_S: f64 = 0.08;
 
 /// One measured insertion.
 #[derive(Clone, Debug)]

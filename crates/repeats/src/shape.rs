@@ -255,7 +255,8 @@ impl Shape {
         if self.has(Ingredient::Relaxation) {
             let two = self.has(Ingredient::SecondTerm);
             // A second term begins weak and fast, so that a fit begins where the one-term law stands.
-            let starts: &[(f64, f64, f64)] = if two { &[(0.2, 0.4, 2.0), (0.05, 0.05, 0.3)] } else { &[(0.2, 0.4, 2.0)] };
+            let starts: &[(f64, f64, f64)] =
+                if two { &[(0.2, 0.4, 2.0), (0.05, 0.05, 0.3)] } else { &[(0.2, 0.4, 2.0)] };
             for (j, (fraction, dragged, time)) in starts.iter().enumerate() {
                 out.push(Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, *fraction, 0.1));
                 out.push(Number::log(format!("terms.{j}.time_constant_s"), 0.05, 60.0, *time));
