@@ -58,7 +58,8 @@ fn causes(json: &serde_json::Value) -> Vec<&str> {
 
 #[test]
 fn a_left_out_insertion_is_predicted_about_as_well_as_by_another_real_one() {
-    let Some(done) = skin_on_muscle("a_left_out_insertion_is_predicted_about_as_well_as_by_another_real_one") else {
+    let Some(done) = skin_on_muscle("a_left_out_insertion_is_predicted_about_as_well_as_by_another_real_one")
+    else {
         return;
     };
     println!("{}", done.said);
@@ -82,7 +83,9 @@ fn the_verdict_names_what_the_base_law_lacks_and_not_what_the_instrument_exclude
     };
     assert_eq!(done.json["verdict"], "named");
     let named = causes(&done.json);
-    for effect in ["power_law_friction", "stress_relaxation", "nonlinear_elasticity", "viscoelastic_presliding"] {
+    for effect in
+        ["power_law_friction", "stress_relaxation", "nonlinear_elasticity", "viscoelastic_presliding"]
+    {
         assert!(named.contains(&effect), "{effect} is missing: {named:?}");
     }
     let excluded: Vec<&str> = done.json["repeats"]["instrument"]["excluded"]
@@ -95,14 +98,16 @@ fn the_verdict_names_what_the_base_law_lacks_and_not_what_the_instrument_exclude
         assert!(excluded.contains(&effect) && !named.contains(&effect), "{effect}: {excluded:?}, {named:?}");
     }
     // Friction hardly depends on speed: viscous friction would have an exponent of 1.
-    let cause = |id: &str| done.json["causes"].as_array().into_iter().flatten().find(|c| c["effect"] == id).cloned();
+    let cause =
+        |id: &str| done.json["causes"].as_array().into_iter().flatten().find(|c| c["effect"] == id).cloned();
     let exponent = cause("power_law_friction").expect("named")["parameters"]["exponent"].clone();
     assert!(number(&exponent["high"]) < 0.5, "{exponent}");
 }
 
 #[test]
 fn the_data_quality_names_the_real_rates_the_gaps_and_where_the_strokes_end() {
-    let Some(done) = skin_on_muscle("the_data_quality_names_the_real_rates_the_gaps_and_where_the_strokes_end")
+    let Some(done) =
+        skin_on_muscle("the_data_quality_names_the_real_rates_the_gaps_and_where_the_strokes_end")
     else {
         return;
     };
@@ -133,7 +138,8 @@ fn the_extended_law_can_be_simulated() {
         support::stylet(&["run", file.to_str().expect("a path"), "--out", out.to_str().expect("a path")]);
     assert!(output.status.success(), "{}", said(&output));
     let score: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("score.json")).expect("scores")).expect("JSON");
+        serde_json::from_str(&std::fs::read_to_string(out.join("score.json")).expect("scores"))
+            .expect("JSON");
     let depth = number(&score["ruptures"][0]["true_m"]);
     assert!(score["ruptures"].as_array().is_some_and(|r| r.len() == 2), "{score}");
     assert!(depth.is_nan() || (0.013..0.018).contains(&depth), "the skin ruptures at {depth} m");
@@ -164,8 +170,12 @@ fn indented_tissue_relaxes_and_no_puncture_is_invented() {
     assert!(named.contains(&"stress_relaxation"), "{named:?}");
     assert_eq!(done.json["specimens"]["punctured"].as_array().map(Vec::len), Some(0));
     assert!(number(&done.json["specimens"]["used"]) >= 140.0);
-    let relaxation =
-        done.json["causes"].as_array().into_iter().flatten().find(|c| c["effect"] == "stress_relaxation").cloned();
+    let relaxation = done.json["causes"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .find(|c| c["effect"] == "stress_relaxation")
+        .cloned();
     let relaxation = relaxation.expect("named");
     for (term, range) in [(0, 0.1..1.5), (1, 1.5..10.0)] {
         let tau = &relaxation["parameters"][format!("terms.{term}.time_constant_s")];

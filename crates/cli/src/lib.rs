@@ -12,6 +12,7 @@ mod hash;
 mod output;
 mod picture;
 mod repeats;
+mod repeats_online;
 mod repeats_report;
 mod run;
 mod specimens;

@@ -3,6 +3,7 @@
 use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
 use crate::output::Output;
+use crate::repeats_online;
 use crate::repeats_report;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
@@ -14,6 +15,14 @@ use stylet_repeats::run::Run;
 use stylet_repeats::study::{self, Study, Written};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
+
+/// `diagnosis.json`.
+#[derive(serde::Serialize)]
+struct WithOnline<'a> {
+    #[serde(flatten)]
+    written: Written<'a>,
+    online: &'a [repeats_online::Online],
+}
 
 /// Fewest recordings that can be told from a law.
 const FEWEST: usize = 3;
@@ -60,7 +69,11 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
 
 fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Result<(), Failure> {
     let internal = |e: &dyn std::fmt::Display| Failure::Internal(e.to_string());
-    let written = Written { diagnosis: &study.diagnosis, repeats: &study.repeats };
+    let online = repeats_online::listen(runs, study);
+    let written = WithOnline {
+        written: Written { diagnosis: &study.diagnosis, repeats: &study.repeats },
+        online: &online,
+    };
     let mut json = serde_json::to_vec_pretty(&written).map_err(|e| internal(&e))?;
     json.push(b'\n');
     let ron = format!(
@@ -70,7 +83,7 @@ fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Re
         study.extended.to_ron().map_err(|e| internal(&e))?
     );
     let mut output = Output::default();
-    output.add("report.html", repeats_report::page(args, set, runs, study).to_html());
+    output.add("report.html", repeats_report::page(args, set, runs, study, &online).to_html());
     output.add("diagnosis.json", json);
     output.add("extended.ron", ron);
     output.add("gain.svg", repeats_report::gain_figure(study));
@@ -81,7 +94,7 @@ fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Re
     });
     output.write(&folder)?;
     if !args.quiet {
-        print!("{}", summary(study));
+        print!("{}{}", summary(study), repeats_online::summary(&online));
         println!("\nReport: {}", folder.join("report.html").display());
     }
     Ok(())

@@ -3,6 +3,7 @@
 
 use crate::args::DiagnoseArgs;
 use crate::repeats::{or_dash, sentence};
+use crate::repeats_online::{self, Online};
 use std::fmt::Write as _;
 use stylet_repeats::dataset::Dataset;
 use stylet_repeats::run::Run;
@@ -14,7 +15,7 @@ use stylet_report::{
 };
 
 /// The page.
-pub fn page(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Page {
+pub fn page(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study, online: &[Online]) -> Page {
     let samples: usize = runs.iter().map(|r| r.recording.len()).sum();
     Page::new(format!("Diagnosis: {}", set.name))
         .subtitle(sentence(study))
@@ -28,6 +29,7 @@ pub fn page(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) ->
         .section(law(study))
         .section(residual(runs, study))
         .section(repeats(study))
+        .section(repeats_online::section(online))
         .section(instrument(study))
         .section(quality(study))
         .section(how(args, runs))

@@ -59,3 +59,18 @@ pub fn free(shape: &Shape, x: &[f64], own: &Own, data: &Columns, force: &mut Vec
     }
     force.iter().all(|f| f.is_finite())
 }
+
+/// Friction along the shaft in N as the law has it, with layers ruptured where `data` says (and nowhere else):
+/// what a compensation may take from a measured force at every instant.
+#[must_use]
+pub fn friction(shape: &Shape, x: &[f64], own: &Own, data: &Columns) -> Option<Vec<f64>> {
+    let (tissue, effects) = shape.tissue(x, own);
+    let law = Law::new(&tissue, &effects).ok()?;
+    let mut state = LawState::default();
+    let mut out = Vec::with_capacity(data.t.len());
+    for i in 0..data.t.len() {
+        let ruptured = data.ruptures.iter().take_while(|at| at.is_some_and(|at| i >= at)).count();
+        out.push(law.step_imposed(&mut state, data.t[i], data.z[i], data.v[i], ruptured, |_| {}).friction_n);
+    }
+    Some(out)
+}

@@ -134,6 +134,8 @@ pub struct Study {
     pub predictions: Vec<Prediction>,
     /// And by the base law.
     pub base_predictions: Vec<Prediction>,
+    /// Extended laws fitted without each run.
+    pub left_out: Vec<(Fit, Population)>,
     /// `diagnosis.json`.
     pub diagnosis: Diagnosis,
     /// What it adds.
@@ -186,7 +188,7 @@ pub fn study(
     };
     let (_, base_out) = sorted(&ladder.base, &singles, ONE_OUT);
     let (fits, out) = sorted(&ladder.best, &singles, ONE_OUT);
-    if base_out.len() != runs.len() || out.len() != runs.len() {
+    if base_out.len() != runs.len() || out.len() != runs.len() || fits.len() != runs.len() {
         return None;
     }
     let by_speed = |fit: &Fit| (groups.len() > 1).then(|| sorted(fit, &groups, SPEED_OUT).1);
@@ -217,6 +219,7 @@ pub fn study(
         population,
         predictions: take(out),
         base_predictions: take(base_out),
+        left_out: fits,
         diagnosis,
         repeats,
         extended,

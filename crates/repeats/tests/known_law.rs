@@ -82,7 +82,8 @@ fn look(runs: &[Run]) -> Study {
 #[test]
 fn the_effects_of_a_known_law_are_found_with_their_numbers_and_the_scatter_between_runs() {
     let branch = |share, time_constant_s, release_m| {
-        ViscoelasticPresliding { layer: 1, share, delta_m: 4e-3, kept: 1.0, time_constant_s, release_m }.into()
+        ViscoelasticPresliding { layer: 1, share, delta_m: 4e-3, kept: 1.0, time_constant_s, release_m }
+            .into()
     };
     let effects = |release_m: f64| -> Vec<AnyEffect> {
         vec![
@@ -100,7 +101,9 @@ fn the_effects_of_a_known_law_are_found_with_their_numbers_and_the_scatter_betwe
     assert_eq!(d.verdict, Verdict::Named);
     let named: Vec<&str> = d.causes.iter().map(|c| c.effect.as_str()).collect();
     println!("{named:?} {:?}", s.repeats.mean);
-    for effect in ["nonlinear_elasticity", "stress_relaxation", "viscoelastic_presliding", "power_law_friction"] {
+    for effect in
+        ["nonlinear_elasticity", "stress_relaxation", "viscoelastic_presliding", "power_law_friction"]
+    {
         assert!(named.contains(&effect), "{effect}: {named:?}");
     }
     let of = |effect: &str, path: &str| {
