@@ -52,6 +52,9 @@ pub fn without(all: &Fit, runs: &[&Run], out: &[usize], effort: Effort) -> Optio
     Some((fitted, population))
 }
 
+/// A law fitted without a group, and the group's runs as it predicts them, with their places.
+pub type Without = (Option<(Fit, Population)>, Vec<(usize, LeftOut, Prediction)>);
+
 /// Predicts every run by laws fitted without its group. Returns the fits too, one per group.
 #[must_use]
 pub fn leave_out(
@@ -59,7 +62,7 @@ pub fn leave_out(
     runs: &[&Run],
     groups: &[Vec<usize>],
     effort: Effort,
-) -> Vec<(Option<(Fit, Population)>, Vec<(usize, LeftOut, Prediction)>)> {
+) -> Vec<Without> {
     groups
         .par_iter()
         .map(|group| {

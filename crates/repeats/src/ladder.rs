@@ -154,8 +154,7 @@ fn candidates(shape: &Shape, runs: &[&Run]) -> Vec<Ingredient> {
     all.retain(|i| {
         !shape.has(*i)
             && i.needs().is_none_or(|n| shape.has(n))
-            && !(*i == Ingredient::Deeper && shape.layers() < 2)
-            && !(*i == Ingredient::Deeper && shape.has(Ingredient::Presliding))
+            && (*i != Ingredient::Deeper || (shape.layers() > 1 && !shape.has(Ingredient::Presliding)))
             // With presliding the layers hold the released force themselves.
             && !(i.id() == "incomplete_release" && shape.has(Ingredient::Presliding))
     });

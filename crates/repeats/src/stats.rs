@@ -32,6 +32,7 @@ pub fn rms(values: &[f64]) -> f64 {
 /// The value below which a share `p` (0 to 1) of a normal distribution lies: P. J. Acklam's rational
 /// approximation, relative error 1.2e-9.
 #[must_use]
+#[allow(clippy::excessive_precision, reason = "coefficients as published")]
 pub fn normal_quantile(p: f64) -> f64 {
     const A: [f64; 6] = [
         -3.969683028665376e1,

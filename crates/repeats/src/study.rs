@@ -340,6 +340,13 @@ fn told(fit: &Fit, population: &Population) -> Vec<Told> {
         }
         *k += 1;
     }
+    for (number, x) in shape.numbers().iter().zip(&fit.x).filter(|(n, _)| n.name.ends_with("curvature")) {
+        out.push(Told {
+            owner: "nonlinear_elasticity".to_owned(),
+            path: number.name.clone(),
+            value: number.value(*x),
+        });
+    }
     // What belongs to a cause although another effect carries it.
     let mut term = 0;
     for effect in &effects {
