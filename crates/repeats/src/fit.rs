@@ -186,7 +186,9 @@ fn evaluate(
             sum
         })
         .sum();
-    Some((each + groups, replays))
+    let likely: f64 =
+        shape.numbers().iter().zip(x).map(|(n, x)| 0.5 * ((x - n.start) / n.prior).powi(2)).sum();
+    Some((each + groups + likely, replays))
 }
 
 /// Normal equations of one run: shared numbers, then its own.
@@ -296,6 +298,11 @@ fn minimise(
                     }
                 }
             }
+        }
+        for (k, n) in numbers.iter().enumerate() {
+            let weight = 1.0 / (n.prior * n.prior);
+            h[k * size + k] += weight;
+            g[k] += weight * (x[k] - n.start);
         }
         // What stands at a bound and wants beyond stays there.
         let fixed: Vec<bool> = (0..size)

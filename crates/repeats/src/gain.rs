@@ -57,12 +57,7 @@ pub type Without = (Option<(Fit, Population)>, Vec<(usize, LeftOut, Prediction)>
 
 /// Predicts every run by laws fitted without its group. Returns the fits too, one per group.
 #[must_use]
-pub fn leave_out(
-    all: &Fit,
-    runs: &[&Run],
-    groups: &[Vec<usize>],
-    effort: Effort,
-) -> Vec<Without> {
+pub fn leave_out(all: &Fit, runs: &[&Run], groups: &[Vec<usize>], effort: Effort) -> Vec<Without> {
     groups
         .par_iter()
         .map(|group| {

@@ -96,11 +96,22 @@ pub struct Number {
     pub log: bool,
     /// Whether the law answers it with steps.
     pub stepped: bool,
+    /// Standard deviation about the start of what is likely beforehand; infinite for most.
+    pub prior: f64,
 }
 
 impl Number {
     fn linear(name: String, low: f64, high: f64, start: f64, scale: f64) -> Self {
-        Self { name, low, high, start: start.clamp(low, high), scale, log: false, stepped: false }
+        Self {
+            name,
+            low,
+            high,
+            start: start.clamp(low, high),
+            scale,
+            log: false,
+            stepped: false,
+            prior: f64::INFINITY,
+        }
     }
     fn log(name: String, low: f64, high: f64, start: f64) -> Self {
         let start = libm::log(start.clamp(low, high));
@@ -112,7 +123,12 @@ impl Number {
             scale: 0.3,
             log: true,
             stepped: false,
+            prior: f64::INFINITY,
         }
+    }
+    /// The same with a standard deviation of what is likely.
+    fn likely(self, prior: f64) -> Self {
+        Self { prior, ..self }
     }
     /// A value of the vector in its own unit.
     #[must_use]
@@ -258,7 +274,10 @@ impl Shape {
             let starts: &[(f64, f64, f64)] =
                 if two { &[(0.2, 0.4, 2.0), (0.05, 0.05, 0.3)] } else { &[(0.2, 0.4, 2.0)] };
             for (j, (fraction, dragged, time)) in starts.iter().enumerate() {
-                out.push(Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, *fraction, 0.1));
+                // Loading at a few speeds hardly tells it: a fifth, give or take a tenth.
+                out.push(
+                    Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, *fraction, 0.1).likely(0.1),
+                );
                 out.push(Number::log(format!("terms.{j}.time_constant_s"), 0.05, 60.0, *time));
                 if self.has(Ingredient::Presliding) {
                     // Of the dragged tissue, as a share of what the terms before leave.
@@ -269,7 +288,8 @@ impl Shape {
         if self.has(Ingredient::PowerLaw) {
             // With one speed nothing tells how friction depends on it: as dry friction then, not at all.
             let (low, high) = if self.frame.several_speeds { (-0.7, 1.5) } else { (0.0, 0.0) };
-            out.push(Number::linear("exponent".to_owned(), low, high, 0.2, 0.1));
+            // Dry friction, give or take.
+            out.push(Number::linear("exponent".to_owned(), low, high, 0.0, 0.1).likely(0.3));
         }
         for ingredient in &self.with {
             let Ingredient::General(info) = ingredient else { continue };

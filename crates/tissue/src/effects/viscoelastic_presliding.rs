@@ -51,6 +51,16 @@ impl Default for ViscoelasticPresliding {
     }
 }
 
+/// `1 - exp(-x)` for `x >= 0`; below 0.1 by its series, to 1e-10 of the value.
+fn lost(x: f64) -> f64 {
+    if x < 0.1 {
+        let series = 1.0 - x / 6.0 * (1.0 - x / 7.0);
+        x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * series))))
+    } else {
+        -libm::expm1(-x)
+    }
+}
+
 static INFO: EffectInfo = EffectInfo {
     id: "viscoelastic_presliding",
     equation: "w' = (share S_i/delta) v - w/tau, abs(w) <= share S_i = share b_i d_i abs(phi(v)), from puncture to release",
@@ -132,7 +142,7 @@ impl Effect for ViscoelasticPresliding {
         if limit == 0.0 || moment.v_mps.abs() >= REST_MPS {
             let steady = self.share * slab.friction_ns_per_m2 * slab.thickness_m * sliding_mps.abs();
             let fresh = limit == 0.0 || moment.ruptured < self.layer;
-            let renewed = if fresh { 1.0 } else { -libm::expm1(-moment.dz_m.abs() / self.delta_m) };
+            let renewed = if fresh { 1.0 } else { lost(moment.dz_m.abs() / self.delta_m) };
             limit += (steady - limit) * renewed;
             memory[1] = limit;
         }
@@ -147,8 +157,9 @@ impl Effect for ViscoelasticPresliding {
         if step == 0.0 || !crate::effect::same_step(moment.dt_s, step) {
             // The spring's force after a step of constant velocity: w keep + k dz ramp.
             let ratio = moment.dt_s / self.time_constant_s;
-            keep = libm::exp(-ratio);
-            ramp = if ratio > 1e-9 { -libm::expm1(-ratio) / ratio } else { 1.0 };
+            let faded = lost(ratio);
+            keep = 1.0 - faded;
+            ramp = if ratio > 0.0 { faded / ratio } else { 1.0 };
             memory[2] = moment.dt_s;
             memory[3] = keep;
             memory[4] = ramp;
