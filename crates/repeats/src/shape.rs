@@ -274,10 +274,10 @@ impl Shape {
             let starts: &[(f64, f64, f64)] =
                 if two { &[(0.2, 0.4, 2.0), (0.05, 0.05, 0.3)] } else { &[(0.2, 0.4, 2.0)] };
             for (j, (fraction, dragged, time)) in starts.iter().enumerate() {
-                // Loading at a few speeds hardly tells it: a fifth, give or take a tenth.
-                out.push(
-                    Number::linear(format!("terms.{j}.fraction"), 0.0, 0.49, *fraction, 0.1).likely(0.1),
-                );
+                // Tissue that is never held while it is pressed hardly tells it: a fifth, give or take a tenth.
+                let likely = if self.frame.unseen[0] { f64::INFINITY } else { 0.1 };
+                let name = format!("terms.{j}.fraction");
+                out.push(Number::linear(name, 0.0, 0.49, *fraction, 0.1).likely(likely));
                 out.push(Number::log(format!("terms.{j}.time_constant_s"), 0.05, 60.0, *time));
                 if self.has(Ingredient::Presliding) {
                     // Of the dragged tissue, as a share of what the terms before leave.
