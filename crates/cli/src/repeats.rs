@@ -94,8 +94,12 @@ fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Re
     });
     output.write(&folder)?;
     if !args.quiet {
-        print!("{}{}", summary(study), repeats_online::summary(&online));
-        println!("\nReport: {}", folder.join("report.html").display());
+        crate::terminal::say(&format!(
+            "{}{}\nReport: {}\n",
+            summary(study),
+            repeats_online::summary(&online),
+            folder.join("report.html").display()
+        ))?;
     }
     Ok(())
 }

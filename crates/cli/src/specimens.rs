@@ -45,8 +45,11 @@ pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Run]) -> Result<(), 
     });
     output.write(&folder)?;
     if !args.quiet {
-        print!("{}", summary(&found, &d));
-        println!("\nReport: {}", folder.join("report.html").display());
+        crate::terminal::say(&format!(
+            "{}\nReport: {}\n",
+            summary(&found, &d),
+            folder.join("report.html").display()
+        ))?;
     }
     Ok(())
 }
