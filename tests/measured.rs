@@ -7,7 +7,6 @@
 
 mod support;
 
-use std::io::Write;
 use std::path::PathBuf;
 use support::{Scratch, said, stylet};
 
@@ -17,19 +16,10 @@ const MAP: &str = r#"Columns(
     force: (name: "fz", scale: 1.0),
 )"#;
 
+const TESTS: usize = 2;
+
 fn measured(test: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("STYLET_MEASURED")
-        .map_or_else(|| support::root().join("../shared/measured"), PathBuf::from);
-    let folder = folder.join("needle_phantom");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let _ = writeln!(
-        std::io::stderr(),
-        "SKIPPED: {test}: no measured recordings in {}; set STYLET_MEASURED to the folder that holds them",
-        folder.display()
-    );
-    None
+    support::measured::measured(test, "needle_phantom", TESTS).map(|folder| folder.join("needle_phantom"))
 }
 
 fn enhance(scratch: &Scratch, data: &std::path::Path) -> serde_json::Value {

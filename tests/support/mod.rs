@@ -1,6 +1,8 @@
 //! The `stylet` binary and scratch folders for the tests of the whole.
 #![allow(dead_code)]
 
+pub mod measured;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -107,15 +107,21 @@ pub struct EnhanceArgs {
 #[command(after_help = "Examples:
   stylet diagnose scenario.ron --data a.csv b.csv c.csv --out out/diagnosis
   stylet diagnose scenario.ron --data log1.csv log2.csv --columns map.ron
+  stylet diagnose scenario.ron --repeats --data run1.csv run2.csv run3.csv --columns map.ron
+  stylet diagnose scenarios/measured/skin_on_muscle.ron
 
 The folder then holds report.html, diagnosis.json and extended.ron: the scenario with re-fitted
 parameters and the effects that were found, ready for `stylet run` (give it a motion if the scenario
 says `Recorded`). The exit code is 0 whatever the verdict, 2 when the input is wrong.")]
 pub struct DiagnoseArgs {
-    /// Scenario: what the simulation believes (RON).
+    /// Scenario: what the simulation believes; or a data set of repeated insertions (RON).
     pub scenario: PathBuf,
-    /// Recordings (CSV with header); several motions tell more than one.
-    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    /// The recordings are repeats of the same insertion: tell what varies from run to run from what
+    /// the law lacks, and predict each run without it. A data set does so by itself.
+    #[arg(long)]
+    pub repeats: bool,
+    /// Recordings (CSV with header); several motions tell more than one. A data set names its own.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
     /// Column map for foreign logs (RON).
     #[arg(long, value_name = "FILE")]

@@ -21,6 +21,15 @@ use stylet_scenario::Scenario;
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let internal = |e: &dyn std::fmt::Display| Failure::Internal(e.to_string());
+    if args.repeats || stylet_repeats::dataset::is_dataset(&args.scenario)? {
+        return crate::repeats::diagnose(args);
+    }
+    if args.data.is_empty() {
+        return Err(Failure::Argument(
+            "no recordings: name them with --data A.csv B.csv, or give a data set in place of the scenario"
+                .to_owned(),
+        ));
+    }
     let scenario = Scenario::load(&args.scenario)?;
     let columns = match &args.columns {
         Some(path) => Some(stylet_scenario::load(path)?),

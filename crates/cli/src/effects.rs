@@ -5,7 +5,7 @@ use crate::exit::Failure;
 use std::fmt::Write as _;
 use stylet_report::significant;
 use stylet_tissue::{
-    AnyEffect, EffectInfo, Law, LawState, Layer, Measurement, Reading, Tissue, info, library,
+    AnyEffect, EffectInfo, Law, LawState, Layer, Measurement, Reading, Tissue, info, library, per_layer,
 };
 
 /// The command.
@@ -15,7 +15,7 @@ use stylet_tissue::{
 pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
     match &args.name {
         None => {
-            for entry in library() {
+            for entry in library().chain(per_layer()) {
                 println!("{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
             }
             println!(
@@ -29,7 +29,7 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
                 Ok(())
             }
             None => {
-                let known: Vec<&str> = library().map(|e| e.id).collect();
+                let known: Vec<&str> = library().chain(per_layer()).map(|e| e.id).collect();
                 let hint = stylet_scenario::closest(name, &known)
                     .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
                 Err(Failure::Argument(format!(

@@ -52,6 +52,9 @@ pub enum Failure {
     /// Recordings and scenario do not belong together.
     #[error(transparent)]
     Diagnose(#[from] stylet_diagnose::DiagnoseError),
+    /// A data set cannot be used.
+    #[error(transparent)]
+    Dataset(stylet_repeats::dataset::DatasetError),
     /// An argument names what there is not.
     #[error("{0}")]
     Argument(String),
@@ -66,6 +69,16 @@ impl From<stylet_scenario::InputError> for Failure {
     }
 }
 
+impl From<stylet_repeats::dataset::DatasetError> for Failure {
+    fn from(error: stylet_repeats::dataset::DatasetError) -> Self {
+        match error {
+            stylet_repeats::dataset::DatasetError::Input(error) => Self::Input(error),
+            stylet_repeats::dataset::DatasetError::Recording(error) => Self::Recording(error),
+            other => Self::Dataset(other),
+        }
+    }
+}
+
 impl Failure {
     /// The exit code that goes with it.
     #[must_use]
@@ -77,6 +90,7 @@ impl Failure {
             | Failure::Output { .. }
             | Failure::Check(_)
             | Failure::Diagnose(_)
+            | Failure::Dataset(_)
             | Failure::Argument(_) => INPUT_WRONG,
             Failure::Gate { .. } => CHECK_FAILED,
             Failure::Internal(_) => INTERNAL,

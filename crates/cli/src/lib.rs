@@ -11,7 +11,11 @@ pub mod exit;
 mod hash;
 mod output;
 mod picture;
+mod repeats;
+mod repeats_online;
+mod repeats_report;
 mod run;
+mod specimens;
 mod sweep;
 mod terminal;
 

@@ -212,7 +212,7 @@ pub fn describe() -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(table, "| `{path}` | {} | {unit} | {range} | {meaning} |", default(path));
     }
-    for effect in stylet_tissue::library() {
+    for effect in stylet_tissue::library().chain(stylet_tissue::per_layer()) {
         for p in effect.larger.unwrap_or(effect).parameters {
             let path = p.path.replace(".0.", "[].");
             if p.path.contains(".1.") {

@@ -153,6 +153,16 @@ pub trait Effect {
         0.0
     }
 
+    /// [`Place::Friction`]: told of every rupture, with the layer (1-based) and the elastic force in N
+    /// that the release effects did not keep back.
+    fn on_layer_rupture(&self, _layer: usize, _released_n: f64, _memory: &mut Memory) {}
+
+    /// [`Place::Friction`]: a force in N with which a punctured layer holds the shaft. `sliding_mps` is
+    /// the velocity that friction feels at this tip velocity, all factors included.
+    fn grip(&self, _moment: &Moment, _slabs: &[Slab], _sliding_mps: f64, _memory: &mut Memory) -> f64 {
+        0.0
+    }
+
     /// [`Place::Tip`]: true when something of the effect's own breaks with the tip at `z_m`; told to
     /// the memory, once, before the forces are summed up.
     fn breaks(&self, _z_m: f64, _slabs: &[Slab], _memory: &mut Memory) -> bool {

@@ -129,13 +129,22 @@ impl core::fmt::Display for ParameterError {
 
 impl core::error::Error for ParameterError {}
 
-/// All effects in the order of the chain, one entry per row of SPEC section 6.
+/// Effects that measured insertions asked for beyond the general library. They describe one layer at a
+/// time, so that a search over single effects has no use for them.
+const PER_LAYER: [&str; 3] = ["deep_indentation", "layer_stiffening", "viscoelastic_presliding"];
+
+/// The general effects in the order of the chain, one entry per row of SPEC section 6.
 pub fn library() -> impl Iterator<Item = &'static EffectInfo> {
-    LIBRARY.iter().map(|entry| entry())
+    LIBRARY.iter().map(|entry| entry()).filter(|entry| !PER_LAYER.contains(&entry.id))
+}
+
+/// Effects that describe one layer at a time, or how layers give way: found in measured insertions.
+pub fn per_layer() -> impl Iterator<Item = &'static EffectInfo> {
+    LIBRARY.iter().map(|entry| entry()).filter(|entry| PER_LAYER.contains(&entry.id))
 }
 
 /// The entry of one effect.
 #[must_use]
 pub fn info(id: &str) -> Option<&'static EffectInfo> {
-    library().find(|entry| entry.id == id)
+    library().chain(per_layer()).find(|entry| entry.id == id)
 }

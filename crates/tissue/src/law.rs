@@ -87,7 +87,9 @@ impl Law {
         }
         law.remembers = active.iter().any(Effect::remembers);
         law.jumps = active.iter().any(|e| e.place() >= Place::Release);
-        law.plain = active.is_empty() && law.needle_n_per_m == f64::INFINITY;
+        law.plain = active.is_empty()
+            && law.needle_n_per_m == f64::INFINITY
+            && law.slabs.iter().all(|slab| slab.reach_m == 0.0 && slab.kappa_per_m == 0.0);
         law.effects = active;
         Ok(law)
     }
@@ -276,10 +278,11 @@ impl Law {
         let x = z - slab.front_m;
         let x = if x > 0.0 { x } else { 0.0 };
         let mut elastic = slab.stiffness_n_per_m * x;
-        if !self.effects.is_empty() {
+        if slab.kappa_per_m != 0.0 || !self.effects.is_empty() {
             for effect in self.at(Place::Elastic) {
                 elastic = effect.elastic(slab.stiffness_n_per_m, x, elastic);
             }
+            elastic += slab.stiffness_n_per_m * x * slab.kappa_per_m * x;
             for (effect, memory) in self.remembering(Place::Relaxation, memory) {
                 elastic = effect.relax(dt, elastic, memory);
             }
@@ -310,7 +313,7 @@ impl Law {
             elastic_n: elastic,
             puncture_n: threshold,
             tip_m: z,
-            far_m: slab.far_m(),
+            far_m: slab.gives_way_m(),
         };
         if !breaking.breaks(&strain) {
             return None;
@@ -323,6 +326,9 @@ impl Law {
         for (effect, memory) in self.remembering(Place::Release, &mut state.memory) {
             effect.on_rupture(released, rupture.position_m, memory);
             released -= effect.withheld(released);
+        }
+        for (effect, memory) in self.remembering(Place::Friction, &mut state.memory) {
+            effect.on_layer_rupture(rupture.layer, released, memory);
         }
         state.ruptured += 1;
         state.elastic_n = 0.0;
@@ -347,7 +353,8 @@ impl Law {
         // A layer entered within this step starts from its front face, not from the last sample.
         let entry = share(state.z_m, z, slab.front_m);
         let start = if state.z_m < slab.front_m { entry } else { 0.0 }.max(done);
-        let at_face = if z >= slab.far_m() { share(state.z_m, z, slab.far_m()).max(done) } else { 2.0 };
+        let far = slab.gives_way_m();
+        let at_face = if z >= far { share(state.z_m, z, far).max(done) } else { 2.0 };
         let at_force = if elastic >= threshold {
             start + (1.0 - start) * share(state.elastic_n, elastic, threshold)
         } else {
@@ -396,7 +403,7 @@ impl Law {
         for (i, slab) in self.slabs.iter().enumerate() {
             let length = slab.inside_m(moment.z_m);
             inside += length;
-            let share = slab.friction_ns_per_m2 * length;
+            let share = slab.friction_ns_per_m2 * length * (1.0 - slab.gripped);
             if i < moment.ruptured {
                 cumulative += share;
             } else {
@@ -406,6 +413,7 @@ impl Law {
         let mut velocity = moment.v_mps;
         let mut tip_extra_n = 0.0;
         let mut dry_n = 0.0;
+        let mut grip_n = 0.0;
         if self.jumps {
             let mut factor = 1.0;
             for (effect, memory) in self.remembering(Place::Release, memory) {
@@ -419,10 +427,13 @@ impl Law {
             for (effect, memory) in self.remembering(Place::Tip, memory) {
                 tip_extra_n += effect.tip_force(moment, &self.slabs, memory);
             }
+            for (effect, memory) in self.remembering(Place::Friction, memory) {
+                grip_n += effect.grip(moment, &self.slabs, velocity * factor, memory);
+            }
             cumulative *= factor;
             local *= factor;
         }
-        let friction_n = velocity * (cumulative + local) + dry_n;
+        let friction_n = velocity * (cumulative + local) + dry_n + grip_n;
         let total_n = elastic_n + friction_n + tip_extra_n;
         TissueForce {
             total_n,
@@ -430,7 +441,7 @@ impl Law {
             friction_n,
             tip_extra_n,
             cumulative_friction_ns_per_m: cumulative,
-            tip_n: total_n - cumulative * moment.v_mps,
+            tip_n: total_n - cumulative * moment.v_mps - grip_n,
             active_layer: moment.ruptured + 1,
         }
     }

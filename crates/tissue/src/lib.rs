@@ -42,7 +42,7 @@ pub use breaking::Strain;
 pub use effect::{Effect, Place};
 pub use effects::*;
 pub use force::{Rupture, TissueForce};
-pub use info::{EffectInfo, ParameterError, ParameterInfo, info, library};
+pub use info::{EffectInfo, ParameterError, ParameterInfo, info, library, per_layer};
 pub use law::{Law, MAX_EFFECTS, TooManyEffects};
 pub use layer::{Layer, Tissue};
 pub use measurement::{Measurement, MeasurementState, Reading};

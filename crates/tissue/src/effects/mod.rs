@@ -90,6 +90,8 @@ macro_rules! effects {
             fn friction_velocity(v_mps: f64) -> f64;
             fn friction_factor(v_mps: f64) -> f64;
             fn shaft_force(moment: &Moment, inside_m: f64, memory: &mut Memory) -> f64;
+            fn on_layer_rupture(layer: usize, released_n: f64, memory: &mut Memory) -> ();
+            fn grip(moment: &Moment, slabs: &[Slab], sliding_mps: f64, memory: &mut Memory) -> f64;
             fn breaks(z_m: f64, slabs: &[Slab], memory: &mut Memory) -> bool;
             fn tip_force(moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64;
             fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
@@ -114,6 +116,8 @@ macro_rules! effects {
 
 effects! {
     boundary_shift::BoundaryShift,
+    deep_indentation::DeepIndentation,
+    layer_stiffening::LayerStiffening,
     respiration::Respiration,
     needle_compliance::NeedleCompliance,
     nonlinear_elasticity::NonlinearElasticity,
@@ -126,6 +130,7 @@ effects! {
     coulomb_friction::CoulombFriction,
     stribeck_friction::StribeckFriction,
     presliding_friction::PreslidingFriction,
+    viscoelastic_presliding::ViscoelasticPresliding,
     cutting_force::CuttingForce,
     hidden_membrane::HiddenMembrane,
     tool_inertia::ToolInertia,

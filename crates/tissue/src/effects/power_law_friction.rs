@@ -12,7 +12,7 @@ use crate::info::{EffectInfo, ParameterInfo};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct PowerLawFriction {
-    /// Exponent `n`, 0 to 3. Neutral: 1.
+    /// Exponent `n`, -0.9 to 3; below zero friction falls with speed. Neutral: 1.
     pub exponent: f64,
 }
 
@@ -30,7 +30,7 @@ static INFO: EffectInfo = EffectInfo {
     signature: "Friction against speed is a curve, not a line; no offset between speeds near 1 mm/s.",
     place: Place::Friction,
     parameters: &[
-        ParameterInfo::strength("exponent", "", "exponent of speed in the friction").allowed(0.0, 3.0).neutral(1.0).search(0.7, 0.1, 2.0),
+        ParameterInfo::strength("exponent", "", "exponent of speed in the friction").allowed(-0.9, 3.0).neutral(1.0).search(0.7, 0.1, 2.0),
     ],
     larger: None,
 };

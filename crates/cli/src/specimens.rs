@@ -1,0 +1,249 @@
+//! `stylet diagnose` on many specimens, each indented once and held.
+
+use crate::args::DiagnoseArgs;
+use crate::exit::Failure;
+use crate::output::Output;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use stylet_diagnose::Diagnosis;
+use stylet_diagnose::outcome::{Cause, Estimate, Gain, LeftoverReport, NoiseReport, Quality, Verdict};
+use stylet_repeats::dataset::{Dataset, DatasetError};
+use stylet_repeats::events;
+use stylet_repeats::run::Run;
+use stylet_repeats::specimens::{Specimens, look};
+use stylet_repeats::stats::median;
+use stylet_report::svg::{Bar, BarChart, FigureOptions, bar_chart};
+use stylet_report::{
+    Block, Cell, Colour, Page, Scorecard, Section, SvgImage, Table, Text, Tile, significant,
+};
+
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    specimens: &'a Specimens,
+}
+
+/// The command, for a data set with `split_by`.
+pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Run]) -> Result<(), Failure> {
+    let found = look(&set.tissue, runs).ok_or_else(|| {
+        Failure::Dataset(DatasetError::TooLittle(
+            "no specimen is indented and held for 3 s with 50 samples or more".to_owned(),
+        ))
+    })?;
+    let d = diagnosis(&found, runs);
+    let written = Written { diagnosis: &d, specimens: &found };
+    let mut json = serde_json::to_vec_pretty(&written).map_err(|e| Failure::Internal(e.to_string()))?;
+    json.push(b'\n');
+    let mut output = Output::default();
+    output.add("report.html", page(args, set, &found, &d).to_html());
+    output.add("diagnosis.json", json);
+    let folder = args.out.clone().unwrap_or_else(|| {
+        let stem = args.scenario.file_stem().unwrap_or(args.scenario.as_os_str());
+        PathBuf::from("stylet-out").join(format!("{}-diagnosis", stem.to_string_lossy()))
+    });
+    output.write(&folder)?;
+    if !args.quiet {
+        crate::terminal::say(&format!(
+            "{}\nReport: {}\n",
+            summary(&found, &d),
+            folder.join("report.html").display()
+        ))?;
+    }
+    Ok(())
+}
+
+fn kept(found: &Specimens) -> impl Iterator<Item = &str> {
+    let mut seen: Vec<&str> = Vec::new();
+    for effect in found.rungs.iter().filter(|r| r.kept).filter_map(|r| r.effect.as_deref()) {
+        if !seen.contains(&effect) {
+            seen.push(effect);
+        }
+    }
+    seen.into_iter()
+}
+
+fn sentence(found: &Specimens) -> String {
+    let names: Vec<&str> = kept(found).collect();
+    let puncture = match found.punctured.len() {
+        0 => "no specimen is punctured".to_owned(),
+        n => format!("{n} specimen(s) show a drop as at a puncture"),
+    };
+    if names.is_empty() {
+        return format!("The base law says what {} specimens do; {puncture}.", found.used);
+    }
+    format!("The simulation lacks {} in {} specimens; {puncture}.", names.join(" and "), found.used)
+}
+
+fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
+    let of = |effect: &str| {
+        found
+            .numbers
+            .iter()
+            .filter(|n| (effect == "stress_relaxation") == n.name.starts_with("terms."))
+            .map(|n| {
+                (
+                    n.name.trim_start_matches("layer.1.").to_owned(),
+                    Estimate { value: n.mean, low: n.low, high: n.high },
+                )
+            })
+            .collect()
+    };
+    let causes: Vec<Cause> = kept(found)
+        .map(|effect| Cause {
+            effect: effect.to_owned(),
+            equivalent: Vec::new(),
+            confidence: found
+                .rungs
+                .iter()
+                .filter(|r| r.kept && r.effect.as_deref() == Some(effect))
+                .map(|r| r.better)
+                .fold(0.0, f64::max),
+            parameters: of(effect),
+            gain_nats: 0.0,
+        })
+        .collect();
+    let last = found.rungs.iter().rfind(|r| r.kept).map_or(0.0, |r| r.left_out_n);
+    let mut noises: Vec<f64> = runs.iter().map(|r| events::noise_n(&r.recording.force_n)).collect();
+    let noise = median(&mut noises);
+    Diagnosis {
+        verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
+        causes,
+        base_parameters: Vec::new(),
+        invisible: ["power_law_friction", "viscoelastic_presliding", "rate_dependent_puncture"]
+            .map(str::to_owned)
+            .to_vec(),
+        gain: Gain {
+            held_out: true,
+            recordings: runs.iter().map(|r| r.name.clone()).collect(),
+            rmse_before_n: found.rungs.first().map_or(0.0, |r| r.left_out_n),
+            rmse_after_n: last,
+            floor_n: noise,
+            each_n: Vec::new(),
+        },
+        leftover: LeftoverReport { p_value: 1.0, depends_on: Vec::new(), nats: 0.0 },
+        data_quality: runs
+            .iter()
+            .flat_map(|r| r.notes.iter().map(|n| Quality { recording: r.name.clone(), note: n.clone() }))
+            .collect(),
+        evidence: Vec::new(),
+        noise: NoiseReport { sd_n: noise, ar: [0.0; 2], from_air: false },
+        advice: vec![
+            "Nothing is retracted or punctured here: friction and puncture cannot be seen.".to_owned(),
+        ],
+    }
+}
+
+fn summary(found: &Specimens, d: &Diagnosis) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "{}\n", sentence(found));
+    let _ = writeln!(
+        out,
+        "    {:<36} {:>10} {:>16} {:>8}",
+        "median error, mN", "fitted", "rest of hold", "better"
+    );
+    for r in &found.rungs {
+        let _ = writeln!(
+            out,
+            "    {:<36} {:>10.2} {:>16.2} {:>7.0} % {}",
+            r.step,
+            1e3 * r.fitted_n,
+            1e3 * r.left_out_n,
+            100.0 * r.better,
+            if r.kept { "" } else { "not kept" }
+        );
+    }
+    for n in &found.numbers {
+        let _ = writeln!(
+            out,
+            "    {} = {} (95 %: {} to {}; nine of ten specimens {} to {})",
+            n.name,
+            significant(n.mean, 3),
+            significant(n.low, 3),
+            significant(n.high, 3),
+            significant(n.nine_of_ten.0, 2),
+            significant(n.nine_of_ten.1, 2)
+        );
+    }
+    let _ = writeln!(
+        out,
+        "    noise {} mN; punctures {}",
+        significant(1e3 * d.noise.sd_n, 2),
+        found.punctured.len()
+    );
+    for (name, why) in &found.unused {
+        let _ = writeln!(out, "  not used: {name}: {why}");
+    }
+    out
+}
+
+fn page(args: &DiagnoseArgs, set: &Dataset, found: &Specimens, d: &Diagnosis) -> Page {
+    let tile = |label: &str, value: String, detail: &str| Tile::new(label, value, detail);
+    let tiles = vec![
+        tile("Specimens", found.used.to_string(), "indented once and held, each a material of its own"),
+        tile("Punctures", found.punctured.len().to_string(), "specimens whose force drops"),
+        tile(
+            "The rest of the hold",
+            format!("{:.1} → {:.1} mN", 1e3 * d.gain.rmse_before_n, 1e3 * d.gain.rmse_after_n),
+            "median error before and after, on the last two fifths of the hold, which took no part in the fit",
+        ),
+    ];
+    let bars = found
+        .rungs
+        .iter()
+        .map(|r| Bar {
+            name: r.step.clone(),
+            value: 1e3 * r.left_out_n,
+            interval: None,
+            colour: if r.kept { Colour::Blue } else { Colour::Grey },
+        })
+        .collect();
+    let options = FigureOptions {
+        title: "What each cause buys".to_owned(),
+        subtitle: "median error on the rest of the hold; grey: not kept".to_owned(),
+        width_px: 860.0,
+        ..FigureOptions::default()
+    };
+    let markup = bar_chart(&BarChart { label: "mN rms".to_owned(), bars }, &options);
+    let rows = found
+        .numbers
+        .iter()
+        .map(|n| {
+            vec![
+                Cell::text(n.name.clone()),
+                Cell::number(significant(n.mean, 3)),
+                Cell::number(format!("{} to {}", significant(n.low, 3), significant(n.high, 3))),
+                Cell::number(format!(
+                    "{} to {}",
+                    significant(n.nine_of_ten.0, 2),
+                    significant(n.nine_of_ten.1, 2)
+                )),
+            ]
+        })
+        .collect();
+    let unused = found.unused.iter().map(|(name, why)| format!("Not used: {name}: {why}.")).collect();
+    Page::new(format!("Diagnosis: {}", set.name))
+        .subtitle(sentence(found))
+        .fact("data set", args.scenario.display().to_string())
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(Section::new("Verdict").block(Block::Scorecard(Scorecard { title: String::new(), tiles })))
+        .section(
+            Section::new("What each cause buys").block(Block::Svg(SvgImage {
+                description: "Error on the rest of the hold".to_owned(),
+                markup,
+            })),
+        )
+        .section(
+            Section::new("Numbers over the specimens")
+                .table(Table {
+                    title: "Mean with its 95 % interval, and the scatter".to_owned(),
+                    groups: Vec::new(),
+                    headers: ["", "mean", "95 % interval", "nine of ten specimens"]
+                        .map(str::to_owned)
+                        .to_vec(),
+                    rows,
+                })
+                .block(Block::Text(Text { paragraphs: unused, status: stylet_report::Status::Plain })),
+        )
+}

@@ -1,0 +1,288 @@
+//! A data set: what was measured, where it lies, what is believed of it.
+//!
+//! ```ron
+//! Dataset(
+//!     name: "skin on muscle",
+//!     columns: (time: (name: "time", scale: 1e-6), position: (name: "pz", scale: 1e-3), force: (name: "fz")),
+//!     tissue: (surface_m: 0.004, layers: [(name: "skin", thickness_m: 0.011, stiffness_n_per_m: 300.0, friction_ns_per_m2: 10000.0)]),
+//!     recordings: ["needle_phantom/skin-on-muscle_*.csv"],
+//!     air: "needle_phantom/air_blank.csv",
+//!     load: (file: "needle_phantom/constant_5N.csv", force_n: 5.0),
+//! )
+//! ```
+//! File names are relative to the folder `STYLET_MEASURED`, by default `../shared/measured`; a `*` in the last part
+//! stands for anything.
+
+use crate::run::Run;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use stylet_record::{ColumnMap, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes};
+use stylet_scenario::{InputError, Problem, parse, read_text};
+use stylet_tissue::Tissue;
+
+/// A recording of a force that is known.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownLoad {
+    /// File.
+    pub file: String,
+    /// The force in N.
+    pub force_n: f64,
+}
+
+/// Recordings of some of the layers alone.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// What it is.
+    pub name: String,
+    /// Which layer of the whole it is, 1-based.
+    pub layer: usize,
+    /// Files.
+    pub recordings: Vec<String>,
+}
+
+/// A data set, as its file has it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename = "Dataset", deny_unknown_fields)]
+pub struct Dataset {
+    /// What it is, for people.
+    pub name: String,
+    /// Where it comes from.
+    #[serde(default)]
+    pub source: String,
+    /// Names and units of the columns; Stylet's own when left out.
+    #[serde(default)]
+    pub columns: Option<ColumnMap>,
+    /// What is believed of the tissue: number, names and thickness of the layers.
+    pub tissue: Tissue,
+    /// Files of repeated insertions.
+    #[serde(default)]
+    pub recordings: Vec<String>,
+    /// Columns whose values tell specimens in one file apart; each is then a material of its own.
+    #[serde(default)]
+    pub split_by: Vec<String>,
+    /// A motion in air.
+    #[serde(default)]
+    pub air: Option<String>,
+    /// A known load.
+    #[serde(default)]
+    pub load: Option<KnownLoad>,
+    /// Recordings of single layers.
+    #[serde(default)]
+    pub parts: Vec<Part>,
+}
+
+/// Why a data set cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The description is wrong.
+    #[error(transparent)]
+    Input(Box<InputError>),
+    /// A recording is wrong.
+    #[error(transparent)]
+    Recording(#[from] RecordError),
+    /// A file is not there.
+    #[error(
+        "no file matches {pattern} in {folder}; set STYLET_MEASURED to the folder that holds the recordings, or name them with --data"
+    )]
+    NoFile {
+        /// What was looked for.
+        pattern: String,
+        /// Where.
+        folder: String,
+    },
+    /// Too little to tell repeats from a law.
+    #[error("{0}")]
+    TooLittle(String),
+}
+
+impl From<InputError> for DatasetError {
+    fn from(error: InputError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+/// Whether a file describes a data set rather than a scenario.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn is_dataset(path: &Path) -> Result<bool, InputError> {
+    let text = read_text(path)?;
+    let first =
+        text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with("//") && !l.starts_with("#!"));
+    Ok(first.is_some_and(|l| l.starts_with("Dataset")))
+}
+
+impl Dataset {
+    /// Loads and checks a description.
+    ///
+    /// # Errors
+    /// [`InputError`] with file, line and column.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        let file = path.display().to_string();
+        let text = read_text(path)?;
+        let out: Self = parse(&file, &text)?;
+        out.check().map_err(|problem| problem.in_file(&file, &text))?;
+        Ok(out)
+    }
+
+    fn check(&self) -> Result<(), Problem> {
+        let layers = self.tissue.layers.len();
+        if !(1..=7).contains(&layers) {
+            return Err(Problem::new(
+                "tissue.layers",
+                format!("there are {layers} layers; 1 to 7 can be told apart"),
+            ));
+        }
+        for (i, layer) in self.tissue.layers.iter().enumerate() {
+            if !(layer.thickness_m > 0.0 && layer.thickness_m < 1.0) {
+                let what = format!("is {}; it must lie between 0 and 1 m", layer.thickness_m);
+                return Err(Problem::new(format!("tissue.layers[{i}].thickness_m"), what));
+            }
+        }
+        for (i, part) in self.parts.iter().enumerate() {
+            if !(1..=layers).contains(&part.layer) {
+                let what = format!("is {}; the tissue has layers 1 to {layers}", part.layer);
+                return Err(Problem::new(format!("parts[{i}].layer"), what));
+            }
+        }
+        match &self.load {
+            Some(load) if !(load.force_n.is_finite() && load.force_n != 0.0) => Err(Problem::new(
+                "load.force_n",
+                format!("is {}; it must be the known force in N", load.force_n),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// How its files are read.
+    #[must_use]
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions { columns: self.columns.clone(), repair: false }
+    }
+
+    /// Reads runs of `layers` layers.
+    ///
+    /// # Errors
+    /// [`DatasetError`].
+    pub fn runs(&self, files: &[PathBuf], layers: usize) -> Result<Vec<Run>, DatasetError> {
+        let mut out = Vec::with_capacity(files.len());
+        for file in files {
+            for (name, recording, notes) in self.read(file)? {
+                out.push(Run::new(name, recording, notes, layers));
+            }
+        }
+        Ok(out)
+    }
+
+    fn read(&self, file: &Path) -> Result<Vec<(String, Recording, Vec<QualityNote>)>, DatasetError> {
+        let name =
+            file.file_name().map_or_else(|| file.display().to_string(), |n| n.to_string_lossy().into_owned());
+        if self.split_by.is_empty() {
+            let (recording, notes) = read_csv(file, &self.options())?;
+            return Ok(vec![(name, recording, notes)]);
+        }
+        let text = read_text_of(file)?;
+        let mut lines = text.lines();
+        let header = lines.next().unwrap_or_default();
+        let columns: Vec<&str> = header.split(',').map(str::trim).collect();
+        let mut places = Vec::new();
+        for wanted in &self.split_by {
+            let place = columns.iter().position(|c| c == wanted).ok_or_else(|| {
+                DatasetError::TooLittle(format!(
+                    "{}: there is no column {wanted:?} to split by; there are {}",
+                    file.display(),
+                    columns.join(", ")
+                ))
+            })?;
+            places.push(place);
+        }
+        let mut groups: Vec<(String, String)> = Vec::new();
+        for line in lines {
+            let cells: Vec<&str> = line.split(',').collect();
+            let key =
+                places.iter().map(|p| cells.get(*p).map_or("", |c| c.trim())).collect::<Vec<_>>().join(" ");
+            let known = groups.iter().rposition(|(k, _)| *k == key);
+            let place = known.unwrap_or_else(|| {
+                groups.push((key, format!("{header}\n")));
+                groups.len() - 1
+            });
+            groups[place].1.push_str(line);
+            groups[place].1.push('\n');
+        }
+        let mut out = Vec::with_capacity(groups.len());
+        for (key, text) in groups {
+            let (recording, notes) = read_csv_bytes(text.as_bytes(), file, &self.options())?;
+            out.push((key, recording, notes));
+        }
+        Ok(out)
+    }
+}
+
+fn read_text_of(file: &Path) -> Result<String, DatasetError> {
+    std::fs::read_to_string(file)
+        .map_err(|source| RecordError::Unreadable { path: file.to_owned(), source }.into())
+}
+
+/// The folder of measured data.
+#[must_use]
+pub fn folder() -> PathBuf {
+    std::env::var_os("STYLET_MEASURED").map_or_else(|| PathBuf::from("../shared/measured"), PathBuf::from)
+}
+
+/// The files that match a name, sorted.
+///
+/// # Errors
+/// [`DatasetError::NoFile`].
+pub fn find(pattern: &str) -> Result<Vec<PathBuf>, DatasetError> {
+    let folder = folder();
+    let whole = folder.join(pattern);
+    let missing =
+        || DatasetError::NoFile { pattern: pattern.to_owned(), folder: folder.display().to_string() };
+    let last = whole.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    if !last.contains('*') {
+        return if whole.is_file() { Ok(vec![whole]) } else { Err(missing()) };
+    }
+    let place = whole.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+    let mut out: Vec<PathBuf> = std::fs::read_dir(&place)
+        .map_err(|_| missing())?
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.file_name().is_some_and(|n| matches(&last, &n.to_string_lossy())))
+        .collect();
+    out.sort();
+    if out.is_empty() { Err(missing()) } else { Ok(out) }
+}
+
+/// Whether `name` is `pattern` with anything in place of each `*`.
+fn matches(pattern: &str, name: &str) -> bool {
+    let mut parts = pattern.split('*');
+    let first = parts.next().unwrap_or_default();
+    let Some(mut rest) = name.strip_prefix(first) else { return false };
+    let parts: Vec<&str> = parts.collect();
+    for (i, part) in parts.iter().enumerate() {
+        if i + 1 == parts.len() {
+            return rest.ends_with(part);
+        }
+        match rest.find(part) {
+            Some(at) => rest = &rest[at + part.len()..],
+            None => return false,
+        }
+    }
+    rest.is_empty()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_star_stands_for_anything() {
+        assert!(matches("skin-on-muscle_*.csv", "skin-on-muscle_1mmps_run5.csv"));
+        assert!(
+            matches("*_run?.csv", "x_run?.csv") && matches("a*b*c", "a--b-b-c") && matches("same", "same")
+        );
+        assert!(!matches("skin_*.csv", "skin-on-muscle_1mmps_run5.csv") && !matches("a*b", "ac"));
+    }
+}

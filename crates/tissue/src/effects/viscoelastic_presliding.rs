@@ -1,0 +1,171 @@
+use super::Described;
+use crate::effect::{Effect, Memory, Moment, Place};
+use crate::info::{EffectInfo, ParameterInfo};
+use crate::slab::Slab;
+
+/// Speed in m/s below which a layer holds with the friction of the last motion (0.1 mm/s).
+const REST_MPS: f64 = 1e-4;
+
+/// A punctured layer that clings to the shaft and is dragged along: a spring in series with friction,
+/// which creeps (one branch of a Maxwell-slip model).
+///
+/// With `S_i = b_i d_i abs(phi(v))` the sliding friction of the whole layer (`phi(v)` is `v`, or what
+/// `power_law_friction` and `asymmetric_friction` make of it), the branch holds the needle with
+///
+/// `w' = (share S_i/delta) v - w/tau`, kept within `-share S_i` and `share S_i`,
+///
+/// from the puncture of the layer on: before it the shaft does not touch the layer. At the puncture
+/// `w` starts from `share kept f_K`, so that the layer releases no more than what friction cannot hold
+/// (`kept` 1) or than tears (`kept` below 1). When the speed changes, `S_i` follows over the travel
+/// `delta` in which the contact renews itself, and not at all below 0.1 mm/s. When the tip comes back to `release_m` beyond the layer's front face the layer lets go: `w = 0`.
+///
+/// Branches of one layer add up; the shares of a layer that are left to no branch remain the base law's
+/// `b_i l_i phi(v)`. Integrated exactly for a velocity that is constant within the step.
+///
+/// Source: Dahl 1968, and Al-Bender, Lampaert, Swevers 2005 (generalised Maxwell-slip), here with
+/// relaxation as in measured insertions into skin and muscle phantoms. Signature: after a reversal the
+/// force follows travel over several millimetres; part of it fades while the needle is held; a layer
+/// that is left behind on the way back lets go at once.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ViscoelasticPresliding {
+    /// Layer `i`, 1-based; one that is not there changes nothing.
+    pub layer: usize,
+    /// Share of the layer's friction that this branch carries, 0 to 1. Neutral: 0.
+    pub share: f64,
+    /// Travel `delta` in metres over which friction builds up from zero to sliding, 1e-6 to 0.1.
+    pub delta_m: f64,
+    /// Share of the elastic force at the puncture that passes into the branch, 0 to 1.
+    pub kept: f64,
+    /// Time constant `tau` of the creep in seconds, 0.001 to 1e6; the longest stands for none.
+    pub time_constant_s: f64,
+    /// Where the layer lets go of the tip on the way back, in metres beyond its front face, -0.1 to 0.1.
+    pub release_m: f64,
+}
+
+impl Default for ViscoelasticPresliding {
+    /// The neutral effect.
+    fn default() -> Self {
+        Self { layer: 1, share: 0.0, delta_m: 5e-3, kept: 1.0, time_constant_s: 1e6, release_m: 0.0 }
+    }
+}
+
+/// `1 - exp(-x)` for `x >= 0`; below 0.1 by its series, to 1e-10 of the value.
+fn lost(x: f64) -> f64 {
+    if x < 0.1 {
+        let series = 1.0 - x / 6.0 * (1.0 - x / 7.0);
+        x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * series))))
+    } else {
+        -libm::expm1(-x)
+    }
+}
+
+static INFO: EffectInfo = EffectInfo {
+    id: "viscoelastic_presliding",
+    equation: "w' = (share S_i/delta) v - w/tau, abs(w) <= share S_i = share b_i d_i abs(phi(v)), from puncture to release",
+    source: "Maxwell-slip friction (Al-Bender, Lampaert, Swevers 2005) with creep; measured skin and muscle phantoms",
+    signature: "After a reversal the force follows travel over millimetres, part of it fades in a hold, and on the way back it ends in a step.",
+    place: Place::Friction,
+    parameters: &[
+        ParameterInfo::shape("layer", "", "layer, 1-based")
+            .allowed(1.0, 1000.0)
+            .neutral(1.0)
+            .search(1.0, 1.0, 10.0)
+            .whole(),
+        ParameterInfo::strength("share", "", "share of the layer's friction that this branch carries")
+            .allowed(0.0, 1.0)
+            .search(1.0, 0.01, 1.0),
+        ParameterInfo::shape("delta_m", "m", "travel over which friction builds up to sliding")
+            .allowed(1e-6, 0.1)
+            .neutral(5e-3)
+            .search(5e-3, 2e-4, 0.05)
+            .log(),
+        ParameterInfo::shape("kept", "", "share of the elastic force at the puncture that passes into friction")
+            .allowed(0.0, 1.0)
+            .neutral(1.0)
+            .search(1.0, 0.0, 1.0),
+        ParameterInfo::shape("time_constant_s", "s", "time constant of the creep")
+            .allowed(1e-3, 1e6)
+            .neutral(1e6)
+            .search(3.0, 0.1, 60.0)
+            .log(),
+        ParameterInfo::shape("release_m", "m", "where the layer lets go on the way back, beyond its front face")
+            .allowed(-0.1, 0.1)
+            .search(0.0, -0.01, 0.01),
+    ],
+    larger: None,
+};
+
+impl Described for ViscoelasticPresliding {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![
+            self.layer as f64,
+            self.share,
+            self.delta_m,
+            self.kept,
+            self.time_constant_s,
+            self.release_m
+        ]
+    }
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [layer, share, delta_m, kept, time_constant_s, release_m] = *values else { return None };
+        let layer = libm::round(layer) as usize; // saturates, and NaN is zero, which is no layer
+        Some(Self { layer, share, delta_m, kept, time_constant_s, release_m })
+    }
+}
+
+impl Effect for ViscoelasticPresliding {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_neutral(&self) -> bool {
+        self.share == 0.0
+    }
+    fn remembers(&self) -> bool {
+        true
+    }
+    fn shape(&self, slabs: &mut [Slab]) {
+        if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
+            slab.gripped = (slab.gripped + self.share).min(1.0);
+        }
+    }
+    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut Memory) {
+        if layer == self.layer {
+            memory[0] = self.share * self.kept * released_n;
+        }
+    }
+    /// Memory: `w`, the limit `share S_i`, and the time step with its weights.
+    fn grip(&self, moment: &Moment, slabs: &[Slab], sliding_mps: f64, memory: &mut Memory) -> f64 {
+        let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
+        let [mut w, mut limit, step, keep, ramp, ..] = *memory;
+        if limit == 0.0 || moment.v_mps.abs() >= REST_MPS {
+            let steady = self.share * slab.friction_ns_per_m2 * slab.thickness_m * sliding_mps.abs();
+            let fresh = limit == 0.0 || moment.ruptured < self.layer;
+            let renewed = if fresh { 1.0 } else { lost(moment.dz_m.abs() / self.delta_m) };
+            limit += (steady - limit) * renewed;
+            memory[1] = limit;
+        }
+        if moment.ruptured < self.layer {
+            return 0.0;
+        }
+        if moment.z_m < slab.front_m + self.release_m {
+            memory[0] = 0.0;
+            return 0.0;
+        }
+        let (mut keep, mut ramp) = (keep, ramp);
+        if step == 0.0 || !crate::effect::same_step(moment.dt_s, step) {
+            // The spring's force after a step of constant velocity: w keep + k dz ramp.
+            let ratio = moment.dt_s / self.time_constant_s;
+            let faded = lost(ratio);
+            keep = 1.0 - faded;
+            ramp = if ratio > 0.0 { faded / ratio } else { 1.0 };
+            memory[2] = moment.dt_s;
+            memory[3] = keep;
+            memory[4] = ramp;
+        }
+        w = (w * keep + limit / self.delta_m * moment.dz_m * ramp).clamp(-limit, limit);
+        memory[0] = w;
+        w
+    }
+}

@@ -1,0 +1,109 @@
+//! Promise: the effects that measured insertions asked for are their equations, neutral ones leave the
+//! base law bit for bit, and the special cases in which they become older effects hold.
+
+mod common;
+use common::*;
+use stylet_tissue::*;
+
+/// One layer of 10 mm with a puncture force, thick ground behind it.
+fn skin() -> Tissue {
+    tissue(&[layer(0.01, 100.0, 50_000.0, Some(0.8)), layer(0.05, 20.0, 0.0, None)])
+}
+
+fn holds(share: f64, delta_m: f64, time_constant_s: f64) -> AnyEffect {
+    ViscoelasticPresliding { layer: 1, share, delta_m, time_constant_s, kept: 1.0, release_m: 0.0 }.into()
+}
+
+/// In to 20 mm at 2 mm/s, held for 5 s, back out at 2 mm/s.
+fn in_hold_out() -> Vec<Sample> {
+    (0..2700)
+        .map(|k| f64::from(k) * 0.01)
+        .map(|t| match t {
+            t if t < 10.0 => (t, 0.002 * t, 0.002),
+            t if t < 15.0 => (t, 0.02, 0.0),
+            t => (t, 0.02 - 0.002 * (t - 15.0), -0.002),
+        })
+        .collect()
+}
+
+#[test]
+fn neutral_effects_leave_the_base_law_bit_for_bit() {
+    let neutral: [AnyEffect; 4] = [
+        DeepIndentation { reach_m: 0.0 }.into(),
+        LayerStiffening { layer: 2, kappa_per_m: 0.0 }.into(),
+        holds(0.0, 0.005, 2.0),
+        LayerStiffening { layer: 9, kappa_per_m: 50.0 }.into(), // there is no such layer
+    ];
+    let base = run(&three_gels(), &[], &usual_motion());
+    assert_eq!(run(&three_gels(), &neutral, &usual_motion()), base);
+    for info in per_layer() {
+        let values: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
+        let effect = AnyEffect::from_parameters(info.id, &values).expect("its own parameters");
+        assert!(effect.is_neutral() && effect.check().is_ok(), "{}", info.id);
+        assert_eq!(effect.parameters(), values);
+        assert!(library().all(|general| general.id != info.id));
+        assert_eq!(stylet_tissue::info(info.id), Some(info));
+    }
+}
+
+#[test]
+fn a_layer_that_can_be_pushed_in_yields_to_force_behind_its_far_face() {
+    let mut soft = skin();
+    soft.layers[0].puncture_n = Some(1.4); // reached 14 mm in, 4 mm behind the far face
+    let (_, at_the_face) = run(&soft, &[], &in_hold_out());
+    assert!((at_the_face[0].position_m - 0.01).abs() < 1e-9 && !at_the_face[0].by_force);
+    let (forces, deeper) = run(&soft, &[DeepIndentation { reach_m: 0.01 }.into()], &in_hold_out());
+    assert!((deeper[0].position_m - 0.014).abs() < 1e-9 && deeper[0].by_force, "{deeper:?}");
+    let highest = forces.iter().map(|f| f.elastic_n).fold(0.0, f64::max);
+    near(highest, 1.4, 0.003);
+}
+
+#[test]
+fn stiffening_of_each_layer_adds_to_that_of_all() {
+    let block = block(30.0, 0.0);
+    let one = forces(&block, &[LayerStiffening { layer: 1, kappa_per_m: 60.0 }.into()], &in_hold_out());
+    let all = forces(&block, &[NonlinearElasticity { kappa_per_m: 60.0 }.into()], &in_hold_out());
+    assert!(worst(&one, &all) < 1e-12 && all.iter().any(|f| *f > 1.0));
+    let both = [
+        LayerStiffening { layer: 1, kappa_per_m: 20.0 }.into(),
+        NonlinearElasticity { kappa_per_m: 40.0 }.into(),
+    ];
+    assert!(worst(&forces(&block, &both, &in_hold_out()), &all) < 1e-12);
+}
+
+#[test]
+fn a_punctured_layer_holds_with_its_sliding_friction_follows_travel_after_the_reversal_and_lets_go() {
+    let motion = in_hold_out();
+    let f = run(&skin(), &[holds(1.0, 0.004, 1e6)], &motion).0;
+    let grip: Vec<f64> = f.iter().map(|f| f.friction_n).collect();
+    // Punctured at 8 mm with 0.8 N, of which sliding friction holds b d v = 1 N: it keeps 0.8 N and rises.
+    assert_eq!(grip[350], 0.0, "no friction before the puncture");
+    near(grip[410], 0.8 + (0.0082 - 0.008) / 0.004, 0.02);
+    near(grip[900], 1.0, 1e-12);
+    near(grip[1490], 1.0, 1e-5); // a hold of 5 s is nothing to a creep of 1e6 s
+    // Back by 4 mm: from 1 N to 0; by 8 mm: to -1 N, and there it slides.
+    near(grip[1700], 0.0, 0.002);
+    near(grip[1950], -1.0, 1e-12);
+    // Let go at the front face, 20 mm back, at once.
+    near(grip[2480], -1.0, 1e-12);
+    assert_eq!(grip[2510], 0.0);
+    // What the tip feels is free of it.
+    near(f[900].tip_n, f[900].total_n - grip[900], 1e-12);
+}
+
+#[test]
+fn a_creeping_branch_fades_in_the_hold_with_its_time_constant_and_is_the_same_at_every_rate() {
+    let motion = in_hold_out();
+    let branches = [holds(0.6, 0.004, 1e6), holds(0.4, 0.004, 2.0)];
+    let f = forces(&skin(), &branches, &motion);
+    let elastic = 20.0 * 0.01; // the ground behind the skin
+    let at_stop = f[999] - elastic;
+    let share = at_stop - 0.6;
+    assert!(share > 0.3, "{share}");
+    near(f[1199] - elastic, 0.6 + share * (-2.0f64 / 2.0).exp(), 0.01);
+    let coarse: Vec<Sample> = motion.iter().copied().step_by(5).collect();
+    let every: Vec<f64> = f.iter().copied().step_by(5).collect();
+    // In the step of the puncture the whole travel counts; it is forgotten once the layer slides.
+    let slow = forces(&skin(), &branches, &coarse);
+    assert!(worst(&every[130..], &slow[130..]) < 1e-3, "{}", worst(&every[130..], &slow[130..]));
+}
