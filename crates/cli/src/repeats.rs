@@ -34,7 +34,7 @@ const FEWEST: usize = 3;
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let set = description(args)?;
     let files = files(args, &set)?;
-    let talk = !args.quiet && std::io::stderr().is_terminal();
+    let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let mut say = |what: &str| {
         if talk {
             eprintln!("  {what}");
@@ -87,13 +87,13 @@ fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Re
     output.add("diagnosis.json", json);
     output.add("extended.ron", ron);
     output.add("gain.svg", repeats_report::gain_figure(study));
-    let folder = args.out.clone().unwrap_or_else(|| {
+    let folder = args.results.out.clone().unwrap_or_else(|| {
         let stem =
             args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
         PathBuf::from("stylet-out").join(format!("{stem}-diagnosis"))
     });
     output.write(&folder)?;
-    if !args.quiet {
+    if !args.results.quiet {
         crate::terminal::say(&format!(
             "{}{}\nReport: {}\n",
             summary(study),

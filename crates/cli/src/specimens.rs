@@ -39,12 +39,12 @@ pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Run]) -> Result<(), 
     let mut output = Output::default();
     output.add("report.html", page(args, set, &found, &d).to_html());
     output.add("diagnosis.json", json);
-    let folder = args.out.clone().unwrap_or_else(|| {
+    let folder = args.results.out.clone().unwrap_or_else(|| {
         let stem = args.scenario.file_stem().unwrap_or(args.scenario.as_os_str());
         PathBuf::from("stylet-out").join(format!("{}-diagnosis", stem.to_string_lossy()))
     });
     output.write(&folder)?;
-    if !args.quiet {
+    if !args.results.quiet {
         crate::terminal::say(&format!(
             "{}\nReport: {}\n",
             summary(&found, &d),

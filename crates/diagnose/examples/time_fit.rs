@@ -10,7 +10,7 @@ fn main() {
     let case = hidden::case(&sketch.drawn);
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
     let t = Instant::now();
-    let Some(search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, Settings::default()) else {
+    let Some(search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, 0.0, Settings::default()) else {
         return;
     };
     println!("base fit {:.3} s, {} samples", t.elapsed().as_secs_f64(), search.data.samples());

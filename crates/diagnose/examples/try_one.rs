@@ -38,7 +38,8 @@ fn main() {
     println!("true ruptures {:?}", case.ruptures);
     let start = Instant::now();
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
-    let Some(mut search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, Settings::default()) else {
+    let Some(mut search) = Search::base(&case.believed.tissue, 0.3, &[], tracks, 0.0, Settings::default())
+    else {
         println!("no base fit");
         return;
     };
@@ -77,5 +78,32 @@ fn main() {
     for e in &search.best.model.effects {
         println!("{} {:?}", e.info.id, e.values);
     }
+    let choices: Vec<_> = drawn
+        .effects
+        .iter()
+        .map(|e| {
+            use stylet_tissue::Effect;
+            stylet_diagnose::model::Choice::new(e.info(), &e.parameters())
+        })
+        .collect();
+    let mut truth = search.base.model.clone();
+    truth.tissue = case.truth.clone();
+    truth.effects = choices;
+    let mut data = search.data.clone();
+    data.ruptures = case.ruptures.clone();
+    println!("truth as drawn {:.1}", stylet_diagnose::search::nats(&truth, &data));
+    if let Some(f) = stylet_diagnose::refine::refine(&truth, &mut data, 3, 8, false) {
+        println!(
+            "truth refined {:.1}: {:?} {:?}",
+            f.nats,
+            f.model.effects.iter().map(|e| &e.values).collect::<Vec<_>>(),
+            data.ruptures
+        );
+        println!("  K {:?}", f.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>());
+    }
+    println!(
+        "found K {:?}",
+        search.best.model.tissue.layers.iter().map(|l| l.stiffness_n_per_m).collect::<Vec<_>>()
+    );
     println!("nats {:.1}; ruptures {:?}", search.best.nats, search.best.ruptures);
 }

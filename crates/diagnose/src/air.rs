@@ -8,11 +8,18 @@ const CLEAR_M: f64 = 1.5e-3;
 /// The same when there are few samples.
 const NEAR_M: f64 = 0.3e-3;
 
-/// The noise in air; `None` when there are too few samples there.
+/// The noise in air beyond `dead_n`; `None` when there are too few samples there.
 #[must_use]
-pub fn noise(tracks: &[Track], surface_m: f64, least_n: f64) -> Option<Noise> {
+pub fn noise(tracks: &[Track], surface_m: f64, least_n: f64, dead_n: f64) -> Option<Noise> {
     for clear in [CLEAR_M, NEAR_M] {
         let runs: Vec<(Track, Vec<f64>)> = tracks.iter().filter_map(|t| run(t, surface_m - clear)).collect();
+        let runs: Vec<(Track, Vec<f64>)> = runs
+            .into_iter()
+            .map(|(t, mut e)| {
+                crate::fit::dead_zone(dead_n, &mut e);
+                (t, e)
+            })
+            .collect();
         let parts: Vec<(&Track, &[f64])> = runs.iter().map(|(t, e)| (t, e.as_slice())).collect();
         let samples: usize = parts.iter().map(|p| p.1.len()).sum();
         if samples >= 200 {

@@ -5,6 +5,7 @@ use crate::fit::Data;
 use crate::held_out::{free_residual, rms};
 use crate::hidden::{self, Drawn, Kind, Size, Sketch};
 use crate::model::{Choice, Model};
+use crate::noise::Noise;
 use crate::outcome::Verdict;
 use crate::refine::refine;
 use crate::search::{Candidate, Search, Settings};
@@ -64,7 +65,7 @@ fn strength(drawn: &Drawn) -> Option<f64> {
     let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
     let clean = hidden::clean_force(drawn);
     let search =
-        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, Settings::default())?;
+        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, 0.0, Settings::default())?;
     Some(size_of(&search, &search.base, &clean, drawn))
 }
 
@@ -78,7 +79,10 @@ fn size_of(search: &Search, base: &Candidate, clean: &[Vec<f64>], drawn: &Drawn)
         .collect();
     let (mut square, mut n) = (0.0, 0.0);
     for track in &tracks {
-        square += free_residual(&base.model, track).iter().map(|e| e * e).sum::<f64>();
+        square += free_residual(&base.model, track, &Noise::white(drawn.noise_n))
+            .iter()
+            .map(|e| e * e)
+            .sum::<f64>();
         n += track.len() as f64;
     }
     let mut square = square / f64::max(n, 1.0);
@@ -192,7 +196,7 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
     };
     let (mut square, mut n) = (0.0, 0.0);
     for track in search.data.tracks.iter() {
-        let e = rms(track, &free_residual(&truth, track));
+        let e = rms(track, &free_residual(&truth, track, &search.data.noise));
         square += e * e * track.len() as f64;
         n += track.len() as f64;
     }

@@ -70,12 +70,12 @@ pub fn curves(examined: &Examined) -> Vec<Curves> {
             position_m: t.z.clone(),
             velocity_mps: t.v.clone(),
             force_n: t.f.clone(),
-            free_n: free_residual(&best.model, t),
+            free_n: free_residual(&best.model, t, &search.data.noise),
             base_n,
             extended_n,
             used: t.used.clone(),
-            ruptures_s: ruptures.iter().filter_map(|r| t.t.get(*r).copied()).collect(),
-            layer: (0..t.len()).map(|i| 1 + ruptures.iter().filter(|r| **r <= i).count()).collect(),
+            ruptures_s: ruptures.iter().copied().filter(|r| r.is_finite()).collect(),
+            layer: (0..t.len()).map(|i| 1 + ruptures.iter().filter(|r| **r <= t.t[i]).count()).collect(),
         })
         .collect()
 }

@@ -51,6 +51,10 @@ pub const CLASS_NATS: f64 = 3.0;
 pub const LEFTOVER_P: f64 = 1e-4;
 /// ... and dominates when it is more than this share of what the causes explain.
 pub const DOMINATES: f64 = 0.05;
+/// What remains is more than noise when its variance is so many times that in air ...
+const EXCESS: f64 = 2.0;
+/// ... and dominates when it is more than this share of what the base law leaves beyond the noise.
+const UNEXPLAINED: f64 = 0.25;
 /// Intervals are widened by this factor (calibrated: `stylet benchmark diagnose`).
 const WIDEN: f64 = 1.15;
 
@@ -80,20 +84,29 @@ pub fn diagnose(
     let raw = raw::look(&recordings, &notes);
     let tracks: Vec<Track> = recordings.iter().zip(&raw.exclude).map(|(r, x)| Track::new(r, x)).collect();
     progress("fitting the base law");
-    let mut search =
-        Search::base(&scenario.tissue, scenario.tolerance, &scenario.effects, tracks, options.search)
-            .ok_or(DiagnoseError::NoFit)?;
+    let mut search = Search::base(
+        &scenario.tissue,
+        scenario.tolerance,
+        &scenario.effects,
+        tracks,
+        raw.step_n.unwrap_or(0.0),
+        options.search,
+    )
+    .ok_or(DiagnoseError::NoFit)?;
     search.run(&mut progress);
     progress("judging");
     let best = search.best.clone();
     let data = search.data_of(&best);
-    let left = leftover::test(&best.model, &data);
+    // By the noise in air: that of the model's own residual takes structure for colour.
+    let in_air = crate::fit::Data { noise: search.air.unwrap_or(data.noise), ..data.clone() };
+    let left = leftover::test(&best.model, &in_air);
     let explained = search.base.nats - best.nats;
     let dominated =
         left.p_value < LEFTOVER_P && left.nats > DOMINATES * explained.max(0.0) && left.nats > 8.0;
+    let dominated = dominated || excess(&search, &in_air);
 
     // A step of the recorded force beyond the noise makes the residual a function of the motion by itself.
-    let coarse_steps = raw.step_n.is_some_and(|step| step > 1.5 * search.data.noise.marginal_n);
+    let coarse_steps = search.data.dead_n > 0.0;
     let dominated = dominated && !coarse_steps;
 
     let mut causes = Vec::new();
@@ -164,6 +177,30 @@ pub fn diagnose(
         advice,
     };
     Ok(Examined { diagnosis, extended, search })
+}
+
+/// Whether the best model leaves far more than the noise in air, and more than a share of what the base law
+/// left beyond it.
+fn excess(search: &Search, in_air: &crate::fit::Data) -> bool {
+    let Some(air) = search.air else { return false };
+    let floor = air.marginal_n * air.marginal_n;
+    let variance = |c: &Candidate| {
+        let mut r = crate::fit::Residuals::default();
+        let data = crate::fit::Data { ruptures: c.ruptures.clone(), ..in_air.clone() };
+        crate::fit::residuals(&c.model, &data, &mut r).then(|| {
+            // Outlying samples are nobody's cause.
+            let limit = 50.0 * floor;
+            let used = data.tracks.iter().flat_map(|t| &t.used);
+            let (sum, n) =
+                r.e.iter()
+                    .zip(used)
+                    .filter(|(_, u)| **u)
+                    .fold((0.0, 0.0), |(s, n), (e, _)| (s + (e * e).min(limit), n + 1.0));
+            sum / f64::max(n, 1.0)
+        })
+    };
+    let (Some(after), Some(before)) = (variance(&search.best), variance(&search.base)) else { return false };
+    after > EXCESS * floor && after - floor > UNEXPLAINED * (before - floor)
 }
 
 fn step(stage: &crate::search::Stage) -> EvidenceStep {
@@ -251,7 +288,7 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
         .map(|r| r.1)
         .next_back();
     let gain_nats = without.unwrap_or(search.base.nats - best.nats);
-    let alarm = (-(gain_nats - search.settings.threshold).max(0.0)).exp() * 0.01;
+    let alarm = (-(gain_nats - search.settings.needed(choice.info.id)).max(0.0)).exp() * 0.01;
     Cause {
         effect: choice.info.id.to_owned(),
         equivalent,

@@ -33,8 +33,13 @@ fn weight(w: f64) -> f64 {
 pub struct Data {
     /// The recordings.
     pub tracks: Arc<Vec<Track>>,
-    /// Per recording and layer the sample at which it has ruptured.
-    pub ruptures: Vec<Vec<usize>>,
+    /// Per recording and layer the time (s) at which the recorded force shows its rupture, or
+    /// [`NEVER`](crate::track::NEVER).
+    pub ruptures: Vec<Vec<f64>>,
+    /// Per recording and layer how far (s) a rupture may be moved at a time.
+    pub reach: Arc<Vec<Vec<f64>>>,
+    /// Half a step of the recorded force in N where that hides the noise: departures within it do not count.
+    pub dead_n: f64,
     /// The noise.
     pub noise: Noise,
 }
@@ -49,9 +54,14 @@ impl Data {
     /// The same in blocks of `q`; `scale` is the noise there.
     #[must_use]
     pub fn blocks(&self, q: usize, noise: Noise) -> Self {
-        let (tracks, ruptures): (Vec<Track>, _) =
-            self.tracks.iter().zip(&self.ruptures).map(|(track, r)| track.blocks(q, r)).unzip();
-        Self { tracks: Arc::new(tracks), ruptures, noise }
+        let tracks = self.tracks.iter().zip(&self.ruptures).map(|(track, r)| track.blocks(q, r)).collect();
+        Self {
+            tracks: Arc::new(tracks),
+            ruptures: self.ruptures.clone(),
+            reach: self.reach.clone(),
+            dead_n: self.dead_n,
+            noise,
+        }
     }
 }
 
@@ -79,14 +89,21 @@ pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
         let to = from + track.len();
         let e = &mut out.e[from..to];
         forward::imposed(&compiled, track, ruptures, e, &mut out.scratch);
-        for (e, f) in e.iter_mut().zip(&track.f) {
-            *e = f - *e;
-        }
+        forward::departures(&compiled, track, ruptures, &data.noise, 0, e);
+        dead_zone(data.dead_n, e);
         data.noise.whiten(track, e, &mut out.w[from..to]);
         out.events.extend_from_slice(&out.scratch);
         from = to;
     }
     out.w.iter().all(|w| w.is_finite())
+}
+
+/// Takes what rounding may have done off every departure.
+#[inline]
+pub(crate) fn dead_zone(half_step_n: f64, e: &mut [f64]) {
+    if half_step_n > 0.0 {
+        e.iter_mut().for_each(|e| *e -= e.clamp(-half_step_n, half_step_n));
+    }
 }
 
 /// The objective of a replayed model, in nats.
@@ -127,7 +144,8 @@ pub struct Jacobian {
     pub columns: Vec<Vec<f64>>,
 }
 
-/// Numeric Jacobian at a model whose residuals are `at`.
+/// Jacobian at a model whose residuals are `at`; the columns of the base parameters are those of `keep`
+/// if given.
 pub fn jacobian(
     model: &Model,
     data: &Data,
@@ -136,14 +154,39 @@ pub fn jacobian(
     keep: Option<&Jacobian>,
 ) -> Jacobian {
     let slots = model.slots();
+    let base = |s: &Slot| matches!(s.role, Role::Base { .. });
+    let known = match keep {
+        Some(keep) => Some(
+            keep.columns.iter().zip(&keep.slots).filter(|(_, s)| base(s)).map(|(c, _)| c.clone()).collect(),
+        ),
+        None => crate::columns::base(model, data, at, &slots),
+    };
+    differences(model, data, at, work, slots, known)
+}
+
+/// The Jacobian with one replay for every number.
+#[cfg(test)]
+pub(crate) fn jacobian_by_differences(
+    model: &Model,
+    data: &Data,
+    at: &Residuals,
+    work: &mut Residuals,
+) -> Jacobian {
+    differences(model, data, at, work, model.slots(), None)
+}
+
+fn differences(
+    model: &Model,
+    data: &Data,
+    at: &Residuals,
+    work: &mut Residuals,
+    slots: Vec<Slot>,
+    known: Option<Vec<Vec<f64>>>,
+) -> Jacobian {
     let p = model.vector(&slots);
     let mut trial = model.clone();
-    let mut columns = Vec::with_capacity(slots.len());
-    for (j, slot) in slots.iter().enumerate() {
-        if let (Some(keep), Role::Base { .. }) = (keep, slot.role) {
-            columns.push(keep.columns[j].clone());
-            continue;
-        }
+    let mut columns = known.unwrap_or_default();
+    for (j, slot) in slots.iter().enumerate().skip(columns.len()) {
         let mut column = vec![0.0; at.w.len() + at.events.len()];
         if !slot.stepped {
             let mut q = p.clone();
@@ -258,9 +301,10 @@ pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit>
     let mut nats = objective(&best, &at);
     let mut lambda = 1e-4;
     let mut last: Option<Jacobian> = None;
+    let linear = crate::columns::are_linear(model);
     for turn in 0..turns {
-        // The force is nearly linear in the base parameters: their columns serve for three turns.
-        let keep = if turn % 3 == 0 { None } else { last.as_ref() };
+        // Where the columns of the base parameters cost a replay each, they serve for three turns.
+        let keep = if turn % 3 == 0 || linear { None } else { last.as_ref() };
         let jac = jacobian(&best, data, &at, &mut work, keep);
         let p = best.vector(&jac.slots);
         let (h, g) = normal(&best, &jac, &at);

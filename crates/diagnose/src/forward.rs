@@ -5,8 +5,9 @@
 //! the law decides, as in any simulation.
 
 use crate::model::Compiled;
+use crate::noise::Noise;
 use crate::track::{NEVER, Track};
-use stylet_tissue::{LawState, MeasurementState, Reading};
+use stylet_tissue::{LawState, MeasurementState, Reading, Strain, TissueForce};
 
 /// What a layer's rupture says of the law: its strain at the instant that the data show.
 #[derive(Clone, Copy, Debug)]
@@ -14,12 +15,13 @@ pub struct Event {
     /// Distance from rupture in standard deviations of what sampling leaves open; positive: the law
     /// would have ruptured before, negative: not yet.
     pub u: f64,
-    /// The same by the puncture force alone; NaN without one.
-    pub by_force: f64,
     /// Elastic force in N half-way between the last sample before the rupture and the first after.
     pub elastic_n: f64,
     /// Ratio of the actual puncture force (speed) to the layer's own.
     pub ratio: f64,
+    /// What it was worked out from.
+    strained: Strained,
+    ruptured: bool,
 }
 
 /// Relative uncertainty of an elastic force at rupture beyond sampling.
@@ -28,8 +30,8 @@ const FORCE_FLOOR: f64 = 5e-5;
 const POSITION_FLOOR_M: f64 = 1e-6;
 
 /// Strain before and at the rupture of one layer.
-#[derive(Clone, Copy)]
-struct Strained {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Strained {
     force_before: f64,
     force_at: f64,
     place_before: f64,
@@ -52,6 +54,32 @@ const UNSEEN: Strained = Strained {
 };
 
 impl Strained {
+    fn note(&mut self, s: &Strain) {
+        self.elastic_before = if self.seen { self.elastic_at } else { 0.0 };
+        self.force_before = self.force_before.max(self.force_at);
+        self.place_before = self.place_before.max(self.place_at);
+        self.elastic_at = s.elastic_n;
+        self.force_at = s.elastic_n - s.puncture_n;
+        self.place_at = s.tip_m - s.far_m;
+        self.puncture = s.puncture_n;
+        self.seen = true;
+    }
+
+    /// The same with the elastic force and the puncture force changed by these shares.
+    fn changed(&self, elastic: f64, puncture: f64) -> Self {
+        let by = |elastic_n: f64| {
+            elastic * elastic_n - if self.puncture.is_finite() { puncture * self.puncture } else { 0.0 }
+        };
+        Self {
+            force_before: self.force_before + by(self.elastic_before),
+            force_at: self.force_at + by(self.elastic_at),
+            elastic_before: self.elastic_before * (1.0 + elastic),
+            elastic_at: self.elastic_at * (1.0 + elastic),
+            puncture: self.puncture * (1.0 + puncture),
+            ..*self
+        }
+    }
+
     fn event(&self, ruptured: bool, own_puncture: f64) -> Event {
         let ratio = if self.puncture.is_finite() { self.puncture / own_puncture } else { 1.0 };
         let spread = |lo: f64, hi: f64, floor: f64| {
@@ -59,12 +87,13 @@ impl Strained {
             (half * half / 3.0 + floor * floor).sqrt()
         };
         let floor = FORCE_FLOOR * self.puncture.min(1e3) + 1e-5;
+        let event = Event { u: 0.0, elastic_n: self.elastic_at, ratio, strained: *self, ruptured };
         if !ruptured {
             // Nothing is known but that it did not happen.
             let step = (self.elastic_at - self.elastic_before).abs();
             let by_force = self.force_before.max(self.force_at) / (floor + step);
             let u = by_force.max(self.place_before.max(self.place_at) / 1e-5).max(0.0);
-            return Event { u, by_force: f64::NAN, elastic_n: self.elastic_at, ratio };
+            return Event { u, ..event };
         }
         let mid = |lo: f64, hi: f64| 0.5 * (lo + hi);
         let by_force = if self.puncture.is_finite() {
@@ -76,52 +105,208 @@ impl Strained {
         let before = self.place_before.max(self.place_at - 1e-2);
         let by_place = mid(before, self.place_at) / spread(before, self.place_at, POSITION_FLOOR_M);
         let u = if by_force.is_nan() { by_place } else { by_force.max(by_place) };
-        Event { u, by_force, elastic_n: mid(self.elastic_before, self.elastic_at), ratio }
+        Event { u, elastic_n: mid(self.elastic_before, self.elastic_at), ..event }
     }
 }
 
-/// Replays with imposed ruptures (`ruptures[i]`: the sample at which layer `i` has given way in the
-/// recorded force, or [`NEVER`]); writes the recorded force that the model predicts and one event per
-/// layer.
-pub fn imposed(
-    model: &Compiled,
-    track: &Track,
-    ruptures: &[usize],
-    out: &mut [f64],
-    events: &mut Vec<Event>,
-) {
-    let lead = (model.delay_s * track.sample_hz).round() as usize;
-    let mut strained = [UNSEEN; 16];
-    let mut state = LawState::default();
-    let mut chain = if model.measures { Some(model.chain.start(track.sample_hz * 4.0)) } else { None };
-    let mut done = 0;
-    for i in 0..track.len() {
-        while done < ruptures.len() && ruptures[done] != NEVER && i + lead >= ruptures[done] {
-            done += 1;
-        }
-        let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
-        let force = model.law.step_imposed(&mut state, t, z, v, done, |s| {
-            let Some(mine) = strained.get_mut(s.layer - 1) else { return };
-            mine.elastic_before = if mine.seen { mine.elastic_at } else { 0.0 };
-            mine.force_before = mine.force_before.max(mine.force_at);
-            mine.place_before = mine.place_before.max(mine.place_at);
-            mine.elastic_at = s.elastic_n;
-            mine.force_at = s.elastic_n - s.puncture_n;
-            mine.place_at = s.tip_m - s.far_m;
-            mine.puncture = s.puncture_n;
-            mine.seen = true;
-        });
-        out[i] = match &mut chain {
-            None => force.total_n,
-            Some(chain) => measure(model, chain, track, i, force.total_n),
-        };
-    }
-    events.clear();
-    for (layer, slab) in model.law.slabs().iter().enumerate().take(strained.len()) {
-        let ruptured = ruptures.get(layer).is_some_and(|r| *r != NEVER);
-        events.push(strained[layer].event(ruptured, slab.puncture_n));
+impl Event {
+    /// Its distance from rupture were the elastic force and the puncture force larger by these shares.
+    #[must_use]
+    pub fn u_at(&self, elastic: f64, puncture: f64) -> f64 {
+        let own = self.strained.puncture / self.ratio;
+        self.strained.changed(elastic, puncture).event(self.ruptured, own * (1.0 + puncture)).u
     }
 }
+
+/// Most layers that a replay keeps events of.
+const LAYERS: usize = 16;
+
+/// A replay with imposed ruptures under way; a clone goes on from the same instant.
+#[derive(Clone)]
+pub(crate) struct Replay {
+    pub(crate) state: LawState,
+    chain: Option<MeasurementState>,
+    strained: [Strained; LAYERS],
+    done: usize,
+    kink: usize,
+    before: Option<(f64, f64, f64)>,
+}
+
+impl Replay {
+    /// Before the first sample.
+    pub(crate) fn start(model: &Compiled, track: &Track) -> Self {
+        Self {
+            state: LawState::default(),
+            chain: model.measures.then(|| model.chain.start(track.sample_hz * 4.0)),
+            strained: [UNSEEN; LAYERS],
+            done: 0,
+            kink: 0,
+            before: None,
+        }
+    }
+
+    /// The tissue's force at sample `i`, to be called in order.
+    #[inline]
+    pub(crate) fn tissue(
+        &mut self,
+        model: &Compiled,
+        track: &Track,
+        ruptures: &[f64],
+        i: usize,
+    ) -> TissueForce {
+        let now = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
+        while let Some(&at) = ruptures.get(self.done).filter(|r| **r - model.delay_s <= now.0) {
+            if model.feels_instants {
+                self.kinks(model, track, i, at - model.delay_s);
+                self.rupture(model, track, i, now, at - model.delay_s);
+            }
+            self.done += 1;
+        }
+        if model.feels_instants {
+            self.kinks(model, track, i, NEVER);
+        }
+        self.before = Some(now);
+        let strained = &mut self.strained;
+        model.law.step_imposed(&mut self.state, now.0, now.1, now.2, self.done, |s| {
+            if let Some(mine) = strained.get_mut(s.layer - 1) {
+                mine.note(&s);
+            }
+        })
+    }
+
+    /// Jumps of the velocity between the sample before and sample `i`, as far as they come before `until_s`.
+    #[inline]
+    fn kinks(&mut self, model: &Compiled, track: &Track, i: usize, until_s: f64) {
+        while let Some(kink) = track.kinks.get(self.kink).filter(|k| k.sample <= i && k.t < until_s) {
+            self.kink += 1;
+            if kink.sample == i {
+                let z = kink.z * model.to_true;
+                for v in kink.v {
+                    self.between(model, track, i, (kink.t, z, v * model.to_true), self.done);
+                }
+            }
+        }
+    }
+
+    /// Law and chain at an instant between the sample before and sample `i`.
+    fn between(
+        &mut self,
+        model: &Compiled,
+        track: &Track,
+        i: usize,
+        (time_s, z, velocity_mps): (f64, f64, f64),
+        done: usize,
+    ) {
+        let force = model.law.step_imposed(&mut self.state, time_s, z, velocity_mps, done, |_| {});
+        if let Some(chain) = &mut self.chain {
+            let (tissue_n, acceleration_mps2) = (force.total_n, track.a[i] * model.to_true);
+            let reading = Reading { time_s, velocity_mps, acceleration_mps2, tissue_n, noise_n: 0.0 };
+            model.chain.step(chain, &reading);
+        }
+        self.before = Some((time_s, z, velocity_mps));
+    }
+
+    /// A rupture between the sample before and sample `i`, at its instant: law and chain see the force
+    /// just before and just after it.
+    #[cold]
+    fn rupture(&mut self, model: &Compiled, track: &Track, i: usize, now: (f64, f64, f64), at_s: f64) {
+        let before = self.before.unwrap_or(now);
+        // What the strain would have been at the sample, had nothing happened.
+        let mut peek = self.state;
+        let (strained, done) = (&mut self.strained, self.done);
+        model.law.step_imposed(&mut peek, now.0, now.1, now.2, done, |s| {
+            if let Some(mine) = strained.get_mut(s.layer - 1) {
+                mine.note(&s);
+            }
+        });
+        let span = now.0 - before.0;
+        let share = if span > 0.0 { ((at_s - before.0) / span).clamp(0.0, 1.0) } else { 1.0 };
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        let (t, z, v) = (mix(before.0, now.0), mix(before.1, now.1), mix(before.2, now.2));
+        for done in [done, done + 1] {
+            self.between(model, track, i, (t, z, v), done);
+        }
+    }
+
+    /// The recorded force at sample `i`, to be called in order.
+    #[inline]
+    pub(crate) fn step(&mut self, model: &Compiled, track: &Track, ruptures: &[f64], i: usize) -> f64 {
+        let tissue_n = self.tissue(model, track, ruptures, i).total_n;
+        match &mut self.chain {
+            None => tissue_n,
+            Some(chain) => measure(model, chain, track, i, tissue_n),
+        }
+    }
+
+    /// The event of a layer (0-based).
+    pub(crate) fn event(&self, model: &Compiled, ruptures: &[f64], layer: usize) -> Event {
+        let ruptured = ruptures.get(layer).is_some_and(|r| *r != NEVER);
+        let own = model.law.slabs().get(layer).map_or(f64::INFINITY, |s| s.puncture_n);
+        self.strained.get(layer).unwrap_or(&UNSEEN).event(ruptured, own)
+    }
+}
+
+/// Replays with imposed ruptures (`ruptures[i]`: the time (s) at which the recorded force shows the rupture of
+/// layer `i`, or [`NEVER`]); writes the recorded force that the model predicts and one event per
+/// layer.
+pub fn imposed(model: &Compiled, track: &Track, ruptures: &[f64], out: &mut [f64], events: &mut Vec<Event>) {
+    let mut replay = Replay::start(model, track);
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = replay.step(model, track, ruptures, i);
+    }
+    events.clear();
+    events.extend((0..model.law.slabs().len().min(LAYERS)).map(|l| replay.event(model, ruptures, l)));
+}
+
+/// How much of a departure counts at the sample of a drop, in standard deviations of the noise.
+const MIXED_SD: f64 = 3.0;
+
+/// Turns predicted forces into recorded less predicted ones. A sample at which the force jumps may have
+/// seen it from before and after, whatever the sensor does between samples: between the predictions it
+/// counts for little. That is the first one after a rupture, and with a delay also those at which jumps of
+/// the velocity arrive. `e` begins at sample `from`.
+pub(crate) fn departures(
+    model: &Compiled,
+    track: &Track,
+    ruptures: &[f64],
+    noise: &Noise,
+    from: usize,
+    e: &mut [f64],
+) {
+    let least = MIXED_SD * noise.marginal_n;
+    let mut mixed: Vec<(usize, f64)> = Vec::new();
+    let mut note = |k: usize, after: bool| {
+        let Some(k) = k.checked_sub(from).filter(|k| *k > 0 && k + 1 < e.len()) else { return };
+        let (mut lo, mut hi) = (e[k - 1].min(e[k]), e[k - 1].max(e[k]));
+        if after {
+            (lo, hi) = (lo.min(e[k + 1]), hi.max(e[k + 1]));
+        }
+        let f = track.f[from + k];
+        let beyond = f - f.clamp(lo, hi);
+        mixed.push((k, beyond + (f - e[k] - beyond).clamp(-least, least)));
+    };
+    let delayed = track.kinks.iter().map(|k| k.t).filter(|_| model.delay_s > 0.0);
+    for at in ruptures.iter().copied().chain(delayed.map(|t| t + model.delay_s)).filter(|t| t.is_finite()) {
+        let k = track.first_from(at);
+        note(k, false);
+        if model.delay_s > 0.0
+            && k > 0
+            && k < track.len()
+            && at - track.t[k - 1] < NEAR * (track.t[k] - track.t[k - 1])
+        {
+            note(k - 1, true);
+        }
+    }
+    for (e, f) in e.iter_mut().zip(&track.f[from..]) {
+        *e = f - *e;
+    }
+    for (k, departure) in mixed {
+        e[k] = departure;
+    }
+}
+
+/// A delayed jump so near (share of a sample) after a sample may already show there.
+const NEAR: f64 = 0.3;
 
 fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usize, tissue_n: f64) -> f64 {
     let reading = Reading {
@@ -134,15 +319,18 @@ fn measure(model: &Compiled, chain: &mut MeasurementState, track: &Track, i: usi
     model.chain.step(chain, &reading)
 }
 
-/// Replays with the law's own ruptures; returns the instants (s) at which layers gave way.
+/// Replays with the law's own ruptures; returns the instants (s) at which the recorded force shows them.
 pub fn free(model: &Compiled, track: &Track, out: &mut [f64]) -> Vec<f64> {
     let mut state = LawState::default();
-    let mut chain = model.chain.start(track.sample_hz);
-    let mut instants = Vec::new();
+    let mut instants = vec![NEVER; model.law.slabs().len()];
     for i in 0..track.len() {
         let (t, z, v) = (track.t[i], track.z[i] * model.to_true, track.v[i] * model.to_true);
-        let force = model.law.step(&mut state, t, z, v, |r| instants.push(r.time_s));
-        out[i] = measure(model, &mut chain, track, i, force.total_n);
+        model.law.step(&mut state, t, z, v, |r| {
+            if let Some(instant) = instants.get_mut(r.layer - 1) {
+                *instant = r.time_s + model.delay_s;
+            }
+        });
     }
+    imposed(model, track, &instants, out, &mut Vec::new());
     instants
 }

@@ -3,6 +3,7 @@
 use crate::fit::{Data, fit};
 use crate::forward;
 use crate::model::Model;
+use crate::noise::Noise;
 use crate::refine::seed_punctures;
 use crate::search::{Candidate, Search};
 use crate::track::Track;
@@ -25,14 +26,14 @@ pub struct Before {
 
 /// Residual of a model with its own ruptures; near a rupture the best of the neighbouring samples counts.
 #[must_use]
-pub fn free_residual(model: &Model, track: &Track) -> Vec<f64> {
+pub fn free_residual(model: &Model, track: &Track, noise: &Noise) -> Vec<f64> {
     let Some(compiled) = model.compile() else { return vec![f64::NAN; track.len()] };
     let mut out = vec![0.0; track.len()];
     let instants = forward::free(&compiled, track, &mut out);
-    let mut e: Vec<f64> = track.f.iter().zip(&out).map(|(f, p)| f - p).collect();
+    let mut e = out.clone();
+    forward::departures(&compiled, track, &instants, noise, 0, &mut e);
     for instant in instants {
-        let delayed = instant + compiled.delay_s;
-        let k = track.t.partition_point(|t| *t < delayed);
+        let k = track.first_from(instant);
         for i in k.saturating_sub(FORGIVEN)..(k + FORGIVEN + 1).min(track.len()) {
             for j in i.saturating_sub(FORGIVEN)..(i + FORGIVEN + 1).min(track.len()) {
                 let other = track.f[i] - out[j];
@@ -62,9 +63,9 @@ pub fn rms(track: &Track, e: &[f64]) -> f64 {
 #[must_use]
 pub fn gain(search: &Search, base: &Candidate, best: &Candidate) -> Vec<Before> {
     let n = search.data.tracks.len();
-    let one = |model: &Model, ruptures: &[Vec<usize>], left: usize| -> Vec<f64> {
+    let one = |model: &Model, ruptures: &[Vec<f64>], left: usize| -> Vec<f64> {
         let model = if n < 2 { model.clone() } else { without(search, model, ruptures, left) };
-        free_residual(&model, &search.data.tracks[left])
+        free_residual(&model, &search.data.tracks[left], &search.data.noise)
     };
     (0..n)
         .into_par_iter()
@@ -81,15 +82,19 @@ pub fn gain(search: &Search, base: &Candidate, best: &Candidate) -> Vec<Before> 
         .collect()
 }
 
-fn without(search: &Search, model: &Model, ruptures: &[Vec<usize>], left: usize) -> Model {
+fn without(search: &Search, model: &Model, ruptures: &[Vec<f64>], left: usize) -> Model {
     let others = |k: &usize| *k != left;
     let n = search.data.tracks.len();
     let data = Data {
         tracks: Arc::new((0..n).filter(others).map(|k| search.data.tracks[k].clone()).collect()),
         ruptures: (0..n).filter(others).map(|k| ruptures[k].clone()).collect(),
+        reach: Arc::new(Vec::new()),
+        dead_n: search.data.dead_n,
         noise: search.data.noise,
     };
-    let fast = model.effects.iter().any(|e| e.info.id == "periodic_interference");
+    // What averages over blocks would blur.
+    let fast = model.effects.iter().any(|e| e.info.id == "periodic_interference")
+        || model.compile().is_some_and(|m| m.feels_instants);
     let q = if fast { 1 } else { search.q };
     let coarse = data.blocks(q, data.noise.blocks(q));
     let mut model = model.clone();

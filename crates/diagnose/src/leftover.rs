@@ -20,8 +20,15 @@ pub struct Leftover {
     pub nats: f64,
 }
 
-const FEATURES: [&str; 6] =
-    ["depth", "time", "velocity", "phase_and_depth", "travel_since_reversal", "depth_and_velocity"];
+const FEATURES: [&str; 7] = [
+    "depth",
+    "time",
+    "velocity",
+    "phase_and_depth",
+    "travel_since_reversal",
+    "depth_and_velocity",
+    "acceleration_and_velocity",
+];
 
 /// Upper tail of the normal distribution.
 #[must_use]
@@ -55,7 +62,11 @@ fn bins(feature: usize, track: &Track, deepest: f64) -> Vec<usize> {
                     }
                     (if sign < 0.0 { 64 } else { 0 }) + ((since * 2e3) as usize).min(63)
                 }
-                _ => speed(v) / 2 * 24 + depth(z, 20.0),
+                5 => speed(v) / 2 * 24 + depth(z, 20.0),
+                _ => {
+                    let bent = (track.a[i] * 400.0).round().clamp(-10.0, 10.0) + 10.0;
+                    bent as usize * 24 + speed(v) / 2
+                }
             }
         })
         .collect()

@@ -6,13 +6,16 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`raw`] | saturation, quantisation, spikes: read off the raw force, named without a law |
+//! | [`velocity`] | velocity from positions, with its jumps at their instants |
 //! | [`track`] | columns made ready for thousands of replays; averages over blocks |
 //! | [`ruptures`] | where each layer ruptured in the data: law-guided Viterbi path, then the edge of the drop |
 //! | [`air`], [`noise`] | autoregressive noise (order two at most) before contact; whitening |
 //! | [`model`], [`forward`] | base parameters and effects as one vector; the replay with imposed or free ruptures, and one event per rupture |
+//! | [`columns`] | the slopes of the base parameters from one replay |
 //! | [`fit`], [`refine`] | bounded Levenberg-Marquardt on Huber's loss; ruptures moved to where a model wants them |
 //! | [`starts`], [`look`] | where fits begin; a linear look that ranks starts and tells what is invisible |
 //! | [`search`] | forward selection, every rival with the base re-fitted; exchange, pruning |
+//! | [`thresholds`] | what each effect must gain, calibrated on clean data |
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
 //! | [`held_out`] | the gain on recordings left out of the fit |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
@@ -23,6 +26,7 @@
 pub mod air;
 pub mod benchmark;
 mod check;
+pub mod columns;
 pub mod curves;
 mod diagnose;
 mod error;
@@ -41,7 +45,9 @@ pub mod ruptures;
 pub mod search;
 pub mod spectrum;
 pub mod starts;
+pub mod thresholds;
 pub mod track;
+pub mod velocity;
 pub mod visible;
 
 pub use diagnose::{CLASS_NATS, Evidence, Examined, Options, diagnose};

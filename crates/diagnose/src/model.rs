@@ -86,6 +86,8 @@ pub struct Compiled {
     pub delay_s: f64,
     /// The chain changes the force.
     pub measures: bool,
+    /// The instant of a rupture between two samples matters afterwards.
+    pub feels_instants: bool,
 }
 
 impl Model {
@@ -142,7 +144,19 @@ impl Model {
             .iter()
             .map(|e| if let AnyEffect::TimeDelay(delay) = e { delay.delay_s } else { 0.0 })
             .sum();
-        Some(Compiled { law, to_true: chain.true_position(1.0), measures: !chain.is_plain(), chain, delay_s })
+        let feels_instants = effects.iter().any(|e| {
+            matches!(
+                e,
+                AnyEffect::StressRelaxation(_)
+                    | AnyEffect::NeedleCompliance(_)
+                    | AnyEffect::LowPassLag(_)
+                    | AnyEffect::TimeDelay(_)
+                    | AnyEffect::SoftBoundary(_)
+                    | AnyEffect::IncompleteRelease(_)
+            )
+        });
+        let (to_true, measures) = (chain.true_position(1.0), !chain.is_plain());
+        Some(Compiled { law, to_true, measures, chain, delay_s, feels_instants })
     }
 
     /// The numbers that are fitted.
@@ -169,7 +183,9 @@ impl Model {
                     Slot { role, low: 1e-4, high: 1.0, step: 1e-5, stepped: true }
                 } else if in_logarithm(choice.info, parameter) {
                     let (low, high) = ((from / 10.0).max(p.low), (to * 10.0).min(p.high));
-                    Slot { role, low: low.max(1e-12).ln(), high: high.ln(), step: 2e-3, stepped: false }
+                    // A frequency is told by the phase at the end of a recording.
+                    let step = if p.unit == "Hz" { 2e-5 / choice.values[parameter].max(1e-3) } else { 2e-3 };
+                    Slot { role, low: low.max(1e-12).ln(), high: high.ln(), step, stepped: false }
                 } else if choice.info.id.ends_with("phase_rad") || p.unit == "rad" {
                     Slot { role, low: -100.0, high: 100.0, step: 1e-3, stepped: false }
                 } else {

@@ -110,6 +110,19 @@ impl Noise {
         Self::of(a, left.max(1e-6 * c0).sqrt())
     }
 
+    /// One whitened residual from those at sample `i` and the two before.
+    #[inline]
+    #[must_use]
+    pub fn one(&self, track: &Track, i: usize, e: [f64; 3]) -> f64 {
+        if !track.used[i] {
+            0.0
+        } else if track.restart[i] {
+            e[0] / self.marginal_n
+        } else {
+            (e[0] - self.a[0] * e[1] - self.a[1] * e[2]) / self.innovation_n
+        }
+    }
+
     /// Whitens residuals: unit variance, independent, zero where the track is not used.
     pub fn whiten(&self, track: &Track, e: &[f64], out: &mut [f64]) {
         let (inner, marginal) = (1.0 / self.innovation_n, 1.0 / self.marginal_n);

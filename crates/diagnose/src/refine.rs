@@ -1,60 +1,108 @@
 //! From a coarse fit to one at full rate: ruptures where this model wants them, puncture forces where
 //! the ruptures say, a membrane where it breaks.
 
-use crate::fit::{Data, Fit, Residuals, fit, objective, residuals, rho};
-use crate::forward::{self, Event};
-use crate::model::{Model, Role};
+use crate::fit::{Data, Fit, Residuals, dead_zone, fit, objective, residuals, rho};
+use crate::forward::{self, Replay};
+use crate::model::{Compiled, Model, Role};
 use crate::noise::{Noise, median};
 use crate::track::{NEVER, Track};
 
-/// Nats of one recording.
-fn nats(
-    model: &Model,
-    track: &Track,
-    ruptures: &[usize],
-    noise: &Noise,
-    buffers: &mut (Vec<f64>, Vec<f64>, Vec<Event>),
-) -> f64 {
-    let Some(compiled) = model.compile() else { return f64::INFINITY };
-    let (e, w, events) = buffers;
-    e.resize(track.len(), 0.0);
-    w.resize(track.len(), 0.0);
-    forward::imposed(&compiled, track, ruptures, e, events);
-    for (e, f) in e.iter_mut().zip(&track.f) {
-        *e = f - *e;
-    }
-    noise.whiten(track, e, w);
-    w.iter().map(|w| rho(*w)).sum::<f64>() + events.iter().map(|e| rho(e.u)).sum::<f64>()
+/// Seconds of a recording before a rupture that a move of it may reach back to.
+const BEFORE_S: f64 = 1.3;
+/// Seconds after it in which a move shows.
+const AFTER_S: f64 = 2.0;
+
+/// A piece of a recording around the rupture of one layer, replayed again and again from its start.
+struct Window<'a> {
+    model: &'a Compiled,
+    track: &'a Track,
+    noise: &'a Noise,
+    dead_n: f64,
+    layer: usize,
+    from: usize,
+    to: usize,
+    start: Replay,
+    e: Vec<f64>,
 }
 
-/// Moves every rupture to the sample where this model fits best, by steps that double and halve. True
-/// when one moved.
-pub fn retime(model: &Model, data: &mut Data, wide: bool) -> bool {
+impl<'a> Window<'a> {
+    fn new(model: &'a Compiled, track: &'a Track, data: &'a Data, ruptures: &[f64], layer: usize) -> Self {
+        let from = track.first_from(ruptures[layer] - BEFORE_S - model.delay_s);
+        let to = track.first_from(ruptures[layer] + AFTER_S);
+        let mut start = Replay::start(model, track);
+        for i in 0..from {
+            start.step(model, track, ruptures, i);
+        }
+        let (noise, dead_n) = (&data.noise, data.dead_n);
+        Self { model, track, noise, dead_n, layer, from, to, start, e: vec![0.0; to.saturating_sub(from)] }
+    }
+
+    /// Where a rupture may be moved to.
+    fn holds(&self, at_s: f64) -> bool {
+        let at = self.track.first_from(at_s - self.model.delay_s);
+        at > self.from + 3 && self.track.first_from(at_s) + 3 < self.to
+    }
+
+    fn nats(&mut self, ruptures: &[f64], events: bool) -> f64 {
+        let mut replay = self.start.clone();
+        for (e, i) in self.e.iter_mut().zip(self.from..self.to) {
+            *e = replay.step(self.model, self.track, ruptures, i);
+        }
+        forward::departures(self.model, self.track, ruptures, self.noise, self.from, &mut self.e);
+        dead_zone(self.dead_n, &mut self.e);
+        let mut nats = 0.0;
+        for k in 2..self.e.len() {
+            nats += rho(self.noise.one(self.track, self.from + k, [self.e[k], self.e[k - 1], self.e[k - 2]]));
+        }
+        let layers = self.layer..(self.layer + 2).min(if events { ruptures.len() } else { 0 });
+        nats + layers
+            .filter(|l| self.track.first_from(ruptures[*l]) < self.to)
+            .map(|l| rho(replay.event(self.model, ruptures, l).u))
+            .sum::<f64>()
+    }
+}
+
+/// Steps in samples by which ruptures are moved: at first, later, and for models that feel where
+/// between two samples a rupture is.
+const WIDE: [f64; 5] = [1.0, 3.0, 9.0, 27.0, 81.0];
+const NARROW: [f64; 2] = [1.0, 4.0];
+const BETWEEN: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
+
+/// Moves every rupture to the instant where this model fits best, by steps that double and halve; with
+/// `events` as far as the law's own rupture is near. True when one moved.
+pub fn retime(model: &Model, data: &mut Data, wide: bool, events: bool) -> bool {
+    let Some(compiled) = model.compile() else { return false };
+    let mut steps: Vec<f64> = Vec::new();
+    if compiled.feels_instants {
+        steps.extend(BETWEEN);
+    }
+    steps.extend(if wide { &WIDE[..] } else { &NARROW[..] });
     let mut moved = false;
     let tracks = data.tracks.clone();
-    let mut buffers = (Vec::new(), Vec::new(), Vec::new());
-    for (track, ruptures) in tracks.iter().zip(&mut data.ruptures) {
-        let mut best = nats(model, track, ruptures, &data.noise, &mut buffers);
+    let whole = Data { ruptures: Vec::new(), ..data.clone() };
+    for (k, (track, ruptures)) in tracks.iter().zip(&mut data.ruptures).enumerate() {
         for layer in 0..ruptures.len() {
             if ruptures[layer] == NEVER {
                 continue;
             }
-            let steps: &[i64] = if wide { &[1, 3, 9, 27, 81] } else { &[1, 4] };
-            for sign in [-1_i64, 1] {
+            let mut window = Window::new(&compiled, track, &whole, ruptures, layer);
+            let mut best = window.nats(ruptures, events);
+            let reach = data.reach.get(k).and_then(|a| a.get(layer)).copied().unwrap_or(f64::INFINITY);
+            let (first, last) = (ruptures[layer] - reach, ruptures[layer] + reach);
+            let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
+            let end = track.t.last().copied().unwrap_or(0.0);
+            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end).min(last);
+            let low = low.max(first);
+            for sign in [-1.0, 1.0] {
                 let mut step = steps.len();
                 let mut turns = 0;
                 // From the widest step that helps to the narrowest.
                 while step > 0 && turns < 30 {
                     turns += 1;
-                    let to = ruptures[layer] as i64 + sign * steps[step - 1];
-                    let low = if layer > 0 { ruptures[layer - 1] as i64 } else { 1 };
-                    let high = ruptures
-                        .get(layer + 1)
-                        .filter(|r| **r != NEVER)
-                        .map_or(track.len() as i64 - 1, |r| *r as i64);
-                    if to >= low && to <= high {
-                        let was = std::mem::replace(&mut ruptures[layer], to as usize);
-                        let value = nats(model, track, ruptures, &data.noise, &mut buffers);
+                    let to = ruptures[layer] + sign * steps[step - 1] / track.sample_hz;
+                    if to >= low && to <= high && window.holds(to) {
+                        let was = std::mem::replace(&mut ruptures[layer], to);
+                        let value = window.nats(ruptures, events);
                         if value < best - 1e-9 {
                             best = value;
                             moved = true;
@@ -77,6 +125,7 @@ pub fn seed_punctures(model: &mut Model, data: &Data) {
         return;
     }
     let layers = model.assumed.layers.len();
+    let events_alone = crate::columns::are_linear(model);
     for layer in 0..layers {
         let Some(assumed) = model.assumed.layers[layer].puncture_n else { continue };
         let mut forces: Vec<f64> = data
@@ -91,9 +140,23 @@ pub fn seed_punctures(model: &mut Model, data: &Data) {
             continue;
         }
         let (low, high) = (assumed * (1.0 - model.tolerance), assumed * (1.0 + model.tolerance));
-        let before = objective(model, &r);
         let mut trial = model.clone();
-        trial.tissue.layers[layer].puncture_n = Some(median(&mut forces).clamp(low, high));
+        let new = median(&mut forces).clamp(low, high);
+        let old = model.tissue.layers[layer].puncture_n.unwrap_or(assumed);
+        trial.tissue.layers[layer].puncture_n = Some(new);
+        if events_alone {
+            // Nothing but the layer's events and the prior change.
+            let share = new / old - 1.0;
+            let own = || r.events.iter().skip(layer).step_by(layers);
+            let events: f64 = own().map(|e| rho(e.u_at(0.0, share)) - rho(e.u)).sum();
+            let sd = model.tolerance * assumed;
+            let drawn = 0.5 * (((new - assumed) / sd).powi(2) - ((old - assumed) / sd).powi(2));
+            if events + drawn < 0.0 {
+                *model = trial;
+            }
+            continue;
+        }
+        let before = objective(model, &r);
         let mut with = Residuals::default();
         if residuals(&trial, data, &mut with) && objective(&trial, &with) < before {
             *model = trial;
@@ -141,12 +204,24 @@ pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide:
     walk_stepped(&mut model, data);
     let mut best = fit(&model, data, turns, enough)?;
     for round in 0..rounds {
-        let mut there = data.clone();
-        let moved = retime(&best.model, &mut there, wide && round == 0);
-        let mut next = best.model.clone();
-        walk_stepped(&mut next, &there);
-        seed_punctures(&mut next, &there);
-        let Some(new) = fit(&next, &there, turns, enough) else { break };
+        let again = |events: bool| {
+            let mut there = data.clone();
+            let moved = retime(&best.model, &mut there, wide && round == 0, events);
+            let mut next = best.model.clone();
+            walk_stepped(&mut next, &there);
+            seed_punctures(&mut next, &there);
+            Some((fit(&next, &there, turns, enough)?, there, moved))
+        };
+        let Some((mut new, mut there, mut moved)) = again(true) else { break };
+        // A puncture force and all the instants that it sets hold one another in place: where the force itself
+        // tells the instants, they go first and the puncture force follows.
+        if wide
+            && round == 0
+            && let Some(other) = again(false)
+            && other.0.nats < new.nats
+        {
+            (new, there, moved) = other;
+        }
         let gained = best.nats - new.nats;
         if gained > 0.0 {
             *data = there;

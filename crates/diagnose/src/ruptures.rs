@@ -10,14 +10,32 @@ use crate::model::Model;
 use crate::track::{NEVER, Track};
 use stylet_tissue::{Slab, Tissue};
 
+/// No sample.
+const NONE: usize = usize::MAX;
+
 /// Samples per second of the first pass.
 const COARSE_HZ: f64 = 50.0;
 
-/// Finds the ruptures in every recording and first values of stiffness and friction.
+/// Where the layers ruptured in the data.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Instants (s) per recording and layer.
+    pub instants: Vec<Vec<f64>>,
+    /// How far (s) each may be moved at a time: infinitely, but for those at clear drops.
+    pub reach: Vec<Vec<f64>>,
+    /// Per recording the instants (s) of clear drops that no rupture took.
+    pub spare: Vec<Vec<f64>>,
+}
+
+/// How far (s) a rupture at a clear drop may be moved at a time: no law that lacks an effect drags it away.
+const CLEAR_S: f64 = 0.4;
+
+/// Finds the ruptures in every recording, how far they may be moved, and first values of stiffness and
+/// friction.
 #[must_use]
-pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<usize>> {
+pub fn find(model: &mut Model, tracks: &[Track]) -> Found {
     let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / COARSE_HZ).round().max(1.0) as usize;
-    let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[]).0).collect();
+    let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[])).collect();
     let range = coarse.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
     let mut paths: Vec<Vec<usize>> = Vec::new();
     for turn in 0..5 {
@@ -32,23 +50,36 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Vec<Vec<usize>> {
     }
     let friction: Vec<(Vec<f64>, &Track)> =
         tracks.iter().map(|t| (without_friction(&model.tissue, t), t)).collect();
-    paths
+    let instants: Vec<Vec<f64>> = paths
         .iter()
         .zip(&friction)
         .map(|(path, (force, track))| {
             let mut previous = 0;
             path.iter()
                 .map(|&r| {
-                    if r == NEVER {
+                    if r == NONE {
                         return NEVER;
                     }
                     let at = edge(force, track, (r * q).min(track.len() - 1), 2 * q).max(previous);
                     previous = at;
-                    at
+                    track.before(at)
                 })
                 .collect()
         })
-        .collect()
+        .collect();
+    let slabs = Slab::stack(&model.tissue);
+    let mut found = Found { instants, ..Found::default() };
+    for (k, (track, path)) in coarse.iter().zip(&paths).enumerate() {
+        let drops = drops(&slabs, track);
+        let clear = |r: usize| drops.get(r).is_some_and(|d| *d >= 1.0);
+        found.reach.push(path.iter().map(|&r| if clear(r) { CLEAR_S } else { f64::INFINITY }).collect());
+        let taken = |i: usize| path.iter().any(|r| r.abs_diff(i) <= 2 * DROP_SIDE);
+        let spare = (0..track.len()).filter(|i| clear(*i) && !taken(*i));
+        let (force, fine) = &friction[k];
+        let at = |i: usize| fine.before(edge(force, fine, (i * q).min(fine.len() - 1), 2 * q));
+        found.spare.push(spare.map(at).collect());
+    }
+    found
 }
 
 fn friction(slabs: &[Slab], z: f64, v: f64) -> f64 {
@@ -58,6 +89,40 @@ fn friction(slabs: &[Slab], z: f64, v: f64) -> f64 {
 fn without_friction(tissue: &Tissue, track: &Track) -> Vec<f64> {
     let slabs = Slab::stack(tissue);
     (0..track.len()).map(|i| track.f[i] - friction(&slabs, track.z[i], track.v[i])).collect()
+}
+
+/// What a rupture costs where the force does not drop: more than any misfit of a law that lacks an effect.
+const WITHOUT_DROP: f64 = 1e5;
+/// Samples of the first pass on each side of a drop.
+const DROP_SIDE: usize = 3;
+/// Share of the largest force that is a full drop.
+const DROP_SHARE: f64 = 0.03;
+
+/// How much of a clear drop the force shows at each sample, 0 (less than half of one) to 1. Friction changes with the velocity, and how
+/// much is not known yet: half of what is believed counts against.
+fn drops(slabs: &[Slab], track: &Track) -> Vec<f64> {
+    let n = track.len();
+    let range = track.f.iter().fold(1e-9_f64, |m, f| m.max(f.abs()));
+    let viscous: Vec<f64> = (0..n).map(|i| friction(slabs, track.z[i], track.v[i])).collect();
+    let mean = |x: &[f64], from: usize| x[from..from + DROP_SIDE].iter().sum::<f64>() / DROP_SIDE as f64;
+    let span = |x: &[f64]| {
+        let (lo, hi) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        hi - lo
+    };
+    let mut out = vec![0.0; n];
+    for i in DROP_SIDE..n.saturating_sub(DROP_SIDE) {
+        let drop = |x: &[f64]| mean(x, i - DROP_SIDE) - mean(x, i + 1);
+        let free = drop(&track.f) - drop(&viscous);
+        let doubt = 0.5 * span(&viscous[i - DROP_SIDE..i + 1 + DROP_SIDE]);
+        out[i] = (2.0 * (free - doubt) / (DROP_SHARE * range) - 1.0).max(0.0);
+    }
+    // A drop serves one rupture: only its peak stays.
+    let reach = 2 * DROP_SIDE;
+    let peak = |i: usize| {
+        let (from, to) = (i.saturating_sub(reach), (i + reach + 1).min(n));
+        (from..to).all(|j| if j < i { out[j] < out[i] } else { out[j] <= out[i] })
+    };
+    (0..n).map(|i| if out[i] > 0.0 && peak(i) { out[i].min(1.0) } else { 0.0 }).collect()
 }
 
 /// The best path: per layer the sample at which it has ruptured.
@@ -70,6 +135,7 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
         *c = f64::INFINITY;
     }
     let mut from: Vec<u8> = vec![0; n * states];
+    let drops = drops(&slabs, track);
     let mut deepest = f64::NEG_INFINITY;
     for i in 0..n {
         let free = track.f[i] - friction(&slabs, track.z[i], track.v[i]);
@@ -82,8 +148,9 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
                 let slab = &slabs[s - 1];
                 let elastic = slab.stiffness_n_per_m * (deepest - slab.front_m).max(0.0);
                 let share = (elastic / slab.puncture_n).max((deepest - slab.front_m) / slab.thickness_m);
-                if share > 0.4 && cost[s - 1] < best {
-                    best = cost[s - 1];
+                let here = cost[s - 1] + WITHOUT_DROP * (1.0 - drops[i]);
+                if share > 0.4 && here < best {
+                    best = here;
                     came = s - 1;
                 }
             }
@@ -96,8 +163,13 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
             from[i * states + s] = came as u8;
         }
     }
+    // A layer far behind the tip has ruptured, drop or none.
+    for (s, cost) in cost.iter_mut().enumerate() {
+        let whole = slabs.iter().skip(s).filter(|slab| deepest > slab.far_m() + 0.2 * slab.thickness_m);
+        *cost += WITHOUT_DROP * whole.count() as f64;
+    }
     let mut state = (0..states).min_by(|a, b| cost[*a].total_cmp(&cost[*b])).unwrap_or(0);
-    let mut out = vec![NEVER; slabs.len()];
+    let mut out = vec![NONE; slabs.len()];
     for i in (0..n).rev() {
         let came = usize::from(from[i * states + state]);
         if came < state {

@@ -1,5 +1,7 @@
 //! Periodogram of residuals: which frequencies stand out.
 
+use crate::track::Track;
+
 /// In-place radix-2 Fourier transform; the length is a power of two.
 fn transform(re: &mut [f64], im: &mut [f64]) {
     let n = re.len();
@@ -57,4 +59,36 @@ pub fn peaks(frequency: &[f64], value: &[f64], low_hz: f64, count: usize) -> Vec
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     found.truncate(count);
     found
+}
+
+/// The frequency (Hz) near `about_hz` of the sinusoid, the same in all recordings with time from their
+/// starts, that explains most of `e`; `span_s` is the longest duration. A peak of a periodogram is known to
+/// a fraction of `1/span_s`, the phase at the end of a recording asks for a tenth of that.
+#[must_use]
+pub fn sharpen(tracks: &[Track], e: &[f64], about_hz: f64, span_s: f64) -> f64 {
+    const REACH: i32 = 12;
+    let explained = |f: f64| {
+        let (mut ss, mut sc, mut cc, mut es, mut ec) = (1e-300, 0.0, 1e-300, 0.0, 0.0);
+        let mut from = 0;
+        for track in tracks {
+            for (i, &t) in track.t.iter().enumerate().filter(|(i, _)| track.used[*i]) {
+                let (s, c) = libm::sincos(core::f64::consts::TAU * f * t);
+                let e = e[from + i];
+                ss += s * s;
+                sc += s * c;
+                cc += c * c;
+                es += e * s;
+                ec += e * c;
+            }
+            from += track.len();
+        }
+        let det = (ss * cc - sc * sc).max(1e-300);
+        (es * es * cc - 2.0 * es * ec * sc + ec * ec * ss) / det
+    };
+    (-REACH..=REACH)
+        .map(|k| about_hz + f64::from(k) / (f64::from(REACH) * span_s))
+        .filter(|f| *f > 0.0)
+        .map(|f| (explained(f), f))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(about_hz, |best| best.1)
 }

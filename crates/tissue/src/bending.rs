@@ -1,16 +1,20 @@
 //! A needle that gives: the position of the tip at which needle and tissue are in balance.
 //!
-//! `needle_compliance` asks for `z_tip = z - f(z_tip, v_tip)/k_s` at every sample, with
-//! `v_tip = (z_tip - z_tip_before)/dt`. Within a step the unknown is the tip's velocity `v`; the
-//! surplus `h(v) = z_tip + f/k_s - z` rises with it wherever force rises with depth and speed. It
-//! is solved by secant steps inside a bracket, without ruptures first: a layer (or membrane) that
-//! would give way at the solution does, and the balance is sought again without it, which is how
-//! the tip jumps. Where the force jumps at the dead band of `sgn` (dry friction), the solution may
-//! lie in the jump: the tip sticks and friction is what the spring asks for.
+//! `needle_compliance` asks for `z_tip = z - f(z_tip, v_tip)/k_s` at every instant. Within a step the
+//! unknown is the tip's velocity `v` at its end, with the travel `dt ((1 - theta) v_before + theta v)`;
+//! `theta` is such that the step is exact for the tip's own relaxation, whose time constant is
+//! `tau = sum_i b_i l_i/(k_s + K_a)` (exponential fitting: Liniger and Willoughby 1970): 1/2 in steps far
+//! shorter than that, 1 (backward Euler) without viscous friction. The surplus
+//! `h(v) = z_tip + f/k_s - z` rises with `v` wherever force rises with depth and speed. It is solved by
+//! secant steps inside a bracket, without ruptures first. A layer that would give way on the way does,
+//! at its instant: the tip stays where it is, gets the velocity at which friction takes over what the
+//! layer has let go, and the rest of the step goes on from there. (Without viscous friction the tip
+//! jumps.) Where the force jumps at the dead band of `sgn` (dry friction), the solution may lie in the
+//! jump: the tip sticks and friction is what the spring asks for.
 
 use crate::breaking::Breaking;
 use crate::effect::{SGN_DEAD_BAND_MPS, sgn};
-use crate::force::TissueForce;
+use crate::force::{Rupture, TissueForce};
 use crate::law::Law;
 use crate::state::LawState;
 
@@ -38,17 +42,33 @@ struct Balance {
 #[derive(Clone, Copy)]
 struct Step {
     dt: f64,
-    /// The part of `dt` after the ruptures so far.
-    left: f64,
+    /// Share of the velocity at the end in the travel, 1/2 to 1.
+    theta: f64,
     base_m: f64,
     from_m: f64,
     v_before: f64,
 }
 
+/// The weight of the velocity at the end of a step of `dt_s` for a relaxation with `tau_s`.
+fn theta(dt_s: f64, tau_s: f64) -> f64 {
+    let ratio = dt_s / tau_s;
+    if ratio.is_nan() || ratio > 700.0 {
+        1.0
+    } else if ratio < 1e-3 {
+        0.5 + ratio / 12.0
+    } else {
+        -1.0 / libm::expm1(-ratio) - 1.0 / ratio
+    }
+}
+
 impl Step {
     /// Position and velocity of the tip at the value `u` of the unknown.
     fn tip(&self, u: f64) -> (f64, f64) {
-        if self.dt > 0.0 { (self.from_m + u * self.dt, u) } else { (u, self.v_before) }
+        if self.dt > 0.0 {
+            (self.from_m + self.dt * ((1.0 - self.theta) * self.v_before + self.theta * u), u)
+        } else {
+            (u, self.v_before)
+        }
     }
 
     /// Where to go from `u` towards `target`: not across an edge of the dead band without having
@@ -78,13 +98,22 @@ impl Law {
         base_m: f64,
         breaking: &mut impl Breaking,
     ) -> TissueForce {
-        let dt = time_s - state.time_s;
-        let mut done = 0.0; // share of the step that the ruptures so far have used up
+        let mut base_before = if state.bent { state.base_m } else { base_m };
+        state.bent = true;
+        state.base_m = base_m;
+        let mut let_go = false; // a layer has given way at this very instant
         loop {
             // Every turn but the last breaks a layer or a membrane, so there are few.
-            let left = (1.0 - done) * dt;
-            let step = Step { dt, left, base_m, from_m: state.z_m, v_before: state.v_mps };
-            let Balance { z, v, force, stuck_n } = self.balance(state, step);
+            let dt = time_s - state.time_s;
+            let (viscous, stiffness) = self.resistance(state);
+            let tau = viscous / (self.needle_n_per_m + stiffness);
+            let step =
+                Step { dt, theta: theta(dt, tau), base_m, from_m: state.z_m, v_before: state.v_mps };
+            let Balance { z, v, force, stuck_n } = if let_go && dt <= 0.0 && viscous > 0.0 {
+                Balance { z: state.z_m, v: state.v_mps, force: None, stuck_n: None }
+            } else {
+                self.balance(state, step)
+            };
             if self.membrane_breaks(state, z) {
                 continue;
             }
@@ -92,10 +121,14 @@ impl Law {
             if let Some(slab) = self.slabs.get(state.ruptured) {
                 elastic = match force {
                     Some(force) => force.elastic_n,
-                    None => self.elastic(slab, left, z, &mut state.memory),
+                    None => self.elastic(slab, dt, z, &mut state.memory),
                 };
-                if let Some(rupture) = self.give_way(state, slab, dt, (z, v), elastic, done, breaking) {
-                    done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
+                if let Some(rupture) = self.give_way(state, slab, dt, (z, v), elastic, 0.0, breaking) {
+                    let share = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
+                    let base = base_before + share * (base_m - base_before);
+                    self.let_go(state, &rupture, base, v, share);
+                    base_before = base;
+                    let_go = true;
                     continue;
                 }
             }
@@ -112,11 +145,35 @@ impl Law {
         }
     }
 
+    /// The tip at the instant at which a layer has given way, the base being at `base_m`: friction takes
+    /// over what the layer has let go.
+    fn let_go(&self, state: &mut LawState, rupture: &Rupture, base_m: f64, v_end: f64, share: f64) {
+        state.v_mps += share * (v_end - state.v_mps);
+        state.z_m = rupture.position_m;
+        state.time_s = rupture.time_s;
+        let (viscous, _) = self.resistance(state);
+        if viscous > 0.0 {
+            let memory = state.memory;
+            let here = Step { dt: 0.0, theta: 1.0, base_m, from_m: state.z_m, v_before: state.v_mps };
+            let force = self.trial(state, &here, state.z_m);
+            state.memory = memory;
+            state.v_mps += ((base_m - state.z_m) * self.needle_n_per_m - force.total_n) / viscous;
+            state.dv_mps = 0.0;
+        }
+    }
+
+    /// Viscous friction in N s/m and stiffness in N/m that the tip feels where it is.
+    fn resistance(&self, state: &LawState) -> (f64, f64) {
+        let viscous = self.slabs.iter().map(|s| s.friction_ns_per_m2 * s.inside_m(state.z_m)).sum();
+        let active = self.slabs.get(state.ruptured).filter(|s| state.z_m > s.front_m);
+        (viscous, active.map_or(0.0, |s| s.stiffness_n_per_m))
+    }
+
     /// Force at a trial position of the tip, with nothing breaking and nothing remembered.
     fn trial(&self, state: &mut LawState, step: &Step, u: f64) -> TissueForce {
         let (z_m, v_mps) = step.tip(u);
         let elastic = match self.slabs.get(state.ruptured) {
-            Some(slab) => self.elastic(slab, step.left, z_m, &mut state.memory),
+            Some(slab) => self.elastic(slab, step.dt, z_m, &mut state.memory),
             None => 0.0,
         };
         self.sum_up(&state.moment(state.time_s + step.dt, z_m, v_mps), elastic, &mut state.memory)
@@ -138,7 +195,11 @@ impl Law {
             }
         }
         let by_depth = 1.0 + by_depth.max(0.0) / self.needle_n_per_m;
-        if step.dt > 0.0 { step.dt * by_depth + friction / self.needle_n_per_m } else { by_depth }
+        if step.dt > 0.0 {
+            step.theta * step.dt * by_depth + friction / self.needle_n_per_m
+        } else {
+            by_depth
+        }
     }
 
     /// Solves `z_tip + f/k_s - z = 0` with the layers as they are.

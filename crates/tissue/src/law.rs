@@ -114,6 +114,19 @@ impl Law {
         &self.slabs
     }
 
+    /// The velocity in m/s that multiplies `sum b_i l_i` when the tip moves at `v_mps`: itself, unless an
+    /// effect changes the viscous friction.
+    #[must_use]
+    #[inline]
+    pub fn viscous_velocity(&self, v_mps: f64) -> f64 {
+        let (mut velocity, mut factor) = (v_mps, 1.0);
+        for effect in self.at(Place::Friction) {
+            velocity = effect.friction_velocity(velocity);
+            factor *= effect.friction_factor(v_mps);
+        }
+        velocity * factor
+    }
+
     /// Advances to the sample at `time_s` with tip position `z_m` and velocity `v_mps`, reports
     /// ruptures (in order; more than one when a step crosses several faces) and returns the force.
     ///
@@ -348,7 +361,8 @@ impl Law {
             2.0
         };
         let by_force = at_force <= at_face;
-        let at = at_force.min(at_face);
+        // Imposed ruptures may come without either: at the end of the step.
+        let at = at_force.min(at_face).min(1.0);
         Rupture {
             layer: state.ruptured + 1,
             time_s: state.time_s + at * dt,

@@ -17,6 +17,9 @@ pub struct LawState {
     /// Change of the velocity in the last step; only a needle that gives asks for it.
     pub(crate) dv_mps: f64,
     pub(crate) elastic_n: f64,
+    /// Position of the base, and whether it is known; only a needle that gives asks for them.
+    pub(crate) base_m: f64,
+    pub(crate) bent: bool,
     pub(crate) memory: Memories,
 }
 
@@ -30,6 +33,8 @@ impl Default for LawState {
             v_mps: 0.0,
             dv_mps: 0.0,
             elastic_n: 0.0,
+            base_m: 0.0,
+            bent: false,
             memory: [[0.0; 8]; MAX_EFFECTS],
         }
     }

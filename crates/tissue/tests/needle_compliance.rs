@@ -55,9 +55,7 @@ fn a_viscous_tissue_relaxes_the_needle_exponentially_in_a_hold() {
     let start = f[10_000].total_n;
     for k in (10_000..14_000).step_by(100) {
         let t = (k - 10_000) as f64 / 1000.0;
-        // Backward Euler of the spec's v_tip, exactly, and the exponential in the limit.
-        near(f[k].total_n, start * (1.0 + 0.001 / tau).powi(-(k as i32 - 10_000)), 1e-9);
-        near(f[k].total_n, start * (-t / tau).exp(), 3e-3 * start);
+        near(f[k].total_n, start * (-t / tau).exp(), 1e-9);
         near(tips[k], 0.05 - f[k].total_n / ks, 1e-12);
     }
 }
@@ -86,9 +84,31 @@ fn the_solution_converges_to_the_differential_equation_for_elastic_and_viscous_l
         let (_, tips, _) = bend(&block(k, b), &[spring(ks)], &motion);
         (tips[4 * rate] - z).abs()
     };
-    let (coarse, fine) = (error(200), error(2000));
-    assert!(coarse < 1e-5 && coarse > 1e-8, "{coarse:e}");
-    near(coarse / fine, 10.0, 0.5); // first order, as the specification's v_tip is
+    let (coarse, fine) = (error(100), error(400));
+    assert!(coarse < 1e-6 && coarse > 1e-12, "{coarse:e}");
+    assert!(coarse / fine > 10.0, "second order: {coarse:e} {fine:e}");
+}
+
+#[test]
+fn after_a_rupture_between_samples_the_force_is_the_same_at_every_sampling_rate() {
+    // Force lets go of 1 N with 180 Ns/m around the shaft and 5 kN/m of needle: 36 ms, seven samples.
+    let tissue = tissue(&[layer(0.05, 50.0, 9000.0, Some(1.0)), layer(0.05, 50.0, 9000.0, None)]);
+    let at = |rate: f64| {
+        let (f, _, ruptures) = bend(&tissue, &[spring(5000.0)], &constant(0.003, rate, 9.0));
+        assert_eq!(ruptures.len(), 1);
+        let every = (rate / 200.0) as usize;
+        (f.iter().step_by(every).map(|f| f.total_n).collect::<Vec<_>>(), ruptures[0])
+    };
+    let (exact, rupture) = at(20_000.0);
+    let first = (rupture.time_s * 200.0).ceil() as usize;
+    for rate in [200.0, 1000.0] {
+        let (f, again) = at(rate);
+        near(again.time_s, rupture.time_s, 1e-5);
+        for k in first..first + 60 {
+            near(f[k], exact[k], 2e-3);
+        }
+    }
+    assert!(exact[first - 1] - exact[first + 60] > 0.9);
 }
 
 #[test]

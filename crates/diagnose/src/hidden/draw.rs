@@ -45,8 +45,8 @@ pub struct Case {
     pub truth: Tissue,
     /// The recordings.
     pub recordings: Vec<Recording>,
-    /// Sample at which each layer had ruptured, per recording; `usize::MAX` for never.
-    pub ruptures: Vec<Vec<usize>>,
+    /// Instant (s) at which each layer ruptured, per recording; infinite for never.
+    pub ruptures: Vec<Vec<f64>>,
 }
 
 /// The ids that can be hidden.
@@ -123,13 +123,13 @@ fn simulate(
     path: &Path,
     phase_s: f64,
     noise: &mut dyn FnMut() -> f64,
-) -> ([Vec<f64>; 4], Vec<usize>) {
+) -> ([Vec<f64>; 4], Vec<f64>) {
     let layers = tissue.layers.len();
     let mut out = [const { Vec::new() }; 4];
-    let mut ruptures = vec![usize::MAX; layers];
+    let mut ruptures = vec![f64::INFINITY; layers];
     let Ok(law) = Law::new(tissue, &drawn.effects) else { return (out, ruptures) };
     let chain = Measurement::new(&drawn.effects);
-    let mut measuring = chain.start(SAMPLE_HZ);
+    let mut measuring = chain.start(SAMPLE_HZ * STEPS as f64);
     let mut state = LawState::default();
     let mut outside = drawn.outside.clone();
     if let Some(o) = &mut outside {
@@ -143,25 +143,22 @@ fn simulate(
         let [z, v, a] = path.at(t + phase_s);
         let force = law.step(&mut state, t, z, v, |r| {
             if let Some(slot) = ruptures.get_mut(r.layer - 1) {
-                *slot = k.div_ceil(STEPS);
+                *slot = r.time_s;
             }
         });
         let mut tissue_n = force.total_n;
         if let Some(o) = &mut outside {
             tissue_n += o.force(t, z, v, a, z.clamp(0.0, end));
         }
-        if k % STEPS == 0 {
-            let reading =
-                Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n: noise() };
+        let sampled = k % STEPS == 0;
+        let noise_n = if sampled { noise() } else { 0.0 };
+        let reading = Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
+        let recorded = chain.step(&mut measuring, &reading);
+        if sampled {
             out[0].push(t);
             out[1].push(chain.position(z));
             out[2].push(chain.position(v));
-            out[3].push(chain.step(&mut measuring, &reading));
-        }
-    }
-    for r in &mut ruptures {
-        if *r >= n {
-            *r = usize::MAX;
+            out[3].push(recorded);
         }
     }
     (out, ruptures)

@@ -111,7 +111,7 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
         Kind::Two => {
             let first = fitted[between(0.0, fitted.len() as f64 - 1e-9) as usize];
             let mut second = first;
-            while second.id == first.id {
+            while second.id == first.id || one_in_the_other(first.id, second.id) {
                 second = fitted[between(0.0, fitted.len() as f64 - 1e-9) as usize];
             }
             drawn.effects.extend(draw_effect(first, &mut between));
@@ -124,6 +124,12 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
         }
     }
     Sketch { kind, target, drawn }
+}
+
+/// Coulomb and Stribeck friction together are a Stribeck friction, exactly.
+fn one_in_the_other(a: &str, b: &str) -> bool {
+    let pair = ["coulomb_friction", "stribeck_friction"];
+    pair.contains(&a) && pair.contains(&b)
 }
 
 /// An effect with shapes drawn over plausible ranges and a first strength.

@@ -1,0 +1,190 @@
+//! Rivals: every effect from its best starts, screened on averages, the best fitted at full rate.
+
+use super::{Begun, Candidate, FAST_HZ, FINALISTS, Search};
+use crate::fit::{Data, Fit, Residuals, fit};
+use crate::look::{Look, Seen};
+use crate::model::Model;
+use crate::refine::{refine, seed_punctures};
+use crate::starts::{self, Start};
+use crate::track::NEVER;
+use rayon::prelude::*;
+
+impl Search {
+    /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened.
+    pub(super) fn contest(&self, standing: &Candidate) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
+        let data = self.data_of(standing);
+        let coarse = data.blocks(self.q, data.noise.blocks(self.q));
+        let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
+        let mut hints = self.hints(standing, &data);
+        if let Some(look) = Look::new(&stood.model, &coarse) {
+            hints.membranes = look.membranes(stood.model.assumed.surface_m, hints.depth_m);
+        }
+        let taken = standing.model.names();
+        let all: Vec<Start> = starts::all(&hints)
+            .into_iter()
+            .filter(|s| {
+                let fast = s.choice.info.id == "periodic_interference" && s.choice.values[1] > FAST_HZ;
+                !fast && (!taken.contains(&s.choice.info.id) || s.choice.info.id == "periodic_interference")
+            })
+            .collect();
+        let seen = looks(&stood.model, &data, &coarse, self.q, &all);
+        // The two best starts of each effect, three of those with several basins.
+        let mut chosen: Vec<&Seen> = Vec::new();
+        let mut order: Vec<&Seen> = seen.iter().collect();
+        order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        for s in order {
+            let id = s.start.choice.info.id;
+            let most = match id {
+                "boundary_shift" | "rate_dependent_puncture" | "position_scale" => 8,
+                "hidden_membrane" | "respiration" | "low_pass_lag" | "soft_boundary" => 3,
+                _ => 2,
+            };
+            if chosen.iter().filter(|c| c.start.choice.info.id == id).count() < most
+                && (s.gain > 1.0 || moves_events(id))
+            {
+                chosen.push(s);
+            }
+        }
+        // Two turns for all; the rest only for those that may still win.
+        let begun: Vec<Option<Begun>> = chosen
+            .par_iter()
+            .map(|s| {
+                let shifted = shift(&data, &s.start);
+                let there = if s.start.lead_m == 0.0 && s.start.lead_s == 0.0 {
+                    coarse.clone()
+                } else {
+                    shifted.blocks(self.q, shifted.noise.blocks(self.q))
+                };
+                let mut model = stood.model.with(s.start.choice.clone());
+                seed_punctures(&mut model, &there);
+                let f = fit(&model, &there, 2, 0.1)?;
+                Some((f, there, shifted.ruptures))
+            })
+            .collect();
+        let mut begun: Vec<Begun> = begun.into_iter().flatten().collect();
+        if !taken.contains(&"hidden_membrane") {
+            begun.extend(self.exchanged(&stood.model, &data));
+        }
+        begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
+        let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
+        let mut kept = 0;
+        begun.retain(|b| {
+            let gain = stood.nats - b.0.nats;
+            let keep = kept < 4 || (kept < 16 && gain > 0.3 * lead - 100.0);
+            kept += usize::from(keep);
+            keep
+        });
+        let fits: Vec<Option<(Fit, Vec<Vec<f64>>)>> = begun
+            .par_iter()
+            .map(|(f, there, ruptures)| Some((fit(&f.model, there, 6, 0.1)?, ruptures.clone())))
+            .collect();
+        let mut best: Vec<(Fit, Vec<Vec<f64>>)> = Vec::new();
+        for found in fits.into_iter().flatten() {
+            let id = found.0.model.names().last().copied();
+            match best.iter_mut().find(|b| b.0.model.names().last().copied() == id) {
+                Some(old) if old.0.nats > found.0.nats => *old = found,
+                Some(_) => {}
+                None => best.push(found),
+            }
+        }
+        best.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
+        let screened: Vec<(&'static str, f64)> = best
+            .iter()
+            .map(|b| (b.0.model.names().last().copied().unwrap_or(""), stood.nats - b.0.nats))
+            .collect();
+        best.truncate(FINALISTS);
+        let lead = best.first().map_or(0.0, |b| stood.nats - b.0.nats);
+        best.retain(|b| {
+            let gain = stood.nats - b.0.nats;
+            gain > 0.5 * lead - 40.0 && (gain > 2.5 || (gain > -400.0 && lead > 50.0))
+        });
+        let mut finalists: Vec<(Model, Vec<Vec<f64>>)> =
+            best.into_iter().map(|(f, r)| (f.model, r)).collect();
+        for c in self.sharp(standing, &data, lead > 30.0) {
+            finalists.push((standing.model.with(c), standing.ruptures.clone()));
+        }
+        for start in self.fast_lines(standing, &data) {
+            finalists.push((standing.model.with(start.choice), standing.ruptures.clone()));
+        }
+        let mut rivals: Vec<Candidate> = finalists
+            .par_iter()
+            .map(|(model, ruptures)| {
+                let mut there = Data { ruptures: ruptures.clone(), ..data.clone() };
+                let wide = matches!(
+                    model.names().last().copied().unwrap_or(""),
+                    "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration"
+                );
+                let f = refine(model, &mut there, if wide { 3 } else { 2 }, 5, wide)?;
+                Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+            })
+            .collect::<Vec<_>>()
+            .into_iter()
+            .flatten()
+            .collect();
+        rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
+        // The same effect from two roads.
+        let mut names: Vec<&str> = Vec::new();
+        rivals.retain(|r| {
+            let name = r.model.names().last().copied().unwrap_or("");
+            let new = !names.contains(&name);
+            names.push(name);
+            new
+        });
+        (rivals, screened)
+    }
+}
+
+/// Whether an effect shows in the instants of ruptures, where a linear look sees little.
+pub(super) fn moves_events(id: &str) -> bool {
+    matches!(
+        id,
+        "boundary_shift" | "position_scale" | "rate_dependent_puncture" | "needle_compliance" | "respiration"
+    )
+}
+
+/// Looks at all starts, in parallel; those that come with other instants of rupture on data of their own.
+pub(super) fn looks(model: &Model, data: &Data, coarse: &Data, q: usize, all: &[Start]) -> Vec<Seen> {
+    let plain: Vec<&Start> = all.iter().filter(|s| s.lead_m == 0.0 && s.lead_s == 0.0).collect();
+    let mut seen: Vec<Seen> = Vec::new();
+    if let Some(look) = Look::new(model, coarse) {
+        let found: Vec<Option<Seen>> =
+            plain.par_iter().map_init(Residuals::default, |work, s| look.at(s, work)).collect();
+        seen.extend(found.into_iter().flatten());
+    }
+    let shifted: Vec<Option<Seen>> = all
+        .par_iter()
+        .filter(|s| s.lead_m != 0.0 || s.lead_s != 0.0)
+        .map(|s| {
+            let there = shift(data, s);
+            let there = there.blocks(q, there.noise.blocks(q));
+            Look::new(model, &there)?.at(s, &mut Residuals::default())
+        })
+        .collect();
+    seen.extend(shifted.into_iter().flatten());
+    seen
+}
+
+/// The data with ruptures moved back to where they were before the drops showed.
+pub(super) fn shift(data: &Data, start: &Start) -> Data {
+    let mut out = data.clone();
+    if start.lead_s == 0.0 && start.lead_m == 0.0 {
+        return out;
+    }
+    for (track, ruptures) in data.tracks.iter().zip(&mut out.ruptures) {
+        let mut previous = track.before(1);
+        for r in ruptures.iter_mut().filter(|r| **r != NEVER) {
+            let mut at = *r - start.lead_s;
+            if start.lead_m > 0.0 {
+                let mut k = track.first_from(*r).min(track.len() - 1);
+                let edge = track.z[k] - start.lead_m;
+                while k > 1 && track.z[k - 1] > edge {
+                    k -= 1;
+                }
+                at = track.before(k);
+            }
+            *r = at.max(previous);
+            previous = *r;
+        }
+    }
+    out
+}

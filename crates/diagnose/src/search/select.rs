@@ -1,0 +1,175 @@
+//! What is taken, exchanged and pruned of the rivals.
+
+use super::{Candidate, Search, Stage, nats, own_noise};
+use crate::fit::Data;
+use crate::model::Model;
+use crate::refine::refine;
+use crate::thresholds;
+use rayon::prelude::*;
+
+impl Search {
+    /// One step of the forward selection; true when an effect was taken.
+    pub(super) fn stage(&mut self, standing: &Candidate) -> bool {
+        let (mut rivals, screened) = self.contest(standing);
+        let stood = standing.model.names();
+        let mut stage = Stage { stood, screened, rivals: Vec::new(), needed: thresholds::LEAST, taken: None };
+        if rivals.is_empty() {
+            self.stages.push(stage);
+            return false;
+        }
+        // The noise as the best model leaves it, for all rivals alike.
+        let noise = (self.data.dead_n == 0.0)
+            .then(|| own_noise(&rivals[0].model, &self.data_of(&rivals[0]), self.least_n()))
+            .flatten();
+        let before = self.data.noise;
+        self.data.noise = noise.unwrap_or(before);
+        let data = &self.data;
+        let first = rivals[0].fined();
+        let rescored: Vec<Option<Candidate>> = rivals
+            .par_iter()
+            .map(|r| {
+                let mut there = Data { ruptures: r.ruptures.clone(), ..data.clone() };
+                if r.fined() > first + 60.0 {
+                    return Some(Candidate { nats: nats(&r.model, &there), ..r.clone() });
+                }
+                let f = refine(&r.model, &mut there, 0, 3, false)?;
+                Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+            })
+            .collect();
+        rivals = rescored.into_iter().flatten().collect();
+        rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
+        let standing = self.refit_standing(standing, &rivals);
+        for r in &rivals {
+            let name = r.model.names().last().copied().unwrap_or("");
+            stage.rivals.push((name, standing.nats - r.nats, r.model.extra() - standing.model.extra()));
+        }
+        let Some(best) = rivals.first().cloned() else {
+            self.stages.push(stage);
+            return false;
+        };
+        let best = self.polished(&simplest(&rivals, &best));
+        stage.needed = self.settings.needed(best.model.names().last().copied().unwrap_or(""));
+        let gain = standing.nats - best.nats;
+        let taken = gain > stage.needed;
+        if standing.model.effects.is_empty() {
+            self.base = standing.clone();
+        }
+        if taken {
+            stage.taken = best.model.names().last().copied();
+            self.reference = best.fined();
+            self.best = best;
+            self.rivals = rivals;
+        } else {
+            self.best = standing;
+        }
+        self.stages.push(stage);
+        taken
+    }
+
+    /// The standing model fitted anew under the present noise, from its own optimum and those of its
+    /// best rivals.
+    pub(super) fn refit_standing(&self, standing: &Candidate, rivals: &[Candidate]) -> Candidate {
+        let count = standing.model.effects.len();
+        // A gain of thousands is no failure of the optimiser.
+        let ahead = rivals.first().map_or(0.0, |r| standing.nats - r.nats);
+        let more = if (4.0..2000.0).contains(&ahead) { 2 } else { 0 };
+        let roads: Vec<(Model, Vec<Vec<f64>>)> =
+            std::iter::once((standing.model.clone(), standing.ruptures.clone()))
+                .chain(rivals.iter().take(more).map(|r| {
+                    let mut model = r.model.clone();
+                    model.effects.truncate(count);
+                    (model, r.ruptures.clone())
+                }))
+                .collect();
+        let fits: Vec<Option<Candidate>> = roads
+            .par_iter()
+            .map(|(model, ruptures)| {
+                let mut there = Data { ruptures: ruptures.clone(), ..self.data.clone() };
+                let f = refine(model, &mut there, 1, 2, false)?;
+                Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+            })
+            .collect();
+        fits.into_iter()
+            .flatten()
+            .min_by(|a, b| a.nats.total_cmp(&b.nats))
+            .unwrap_or_else(|| standing.clone())
+    }
+
+    /// With several effects: each in turn is taken out and contested anew.
+    pub(super) fn exchange(&mut self) {
+        for index in 0..self.best.model.effects.len() {
+            let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures) else {
+                continue;
+            };
+            let (rivals, _) = self.contest(&without);
+            let Some(first) = rivals.first() else { continue };
+            let first = simplest(&rivals, first);
+            if first.fined() < self.best.fined() - 0.5 {
+                self.reference = first.fined();
+                self.best = first;
+                self.rivals = rivals;
+            }
+        }
+    }
+
+    /// The candidate fitted to the end.
+    pub(super) fn polished(&self, candidate: &Candidate) -> Candidate {
+        let mut there = self.data_of(candidate);
+        match refine(&candidate.model, &mut there, 3, 8, true) {
+            Some(f) if f.nats < candidate.nats => {
+                Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats }
+            }
+            _ => candidate.clone(),
+        }
+    }
+
+    pub(super) fn refitted(&self, model: &Model, ruptures: &[Vec<f64>]) -> Option<Candidate> {
+        let mut there = Data { ruptures: ruptures.to_vec(), ..self.data.clone() };
+        let f = refine(model, &mut there, 2, 5, true)?;
+        Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+    }
+
+    /// Takes out what is not needed.
+    pub(super) fn prune(&mut self) {
+        while self.best.model.effects.len() > 1 {
+            let mut least: Option<(f64, Candidate)> = None;
+            for index in 0..self.best.model.effects.len() {
+                let id = self.best.model.effects[index].info.id;
+                let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures)
+                else {
+                    continue;
+                };
+                let spare = without.nats - self.best.nats - self.settings.needed(id);
+                if spare < 0.0 && least.as_ref().is_none_or(|l| spare < l.0) {
+                    least = Some((spare, without));
+                }
+            }
+            match least {
+                Some((_, without)) => self.best = without,
+                None => break,
+            }
+        }
+    }
+}
+
+/// Nested models: the simplest wins unless the larger gains what its further numbers must.
+pub(super) fn simplest(rivals: &[Candidate], best: &Candidate) -> Candidate {
+    const NESTED: [(&str, &str); 3] = [
+        ("stribeck_friction", "coulomb_friction"),
+        ("presliding_friction", "coulomb_friction"),
+        ("hidden_membrane", "boundary_shift"),
+    ];
+    let name = best.model.names().last().copied().unwrap_or("");
+    for (larger, smaller) in NESTED {
+        if name == larger {
+            let small = rivals.iter().find(|r| r.model.names().last().copied() == Some(smaller));
+            if let Some(small) = small.filter(|_| larger != "hidden_membrane") {
+                let more = best.model.extra() - small.model.extra();
+                if small.nats - best.nats < 3.0 + 2.0 * more as f64 {
+                    return small.clone();
+                }
+            }
+        }
+    }
+    best.clone()
+}
