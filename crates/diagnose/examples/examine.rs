@@ -1,8 +1,8 @@
 //! Examines drawn cases of one kind and prints each:
-//! `cargo run --release -p stylet-diagnose --example examine -- single 0 54 [seed]`
+//! `cargo run --release -p stylet-diagnose --example examine -- single 0 54 [seed [ar2|scatter|velocity|and_outside]]`
 use rayon::prelude::*;
 use stylet_diagnose::benchmark::run;
-use stylet_diagnose::hidden::{Kind, sketch_of};
+use stylet_diagnose::hidden::{Harder, Kind, sketch_of};
 use stylet_diagnose::search::Settings;
 
 fn main() {
@@ -15,11 +15,20 @@ fn main() {
     };
     let number = |k: usize, default: u64| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (from, to, seed) = (number(2, 0), number(3, 27), number(4, 1));
+    let harder = match args.get(5).map(String::as_str) {
+        Some("ar2") => Some(Harder::Ar2),
+        Some("scatter") => Some(Harder::Scatter),
+        Some("velocity") => Some(Harder::Velocity),
+        Some("and_outside") => Some(Harder::AndOutside),
+        _ => None,
+    };
     let indices: Vec<u64> = (from..to).collect();
     let results: Vec<_> = indices
         .par_iter()
         .map(|&i| {
-            let r = run(i, &sketch_of(seed, i, kind, i), Settings::default());
+            let sketch = sketch_of(seed, i, kind, i);
+            let sketch = harder.map_or(sketch.clone(), |h| h.make(sketch));
+            let r = run(i, &sketch, Settings::default());
             if let Some(r) = &r {
                 println!(
                     "{:>3} {} {:?} {:.2} sd ar {} {:?}: {:?} {:?} truth {:?} gain {:?} rms {:.4?} left {:.1e} {:.0} expl {:.0} err {:?} {:.1} s",

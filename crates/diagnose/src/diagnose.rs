@@ -47,8 +47,9 @@ pub struct Examined {
 
 /// Rivals within so many nats of the best form one class.
 pub const CLASS_NATS: f64 = 3.0;
-/// Leftover structure counts from this p-value on.
-pub const LEFTOVER_P: f64 = 1e-4;
+/// Leftover structure counts from this p-value on: the noise's colour in air is known to a few hundred samples, so
+/// that clean data with strongly coloured noise reach 1e-5 now and then.
+pub const LEFTOVER_P: f64 = 1e-6;
 /// ... and dominates when it is more than this share of what the causes explain.
 pub const DOMINATES: f64 = 0.05;
 /// What remains is more than noise when its variance is so many times that in air ...

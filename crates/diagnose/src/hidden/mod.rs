@@ -11,4 +11,4 @@ mod plan;
 pub use draw::{Case, Drawn, SAMPLE_HZ, case, clean_force, library_ids, scenario};
 pub use motion::Motions;
 pub use outside::{OUTSIDE, Outside};
-pub use plan::{Kind, Size, Sketch, largest_force, scaled, sketch, sketch_of};
+pub use plan::{Harder, Kind, Size, Sketch, largest_force, scaled, sketch, sketch_of};

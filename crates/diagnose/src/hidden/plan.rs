@@ -126,6 +126,37 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
     Sketch { kind, target, drawn }
 }
 
+/// What makes a case harder than the diagnosis assumes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Harder {
+    /// Noise of second order.
+    Ar2,
+    /// Puncture forces that scatter 3 % between recordings.
+    Scatter,
+    /// Noise of 0.1 mm/s on the measured velocity.
+    Velocity,
+    /// An effect outside the library on top, about as strong.
+    AndOutside,
+}
+
+impl Harder {
+    /// The sketch made harder.
+    #[must_use]
+    pub fn make(self, mut sketch: Sketch) -> Sketch {
+        let drawn = &mut sketch.drawn;
+        match self {
+            Harder::Ar2 => drawn.ar = [1.3, -0.6],
+            Harder::Scatter => drawn.scatter = 0.03,
+            Harder::Velocity => drawn.velocity_noise_mps = 1e-4,
+            Harder::AndOutside => {
+                let kind = (drawn.seed % 8) as usize;
+                drawn.outside = Some(Outside::new(kind, [0.3, 0.5, 0.7, 0.4], 0.02 * sketch.target));
+            }
+        }
+        sketch
+    }
+}
+
 /// Coulomb and Stribeck friction together are a Stribeck friction, exactly.
 fn one_in_the_other(a: &str, b: &str) -> bool {
     let pair = ["coulomb_friction", "stribeck_friction"];
