@@ -107,8 +107,7 @@ impl Law {
             let dt = time_s - state.time_s;
             let (viscous, stiffness) = self.resistance(state);
             let tau = viscous / (self.needle_n_per_m + stiffness);
-            let step =
-                Step { dt, theta: theta(dt, tau), base_m, from_m: state.z_m, v_before: state.v_mps };
+            let step = Step { dt, theta: theta(dt, tau), base_m, from_m: state.z_m, v_before: state.v_mps };
             let Balance { z, v, force, stuck_n } = if let_go && dt <= 0.0 && viscous > 0.0 {
                 Balance { z: state.z_m, v: state.v_mps, force: None, stuck_n: None }
             } else {
