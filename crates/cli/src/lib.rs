@@ -11,6 +11,8 @@ pub mod exit;
 mod hash;
 mod output;
 mod picture;
+mod progress;
+mod reproduce;
 mod run;
 mod sweep;
 mod terminal;
@@ -34,6 +36,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),
+        Command::Reproduce(args) => reproduce::reproduce(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
     match outcome {

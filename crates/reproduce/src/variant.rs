@@ -1,19 +1,20 @@
 //! The ways in which the online algorithm is run.
 
 use stylet_core::EnhanceConfig;
-use stylet_core::config::{Depths, Model, Reset};
+use stylet_core::config::{Contact, Depths, Model, Reset};
 use stylet_scenario::Scenario;
 
-/// Thresholds on `trace P` that are tried for the threshold-triggered reset. The friction's entry stays
-/// near its prior of 1e6, so that what can be set is by how much the trace may exceed that.
-pub const TRACE_THRESHOLDS: [f64; 6] = [1.000_05e6, 1.000_2e6, 1.000_5e6, 1.001e6, 1.003e6, 1.01e6];
+/// Thresholds on `trace P` that are tried for the threshold-triggered reset; the prior's trace is 2e6. At
+/// constant velocity the friction's entry stays near 1e6 and the threshold must lie above that; where the
+/// speed varies it falls too and the threshold must lie below.
+pub const TRACE_THRESHOLDS: [f64; 8] = [1e5, 5e5, 9e5, 9.9e5, 9.99e5, 1.000_05e6, 1.000_5e6, 1.005e6];
 
 /// What is changed against the scenario's own configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Protocol {
     /// Nothing: depths unknown, 40 Hz resets, re-weighting, `s1` as published.
     Paper,
-    /// The layers' depths are known (the paper's 3-D model): a layer ends at the latest at its far face.
+    /// Surface and depths are known (the paper's 3-D model): a layer ends at the latest at its far face.
     KnownDepth,
     /// A CUSUM tuned to weak exits, `s1 = 0.03 N`: the lower end of what was published.
     Sensitive,
@@ -66,12 +67,16 @@ impl Variant {
         let thicknesses = || scenario.tissue.layers.iter().map(|l| l.thickness_m).collect();
         match self.protocol {
             Protocol::Paper => {}
-            Protocol::KnownDepth => config.depths = Depths::Known(thicknesses()),
+            Protocol::KnownDepth => {
+                config.contact = Contact::Known;
+                config.depths = Depths::Known(thicknesses());
+            }
             Protocol::Sensitive => config.cusum.sigma_rupture_n = 0.03,
             Protocol::OnlyRuptures => config.reset = Reset::Ruptures,
             Protocol::NoReweight => config.drop.reweight = false,
             Protocol::NoReweightKnown => {
                 config.drop.reweight = false;
+                config.contact = Contact::Known;
                 config.depths = Depths::Known(thicknesses());
             }
             Protocol::Trace(index) => {

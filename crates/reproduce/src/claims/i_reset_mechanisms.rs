@@ -54,7 +54,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
-        remark: "The threshold was tuned per target among six; at constant velocity the friction's share of the trace hardly moves, so \
+        remark: "The threshold was tuned per target among eight; at constant velocity the friction's share of the trace hardly moves, so \
                  that the threshold acts on the stiffness's share above 1e6."
             .to_owned(),
     }
