@@ -65,12 +65,7 @@ pub const TRANSITIONS: [Transition; 8] = {
         Compensated, CusumAlarm, DerivativeOff, DerivativeOn, DropOver, KnownFace, NextSample, Reversal,
         TrailingEdge,
     };
-    const fn arrow(
-        from: State,
-        to: State,
-        triggers: &'static [Trigger],
-        in_supplement: bool,
-    ) -> Transition {
+    const fn arrow(from: State, to: State, triggers: &'static [Trigger], in_supplement: bool) -> Transition {
         Transition { from, to, triggers, in_supplement }
     }
     [

@@ -30,7 +30,8 @@ fn runs() -> Vec<Vec<Output>> {
     }
     let config = EnhanceConfig::default();
     let forward = constant(0.02, 1);
-    let found = enhance(&config, &forward.samples).iter().position(|o| o.detection.is_some()).expect("a rupture");
+    let found =
+        enhance(&config, &forward.samples).iter().position(|o| o.detection.is_some()).expect("a rupture");
     let mut back = forward.samples;
     for sample in &mut back[found + 1..] {
         sample.velocity_mps = -0.0023;
@@ -41,7 +42,8 @@ fn runs() -> Vec<Vec<Output>> {
 
 #[test]
 fn runs_make_the_transitions_of_the_table_and_no_others() {
-    let table: BTreeSet<(usize, usize)> = TRANSITIONS.iter().map(|t| (number(t.from), number(t.to))).collect();
+    let table: BTreeSet<(usize, usize)> =
+        TRANSITIONS.iter().map(|t| (number(t.from), number(t.to))).collect();
     assert_eq!(table.len(), TRANSITIONS.len(), "an arrow stands in the table once");
     let mut seen = BTreeSet::new();
     for run in runs() {
@@ -69,7 +71,11 @@ fn a_rupture_is_declared_for_a_reason_that_the_table_gives() {
                     Cause::KnownFace => Trigger::KnownFace,
                 };
                 let arrow = TRANSITIONS.iter().find(|t| t.from == state && t.to == out.state);
-                assert!(arrow.is_some_and(|t| t.triggers.contains(&trigger)), "{state:?} to {:?}: {trigger:?}", out.state);
+                assert!(
+                    arrow.is_some_and(|t| t.triggers.contains(&trigger)),
+                    "{state:?} to {:?}: {trigger:?}",
+                    out.state
+                );
                 causes.insert(detection.cause.name());
             }
             state = out.state;

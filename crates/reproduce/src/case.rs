@@ -97,10 +97,7 @@ impl Case {
     /// noise of the joint torques moves the arm.
     #[must_use]
     pub const fn on_arm(self) -> bool {
-        matches!(
-            self,
-            Case::LiverArm | Case::AbdomenArm | Case::LiverArmFriction | Case::AbdomenArmFriction
-        )
+        matches!(self, Case::LiverArm | Case::AbdomenArm | Case::LiverArmFriction | Case::AbdomenArmFriction)
     }
 
     /// The scenario as it is simulated.
@@ -151,7 +148,11 @@ mod tests {
             Case::LiverQuadratic,
         ]) {
             case.scenario().expect("a valid file").check().expect("valid numbers");
-            assert_eq!(case.on_arm(), matches!(case.scenario().expect("valid").robot, Robot::Arm(_)), "{case:?}");
+            assert_eq!(
+                case.on_arm(),
+                matches!(case.scenario().expect("valid").robot, Robot::Arm(_)),
+                "{case:?}"
+            );
         }
     }
 }

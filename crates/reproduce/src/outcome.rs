@@ -90,7 +90,12 @@ impl Outcome {
     }
 }
 
-fn friction_only(recording: &Recording, force_n: &[f64], truth: &Truth, layers: &[LayerTruth]) -> Option<f64> {
+fn friction_only(
+    recording: &Recording,
+    force_n: &[f64],
+    truth: &Truth,
+    layers: &[LayerTruth],
+) -> Option<f64> {
     let (layer, rupture) = (layers.first()?, truth.ruptures.first()?);
     let (mut over, mut under) = (0.0, 0.0);
     for (s, f) in recording.samples().zip(force_n) {

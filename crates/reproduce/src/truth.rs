@@ -6,9 +6,9 @@ use crate::outcome::Outcome;
 use crate::spread::Spread;
 use crate::study::{NOISE_LEVELS_MN, NOISE_MN, Study};
 use crate::variant::{Protocol, Sensor, Variant};
-use stylet_report::{Block, Cell, Section, Status, SvgImage, Table, percent};
 use stylet_report::Colour;
 use stylet_report::svg::{FigureOptions, Strip, StripChart, StripGroup, strip_chart};
+use stylet_report::{Block, Cell, Section, Status, SvgImage, Table, percent};
 use stylet_score::Compared;
 
 type Row = (String, Case, u32, Sensor, Protocol);
@@ -82,7 +82,9 @@ fn strips(study: &Study, friction: bool) -> String {
             name: (*name).to_owned(),
             truth: Some(1.0),
             strips: (0..*layers)
-                .flat_map(|layer| [Variant::ml(Protocol::Paper), Variant::kv(Protocol::Paper)].map(|v| (layer, v)))
+                .flat_map(|layer| {
+                    [Variant::ml(Protocol::Paper), Variant::kv(Protocol::Paper)].map(|v| (layer, v))
+                })
                 .map(|(layer, variant)| Strip {
                     name: variant.model_name().to_owned(),
                     colour: if variant.kelvin_voigt { Colour::Blue } else { Colour::Vermillion },
@@ -101,14 +103,10 @@ fn strips(study: &Study, friction: bool) -> String {
         .collect();
     let label = if friction { "b estimated / true" } else { "K estimated / true" };
     strip_chart(
-        &StripChart {
-            label: label.to_owned(),
-            truth_label: "true".to_owned(),
-            groups,
-            height_px: 260.0,
-        },
+        &StripChart { label: label.to_owned(), truth_label: "true".to_owned(), groups, height_px: 260.0 },
         &FigureOptions {
-            title: if friction { "Friction b of every layer" } else { "Stiffness K of every layer" }.to_owned(),
+            title: if friction { "Friction b of every layer" } else { "Stiffness K of every layer" }
+                .to_owned(),
             subtitle: format!(
                 "layers from the left, ML and KV each; every dot one of {} noise seeds at 20 mN; cut at 4",
                 study.seeds
@@ -124,7 +122,8 @@ fn worst(study: &Study, case: Case, sensor: Sensor, variant: Variant) -> String 
     let runs = study.runs(case, NOISE_MN, sensor, variant);
     let layers = runs.first().map_or(0, |o| o.score.layers.len());
     let of = |friction: bool| {
-        let medians = (0..layers).filter_map(|i| Spread::of(runs.iter().map(|o| error(o, i, friction))).map(|s| s.median));
+        let medians = (0..layers)
+            .filter_map(|i| Spread::of(runs.iter().map(|o| error(o, i, friction))).map(|s| s.median));
         percent(medians.fold(f64::NAN, f64::max))
     };
     format!("K {}, b {}", of(false), of(true))
@@ -133,7 +132,10 @@ fn worst(study: &Study, case: Case, sensor: Sensor, variant: Variant) -> String 
 /// The pictures, for the files.
 #[must_use]
 pub fn pictures(study: &Study) -> [(&'static str, String); 2] {
-    [("stiffness_against_truth.svg", strips(study, false)), ("friction_against_truth.svg", strips(study, true))]
+    [
+        ("stiffness_against_truth.svg", strips(study, false)),
+        ("friction_against_truth.svg", strips(study, true)),
+    ]
 }
 
 /// The section of the page.
@@ -170,7 +172,8 @@ pub fn section(study: &Study, pictures: &[(&'static str, String)]) -> Section {
              seeds, of all true ruptures. Marked: median above 10 % (!) and above 50 % (✕).",
         );
     for (name, svg) in pictures {
-        section = section.block(Block::Svg(SvgImage { description: (*name).to_owned(), markup: svg.clone() }));
+        section =
+            section.block(Block::Svg(SvgImage { description: (*name).to_owned(), markup: svg.clone() }));
     }
     let arm = |case: Case, name: &str| -> Vec<Row> {
         vec![

@@ -5,7 +5,7 @@
 //! does in at least 90 % of the seeds, it *fails* when it does in at most 10 %; between, the noise decides.
 //! All conditions hold: **supported**. All fail: **not supported**. Otherwise: **depends on** what
 //! separates the conditions. The thresholds inside the statements stand in each claim's file; they were set
-//! before the numbers were seen and are not tuned.
+//! before the numbers were seen and are not tuned to the verdicts.
 
 use serde::{Serialize, Serializer};
 

@@ -1,9 +1,9 @@
 //! `stylet gate`: bounds on scores, a baseline, exit code 1 when a bound does not hold.
 
 use super::args::GateArgs;
-use crate::progress::Progress;
 use super::with_threads;
 use crate::exit::Failure;
+use crate::progress::Progress;
 use std::path::{Path, PathBuf};
 use stylet_sweep::gate::{Baseline, Judged, baseline, changes, describe, junit, load};
 

@@ -1,9 +1,9 @@
 //! `stylet sweep map`: the robustness map of several sweeps.
 
 use super::args::MapArgs;
-use crate::progress::Progress;
 use super::with_threads;
 use crate::exit::Failure;
+use crate::progress::Progress;
 use stylet_sweep::{Columns, Overrides, Sweep, map_rows, map_svg, rows};
 
 /// The command.

@@ -12,10 +12,10 @@ pub use gate::gate;
 pub use replay::replay;
 
 use crate::exit::Failure;
+use crate::progress::Progress;
 use crate::run::default_folder;
 use args::{SweepArgs, SweepCommand};
 use files::results;
-use crate::progress::Progress;
 use std::path::{Path, PathBuf};
 use stylet_report::{percent, significant};
 use stylet_sweep::shard::{self, ShardError, ShardNumber};

@@ -87,16 +87,14 @@ fn draw(canvas: &mut Canvas, arrow: &Arrow, from: (f64, f64), to: (f64, f64)) {
         .filter(|p| !inside(*p, from, 0.0) && !inside(*p, to, 3.0))
         .collect();
     let dash = if arrow.dashed { "dashed" } else { "" };
-    if let (Some(tip), Some(before)) = (points.last(), points.len().checked_sub(6).and_then(|i| points.get(i))) {
+    if let (Some(tip), Some(before)) =
+        (points.last(), points.len().checked_sub(6).and_then(|i| points.get(i)))
+    {
         let (ux, uy) = (tip.0 - before.0, tip.1 - before.1);
         let norm = ux.hypot(uy).max(1e-9);
         let (ux, uy) = (ux / norm, uy / norm);
         let back = (tip.0 - 11.0 * ux, tip.1 - 11.0 * uy);
-        let head = vec![
-            (back.0 - 5.0 * uy, back.1 + 5.0 * ux),
-            *tip,
-            (back.0 + 5.0 * uy, back.1 - 5.0 * ux),
-        ];
+        let head = vec![(back.0 - 5.0 * uy, back.1 + 5.0 * ux), *tip, (back.0 + 5.0 * uy, back.1 - 5.0 * ux)];
         canvas.path(&[head], 1.8, "l l-ink");
     }
     canvas.path(&[points], 1.6, &format!("l l-ink {dash}"));

@@ -101,7 +101,8 @@ fn draw(canvas: &mut Canvas, strip: &Strip, (x, width): (f64, f64), py: &dyn Fn(
     }
     let at = |q: f64| {
         let at = q * last as f64;
-        sorted[at.floor() as usize] + (at - at.floor()) * (sorted[at.ceil() as usize] - sorted[at.floor() as usize])
+        sorted[at.floor() as usize]
+            + (at - at.floor()) * (sorted[at.ceil() as usize] - sorted[at.floor() as usize])
     };
     let (low, middle, high) = (py(at(0.05)), py(at(0.5)), py(at(0.95)));
     let side = x + width * 0.26;

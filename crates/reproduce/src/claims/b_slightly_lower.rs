@@ -15,7 +15,10 @@ pub(super) fn claim(study: &Study) -> Claim {
     let online = Method::Online(Protocol::KnownDepth);
     let phantoms = 0..PHANTOMS.len();
     let online_over_offline = |phantom: usize, motion: usize, seed: usize| {
-        Some(estimate(study, phantom, motion, online, seed)? / estimate(study, phantom, motion, Method::Offline, seed)?)
+        Some(
+            estimate(study, phantom, motion, online, seed)?
+                / estimate(study, phantom, motion, Method::Offline, seed)?,
+        )
     };
     let sinusoidal_over_constant = |phantom: usize, method: Method, seed: usize| {
         Some(estimate(study, phantom, 1, method, seed)? / estimate(study, phantom, 0, method, seed)?)
@@ -26,7 +29,9 @@ pub(super) fn claim(study: &Study) -> Claim {
     for (motion, name) in MOTIONS.iter().enumerate() {
         conditions.push(Condition::new(
             format!("online below offline, {name}"),
-            seeds.clone().map(|seed| phantoms.clone().all(|p| slightly(online_over_offline(p, motion, seed)))),
+            seeds
+                .clone()
+                .map(|seed| phantoms.clone().all(|p| slightly(online_over_offline(p, motion, seed)))),
         ));
         for p in phantoms.clone() {
             let values = seeds.clone().map(|seed| online_over_offline(p, motion, seed));
@@ -36,7 +41,9 @@ pub(super) fn claim(study: &Study) -> Claim {
     for (name, method) in [("offline", Method::Offline), ("online", online)] {
         conditions.push(Condition::new(
             format!("sinusoidal below constant, {name}"),
-            seeds.clone().map(|seed| phantoms.clone().all(|p| slightly(sinusoidal_over_constant(p, method, seed)))),
+            seeds
+                .clone()
+                .map(|seed| phantoms.clone().all(|p| slightly(sinusoidal_over_constant(p, method, seed)))),
         ));
         for p in phantoms.clone() {
             let values = seeds.clone().map(|seed| sinusoidal_over_constant(p, method, seed));
@@ -48,7 +55,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         claim: "Online estimates, and those of sinusoidal motion, are slightly lower.",
         figure: "S Fig. 2, sec. III",
         rule: "In a seed, for all three phantoms (depths known), the ratio lies between 0.75 and 1.".to_owned(),
-        verdict: Verdict::of(&conditions, "method and motion"),
+        verdict: Verdict::of(&conditions, "method and motion: offline they are lower, online only the sinusoid's noise decides"),
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),

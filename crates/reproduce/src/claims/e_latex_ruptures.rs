@@ -24,11 +24,13 @@ pub(super) fn claim(study: &Study) -> Claim {
         id: 'e',
         claim: "Three ruptures are found in the latex stack, constant and sinusoidal.",
         figure: "S Fig. 7, M Fig. 12",
-        rule: "In a seed, all three true ruptures are found within a second and nothing else is declared.".to_owned(),
+        rule: "In a seed, all three true ruptures are found within a second and nothing else is declared."
+            .to_owned(),
         verdict: Verdict::of(&conditions, "motion and model"),
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
-        remark: "At 0.02 N of noise. The algorithm breaks down above that: see the table against the truth.".to_owned(),
+        remark: "At 0.02 N of noise. The algorithm breaks down above that: see the table against the truth."
+            .to_owned(),
     }
 }

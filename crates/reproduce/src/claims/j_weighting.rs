@@ -12,8 +12,8 @@ use crate::spread::Spread;
 use crate::study::{Insertion, ReproduceError};
 use crate::verdict::{Condition, Verdict};
 use stylet_core::Rls;
-use stylet_testbed::Measuring;
 use stylet_testbed::InsertionSample;
+use stylet_testbed::Measuring;
 use stylet_tissue::TissueForce;
 
 /// Up to rounding: relative to the largest force and parameter.

@@ -20,7 +20,13 @@ struct Spec {
 
 const SPECS: [Spec; 6] = {
     use Protocol::{KnownDepth, NoReweight, NoReweightKnown, OnlyRuptures, Paper};
-    const fn spec(number: &'static str, file: &'static str, case: Case, protocol: Protocol, beside: Protocol) -> Spec {
+    const fn spec(
+        number: &'static str,
+        file: &'static str,
+        case: Case,
+        protocol: Protocol,
+        beside: Protocol,
+    ) -> Spec {
         Spec { number, file, case, protocol, beside }
     }
     [
@@ -48,10 +54,15 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
     let mut all = vec![a.clone()];
     all.extend(b.iter().cloned());
     let look = match spec.protocol {
-        Protocol::OnlyRuptures => "The predicted force should leave the measured one, above all after abrupt drops.",
-        _ => "The predicted force should follow the measured one; the enhanced force should hardly differ from it.",
+        Protocol::OnlyRuptures => {
+            "The predicted force should leave the measured one, above all after abrupt drops."
+        }
+        _ => {
+            "The predicted force should follow the measured one; the enhanced force should hardly differ from it."
+        }
     };
-    let known = if spec.protocol == Protocol::NoReweightKnown { ", with surface and depth known" } else { "" };
+    let known =
+        if spec.protocol == Protocol::NoReweightKnown { ", with surface and depth known" } else { "" };
     Ok(Figure {
         number: spec.number,
         title: format!("{}: {what}", spec.case.name()),
@@ -62,7 +73,14 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
         ),
         force: Some(a),
         pictures: vec![picture(&b, "", "")],
-        files: vec![(spec.file, picture(&all, &format!("{}: {}", spec.number, scenario.name), &format!("{what}; noise seed {}", scenario.seed)))],
+        files: vec![(
+            spec.file,
+            picture(
+                &all,
+                &format!("{}: {}", spec.number, scenario.name),
+                &format!("{what}; noise seed {}", scenario.seed),
+            ),
+        )],
         tables: vec![table(study, spec, what)],
     })
 }

@@ -57,7 +57,10 @@ pub(super) fn figure(study: &Study) -> Figure {
             ],
         })
         .collect();
-    let seeds = format!("every dot a noise seed ({}); large dot and bar: median, 5th to 95th percentile", study.seeds);
+    let seeds = format!(
+        "every dot a noise seed ({}); large dot and bar: median, 5th to 95th percentile",
+        study.seeds
+    );
     let a = strip_chart(&chart(by_experiment), &options("(a) Estimates by experiment", &seeds));
     let b = strip_chart(
         &chart(by_phantom),
@@ -79,7 +82,13 @@ pub(super) fn figure(study: &Study) -> Figure {
 
 fn row(name: &str, spread: Option<Spread>, truth: Option<f64>) -> Vec<Cell> {
     let (Some(s), Some(truth)) = (spread, truth) else {
-        return vec![Cell::text(name), Cell::number("–"), Cell::number("–"), Cell::number("–"), Cell::number("0")];
+        return vec![
+            Cell::text(name),
+            Cell::number("–"),
+            Cell::number("–"),
+            Cell::number("–"),
+            Cell::number("0"),
+        ];
     };
     let error = s.mean / truth - 1.0;
     vec![
@@ -98,8 +107,13 @@ pub(super) fn table_one(study: &Study) -> Figure {
     for (p, phantom) in PHANTOMS.iter().enumerate() {
         let truth = true_friction(study, p);
         let of = |m, method| estimates(study, p, m, method);
-        let all = of(0, Method::Offline).chain(of(1, Method::Offline)).chain(of(0, ONLINE)).chain(of(1, ONLINE));
-        let name = format!("{}: all four (true {})", phantom.name, truth.map_or("–".to_owned(), |t| significant(t, 5)));
+        let all =
+            of(0, Method::Offline).chain(of(1, Method::Offline)).chain(of(0, ONLINE)).chain(of(1, ONLINE));
+        let name = format!(
+            "{}: all four (true {})",
+            phantom.name,
+            truth.map_or("–".to_owned(), |t| significant(t, 5))
+        );
         rows.push(row(&name, Spread::of(all), truth));
         for (m, motion) in MOTIONS.iter().enumerate() {
             rows.push(row(&format!("  offline, {motion}"), Spread::of(of(m, Method::Offline)), truth));
@@ -108,7 +122,8 @@ pub(super) fn table_one(study: &Study) -> Figure {
             rows.push(row(&format!("  online, {motion}, depth unknown"), Spread::of(unknown), truth));
         }
     }
-    let headers = ["isinglass", "mean b, N s/m²", "standard deviation", "error of the mean", "seeds with an estimate"];
+    let headers =
+        ["isinglass", "mean b, N s/m²", "standard deviation", "error of the mean", "seeds with an estimate"];
     Figure {
         number: "M Table I",
         title: "Friction coefficients: mean, spread, percentage error".to_owned(),

@@ -19,43 +19,111 @@ struct Spec {
     look: &'static str,
 }
 
-const fn spec(number: &'static str, file: &'static str, case: Case, protocol: Protocol, look: &'static str) -> Spec {
+const fn spec(
+    number: &'static str,
+    file: &'static str,
+    case: Case,
+    protocol: Protocol,
+    look: &'static str,
+) -> Spec {
     Spec { number, file, case, protocol, sensor: Sensor::ForceTorque, look }
 }
 
 const SUPPLEMENT: [Spec; 7] = [
-    spec("S Fig. 3", "figure_s03.svg", Case::Gel25Constant, Protocol::KnownDepth, "Behind the gel only friction is left: the enhanced force should be zero."),
-    spec("S Fig. 4", "figure_s04.svg", Case::Gel50Constant, Protocol::KnownDepth, "Behind the gel only friction is left: the enhanced force should be zero."),
-    spec("S Fig. 5", "figure_s05.svg", Case::Gel25Sinusoidal, Protocol::KnownDepth, "The supplement sees KV over-compensate here."),
-    spec("S Fig. 6", "figure_s06.svg", Case::Gel50Sinusoidal, Protocol::KnownDepth, "As Fig. 5 with the stronger gel."),
-    spec("S Fig. 7", "figure_s07.svg", Case::LatexSinusoidal, Protocol::Paper, "Three ruptures; compare with M Fig. 12, constant velocity."),
-    spec("S Fig. 8", "figure_s08.svg", Case::Liver, Protocol::Paper, "Two ruptures; compare with M Fig. 13, virtual sensor."),
-    spec("S Fig. 9", "figure_s09.svg", Case::Abdomen, Protocol::Paper, "Two ruptures; compare with M Fig. 14, virtual sensor."),
+    spec(
+        "S Fig. 3",
+        "figure_s03.svg",
+        Case::Gel25Constant,
+        Protocol::KnownDepth,
+        "Behind the gel only friction is left: the enhanced force should be zero.",
+    ),
+    spec(
+        "S Fig. 4",
+        "figure_s04.svg",
+        Case::Gel50Constant,
+        Protocol::KnownDepth,
+        "Behind the gel only friction is left: the enhanced force should be zero.",
+    ),
+    spec(
+        "S Fig. 5",
+        "figure_s05.svg",
+        Case::Gel25Sinusoidal,
+        Protocol::KnownDepth,
+        "The supplement sees KV over-compensate here.",
+    ),
+    spec(
+        "S Fig. 6",
+        "figure_s06.svg",
+        Case::Gel50Sinusoidal,
+        Protocol::KnownDepth,
+        "As Fig. 5 with the stronger gel.",
+    ),
+    spec(
+        "S Fig. 7",
+        "figure_s07.svg",
+        Case::LatexSinusoidal,
+        Protocol::Paper,
+        "Three ruptures; compare with M Fig. 12, constant velocity.",
+    ),
+    spec(
+        "S Fig. 8",
+        "figure_s08.svg",
+        Case::Liver,
+        Protocol::Paper,
+        "Two ruptures; compare with M Fig. 13, virtual sensor.",
+    ),
+    spec(
+        "S Fig. 9",
+        "figure_s09.svg",
+        Case::Abdomen,
+        Protocol::Paper,
+        "Two ruptures; compare with M Fig. 14, virtual sensor.",
+    ),
 ];
 
 const MAIN: [Spec; 3] = [
-    spec("M Fig. 12", "figure_m12.svg", Case::LatexConstant, Protocol::Paper, "Three ruptures at constant velocity."),
+    spec(
+        "M Fig. 12",
+        "figure_m12.svg",
+        Case::LatexConstant,
+        Protocol::Paper,
+        "Three ruptures at constant velocity.",
+    ),
     Spec {
         sensor: Sensor::Virtual,
-        ..spec("M Fig. 13", "figure_m13.svg", Case::LiverArm, Protocol::Paper, "The same two ruptures as in S Fig. 8, felt through the joint torques.")
+        ..spec(
+            "M Fig. 13",
+            "figure_m13.svg",
+            Case::LiverArm,
+            Protocol::Paper,
+            "The same two ruptures as in S Fig. 8, felt through the joint torques.",
+        )
     },
     Spec {
         sensor: Sensor::Virtual,
-        ..spec("M Fig. 14", "figure_m14.svg", Case::AbdomenArm, Protocol::Paper, "The same two ruptures as in S Fig. 9, felt through the joint torques.")
+        ..spec(
+            "M Fig. 14",
+            "figure_m14.svg",
+            Case::AbdomenArm,
+            Protocol::Paper,
+            "The same two ruptures as in S Fig. 9, felt through the joint torques.",
+        )
     },
 ];
 
 fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
     let scenario = spec.case.scenario()?;
     let insertion = Insertion::of(&scenario, scenario.seed)?;
-    let runs = [Variant::kv(spec.protocol), Variant::ml(spec.protocol)].map(|v| Run::of(&insertion, spec.sensor, v));
+    let runs =
+        [Variant::kv(spec.protocol), Variant::ml(spec.protocol)].map(|v| Run::of(&insertion, spec.sensor, v));
     let a = force(&insertion, spec.sensor, &runs, true);
     let b = coefficients(&insertion, &runs, true);
     let mut all = vec![a.clone()];
     all.extend(b.iter().cloned());
     let title = format!("{}: {}", spec.number, scenario.name);
     let sensor = format!("{} sensor, noise seed {}", spec.sensor.name(), scenario.seed);
-    let nothing = if runs.iter().any(visited) { "" } else { " In this seed nothing is found and nothing compensated." };
+    let nothing =
+        if runs.iter().any(visited) { "" } else { " In this seed nothing is found and nothing compensated." };
     let caption = format!(
         "Corresponds to {}. {}{nothing} Scenario: scenarios/{}{}.",
         if spec.number.starts_with('S') {
@@ -90,7 +158,9 @@ fn table(study: &Study, spec: &Spec) -> Table {
         _ => &[(Protocol::Paper, "depth unknown")],
     };
     let show = |s: Option<Spread>, text: &dyn Fn(f64) -> String| {
-        Cell::number(s.map_or("–".to_owned(), |s| format!("{} ({} to {})", text(s.median), text(s.p5), text(s.p95))))
+        Cell::number(
+            s.map_or("–".to_owned(), |s| format!("{} ({} to {})", text(s.median), text(s.p5), text(s.p95))),
+        )
     };
     let short = |x: f64| significant(x, 3);
     for (protocol, name) in protocols {

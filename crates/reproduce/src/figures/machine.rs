@@ -8,11 +8,11 @@ use stylet_report::{Cell, Table};
 /// Where a state stands in the drawing: the only thing that is not read from the core.
 const fn place(state: State) -> (f64, f64) {
     match state {
-        State::NoRupture => (170.0, 80.0),
-        State::ExpectedRupture => (560.0, 80.0),
-        State::DetectedRupture => (950.0, 80.0),
-        State::ForceDropMeasuring => (950.0, 300.0),
-        State::ForceCompensation => (170.0, 300.0),
+        State::NoRupture => (170.0, 160.0),
+        State::ExpectedRupture => (560.0, 160.0),
+        State::DetectedRupture => (950.0, 160.0),
+        State::ForceDropMeasuring => (950.0, 360.0),
+        State::ForceCompensation => (170.0, 360.0),
     }
 }
 
@@ -21,8 +21,8 @@ const fn bend(from: State, to: State) -> f64 {
     match (from, to) {
         (State::NoRupture, State::ExpectedRupture) => 26.0,
         (State::ExpectedRupture, State::NoRupture) => 26.0,
-        (State::NoRupture, State::DetectedRupture) => -100.0,
-        (State::DetectedRupture, State::ForceCompensation) => -20.0,
+        (State::NoRupture, State::DetectedRupture) => 108.0,
+        (State::DetectedRupture, State::ForceCompensation) => -24.0,
         _ => 0.0,
     }
 }
@@ -57,7 +57,7 @@ pub(super) fn figure() -> Figure {
                 dashed: !t.in_supplement,
             })
             .collect(),
-        height_px: 370.0,
+        height_px: 410.0,
     };
     let options = FigureOptions { width_px: 1120.0, ..FigureOptions::default() };
     let svg = state_machine(&diagram, &options);

@@ -40,7 +40,12 @@ fn instants(run: &Run, labels: bool) -> [MarkerSet; 2] {
             colour: Colour::Ink,
             style: LineStyle::Solid,
             side: Side::Left,
-            marks: run.trace.detections.iter().map(|d| (d.time_s, label(format!("rupture {}", d.layer)))).collect(),
+            marks: run
+                .trace
+                .detections
+                .iter()
+                .map(|d| (d.time_s, label(format!("rupture {}", d.layer))))
+                .collect(),
         },
         MarkerSet {
             name: "compensated, t_r + T_drop".to_owned(),
@@ -60,28 +65,26 @@ fn with_instants(chart: Chart, run: &Run, labels: bool) -> Chart {
 /// Measured (green), predicted, and the force enhanced by every run; markers of the last run.
 pub(super) fn force(insertion: &Insertion, sensor: Sensor, runs: &[Run], enhanced: bool) -> Chart {
     let t = time(insertion);
-    let mut chart = Chart::new("(a) Force", TIME, "Force (N)").height(330).with_series(
-        Series::line("measured", Colour::Green, t.clone(), insertion.force_n(sensor).to_vec()).width(1.1),
-    );
+    let mut chart = Chart::new("(a) Force", TIME, "Force (N)").height(330);
     if let Some(run) = runs.last() {
-        let touched = run.trace.state.iter().zip(&run.trace.stiffness_n_per_m);
-        let predicted: Vec<f64> = run
-            .trace
-            .reconstructed_n
-            .iter()
-            .zip(touched)
-            .map(|(f, (_, k))| if k.is_finite() { *f } else { f64::NAN })
-            .collect();
-        chart = chart.with_series(Series::line("predicted (ML)", Colour::Orange, t.clone(), predicted).width(1.1));
+        let predicted = run.trace.reconstructed_n.iter().zip(&run.trace.stiffness_n_per_m);
+        let predicted = predicted.map(|(f, k)| if k.is_finite() { *f } else { f64::NAN }).collect();
+        chart = chart
+            .with_series(Series::line("predicted (ML)", Colour::Orange, t.clone(), predicted).width(2.6));
     }
     for run in runs.iter().filter(|_| enhanced) {
         let name = format!("enhanced, {}", run.name());
-        chart = chart.with_series(Series::line(name, run.colour, t.clone(), run.trace.enhanced_n.clone()).width(1.3));
+        chart = chart
+            .with_series(Series::line(name, run.colour, t.clone(), run.trace.enhanced_n.clone()).width(1.3));
     }
+    // Above the others: the enhanced force is the measured one until something is compensated.
+    let measured = insertion.force_n(sensor).to_vec();
+    chart = chart.with_series(Series::line("measured", Colour::Green, t.clone(), measured).width(1.0));
     if enhanced {
         let truth = insertion.simulation.truth.tip_force_n.clone();
-        chart = chart
-            .with_series(Series::line("true tip force", Colour::Ink, t, truth).styled(LineStyle::Dashed).width(1.2));
+        chart = chart.with_series(
+            Series::line("true tip force", Colour::Ink, t, truth).styled(LineStyle::Dashed).width(1.2),
+        );
     }
     match runs.last() {
         Some(run) => with_instants(chart, run, true),
@@ -114,7 +117,11 @@ fn held(spans: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// The a posteriori estimates of a run, each over the time in which its layer was traversed.
-fn afterwards(insertion: &Insertion, run: &Run, value: impl Fn(&stylet_core::LayerEstimate) -> f64) -> (Vec<f64>, Vec<f64>) {
+fn afterwards(
+    insertion: &Insertion,
+    run: &Run,
+    value: impl Fn(&stylet_core::LayerEstimate) -> f64,
+) -> (Vec<f64>, Vec<f64>) {
     let contact = run.trace.contact_s.or(insertion.simulation.truth.surface_contact_s).unwrap_or(0.0);
     let ends: Vec<f64> = run.trace.detections.iter().map(|d| d.time_s).collect();
     held(run.trace.estimates.iter().filter_map(|e| {
@@ -125,7 +132,8 @@ fn afterwards(insertion: &Insertion, run: &Run, value: impl Fn(&stylet_core::Lay
 }
 
 fn truth_line(insertion: &Insertion, value: impl Fn(&stylet_score::LayerTruth) -> f64) -> Series {
-    let (x, y) = held(spans(insertion).into_iter().map(|(from, to, i)| (from, to, value(&insertion.layers[i]))));
+    let (x, y) =
+        held(spans(insertion).into_iter().map(|(from, to, i)| (from, to, value(&insertion.layers[i]))));
     Series::line("true", Colour::Ink, x, y).styled(LineStyle::Dashed).width(1.6)
 }
 
@@ -150,8 +158,13 @@ fn coefficient(
     let mut kept: Vec<Series> = truth.into_iter().collect();
     let mut high = 0.0f64;
     for run in runs {
-        let online = Series::line(format!("{} online", run.name()), run.colour, time(insertion), column(&run.trace).clone())
-            .width(0.8);
+        let online = Series::line(
+            format!("{} online", run.name()),
+            run.colour,
+            time(insertion),
+            column(&run.trace).clone(),
+        )
+        .width(0.8);
         let (x, y) = afterwards(insertion, run, &estimate);
         kept.push(Series::line(format!("{} a posteriori", run.name()), run.colour, x, y).width(3.2));
         high = high.max(range(&kept, &online).1);
@@ -202,10 +215,13 @@ pub(super) fn coefficients(insertion: &Insertion, runs: &[Run], cumulative: bool
         let mut chart = Chart::new("", TIME, "D (N s/m)").height(130);
         for run in runs {
             let d = run.trace.cumulative_friction_ns_per_m.clone();
-            chart = chart.with_series(Series::line(format!("{} a posteriori", run.name()), run.colour, t.clone(), d).width(2.4));
+            chart = chart.with_series(
+                Series::line(format!("{} a posteriori", run.name()), run.colour, t.clone(), d).width(2.4),
+            );
         }
         let truth = insertion.simulation.truth.cumulative_friction_ns_per_m.clone();
-        chart = chart.with_series(Series::line("true", Colour::Ink, t, truth).styled(LineStyle::Dashed).width(1.6));
+        chart = chart
+            .with_series(Series::line("true", Colour::Ink, t, truth).styled(LineStyle::Dashed).width(1.6));
         charts.push(match runs.last() {
             Some(run) => with_instants(chart, run, false),
             None => chart,
