@@ -7,7 +7,7 @@ use stylet_scenario::Scenario;
 /// Thresholds on `trace P` that are tried for the threshold-triggered reset; the prior's trace is 2e6. At
 /// constant velocity the friction's entry stays near 1e6 and the threshold must lie above that; where the
 /// speed varies it falls too and the threshold must lie below.
-pub const TRACE_THRESHOLDS: [f64; 8] = [1e5, 5e5, 9e5, 9.9e5, 9.99e5, 1.000_05e6, 1.000_5e6, 1.005e6];
+pub const TRACE_THRESHOLDS: [f64; 8] = [9e5, 9.9e5, 1.000_05e6, 1.000_5e6, 1.005e6, 1.02e6, 1.1e6, 1.4e6];
 
 /// What is changed against the scenario's own configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
