@@ -25,6 +25,9 @@ fn runs() -> Vec<Vec<Output>> {
         }
         let known = EnhanceConfig { depths: Depths::Known(vec![0.01, 0.02, 0.02]), ..config.clone() };
         runs.push(enhance(&known, &constant(0.02, 1).samples));
+        // A slope below the derivative's threshold: the CUSUM alone sees the drop.
+        let slow = |_| 0.0008;
+        runs.push(enhance(&config, &insertion(&three_gels(), -0.002, 45.0, 200.0, 0.02, 1, slow).samples));
         let hold = |t: f64| if (20.0..23.0).contains(&t) { 0.0 } else { 0.0023 };
         runs.push(enhance(&config, &insertion(&three_gels(), -0.005, 50.0, 200.0, 0.02, 1, hold).samples));
     }
