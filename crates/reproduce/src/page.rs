@@ -15,6 +15,16 @@ fn status(verdict: &Verdict) -> Status {
     }
 }
 
+/// The claim's main numbers.
+fn headline(claim: &Claim) -> String {
+    let shown = claim.headline.iter().filter_map(|wanted| {
+        let s = claim.numbers.get(*wanted)?;
+        let text = |x: f64| significant(x, 3);
+        Some(format!("{wanted}: {} ({} to {})", text(s.median), text(s.p5), text(s.p95)))
+    });
+    shown.collect::<Vec<_>>().join("; ")
+}
+
 fn summary(claims: &[Claim], seeds: u64) -> Section {
     let rows = claims
         .iter()
@@ -26,6 +36,7 @@ fn summary(claims: &[Claim], seeds: u64) -> Section {
                 Cell::text(c.figure),
                 Cell::text(c.verdict.words()).status(status(&c.verdict)),
                 Cell::text(shares.join(" · ")),
+                Cell::text(headline(c)),
             ]
         })
         .collect();
@@ -37,7 +48,13 @@ fn summary(claims: &[Claim], seeds: u64) -> Section {
              S: supplement, M: main paper."
         ))
         .table(Table {
-            headers: ["claim", "figure", "verdict", "seeds in which it holds, by condition"].map(String::from).to_vec(),
+            headers: [
+                "claim",
+                "figure",
+                "verdict",
+                "seeds in which it holds, by condition",
+                "our numbers: median (5th to 95th percentile)",
+            ].map(String::from).to_vec(),
             rows,
             ..Table::default()
         })

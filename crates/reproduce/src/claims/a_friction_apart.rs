@@ -62,6 +62,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["b of 25 % constant online, depth known N s/m²", "b of 50 % constant online, depth known N s/m²", "b of 70 % constant online, depth known N s/m²"],
         remark: "True: 6000, 12 000, 16 000 N s/m². Offline is the supplement's assumption, all force is friction: it takes the \
                  small elastic force for friction too, K/v on top of b."
             .to_owned(),

@@ -59,6 +59,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["online / offline, 50 % constant", "online / offline, 50 % sinusoidal", "sinusoidal / constant, 50 % offline", "sinusoidal / constant, 50 % online"],
         remark: "Where all force is taken for friction, the estimate is b + K/v on average: a faster motion, as the sinusoid is, \
                  gives less. That alone makes offline sinusoidal estimates lower, without any property of the gel."
             .to_owned(),

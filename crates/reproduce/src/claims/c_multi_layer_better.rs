@@ -64,6 +64,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["isinglass 50 %, constant, depth known, KV", "isinglass 50 %, constant, depth known, ML", "tip force, liver, force/torque sensor, KV", "tip force, liver, force/torque sensor, ML"],
         remark: "Where neither model finds the exit, nothing is compensated, both leave the whole force and neither is nearer to zero. On the liver KV takes away \
                  too much behind the first rupture; that happens to remove local friction too and so comes nearer to the elastic force alone (S Fig. 8)."
             .to_owned(),

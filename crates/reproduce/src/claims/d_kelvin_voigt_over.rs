@@ -34,6 +34,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["D / true D, KV, depth known", "D / true D, KV, depth unknown, s1 = 0.03 N"],
         remark: "Behind the gel f = D v, so that D above the true one is an enhanced force below zero. A ratio of zero: nothing was \
                  compensated."
             .to_owned(),

@@ -30,6 +30,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["delay ms, latex stack, constant, ML", "delay ms, latex stack, sinusoidal, ML"],
         remark: "At 0.02 N of noise. The algorithm breaks down above that: see the table against the truth."
             .to_owned(),
     }

@@ -41,6 +41,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["delay ms, bovine liver on the arm, force/torque sensor", "delay ms, bovine liver on the arm, virtual sensor", "delay ms, abdomen on the arm, virtual sensor"],
         remark: "The virtual sensor runs with a detection adapted to its lag (s1 = 0.015 N). The last two rows add to the joint torques the \
                  friction that was measured on a Panda; it is left out of the model, as if it had not been identified."
             .to_owned(),

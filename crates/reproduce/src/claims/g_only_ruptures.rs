@@ -41,6 +41,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["RMS error / that at 40 Hz, isinglass 70 %, constant", "RMS error / that at 40 Hz, latex stack, sinusoidal", "RMS error / that at 40 Hz, bovine liver, constant", "RMS error / that at 40 Hz, bovine liver, quadratic elasticity"],
         remark: "The base law is the multi-layer model itself, which resets can help only where ruptures are missed or false or the prior is wrong. Real tissue is \
                  not linear: the last row shows what a measured quadratic elasticity does."
             .to_owned(),

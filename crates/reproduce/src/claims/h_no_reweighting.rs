@@ -47,6 +47,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["RMS error / RMS force, latex stack, sinusoidal", "RMS error / RMS force, bovine liver, constant", "D / true D without, latex stack, sinusoidal", "D / true D without, bovine liver, constant"],
         remark: "The single gel with its depth known, so that there is something to compensate. At 2.3 mm/s the friction's column of the \
                  regressor is 0.0023 of the other: with equal priors nearly all force goes to the stiffness."
             .to_owned(),

@@ -70,6 +70,7 @@ pub(super) fn claim(study: &Study) -> Claim {
         seeds: study.seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["enhanced force off by, latex stack, sinusoidal, 40 Hz", "enhanced force off by, latex stack, sinusoidal, trace P below 1400000", "enhanced force off by, abdomen, sinusoidal, 40 Hz", "enhanced force off by, abdomen, sinusoidal, trace P below 1400000"],
         remark: "The threshold was tuned per target among eight; at constant velocity the friction's share of the trace hardly moves, so \
                  that the threshold acts on the stiffness's share above 1e6."
             .to_owned(),

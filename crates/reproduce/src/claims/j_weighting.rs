@@ -101,6 +101,7 @@ pub(super) fn claim(seeds: u64) -> Result<Claim, ReproduceError> {
         seeds,
         conditions,
         numbers: numbers(list),
+        headline: &["largest relative difference, powers of two", "largest relative difference, W, eq. 17: 1/v"],
         remark: "An algebraic identity; it holds for one start of the recursion, and so for every reset of the covariance.".to_owned(),
     })
 }

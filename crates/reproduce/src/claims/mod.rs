@@ -37,6 +37,9 @@ pub struct Claim {
     pub conditions: Vec<Condition>,
     /// Our numbers with their spread.
     pub numbers: BTreeMap<String, Spread>,
+    /// Those of them that stand in the table of all claims.
+    #[serde(skip)]
+    pub headline: &'static [&'static str],
     /// What the numbers mean, and why the testbed says so.
     pub remark: String,
 }
