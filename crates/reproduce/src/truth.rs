@@ -8,7 +8,7 @@ use crate::study::{NOISE_LEVELS_MN, NOISE_MN, Study};
 use crate::variant::{Protocol, Sensor, Variant};
 use stylet_report::Colour;
 use stylet_report::svg::{FigureOptions, Strip, StripChart, StripGroup, strip_chart};
-use stylet_report::{Block, Cell, Section, Status, SvgImage, Table, percent};
+use stylet_report::{Block, Cell, Section, Status, SvgImage, Table, percent, significant};
 use stylet_score::Compared;
 
 type Row = (String, Case, u32, Sensor, Protocol);
@@ -22,8 +22,10 @@ fn error(outcome: &Outcome, layer: usize, friction: bool) -> Option<f64> {
 fn cell(spread: Option<Spread>) -> Cell {
     match spread {
         Some(s) if s.n * 2 < s.of => Cell::number(format!("{} of {}", s.n, s.of)).status(Status::Bad),
-        Some(s) => Cell::number(format!("{} ({})", percent(s.median), percent(s.p95)))
-            .status(Status::at_most(s.median, 0.1, 0.5)),
+        Some(s) => {
+            Cell::number(format!("{} ({})", significant(100.0 * s.median, 2), significant(100.0 * s.p95, 2)))
+                .status(Status::at_most(s.median, 0.1, 0.5))
+        }
         None => Cell::number("none").status(Status::Bad),
     }
 }
@@ -51,9 +53,9 @@ fn table(study: &Study, title: &str, layers: usize, rows: &[Row]) -> Table {
         }
     }
     let mut headers = vec!["".to_owned(), "model".to_owned(), "missed / false".to_owned()];
-    headers.extend((1..=layers).map(|i| format!("K{i}")));
-    headers.extend((1..=layers).map(|i| format!("b{i}")));
-    headers.push("D".to_owned());
+    headers.extend((1..=layers).map(|i| format!("K{i} %")));
+    headers.extend((1..=layers).map(|i| format!("b{i} %")));
+    headers.push("D %".to_owned());
     Table { title: title.to_owned(), headers, rows: out, ..Table::default() }
 }
 
@@ -167,7 +169,7 @@ pub fn section(study: &Study, pictures: &[(&'static str, String)]) -> Section {
             at(Case::AbdomenArm, Virtual, kv),
         ))
         .text(
-            "In the tables: relative error, median over the seeds with an estimate and in brackets the 95th percentile; where fewer than half of the \
+            "In the tables: relative error in %, median over the seeds with an estimate and in brackets the 95th percentile; where fewer than half of the \
              seeds gave an estimate, how many did. An estimate counts when its rupture was found within a second. Missed and false ruptures over all \
              seeds, of all true ruptures. Marked: median above 10 % (!) and above 50 % (✕).",
         );
