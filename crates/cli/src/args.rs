@@ -34,6 +34,23 @@ pub enum Command {
     Effects(EffectsArgs),
     /// Examine a part of Stylet on many drawn cases.
     Benchmark(BenchmarkArgs),
+    /// Re-make the paper's figures and judge its claims, on one page.
+    Reproduce(ReproduceArgs),
+}
+
+/// Arguments of `stylet reproduce`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  stylet reproduce --out out/paper
+
+The folder then holds index.html (open it beside the paper's supplement), claims.json and every figure
+as SVG. The same seeds give the same bytes for any number of threads.")]
+pub struct ReproduceArgs {
+    #[command(flatten)]
+    pub results: Results,
+    /// Number of noise seeds; fewer than 50 are a quick look.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(2..=100_000))]
+    pub seeds: u64,
 }
 
 /// Where results go and what is said meanwhile: the same for every command that makes a folder.

@@ -11,9 +11,11 @@ pub mod exit;
 mod hash;
 mod output;
 mod picture;
+mod progress;
 mod repeats;
 mod repeats_online;
 mod repeats_report;
+mod reproduce;
 mod run;
 mod specimens;
 mod sweep;
@@ -38,6 +40,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),
+        Command::Reproduce(args) => reproduce::reproduce(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
     match outcome {

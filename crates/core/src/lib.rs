@@ -33,9 +33,11 @@ mod line;
 mod reweigh;
 mod rls;
 mod sample;
+mod transition;
 
 pub use compensation::MAX_LAYERS;
 pub use config::EnhanceConfig;
 pub use enhancer::Enhancer;
 pub use rls::Rls;
 pub use sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
+pub use transition::{TRANSITIONS, Transition, Trigger};

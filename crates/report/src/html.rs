@@ -21,6 +21,8 @@ const ERROR_TRAP: &str = "addEventListener('error',function(e){var d=document.do
 d.dataset.errors=(d.dataset.errors||'')+e.message+'\\n'});";
 /// Nothing is fetched, whatever the page says.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+/// A cell with more characters of text is broken into lines.
+const LONG_CELL: usize = 48;
 const DISCLAIMER: &str = "Research software, not a medical device.";
 
 /// The whole file.
@@ -218,6 +220,8 @@ fn render_cell(out: &mut String, cell: &Cell, heading: bool) {
     let mut classes: Vec<&str> = Vec::new();
     if cell.numeric {
         classes.push("n");
+    } else if cell.text.chars().count() > LONG_CELL {
+        classes.push("long");
     }
     if cell.status != Status::Plain {
         classes.push(cell.status.class());

@@ -1,9 +1,9 @@
 //! `stylet gate`: bounds on scores, a baseline, exit code 1 when a bound does not hold.
 
 use super::args::GateArgs;
-use super::progress::Progress;
 use super::with_threads;
 use crate::exit::Failure;
+use crate::progress::Progress;
 use std::path::{Path, PathBuf};
 use stylet_sweep::gate::{Baseline, Judged, baseline, changes, describe, junit, load};
 
@@ -15,7 +15,7 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let gates = load(&args.gates, args.seed)?;
     let at = args.baseline.clone().unwrap_or_else(|| args.gates.with_extension("baseline.json"));
     let old = read(&at)?;
-    let progress = Progress::new(gates.iter().map(|g| g.trials()).sum(), false);
+    let progress = Progress::new(gates.iter().map(|g| g.trials()).sum(), "trials", false);
     let judged: Vec<Judged> = with_threads(args.threads.unwrap_or(0), || {
         let all: Result<Vec<Vec<Judged>>, _> =
             gates.iter().map(|gate| gate.judge(&|n| progress.advance(n))).collect();

@@ -1,9 +1,9 @@
 //! `stylet sweep map`: the robustness map of several sweeps, as a table on the terminal and as SVG.
 
 use super::args::MapArgs;
-use super::progress::Progress;
 use super::with_threads;
 use crate::exit::Failure;
+use crate::progress::Progress;
 use stylet_sweep::{Columns, MapRow, Overrides, Sweep, map_rows, map_svg, rows};
 
 /// The command.
@@ -11,7 +11,7 @@ pub fn map(args: &MapArgs) -> Result<(), Failure> {
     let overrides = Overrides { trials: args.trials, seed: None };
     let sweeps: Vec<Sweep> =
         args.sweeps.iter().map(|file| Sweep::load(file, overrides)).collect::<Result<_, _>>()?;
-    let progress = Progress::new(sweeps.iter().map(Sweep::trials).sum(), false);
+    let progress = Progress::new(sweeps.iter().map(Sweep::trials).sum(), "trials", false);
     let mut map = Vec::new();
     for sweep in &sweeps {
         let columns = Columns::new(sweep);

@@ -4,7 +4,7 @@ pub mod args;
 mod files;
 mod gate;
 mod map;
-mod progress;
+
 mod replay;
 mod shards;
 
@@ -12,10 +12,10 @@ pub use gate::gate;
 pub use replay::replay;
 
 use crate::exit::Failure;
+use crate::progress::Progress;
 use crate::run::default_folder;
 use args::{SweepArgs, SweepCommand};
 use files::results;
-use progress::Progress;
 use std::path::{Path, PathBuf};
 use stylet_report::{percent, significant};
 use stylet_sweep::shard::{self, ShardError, ShardNumber};
@@ -67,7 +67,7 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     let out = args.results.out.clone().unwrap_or_else(|| default_folder(file));
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     begin(&sweep, &columns, &out, of, args.resume)?;
-    let progress = Progress::new(sweep.trials(), args.results.quiet);
+    let progress = Progress::new(sweep.trials(), "trials", args.results.quiet);
     let rows =
         with_threads(args.threads.unwrap_or(0), || all_shards(&sweep, &columns, &out, of, &progress))??;
     progress.finish();

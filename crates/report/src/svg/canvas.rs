@@ -73,6 +73,18 @@ impl Canvas {
         );
     }
 
+    /// A box with round corners.
+    pub(super) fn rounded(&mut self, x: f64, y: f64, width: f64, height: f64, class: &str) {
+        let _ = writeln!(
+            self.body,
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" rx=\"12\" class=\"{class}\"/>",
+            coordinate(x),
+            coordinate(y),
+            coordinate(width),
+            coordinate(height)
+        );
+    }
+
     pub(super) fn line(&mut self, from: (f64, f64), to: (f64, f64), class: &str) {
         let _ = writeln!(
             self.body,
@@ -195,7 +207,7 @@ fn style(theme: Theme) -> String {
         "text{{font:12px {FONT}}}.h{{font-size:18px;font-weight:650}}.s{{font-size:13px}}.b{{font-weight:600}}.t{{font-size:11.5px}}\
          .l{{fill:none;stroke-linejoin:round}}.dashed{{stroke-dasharray:7 4}}.dotted{{stroke-dasharray:1.5 3.5;stroke-width:2}}\
          .m{{stroke-width:1.5;fill:none}}.area{{fill-opacity:.13;stroke:none}}.halo{{paint-order:stroke;stroke-width:3.5px;stroke-linejoin:round}}\
-         .grid{{fill:none;stroke-width:1}}.frame{{fill:none;stroke-width:1}}.p{{stroke-width:1.3}}.rest{{fill-opacity:.35}}"
+         .grid{{fill:none;stroke-width:1}}.frame{{fill:none;stroke-width:1}}.p{{stroke-width:1.3}}.rest{{fill-opacity:.35}}.faint{{fill-opacity:.28}}"
     );
     match theme {
         Theme::Light => fixed + &colours(false),

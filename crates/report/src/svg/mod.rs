@@ -1,16 +1,21 @@
 //! Still pictures: SVG text without scripts or fonts of its own, the same bytes for the same numbers.
 //!
 //! [`figure`] stacks charts over one abscissa, [`bar_chart`] compares values with error bars, [`heat_map`] colours a
-//! matrix (a confusion matrix, a sweep over two parameters).
+//! matrix (a confusion matrix, a sweep over two parameters), [`strip_chart`] shows all values of several groups, and
+//! [`state_machine`] boxes and arrows.
 
 mod bars;
 mod canvas;
+mod diagram;
 mod heatmap;
 mod lines;
+mod strips;
 
 pub use bars::{Bar, BarChart, bar_chart};
+pub use diagram::{Arrow, Diagram, Node, state_machine};
 pub use heatmap::{HeatMap, heat_map};
 pub use lines::figure;
+pub use strips::{Strip, StripChart, StripGroup, strip_chart};
 
 use serde::{Deserialize, Serialize};
 

@@ -7,13 +7,13 @@ use std::io::IsTerminal;
 pub struct Progress(ProgressBar);
 
 impl Progress {
-    /// A bar over `trials`.
-    pub fn new(trials: u64, quiet: bool) -> Self {
+    /// A bar over `trials`, called `what`.
+    pub fn new(trials: u64, what: &str, quiet: bool) -> Self {
         let seen = !quiet && std::io::stderr().is_terminal();
         let target = if seen { ProgressDrawTarget::stderr_with_hz(5) } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(trials), target);
-        let style = "{wide_bar} {pos}/{len} trials, {per_sec}, {eta} left";
-        if let Ok(style) = ProgressStyle::with_template(style) {
+        let style = format!("{{wide_bar}} {{pos}}/{{len}} {what}, {{per_sec}}, {{eta}} left");
+        if let Ok(style) = ProgressStyle::with_template(&style) {
             bar.set_style(style);
         }
         Self(bar)

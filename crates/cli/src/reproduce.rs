@@ -1,0 +1,47 @@
+//! `stylet reproduce`: the paper, figure by figure.
+
+use crate::args::ReproduceArgs;
+use crate::exit::Failure;
+use crate::output::Output;
+use crate::progress::Progress;
+use crate::terminal;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::Instant;
+use stylet_reproduce::study::Study;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
+    let folder = args.results.out.clone().unwrap_or_else(|| PathBuf::from("stylet-out/reproduce"));
+    let begun = Instant::now();
+    let progress = Progress::new(Study::insertions(args.seeds), "insertions", args.results.quiet);
+    let made = stylet_reproduce::reproduce(args.seeds, &|| progress.advance(1));
+    progress.finish();
+    let made = made.map_err(|e| Failure::Internal(e.to_string()))?;
+    let mut output = Output::default();
+    let mut text = String::new();
+    for claim in &made.claims {
+        let _ = writeln!(text, "({}) {}\n    {}", claim.id, claim.claim, claim.verdict.words());
+    }
+    output.add("claims.json", made.claims_json);
+    for (name, svg) in made.pictures {
+        output.add(name, svg);
+    }
+    output.add("index.html", made.html);
+    output.write(&folder)?;
+    if !args.results.quiet {
+        let _ = writeln!(
+            text,
+            "\n{} noise seeds, {} insertions in {:.0} s\nPage: {}",
+            args.seeds,
+            Study::insertions(args.seeds),
+            begun.elapsed().as_secs_f64(),
+            folder.join("index.html").display()
+        );
+        terminal::say(&text)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,63 @@
+//! A number with its spread over the noise seeds.
+
+use serde::Serialize;
+
+/// Median, 5th and 95th percentile, mean and standard deviation over the seeds that gave a value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// 5th percentile.
+    pub p5: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation (of a sample).
+    pub sd: f64,
+    /// Seeds that gave a value,
+    pub n: usize,
+    /// of so many.
+    pub of: usize,
+}
+
+impl Spread {
+    /// Of one value per seed; seeds without a value are counted, not filled in. `None` without any.
+    #[must_use]
+    pub fn of(values: impl Iterator<Item = Option<f64>>) -> Option<Self> {
+        let all: Vec<Option<f64>> = values.collect();
+        let mut sorted: Vec<f64> = all.iter().copied().flatten().filter(|x| x.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        let n = sorted.len() as f64;
+        let at = |q: f64| {
+            let at = q * last as f64;
+            let (low, high) = (at.floor() as usize, at.ceil() as usize);
+            sorted[low] + (at - at.floor()) * (sorted[high] - sorted[low])
+        };
+        let mean = sorted.iter().sum::<f64>() / n;
+        let variance = sorted.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0).max(1.0);
+        Some(Self {
+            median: at(0.5),
+            p5: at(0.05),
+            p95: at(0.95),
+            mean,
+            sd: variance.sqrt(),
+            n: sorted.len(),
+            of: all.len(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_of_a_hundred_and_one_numbers() {
+        let s = Spread::of((0..=100).rev().map(|i| Some(f64::from(i))).chain([None])).expect("values");
+        assert_eq!((s.p5, s.median, s.p95, s.mean, s.n, s.of), (5.0, 50.0, 95.0, 50.0, 101, 102));
+        assert!((s.sd - 29.300_170_647).abs() < 1e-6, "{s:?}");
+        assert_eq!(Spread::of([None].into_iter()), None);
+    }
+}
