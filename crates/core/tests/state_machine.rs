@@ -28,9 +28,15 @@ fn runs() -> Vec<Vec<Output>> {
         runs.push(enhance(&known, &constant(0.02, 1).samples));
         // A slope below the derivative's threshold: the CUSUM alone sees the drop.
         let slow = |_| 0.0008;
-        runs.push(enhance(&config, &insertion(&Tissue::three_gels(), -0.002, 45.0, 200.0, 0.02, 1, slow).samples));
+        runs.push(enhance(
+            &config,
+            &insertion(&Tissue::three_gels(), -0.002, 45.0, 200.0, 0.02, 1, slow).samples,
+        ));
         let hold = |t: f64| if (20.0..23.0).contains(&t) { 0.0 } else { 0.0023 };
-        runs.push(enhance(&config, &insertion(&Tissue::three_gels(), -0.005, 50.0, 200.0, 0.02, 1, hold).samples));
+        runs.push(enhance(
+            &config,
+            &insertion(&Tissue::three_gels(), -0.005, 50.0, 200.0, 0.02, 1, hold).samples,
+        ));
     }
     let config = EnhanceConfig::default();
     let forward = constant(0.02, 1);

@@ -110,8 +110,8 @@ fn detail(claim: &Claim) -> Section {
     Section::new(format!("Claim ({}): {}", claim.id, claim.verdict_in_short()))
         .text(claim.claim)
         .text(format!("Verdict: {}. {}", claim.verdict.words(), claim.remark))
+        .text(format!("Rule: {}", claim.rule))
         .table(Table {
-            title: claim.rule.clone(),
             headers: ["condition", "holds in seeds"].map(String::from).to_vec(),
             rows: conditions,
             ..Table::default()
