@@ -4,6 +4,7 @@ use crate::args::DiagnoseArgs;
 use crate::diagnose_report;
 use crate::exit::Failure;
 use crate::output::Output;
+use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -36,9 +37,10 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         None => None,
     };
     let options = ReadOptions { columns, repair: args.repair };
+    let read: Vec<_> = args.data.par_iter().map(|path| read_with_holes(path, &options)).collect();
     let mut evidence = Vec::new();
-    for path in &args.data {
-        let (recording, notes) = read_with_holes(path, &options)?;
+    for (path, read) in args.data.iter().zip(read) {
+        let (recording, notes) = read?;
         evidence.push(Evidence { name: name_of(path, &args.data), recording, notes });
     }
     let talk = !args.results.quiet && std::io::stderr().is_terminal();

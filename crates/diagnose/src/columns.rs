@@ -5,9 +5,11 @@
 //! (a needle that gives, releases kept back, a sensor that clips), or where a strain before the last one
 //! may count (punctures that depend on speed), there is no short cut.
 
-use crate::fit::{Data, Residuals};
+use crate::fit::{Data, Residuals, WORTH_THREADS};
 use crate::forward::Replay;
 use crate::model::{Model, Role, Slot};
+use crate::track::Track;
+use rayon::prelude::*;
 use stylet_tissue::{AnyEffect, Measurement, Reading};
 
 /// Relative step by which the events' slopes are told.
@@ -60,14 +62,17 @@ pub fn base(model: &Model, data: &Data, at: &Residuals, slots: &[Slot]) -> Optio
     let column_of = |layer: usize, what: usize| wanted.iter().position(|w| w.0 == layer && w.1 == what);
     let elastic: Vec<Option<usize>> = (0..layers).map(|l| column_of(l, 0)).collect();
     let viscous: Vec<Option<usize>> = (0..layers).map(|l| column_of(l, 1)).collect();
-    let longest = data.tracks.iter().map(|t| t.len()).max().unwrap_or(0);
-    let mut raw = vec![vec![0.0; longest]; wanted.len()];
-    let mut from = 0;
-    for (k, (track, ruptures)) in data.tracks.iter().zip(&data.ruptures).enumerate() {
-        let to = from + track.len();
-        for column in &mut raw {
-            column[..track.len()].fill(0.0);
-        }
+    let from: Vec<usize> = data
+        .tracks
+        .iter()
+        .scan(0, |next, t| {
+            let first = *next;
+            *next += t.len();
+            Some(first)
+        })
+        .collect();
+    let whitened = |(k, (track, ruptures)): (usize, (&Track, &Vec<f64>))| {
+        let mut raw = vec![vec![0.0; track.len()]; wanted.len()];
         let mut replay = Replay::start(&compiled, track);
         for i in 0..track.len() {
             let force = replay.tissue(&compiled, track, ruptures, i);
@@ -84,29 +89,40 @@ pub fn base(model: &Model, data: &Data, at: &Residuals, slots: &[Slot]) -> Optio
                 }
             }
         }
+        for (raw, _) in raw.iter_mut().zip(&wanted).filter(|(_, w)| w.1 < 2) {
+            if !linear.is_plain() {
+                let mut state = linear.start(track.sample_hz * 4.0);
+                for (i, x) in raw.iter_mut().enumerate() {
+                    *x = linear.step(
+                        &mut state,
+                        &Reading { time_s: track.t[i], tissue_n: *x, ..Reading::default() },
+                    );
+                }
+            }
+            // The sample of a drop may be mixed: it tells no slope.
+            for k in ruptures.iter().map(|r| track.first_from(*r)).filter(|k| *k < track.len()) {
+                raw[k] = 0.0;
+            }
+            if data.dead_n > 0.0 {
+                let at = &at.e[from[k]..];
+                raw.iter_mut().zip(at).filter(|(_, e)| **e == 0.0).for_each(|(x, _)| *x = 0.0);
+            }
+            let mut out = vec![0.0; track.len()];
+            data.noise.whiten(track, raw, &mut out);
+            *raw = out;
+        }
+        raw
+    };
+    let parts = data.tracks.iter().zip(&data.ruptures).enumerate();
+    let parts: Vec<Vec<Vec<f64>>> = if n < WORTH_THREADS {
+        parts.map(whitened).collect()
+    } else {
+        data.tracks.par_iter().zip(&data.ruptures).enumerate().map(whitened).collect()
+    };
+    for (k, part) in parts.iter().enumerate() {
         for (j, &(layer, what, value)) in wanted.iter().enumerate() {
             if what < 2 {
-                let raw = &mut raw[j][..track.len()];
-                if !linear.is_plain() {
-                    let mut state = linear.start(track.sample_hz * 4.0);
-                    for (i, x) in raw.iter_mut().enumerate() {
-                        *x = linear.step(
-                            &mut state,
-                            &Reading { time_s: track.t[i], tissue_n: *x, ..Reading::default() },
-                        );
-                    }
-                }
-                // The sample of a drop may be mixed: it tells no slope.
-                for k in ruptures.iter().map(|r| track.first_from(*r)).filter(|k| *k < track.len()) {
-                    raw[k] = 0.0;
-                }
-                if data.dead_n > 0.0 {
-                    raw.iter_mut()
-                        .zip(&at.e[from..to])
-                        .filter(|(_, e)| **e == 0.0)
-                        .for_each(|(x, _)| *x = 0.0);
-                }
-                data.noise.whiten(track, raw, &mut columns[j][from..to]);
+                columns[j][from[k]..from[k] + part[j].len()].copy_from_slice(&part[j]);
             }
             let Some(event) = at.events.get(k * layers + layer) else { continue };
             let (by_elastic, by_puncture) = match what {
@@ -117,7 +133,6 @@ pub fn base(model: &Model, data: &Data, at: &Residuals, slots: &[Slot]) -> Optio
             columns[j][n + k * layers + layer] =
                 (event.u_at(by_elastic, by_puncture) - event.u_at(0.0, 0.0)) / (STEP * value);
         }
-        from = to;
     }
     Some(columns)
 }

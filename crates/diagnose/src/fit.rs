@@ -8,6 +8,7 @@ use crate::forward::{self, Event};
 use crate::model::{Model, Role, Slot};
 use crate::noise::Noise;
 use crate::track::Track;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Where Huber's loss turns linear, in standard deviations.
@@ -74,8 +75,11 @@ pub struct Residuals {
     pub w: Vec<f64>,
     /// Rupture events, recordings by layers.
     pub events: Vec<Event>,
-    scratch: Vec<Event>,
+    scratch: Vec<Vec<Event>>,
 }
+
+/// From so many samples on recordings are replayed side by side.
+pub(crate) const WORTH_THREADS: usize = 8192;
 
 /// Replays a model over all recordings; false when it cannot be replayed.
 pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
@@ -84,18 +88,37 @@ pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
     out.e.resize(n, 0.0);
     out.w.resize(n, 0.0);
     out.events.clear();
-    let mut from = 0;
-    for (track, ruptures) in data.tracks.iter().zip(&data.ruptures) {
-        let to = from + track.len();
-        let e = &mut out.e[from..to];
-        forward::imposed(&compiled, track, ruptures, e, &mut out.scratch);
+    out.scratch.resize_with(data.tracks.len(), Vec::new);
+    let e = slices(&data.tracks, &mut out.e);
+    let w = slices(&data.tracks, &mut out.w);
+    let parts: Vec<_> = data.tracks.iter().zip(&data.ruptures).zip(e.into_iter().zip(w)).collect();
+    let one = |(((track, ruptures), (e, w)), events): (
+        ((&Track, &Vec<f64>), (&mut [f64], &mut [f64])),
+        &mut Vec<Event>,
+    )| {
+        forward::imposed(&compiled, track, ruptures, e, events);
         forward::departures(&compiled, track, ruptures, &data.noise, 0, e);
         dead_zone(data.dead_n, e);
-        data.noise.whiten(track, e, &mut out.w[from..to]);
-        out.events.extend_from_slice(&out.scratch);
-        from = to;
+        data.noise.whiten(track, e, w);
+    };
+    if n < WORTH_THREADS {
+        parts.into_iter().zip(&mut out.scratch).for_each(one);
+    } else {
+        parts.into_par_iter().zip(&mut out.scratch).for_each(one);
     }
+    out.events.extend(out.scratch.iter().flatten().copied());
     out.w.iter().all(|w| w.is_finite())
+}
+
+/// A vector over all recordings as one slice for each.
+fn slices<'a>(tracks: &[Track], mut whole: &'a mut [f64]) -> Vec<&'a mut [f64]> {
+    let mut parts = Vec::with_capacity(tracks.len());
+    for track in tracks {
+        let (part, rest) = std::mem::take(&mut whole).split_at_mut(track.len());
+        parts.push(part);
+        whole = rest;
+    }
+    parts
 }
 
 /// Takes what rounding may have done off every departure.
@@ -184,27 +207,31 @@ fn differences(
     known: Option<Vec<Vec<f64>>>,
 ) -> Jacobian {
     let p = model.vector(&slots);
-    let mut trial = model.clone();
     let mut columns = known.unwrap_or_default();
-    for (j, slot) in slots.iter().enumerate().skip(columns.len()) {
+    let one = |work: &mut Residuals, j: usize| {
+        let slot = &slots[j];
         let mut column = vec![0.0; at.w.len() + at.events.len()];
-        if !slot.stepped {
-            let mut q = p.clone();
-            let step = if q[j] + slot.step > slot.high { -slot.step } else { slot.step };
-            q[j] += step;
-            trial.set(&slots, &q);
-            if residuals(&trial, data, work) {
-                let inverse = 1.0 / step;
-                for (c, (new, old)) in column.iter_mut().zip(work.w.iter().zip(&at.w)) {
-                    *c = (new - old) * inverse;
-                }
-                for (c, (new, old)) in column[at.w.len()..].iter_mut().zip(work.events.iter().zip(&at.events))
-                {
-                    *c = (new.u - old.u) * inverse;
-                }
+        if slot.stepped {
+            return column;
+        }
+        let mut trial = model.clone();
+        let mut q = p.clone();
+        let step = if q[j] + slot.step > slot.high { -slot.step } else { slot.step };
+        q[j] += step;
+        trial.set(&slots, &q);
+        if residuals(&trial, data, work) {
+            let inverse = 1.0 / step;
+            for (c, (new, old)) in column.iter_mut().zip(work.w.iter().zip(&at.w)) {
+                *c = (new - old) * inverse;
+            }
+            for (c, (new, old)) in column[at.w.len()..].iter_mut().zip(work.events.iter().zip(&at.events)) {
+                *c = (new.u - old.u) * inverse;
             }
         }
-        columns.push(column);
+        column
+    };
+    for j in columns.len()..slots.len() {
+        columns.push(one(work, j));
     }
     Jacobian { slots, columns }
 }

@@ -6,6 +6,7 @@ use crate::forward::{self, Replay};
 use crate::model::{Compiled, Model, Role};
 use crate::noise::{Noise, median};
 use crate::track::{NEVER, Track};
+use rayon::prelude::*;
 
 /// Seconds of a recording before a rupture that a move of it may reach back to.
 const BEFORE_S: f64 = 1.3;
@@ -77,41 +78,57 @@ pub fn retime(model: &Model, data: &mut Data, wide: bool, events: bool) -> bool 
         steps.extend(BETWEEN);
     }
     steps.extend(if wide { &WIDE[..] } else { &NARROW[..] });
-    let mut moved = false;
-    let tracks = data.tracks.clone();
     let whole = Data { ruptures: Vec::new(), ..data.clone() };
-    for (k, (track, ruptures)) in tracks.iter().zip(&mut data.ruptures).enumerate() {
-        for layer in 0..ruptures.len() {
-            if ruptures[layer] == NEVER {
-                continue;
-            }
-            let mut window = Window::new(&compiled, track, &whole, ruptures, layer);
-            let mut best = window.nats(ruptures, events);
-            let reach = data.reach.get(k).and_then(|a| a.get(layer)).copied().unwrap_or(f64::INFINITY);
-            let (first, last) = (ruptures[layer] - reach, ruptures[layer] + reach);
-            let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
-            let end = track.t.last().copied().unwrap_or(0.0);
-            let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end).min(last);
-            let low = low.max(first);
-            for sign in [-1.0, 1.0] {
-                let mut step = steps.len();
-                let mut turns = 0;
-                // From the widest step that helps to the narrowest.
-                while step > 0 && turns < 30 {
-                    turns += 1;
-                    let to = ruptures[layer] + sign * steps[step - 1] / track.sample_hz;
-                    if to >= low && to <= high && window.holds(to) {
-                        let was = std::mem::replace(&mut ruptures[layer], to);
-                        let value = window.nats(ruptures, events);
-                        if value < best - 1e-9 {
-                            best = value;
-                            moved = true;
-                            continue;
-                        }
-                        ruptures[layer] = was;
+    let mut ruptures = std::mem::take(&mut data.ruptures);
+    let tracks = data.tracks.clone();
+    let one = |(k, (track, ruptures)): (usize, (&Track, &mut Vec<f64>))| {
+        retime_one(&compiled, &whole, (k, track), ruptures, &steps, events)
+    };
+    let moved: Vec<bool> = tracks.par_iter().zip(&mut ruptures).enumerate().map(one).collect();
+    data.ruptures = ruptures;
+    moved.contains(&true)
+}
+
+/// The same of one recording.
+fn retime_one(
+    compiled: &Compiled,
+    whole: &Data,
+    (k, track): (usize, &Track),
+    ruptures: &mut [f64],
+    steps: &[f64],
+    events: bool,
+) -> bool {
+    let mut moved = false;
+    for layer in 0..ruptures.len() {
+        if ruptures[layer] == NEVER {
+            continue;
+        }
+        let mut window = Window::new(compiled, track, whole, ruptures, layer);
+        let mut best = window.nats(ruptures, events);
+        let reach = whole.reach.get(k).and_then(|a| a.get(layer)).copied().unwrap_or(f64::INFINITY);
+        let (first, last) = (ruptures[layer] - reach, ruptures[layer] + reach);
+        let low = if layer > 0 { ruptures[layer - 1] } else { track.before(1) };
+        let end = track.t.last().copied().unwrap_or(0.0);
+        let high = ruptures.get(layer + 1).copied().unwrap_or(NEVER).min(end).min(last);
+        let low = low.max(first);
+        for sign in [-1.0, 1.0] {
+            let mut step = steps.len();
+            let mut turns = 0;
+            // From the widest step that helps to the narrowest.
+            while step > 0 && turns < 30 {
+                turns += 1;
+                let to = ruptures[layer] + sign * steps[step - 1] / track.sample_hz;
+                if to >= low && to <= high && window.holds(to) {
+                    let was = std::mem::replace(&mut ruptures[layer], to);
+                    let value = window.nats(ruptures, events);
+                    if value < best - 1e-9 {
+                        best = value;
+                        moved = true;
+                        continue;
                     }
-                    step -= 1;
+                    ruptures[layer] = was;
                 }
+                step -= 1;
             }
         }
     }
@@ -198,11 +215,25 @@ fn walk_stepped(model: &mut Model, data: &Data) {
 /// Fits a model and moves its ruptures in turn.
 #[must_use]
 pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide: bool) -> Option<Fit> {
+    refine_below(f64::INFINITY, model, data, rounds, turns, wide)
+}
+
+/// The same, given up after the first fit when that leaves more than `limit` nats.
+#[must_use]
+pub fn refine_below(
+    limit: f64,
+    model: &Model,
+    data: &mut Data,
+    rounds: usize,
+    turns: usize,
+    wide: bool,
+) -> Option<Fit> {
     let enough = if turns < 6 { 0.2 } else { 0.02 };
     let mut model = model.clone();
     seed_punctures(&mut model, data);
     walk_stepped(&mut model, data);
     let mut best = fit(&model, data, turns, enough)?;
+    let rounds = if best.nats > limit { 0 } else { rounds };
     for round in 0..rounds {
         let again = |events: bool| {
             let mut there = data.clone();

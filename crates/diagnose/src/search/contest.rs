@@ -4,10 +4,13 @@ use super::{Begun, Candidate, FAST_HZ, FINALISTS, Search};
 use crate::fit::{Data, Fit, Residuals, fit};
 use crate::look::{Look, Seen};
 use crate::model::Model;
-use crate::refine::{refine, seed_punctures};
+use crate::refine::{refine_below, seed_punctures};
 use crate::starts::{self, Start};
 use crate::track::NEVER;
 use rayon::prelude::*;
+
+/// Share of the best rival's gain by which a costly rival may be behind after its first fit.
+const FAR_BEHIND: f64 = 0.5;
 
 impl Search {
     /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened.
@@ -106,21 +109,28 @@ impl Search {
         for start in self.fast_lines(standing, &data) {
             finalists.push((standing.model.with(start.choice), standing.ruptures.clone()));
         }
-        let mut rivals: Vec<Candidate> = finalists
+        let finish = |limit: f64, (model, ruptures): &(Model, Vec<Vec<f64>>)| {
+            let mut there = Data { ruptures: ruptures.clone(), ..data.clone() };
+            let wide = matches!(
+                model.names().last().copied().unwrap_or(""),
+                "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration"
+            );
+            let f = refine_below(limit, model, &mut there, if wide { 3 } else { 2 }, 5, wide)?;
+            Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+        };
+        // The needle's compliance costs most: it goes on only where it is not far behind the others.
+        let (last, first): (Vec<_>, Vec<_>) =
+            finalists.into_iter().partition(|(m, _)| m.names().last().copied() == Some("needle_compliance"));
+        let mut rivals: Vec<Candidate> = first
             .par_iter()
-            .map(|(model, ruptures)| {
-                let mut there = Data { ruptures: ruptures.clone(), ..data.clone() };
-                let wide = matches!(
-                    model.names().last().copied().unwrap_or(""),
-                    "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration"
-                );
-                let f = refine(model, &mut there, if wide { 3 } else { 2 }, 5, wide)?;
-                Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
-            })
+            .map(|f| finish(f64::INFINITY, f))
             .collect::<Vec<_>>()
             .into_iter()
             .flatten()
             .collect();
+        let ahead = rivals.iter().map(|r| r.nats).fold(standing.nats, f64::min);
+        let limit = ahead + FAR_BEHIND * (standing.nats - ahead) + 50.0;
+        rivals.extend(last.iter().filter_map(|f| finish(limit, f)));
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         // The same effect from two roads.
         let mut names: Vec<&str> = Vec::new();

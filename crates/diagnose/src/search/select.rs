@@ -7,6 +7,9 @@ use crate::refine::refine;
 use crate::thresholds;
 use rayon::prelude::*;
 
+/// A rival is fitted to the end from this share of the needed gain on.
+const POLISHED: f64 = 0.4;
+
 impl Search {
     /// One step of the forward selection; true when an effect was taken.
     pub(super) fn stage(&mut self, standing: &Candidate) -> bool {
@@ -47,8 +50,10 @@ impl Search {
             self.stages.push(stage);
             return false;
         };
-        let best = self.polished(&simplest(&rivals, &best));
+        let best = simplest(&rivals, &best);
         stage.needed = self.settings.needed(best.model.names().last().copied().unwrap_or(""));
+        let near = standing.nats - best.nats > POLISHED * stage.needed;
+        let best = if near { self.polished(&best) } else { best };
         let gain = standing.nats - best.nats;
         let taken = gain > stage.needed;
         if standing.model.effects.is_empty() {
