@@ -1,4 +1,6 @@
-//! Writes a drawn case as files: `draw_case DIR EFFECT VALUES SEED AR`.
+//! Writes a drawn case as files: `draw_case DIR EFFECT VALUES SEED AR`, or that of the benchmark:
+//! `draw_case DIR sketch INDEX SEED`.
+use stylet_diagnose::benchmark::aim;
 use stylet_diagnose::hidden::{self, Drawn, Motions};
 use stylet_tissue::AnyEffect;
 
@@ -6,7 +8,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().collect();
     let text = |k: usize| args.get(k).map_or("", String::as_str);
     let values: Vec<f64> = text(3).split(',').filter_map(|x| x.parse().ok()).collect();
-    let drawn = Drawn {
+    let own = Drawn {
         seed: text(4).parse().unwrap_or(1),
         effects: AnyEffect::from_parameters(text(2), &values).into_iter().collect(),
         outside: None,
@@ -17,6 +19,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         scatter: 0.0,
         velocity_noise_mps: 0.0,
     };
+    let index = values.first().map_or(0, |v| *v as u64);
+    let drawn = if text(2) == "sketch" { aim(&hidden::sketch(own.seed, index)) } else { own };
     let case = hidden::case(&drawn);
     let dir = std::path::Path::new(text(1));
     std::fs::create_dir_all(dir)?;

@@ -23,8 +23,8 @@ pub struct Found {
     pub instants: Vec<Vec<f64>>,
     /// How far (s) each may be moved at a time: infinitely, but for those at clear drops.
     pub reach: Vec<Vec<f64>>,
-    /// Per recording the instants (s) of clear drops that no rupture took.
-    pub spare: Vec<Vec<f64>>,
+    /// Per recording the instants (s) of drops that no rupture took, and whether they are clear.
+    pub spare: Vec<Vec<(f64, bool)>>,
 }
 
 /// How far (s) a rupture at a clear drop may be moved at a time: no law that lacks an effect drags it away.
@@ -74,10 +74,10 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Found {
         let clear = |r: usize| drops.get(r).is_some_and(|d| *d >= 1.0);
         found.reach.push(path.iter().map(|&r| if clear(r) { CLEAR_S } else { f64::INFINITY }).collect());
         let taken = |i: usize| path.iter().any(|r| r.abs_diff(i) <= 2 * DROP_SIDE);
-        let spare = (0..track.len()).filter(|i| clear(*i) && !taken(*i));
+        let spare = (0..track.len()).filter(|i| drops[*i] > 0.0 && !taken(*i));
         let (force, fine) = &friction[k];
         let at = |i: usize| fine.before(edge(force, fine, (i * q).min(fine.len() - 1), 2 * q));
-        found.spare.push(spare.map(at).collect());
+        found.spare.push(spare.map(|i| (at(i), clear(i))).collect());
     }
     found
 }

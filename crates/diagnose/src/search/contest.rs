@@ -65,9 +65,7 @@ impl Search {
             })
             .collect();
         let mut begun: Vec<Begun> = begun.into_iter().flatten().collect();
-        if !taken.contains(&"hidden_membrane") {
-            begun.extend(self.exchanged(&stood.model, &data));
-        }
+        begun.extend(self.exchanged(&stood.model, &data));
         begun.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
         let lead = begun.first().map_or(0.0, |b| stood.nats - b.0.nats);
         let mut kept = 0;

@@ -1,16 +1,18 @@
-//! A membrane's drop may have been taken for that of a layer: the two exchanged.
+//! The drop of a membrane, or of cutting that ends, may have been taken for that of a layer: the two exchanged.
 
 use super::{Begun, Search, choice};
 use crate::fit::{Data, fit};
 use crate::model::{Choice, Model};
 use crate::noise::median;
 use crate::refine::seed_punctures;
-use crate::track::NEVER;
+use crate::track::{NEVER, Track};
 use rayon::prelude::*;
 
 impl Search {
-    /// Membranes at drops that were taken for a layer's rupture, with that layer's at a drop that nobody took.
+    /// Membranes and cutting forces at drops that were taken for a layer's rupture, with that layer's at a drop that nobody took.
     pub(super) fn exchanged(&self, stood: &Model, data: &Data) -> Vec<Begun> {
+        let taken = stood.names();
+        let choice = |id: &str, values: &[f64]| choice(id, values).filter(|c| !taken.contains(&c.info.id));
         let mut tried: Vec<(Choice, Data)> = Vec::new();
         let surface = stood.assumed.surface_m;
         for layer in 0..stood.assumed.layers.len() {
@@ -26,6 +28,8 @@ impl Search {
             }
             let (breaks, force) = (median(&mut depths), median(&mut forces).max(0.02));
             let there = Data { ruptures: other, ..data.clone() };
+            // Cutting ends where the tip comes to a layer that is whole.
+            tried.extend(choice("cutting_force", &[force]).map(|c| (c, there.clone())));
             for stretch in [1e-3, 4e-3, 12e-3] {
                 let values = [breaks - stretch, force / stretch, force];
                 if let Some(choice) = choice("hidden_membrane", &values).filter(|_| values[0] > 0.0) {
@@ -45,27 +49,28 @@ impl Search {
         fits.into_iter().flatten().collect()
     }
 
-    /// The ruptures with those of one layer at spare drops, the same depth in every recording; `None` when
-    /// there are none.
+    /// The ruptures with those of one layer at spare drops, the same depth in every recording and clear in one at
+    /// least; `None` when there are none.
     pub(super) fn exchange_drops(&self, data: &Data, layer: usize) -> Option<Vec<Vec<f64>>> {
         const SAME_DEPTH_M: f64 = 2e-3;
-        let mut depth: Option<f64> = None;
-        let mut out = Vec::new();
-        for ((track, ruptures), spare) in data.tracks.iter().zip(&data.ruptures).zip(&self.spare) {
-            let mut new = ruptures.clone();
+        let z = |track: &Track, t: f64| track.z.get(track.first_from(t)).copied().unwrap_or(f64::INFINITY);
+        let parts = || data.tracks.iter().zip(&data.ruptures).zip(&self.spare);
+        let free = |ruptures: &[f64], t: f64| {
             let after = if layer > 0 { ruptures[layer - 1] } else { f64::NEG_INFINITY };
-            let before = ruptures.get(layer + 1).copied().unwrap_or(NEVER);
-            let z = |t: f64| track.z.get(track.first_from(t)).copied().unwrap_or(f64::INFINITY);
-            let free = spare.iter().copied().filter(|t| *t > after && *t < before);
-            let nearest = match depth {
-                None => free.min_by(|a, b| a.total_cmp(b)),
-                Some(d) => free.min_by(|a, b| (z(*a) - d).abs().total_cmp(&(z(*b) - d).abs())),
-            };
-            let at = nearest.filter(|t| depth.is_none_or(|d: f64| (z(*t) - d).abs() < SAME_DEPTH_M))?;
-            depth = depth.or(Some(z(at)));
-            new[layer] = at;
-            out.push(new);
-        }
-        (!out.is_empty()).then_some(out)
+            t > after && t < ruptures.get(layer + 1).copied().unwrap_or(NEVER)
+        };
+        let depth = parts().find_map(|((track, ruptures), spare)| {
+            spare.iter().find(|(t, clear)| *clear && free(ruptures, *t)).map(|(t, _)| z(track, *t))
+        })?;
+        let off = |track: &Track, t: f64| (z(track, t) - depth).abs();
+        parts()
+            .map(|((track, ruptures), spare)| {
+                let there = spare.iter().map(|s| s.0).filter(|t| free(ruptures, *t));
+                let nearest = there.min_by(|a, b| off(track, *a).total_cmp(&off(track, *b)))?;
+                let mut new = ruptures.clone();
+                new[layer] = nearest;
+                (off(track, nearest) < SAME_DEPTH_M).then_some(new)
+            })
+            .collect()
     }
 }

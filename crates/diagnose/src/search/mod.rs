@@ -120,8 +120,8 @@ pub struct Search {
     pub force_n: f64,
     /// Fined nats of the effect taken last, under the noise by which its rivals were judged.
     pub reference: f64,
-    /// Per recording the instants (s) of clear drops that no layer's rupture took.
-    pub spare: Vec<Vec<f64>>,
+    /// Per recording the instants (s) of drops that no layer's rupture took, and whether they are clear.
+    pub spare: Vec<Vec<(f64, bool)>>,
 }
 
 impl Search {
