@@ -215,25 +215,11 @@ fn walk_stepped(model: &mut Model, data: &Data) {
 /// Fits a model and moves its ruptures in turn.
 #[must_use]
 pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide: bool) -> Option<Fit> {
-    refine_below(f64::INFINITY, model, data, rounds, turns, wide)
-}
-
-/// The same, given up after the first fit when that leaves more than `limit` nats.
-#[must_use]
-pub fn refine_below(
-    limit: f64,
-    model: &Model,
-    data: &mut Data,
-    rounds: usize,
-    turns: usize,
-    wide: bool,
-) -> Option<Fit> {
     let enough = if turns < 6 { 0.2 } else { 0.02 };
     let mut model = model.clone();
     seed_punctures(&mut model, data);
     walk_stepped(&mut model, data);
     let mut best = fit(&model, data, turns, enough)?;
-    let rounds = if best.nats > limit { 0 } else { rounds };
     for round in 0..rounds {
         let again = |events: bool| {
             let mut there = data.clone();

@@ -1,20 +1,29 @@
 //! Rivals: every effect from its best starts, screened on averages, the best fitted at full rate.
 
-use super::{Begun, Candidate, FAST_HZ, FINALISTS, Search};
+use super::{Begun, Candidate, FAST_HZ, FINALISTS, Search, nats};
 use crate::fit::{Data, Fit, Residuals, fit};
 use crate::look::{Look, Seen};
 use crate::model::Model;
-use crate::refine::{refine_below, seed_punctures};
+use crate::refine::{refine, seed_punctures};
 use crate::starts::{self, Start};
 use crate::track::NEVER;
 use rayon::prelude::*;
 
-/// Share of the best rival's gain by which a costly rival may be behind after its first fit.
-const FAR_BEHIND: f64 = 0.5;
+/// Share of the best rival's gain by which another may be behind after its first fit.
+const FAR_BEHIND: f64 = 0.6;
+
+/// Whether an effect moves its ruptures far, or between samples.
+fn wide(id: &str) -> bool {
+    matches!(id, "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration")
+}
+
+/// A model to be fitted at full rate and its ruptures.
+type Finalist = (Model, Vec<Vec<f64>>);
 
 impl Search {
-    /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened.
-    pub(super) fn contest(&self, standing: &Candidate) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
+    /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened. Those far behind
+    /// `incumbent` nats are not fitted to the end.
+    pub(super) fn contest(&self, standing: &Candidate, incumbent: f64) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
         let data = self.data_of(standing);
         let coarse = data.blocks(self.q, data.noise.blocks(self.q));
         let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
@@ -99,7 +108,7 @@ impl Search {
             let gain = stood.nats - b.0.nats;
             gain > 0.5 * lead - 40.0 && (gain > 2.5 || (gain > -400.0 && lead > 50.0))
         });
-        let mut finalists: Vec<(Model, Vec<Vec<f64>>)> =
+        let mut finalists: Vec<Finalist> =
             best.into_iter().map(|(f, r)| (f.model, r)).collect();
         for c in self.sharp(standing, &data, lead > 30.0) {
             finalists.push((standing.model.with(c), standing.ruptures.clone()));
@@ -107,28 +116,29 @@ impl Search {
         for start in self.fast_lines(standing, &data) {
             finalists.push((standing.model.with(start.choice), standing.ruptures.clone()));
         }
-        let finish = |limit: f64, (model, ruptures): &(Model, Vec<Vec<f64>>)| {
-            let mut there = Data { ruptures: ruptures.clone(), ..data.clone() };
-            let wide = matches!(
-                model.names().last().copied().unwrap_or(""),
-                "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration"
-            );
-            let f = refine_below(limit, model, &mut there, if wide { 3 } else { 2 }, 5, wide)?;
+        let finalists = self.better_starts(&data, finalists);
+        let name = |m: &Model| m.names().last().copied().unwrap_or("");
+        let refined = |c: &Candidate, rounds: usize| {
+            let mut there = Data { ruptures: c.ruptures.clone(), ..data.clone() };
+            let f = refine(&c.model, &mut there, rounds, 5, wide(name(&c.model)))?;
             Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
         };
-        // The needle's compliance costs most: it goes on only where it is not far behind the others.
-        let (last, first): (Vec<_>, Vec<_>) =
-            finalists.into_iter().partition(|(m, _)| m.names().last().copied() == Some("needle_compliance"));
-        let mut rivals: Vec<Candidate> = first
-            .par_iter()
-            .map(|f| finish(f64::INFINITY, f))
-            .collect::<Vec<_>>()
-            .into_iter()
-            .flatten()
+        // Fitted with the ruptures where they are; only those not far behind go on to move them.
+        let first: Vec<Option<Candidate>> = finalists
+            .into_par_iter()
+            .map(|(model, ruptures)| refined(&Candidate { model, ruptures, nats: f64::INFINITY }, 0))
             .collect();
-        let ahead = rivals.iter().map(|r| r.nats).fold(standing.nats, f64::min);
-        let limit = ahead + FAR_BEHIND * (standing.nats - ahead) + 50.0;
-        rivals.extend(last.iter().filter_map(|f| finish(limit, f)));
+        let first: Vec<Candidate> = first.into_iter().flatten().collect();
+        let ahead = first.iter().map(|r| r.nats).fold(standing.nats.min(incumbent), f64::min);
+        let limit = ahead + FAR_BEHIND * (standing.nats - ahead) + 100.0;
+        let rivals: Vec<Option<Candidate>> = first
+            .into_par_iter()
+            .map(|c| {
+                let far = c.nats > limit;
+                if far { Some(c) } else { refined(&c, if wide(name(&c.model)) { 3 } else { 2 }) }
+            })
+            .collect();
+        let mut rivals: Vec<Candidate> = rivals.into_iter().flatten().collect();
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         // The same effect from two roads.
         let mut names: Vec<&str> = Vec::new();
@@ -139,6 +149,25 @@ impl Search {
             new
         });
         (rivals, screened)
+    }
+
+    /// Of two starts of the same effect the one that fits better as it stands; interferences have lines of
+    /// their own.
+    fn better_starts(&self, data: &Data, finalists: Vec<Finalist>) -> Vec<Finalist> {
+        let fits = |(model, ruptures): &Finalist| {
+            nats(model, &Data { ruptures: ruptures.clone(), ..data.clone() })
+        };
+        let mut kept: Vec<Finalist> = Vec::new();
+        for new in finalists {
+            let id = new.0.names().last().copied().unwrap_or("");
+            let same = |k: &Finalist| k.0.names().last().copied() == Some(id) && id != "periodic_interference";
+            match kept.iter_mut().find(|k| same(k)) {
+                Some(old) if fits(&new) < fits(old) => *old = new,
+                Some(_) => {}
+                None => kept.push(new),
+            }
+        }
+        kept
     }
 }
 

@@ -13,7 +13,7 @@ const POLISHED: f64 = 0.4;
 impl Search {
     /// One step of the forward selection; true when an effect was taken.
     pub(super) fn stage(&mut self, standing: &Candidate) -> bool {
-        let (mut rivals, screened) = self.contest(standing);
+        let (mut rivals, screened) = self.contest(standing, f64::INFINITY);
         let stood = standing.model.names();
         let mut stage = Stage { stood, screened, rivals: Vec::new(), needed: thresholds::LEAST, taken: None };
         if rivals.is_empty() {
@@ -106,7 +106,7 @@ impl Search {
             let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures) else {
                 continue;
             };
-            let (rivals, _) = self.contest(&without);
+            let (rivals, _) = self.contest(&without, self.best.nats);
             let Some(first) = rivals.first() else { continue };
             let first = simplest(&rivals, first);
             if first.fined() < self.best.fined() - 0.5 {
