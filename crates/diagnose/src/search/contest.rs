@@ -10,7 +10,7 @@ use crate::track::NEVER;
 use rayon::prelude::*;
 
 /// Share of the best rival's gain by which another may be behind after its first fit.
-const FAR_BEHIND: f64 = 0.6;
+const FAR_BEHIND: f64 = 0.15;
 
 /// Whether an effect moves its ruptures far, or between samples.
 fn wide(id: &str) -> bool {
