@@ -1,8 +1,8 @@
 //! A linear look at many starts: how much would the objective gain if the start's change of the force,
 //! less what the parameters already fitted can imitate, were added in the right amount.
 
-use crate::fit::{Data, Residuals, dot, jacobian, residuals, solve};
-use crate::model::Model;
+use crate::fit::{Data, Residuals, dot, jacobian, normal, residuals, solve};
+use crate::model::{Model, Slot};
 use crate::starts::Start;
 
 /// The model that stands, taken apart for looking.
@@ -16,7 +16,15 @@ pub struct Look<'a> {
     r: Vec<f64>,
     /// Orthonormal weighted columns of the fitted numbers.
     q: Vec<Vec<f64>>,
+    /// The fitted numbers, their weighted columns and normal matrix.
+    p: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+    h: Vec<Vec<f64>>,
+    slots: Vec<Slot>,
 }
+
+/// Share of a start's change that is left where the fitted numbers imitate it nearly.
+const IMITATED: f64 = 0.1;
 
 /// What a look at a start shows.
 #[derive(Clone, Debug)]
@@ -27,6 +35,8 @@ pub struct Seen {
     pub gain: f64,
     /// Nats that the start's own size would cost if it were there and ignored.
     pub visible: f64,
+    /// Where the numbers fitted before, which imitate most of the start, have to go when it is added.
+    pub given_way: Option<Vec<f64>>,
 }
 
 impl<'a> Look<'a> {
@@ -46,6 +56,9 @@ impl<'a> Look<'a> {
             })
             .collect();
         let r: Vec<f64> = all().zip(&root).map(|(w, s)| w * s).collect();
+        let (h, _) = normal(model, &jac, &at);
+        let columns =
+            jac.columns.iter().map(|c| c.iter().zip(&root).map(|(x, s)| x * s).collect()).collect();
         // Gram-Schmidt with the prior's pull as one further row per base number.
         let m = jac.slots.len();
         let mut q: Vec<Vec<f64>> = Vec::new();
@@ -74,11 +87,12 @@ impl<'a> Look<'a> {
         for u in &mut q {
             u.truncate(n);
         }
-        Some(Self { model, data, at, root, r, q })
+        let p = model.vector(&jac.slots);
+        Some(Self { model, data, at, root, r, q, p, columns, h, slots: jac.slots })
     }
 
     /// Change of the weighted residuals by an effect, less what the fitted numbers imitate.
-    fn change(&self, start: &Start, work: &mut Residuals) -> Option<(Vec<f64>, f64)> {
+    fn change(&self, start: &Start, work: &mut Residuals) -> Option<(Vec<f64>, f64, Vec<f64>)> {
         let trial = self.model.with(start.choice.clone());
         if !residuals(&trial, self.data, work) {
             return None;
@@ -87,11 +101,26 @@ impl<'a> Look<'a> {
         let old = self.at.w.iter().copied().chain(self.at.events.iter().map(|e| e.u));
         let mut d: Vec<f64> = new.zip(old).zip(&self.root).map(|((n, o), s)| (n - o) * s).collect();
         let size = dot(&d, &d);
+        let whole = d.clone();
         for u in &self.q {
             let share = dot(u, &d);
             d.iter_mut().zip(u).for_each(|(d, u)| *d -= share * u);
         }
-        Some((d, size))
+        Some((d, size, whole))
+    }
+
+    /// The fitted numbers when `amount` of a change is added.
+    fn give_way(&self, change: &[f64], amount: f64) -> Option<Vec<f64>> {
+        let g: Vec<f64> = self.columns.iter().map(|c| -amount * dot(c, change)).collect();
+        let live: Vec<usize> = (0..g.len()).filter(|i| self.h[*i][*i] > 0.0 && !self.slots[*i].stepped).collect();
+        let sub: Vec<Vec<f64>> = live.iter().map(|&i| live.iter().map(|&j| self.h[i][j]).collect()).collect();
+        let right: Vec<f64> = live.iter().map(|&i| g[i]).collect();
+        let d = solve(&sub, &right)?;
+        let mut p = self.p.clone();
+        for (&i, d) in live.iter().zip(d) {
+            p[i] = (p[i] + d).clamp(self.slots[i].low, self.slots[i].high);
+        }
+        Some(p)
     }
 
     /// Looks at a start.
@@ -100,9 +129,9 @@ impl<'a> Look<'a> {
         if start.quadrature {
             return self.both_phases(start, work);
         }
-        let (d, size) = self.change(start, work)?;
+        let (d, size, whole) = self.change(start, work)?;
         let left = dot(&d, &d);
-        let nothing = Seen { start: start.clone(), gain: 0.0, visible: 0.5 * left };
+        let nothing = Seen { start: start.clone(), gain: 0.0, visible: 0.5 * left, given_way: None };
         if left <= 1e-9 * size || left < 1e-12 {
             return Some(Seen { visible: 0.0, ..nothing });
         }
@@ -133,18 +162,20 @@ impl<'a> Look<'a> {
                 }
             }
         }
-        Some(Seen { start, gain, visible: 0.5 * left })
+        let given_way = (left < IMITATED * size).then(|| self.give_way(&whole, scale)).flatten();
+        Some(Seen { start, gain, visible: 0.5 * left, given_way })
     }
 
     /// An effect with amplitude and phase: linear in the two quadratures.
     fn both_phases(&self, start: &Start, work: &mut Residuals) -> Option<Seen> {
         let mut other = start.clone();
         other.choice.values[2] = core::f64::consts::FRAC_PI_2;
-        let (a, _) = self.change(start, work)?;
-        let (b, _) = self.change(&other, work)?;
+        let (a, ..) = self.change(start, work)?;
+        let (b, ..) = self.change(&other, work)?;
         let (aa, ab, bb) = (dot(&a, &a), dot(&a, &b), dot(&b, &b));
         let (ar, br) = (-dot(&a, &self.r), -dot(&b, &self.r));
-        let nothing = Seen { start: start.clone(), gain: 0.0, visible: 0.25 * (aa + bb) };
+        let nothing =
+            Seen { start: start.clone(), gain: 0.0, visible: 0.25 * (aa + bb), given_way: None };
         let Some(x) = solve(&[vec![aa, ab], vec![ab, bb]], &[ar, br]) else { return Some(nothing) };
         let (sin, cos) = (x[0], x[1]);
         let gain = 0.5 * (sin * ar + cos * br);
@@ -154,7 +185,7 @@ impl<'a> Look<'a> {
             (start.choice.values[0] * libm::hypot(sin, cos)).clamp(amplitude.search.0, amplitude.search.1);
         start.choice.values[2] = libm::atan2(cos, sin);
         start.quadrature = false;
-        Some(Seen { start, gain, visible: nothing.visible })
+        Some(Seen { start, gain, ..nothing })
     }
 
     /// The best places for a membrane that breaks at `z_b` after `w` of travel: its force has a short support

@@ -67,7 +67,11 @@ impl Search {
                 } else {
                     shifted.blocks(self.q, shifted.noise.blocks(self.q))
                 };
-                let mut model = stood.model.with(s.start.choice.clone());
+                let mut model = stood.model.clone();
+                if let Some(numbers) = &s.given_way {
+                    model.set(&model.slots(), numbers);
+                }
+                let mut model = model.with(s.start.choice.clone());
                 seed_punctures(&mut model, &there);
                 let f = fit(&model, &there, 2, 0.1)?;
                 Some((f, there, shifted.ruptures))

@@ -3,6 +3,7 @@
 
 mod clues;
 mod contest;
+mod level;
 mod membrane;
 mod select;
 
@@ -197,6 +198,8 @@ impl Search {
 
     /// Runs the whole selection.
     pub fn run(&mut self, mut progress: impl FnMut(&str)) {
+        self.base = self.levelled(self.base.clone());
+        self.best = self.base.clone();
         while self.best.model.effects.len() < self.settings.most {
             progress(&format!("looking for effect {}", self.best.model.effects.len() + 1));
             let standing = self.best.clone();
@@ -204,7 +207,7 @@ impl Search {
             if taken {
                 self.enlarge();
             }
-            if !taken || self.hopeless(2.0) {
+            if !taken || (self.best.model.effects.len() > 1 && self.hopeless(2.0)) {
                 break;
             }
         }
@@ -231,11 +234,17 @@ impl Search {
                     self.refitted(&model, &self.best.ruptures)
                 })
                 .collect();
-            let best = found.into_iter().flatten().min_by(|a, b| a.nats.total_cmp(&b.nats));
-            if let Some(best) =
-                best.filter(|b| self.best.nats - b.nats > thresholds::SECOND_TERM + self.settings.margin)
-            {
-                self.best = best;
+            let found = found.into_iter().flatten().min_by(|a, b| a.nats.total_cmp(&b.nats));
+            let Some(two) = found.filter(|two| two.nats < self.best.nats) else { continue };
+            // What more turns of the optimiser would have gained without it does not count.
+            let mut one = two.model.clone();
+            one.effects[index] = own;
+            let one = self.refitted(&one, &two.ruptures).filter(|one| one.nats < self.best.nats);
+            if let Some(one) = one {
+                self.best = one;
+            }
+            if self.best.nats - two.nats > thresholds::SECOND_TERM + self.settings.margin {
+                self.best = two;
             }
         }
     }

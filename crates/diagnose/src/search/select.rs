@@ -53,7 +53,7 @@ impl Search {
         let best = simplest(&rivals, &best);
         stage.needed = self.settings.needed(best.model.names().last().copied().unwrap_or(""));
         let near = standing.nats - best.nats > POLISHED * stage.needed;
-        let best = if near { self.polished(&best) } else { best };
+        let best = if near { self.levelled(self.polished(&best)) } else { best };
         let gain = standing.nats - best.nats;
         let taken = gain > stage.needed;
         if standing.model.effects.is_empty() {
