@@ -1,7 +1,8 @@
 //! Examines drawn cases of one kind and prints each:
-//! `cargo run --release -p stylet-diagnose --example examine -- single 0 54 [seed [ar2|scatter|velocity|and_outside]]`
+//! `cargo run --release -p stylet-diagnose --example examine -- single 0 54 [seed [ar2|scatter|velocity|and_outside|one]]`
 use rayon::prelude::*;
 use stylet_diagnose::benchmark::run;
+use stylet_diagnose::Verdict;
 use stylet_diagnose::hidden::{Harder, Kind, sketch_of};
 use stylet_diagnose::search::Settings;
 
@@ -20,6 +21,7 @@ fn main() {
         Some("scatter") => Some(Harder::Scatter),
         Some("velocity") => Some(Harder::Velocity),
         Some("and_outside") => Some(Harder::AndOutside),
+        Some("one") => Some(Harder::One),
         _ => None,
     };
     let indices: Vec<u64> = (from..to).collect();
@@ -42,4 +44,13 @@ fn main() {
         .collect();
     let done: Vec<_> = results.into_iter().flatten().collect();
     println!("right {} of {}", done.iter().filter(|r| r.right).count(), done.len());
+    let said = |v: Verdict| done.iter().filter(|r| r.verdict == v).count();
+    println!(
+        "said: none {}, named {}, ambiguous {}, unknown {}; the one hidden is among those named in {}",
+        said(Verdict::None),
+        said(Verdict::Named),
+        said(Verdict::Ambiguous),
+        said(Verdict::Unknown),
+        done.iter().filter(|r| r.hidden.iter().all(|h| r.named.iter().flatten().any(|n| n == h))).count()
+    );
 }

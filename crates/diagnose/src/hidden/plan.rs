@@ -137,6 +137,8 @@ pub enum Harder {
     Velocity,
     /// An effect outside the library on top, about as strong.
     AndOutside,
+    /// One recording alone.
+    One,
 }
 
 impl Harder {
@@ -148,6 +150,7 @@ impl Harder {
             Harder::Ar2 => drawn.ar = [1.3, -0.6],
             Harder::Scatter => drawn.scatter = 0.03,
             Harder::Velocity => drawn.velocity_noise_mps = 1e-4,
+            Harder::One => drawn.motions = Motions::One,
             Harder::AndOutside => {
                 let kind = (drawn.seed % 8) as usize;
                 drawn.outside = Some(Outside::new(kind, [0.3, 0.5, 0.7, 0.4], 0.02 * sketch.target));

@@ -41,7 +41,12 @@ impl Search {
             .collect();
         rivals = rescored.into_iter().flatten().collect();
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
-        let standing = self.refit_standing(standing, &rivals);
+        let mut standing = self.refit_standing(standing, &rivals);
+        if rivals.first().is_some_and(|best| self.scatter(best) > 0.0) {
+            standing = self.forgiving(&standing);
+            rivals = rivals.iter().map(|r| self.forgiving(r)).collect();
+            rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
+        }
         for r in &rivals {
             let name = r.model.names().last().copied().unwrap_or("");
             stage.rivals.push((name, standing.nats - r.nats, r.model.extra() - standing.model.extra()));
@@ -138,12 +143,18 @@ impl Search {
     pub(super) fn prune(&mut self) {
         while self.best.model.effects.len() > 1 {
             let mut least: Option<(f64, Candidate)> = None;
+            let scattered = self.scatter(&self.best) > 0.0;
+            if scattered {
+                let raw = nats(&self.best.model, &self.data_of(&self.best));
+                self.best = self.forgiving(&Candidate { nats: raw, ..self.best.clone() });
+            }
             for index in 0..self.best.model.effects.len() {
                 let id = self.best.model.effects[index].info.id;
                 let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures)
                 else {
                     continue;
                 };
+                let without = if scattered { self.forgiving(&without) } else { without };
                 let spare = without.nats - self.best.nats - self.settings.needed(id);
                 if spare < 0.0 && least.as_ref().is_none_or(|l| spare < l.0) {
                     least = Some((spare, without));
