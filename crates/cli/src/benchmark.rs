@@ -62,7 +62,5 @@ fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     done.sort_by_key(|d| d.index);
     let text = summary(&done);
     std::fs::write(folder.join("summary.txt"), &text).map_err(failed)?;
-    print!("{text}");
-    println!("\nCases: {}", path.display());
-    Ok(())
+    crate::terminal::say(&format!("{text}\nCases: {}\n", path.display()))
 }

@@ -4,6 +4,7 @@ use crate::args::DiagnoseArgs;
 use crate::diagnose_report;
 use crate::exit::Failure;
 use crate::output::Output;
+use crate::terminal::say;
 use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
@@ -69,8 +70,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     });
     output.write(&folder)?;
     if !args.results.quiet {
-        print!("{}", summary(d));
-        println!("\nReport: {}", folder.join("report.html").display());
+        say(&format!("{}\nReport: {}\n", summary(d), folder.join("report.html").display()))?;
     }
     Ok(())
 }

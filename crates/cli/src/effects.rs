@@ -2,6 +2,7 @@
 
 use crate::args::EffectsArgs;
 use crate::exit::Failure;
+use crate::terminal::say;
 use std::fmt::Write as _;
 use stylet_report::significant;
 use stylet_tissue::{
@@ -15,19 +16,17 @@ use stylet_tissue::{
 pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
     match &args.name {
         None => {
+            let mut text = String::new();
             for entry in library().chain(per_layer()) {
-                println!("{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
+                let _ =
+                    writeln!(text, "{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
             }
-            println!(
-                "stylet effects NAME shows one: its parameters, its source, what it does to an insertion."
-            );
-            Ok(())
+            text +=
+                "stylet effects NAME shows one: its parameters, its source, what it does to an insertion.\n";
+            say(&text)
         }
         Some(name) => match info(name) {
-            Some(entry) => {
-                print!("{}", one(entry));
-                Ok(())
-            }
+            Some(entry) => say(&one(entry)),
             None => {
                 let known: Vec<&str> = library().chain(per_layer()).map(|e| e.id).collect();
                 let hint = stylet_scenario::closest(name, &known)

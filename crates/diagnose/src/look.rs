@@ -57,8 +57,7 @@ impl<'a> Look<'a> {
             .collect();
         let r: Vec<f64> = all().zip(&root).map(|(w, s)| w * s).collect();
         let (h, _) = normal(model, &jac, &at);
-        let columns =
-            jac.columns.iter().map(|c| c.iter().zip(&root).map(|(x, s)| x * s).collect()).collect();
+        let columns = jac.columns.iter().map(|c| c.iter().zip(&root).map(|(x, s)| x * s).collect()).collect();
         // Gram-Schmidt with the prior's pull as one further row per base number.
         let m = jac.slots.len();
         let mut q: Vec<Vec<f64>> = Vec::new();
@@ -112,7 +111,8 @@ impl<'a> Look<'a> {
     /// The fitted numbers when `amount` of a change is added.
     fn give_way(&self, change: &[f64], amount: f64) -> Option<Vec<f64>> {
         let g: Vec<f64> = self.columns.iter().map(|c| -amount * dot(c, change)).collect();
-        let live: Vec<usize> = (0..g.len()).filter(|i| self.h[*i][*i] > 0.0 && !self.slots[*i].stepped).collect();
+        let live: Vec<usize> =
+            (0..g.len()).filter(|i| self.h[*i][*i] > 0.0 && !self.slots[*i].stepped).collect();
         let sub: Vec<Vec<f64>> = live.iter().map(|&i| live.iter().map(|&j| self.h[i][j]).collect()).collect();
         let right: Vec<f64> = live.iter().map(|&i| g[i]).collect();
         let d = solve(&sub, &right)?;
@@ -174,8 +174,7 @@ impl<'a> Look<'a> {
         let (b, ..) = self.change(&other, work)?;
         let (aa, ab, bb) = (dot(&a, &a), dot(&a, &b), dot(&b, &b));
         let (ar, br) = (-dot(&a, &self.r), -dot(&b, &self.r));
-        let nothing =
-            Seen { start: start.clone(), gain: 0.0, visible: 0.25 * (aa + bb), given_way: None };
+        let nothing = Seen { start: start.clone(), gain: 0.0, visible: 0.25 * (aa + bb), given_way: None };
         let Some(x) = solve(&[vec![aa, ab], vec![ab, bb]], &[ar, br]) else { return Some(nothing) };
         let (sin, cos) = (x[0], x[1]);
         let gain = 0.5 * (sin * ar + cos * br);

@@ -199,6 +199,17 @@ impl Model {
         slots
     }
 
+    /// Whether the effect taken last has shrunk to the smallest strength that is searched: then it is not there, and
+    /// what it gains comes from what the fit may do beside it (ruptures between samples).
+    #[must_use]
+    pub fn last_vanishes(&self) -> bool {
+        let Some(choice) = self.effects.last() else { return false };
+        choice.info.parameters.iter().zip(&choice.values).enumerate().any(|(k, (p, value))| {
+            let least = (p.search.0 / 10.0).max(p.low);
+            p.strength && p.neutral == 0.0 && in_logarithm(choice.info, k) && *value <= 1.05 * least
+        })
+    }
+
     /// The value of a number.
     #[must_use]
     pub fn get(&self, slot: &Slot) -> f64 {

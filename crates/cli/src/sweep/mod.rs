@@ -128,7 +128,7 @@ fn conclude(sweep: &Sweep, columns: &Columns, rows: &[Row], out: &Path, quiet: b
     output.write(out)?;
     let _ = std::fs::remove_dir_all(out.join(shard::FOLDER));
     if !quiet {
-        print!("{}", terminal(&summary, out));
+        crate::terminal::say(&terminal(&summary, out))?;
     }
     Ok(())
 }

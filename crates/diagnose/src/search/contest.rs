@@ -23,7 +23,11 @@ type Finalist = (Model, Vec<Vec<f64>>);
 impl Search {
     /// Rivals that extend `standing`, fitted at full rate, best first; and what was screened. Those far behind
     /// `incumbent` nats are not fitted to the end.
-    pub(super) fn contest(&self, standing: &Candidate, incumbent: f64) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
+    pub(super) fn contest(
+        &self,
+        standing: &Candidate,
+        incumbent: f64,
+    ) -> (Vec<Candidate>, Vec<(&'static str, f64)>) {
         let data = self.data_of(standing);
         let coarse = data.blocks(self.q, data.noise.blocks(self.q));
         let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
@@ -112,8 +116,7 @@ impl Search {
             let gain = stood.nats - b.0.nats;
             gain > 0.5 * lead - 40.0 && (gain > 2.5 || (gain > -400.0 && lead > 50.0))
         });
-        let mut finalists: Vec<Finalist> =
-            best.into_iter().map(|(f, r)| (f.model, r)).collect();
+        let mut finalists: Vec<Finalist> = best.into_iter().map(|(f, r)| (f.model, r)).collect();
         for c in self.sharp(standing, &data, lead > 30.0) {
             finalists.push((standing.model.with(c), standing.ruptures.clone()));
         }
@@ -143,6 +146,7 @@ impl Search {
             })
             .collect();
         let mut rivals: Vec<Candidate> = rivals.into_iter().flatten().collect();
+        rivals.retain(|r| !r.model.last_vanishes());
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         // The same effect from two roads.
         let mut names: Vec<&str> = Vec::new();
@@ -158,13 +162,13 @@ impl Search {
     /// Of two starts of the same effect the one that fits better as it stands; interferences have lines of
     /// their own.
     fn better_starts(&self, data: &Data, finalists: Vec<Finalist>) -> Vec<Finalist> {
-        let fits = |(model, ruptures): &Finalist| {
-            nats(model, &Data { ruptures: ruptures.clone(), ..data.clone() })
-        };
+        let fits =
+            |(model, ruptures): &Finalist| nats(model, &Data { ruptures: ruptures.clone(), ..data.clone() });
         let mut kept: Vec<Finalist> = Vec::new();
         for new in finalists {
             let id = new.0.names().last().copied().unwrap_or("");
-            let same = |k: &Finalist| k.0.names().last().copied() == Some(id) && id != "periodic_interference";
+            let same =
+                |k: &Finalist| k.0.names().last().copied() == Some(id) && id != "periodic_interference";
             match kept.iter_mut().find(|k| same(k)) {
                 Some(old) if fits(&new) < fits(old) => *old = new,
                 Some(_) => {}
