@@ -91,23 +91,31 @@ pub fn residuals(model: &Model, data: &Data, out: &mut Residuals) -> bool {
     out.scratch.resize_with(data.tracks.len(), Vec::new);
     let e = slices(&data.tracks, &mut out.e);
     let w = slices(&data.tracks, &mut out.w);
-    let parts: Vec<_> = data.tracks.iter().zip(&data.ruptures).zip(e.into_iter().zip(w)).collect();
-    let one = |(((track, ruptures), (e, w)), events): (
-        ((&Track, &Vec<f64>), (&mut [f64], &mut [f64])),
-        &mut Vec<Event>,
-    )| {
-        forward::imposed(&compiled, track, ruptures, e, events);
-        forward::departures(&compiled, track, ruptures, &data.noise, 0, e);
-        dead_zone(data.dead_n, e);
-        data.noise.whiten(track, e, w);
+    let parts = data.tracks.iter().zip(&data.ruptures).zip(e.into_iter().zip(w)).zip(&mut out.scratch);
+    let parts: Vec<Part> =
+        parts.map(|(((track, ruptures), (e, w)), events)| Part { track, ruptures, e, w, events }).collect();
+    let one = |part: Part| {
+        forward::imposed(&compiled, part.track, part.ruptures, part.e, part.events);
+        forward::departures(&compiled, part.track, part.ruptures, &data.noise, 0, part.e);
+        dead_zone(data.dead_n, part.e);
+        data.noise.whiten(part.track, part.e, part.w);
     };
     if n < WORTH_THREADS {
-        parts.into_iter().zip(&mut out.scratch).for_each(one);
+        parts.into_iter().for_each(one);
     } else {
-        parts.into_par_iter().zip(&mut out.scratch).for_each(one);
+        parts.into_par_iter().for_each(one);
     }
     out.events.extend(out.scratch.iter().flatten().copied());
     out.w.iter().all(|w| w.is_finite())
+}
+
+/// One recording and where its residuals go.
+struct Part<'a> {
+    track: &'a Track,
+    ruptures: &'a [f64],
+    e: &'a mut [f64],
+    w: &'a mut [f64],
+    events: &'a mut Vec<Event>,
 }
 
 /// A vector over all recordings as one slice for each.
