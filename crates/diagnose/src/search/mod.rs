@@ -6,6 +6,8 @@ mod contest;
 mod membrane;
 mod select;
 
+pub(crate) use contest::shift;
+
 use crate::air;
 use crate::fit::{Data, Fit, Residuals, fit, objective, residuals};
 use crate::model::{Choice, Model};
