@@ -170,3 +170,54 @@ fn candidates(search: &Search, data: &Data, at: &Residuals) -> Vec<Start> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Terms;
+    use crate::fit::{dot, solve};
+    use crate::hidden::{self, Kind};
+    use crate::search::{Search, Settings};
+    use crate::track::Track;
+    use stylet_tissue::AnyEffect;
+
+    /// Least squares on the base parameters' columns and those of the effect that is there finds its size,
+    /// and leaves the noise.
+    #[test]
+    fn the_columns_of_the_hidden_effect_explain_the_residual() {
+        for (id, truth) in [("coulomb_friction", 4.0), ("force_drift", 0.004), ("tool_inertia", 2.0)] {
+            let mut drawn = hidden::sketch_of(5, 2, Kind::Clean, 2).drawn;
+            drawn.effects.extend(AnyEffect::from_parameters(id, &[truth]));
+            let case = hidden::case(&drawn);
+            let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
+            let search = Search::base(&case.believed.tissue, 0.3, &[], tracks, 0.0, Settings::default())
+                .expect("base fit");
+            let terms = Terms::of(&search, 2).expect("terms");
+            assert!(terms.columns.iter().all(|c| c.x.len() == terms.y.len()));
+            let samples = terms.recording.iter().filter(|r| **r < case.recordings.len()).count();
+            let chosen: Vec<_> = terms
+                .columns
+                .iter()
+                .filter(|c| c.effect == id || c.effect.is_empty() && c.x[..samples].iter().any(|x| *x != 0.0))
+                .collect();
+            let x: Vec<&[f64]> = chosen.iter().map(|c| &c.x[..samples]).collect();
+            let y = &terms.y[..samples];
+            let gram: Vec<Vec<f64>> = x.iter().map(|a| x.iter().map(|b| dot(a, b)).collect()).collect();
+            let right: Vec<f64> = x.iter().map(|a| dot(a, y)).collect();
+            let found = solve(&gram, &right).expect("independent columns");
+            let at = chosen.iter().position(|c| c.effect == id).expect("its column");
+            let value = found[at] * chosen[at].values[0];
+            assert!((value / truth - 1.0).abs() < 0.05, "{id}: {value} for {truth}");
+            let left: f64 = (0..samples)
+                .map(|i| y[i] - x.iter().zip(&found).map(|(c, k)| k * c[i]).sum::<f64>())
+                .map(|e| e * e)
+                .sum();
+            let noise_n = search.data.noise.blocks(2).marginal_n;
+            let rms = (left / samples as f64).sqrt();
+            let before = (dot(y, y) / samples as f64).sqrt();
+            assert!(
+                before > 2.0 * noise_n && rms < 1.3 * noise_n,
+                "{id}: {before} to {rms}, noise {noise_n}"
+            );
+        }
+    }
+}
