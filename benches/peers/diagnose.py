@@ -54,9 +54,13 @@ def tune(cases):
                 for setting, coefficients in peer.scan(problem).items():
                     if view[1] and setting[0] == "NARX":
                         continue  # rows of ruptures have no sample before
-                    found = problem.contributions(coefficients)
+                    found, verdicts = problem.contributions(coefficients), {}
                     told = right[name].setdefault((view, setting), np.zeros((len(cases), len(CUTS)), bool))
-                    told[number] = [judge(case, problem, chosen(found, *cut))[1] for cut in CUTS]
+                    for k, cut in enumerate(CUTS):
+                        named = chosen(found, *cut)  # the largest first: how many there are says which
+                        if len(named) not in verdicts:
+                            verdicts[len(named)] = judge(case, problem, named)[1]
+                        told[number, k] = verdicts[len(named)]
         print(f"tuning: {number + 1} of {len(cases)}", file=sys.stderr, flush=True)
     best = {}
     for name, settings in right.items():
