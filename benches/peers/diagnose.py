@@ -130,7 +130,7 @@ def main():
     print(f"\njudged on {len(cases)} cases of seed {test}:\n")
 
     def line(label, cell):
-        print(f"{label:<40}" + "".join(f"{cell(n):<26}" for n in names).rstrip())
+        print(f"{label:<46}" + "".join(f"{cell(n):<26}" for n in names).rstrip())
 
     line("", lambda n: n)
     for label in labels:

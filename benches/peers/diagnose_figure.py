@@ -25,7 +25,7 @@ def draw(path, table, labels, command):
     fig, axes = plt.subplots(1, 2, figsize=(13, 5.4), gridspec_kw={"width_ratios": [4, 2]}, sharey=True)
     halves = [
         (axes[0], [1, 2, 3, 4], "named, or in its class (higher is better)"),
-        (axes[1], [0, 5], "named although nothing of the library is there (lower is better)"),
+        (axes[1], [0, 5], "something named that is not there (lower is better)"),
     ]
     width = 0.16
     for axis, which, title in halves:
@@ -40,7 +40,7 @@ def draw(path, table, labels, command):
                 axis.plot([at, at], [100 * low, 100 * high], color="#222222", lw=1.4)
                 axis.text(at, 100 * high + 1.2, str(count), ha="center", va="bottom", fontsize=9)
         axis.set_xticks(range(len(which)), [f"{LABELS[r]}\n({table[names[0]][labels[r]][1]} cases)" for r in which])
-        axis.set_title(title, fontsize=11)
+        axis.set_title(title, fontsize=10.5)
         axis.set_ylim(0, 112)
         axis.set_yticks(range(0, 101, 20))
         axis.grid(axis="y", color="#dddddd", lw=0.8)
