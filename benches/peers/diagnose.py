@@ -10,7 +10,8 @@ highest peaks of the periodogram).
 Every peer is tuned by itself on the tuning seed, to the best mean of two rates, clean called clean and hidden effects named: its
 own settings (see diagnose_regressions.py); whether residual and columns are whitened with the noise's colour in air, as Stylet
 does; whether what the ruptures say comes as further rows; the smallest contribution that counts, in noise standard
-deviations and as a share of the largest; the largest number of effects. Then it is judged once on the test seed.
+deviations and as a share of the largest; the largest number of effects, where of equal scores the larger number is taken. Then it is
+judged on the test seed.
 
 Right: as many effects named as hidden, and each hidden one among them; an effect with a chosen column that correlates above
 0.98 with one of a hidden effect's counts as that one. Stylet: as many causes as effects, each effect in the class of one.
@@ -35,8 +36,8 @@ from diagnose_regressions import PEERS  # noqa: E402
 VIEWS = list(itertools.product((False, True), repeat=2))  # whitened, rows of ruptures
 LEAST = [0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.13, 0.16, 0.2, 0.25, 0.3, 0.4, 0.6]
 SHARE = [0.0, 0.1, 0.2, 0.35, 0.5]
-MOST = [1, 2, 3, 99]
-CUTS = list(itertools.product(LEAST, SHARE, MOST))
+MOST = [99, 3, 2, 1]  # of equal scores the one that names more effects
+CUTS = [(least, share, most) for most, least, share in itertools.product(MOST, LEAST, SHARE)]
 
 
 def load(folder, seed, count):
@@ -68,7 +69,7 @@ def tune(cases):
             rates = told[clean].mean(axis=0), told[~clean].mean(axis=0)
             score = 0.5 * (rates[0] + rates[1])
             k = int(np.argmax(score))
-            if name not in best or score[k] > best[name][0]:
+            if name not in best or (score[k], CUTS[k][2]) > (best[name][0], best[name][3][2]):
                 best[name] = (score[k], view, setting, CUTS[k], (rates[0][k], rates[1][k]))
     return best
 

@@ -6,7 +6,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402
 from diagnose_cases import wilson  # noqa: E402
 
-COLOURS = ["#0b5394", "#e69138", "#6aa84f", "#a64d79", "#999999"]
+COLOURS = ["#5b9bd5", "#e69138", "#6aa84f", "#a64d79", "#999999"]
 LABELS = [
     "clean:\nfalsely accused",
     "one effect,\nstrong",
