@@ -4,5 +4,5 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 python3 -m venv target/peers
-target/peers/bin/pip install --quiet --disable-pip-version-check -r benches/peers/requirements.txt
+target/peers/bin/python -m pip install --quiet --disable-pip-version-check -r benches/peers/requirements.txt
 echo "peers ready: target/peers/bin/python"

@@ -130,8 +130,13 @@ pub fn aim(sketch: &Sketch) -> Drawn {
 /// Runs one case.
 #[must_use]
 pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
-    let drawn = aim(sketch);
-    let case = hidden::case(&drawn);
+    examine(index, sketch.kind, &aim(sketch), settings)
+}
+
+/// Runs one case whose strengths are drawn already.
+#[must_use]
+pub fn examine(index: u64, kind: Kind, drawn: &Drawn, settings: Settings) -> Option<Result> {
+    let case = hidden::case(drawn);
     let evidence: Vec<Evidence> = case
         .recordings
         .iter()
@@ -143,15 +148,15 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
         diagnose(&case.believed, &evidence, &Options { search: settings, brief: false }, |_| {}).ok()?;
     let seconds = start.elapsed().as_secs_f64();
     let (d, search) = (&examined.diagnosis, &examined.search);
-    let clean = hidden::clean_force(&drawn);
-    let strength = size_of(search, &search.base, &clean, &drawn);
+    let clean = hidden::clean_force(drawn);
+    let strength = size_of(search, &search.base, &clean, drawn);
     let hidden_ids: Vec<String> = drawn.effects.iter().map(|e| e.id().to_owned()).collect();
     let named: Vec<Vec<String>> = d
         .causes
         .iter()
         .map(|c| std::iter::once(c.effect.clone()).chain(c.equivalent.iter().cloned()).collect())
         .collect();
-    let right = match sketch.kind {
+    let right = match kind {
         Kind::Clean => d.verdict == Verdict::None,
         Kind::Outside => d.verdict == Verdict::Unknown,
         _ if hidden_ids == ["force_gain"] => {
@@ -207,7 +212,7 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
     let after_true = (square / n.max(1.0_f64)).sqrt();
     let (before, after) = (d.gain.rmse_before_n, d.gain.rmse_after_n);
     let gain = (before - after_true > 0.03 * before).then(|| (before - after) / (before - after_true));
-    let truth_nats = if right || sketch.kind == Kind::Outside || drawn.effects.is_empty() {
+    let truth_nats = if right || kind == Kind::Outside || drawn.effects.is_empty() {
         None
     } else {
         let mut data = Data { ruptures: case.ruptures.clone(), ..search.data.clone() };
@@ -215,7 +220,7 @@ pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
     };
     Some(Result {
         index,
-        kind: sketch.kind,
+        kind,
         hidden: if let Some(o) = &drawn.outside {
             vec![hidden::OUTSIDE[o.kind].to_owned()]
         } else {

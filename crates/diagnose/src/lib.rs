@@ -19,6 +19,7 @@
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
 //! | [`held_out`] | the gain on recordings left out of the fit |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
+//! | [`terms`] | the same candidates as columns, for sparse regressions beside |
 //! | [`hidden`], [`benchmark`] | cases drawn without knowledge of the above, and the examination on them |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
@@ -45,6 +46,7 @@ pub mod ruptures;
 pub mod search;
 pub mod spectrum;
 pub mod starts;
+pub mod terms;
 pub mod thresholds;
 pub mod track;
 pub mod velocity;

@@ -210,7 +210,7 @@ pub(super) fn looks(model: &Model, data: &Data, coarse: &Data, q: usize, all: &[
 }
 
 /// The data with ruptures moved back to where they were before the drops showed.
-pub(super) fn shift(data: &Data, start: &Start) -> Data {
+pub(crate) fn shift(data: &Data, start: &Start) -> Data {
     let mut out = data.clone();
     if start.lead_s == 0.0 && start.lead_m == 0.0 {
         return out;

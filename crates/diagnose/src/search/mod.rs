@@ -8,6 +8,8 @@ mod membrane;
 mod scatter;
 mod select;
 
+pub(crate) use contest::shift;
+
 use crate::air;
 use crate::fit::{Data, Fit, Residuals, fit, objective, residuals};
 use crate::model::{Choice, Model};
