@@ -214,10 +214,8 @@ mod tests {
             let noise_n = search.data.noise.blocks(2).marginal_n;
             let rms = (left / samples as f64).sqrt();
             let before = (dot(y, y) / samples as f64).sqrt();
-            assert!(
-                before > 2.0 * noise_n && rms < 1.3 * noise_n,
-                "{id}: {before} to {rms}, noise {noise_n}"
-            );
+            let nats = samples as f64 * (before / rms).ln();
+            assert!(nats > 100.0 && rms < 1.3 * noise_n, "{id}: {nats} nats, left {rms}, noise {noise_n}");
         }
     }
 }
