@@ -202,6 +202,7 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn, settings: Settings) -> Opt
         tolerance: case.believed.tolerance,
         given: Vec::new(),
         effects: choices,
+        held: None,
     };
     let (mut square, mut n) = (0.0, 0.0);
     for track in search.data.tracks.iter() {

@@ -5,6 +5,7 @@ use crate::held_out;
 use crate::leftover;
 use crate::model::{Model, Role, base_value, in_logarithm};
 use crate::outcome::*;
+use crate::profile;
 use crate::raw;
 use crate::refine::covariance_diagonal;
 use crate::search::{Candidate, Search, Settings};
@@ -96,6 +97,10 @@ pub fn diagnose(
     .ok_or(DiagnoseError::NoFit)?;
     search.run(&mut progress);
     progress("judging");
+    let mut told = Vec::new();
+    if !options.brief {
+        (search.best, told) = profile::settled(&search, &search.best);
+    }
     let best = search.best.clone();
     let data = search.data_of(&best);
     // By the noise in air: that of the model's own residual takes structure for colour.
@@ -111,7 +116,12 @@ pub fn diagnose(
     let dominated = dominated && !coarse_steps;
 
     let mut causes = Vec::new();
-    let spread = if options.brief { None } else { covariance_diagonal(&best.model, &data) };
+    let mut spread = if options.brief { None } else { covariance_diagonal(&best.model, &data) };
+    for number in spread.iter_mut().flatten() {
+        if let Some((_, sd)) = told.iter().find(|t| t.0 == number.0) {
+            number.2 = sd.max(number.2);
+        }
+    }
     for index in 0..best.model.effects.len() {
         causes.push(cause(&search, &best, index, spread.as_deref()));
     }

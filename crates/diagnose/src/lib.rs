@@ -40,6 +40,7 @@ pub mod look;
 pub mod model;
 pub mod noise;
 pub mod outcome;
+pub mod profile;
 pub mod raw;
 pub mod refine;
 pub mod ruptures;

@@ -72,6 +72,8 @@ pub struct Model {
     pub given: Vec<AnyEffect>,
     /// The effects under trial.
     pub effects: Vec<Choice>,
+    /// A number that is not fitted.
+    pub held: Option<Role>,
 }
 
 /// A model ready to be replayed.
@@ -100,6 +102,7 @@ impl Model {
             tolerance,
             given: given.to_vec(),
             effects: Vec::new(),
+            held: None,
         }
     }
 
@@ -196,6 +199,7 @@ impl Model {
                 slots.push(slot);
             }
         }
+        slots.retain(|s| Some(s.role) != self.held);
         slots
     }
 

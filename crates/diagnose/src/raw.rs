@@ -18,6 +18,8 @@ pub struct Raw {
 
 /// Fewest equal extremes that make a saturation.
 const EXTREMES: usize = 6;
+/// With fewer levels than this up to the largest force, a limit must hold far more samples.
+const COARSE_LEVELS: f64 = 20.0;
 /// A spike stands out of its neighbours by so many robust standard deviations.
 const SPIKE_SD: f64 = 6.5;
 
@@ -76,7 +78,9 @@ fn limit(recordings: &[&Recording], step: Option<f64>) -> Option<f64> {
         // On a grid several samples share the last level; below the limit they thin out.
         Some(step) => {
             let level = |k: f64| all().filter(|f| (f.abs() - (most - k * step)).abs() < 0.25 * step).count();
-            3 * level(1.0).max(level(2.0)).max(2)
+            // A force that is held within one of few levels looks like a limit.
+            let factor = if COARSE_LEVELS * step > most { 12 } else { 3 };
+            factor * level(1.0).max(level(2.0)).max(2)
         }
     };
     (at >= EXTREMES && at > expected).then_some(most)

@@ -27,20 +27,35 @@ pub struct Found {
     pub spare: Vec<Vec<(f64, bool)>>,
 }
 
+/// A drop from one sample of the first pass to the next, and one that takes its time.
+pub const SHARP: usize = 1;
+/// See [`SHARP`].
+pub const SMEARED: usize = 10;
+
+impl Found {
+    /// Whether some layer ruptures elsewhere in `other`.
+    #[must_use]
+    pub fn differs(&self, other: &Self) -> bool {
+        const APART_S: f64 = 0.8;
+        let pairs = self.instants.iter().flatten().zip(other.instants.iter().flatten());
+        pairs.into_iter().any(|(a, b)| a != b && !((a - b).abs() < APART_S))
+    }
+}
+
 /// How far (s) a rupture at a clear drop may be moved at a time: no law that lacks an effect drags it away.
 const CLEAR_S: f64 = 0.4;
 
 /// Finds the ruptures in every recording, how far they may be moved, and first values of stiffness and
-/// friction.
+/// friction. A drop is over `within` samples of the first pass.
 #[must_use]
-pub fn find(model: &mut Model, tracks: &[Track]) -> Found {
+pub fn find(model: &mut Model, tracks: &[Track], within: usize) -> Found {
     let q = (tracks.first().map_or(1.0, |t| t.sample_hz) / COARSE_HZ).round().max(1.0) as usize;
     let coarse: Vec<Track> = tracks.iter().map(|t| t.blocks(q, &[])).collect();
     let range = coarse.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
     let mut paths: Vec<Vec<usize>> = Vec::new();
     for turn in 0..5 {
         let scale = range * [0.1, 0.05, 0.03, 0.02, 0.02][turn];
-        let new: Vec<Vec<usize>> = coarse.iter().map(|t| path(&model.tissue, t, scale)).collect();
+        let new: Vec<Vec<usize>> = coarse.iter().map(|t| path(&model.tissue, t, scale, within)).collect();
         let same = new == paths;
         paths = new;
         refit(model, &coarse, &paths);
@@ -70,7 +85,7 @@ pub fn find(model: &mut Model, tracks: &[Track]) -> Found {
     let slabs = Slab::stack(&model.tissue);
     let mut found = Found { instants, ..Found::default() };
     for (k, (track, path)) in coarse.iter().zip(&paths).enumerate() {
-        let drops = drops(&slabs, track);
+        let drops = drops(&slabs, track, within);
         let clear = |r: usize| drops.get(r).is_some_and(|d| *d >= 1.0);
         found.reach.push(path.iter().map(|&r| if clear(r) { CLEAR_S } else { f64::INFINITY }).collect());
         let taken = |i: usize| path.iter().any(|r| r.abs_diff(i) <= 2 * DROP_SIDE);
@@ -100,7 +115,7 @@ const DROP_SHARE: f64 = 0.03;
 
 /// How much of a clear drop the force shows at each sample, 0 (less than half of one) to 1. Friction changes with the velocity, and how
 /// much is not known yet: half of what is believed counts against.
-fn drops(slabs: &[Slab], track: &Track) -> Vec<f64> {
+fn drops(slabs: &[Slab], track: &Track, within: usize) -> Vec<f64> {
     let n = track.len();
     let range = track.f.iter().fold(1e-9_f64, |m, f| m.max(f.abs()));
     let viscous: Vec<f64> = (0..n).map(|i| friction(slabs, track.z[i], track.v[i])).collect();
@@ -110,10 +125,10 @@ fn drops(slabs: &[Slab], track: &Track) -> Vec<f64> {
         hi - lo
     };
     let mut out = vec![0.0; n];
-    for i in DROP_SIDE..n.saturating_sub(DROP_SIDE) {
-        let drop = |x: &[f64]| mean(x, i - DROP_SIDE) - mean(x, i + 1);
+    for i in DROP_SIDE..n.saturating_sub(DROP_SIDE + within - 1) {
+        let drop = |x: &[f64]| mean(x, i - DROP_SIDE) - mean(x, i + within);
         let free = drop(&track.f) - drop(&viscous);
-        let doubt = 0.5 * span(&viscous[i - DROP_SIDE..i + 1 + DROP_SIDE]);
+        let doubt = 0.5 * span(&viscous[i - DROP_SIDE..i + within + DROP_SIDE]);
         out[i] = (2.0 * (free - doubt) / (DROP_SHARE * range) - 1.0).max(0.0);
     }
     // A drop serves one rupture: only its peak stays.
@@ -126,7 +141,7 @@ fn drops(slabs: &[Slab], track: &Track) -> Vec<f64> {
 }
 
 /// The best path: per layer the sample at which it has ruptured.
-fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
+fn path(tissue: &Tissue, track: &Track, scale: f64, within: usize) -> Vec<usize> {
     let slabs = Slab::stack(tissue);
     let states = slabs.len() + 1;
     let n = track.len();
@@ -135,7 +150,7 @@ fn path(tissue: &Tissue, track: &Track, scale: f64) -> Vec<usize> {
         *c = f64::INFINITY;
     }
     let mut from: Vec<u8> = vec![0; n * states];
-    let drops = drops(&slabs, track);
+    let drops = drops(&slabs, track, within);
     let mut deepest = f64::NEG_INFINITY;
     for i in 0..n {
         let free = track.f[i] - friction(&slabs, track.z[i], track.v[i]);

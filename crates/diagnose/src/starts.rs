@@ -17,6 +17,15 @@ pub struct Start {
     pub quadrature: bool,
 }
 
+impl Start {
+    /// Whether a fit from here is that from `other`.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        let whole = |s: &Self| (s.choice.info.id, s.lead_s.to_bits(), s.lead_m.to_bits());
+        whole(self) == whole(other) && self.choice.values == other.choice.values
+    }
+}
+
 /// Effects that are named from the raw data and not from the residual of a law.
 pub const FROM_THE_RAW_DATA: [&str; 3] = ["saturation", "quantisation", "force_spikes"];
 

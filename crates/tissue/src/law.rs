@@ -398,18 +398,17 @@ impl Law {
     #[inline]
     pub(crate) fn sum_up(&self, moment: &Moment, elastic_n: f64, memory: &mut Memories) -> TissueForce {
         let mut inside = 0.0;
-        let mut cumulative = 0.0;
-        let mut local = 0.0;
-        for (i, slab) in self.slabs.iter().enumerate() {
-            let length = slab.inside_m(moment.z_m);
-            inside += length;
-            let share = slab.friction_ns_per_m2 * length * (1.0 - slab.gripped);
-            if i < moment.ruptured {
-                cumulative += share;
-            } else {
-                local += share;
+        let mut along = |slabs: &[Slab]| {
+            let mut sum = 0.0;
+            for slab in slabs {
+                let length = slab.inside_m(moment.z_m);
+                inside += length;
+                sum += slab.friction_ns_per_m2 * length * (1.0 - slab.gripped);
             }
-        }
+            sum
+        };
+        let (behind, ahead) = self.slabs.split_at(moment.ruptured.min(self.slabs.len()));
+        let (mut cumulative, mut local) = (along(behind), along(ahead));
         let mut velocity = moment.v_mps;
         let mut tip_extra_n = 0.0;
         let mut dry_n = 0.0;

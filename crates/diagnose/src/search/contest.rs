@@ -9,8 +9,13 @@ use crate::starts::{self, Start};
 use crate::track::NEVER;
 use rayon::prelude::*;
 
-/// Share of the best rival's gain by which another may be behind after its first fit.
-const FAR_BEHIND: f64 = 0.15;
+/// Share of the best rival's gain by which another may be behind after its first fit, if other instants of
+/// rupture may bring it much, and if not.
+const FAR_BEHIND: [f64; 2] = [0.15, 0.05];
+/// Share of the needed gain that an effect which does not care for instants of rupture shows at once.
+const PROMISING: f64 = 0.3;
+/// Nats behind the standing model at which an effect that costs much to fit is given up after two turns.
+const GIVEN_UP: f64 = 1000.0;
 
 /// Whether an effect moves its ruptures far, or between samples.
 fn wide(id: &str) -> bool {
@@ -55,9 +60,9 @@ impl Search {
                 "hidden_membrane" | "respiration" | "low_pass_lag" | "soft_boundary" => 3,
                 _ => 2,
             };
-            if chosen.iter().filter(|c| c.start.choice.info.id == id).count() < most
-                && (s.gain > 1.0 || moves_events(id))
-            {
+            let same = |c: &&&Seen| c.start.choice.info.id == id;
+            let twice = chosen.iter().filter(same).any(|c| c.start.is_same(&s.start));
+            if !twice && chosen.iter().filter(same).count() < most && (s.gain > 1.0 || moves_events(id)) {
                 chosen.push(s);
             }
         }
@@ -125,24 +130,38 @@ impl Search {
         }
         let finalists = self.better_starts(&data, finalists);
         let name = |m: &Model| m.names().last().copied().unwrap_or("");
-        let refined = |c: &Candidate, rounds: usize| {
+        let refined = |c: &Candidate, rounds: usize, turns: usize| {
             let mut there = Data { ruptures: c.ruptures.clone(), ..data.clone() };
-            let f = refine(&c.model, &mut there, rounds, 5, wide(name(&c.model)))?;
+            let f = refine(&c.model, &mut there, rounds, turns, wide(name(&c.model)))?;
             Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
         };
         // Fitted with the ruptures where they are; only those not far behind go on to move them.
         let first: Vec<Option<Candidate>> = finalists
             .into_par_iter()
-            .map(|(model, ruptures)| refined(&Candidate { model, ruptures, nats: f64::INFINITY }, 0))
+            .map(|(model, ruptures)| {
+                let begun = Candidate { model, ruptures, nats: f64::INFINITY };
+                if name(&begun.model) != "needle_compliance" {
+                    return refined(&begun, 0, 5);
+                }
+                let begun = refined(&begun, 0, 2)?;
+                if begun.nats > standing.nats + GIVEN_UP { Some(begun) } else { refined(&begun, 0, 5) }
+            })
             .collect();
         let first: Vec<Candidate> = first.into_iter().flatten().collect();
         let ahead = first.iter().map(|r| r.nats).fold(standing.nats.min(incumbent), f64::min);
-        let limit = ahead + FAR_BEHIND * (standing.nats - ahead) + 100.0;
         let rivals: Vec<Option<Candidate>> = first
             .into_par_iter()
             .map(|c| {
-                let far = c.nats > limit;
-                if far { Some(c) } else { refined(&c, if wide(name(&c.model)) { 3 } else { 2 }) }
+                let id = name(&c.model);
+                let by_instants = wide(id) || moves_events(id);
+                let far = FAR_BEHIND[usize::from(!by_instants)] * (standing.nats - ahead) + 100.0;
+                let gain = standing.nats - c.nats;
+                let promising = by_instants || gain > PROMISING * self.settings.needed(id);
+                if !promising || c.nats > ahead + far {
+                    Some(c)
+                } else {
+                    refined(&c, if wide(id) { 3 } else { 2 }, 5)
+                }
             })
             .collect();
         let mut rivals: Vec<Candidate> = rivals.into_iter().flatten().collect();

@@ -1,4 +1,5 @@
-//! A layer gives way at about the same depth in all recordings: one that does not is tried there.
+//! A layer gives way at about the same depth in all recordings: one that does not, or not at all, is tried
+//! there.
 
 use super::{Candidate, Search};
 use crate::noise::median;
@@ -25,21 +26,21 @@ impl Search {
     }
 
     /// The instant at which a recording first reaches the depth at which a layer gave way in the others, when its
-    /// own rupture is far from there.
+    /// own rupture is far from there or was not seen.
     fn stray(&self, ruptures: &[Vec<f64>], k: usize, layer: usize) -> Option<f64> {
         let depth = |track: &Track, r: &[f64]| {
             let at = *r.get(layer)?;
             if at == NEVER { None } else { track.z.get(track.first_from(at)).copied() }
         };
         let track = &self.data.tracks[k];
-        let own = depth(track, &ruptures[k])?;
+        let own = depth(track, &ruptures[k]);
         let others = self.data.tracks.iter().zip(ruptures).enumerate().filter(|(j, _)| *j != k);
         let mut others: Vec<f64> = others.filter_map(|(_, (t, r))| depth(t, r)).collect();
         if others.len() < 2 {
             return None;
         }
         let usual = median(&mut others);
-        if (own - usual).abs() < APART_M {
+        if own.is_some_and(|own| (own - usual).abs() < APART_M) {
             return None;
         }
         let at = (1..track.len()).find(|i| track.z[*i] >= usual).map(|i| track.before(i))?;

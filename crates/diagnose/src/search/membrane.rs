@@ -1,6 +1,6 @@
 //! The drop of a membrane, or of cutting that ends, may have been taken for that of a layer: the two exchanged.
 
-use super::{Begun, Search, choice};
+use super::{Begun, Candidate, Search, choice};
 use crate::fit::{Data, fit};
 use crate::model::{Choice, Model};
 use crate::noise::median;
@@ -47,6 +47,46 @@ impl Search {
             })
             .collect();
         fits.into_iter().flatten().collect()
+    }
+
+    /// A membrane that breaks next to a layer: the candidate with the two drops given to the other each, where that
+    /// fits better.
+    pub(super) fn uncrossed(&self, candidate: Candidate) -> Candidate {
+        const NEXT_TO_S: f64 = 0.6;
+        let membranes = candidate.model.effects.iter().position(|e| e.info.id == "hidden_membrane");
+        let Some(index) = membranes else { return candidate };
+        let surface = candidate.model.assumed.surface_m;
+        let mut best = candidate;
+        for layer in 0..best.model.assumed.layers.len() {
+            let [begins, slope, force] = *best.model.effects[index].values.as_slice() else { return best };
+            let breaks = surface + begins + force / slope;
+            let mut ruptures = best.ruptures.clone();
+            let (mut depths, mut near) = (Vec::new(), 0);
+            for (track, own) in self.data.tracks.iter().zip(&mut ruptures) {
+                let (Some(was), Some(k)) =
+                    (own.get(layer).copied(), track.z.iter().position(|z| *z >= breaks))
+                else {
+                    continue;
+                };
+                let at = track.before(k);
+                let after = if layer > 0 { own[layer - 1] } else { f64::NEG_INFINITY };
+                let before = own.get(layer + 1).copied().unwrap_or(NEVER);
+                if (at - was).abs() < NEXT_TO_S && at > after && at < before {
+                    near += 1;
+                    depths.extend(track.z.get(track.first_from(was)));
+                    own[layer] = at;
+                }
+            }
+            if 2 * near <= ruptures.len() {
+                continue;
+            }
+            let mut model = best.model.clone();
+            model.effects[index].values[0] = (median(&mut depths) - surface - force / slope).max(1e-4);
+            if let Some(new) = self.refitted(&model, &ruptures).filter(|new| new.nats < best.nats) {
+                best = new;
+            }
+        }
+        best
     }
 
     /// The ruptures with those of one layer at spare drops, the same depth in every recording and clear in one at

@@ -7,6 +7,7 @@ mod level;
 mod membrane;
 mod scatter;
 mod select;
+mod smeared;
 
 pub(crate) use contest::shift;
 
@@ -34,6 +35,8 @@ const FAST_HZ: f64 = 6.0;
 
 /// Nats more that every effect must gain when rounding hides the noise: what is left then has no known colour.
 const ROUNDED: f64 = 25.0;
+/// Beyond two effects nothing is sought where what is left looks like noise by this p-value.
+const NOISE_ALONE_P: f64 = 0.1;
 /// How far (s) the base law may move a rupture at a clear drop.
 const BASE_MOVES_S: f64 = 0.12;
 
@@ -142,9 +145,10 @@ impl Search {
         let mut model = Model::base(tissue, tolerance, given);
         let force_n = tracks.iter().flat_map(|t| &t.f).fold(0.0_f64, |m, f| m.max(f.abs()));
         let least = 1e-4 * force_n.max(1e-9);
-        let found = ruptures::find(&mut model, &tracks);
+        let mut found = ruptures::find(&mut model, &tracks, ruptures::SHARP);
         let air = air::noise(&tracks, tissue.surface_m, least, 0.0);
         let noise = air.unwrap_or_else(|| rough(&tracks, least));
+        smeared::tried(&mut model, &mut found, &tracks, noise);
         // Rounding to steps beyond the noise is no noise: it repeats itself wherever the force does.
         let coarse = step_n > COARSE_STEP * noise.marginal_n;
         let (air, noise, dead_n) = if coarse {
@@ -209,8 +213,9 @@ impl Search {
             let taken = self.stage(&standing);
             if taken {
                 self.enlarge();
+                self.best = crate::profile::settled(self, &self.uncrossed(self.best.clone())).0;
             }
-            if !taken || (self.best.model.effects.len() > 1 && self.hopeless(2.0)) {
+            if !taken || (self.best.model.effects.len() > 1 && (self.hopeless(2.0) || self.nothing_left())) {
                 break;
             }
         }
@@ -259,6 +264,11 @@ impl Search {
         let left = crate::leftover::test(&self.best.model, &data);
         let base = nats(&self.base.model, &self.data_of(&self.base));
         left.p_value < 1e-20 && left.nats > ratio * (base - self.best.nats)
+    }
+
+    /// Whether what the effects taken leave looks like noise alone.
+    fn nothing_left(&self) -> bool {
+        crate::leftover::test(&self.best.model, &self.data_of(&self.best)).p_value > NOISE_ALONE_P
     }
 
     /// The base model once more under the final noise; effects that then gain too little go.

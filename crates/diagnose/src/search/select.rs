@@ -9,6 +9,10 @@ use rayon::prelude::*;
 
 /// A rival is fitted to the end from this share of the needed gain on.
 const POLISHED: f64 = 0.4;
+/// Nats that a model without an effect lacks after two turns when nothing replaces it.
+const INDISPENSABLE: f64 = 3000.0;
+/// Share of its gain by which an effect must be ahead of its rivals not to be contested again.
+const NEAR: f64 = 0.15;
 
 impl Search {
     /// One step of the forward selection; true when an effect was taken.
@@ -107,7 +111,11 @@ impl Search {
 
     /// With several effects: each in turn is taken out and contested anew.
     pub(super) fn exchange(&mut self) {
-        for index in 0..self.best.model.effects.len() {
+        let count = self.best.model.effects.len();
+        for index in 0..count {
+            if index + 1 == count && self.alone() {
+                continue;
+            }
             let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures) else {
                 continue;
             };
@@ -120,6 +128,15 @@ impl Search {
                 self.rivals = rivals;
             }
         }
+    }
+
+    /// Whether the effect taken last had no rival anywhere near.
+    fn alone(&self) -> bool {
+        let gained = self.stages.iter().rev().find(|s| s.taken.is_some()).and_then(|s| s.rivals.first());
+        let own = self.best.model.names().last().copied().unwrap_or("");
+        let others = self.rivals.iter().filter(|r| r.model.names().last().copied() != Some(own));
+        let near = self.reference + NEAR * gained.map_or(0.0, |g| g.1) + 100.0;
+        gained.is_some_and(|g| g.0 == own) && others.map(Candidate::fined).all(|nats| nats > near)
     }
 
     /// The candidate fitted to the end.
@@ -150,8 +167,14 @@ impl Search {
             }
             for index in 0..self.best.model.effects.len() {
                 let id = self.best.model.effects[index].info.id;
-                let Some(without) = self.refitted(&self.best.model.without(index), &self.best.ruptures)
-                else {
+                let model = self.best.model.without(index);
+                let mut there = self.data_of(&self.best);
+                if refine(&model, &mut there, 0, 2, false)
+                    .is_some_and(|f| f.nats > self.best.nats + INDISPENSABLE)
+                {
+                    continue;
+                }
+                let Some(without) = self.refitted(&model, &self.best.ruptures) else {
                     continue;
                 };
                 let without = if scattered { self.forgiving(&without) } else { without };

@@ -1,0 +1,84 @@
+//! Numbers that the instants of ruptures follow: a lag that is a little longer with ruptures a little earlier
+//! fits nearly as well, so that the curvature with the instants held promises too much. Such a number is
+//! sought, and its uncertainty told, along the profile: the objective with everything else fitted anew.
+
+use crate::model::Role;
+use crate::refine::{covariance_diagonal, refine};
+use crate::search::{Candidate, Search};
+
+/// Effects with such a number, their first.
+const COUPLED: [&str; 4] = ["low_pass_lag", "time_delay", "soft_boundary", "needle_compliance"];
+/// Steps along the profile at most.
+const STEPS: usize = 8;
+/// Nats that the neighbours must rise for their parabola to be trusted, and may at most.
+const RISE: [f64; 2] = [0.5, 12.0];
+
+/// The candidate at the lowest point of the profile of each such number, and their standard deviations (a
+/// logarithm's where the number is fitted in its logarithm).
+#[must_use]
+pub fn settled(search: &Search, best: &Candidate) -> (Candidate, Vec<(Role, f64)>) {
+    let mut best = best.clone();
+    let mut told = Vec::new();
+    for effect in 0..best.model.effects.len() {
+        if COUPLED.contains(&best.model.effects[effect].info.id) {
+            let role = Role::Effect { effect, parameter: 0 };
+            if let Some(sd) = along(search, &mut best, role) {
+                told.push((role, sd));
+            }
+        }
+    }
+    (best, told)
+}
+
+/// Walks down the profile of one number; its standard deviation by the parabola at the bottom.
+fn along(search: &Search, best: &mut Candidate, role: Role) -> Option<f64> {
+    let spread = covariance_diagonal(&best.model, &search.data_of(best))?;
+    let (_, mut x, sd) = *spread.iter().find(|s| s.0 == role)?;
+    let mut h = if sd.is_finite() { 2.0 * sd.max(1e-5) } else { 1e-2 };
+    let mut centre = at(search, best, role, x)?;
+    for _ in 0..STEPS {
+        let (low, high) =
+            rayon::join(|| at(search, &centre, role, x - h), || at(search, &centre, role, x + h));
+        let (low, high) = (low?, high?);
+        let (fall, rise) = (low.nats - centre.nats, high.nats - centre.nats);
+        if fall.min(rise) < 0.0 {
+            let down = if fall < rise { -h } else { h };
+            centre = if fall < rise { low } else { high };
+            x += down;
+            h *= if fall.max(rise) > RISE[1] { 1.0 } else { 1.6 };
+            continue;
+        }
+        if fall.max(rise) < RISE[0] {
+            h *= 2.0;
+            continue;
+        }
+        if fall.min(rise) > RISE[1] {
+            h *= 0.5;
+            continue;
+        }
+        let bottom = x + 0.5 * h * (fall - rise) / (fall + rise);
+        let lowest = at(search, &centre, role, bottom).filter(|c| c.nats < centre.nats).unwrap_or(centre);
+        if lowest.nats < best.nats {
+            *best = lowest;
+        }
+        return Some(h / (fall + rise).sqrt());
+    }
+    if centre.nats < best.nats {
+        *best = centre;
+    }
+    None
+}
+
+/// Everything else fitted with a number held.
+fn at(search: &Search, from: &Candidate, role: Role, x: f64) -> Option<Candidate> {
+    let mut model = from.model.clone();
+    let slots = model.slots();
+    let mut p = model.vector(&slots);
+    p[slots.iter().position(|s| s.role == role)?] = x;
+    model.set(&slots, &p);
+    model.held = Some(role);
+    let mut there = search.data_of(from);
+    let mut fitted = refine(&model, &mut there, 2, 4, false)?;
+    fitted.model.held = None;
+    Some(Candidate { model: fitted.model, ruptures: there.ruptures, nats: fitted.nats })
+}
