@@ -3,6 +3,7 @@
 //! cases; `stylet benchmark diagnose --cases N --seed S` examines as many as you like and prints the
 //! same table.
 
+use rayon::prelude::*;
 use stylet_diagnose::benchmark::{Result, run, summary};
 use stylet_diagnose::hidden::{self, Drawn, Kind, Motions, Size, sketch_of};
 use stylet_diagnose::search::Settings;
@@ -10,7 +11,11 @@ use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
 use stylet_tissue::AnyEffect;
 
 fn examine(kind: Kind, turns: &[u64]) -> Vec<Result> {
-    turns.iter().filter_map(|&turn| run(turn, &sketch_of(7, turn, kind, turn), Settings::default())).collect()
+    turns.iter().filter_map(|&turn| case(7, kind, turn)).collect()
+}
+
+fn case(seed: u64, kind: Kind, turn: u64) -> Option<Result> {
+    run(turn, &sketch_of(seed, turn, kind, turn), Settings::default())
 }
 
 #[test]
@@ -31,6 +36,47 @@ fn an_effect_outside_the_library_is_called_unknown() {
     let cases = examine(Kind::Outside, &[11]);
     assert!(cases.iter().all(|c| c.right && c.verdict == Verdict::Unknown), "{}", summary(&cases));
     assert_eq!(cases.len(), 1);
+}
+
+/// A boundary so soft that no drop is sharp, one drop of which is not seen at all in one recording, and a membrane that
+/// breaks a fifth of a second before a layer does.
+#[test]
+fn ruptures_that_are_smeared_unseen_or_side_by_side_do_not_mislead() {
+    for (seed, turn) in [(83, 7), (81, 7), (84, 14)] {
+        let found = case(seed, Kind::Single, turn).expect("a result");
+        assert!(found.right, "seed {seed}, turn {turn}: {:?} for {:?}", found.named, found.hidden);
+    }
+}
+
+/// The whole library: each effect strong, medium and faint, two at once, none, outside the library, under the three
+/// colours of noise. A bar counts as missed when the rate is below it beyond chance. Minutes:
+/// `cargo test --release --test hidden_effects -- --ignored --nocapture`.
+#[test]
+#[ignore = "minutes; run in release"]
+fn every_effect_at_three_strengths() {
+    let turns = |kind: Kind, n: u64| (0..n).map(move |turn| (kind, turn));
+    let all: Vec<(Kind, u64)> = turns(Kind::Single, 81)
+        .chain(turns(Kind::Clean, 24))
+        .chain(turns(Kind::Two, 16))
+        .chain(turns(Kind::Outside, 12))
+        .collect();
+    let cases: Vec<Result> = all.par_iter().filter_map(|&(kind, turn)| case(7, kind, turn)).collect();
+    println!("{}", summary(&cases));
+    let bars: [(Kind, Option<Size>, f64); 6] = [
+        (Kind::Clean, None, 0.99),
+        (Kind::Single, Some(Size::Strong), 0.98),
+        (Kind::Single, Some(Size::Medium), 0.90),
+        (Kind::Single, Some(Size::Faint), 0.75),
+        (Kind::Two, None, 0.85),
+        (Kind::Outside, Some(Size::Strong), 0.95),
+    ];
+    for (kind, size, bar) in bars {
+        let of: Vec<&Result> =
+            cases.iter().filter(|c| c.kind == kind && size.is_none_or(|s| c.size == s)).collect();
+        let right = of.iter().filter(|c| c.right).count();
+        let highest = stylet_sweep::stats::wilson(right as f64, of.len() as f64).high;
+        assert!(of.is_empty() || highest >= bar, "{kind:?} {size:?}: {right} of {}, bar {bar}", of.len());
+    }
 }
 
 fn drawn(motions: Motions, effects: Vec<AnyEffect>) -> Drawn {

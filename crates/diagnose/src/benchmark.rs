@@ -258,8 +258,8 @@ fn wilson(right: usize, of: usize) -> String {
     format!(
         "{right}/{of} = {:.1} % ({:.1} to {:.1})",
         100.0 * p,
-        100.0 * (middle - half),
-        100.0 * (middle + half)
+        100.0 * (middle - half).max(0.0),
+        100.0 * (middle + half).min(1.0)
     )
 }
 

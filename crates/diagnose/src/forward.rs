@@ -263,8 +263,8 @@ const MIXED_SD: f64 = 3.0;
 
 /// Turns predicted forces into recorded less predicted ones. A sample at which the force jumps may have
 /// seen it from before and after, whatever the sensor does between samples: between the predictions it
-/// counts for little. That is the first one after a rupture, and with a delay also those at which jumps of
-/// the velocity arrive. `e` begins at sample `from`.
+/// counts for little. That is the first one after a rupture, and with a delay or a lag also those at which
+/// jumps of the velocity arrive. `e` begins at sample `from`.
 pub(crate) fn departures(
     model: &Compiled,
     track: &Track,
@@ -285,10 +285,12 @@ pub(crate) fn departures(
         let beyond = f - f.clamp(lo, hi);
         mixed.push((k, beyond + (f - e[k] - beyond).clamp(-least, least)));
     };
-    let delayed = track.kinks.iter().map(|k| k.t).filter(|_| model.delay_s > 0.0);
-    for at in ruptures.iter().copied().chain(delayed.map(|t| t + model.delay_s)).filter(|t| t.is_finite()) {
+    let at_kinks = model.delay_s > 0.0 || model.smears;
+    let kinks = track.kinks.iter().filter(|_| at_kinks).map(|k| (k.t + model.delay_s, true));
+    let ruptures = ruptures.iter().map(|t| (*t, false));
+    for (at, after) in ruptures.chain(kinks).filter(|at| at.0.is_finite()) {
         let k = track.first_from(at);
-        note(k, false);
+        note(k, after);
         if model.delay_s > 0.0
             && k > 0
             && k < track.len()

@@ -86,6 +86,8 @@ pub struct Compiled {
     pub to_true: f64,
     /// Delay of the chain in s.
     pub delay_s: f64,
+    /// The chain smears jumps.
+    pub smears: bool,
     /// The chain changes the force.
     pub measures: bool,
     /// The instant of a rupture between two samples matters afterwards.
@@ -147,6 +149,7 @@ impl Model {
             .iter()
             .map(|e| if let AnyEffect::TimeDelay(delay) = e { delay.delay_s } else { 0.0 })
             .sum();
+        let smears = effects.iter().any(|e| matches!(e, AnyEffect::LowPassLag(_)));
         let feels_instants = effects.iter().any(|e| {
             matches!(
                 e,
@@ -159,7 +162,7 @@ impl Model {
             )
         });
         let (to_true, measures) = (chain.true_position(1.0), !chain.is_plain());
-        Some(Compiled { law, to_true, measures, chain, delay_s, feels_instants })
+        Some(Compiled { law, to_true, measures, chain, delay_s, smears, feels_instants })
     }
 
     /// The numbers that are fitted.

@@ -2,7 +2,7 @@
 //! fits nearly as well, so that the curvature with the instants held promises too much. Such a number is
 //! sought, and its uncertainty told, along the profile: the objective with everything else fitted anew.
 
-use crate::model::Role;
+use crate::model::{Choice, Role};
 use crate::refine::{covariance_diagonal, refine};
 use crate::search::{Candidate, Search};
 
@@ -13,6 +13,12 @@ const STEPS: usize = 8;
 /// Nats that the neighbours must rise for their parabola to be trusted, and may at most.
 const RISE: [f64; 2] = [0.5, 12.0];
 
+/// Whether an effect has such a number.
+#[must_use]
+pub fn is_coupled(choice: &Choice) -> bool {
+    COUPLED.contains(&choice.info.id)
+}
+
 /// The candidate at the lowest point of the profile of each such number, and their standard deviations (a
 /// logarithm's where the number is fitted in its logarithm).
 #[must_use]
@@ -20,7 +26,7 @@ pub fn settled(search: &Search, best: &Candidate) -> (Candidate, Vec<(Role, f64)
     let mut best = best.clone();
     let mut told = Vec::new();
     for effect in 0..best.model.effects.len() {
-        if COUPLED.contains(&best.model.effects[effect].info.id) {
+        if is_coupled(&best.model.effects[effect]) {
             let role = Role::Effect { effect, parameter: 0 };
             if let Some(sd) = along(search, &mut best, role) {
                 told.push((role, sd));

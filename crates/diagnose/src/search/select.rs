@@ -3,6 +3,7 @@
 use super::{Candidate, Search, Stage, nats, own_noise};
 use crate::fit::Data;
 use crate::model::Model;
+use crate::profile;
 use crate::refine::refine;
 use crate::thresholds;
 use rayon::prelude::*;
@@ -45,6 +46,7 @@ impl Search {
             .collect();
         rivals = rescored.into_iter().flatten().collect();
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
+        self.settle_close(&mut rivals);
         let mut standing = self.refit_standing(standing, &rivals);
         if rivals.first().is_some_and(|best| self.scatter(best) > 0.0) {
             standing = self.forgiving(&standing);
@@ -78,6 +80,20 @@ impl Search {
         }
         self.stages.push(stage);
         taken
+    }
+
+    /// Rivals whose numbers hang on the instants of ruptures are far from their best at first: two of them that are
+    /// close are compared at the bottom of their profiles.
+    fn settle_close(&self, rivals: &mut Vec<Candidate>) {
+        const CLOSE: f64 = 100.0;
+        let near = rivals.first().map_or(0.0, |r| r.fined() + CLOSE);
+        let close =
+            |r: &Candidate| r.fined() < near && r.model.effects.last().is_some_and(profile::is_coupled);
+        if rivals.iter().filter(|r| close(r)).count() < 2 {
+            return;
+        }
+        rivals.par_iter_mut().filter(|r| close(r)).for_each(|r| *r = profile::settled(self, r).0);
+        rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
     }
 
     /// The standing model fitted anew under the present noise, from its own optimum and those of its
