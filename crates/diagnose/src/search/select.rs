@@ -185,9 +185,8 @@ impl Search {
                 let id = self.best.model.effects[index].info.id;
                 let model = self.best.model.without(index);
                 let mut there = self.data_of(&self.best);
-                if refine(&model, &mut there, 0, 2, false)
-                    .is_some_and(|f| f.nats > self.best.nats + INDISPENSABLE)
-                {
+                let mut quick = || refine(&model, &mut there, 0, 2, false);
+                if !scattered && quick().is_some_and(|f| f.nats > self.best.nats + INDISPENSABLE) {
                     continue;
                 }
                 let Some(without) = self.refitted(&model, &self.best.ruptures) else {
