@@ -38,7 +38,7 @@ impl Found {
     pub fn differs(&self, other: &Self) -> bool {
         const APART_S: f64 = 0.8;
         let pairs = self.instants.iter().flatten().zip(other.instants.iter().flatten());
-        pairs.into_iter().any(|(a, b)| a != b && !((a - b).abs() < APART_S))
+        pairs.into_iter().any(|(a, b)| a != b && (a - b).abs() >= APART_S)
     }
 }
 
