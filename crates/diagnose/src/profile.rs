@@ -131,7 +131,8 @@ mod tests {
         let (found, told) = settled(&search, &begun);
         let value = found.model.effects[0].values[0];
         assert!((value / TRUTH_S - 1.0).abs() < 0.004 && found.nats < begun.nats, "{value}");
-        let [(role, sd)] = told[..] else { panic!("one number: {told:?}") };
+        assert_eq!(told.len(), 1, "one number: {told:?}");
+        let (role, sd) = told[0];
         let held = covariance_diagonal(&found.model, &search.data_of(&found)).expect("a curvature");
         let held = held.iter().find(|h| h.0 == role).expect("its number").2;
         assert!(sd > 0.8 * held && sd < 0.02, "{sd} against {held}");
