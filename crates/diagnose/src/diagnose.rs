@@ -254,7 +254,7 @@ fn cause(search: &Search, best: &Candidate, index: usize, spread: Option<&[(Role
             r.model.names().starts_with(others) && r.model.effects.len() == others.len() + 1
         });
     let own = search.reference;
-    let name_of = |c: &Candidate| c.model.names().last().copied().unwrap_or("").to_owned();
+    let name_of = |c: &Candidate| c.model.last_name().to_owned();
     let mut weights = 0.0;
     let mut equivalent = Vec::new();
     let rivals: Vec<&Candidate> = if last {

@@ -176,20 +176,20 @@ pub struct Jacobian {
 }
 
 /// Jacobian at a model whose residuals are `at`; the columns of the base parameters are those of `keep`
-/// if given.
+/// if given, which were worked out nearby.
 pub fn jacobian(
     model: &Model,
     data: &Data,
     at: &Residuals,
     work: &mut Residuals,
-    keep: Option<&Jacobian>,
+    keep: Option<Jacobian>,
 ) -> Jacobian {
     let slots = model.slots();
     let base = |s: &Slot| matches!(s.role, Role::Base { .. });
     let known = match keep {
-        Some(keep) => Some(
-            keep.columns.iter().zip(&keep.slots).filter(|(_, s)| base(s)).map(|(c, _)| c.clone()).collect(),
-        ),
+        Some(keep) => {
+            Some(keep.columns.into_iter().zip(&keep.slots).filter(|(_, s)| base(s)).map(|(c, _)| c).collect())
+        }
         None => crate::columns::base(model, data, at, &slots),
     };
     differences(model, data, at, work, slots, known)
@@ -248,18 +248,21 @@ fn differences(
 #[must_use]
 pub fn normal(model: &Model, jac: &Jacobian, at: &Residuals) -> (Vec<Vec<f64>>, Vec<f64>) {
     let m = jac.slots.len();
-    let root: Vec<f64> =
-        at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).map(|w| weight(w).sqrt()).collect();
-    let r: Vec<f64> =
-        at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).zip(&root).map(|(w, s)| w * s).collect();
-    let weighted: Vec<Vec<f64>> =
-        jac.columns.iter().map(|c| c.iter().zip(&root).map(|(x, s)| x * s).collect()).collect();
+    let r: Vec<f64> = at.w.iter().copied().chain(at.events.iter().map(|e| e.u)).collect();
+    let weights: Vec<f64> = r.iter().map(|w| weight(*w)).collect();
+    // Punctures show in events alone: their columns begin with zeros.
+    let from: Vec<usize> =
+        jac.columns.iter().map(|c| c.iter().position(|x| *x != 0.0).unwrap_or(c.len())).collect();
     let mut h = vec![vec![0.0; m]; m];
     let mut g = vec![0.0; m];
+    let mut weighted = Vec::with_capacity(r.len());
     for i in 0..m {
-        g[i] = dot(&weighted[i], &r);
+        weighted.clear();
+        weighted.extend(jac.columns[i][from[i]..].iter().zip(&weights[from[i]..]).map(|(x, w)| x * w));
+        g[i] = dot(&weighted, &r[from[i]..]);
         for j in 0..=i {
-            h[i][j] = dot(&weighted[i], &weighted[j]);
+            let both = from[i].max(from[j]);
+            h[i][j] = dot(&weighted[both - from[i]..], &jac.columns[j][both..]);
             h[j][i] = h[i][j];
         }
     }
@@ -323,14 +326,18 @@ pub fn solve(h: &[Vec<f64>], g: &[f64]) -> Option<Vec<f64>> {
 #[must_use]
 pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit> {
     let mut at = Residuals::default();
+    residuals(model, data, &mut at).then(|| fit_from(model, data, at, turns, enough)).flatten()
+}
+
+/// The same of a model whose residuals are known.
+#[must_use]
+pub fn fit_from(model: &Model, data: &Data, mut at: Residuals, turns: usize, enough: f64) -> Option<Fit> {
     let mut work = Residuals::default();
     let mut best = model.clone();
-    {
-        let slots = best.slots();
-        let p = best.vector(&slots);
-        best.set(&slots, &p);
-    }
-    if !residuals(&best, data, &mut at) {
+    let slots = best.slots();
+    let begins = best.vector(&slots);
+    best.set(&slots, &begins);
+    if best.vector(&slots) != model.vector(&slots) && !residuals(&best, data, &mut at) {
         return None;
     }
     let mut nats = objective(&best, &at);
@@ -338,8 +345,8 @@ pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit>
     let mut last: Option<Jacobian> = None;
     let linear = crate::columns::are_linear(model);
     for turn in 0..turns {
-        // Where the columns of the base parameters cost a replay each, they serve for three turns.
-        let keep = if turn % 3 == 0 || linear { None } else { last.as_ref() };
+        // The columns of the base parameters serve for two turns; for three where they cost a replay each.
+        let keep = last.take().filter(|_| turn % if linear { 2 } else { 3 } != 0);
         let jac = jacobian(&best, data, &at, &mut work, keep);
         let p = best.vector(&jac.slots);
         let (h, g) = normal(&best, &jac, &at);
@@ -349,6 +356,9 @@ pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit>
                 lambda = (lambda * 10.0).max(1e-3);
                 continue;
             };
+            if promised(&p, &q, &h, &g) < HOPE * enough {
+                break;
+            }
             let mut trial = best.clone();
             trial.set(&jac.slots, &q);
             if residuals(&trial, data, &mut work) {
@@ -370,6 +380,16 @@ pub fn fit(model: &Model, data: &Data, turns: usize, enough: f64) -> Option<Fit>
         }
     }
     Some(Fit { model: best, nats })
+}
+
+/// A step that promises less than this share of what is enough is not tried.
+const HOPE: f64 = 0.3;
+
+/// Nats that a step from `p` to `q` gains by the curvature at `p`.
+fn promised(p: &[f64], q: &[f64], h: &[Vec<f64>], g: &[f64]) -> f64 {
+    let d: Vec<f64> = q.iter().zip(p).map(|(q, p)| q - p).collect();
+    let bent: f64 = h.iter().zip(&d).map(|(row, di)| di * dot(row, &d)).sum();
+    -dot(g, &d) - 0.5 * bent
 }
 
 /// One step within the bounds: numbers at a bound that want beyond it stay there.

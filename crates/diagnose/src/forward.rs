@@ -110,6 +110,13 @@ impl Strained {
 }
 
 impl Event {
+    /// The same were the puncture force larger by this share.
+    #[must_use]
+    pub fn with_puncture(&self, share: f64) -> Self {
+        let own = self.strained.puncture / self.ratio;
+        self.strained.changed(0.0, share).event(self.ruptured, own * (1.0 + share))
+    }
+
     /// Its distance from rupture were the elastic force and the puncture force larger by these shares.
     #[must_use]
     pub fn u_at(&self, elastic: f64, puncture: f64) -> f64 {

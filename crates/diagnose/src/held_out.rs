@@ -1,10 +1,10 @@
 //! How much better the extended model is on recordings that took no part in the fit.
 
-use crate::fit::{Data, fit};
+use crate::fit::Data;
 use crate::forward;
 use crate::model::Model;
 use crate::noise::Noise;
-use crate::refine::seed_punctures;
+use crate::refine::fit_seeded;
 use crate::search::{Candidate, Search};
 use crate::track::Track;
 use rayon::prelude::*;
@@ -97,7 +97,5 @@ fn without(search: &Search, model: &Model, ruptures: &[Vec<f64>], left: usize) -
         || model.compile().is_some_and(|m| m.feels_instants);
     let q = if fast { 1 } else { search.q };
     let coarse = data.blocks(q, data.noise.blocks(q));
-    let mut model = model.clone();
-    seed_punctures(&mut model, &coarse);
-    fit(&model, &coarse, 5, 0.05).map_or(model, |f| f.model)
+    fit_seeded(model.clone(), &coarse, 5, 0.05).map_or_else(|| model.clone(), |f| f.model)
 }

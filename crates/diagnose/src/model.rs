@@ -130,6 +130,12 @@ impl Model {
         self.effects.iter().map(|e| e.info.id).collect()
     }
 
+    /// The effect taken last, or "".
+    #[must_use]
+    pub fn last_name(&self) -> &'static str {
+        self.effects.last().map_or("", |e| e.info.id)
+    }
+
     /// Number of fitted numbers that belong to effects.
     #[must_use]
     pub fn extra(&self) -> usize {

@@ -1,7 +1,7 @@
 //! From a coarse fit to one at full rate: ruptures where this model wants them, puncture forces where
 //! the ruptures say, a membrane where it breaks.
 
-use crate::fit::{Data, Fit, Residuals, dead_zone, fit, objective, residuals, rho};
+use crate::fit::{Data, Fit, Residuals, dead_zone, fit, fit_from, objective, residuals, rho};
 use crate::forward::{self, Replay};
 use crate::model::{Compiled, Model, Role};
 use crate::noise::{Noise, median};
@@ -135,11 +135,12 @@ fn retime_one(
     moved
 }
 
-/// Puts every puncture force where the elastic forces at the ruptures are, when that fits better.
-pub fn seed_punctures(model: &mut Model, data: &Data) {
+/// Puts every puncture force where the elastic forces at the ruptures are, when that fits better. Returns the
+/// residuals of the model as it then is; `None` when it cannot be replayed.
+pub fn seed_punctures(model: &mut Model, data: &Data) -> Option<Residuals> {
     let mut r = Residuals::default();
     if !residuals(model, data, &mut r) {
-        return;
+        return None;
     }
     let layers = model.assumed.layers.len();
     let events_alone = crate::columns::are_linear(model);
@@ -170,6 +171,7 @@ pub fn seed_punctures(model: &mut Model, data: &Data) {
             let drawn = 0.5 * (((new - assumed) / sd).powi(2) - ((old - assumed) / sd).powi(2));
             if events + drawn < 0.0 {
                 *model = trial;
+                r.events.iter_mut().skip(layer).step_by(layers).for_each(|e| *e = e.with_puncture(share));
             }
             continue;
         }
@@ -180,12 +182,20 @@ pub fn seed_punctures(model: &mut Model, data: &Data) {
             r = with;
         }
     }
+    Some(r)
 }
 
-/// Tries values of the numbers in which the force is step-like.
-fn walk_stepped(model: &mut Model, data: &Data) {
+/// Fits a model after its puncture forces were put where the ruptures are.
+#[must_use]
+pub fn fit_seeded(mut model: Model, data: &Data, turns: usize, enough: f64) -> Option<Fit> {
+    let at = seed_punctures(&mut model, data)?;
+    fit_from(&model, data, at, turns, enough)
+}
+
+/// Tries values of the numbers in which the force is step-like; true when there are any.
+fn walk_stepped(model: &mut Model, data: &Data) -> bool {
     let slots = model.slots();
-    let Some(index) = slots.iter().position(|s| s.stepped) else { return };
+    let Some(index) = slots.iter().position(|s| s.stepped) else { return false };
     let mut r = Residuals::default();
     let mut p = model.vector(&slots);
     let mut best = f64::INFINITY;
@@ -210,24 +220,28 @@ fn walk_stepped(model: &mut Model, data: &Data) {
             }
         }
     }
+    true
 }
 
 /// Fits a model and moves its ruptures in turn.
 #[must_use]
 pub fn refine(model: &Model, data: &mut Data, rounds: usize, turns: usize, wide: bool) -> Option<Fit> {
     let enough = if turns < 6 { 0.2 } else { 0.02 };
+    // What is stepped is walked after the puncture forces at first, before them later.
     let mut model = model.clone();
-    seed_punctures(&mut model, data);
-    walk_stepped(&mut model, data);
-    let mut best = fit(&model, data, turns, enough)?;
+    let at = seed_punctures(&mut model, data)?;
+    let mut best = if walk_stepped(&mut model, data) {
+        fit(&model, data, turns, enough)?
+    } else {
+        fit_from(&model, data, at, turns, enough)?
+    };
     for round in 0..rounds {
         let again = |events: bool| {
             let mut there = data.clone();
             let moved = retime(&best.model, &mut there, wide && round == 0, events);
             let mut next = best.model.clone();
             walk_stepped(&mut next, &there);
-            seed_punctures(&mut next, &there);
-            Some((fit(&next, &there, turns, enough)?, there, moved))
+            Some((fit_seeded(next, &there, turns, enough)?, there, moved))
         };
         let Some((mut new, mut there, mut moved)) = again(true) else { break };
         // A puncture force and all the instants that it sets hold one another in place: where the force itself

@@ -1,9 +1,9 @@
 //! Where in the data to look: spectral lines, and what shows only in the few samples after a rupture.
 
 use super::{Candidate, FAST_HZ, Search, choice, nats};
-use crate::fit::{Data, Residuals, residuals};
+use crate::fit::{Data, Residuals, objective, residuals};
 use crate::look::Look;
-use crate::model::Choice;
+use crate::model::{Choice, Model};
 use crate::refine::seed_punctures;
 use crate::spectrum::{peaks, periodogram, sharpen};
 use crate::starts::{self, Hints, Start};
@@ -11,28 +11,29 @@ use crate::track::Track;
 use rayon::prelude::*;
 
 impl Search {
-    pub(super) fn hints(&self, standing: &Candidate, data: &Data) -> Hints {
-        let layers = standing.model.assumed.layers.len();
-        let surface = standing.model.assumed.surface_m;
-        let deepest = data.tracks.iter().flat_map(|t| &t.z).fold(f64::NEG_INFINITY, |m, z| m.max(*z));
+    /// Where to look, by what the standing model leaves: its lines from the spectrum at full rate, as exactly as the
+    /// averages tell them.
+    pub(super) fn hints(&self, stood: &Model, spectrum: &(Vec<f64>, Vec<f64>), coarse: &Data) -> Hints {
+        let layers = stood.assumed.layers.len();
+        let surface = stood.assumed.surface_m;
+        let deepest = coarse.tracks.iter().flat_map(|t| &t.z).fold(f64::NEG_INFINITY, |m, z| m.max(*z));
         let depth_m = (deepest - surface).max(0.0);
         let mut hints = Hints { layers, depth_m, force_n: self.force_n, ..Hints::default() };
-        let spectrum = self.spectrum(standing, data);
         let mut lines: Vec<f64> = peaks(&spectrum.0, &spectrum.1, 0.04, 5)
             .into_iter()
             .map(|p| p.0)
             .filter(|f| *f <= FAST_HZ)
             .collect();
-        self.sharpen(standing, data, &mut lines);
+        self.sharpen(stood, coarse, &mut lines);
         hints.lines_hz = lines;
         hints.breath_hz = (0..64).map(|k| 0.05 + 0.0125 * f64::from(k)).collect();
         hints
     }
 
     /// Frequencies of peaks as exactly as all recordings together tell them.
-    pub(super) fn sharpen(&self, of: &Candidate, data: &Data, lines_hz: &mut [f64]) {
+    pub(super) fn sharpen(&self, of: &Model, data: &Data, lines_hz: &mut [f64]) {
         let mut r = Residuals::default();
-        if lines_hz.is_empty() || !residuals(&of.model, data, &mut r) {
+        if lines_hz.is_empty() || !residuals(of, data, &mut r) {
             return;
         }
         let limit = 6.0 * data.noise.marginal_n;
@@ -50,24 +51,36 @@ impl Search {
             return (Vec::new(), Vec::new());
         }
         let longest = data.tracks.iter().map(Track::len).max().unwrap_or(0);
-        let mut sum: (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let mut parts: Vec<(&Track, &[f64])> = Vec::new();
         let mut from = 0;
         for track in data.tracks.iter() {
-            let to = from + track.len();
-            let w: Vec<f64> = r.w[from..to].iter().map(|w| w.clamp(-6.0, 6.0)).collect();
-            let (f, p) = periodogram(&w, track.sample_hz, longest);
-            if sum.1.is_empty() {
-                sum = (f, p);
-            } else {
-                sum.1.iter_mut().zip(p).for_each(|(s, p)| *s += p);
-            }
-            from = to;
+            parts.push((track, &r.w[from..from + track.len()]));
+            from += track.len();
+        }
+        let each: Vec<(Vec<f64>, Vec<f64>)> = parts
+            .into_par_iter()
+            .map(|(track, w)| {
+                let w: Vec<f64> = w.iter().map(|w| w.clamp(-6.0, 6.0)).collect();
+                periodogram(&w, track.sample_hz, longest)
+            })
+            .collect();
+        let mut each = each.into_iter();
+        let mut sum = each.next().unwrap_or_default();
+        for (_, p) in each {
+            sum.1.iter_mut().zip(p).for_each(|(s, p)| *s += p);
         }
         sum
     }
 
-    /// Effects that show in the few samples after a rupture, which averages blur: a look at full rate.
-    pub(super) fn sharp(&self, standing: &Candidate, data: &Data, springs: bool) -> Vec<Choice> {
+    /// Effects that show in the few samples after a rupture, which averages blur: a look at full rate. Springs are
+    /// looked at on averages, when so many nats of theirs are worth a fit.
+    pub(super) fn sharp(
+        &self,
+        standing: &Candidate,
+        data: &Data,
+        coarse: &Data,
+        springs: Option<f64>,
+    ) -> Vec<Choice> {
         const TRIED: [(&str, &[f64]); 4] = [
             ("low_pass_lag", &[3e-4, 1e-3, 3e-3, 1e-2]),
             ("time_delay", &[3e-4, 1e-3, 3e-3]),
@@ -78,7 +91,7 @@ impl Search {
         let stood = nats(&standing.model, data);
         let tried: Vec<(&'static str, f64)> = TRIED
             .iter()
-            .filter(|(id, _)| !taken.contains(id) && (springs || *id != "needle_compliance"))
+            .filter(|(id, _)| !taken.contains(id) && (springs.is_some() || *id != "needle_compliance"))
             .flat_map(|(id, values)| values.iter().map(|v| (*id, *v)))
             .collect();
         let found: Vec<Option<(f64, &'static str, f64)>> = tried
@@ -86,7 +99,8 @@ impl Search {
             .map(|&(id, value)| {
                 let mut model = standing.model.with(choice(id, &[value])?);
                 if id == "needle_compliance" {
-                    seed_punctures(&mut model, data);
+                    let at = seed_punctures(&mut model, coarse)?;
+                    return Some((objective(&model, &at), id, value));
                 }
                 if id == "soft_boundary" {
                     // What a narrow boundary does lies within a sample of the rupture.
@@ -105,26 +119,33 @@ impl Search {
                 None => best.push(f),
             }
         }
-        best.retain(|b| b.0 < stood - 3.0 || (springs && b.1 == "needle_compliance"));
+        best.retain(|b| match (b.1, springs) {
+            ("needle_compliance", Some(most)) => b.0 < most,
+            _ => b.0 < stood - 3.0,
+        });
         best.iter().filter_map(|b| choice(b.1, &[b.2])).collect()
     }
 
     /// Interferences too fast for averages.
-    pub(super) fn fast_lines(&self, standing: &Candidate, data: &Data) -> Vec<Start> {
-        let (f, p) = self.spectrum(standing, data);
+    pub(super) fn fast_lines(
+        &self,
+        standing: &Candidate,
+        data: &Data,
+        (f, p): &(Vec<f64>, Vec<f64>),
+    ) -> Vec<Start> {
         // Not beside a line that stands already.
         let near = |hz: f64| {
             let lines = standing.model.effects.iter().filter(|e| e.info.id == "periodic_interference");
             lines.map(|e| e.values[1]).any(|own| (own - hz).abs() < 0.2)
         };
-        let mut lines = peaks(&f, &p, FAST_HZ, 9);
+        let mut lines = peaks(f, p, FAST_HZ, 9);
         lines.retain(|l| !near(l.0));
         let Some(&(frequency, value)) = lines.first() else { return Vec::new() };
         if value < 14.0 {
             return Vec::new();
         }
         let mut frequency = [frequency];
-        self.sharpen(standing, data, &mut frequency);
+        self.sharpen(&standing.model, data, &mut frequency);
         let hints = Hints { lines_hz: frequency.to_vec(), ..Hints::default() };
         let Some(info) = stylet_tissue::info("periodic_interference") else { return Vec::new() };
         let Some(look) = Look::new(&standing.model, data) else { return Vec::new() };

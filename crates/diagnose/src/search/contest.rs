@@ -1,7 +1,7 @@
 //! Rivals: every effect from its best starts, screened on averages, the best fitted at full rate.
 
 use super::{Begun, Candidate, FAST_HZ, FINALISTS, Search, nats};
-use crate::fit::{Data, Fit, Residuals, fit};
+use crate::fit::{Data, Fit, Residuals, fit, fit_from, objective};
 use crate::look::{Look, Seen};
 use crate::model::Model;
 use crate::refine::{refine, seed_punctures};
@@ -12,14 +12,24 @@ use rayon::prelude::*;
 /// Share of the best rival's gain by which another may be behind after its first fit, if other instants of
 /// rupture may bring it much, and if not.
 const FAR_BEHIND: [f64; 2] = [0.15, 0.05];
-/// Share of the needed gain that an effect which does not care for instants of rupture shows at once.
+/// Share of the needed gain that an effect which does not care for instants of rupture shows at once, and
+/// after two turns.
 const PROMISING: f64 = 0.3;
+const BEGINNING: f64 = 0.15;
+/// Nats behind, besides so many times what the best start promises, at which a start whose one number is a time,
+/// a width or a spring is not worth a fit: none that was so far off ever came back.
+const BEYOND: (f64, f64) = (3000.0, 5.0);
 /// Nats behind the standing model at which an effect that costs much to fit is given up after two turns.
 const GIVEN_UP: f64 = 1000.0;
 
 /// Whether an effect moves its ruptures far, or between samples.
 fn wide(id: &str) -> bool {
     matches!(id, "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance" | "respiration")
+}
+
+/// Effects with one number that their ruptures follow; far from its best they are thousands of nats behind.
+fn is_measured(id: &str) -> bool {
+    matches!(id, "low_pass_lag" | "soft_boundary" | "time_delay" | "needle_compliance")
 }
 
 /// A model to be fitted at full rate and its ruptures.
@@ -36,7 +46,8 @@ impl Search {
         let data = self.data_of(standing);
         let coarse = data.blocks(self.q, data.noise.blocks(self.q));
         let Some(stood) = fit(&standing.model, &coarse, 4, 0.05) else { return (Vec::new(), Vec::new()) };
-        let mut hints = self.hints(standing, &data);
+        let spectrum = self.spectrum(standing, &data);
+        let mut hints = self.hints(&stood.model, &spectrum, &coarse);
         if let Some(look) = Look::new(&stood.model, &coarse) {
             hints.membranes = look.membranes(stood.model.assumed.surface_m, hints.depth_m);
         }
@@ -66,6 +77,8 @@ impl Search {
                 chosen.push(s);
             }
         }
+        let promised = seen.iter().map(|s| s.gain).fold(0.0, f64::max);
+        let worth_a_fit = stood.nats + BEYOND.0 + BEYOND.1 * promised;
         // Two turns for all; the rest only for those that may still win.
         let begun: Vec<Option<Begun>> = chosen
             .par_iter()
@@ -81,8 +94,11 @@ impl Search {
                     model.set(&model.slots(), numbers);
                 }
                 let mut model = model.with(s.start.choice.clone());
-                seed_punctures(&mut model, &there);
-                let f = fit(&model, &there, 2, 0.1)?;
+                let at = seed_punctures(&mut model, &there)?;
+                if is_measured(s.start.choice.info.id) && objective(&model, &at) > worth_a_fit {
+                    return None;
+                }
+                let f = fit_from(&model, &there, at, 2, 0.1)?;
                 Some((f, there, shifted.ruptures))
             })
             .collect();
@@ -103,8 +119,8 @@ impl Search {
             .collect();
         let mut best: Vec<(Fit, Vec<Vec<f64>>)> = Vec::new();
         for found in fits.into_iter().flatten() {
-            let id = found.0.model.names().last().copied();
-            match best.iter_mut().find(|b| b.0.model.names().last().copied() == id) {
+            let id = found.0.model.last_name();
+            match best.iter_mut().find(|b| b.0.model.last_name() == id) {
                 Some(old) if old.0.nats > found.0.nats => *old = found,
                 Some(_) => {}
                 None => best.push(found),
@@ -113,7 +129,7 @@ impl Search {
         best.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
         let screened: Vec<(&'static str, f64)> = best
             .iter()
-            .map(|b| (b.0.model.names().last().copied().unwrap_or(""), stood.nats - b.0.nats))
+            .map(|b| (b.0.model.last_name(), stood.nats - b.0.nats))
             .collect();
         best.truncate(FINALISTS);
         let lead = best.first().map_or(0.0, |b| stood.nats - b.0.nats);
@@ -122,17 +138,16 @@ impl Search {
             gain > 0.5 * lead - 40.0 && (gain > 2.5 || (gain > -400.0 && lead > 50.0))
         });
         let mut finalists: Vec<Finalist> = best.into_iter().map(|(f, r)| (f.model, r)).collect();
-        for c in self.sharp(standing, &data, lead > 30.0) {
+        for c in self.sharp(standing, &data, &coarse, (lead > 30.0).then_some(worth_a_fit)) {
             finalists.push((standing.model.with(c), standing.ruptures.clone()));
         }
-        for start in self.fast_lines(standing, &data) {
+        for start in self.fast_lines(standing, &data, &spectrum) {
             finalists.push((standing.model.with(start.choice), standing.ruptures.clone()));
         }
         let finalists = self.better_starts(&data, finalists);
-        let name = |m: &Model| m.names().last().copied().unwrap_or("");
         let refined = |c: &Candidate, rounds: usize, turns: usize| {
             let mut there = Data { ruptures: c.ruptures.clone(), ..data.clone() };
-            let f = refine(&c.model, &mut there, rounds, turns, wide(name(&c.model)))?;
+            let f = refine(&c.model, &mut there, rounds, turns, wide(c.model.last_name()))?;
             Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
         };
         // Fitted with the ruptures where they are; only those not far behind go on to move them.
@@ -140,11 +155,14 @@ impl Search {
             .into_par_iter()
             .map(|(model, ruptures)| {
                 let begun = Candidate { model, ruptures, nats: f64::INFINITY };
-                if name(&begun.model) != "needle_compliance" {
-                    return refined(&begun, 0, 5);
-                }
+                let id = begun.model.last_name();
+                let least = match id {
+                    "needle_compliance" => -GIVEN_UP,
+                    id if wide(id) || moves_events(id) => return refined(&begun, 0, 5),
+                    id => BEGINNING * self.settings.needed(id),
+                };
                 let begun = refined(&begun, 0, 2)?;
-                if begun.nats > standing.nats + GIVEN_UP { Some(begun) } else { refined(&begun, 0, 5) }
+                if standing.nats - begun.nats < least { Some(begun) } else { refined(&begun, 0, 5) }
             })
             .collect();
         let first: Vec<Candidate> = first.into_iter().flatten().collect();
@@ -152,7 +170,7 @@ impl Search {
         let rivals: Vec<Option<Candidate>> = first
             .into_par_iter()
             .map(|c| {
-                let id = name(&c.model);
+                let id = c.model.last_name();
                 let by_instants = wide(id) || moves_events(id);
                 let far = FAR_BEHIND[usize::from(!by_instants)] * (standing.nats - ahead) + 100.0;
                 let gain = standing.nats - c.nats;
@@ -170,7 +188,7 @@ impl Search {
         // The same effect from two roads.
         let mut names: Vec<&str> = Vec::new();
         rivals.retain(|r| {
-            let name = r.model.names().last().copied().unwrap_or("");
+            let name = r.model.last_name();
             let new = !names.contains(&name);
             names.push(name);
             new
@@ -185,9 +203,9 @@ impl Search {
             |(model, ruptures): &Finalist| nats(model, &Data { ruptures: ruptures.clone(), ..data.clone() });
         let mut kept: Vec<Finalist> = Vec::new();
         for new in finalists {
-            let id = new.0.names().last().copied().unwrap_or("");
+            let id = new.0.last_name();
             let same =
-                |k: &Finalist| k.0.names().last().copied() == Some(id) && id != "periodic_interference";
+                |k: &Finalist| k.0.last_name() == id && id != "periodic_interference";
             match kept.iter_mut().find(|k| same(k)) {
                 Some(old) if fits(&new) < fits(old) => *old = new,
                 Some(_) => {}

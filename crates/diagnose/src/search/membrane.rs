@@ -1,10 +1,10 @@
 //! The drop of a membrane, or of cutting that ends, may have been taken for that of a layer: the two exchanged.
 
 use super::{Begun, Candidate, Search, choice};
-use crate::fit::{Data, fit};
+use crate::fit::Data;
 use crate::model::{Choice, Model};
 use crate::noise::median;
-use crate::refine::seed_punctures;
+use crate::refine::fit_seeded;
 use crate::track::{NEVER, Track};
 use rayon::prelude::*;
 
@@ -41,9 +41,7 @@ impl Search {
             .into_par_iter()
             .map(|(choice, there)| {
                 let coarse = there.blocks(self.q, there.noise.blocks(self.q));
-                let mut model = stood.with(choice);
-                seed_punctures(&mut model, &coarse);
-                Some((fit(&model, &coarse, 4, 0.1)?, coarse, there.ruptures))
+                Some((fit_seeded(stood.with(choice), &coarse, 4, 0.1)?, coarse, there.ruptures))
             })
             .collect();
         fits.into_iter().flatten().collect()

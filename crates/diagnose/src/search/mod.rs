@@ -12,10 +12,10 @@ mod smeared;
 pub(crate) use contest::shift;
 
 use crate::air;
-use crate::fit::{Data, Fit, Residuals, fit, objective, residuals};
+use crate::fit::{Data, Fit, Residuals, objective, residuals};
 use crate::model::{Choice, Model};
 use crate::noise::{Noise, median};
-use crate::refine::{refine, seed_punctures};
+use crate::refine::{fit_seeded, refine};
 use crate::ruptures;
 use crate::thresholds;
 use crate::track::Track;
@@ -164,9 +164,8 @@ impl Search {
         let near = found.reach.iter().map(|r| r.iter().map(|r| least_reach(*r)).collect()).collect();
         let mut data =
             Data { tracks: Arc::new(tracks), ruptures: found.instants, reach: Arc::new(near), dead_n, noise };
-        seed_punctures(&mut model, &data);
         let coarse = data.blocks(q, noise.blocks(q));
-        let first = fit(&model, &coarse, 8, 0.1)?;
+        let first = fit_seeded(model, &coarse, 8, 0.1)?;
         let fitted = refine(&first.model, &mut data, 3, 5, true)?;
         if air.is_none() {
             data.noise = own_noise(&fitted.model, &data, least).unwrap_or(noise);

@@ -10,6 +10,8 @@ use rayon::prelude::*;
 
 /// A rival is fitted to the end from this share of the needed gain on.
 const POLISHED: f64 = 0.4;
+/// Share of the needed gain below which nothing is made of the best rival.
+const HARDLY: f64 = 0.3;
 /// Nats that a model without an effect lacks after two turns when nothing replaces it.
 const INDISPENSABLE: f64 = 3000.0;
 /// Share of its gain by which an effect must be ahead of its rivals not to be contested again.
@@ -22,6 +24,12 @@ impl Search {
         let stood = standing.model.names();
         let mut stage = Stage { stood, screened, rivals: Vec::new(), needed: thresholds::LEAST, taken: None };
         if rivals.is_empty() {
+            self.stages.push(stage);
+            return false;
+        }
+        if standing.nats - rivals[0].nats < HARDLY * self.settings.needed(rivals[0].model.last_name()) {
+            stage.rivals = told(standing, &rivals);
+            stage.needed = self.settings.needed(rivals[0].model.last_name());
             self.stages.push(stage);
             return false;
         }
@@ -53,16 +61,13 @@ impl Search {
             rivals = rivals.iter().map(|r| self.forgiving(r)).collect();
             rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         }
-        for r in &rivals {
-            let name = r.model.names().last().copied().unwrap_or("");
-            stage.rivals.push((name, standing.nats - r.nats, r.model.extra() - standing.model.extra()));
-        }
+        stage.rivals = told(&standing, &rivals);
         let Some(best) = rivals.first().cloned() else {
             self.stages.push(stage);
             return false;
         };
         let best = simplest(&rivals, &best);
-        stage.needed = self.settings.needed(best.model.names().last().copied().unwrap_or(""));
+        stage.needed = self.settings.needed(best.model.last_name());
         let near = standing.nats - best.nats > POLISHED * stage.needed;
         let best = if near { self.levelled(self.polished(&best)) } else { best };
         let gain = standing.nats - best.nats;
@@ -149,8 +154,8 @@ impl Search {
     /// Whether the effect taken last had no rival anywhere near.
     fn alone(&self) -> bool {
         let gained = self.stages.iter().rev().find(|s| s.taken.is_some()).and_then(|s| s.rivals.first());
-        let own = self.best.model.names().last().copied().unwrap_or("");
-        let others = self.rivals.iter().filter(|r| r.model.names().last().copied() != Some(own));
+        let own = self.best.model.last_name();
+        let others = self.rivals.iter().filter(|r| r.model.last_name() != own);
         let near = self.reference + NEAR * gained.map_or(0.0, |g| g.1) + 100.0;
         gained.is_some_and(|g| g.0 == own) && others.map(Candidate::fined).all(|nats| nats > near)
     }
@@ -206,6 +211,12 @@ impl Search {
     }
 }
 
+/// Effect, nats gained and further numbers of every rival.
+fn told(standing: &Candidate, rivals: &[Candidate]) -> Vec<(&'static str, f64, usize)> {
+    let one = |r: &Candidate| (r.model.last_name(), standing.nats - r.nats, r.model.extra() - standing.model.extra());
+    rivals.iter().map(one).collect()
+}
+
 /// Nested models: the simplest wins unless the larger gains what its further numbers must.
 pub(super) fn simplest(rivals: &[Candidate], best: &Candidate) -> Candidate {
     const NESTED: [(&str, &str); 3] = [
@@ -213,10 +224,10 @@ pub(super) fn simplest(rivals: &[Candidate], best: &Candidate) -> Candidate {
         ("presliding_friction", "coulomb_friction"),
         ("hidden_membrane", "boundary_shift"),
     ];
-    let name = best.model.names().last().copied().unwrap_or("");
+    let name = best.model.last_name();
     for (larger, smaller) in NESTED {
         if name == larger {
-            let small = rivals.iter().find(|r| r.model.names().last().copied() == Some(smaller));
+            let small = rivals.iter().find(|r| r.model.last_name() == smaller);
             if let Some(small) = small.filter(|_| larger != "hidden_membrane") {
                 let more = best.model.extra() - small.model.extra();
                 if small.nats - best.nats < 3.0 + 2.0 * more as f64 {

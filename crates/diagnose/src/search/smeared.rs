@@ -2,10 +2,10 @@
 //! ones, and the law with soft boundaries likes the smeared ones far better, those are begun with.
 
 use super::choice;
-use crate::fit::{Data, fit};
+use crate::fit::Data;
 use crate::model::Model;
 use crate::noise::Noise;
-use crate::refine::seed_punctures;
+use crate::refine::fit_seeded;
 use crate::ruptures::{self, Found, SMEARED};
 use crate::track::Track;
 use std::sync::Arc;
@@ -36,10 +36,7 @@ pub(super) fn tried(model: &mut Model, found: &mut Found, tracks: &[Track], nois
         let soft = WIDTHS_M.iter().filter_map(|w| Some(model.with(choice("soft_boundary", &[*w])?)));
         std::iter::once(model.clone())
             .chain(soft)
-            .filter_map(|mut m| {
-                seed_punctures(&mut m, &coarse);
-                Some(fit(&m, &coarse, 6, 1.0)?.nats)
-            })
+            .filter_map(|m| Some(fit_seeded(m, &coarse, 6, 1.0)?.nats))
             .fold(f64::INFINITY, f64::min)
     };
     if best(&other, &smeared.instants) < FAR_BETTER * best(model, &found.instants) {
