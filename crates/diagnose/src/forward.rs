@@ -29,13 +29,46 @@ const FORCE_FLOOR: f64 = 5e-5;
 /// Uncertainty of a position in m beyond sampling.
 const POSITION_FLOOR_M: f64 = 1e-6;
 
+/// What must pass zero for a rupture: its largest value up to the sample before last, and the last two.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    most: f64,
+    before: f64,
+    at: f64,
+}
+
+impl Course {
+    const UNSEEN: Self = Self { most: f64::NEG_INFINITY, before: f64::NEG_INFINITY, at: f64::NEG_INFINITY };
+
+    fn note(&mut self, value: f64) {
+        self.most = self.most.max(self.before);
+        self.before = self.at;
+        self.at = value;
+    }
+
+    /// Largest value before the last.
+    fn largest_before(&self) -> f64 {
+        self.most.max(self.before)
+    }
+
+    /// Half-way between the last sample and the largest before, of which none is taken for less than `least`, and
+    /// what they leave open beyond a floor. Where the largest came before and was not passed again, it says how far
+    /// this is from a rupture, and the last step what sampling leaves open.
+    fn passed(&self, least: f64, floor: f64) -> (f64, f64) {
+        let before = self.largest_before().max(least);
+        if self.at >= before {
+            (mid(before, self.at), spread(before, self.at, floor))
+        } else {
+            (before, spread(self.before.max(least), self.at, floor))
+        }
+    }
+}
+
 /// Strain before and at the rupture of one layer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Strained {
-    force_before: f64,
-    force_at: f64,
-    place_before: f64,
-    place_at: f64,
+    force: Course,
+    place: Course,
     elastic_before: f64,
     elastic_at: f64,
     puncture: f64,
@@ -43,10 +76,8 @@ pub(crate) struct Strained {
 }
 
 const UNSEEN: Strained = Strained {
-    force_before: f64::NEG_INFINITY,
-    force_at: f64::NEG_INFINITY,
-    place_before: f64::NEG_INFINITY,
-    place_at: f64::NEG_INFINITY,
+    force: Course::UNSEEN,
+    place: Course::UNSEEN,
     elastic_before: 0.0,
     elastic_at: 0.0,
     puncture: f64::INFINITY,
@@ -56,11 +87,9 @@ const UNSEEN: Strained = Strained {
 impl Strained {
     fn note(&mut self, s: &Strain) {
         self.elastic_before = if self.seen { self.elastic_at } else { 0.0 };
-        self.force_before = self.force_before.max(self.force_at);
-        self.place_before = self.place_before.max(self.place_at);
         self.elastic_at = s.elastic_n;
-        self.force_at = s.elastic_n - s.puncture_n;
-        self.place_at = s.tip_m - s.far_m;
+        self.force.note(s.elastic_n - s.puncture_n);
+        self.place.note(s.tip_m - s.far_m);
         self.puncture = s.puncture_n;
         self.seen = true;
     }
@@ -71,8 +100,11 @@ impl Strained {
             elastic * elastic_n - if self.puncture.is_finite() { puncture * self.puncture } else { 0.0 }
         };
         Self {
-            force_before: self.force_before + by(self.elastic_before),
-            force_at: self.force_at + by(self.elastic_at),
+            force: Course {
+                most: self.force.most + by(self.elastic_before),
+                before: self.force.before + by(self.elastic_before),
+                at: self.force.at + by(self.elastic_at),
+            },
             elastic_before: self.elastic_before * (1.0 + elastic),
             elastic_at: self.elastic_at * (1.0 + elastic),
             puncture: self.puncture * (1.0 + puncture),
@@ -82,34 +114,63 @@ impl Strained {
 
     fn event(&self, ruptured: bool, own_puncture: f64) -> Event {
         let ratio = if self.puncture.is_finite() { self.puncture / own_puncture } else { 1.0 };
-        let spread = |lo: f64, hi: f64, floor: f64| {
-            let half = 0.5 * (hi - lo).abs();
-            (half * half / 3.0 + floor * floor).sqrt()
-        };
-        let floor = FORCE_FLOOR * self.puncture.min(1e3) + 1e-5;
         let event = Event { u: 0.0, elastic_n: self.elastic_at, ratio, strained: *self, ruptured };
         if !ruptured {
             // Nothing is known but that it did not happen.
             let step = (self.elastic_at - self.elastic_before).abs();
-            let by_force = self.force_before.max(self.force_at) / (floor + step);
-            let u = by_force.max(self.place_before.max(self.place_at) / 1e-5).max(0.0);
+            let by_force = self.force.largest_before().max(self.force.at) / (self.floor_n() + step);
+            let u = by_force.max(self.place.largest_before().max(self.place.at) / 1e-5).max(0.0);
             return Event { u, ..event };
         }
-        let mid = |lo: f64, hi: f64| 0.5 * (lo + hi);
         let by_force = if self.puncture.is_finite() {
-            let before = self.force_before.max(-1e3);
-            mid(before, self.force_at) / spread(before, self.force_at, floor)
+            let (mid, spread) = self.force_and_spread();
+            mid / spread
         } else {
             f64::NAN
         };
-        let before = self.place_before.max(self.place_at - 1e-2);
-        let by_place = mid(before, self.place_at) / spread(before, self.place_at, POSITION_FLOOR_M);
+        let by_place = self.by_place();
         let u = if by_force.is_nan() { by_place } else { by_force.max(by_place) };
         Event { u, elastic_n: mid(self.elastic_before, self.elastic_at), ..event }
     }
+
+    fn floor_n(&self) -> f64 {
+        FORCE_FLOOR * self.puncture.min(1e3) + 1e-5
+    }
+
+    /// Force beyond the puncture force around the rupture, and what sampling leaves open of it, in N.
+    fn force_and_spread(&self) -> (f64, f64) {
+        self.force.passed(-1e3, self.floor_n())
+    }
+
+    /// Distance from the layer's far side in standard deviations.
+    fn by_place(&self) -> f64 {
+        let (mid, spread) = self.place.passed(self.place.at - 1e-2, POSITION_FLOOR_M);
+        mid / spread
+    }
+}
+
+fn mid(lo: f64, hi: f64) -> f64 {
+    0.5 * (lo + hi)
+}
+
+/// Standard deviation of a value that lies anywhere between two, and of a floor.
+fn spread(lo: f64, hi: f64, floor: f64) -> f64 {
+    let half = 0.5 * (hi - lo).abs();
+    (half * half / 3.0 + floor * floor).sqrt()
 }
 
 impl Event {
+    /// How far the elastic force at rupture is from the puncture force, as a share of it, and the standard deviation
+    /// that sampling leaves; `None` where no force says when the layer ruptured.
+    #[must_use]
+    pub fn by_force(&self) -> Option<(f64, f64)> {
+        let puncture = self.strained.puncture;
+        let known = self.ruptured && puncture.is_finite() && puncture > 0.0 && self.strained.seen;
+        let (mid, spread) = self.strained.force_and_spread();
+        let by_place = self.strained.by_place();
+        (known && mid / spread >= by_place).then_some((mid / puncture, spread / puncture))
+    }
+
     /// The same were the puncture force larger by this share.
     #[must_use]
     pub fn with_puncture(&self, share: f64) -> Self {

@@ -127,10 +127,8 @@ impl Search {
             }
         }
         best.sort_by(|a, b| a.0.nats.total_cmp(&b.0.nats));
-        let screened: Vec<(&'static str, f64)> = best
-            .iter()
-            .map(|b| (b.0.model.last_name(), stood.nats - b.0.nats))
-            .collect();
+        let screened: Vec<(&'static str, f64)> =
+            best.iter().map(|b| (b.0.model.last_name(), stood.nats - b.0.nats)).collect();
         best.truncate(FINALISTS);
         let lead = best.first().map_or(0.0, |b| stood.nats - b.0.nats);
         best.retain(|b| {
@@ -204,8 +202,7 @@ impl Search {
         let mut kept: Vec<Finalist> = Vec::new();
         for new in finalists {
             let id = new.0.last_name();
-            let same =
-                |k: &Finalist| k.0.last_name() == id && id != "periodic_interference";
+            let same = |k: &Finalist| k.0.last_name() == id && id != "periodic_interference";
             match kept.iter_mut().find(|k| same(k)) {
                 Some(old) if fits(&new) < fits(old) => *old = new,
                 Some(_) => {}

@@ -279,12 +279,11 @@ impl Search {
         let rivals = [self.best.clone()];
         let base = Candidate { nats: nats(&self.base.model, &self.data_of(&self.base)), ..self.base.clone() };
         self.base = self.refit_standing(&base, &rivals);
-        let (base, best) = if self.scatter(&self.best) > 0.0 {
-            let raw = |c: &Candidate| Candidate { nats: nats(&c.model, &self.data_of(c)), ..c.clone() };
-            (self.forgiving(&raw(&self.base)).nats, self.forgiving(&raw(&self.best)).nats)
-        } else {
-            (self.base.nats, self.best.nats)
+        let judged = |c: &Candidate| {
+            let nats = nats(&c.model, &self.data_of(c));
+            self.forgiving(&Candidate { nats, ..c.clone() }).nats
         };
+        let (base, best) = (judged(&self.base), judged(&self.best));
         let names = self.best.model.names();
         let needed = names.iter().map(|id| self.settings.needed(id)).fold(0.0, f64::max);
         if base - best < needed {

@@ -56,11 +56,10 @@ impl Search {
         rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         self.settle_close(&mut rivals);
         let mut standing = self.refit_standing(standing, &rivals);
-        if rivals.first().is_some_and(|best| self.scatter(best) > 0.0) {
-            standing = self.forgiving(&standing);
-            rivals = rivals.iter().map(|r| self.forgiving(r)).collect();
-            rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
-        }
+        // What scattered punctures would explain as well is no gain of any effect's.
+        standing = self.forgiving(&standing);
+        rivals = rivals.par_iter().map(|r| self.forgiving(r)).collect();
+        rivals.sort_by(|a, b| a.fined().total_cmp(&b.fined()));
         stage.rivals = told(&standing, &rivals);
         let Some(best) = rivals.first().cloned() else {
             self.stages.push(stage);
@@ -177,27 +176,30 @@ impl Search {
         Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
     }
 
+    /// The same in two turns, the ruptures where they are.
+    fn quickly(&self, model: &Model, ruptures: &[Vec<f64>]) -> Option<Candidate> {
+        let mut there = Data { ruptures: ruptures.to_vec(), ..self.data.clone() };
+        let f = refine(model, &mut there, 0, 2, false)?;
+        Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+    }
+
     /// Takes out what is not needed.
     pub(super) fn prune(&mut self) {
         while self.best.model.effects.len() > 1 {
             let mut least: Option<(f64, Candidate)> = None;
-            let scattered = self.scatter(&self.best) > 0.0;
-            if scattered {
-                let raw = nats(&self.best.model, &self.data_of(&self.best));
-                self.best = self.forgiving(&Candidate { nats: raw, ..self.best.clone() });
-            }
+            let raw = nats(&self.best.model, &self.data_of(&self.best));
+            self.best = self.forgiving(&Candidate { nats: raw, ..self.best.clone() });
             for index in 0..self.best.model.effects.len() {
                 let id = self.best.model.effects[index].info.id;
                 let model = self.best.model.without(index);
-                let mut there = self.data_of(&self.best);
-                let mut quick = || refine(&model, &mut there, 0, 2, false);
-                if !scattered && quick().is_some_and(|f| f.nats > self.best.nats + INDISPENSABLE) {
+                let quick = self.quickly(&model, &self.best.ruptures);
+                if quick.is_some_and(|c| self.forgiving(&c).nats > self.best.nats + INDISPENSABLE) {
                     continue;
                 }
                 let Some(without) = self.refitted(&model, &self.best.ruptures) else {
                     continue;
                 };
-                let without = if scattered { self.forgiving(&without) } else { without };
+                let without = self.forgiving(&without);
                 let spare = without.nats - self.best.nats - self.settings.needed(id);
                 if spare < 0.0 && least.as_ref().is_none_or(|l| spare < l.0) {
                     least = Some((spare, without));
@@ -213,7 +215,9 @@ impl Search {
 
 /// Effect, nats gained and further numbers of every rival.
 fn told(standing: &Candidate, rivals: &[Candidate]) -> Vec<(&'static str, f64, usize)> {
-    let one = |r: &Candidate| (r.model.last_name(), standing.nats - r.nats, r.model.extra() - standing.model.extra());
+    let one = |r: &Candidate| {
+        (r.model.last_name(), standing.nats - r.nats, r.model.extra() - standing.model.extra())
+    };
     rivals.iter().map(one).collect()
 }
 
