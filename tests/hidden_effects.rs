@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 use stylet_diagnose::benchmark::{Result, run, summary};
-use stylet_diagnose::hidden::{self, Drawn, Kind, Motions, Size, sketch_of};
+use stylet_diagnose::hidden::{self, Drawn, Harder, Kind, Motions, Size, sketch_of};
 use stylet_diagnose::search::Settings;
 use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
 use stylet_tissue::AnyEffect;
@@ -45,6 +45,17 @@ fn ruptures_that_are_smeared_unseen_or_side_by_side_do_not_mislead() {
     for (seed, turn) in [(83, 7), (81, 7), (84, 14)] {
         let found = case(seed, Kind::Single, turn).expect("a result");
         assert!(found.right, "seed {seed}, turn {turn}: {:?} for {:?}", found.named, found.hidden);
+    }
+}
+
+/// Puncture forces that scatter by 3 % between recordings are no dependence on speed, neither on clean data nor beside an
+/// effect that is there.
+#[test]
+fn punctures_that_scatter_are_not_taken_for_an_effect() {
+    for (kind, turn) in [(Kind::Clean, 4), (Kind::Single, 6)] {
+        let sketch = Harder::Scatter.make(sketch_of(94, turn, kind, turn));
+        let found = run(turn, &sketch, Settings::default()).expect("a result");
+        assert!(found.right, "{kind:?} {turn}: {:?} for {:?}", found.named, found.hidden);
     }
 }
 

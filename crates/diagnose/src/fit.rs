@@ -347,6 +347,7 @@ pub fn fit_from(model: &Model, data: &Data, mut at: Residuals, turns: usize, eno
     for turn in 0..turns {
         // The columns of the base parameters serve for two turns; for three where they cost a replay each.
         let keep = last.take().filter(|_| turn % if linear { 2 } else { 3 } != 0);
+        let kept = keep.is_some();
         let jac = jacobian(&best, data, &at, &mut work, keep);
         let p = best.vector(&jac.slots);
         let (h, g) = normal(&best, &jac, &at);
@@ -356,7 +357,8 @@ pub fn fit_from(model: &Model, data: &Data, mut at: Residuals, turns: usize, eno
                 lambda = (lambda * 10.0).max(1e-3);
                 continue;
             };
-            if promised(&p, &q, &h, &g) < HOPE * enough {
+            let free = jac.slots.iter().zip(&q).all(|(s, q)| *q > s.low && *q < s.high);
+            if free && promised(&p, &q, &h, &g) < HOPE * enough {
                 break;
             }
             let mut trial = best.clone();
@@ -374,8 +376,8 @@ pub fn fit_from(model: &Model, data: &Data, mut at: Residuals, turns: usize, eno
             }
             lambda = (lambda * 10.0).max(1e-3);
         }
-        last = Some(jac);
-        if gained < enough {
+        last = Some(jac).filter(|_| gained >= enough);
+        if gained < enough && !kept {
             break;
         }
     }

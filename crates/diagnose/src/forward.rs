@@ -404,3 +404,40 @@ pub fn free(model: &Compiled, track: &Track, out: &mut [f64]) -> Vec<f64> {
     imposed(model, track, &instants, out, &mut Vec::new());
     instants
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Course;
+
+    fn after(values: impl IntoIterator<Item = f64>) -> Course {
+        let mut course = Course::UNSEEN;
+        values.into_iter().for_each(|v| course.note(v));
+        course
+    }
+
+    /// A force that rises steadily passes zero somewhere between its last two samples.
+    #[test]
+    fn a_steady_rise_passes_between_the_last_two_samples() {
+        let (mid, spread) = after([-0.3, -0.2, -0.04, 0.06]).passed(-1e3, 0.0);
+        assert!((mid - 0.01).abs() < 1e-12);
+        assert!((spread - 0.05 / 3.0_f64.sqrt()).abs() < 1e-12);
+    }
+
+    /// A law that had to rupture long before, and hardly moves now, is not excused by how far it has come back since.
+    #[test]
+    fn a_rupture_that_was_due_long_before_is_far_off() {
+        let rise = (0..20).map(|k| -0.1 + 0.01 * f64::from(k));
+        let fall = (0..50).map(|k| 0.09 - 0.001 * f64::from(k));
+        let (off, spread) = after(rise.chain(fall)).passed(-1e3, 0.0);
+        assert!((off - 0.09).abs() < 1e-12);
+        assert!(off / spread > 100.0);
+    }
+
+    /// Nor is one that came near once, and is far from rupture now, credited with more than it reached.
+    #[test]
+    fn a_rupture_that_came_near_once_is_as_far_as_it_came() {
+        let (off, spread) = after([-0.3, -0.02, -0.1, -0.1 - 1e-4]).passed(-1e3, 1e-5);
+        assert!((off + 0.02).abs() < 1e-12);
+        assert!(off / spread < -100.0);
+    }
+}
