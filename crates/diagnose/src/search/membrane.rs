@@ -87,6 +87,32 @@ impl Search {
         best
     }
 
+    /// What broke was no membrane but a layer, whose rupture was sought elsewhere: the candidate without the membrane and
+    /// with the rupture there, where that fits better.
+    pub(super) fn unveiled(&self, candidate: Candidate) -> Candidate {
+        let membranes = candidate.model.effects.iter().position(|e| e.info.id == "hidden_membrane");
+        let Some(index) = membranes.filter(|_| candidate.model.effects.len() > 1) else { return candidate };
+        let [begins, slope, force] = *candidate.model.effects[index].values.as_slice() else {
+            return candidate;
+        };
+        let breaks = candidate.model.assumed.surface_m + begins + force / slope;
+        let without = candidate.model.without(index);
+        (0..candidate.model.assumed.layers.len())
+            .filter_map(|layer| {
+                let mut ruptures = candidate.ruptures.clone();
+                for (track, own) in self.data.tracks.iter().zip(&mut ruptures) {
+                    let at = track.before(track.z.iter().position(|z| *z >= breaks)?);
+                    let after = if layer > 0 { own[layer - 1] } else { f64::NEG_INFINITY };
+                    let before = own.get(layer + 1).copied().unwrap_or(NEVER);
+                    *own.get_mut(layer).filter(|_| at > after && at < before)? = at;
+                }
+                self.refitted(&without, &ruptures)
+            })
+            .filter(|new| new.nats < candidate.nats)
+            .min_by(|a, b| a.nats.total_cmp(&b.nats))
+            .unwrap_or(candidate)
+    }
+
     /// The ruptures with those of one layer at spare drops, the same depth in every recording and clear in one at
     /// least; `None` when there are none.
     pub(super) fn exchange_drops(&self, data: &Data, layer: usize) -> Option<Vec<Vec<f64>>> {

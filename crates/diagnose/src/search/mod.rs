@@ -212,7 +212,8 @@ impl Search {
             let taken = self.stage(&standing);
             if taken {
                 self.enlarge();
-                self.best = crate::profile::settled(self, &self.uncrossed(self.best.clone())).0;
+                let uncrossed = self.unveiled(self.uncrossed(self.best.clone()));
+                self.best = crate::profile::settled(self, &uncrossed).0;
             }
             if !taken || (self.best.model.effects.len() > 1 && (self.hopeless(2.0) || self.nothing_left())) {
                 break;
