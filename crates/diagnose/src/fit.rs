@@ -345,7 +345,8 @@ pub fn fit_from(model: &Model, data: &Data, mut at: Residuals, turns: usize, eno
     let mut last: Option<Jacobian> = None;
     let linear = crate::columns::are_linear(model);
     for turn in 0..turns {
-        // The columns of the base parameters serve for two turns; for three where they cost a replay each.
+        // The columns of the base parameters serve for two turns; for three where they cost a replay each. Only with
+        // columns of its own does a turn say that nothing more is to be gained.
         let keep = last.take().filter(|_| turn % if linear { 2 } else { 3 } != 0);
         let kept = keep.is_some();
         let jac = jacobian(&best, data, &at, &mut work, keep);

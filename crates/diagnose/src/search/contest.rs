@@ -17,7 +17,8 @@ const FAR_BEHIND: [f64; 2] = [0.15, 0.05];
 const PROMISING: f64 = 0.3;
 const BEGINNING: f64 = 0.15;
 /// Nats behind, besides so many times what the best start promises, at which a start whose one number is a time,
-/// a width or a spring is not worth a fit: none that was so far off ever came back.
+/// a width or a spring is not worth a fit. (Of 516 that were 3000 behind in forty drawn cases one came back, and that
+/// one is within the second bound.)
 const BEYOND: (f64, f64) = (3000.0, 5.0);
 /// Nats behind the standing model at which an effect that costs much to fit is given up after two turns.
 const GIVEN_UP: f64 = 1000.0;
