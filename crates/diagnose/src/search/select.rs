@@ -171,15 +171,13 @@ impl Search {
     }
 
     pub(super) fn refitted(&self, model: &Model, ruptures: &[Vec<f64>]) -> Option<Candidate> {
-        let mut there = Data { ruptures: ruptures.to_vec(), ..self.data.clone() };
-        let f = refine(model, &mut there, 2, 5, true)?;
-        Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
+        self.fitted(model, ruptures, 2, 5)
     }
 
-    /// The same in two turns, the ruptures where they are.
-    fn quickly(&self, model: &Model, ruptures: &[Vec<f64>]) -> Option<Candidate> {
+    /// The model fitted from these ruptures, which are moved in so many rounds.
+    fn fitted(&self, model: &Model, ruptures: &[Vec<f64>], rounds: usize, turns: usize) -> Option<Candidate> {
         let mut there = Data { ruptures: ruptures.to_vec(), ..self.data.clone() };
-        let f = refine(model, &mut there, 0, 2, false)?;
+        let f = refine(model, &mut there, rounds, turns, rounds > 0)?;
         Some(Candidate { model: f.model, ruptures: there.ruptures, nats: f.nats })
     }
 
@@ -192,7 +190,7 @@ impl Search {
             for index in 0..self.best.model.effects.len() {
                 let id = self.best.model.effects[index].info.id;
                 let model = self.best.model.without(index);
-                let quick = self.quickly(&model, &self.best.ruptures);
+                let quick = self.fitted(&model, &self.best.ruptures, 0, 2);
                 if quick.is_some_and(|c| self.forgiving(&c).nats > self.best.nats + INDISPENSABLE) {
                     continue;
                 }
