@@ -25,6 +25,7 @@
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod air;
+pub mod engine;
 pub mod benchmark;
 mod check;
 pub mod columns;

@@ -186,6 +186,22 @@ pub trait Effect {
         force_n
     }
 
+    /// [`Place::Sensor`]: the mean of what the sensor makes of a force over a span: `force_n` is the mean of what comes
+    /// in over `span_s` seconds around `time_s`, in which the sensor takes `samples` samples.
+    fn sense_mean(&self, time_s: f64, span_s: f64, _samples: f64, force_n: f64, memory: &mut Memory) -> f64 {
+        self.sense(time_s, span_s, force_n, memory)
+    }
+
+    /// [`Place::Sensor`]: time in s by which the whole force comes late.
+    fn delay_s(&self) -> f64 {
+        0.0
+    }
+
+    /// [`Place::Tip`]: depth in m below the surface at which something of the effect's own breaks, if it does.
+    fn break_depth_m(&self) -> Option<f64> {
+        None
+    }
+
     /// [`Place::Position`]: recorded position over true position.
     fn position_factor(&self) -> f64 {
         1.0

@@ -21,6 +21,43 @@ pub struct EffectInfo {
     pub parameters: &'static [ParameterInfo],
     /// The same effect with more terms, if there is such a variant.
     pub larger: Option<&'static EffectInfo>,
+    /// Where a search for it begins.
+    pub proposal: Proposal,
+    /// Ids of effects that hold this one as a special case.
+    pub nested_in: &'static [&'static str],
+}
+
+/// Where a search for an effect in measured data begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Proposal {
+    /// Groups of parameter vectors. What such an effect adds to the force is a column; the columns of a group act together,
+    /// and their coefficients scale the strengths. Several groups: shapes in which the force is not linear.
+    Columns(&'static [&'static [&'static [f64]]]),
+    /// One column per inner face, moved by so many metres; the first parameter is the layer before it.
+    Faces(f64),
+    /// A motion of the tissue at any of a grid of frequencies: how the force changes with depth and speed makes the columns.
+    Breath,
+    /// A line of the residual's spectrum.
+    Line,
+    /// An element that stretches and breaks, at any depth.
+    Break,
+    /// Read off the raw samples before any law.
+    Raw,
+    /// Describes one layer at a time: not sought in single insertions.
+    PerLayer,
+}
+
+/// How a parameter enters a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FitScale {
+    /// As it is.
+    Linear,
+    /// By its logarithm: a time constant, a frequency.
+    Log,
+    /// By its reciprocal: the stiffness of what is rigid when neutral.
+    Reciprocal,
 }
 
 /// One parameter of an effect.
@@ -54,6 +91,17 @@ pub struct ParameterInfo {
 }
 
 impl ParameterInfo {
+    /// How the parameter enters a fit: strengths as they are (a fit may then shrink them to nothing), shapes by their
+    /// logarithm where the library says so.
+    #[must_use]
+    pub fn fit_scale(&self) -> FitScale {
+        match (self.strength, self.neutral == f64::INFINITY) {
+            (true, true) => FitScale::Reciprocal,
+            (false, _) if self.log => FitScale::Log,
+            _ => FitScale::Linear,
+        }
+    }
+
     /// A parameter that says how strong the effect is.
     pub(crate) const fn strength(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self {

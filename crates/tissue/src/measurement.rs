@@ -46,6 +46,23 @@ pub struct Reading {
     pub noise_n: f64,
 }
 
+/// A span of time whose mean is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cell {
+    /// Middle of the span in s.
+    pub time_s: f64,
+    /// Its length in s.
+    pub span_s: f64,
+    /// Samples that the sensor takes in it, evenly spaced.
+    pub samples: f64,
+    /// Mean velocity of the needle's base in m/s.
+    pub velocity_mps: f64,
+    /// Mean acceleration of the needle's base in m/s².
+    pub acceleration_mps2: f64,
+    /// Mean force of the tissue on the needle in N.
+    pub tissue_n: f64,
+}
+
 impl Measurement {
     /// The chain of those effects that act outside the tissue. Neutral effects and those of the
     /// tissue are left out.
@@ -123,6 +140,29 @@ impl Measurement {
         }
         for effect in &self.after_noise {
             force = effect.sense(time_s, dt_s, force, &mut none);
+        }
+        force
+    }
+
+    /// Time in s by which the recorded force comes late.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
+    }
+
+    /// The mean of the recorded force over a span of time, without delay, noise and what comes after the noise. Spans
+    /// follow one another without gaps; a lag is integrated through them.
+    pub fn mean(&self, state: &mut MeasurementState, cell: &Cell) -> f64 {
+        let mut force = cell.tissue_n;
+        for effect in &self.tool {
+            force += effect.tool_force(cell.velocity_mps, cell.acceleration_mps2);
+        }
+        for (effect, memory) in self.before_delay.iter().zip(&mut state.memory) {
+            force = effect.sense_mean(cell.time_s, cell.span_s, cell.samples, force, memory);
+        }
+        let mut none = [0.0; 8];
+        for effect in &self.before_noise {
+            force = effect.sense_mean(cell.time_s, cell.span_s, cell.samples, force, &mut none);
         }
         force
     }

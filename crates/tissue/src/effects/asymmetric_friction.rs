@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Friction that differs between advance and retraction: `b_i -> b_i (1 + eps sgn v)`, in the
 /// cumulative friction `D` as well.
@@ -25,6 +25,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("eps", "", "asymmetry between advance and retraction").allowed(-1.0, 1.0).search(0.2, -0.9, 0.9),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.01]]]),
+    nested_in: &[],
 };
 
 impl Described for AsymmetricFriction {

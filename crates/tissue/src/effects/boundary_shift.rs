@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// A boundary that is not where it was thought to be: the face between layers `i` and `i + 1` is
@@ -45,6 +45,8 @@ static INFO: EffectInfo = EffectInfo {
             .search(0.003, -0.015, 0.015),
     ],
     larger: None,
+    proposal: Proposal::Faces(1e-3),
+    nested_in: &[],
 };
 
 impl Described for BoundaryShift {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction along the shaft: `f_B += c sgn(v) sum l_i`.
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside").allowed(0.0, 1e4).search(3.0, 0.05, 100.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[1.0]]]),
+    nested_in: &["stribeck_friction", "presliding_friction"],
 };
 
 impl Described for CoulombFriction {

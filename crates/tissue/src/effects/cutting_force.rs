@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// Force of cutting at the tip: `+ F_c` while advancing (`sgn v > 0`) with the tip inside a layer
@@ -26,6 +26,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("force_n", "N", "cutting force").allowed(0.0, 100.0).search(0.3, 0.01, 3.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    nested_in: &[],
 };
 
 impl Described for CuttingForce {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// Layers that yield to force and not to the tip's depth: a blunt tip pushes a layer in front of it
@@ -34,6 +34,8 @@ static INFO: EffectInfo = EffectInfo {
     .allowed(0.0, 1.0)
     .search(0.01, 0.001, 0.05)],
     larger: None,
+    proposal: Proposal::PerLayer,
+    nested_in: &[],
 };
 
 impl Described for DeepIndentation {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction of the drive that the sensor feels: `+ F_j sgn(v)`, in air too (virtual sensor).
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("force_n", "N", "dry friction of the drive").allowed(0.0, 100.0).search(0.2, 0.01, 3.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    nested_in: &[],
 };
 
 impl Described for DriveFriction {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// An offset of the sensor: `+ F_0`, in air too.
 ///
@@ -23,6 +23,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("force_n", "N", "offset").allowed(-100.0, 100.0).search(0.05, -2.0, 2.0),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    nested_in: &[],
 };
 
 impl Described for ForceBias {

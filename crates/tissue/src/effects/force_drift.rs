@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor that drifts: `+ rate t`, `t` being the recording's time.
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("rate_n_per_s", "N/s", "drift").allowed(-10.0, 10.0).search(0.005, -0.1, 0.1),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[1e-3]]]),
+    nested_in: &[],
 };
 
 impl Described for ForceDrift {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor that is not calibrated: `f -> (1 + eps) f`.
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("eps", "", "relative error of the force").allowed(-0.99, 10.0).search(0.05, -0.5, 0.5),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.01]]]),
+    nested_in: &[],
 };
 
 impl Described for ForceGain {

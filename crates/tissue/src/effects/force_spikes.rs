@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Isolated outlying samples. Only their parameters live here: the drawing is the sensor's, and the
 /// spikes enter the chain with the noise.
@@ -28,6 +28,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("size_n", "N", "size of a spike").allowed(-1000.0, 1000.0).search(1.0, 0.1, 20.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Raw,
+    nested_in: &[],
 };
 
 impl Described for ForceSpikes {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// A membrane that the layers do not know: an elastic element `+ K_m max(0, z - s_1 - z_m)`, gone
@@ -36,6 +36,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("puncture_n", "N", "force at which it breaks").allowed(0.0, 100.0).search(0.5, 0.02, 5.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Break,
+    nested_in: &[],
 };
 
 impl Described for HiddenMembrane {
@@ -45,6 +47,15 @@ impl Described for HiddenMembrane {
     fn from_values(values: &[f64]) -> Option<Self> {
         let [depth_m, stiffness_n_per_m, puncture_n] = *values else { return None };
         Some(Self { depth_m, stiffness_n_per_m, puncture_n })
+    }
+    /// The depth at which it breaks in place of the one at which it begins.
+    fn coordinates(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.depth_m + self.stretch_m(), self.stiffness_n_per_m, self.puncture_n]
+    }
+    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
+        let [breaks_m, stiffness_n_per_m, puncture_n] = *coordinates else { return None };
+        let whole = Self { depth_m: 0.0, stiffness_n_per_m, puncture_n };
+        Some(Self { depth_m: (breaks_m - whole.stretch_m()).max(0.0), ..whole })
     }
 }
 
@@ -66,12 +77,20 @@ impl Effect for HiddenMembrane {
         memory[0] = 1.0;
         true
     }
+    fn break_depth_m(&self) -> Option<f64> {
+        Some(self.depth_m + self.stretch_m())
+    }
     fn tip_force(&self, moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64 {
         if memory[0] != 0.0 { 0.0 } else { self.force(moment.z_m, slabs) }
     }
 }
 
 impl HiddenMembrane {
+    /// How far it stretches before it breaks, in m.
+    fn stretch_m(&self) -> f64 {
+        if self.stiffness_n_per_m > 0.0 { self.puncture_n / self.stiffness_n_per_m } else { 0.0 }
+    }
+
     /// Its force in N with the tip at `z_m`, while whole.
     fn force(&self, z_m: f64, slabs: &[Slab]) -> f64 {
         let surface = slabs.first().map_or(0.0, |slab| slab.front_m);

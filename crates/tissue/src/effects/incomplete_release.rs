@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, SGN_DEAD_BAND_MPS};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// A rupture that does not release everything: a share `rho` of `f_K` at rupture stays as a
@@ -26,6 +26,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("fraction", "", "share of the elastic force that stays").allowed(0.0, 1.0).search(0.3, 0.01, 0.99),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.05]]]),
+    nested_in: &[],
 };
 
 impl Described for IncompleteRelease {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// One layer that stiffens otherwise than the others: `K_i kappa_i x^2` is added to its elastic force.
@@ -44,6 +44,8 @@ static INFO: EffectInfo = EffectInfo {
             .search(10.0, -100.0, 1000.0),
     ],
     larger: None,
+    proposal: Proposal::PerLayer,
+    nested_in: &[],
 };
 
 impl Described for LayerStiffening {

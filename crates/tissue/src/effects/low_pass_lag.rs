@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place, lag_weights, same_step};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor or filter that lags: first order, `tau y' = f - y`, at rest at the first sample.
 ///
@@ -27,6 +27,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("time_constant_s", "s", "time constant").allowed(0.0, 100.0).search(0.05, 0.002, 2.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.004]], &[&[0.02]], &[&[0.08]], &[&[0.3]]]),
+    nested_in: &[],
 };
 
 impl Described for LowPassLag {
@@ -64,5 +66,21 @@ impl Effect for LowPassLag {
         }
         memory[1] = force_n;
         memory[0]
+    }
+    /// Memory: output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
+    /// `y` follows from `tau y' = x - y` integrated over the span.
+    fn sense_mean(&self, _time_s: f64, span_s: f64, _samples: f64, force_n: f64, memory: &mut Memory) -> f64 {
+        if memory[7] == 0.0 {
+            memory[7] = 1.0;
+            memory[6] = force_n;
+        }
+        let before = memory[6];
+        if span_s <= 0.0 {
+            return before;
+        }
+        let ratio = span_s / self.time_constant_s;
+        let change = -libm::expm1(-ratio) * (force_n - before);
+        memory[6] = before + change;
+        force_n - change / ratio
     }
 }

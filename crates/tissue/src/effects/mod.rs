@@ -21,6 +21,17 @@ trait Described: Effect + Default {
     /// The effect with these parameters; `None` when their number is wrong.
     fn from_values(values: &[f64]) -> Option<Self>;
 
+    /// The parameters in coordinates in which a force is less curved, as many as parameters, each in the scale of its
+    /// parameter's [`FitScale`](crate::FitScale); by default the parameters themselves.
+    fn coordinates(&self) -> Vec<f64> {
+        self.values()
+    }
+
+    /// The effect at these coordinates.
+    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
+        Self::from_values(coordinates)
+    }
+
     /// Conditions on several parameters together.
     fn check_together(&self) -> Result<(), ParameterError> {
         Ok(())
@@ -71,6 +82,21 @@ macro_rules! effects {
                 match self { $(Self::$name(effect) => effect.values(),)* }
             }
 
+            /// The parameters in coordinates that suit a fit: as many as parameters, in their order.
+            #[must_use]
+            pub fn coordinates(&self) -> Vec<f64> {
+                match self { $(Self::$name(effect) => effect.coordinates(),)* }
+            }
+
+            /// The effect of this id at these coordinates.
+            #[must_use]
+            pub fn from_coordinates(id: &str, coordinates: &[f64]) -> Option<Self> {
+                match id {
+                    $(stringify!($module) => $name::from_coordinates(coordinates).map(Self::$name),)*
+                    _ => None,
+                }
+            }
+
             fn check_together(&self) -> Result<(), ParameterError> {
                 match self { $(Self::$name(effect) => effect.check_together(),)* }
             }
@@ -96,6 +122,9 @@ macro_rules! effects {
             fn tip_force(moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64;
             fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
             fn sense(time_s: f64, dt_s: f64, force_n: f64, memory: &mut Memory) -> f64;
+            fn sense_mean(time_s: f64, span_s: f64, samples: f64, force_n: f64, memory: &mut Memory) -> f64;
+            fn delay_s() -> f64;
+            fn break_depth_m() -> Option<f64>;
             fn position_factor() -> f64;
         );
     };

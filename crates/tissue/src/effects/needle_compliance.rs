@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A needle or holder that gives: `z_tip = z - f/k_s`, implicit; `z` and `v` in the law are the
 /// tip's, and `v_tip = (z_tip - z_tip_before)/dt`.
@@ -33,6 +33,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness of needle and holder").allowed(1.0, f64::INFINITY).neutral(f64::INFINITY).search(1000.0, 50.0, 1e5).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[8000.0]], &[&[1500.0]], &[&[300.0]]]),
+    nested_in: &[],
 };
 
 impl Described for NeedleCompliance {

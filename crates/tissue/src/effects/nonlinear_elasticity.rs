@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Tissue that stiffens with indentation: `f_K = K x (1 + kappa x)`.
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("kappa_per_m", "1/m", "stiffening with indentation").allowed(-100.0, 1000.0).search(10.0, -5.0, 100.0),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[1.0]]]),
+    nested_in: &[],
 };
 
 impl Described for NonlinearElasticity {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A tone in the force: `+ A sin(2 pi f t + phase)`, in air too.
 ///
@@ -30,6 +30,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(0.0, -core::f64::consts::PI, core::f64::consts::PI),
     ],
     larger: None,
+    proposal: Proposal::Line,
+    nested_in: &[],
 };
 
 impl Described for PeriodicInterference {
@@ -52,5 +54,13 @@ impl Effect for PeriodicInterference {
     fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
         let angle = core::f64::consts::TAU * self.frequency_hz * time_s + self.phase_rad;
         force_n + self.amplitude_n * libm::sin(angle)
+    }
+    /// The mean of a line over evenly spaced samples (Dirichlet's kernel).
+    fn sense_mean(&self, time_s: f64, span_s: f64, samples: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+        let half = core::f64::consts::PI * self.frequency_hz * span_s / samples.max(1.0);
+        let (below, above) = (libm::sin(half), libm::sin(samples * half));
+        let share = if below.abs() < 1e-9 { 1.0 } else { above / (samples * below) };
+        let angle = core::f64::consts::TAU * self.frequency_hz * time_s + self.phase_rad;
+        force_n + self.amplitude_n * share * libm::sin(angle)
     }
 }

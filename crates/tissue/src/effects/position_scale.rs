@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A recorded position that is `(1 + eps)` times the true one; the recorded velocity as well.
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("eps", "", "relative error of the recorded position").allowed(-0.5, 1.0).search(0.02, -0.2, 0.2),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.01]]]),
+    nested_in: &[],
 };
 
 impl Described for PositionScale {

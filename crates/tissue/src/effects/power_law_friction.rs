@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Friction that is not linear in speed: `v -> sgn(v) v0 (abs(v)/v0)^n` in the viscous friction,
 /// `v0 = 1 mm/s`.
@@ -33,6 +33,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("exponent", "", "exponent of speed in the friction").allowed(-0.9, 3.0).neutral(1.0).search(0.7, 0.1, 2.0),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[1.02]]]),
+    nested_in: &[],
 };
 
 impl Described for PowerLawFriction {

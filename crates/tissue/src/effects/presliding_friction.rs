@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction that builds up with travel (Dahl): `f_B += c xi sum l_i`,
 /// `xi' = (v/delta)(1 - xi sgn v)` while any shaft is inside.
@@ -40,6 +40,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("delta_m", "m", "travel over which the friction builds up").allowed(1e-7, 0.1).neutral(5e-4).search(5e-4, 1e-5, 2e-2).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[1.0, 6e-5]], &[&[1.0, 2.5e-4]], &[&[1.0, 1e-3]], &[&[1.0, 4e-3]]]),
+    nested_in: &[],
 };
 
 impl Described for PreslidingFriction {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor with a coarse step: round to a multiple of `q` (halves away from zero).
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("step_n", "N", "step").allowed(0.0, 100.0).search(0.05, 0.0005, 1.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Raw,
+    nested_in: &[],
 };
 
 impl Described for Quantisation {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Puncture force that depends on speed: `F_i -> F_i max(0.1, 1 + alpha ln(abs(v)/v0))`,
 /// `v0 = 1 mm/s`, `abs(v)` at least 0.1 mm/s.
@@ -25,6 +25,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("alpha", "", "change of the puncture force per factor e in speed").allowed(-2.0, 2.0).search(0.1, -0.5, 0.5),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.02]]]),
+    nested_in: &[],
 };
 
 impl Described for RateDependentPuncture {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Tissue that moves with the breath: `s_i -> s_i + A sin(2 pi f t + phase)`; depth and velocity
 /// in the law become relative to it.
@@ -31,6 +31,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(0.0, -core::f64::consts::PI, core::f64::consts::PI),
     ],
     larger: None,
+    proposal: Proposal::Breath,
+    nested_in: &[],
 };
 
 impl Described for Respiration {

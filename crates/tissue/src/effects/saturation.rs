@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor at the end of its range: `clamp(f, -L, L)`.
 ///
@@ -30,6 +30,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("limit_n", "N", "range of the sensor").allowed(0.0, f64::INFINITY).neutral(f64::INFINITY).search(4.0, 0.2, 50.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Raw,
+    nested_in: &[],
 };
 
 impl Described for Saturation {

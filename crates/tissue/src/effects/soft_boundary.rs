@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// A boundary that gives way gradually: the elastic release of a rupture is spread over travel `w`,
@@ -29,6 +29,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("width_m", "m", "travel over which a rupture releases its force").allowed(0.0, 0.1).search(0.003, 1e-4, 0.02).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[3e-4]], &[&[1e-3]], &[&[3e-3]], &[&[8e-3]]]),
+    nested_in: &[],
 };
 
 impl Described for SoftBoundary {

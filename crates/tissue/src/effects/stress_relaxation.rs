@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Place, lag_weights, same_step};
-use crate::info::{EffectInfo, ParameterError, ParameterInfo};
+use crate::info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 use alloc::vec::Vec;
 
 /// One term of the Prony series.
@@ -48,6 +48,10 @@ const ONE: EffectInfo = EffectInfo {
     place: Place::Relaxation,
     parameters: &[FRACTION, TIME],
     larger: None,
+    proposal: Proposal::Columns(&[
+        &[&[0.05, 0.06]], &[&[0.05, 0.2]], &[&[0.05, 0.5]], &[&[0.05, 1.3]], &[&[0.05, 3.0]], &[&[0.05, 8.0]], &[&[0.05, 25.0]],
+    ]),
+    nested_in: &[],
 };
 
 static TWO_TERMS: EffectInfo = EffectInfo {

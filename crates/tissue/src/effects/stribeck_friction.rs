@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, ParameterError};
+use crate::info::{EffectInfo, ParameterInfo, ParameterError, Proposal};
 
 /// Dry friction that is larger at low speed:
 /// `f_B += sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)^2))`, `c_s >= c`.
@@ -38,6 +38,13 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("v_stribeck_mps", "m/s", "speed at which static friction fades").allowed(1e-6, 1.0).neutral(2e-3).search(2e-3, 1e-4, 2e-2).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[
+        &[&[1.0, 1.0, 3e-4], &[0.0, 1.0, 3e-4]],
+        &[&[1.0, 1.0, 8e-4], &[0.0, 1.0, 8e-4]],
+        &[&[1.0, 1.0, 2e-3], &[0.0, 1.0, 2e-3]],
+        &[&[1.0, 1.0, 5e-3], &[0.0, 1.0, 5e-3]],
+    ]),
+    nested_in: &[],
 };
 
 impl Described for StribeckFriction {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A force that arrives late against the position: `f(t) -> f(t - tau)`, linear between samples.
 ///
@@ -25,6 +25,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("delay_s", "s", "delay of the force").allowed(0.0, 10.0).search(0.03, 0.001, 0.5).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.003]], &[&[0.012]], &[&[0.05]], &[&[0.15]]]),
+    nested_in: &[],
 };
 
 impl Described for TimeDelay {
@@ -43,5 +45,8 @@ impl Effect for TimeDelay {
     }
     fn is_neutral(&self) -> bool {
         self.delay_s <= 0.0
+    }
+    fn delay_s(&self) -> f64 {
+        self.delay_s
     }
 }

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Mass of the tool beyond the sensor: `+ m a`.
 ///
@@ -24,6 +24,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::strength("mass_kg", "kg", "mass beyond the sensor").allowed(0.0, 100.0).search(0.1, 0.005, 5.0).log(),
     ],
     larger: None,
+    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    nested_in: &[],
 };
 
 impl Described for ToolInertia {

@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place};
-use crate::info::{EffectInfo, ParameterInfo};
+use crate::info::{EffectInfo, ParameterInfo, Proposal};
 use crate::slab::Slab;
 
 /// Speed in m/s below which a layer holds with the friction of the last motion (0.1 mm/s).
@@ -95,6 +95,8 @@ static INFO: EffectInfo = EffectInfo {
             .search(0.0, -0.01, 0.01),
     ],
     larger: None,
+    proposal: Proposal::PerLayer,
+    nested_in: &[],
 };
 
 impl Described for ViscoelasticPresliding {

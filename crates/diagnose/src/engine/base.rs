@@ -1,0 +1,90 @@
+//! The base law fitted: drops of the force given to layers, numbers and instants in turn.
+
+use std::sync::Arc;
+use stylet_identify::assign::assign;
+use stylet_identify::blocks::Blocks;
+use stylet_identify::drops::{Drop, drops};
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::model::{Belief, Model};
+use stylet_identify::noise::{From, Noise};
+use stylet_identify::objective::Data;
+use stylet_identify::retime::retime;
+use rayon::prelude::*;
+
+/// Recordings made ready, with the drops of their forces.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// What is believed.
+    pub belief: Arc<Belief>,
+    /// The recordings.
+    pub blocks: Arc<Vec<Blocks>>,
+    /// Drops per recording.
+    pub drops: Vec<Vec<Drop>>,
+}
+
+impl Prepared {
+    /// Finds the drops.
+    #[must_use]
+    pub fn new(belief: Arc<Belief>, blocks: Vec<Blocks>) -> Self {
+        let drops = blocks.par_iter().map(drops).collect();
+        Self { belief, blocks: Arc::new(blocks), drops }
+    }
+
+    /// Instants (s) of the drops.
+    #[must_use]
+    pub fn drop_times(&self) -> Vec<Vec<f64>> {
+        self.drops.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect()
+    }
+
+    /// Largest force in N.
+    #[must_use]
+    pub fn largest_n(&self) -> f64 {
+        self.blocks.iter().flat_map(|b| &b.size_n).fold(1e-9, |m: f64, f| m.max(*f))
+    }
+}
+
+/// The first fits see misfits of this share of the largest force as noise: no detail traps them.
+const FIRST_SHARE: f64 = 0.03;
+
+/// Standard deviation in N of blocks about their neighbours.
+fn roughness(blocks: &[Blocks]) -> f64 {
+    let third = |b: &Blocks| -> Vec<f64> {
+        b.f.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect()
+    };
+    let mut all: Vec<f64> = blocks.iter().flat_map(third).collect();
+    (stylet_stats::order::median(&mut all) * 1.4826 / 20.0_f64.sqrt()).max(1e-6)
+}
+
+/// Fits the base law; returns it with the noise by which it is judged. `None` when it cannot be replayed.
+#[must_use]
+pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
+    let rough_n = roughness(&prepared.blocks);
+    let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
+    let mut data = Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide) };
+    let mut model = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
+    let mut best: Option<Fit> = None;
+    for trust in [1.0, 0.5] {
+        let from = best.as_ref().map_or(&model, |b| &b.model);
+        let instants =
+            prepared.blocks.iter().zip(&prepared.drops).map(|(b, d)| assign(from, b, d, trust, rough_n)).collect();
+        let next = Model { instants, ..from.clone() };
+        if let Some(new) = fit(&next, &data, Effort { turns: 4, enough: 0.3 })
+            && best.as_ref().is_none_or(|b| new.nats() < b.nats())
+        {
+            model = new.model.clone();
+            best = Some(new);
+        }
+    }
+    let _ = model;
+    let mut best = best?;
+    let times = prepared.drop_times();
+    for round in 0..3 {
+        data = data.with_noise(Noise::estimate(&data.blocks, &best.residuals.e, From::Calm));
+        let mut model = best.model.clone();
+        retime(&mut model, &data, &times);
+        best = fit(&model, &data, if round == 2 { Effort::FULL } else { Effort { turns: 5, enough: 0.3 } })?;
+    }
+    data = data.with_noise(Noise::estimate(&data.blocks, &best.residuals.e, From::Calm));
+    best = fit(&best.model, &data, Effort::FULL)?;
+    Some((best, data))
+}

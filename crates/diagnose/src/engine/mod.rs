@@ -1,0 +1,5 @@
+//! The engine.
+pub mod base;
+pub mod judge;
+pub mod propose;
+pub mod select;

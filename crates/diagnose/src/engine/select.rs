@@ -1,0 +1,144 @@
+//! Effects enter by what they gain, and leave when the others can do without them.
+
+use super::base::Prepared;
+use super::judge::{LEAST, cost, gain};
+use super::propose::{Start, starts};
+use rayon::prelude::*;
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::look::Look;
+use stylet_identify::model::Model;
+use stylet_identify::noise::{From, Noise};
+use stylet_identify::objective::Data;
+use stylet_identify::retime::retime;
+
+/// Most effects at once.
+pub const MOST: usize = 5;
+/// Effects that get a short fit, and of those the ones that get a full one.
+const SHORT: usize = 8;
+const FULL: usize = 4;
+
+/// One step of the search.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Effects that stood.
+    pub stood: Vec<&'static str>,
+    /// Rivals: name, nats gained by the search's noise, numbers.
+    pub rivals: Vec<(&'static str, f64, usize)>,
+    /// The one taken, and what it gained.
+    pub taken: Option<(&'static str, f64)>,
+}
+
+/// A search under way.
+pub struct Search {
+    /// The base law.
+    pub base: Fit,
+    /// The best so far.
+    pub best: Fit,
+    /// The data with the noise of the best.
+    pub data: Data,
+    /// What was tried.
+    pub stages: Vec<Stage>,
+}
+
+/// Frequencies (Hz) at which the residual has lines.
+pub fn strongest_lines(_look: &Look) -> Vec<f64> {
+    Vec::new()
+}
+
+impl Search {
+    /// From the base law on.
+    #[must_use]
+    pub fn run(prepared: &Prepared, base: Fit, data: Data) -> Self {
+        let mut search = Self { best: base.clone(), base, data, stages: Vec::new() };
+        while search.best.model.effects.len() < MOST && search.grow(prepared) {}
+        search.prune();
+        search
+    }
+
+    /// Takes one more effect; false when none is worth it.
+    fn grow(&mut self, prepared: &Prepared) -> bool {
+        let look = Look::new(&self.best, &self.data);
+        let ranked = starts(&look, prepared);
+        let times = prepared.drop_times();
+        let blocks = self.data.compared();
+        let worth = |m: &Model| cost(m.effect_numbers(), blocks);
+        let tried: Vec<&Start> = ranked.iter().take(SHORT).flatten().collect();
+        let mut short: Vec<Fit> = tried
+            .par_iter()
+            .filter_map(|s| fit(&self.best.model.with(s.choice.clone()), &self.data, Effort::SHORT))
+            .collect();
+        short.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
+        let mut names: Vec<&str> = Vec::new();
+        short.retain(|f| {
+            let name = f.model.effects.last().map_or("", |e| e.info.id);
+            let new = !names.contains(&name);
+            names.push(name);
+            new
+        });
+        let mut full: Vec<Fit> = short
+            .par_iter()
+            .take(FULL)
+            .filter_map(|f| {
+                let mut model = f.model.clone();
+                retime(&mut model, &self.data, &times);
+                fit(&model, &self.data, Effort::FULL)
+            })
+            .collect();
+        full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
+        let name = |f: &Fit| f.model.effects.last().map_or("", |e| e.info.id);
+        let mut stage = Stage {
+            stood: self.best.model.effects.iter().map(|e| e.info.id).collect(),
+            rivals: full
+                .iter()
+                .map(|f| (name(f), self.best.nats() - f.nats(), f.model.effect_numbers()))
+                .collect(),
+            taken: None,
+        };
+        for f in full.into_iter().take(2) {
+            let needed = worth(&f.model) - worth(&self.best.model) + LEAST;
+            if self.best.nats() - f.nats() < needed {
+                continue;
+            }
+            let judged = gain(&self.best, &f, &self.data);
+            if judged < needed {
+                continue;
+            }
+            stage.taken = Some((name(&f), judged));
+            self.settle(f);
+            break;
+        }
+        let any = stage.taken.is_some();
+        self.stages.push(stage);
+        any
+    }
+
+    /// Makes a fit the best, with the noise that it leaves.
+    fn settle(&mut self, f: Fit) {
+        self.data = self.data.with_noise(Noise::estimate(&self.data.blocks, &f.residuals.e, From::Calm));
+        self.best = fit(&f.model, &self.data, Effort::FULL).unwrap_or(f);
+    }
+
+    /// Drops effects that the others can do without.
+    fn prune(&mut self) {
+        loop {
+            let n = self.best.model.effects.len();
+            if n < 2 {
+                return;
+            }
+            let blocks = self.data.compared();
+            let less: Vec<(usize, Fit)> = (0..n)
+                .into_par_iter()
+                .filter_map(|k| Some((k, fit(&self.best.model.without(k), &self.data, Effort::FULL)?)))
+                .collect();
+            let lost = |f: &Fit| {
+                let saved = cost(self.best.model.effect_numbers() - f.model.effect_numbers(), blocks) + LEAST;
+                gain(f, &self.best, &self.data) - saved
+            };
+            let worst = less.into_iter().map(|(_, f)| (lost(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
+            match worst {
+                Some((lost, f)) if lost < 0.0 => self.settle(f),
+                _ => return,
+            }
+        }
+    }
+}

@@ -1,0 +1,377 @@
+//! Bounded, damped least squares of all numbers of a model, the instants of its ruptures included.
+
+use crate::events::{rows_like, scatter_of};
+use crate::linear::{Factor, Symmetric, dot};
+use crate::model::{Model, NEVER, Number, Role};
+use crate::noise::weight;
+use crate::objective::{Data, Residuals, nats, replay, residuals};
+use rayon::prelude::*;
+
+/// A fitted model.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model.
+    pub model: Model,
+    /// What it leaves.
+    pub residuals: Residuals,
+}
+
+impl Fit {
+    /// Nats, with the noise of the data as it is.
+    #[must_use]
+    pub fn nats(&self) -> f64 {
+        self.residuals.nats
+    }
+}
+
+/// A change of all residuals with a number.
+#[derive(Clone, Debug, Default)]
+pub struct Column {
+    /// Weighted, whitened change of the prediction, per recording.
+    pub w: Vec<Vec<f64>>,
+    /// Change of the rows of every event, per recording.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Column {
+    /// Scalar product over one recording.
+    #[must_use]
+    pub fn dot(&self, other: &Self, r: usize) -> f64 {
+        let part = |a: &Vec<Vec<f64>>, b: &Vec<Vec<f64>>| match (a.get(r), b.get(r)) {
+            (Some(a), Some(b)) => dot(a, b),
+            _ => 0.0,
+        };
+        part(&self.w, &other.w) + part(&self.rows, &other.rows)
+    }
+
+    /// Scalar product over all recordings.
+    #[must_use]
+    pub fn dot_all(&self, other: &Self) -> f64 {
+        (0..self.w.len()).map(|r| self.dot(other, r)).sum()
+    }
+}
+
+/// The linear picture of a model around where it stands.
+pub struct Tangent {
+    /// Numbers that all recordings share.
+    pub shared: Vec<Number>,
+    /// Numbers of each recording's own.
+    pub own: Vec<Number>,
+    /// Their columns, `shared` first.
+    pub columns: Vec<Column>,
+    /// The residuals as a column, weighted.
+    pub rest: Column,
+    /// Normal matrix with priors: `shared`, then the own ones recording by recording.
+    pub matrix: Symmetric,
+    /// Downhill direction: minus the gradient of the nats.
+    pub slope: Vec<f64>,
+    roots: Vec<Vec<f64>>,
+}
+
+impl Tangent {
+    /// Where an own number stands in the matrix.
+    #[must_use]
+    pub fn place(&self, own: usize, r: usize) -> usize {
+        self.shared.len() + r * self.own.len() + own
+    }
+
+    /// The linear picture of `model` whose residuals are `at`.
+    #[must_use]
+    pub fn new(model: &Model, data: &Data, at: &Residuals) -> Self {
+        let (shared, own) = (model.shared(), model.own_numbers());
+        let roots: Vec<Vec<f64>> =
+            at.w.iter().map(|w| w.iter().map(|w| weight(*w).sqrt()).collect()).collect();
+        let mut t = Self {
+            rest: Column { w: weighted(&at.w, &roots), rows: event_rows(model, at, at) },
+            shared,
+            own,
+            columns: Vec::new(),
+            matrix: Symmetric::zeros(0),
+            slope: Vec::new(),
+            roots,
+        };
+        let numbers: Vec<Number> = t.shared.iter().chain(&t.own).copied().collect();
+        t.columns = numbers.par_iter().map(|n| t.derivative(model, data, at, n)).collect();
+        t.assemble(model, data.recordings());
+        t
+    }
+
+    /// The column of a number by a forward difference.
+    fn derivative(&self, model: &Model, data: &Data, at: &Residuals, n: &Number) -> Column {
+        let mut moved = model.clone();
+        let mut steps = Vec::new();
+        for r in 0..if n.role.is_own() { data.recordings() } else { 1 } {
+            let x = model.get(n.role, r);
+            let h = if x + n.step > n.high { -n.step } else { n.step };
+            steps.push(h);
+            if x < NEVER {
+                moved.set(n.role, r, x + h);
+            }
+        }
+        let h = |r: usize| steps.get(r).copied().unwrap_or(steps[0]);
+        let mut column = self.difference(model, data, at, &moved).unwrap_or_default();
+        for (r, (w, rows)) in column.w.iter_mut().zip(&mut column.rows).enumerate() {
+            let scale = 1.0 / h(r);
+            w.iter_mut().chain(rows).for_each(|x| *x *= scale);
+        }
+        column
+    }
+
+    /// What changes between `model` and another one, as a column: predicted force weighted and whitened, rows of events.
+    #[must_use]
+    pub fn difference(&self, model: &Model, data: &Data, at: &Residuals, other: &Model) -> Option<Column> {
+        let mut column = Column::default();
+        for (r, b) in data.blocks.iter().enumerate() {
+            let replayed = replay(other, data, r)?;
+            // Predicted now less predicted before = residual before less residual now.
+            let change: Vec<f64> =
+                replayed.f.iter().zip(&at.e[r]).zip(&b.f).map(|((f, e), y)| f - (y - e)).collect();
+            let mut w = vec![0.0; change.len()];
+            data.noise.whiten(b, &change, &mut w);
+            w.iter_mut().zip(&self.roots[r]).for_each(|(w, root)| *w *= root);
+            column.w.push(w);
+            let rows = replayed.events.iter().zip(&at.events[r]).flat_map(|(now, was)| {
+                let (now, was) =
+                    (rows_like(now, &model.scatter, was), rows_like(was, &model.scatter, was));
+                (0..4).map(move |k| was[k] - now[k])
+            });
+            column.rows.push(rows.collect());
+        }
+        Some(column)
+    }
+
+    fn assemble(&mut self, model: &Model, recordings: usize) {
+        let (ns, no) = (self.shared.len(), self.own.len());
+        let size = ns + recordings * no;
+        let mut h = Symmetric::zeros(size);
+        let mut g = vec![0.0; size];
+        for i in 0..ns {
+            let c = &self.columns[i];
+            g[i] = c.dot_all(&self.rest);
+            for j in 0..=i {
+                h.add(i, j, c.dot_all(&self.columns[j]));
+            }
+        }
+        for r in 0..recordings {
+            for o in 0..no {
+                let (i, c) = (self.place(o, r), &self.columns[ns + o]);
+                g[i] = c.dot(&self.rest, r);
+                for j in 0..ns {
+                    h.add(i, j, c.dot(&self.columns[j], r));
+                }
+                for p in 0..=o {
+                    h.add(i, self.place(p, r), c.dot(&self.columns[ns + p], r));
+                }
+            }
+        }
+        let mut prior = |i: usize, n: &Number, x: f64| {
+            if n.sd.is_finite() {
+                let information = 1.0 / (n.sd * n.sd);
+                h.add(i, i, information);
+                g[i] -= (x - n.mean) * information;
+            }
+        };
+        for (i, n) in self.shared.iter().enumerate() {
+            prior(i, n, model.get(n.role, 0));
+        }
+        for r in 0..recordings {
+            for (o, n) in self.own.iter().enumerate() {
+                prior(ns + r * no + o, n, model.get(n.role, r));
+            }
+        }
+        (self.matrix, self.slope) = (h, g);
+    }
+
+    /// Scalar products of a column with all of the tangent's.
+    #[must_use]
+    pub fn against(&self, c: &Column, recordings: usize) -> Vec<f64> {
+        let ns = self.shared.len();
+        let mut out: Vec<f64> = self.columns[..ns].iter().map(|s| s.dot_all(c)).collect();
+        for r in 0..recordings {
+            out.extend(self.columns[ns..].iter().map(|o| o.dot(c, r)));
+        }
+        out
+    }
+
+    /// Factor of the normal matrix.
+    #[must_use]
+    pub fn factor(&self) -> Factor {
+        self.matrix.factor()
+    }
+}
+
+fn weighted(w: &[Vec<f64>], roots: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    w.iter().zip(roots).map(|(w, r)| w.iter().zip(r).map(|(w, r)| w * r).collect()).collect()
+}
+
+/// Rows of the events as residuals: what they are less what they should be, zero.
+fn event_rows(model: &Model, now: &Residuals, at: &Residuals) -> Vec<Vec<f64>> {
+    now.events
+        .iter()
+        .zip(&at.events)
+        .map(|(now, at)| now.iter().zip(at).flat_map(|(n, a)| rows_like(n, &model.scatter, a)).collect())
+        .collect()
+}
+
+/// How long a fit goes on.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Steps at most.
+    pub turns: usize,
+    /// It ends when a step gains less than so many nats.
+    pub enough: f64,
+}
+
+impl Effort {
+    /// A short one, to rank.
+    pub const SHORT: Self = Self { turns: 3, enough: 0.3 };
+    /// To the end.
+    pub const FULL: Self = Self { turns: 14, enough: 0.03 };
+}
+
+/// Longest move of an instant in one step, in blocks: beyond, a derivative says nothing.
+const INSTANT_BLOCKS: f64 = 1.5;
+
+/// Fits a model from where it stands.
+#[must_use]
+pub fn fit(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
+    let mut best = model.clone();
+    clamp(&mut best);
+    let mut at = residuals(&best, data)?;
+    rescatter(&mut best, &mut at);
+    let mut damping = 1e-4;
+    for _ in 0..effort.turns {
+        let tangent = Tangent::new(&best, data, &at);
+        let before = at.nats;
+        let mut gained = false;
+        for _ in 0..7 {
+            let Some(next) = step(&best, data, &tangent, damping) else { break };
+            let Some(mut left) = residuals(&next, data) else {
+                damping *= 10.0;
+                continue;
+            };
+            let mut next = next;
+            if left.nats < at.nats {
+                rescatter(&mut next, &mut left);
+                (best, at) = (next, left);
+                damping = (damping * 0.1).max(1e-9);
+                gained = true;
+                break;
+            }
+            damping = (damping * 8.0).max(1e-6);
+        }
+        if !gained || before - at.nats < effort.enough {
+            break;
+        }
+    }
+    Some(Fit { model: best, residuals: at })
+}
+
+/// Scatter between insertions as the events tell it.
+fn rescatter(model: &mut Model, at: &mut Residuals) {
+    let events: Vec<_> = at.events.iter().flatten().copied().collect();
+    model.scatter = scatter_of(&events, &model.scatter);
+    let spread = |x: &dyn Fn(usize) -> f64, least: f64| {
+        let n = model.own.len().max(1) as f64;
+        ((0..model.own.len()).map(|r| x(r).powi(2)).sum::<f64>() / n).sqrt().max(least)
+    };
+    let (mut surface_m, mut friction) = (model.scatter.surface_m, model.scatter.friction);
+    if model.free.own_surface {
+        surface_m = spread(&|r| model.own[r].surface_m, 1e-6);
+    }
+    if model.free.own_friction {
+        friction = spread(&|r| model.own[r].friction, 1e-4);
+    }
+    (model.scatter.surface_m, model.scatter.friction) = (surface_m, friction);
+    at.nats = nats(model, at);
+}
+
+fn clamp(model: &mut Model) {
+    for n in model.shared() {
+        let x = model.get(n.role, 0);
+        if x < n.low || x > n.high {
+            model.set(n.role, 0, x.clamp(n.low, n.high));
+        }
+    }
+}
+
+/// One damped step that stays within bounds; `None` when nothing can move.
+fn step(model: &Model, data: &Data, t: &Tangent, damping: f64) -> Option<Model> {
+    let recordings = data.recordings();
+    let ns = t.shared.len();
+    let size = t.matrix.size;
+    let mut damped = t.matrix.clone();
+    for i in 0..size {
+        damped.add(i, i, damping * t.matrix.at(i, i));
+    }
+    let number = |i: usize| -> (Number, usize) {
+        if i < ns { (t.shared[i], 0) } else { (t.own[(i - ns) % t.own.len()], (i - ns) / t.own.len()) }
+    };
+    let mut free: Vec<usize> = (0..size).filter(|i| t.matrix.at(*i, *i) > 0.0).collect();
+    let mut delta = vec![0.0; size];
+    // Numbers that run against a bound stay there; the others are solved for again.
+    for _ in 0..6 {
+        let rhs: Vec<f64> = free
+            .iter()
+            .map(|&i| {
+                let held: f64 =
+                    (0..size).filter(|j| delta[*j] != 0.0 && !free.contains(j)).map(|j| t.matrix.at(i, j) * delta[j]).sum();
+                t.slope[i] - held
+            })
+            .collect();
+        let x = damped.part(&free).factor().solve(&rhs);
+        let mut kept = Vec::new();
+        let mut hit = false;
+        for (&i, x) in free.iter().zip(&x) {
+            let (n, r) = number(i);
+            let now = model.get(n.role, r);
+            let (mut low, mut high) = (n.low - now, n.high - now);
+            if let Role::Instant(_) = n.role {
+                let b = &data.blocks[r];
+                let reach = INSTANT_BLOCKS * b.step_s * b.samples as f64;
+                (low, high) = (-reach, reach);
+            }
+            if *x < low || *x > high {
+                delta[i] = x.clamp(low, high);
+                hit = true;
+            } else {
+                delta[i] = *x;
+                kept.push(i);
+            }
+        }
+        if !hit {
+            break;
+        }
+        kept.iter().for_each(|i| delta[*i] = 0.0);
+        free = kept;
+        if free.is_empty() {
+            break;
+        }
+    }
+    if delta.iter().all(|d| *d == 0.0) || delta.iter().any(|d| !d.is_finite()) {
+        return None;
+    }
+    let mut next = model.clone();
+    for (i, n) in t.shared.iter().enumerate() {
+        next.set(n.role, 0, (model.get(n.role, 0) + delta[i]).clamp(n.low, n.high));
+    }
+    for r in 0..recordings {
+        for (o, n) in t.own.iter().enumerate() {
+            let x = model.get(n.role, r);
+            if x < NEVER {
+                next.set(n.role, r, x + delta[t.place(o, r)]);
+            }
+        }
+        in_order(&mut next.instants[r], data.blocks[r].span_s());
+    }
+    Some(next)
+}
+
+/// Instants stay inside the recording and in their order.
+fn in_order(instants: &mut [f64], (first, last): (f64, f64)) {
+    let mut before = first;
+    for t in instants.iter_mut().filter(|t| **t < NEVER) {
+        *t = t.clamp(before, last);
+        before = *t;
+    }
+}

@@ -1,0 +1,180 @@
+//! The forward model: the law replayed over the blocks of a recording with its ruptures at given instants.
+
+use crate::blocks::Blocks;
+use crate::events::Event;
+use crate::model::{Compiled, NEVER};
+use crate::motion::Piece;
+use stylet_tissue::{Cell, LawState, MeasurementState, Strain};
+
+/// Buffers of a replay.
+#[derive(Clone, Debug, Default)]
+pub struct Replayed {
+    /// Predicted mean force of every block in N.
+    pub f: Vec<f64>,
+    /// One event per layer.
+    pub events: Vec<Event>,
+}
+
+/// What is remembered on the way.
+struct Walk<'a> {
+    model: &'a Compiled,
+    state: LawState,
+    chain: Option<MeasurementState>,
+    done: usize,
+    events: &'a mut [Event],
+    step_s: f64,
+}
+
+impl Walk<'_> {
+    /// Law and chain over a span of smooth motion: mean force times the span.
+    fn span(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
+        let t = 0.5 * (from_s + to_s);
+        let (z, v) = piece.at(t);
+        let (z, v) = (z * self.model.to_true, v * self.model.to_true);
+        let events = &mut *self.events;
+        let force = self.model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| note(events, &s));
+        let span_s = to_s - from_s;
+        let Some(chain) = &mut self.chain else { return force.total_n * span_s };
+        let cell = Cell {
+            time_s: t,
+            span_s,
+            samples: span_s / self.step_s,
+            velocity_mps: v,
+            acceleration_mps2: piece.a_mps2 * self.model.to_true,
+            tissue_n: force.total_n,
+        };
+        self.model.chain.mean(chain, &cell) * span_s
+    }
+
+    /// The rupture of the active layer at an instant.
+    fn rupture(&mut self, piece: &Piece, at_s: f64) {
+        let (z, v) = piece.at(at_s);
+        let (z, v) = (z * self.model.to_true, v * self.model.to_true);
+        let layer = self.done;
+        let (mut strained, mut tip_v) = (None, v);
+        // The force just before.
+        let before = &mut *self.events;
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
+            note(before, &s);
+            if s.layer == layer + 1 {
+                strained = Some(s);
+            }
+        });
+        if self.state.tip_velocity_mps().is_finite() {
+            tip_v = self.state.tip_velocity_mps();
+        }
+        if let (Some(s), Some(event)) = (strained, self.events.get_mut(layer)) {
+            event.ruptured = true;
+            event.elastic_n = s.elastic_n;
+            event.place_rate = tip_v.max(0.0);
+            let stiffness = self.model.stiffness.get(layer).copied().unwrap_or(0.0);
+            event.force_rate =
+                if s.puncture_n.is_finite() { stiffness * tip_v.max(0.0) / s.puncture_n } else { 0.0 };
+        }
+        self.done += 1;
+        // And just after: what the layer lets go.
+        let after = &mut *self.events;
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.done, |s| {
+            if s.layer > layer + 1 {
+                note(after, &s);
+            }
+        });
+    }
+}
+
+/// Keeps the largest strain of every layer while it is active.
+fn note(events: &mut [Event], s: &Strain) {
+    let Some(event) = events.get_mut(s.layer - 1) else { return };
+    if s.puncture_n.is_finite() && s.puncture_n > 0.0 {
+        event.force = event.force.max(s.elastic_n / s.puncture_n - 1.0);
+    }
+    event.place_m = event.place_m.max(s.tip_m - s.far_m);
+}
+
+/// Replays a law with the ruptures at `instants` (s; [`NEVER`] for those that never were).
+pub fn imposed(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[f64], out: &mut Replayed) {
+    let layers = model.puncture_n.len();
+    out.f.clear();
+    out.f.resize(blocks.len(), 0.0);
+    out.events.clear();
+    out.events.resize(layers, Event { step_s: blocks.step_s, ..Event::UNSEEN });
+    let mut walk = Walk {
+        model,
+        state: LawState::default(),
+        chain: model.measures.then(|| model.chain.start(0.0)),
+        done: 0,
+        events: &mut out.events,
+        step_s: blocks.step_s,
+    };
+    let mut broken = vec![false; model.breaks_m.len()];
+    let (mut block, mut sum) = (0_u32, 0.0);
+    let end_s = pieces.last().map_or(0.0, |p| p.to_s);
+    for piece in pieces {
+        if piece.block != block {
+            let k = block as usize;
+            out.f[k] = sum / (blocks.to_s[k] - blocks.from_s[k]);
+            (block, sum) = (piece.block, 0.0);
+        }
+        let mut at = piece.from_s;
+        loop {
+            let rupture = instants.get(walk.done).copied().unwrap_or(NEVER);
+            let breaks = next_break(model, piece, at, &mut broken);
+            let next = rupture.min(breaks);
+            if next < piece.to_s || (rupture <= piece.to_s && piece.to_s >= end_s && rupture < NEVER) {
+                let next = next.max(at).min(piece.to_s);
+                if next > at {
+                    sum += walk.span(piece, at, next);
+                    at = next;
+                }
+                if rupture <= breaks {
+                    walk.rupture(piece, at);
+                }
+                continue;
+            }
+            if piece.to_s > at {
+                sum += walk.span(piece, at, piece.to_s);
+            }
+            break;
+        }
+    }
+    if let Some(k) = Some(block as usize).filter(|k| *k < out.f.len()) {
+        out.f[k] = sum / (blocks.to_s[k] - blocks.from_s[k]);
+    }
+}
+
+/// When in a piece something of an effect's own breaks, from `at_s` on; it is then marked as broken.
+fn next_break(model: &Compiled, piece: &Piece, at_s: f64, broken: &mut [bool]) -> f64 {
+    let mut first = (NEVER, usize::MAX);
+    for (k, place) in model.breaks_m.iter().enumerate().filter(|(k, _)| !broken[*k]) {
+        let (z0, z1) = (piece.at(at_s).0 * model.to_true, piece.at(piece.to_s).0 * model.to_true);
+        if z1 >= *place {
+            let share = if z1 > z0 { ((place - z0) / (z1 - z0)).clamp(0.0, 1.0) } else { 0.0 };
+            let at = at_s + share * (piece.to_s - at_s);
+            if at < first.0 {
+                first = (at, k);
+            }
+        }
+    }
+    if first.1 < broken.len() {
+        broken[first.1] = true;
+    }
+    // Only an instant inside the piece cuts it.
+    if first.0 < piece.to_s { first.0 } else { NEVER }
+}
+
+/// Replays with the law's own ruptures; returns the instants (s) at which they show in the recorded force.
+pub fn free(model: &Compiled, pieces: &[Piece]) -> Vec<f64> {
+    let mut state = LawState::default();
+    let mut instants = vec![NEVER; model.puncture_n.len()];
+    for piece in pieces {
+        for t in [0.75 * piece.from_s + 0.25 * piece.to_s, 0.25 * piece.from_s + 0.75 * piece.to_s] {
+            let (z, v) = piece.at(t);
+            model.law.step(&mut state, t, z * model.to_true, v * model.to_true, |r| {
+                if let Some(instant) = instants.get_mut(r.layer - 1) {
+                    *instant = r.time_s;
+                }
+            });
+        }
+    }
+    instants
+}

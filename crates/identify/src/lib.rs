@@ -1,0 +1,36 @@
+//! One likelihood for measured force.
+//!
+//! Unknowns are the base parameters `K_i, b_i, F_i`, the geometry (surface, thicknesses), the numbers of effects, numbers
+//! of each recording's own, and the instant of every rupture in every recording. With the instants given, the force is a
+//! smooth function of everything else; the law's own condition for a rupture enters as a datum.
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`velocity`], [`settle`] | velocity and its jumps from exact and from noisy positions |
+//! | [`motion`], [`blocks`] | the motion between samples; a recording as means over blocks of 20 ms |
+//! | [`model`] | what is fitted: numbers with their priors and bounds |
+//! | [`forward`] | the law replayed with imposed ruptures, or its own |
+//! | [`events`] | the likelihood of a rupture: by force or by place |
+//! | [`noise`] | autoregressive noise per range of the force, whitening |
+//! | [`objective`], [`fit`], [`retime`] | the likelihood, its optimum, instants moved |
+//! | [`drops`], [`assign`] | drops of the force, and which layer each belongs to |
+//! | [`look`] | what every effect would gain, to first order |
+//! | [`linear`] | small dense algebra |
+#![forbid(unsafe_code)]
+#![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
+
+pub mod assign;
+pub mod blocks;
+pub mod drops;
+pub mod events;
+pub mod fit;
+pub mod forward;
+pub mod linear;
+pub mod look;
+pub mod model;
+pub mod motion;
+pub mod noise;
+pub mod objective;
+pub mod retime;
+pub mod settle;
+pub mod velocity;

@@ -1,0 +1,193 @@
+//! What the needle's base did, as a function of time: position and velocity between samples, jumps of the speed at
+//! their instants, means over any span.
+
+use crate::settle::settle;
+use crate::velocity::{Kink, velocity};
+use stylet_record::Recording;
+
+/// The motion of one recording.
+#[derive(Clone, Debug, Default)]
+pub struct Motion {
+    /// Knots: time in s, never falling; twice the same at a jump of the speed.
+    t: Vec<f64>,
+    /// Position in m.
+    z: Vec<f64>,
+    /// Velocity in m/s.
+    v: Vec<f64>,
+    /// Integral of the position in m s up to each knot.
+    sum_z: Vec<f64>,
+    /// Integral of the velocity in m.
+    sum_v: Vec<f64>,
+    /// Instants in s of jumps of the speed.
+    pub jumps_s: Vec<f64>,
+    /// Standard deviation in m/s of what the positions leave open of the velocity.
+    pub velocity_sd_mps: f64,
+}
+
+/// Velocity noise in m/s from which on positions are smoothed over as long as they allow.
+const NOISY_MPS: f64 = 1.2e-5;
+
+impl Motion {
+    /// The motion of a recording whose samples are all finite.
+    #[must_use]
+    pub fn of(recording: &Recording) -> Self {
+        let (t, z) = (&recording.time_s, &recording.position_m);
+        let told = velocity(t, z);
+        let recorded_sd = roughness(&recording.velocity_mps);
+        let (mut z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
+            (z.clone(), told.v, told.kinks, told.noise_mps)
+        } else {
+            let calm = settle(t, z);
+            (calm.z, calm.v, calm.kinks, calm.sd_mps)
+        };
+        if recording.velocity_measured && recorded_sd < sd {
+            return Self::from_knots(t, &z, &recording.velocity_mps, &[], recorded_sd);
+        }
+        if z.len() != t.len() {
+            z.clone_from(&recording.position_m);
+        }
+        Self::from_knots(t, &z, &v, &kinks, sd)
+    }
+
+    fn from_knots(t: &[f64], z: &[f64], v: &[f64], kinks: &[Kink], sd: f64) -> Self {
+        let mut m = Self { velocity_sd_mps: sd, ..Self::default() };
+        let mut kinks = kinks.iter().peekable();
+        for i in 0..t.len() {
+            while let Some(kink) = kinks.next_if(|k| k.sample <= i) {
+                if kink.sample == i {
+                    let at = kink.t.clamp(if i > 0 { t[i - 1] } else { t[i] }, t[i]);
+                    for side in kink.v {
+                        m.knot(at, kink.z, side);
+                    }
+                    m.jumps_s.push(at);
+                }
+            }
+            m.knot(t[i], z[i], v[i]);
+        }
+        m
+    }
+
+    fn knot(&mut self, t: f64, z: f64, v: f64) {
+        let (mut sum_z, mut sum_v) = (0.0, 0.0);
+        if let (Some(t0), Some(z0), Some(v0)) = (self.t.last(), self.z.last(), self.v.last()) {
+            let dt = t - t0;
+            sum_z = self.sum_z.last().unwrap_or(&0.0) + 0.5 * dt * (z0 + z);
+            sum_v = self.sum_v.last().unwrap_or(&0.0) + 0.5 * dt * (v0 + v);
+        }
+        self.t.push(t);
+        self.z.push(z);
+        self.v.push(v);
+        self.sum_z.push(sum_z);
+        self.sum_v.push(sum_v);
+    }
+
+    /// The last knot at or before `at_s`; the first one when there is none.
+    fn before(&self, at_s: f64) -> usize {
+        self.t.partition_point(|t| *t <= at_s).saturating_sub(1)
+    }
+
+    /// Integrals of position and velocity up to an instant, searched from knot `near` on.
+    fn sums(&self, at_s: f64, near: &mut usize) -> (f64, f64) {
+        let last = self.t.len() - 1;
+        let mut k = (*near).min(last);
+        if self.t[k] > at_s {
+            k = self.before(at_s);
+        }
+        while k < last && self.t[k + 1] <= at_s {
+            k += 1;
+        }
+        *near = k;
+        let dt = at_s - self.t[k];
+        if k == last || dt <= 0.0 {
+            return (self.sum_z[k] + dt * self.z[k], self.sum_v[k] + dt * self.v[k]);
+        }
+        let share = dt / (self.t[k + 1] - self.t[k]);
+        let mix = |x: &[f64]| x[k] + 0.5 * share * (x[k + 1] - x[k]);
+        (self.sum_z[k] + dt * mix(&self.z), self.sum_v[k] + dt * mix(&self.v))
+    }
+
+    /// Position in m and velocity in m/s at an instant.
+    #[must_use]
+    pub fn at(&self, at_s: f64) -> (f64, f64) {
+        let last = self.t.len() - 1;
+        let k = self.before(at_s);
+        if k == last || at_s <= self.t[k] {
+            return (self.z[k], self.v[k]);
+        }
+        let share = (at_s - self.t[k]) / (self.t[k + 1] - self.t[k]).max(1e-300);
+        (self.z[k] + share * (self.z[k + 1] - self.z[k]), self.v[k] + share * (self.v[k + 1] - self.v[k]))
+    }
+
+    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece;
+    /// the motion taken `late_s` earlier.
+    #[must_use]
+    pub fn pieces(&self, spans: impl Iterator<Item = (f64, f64)>, late_s: f64) -> Vec<Piece> {
+        let mut out = Vec::new();
+        let mut near = 0;
+        let mut jump = 0;
+        for (block, (from, to)) in spans.enumerate() {
+            let mut at = from;
+            let whole = to - from;
+            loop {
+                while jump < self.jumps_s.len() && self.jumps_s[jump] + late_s <= at + 1e-6 * whole {
+                    jump += 1;
+                }
+                let end = match self.jumps_s.get(jump) {
+                    Some(j) if j + late_s < to - 1e-6 * whole => j + late_s,
+                    _ => to,
+                };
+                let (z0, v0) = self.sums(at - late_s, &mut near);
+                let (z1, v1) = self.sums(end - late_s, &mut near);
+                let dt = (end - at).max(1e-12);
+                // Slope of the velocity from means over both halves.
+                let (_, vm) = self.sums(0.5 * (at + end) - late_s, &mut near);
+                let a = ((v1 - vm) - (vm - v0)) / (0.25 * dt * dt);
+                out.push(Piece {
+                    block: block as u32,
+                    from_s: at,
+                    to_s: end,
+                    z_m: (z1 - z0) / dt,
+                    v_mps: (v1 - v0) / dt,
+                    a_mps2: a,
+                });
+                if end >= to {
+                    break;
+                }
+                at = end;
+            }
+        }
+        out
+    }
+}
+
+/// A span of time in which the motion is smooth: its mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// The block that it belongs to.
+    pub block: u32,
+    /// Begin in s.
+    pub from_s: f64,
+    /// End in s.
+    pub to_s: f64,
+    /// Mean recorded position in m.
+    pub z_m: f64,
+    /// Mean velocity in m/s.
+    pub v_mps: f64,
+    /// Acceleration in m/s².
+    pub a_mps2: f64,
+}
+
+impl Piece {
+    /// Position and velocity at an instant within.
+    #[must_use]
+    pub fn at(&self, t: f64) -> (f64, f64) {
+        let s = t - 0.5 * (self.from_s + self.to_s);
+        (self.z_m + self.v_mps * s, self.v_mps + self.a_mps2 * s)
+    }
+}
+
+/// Standard deviation of a column about a smooth course, by its third differences.
+fn roughness(x: &[f64]) -> f64 {
+    let mut d: Vec<f64> = x.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
+    stylet_stats::order::median(&mut d) * 1.4826 / 20.0_f64.sqrt()
+}

@@ -1,0 +1,147 @@
+//! The likelihood of a model: whitened residuals, ruptures, priors.
+
+use crate::blocks::Blocks;
+use crate::events::{Event, judge};
+use crate::forward::{Replayed, imposed};
+use crate::model::{Compiled, Model, NEVER, Number};
+use crate::motion::Piece;
+use crate::noise::{Noise, rho};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// Recordings in blocks and the noise by which they are judged.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// The recordings.
+    pub blocks: Arc<Vec<Blocks>>,
+    /// The noise.
+    pub noise: Arc<Noise>,
+}
+
+impl Data {
+    /// The same recordings judged by another noise.
+    #[must_use]
+    pub fn with_noise(&self, noise: Noise) -> Self {
+        Self { blocks: Arc::clone(&self.blocks), noise: Arc::new(noise) }
+    }
+
+    /// Some of the recordings.
+    #[must_use]
+    pub fn only(&self, which: &[usize]) -> Self {
+        let blocks = which.iter().map(|k| self.blocks[*k].clone()).collect();
+        Self { blocks: Arc::new(blocks), noise: Arc::clone(&self.noise) }
+    }
+
+    /// Number of blocks compared.
+    #[must_use]
+    pub fn compared(&self) -> usize {
+        self.blocks.iter().map(|b| b.used.iter().filter(|u| **u).count()).sum()
+    }
+
+    /// Number of recordings.
+    #[must_use]
+    pub fn recordings(&self) -> usize {
+        self.blocks.len()
+    }
+}
+
+/// What a model leaves.
+#[derive(Clone, Debug, Default)]
+pub struct Residuals {
+    /// Recorded less predicted force in N, per recording.
+    pub e: Vec<Vec<f64>>,
+    /// Normalised innovations.
+    pub w: Vec<Vec<f64>>,
+    /// Events, per recording and layer.
+    pub events: Vec<Vec<Event>>,
+    /// Negative logarithmic likelihood with priors, in nats, but for the noise's own normalisation.
+    pub nats: f64,
+}
+
+/// The pieces of smooth motion that a model sees.
+#[must_use]
+pub fn pieces<'a>(model: &Compiled, blocks: &'a Blocks) -> Cow<'a, [Piece]> {
+    if model.delay_s > 0.0 {
+        Cow::Owned(blocks.pieces_late(model.delay_s))
+    } else {
+        Cow::Borrowed(&blocks.pieces)
+    }
+}
+
+/// Replays one recording.
+#[must_use]
+pub fn replay(model: &Model, data: &Data, r: usize) -> Option<Replayed> {
+    let compiled = model.compile(r)?;
+    let mut out = Replayed::default();
+    let blocks = &data.blocks[r];
+    imposed(&compiled, blocks, &pieces(&compiled, blocks), &model.instants[r], &mut out);
+    out.f.iter().all(|f| f.is_finite()).then_some(out)
+}
+
+/// What a model leaves of all recordings; `None` when it cannot be replayed.
+#[must_use]
+pub fn residuals(model: &Model, data: &Data) -> Option<Residuals> {
+    let mut all = Residuals::default();
+    for (r, b) in data.blocks.iter().enumerate() {
+        let replayed = replay(model, data, r)?;
+        let e: Vec<f64> = b.f.iter().zip(&replayed.f).map(|(y, f)| y - f).collect();
+        let mut w = vec![0.0; e.len()];
+        data.noise.whiten(b, &e, &mut w);
+        all.e.push(e);
+        all.w.push(w);
+        all.events.push(replayed.events);
+    }
+    all.nats = nats(model, &all);
+    Some(all)
+}
+
+/// Nats of residuals that are at hand.
+#[must_use]
+pub fn nats(model: &Model, r: &Residuals) -> f64 {
+    let mut sum: f64 = r.w.iter().map(|w| w.iter().map(|w| rho(*w)).sum::<f64>()).sum();
+    sum += event_nats(model, r);
+    sum + prior_nats(model)
+}
+
+/// Nats of the events alone.
+#[must_use]
+pub fn event_nats(model: &Model, r: &Residuals) -> f64 {
+    r.events.iter().flatten().map(|e| judge(e, &model.scatter).nats).sum()
+}
+
+/// Nats of the priors.
+#[must_use]
+pub fn prior_nats(model: &Model) -> f64 {
+    let of = |n: &Number, x: f64| if n.sd.is_finite() { 0.5 * ((x - n.mean) / n.sd).powi(2) } else { 0.0 };
+    let shared: f64 = model.shared().iter().map(|n| of(n, model.get(n.role, 0))).sum();
+    let own: f64 = model
+        .own_numbers()
+        .iter()
+        .filter(|n| n.sd.is_finite())
+        .map(|n| (0..model.own.len()).map(|r| of(n, model.get(n.role, r))).sum::<f64>())
+        .sum();
+    shared + own
+}
+
+/// Nats of one recording: residuals and events, with the noise as it is.
+#[must_use]
+pub fn nats_of(model: &Model, compiled: &Compiled, data: &Data, r: usize, instants: &[f64], work: &mut Work) -> f64 {
+    let b = &data.blocks[r];
+    imposed(compiled, b, &pieces(compiled, b), instants, &mut work.replayed);
+    work.e.clear();
+    work.e.extend(b.f.iter().zip(&work.replayed.f).map(|(y, f)| y - f));
+    work.w.clear();
+    work.w.resize(work.e.len(), 0.0);
+    data.noise.whiten(b, &work.e, &mut work.w);
+    let events: f64 = work.replayed.events.iter().map(|e| judge(e, &model.scatter).nats).sum();
+    let sum = work.w.iter().map(|w| rho(*w)).sum::<f64>() + events;
+    if sum.is_finite() { sum } else { NEVER }
+}
+
+/// Buffers of [`nats_of`].
+#[derive(Default)]
+pub struct Work {
+    replayed: Replayed,
+    e: Vec<f64>,
+    w: Vec<f64>,
+}

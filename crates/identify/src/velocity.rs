@@ -1,0 +1,223 @@
+//! Velocity from recorded positions, as exactly as they allow, and where it jumps.
+//!
+//! Friction turns an error of the velocity into one of the force (0.01 mm/s are 5 mN at 500 Ns/m), so the wide
+//! windows that suit noisy positions (`stylet_record::differentiate`) would leave structure at every ripple and
+//! every stop. Here the window is the narrowest that the positions' own noise allows, and none reaches across a
+//! jump of the velocity, of which the positions tell the instant: where the parabolas on both sides meet.
+
+use crate::linear::Symmetric;
+use stylet_stats::order::median;
+
+/// Noise of the velocity in m/s that is asked for.
+const WANTED_MPS: f64 = 5e-6;
+/// Widest half window in samples.
+const WIDEST: usize = 12;
+/// Smallest jump of the velocity in m/s that is looked for.
+const LEAST_JUMP_MPS: f64 = 2e-5;
+
+/// A jump of the velocity between two samples; where, the positions tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kink {
+    /// The sample after it.
+    pub sample: usize,
+    /// Time in s.
+    pub t: f64,
+    /// Recorded position in m.
+    pub z: f64,
+    /// Velocities in m/s before and after.
+    pub v: [f64; 2],
+}
+
+/// Velocities, their noise, and their jumps.
+#[derive(Clone, Debug, Default)]
+pub struct Velocity {
+    /// Velocity in m/s at every sample.
+    pub v: Vec<f64>,
+    /// Standard deviation in m/s that the noise of the positions leaves.
+    pub noise_mps: f64,
+    /// Jumps.
+    pub kinks: Vec<Kink>,
+}
+
+/// The velocity of positions `z` (m) at times `t` (s).
+#[must_use]
+pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
+    let n = t.len().min(z.len());
+    if n < 8 {
+        return Velocity { v: vec![0.0; n], noise_mps: f64::INFINITY, kinks: Vec::new() };
+    }
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let step = median(&mut steps).max(1e-9);
+    let noise_m = position_noise(z);
+    // Slope of a straight line over 2 m + 1 samples: sd = noise / (step sqrt(m (m+1) (2m+1) / 3)).
+    let gain = |m: usize| 1.0 / (step * ((m * (m + 1) * (2 * m + 1)) as f64 / 3.0).sqrt());
+    let half = (1..WIDEST).find(|m| noise_m * gain(*m) <= WANTED_MPS).unwrap_or(WIDEST);
+    let side = (2 * half + 2).max(6);
+    // Slope at the end of a parabola over `side` samples: sd = noise sqrt(192/side^3)/step. Five of them.
+    let doubt = 70.0 * noise_m / (step * (side as f64).powf(1.5));
+    let breaks = breaks(t, z, side, 1.8 * step, doubt);
+    let mut kinks = Vec::new();
+    for &(i, left, right) in &breaks {
+        kinks.push(Kink { sample: i, t: left.0, z: left.1, v: [left.2, right] });
+    }
+    let mut edges: Vec<usize> = breaks.iter().map(|b| b.0).collect();
+    edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > 1.8 * step));
+    edges.extend([0, n]);
+    edges.sort_unstable();
+    edges.dedup();
+    let mut v = vec![0.0; n];
+    for piece in edges.windows(2) {
+        let (from, to) = (piece[0], piece[1]);
+        for i in from..to {
+            let reach = half.min(i - from).min(to - 1 - i);
+            let (lo, hi) = if reach == half {
+                (i - half, i + half + 1)
+            } else {
+                // Beside an edge: one-sided, wider.
+                let lo = i.saturating_sub(half.max(2)).max(from);
+                let hi = (i + half.max(2) + 1).min(to);
+                if hi - lo >= 3 { (lo, hi) } else { (from, to.min(from + 3)) }
+            };
+            v[i] = slope_at(&t[lo..hi], &z[lo..hi], t[i]);
+        }
+    }
+    Velocity { v, noise_mps: noise_m * gain(half), kinks }
+}
+
+/// Standard deviation of positions about a smooth course, by their third differences.
+pub(crate) fn position_noise(z: &[f64]) -> f64 {
+    let mut d: Vec<f64> = z.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
+    // Rounded positions of a needle at rest do not differ at all.
+    d.retain(|d| *d > 0.0);
+    median(&mut d) * 1.4826 / 20.0_f64.sqrt()
+}
+
+/// A break of the slope: the sample after it, the instant with position and slope before, the slope after.
+pub(crate) type Break = (usize, (f64, f64, f64), f64);
+
+/// Where parabolas on both sides of a gap between two samples meet with different slopes.
+pub(crate) fn breaks(t: &[f64], z: &[f64], side: usize, gap_s: f64, doubt_mps: f64) -> Vec<Break> {
+    let n = t.len();
+    let mut found: Vec<(f64, Break)> = Vec::new();
+    for i in side..n.saturating_sub(side) {
+        if t[i] - t[i - 1] > gap_s {
+            continue;
+        }
+        let (left, off_left) = parabola(&t[i - side..i], &z[i - side..i], t[i - 1]);
+        let (right, off_right) = parabola(&t[i..i + side], &z[i..i + side], t[i]);
+        let dt = t[i] - t[i - 1];
+        // Slopes carried to the middle of the gap.
+        let (vl, vr) = (left[1] + left[2] * dt, right[1] - right[2] * dt);
+        let jump = (vr - vl).abs();
+        let curved = (left[2].abs() + right[2].abs()) * dt;
+        if jump < LEAST_JUMP_MPS + doubt_mps || jump < 2.0 * curved {
+            continue;
+        }
+        // Where z_left + v_left s = z_right - v_right (dt - s).
+        let s = ((right[0] - right[1] * dt - left[0]) / (left[1] - right[1])).clamp(0.0, dt);
+        found.push((off_left + off_right, (i, (t[i - 1] + s, left[0] + left[1] * s, left[1]), right[1])));
+    }
+    // Of neighbours the one that leaves least.
+    let mut out: Vec<Break> = Vec::new();
+    let mut last = 0.0;
+    for (off, at) in found {
+        match out.last_mut() {
+            Some(before) if at.0 - before.0 <= side => {
+                if off < last {
+                    *before = at;
+                    last = off;
+                }
+            }
+            _ => {
+                out.push(at);
+                last = off;
+            }
+        }
+    }
+    out
+}
+
+/// Least-squares parabola `a + b s + c s^2`, `s = t - at`, and the sum of squares that it leaves.
+pub(crate) fn parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
+    let span = t.last().zip(t.first()).map_or(1.0, |(b, a)| (b - a).max(1e-12));
+    let base = z.first().copied().unwrap_or(0.0);
+    let mut m = [[0.0; 3]; 3];
+    let mut g = [0.0; 3];
+    for (t, z) in t.iter().zip(z) {
+        let s = (t - at) / span;
+        let row = [1.0, s, s * s];
+        for a in 0..3 {
+            g[a] += row[a] * (z - base);
+            for b in 0..3 {
+                m[a][b] += row[a] * row[b];
+            }
+        }
+    }
+    let mut h = Symmetric::zeros(3);
+    for a in 0..3 {
+        for b in 0..=a {
+            h.add(a, b, m[a][b]);
+        }
+    }
+    let x = h.factor().solve(&g);
+    let left = |(t, z): (&f64, &f64)| {
+        let s = (t - at) / span;
+        (z - base - x[0] - (x[1] + x[2] * s) * s).powi(2)
+    };
+    let off = t.iter().zip(z).map(left).sum();
+    ([x[0] + base, x[1] / span, x[2] / (span * span)], off)
+}
+
+/// Slope at `at`: of a parabola, of a straight line with two samples.
+fn slope_at(t: &[f64], z: &[f64], at: f64) -> f64 {
+    match (t, z) {
+        ([], _) | (_, []) | ([_], _) => 0.0,
+        ([a, b], [y, x]) => (x - y) / (b - a),
+        _ => parabola(t, z, at).0[1],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::velocity;
+
+    /// Ripple, a stop between two samples, a retraction.
+    fn course(t: f64) -> (f64, f64) {
+        let stop = 4.0013;
+        let (w, a) = (core::f64::consts::TAU, 0.0015);
+        if t < stop {
+            (0.003 * t + a / w * (1.0 - (w * t).cos()), 0.003 + a * (w * t).sin())
+        } else if t < 6.0 {
+            (course(stop - 1e-12).0, 0.0)
+        } else {
+            (course(5.0).0 - 0.004 * (t - 6.0), -0.004)
+        }
+    }
+
+    #[test]
+    fn the_velocity_of_exact_positions_is_exact_and_its_jumps_have_their_instants() {
+        let t: Vec<f64> = (0..1600).map(|k| f64::from(k) / 200.0).collect();
+        let z: Vec<f64> = t.iter().map(|t| course(*t).0).collect();
+        let found = velocity(&t, &z);
+        let instants: Vec<f64> = found.kinks.iter().map(|k| k.t).collect();
+        assert_eq!(instants.len(), 2, "{instants:?}");
+        assert!((instants[0] - 4.0013).abs() < 1e-4, "{instants:?}");
+        assert!((instants[1] - 6.0).abs() < 1e-4, "{instants:?}");
+        // At six seconds sharp the velocity is either.
+        for (v, t) in found.v.iter().zip(&t).filter(|(_, t)| **t != 6.0) {
+            assert!((v - course(*t).1).abs() < 4e-6, "{v} at {t}");
+        }
+    }
+
+    #[test]
+    fn positions_rounded_to_a_micrometre_give_the_velocity_to_a_hundredth_of_a_millimetre_per_second() {
+        let t: Vec<f64> = (0..1600).map(|k| f64::from(k) / 200.0).collect();
+        let z: Vec<f64> = t.iter().map(|t| (course(*t).0 * 1e6).round() / 1e6).collect();
+        let found = velocity(&t, &z);
+        assert_eq!(found.kinks.len(), 2, "{:?}", found.kinks);
+        let mut off: Vec<f64> = found.v.iter().zip(&t).map(|(v, t)| (v - course(*t).1).abs()).collect();
+        off.sort_unstable_by(f64::total_cmp);
+        assert!(off[off.len() * 95 / 100] < 1e-5, "{}", off[off.len() * 95 / 100]);
+        assert!(found.noise_mps < 1e-5, "{}", found.noise_mps);
+    }
+}
