@@ -45,6 +45,10 @@ fn main() {
             for e in &search.best.model.effects { println!("     found {} {:?}", e.info.id, e.values); }
             let t = &search.best.model.tissue;
             println!("     surface {:.5} {:?} scatter {:?}", t.surface_m, t.layers.iter().zip(&c.truth.layers).map(|(a, b)| [a.stiffness_n_per_m / b.stiffness_n_per_m, a.friction_ns_per_m2 / b.friction_ns_per_m2, a.puncture_n.unwrap_or(1.0) / b.puncture_n.unwrap_or(1.0), a.thickness_m - b.thickness_m]).collect::<Vec<_>>(), search.best.model.scatter);
+            if let Some(e) = drawn.effects.first() { use stylet_identify::{fit::{fit, Effort}, model::Choice};
+                let m = search.base.model.with(Choice::new(e.info(), &e.parameters()));
+                if let Some(f) = fit(&m, &search.data, Effort::FULL) { println!("     with truth: base {:.1} truth {:.1} values {:?} scatter {:?}", search.base.nats(), f.nats(), f.model.effects.last().map(|e| e.values.clone()), f.model.scatter);
+                    for ev in f.residuals.events.iter().flatten() { println!("        {ev:?}"); } } }
             for s in &search.stages { println!("     {:?} {:?} -> {:?}", s.stood, s.rivals, s.taken); }
         }
     }

@@ -3,7 +3,7 @@
 //! The mean over a block in which a layer ruptures lies between the force before and after, so that a predicted mean is
 //! continuous in the instant of the rupture; and a recording at 1 kHz costs as much as one at 200 Hz.
 
-use crate::motion::{Motion, Piece};
+use crate::motion::{Motion, Piece, Shown};
 use std::sync::Arc;
 use stylet_record::Recording;
 
@@ -11,6 +11,10 @@ use stylet_record::Recording;
 pub const BLOCK_S: f64 = 0.02;
 /// A time step of more than so many sampling steps is a gap.
 const GAP: f64 = 1.8;
+/// A sample so near (share of a step) to a jump of the speed may have either speed.
+const AT_A_JUMP: f64 = 0.03;
+/// Standard deviation of a number spread evenly over one.
+const UNIFORM_SD: f64 = 0.289;
 /// Seconds over which the size of the force is smoothed.
 const SMOOTH_S: f64 = 0.1;
 
@@ -29,6 +33,8 @@ pub struct Blocks {
     pub restart: Vec<bool>,
     /// Size of the recorded force around the block in N.
     pub size_n: Vec<f64>,
+    /// Standard deviation in N of what sampling leaves open of the block's mean where the speed jumps.
+    pub doubt_n: Vec<f64>,
     /// Samples in a block.
     pub samples: usize,
     /// Time between samples in s.
@@ -56,6 +62,7 @@ impl Blocks {
             used: Vec::new(),
             restart: Vec::new(),
             size_n: Vec::new(),
+            doubt_n: Vec::new(),
             samples: q,
             step_s,
             motion,
@@ -78,15 +85,31 @@ impl Blocks {
             b.used.push(2 * kept > q.min(to - i) && 2 * (to - i) > q);
             i = to;
         }
+        b.leave_out_jumps(t);
         b.finish();
         b
+    }
+
+    /// A sample at the very instant of a jump of the speed has either; so have all within the doubt about the instant.
+    fn leave_out_jumps(&mut self, t: &[f64]) {
+        let motion = Arc::clone(&self.motion);
+        for jump in &motion.jumps {
+            let reach = jump.doubt_s.max(AT_A_JUMP * self.step_s);
+            let (lo, hi) = (jump.at_s - reach, jump.at_s + reach);
+            let first = t.partition_point(|t| *t < lo);
+            if t.get(first).is_some_and(|t| *t <= hi) {
+                for k in self.at(lo)..(self.at(hi) + 1).min(self.len()) {
+                    self.used[k] = false;
+                }
+            }
+        }
     }
 
     /// Blocks of `m` blocks each, for screening.
     #[must_use]
     pub fn coarser(&self, m: usize) -> Self {
         let mut b = Self { samples: self.samples * m, pieces: Arc::default(), ..self.clone() };
-        for column in [&mut b.from_s, &mut b.to_s, &mut b.f, &mut b.size_n] {
+        for column in [&mut b.from_s, &mut b.to_s, &mut b.f, &mut b.size_n, &mut b.doubt_n] {
             column.clear();
         }
         b.used.clear();
@@ -123,13 +146,23 @@ impl Blocks {
                 self.f[lo..hi].iter().sum::<f64>().abs() / (hi - lo) as f64
             })
             .collect();
-        self.pieces = Arc::new(self.pieces_late(0.0));
+        // A force that jumps with the speed jumps between two samples: its mean is known to a step of one sample.
+        self.doubt_n = vec![0.0; n];
+        let motion = Arc::clone(&self.motion);
+        for jump in &motion.jumps {
+            let k = self.at(jump.between_s);
+            if k > 0 && k + 1 < n {
+                let step = (self.f[k + 1] - self.f[k - 1]).abs() / self.samples as f64 * UNIFORM_SD;
+                self.doubt_n[k] = self.doubt_n[k].max(step);
+            }
+        }
+        self.pieces = Arc::new(self.pieces_shown(Shown::Sampled));
     }
 
-    /// Pieces with the motion taken `late_s` earlier.
+    /// Pieces of smooth motion.
     #[must_use]
-    pub fn pieces_late(&self, late_s: f64) -> Vec<Piece> {
-        self.motion.pieces(self.from_s.iter().copied().zip(self.to_s.iter().copied()), late_s)
+    pub fn pieces_shown(&self, shown: Shown) -> Vec<Piece> {
+        self.motion.pieces(self.from_s.iter().copied().zip(self.to_s.iter().copied()), shown)
     }
 
     /// Number of blocks.

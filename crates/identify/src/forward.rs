@@ -23,7 +23,12 @@ struct Walk<'a> {
     done: usize,
     events: &'a mut [Event],
     step_s: f64,
+    /// Puncture force in N of the active layer at the span before.
+    threshold_n: f64,
 }
+
+/// A threshold that changes by this share from one span to the next has jumped.
+const JUMPED: f64 = 0.01;
 
 impl Walk<'_> {
     /// Law and chain over a span of smooth motion: mean force times the span.
@@ -32,7 +37,11 @@ impl Walk<'_> {
         let (z, v) = piece.at(t);
         let (z, v) = (z * self.model.to_true, v * self.model.to_true);
         let events = &mut *self.events;
-        let force = self.model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| note(events, &s));
+        let threshold = &mut self.threshold_n;
+        let force = self.model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| {
+            note(events, &s);
+            *threshold = s.puncture_n;
+        });
         let span_s = to_s - from_s;
         let Some(chain) = &mut self.chain else { return force.total_n * span_s };
         let cell = Cell {
@@ -47,12 +56,13 @@ impl Walk<'_> {
     }
 
     /// The rupture of the active layer at an instant.
-    fn rupture(&mut self, piece: &Piece, at_s: f64) {
+    fn rupture(&mut self, piece: &Piece, after: Option<&Piece>, at_s: f64) {
         let (z, v) = piece.at(at_s);
         let (z, v) = (z * self.model.to_true, v * self.model.to_true);
         let layer = self.done;
         let (mut strained, mut tip_v) = (None, v);
         // The force just before.
+        let most = self.events.get(layer).map_or(f64::NEG_INFINITY, |e| e.force);
         let before = &mut *self.events;
         self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
             note(before, &s);
@@ -60,6 +70,24 @@ impl Walk<'_> {
                 strained = Some(s);
             }
         });
+        // Where the threshold itself has jumped, with the speed, it passed the force on the way.
+        if let (Some(s), Some(event)) = (strained, self.events.get_mut(layer))
+            && s.puncture_n.is_finite()
+        {
+            let jumped = |to: f64, from: f64| (to / from - 1.0).abs() > JUMPED;
+            if jumped(s.puncture_n, self.threshold_n) && most < 0.0 && event.force > 0.0 {
+                event.force = 0.0;
+            } else if let Some(next) = after.filter(|_| event.force < 0.0 && piece.to_s - at_s < self.step_s) {
+                // The speed jumps within a sample of here: so may the threshold.
+                let mut then = f64::INFINITY;
+                let v = next.v_mps * self.model.to_true;
+                let mut peek = self.state;
+                self.model.law.step_imposed(&mut peek, at_s, z, v, layer, |s| then = s.puncture_n);
+                if jumped(then, s.puncture_n) && s.elastic_n > then {
+                    event.force = 0.0;
+                }
+            }
+        }
         if self.state.tip_velocity_mps().is_finite() {
             tip_v = self.state.tip_velocity_mps();
         }
@@ -105,11 +133,12 @@ pub fn imposed(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[
         done: 0,
         events: &mut out.events,
         step_s: blocks.step_s,
+        threshold_n: f64::INFINITY,
     };
     let mut broken = vec![false; model.breaks_m.len()];
     let (mut block, mut sum) = (0_u32, 0.0);
     let end_s = pieces.last().map_or(0.0, |p| p.to_s);
-    for piece in pieces {
+    for (index, piece) in pieces.iter().enumerate() {
         if piece.block != block {
             let k = block as usize;
             out.f[k] = sum / (blocks.to_s[k] - blocks.from_s[k]);
@@ -127,7 +156,7 @@ pub fn imposed(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[
                     at = next;
                 }
                 if rupture <= breaks {
-                    walk.rupture(piece, at);
+                    walk.rupture(piece, pieces.get(index + 1), at);
                 }
                 continue;
             }

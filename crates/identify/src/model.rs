@@ -174,6 +174,8 @@ pub struct Compiled {
     pub to_true: f64,
     /// Delay in s.
     pub delay_s: f64,
+    /// A jump of the speed is smeared before it is sampled.
+    pub smears: bool,
     /// Positions (m, relative to the tissue) at which something of an effect's own breaks.
     pub breaks_m: Vec<f64>,
     /// Own puncture force of every layer in N, infinite when only its far face ruptures it.
@@ -242,6 +244,7 @@ impl Model {
         Some(Compiled {
             to_true: chain.true_position(1.0),
             delay_s: chain.delay_s(),
+            smears: chain.smears() || law.bends(),
             measures: !chain.is_plain(),
             breaks_m: effects.iter().filter_map(Effect::break_depth_m).map(|d| surface + d).collect(),
             puncture_n: law.slabs().iter().map(|s| s.puncture_n).collect(),

@@ -2,13 +2,26 @@
 //! their instants, means over any span.
 
 use crate::settle::settle;
-use crate::velocity::{Kink, velocity};
+use crate::velocity::{Kink, position_noise, velocity};
 use stylet_record::Recording;
 
 /// The motion of one recording.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// Knots: time in s, never falling; twice the same at a jump of the speed.
+    /// With the jumps of the speed at their instants.
+    exact: Knots,
+    /// With the jumps half-way between two samples: what a mean over samples sees.
+    sampled: Knots,
+    /// Jumps of the speed.
+    pub jumps: Vec<Jump>,
+    /// Standard deviation in m/s of what the positions leave open of the velocity.
+    pub velocity_sd_mps: f64,
+}
+
+/// Position and velocity, linear between knots.
+#[derive(Clone, Debug, Default)]
+struct Knots {
+    /// Time in s, never falling; twice the same at a jump of the speed.
     t: Vec<f64>,
     /// Position in m.
     z: Vec<f64>,
@@ -18,10 +31,26 @@ pub struct Motion {
     sum_z: Vec<f64>,
     /// Integral of the velocity in m.
     sum_v: Vec<f64>,
-    /// Instants in s of jumps of the speed.
-    pub jumps_s: Vec<f64>,
-    /// Standard deviation in m/s of what the positions leave open of the velocity.
-    pub velocity_sd_mps: f64,
+}
+
+/// How jumps of the speed show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shown {
+    /// A force that follows the speed at once is sampled before or after a jump.
+    Sampled,
+    /// A force that is late by so many s, or smeared, shows the instants.
+    Late(f64),
+}
+
+/// A jump of the speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jump {
+    /// Its instant in s.
+    pub at_s: f64,
+    /// The middle between the samples before and after it: what a mean over samples sees.
+    pub between_s: f64,
+    /// How uncertain the instant is, in s.
+    pub doubt_s: f64,
 }
 
 /// Velocity noise in m/s from which on positions are smoothed over as long as they allow.
@@ -34,40 +63,109 @@ impl Motion {
         let (t, z) = (&recording.time_s, &recording.position_m);
         let told = velocity(t, z);
         let recorded_sd = roughness(&recording.velocity_mps);
+        let mut noise_m = position_noise(z);
         let (mut z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
+            noise_m = noise_m.min(1e-6);
             (z.clone(), told.v, told.kinks, told.noise_mps)
         } else {
             let calm = settle(t, z);
             (calm.z, calm.v, calm.kinks, calm.sd_mps)
         };
-        if recording.velocity_measured && recorded_sd < sd {
-            return Self::from_knots(t, &z, &recording.velocity_mps, &[], recorded_sd);
+        if recording.velocity_measured && sd > NOISY_MPS && recorded_sd < sd {
+            let v = &recording.velocity_mps;
+            let sides = |k: &Kink| Kink { v: [v[k.sample.saturating_sub(1)], v[k.sample.min(v.len() - 1)]], ..*k };
+            let kinks: Vec<Kink> = kinks.iter().map(sides).collect();
+            return Self::from_knots(t, &z, v, &kinks, recorded_sd, noise_m);
         }
         if z.len() != t.len() {
             z.clone_from(&recording.position_m);
         }
-        Self::from_knots(t, &z, &v, &kinks, sd)
+        Self::from_knots(t, &z, &v, &kinks, sd, noise_m)
     }
 
-    fn from_knots(t: &[f64], z: &[f64], v: &[f64], kinks: &[Kink], sd: f64) -> Self {
+    fn from_knots(t: &[f64], z: &[f64], v: &[f64], kinks: &[Kink], sd: f64, noise_m: f64) -> Self {
         let mut m = Self { velocity_sd_mps: sd, ..Self::default() };
         let mut kinks = kinks.iter().peekable();
         for i in 0..t.len() {
             while let Some(kink) = kinks.next_if(|k| k.sample <= i) {
-                if kink.sample == i {
-                    let at = kink.t.clamp(if i > 0 { t[i - 1] } else { t[i] }, t[i]);
+                if kink.sample == i && i > 0 {
+                    let at_s = kink.t.clamp(t[i - 1], t[i]);
+                    let between_s = 0.5 * (t[i - 1] + t[i]);
                     for side in kink.v {
-                        m.knot(at, kink.z, side);
+                        m.exact.push(at_s, kink.z, side);
+                        m.sampled.push(between_s, kink.z + side * (between_s - at_s), side);
                     }
-                    m.jumps_s.push(at);
+                    let doubt_s = noise_m / (kink.v[1] - kink.v[0]).abs().max(1e-6);
+                    m.jumps.push(Jump { at_s, between_s, doubt_s });
                 }
             }
-            m.knot(t[i], z[i], v[i]);
+            m.exact.push(t[i], z[i], v[i]);
+            m.sampled.push(t[i], z[i], v[i]);
         }
         m
     }
 
-    fn knot(&mut self, t: f64, z: f64, v: f64) {
+    /// Position in m and velocity in m/s at an instant.
+    #[must_use]
+    pub fn at(&self, at_s: f64) -> (f64, f64) {
+        let k = &self.exact;
+        let last = k.t.len() - 1;
+        let i = k.before(at_s);
+        if i == last || at_s <= k.t[i] {
+            return (k.z[i], k.v[i]);
+        }
+        let share = (at_s - k.t[i]) / (k.t[i + 1] - k.t[i]).max(1e-300);
+        (k.z[i] + share * (k.z[i + 1] - k.z[i]), k.v[i] + share * (k.v[i + 1] - k.v[i]))
+    }
+
+    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece.
+    #[must_use]
+    pub fn pieces(&self, spans: impl Iterator<Item = (f64, f64)>, shown: Shown) -> Vec<Piece> {
+        let (knots, late_s) = match shown {
+            Shown::Sampled => (&self.sampled, 0.0),
+            Shown::Late(late_s) => (&self.exact, late_s),
+        };
+        let at_of = |j: &Jump| if shown == Shown::Sampled { j.between_s } else { j.at_s + late_s };
+        let mut out = Vec::new();
+        let mut near = 0;
+        let mut jump = 0;
+        for (block, (from, to)) in spans.enumerate() {
+            let mut at = from;
+            let whole = to - from;
+            loop {
+                while self.jumps.get(jump).is_some_and(|j| at_of(j) <= at + 1e-6 * whole) {
+                    jump += 1;
+                }
+                let end = match self.jumps.get(jump).map(at_of) {
+                    Some(j) if j < to - 1e-6 * whole => j,
+                    _ => to,
+                };
+                let (z0, v0) = knots.sums(at - late_s, &mut near);
+                let (z1, v1) = knots.sums(end - late_s, &mut near);
+                let dt = (end - at).max(1e-12);
+                // Slope of the velocity from means over both halves.
+                let (_, vm) = knots.sums(0.5 * (at + end) - late_s, &mut near);
+                let a = ((v1 - vm) - (vm - v0)) / (0.25 * dt * dt);
+                out.push(Piece {
+                    block: block as u32,
+                    from_s: at,
+                    to_s: end,
+                    z_m: (z1 - z0) / dt,
+                    v_mps: (v1 - v0) / dt,
+                    a_mps2: a,
+                });
+                if end >= to {
+                    break;
+                }
+                at = end;
+            }
+        }
+        out
+    }
+}
+
+impl Knots {
+    fn push(&mut self, t: f64, z: f64, v: f64) {
         let (mut sum_z, mut sum_v) = (0.0, 0.0);
         if let (Some(t0), Some(z0), Some(v0)) = (self.t.last(), self.z.last(), self.v.last()) {
             let dt = t - t0;
@@ -104,59 +202,6 @@ impl Motion {
         let share = dt / (self.t[k + 1] - self.t[k]);
         let mix = |x: &[f64]| x[k] + 0.5 * share * (x[k + 1] - x[k]);
         (self.sum_z[k] + dt * mix(&self.z), self.sum_v[k] + dt * mix(&self.v))
-    }
-
-    /// Position in m and velocity in m/s at an instant.
-    #[must_use]
-    pub fn at(&self, at_s: f64) -> (f64, f64) {
-        let last = self.t.len() - 1;
-        let k = self.before(at_s);
-        if k == last || at_s <= self.t[k] {
-            return (self.z[k], self.v[k]);
-        }
-        let share = (at_s - self.t[k]) / (self.t[k + 1] - self.t[k]).max(1e-300);
-        (self.z[k] + share * (self.z[k + 1] - self.z[k]), self.v[k] + share * (self.v[k + 1] - self.v[k]))
-    }
-
-    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece;
-    /// the motion taken `late_s` earlier.
-    #[must_use]
-    pub fn pieces(&self, spans: impl Iterator<Item = (f64, f64)>, late_s: f64) -> Vec<Piece> {
-        let mut out = Vec::new();
-        let mut near = 0;
-        let mut jump = 0;
-        for (block, (from, to)) in spans.enumerate() {
-            let mut at = from;
-            let whole = to - from;
-            loop {
-                while jump < self.jumps_s.len() && self.jumps_s[jump] + late_s <= at + 1e-6 * whole {
-                    jump += 1;
-                }
-                let end = match self.jumps_s.get(jump) {
-                    Some(j) if j + late_s < to - 1e-6 * whole => j + late_s,
-                    _ => to,
-                };
-                let (z0, v0) = self.sums(at - late_s, &mut near);
-                let (z1, v1) = self.sums(end - late_s, &mut near);
-                let dt = (end - at).max(1e-12);
-                // Slope of the velocity from means over both halves.
-                let (_, vm) = self.sums(0.5 * (at + end) - late_s, &mut near);
-                let a = ((v1 - vm) - (vm - v0)) / (0.25 * dt * dt);
-                out.push(Piece {
-                    block: block as u32,
-                    from_s: at,
-                    to_s: end,
-                    z_m: (z1 - z0) / dt,
-                    v_mps: (v1 - v0) / dt,
-                    a_mps2: a,
-                });
-                if end >= to {
-                    break;
-                }
-                at = end;
-            }
-        }
-        out
     }
 }
 

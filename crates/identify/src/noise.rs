@@ -160,16 +160,17 @@ impl Noise {
                 continue;
             }
             let bin = &self.bins[self.bin(b.size_n[k]).min(self.bins.len() - 1)];
-            out[k] = if run >= ORDER {
-                let mut w = e[k];
+            let (mut w, mut sd) = (e[k], bin.sd_n.max(bin.innovation_n));
+            if run >= ORDER {
                 for (i, a) in bin.a.iter().enumerate() {
                     w -= a * e[k - 1 - i];
                 }
-                w / bin.innovation_n
-            } else {
-                // Nothing is known of the samples before.
-                e[k] / bin.sd_n.max(bin.innovation_n)
-            };
+                sd = bin.innovation_n;
+            } // else nothing is known of the samples before.
+            if b.doubt_n[k] > 0.0 {
+                sd = libm::hypot(sd, b.doubt_n[k]);
+            }
+            out[k] = w / sd;
         }
     }
 

@@ -4,7 +4,7 @@ use crate::blocks::Blocks;
 use crate::events::{Event, judge};
 use crate::forward::{Replayed, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
-use crate::motion::Piece;
+use crate::motion::{Piece, Shown};
 use crate::noise::{Noise, rho};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -61,8 +61,8 @@ pub struct Residuals {
 /// The pieces of smooth motion that a model sees.
 #[must_use]
 pub fn pieces<'a>(model: &Compiled, blocks: &'a Blocks) -> Cow<'a, [Piece]> {
-    if model.delay_s > 0.0 {
-        Cow::Owned(blocks.pieces_late(model.delay_s))
+    if model.smears || model.delay_s > 0.0 {
+        Cow::Owned(blocks.pieces_shown(Shown::Late(model.delay_s)))
     } else {
         Cow::Borrowed(&blocks.pieces)
     }

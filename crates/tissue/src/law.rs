@@ -114,6 +114,12 @@ impl Law {
         &self.slabs
     }
 
+    /// Whether the needle gives.
+    #[must_use]
+    pub fn bends(&self) -> bool {
+        self.needle_n_per_m < f64::INFINITY
+    }
+
     /// The velocity in m/s that multiplies `sum b_i l_i` when the tip moves at `v_mps`: itself, unless an
     /// effect changes the viscous friction.
     #[must_use]

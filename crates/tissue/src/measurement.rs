@@ -150,6 +150,12 @@ impl Measurement {
         self.delay_s
     }
 
+    /// Whether a jump of the force is smeared.
+    #[must_use]
+    pub fn smears(&self) -> bool {
+        self.before_delay.iter().any(Effect::remembers)
+    }
+
     /// The mean of the recorded force over a span of time, without delay, noise and what comes after the noise. Spans
     /// follow one another without gaps; a lag is integrated through them.
     pub fn mean(&self, state: &mut MeasurementState, cell: &Cell) -> f64 {
