@@ -8,6 +8,7 @@
 //! | [`effect`] | the departures from the base law, by id and parameter path |
 //! | [`law`] | what a law has to answer |
 //! | [`plain`] | the base law with all departures, event by event |
+//! | [`rich`] | a law of another form, of which the base law is the neutral case |
 //! | [`sensor`] | from the force at the needle's base to the recorded one |
 //! | [`noise`] | what the sensor adds |
 //! | [`insertion`] | one needle going through all of it |
@@ -18,5 +19,6 @@ pub mod law;
 pub mod motion;
 pub mod noise;
 pub mod plain;
+pub mod rich;
 pub mod sensor;
 pub mod tissue;

@@ -90,10 +90,10 @@ pub fn set_up(id: &CaseId) -> Setup {
     for attempt in 0..ATTEMPTS {
         let setup = attempt_at(id, attempt);
         let free = id.hide == Hide::Clean || setup.effects.iter().any(hidden::by_size);
-        let off = if free {
-            0.0
-        } else if !clear_of_ruptures(&setup) {
+        let off = if !clear_of_ruptures(&setup) || !told_by_ruptures(&setup, id.size) {
             f64::INFINITY
+        } else if free {
+            0.0
         } else if setup.strength_sd < 0.95 * low {
             low / setup.strength_sd
         } else if setup.strength_sd > 1.3 * high {
@@ -297,6 +297,37 @@ fn clear_of_ruptures(setup: &Setup) -> bool {
                 })
         }
         _ => true,
+    })
+}
+
+/// Whether a puncture force that depends on speed does so where it can be seen: at least one layer gives way by force in two
+/// recordings at forces that differ by as much as the size asks for.
+fn told_by_ruptures(setup: &Setup, size: Size) -> bool {
+    let depends = setup.effects.iter().any(|e| matches!(e, Effect::RateDependentPuncture { .. }));
+    if !depends || setup.paths.len() < 2 {
+        return true;
+    }
+    let least = match size {
+        Size::Faint => 0.005,
+        Size::Medium => 0.015,
+        Size::Strong => 0.05,
+    };
+    let all = look(setup, &setup.effects, None);
+    (0..setup.truth.layers.len()).any(|i| {
+        let layer = &setup.truth.layers[i];
+        let front = setup.truth.front_m(i);
+        let mut forces = Vec::new();
+        for (there, _) in &all {
+            let Some(r) = there.ruptures_s.get(i) else { continue };
+            let k = there.time_s.partition_point(|t| t < r).min(there.position_m.len() - 1);
+            let x = there.position_m[k] - front;
+            if x < 0.97 * layer.thickness_m {
+                forces.push(x * layer.stiffness_n_per_m);
+            }
+        }
+        let high = forces.iter().fold(0.0, |m: f64, f| m.max(*f));
+        let low = forces.iter().fold(f64::INFINITY, |m: f64, f| m.min(*f));
+        forces.len() >= 2 && high - low >= least * high
     })
 }
 
