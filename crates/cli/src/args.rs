@@ -175,15 +175,48 @@ pub enum BenchmarkWhat {
 
 /// Arguments of `stylet benchmark diagnose`.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet benchmark diagnose
+  stylet benchmark diagnose --wrong thickness,encoder --grade large --cases 60 --seed 7
+  stylet benchmark diagnose --wrong all --hide one,one,clean --cases 60 --out out/baseline
+  stylet benchmark diagnose --hide outside --cases 48
+  stylet benchmark diagnose --world own --cases 1000
+
+Words for --wrong (`all` for every one of them):
+  nothing thickness surface surface_each coefficients encoder encoder_steps jitter dropped late growing tails ar1
+  ar2 wander hum bits rate layers no_air recordings scatter_puncture scatter_friction scatter_surface five
+Words for --hide: clean one two three outside beside instrument; the cases of a cell go round the list.
+
+The folder then holds table.txt (rates with 95 % Wilson intervals), table.json and cases.jsonl, one line per case: cases in
+it are not run again, so that a run that was stopped goes on where it was.")]
 pub struct BenchmarkDiagnoseArgs {
-    /// Number of cases. Of twenty, eight are clean, eight hide one effect, two hide two, two one outside the library.
-    #[arg(long, value_name = "N", default_value_t = 1000)]
+    /// Which law the tissue follows: `plain` and `rich` are written independently of the diagnosis, `own` shares law, clock and
+    /// noise with it.
+    #[arg(long, value_name = "WORLD", default_value = "plain")]
+    pub world: String,
+    /// What the believed simulation or the sensor has wrong, row by row.
+    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
+    pub wrong: Vec<String>,
+    /// How much of it: small, medium, large.
+    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "small,medium,large")]
+    pub grade: Vec<String>,
+    /// What is hidden in the cases.
+    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "one,one,clean")]
+    pub hide: Vec<String>,
+    /// How strong that is: faint (0.15 to 0.5 standard deviations of the noise after re-fitting), medium (0.5 to 5) or strong (5 to 15).
+    #[arg(long, value_name = "WORD", default_value = "strong")]
+    pub size: String,
+    /// Number of cases per row and grade. World `own`: of all cases; of twenty, eight are clean, eight hide one effect, two
+    /// hide two, two one outside the library.
+    #[arg(long, value_name = "N", default_value_t = 60)]
     pub cases: u64,
     /// Seed of the drawing.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// Folder: cases.jsonl (one line per case; cases in it are not run again) and summary.txt
-    /// [default: stylet-out/benchmark-diagnose-<seed>].
+    /// Cases run side by side [default: as many as there are cores].
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Folder for the results [default: stylet-out/benchmark-diagnose-<world>-<seed>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

@@ -1,6 +1,6 @@
-//! `stylet benchmark`: examinations at scale.
+//! `stylet benchmark diagnose --world own`: cases drawn with the diagnosis' own law, for comparison with older tables.
 
-use crate::args::{BenchmarkArgs, BenchmarkDiagnoseArgs, BenchmarkWhat};
+use crate::args::BenchmarkDiagnoseArgs;
 use crate::exit::Failure;
 use rayon::prelude::*;
 use std::io::{BufRead, Write};
@@ -10,21 +10,15 @@ use stylet_diagnose::benchmark::{Result as Case, run, summary};
 use stylet_diagnose::hidden::sketch;
 use stylet_diagnose::search::Settings;
 
-/// The command.
+/// The command in this world.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
-pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
-    match &args.what {
-        BenchmarkWhat::Diagnose(args) => diagnose(args),
-    }
-}
-
-fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
+pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     let folder = args
         .out
         .clone()
-        .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}", args.seed)));
+        .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{}", args.seed)));
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let path = folder.join("cases.jsonl");

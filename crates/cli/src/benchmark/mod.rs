@@ -1,0 +1,19 @@
+//! `stylet benchmark`: examinations at scale.
+
+mod engine;
+mod examine;
+mod own;
+
+use crate::args::{BenchmarkArgs, BenchmarkWhat};
+use crate::exit::Failure;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
+    match &args.what {
+        BenchmarkWhat::Diagnose(args) if args.world == "own" => own::diagnose(args),
+        BenchmarkWhat::Diagnose(args) => examine::diagnose(args),
+    }
+}

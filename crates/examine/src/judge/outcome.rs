@@ -1,0 +1,147 @@
+//! What came of one case.
+
+use super::answer::{Answer, Verdict};
+use super::answers::{Expected, Worth, expected, judge};
+use crate::world::case::Case;
+use crate::world::id::CaseId;
+use serde::{Deserialize, Serialize};
+
+/// One number of an answer beside the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Number {
+    /// Such as `coulomb_friction.c_n_per_m`, or `base.stiffness_n_per_m`.
+    pub name: String,
+    /// The truth.
+    pub truth: f64,
+    /// The answer.
+    pub value: f64,
+    /// Whether the 95 % interval holds the truth; none without an interval.
+    pub held: Option<bool>,
+}
+
+/// What came of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The case.
+    pub id: CaseId,
+    /// What was hidden, by name.
+    pub hidden: Vec<String>,
+    /// With which numbers.
+    pub values: Vec<(String, f64)>,
+    /// How strong it was, in noise standard deviations.
+    pub strength_sd: f64,
+    /// What was right.
+    pub expected: Expected,
+    /// What was said.
+    pub verdict: Verdict,
+    /// Causes named, each with its class.
+    pub named: Vec<Vec<String>>,
+    /// Confidences of the causes, and whether each is one that is there.
+    pub confidence: Vec<(f64, bool)>,
+    /// What that was worth.
+    pub worth: Worth,
+    /// Numbers beside the truth.
+    pub numbers: Vec<Number>,
+    /// Samples.
+    pub samples: usize,
+    /// Wall time of the answer in s.
+    pub seconds: f64,
+    /// Why there was no answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failed: Option<String>,
+}
+
+impl Outcome {
+    /// Judges what an engine said. Without an answer the case counts as wrong.
+    #[must_use]
+    pub fn of(case: &Case, answer: Result<Answer, String>, seconds: f64) -> Self {
+        let expected = expected(&case.id, &case.setup);
+        let (answer, failed) = match answer {
+            Ok(answer) => (answer, None),
+            Err(why) => (Answer { verdict: Verdict::Unknown, ..Answer::none() }, Some(why)),
+        };
+        let mut worth = judge(&expected, &answer);
+        if failed.is_some() {
+            worth.right = false;
+        }
+        let mut hidden: Vec<String> = case.setup.effects.iter().map(|e| e.id().to_owned()).collect();
+        hidden.extend(case.setup.shape.as_ref().map(|s| s.name().to_owned()));
+        let mut values = Vec::new();
+        for e in &case.setup.effects {
+            values.extend(e.parameters().into_iter().map(|(p, x)| (format!("{}.{p}", e.id()), x)));
+        }
+        let there = |name: &str| {
+            expected.wanted.iter().any(|w| w.effect == name || w.also.iter().any(|a| a == name))
+                || expected.optional.iter().any(|o| o == name)
+        };
+        Self {
+            id: case.id,
+            hidden,
+            values,
+            strength_sd: case.setup.strength_sd,
+            verdict: answer.verdict,
+            named: answer
+                .causes
+                .iter()
+                .map(|c| {
+                    std::iter::once(&c.effect)
+                        .chain(c.equivalent.iter().filter(|e| **e != c.effect))
+                        .cloned()
+                        .collect()
+                })
+                .collect(),
+            confidence: answer
+                .causes
+                .iter()
+                .filter_map(|c| Some((c.confidence?, there(&c.effect))))
+                .collect(),
+            numbers: numbers(case, &answer),
+            worth,
+            expected,
+            samples: case.samples(),
+            seconds,
+            failed,
+        }
+    }
+}
+
+fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
+    let mut out = Vec::new();
+    for effect in &case.setup.effects {
+        let Some(cause) = answer.causes.iter().find(|c| c.effect == effect.id()) else { continue };
+        for (path, truth) in effect.parameters() {
+            let Some(e) = cause.parameters.get(&path) else { continue };
+            if path == "layer" {
+                continue;
+            }
+            let turn = if path.ends_with("_rad") {
+                let whole = core::f64::consts::TAU;
+                libm::round((truth - e.value) / whole) * whole
+            } else {
+                0.0
+            };
+            out.push(number(format!("{}.{path}", effect.id()), truth, e.value + turn, e.low.map(|x| x + turn), e.high.map(|x| x + turn)));
+        }
+    }
+    let truth = &case.setup.truth;
+    for p in &answer.base_parameters {
+        let layer = p.layer.checked_sub(1).and_then(|i| truth.layers.get(i));
+        let value = match (p.name.as_str(), layer) {
+            ("surface_m", _) => Some(truth.surface_m),
+            ("stiffness_n_per_m", Some(l)) => Some(l.stiffness_n_per_m),
+            ("friction_ns_per_m2", Some(l)) => Some(l.friction_ns_per_m2),
+            ("puncture_n", Some(l)) => l.puncture_n,
+            ("thickness_m", Some(l)) => Some(l.thickness_m),
+            _ => None,
+        };
+        if let Some(value) = value {
+            out.push(number(format!("base.{}", p.name), value, p.value, p.low, p.high));
+        }
+    }
+    out
+}
+
+fn number(name: String, truth: f64, value: f64, low: Option<f64>, high: Option<f64>) -> Number {
+    let held = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
+    Number { name, truth, value, held }
+}

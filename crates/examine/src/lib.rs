@@ -1,0 +1,40 @@
+//! The referee of the diagnosis: realities written independently of it, wrong beliefs about them, and the tables that
+//! judge its answers.
+//!
+//! An engine is a function from a [`Question`] (the believed scenario as RON text, the recordings) to an
+//! [`Answer`] (`diagnosis.json` as plain data). It is told nothing of the truth, and this crate knows nothing of
+//! it: of the crates of this project it depends on `record` alone.
+//!
+//! ```
+//! use stylet_examine::{Answer, Plan, run, table};
+//!
+//! let plan = Plan { cases: 3, ..Plan::default() };
+//! // An engine that never finds anything.
+//! let outcomes = run(&plan.cases(), None, &|_question| Ok(Answer::none()), &|_, _| {})?;
+//! assert_eq!(outcomes.iter().filter(|o| o.worth.right).count(), 1); // the clean one
+//! println!("{}", table::text(&outcomes));
+//! # Ok::<(), stylet_examine::RunError>(())
+//! ```
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`reality`] | tissue, needle and sensor, written from the page |
+//! | [`world`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
+//! | [`judge`] | which answers are right, and the table |
+//! | [`plan`], [`run`](mod@run) | which cases, and running an engine on them |
+#![forbid(unsafe_code)]
+
+pub mod judge;
+pub mod plan;
+pub mod reality;
+pub mod run;
+pub mod stats;
+pub mod world;
+
+pub use judge::answer::{Answer, Verdict};
+pub use judge::outcome::Outcome;
+pub use judge::table;
+pub use plan::Plan;
+pub use run::{RunError, run};
+pub use world::case::{Case, Named, Question, case};
+pub use world::id::{CaseId, Grade, Hide, Size, World, Wrong};

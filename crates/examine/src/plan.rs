@@ -1,0 +1,58 @@
+//! Which cases an examination consists of.
+
+use crate::world::id::{CaseId, Grade, Hide, Size, World, Wrong};
+
+/// An examination: rows of what is wrong, each in some grades, with a number of cases per cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// World.
+    pub world: World,
+    /// What is wrong, row by row.
+    pub wrong: Vec<Wrong>,
+    /// How much of it.
+    pub grades: Vec<Grade>,
+    /// What is hidden; the cases of a cell go round these, so that two thirds hide something when this is
+    /// `[One, One, Clean]`.
+    pub hide: Vec<Hide>,
+    /// How strong it is.
+    pub size: Size,
+    /// Cases per cell.
+    pub cases: u64,
+    /// Seed.
+    pub seed: u64,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            world: World::Plain,
+            wrong: vec![Wrong::Nothing],
+            grades: vec![Grade::Large],
+            hide: vec![Hide::One, Hide::One, Hide::Clean],
+            size: Size::Strong,
+            cases: 60,
+            seed: 1,
+        }
+    }
+}
+
+impl Plan {
+    /// The cases, row by row. Where nothing is wrong there is one grade.
+    #[must_use]
+    pub fn cases(&self) -> Vec<CaseId> {
+        let mut out = Vec::new();
+        for &wrong in &self.wrong {
+            let grades: &[Grade] = if wrong == Wrong::Nothing { &[Grade::Large] } else { &self.grades };
+            for &grade in grades {
+                let mut counts = vec![0; Hide::ALL.len()];
+                for k in 0..self.cases {
+                    let Some(&hide) = self.hide.get(k as usize % self.hide.len().max(1)) else { continue };
+                    let index = counts[hide as usize];
+                    counts[hide as usize] += 1;
+                    out.push(CaseId { world: self.world, wrong, grade, hide, size: self.size, seed: self.seed, index });
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,111 @@
+//! Running an examination: side by side, deterministic, and resumable.
+
+use crate::judge::answer::Answer;
+use crate::judge::outcome::Outcome;
+use crate::world::case::{Question, case};
+use crate::world::id::CaseId;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::io::{BufRead, Write};
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// Why an examination ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The journal cannot be read or written.
+    #[error("{path}: {why}")]
+    Journal {
+        /// File.
+        path: String,
+        /// What the system says.
+        why: std::io::Error,
+    },
+    /// A case could not be drawn.
+    #[error("case {name} cannot be drawn: {why}")]
+    Draw {
+        /// Case.
+        name: String,
+        /// Reason.
+        why: stylet_record::RecordError,
+    },
+}
+
+/// Runs an engine on cases and judges its answers, in the order of `cases` whatever the number of threads.
+///
+/// With a journal (a file of one JSON line per case) every outcome is written as soon as it is there, and cases that the journal
+/// holds are not run again; a line that was cut off when a run was stopped is. A journal belongs to one engine.
+/// `progress` is told how many of how many cases there are.
+///
+/// # Errors
+/// [`RunError`]. What an engine could not answer is no error of the run: it counts as wrong.
+pub fn run(
+    cases: &[CaseId],
+    journal: Option<&Path>,
+    engine: &(dyn Fn(&Question) -> Result<Answer, String> + Sync),
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Outcome>, RunError> {
+    let failed = |why| RunError::Journal {
+        path: journal.map_or_else(String::new, |p| p.display().to_string()),
+        why,
+    };
+    let mut done: BTreeMap<CaseId, Outcome> = BTreeMap::new();
+    let file = match journal {
+        None => None,
+        Some(path) => {
+            done = read(path).map_err(failed)?;
+            // Written anew beside and renamed, so that a cut-off last line is gone and nothing is lost.
+            let part = path.with_extension("part");
+            let mut text = Vec::new();
+            for outcome in done.values() {
+                serde_json::to_writer(&mut text, outcome).map_err(|e| failed(e.into()))?;
+                text.push(b'\n');
+            }
+            std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path)).map_err(failed)?;
+            Some(std::fs::OpenOptions::new().append(true).open(path).map_err(failed)?)
+        }
+    };
+    let missing: Vec<&CaseId> = cases.iter().filter(|id| !done.contains_key(*id)).collect();
+    let count = Mutex::new((file, cases.len() - missing.len()));
+    progress(cases.len() - missing.len(), cases.len());
+    let new: Result<Vec<Outcome>, RunError> = missing
+        .par_iter()
+        .map(|id| {
+            let case = case(id).map_err(|why| RunError::Draw { name: id.name(), why })?;
+            let start = Instant::now();
+            let answer = engine(&case.question);
+            let outcome = Outcome::of(&case, answer, start.elapsed().as_secs_f64());
+            if let Ok(mut state) = count.lock() {
+                if let Some(file) = &mut state.0 {
+                    let mut line = serde_json::to_vec(&outcome).map_err(|e| failed(e.into()))?;
+                    line.push(b'\n');
+                    file.write_all(&line).map_err(failed)?;
+                }
+                state.1 += 1;
+                progress(state.1, cases.len());
+            }
+            Ok(outcome)
+        })
+        .collect();
+    done.extend(new?.into_iter().map(|o| (o.id, o)));
+    Ok(cases.iter().filter_map(|id| done.get(id).cloned()).collect())
+}
+
+/// The outcomes that a journal holds.
+///
+/// # Errors
+/// What the system says, unless the file is not there.
+pub fn read(path: &Path) -> std::io::Result<BTreeMap<CaseId, Outcome>> {
+    let file = match std::fs::File::open(path) {
+        Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
+        other => other?,
+    };
+    let mut out = BTreeMap::new();
+    for line in std::io::BufReader::new(file).lines() {
+        if let Ok(outcome) = serde_json::from_str::<Outcome>(&line?) {
+            out.insert(outcome.id, outcome);
+        }
+    }
+    Ok(out)
+}
