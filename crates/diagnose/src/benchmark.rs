@@ -1,15 +1,15 @@
 //! The examination: diagnoses drawn cases and compares with what was hidden.
 
-use crate::diagnose::{Evidence, Options, diagnose};
-use crate::fit::Data;
-use crate::held_out::{free_residual, rms};
+use crate::base::{Prepared, base};
+use crate::diagnose::{Evidence, Options, belief, diagnose};
+use crate::held_out::{by_its_own, rms};
 use crate::hidden::{self, Drawn, Kind, Size, Sketch};
-use crate::model::{Choice, Model};
-use crate::noise::Noise;
 use crate::outcome::Verdict;
-use crate::refine::refine;
-use crate::search::{Candidate, Search, Settings};
-use crate::track::Track;
+use std::sync::Arc;
+use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_identify::fit::Fit;
+use stylet_identify::model::{Choice, Model};
+use stylet_identify::objective::Data;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use stylet_tissue::{AnyEffect, Effect};
@@ -62,28 +62,30 @@ pub struct Result {
 /// Strength of what is hidden after re-fitting the base law.
 fn strength(drawn: &Drawn) -> Option<f64> {
     let case = hidden::case(drawn);
-    let tracks: Vec<Track> = case.recordings.iter().map(|r| Track::new(r, &[])).collect();
-    let clean = hidden::clean_force(drawn);
-    let search =
-        Search::base(&case.believed.tissue, case.believed.tolerance, &[], tracks, 0.0, Settings::default())?;
-    Some(size_of(&search, &search.base, &clean, drawn))
+    let blocks = case.recordings.iter().map(|r| Blocks::new(r, &[], BLOCK_S)).collect();
+    let (fit, data) = base(&Prepared::new(Arc::new(belief(&case.believed)), blocks, 0.0))?;
+    Some(size_of(&fit, &data, drawn))
 }
 
-fn size_of(search: &Search, base: &Candidate, clean: &[Vec<f64>], drawn: &Drawn) -> f64 {
-    let tracks: Vec<Track> = search
-        .data
-        .tracks
-        .iter()
-        .zip(clean)
-        .map(|(t, f)| Track { f: f.clone(), used: vec![true; f.len()], ..t.clone() })
-        .collect();
+/// Root mean square of what the fitted base law leaves of the force without noise, in standard deviations of the noise.
+fn size_of(fit: &Fit, data: &Data, drawn: &Drawn) -> f64 {
+    let mut clean = data.clone();
+    let mut blocks = clean.blocks.to_vec();
+    for (b, f) in blocks.iter_mut().zip(&hidden::clean_force(drawn)) {
+        let mut sums = vec![(0.0, 0.0); b.len()];
+        for (f, k) in f.iter().zip(b.raw_block.iter()) {
+            sums[*k as usize].0 += f;
+            sums[*k as usize].1 += 1.0;
+        }
+        b.f = sums.iter().map(|(s, n)| s / f64::max(*n, 1.0)).collect();
+    }
+    clean.blocks = Arc::new(blocks);
     let (mut square, mut n) = (0.0, 0.0);
-    for track in &tracks {
-        square += free_residual(&base.model, track, &Noise::white(drawn.noise_n))
-            .iter()
-            .map(|e| e * e)
-            .sum::<f64>();
-        n += track.len() as f64;
+    for r in 0..clean.recordings() {
+        if let Some(left) = by_its_own(&fit.model, &clean, r) {
+            square += left.square_n2 * left.blocks as f64;
+            n += left.blocks as f64;
+        }
     }
     let mut square = square / f64::max(n, 1.0);
     for e in &drawn.effects {
@@ -129,13 +131,13 @@ pub fn aim(sketch: &Sketch) -> Drawn {
 
 /// Runs one case.
 #[must_use]
-pub fn run(index: u64, sketch: &Sketch, settings: Settings) -> Option<Result> {
-    examine(index, sketch.kind, &aim(sketch), settings)
+pub fn run(index: u64, sketch: &Sketch) -> Option<Result> {
+    examine(index, sketch.kind, &aim(sketch))
 }
 
 /// Runs one case whose strengths are drawn already.
 #[must_use]
-pub fn examine(index: u64, kind: Kind, drawn: &Drawn, settings: Settings) -> Option<Result> {
+pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Result> {
     let case = hidden::case(drawn);
     let evidence: Vec<Evidence> = case
         .recordings
@@ -144,12 +146,10 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn, settings: Settings) -> Opt
         .map(|(k, r)| Evidence { name: format!("{k}.csv"), recording: r.clone(), notes: Vec::new() })
         .collect();
     let start = Instant::now();
-    let examined =
-        diagnose(&case.believed, &evidence, &Options { search: settings, brief: false }, |_| {}).ok()?;
+    let examined = diagnose(&case.believed, &evidence, &Options::default(), |_| {}).ok()?;
     let seconds = start.elapsed().as_secs_f64();
     let (d, search) = (&examined.diagnosis, &examined.search);
-    let clean = hidden::clean_force(drawn);
-    let strength = size_of(search, &search.base, &clean, drawn);
+    let strength = size_of(&search.base, &search.data, drawn);
     let hidden_ids: Vec<String> = drawn.effects.iter().map(|e| e.id().to_owned()).collect();
     let named: Vec<Vec<String>> = d
         .causes
@@ -194,31 +194,15 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn, settings: Settings) -> Opt
             ));
         }
     }
-    // What the truth would leave, and by how much it beats the base.
+    // What the truth would leave.
     let choices: Vec<Choice> = drawn.effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
-    let truth = Model {
-        tissue: case.truth.clone(),
-        assumed: case.believed.tissue.clone(),
-        tolerance: case.believed.tolerance,
-        given: Vec::new(),
-        effects: choices,
-        held: None,
-    };
-    let (mut square, mut n) = (0.0, 0.0);
-    for track in search.data.tracks.iter() {
-        let e = rms(track, &free_residual(&truth, track, &search.data.noise));
-        square += e * e * track.len() as f64;
-        n += track.len() as f64;
-    }
-    let after_true = (square / n.max(1.0_f64)).sqrt();
+    let mut truth = Model::base(Arc::new(belief(&case.believed)), case.recordings.len());
+    truth.tissue = case.truth.clone();
+    truth.effects = choices;
+    let left: Vec<_> = (0..case.recordings.len()).map(|r| by_its_own(&truth, &search.data, r)).collect();
+    let after_true = rms(&left, &search.data);
     let (before, after) = (d.gain.rmse_before_n, d.gain.rmse_after_n);
     let gain = (before - after_true > 0.03 * before).then(|| (before - after) / (before - after_true));
-    let truth_nats = if right || kind == Kind::Outside || drawn.effects.is_empty() {
-        None
-    } else {
-        let mut data = Data { ruptures: case.ruptures.clone(), ..search.data.clone() };
-        refine(&truth, &mut data, 1, 4, false).map(|f| search.base.nats - f.nats)
-    };
     Some(Result {
         index,
         kind,
@@ -236,14 +220,14 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn, settings: Settings) -> Opt
         confidence: d.causes.iter().map(|c| c.confidence).collect(),
         invisible: d.invisible.clone(),
         right,
-        truth_nats,
+        truth_nats: None,
         errors,
         gain,
         rms_n: [before, after, after_true],
         leftover: (d.leftover.p_value, d.leftover.nats),
-        explained: search.base.nats - search.best.nats,
+        explained: search.base.nats() - search.best.nats(),
         seconds,
-        samples: search.data.samples(),
+        samples: case.recordings.iter().map(stylet_record::Recording::len).sum(),
     })
 }
 

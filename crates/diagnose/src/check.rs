@@ -98,6 +98,24 @@ fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<(), Diag
     Ok(())
 }
 
+/// The recording without samples that are not finite.
+pub(crate) fn finite(r: &Recording) -> Recording {
+    let good = |i: usize| (r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite();
+    let kept: Vec<usize> = (0..r.len()).filter(|i| good(*i)).collect();
+    if kept.len() == r.len() {
+        return r.clone();
+    }
+    let pick = |x: &[f64]| kept.iter().map(|i| x[*i]).collect::<Vec<f64>>();
+    Recording {
+        time_s: pick(&r.time_s),
+        position_m: pick(&r.position_m),
+        velocity_mps: pick(&r.velocity_mps),
+        force_n: pick(&r.force_n),
+        velocity_measured: r.velocity_measured,
+        ..Recording::default()
+    }
+}
+
 /// A remark on samples that are not finite: they are cut out.
 pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
     let bad: Vec<usize> = (0..r.len())

@@ -1,10 +1,10 @@
 //! What the report draws: predictions, residuals and how they depend on what was done.
 
 use crate::diagnose::Examined;
-use crate::fit::{Residuals, dot, residuals};
-use crate::held_out::free_residual;
+use crate::held_out::by_its_own;
 use crate::outcome::Verdict;
-use crate::search::Candidate;
+use stylet_identify::fit::Fit;
+use stylet_identify::linear::dot;
 use stylet_tissue::Slab;
 
 /// Curves of one recording.
@@ -32,10 +32,11 @@ pub struct Curves {
     pub layer: Vec<usize>,
 }
 
-/// The model that the diagnosis stands by.
+/// The fit that the diagnosis stands by.
 #[must_use]
-pub fn shown(examined: &Examined) -> &Candidate {
-    if examined.diagnosis.verdict == Verdict::Unknown { &examined.search.base } else { &examined.search.best }
+pub fn shown(examined: &Examined) -> &Fit {
+    let d = &examined.diagnosis;
+    if d.verdict == Verdict::Unknown && d.causes.is_empty() { &examined.search.base } else { &examined.search.best }
 }
 
 /// Curves of every recording.
@@ -43,39 +44,26 @@ pub fn shown(examined: &Examined) -> &Candidate {
 pub fn curves(examined: &Examined) -> Vec<Curves> {
     let search = &examined.search;
     let best = shown(examined);
-    let split = |candidate: &Candidate| {
-        let mut r = Residuals::default();
-        let _ = residuals(&candidate.model, &search.data_of(candidate), &mut r);
-        let mut from = 0;
-        search
-            .data
-            .tracks
-            .iter()
-            .map(|t| {
-                let part = r.e.get(from..from + t.len()).map_or_else(Vec::new, <[f64]>::to_vec);
-                from += t.len();
-                part
-            })
-            .collect::<Vec<_>>()
-    };
-    let (base, extended) = (split(&search.base), split(best));
-    search
-        .data
-        .tracks
+    let data = &search.data;
+    data.blocks
         .iter()
-        .zip(base.into_iter().zip(extended))
-        .zip(&best.ruptures)
-        .map(|((t, (base_n, extended_n)), ruptures)| Curves {
-            time_s: t.t.clone(),
-            position_m: t.z.clone(),
-            velocity_mps: t.v.clone(),
-            force_n: t.f.clone(),
-            free_n: free_residual(&best.model, t, &search.data.noise),
-            base_n,
-            extended_n,
-            used: t.used.clone(),
-            ruptures_s: ruptures.iter().copied().filter(|r| r.is_finite()).collect(),
-            layer: (0..t.len()).map(|i| 1 + ruptures.iter().filter(|r| **r <= t.t[i]).count()).collect(),
+        .enumerate()
+        .map(|(r, b)| {
+            let t: Vec<f64> = (0..b.len()).map(|k| 0.5 * (b.from_s[k] + b.to_s[k])).collect();
+            let (position_m, velocity_mps) = t.iter().map(|t| b.motion.at(*t)).unzip();
+            let ruptures = &best.model.instants[r];
+            Curves {
+                force_n: b.f.clone(),
+                free_n: by_its_own(&best.model, data, r).map_or_else(|| vec![f64::NAN; b.len()], |l| l.e),
+                base_n: search.base.residuals.e[r].clone(),
+                extended_n: best.residuals.e[r].clone(),
+                used: b.used.clone(),
+                ruptures_s: ruptures.iter().copied().filter(|r| r.is_finite()).collect(),
+                layer: t.iter().map(|t| 1 + ruptures.iter().filter(|r| **r <= *t).count()).collect(),
+                time_s: t,
+                position_m,
+                velocity_mps,
+            }
         })
         .collect()
 }

@@ -1,101 +1,102 @@
 //! How much better the extended model is on recordings that took no part in the fit.
 
-use crate::fit::Data;
-use crate::forward;
-use crate::model::Model;
-use crate::noise::Noise;
-use crate::refine::fit_seeded;
-use crate::search::{Candidate, Search};
-use crate::track::Track;
 use rayon::prelude::*;
-use std::sync::Arc;
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::forward::free;
+use stylet_identify::model::{Model, NEVER, Own};
+use stylet_identify::objective::{Data, Work, nats_of, pieces, replay};
 
-/// Samples by which a free rupture may be early or late without counting as an error.
-const FORGIVEN: usize = 2;
+/// Samples by which a rupture may be early or late without counting as an error.
+const FORGIVEN: f64 = 2.0;
 
-/// Sums of squares and counts of one recording.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Before {
-    /// Root mean square of the base law's residual in N.
-    pub before_n: f64,
-    /// Of the extended model's.
-    pub after_n: f64,
-    /// Samples.
-    pub samples: usize,
+/// What is left of one recording.
+#[derive(Clone, Debug, Default)]
+pub struct Left {
+    /// Mean square in N² over the blocks compared.
+    pub square_n2: f64,
+    /// Blocks compared.
+    pub blocks: usize,
+    /// Residual of every block in N.
+    pub e: Vec<f64>,
+    /// The law's own instants in s.
+    pub instants: Vec<f64>,
 }
 
-/// Residual of a model with its own ruptures; near a rupture the best of the neighbouring samples counts.
+/// Residual of a model with its own ruptures, each as early or late by a sample or two as fits best.
 #[must_use]
-pub fn free_residual(model: &Model, track: &Track, noise: &Noise) -> Vec<f64> {
-    let Some(compiled) = model.compile() else { return vec![f64::NAN; track.len()] };
-    let mut out = vec![0.0; track.len()];
-    let instants = forward::free(&compiled, track, &mut out);
-    let mut e = out.clone();
-    forward::departures(&compiled, track, &instants, noise, 0, &mut e);
-    for instant in instants {
-        let k = track.first_from(instant);
-        for i in k.saturating_sub(FORGIVEN)..(k + FORGIVEN + 1).min(track.len()) {
-            for j in i.saturating_sub(FORGIVEN)..(i + FORGIVEN + 1).min(track.len()) {
-                let other = track.f[i] - out[j];
-                if other.abs() < e[i].abs() {
-                    e[i] = other;
-                }
+pub fn by_its_own(model: &Model, data: &Data, r: usize) -> Option<Left> {
+    let compiled = model.compile(r)?;
+    let b = &data.blocks[r];
+    let mut instants = free(&compiled, &pieces(&compiled, b));
+    let mut work = Work::default();
+    let (first, last) = b.span_s();
+    for layer in 0..instants.len() {
+        let own = instants[layer];
+        if own == NEVER {
+            continue;
+        }
+        let mut best = (f64::INFINITY, own);
+        for k in [0.0, -0.5, 0.5, -1.0, 1.0, -FORGIVEN, FORGIVEN] {
+            instants[layer] = (own + k * b.step_s).clamp(first, last);
+            let nats = nats_of(model, &compiled, data, r, &instants, &mut work);
+            if nats < best.0 {
+                best = (nats, instants[layer]);
             }
         }
+        instants[layer] = best.1;
     }
-    e
+    let mut at = model.clone();
+    at.instants[r].clone_from(&instants);
+    let predicted = replay(&at, data, r)?;
+    let e: Vec<f64> = b.f.iter().zip(&predicted.f).map(|(y, f)| y - f).collect();
+    let kept = e.iter().zip(&b.used).filter(|(_, u)| **u);
+    let (square, blocks) = kept.fold((0.0, 0), |(s, n), (e, _)| (s + e * e, n + 1));
+    Some(Left { square_n2: square / blocks.max(1) as f64, blocks, e, instants })
 }
 
-/// Root mean square over the samples in use.
+/// Predicts every recording from a fit to the others; with one recording the fit itself is used.
 #[must_use]
-pub fn rms(track: &Track, e: &[f64]) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0_f64);
-    for (e, used) in e.iter().zip(&track.used) {
-        if *used {
-            sum += e * e;
-            n += 1.0;
-        }
-    }
-    (sum / n.max(1.0)).sqrt()
-}
-
-/// Leaves out each recording in turn; with one recording the fit itself is reported.
-#[must_use]
-pub fn gain(search: &Search, base: &Candidate, best: &Candidate) -> Vec<Before> {
-    let n = search.data.tracks.len();
-    let one = |model: &Model, ruptures: &[Vec<f64>], left: usize| -> Vec<f64> {
-        let model = if n < 2 { model.clone() } else { without(search, model, ruptures, left) };
-        free_residual(&model, &search.data.tracks[left], &search.data.noise)
-    };
+pub fn left_out(best: &Fit, data: &Data) -> Vec<Option<Left>> {
+    let n = data.recordings();
     (0..n)
         .into_par_iter()
-        .map(|left| {
-            let track = &search.data.tracks[left];
-            let before = one(&base.model, &base.ruptures, left);
-            let after = if best.model.effects.is_empty() && best.model.given.len() == base.model.given.len() {
-                before.clone()
-            } else {
-                one(&best.model, &best.ruptures, left)
-            };
-            Before { before_n: rms(track, &before), after_n: rms(track, &after), samples: track.len() }
+        .map(|r| {
+            let model = if n < 2 { best.model.clone() } else { without(best, data, r)? };
+            by_its_own(&model, data, r)
         })
         .collect()
 }
 
-fn without(search: &Search, model: &Model, ruptures: &[Vec<f64>], left: usize) -> Model {
-    let others = |k: &usize| *k != left;
-    let n = search.data.tracks.len();
-    let data = Data {
-        tracks: Arc::new((0..n).filter(others).map(|k| search.data.tracks[k].clone()).collect()),
-        ruptures: (0..n).filter(others).map(|k| ruptures[k].clone()).collect(),
-        reach: Arc::new(Vec::new()),
-        dead_n: search.data.dead_n,
-        noise: search.data.noise,
-    };
-    // What averages over blocks would blur.
-    let fast = model.effects.iter().any(|e| e.info.id == "periodic_interference")
-        || model.compile().is_some_and(|m| m.feels_instants);
-    let q = if fast { 1 } else { search.q };
-    let coarse = data.blocks(q, data.noise.blocks(q));
-    fit_seeded(model.clone(), &coarse, 5, 0.05).map_or_else(|| model.clone(), |f| f.model)
+/// The model fitted to all recordings but one; that one has nothing of its own.
+fn without(best: &Fit, data: &Data, r: usize) -> Option<Model> {
+    let others: Vec<usize> = (0..data.recordings()).filter(|k| *k != r).collect();
+    let mut model = best.model.clone();
+    model.instants.remove(r);
+    model.own.remove(r);
+    let fitted = fit(&model, &data.only(&others), Effort { turns: 2, enough: 0.5 })?;
+    let mut model = fitted.model;
+    model.instants.insert(r, vec![NEVER; best.model.layers()]);
+    model.own.insert(r, Own::default());
+    Some(model)
+}
+
+/// Root mean square in N over recordings, samples' own noise about their blocks' means included.
+#[must_use]
+pub fn rms(left: &[Option<Left>], data: &Data) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (l, b) in left.iter().zip(data.blocks.iter()) {
+        if let Some(l) = l {
+            sum += l.blocks as f64 * (l.square_n2 + b.within_n().powi(2));
+            n += l.blocks as f64;
+        }
+    }
+    (sum / f64::max(n, 1.0)).sqrt()
+}
+
+/// Standard deviation in N of the noise of single samples.
+#[must_use]
+pub fn floor(data: &Data) -> f64 {
+    let n = data.recordings().max(1) as f64;
+    let within = data.blocks.iter().map(|b| b.within_n().powi(2)).sum::<f64>() / n;
+    (data.noise.sd_n().powi(2) + within).sqrt()
 }

@@ -1,25 +1,25 @@
 //! What remains: is the residual of a model still predictable?
 //!
-//! Whitened residuals are averaged in bins of depth, time, speed, phase and travel since reversal; what
-//! is the same in several recordings is no noise. The cross-recording statistic
-//! `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero whatever the noise's colour, since the noises of two
-//! recordings know nothing of each other.
+//! Residuals are averaged in bins of depth, time, speed, phase and travel since reversal; what is the same in several
+//! recordings is no noise. The cross-recording statistic `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero whatever the noise's
+//! colour, since the noises of two recordings know nothing of each other.
 
-use crate::fit::{Data, Residuals, residuals};
-use crate::model::Model;
-use crate::track::Track;
+use stylet_identify::fit::Fit;
+use stylet_identify::objective::Data;
+use stylet_identify::blocks::Blocks;
 
 /// Structure that a model leaves.
 #[derive(Clone, Debug, Default)]
 pub struct Leftover {
     /// Smallest p-value over the features, times their number.
     pub p_value: f64,
-    /// Features by which the residual is predictable, strongest first: name, p-value, nats.
-    pub depends_on: Vec<(String, f64, f64)>,
+    /// Features by which the residual is predictable, strongest first, with their p-values.
+    pub depends_on: Vec<(String, f64)>,
     /// Nats of the strongest.
     pub nats: f64,
 }
 
+/// Features with their binning.
 const FEATURES: [&str; 7] = [
     "depth",
     "time",
@@ -29,42 +29,48 @@ const FEATURES: [&str; 7] = [
     "depth_and_velocity",
     "acceleration_and_velocity",
 ];
+/// Bins at most.
+const BINS: usize = 800;
+/// Fewest blocks of a recording in a bin.
+const LEAST: f64 = 3.0;
+/// Features with a p-value below this are reported.
+const REPORTED: f64 = 1e-3;
 
 /// Upper tail of the normal distribution.
-#[must_use]
-pub fn tail(z: f64) -> f64 {
-    0.5 * libm::erfc(z / core::f64::consts::SQRT_2)
+fn tail(z: f64) -> f64 {
+    stylet_stats::normal::sf(z)
 }
 
-/// Bin of every sample of a track by a feature.
-fn bins(feature: usize, track: &Track, deepest: f64) -> Vec<usize> {
+/// Bin of every block of a recording by a feature.
+fn bins(feature: usize, b: &Blocks, deepest: f64) -> Vec<usize> {
     let depth = |z: f64, n: f64| ((z / deepest.max(1e-9) * n).floor().clamp(-1.0, n) + 1.0) as usize;
     let speed = |v: f64| ((v * 1e3 * 2.0).round().clamp(-16.0, 16.0) + 16.0) as usize;
     let phase = |v: f64| if v > 1e-5 { 2 } else { usize::from(v < -1e-5) };
-    let mut since = 0.0;
-    let mut sign = 0.0;
-    (0..track.len())
+    let (mut since, mut sign, mut before) = (0.0, 0.0, (f64::NAN, 0.0));
+    let first = b.from_s.first().copied().unwrap_or(0.0);
+    (0..b.len())
         .map(|i| {
-            let (z, v) = (track.z[i], track.v[i]);
+            let t = 0.5 * (b.from_s[i] + b.to_s[i]);
+            let (z, v) = b.motion.at(t);
+            let a = if before.0.is_finite() { (v - before.1) / (b.to_s[i] - b.from_s[i]) } else { 0.0 };
+            let travelled = if before.0.is_finite() { (z - before.0).abs() } else { 0.0 };
+            before = (z, v);
             match feature {
                 0 => depth(z, 80.0),
-                1 => ((track.t[i] - track.t[0]) / 0.5) as usize,
+                1 => ((t - first) / 0.5) as usize,
                 2 => speed(v),
                 3 => phase(v) * 32 + depth(z, 30.0),
                 4 => {
                     let s = stylet_tissue::effect::sgn(v);
                     if s != 0.0 && s != sign {
-                        sign = s;
-                        since = 0.0;
+                        (sign, since) = (s, 0.0);
                     }
-                    if i > 0 {
-                        since += (z - track.z[i - 1]).abs();
-                    }
+                    since += travelled;
                     (if sign < 0.0 { 64 } else { 0 }) + ((since * 2e3) as usize).min(63)
                 }
                 5 => speed(v) / 2 * 24 + depth(z, 20.0),
                 _ => {
-                    let bent = (track.a[i] * 400.0).round().clamp(-10.0, 10.0) + 10.0;
+                    let bent = (a * 400.0).round().clamp(-10.0, 10.0) + 10.0;
                     bent as usize * 24 + speed(v) / 2
                 }
             }
@@ -72,49 +78,47 @@ fn bins(feature: usize, track: &Track, deepest: f64) -> Vec<usize> {
         .collect()
 }
 
-/// Tests what a model leaves.
+/// Tests what a model leaves under the noise of the data.
 #[must_use]
-pub fn test(model: &Model, data: &Data) -> Leftover {
-    let mut r = Residuals::default();
-    if !residuals(model, data, &mut r) {
-        return Leftover { p_value: 1.0, ..Leftover::default() };
-    }
-    let deepest = data.tracks.iter().flat_map(|t| &t.z).fold(0.0_f64, |m, z| m.max(*z));
-    let mut found: Vec<(String, f64, f64)> = Vec::new();
-    for (feature, name) in FEATURES.iter().enumerate() {
-        let (p, nats) = structure(feature, data, &r.w, deepest);
-        found.push(((*name).to_owned(), (p * FEATURES.len() as f64).min(1.0), nats));
-    }
+pub fn test(fit: &Fit, data: &Data) -> Leftover {
+    let deepest = data.blocks.iter().flat_map(|b| b.pieces.iter()).fold(0.0_f64, |m, p| m.max(p.z_m));
+    let mut found: Vec<(String, f64, f64)> = FEATURES
+        .iter()
+        .enumerate()
+        .map(|(feature, name)| {
+            let (p, nats) = structure(feature, data, &fit.residuals.w, deepest);
+            ((*name).to_owned(), (p * FEATURES.len() as f64).min(1.0), nats)
+        })
+        .collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1).then(b.2.total_cmp(&a.2)));
     let p_value = found.first().map_or(1.0, |f| f.1);
-    found.retain(|f| f.1 < 1e-3);
+    found.retain(|f| f.1 < REPORTED);
     let nats = found.iter().fold(0.0_f64, |m, f| m.max(f.2));
-    Leftover { p_value, depends_on: found, nats }
+    Leftover { p_value, depends_on: found.into_iter().map(|f| (f.0, f.1)).collect(), nats }
 }
 
 /// p-value and nats of one feature.
-fn structure(feature: usize, data: &Data, w: &[f64], deepest: f64) -> (f64, f64) {
+fn structure(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> (f64, f64) {
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new(); // per recording and bin: sum, count
-    let mut from = 0;
-    for track in data.tracks.iter() {
+    for (b, w) in data.blocks.iter().zip(w) {
         // A single recording is compared with itself: every other half second.
-        let halves = if data.tracks.len() == 1 { 2 } else { 1 };
-        let mut sums = vec![vec![(0.0, 0.0); 800]; halves];
-        for (i, bin) in bins(feature, track, deepest).into_iter().enumerate() {
-            if track.used[i] {
-                let half = if halves == 2 { ((track.t[i] - track.t[0]) / 0.25) as usize % 2 } else { 0 };
+        let halves = if data.recordings() == 1 { 2 } else { 1 };
+        let mut sums = vec![vec![(0.0, 0.0); BINS]; halves];
+        let first = b.from_s.first().copied().unwrap_or(0.0);
+        for (i, bin) in bins(feature, b, deepest).into_iter().enumerate() {
+            if b.used[i] {
+                let half = if halves == 2 { ((b.from_s[i] - first) / 0.5) as usize % 2 } else { 0 };
                 if let Some(slot) = sums[half].get_mut(bin) {
-                    slot.0 += w[from + i].clamp(-4.0, 4.0);
+                    slot.0 += w[i].clamp(-4.0, 4.0);
                     slot.1 += 1.0;
                 }
             }
         }
         parts.extend(sums);
-        from += track.len();
     }
     let (mut t, mut variance, mut third, mut pooled, mut used) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for bin in 0..800 {
-        let z: Vec<(f64, f64)> = parts.iter().map(|p| p[bin]).filter(|s| s.1 >= 8.0).collect();
+    for bin in 0..BINS {
+        let z: Vec<(f64, f64)> = parts.iter().map(|p| p[bin]).filter(|s| s.1 >= LEAST).collect();
         let all: (f64, f64) = z.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         if all.1 > 0.0 {
             pooled += all.0 * all.0 / all.1;
@@ -126,8 +130,7 @@ fn structure(feature: usize, data: &Data, w: &[f64], deepest: f64) -> (f64, f64)
         for (k, a) in z.iter().enumerate() {
             for b in &z[..k] {
                 t += a.0 * b.0 / (a.1 * b.1).sqrt();
-                // Under the null a product of independent values; their sizes as observed would hide a strong
-                // structure, so unit variance is the floor and the ceiling is a mild excess.
+                // Under the null a product of independent values of unit variance.
                 variance += 1.0;
             }
         }
@@ -152,7 +155,7 @@ pub fn skewed_tail(z: f64, skewness: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{skewed_tail, tail};
+    use super::skewed_tail;
 
     /// Against the exact upper tails of chi-square with 2 and 8 degrees of freedom (`exp(-x/2)` and its series).
     #[test]
@@ -165,12 +168,8 @@ mod tests {
             (-x).exp() * (1.0 + x + x * x / 2.0 + x * x * x / 6.0)
         };
         for z in [1.0, 3.0, 5.0] {
-            assert!(
-                (skewed_tail(z, 1.0) / eight(z) - 1.0).abs() < 0.25,
-                "{z}: {}",
-                skewed_tail(z, 1.0) / eight(z)
-            );
+            assert!((skewed_tail(z, 1.0) / eight(z) - 1.0).abs() < 0.25, "{z}: {}", skewed_tail(z, 1.0) / eight(z));
         }
-        assert!((skewed_tail(2.0, 0.0) - tail(2.0)).abs() < 1e-15);
+        assert!((skewed_tail(2.0, 0.0) - stylet_stats::normal::sf(2.0)).abs() < 1e-15);
     }
 }

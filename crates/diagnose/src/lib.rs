@@ -1,59 +1,46 @@
 //! Given measured data: what the simulation gets wrong, why, and how much better it gets.
 //!
-//! [`diagnose()`] takes what a scenario believes and what was measured, and goes the eight steps of SPEC
-//! section 7. The pieces, in the order in which data pass them:
+//! [`diagnose()`] takes what a scenario believes and what was measured, and goes the steps of SPEC section 7 on the one
+//! likelihood of `stylet-identify`. The pieces, in the order in which data pass them:
 //!
 //! | module | what lives there |
 //! |---|---|
 //! | [`raw`] | saturation, quantisation, spikes: read off the raw force, named without a law |
-//! | [`velocity`] | velocity from positions, with its jumps at their instants |
-//! | [`track`] | columns made ready for thousands of replays; averages over blocks |
-//! | [`ruptures`] | where each layer ruptured in the data: law-guided Viterbi path, then the edge of the drop |
-//! | [`air`], [`noise`] | autoregressive noise (order two at most) before contact; whitening |
-//! | [`model`], [`forward`] | base parameters and effects as one vector; the replay with imposed or free ruptures, and one event per rupture |
-//! | [`columns`] | the slopes of the base parameters from one replay |
-//! | [`fit`], [`refine`] | bounded Levenberg-Marquardt on Huber's loss; ruptures moved to where a model wants them |
-//! | [`starts`], [`look`] | where fits begin; a linear look that ranks starts and tells what is invisible |
-//! | [`search`] | forward selection, every rival with the base re-fitted; exchange, pruning |
-//! | [`thresholds`] | what each effect must gain, calibrated on clean data |
+//! | [`base`] | the base law with its geometry: drops given to layers, numbers and instants in turn |
+//! | [`propose`], [`lines`] | what every effect would gain to first order, and where its fit starts |
+//! | [`select`], [`judge`] | effects enter by what they gain and leave when the others can do without them |
+//! | [`geometry`] | whether the believed geometry stands; a scaled position, a shifted face |
+//! | [`rivals`] | effects that explain the data as well |
+//! | [`intervals`] | intervals of every number |
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
-//! | [`held_out`] | the gain on recordings left out of the fit |
+//! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
-//! | [`terms`] | the same candidates as columns, for sparse regressions beside |
-//! | [`hidden`], [`benchmark`] | cases drawn without knowledge of the above, and the examination on them |
+//! | [`hidden`], [`benchmark`] | cases of the own world, and the examination on them |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
-pub mod air;
-pub mod engine;
+pub mod base;
 pub mod benchmark;
 mod check;
-pub mod columns;
 pub mod curves;
 mod diagnose;
 mod error;
-pub mod fit;
-pub mod forward;
+pub mod geometry;
 pub mod held_out;
 pub mod hidden;
+pub mod intervals;
+pub mod judge;
 pub mod leftover;
-pub mod look;
-pub mod model;
-pub mod noise;
+pub mod lines;
 pub mod outcome;
-pub mod profile;
+pub mod propose;
 pub mod raw;
-pub mod refine;
-pub mod ruptures;
-pub mod search;
-pub mod spectrum;
-pub mod starts;
-pub mod terms;
-pub mod thresholds;
-pub mod track;
-pub mod velocity;
+pub mod rivals;
+pub mod select;
+pub mod small;
 pub mod visible;
 
-pub use diagnose::{CLASS_NATS, Evidence, Examined, Options, diagnose};
+pub use diagnose::{Evidence, Examined, Options, belief, diagnose};
 pub use error::DiagnoseError;
 pub use outcome::{Diagnosis, Verdict};
+pub use rivals::CLASS_NATS;

@@ -42,12 +42,26 @@ pub struct Cause {
     pub parameters: BTreeMap<String, Estimate>,
     /// Nats that it gains.
     pub gain_nats: f64,
+    /// Share of what the base law leaves beyond the noise that is left again without it, 0 to 1.
+    #[serde(default)]
+    pub share: f64,
+}
+
+/// An effect that was found and is too small to matter, or that does not pay on recordings left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Trace {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Parameters by their paths.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Why it is no cause.
+    pub why: String,
 }
 
 /// A base parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BaseParameter {
-    /// Layer, 1-based.
+    /// Layer, 1-based; 0 for what belongs to the whole stack.
     pub layer: usize,
     /// Field of the layer.
     pub name: String,
@@ -91,6 +105,9 @@ pub struct LeftoverReport {
     pub depends_on: Vec<String>,
     /// Nats that the strongest dependence explains.
     pub nats: f64,
+    /// Share of what the base law leaves beyond the noise that is still left, 0 to 1.
+    #[serde(default)]
+    pub share: f64,
 }
 
 /// One rival of a step of the search.
@@ -153,6 +170,9 @@ pub struct Diagnosis {
     pub invisible: Vec<String>,
     /// Gain.
     pub gain: Gain,
+    /// Effects found that are too small to matter.
+    #[serde(default)]
+    pub traces: Vec<Trace>,
     /// What remains.
     pub leftover: LeftoverReport,
     /// Data quality.

@@ -1,6 +1,6 @@
 //! What the raw numbers say before any law: saturation, quantisation, spikes.
 
-use crate::noise::median;
+use stylet_stats::order::median;
 use stylet_record::{QualityKind, QualityNote, Recording};
 
 /// What was found in the raw force.

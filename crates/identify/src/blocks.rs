@@ -35,6 +35,10 @@ pub struct Blocks {
     pub size_n: Vec<f64>,
     /// Standard deviation in N of what sampling leaves open of the block's mean where the speed jumps.
     pub doubt_n: Vec<f64>,
+    /// Forces in N as they were recorded.
+    pub raw_f: Arc<Vec<f64>>,
+    /// The block of every recorded force.
+    pub raw_block: Arc<Vec<u32>>,
     /// Samples in a block.
     pub samples: usize,
     /// Time between samples in s.
@@ -63,12 +67,15 @@ impl Blocks {
             restart: Vec::new(),
             size_n: Vec::new(),
             doubt_n: Vec::new(),
+            raw_f: Arc::new(recording.force_n.clone()),
+            raw_block: Arc::default(),
             samples: q,
             step_s,
             motion,
             pieces: Arc::default(),
         };
         let mut i = 0;
+        let mut raw_block = Vec::with_capacity(n);
         while i < n {
             let mut to = i + 1;
             while to < n && to - i < q && t[to] - t[to - 1] <= GAP * step_s {
@@ -83,8 +90,10 @@ impl Blocks {
             b.to_s.push(to_s);
             b.f.push(if kept > 0 { sum / kept as f64 } else { 0.0 });
             b.used.push(2 * kept > q.min(to - i) && 2 * (to - i) > q);
+            raw_block.resize(to, (b.f.len() - 1) as u32);
             i = to;
         }
+        b.raw_block = Arc::new(raw_block);
         b.leave_out_jumps(t);
         b.finish();
         b
@@ -163,6 +172,51 @@ impl Blocks {
     #[must_use]
     pub fn pieces_shown(&self, shown: Shown) -> Vec<Piece> {
         self.motion.pieces(self.from_s.iter().copied().zip(self.to_s.iter().copied()), shown)
+    }
+
+    /// Residuals (N) of the recorded forces for those of the blocks: what a block leaves, and what a sample differs from
+    /// the course of the blocks' means.
+    #[must_use]
+    pub fn raw_residual(&self, e: &[f64]) -> Vec<f64> {
+        let n = self.len();
+        let mut within = 0;
+        let mut before = u32::MAX;
+        (0..self.raw_f.len())
+            .map(|i| {
+                let block = self.raw_block[i];
+                within = if block == before { within + 1 } else { 0 };
+                before = block;
+                let k = block as usize;
+                let (lo, hi) = (k.saturating_sub(1), (k + 1).min(n - 1));
+                // Predicted means have the slope of their neighbours.
+                let predicted = |k: usize| self.f[k] - e[k];
+                let slope = (predicted(hi) - predicted(lo)) / ((hi - lo).max(1) * self.samples) as f64;
+                let off = within as f64 - 0.5 * (self.samples as f64 - 1.0);
+                self.raw_f[i] - predicted(k) - slope * off
+            })
+            .collect()
+    }
+
+    /// Standard deviation in N of recorded forces about their blocks' means, by the median block.
+    #[must_use]
+    pub fn within_n(&self) -> f64 {
+        if self.samples < 2 {
+            return 0.0;
+        }
+        let mut sums = vec![(0.0, 0.0, 0.0); self.len()];
+        for (f, k) in self.raw_f.iter().zip(self.raw_block.iter()) {
+            let s: &mut (f64, f64, f64) = &mut sums[*k as usize];
+            *s = (s.0 + 1.0, s.1 + f, s.2 + f * f);
+        }
+        let mut variances: Vec<f64> = sums
+            .iter()
+            .filter(|s| s.0 >= 2.0)
+            .map(|(n, f, ff)| (ff / n - (f / n) * (f / n)).max(0.0))
+            .collect();
+        variances.sort_unstable_by(f64::total_cmp);
+        // A mean without the roughest tenth, which ruptures and jumps make.
+        let kept = variances.len() * 9 / 10;
+        (variances[..kept].iter().sum::<f64>() / kept.max(1) as f64).sqrt()
     }
 
     /// Number of blocks.

@@ -16,6 +16,8 @@ pub struct Motion {
     pub jumps: Vec<Jump>,
     /// Standard deviation in m/s of what the positions leave open of the velocity.
     pub velocity_sd_mps: f64,
+    /// Standard deviation of the positions' noise in m.
+    pub noise_m: f64,
 }
 
 /// Position and velocity, linear between knots.
@@ -84,7 +86,7 @@ impl Motion {
     }
 
     fn from_knots(t: &[f64], z: &[f64], v: &[f64], kinks: &[Kink], sd: f64, noise_m: f64) -> Self {
-        let mut m = Self { velocity_sd_mps: sd, ..Self::default() };
+        let mut m = Self { velocity_sd_mps: sd, noise_m, ..Self::default() };
         let mut kinks = kinks.iter().peekable();
         for i in 0..t.len() {
             while let Some(kink) = kinks.next_if(|k| k.sample <= i) {

@@ -67,9 +67,9 @@ impl Noise {
         Self { edges_n: Vec::new(), bins: vec![Bin { a: [0.0; ORDER], innovation_n: sd_n, sd_n }] }
     }
 
-    /// The noise of residuals `e` (N), one column per recording.
+    /// The noise of residuals `e` (N), one column per recording; nowhere less than `floor_n`.
     #[must_use]
-    pub fn estimate(blocks: &[Blocks], e: &[Vec<f64>], from: From) -> Self {
+    pub fn estimate(blocks: &[Blocks], e: &[Vec<f64>], from: From, floor_n: f64) -> Self {
         let columns: Vec<Vec<f64>> = match from {
             From::Whole => e.to_vec(),
             From::Calm => blocks.iter().zip(e).map(|(b, e)| calm(b, e)).collect(),
@@ -84,7 +84,7 @@ impl Noise {
             (1..count).map(|k| quantile_of_sorted(&sizes, k as f64 / count as f64)).collect();
         let mut noise = Self { edges_n, bins: Vec::new() };
         for bin in 0..count {
-            noise.bins.push(noise.fit(blocks, &columns, bin));
+            noise.bins.push(noise.fit(blocks, &columns, bin, floor_n.max(FLOOR_N)));
         }
         noise
     }
@@ -96,7 +96,7 @@ impl Noise {
     }
 
     /// Robust least squares of one range.
-    fn fit(&self, blocks: &[Blocks], columns: &[Vec<f64>], bin: usize) -> Bin {
+    fn fit(&self, blocks: &[Blocks], columns: &[Vec<f64>], bin: usize, floor_n: f64) -> Bin {
         let mut rows: Vec<[f64; ORDER + 1]> = Vec::new();
         let mut all: Vec<f64> = Vec::new();
         for (b, e) in blocks.iter().zip(columns) {
@@ -112,7 +112,7 @@ impl Noise {
                 }
             }
         }
-        let sd_n = (median(&mut all) * 1.4826).max(FLOOR_N);
+        let sd_n = (median(&mut all) * 1.4826).max(floor_n);
         let white = Bin { a: [0.0; ORDER], innovation_n: sd_n, sd_n };
         if rows.len() < 40 {
             return if sd_n.is_finite() { white } else { Bin { a: [0.0; ORDER], innovation_n: 1.0, sd_n: 1.0 } };
@@ -136,7 +136,7 @@ impl Noise {
                 }
                 let x = h.factor().solve(&g);
                 a[..order].copy_from_slice(&x);
-                s = scale(&rows, &a).max(FLOOR_N);
+                s = scale(&rows, &a).max(floor_n);
             }
             if !stationary(&a[..order]) {
                 continue;

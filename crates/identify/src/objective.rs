@@ -5,7 +5,7 @@ use crate::events::{Event, judge};
 use crate::forward::{Replayed, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
 use crate::motion::{Piece, Shown};
-use crate::noise::{Noise, rho};
+use crate::noise::{From, Noise, rho};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -16,20 +16,28 @@ pub struct Data {
     pub blocks: Arc<Vec<Blocks>>,
     /// The noise.
     pub noise: Arc<Noise>,
+    /// The noise is nowhere less, in N: what the recorded force is rounded to leaves open.
+    pub floor_n: f64,
 }
 
 impl Data {
     /// The same recordings judged by another noise.
     #[must_use]
     pub fn with_noise(&self, noise: Noise) -> Self {
-        Self { blocks: Arc::clone(&self.blocks), noise: Arc::new(noise) }
+        Self { blocks: Arc::clone(&self.blocks), noise: Arc::new(noise), floor_n: self.floor_n }
+    }
+
+    /// The same recordings judged by the noise that residuals tell.
+    #[must_use]
+    pub fn judged_by(&self, e: &[Vec<f64>], from: From) -> Self {
+        self.with_noise(Noise::estimate(&self.blocks, e, from, self.floor_n))
     }
 
     /// Some of the recordings.
     #[must_use]
     pub fn only(&self, which: &[usize]) -> Self {
         let blocks = which.iter().map(|k| self.blocks[*k].clone()).collect();
-        Self { blocks: Arc::new(blocks), noise: Arc::clone(&self.noise) }
+        Self { blocks: Arc::new(blocks), noise: Arc::clone(&self.noise), floor_n: self.floor_n }
     }
 
     /// Number of blocks compared.

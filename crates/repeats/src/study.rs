@@ -432,6 +432,7 @@ fn diagnosis(
     let causes: Vec<Cause> = ids
         .iter()
         .map(|id| Cause {
+            share: 0.0,
             effect: (*id).to_owned(),
             equivalent: Vec::new(),
             confidence: confidence(
@@ -471,6 +472,7 @@ fn diagnosis(
         .collect();
     let verdict = if causes.is_empty() { Verdict::None } else { Verdict::Named };
     Diagnosis {
+        traces: Vec::new(),
         verdict,
         causes,
         base_parameters,
@@ -606,6 +608,7 @@ fn leftover(best: &Fit, runs: &[&Run]) -> LeftoverReport {
         .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     LeftoverReport {
+        share: 0.0,
         p_value: found[0].0,
         depends_on: found.iter().filter(|f| f.0 < 1e-3).map(|f| f.2.to_owned()).collect(),
         nats: found[0].1,
@@ -721,6 +724,8 @@ fn blank() -> Scenario {
         sample_hz: 200.0,
         physics_hz: 1000.0,
         tolerance: 0.3,
+        thickness_tolerance: 0.1,
+        surface_tolerance_m: 0.002,
         seed: 1,
     }
 }

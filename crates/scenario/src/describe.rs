@@ -187,6 +187,8 @@ const ROWS: &[Row] = &[
     ("sample_hz", "Hz", "above 0", "samples per second"),
     ("physics_hz", "Hz", "positive; rounded up to a whole multiple of sample_hz", "physics steps per second"),
     ("tolerance", "", "above 0, below 1", "how far the tissue's numbers may be off, relative"),
+    ("thickness_tolerance", "", "0 or above, below 1", "how far thicknesses may be off, relative"),
+    ("surface_tolerance_m", "m", "0 or above, below 1", "how far the surface may be off"),
     ("seed", "", "whole number", "seed of every random number"),
 ];
 

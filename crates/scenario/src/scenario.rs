@@ -54,6 +54,12 @@ pub struct Scenario {
     /// How far the tissue's numbers may be off, relative, 0 to 1: bounds for the diagnosis.
     #[serde(default = "tolerance")]
     pub tolerance: f64,
+    /// The same for thicknesses.
+    #[serde(default = "thickness_tolerance")]
+    pub thickness_tolerance: f64,
+    /// How far the surface may be off, in m.
+    #[serde(default = "surface_tolerance_m")]
+    pub surface_tolerance_m: f64,
     /// Seed of every random number.
     #[serde(default = "seed")]
     pub seed: u64,
@@ -67,6 +73,12 @@ fn physics_hz() -> f64 {
 }
 fn tolerance() -> f64 {
     0.3
+}
+fn thickness_tolerance() -> f64 {
+    0.1
+}
+fn surface_tolerance_m() -> f64 {
+    0.002
 }
 fn seed() -> u64 {
     1

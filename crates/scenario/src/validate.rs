@@ -37,6 +37,19 @@ pub(crate) fn scenario(s: &Scenario) -> Checked {
     check("sample_hz", s.sample_hz, s.sample_hz > 0.0, "it must be positive, for example 200.0")?;
     check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
     check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
+    let within = |x: f64| (0.0..1.0).contains(&x);
+    check(
+        "thickness_tolerance",
+        s.thickness_tolerance,
+        within(s.thickness_tolerance),
+        "it must be zero or positive and below 1",
+    )?;
+    check(
+        "surface_tolerance_m",
+        s.surface_tolerance_m,
+        within(s.surface_tolerance_m),
+        "it must be zero or positive and below 1 m",
+    )?;
     motion(s)?;
     sensors(&s.sensor, s.physics_hz)?;
     validate_arm::robot(s)?;

@@ -86,6 +86,8 @@ pub fn scenario() -> Scenario {
         sample_hz: SAMPLE_HZ,
         physics_hz: 1000.0,
         tolerance: 0.3,
+        thickness_tolerance: 0.1,
+        surface_tolerance_m: 0.002,
         seed: 1,
     }
 }

@@ -1,13 +1,13 @@
 //! Effects enter by what they gain, and leave when the others can do without them.
 
-use super::base::Prepared;
-use super::judge::{LEAST, cost, gain};
-use super::propose::{Start, starts};
+use crate::base::Prepared;
+use crate::judge::{LEAST, cost, gain};
+use crate::propose::{Start, starts};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
-use stylet_identify::model::Model;
-use stylet_identify::noise::{From, Noise};
+use stylet_identify::model::{Choice, Model};
+use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
 
@@ -26,6 +26,10 @@ pub struct Stage {
     pub rivals: Vec<(&'static str, f64, usize)>,
     /// The one taken, and what it gained.
     pub taken: Option<(&'static str, f64)>,
+    /// Nats that it needed.
+    pub needed: f64,
+    /// The rivals as effects, where one was taken.
+    pub choices: Vec<Choice>,
 }
 
 /// A search under way.
@@ -40,18 +44,23 @@ pub struct Search {
     pub stages: Vec<Stage>,
 }
 
-/// Frequencies (Hz) at which the residual has lines.
-pub fn strongest_lines(_look: &Look) -> Vec<f64> {
-    Vec::new()
-}
-
 impl Search {
     /// From the base law on.
     #[must_use]
-    pub fn run(prepared: &Prepared, base: Fit, data: Data) -> Self {
+    pub fn run(prepared: &Prepared, base: Fit, data: Data, progress: &mut impl FnMut(&str)) -> Self {
         let mut search = Self { best: base.clone(), base, data, stages: Vec::new() };
-        while search.best.model.effects.len() < MOST && search.grow(prepared) {}
+        loop {
+            let stands = search.best.model.effects.len();
+            progress(&format!("looking for {} effect", if stands == 0 { "an" } else { "another" }));
+            if stands >= MOST || !search.grow(prepared) {
+                break;
+            }
+        }
         search.prune();
+        let told = crate::geometry::tighten(&mut search, prepared);
+        if told {
+            search.prune();
+        }
         search
     }
 
@@ -93,6 +102,8 @@ impl Search {
                 .map(|f| (name(f), self.best.nats() - f.nats(), f.model.effect_numbers()))
                 .collect(),
             taken: None,
+            needed: full.first().map_or(0.0, |f| worth(&f.model) - worth(&self.best.model) + LEAST),
+            choices: full.iter().filter_map(|f| f.model.effects.last().cloned()).collect(),
         };
         for f in full.into_iter().take(2) {
             let needed = worth(&f.model) - worth(&self.best.model) + LEAST;
@@ -113,8 +124,8 @@ impl Search {
     }
 
     /// Makes a fit the best, with the noise that it leaves.
-    fn settle(&mut self, f: Fit) {
-        self.data = self.data.with_noise(Noise::estimate(&self.data.blocks, &f.residuals.e, From::Calm));
+    pub fn settle(&mut self, f: Fit) {
+        self.data = self.data.judged_by(&f.residuals.e, From::Calm);
         self.best = fit(&f.model, &self.data, Effort::FULL).unwrap_or(f);
     }
 

@@ -20,14 +20,16 @@ pub struct Prepared {
     pub blocks: Arc<Vec<Blocks>>,
     /// Drops per recording.
     pub drops: Vec<Vec<Drop>>,
+    /// The noise is nowhere less, in N.
+    pub floor_n: f64,
 }
 
 impl Prepared {
     /// Finds the drops.
     #[must_use]
-    pub fn new(belief: Arc<Belief>, blocks: Vec<Blocks>) -> Self {
+    pub fn new(belief: Arc<Belief>, blocks: Vec<Blocks>, floor_n: f64) -> Self {
         let drops = blocks.par_iter().map(drops).collect();
-        Self { belief, blocks: Arc::new(blocks), drops }
+        Self { belief, blocks: Arc::new(blocks), drops, floor_n }
     }
 
     /// Instants (s) of the drops.
@@ -60,7 +62,7 @@ fn roughness(blocks: &[Blocks]) -> f64 {
 pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
-    let mut data = Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide) };
+    let mut data = Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide), floor_n: prepared.floor_n };
     let mut model = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
@@ -79,12 +81,12 @@ pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
     let mut best = best?;
     let times = prepared.drop_times();
     for round in 0..3 {
-        data = data.with_noise(Noise::estimate(&data.blocks, &best.residuals.e, From::Calm));
+        data = data.judged_by(&best.residuals.e, From::Calm);
         let mut model = best.model.clone();
         retime(&mut model, &data, &times);
         best = fit(&model, &data, if round == 2 { Effort::FULL } else { Effort { turns: 5, enough: 0.3 } })?;
     }
-    data = data.with_noise(Noise::estimate(&data.blocks, &best.residuals.e, From::Calm));
+    data = data.judged_by(&best.residuals.e, From::Calm);
     best = fit(&best.model, &data, Effort::FULL)?;
     Some((best, data))
 }

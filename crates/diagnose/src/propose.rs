@@ -1,6 +1,6 @@
 //! Where a search begins: for every effect the starts that gain most to first order.
 
-use super::base::Prepared;
+use crate::base::Prepared;
 use rayon::prelude::*;
 use stylet_identify::fit::Column;
 use stylet_identify::look::{Gain, Look, scaled};
@@ -157,7 +157,7 @@ fn slopes(look: &Look) -> Option<(Vec<Vec<f64>>, Vec<Vec<f64>>)> {
 
 /// Lines of the residual's spectrum.
 fn lines(info: &'static EffectInfo, look: &Look) -> Vec<Start> {
-    super::super::engine::select::strongest_lines(look)
+    crate::lines::lines(look.fit, look.data)
         .into_iter()
         .filter_map(|hz| {
             let quarter = core::f64::consts::FRAC_PI_2;

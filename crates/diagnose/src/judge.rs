@@ -1,7 +1,7 @@
 //! Whether a larger model is worth its numbers: both under the noise that the larger one leaves.
 
 use stylet_identify::fit::{Effort, Fit, fit};
-use stylet_identify::noise::{From, Noise};
+use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
 
 /// Nats that an effect must gain beyond half the logarithm of the number of blocks per fitted number.
@@ -10,7 +10,7 @@ pub const LEAST: f64 = 4.0;
 /// What `larger` gains over `smaller` when all that `larger` leaves is noise.
 #[must_use]
 pub fn gain(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
-    let own = data.with_noise(Noise::estimate(&data.blocks, &larger.residuals.e, From::Whole));
+    let own = data.judged_by(&larger.residuals.e, From::Whole);
     let effort = Effort { turns: 3, enough: 0.2 };
     let (a, b) = rayon::join(|| fit(&smaller.model, &own, effort), || fit(&larger.model, &own, effort));
     match (a, b) {

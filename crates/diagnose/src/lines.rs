@@ -1,0 +1,81 @@
+//! Lines of the residual's spectrum, at the recordings' own rate.
+
+use rustfft::FftPlannerScalar;
+use rustfft::num_complex::Complex;
+use stylet_identify::fit::Fit;
+use stylet_identify::objective::Data;
+use stylet_stats::order::median;
+
+/// Zero padding: frequencies are told to a part of the resolution.
+const PADDING: usize = 4;
+/// A line stands out of its surroundings by this factor in power, averaged over recordings.
+const STANDS_OUT: f64 = 14.0;
+/// Bins (before padding) on each side that make the surroundings.
+const AROUND: usize = 60;
+/// Most lines.
+const LINES: usize = 3;
+/// Lowest line in Hz.
+const LEAST_HZ: f64 = 0.3;
+
+/// Frequencies (Hz) at which the residual of a fit has lines, strongest first.
+#[must_use]
+pub fn lines(fit: &Fit, data: &Data) -> Vec<f64> {
+    let longest = data.blocks.iter().map(|b| b.raw_f.len()).max().unwrap_or(0);
+    if longest < 64 {
+        return Vec::new();
+    }
+    let size = (longest * PADDING).next_power_of_two();
+    let mut power = vec![0.0; size / 2];
+    let mut planner = FftPlannerScalar::new();
+    let fft = planner.plan_fft_forward(size);
+    let step_s = data.blocks[0].step_s;
+    for (r, b) in data.blocks.iter().enumerate() {
+        if (b.step_s / step_s - 1.0).abs() > 0.01 {
+            continue;
+        }
+        let mut e = b.raw_residual(&fit.residuals.e[r]);
+        let mut sizes: Vec<f64> = e.iter().map(|e| e.abs()).collect();
+        let limit = 6.0 * median(&mut sizes).max(1e-9);
+        e.iter_mut().for_each(|e| *e = e.clamp(-limit, limit));
+        let n = e.len() as f64;
+        let mut buffer: Vec<Complex<f64>> = e
+            .iter()
+            .enumerate()
+            .map(|(k, e)| {
+                let taper = 0.5 - 0.5 * libm::cos(core::f64::consts::TAU * (k as f64 + 0.5) / n);
+                Complex::new(taper * e, 0.0)
+            })
+            .collect();
+        buffer.resize(size, Complex::new(0.0, 0.0));
+        fft.process(&mut buffer);
+        let scale = 1.0 / (limit * limit * n);
+        power.iter_mut().zip(&buffer).for_each(|(p, c)| *p += c.norm_sqr() * scale);
+    }
+    let bin_hz = 1.0 / (size as f64 * step_s);
+    let around = AROUND * PADDING;
+    let first = ((LEAST_HZ / bin_hz) as usize).max(1);
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    let last = power.len().saturating_sub(1);
+    let mut floor = 0.0;
+    for k in first..last {
+        if (k - first).is_multiple_of(around / 4) {
+            let (lo, hi) = (k.saturating_sub(around), (k + around).min(last));
+            floor = median(&mut power[lo..hi].to_vec());
+        }
+        if power[k] > STANDS_OUT * floor && power[k] > power[k - 1] && power[k] >= power[k + 1] {
+            // The top of a parabola through the three.
+            let (a, b, c) = (power[k - 1], power[k], power[k + 1]);
+            let shift = 0.5 * (a - c) / (a - 2.0 * b + c);
+            found.push((power[k] / floor.max(1e-300), (k as f64 + shift) * bin_hz));
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // Neighbours of a strong line are its own flanks.
+    let mut out: Vec<f64> = Vec::new();
+    for (_, hz) in found {
+        if out.iter().all(|o| (o - hz).abs() > 8.0 * PADDING as f64 * bin_hz) && out.len() < LINES {
+            out.push(hz);
+        }
+    }
+    out
+}

@@ -1,0 +1,71 @@
+//! Effects that were found and are too small to matter: traces.
+
+use crate::held_out::{Left, left_out, rms};
+use crate::outcome::Cause;
+use crate::select::Search;
+use rayon::prelude::*;
+use stylet_identify::fit::{Effort, fit};
+use stylet_tissue::{Place, Proposal};
+
+/// A trace.
+#[derive(Clone, Debug)]
+pub struct Small {
+    /// Effect.
+    pub effect: String,
+    /// Why.
+    pub why: String,
+}
+
+/// A cause changes the left-out root mean square by at least this share of the noise.
+const LEAST_SHARE: f64 = 0.002;
+/// A lag or a delay below this share of the sampling step is none.
+const OF_STEP: f64 = 0.05;
+/// A motion below this share of the encoder's noise is none.
+const OF_ENCODER: f64 = 0.1;
+/// A cause that brings back less than this share of the noise's variance is asked whether it pays.
+const ASKED: f64 = 0.3;
+
+/// Causes that are traces.
+#[must_use]
+pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<Small> {
+    let noise_n = crate::held_out::floor(&search.data);
+    let with_n = rms(after, &search.data);
+    let effects = &search.best.model.effects;
+    let one = |c: &Cause| -> Option<Small> {
+        let k = effects.iter().position(|e| e.info.id == c.effect)?;
+        let why = |why: String| Some(Small { effect: c.effect.clone(), why });
+        if let Some(reason) = unresolved(search, k) {
+            return why(reason);
+        }
+        let without = fit(&search.best.model.without(k), &search.data, Effort { turns: 4, enough: 0.5 })?;
+        let lost = (without.nats() - search.best.nats()) / search.data.compared() as f64;
+        if lost > ASKED {
+            return None;
+        }
+        let without_n = rms(&left_out(&without, &search.data), &search.data);
+        let gained = (without_n - with_n) / noise_n;
+        (gained < LEAST_SHARE).then(|| {
+            let change = if gained < 0.0 { "makes left-out recordings no better" } else { "changes left-out recordings by less than 0.2 % of the noise" };
+            Small { effect: c.effect.clone(), why: change.to_owned() }
+        })
+    };
+    causes.par_iter().filter_map(one).collect()
+}
+
+/// Why the number of an effect lies below what the instrument resolves.
+fn unresolved(search: &Search, k: usize) -> Option<String> {
+    let choice = &search.best.model.effects[k];
+    let step_s = search.data.blocks.iter().map(|b| b.step_s).fold(f64::INFINITY, f64::min);
+    for (p, value) in choice.info.parameters.iter().zip(&choice.values) {
+        if p.strength && p.unit == "s" && choice.info.place == Place::Sensor && *value < OF_STEP * step_s {
+            return Some("below a twentieth of the sampling step".to_owned());
+        }
+        if p.strength && p.unit == "m" && choice.info.proposal == Proposal::Breath {
+            let noise_m = search.data.blocks.iter().map(|b| b.motion.noise_m).fold(0.0, f64::max);
+            if *value < OF_ENCODER * noise_m {
+                return Some("below a tenth of the encoder's noise".to_owned());
+            }
+        }
+    }
+    None
+}
