@@ -6,7 +6,6 @@
 use rayon::prelude::*;
 use stylet_diagnose::benchmark::{Result, run, summary};
 use stylet_diagnose::hidden::{self, Drawn, Harder, Kind, Motions, Size, sketch_of};
-use stylet_diagnose::search::Settings;
 use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
 use stylet_tissue::AnyEffect;
 
@@ -15,7 +14,7 @@ fn examine(kind: Kind, turns: &[u64]) -> Vec<Result> {
 }
 
 fn case(seed: u64, kind: Kind, turn: u64) -> Option<Result> {
-    run(turn, &sketch_of(seed, turn, kind, turn), Settings::default())
+    run(turn, &sketch_of(seed, turn, kind, turn))
 }
 
 #[test]
@@ -54,7 +53,7 @@ fn ruptures_that_are_smeared_unseen_or_side_by_side_do_not_mislead() {
 fn punctures_that_scatter_are_not_taken_for_an_effect() {
     for (kind, turn) in [(Kind::Clean, 4), (Kind::Single, 6)] {
         let sketch = Harder::Scatter.make(sketch_of(94, turn, kind, turn));
-        let found = run(turn, &sketch, Settings::default()).expect("a result");
+        let found = run(turn, &sketch).expect("a result");
         assert!(found.right, "{kind:?} {turn}: {:?} for {:?}", found.named, found.hidden);
     }
 }

@@ -4,6 +4,7 @@ use crate::args::DiagnoseArgs;
 use crate::diagnose::sentence;
 use std::fmt::Write as _;
 use stylet_diagnose::Examined;
+use stylet_diagnose::lines::spectrum;
 use stylet_diagnose::curves::{Curves, binned, by_layer_and_phase, correlations, curves, shown};
 use stylet_diagnose::outcome::{Diagnosis, Verdict};
 use stylet_report::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
@@ -244,7 +245,7 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
         velocity = velocity.with_series(Series::points(name.clone(), colour, x, y));
     }
     section = section.chart(time).chart(depth).chart(velocity);
-    let layers = examined.search.base.model.assumed.layers.len();
+    let layers = examined.search.base.model.layers();
     let (before, after) =
         (by_layer_and_phase(all, |c| &c.base_n, layers), by_layer_and_phase(all, |c| &c.extended_n, layers));
     let rows = before
@@ -295,18 +296,18 @@ fn residual(d: &Diagnosis, examined: &Examined, all: &[Curves]) -> Section {
             .collect(),
     });
     let search = &examined.search;
-    let (f, base) = search.spectrum(&search.base, &search.data_of(&search.base));
+    let (f, base) = spectrum(&search.base, &search.data);
     let best = shown(examined);
-    let (_, after) = search.spectrum(best, &search.data_of(best));
+    let (_, after) = spectrum(best, &search.data);
     let keep: Vec<usize> = thin(&f, &base);
     let pick = |x: &[f64]| keep.iter().map(|k| x[*k]).collect::<Vec<_>>();
-    let spectrum = Chart::new("Periodogram of the whitened residual", "log10 of frequency (Hz)", "Nats explained by a sinusoid")
-        .caption("Noise of the estimated colour stands at the number of recordings; the highest of each fiftieth of a decade is drawn.")
+    let chart = Chart::new("Spectrum of the residual", "log10 of frequency (Hz)", "N/sqrt(Hz)")
+        .caption("Amplitude of the residual at the recordings' own rate, mean over recordings; the highest of each fiftieth of a decade is drawn.")
         .height(240);
     let log: Vec<f64> = pick(&f).iter().map(|f| f.log10()).collect();
     section.chart(Chart {
         scale: Scale::Log,
-        ..spectrum
+        ..chart
             .with_series(Series::line("base law", Colour::Vermillion, log.clone(), pick(&base)))
             .with_series(Series::line("extended model", Colour::Blue, log, pick(&after)))
     })

@@ -92,6 +92,7 @@ fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
     };
     let causes: Vec<Cause> = kept(found)
         .map(|effect| Cause {
+            share: 0.0,
             effect: effect.to_owned(),
             equivalent: Vec::new(),
             confidence: found
@@ -108,6 +109,7 @@ fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
     let mut noises: Vec<f64> = runs.iter().map(|r| events::noise_n(&r.recording.force_n)).collect();
     let noise = median(&mut noises);
     Diagnosis {
+        traces: Vec::new(),
         verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
         causes,
         base_parameters: Vec::new(),
@@ -122,7 +124,7 @@ fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
             floor_n: noise,
             each_n: Vec::new(),
         },
-        leftover: LeftoverReport { p_value: 1.0, depends_on: Vec::new(), nats: 0.0 },
+        leftover: LeftoverReport { p_value: 1.0, depends_on: Vec::new(), nats: 0.0, share: 0.0 },
         data_quality: runs
             .iter()
             .flat_map(|r| r.notes.iter().map(|n| Quality { recording: r.name.clone(), note: n.clone() }))

@@ -17,18 +17,15 @@ const LINES: usize = 3;
 /// Lowest line in Hz.
 const LEAST_HZ: f64 = 0.3;
 
-/// Frequencies (Hz) at which the residual of a fit has lines, strongest first.
-#[must_use]
-pub fn lines(fit: &Fit, data: &Data) -> Vec<f64> {
+/// Power of the residual of a fit at the recordings' own rate, in N²/Hz: the width of a bin in Hz, and the bins.
+fn power(fit: &Fit, data: &Data, padding: usize) -> (f64, Vec<f64>) {
     let longest = data.blocks.iter().map(|b| b.raw_f.len()).max().unwrap_or(0);
-    if longest < 64 {
-        return Vec::new();
-    }
-    let size = (longest * PADDING).next_power_of_two();
+    let size = (longest * padding).next_power_of_two();
     let mut power = vec![0.0; size / 2];
     let mut planner = FftPlannerScalar::new();
     let fft = planner.plan_fft_forward(size);
-    let step_s = data.blocks[0].step_s;
+    let step_s = data.blocks.first().map_or(1.0, |b| b.step_s);
+    let mut count = 0.0;
     for (r, b) in data.blocks.iter().enumerate() {
         if (b.step_s / step_s - 1.0).abs() > 0.01 {
             continue;
@@ -48,10 +45,38 @@ pub fn lines(fit: &Fit, data: &Data) -> Vec<f64> {
             .collect();
         buffer.resize(size, Complex::new(0.0, 0.0));
         fft.process(&mut buffer);
-        let scale = 1.0 / (limit * limit * n);
+        // One-sided; the taper keeps three eighths of the power.
+        let scale = 2.0 * step_s / (0.375 * n);
         power.iter_mut().zip(&buffer).for_each(|(p, c)| *p += c.norm_sqr() * scale);
+        count += 1.0;
     }
-    let bin_hz = 1.0 / (size as f64 * step_s);
+    power.iter_mut().for_each(|p| *p /= f64::max(count, 1.0));
+    (1.0 / (size as f64 * step_s), power)
+}
+
+/// Spectrum of the residual of a fit for drawing: frequencies in Hz, and amplitudes in N/sqrt(Hz), smoothed.
+#[must_use]
+pub fn spectrum(fit: &Fit, data: &Data) -> (Vec<f64>, Vec<f64>) {
+    const POINTS: usize = 400;
+    let (bin_hz, power) = power(fit, data, 1);
+    let wide = (power.len() / POINTS).max(1);
+    power
+        .chunks(wide)
+        .enumerate()
+        .map(|(k, c)| {
+            let hz = (k as f64 + 0.5) * wide as f64 * bin_hz;
+            (hz, (c.iter().sum::<f64>() / c.len() as f64).sqrt())
+        })
+        .unzip()
+}
+
+/// Frequencies (Hz) at which the residual of a fit has lines, strongest first.
+#[must_use]
+pub fn lines(fit: &Fit, data: &Data) -> Vec<f64> {
+    if data.blocks.iter().all(|b| b.raw_f.len() < 64) {
+        return Vec::new();
+    }
+    let (bin_hz, power) = power(fit, data, PADDING);
     let around = AROUND * PADDING;
     let first = ((LEAST_HZ / bin_hz) as usize).max(1);
     let mut found: Vec<(f64, f64)> = Vec::new();

@@ -4,11 +4,12 @@ use crate::base::Prepared;
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
+use std::sync::Arc;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model};
 use stylet_identify::noise::From;
-use stylet_identify::objective::Data;
+use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
 
 /// Most effects at once.
@@ -16,6 +17,13 @@ pub const MOST: usize = 5;
 /// Effects that get a short fit, and of those the ones that get a full one.
 const SHORT: usize = 8;
 const FULL: usize = 4;
+
+/// An effect gets a fit when it promises this share of what it needs, to first order.
+const PROMISE: f64 = 0.5;
+/// A rival that gains less than the best by more than this share is not fitted to the end.
+const BEHIND: f64 = 0.5;
+/// Blocks of the search are averaged by so many to rank starts.
+const COARSER: usize = 3;
 
 /// One step of the search.
 #[derive(Clone, Debug)]
@@ -67,14 +75,20 @@ impl Search {
     /// Takes one more effect; false when none is worth it.
     fn grow(&mut self, prepared: &Prepared) -> bool {
         let look = Look::new(&self.best, &self.data);
-        let ranked = starts(&look, prepared);
         let times = prepared.drop_times();
         let blocks = self.data.compared();
         let worth = |m: &Model| cost(m.effect_numbers(), blocks);
+        let promises = |s: &[Start]| {
+            let numbers = s[0].choice.info.parameters.iter().filter(|p| !p.whole).count();
+            s[0].nats > PROMISE * (cost(numbers, blocks) + LEAST)
+        };
+        let mut ranked = starts(&look, prepared);
+        ranked.retain(|s| promises(s));
         let tried: Vec<&Start> = ranked.iter().take(SHORT).flatten().collect();
+        let coarse = self.coarse();
         let mut short: Vec<Fit> = tried
             .par_iter()
-            .filter_map(|s| fit(&self.best.model.with(s.choice.clone()), &self.data, Effort::SHORT))
+            .filter_map(|s| fit(&self.best.model.with(s.choice.clone()), &coarse, Effort::SHORT))
             .collect();
         short.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
         let mut names: Vec<&str> = Vec::new();
@@ -84,6 +98,11 @@ impl Search {
             names.push(name);
             new
         });
+        // Rivals far behind are not fitted to the end.
+        if let (Some(first), Some(stood)) = (short.first().map(Fit::nats), residuals(&self.best.model, &coarse)) {
+            let reach = (1.0 - BEHIND) * (stood.nats - first);
+            short.retain(|f| stood.nats - f.nats() >= reach.min(stood.nats - first - 30.0));
+        }
         let mut full: Vec<Fit> = short
             .par_iter()
             .take(FULL)
@@ -121,6 +140,16 @@ impl Search {
         let any = stage.taken.is_some();
         self.stages.push(stage);
         any
+    }
+
+    /// The data averaged further, with the noise of the best, to rank starts.
+    fn coarse(&self) -> Data {
+        let blocks = Arc::new(self.data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
+        let coarse = Data { blocks, ..self.data.clone() };
+        match residuals(&self.best.model, &coarse) {
+            Some(left) => coarse.judged_by(&left.e, From::Calm),
+            None => coarse,
+        }
     }
 
     /// Makes a fit the best, with the noise that it leaves.

@@ -8,7 +8,6 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use stylet_diagnose::benchmark::{Result as Case, run, summary};
 use stylet_diagnose::hidden::sketch;
-use stylet_diagnose::search::Settings;
 
 /// The command in this world.
 ///
@@ -40,7 +39,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     let new: Vec<Option<Case>> = missing
         .par_iter()
         .map(|&index| {
-            let case = run(index, &sketch(args.seed, index), Settings::default())?;
+            let case = run(index, &sketch(args.seed, index))?;
             if let (Ok(mut file), Ok(line)) = (file.lock(), serde_json::to_string(&case)) {
                 let _ = writeln!(file.0, "{line}");
                 file.1 += 1;
