@@ -1,6 +1,6 @@
 //! The thresholds of `crates/diagnose/src/thresholds.rs`: what each effect gains on clean data, and what it must
 //! gain so that all together accuse one clean case in a hundred:
-//! `cargo run --release -p stylet-diagnose --example calibrate -- 200 7001`
+//! `cargo run --release -p stylet-diagnose --features own_world --example calibrate -- 200 7001`
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use stylet_diagnose::hidden::{self, Kind};

@@ -1,5 +1,5 @@
 //! Examines drawn cases of one kind and prints each:
-//! `cargo run --release -p stylet-diagnose --example examine -- single 0 54 [seed [ar2|scatter|velocity|and_outside|one]]`
+//! `cargo run --release -p stylet-diagnose --features own_world --example examine -- single 0 54 [seed [ar2|scatter|velocity|and_outside|one]]`
 use rayon::prelude::*;
 use stylet_diagnose::Verdict;
 use stylet_diagnose::benchmark::run;

@@ -1,5 +1,5 @@
 //! What remains of a drawn case under its truth, and what the search says of it: for finding where replay and
-//! generator part. `cargo run --release -p stylet-diagnose --example outliers -- two 15 22`
+//! generator part. `cargo run --release -p stylet-diagnose --features own_world --example outliers -- two 15 22`
 use stylet_diagnose::benchmark::aim;
 use stylet_diagnose::fit::{Data, Residuals, residuals};
 use stylet_diagnose::hidden::{self, Kind};

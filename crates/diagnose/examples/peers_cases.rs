@@ -1,5 +1,5 @@
 //! Draws cases for sparse regressions and writes what they are given, the truth, and this diagnosis's own
-//! answer: `cargo run --release -p stylet-diagnose --example peers_cases -- DIR CASES SEED`
+//! answer: `cargo run --release -p stylet-diagnose --features own_world --example peers_cases -- DIR CASES SEED`
 //!
 //! Of ten cases three are clean, five have one effect, one has two, one has an effect outside the library;
 //! effects and strengths go round. Per case `SEED-INDEX.json` (truth, names of the columns) with `SEED-INDEX.f32`

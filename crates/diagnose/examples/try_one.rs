@@ -1,5 +1,5 @@
 //! Diagnoses one drawn case and prints what the search did:
-//! `cargo run --release -p stylet-diagnose --example try_one -- coulomb_friction 3.0 seed ar`
+//! `cargo run --release -p stylet-diagnose --features own_world --example try_one -- coulomb_friction 3.0 seed ar`
 use std::time::Instant;
 use stylet_diagnose::hidden::{self, Drawn, Motions};
 use stylet_diagnose::search::{Search, Settings};

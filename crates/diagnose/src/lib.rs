@@ -20,11 +20,12 @@
 //! | [`held_out`] | the gain on recordings left out of the fit |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
 //! | [`terms`] | the same candidates as columns, for sparse regressions beside |
-//! | [`hidden`], [`benchmark`] | cases drawn without knowledge of the above, and the examination on them |
+//! | `hidden`, `benchmark` (feature `own_world`) | cases drawn with this law, for comparison with older tables |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod air;
+#[cfg(feature = "own_world")]
 pub mod benchmark;
 mod check;
 pub mod columns;
@@ -34,6 +35,7 @@ mod error;
 pub mod fit;
 pub mod forward;
 pub mod held_out;
+#[cfg(feature = "own_world")]
 pub mod hidden;
 pub mod leftover;
 pub mod look;

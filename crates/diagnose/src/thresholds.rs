@@ -3,7 +3,7 @@
 //! Calibrated over the whole search on clean cases (every third of them with independent noise, AR(1) 0.5 and
 //! 0.9): an effect that is sought at many places (depths of a membrane, frequencies) gains more by chance than
 //! one that has a single number. The table is what this prints:
-//! `cargo run --release -p stylet-diagnose --example calibrate -- 160 7001`
+//! `cargo run --release -p stylet-diagnose --features own_world --example calibrate -- 160 7001`
 //! For each effect: the 90 % quantile of what it gains on clean data, carried on along the exponential tail of a
 //! likelihood ratio to its share of one accused case in a hundred; at least one more than it ever gained; and at
 //! least [`LEAST`], since data are never quite what the cases assume.

@@ -1,5 +1,5 @@
 //! Draws cases and prints what is in them and what the drawing costs:
-//! `cargo run --release -p stylet-examine --example draw -- WRONG GRADE HIDE SIZE CASES SEED`
+//! `cargo run --release -p stylet-examine --example draw -- WRONG GRADE HIDE SIZE CASES SEED WORLD`
 
 use stylet_examine::{CaseId, Grade, Hide, Size, World, Wrong, case};
 
@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut seconds = 0.0;
     for index in 0..cases {
         let id = CaseId {
-            world: World::Plain,
+            world: World::parse(word(6)).unwrap_or(World::Plain),
             wrong: Wrong::parse(word(0)).unwrap_or(Wrong::Nothing),
             grade: Grade::parse(word(1)).unwrap_or(Grade::Large),
             hide: Hide::parse(word(2)).unwrap_or(Hide::One),
@@ -26,11 +26,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let hidden: Vec<String> =
             case.setup.effects.iter().map(|e| format!("{} {:?}", e.id(), e.parameters())).collect();
         println!(
-            "{index:3} {:6.2} sd {:6} samples {took:.3} s  {} {} layers {}",
+            "{index:3} {:6.2} sd {:6} samples {took:.3} s  {} {} {:?} layers {}",
             case.setup.strength_sd,
             case.samples(),
             hidden.join(" + "),
             case.setup.shape.as_ref().map_or("", |s| s.name()),
+            stylet_examine::world::ingredients::names(&case.setup.rich),
             case.setup.truth.layers.len()
         );
     }

@@ -4,6 +4,7 @@ use super::answer::{Answer, Verdict};
 use super::answers::{Expected, Worth, expected, judge};
 use crate::world::case::Case;
 use crate::world::id::CaseId;
+use crate::world::ingredients;
 use serde::{Deserialize, Serialize};
 
 /// One number of an answer beside the truth.
@@ -65,6 +66,7 @@ impl Outcome {
             worth.right = false;
         }
         let mut hidden: Vec<String> = case.setup.effects.iter().map(|e| e.id().to_owned()).collect();
+        hidden.extend(ingredients::names(&case.setup.rich).iter().map(|n| (*n).to_owned()));
         hidden.extend(case.setup.shape.as_ref().map(|s| s.name().to_owned()));
         let mut values = Vec::new();
         for e in &case.setup.effects {
@@ -107,6 +109,10 @@ impl Outcome {
 
 fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
     let mut out = Vec::new();
+    if !ingredients::names(&case.setup.rich).is_empty() {
+        // A law of another form has no true values of the base law's numbers.
+        return out;
+    }
     for effect in &case.setup.effects {
         let Some(cause) = answer.causes.iter().find(|c| c.effect == effect.id()) else { continue };
         for (path, truth) in effect.parameters() {

@@ -157,7 +157,7 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
             Respiration { amplitude_m: to(amplitude_m, 5e-6, 0.012), frequency_hz, phase_rad }
         }
         NeedleCompliance { stiffness_n_per_m } => {
-            NeedleCompliance { stiffness_n_per_m: (stiffness_n_per_m / factor).clamp(100.0, 1e5) }
+            NeedleCompliance { stiffness_n_per_m: (stiffness_n_per_m / factor).clamp(100.0, 3e5) }
         }
         ToolInertia { mass_kg } => ToolInertia { mass_kg: to(mass_kg, 0.01, 12.0) },
         DriveFriction { force_n } => DriveFriction { force_n: to(force_n, 0.002, 3.0) },

@@ -6,7 +6,7 @@
 use super::case::Setup;
 use crate::reality::effect::Effect;
 use crate::reality::insertion::{Insertion, Strange, insert};
-use crate::reality::plain::{Plain, sgn};
+use crate::reality::plain::sgn;
 use crate::reality::sensor::Instrument;
 use crate::reality::tissue::Tissue;
 use crate::world::outside::Shape;
@@ -37,10 +37,10 @@ pub fn look(setup: &Setup, effects: &[Effect], shape: Option<&Shape>) -> Vec<(In
         .map(|path| {
             let n = (path.duration_s() * LOOK_HZ) as usize;
             let at: Vec<f64> = (0..n).map(|k| k as f64 / LOOK_HZ).collect();
-            let mut law = Plain::new(&setup.truth, effects);
+            let mut law = setup.law(&setup.truth, effects);
             let mut strange = shape.cloned();
             let strange = strange.as_mut().map(|s| s as &mut dyn Strange);
-            let there = insert(&mut law, &instrument, strange, path, &at, LOOK_STEP_S);
+            let there = insert(law.as_mut(), &instrument, strange, path, &at, LOOK_STEP_S);
             let read = at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
             (there, read)
         })
