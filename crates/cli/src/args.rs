@@ -230,6 +230,9 @@ pub struct BenchmarkDiagnoseArgs {
     /// Cases run side by side [default: as many as there are cores].
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
+    /// Run nothing: write table and page of the asked-for cases that the folder's cases.jsonl holds already.
+    #[arg(long)]
+    pub look: bool,
     /// Folder for the results [default: stylet-out/benchmark-diagnose-<world>-<seed>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -17,11 +17,8 @@ const SAMPLE_HZ: f64 = 100.0;
 const STEP_S: f64 = 2e-4;
 
 fn main() {
-    let layers = [
-        (0.025, 50.0, 9000.0, Some(0.9)),
-        (0.030, 80.0, 12000.0, None),
-        (0.028, 60.0, 7000.0, Some(1.3)),
-    ];
+    let layers =
+        [(0.025, 50.0, 9000.0, Some(0.9)), (0.030, 80.0, 12000.0, None), (0.028, 60.0, 7000.0, Some(1.3))];
     let tissue = Tissue {
         surface_m: 0.001,
         layers: layers

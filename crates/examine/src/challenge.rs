@@ -156,7 +156,10 @@ pub fn judge(folder: &Path, answers: &Path) -> Result<Vec<Outcome>, ChallengeErr
     if let Some(stray) = answers_given.keys().find(|k| !key.cases.contains_key(*k)) {
         return Err(ChallengeError::Content {
             path: answers.display().to_string(),
-            why: format!("there is no case \"{stray}\"; the cases are \"0001\" to \"{:04}\"", key.cases.len()),
+            why: format!(
+                "there is no case \"{stray}\"; the cases are \"0001\" to \"{:04}\"",
+                key.cases.len()
+            ),
         });
     }
     key.cases
@@ -180,5 +183,6 @@ pub fn judge(folder: &Path, answers: &Path) -> Result<Vec<Outcome>, ChallengeErr
 fn json<T: serde::de::DeserializeOwned>(path: &Path, what: &str) -> Result<T, ChallengeError> {
     let at = || path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|why| ChallengeError::File { path: at(), why })?;
-    serde_json::from_str(&text).map_err(|e| ChallengeError::Content { path: at(), why: format!("{e}; {what}") })
+    serde_json::from_str(&text)
+        .map_err(|e| ChallengeError::Content { path: at(), why: format!("{e}; {what}") })
 }

@@ -46,10 +46,8 @@ pub fn run(
     engine: &(dyn Fn(&Question) -> Result<Answer, String> + Sync),
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Outcome>, RunError> {
-    let failed = |why| RunError::Journal {
-        path: journal.map_or_else(String::new, |p| p.display().to_string()),
-        why,
-    };
+    let failed =
+        |why| RunError::Journal { path: journal.map_or_else(String::new, |p| p.display().to_string()), why };
     let mut done: BTreeMap<CaseId, Outcome> = BTreeMap::new();
     let file = match journal {
         None => None,

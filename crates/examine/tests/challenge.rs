@@ -21,8 +21,11 @@ fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_judged() {
     }
 
     let answers = folder.join("answers.json");
-    std::fs::write(&answers, r#"{"0001":{"verdict":"none"},"0002":{"verdict":"none"},"0003":{"verdict":"none"}}"#)
-        .expect("answers");
+    std::fs::write(
+        &answers,
+        r#"{"0001":{"verdict":"none"},"0002":{"verdict":"none"},"0003":{"verdict":"none"}}"#,
+    )
+    .expect("answers");
     let outcomes = challenge::judge(&folder, &answers).expect("judged");
     assert_eq!(outcomes.len(), 4);
     assert_eq!(outcomes.iter().filter(|o| o.failed.is_some()).count(), 1);

@@ -6,7 +6,9 @@ use stylet_examine::reality::insertion::{Insertion, insert};
 use stylet_examine::reality::law::Law;
 use stylet_examine::reality::motion::{Path, Piece};
 use stylet_examine::reality::plain::Plain;
-use stylet_examine::reality::rich::{Bending, Bristles, Damage, Foundation, Ingredients, Membrane, Rich, Tearing};
+use stylet_examine::reality::rich::{
+    Bending, Bristles, Damage, Foundation, Ingredients, Membrane, Rich, Tearing,
+};
 use stylet_examine::reality::sensor::Instrument;
 use stylet_examine::reality::tissue::{Layer, Tissue};
 use stylet_examine::{CaseId, Grade, Hide, Size, World, Wrong, case};

@@ -65,7 +65,11 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let journal = folder.join("cases.jsonl");
-    let cases = plan.cases();
+    let mut cases = plan.cases();
+    if args.look {
+        let there = stylet_examine::run::read(&journal).map_err(failed)?;
+        cases.retain(|id| there.contains_key(id));
+    }
     let bar = Progress::new(cases.len() as u64, "cases", false);
     let before = AtomicUsize::new(0);
     let tell = |done: usize, of: usize| {

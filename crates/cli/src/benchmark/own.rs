@@ -15,10 +15,9 @@ use stylet_diagnose::search::Settings;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{}", args.cases.seed)));
+    let folder = args.out.clone().unwrap_or_else(|| {
+        PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{}", args.cases.seed))
+    });
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let path = folder.join("cases.jsonl");

@@ -42,7 +42,12 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     };
     let options = FigureOptions {
         title,
-        subtitle: format!("world {}, {}, up to {cases} cases per cell, seed {}", plan.world, plan.size.says(), plan.seed),
+        subtitle: format!(
+            "world {}, {}, up to {cases} cases per cell, seed {}",
+            plan.world,
+            plan.size.says(),
+            plan.seed
+        ),
         width_px: 760.0,
         ..FigureOptions::default()
     };
@@ -58,9 +63,19 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
     }
     let mut table = Table {
         title: "Rates with 95 % Wilson intervals".to_owned(),
-        headers: ["wrong", "how much", "hidden", "right", "a wrong name", "unknown", "median s", "p90 s"]
-            .map(str::to_owned)
-            .to_vec(),
+        headers: [
+            "wrong",
+            "how much",
+            "hidden",
+            "right, and alone",
+            "all found",
+            "a wrong name",
+            "unknown",
+            "median s",
+            "p90 s",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
         ..Table::default()
     };
     for c in cells {
@@ -70,6 +85,7 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
             Cell::text(if c.id.wrong == Wrong::Nothing { "" } else { c.id.grade.word() }),
             Cell::text(c.id.hide.word()),
             Cell::number(c.right.to_string()).status(good),
+            Cell::number(c.all_found.to_string()),
             Cell::number(c.wrong_name.to_string()),
             Cell::number(format!("{}/{}", c.unknown.hits, c.unknown.of)),
             Cell::number(format!("{:.2}", c.median_s)),

@@ -123,8 +123,9 @@ fn wanted(effect: &Effect, setup: &Setup) -> Wanted {
     let mut it =
         Wanted { effect: effect.id().to_owned(), also: Vec::new(), may_be_silent: false, unseen: false };
     let interval_s = 1.0 / setup.amounts.rate_hz;
-    let passes_for_dry =
-        || left_n(setup, core::slice::from_ref(effect), None, Beside::DryFriction) < AS_DRY_SD * setup.noise.sd_n;
+    let passes_for_dry = || {
+        left_n(setup, core::slice::from_ref(effect), None, Beside::DryFriction) < AS_DRY_SD * setup.noise.sd_n
+    };
     match *effect {
         Effect::ForceGain { .. } => {
             it.unseen = true;
@@ -185,7 +186,8 @@ pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
     let mut order: Vec<&Wanted> = expected.wanted.iter().collect();
     order.sort_by_key(|w| !answer.causes.iter().any(|c| c.effect == w.effect));
     for w in order {
-        let exact = (0..classes.len()).find(|&k| !taken[k] && classes[k][0] == w.effect && w.fits(&classes[k]));
+        let exact =
+            (0..classes.len()).find(|&k| !taken[k] && classes[k][0] == w.effect && w.fits(&classes[k]));
         let found = exact.or_else(|| (0..classes.len()).find(|&k| !taken[k] && w.fits(&classes[k])));
         match found {
             Some(k) => taken[k] = true,
@@ -197,9 +199,7 @@ pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
     }
     let described = |c: &str| expected.optional.iter().chain(&expected.allowed).any(|o| o == c);
     let stray = (0..classes.len()).any(|k| {
-        !taken[k]
-            && !(classes[k].len() <= LARGEST_CLASS
-                && classes[k].iter().any(|c| described(c)))
+        !taken[k] && !(classes[k].len() <= LARGEST_CLASS && classes[k].iter().any(|c| described(c)))
     });
     let says_allowed = classes.iter().flatten().any(|c| expected.allowed.iter().any(|a| a == c));
     let unknown = answer.verdict == Verdict::Unknown;

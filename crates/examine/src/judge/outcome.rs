@@ -126,7 +126,13 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
             } else {
                 0.0
             };
-            out.push(number(format!("{}.{path}", effect.id()), truth, e.value + turn, e.low.map(|x| x + turn), e.high.map(|x| x + turn)));
+            out.push(number(
+                format!("{}.{path}", effect.id()),
+                truth,
+                e.value + turn,
+                e.low.map(|x| x + turn),
+                e.high.map(|x| x + turn),
+            ));
         }
     }
     let truth = &case.setup.truth;

@@ -379,7 +379,8 @@ impl Rich {
             Some(b) => (1.0 - b.share) * viscous * m.v + b.share * self.shaft.bristles(),
             None => viscous * m.v,
         };
-        let rubbing = self.with.bending.map_or(0.0, |b| b.rubbing * b.ratio * tip * libm::tanh(m.v / RUB_MPS));
+        let rubbing =
+            self.with.bending.map_or(0.0, |b| b.rubbing * b.ratio * tip * libm::tanh(m.v / RUB_MPS));
         self.now.tip_n = tip;
         self.now.total = tip + friction + rubbing;
     }

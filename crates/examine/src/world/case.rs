@@ -107,8 +107,7 @@ pub fn set_up(id: &CaseId) -> Setup {
     for attempt in 0..ATTEMPTS {
         let setup = attempt_at(id, attempt);
         let drawn_with_number = setup.rich.foundation.is_some() || setup.rich.damage.is_some();
-        let free =
-            id.hide == Hide::Clean || drawn_with_number || setup.effects.iter().any(hidden::by_size);
+        let free = id.hide == Hide::Clean || drawn_with_number || setup.effects.iter().any(hidden::by_size);
         let off = if !clear_of_ruptures(&setup) || !told_by_ruptures(&setup, id.size) {
             f64::INFINITY
         } else if free {

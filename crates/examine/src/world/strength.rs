@@ -41,7 +41,8 @@ pub fn look(setup: &Setup, effects: &[Effect], shape: Option<&Shape>) -> Vec<(In
             let mut strange = shape.cloned();
             let strange = strange.as_mut().map(|s| s as &mut dyn Strange);
             let there = insert(law.as_mut(), &instrument, strange, path, &at, LOOK_STEP_S);
-            let read = at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
+            let read =
+                at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
             (there, read)
         })
         .collect()
@@ -93,7 +94,16 @@ fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, bes
             let x = (z - tissue.front_m(ruptured)).max(0.0);
             let active = if ruptured < tissue.layers.len() { x * x } else { 0.0 };
             let cut = f64::from(sgn(v) > 0.0 && inside > 0.0);
-            row.extend([dry, 1.0, t, sgn(v), there.acceleration_mps2[k], cut, active, v * v * sgn(v) * inside]);
+            row.extend([
+                dry,
+                1.0,
+                t,
+                sgn(v),
+                there.acceleration_mps2[k],
+                cut,
+                active,
+                v * v * sgn(v) * inside,
+            ]);
         }
     }
 }
