@@ -102,7 +102,7 @@ def answer(folder):
     left = force - q @ (q.T @ force)
     extra = extra - q @ (q.T @ extra)
     size = np.maximum(np.sqrt(np.mean(extra**2, axis=0)), 1e-12)
-    fit = LassoCV(cv=4, n_alphas=30, fit_intercept=False).fit(extra / size, left)
+    fit = LassoCV(cv=4, alphas=30, fit_intercept=False).fit(extra / size, left)
     share = np.abs(fit.coef_)
     least = max(0.3 * np.median(quiet), 0.1 * np.sqrt(np.mean(left**2)))
     found = [(share[k], names[k]) for k in np.argsort(-share) if share[k] > least]

@@ -7,7 +7,7 @@ use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
 use stylet_report::{Block, Cell, Page, Section, Status, SvgImage, Table};
 
 /// Columns of a map: nothing wrong, then the grades.
-const COLUMNS: [&str; 4] = ["nothing wrong", "small", "medium", "large"];
+const COLUMNS: [&str; 4] = ["none", "small", "medium", "large"];
 
 /// Shares right, one map per kind of case: rows what is wrong, columns how much of it.
 pub fn maps(plan: &Plan, cells: &[Row]) -> Vec<(Hide, String)> {
@@ -27,17 +27,24 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
             })
             .map_or(f64::NAN, |c| c.right.share())
     };
+    // Only what was asked for has a column.
+    let columns: Vec<usize> =
+        (0..COLUMNS.len()).filter(|k| rows.iter().any(|w| value(*w, *k).is_finite())).collect();
     let cases = of.iter().map(|c| c.right.of).max().unwrap_or(0);
     let title = match hide {
         Hide::Clean => "Clean data called clean".to_owned(),
-        hide => format!("{}: right, and alone", hide.says()),
+        hide => {
+            let says = hide.says();
+            let (first, rest) = says.split_at(1);
+            format!("{}{rest}: right, and alone", first.to_uppercase())
+        }
     };
     let map = HeatMap {
         row_label: "what the believed simulation or the sensor has wrong".to_owned(),
         column_label: "how much of it".to_owned(),
         rows: rows.iter().map(|w| w.word().to_owned()).collect(),
-        columns: COLUMNS.map(str::to_owned).to_vec(),
-        values: rows.iter().map(|w| (0..COLUMNS.len()).map(|k| value(*w, k)).collect()).collect(),
+        columns: columns.iter().map(|k| COLUMNS[*k].to_owned()).collect(),
+        values: rows.iter().map(|w| columns.iter().map(|k| value(*w, *k)).collect()).collect(),
         shares: true,
     };
     let options = FigureOptions {

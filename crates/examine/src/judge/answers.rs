@@ -61,6 +61,7 @@ impl Wanted {
 
 /// What a right answer says.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Expected {
     /// Causes.
     pub wanted: Vec<Wanted>,
@@ -198,9 +199,8 @@ pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
         }
     }
     let described = |c: &str| expected.optional.iter().chain(&expected.allowed).any(|o| o == c);
-    let stray = (0..classes.len()).any(|k| {
-        !taken[k] && !(classes[k].len() <= LARGEST_CLASS && classes[k].iter().any(|c| described(c)))
-    });
+    let stray = (0..classes.len())
+        .any(|k| !taken[k] && (classes[k].len() > LARGEST_CLASS || !classes[k].iter().any(|c| described(c))));
     let says_allowed = classes.iter().flatten().any(|c| expected.allowed.iter().any(|a| a == c));
     let unknown = answer.verdict == Verdict::Unknown;
     let right = if expected.outside && expected.wanted.is_empty() {

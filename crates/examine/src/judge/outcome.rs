@@ -2,6 +2,7 @@
 
 use super::answer::{Answer, Verdict};
 use super::answers::{Expected, Worth, expected, judge};
+use crate::reality::effect::Effect;
 use crate::world::case::Case;
 use crate::world::id::CaseId;
 use crate::world::ingredients;
@@ -136,6 +137,12 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
         }
     }
     let truth = &case.setup.truth;
+    // A gain or a scale of the position is the base law with other numbers: which of them are true is a matter of words.
+    let relabelled = |e: &Effect| matches!(e, Effect::ForceGain { .. } | Effect::PositionScale { .. });
+    if case.setup.effects.iter().any(relabelled) {
+        return out;
+    }
+    let moved = case.setup.effects.iter().any(|e| matches!(e, Effect::BoundaryShift { .. }));
     for p in &answer.base_parameters {
         let layer = p.layer.checked_sub(1).and_then(|i| truth.layers.get(i));
         let value = match (p.name.as_str(), layer) {
@@ -143,7 +150,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
             ("stiffness_n_per_m", Some(l)) => Some(l.stiffness_n_per_m),
             ("friction_ns_per_m2", Some(l)) => Some(l.friction_ns_per_m2),
             ("puncture_n", Some(l)) => l.puncture_n,
-            ("thickness_m", Some(l)) => Some(l.thickness_m),
+            ("thickness_m", Some(l)) if !moved => Some(l.thickness_m),
             _ => None,
         };
         if let Some(value) = value {

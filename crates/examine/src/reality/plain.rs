@@ -131,11 +131,9 @@ impl Plain {
                 Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
                     with.membrane = Some((tissue.surface_m + depth_m, stiffness_n_per_m, puncture_n));
                 }
-                Effect::BoundaryShift { layer, shift_m } => {
-                    if layer >= 1 && layer < slabs.len() {
-                        slabs[layer - 1].far += shift_m;
-                        slabs[layer].front += shift_m;
-                    }
+                Effect::BoundaryShift { layer, shift_m } if layer >= 1 && layer < slabs.len() => {
+                    slabs[layer - 1].far += shift_m;
+                    slabs[layer].front += shift_m;
                 }
                 Effect::SoftBoundary { width_m } => with.width = width_m,
                 Effect::Respiration { amplitude_m, frequency_hz, phase_rad } => {

@@ -60,9 +60,9 @@ pub fn left_n(setup: &Setup, effects: &[Effect], shape: Option<&Shape>, beside: 
     let mut fit = LeastSquares::default();
     let mut row = Vec::new();
     for (there, read) in look(setup, effects, shape) {
-        for k in 0..read.len() {
+        for (k, force) in read.into_iter().enumerate() {
             columns(&mut row, &setup.truth, &there, k, beside);
-            fit.add(&row, read[k]);
+            fit.add(&row, force);
         }
     }
     let mut square = fit.left_square();
@@ -140,9 +140,9 @@ impl LeastSquares {
         let n = self.product.len();
         let own: Vec<f64> = (0..n).map(|i| self.gram[i][i]).collect();
         let mut left = self.square;
-        for i in 0..n {
+        for (i, own) in own.into_iter().enumerate() {
             let pivot = self.gram[i][i];
-            if pivot <= 1e-10 * own[i] || pivot <= 0.0 {
+            if pivot <= 1e-10 * own || pivot <= 0.0 {
                 continue;
             }
             left -= self.product[i] * self.product[i] / pivot;
