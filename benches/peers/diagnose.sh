@@ -14,7 +14,7 @@ tuning=${TUNING_CASES:-40}
 export RAYON_NUM_THREADS=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 python=${STYLET_PEERS_PYTHON:-target/peers/bin/python}
 "$python" -c 'import pysindy, sklearn, sysidentpy' || { echo "no peers: run bash benches/peers/setup.sh first" >&2; exit 2; }
-cargo build --release --quiet -p stylet-diagnose --example peers_cases
+cargo build --release --quiet -p stylet-diagnose --features own_world --example peers_cases
 draw=target/release/examples/peers_cases
 "$draw" target/peers_cases "$tuning" 701 >&2
 "$draw" target/peers_cases "$cases" "$seed" >&2

@@ -169,41 +169,32 @@ pub struct BenchmarkArgs {
 /// What can be examined.
 #[derive(Debug, Subcommand)]
 pub enum BenchmarkWhat {
-    /// Hide effects in generated data, diagnose them, and write confusion matrix, power and calibration.
+    /// Diagnose cases of worlds that the diagnosis did not make, and write the table and a map of where it fails.
     Diagnose(BenchmarkDiagnoseArgs),
+    /// Write such cases for others to diagnose: believed scenarios and recordings without the truth.
+    Export(BenchmarkExportArgs),
+    /// Judge anybody's answers to exported cases with the same table.
+    Judge(BenchmarkJudgeArgs),
 }
 
-/// Arguments of `stylet benchmark diagnose`.
-#[derive(Debug, Args)]
-#[command(after_help = "Examples:
-  stylet benchmark diagnose
-  stylet benchmark diagnose --wrong thickness,encoder --grade large --cases 60 --seed 7
-  stylet benchmark diagnose --wrong all --hide one,one,clean --cases 60 --out out/baseline
-  stylet benchmark diagnose --hide outside --cases 48
-  stylet benchmark diagnose --world own --cases 1000
-
-Words for --wrong (`all` for every one of them):
-  nothing thickness surface surface_each coefficients encoder encoder_steps jitter dropped late growing tails ar1
-  ar2 wander hum bits rate layers no_air recordings scatter_puncture scatter_friction scatter_surface five
-Words for --hide: clean one two three outside beside instrument; the cases of a cell go round the list.
-
-The folder then holds table.txt (rates with 95 % Wilson intervals), table.json and cases.jsonl, one line per case: cases in
-it are not run again, so that a run that was stopped goes on where it was.")]
-pub struct BenchmarkDiagnoseArgs {
-    /// Which law the tissue follows: `plain` and `rich` are written independently of the diagnosis, `own` shares law, clock and
-    /// noise with it.
+/// Which cases: the same for every command about them.
+#[derive(Clone, Debug, Args)]
+pub struct CaseArgs {
+    /// Which law the tissue follows: `plain` and `rich` are written independently of the diagnosis, `own` (for `diagnose`
+    /// alone) shares law, clock and noise with it.
     #[arg(long, value_name = "WORLD", default_value = "plain")]
     pub world: String,
-    /// What the believed simulation or the sensor has wrong, row by row.
+    /// What the believed simulation or the sensor has wrong, row by row; `all` for every word.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
     pub wrong: Vec<String>,
     /// How much of it: small, medium, large.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "small,medium,large")]
     pub grade: Vec<String>,
-    /// What is hidden in the cases.
+    /// What is hidden in the cases; those of a row and grade go round the list.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "one,one,clean")]
     pub hide: Vec<String>,
-    /// How strong that is: faint (0.15 to 0.5 standard deviations of the noise after re-fitting), medium (0.5 to 5) or strong (5 to 15).
+    /// How strong that is, in standard deviations of the noise after re-fitting: faint (0.15 to 0.5), medium (0.5 to 5),
+    /// strong (5 to 15).
     #[arg(long, value_name = "WORD", default_value = "strong")]
     pub size: String,
     /// Number of cases per row and grade. World `own`: of all cases; of twenty, eight are clean, eight hide one effect, two
@@ -213,12 +204,68 @@ pub struct BenchmarkDiagnoseArgs {
     /// Seed of the drawing.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
+}
+
+/// Arguments of `stylet benchmark diagnose`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet benchmark diagnose --grade large
+  stylet benchmark diagnose --wrong thickness,encoder --grade large --cases 60 --seed 7
+  stylet benchmark diagnose --wrong all --cases 60 --out out/baseline
+  stylet benchmark diagnose --hide outside --cases 48
+  stylet benchmark diagnose --world rich --hide one --cases 60
+  stylet benchmark diagnose --world own --cases 1000
+
+Words for --wrong:
+  nothing thickness surface surface_each coefficients encoder encoder_steps jitter dropped late growing tails ar1
+  ar2 wander hum bits rate layers no_air recordings scatter_puncture scatter_friction scatter_surface five
+Words for --hide: clean one two three outside beside instrument.
+
+The folder then holds report.html with the map of where the diagnosis fails, the same as SVG, table.txt (rates with 95 %
+Wilson intervals), table.json and cases.jsonl, one line per case: cases in it are not run again, so that a run that
+was stopped goes on where it was.")]
+pub struct BenchmarkDiagnoseArgs {
+    #[command(flatten)]
+    pub cases: CaseArgs,
     /// Cases run side by side [default: as many as there are cores].
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
+    /// Run nothing: write table and page of the asked-for cases that the folder's cases.jsonl holds already.
+    #[arg(long)]
+    pub look: bool,
     /// Folder for the results [default: stylet-out/benchmark-diagnose-<world>-<seed>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `stylet benchmark export`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  stylet benchmark export --wrong thickness,encoder --grade large --cases 30 --seed 20261 --out out/challenge
+
+The folder then holds README.md (the task), names.txt (admissible names) and cases/NNNN with believed.ron and the
+recordings as CSV. The key that says what was hidden goes beside the folder, to DIR.key.json: keep it, and choose a
+seed that nobody would guess.")]
+pub struct BenchmarkExportArgs {
+    #[command(flatten)]
+    pub cases: CaseArgs,
+    /// Folder for the challenge; it must not be there yet.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `stylet benchmark judge`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  stylet benchmark judge out/challenge answers.json
+
+answers.json: {\"0001\": {\"verdict\": \"named\", \"causes\": [{\"effect\": \"coulomb_friction\"}]}, \"0002\": {\"verdict\": \"none\"}};
+each answer as in diagnosis.json, of which all but `verdict` and `effect` may be left out.")]
+pub struct BenchmarkJudgeArgs {
+    /// Folder of the challenge, with its key beside it.
+    pub folder: PathBuf,
+    /// The answers (JSON).
+    pub answers: PathBuf,
 }
 
 #[cfg(test)]

@@ -15,11 +15,12 @@
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
 //! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
-//! | [`hidden`], [`benchmark`] | cases of the own world, and the examination on them |
+//! | `hidden`, `benchmark` (feature `own_world`) | cases drawn with this law, for comparison with older tables |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod base;
+#[cfg(feature = "own_world")]
 pub mod benchmark;
 mod check;
 pub mod curves;
@@ -27,6 +28,7 @@ mod diagnose;
 mod error;
 pub mod geometry;
 pub mod held_out;
+#[cfg(feature = "own_world")]
 pub mod hidden;
 pub mod intervals;
 pub mod judge;

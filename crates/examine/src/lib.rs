@@ -21,9 +21,11 @@
 //! | [`reality`] | tissue, needle and sensor, written from the page |
 //! | [`world`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
 //! | [`judge`] | which answers are right, and the table |
+//! | [`challenge`] | cases for others, and judging their answers |
 //! | [`plan`], [`run`](mod@run) | which cases, and running an engine on them |
 #![forbid(unsafe_code)]
 
+pub mod challenge;
 pub mod judge;
 pub mod plan;
 pub mod reality;

@@ -49,7 +49,15 @@ impl Plan {
                     let Some(&hide) = self.hide.get(k as usize % self.hide.len().max(1)) else { continue };
                     let index = counts[hide as usize];
                     counts[hide as usize] += 1;
-                    out.push(CaseId { world: self.world, wrong, grade, hide, size: self.size, seed: self.seed, index });
+                    out.push(CaseId {
+                        world: self.world,
+                        wrong,
+                        grade,
+                        hide,
+                        size: self.size,
+                        seed: self.seed,
+                        index,
+                    });
                 }
             }
         }

@@ -28,7 +28,7 @@ pub enum RunError {
         /// Case.
         name: String,
         /// Reason.
-        why: stylet_record::RecordError,
+        why: Box<stylet_record::RecordError>,
     },
 }
 
@@ -46,10 +46,8 @@ pub fn run(
     engine: &(dyn Fn(&Question) -> Result<Answer, String> + Sync),
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Outcome>, RunError> {
-    let failed = |why| RunError::Journal {
-        path: journal.map_or_else(String::new, |p| p.display().to_string()),
-        why,
-    };
+    let failed =
+        |why| RunError::Journal { path: journal.map_or_else(String::new, |p| p.display().to_string()), why };
     let mut done: BTreeMap<CaseId, Outcome> = BTreeMap::new();
     let file = match journal {
         None => None,
@@ -72,7 +70,7 @@ pub fn run(
     let new: Result<Vec<Outcome>, RunError> = missing
         .par_iter()
         .map(|id| {
-            let case = case(id).map_err(|why| RunError::Draw { name: id.name(), why })?;
+            let case = case(id).map_err(|why| RunError::Draw { name: id.name(), why: Box::new(why) })?;
             let start = Instant::now();
             let answer = engine(&case.question);
             let outcome = Outcome::of(&case, answer, start.elapsed().as_secs_f64());

@@ -6,7 +6,9 @@ use stylet_examine::reality::insertion::{Insertion, insert};
 use stylet_examine::reality::law::Law;
 use stylet_examine::reality::motion::{Path, Piece};
 use stylet_examine::reality::plain::Plain;
-use stylet_examine::reality::rich::{Bending, Bristles, Damage, Foundation, Ingredients, Membrane, Rich, Tearing};
+use stylet_examine::reality::rich::{
+    Bending, Bristles, Damage, Foundation, Ingredients, Membrane, Rich, Tearing,
+};
 use stylet_examine::reality::sensor::Instrument;
 use stylet_examine::reality::tissue::{Layer, Tissue};
 use stylet_examine::{CaseId, Grade, Hide, Size, World, Wrong, case};
@@ -85,7 +87,8 @@ fn nearly_neutral_ingredients_leave_the_plain_force_within_a_thousandth() {
     };
     let plain = go(&mut Plain::new(&tissue(), &[]), 2e-4);
     let rich = go(&mut Rich::new(&tissue(), &nearly), 2e-4);
-    let off = differs(&plain.force_n, &rich.force_n, 4);
+    // Bristles do not jump with the speed: the sample on each of six borders of the motion is left out, and two ruptures'.
+    let off = differs(&plain.force_n, &rich.force_n, 8);
     assert!(off < 1e-3 * largest(&plain.force_n), "{off} of {}", largest(&plain.force_n));
 }
 

@@ -60,6 +60,7 @@ fn confusion() -> String {
         rows: names.clone(),
         columns: names,
         values: values.collect(),
+        shares: false,
     };
     heat_map(
         &map,

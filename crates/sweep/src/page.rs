@@ -298,6 +298,7 @@ pub fn map_svg(rows: &[MapRow]) -> String {
         rows: rows.iter().map(|r| r.name.clone()).collect(),
         columns: (1..=BINS).map(|i| i.to_string()).collect(),
         values: rows.iter().map(|r| r.failed_percent.clone()).collect(),
+        shares: false,
     };
     heat_map(
         &map,

@@ -113,8 +113,7 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
         }
         let p = path.at(piece, time_s);
         let tissue_n = law.step(&mut state, time_s, p.z, p.v, |_| {}).total_n;
-        let reading =
-            Reading { time_s, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
+        let reading = Reading { time_s, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
         let force = chain.step(&mut measuring, &reading);
         if k % 50 == 0 {
             out.push(force);
@@ -154,7 +153,10 @@ fn every_effect_of_the_page_is_the_same_force_in_both_laws() {
         println!("{name:<26} differs {off:.2e} N of {largest:.2} N; acts by {acts:.2} N");
         worst.push((name, off / largest));
         // Noise and recorded positions are not the law's.
-        assert!(effect.is_none() || acts > 0.02 || ["position_scale", "force_spikes"].contains(&name), "{name}");
+        assert!(
+            effect.is_none() || acts > 0.02 || ["position_scale", "force_spikes"].contains(&name),
+            "{name}"
+        );
     }
     let wrong: Vec<_> = worst.iter().filter(|w| w.1 > 1e-3).collect();
     assert!(wrong.is_empty(), "{wrong:?}");

@@ -1,7 +1,7 @@
 //! `stylet benchmark diagnose` in the referee's worlds.
 
-use super::engine;
-use crate::args::BenchmarkDiagnoseArgs;
+use super::{engine, page};
+use crate::args::{BenchmarkDiagnoseArgs, CaseArgs};
 use crate::exit::Failure;
 use crate::output::Output;
 use crate::progress::Progress;
@@ -35,7 +35,7 @@ fn words<T: Copy>(
 ///
 /// # Errors
 /// A word that there is not, with those that there are.
-pub fn plan(args: &BenchmarkDiagnoseArgs) -> Result<Plan, Failure> {
+pub fn plan(args: &CaseArgs) -> Result<Plan, Failure> {
     let one = |given: &String| std::slice::from_ref(given).to_vec();
     let world = words("--world", &one(&args.world), World::ALL, World::parse, World::word)?;
     let size = words("--size", &one(&args.size), Size::ALL, Size::parse, Size::word)?;
@@ -58,14 +58,18 @@ pub fn plan(args: &BenchmarkDiagnoseArgs) -> Result<Plan, Failure> {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
-    let plan = plan(args)?;
+    let plan = plan(&args.cases)?;
     let folder = args.out.clone().unwrap_or_else(|| {
         PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}-{}", plan.world, plan.seed))
     });
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let journal = folder.join("cases.jsonl");
-    let cases = plan.cases();
+    let mut cases = plan.cases();
+    if args.look {
+        let there = stylet_examine::run::read(&journal).map_err(failed)?;
+        cases.retain(|id| there.contains_key(id));
+    }
     let bar = Progress::new(cases.len() as u64, "cases", false);
     let before = AtomicUsize::new(0);
     let tell = |done: usize, of: usize| {
@@ -88,12 +92,29 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
         .map_err(|e| Failure::Internal(e.to_string()))?;
     bar.finish();
     let text = table::text(&outcomes);
-    let mut json = serde_json::to_vec_pretty(&table::cells(&outcomes))
-        .map_err(|e| Failure::Internal(e.to_string()))?;
+    let cells = table::cells(&outcomes);
+    let mut json = serde_json::to_vec_pretty(&cells).map_err(|e| Failure::Internal(e.to_string()))?;
     json.push(b'\n');
     let mut output = Output::default();
     output.add("table.txt", text.clone());
     output.add("table.json", json);
+    output.add("report.html", page::page(&plan, &cells, &text).to_html());
+    for (hide, svg) in page::maps(&plan, &cells) {
+        output.add(map_name(hide), svg);
+    }
     output.write(&folder)?;
-    crate::terminal::say(&format!("{text}\nCases: {}\n", journal.display()))
+    crate::terminal::say(&format!("{text}\nReport: {}\n", folder.join("report.html").display()))
+}
+
+/// The file of a map.
+fn map_name(hide: Hide) -> &'static str {
+    match hide {
+        Hide::Clean => "map_clean.svg",
+        Hide::One => "map_one.svg",
+        Hide::Two => "map_two.svg",
+        Hide::Three => "map_three.svg",
+        Hide::Outside => "map_outside.svg",
+        Hide::Beside => "map_beside.svg",
+        Hide::Instrument => "map_instrument.svg",
+    }
 }

@@ -1,8 +1,10 @@
 //! `stylet benchmark`: examinations at scale.
 
+mod challenge;
 mod engine;
 mod examine;
 mod own;
+mod page;
 
 use crate::args::{BenchmarkArgs, BenchmarkWhat};
 use crate::exit::Failure;
@@ -13,7 +15,9 @@ use crate::exit::Failure;
 /// [`Failure`] with the exit code that fits.
 pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
     match &args.what {
-        BenchmarkWhat::Diagnose(args) if args.world == "own" => own::diagnose(args),
+        BenchmarkWhat::Diagnose(args) if args.cases.world == "own" => own::diagnose(args),
         BenchmarkWhat::Diagnose(args) => examine::diagnose(args),
+        BenchmarkWhat::Export(args) => challenge::export(args),
+        BenchmarkWhat::Judge(args) => challenge::judge(args),
     }
 }

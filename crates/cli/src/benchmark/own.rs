@@ -14,10 +14,9 @@ use stylet_diagnose::hidden::sketch;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{}", args.seed)));
+    let folder = args.out.clone().unwrap_or_else(|| {
+        PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{}", args.cases.seed))
+    });
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
     std::fs::create_dir_all(&folder).map_err(failed)?;
     let path = folder.join("cases.jsonl");
@@ -31,7 +30,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
                 .filter_map(|l| serde_json::from_str(&l).ok()),
         );
     }
-    let missing: Vec<u64> = (0..args.cases).filter(|i| !done.iter().any(|d| d.index == *i)).collect();
+    let missing: Vec<u64> = (0..args.cases.cases).filter(|i| !done.iter().any(|d| d.index == *i)).collect();
     let kept: String = done.iter().filter_map(|d| serde_json::to_string(d).ok()).map(|l| l + "\n").collect();
     std::fs::write(&path, kept).map_err(failed)?;
     let file = std::fs::OpenOptions::new().append(true).open(&path).map_err(failed)?;
@@ -39,19 +38,19 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     let new: Vec<Option<Case>> = missing
         .par_iter()
         .map(|&index| {
-            let case = run(index, &sketch(args.seed, index))?;
+            let case = run(index, &sketch(args.cases.seed, index))?;
             if let (Ok(mut file), Ok(line)) = (file.lock(), serde_json::to_string(&case)) {
                 let _ = writeln!(file.0, "{line}");
                 file.1 += 1;
                 if file.1 % 20 == 0 {
-                    eprintln!("  {} of {} cases", file.1, args.cases);
+                    eprintln!("  {} of {} cases", file.1, args.cases.cases);
                 }
             }
             Some(case)
         })
         .collect();
     done.extend(new.into_iter().flatten());
-    done.retain(|d| d.index < args.cases);
+    done.retain(|d| d.index < args.cases.cases);
     done.sort_by_key(|d| d.index);
     let text = summary(&done);
     std::fs::write(folder.join("summary.txt"), &text).map_err(failed)?;

@@ -2,7 +2,7 @@
 
 use super::draw::{Drawn, case};
 use super::motion::Motions;
-use super::outside::Outside;
+use super::outside::{OUTSIDE, Outside};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use stylet_tissue::{AnyEffect, EffectInfo};
@@ -63,13 +63,15 @@ pub struct Sketch {
 /// outside the library.
 #[must_use]
 pub fn sketch(seed: u64, index: u64) -> Sketch {
-    let kind = match index % 20 {
-        0..8 => Kind::Clean,
-        8..16 => Kind::Single,
-        16..18 => Kind::Two,
-        _ => Kind::Outside,
-    };
-    sketch_of(seed, index, kind, index / 20 * 8 + index % 20)
+    let (round, place) = (index / 20, index % 20);
+    let turn = round * 8 + place;
+    match place {
+        0..8 => sketch_of(seed, index, Kind::Clean, turn),
+        8..16 => sketch_of(seed, index, Kind::Single, turn),
+        16..18 => sketch_of(seed, index, Kind::Two, turn),
+        // Counted by themselves, so that every shape comes at every strength.
+        _ => sketch_of(seed, index, Kind::Outside, round * 2 + place - 18),
+    }
 }
 
 /// The sketch of a case of a given kind; `turn` goes round the effects and the sizes.
@@ -80,7 +82,7 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
     let ar = [0.0, 0.5, 0.9][rng.random_range(0..3)];
     let size = match kind {
         Kind::Two => 0,
-        Kind::Outside => (turn % 3).min(2),
+        Kind::Outside => (turn / OUTSIDE.len() as u64) % 3,
         _ => (turn / 27) % 3,
     };
     let mut between = |lo: f64, hi: f64| lo + (hi - lo) * rng.random::<f64>();
@@ -118,7 +120,7 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
             drawn.effects.extend(draw_effect(second, &mut between));
         }
         Kind::Outside => {
-            let kind = (turn / 3) as usize;
+            let kind = (turn % OUTSIDE.len() as u64) as usize;
             let u = [between(0.0, 1.0), between(0.0, 1.0), between(0.0, 1.0), between(0.0, 1.0)];
             drawn.outside = Some(Outside::new(kind, u, 0.02 * target));
         }
@@ -236,4 +238,25 @@ pub fn largest_force(drawn: &Drawn) -> f64 {
         e.id() != "saturation"
     });
     case(&plain).recordings.iter().flat_map(|r| &r.force_n).fold(0.0_f64, |m, f| m.max(f.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    /// 24 cells of shape and strength, two of twenty cases each: 480 cases go round twice.
+    #[test]
+    fn every_shape_outside_the_library_is_drawn_equally_often_at_every_strength() {
+        let mut cells: BTreeMap<(usize, u64), usize> = BTreeMap::new();
+        for index in 0..480 {
+            let sketch = sketch(1, index);
+            if let Some(shape) = &sketch.drawn.outside {
+                let size = Size::of(sketch.target) as u64;
+                *cells.entry((shape.kind, size)).or_default() += 1;
+            }
+        }
+        assert_eq!(cells.len(), 3 * OUTSIDE.len());
+        assert!(cells.values().all(|n| *n == 2), "{cells:?}");
+    }
 }

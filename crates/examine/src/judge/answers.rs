@@ -29,6 +29,7 @@ use crate::reality::effect::Effect;
 use crate::world::case::Setup;
 use crate::world::hidden::THICKNESS_TOLERANCE;
 use crate::world::id::{CaseId, Hide};
+use crate::world::ingredients;
 use crate::world::strength::{Beside, left_n};
 use serde::{Deserialize, Serialize};
 
@@ -60,11 +61,16 @@ impl Wanted {
 
 /// What a right answer says.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Expected {
     /// Causes.
     pub wanted: Vec<Wanted>,
     /// Names that may stand beside them.
     pub optional: Vec<String>,
+    /// Names that describe a rich law's ingredients.
+    pub allowed: Vec<String>,
+    /// Whether one of these, or `unknown`, has to be said.
+    pub asks_for_allowed: bool,
     /// Whether something is there that no library has.
     pub outside: bool,
     /// Whether `unknown` is right as well.
@@ -104,6 +110,12 @@ pub fn expected(id: &CaseId, setup: &Setup) -> Expected {
     if a.bits_range_n.is_some() {
         out.optional.push("quantisation".to_owned());
     }
+    // Rule 9.
+    for name in ingredients::names(&setup.rich) {
+        out.allowed.extend(ingredients::may_be_called(name).iter().map(|s| (*s).to_owned()));
+        out.unknown_is_right = true;
+        out.asks_for_allowed |= !may_be_silent(name, setup);
+    }
     debug_assert!(id.hide != Hide::Clean || out.wanted.is_empty());
     out
 }
@@ -112,8 +124,9 @@ fn wanted(effect: &Effect, setup: &Setup) -> Wanted {
     let mut it =
         Wanted { effect: effect.id().to_owned(), also: Vec::new(), may_be_silent: false, unseen: false };
     let interval_s = 1.0 / setup.amounts.rate_hz;
-    let passes_for_dry =
-        || left_n(setup, core::slice::from_ref(effect), None, Beside::DryFriction) < AS_DRY_SD * setup.noise.sd_n;
+    let passes_for_dry = || {
+        left_n(setup, core::slice::from_ref(effect), None, Beside::DryFriction) < AS_DRY_SD * setup.noise.sd_n
+    };
     match *effect {
         Effect::ForceGain { .. } => {
             it.unseen = true;
@@ -140,6 +153,21 @@ fn wanted(effect: &Effect, setup: &Setup) -> Wanted {
     it
 }
 
+/// Whether an ingredient may pass unsaid: a foundation that yields by less than the thickness may be off, or under layers that all
+/// give way by force (it is a softer layer then); damage that shows in no or in one recording's punctures; whatever leaves less
+/// than half a standard deviation of the noise.
+fn may_be_silent(ingredient: &str, setup: &Setup) -> bool {
+    match ingredient {
+        "foundation" => {
+            let softness = setup.rich.foundation.map_or(0.0, |f| f.softness);
+            softness / (1.0 + softness) <= THICKNESS_TOLERANCE + setup.amounts.thickness
+                || setup.truth.layers.iter().all(|l| l.puncture_n.is_some())
+        }
+        "damage" => setup.paths.len() == 1 || setup.rich.damage.is_none_or(|d| d.exponent > 10.0),
+        _ => setup.strength_sd < 0.5,
+    }
+}
+
 /// Judges an answer.
 #[must_use]
 pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
@@ -159,7 +187,8 @@ pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
     let mut order: Vec<&Wanted> = expected.wanted.iter().collect();
     order.sort_by_key(|w| !answer.causes.iter().any(|c| c.effect == w.effect));
     for w in order {
-        let exact = (0..classes.len()).find(|&k| !taken[k] && classes[k][0] == w.effect && w.fits(&classes[k]));
+        let exact =
+            (0..classes.len()).find(|&k| !taken[k] && classes[k][0] == w.effect && w.fits(&classes[k]));
         let found = exact.or_else(|| (0..classes.len()).find(|&k| !taken[k] && w.fits(&classes[k])));
         match found {
             Some(k) => taken[k] = true,
@@ -169,11 +198,10 @@ pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
             }
         }
     }
-    let stray = (0..classes.len()).any(|k| {
-        !taken[k]
-            && !(classes[k].len() <= LARGEST_CLASS
-                && classes[k].iter().any(|c| expected.optional.iter().any(|o| o == c)))
-    });
+    let described = |c: &str| expected.optional.iter().chain(&expected.allowed).any(|o| o == c);
+    let stray = (0..classes.len())
+        .any(|k| !taken[k] && (classes[k].len() > LARGEST_CLASS || !classes[k].iter().any(|c| described(c))));
+    let says_allowed = classes.iter().flatten().any(|c| expected.allowed.iter().any(|a| a == c));
     let unknown = answer.verdict == Verdict::Unknown;
     let right = if expected.outside && expected.wanted.is_empty() {
         unknown && !stray
@@ -181,9 +209,9 @@ pub fn judge(expected: &Expected, answer: &Answer) -> Worth {
         // The known one beside the unknown: found, under whatever verdict.
         !missing
     } else if unknown {
-        expected.unknown_is_right
+        expected.unknown_is_right && !missing && !stray
     } else {
-        !missing && !stray
+        !missing && !stray && (says_allowed || !expected.asks_for_allowed)
     };
     Worth { right, wrong_name: stray, all_found }
 }

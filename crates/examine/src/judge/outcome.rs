@@ -2,8 +2,10 @@
 
 use super::answer::{Answer, Verdict};
 use super::answers::{Expected, Worth, expected, judge};
+use crate::reality::effect::Effect;
 use crate::world::case::Case;
 use crate::world::id::CaseId;
+use crate::world::ingredients;
 use serde::{Deserialize, Serialize};
 
 /// One number of an answer beside the truth.
@@ -65,6 +67,7 @@ impl Outcome {
             worth.right = false;
         }
         let mut hidden: Vec<String> = case.setup.effects.iter().map(|e| e.id().to_owned()).collect();
+        hidden.extend(ingredients::names(&case.setup.rich).iter().map(|n| (*n).to_owned()));
         hidden.extend(case.setup.shape.as_ref().map(|s| s.name().to_owned()));
         let mut values = Vec::new();
         for e in &case.setup.effects {
@@ -107,6 +110,10 @@ impl Outcome {
 
 fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
     let mut out = Vec::new();
+    if !ingredients::names(&case.setup.rich).is_empty() {
+        // A law of another form has no true values of the base law's numbers.
+        return out;
+    }
     for effect in &case.setup.effects {
         let Some(cause) = answer.causes.iter().find(|c| c.effect == effect.id()) else { continue };
         for (path, truth) in effect.parameters() {
@@ -120,10 +127,22 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
             } else {
                 0.0
             };
-            out.push(number(format!("{}.{path}", effect.id()), truth, e.value + turn, e.low.map(|x| x + turn), e.high.map(|x| x + turn)));
+            out.push(number(
+                format!("{}.{path}", effect.id()),
+                truth,
+                e.value + turn,
+                e.low.map(|x| x + turn),
+                e.high.map(|x| x + turn),
+            ));
         }
     }
     let truth = &case.setup.truth;
+    // A gain or a scale of the position is the base law with other numbers: which of them are true is a matter of words.
+    let relabelled = |e: &Effect| matches!(e, Effect::ForceGain { .. } | Effect::PositionScale { .. });
+    if case.setup.effects.iter().any(relabelled) {
+        return out;
+    }
+    let moved = case.setup.effects.iter().any(|e| matches!(e, Effect::BoundaryShift { .. }));
     for p in &answer.base_parameters {
         let layer = p.layer.checked_sub(1).and_then(|i| truth.layers.get(i));
         let value = match (p.name.as_str(), layer) {
@@ -131,7 +150,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
             ("stiffness_n_per_m", Some(l)) => Some(l.stiffness_n_per_m),
             ("friction_ns_per_m2", Some(l)) => Some(l.friction_ns_per_m2),
             ("puncture_n", Some(l)) => l.puncture_n,
-            ("thickness_m", Some(l)) => Some(l.thickness_m),
+            ("thickness_m", Some(l)) if !moved => Some(l.thickness_m),
             _ => None,
         };
         if let Some(value) = value {

@@ -30,6 +30,8 @@ pub struct Cell {
     pub id: CellId,
     /// Right answers.
     pub right: Rate,
+    /// Answers in which all that is there is named, whatever else is.
+    pub all_found: Rate,
     /// Answers with a cause that is not there.
     pub wrong_name: Rate,
     /// Answers `unknown`.
@@ -45,7 +47,13 @@ pub struct Cell {
 pub fn cells(outcomes: &[Outcome]) -> Vec<Cell> {
     let mut by: BTreeMap<CellId, Vec<&Outcome>> = BTreeMap::new();
     for o in outcomes {
-        let id = CellId { world: o.id.world, wrong: o.id.wrong, grade: o.id.grade, hide: o.id.hide, size: o.id.size };
+        let id = CellId {
+            world: o.id.world,
+            wrong: o.id.wrong,
+            grade: o.id.grade,
+            hide: o.id.hide,
+            size: o.id.size,
+        };
         by.entry(id).or_default().push(o);
     }
     by.into_iter()
@@ -54,8 +62,9 @@ pub fn cells(outcomes: &[Outcome]) -> Vec<Cell> {
             Cell {
                 id,
                 right: Rate::of(&all, |o| o.worth.right),
+                all_found: Rate::of(&all, |o| o.worth.all_found),
                 wrong_name: Rate::of(&all, |o| o.worth.wrong_name),
-                unknown: Rate::of(&all, |o| o.verdict == Verdict::Unknown),
+                unknown: Rate::of(&all, |o| o.verdict == Verdict::Unknown && o.failed.is_none()),
                 median_s: quantile(&seconds, 0.5),
                 p90_s: quantile(&seconds, 0.9),
             }
@@ -69,8 +78,8 @@ pub fn text(outcomes: &[Outcome]) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "{:<32}{:<20}{:<28}{:<28}{:<10}{:>8}{:>8}",
-        "wrong", "hidden", "right", "a wrong name", "unknown", "med s", "p90 s"
+        "{:<32}{:<20}{:<28}{:<28}{:<28}{:<10}{:>8}{:>8}",
+        "wrong", "hidden", "right, and alone", "all found", "a wrong name", "unknown", "med s", "p90 s"
     );
     for c in cells(outcomes) {
         let row = match c.id.wrong {
@@ -83,8 +92,9 @@ pub fn text(outcomes: &[Outcome]) -> String {
         };
         let _ = writeln!(
             out,
-            "{row:<32}{hidden:<20}{:<28}{:<28}{:<10}{:>8.2}{:>8.2}",
+            "{row:<32}{hidden:<20}{:<28}{:<28}{:<28}{:<10}{:>8.2}{:>8.2}",
             c.right,
+            if matches!(c.id.hide, Hide::Clean | Hide::Outside) { Rate::default() } else { c.all_found },
             c.wrong_name,
             format!("{}/{}", c.unknown.hits, c.unknown.of),
             c.median_s,
@@ -97,7 +107,8 @@ pub fn text(outcomes: &[Outcome]) -> String {
     let failed: Vec<&Outcome> = outcomes.iter().filter(|o| o.failed.is_some()).collect();
     if let Some(first) = failed.first() {
         let why = first.failed.as_deref().unwrap_or("");
-        let _ = writeln!(out, "\n{} cases without an answer, the first {}: {why}", failed.len(), first.id.name());
+        let _ =
+            writeln!(out, "\n{} cases without an answer, the first {}: {why}", failed.len(), first.id.name());
     }
     out
 }
@@ -109,6 +120,7 @@ fn said(out: &mut String, outcomes: &[Outcome]) {
         let hidden = if o.hidden.is_empty() { "(clean)".to_owned() } else { o.hidden.join(" + ") };
         let causes: Vec<String> = o.named.iter().map(|c| c.join("|")).collect();
         let said = match o.verdict {
+            _ if o.failed.is_some() => "no answer".to_owned(),
             Verdict::None => "none".to_owned(),
             Verdict::Unknown if causes.is_empty() => "unknown".to_owned(),
             Verdict::Unknown => format!("unknown, beside {}", causes.join(" + ")),
@@ -133,12 +145,19 @@ fn held(out: &mut String, outcomes: &[Outcome]) {
         }
     }
     let all = |base: bool| {
-        Rate::of(by.iter().filter(|(name, _)| name.starts_with("base.") == base).flat_map(|(_, h)| h), |h| **h)
+        Rate::of(by.iter().filter(|(name, _)| name.starts_with("base.") == base).flat_map(|(_, h)| h), |h| {
+            **h
+        })
     };
     if by.is_empty() {
         return;
     }
-    let _ = writeln!(out, "\n95 % intervals hold the truth: causes' numbers {}, base numbers {}", all(false), all(true));
+    let _ = writeln!(
+        out,
+        "\n95 % intervals hold the truth: causes' numbers {}, base numbers {}",
+        all(false),
+        all(true)
+    );
     for (name, held) in &by {
         let rate = Rate::of(held, |h| **h);
         let _ = writeln!(out, "    {name:<52}{rate}");

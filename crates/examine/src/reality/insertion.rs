@@ -78,7 +78,8 @@ pub fn insert(
                 knots.clear();
                 law.jump(&here, &mut knots);
                 for knot in &knots {
-                    let force_n = knot.force_n + extra(&here, law.ruptures()) + instrument.tool_n(here.v, here.a);
+                    let force_n =
+                        knot.force_n + extra(&here, law.ruptures()) + instrument.tool_n(here.v, here.a);
                     line.feed(Knot { t: knot.t, force_n });
                 }
             }

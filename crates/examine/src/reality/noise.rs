@@ -111,9 +111,8 @@ impl<'a> NoiseSource<'a> {
         }
         if let Some((amplitude, middle)) = self.noise.hum {
             let keep = libm::exp(-dt / HUM_S);
-            self.hum_hz = middle
-                + keep * (self.hum_hz - middle)
-                + HUM_HZ * (1.0 - keep * keep).sqrt() * self.normal();
+            self.hum_hz =
+                middle + keep * (self.hum_hz - middle) + HUM_HZ * (1.0 - keep * keep).sqrt() * self.normal();
             self.hum_phase += core::f64::consts::TAU * self.hum_hz * dt;
             x += amplitude * libm::sin(self.hum_phase);
         }

@@ -131,11 +131,9 @@ impl Plain {
                 Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
                     with.membrane = Some((tissue.surface_m + depth_m, stiffness_n_per_m, puncture_n));
                 }
-                Effect::BoundaryShift { layer, shift_m } => {
-                    if layer >= 1 && layer < slabs.len() {
-                        slabs[layer - 1].far += shift_m;
-                        slabs[layer].front += shift_m;
-                    }
+                Effect::BoundaryShift { layer, shift_m } if layer >= 1 && layer < slabs.len() => {
+                    slabs[layer - 1].far += shift_m;
+                    slabs[layer].front += shift_m;
                 }
                 Effect::SoftBoundary { width_m } => with.width = width_m,
                 Effect::Respiration { amplitude_m, frequency_hz, phase_rad } => {
@@ -194,7 +192,8 @@ impl Plain {
         to.active_n = to.elastic;
         if self.with.relaxes {
             if (dt - self.decay.0).abs() > 1e-9 * dt {
-                self.decay = (dt, self.with.prony.map(|(_, tau)| if tau > 0.0 { libm::exp(-dt / tau) } else { 0.0 }));
+                self.decay =
+                    (dt, self.with.prony.map(|(_, tau)| if tau > 0.0 { libm::exp(-dt / tau) } else { 0.0 }));
             }
             for (k, &(g, tau)) in self.with.prony.iter().enumerate() {
                 if g == 0.0 || dt <= 0.0 {
@@ -284,9 +283,7 @@ impl Plain {
     }
 
     fn membrane_gives_way(&self, m: &Memory) -> bool {
-        self.with
-            .membrane
-            .is_some_and(|(depth, k, f)| !m.membrane_gone && k > 0.0 && k * (m.z - depth) >= f)
+        self.with.membrane.is_some_and(|(depth, k, f)| !m.membrane_gone && k > 0.0 && k * (m.z - depth) >= f)
     }
 
     /// The state a share `s` of the way to the base's next place.
@@ -400,7 +397,8 @@ impl Law for Plain {
             self.rupture();
         }
         let (viscous, inside) = self.shaft(z);
-        self.now.total = if self.with.spring.is_some() { 0.0 } else { self.total(&self.now, viscous, inside) };
+        self.now.total =
+            if self.with.spring.is_some() { 0.0 } else { self.total(&self.now, viscous, inside) };
         self.now.total
     }
 

@@ -352,11 +352,13 @@ impl Rich {
         if let Some(b) = self.with.bristles {
             let v = 0.5 * (self.now.v + to.v);
             let slip = v.abs() + b.dry_mps;
-            let sliding = if slip > 0.0 { (v.abs() / slip).max(if b.dry_mps > 0.0 { 0.0 } else { 1.0 }) } else { 1.0 };
-            let rate = V_REF_MPS / b.delta_m * sliding + 1.0 / b.creep_s;
+            // Without a dry part the bristles slide at any speed, at rest as well.
+            let sliding = if b.dry_mps > 0.0 { v.abs() / slip } else { 1.0 };
+            let stiff = V_REF_MPS / b.delta_m;
+            let rate = stiff * sliding + 1.0 / b.creep_s;
             let keep = libm::exp(-rate * dt);
-            let end = V_REF_MPS / b.delta_m * v / rate;
-            self.shaft.relax(keep, (1.0 - keep) * end);
+            let give = if rate * dt > 1e-9 { (1.0 - keep) * stiff * v / rate } else { stiff * v * dt };
+            self.shaft.relax(keep, give);
         }
         self.now = to;
         self.shaft.cover(to.z);
@@ -377,7 +379,8 @@ impl Rich {
             Some(b) => (1.0 - b.share) * viscous * m.v + b.share * self.shaft.bristles(),
             None => viscous * m.v,
         };
-        let rubbing = self.with.bending.map_or(0.0, |b| b.rubbing * b.ratio * tip * libm::tanh(m.v / RUB_MPS));
+        let rubbing =
+            self.with.bending.map_or(0.0, |b| b.rubbing * b.ratio * tip * libm::tanh(m.v / RUB_MPS));
         self.now.tip_n = tip;
         self.now.total = tip + friction + rubbing;
     }

@@ -26,7 +26,8 @@ impl Tissue {
     /// Front face of layer `index` (0-based) in m; behind the last one the far face of the stack.
     #[must_use]
     pub fn front_m(&self, index: usize) -> f64 {
-        self.surface_m + self.layers[..index.min(self.layers.len())].iter().map(|l| l.thickness_m).sum::<f64>()
+        self.surface_m
+            + self.layers[..index.min(self.layers.len())].iter().map(|l| l.thickness_m).sum::<f64>()
     }
 
     /// Far face of the stack in m.

@@ -4,6 +4,7 @@ use super::amounts::Amounts;
 use super::draw;
 use super::hidden::{self, For};
 use super::id::{CaseId, Hide, Size, World};
+use super::ingredients::{self, INGREDIENTS};
 use super::outside::{SHAPES, Shape};
 use super::paths::{self, between, log_between};
 use super::strength::{Beside, largest_n, left_n, look};
@@ -13,6 +14,7 @@ use crate::reality::law::Law;
 use crate::reality::motion::Path;
 use crate::reality::noise::{Noise, NoiseSource};
 use crate::reality::plain::Plain;
+use crate::reality::rich::{Ingredients, Rich};
 use crate::reality::sensor::Instrument;
 use crate::reality::tissue::Tissue;
 use rand::rngs::ChaCha8Rng;
@@ -41,12 +43,27 @@ pub struct Setup {
     pub paths: Vec<Path>,
     /// The noise.
     pub noise: Noise,
+    /// The law that the tissue follows.
+    pub world: World,
+    /// Ingredients of the rich law.
+    pub rich: Ingredients,
     /// What of the library is hidden.
     pub effects: Vec<Effect>,
     /// What else is.
     pub shape: Option<Shape>,
     /// Strength of all that is hidden, in noise standard deviations.
     pub strength_sd: f64,
+}
+
+impl Setup {
+    /// The law of a tissue in this world. The rich law knows no effects of the library but those of tool and sensor.
+    #[must_use]
+    pub fn law(&self, tissue: &Tissue, effects: &[Effect]) -> Box<dyn Law> {
+        match self.world {
+            World::Plain => Box::new(Plain::new(tissue, effects)),
+            World::Rich => Box::new(Rich::new(tissue, &self.rich)),
+        }
+    }
 }
 
 /// One recording under its name.
@@ -89,7 +106,8 @@ pub fn set_up(id: &CaseId) -> Setup {
     let mut kept: Option<(f64, Setup)> = None;
     for attempt in 0..ATTEMPTS {
         let setup = attempt_at(id, attempt);
-        let free = id.hide == Hide::Clean || setup.effects.iter().any(hidden::by_size);
+        let drawn_with_number = setup.rich.foundation.is_some() || setup.rich.damage.is_some();
+        let free = id.hide == Hide::Clean || drawn_with_number || setup.effects.iter().any(hidden::by_size);
         let off = if !clear_of_ruptures(&setup) || !told_by_ruptures(&setup, id.size) {
             f64::INFINITY
         } else if free {
@@ -140,8 +158,18 @@ fn attempt_at(id: &CaseId, attempt: u64) -> Setup {
     } else {
         paths::drawn(&mut path_rng, amounts.recordings, start_m, depth_m, hurry)
     };
-    let mut setup =
-        Setup { amounts, believed, truth, paths, noise, effects: Vec::new(), shape: None, strength_sd: 0.0 };
+    let mut setup = Setup {
+        amounts,
+        believed,
+        truth,
+        paths,
+        noise,
+        world: id.world,
+        rich: Ingredients::default(),
+        effects: Vec::new(),
+        shape: None,
+        strength_sd: 0.0,
+    };
     let (low, high) = range_sd(id.size);
     // A little inside, so that the last step of the search need not be exact.
     let target = log_between(&mut rng, 1.1 * low, 0.9 * high) * setup.noise.sd_n;
@@ -211,7 +239,11 @@ fn hide(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
         coefficients: setup.amounts.coefficients,
         size: id.size,
     };
+    if id.world == World::Rich {
+        enrich(rng, id, setup, target_n);
+    }
     let count = match id.hide {
+        Hide::One | Hide::Two | Hide::Three if id.world == World::Rich => 0,
         Hide::Clean | Hide::Outside => 0,
         Hide::One | Hide::Beside | Hide::Instrument => 1,
         Hide::Two => 2,
@@ -224,6 +256,9 @@ fn hide(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
                 // Every effect equally often; where one does not fit, the next.
                 (Hide::One, _) => (shuffled(id.seed, id.index, IDS.len()) + turn as usize) % IDS.len(),
                 (Hide::Instrument, _) => number_of(INSTRUMENT[(id.index + turn) as usize % INSTRUMENT.len()]),
+                (Hide::Beside, _) if id.world == World::Rich => {
+                    number_of(INSTRUMENT[1 + (id.index + turn) as usize % (INSTRUMENT.len() - 1)])
+                }
                 (Hide::Beside, _) => (id.index as usize * 7 + turn as usize) % IDS.len(),
                 (_, 0) => (shuffled(id.seed, id.index, IDS.len()) + turn as usize) % IDS.len(),
                 _ => rng.random_range(0..IDS.len()),
@@ -237,7 +272,7 @@ fn hide(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
         let Some(effect) = effect else { continue };
         setup.effects.push(strengthened(setup, effect, each, largest));
     }
-    if matches!(id.hide, Hide::Outside | Hide::Beside) {
+    if id.hide == Hide::Outside || (id.hide == Hide::Beside && id.world == World::Plain) {
         let mut u = [0.0; 6];
         u.iter_mut().for_each(|x| *x = rng.random());
         let kind = id.index as usize % SHAPES.len();
@@ -249,10 +284,39 @@ fn hide(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
         setup.shape = Some(shape);
     }
     setup.strength_sd = match (&setup.shape, count) {
-        (None, 0) => 0.0,
+        (None, 0) if setup.rich == Ingredients::default() => 0.0,
         (Some(shape), 0) => left_n(setup, &[], Some(shape), Beside::Common) / sd,
         _ => left_n(setup, &setup.effects, None, Beside::Nothing) / sd,
     };
+}
+
+/// How many ingredients of the rich law a case has, and they.
+fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
+    let count = match id.hide {
+        Hide::One | Hide::Beside => 1,
+        Hide::Two => 2,
+        Hide::Three => 3,
+        Hide::Clean | Hide::Outside | Hide::Instrument => 0,
+    };
+    let truth = setup.truth.clone();
+    let mut all = Ingredients::default();
+    for k in 0..count {
+        let turn = if k == 0 { 0 } else { rng.random_range(1..INGREDIENTS.len()) };
+        let which = (shuffled(id.seed, id.index, INGREDIENTS.len()) + turn) % INGREDIENTS.len();
+        let mut one = Ingredients::default();
+        ingredients::add(rng, which, &truth, id.size, &mut one);
+        for _ in 0..5 {
+            setup.rich = one;
+            let left = left_n(setup, &[], None, Beside::Nothing);
+            let factor = (target_n / f64::from(count).sqrt() / left.max(1e-9)).clamp(0.05, 20.0);
+            match ingredients::scaled(&one, factor) {
+                Some(next) if !(0.87..1.15).contains(&factor) && next != one => one = next,
+                _ => break,
+            }
+        }
+        all = ingredients::together(&all, &one);
+    }
+    setup.rich = all;
 }
 
 /// A permutation of `0..n` that changes with every round: the `index`-th entry.
@@ -342,7 +406,7 @@ pub fn case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
     let (mut recordings, mut there) = (Vec::new(), Vec::new());
     for (k, path) in setup.paths.iter().enumerate() {
         let mut own = ChaCha8Rng::seed_from_u64(rng.random());
-        let (recording, insertion) = measured(&setup, id.world, path, &mut own)?;
+        let (recording, insertion) = measured(&setup, path, &mut own)?;
         recordings.push(Named { name: format!("{}.csv", k + 1), recording });
         there.push(insertion);
     }
@@ -374,7 +438,6 @@ fn instants(path: &Path, amounts: &Amounts, rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 fn measured(
     setup: &Setup,
-    world: World,
     path: &Path,
     rng: &mut ChaCha8Rng,
 ) -> Result<(Recording, Insertion), stylet_record::RecordError> {
@@ -390,9 +453,7 @@ fn measured(
         instrument = instrument.rounding(2.0 * range / 4096.0);
     }
     let at = instants(path, amounts, &mut time_rng);
-    let mut law: Box<dyn Law> = match world {
-        World::Plain | World::Rich => Box::new(Plain::new(&tissue, &setup.effects)),
-    };
+    let mut law = setup.law(&tissue, &setup.effects);
     let mut strange = setup.shape.clone();
     let strange = strange.as_mut().map(|s| s as &mut dyn Strange);
     let step_s = STEP_S.min(interval_s / STEPS_PER_SAMPLE);

@@ -61,12 +61,16 @@ pub fn draw(rng: &mut ChaCha8Rng, which: usize, case: &For) -> Effect {
         "power_law_friction" => Effect::PowerLawFriction { exponent: 1.0 + 0.25 * sign },
         "cutting_force" => Effect::CuttingForce { force_n: 0.2 },
         "incomplete_release" => Effect::IncompleteRelease { fraction: 0.25 },
-        "rate_dependent_puncture" => {
-            Effect::RateDependentPuncture { alpha: sign * by_size(rng, [(0.01, 0.03), (0.03, 0.1), (0.1, 0.25)]) }
-        }
+        "rate_dependent_puncture" => Effect::RateDependentPuncture {
+            alpha: sign * by_size(rng, [(0.01, 0.03), (0.03, 0.1), (0.1, 0.25)]),
+        },
         "hidden_membrane" => {
             let stiffness_n_per_m = log_between(rng, 80.0, 400.0);
-            Effect::HiddenMembrane { depth_m: between(rng, 0.08, 0.85) * depth, stiffness_n_per_m, puncture_n: 0.4 }
+            Effect::HiddenMembrane {
+                depth_m: between(rng, 0.08, 0.85) * depth,
+                stiffness_n_per_m,
+                puncture_n: 0.4,
+            }
         }
         "boundary_shift" => {
             let faces = case.tissue.layers.len().max(2) - 1;
@@ -79,7 +83,9 @@ pub fn draw(rng: &mut ChaCha8Rng, which: usize, case: &For) -> Effect {
             Effect::BoundaryShift { layer, shift_m: sign * (size * of).min(0.5 * near.min(far)) }
         }
         "soft_boundary" => Effect::SoftBoundary { width_m: 2e-3 },
-        "respiration" => Effect::Respiration { amplitude_m: 1e-3, frequency_hz: between(rng, 0.15, 0.4), phase_rad },
+        "respiration" => {
+            Effect::Respiration { amplitude_m: 1e-3, frequency_hz: between(rng, 0.15, 0.4), phase_rad }
+        }
         "needle_compliance" => Effect::NeedleCompliance { stiffness_n_per_m: 800.0 },
         "tool_inertia" => Effect::ToolInertia { mass_kg: 2.0 },
         "drive_friction" => Effect::DriveFriction { force_n: 0.2 },
@@ -125,7 +131,9 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
     use Effect::*;
     let to = |x: f64, low: f64, high: f64| (x * factor).abs().clamp(low, high) * x.signum();
     Some(match *effect {
-        NonlinearElasticity { kappa_per_m } => NonlinearElasticity { kappa_per_m: to(kappa_per_m, 0.05, 80.0) },
+        NonlinearElasticity { kappa_per_m } => {
+            NonlinearElasticity { kappa_per_m: to(kappa_per_m, 0.05, 80.0) }
+        }
         StressRelaxation { terms } => {
             let sum = terms[0].0 + terms[1].0;
             let by = to(sum, 0.005, 0.85) / sum;
@@ -134,7 +142,11 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
         CoulombFriction { c_n_per_m } => CoulombFriction { c_n_per_m: to(c_n_per_m, 0.02, 60.0) },
         StribeckFriction { c_n_per_m, c_static_n_per_m, v_stribeck_mps } => {
             let c = to(c_n_per_m, 0.02, 60.0);
-            StribeckFriction { c_n_per_m: c, c_static_n_per_m: c_static_n_per_m * c / c_n_per_m, v_stribeck_mps }
+            StribeckFriction {
+                c_n_per_m: c,
+                c_static_n_per_m: c_static_n_per_m * c / c_n_per_m,
+                v_stribeck_mps,
+            }
         }
         PreslidingFriction { c_n_per_m, delta_m } => {
             PreslidingFriction { c_n_per_m: to(c_n_per_m, 0.02, 60.0), delta_m }
@@ -157,7 +169,7 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
             Respiration { amplitude_m: to(amplitude_m, 5e-6, 0.012), frequency_hz, phase_rad }
         }
         NeedleCompliance { stiffness_n_per_m } => {
-            NeedleCompliance { stiffness_n_per_m: (stiffness_n_per_m / factor).clamp(100.0, 1e5) }
+            NeedleCompliance { stiffness_n_per_m: (stiffness_n_per_m / factor).clamp(100.0, 3e5) }
         }
         ToolInertia { mass_kg } => ToolInertia { mass_kg: to(mass_kg, 0.01, 12.0) },
         DriveFriction { force_n } => DriveFriction { force_n: to(force_n, 0.002, 3.0) },
@@ -174,6 +186,8 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
         }
         Quantisation { step_n } => Quantisation { step_n: to(step_n, 2e-3, 2.0) },
         ForceSpikes { rate_hz, size_n } => ForceSpikes { rate_hz, size_n: to(size_n, 0.05, 8.0) },
-        RateDependentPuncture { .. } | BoundaryShift { .. } | PositionScale { .. } | ForceGain { .. } => return None,
+        RateDependentPuncture { .. } | BoundaryShift { .. } | PositionScale { .. } | ForceGain { .. } => {
+            return None;
+        }
     })
 }

@@ -5,6 +5,7 @@ pub mod case;
 pub mod draw;
 pub mod hidden;
 pub mod id;
+pub mod ingredients;
 pub mod outside;
 pub mod paths;
 pub mod strength;

@@ -63,7 +63,8 @@ impl Way {
     }
 
     fn swing(&self, rng: &mut ChaCha8Rng) -> Path {
-        let frequency_hz = self.pace * between(rng, 0.0115, 0.0167) * USUAL_DEPTH_M / self.length_m().max(0.05);
+        let frequency_hz =
+            self.pace * between(rng, 0.0115, 0.0167) * USUAL_DEPTH_M / self.length_m().max(0.05);
         let duration_s = between(rng, 0.65, 0.9) / frequency_hz;
         Path::new(
             self.start_m,

@@ -6,7 +6,7 @@
 use super::case::Setup;
 use crate::reality::effect::Effect;
 use crate::reality::insertion::{Insertion, Strange, insert};
-use crate::reality::plain::{Plain, sgn};
+use crate::reality::plain::sgn;
 use crate::reality::sensor::Instrument;
 use crate::reality::tissue::Tissue;
 use crate::world::outside::Shape;
@@ -37,11 +37,12 @@ pub fn look(setup: &Setup, effects: &[Effect], shape: Option<&Shape>) -> Vec<(In
         .map(|path| {
             let n = (path.duration_s() * LOOK_HZ) as usize;
             let at: Vec<f64> = (0..n).map(|k| k as f64 / LOOK_HZ).collect();
-            let mut law = Plain::new(&setup.truth, effects);
+            let mut law = setup.law(&setup.truth, effects);
             let mut strange = shape.cloned();
             let strange = strange.as_mut().map(|s| s as &mut dyn Strange);
-            let there = insert(&mut law, &instrument, strange, path, &at, LOOK_STEP_S);
-            let read = at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
+            let there = insert(law.as_mut(), &instrument, strange, path, &at, LOOK_STEP_S);
+            let read =
+                at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
             (there, read)
         })
         .collect()
@@ -59,9 +60,9 @@ pub fn left_n(setup: &Setup, effects: &[Effect], shape: Option<&Shape>, beside: 
     let mut fit = LeastSquares::default();
     let mut row = Vec::new();
     for (there, read) in look(setup, effects, shape) {
-        for k in 0..read.len() {
+        for (k, force) in read.into_iter().enumerate() {
             columns(&mut row, &setup.truth, &there, k, beside);
-            fit.add(&row, read[k]);
+            fit.add(&row, force);
         }
     }
     let mut square = fit.left_square();
@@ -93,7 +94,16 @@ fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, bes
             let x = (z - tissue.front_m(ruptured)).max(0.0);
             let active = if ruptured < tissue.layers.len() { x * x } else { 0.0 };
             let cut = f64::from(sgn(v) > 0.0 && inside > 0.0);
-            row.extend([dry, 1.0, t, sgn(v), there.acceleration_mps2[k], cut, active, v * v * sgn(v) * inside]);
+            row.extend([
+                dry,
+                1.0,
+                t,
+                sgn(v),
+                there.acceleration_mps2[k],
+                cut,
+                active,
+                v * v * sgn(v) * inside,
+            ]);
         }
     }
 }
@@ -130,9 +140,9 @@ impl LeastSquares {
         let n = self.product.len();
         let own: Vec<f64> = (0..n).map(|i| self.gram[i][i]).collect();
         let mut left = self.square;
-        for i in 0..n {
+        for (i, own) in own.into_iter().enumerate() {
             let pivot = self.gram[i][i];
-            if pivot <= 1e-10 * own[i] || pivot <= 0.0 {
+            if pivot <= 1e-10 * own || pivot <= 0.0 {
                 continue;
             }
             left -= self.product[i] * self.product[i] / pivot;

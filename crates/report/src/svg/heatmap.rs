@@ -19,9 +19,14 @@ pub struct HeatMap {
     pub columns: Vec<String>,
     /// `values[row][column]`; what is not finite stays blank.
     pub values: Vec<Vec<f64>>,
+    /// The values are shares, 0 to 1: coloured from 0 to 1 whatever there is, written in per cent, zeros as well; what is
+    /// not finite has no cell.
+    #[serde(default)]
+    pub shares: bool,
 }
 
-/// Draws the matrix in eight steps from pale to deep blue, each value written in its cell; zero cells stay empty.
+/// Draws the matrix in eight steps from pale to deep blue, each value written in its cell; zero cells stay empty
+/// unless the values are shares.
 #[must_use]
 pub fn heat_map(map: &HeatMap, options: &FigureOptions) -> String {
     let mut canvas = Canvas::new(options);
@@ -36,7 +41,13 @@ pub fn heat_map(map: &HeatMap, options: &FigureOptions) -> String {
     let grid_top = top + head;
     let range = extent(map.values.iter().flatten().copied()).unwrap_or((0.0, 1.0));
     let low = range.0.min(0.0);
-    let span = if range.1 > low { range.1 - low } else { 1.0 };
+    let span = if map.shares {
+        1.0
+    } else if range.1 > low {
+        range.1 - low
+    } else {
+        1.0
+    };
     for (column, name) in map.columns.iter().enumerate() {
         let x = left + cell_width * (column as f64 + 0.5);
         if turned {
@@ -49,6 +60,9 @@ pub fn heat_map(map: &HeatMap, options: &FigureOptions) -> String {
         let y = grid_top + cell_height * row as f64;
         canvas.text(left - 8.0, y + cell_height / 2.0 + 4.0, Anchor::End, "", name);
         for (column, value) in map.values.get(row).into_iter().flatten().enumerate().take(map.columns.len()) {
+            if map.shares && !value.is_finite() {
+                continue;
+            }
             let x = left + cell_width * column as f64;
             let part = if value.is_finite() { (value - low) / span } else { 0.0 };
             canvas.rect(
@@ -58,10 +72,12 @@ pub fn heat_map(map: &HeatMap, options: &FigureOptions) -> String {
                 cell_height - 1.0,
                 &format!("q{}", (part * 7.999) as usize),
             );
-            if value.is_finite() && *value != 0.0 {
+            if value.is_finite() && (*value != 0.0 || map.shares) {
                 let class = if part > 0.5 { "t hi" } else { "t lo" };
                 let middle = y + cell_height / 2.0 + 4.0;
-                canvas.text(x + cell_width / 2.0, middle, Anchor::Middle, class, &significant(*value, 3));
+                let said =
+                    if map.shares { format!("{:.0} %", 100.0 * value) } else { significant(*value, 3) };
+                canvas.text(x + cell_width / 2.0, middle, Anchor::Middle, class, &said);
             }
         }
     }

@@ -1,0 +1,29 @@
+//! `stylet benchmark export` and `judge`: a challenge that others can enter.
+
+use crate::args::{BenchmarkExportArgs, BenchmarkJudgeArgs};
+use crate::exit::Failure;
+use stylet_examine::{challenge, table};
+
+/// Writes a challenge.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
+    let plan = super::examine::plan(&args.cases)?;
+    let written = challenge::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
+    crate::terminal::say(&format!(
+        "{written} cases in {}\nThe key, for the judge alone: {}\n",
+        args.out.display(),
+        challenge::key_path(&args.out).display()
+    ))
+}
+
+/// Judges answers.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn judge(args: &BenchmarkJudgeArgs) -> Result<(), Failure> {
+    let outcomes =
+        challenge::judge(&args.folder, &args.answers).map_err(|e| Failure::Check(e.to_string()))?;
+    crate::terminal::say(&table::text(&outcomes))
+}
