@@ -281,6 +281,23 @@ pub enum Algorithm {
     /// The paper's to the letter: no blind travel after contact, no motion guards, drop by
     /// extremes. For the record: it diverges on the sinusoid with contact found from the data.
     Literal,
+    /// This project's: calibrated, one pass, with the uncertainty of everything it says (see [`StyletConfig`]).
+    Stylet,
+}
+
+/// What can be set for [`Algorithm::Stylet`]. Noise, friction law and drop sizes are learned on the way in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct StyletConfig {
+    /// False alarms per hour of insertion that are accepted, above 0.
+    pub false_alarms_per_hour: f64,
+}
+
+impl Default for StyletConfig {
+    fn default() -> Self {
+        Self { false_alarms_per_hour: 0.05 }
+    }
 }
 
 /// Everything that can be set. The defaults are the paper's values.
@@ -314,6 +331,8 @@ pub struct EnhanceConfig {
     pub contact_search: ContactConfig,
     /// Guards against false ruptures.
     pub guard: GuardConfig,
+    /// What [`Algorithm::Stylet`] is set by.
+    pub stylet: StyletConfig,
 }
 
 impl Default for EnhanceConfig {
@@ -332,6 +351,7 @@ impl Default for EnhanceConfig {
             drop: DropConfig::default(),
             contact_search: ContactConfig::default(),
             guard: GuardConfig::default(),
+            stylet: StyletConfig::default(),
         }
     }
 }

@@ -1,0 +1,341 @@
+//! `algorithm: Stylet`: one pass, no buffer, a bounded handful of operations per sample. The derivation stands in
+//! `docs/enhancer.md`.
+
+mod alarm;
+mod gaussian;
+mod layers;
+mod local;
+mod noise;
+
+use crate::config::{Contact, EnhanceConfig};
+use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
+use alarm::Alarm;
+use layers::{FP, K, KP, Layers};
+use local::{Local, Step};
+use noise::Noise;
+
+/// Stiffest tissue that a needle is pushed into, in N/m: how wide a slope is before it is known.
+const STIFFEST: f64 = 2000.0;
+/// A force outside this many standard deviations that comes alone is a spike.
+const SPIKE_SDS: f64 = 6.0;
+/// A spike lasts at most this many samples.
+const SPIKE_SAMPLES: u8 = 3;
+/// What an ordinary drop lasts at most, in s.
+const LONGEST_DROP_S: f64 = 0.1;
+/// Samples in a row above the threshold that are a contact.
+const CONTACT_SAMPLES: u32 = 5;
+
+/// What is remembered from sample to sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stylet {
+    noise: Noise,
+    local: Local,
+    alarm: Alarm,
+    layers: Layers,
+    /// The estimator as it was when the alarm's sums left zero, and the position then.
+    before: Layers,
+    before_m: f64,
+    in_tissue: bool,
+    started: bool,
+    last: Sample,
+    deepest_m: f64,
+    speed_mps: f64,
+    low_passed_n: f64,
+    above: u32,
+    spikes: u8,
+    /// Samples since the last rupture, and the count at which the ruptured layer is reported next.
+    since: u32,
+    report_at: u32,
+    /// The estimator just after the last rupture, while its drop may go on.
+    fallen: Option<Layers>,
+    since_s: f64,
+    falling: bool,
+    out: Output,
+}
+
+impl Stylet {
+    pub(crate) fn new(config: &EnhanceConfig, surface_m: f64) -> Self {
+        let noise = Noise::new(config.contact_search.smallest_noise_n);
+        let layers = Layers::contact(surface_m, 0.0, 0.0, 1.0, 1.0, &noise);
+        Self {
+            noise,
+            local: Local::new(0.0),
+            alarm: Alarm::new(config.stylet.false_alarms_per_hour, 0.005),
+            layers,
+            before: layers,
+            before_m: surface_m,
+            in_tissue: false,
+            started: false,
+            last: Sample::default(),
+            deepest_m: f64::NEG_INFINITY,
+            speed_mps: 0.0,
+            low_passed_n: 0.0,
+            above: 0,
+            spikes: 0,
+            since: 0,
+            report_at: u32::MAX,
+            fallen: None,
+            since_s: 0.0,
+            falling: false,
+            out: Output::default(),
+        }
+    }
+
+    pub(crate) fn out(&self) -> &Output {
+        &self.out
+    }
+
+    #[inline]
+    pub(crate) fn step(&mut self, config: &EnhanceConfig, surface_m: f64, sample: Sample) -> &Output {
+        self.out.detection = None;
+        self.out.estimate = None;
+        self.out.used = sample.is_usable() && (!self.started || sample.time_s > self.last.time_s);
+        if !self.out.used {
+            return &self.out;
+        }
+        let last = if self.started { self.last } else { sample };
+        let step = self.motion(config, &last, &sample);
+        if self.in_tissue {
+            self.feel(config, &step, &sample);
+        } else {
+            self.look_for_contact(config, surface_m, &step, &sample);
+        }
+        self.last = sample;
+        self.started = true;
+        self.speak(&sample);
+        &self.out
+    }
+
+    /// How the needle has moved since the last sample.
+    #[inline(always)]
+    fn motion(&mut self, config: &EnhanceConfig, last: &Sample, sample: &Sample) -> Step {
+        let dt_s = sample.time_s - last.time_s;
+        if dt_s > 0.0 {
+            self.noise.clock(dt_s);
+        }
+        let speed = sample.velocity_mps.abs();
+        if speed > config.drop.standstill_mps {
+            if self.speed_mps == 0.0 {
+                self.speed_mps = speed;
+            } else {
+                let share = dt_s / (dt_s + 0.2);
+                self.speed_mps += share * (speed - self.speed_mps);
+            }
+        }
+        Step {
+            dt_s,
+            dz_m: sample.position_m - last.position_m,
+            dv_mps: sample.velocity_mps - last.velocity_mps,
+            speed_mps: self.speed_mps.max(config.drop.standstill_mps),
+        }
+    }
+
+    /// In the air.
+    fn look_for_contact(&mut self, config: &EnhanceConfig, surface_m: f64, step: &Step, sample: &Sample) {
+        self.deepest_m = self.deepest_m.max(sample.position_m);
+        let known = config.contact == Contact::Known;
+        if known && sample.position_m >= surface_m {
+            self.touch(config, step, sample, surface_m, 0.0, 0.0);
+            return;
+        }
+        self.noise.in_air(sample.force_n);
+        let search = &config.contact_search;
+        if !self.started {
+            self.low_passed_n = sample.force_n;
+        }
+        let share = step.dt_s / (step.dt_s + search.time_constant_s);
+        self.low_passed_n += share * (sample.force_n - self.low_passed_n);
+        if known || self.noise.in_air_count() == 0.0 {
+            return;
+        }
+        let risen = self.low_passed_n - self.noise.bias_n();
+        let spread = self.noise.variance * self.noise.slow() * self.noise.step_s / (2.0 * search.time_constant_s);
+        let sd = libm::sqrt(spread.min(self.noise.marginal()) + self.noise.bias_variance().min(self.noise.marginal()));
+        if risen > search.noise_sds * sd && sample.velocity_mps > -config.drop.standstill_mps {
+            self.above += 1;
+        } else {
+            self.above = 0;
+        }
+        if self.above >= CONTACT_SAMPLES {
+            self.touch(config, step, sample, sample.position_m, risen, risen + 3.0 * sd);
+        }
+    }
+
+    #[cold]
+    fn touch(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, start_m: f64, force_n: f64, sd_n: f64) {
+        self.in_tissue = true;
+        self.alarm = Alarm::new(config.stylet.false_alarms_per_hour, self.noise.step_s);
+        let drive = step.speed_mps;
+        self.layers = Layers::contact(start_m, force_n, sd_n, STIFFEST, drive, &self.noise);
+        self.before = self.layers;
+        self.before_m = sample.position_m;
+        self.local = Local::new(sample.force_n);
+        self.local.renew(sample.force_n, STIFFEST * local::MEMORY_M, &self.noise, step.speed_mps, true);
+        self.out.contact_m = Some(start_m);
+    }
+
+    /// In the tissue.
+    #[inline(always)]
+    fn feel(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
+        let force_n = sample.force_n;
+        self.local.advance(step, &self.noise);
+        let innovation = self.local.innovation(force_n, step, &self.noise);
+        let sd = libm::sqrt(innovation.s * self.noise.variance);
+        let z = innovation.e / sd;
+        self.out.error_n = innovation.e;
+        self.since = self.since.saturating_add(1);
+        self.since_s += step.dt_s;
+        let standstill = config.drop.standstill_mps;
+        let forward = sample.velocity_mps > -standstill && sample.position_m > self.deepest_m - config.guard.old_ground_m;
+        if sample.position_m > self.deepest_m {
+            self.deepest_m = sample.position_m;
+        }
+        // A spike: upwards, or below what any rupture can leave, and not for long.
+        let below = force_n - self.noise.bias_n() < -SPIKE_SDS * libm::sqrt(self.noise.marginal());
+        let odd = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && below);
+        if odd && self.spikes < SPIKE_SAMPLES {
+            self.spikes += 1;
+            self.local.pass();
+            self.layers.pass();
+            return;
+        }
+        if odd {
+            // It stays: the force has jumped.
+            let force = (force_n - self.noise.bias_n()).abs();
+            self.local.renew(force_n, force.max(sd), &self.noise, step.speed_mps, false);
+        }
+        self.spikes = 0;
+        let heard = self.alarm.take(if forward && !odd { z } else { 0.0 });
+        if !forward {
+            self.alarm.rest();
+        }
+        if heard.outweighs && !heard.quiet {
+            self.before = self.layers;
+            self.before_m = self.last.position_m;
+        }
+        if heard.alarm && forward && !odd {
+            self.rupture(config, step, sample, heard.evidence);
+            return;
+        }
+        if !odd {
+            self.noise.in_tissue(innovation.e, innovation.s);
+            self.local.take(&innovation, force_n);
+        }
+        self.falling = self.fallen.is_some() && self.settle(step);
+        if self.falling {
+            if let Some(fallen) = self.fallen {
+                self.layers = fallen;
+            }
+        } else if forward && sample.position_m >= self.layers.start_m {
+            let rho = self.noise.rho_over(step.dt_s);
+            self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
+        } else {
+            self.layers.pass();
+        }
+        if heard.quiet {
+            self.before = self.layers;
+            self.before_m = sample.position_m;
+        }
+        if self.since >= self.report_at {
+            self.report_at = self.report_at.saturating_mul(2);
+            self.report(sample);
+        }
+    }
+
+    #[cold]
+    fn rupture(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, evidence: f64) {
+        if self.report_at < u32::MAX {
+            self.report(sample);
+        }
+        let bias = self.noise.bias_n();
+        let span = (sample.position_m - self.before_m).max(0.0);
+        let at_m = self.before_m + 0.5 * span;
+        let drive = step.speed_mps;
+        let predicted = self.local.level_n();
+        self.layers = self.before;
+        self.layers.rupture(at_m, span / libm::sqrt(12.0), drive, &self.noise);
+        self.fallen = Some(self.layers);
+        self.since_s = 0.0;
+        self.layers.take(sample.position_m, sample.velocity_mps, sample.force_n, 0.0);
+        let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
+        self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
+        self.alarm.rest();
+        self.before = self.layers;
+        self.before_m = sample.position_m;
+        self.since = 0;
+        self.report_at = 16;
+        if self.out.ruptures == 0 {
+            self.out.contact_m = Some(self.layers.start_m - self.layers.previous_m);
+        }
+        self.out.ruptures += 1;
+        let _ = (evidence, config);
+        self.out.detection = Some(Detection {
+            layer: self.out.ruptures,
+            time_s: sample.time_s,
+            position_m: sample.position_m,
+            located_s: sample.time_s,
+            located_m: at_m,
+            cause: Cause::Cusum,
+        });
+    }
+
+    /// Whether the drop still goes on; once it is over, that is settled.
+    fn settle(&mut self, step: &Step) -> bool {
+        let (rate, variance) = self.local.rate(step.speed_mps);
+        let sd = libm::sqrt(variance * self.noise.variance);
+        let falling = rate < -3.0 * sd;
+        if self.since_s > LONGEST_DROP_S && rate > -2.0 * sd {
+            self.fallen = None;
+        }
+        falling
+    }
+
+    /// The layer before, as it is known now.
+    fn report(&mut self, sample: &Sample) {
+        let l = &self.layers;
+        let d = l.previous_m;
+        let [k, b] = [l.belief.x[KP], l.belief.x[FP]];
+        let [vk, vb] = l.previous_variance(&self.noise);
+        let (cumulative, cumulative_variance) = l.behind(&self.noise);
+        let drop = k * d;
+        if !(drop > 1.96 * d * libm::sqrt(vk.max(0.0))) {
+            return;
+        }
+        self.out.estimate = Some(LayerEstimate {
+            layer: self.out.ruptures,
+            start_m: l.start_m - d,
+            thickness_m: d,
+            stiffness_n_per_m: k,
+            friction: b,
+            drop_n: drop,
+            elastic_share: (k / (k + b * self.speed_mps)).clamp(0.0, 1.0),
+            added_friction_ns_per_m: b * d,
+            time_s: sample.time_s,
+            stiffness_sd: libm::sqrt(vk.max(0.0)),
+            friction_sd: libm::sqrt(vb.max(0.0)),
+            drop_sd_n: d * libm::sqrt(vk.max(0.0)),
+            cumulative_ns_per_m: cumulative,
+            cumulative_sd: libm::sqrt(cumulative_variance.max(0.0)),
+        });
+    }
+
+    #[inline(always)]
+    fn speak(&mut self, sample: &Sample) {
+        let out = &mut self.out;
+        out.state = if out.detection.is_some() { State::DetectedRupture } else { State::NoRupture };
+        out.theta = [self.layers.belief.x[K], self.layers.belief.x[layers::F]];
+        let (mut behind, variance) = self.layers.behind(&self.noise);
+        if let (Some(fallen), true) = (&self.fallen, self.falling) {
+            // As long as elastic force may be left, friction is no more than what was expected of it.
+            behind = behind.min(fallen.behind(&self.noise).0);
+        }
+        let behind = behind.max(0.0);
+        out.cumulative_friction_ns_per_m = behind;
+        out.enhanced_n = sample.force_n - behind * sample.velocity_mps;
+        let u = sample.velocity_mps;
+        let half = 1.96 * libm::sqrt(self.noise.marginal() + variance.max(0.0) * u * u);
+        out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
+        out.reconstructed_n = sample.force_n - out.error_n;
+        out.cusum_n2 = self.alarm.level();
+    }
+}
