@@ -292,11 +292,14 @@ pub enum Algorithm {
 pub struct StyletConfig {
     /// False alarms per hour of insertion that are accepted, above 0.
     pub false_alarms_per_hour: f64,
+    /// Where the tissue does not follow the law of layers, a fall counts as a rupture from this share of the largest
+    /// force so far, 0 to 1; smaller falls are texture.
+    pub smallest_drop: f64,
 }
 
 impl Default for StyletConfig {
     fn default() -> Self {
-        Self { false_alarms_per_hour: 0.05 }
+        Self { false_alarms_per_hour: 0.05, smallest_drop: 0.08 }
     }
 }
 

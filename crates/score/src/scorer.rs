@@ -110,7 +110,11 @@ impl Scorer {
     /// What happened at a sample: a detection, a layer's estimate. Samples where nothing did may be left out.
     pub fn event(&mut self, output: &Output) {
         self.detections.extend(output.detection);
-        self.estimates.extend(output.estimate);
+        if let Some(estimate) = output.estimate {
+            // A later word on a layer replaces an earlier one.
+            self.estimates.retain(|e| e.layer != estimate.layer);
+            self.estimates.push(estimate);
+        }
     }
 
     /// The position in m at which the core has found contact, if it has.

@@ -80,7 +80,11 @@ impl Trace {
             trace.derivative_n_per_s.push(out.derivative_n_per_s);
             trace.state.push(out.state);
             trace.detections.extend(out.detection);
-            trace.estimates.extend(out.estimate);
+            if let Some(estimate) = out.estimate {
+                // A later word on a layer replaces an earlier one.
+                trace.estimates.retain(|e| e.layer != estimate.layer);
+                trace.estimates.push(estimate);
+            }
             trace.contact_m = out.contact_m;
             trace.unused += usize::from(!out.used);
         }

@@ -22,8 +22,19 @@ const SPIKE_SDS: f64 = 6.0;
 const SPIKE_SAMPLES: u8 = 3;
 /// What an ordinary drop lasts at most, in s.
 const LONGEST_DROP_S: f64 = 0.1;
+/// Misfit at which the law of layers does not hold; it has to be shown that it does.
+const UNPROVEN: f64 = 3.0;
 /// Samples in a row above the threshold that are a contact.
 const CONTACT_SAMPLES: u32 = 5;
+
+/// A fall of the force that may become a rupture.
+#[derive(Clone, Copy, Debug)]
+struct Fall {
+    from_n: f64,
+    mean_n: f64,
+    since_s: f64,
+    count: f64,
+}
 
 /// What is remembered from sample to sample.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +61,14 @@ pub(crate) struct Stylet {
     fallen: Option<Layers>,
     since_s: f64,
     falling: bool,
+    fall: Option<Fall>,
+    last_level_n: f64,
+    /// Largest force so far in N, noise smoothed away.
+    peak_n: f64,
+    /// Mean squared standardised error of the estimator over the last travel: one where its law holds.
+    misfit: f64,
+    /// Least fall that is a rupture, in N.
+    least_n: f64,
     out: Output,
 }
 
@@ -77,6 +96,11 @@ impl Stylet {
             fallen: None,
             since_s: 0.0,
             falling: false,
+            fall: None,
+            last_level_n: 0.0,
+            peak_n: 0.0,
+            misfit: UNPROVEN,
+            least_n: 0.0,
             out: Output::default(),
         }
     }
@@ -179,6 +203,7 @@ impl Stylet {
     fn feel(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
         let force_n = sample.force_n;
         self.local.advance(step, &self.noise);
+        self.last_level_n = if self.fall.is_none() { self.local.level_n() } else { self.last_level_n };
         let innovation = self.local.innovation(force_n, step, &self.noise);
         let sd = libm::sqrt(innovation.s * self.noise.variance);
         let z = innovation.e / sd;
@@ -213,9 +238,23 @@ impl Stylet {
             self.before = self.layers;
             self.before_m = self.last.position_m;
         }
+        if forward && !odd && !heard.quiet {
+            self.fall(config, step, sample, heard.alarm, heard.outweighs && self.fall.is_none());
+        }
+        if heard.quiet {
+            self.fall = None;
+        }
         if heard.alarm && forward && !odd {
-            self.rupture(config, step, sample, heard.evidence);
-            return;
+            let recent = self.out.ruptures > 0 && self.since_s <= LONGEST_DROP_S;
+            if recent {
+                // Still the same drop.
+                self.go_on_falling(step, sample, sd);
+                return;
+            }
+            if self.is_a_drop(config) {
+                self.rupture(config, step, sample, heard.evidence);
+                return;
+            }
         }
         if !odd {
             self.noise.in_tissue(innovation.e, innovation.s);
@@ -228,7 +267,16 @@ impl Stylet {
             }
         } else if forward && sample.position_m >= self.layers.start_m {
             let rho = self.noise.rho_over(step.dt_s);
-            self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
+            let (e, s) = self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
+            let z2 = (e * e / (s * self.noise.variance)).min(100.0);
+            if s < 2.0 {
+                let share = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * local::MEMORY_M);
+                self.misfit += share * (z2 - self.misfit);
+            }
+            self.peak_n = self.peak_n.max(self.local.level_n() - self.noise.bias_n());
+            // Where the law of layers does not hold, small falls are texture.
+            let weight = ((self.misfit - 0.5 * UNPROVEN) / (0.5 * UNPROVEN)).clamp(0.0, 1.0);
+            self.least_n = weight * config.stylet.smallest_drop * self.peak_n;
         } else {
             self.layers.pass();
         }
@@ -240,6 +288,39 @@ impl Stylet {
             self.report_at = self.report_at.saturating_mul(2);
             self.report(sample);
         }
+    }
+
+    /// Follows a fall from where it began.
+    fn fall(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, alarm: bool, begins: bool) {
+        let _ = (config, alarm, begins);
+        let fall = self.fall.get_or_insert(Fall { from_n: self.last_level_n, mean_n: sample.force_n, since_s: 0.0, count: 0.0 });
+        fall.since_s += step.dt_s;
+        fall.count += 1.0;
+        // As many samples as it takes to know the force to a quarter of the drop that counts.
+        let ratio = 4.0 * libm::sqrt(self.noise.marginal()) / self.least_n.max(1e-12);
+        let most = (ratio * ratio).clamp(1.0, 16.0);
+        fall.mean_n += (sample.force_n - fall.mean_n) / fall.count.min(most);
+        if fall.since_s > LONGEST_DROP_S && self.least_n > 0.0 && fall.from_n - fall.mean_n < self.least_n {
+            // Too slow, or too small: not a rupture.
+            self.fall = None;
+            self.alarm.rest();
+        }
+    }
+
+    fn is_a_drop(&self, _config: &EnhanceConfig) -> bool {
+        self.least_n <= 0.0 || self.fall.is_some_and(|f| f.from_n - f.mean_n >= self.least_n)
+    }
+
+    fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {
+        let force = (sample.force_n - self.noise.bias_n()).abs().max(sd);
+        self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
+        self.alarm.rest();
+        self.fall = None;
+        if let Some(fallen) = self.fallen {
+            self.layers = fallen;
+        }
+        self.before = self.layers;
+        self.before_m = sample.position_m;
     }
 
     #[cold]
@@ -260,6 +341,7 @@ impl Stylet {
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.alarm.rest();
+        self.fall = None;
         self.before = self.layers;
         self.before_m = sample.position_m;
         self.since = 0;
