@@ -24,6 +24,7 @@ const SPIKE_SAMPLES: u8 = 3;
 const LONGEST_DROP_S: f64 = 0.1;
 /// Misfit at which the law of layers does not hold; it has to be shown that it does.
 const UNPROVEN: f64 = 3.0;
+
 /// Samples in a row above the threshold that are a contact.
 const CONTACT_SAMPLES: u32 = 5;
 
@@ -67,6 +68,9 @@ pub(crate) struct Stylet {
     peak_n: f64,
     /// Mean squared standardised error of the estimator over the last travel: one where its law holds.
     misfit: f64,
+    /// How far the law of layers fails, 0 to 1; and then, how much rougher the force is than the sensor's noise (a variance ratio).
+    rough: f64,
+    texture: f64,
     /// Least fall that is a rupture, in N.
     least_n: f64,
     out: Output,
@@ -100,6 +104,8 @@ impl Stylet {
             last_level_n: 0.0,
             peak_n: 0.0,
             misfit: UNPROVEN,
+            rough: 1.0,
+            texture: 1.0,
             least_n: 0.0,
             out: Output::default(),
         }
@@ -230,7 +236,8 @@ impl Stylet {
             self.local.renew(force_n, force.max(sd), &self.noise, step.speed_mps, false);
         }
         self.spikes = 0;
-        let heard = self.alarm.take(if forward && !odd { z } else { 0.0 });
+        let rough = 1.0 + self.rough * (self.texture - 1.0).max(0.0);
+        let heard = self.alarm.take(if forward && !odd { z / libm::sqrt(rough) } else { 0.0 });
         if !forward {
             self.alarm.rest();
         }
@@ -259,6 +266,8 @@ impl Stylet {
         if !odd {
             self.noise.in_tissue(innovation.e, innovation.s);
             self.local.take(&innovation, force_n);
+            let share = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * local::MEMORY_M);
+            self.texture += share * ((z * z).min(36.0) - self.texture);
         }
         self.falling = self.fallen.is_some() && self.settle(step);
         if self.falling {
@@ -275,7 +284,8 @@ impl Stylet {
             }
             self.peak_n = self.peak_n.max(self.local.level_n() - self.noise.bias_n());
             // Where the law of layers does not hold, small falls are texture.
-            let weight = ((self.misfit - 0.5 * UNPROVEN) / (0.5 * UNPROVEN)).clamp(0.0, 1.0);
+            let weight = ((self.misfit - 0.5 * UNPROVEN) / (UNPROVEN - 0.5 * UNPROVEN - 1.0)).clamp(0.0, 1.0);
+            self.rough = weight;
             self.least_n = weight * config.stylet.smallest_drop * self.peak_n;
         } else {
             self.layers.pass();
@@ -307,8 +317,12 @@ impl Stylet {
         }
     }
 
+    /// Whether the fall so far is a drop: larger than what the noise may feign, and than texture.
     fn is_a_drop(&self, _config: &EnhanceConfig) -> bool {
-        self.least_n <= 0.0 || self.fall.is_some_and(|f| f.from_n - f.mean_n >= self.least_n)
+        let Some(fall) = self.fall else { return false };
+        let effective = (fall.count.min(16.0) / libm::sqrt(self.noise.slow())).max(1.0);
+        let noise = 2.0 * libm::sqrt(self.noise.marginal() / effective);
+        fall.from_n - fall.mean_n >= self.least_n.max(noise)
     }
 
     fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {
