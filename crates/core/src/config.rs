@@ -295,11 +295,13 @@ pub struct StyletConfig {
     /// Where the tissue does not follow the law of layers, a fall counts as a rupture from this share of the largest
     /// force so far, 0 to 1; smaller falls are texture.
     pub smallest_drop: f64,
+    /// Whether slow changes of the force on the way back count as friction; off: only what the way in has taught.
+    pub track_way_back: bool,
 }
 
 impl Default for StyletConfig {
     fn default() -> Self {
-        Self { false_alarms_per_hour: 0.05, smallest_drop: 0.08 }
+        Self { false_alarms_per_hour: 0.05, smallest_drop: 0.08, track_way_back: true }
     }
 }
 

@@ -76,7 +76,8 @@ fn main() {
         position: Column::scaled("pz", 1e-3),
         ..ColumnMap { force: Column::si("fz"), time: Column::si("time"), position: Column::si("pz"), velocity: None, force_virtual: None }
     };
-    let config = EnhanceConfig { algorithm: if paper { Algorithm::Paper } else { Algorithm::Stylet }, ..EnhanceConfig::default() };
+    let mut config = EnhanceConfig { algorithm: if paper { Algorithm::Paper } else { Algorithm::Stylet }, ..EnhanceConfig::default() };
+    config.stylet.track_way_back = !args.iter().any(|a| a == "--taught");
     let (mut n_falls, mut found, mut big, mut big_found, mut lesser, mut groundless, mut back) = (0, 0, 0, 0, 0, 0, 0);
     let mut delays = vec![];
     let mut sets: Vec<(String, Vec<f64>, Vec<f64>, f64)> = vec![];

@@ -6,6 +6,7 @@ mod gaussian;
 mod layers;
 mod local;
 mod noise;
+mod shaft;
 
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
@@ -13,6 +14,7 @@ use alarm::Alarm;
 use layers::{FP, K, KP, Layers};
 use local::{Local, Step};
 use noise::Noise;
+use shaft::{Felt, Shaft};
 
 /// Stiffest tissue that a needle is pushed into, in N/m: how wide a slope is before it is known.
 const STIFFEST: f64 = 2000.0;
@@ -64,6 +66,10 @@ pub(crate) struct Stylet {
     falling: bool,
     fall: Option<Fall>,
     last_level_n: f64,
+    shaft: Shaft,
+    /// The law of layers has failed: friction is taken as dry.
+    dry: bool,
+    jumped: bool,
     /// Largest force so far in N, noise smoothed away.
     peak_n: f64,
     /// Mean squared standardised error of the estimator over the last travel: one where its law holds.
@@ -102,6 +108,9 @@ impl Stylet {
             falling: false,
             fall: None,
             last_level_n: 0.0,
+            shaft: Shaft::default(),
+            dry: false,
+            jumped: false,
             peak_n: 0.0,
             misfit: UNPROVEN,
             rough: 1.0,
@@ -132,7 +141,7 @@ impl Stylet {
         }
         self.last = sample;
         self.started = true;
-        self.speak(&sample);
+        self.speak(config, &step, &sample);
         &self.out
     }
 
@@ -224,7 +233,8 @@ impl Stylet {
         // A spike: upwards, or below what any rupture can leave, and not for long.
         let below = force_n - self.noise.bias_n() < -SPIKE_SDS * libm::sqrt(self.noise.marginal());
         let odd = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && below);
-        if odd && self.spikes < SPIKE_SAMPLES {
+        self.jumped = z > SPIKE_SDS && !forward;
+        if odd && forward && self.spikes < SPIKE_SAMPLES {
             self.spikes += 1;
             self.local.pass();
             self.layers.pass();
@@ -286,6 +296,11 @@ impl Stylet {
             // Where the law of layers does not hold, small falls are texture.
             let weight = ((self.misfit - 0.5 * UNPROVEN) / (UNPROVEN - 0.5 * UNPROVEN - 1.0)).clamp(0.0, 1.0);
             self.rough = weight;
+            if weight >= 1.0 {
+                self.dry = true;
+            } else if weight <= 0.0 {
+                self.dry = false;
+            }
             self.least_n = weight * config.stylet.smallest_drop * self.peak_n;
         } else {
             self.layers.pass();
@@ -335,6 +350,7 @@ impl Stylet {
         }
         self.before = self.layers;
         self.before_m = sample.position_m;
+        self.shaft.rupture(sample.position_m, sample.force_n - self.noise.bias_n());
     }
 
     #[cold]
@@ -364,6 +380,7 @@ impl Stylet {
             self.out.contact_m = Some(self.layers.start_m - self.layers.previous_m);
         }
         self.out.ruptures += 1;
+        self.shaft.rupture(sample.position_m, sample.force_n - bias);
         let _ = (evidence, config);
         self.out.detection = Some(Detection {
             layer: self.out.ruptures,
@@ -416,20 +433,42 @@ impl Stylet {
     }
 
     #[inline(always)]
-    fn speak(&mut self, sample: &Sample) {
-        let out = &mut self.out;
-        out.state = if out.detection.is_some() { State::DetectedRupture } else { State::NoRupture };
-        out.theta = [self.layers.belief.x[K], self.layers.belief.x[layers::F]];
-        let (mut behind, variance) = self.layers.behind(&self.noise);
+    fn speak(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
+        let standstill = config.drop.standstill_mps;
+        let retracting = sample.velocity_mps < -standstill;
+        let marginal = self.noise.marginal();
+        let (mut behind, mut variance) = self.layers.behind(&self.noise);
         if let (Some(fallen), true) = (&self.fallen, self.falling) {
             // As long as elastic force may be left, friction is no more than what was expected of it.
             behind = behind.min(fallen.behind(&self.noise).0);
         }
-        let behind = behind.max(0.0);
-        out.cumulative_friction_ns_per_m = behind;
-        out.enhanced_n = sample.force_n - behind * sample.velocity_mps;
+        behind = behind.max(0.0);
         let u = sample.velocity_mps;
-        let half = 1.96 * libm::sqrt(self.noise.marginal() + variance.max(0.0) * u * u);
+        let mut friction = behind * u;
+        variance *= u * u;
+        if self.in_tissue {
+            let felt = Felt {
+                dt_s: step.dt_s,
+                position_m: sample.position_m,
+                force_n: sample.force_n - self.noise.bias_n(),
+                advancing: sample.velocity_mps > standstill,
+                retracting,
+                peak_n: self.peak_n,
+                jumped: self.jumped,
+                noise_n: libm::sqrt(marginal),
+                track: config.stylet.track_way_back,
+            };
+            let (dry_n, sd) = self.shaft.take(&felt);
+            if self.dry {
+                (friction, variance) = (dry_n, sd * sd);
+            }
+        }
+        let out = &mut self.out;
+        out.state = if out.detection.is_some() { State::DetectedRupture } else { State::NoRupture };
+        out.theta = [self.layers.belief.x[K], self.layers.belief.x[layers::F]];
+        out.cumulative_friction_ns_per_m = behind;
+        out.enhanced_n = sample.force_n - friction;
+        let half = 1.96 * libm::sqrt(marginal + variance.max(0.0));
         out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
         out.reconstructed_n = sample.force_n - out.error_n;
         out.cusum_n2 = self.alarm.level();
