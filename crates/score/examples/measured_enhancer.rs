@@ -80,6 +80,8 @@ fn main() {
     config.stylet.track_way_back = !args.iter().any(|a| a == "--taught");
     let (mut n_falls, mut found, mut big, mut big_found, mut lesser, mut groundless, mut back) = (0, 0, 0, 0, 0, 0, 0);
     let mut delays = vec![];
+    let (mut alone, mut behind, mut muscles, mut pulses, mut steps) = (vec![], vec![], vec![], vec![], vec![]);
+    let mut muscle: Option<(Vec<f64>, Vec<f64>)> = None;
     let mut sets: Vec<(String, Vec<f64>, Vec<f64>, f64)> = vec![];
     let mut rng = ChaCha8Rng::seed_from_u64(value("--seed", 1.0) as u64);
     for file in &files {
@@ -134,6 +136,47 @@ fn main() {
             let what = if i > turn { back += 1; "on the way back" } else if small.is_some() { lesser += 1; "lesser" } else { groundless += 1; "GROUNDLESS" };
             line += &format!("\n    {what} {:.3} s {:.2} mm F {:.2} (fall {:.2})", d.time_s, 1e3 * d.position_m, r.force_n[i], small.map_or(0.0, |f| f.size));
         }
+        if name.starts_with("skin") {
+            if let Some(first) = all.first() {
+                let from = (first.at..r.len()).min_by(|a, b| {
+                    let f = |i: &usize| if r.time_s[*i] <= r.time_s[first.from] + 0.15 { r.force_n[*i] } else { f64::MAX };
+                    f(a).total_cmp(&f(b))
+                }).unwrap();
+                if name.starts_with("skin_") {
+                    alone.push((rms((from..turn).map(|i| trace.enhanced_n[i])), rms((from..turn).map(|i| r.force_n[i]))));
+                } else if let Some(muscle) = &muscle {
+                    let to = all.get(1).map_or(stop, |f| f.from);
+                    let of = |z: f64| {
+                        let k = muscle.0.partition_point(|x| *x < z).clamp(1, muscle.0.len() - 1);
+                        let (a, b) = (muscle.0[k - 1], muscle.0[k]);
+                        muscle.1[k - 1] + (muscle.1[k] - muscle.1[k - 1]) * ((z - a) / (b - a)).clamp(0.0, 1.0)
+                    };
+                    let z = |i: usize| r.position_m[i];
+                    behind.push((rms((from..to).map(|i| trace.enhanced_n[i] - scale * of(z(i)))), rms((from..to).map(|i| r.force_n[i] - scale * of(z(i))))));
+                }
+            }
+        } else {
+            muscles.push((r.position_m[..stop].to_vec(), r.force_n[..stop].iter().map(|f| f / scale).collect::<Vec<_>>()));
+            let grid: Vec<f64> = (0..1400).map(|k| 0.0108 + 1e-5 * k as f64).collect();
+            let mean = grid.iter().map(|z| muscles.iter().map(|(p, f)| f[p.partition_point(|x| x < z).min(f.len() - 1)]).sum::<f64>() / muscles.len() as f64).collect::<Vec<_>>();
+            muscle = Some((grid, mean));
+        }
+        // A tip that is pulled: a half sine of -0.5 N over 2 mm, and a step.
+        if !args.iter().any(|a| a == "--no-tip") {
+            for at in [0.004, 0.007, 0.012] {
+                let x = |i: usize| if i > turn { r.position_m[turn] - r.position_m[i] } else { 0.0 };
+                if x(r.len() - 1) < at + 0.003 { continue; }
+                let heard = |add: &dyn Fn(f64) -> f64| {
+                    let f: Vec<f64> = (0..r.len()).map(|i| noisy.force_n[i] + add(x(i))).collect();
+                    Trace::record(&noisy, &f, &config, 0.0, |_, _| {}).enhanced_n
+                };
+                let pulsed = heard(&|x| if x > at && x < at + 0.002 { -0.5 * scale * (std::f64::consts::PI * (x - at) / 0.002).sin() } else { 0.0 });
+                let stepped = heard(&|x| if x > at { -0.5 * scale } else { 0.0 });
+                pulses.push((0..r.len()).map(|i| (pulsed[i] - trace.enhanced_n[i]).abs()).fold(0.0, f64::max) / 0.5 / scale);
+                let i = (turn..r.len()).find(|&i| x(i) >= at + 0.001).unwrap();
+                steps.push((stepped[i] - trace.enhanced_n[i]) / -0.5 / scale);
+            }
+        }
         let contact = trace.contact_m.unwrap_or(f64::NAN);
         let inside: Vec<usize> = (turn..r.len()).filter(|&i| r.position_m[i] > contact).collect();
         let raw = rms(inside.iter().map(|&i| r.force_n[i]));
@@ -160,6 +203,12 @@ fn main() {
     delays.sort_by(f64::total_cmp);
     let q = |p: f64| delays.get(((delays.len().max(1) - 1) as f64 * p) as usize).copied().unwrap_or(f64::NAN);
     println!("falls {n_falls}: found {found}; of {big} large ones {big_found}; on lesser falls {lesser}, groundless {groundless}, on the way back {back}; delay median {:.0} p95 {:.0} ms", q(0.5), q(0.95));
+    let root = |v: &[(f64, f64)], k: usize| rms(v.iter().map(|x| if k == 0 { x.0 } else { x.1 }));
+    println!("  way in: behind the skin against muscle alone {:.3} (raw {:.3}); punctured skin with its hold {:.3} (raw {:.3})", root(&behind, 0), root(&behind, 1), root(&alone, 0), root(&alone, 1));
+    pulses.sort_by(f64::total_cmp);
+    steps.sort_by(f64::total_cmp);
+    let p = |v: &[f64], q: f64| v.get(((v.len().max(1) - 1) as f64 * q) as usize).copied().unwrap_or(f64::NAN);
+    println!("  tip on the way back: a pulse keeps {:.2} (least {:.2}), a step after 1 mm {:.2} (least {:.2})", p(&pulses, 0.5), p(&pulses, 0.0), p(&steps, 0.5), p(&steps, 0.0));
     for (set, raw, enh, spike) in &sets {
         let m = |v: &Vec<f64>| rms(v.iter().copied());
         println!("  {set}: way back raw {:.3} enhanced {:.3} spike {spike:.2}", m(raw), m(enh));

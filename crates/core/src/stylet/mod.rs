@@ -49,6 +49,7 @@ pub(crate) struct Stylet {
     /// The estimator as it was when the alarm's sums left zero, and the position then.
     before: Layers,
     before_m: f64,
+    first_m: f64,
     in_tissue: bool,
     started: bool,
     last: Sample,
@@ -93,6 +94,7 @@ impl Stylet {
             layers,
             before: layers,
             before_m: surface_m,
+            first_m: surface_m,
             in_tissue: false,
             started: false,
             last: Sample::default(),
@@ -203,6 +205,7 @@ impl Stylet {
     #[cold]
     fn touch(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, start_m: f64, force_n: f64, sd_n: f64) {
         self.in_tissue = true;
+        self.first_m = sample.position_m;
         self.alarm = Alarm::new(config.stylet.false_alarms_per_hour, self.noise.step_s);
         let drive = step.speed_mps;
         self.layers = Layers::contact(start_m, force_n, sd_n, STIFFEST, drive, &self.noise);
@@ -333,8 +336,12 @@ impl Stylet {
     }
 
     /// Whether the fall so far is a drop: larger than what the noise may feign, and than texture.
-    fn is_a_drop(&self, _config: &EnhanceConfig) -> bool {
+    fn is_a_drop(&self, config: &EnhanceConfig) -> bool {
         let Some(fall) = self.fall else { return false };
+        // As long as the law has not been seen to hold, the first travel after contact is no layer.
+        if self.rough > 0.0 && self.deepest_m - self.first_m < config.guard.blind_travel_m {
+            return false;
+        }
         let effective = (fall.count.min(16.0) / libm::sqrt(self.noise.slow())).max(1.0);
         let noise = 2.0 * libm::sqrt(self.noise.marginal() / effective);
         fall.from_n - fall.mean_n >= self.least_n.max(noise)
