@@ -70,7 +70,7 @@ pub(crate) struct Stylet {
     shaft: Shaft,
     /// The law of layers has failed: friction is taken as dry.
     dry: bool,
-    jumped: bool,
+    releasing_s: f64,
     /// Largest force so far in N, noise smoothed away.
     peak_n: f64,
     /// Mean squared standardised error of the estimator over the last travel: one where its law holds.
@@ -112,7 +112,7 @@ impl Stylet {
             last_level_n: 0.0,
             shaft: Shaft::default(),
             dry: false,
-            jumped: false,
+            releasing_s: 0.0,
             peak_n: 0.0,
             misfit: UNPROVEN,
             rough: 1.0,
@@ -236,7 +236,8 @@ impl Stylet {
         // A spike: upwards, or below what any rupture can leave, and not for long.
         let below = force_n - self.noise.bias_n() < -SPIKE_SDS * libm::sqrt(self.noise.marginal());
         let odd = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && below);
-        self.jumped = z > SPIKE_SDS && !forward;
+        // A release of the shaft takes as long as a drop.
+        self.releasing_s = if z > SPIKE_SDS && !forward { LONGEST_DROP_S } else { self.releasing_s - step.dt_s };
         if odd && forward && self.spikes < SPIKE_SAMPLES {
             self.spikes += 1;
             self.local.pass();
@@ -291,18 +292,18 @@ impl Stylet {
             let rho = self.noise.rho_over(step.dt_s);
             let (e, s) = self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
             let z2 = (e * e / (s * self.noise.variance)).min(100.0);
-            if s < 2.0 {
-                let share = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * local::MEMORY_M);
+            if s < 2.0 || sample.velocity_mps.abs() <= standstill {
+                let travel = step.dz_m.abs();
+                let share = (travel / (travel + 2.0 * local::MEMORY_M)).max(step.dt_s / (step.dt_s + 4.0 * local::MEMORY_S));
                 self.misfit += share * (z2 - self.misfit);
             }
             self.peak_n = self.peak_n.max(self.local.level_n() - self.noise.bias_n());
             // Where the law of layers does not hold, small falls are texture.
             let weight = ((self.misfit - 0.5 * UNPROVEN) / (UNPROVEN - 0.5 * UNPROVEN - 1.0)).clamp(0.0, 1.0);
             self.rough = weight;
-            if weight >= 1.0 {
+            // A law that has failed is not trusted again.
+            if self.misfit >= UNPROVEN && self.deepest_m - self.first_m >= config.guard.blind_travel_m {
                 self.dry = true;
-            } else if weight <= 0.0 {
-                self.dry = false;
             }
             self.least_n = weight * config.stylet.smallest_drop * self.peak_n;
         } else {
@@ -461,7 +462,7 @@ impl Stylet {
                 advancing: sample.velocity_mps > standstill,
                 retracting,
                 peak_n: self.peak_n,
-                jumped: self.jumped,
+                jumped: self.releasing_s > 0.0,
                 noise_n: libm::sqrt(marginal),
                 track: config.stylet.track_way_back,
             };
