@@ -291,7 +291,7 @@ impl Stylet {
         } else if forward && sample.position_m >= self.layers.start_m {
             let rho = self.noise.rho_over(step.dt_s);
             let (e, s) = self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
-            let z2 = (e * e / (s * self.noise.variance)).min(100.0);
+            let z2 = (e * e / (s * self.noise.variance)).min(400.0);
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
                 let travel = step.dz_m.abs();
                 let share = (travel / (travel + 2.0 * local::MEMORY_M)).max(step.dt_s / (step.dt_s + 4.0 * local::MEMORY_S));
