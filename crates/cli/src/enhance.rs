@@ -15,7 +15,7 @@ use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::significant;
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::{EnhanceFile, ron_options};
-use stylet_score::{Trace, model_name};
+use stylet_score::{Trace, algorithm_name, model_name};
 
 /// A detection as `enhance.json` has it.
 #[derive(Serialize)]
@@ -93,7 +93,7 @@ fn listen(recording: &Recording, config: &EnhanceFile, model: Model) -> Ran {
     let mut enhance = config.enhance.clone();
     enhance.model = model;
     Ran {
-        name: format!("paper/{}/force_torque", model_name(model)),
+        name: format!("{}/{}/force_torque", algorithm_name(enhance.algorithm), model_name(model)),
         sensor: "force_torque",
         trace: Trace::record(recording, &recording.force_n, &enhance, config.surface_m, |_, _| {}),
         config: enhance,

@@ -11,7 +11,7 @@ use std::path::Path;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::{
     Algorithm, Contact, ContactConfig, CusumConfig, Depths, DerivativeConfig, DropConfig, GuardConfig, Model,
-    Reset,
+    Reset, StyletConfig,
 };
 
 /// Where the surface is, and the core's configuration.
@@ -78,6 +78,7 @@ struct Flat {
     drop: DropConfig,
     contact_search: ContactConfig,
     guard: GuardConfig,
+    stylet: StyletConfig,
 }
 
 impl Default for Flat {
@@ -115,7 +116,8 @@ convert!(
     derivative,
     drop,
     contact_search,
-    guard
+    guard,
+    stylet
 );
 
 #[cfg(test)]

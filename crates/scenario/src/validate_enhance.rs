@@ -20,6 +20,14 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
         }
         Reset::Ruptures => {}
     }
+    let rate = path("stylet.false_alarms_per_hour");
+    positive(rate, c.stylet.false_alarms_per_hour, "per hour")?;
+    check(
+        path("stylet.smallest_drop"),
+        c.stylet.smallest_drop,
+        (0.0..=1.0).contains(&c.stylet.smallest_drop),
+        "it must lie between 0 and 1",
+    )?;
     if let Depths::Known(thicknesses) = &c.depths {
         if thicknesses.is_empty() {
             return Err(Problem::new(path("depths"), "is empty; give one thickness in metres per layer"));
