@@ -72,4 +72,24 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             None => self.paper.run(samples, hear),
         }
     }
+
+    /// Whether everything that is remembered is a number and every covariance positive definite. `Stylet` sees to it itself and
+    /// starts afresh where rounding or senseless data have spoilt a belief; this is for tests and monitors.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.stylet.as_ref().is_none_or(Stylet::is_sound)
+    }
+
+    /// What is remembered, for a look at what went wrong.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn inside(&self) -> alloc::string::String {
+        alloc::format!("{:?}", self.stylet)
+    }
+
+    /// Multiplications and additions that `Stylet` did for the last sample, counted where they are done; zero for the others.
+    #[must_use]
+    pub fn work(&self) -> u32 {
+        self.stylet.as_ref().map_or(0, Stylet::work)
+    }
 }

@@ -365,6 +365,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Paper<B> {
             located_s: located.time_s,
             located_m: located.position_m,
             cause,
+            drop_n: 0.0,
+            drop_sd_n: 0.0,
+            confidence: 0.0,
         });
         self.pending = Some(Pending {
             layer: self.out.ruptures,

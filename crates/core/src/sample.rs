@@ -110,6 +110,12 @@ pub struct Detection {
     pub located_m: f64,
     /// What declared it.
     pub cause: Cause,
+    /// Fall of the force at the declaration in N, and its standard deviation; zero when the algorithm does not tell.
+    pub drop_n: f64,
+    /// See `drop_n`.
+    pub drop_sd_n: f64,
+    /// Probability that it is no false alarm, 0 to 1; zero when the algorithm does not tell.
+    pub confidence: f64,
 }
 
 /// What the core holds of a traversed layer after compensation.

@@ -23,7 +23,7 @@ impl<const N: usize> Gaussian<N> {
     pub(crate) fn new(x: [f64; N], variance: [f64; N]) -> Self {
         let mut p = [[0.0; N]; N];
         for (i, v) in variance.into_iter().enumerate() {
-            p[i][i] = v;
+            p[i][i] = if v > TINY { v } else { TINY };
         }
         Self { x, p }
     }
@@ -43,7 +43,8 @@ impl<const N: usize> Gaussian<N> {
             s += sum * h[i];
             e -= h[i] * self.x[i];
         }
-        Innovation { e, s, ph }
+        // Never less than the noise alone, whatever rounding does.
+        Innovation { e, s: if s > r { s } else { r }, ph }
     }
 
     /// Takes the measurement: `x += P h e/s`, `P -= (P h)(P h)'/s`, which keeps `P` symmetric.
@@ -54,8 +55,11 @@ impl<const N: usize> Gaussian<N> {
         for i in 0..N {
             let k = ph[i] * gain;
             self.x[i] += k * e;
-            for j in 0..N {
-                self.p[i][j] -= k * ph[j];
+            for j in 0..=i {
+                // The lower triangle counts: what rounding has made of the upper goes.
+                let entry = self.p[i][j] - k * ph[j];
+                self.p[i][j] = entry;
+                self.p[j][i] = entry;
             }
         }
         // What rounding may take from a variance that is known very well.
@@ -111,11 +115,46 @@ impl<const N: usize> Gaussian<N> {
         }
     }
 
-    /// True while all entries are numbers.
-    pub(crate) fn is_finite(&self) -> bool {
+    /// True while all entries are numbers and the covariance is positive definite: its Cholesky factor, of the matrix scaled to
+    /// a unit diagonal, exists up to rounding.
+    pub(crate) fn is_sound(&self) -> bool {
+        let mut l = [[0.0; N]; N];
+        for i in 0..N {
+            for j in 0..=i {
+                let scale = libm::sqrt(self.p[i][i] * self.p[j][j]);
+                let mut sum = self.p[i][j] / scale;
+                for k in 0..j {
+                    sum -= l[i][k] * l[j][k];
+                }
+                if i == j {
+                    if !(sum > -ROUNDING && self.p[i][i] > 0.0) {
+                        return false;
+                    }
+                    l[i][i] = libm::sqrt(sum.max(ROUNDING));
+                } else {
+                    l[i][j] = sum / l[j][j];
+                }
+            }
+        }
         self.x.iter().chain(self.p.iter().flatten()).sum::<f64>().is_finite()
+    }
+
+    /// The diagonal is positive and finite, and so is the mean: cheap enough for every sample.
+    #[inline(always)]
+    pub(crate) fn is_usable(&self) -> bool {
+        let (mut least, mut sum) = (f64::MAX, 0.0);
+        for i in 0..N {
+            least = if self.p[i][i] < least { self.p[i][i] } else { least };
+            sum += self.p[i][i] + self.x[i];
+        }
+        least > 0.0 && sum.is_finite()
     }
 }
 
+/// Largest variance of a force that a prior may state, in units of the noise's: wide enough to be no prior at all, and far enough from
+/// what 16 digits can tell apart from the noise.
+pub(crate) const WIDEST: f64 = 1e8;
+/// What rounding may take from a pivot of a correlation matrix.
+const ROUNDING: f64 = 1e-6;
 /// Least variance kept, in units of the noise variance and the unknown's own unit squared.
-const TINY: f64 = 1e-18;
+const TINY: f64 = 1e-15;

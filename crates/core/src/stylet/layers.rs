@@ -15,7 +15,8 @@
 //! *before* it (the force that is left is friction), and every sample before about `D` after: the joint least-squares solution without
 //! buffer or replay.
 
-use super::gaussian::Gaussian;
+use super::gaussian::{Gaussian, WIDEST};
+use super::local::MEMORY_M;
 use super::noise::Noise;
 
 pub(crate) const A: usize = 0;
@@ -45,6 +46,8 @@ impl Layers {
     /// unknown on the scale of `slope` N/m.
     pub(crate) fn contact(start_m: f64, force_n: f64, sd_n: f64, slope: f64, drive: f64, noise: &Noise) -> Self {
         let unit = 1.0 / noise.variance;
+        let sd_n = sd_n.min(libm::sqrt(WIDEST / unit));
+        let slope = slope.min(libm::sqrt(WIDEST / unit) / MEMORY_M);
         let friction = slope / drive;
         let half = 0.5 * force_n;
         let variance = [
@@ -125,7 +128,8 @@ impl Layers {
             }
         }
         let before = self.slope(drive).abs().max(1.0);
-        let b = self.belief.x[F];
+        let before = before.min(libm::sqrt(WIDEST / unit) / MEMORY_M);
+        let b = self.belief.x[F].clamp(-before / drive, before / drive);
         // The belief moves on by a linear map; the new layer's stiffness and friction are unknown.
         let mut map = [[0.0; N]; N];
         map[A][if first { KP } else { A }] = 1.0;
@@ -134,7 +138,7 @@ impl Layers {
         map[FP][F] = 1.0;
         map[ZERO][ZERO] = 1.0;
         self.belief = self.belief.mapped(&map);
-        let wide = 3.0 * before;
+        let wide = (3.0 * before).min(libm::sqrt(WIDEST / unit) / MEMORY_M);
         let g = &mut self.belief;
         g.renew(K, 0.5 * before, wide * wide * unit);
         g.renew(F, 0.5 * before / drive, wide * wide / (drive * drive) * unit);

@@ -12,7 +12,7 @@
 //! variance: while the speed stays the same nothing is learned of `B`, so that a change of speed widens the prediction by what friction
 //! may do, and cannot alarm.
 
-use super::gaussian::{Gaussian, Innovation};
+use super::gaussian::{Gaussian, Innovation, WIDEST};
 use super::noise::Noise;
 
 /// Travel over which the loading curve counts as straight, in m: between the travel of a puncture (tenths of a
@@ -47,14 +47,14 @@ pub(crate) struct Step {
 impl Local {
     /// In the air: the level is the bias, nothing changes with anything.
     pub(crate) fn new(level_n: f64) -> Self {
-        Self { state: Gaussian::new([level_n, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0]), last_n: level_n, fresh: true }
+        Self { state: Gaussian::new([level_n, 0.0, 0.0, 0.0, 0.0], [1.0, 1e-12, 1e-12, 1e-12, 1e-12]), last_n: level_n, fresh: true }
     }
 
     /// After contact or a rupture: slopes unknown on the scale of `force_n` per memory; friction as it was, but no better known
     /// than to the whole force when `all` is set.
     pub(crate) fn renew(&mut self, measured_n: f64, force_n: f64, noise: &Noise, speed_mps: f64, all: bool) {
         let unit = 1.0 / noise.variance;
-        let scale = force_n * force_n * unit;
+        let scale = (force_n * force_n * unit).min(WIDEST);
         let v2 = speed_mps * speed_mps;
         let slope = scale / (MEMORY_M * MEMORY_M);
         self.state.renew(L, measured_n, 1.0 / (1.0 - noise.rho * noise.rho));

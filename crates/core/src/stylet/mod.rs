@@ -22,6 +22,15 @@ const STIFFEST: f64 = 2000.0;
 const SPIKE_SDS: f64 = 6.0;
 /// A spike lasts at most this many samples.
 const SPIKE_SAMPLES: u8 = 3;
+/// Multiplications and additions: of what every sample costs beside the beliefs, of the local predictor (five shears, an innovation and
+/// an update of five unknowns), of the layers (an innovation and an update of six), and of a rupture (a linear map of six unknowns).
+const WORK_FRAME: u32 = 60;
+const WORK_LOCAL: u32 = 5 * 22 + 2 * 30 + 2 * 30;
+const WORK_LAYERS: u32 = 2 * 42 + 2 * 42 + 12;
+const WORK_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
+/// No needle is faster, in m/s, nor farther from the origin, in m: what says so is a fault of the logging.
+const FASTEST_MPS: f64 = 2.0;
+const FARTHEST_M: f64 = 10.0;
 /// What an ordinary drop lasts at most, in s.
 const LONGEST_DROP_S: f64 = 0.1;
 /// Misfit at which the law of layers does not hold; it has to be shown that it does.
@@ -66,6 +75,8 @@ pub(crate) struct Stylet {
     since_s: f64,
     falling: bool,
     fall: Option<Fall>,
+    /// Size of the last fall that was looked at, and its standard deviation, in N.
+    drop: (f64, f64),
     last_level_n: f64,
     shaft: Shaft,
     /// The law of layers has failed: friction is taken as dry.
@@ -80,6 +91,8 @@ pub(crate) struct Stylet {
     texture: f64,
     /// Least fall that is a rupture, in N.
     least_n: f64,
+    /// Multiplications and additions of the last sample.
+    work: u32,
     out: Output,
 }
 
@@ -109,6 +122,7 @@ impl Stylet {
             since_s: 0.0,
             falling: false,
             fall: None,
+            drop: (0.0, 0.0),
             last_level_n: 0.0,
             shaft: Shaft::default(),
             dry: false,
@@ -118,8 +132,18 @@ impl Stylet {
             rough: 1.0,
             texture: 1.0,
             least_n: 0.0,
+            work: 0,
             out: Output::default(),
         }
+    }
+
+    pub(crate) fn is_sound(&self) -> bool {
+        let numbers = self.noise.variance + self.noise.rho + self.peak_n + self.misfit + self.texture + self.out.enhanced_n;
+        numbers.is_finite() && self.noise.variance > 0.0 && self.local.state.is_sound() && self.layers.belief.is_sound()
+    }
+
+    pub(crate) fn work(&self) -> u32 {
+        self.work
     }
 
     pub(crate) fn out(&self) -> &Output {
@@ -130,7 +154,9 @@ impl Stylet {
     pub(crate) fn step(&mut self, config: &EnhanceConfig, surface_m: f64, sample: Sample) -> &Output {
         self.out.detection = None;
         self.out.estimate = None;
-        self.out.used = sample.is_usable() && (!self.started || sample.time_s > self.last.time_s);
+        self.work = WORK_FRAME;
+        let robot = sample.velocity_mps.abs() < FASTEST_MPS && sample.position_m.abs() < FARTHEST_M;
+        self.out.used = sample.is_usable() && robot && (!self.started || sample.time_s > self.last.time_s);
         if !self.out.used {
             return &self.out;
         }
@@ -192,7 +218,7 @@ impl Stylet {
         let risen = self.low_passed_n - self.noise.bias_n();
         let spread = self.noise.variance * self.noise.slow() * self.noise.step_s / (2.0 * search.time_constant_s);
         let sd = libm::sqrt(spread.min(self.noise.marginal()) + self.noise.bias_variance().min(self.noise.marginal()));
-        if risen > search.noise_sds * sd && sample.velocity_mps > -config.drop.standstill_mps {
+        if risen > search.noise_sds * sd && sample.force_n > self.noise.bias_n() && sample.velocity_mps > -config.drop.standstill_mps {
             self.above += 1;
         } else {
             self.above = 0;
@@ -220,6 +246,8 @@ impl Stylet {
     #[inline(always)]
     fn feel(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
         let force_n = sample.force_n;
+        self.mend(step, sample);
+        self.work += WORK_LOCAL;
         self.local.advance(step, &self.noise);
         self.last_level_n = if self.fall.is_none() { self.local.level_n() } else { self.last_level_n };
         let innovation = self.local.innovation(force_n, step, &self.noise);
@@ -290,6 +318,7 @@ impl Stylet {
             }
         } else if forward && sample.position_m >= self.layers.start_m {
             let rho = self.noise.rho_over(step.dt_s);
+            self.work += WORK_LAYERS;
             let (e, s) = self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
             let z2 = (e * e / (s * self.noise.variance)).min(400.0);
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
@@ -319,6 +348,26 @@ impl Stylet {
         }
     }
 
+    /// Beliefs that senseless data have spoilt begin afresh.
+    #[inline(always)]
+    fn mend(&mut self, step: &Step, sample: &Sample) {
+        if !(self.noise.variance.is_finite() && self.noise.variance < 1e12) {
+            self.noise = Noise::new(1e-3);
+        }
+        if !self.local.state.is_usable() {
+            self.local = Local::new(sample.force_n);
+            let force = (sample.force_n - self.noise.bias_n()).abs().max(1e-3);
+            self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, true);
+            self.work += WORK_RUPTURE;
+        }
+        if !self.layers.belief.is_usable() {
+            self.layers = Layers::contact(sample.position_m, 0.0, 1.0, STIFFEST, step.speed_mps, &self.noise);
+            self.before = self.layers;
+            self.fallen = None;
+            self.work += WORK_RUPTURE;
+        }
+    }
+
     /// Follows a fall from where it began.
     fn fall(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, alarm: bool, begins: bool) {
         let _ = (config, alarm, begins);
@@ -337,7 +386,7 @@ impl Stylet {
     }
 
     /// Whether the fall so far is a drop: larger than what the noise may feign, and than texture.
-    fn is_a_drop(&self, config: &EnhanceConfig) -> bool {
+    fn is_a_drop(&mut self, config: &EnhanceConfig) -> bool {
         let Some(fall) = self.fall else { return false };
         // As long as the law has not been seen to hold, the first travel after contact is no layer.
         if self.rough > 0.0 && self.deepest_m - self.first_m < config.guard.blind_travel_m {
@@ -345,7 +394,9 @@ impl Stylet {
         }
         let effective = (fall.count.min(16.0) / libm::sqrt(self.noise.slow())).max(1.0);
         let noise = 2.0 * libm::sqrt(self.noise.marginal() / effective);
-        fall.from_n - fall.mean_n >= self.least_n.max(noise)
+        let size = fall.from_n - fall.mean_n;
+        self.drop = (size, noise / 2.0);
+        size >= self.least_n.max(noise)
     }
 
     fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {
@@ -372,6 +423,7 @@ impl Stylet {
         let drive = step.speed_mps;
         let predicted = self.local.level_n();
         self.layers = self.before;
+        self.work += WORK_RUPTURE;
         self.layers.rupture(at_m, span / libm::sqrt(12.0), drive, &self.noise);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
@@ -389,7 +441,10 @@ impl Stylet {
         }
         self.out.ruptures += 1;
         self.shaft.rupture(sample.position_m, sample.force_n - bias);
-        let _ = (evidence, config);
+        // Before the sum passed its threshold a rupture was as likely as a false alarm; what is above it counts.
+        let confidence = 1.0 / (1.0 + libm::exp(-(evidence + core::f64::consts::LN_2)));
+        let (drop_n, drop_sd_n) = self.drop;
+        let _ = config;
         self.out.detection = Some(Detection {
             layer: self.out.ruptures,
             time_s: sample.time_s,
@@ -397,6 +452,9 @@ impl Stylet {
             located_s: sample.time_s,
             located_m: at_m,
             cause: Cause::Cusum,
+            drop_n,
+            drop_sd_n,
+            confidence,
         });
     }
 
@@ -453,6 +511,7 @@ impl Stylet {
         behind = behind.max(0.0);
         let u = sample.velocity_mps;
         let mut friction = behind * u;
+        let behind_variance = variance;
         variance *= u * u;
         if self.in_tissue {
             let felt = Felt {
@@ -473,7 +532,12 @@ impl Stylet {
         }
         let out = &mut self.out;
         out.state = if out.detection.is_some() { State::DetectedRupture } else { State::NoRupture };
-        out.theta = [self.layers.belief.x[K], self.layers.belief.x[layers::F]];
+        if self.in_tissue {
+            let belief = &self.layers.belief;
+            out.theta = [belief.x[K], belief.x[layers::F]];
+            let sd = |i: usize| libm::sqrt((belief.p[i][i] * self.noise.variance).max(0.0));
+            out.sd = [sd(K), sd(layers::F), libm::sqrt(behind_variance.max(0.0))];
+        }
         out.cumulative_friction_ns_per_m = behind;
         out.enhanced_n = sample.force_n - friction;
         let half = 1.96 * libm::sqrt(marginal + variance.max(0.0));
