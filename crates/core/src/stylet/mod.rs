@@ -419,12 +419,16 @@ impl Stylet {
         }
         let bias = self.noise.bias_n();
         let span = (sample.position_m - self.before_m).max(0.0);
-        let at_m = self.before_m + 0.5 * span;
+        // One sample that says it all lies half a step behind the rupture; a sum over many began where it left zero, give or take
+        // a step.
+        let first = span.min(step.dz_m.max(0.0));
+        let at_m = self.before_m + 0.5 * first;
+        let place_m = if span > 1.5 * first { first.max(span / libm::sqrt(12.0)) } else { first / libm::sqrt(12.0) };
         let drive = step.speed_mps;
         let predicted = self.local.level_n();
         self.layers = self.before;
         self.work += WORK_RUPTURE;
-        self.layers.rupture(at_m, span / libm::sqrt(12.0), drive, &self.noise);
+        self.layers.rupture(at_m, place_m, drive, &self.noise);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
         self.layers.take(sample.position_m, sample.velocity_mps, sample.force_n, 0.0);
@@ -474,7 +478,8 @@ impl Stylet {
         let l = &self.layers;
         let d = l.previous_m;
         let [k, b] = [l.belief.x[KP], l.belief.x[FP]];
-        let [vk, vb] = l.previous_variance(&self.noise);
+        let doubt = self.noise.doubt();
+        let [vk, vb] = l.previous_variance(&self.noise).map(|v| v * doubt);
         let (cumulative, cumulative_variance) = l.behind(&self.noise);
         let drop = k * d;
         if !(drop > 1.96 * d * libm::sqrt(vk.max(0.0))) {
@@ -494,7 +499,7 @@ impl Stylet {
             friction_sd: libm::sqrt(vb.max(0.0)),
             drop_sd_n: d * libm::sqrt(vk.max(0.0)),
             cumulative_ns_per_m: cumulative,
-            cumulative_sd: libm::sqrt(cumulative_variance.max(0.0)),
+            cumulative_sd: libm::sqrt((cumulative_variance * doubt).max(0.0)),
         });
     }
 

@@ -144,6 +144,13 @@ impl Noise {
         self.variance / (1.0 - self.rho * self.rho)
     }
 
+    /// What intervals grow by, as a factor of the variance, because the level of slow noise was learned from few samples: with
+    /// `var rho = (1 - rho²)/n` its relative variance is `4 (1 + rho)/((1 - rho) n)`, of which half is above.
+    pub(crate) fn doubt(&self) -> f64 {
+        let n = self.sums[3].max(40.0);
+        1.0 + 2.0 * (1.0 + self.rho) / ((1.0 - self.rho) * n)
+    }
+
     /// How much more slow noise weighs than white noise of the same innovations: `1/(1 - rho)²`.
     #[inline(always)]
     pub(crate) fn slow(&self) -> f64 {
