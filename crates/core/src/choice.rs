@@ -42,7 +42,10 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
         match &mut self.stylet {
-            Some(stylet) => *stylet.step(self.paper.config(), self.surface_m, sample),
+            Some(stylet) => {
+                stylet.step(self.paper.config(), self.surface_m, sample);
+                *stylet.complete(&sample)
+            }
             None => self.paper.step(sample),
         }
     }

@@ -1,6 +1,6 @@
 //! A small Gaussian belief: mean, covariance, and what a scalar measurement does to them.
 
-/// Mean and covariance of `N` unknowns. The covariance is in units of a noise variance that the
+/// Mean and covariance of `N` unknowns; of the covariance the lower triangle. The covariance is in units of a noise variance that the
 /// caller keeps, so that gains do not change when the noise is re-estimated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gaussian<const N: usize> {
@@ -28,26 +28,39 @@ impl<const N: usize> Gaussian<N> {
         Self { x, p }
     }
 
-    /// The innovation of `y = h x + noise`, whose noise has variance `r`.
+    /// Covariance of two unknowns: the lower triangle is what is kept.
     #[inline(always)]
-    pub(crate) fn innovation(&self, h: &[f64; N], y: f64, r: f64) -> Innovation<N> {
+    pub(crate) fn cov(&self, i: usize, j: usize) -> f64 {
+        if i >= j { self.p[i][j] } else { self.p[j][i] }
+    }
+
+    /// The innovation of `y = sum h_k x_(columns_k) + noise`, whose noise has variance `r`.
+    #[inline(always)]
+    pub(crate) fn innovation<const M: usize>(
+        &self,
+        columns: [usize; M],
+        h: [f64; M],
+        y: f64,
+        r: f64,
+    ) -> Innovation<N> {
         let mut ph = [0.0; N];
-        let mut s = r;
-        let mut e = y;
-        for i in 0..N {
+        for (i, ph) in ph.iter_mut().enumerate() {
             let mut sum = 0.0;
-            for j in 0..N {
-                sum += self.p[i][j] * h[j];
+            for k in 0..M {
+                sum += self.cov(i, columns[k]) * h[k];
             }
-            ph[i] = sum;
-            s += sum * h[i];
-            e -= h[i] * self.x[i];
+            *ph = sum;
+        }
+        let (mut s, mut e) = (r, y);
+        for k in 0..M {
+            s += ph[columns[k]] * h[k];
+            e -= h[k] * self.x[columns[k]];
         }
         // Never less than the noise alone, whatever rounding does.
         Innovation { e, s: if s > r { s } else { r }, ph }
     }
 
-    /// Takes the measurement: `x += P h e/s`, `P -= (P h)(P h)'/s`, which keeps `P` symmetric.
+    /// Takes the measurement: `x += P h e/s`, `P -= (P h)(P h)'/s`.
     #[inline(always)]
     pub(crate) fn take(&mut self, innovation: &Innovation<N>) {
         let Innovation { e, s, ph } = innovation;
@@ -55,18 +68,12 @@ impl<const N: usize> Gaussian<N> {
         for i in 0..N {
             let k = ph[i] * gain;
             self.x[i] += k * e;
-            for j in 0..=i {
-                // The lower triangle counts: what rounding has made of the upper goes.
-                let entry = self.p[i][j] - k * ph[j];
-                self.p[i][j] = entry;
-                self.p[j][i] = entry;
+            for j in 0..i {
+                self.p[i][j] -= k * ph[j];
             }
-        }
-        // What rounding may take from a variance that is known very well.
-        for i in 0..N {
-            if self.p[i][i] < TINY {
-                self.p[i][i] = TINY;
-            }
+            // What rounding may take from a variance that is known very well.
+            let variance = self.p[i][i] - k * ph[i];
+            self.p[i][i] = if variance > TINY { variance } else { TINY };
         }
     }
 
@@ -88,7 +95,7 @@ impl<const N: usize> Gaussian<N> {
             for j in 0..N {
                 out.x[i] += map[i][j] * self.x[j];
                 for k in 0..N {
-                    half[i][j] += map[i][k] * self.p[k][j];
+                    half[i][j] += map[i][k] * self.cov(k, j);
                 }
             }
         }
@@ -107,11 +114,16 @@ impl<const N: usize> Gaussian<N> {
     #[inline(always)]
     pub(crate) fn shear(&mut self, i: usize, j: usize, by: f64) {
         self.x[i] += by * self.x[j];
+        self.p[i][i] += by * (2.0 * self.cov(i, j) + by * self.p[j][j]);
         for k in 0..N {
-            self.p[i][k] += by * self.p[j][k];
-        }
-        for k in 0..N {
-            self.p[k][i] += by * self.p[k][j];
+            if k != i {
+                let more = by * self.cov(j, k);
+                if i > k {
+                    self.p[i][k] += more;
+                } else {
+                    self.p[k][i] += more;
+                }
+            }
         }
     }
 

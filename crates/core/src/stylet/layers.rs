@@ -80,18 +80,22 @@ impl Layers {
     #[inline(always)]
     pub(crate) fn take(&mut self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> (f64, f64) {
         let h = self.regressor(position_m, drive);
-        let innovation = match &self.last {
-            None => {
-                let r = 1.0 / (1.0 - rho * rho);
-                self.belief.innovation(&h, force_n, r)
-            }
+        let (w, y, r) = match &self.last {
+            None => (h, force_n, 1.0 / (1.0 - rho * rho)),
             Some((before, force_before)) => {
                 let mut w = h;
-                for (w, before) in w.iter_mut().zip(before) {
-                    *w -= rho * before;
+                if rho != 0.0 {
+                    for (w, before) in w.iter_mut().zip(before) {
+                        *w -= rho * before;
+                    }
                 }
-                self.belief.innovation(&w, force_n - rho * force_before, 1.0)
+                (w, force_n - rho * force_before, 1.0)
             }
+        };
+        let innovation = if self.passed > 0 {
+            self.belief.innovation([A, K, F, ZERO], [w[A], w[K], w[F], w[ZERO]], y, r)
+        } else {
+            self.belief.innovation([A, K, F, KP, ZERO], [w[A], w[K], w[F], w[KP], w[ZERO]], y, r)
         };
         self.belief.take(&innovation);
         self.last = Some((h, force_n));
@@ -121,9 +125,8 @@ impl Layers {
                 delta = (force / slope).min(d);
                 let g = &self.belief.p;
                 let u0 = self.drive0;
-                let variance = (g[A][A] + 2.0 * u0 * g[A][KP] + u0 * u0 * g[KP][KP]).max(1e-6);
-                let share = [1.0, -delta, 0.0, 0.0, 0.0, 0.0];
-                let constraint = self.belief.innovation(&share, 0.0, variance);
+                let variance = (g[A][A] + 2.0 * u0 * g[KP][A] + u0 * u0 * g[KP][KP]).max(1e-6);
+                let constraint = self.belief.innovation([A, K], [1.0, -delta], 0.0, variance);
                 self.belief.take(&constraint);
             }
         }

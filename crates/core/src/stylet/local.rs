@@ -96,11 +96,14 @@ impl Local {
         if self.fresh {
             // Nothing before it to be whitened with.
             let r = 1.0 / (1.0 - noise.rho * noise.rho);
-            return self.state.innovation(&[1.0, 0.0, 0.0, 0.0, 0.0], force_n, r);
+            return self.state.innovation([L], [1.0], force_n, r);
         }
         let rho = noise.rho_over(step.dt_s);
-        let h = [1.0 - rho, rho * step.dt_s, rho * step.dz_m, rho * step.dv_mps, 0.0];
-        self.state.innovation(&h, force_n - rho * self.last_n, 1.0)
+        if rho == 0.0 {
+            return self.state.innovation([L], [1.0], force_n, 1.0);
+        }
+        let h = [1.0 - rho, rho * step.dt_s, rho * step.dz_m, rho * step.dv_mps];
+        self.state.innovation([L, R, S, B], h, force_n - rho * self.last_n, 1.0)
     }
 
     #[inline(always)]
@@ -119,7 +122,7 @@ impl Local {
     pub(crate) fn rate(&self, speed_mps: f64) -> (f64, f64) {
         let g = &self.state;
         let v = speed_mps;
-        (g.x[R] + v * g.x[S], g.p[R][R] + 2.0 * v * g.p[R][S] + v * v * g.p[S][S])
+        (g.x[R] + v * g.x[S], g.p[R][R] + 2.0 * v * g.cov(R, S) + v * v * g.p[S][S])
     }
 
     /// Predicted force in N.

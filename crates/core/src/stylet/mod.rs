@@ -25,12 +25,14 @@ const SPIKE_SAMPLES: u8 = 3;
 /// Multiplications and additions: of what every sample costs beside the beliefs, of the local predictor (five shears, an innovation and
 /// an update of five unknowns), of the layers (an innovation and an update of six), and of a rupture (a linear map of six unknowns).
 const WORK_FRAME: u32 = 60;
-const WORK_LOCAL: u32 = 5 * 22 + 2 * 30 + 2 * 30;
-const WORK_LAYERS: u32 = 2 * 42 + 2 * 42 + 12;
+const WORK_LOCAL: u32 = 5 * 14 + 2 * 24 + 2 * 20;
+const WORK_LAYERS: u32 = 2 * 35 + 2 * 27 + 12;
 const WORK_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
 /// No needle is faster, in m/s, nor farther from the origin, in m: what says so is a fault of the logging.
 const FASTEST_MPS: f64 = 2.0;
 const FARTHEST_M: f64 = 10.0;
+/// Smoothing of the speed that stands for the motion, in s.
+const SPEED_S: f64 = 0.2;
 /// What an ordinary drop lasts at most, in s.
 const LONGEST_DROP_S: f64 = 0.1;
 /// Misfit at which the law of layers does not hold; it has to be shown that it does.
@@ -59,6 +61,9 @@ pub(crate) struct Stylet {
     before: Layers,
     before_m: f64,
     first_m: f64,
+    was_quiet: bool,
+    /// The last step's length, and the shares of the low-passes that go with it.
+    shares: [f64; 3],
     in_tissue: bool,
     started: bool,
     last: Sample,
@@ -91,6 +96,7 @@ pub(crate) struct Stylet {
     texture: f64,
     /// Least fall that is a rupture, in N.
     least_n: f64,
+    behind_variance: f64,
     /// Multiplications and additions of the last sample.
     work: u32,
     out: Output,
@@ -108,6 +114,8 @@ impl Stylet {
             before: layers,
             before_m: surface_m,
             first_m: surface_m,
+            was_quiet: true,
+            shares: [0.0; 3],
             in_tissue: false,
             started: false,
             last: Sample::default(),
@@ -132,6 +140,7 @@ impl Stylet {
             rough: 1.0,
             texture: 1.0,
             least_n: 0.0,
+            behind_variance: 0.0,
             work: 0,
             out: Output::default(),
         }
@@ -179,14 +188,16 @@ impl Stylet {
         let dt_s = sample.time_s - last.time_s;
         if dt_s > 0.0 {
             self.noise.clock(dt_s);
+            if (dt_s - self.shares[0]).abs() > 1e-9 {
+                self.shares = [dt_s, dt_s / (dt_s + SPEED_S), dt_s / (dt_s + shaft::SMOOTH_S)];
+            }
         }
         let speed = sample.velocity_mps.abs();
         if speed > config.drop.standstill_mps {
             if self.speed_mps == 0.0 {
                 self.speed_mps = speed;
             } else {
-                let share = dt_s / (dt_s + 0.2);
-                self.speed_mps += share * (speed - self.speed_mps);
+                self.speed_mps += self.shares[1] * (speed - self.speed_mps);
             }
         }
         Step {
@@ -261,6 +272,7 @@ impl Stylet {
         if sample.position_m > self.deepest_m {
             self.deepest_m = sample.position_m;
         }
+        let share = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * local::MEMORY_M);
         // A spike: upwards, or below what any rupture can leave, and not for long.
         let below = force_n - self.noise.bias_n() < -SPIKE_SDS * libm::sqrt(self.noise.marginal());
         let odd = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && below);
@@ -283,10 +295,11 @@ impl Stylet {
         if !forward {
             self.alarm.rest();
         }
-        if heard.outweighs && !heard.quiet {
+        if !heard.quiet && (self.was_quiet || heard.outweighs) {
             self.before = self.layers;
             self.before_m = self.last.position_m;
         }
+        self.was_quiet = heard.quiet || !forward;
         if forward && !odd && !heard.quiet {
             self.fall(config, step, sample, heard.alarm, heard.outweighs && self.fall.is_none());
         }
@@ -308,7 +321,6 @@ impl Stylet {
         if !odd {
             self.noise.in_tissue(innovation.e, innovation.s);
             self.local.take(&innovation, force_n);
-            let share = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * local::MEMORY_M);
             self.texture += share * ((z * z).min(36.0) - self.texture);
         }
         self.falling = self.fallen.is_some() && self.settle(step);
@@ -322,8 +334,7 @@ impl Stylet {
             let (e, s) = self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
             let z2 = (e * e / (s * self.noise.variance)).min(400.0);
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
-                let travel = step.dz_m.abs();
-                let share = (travel / (travel + 2.0 * local::MEMORY_M)).max(step.dt_s / (step.dt_s + 4.0 * local::MEMORY_S));
+                let share = share.max((step.dt_s * (0.25 / local::MEMORY_S)).min(0.5));
                 self.misfit += share * (z2 - self.misfit);
             }
             self.peak_n = self.peak_n.max(self.local.level_n() - self.noise.bias_n());
@@ -337,10 +348,6 @@ impl Stylet {
             self.least_n = weight * config.stylet.smallest_drop * self.peak_n;
         } else {
             self.layers.pass();
-        }
-        if heard.quiet {
-            self.before = self.layers;
-            self.before_m = sample.position_m;
         }
         if self.since >= self.report_at {
             self.report_at = self.report_at.saturating_mul(2);
@@ -382,6 +389,7 @@ impl Stylet {
             // Too slow, or too small: not a rupture.
             self.fall = None;
             self.alarm.rest();
+            self.was_quiet = true;
         }
     }
 
@@ -403,6 +411,7 @@ impl Stylet {
         let force = (sample.force_n - self.noise.bias_n()).abs().max(sd);
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.alarm.rest();
+        self.was_quiet = true;
         self.fall = None;
         if let Some(fallen) = self.fallen {
             self.layers = fallen;
@@ -423,7 +432,7 @@ impl Stylet {
         // a step.
         let first = span.min(step.dz_m.max(0.0));
         let at_m = self.before_m + 0.5 * first;
-        let place_m = if span > 1.5 * first { first.max(span / libm::sqrt(12.0)) } else { first / libm::sqrt(12.0) };
+        let place_m = if span > 1.5 * first { first.max(0.5 * span) } else { first / libm::sqrt(12.0) };
         let drive = step.speed_mps;
         let predicted = self.local.level_n();
         self.layers = self.before;
@@ -435,6 +444,7 @@ impl Stylet {
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.alarm.rest();
+        self.was_quiet = true;
         self.fall = None;
         self.before = self.layers;
         self.before_m = sample.position_m;
@@ -520,14 +530,14 @@ impl Stylet {
         variance *= u * u;
         if self.in_tissue {
             let felt = Felt {
-                dt_s: step.dt_s,
+                share: self.shares[2],
                 position_m: sample.position_m,
                 force_n: sample.force_n - self.noise.bias_n(),
                 advancing: sample.velocity_mps > standstill,
                 retracting,
                 peak_n: self.peak_n,
                 jumped: self.releasing_s > 0.0,
-                noise_n: libm::sqrt(marginal),
+                noise_n2: marginal,
                 track: config.stylet.track_way_back,
             };
             let (dry_n, sd) = self.shaft.take(&felt);
@@ -537,17 +547,27 @@ impl Stylet {
         }
         let out = &mut self.out;
         out.state = if out.detection.is_some() { State::DetectedRupture } else { State::NoRupture };
-        if self.in_tissue {
-            let belief = &self.layers.belief;
-            out.theta = [belief.x[K], belief.x[layers::F]];
-            let sd = |i: usize| libm::sqrt((belief.p[i][i] * self.noise.variance).max(0.0));
-            out.sd = [sd(K), sd(layers::F), libm::sqrt(behind_variance.max(0.0))];
-        }
+        self.behind_variance = behind_variance;
+        let out = &mut self.out;
         out.cumulative_friction_ns_per_m = behind;
         out.enhanced_n = sample.force_n - friction;
         let half = 1.96 * libm::sqrt(marginal + variance.max(0.0));
         out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
-        out.reconstructed_n = sample.force_n - out.error_n;
-        out.cusum_n2 = self.alarm.level();
+    }
+
+    /// Fills in what only callers of the whole output look at.
+    pub(crate) fn complete(&mut self, sample: &Sample) -> &Output {
+        let out = &mut self.out;
+        if out.used {
+            out.reconstructed_n = if self.in_tissue { sample.force_n - out.error_n } else { 0.0 };
+            out.cusum_n2 = self.alarm.level();
+            if self.in_tissue {
+                let belief = &self.layers.belief;
+                out.theta = [belief.x[K], belief.x[layers::F]];
+                let sd = |i: usize| libm::sqrt((belief.p[i][i] * self.noise.variance).max(0.0));
+                out.sd = [sd(K), sd(layers::F), libm::sqrt(self.behind_variance.max(0.0))];
+            }
+        }
+        &self.out
     }
 }

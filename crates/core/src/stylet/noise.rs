@@ -141,6 +141,9 @@ impl Noise {
     /// Variance of the noise itself in N².
     #[inline(always)]
     pub(crate) fn marginal(&self) -> f64 {
+        if self.rho == 0.0 {
+            return self.variance;
+        }
         self.variance / (1.0 - self.rho * self.rho)
     }
 
@@ -154,6 +157,9 @@ impl Noise {
     /// How much more slow noise weighs than white noise of the same innovations: `1/(1 - rho)²`.
     #[inline(always)]
     pub(crate) fn slow(&self) -> f64 {
+        if self.rho == 0.0 {
+            return 1.0;
+        }
         let d = 1.0 - self.rho;
         1.0 / (d * d)
     }

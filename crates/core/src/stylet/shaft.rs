@@ -27,7 +27,7 @@ const SLOPE_M: f64 = 8e-3;
 /// Travel over which it gives in to an excess push, which no tip can make on the way back, in m.
 const EXCESS_M: f64 = 1e-3;
 /// Smoothing of the force in s, shorter than a drop.
-const SMOOTH_S: f64 = 0.05;
+pub(crate) const SMOOTH_S: f64 = 0.05;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shaft {
@@ -56,7 +56,8 @@ struct Back {
 /// One sample, as the shaft's friction needs it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Felt {
-    pub(crate) dt_s: f64,
+    /// Share that the sample has in the smoothed force.
+    pub(crate) share: f64,
     pub(crate) position_m: f64,
     /// Force without the sensor's zero in N.
     pub(crate) force_n: f64,
@@ -66,7 +67,8 @@ pub(crate) struct Felt {
     pub(crate) peak_n: f64,
     /// The force has just jumped up.
     pub(crate) jumped: bool,
-    pub(crate) noise_n: f64,
+    /// Variance of the noise in N².
+    pub(crate) noise_n2: f64,
     pub(crate) track: bool,
 }
 
@@ -83,7 +85,7 @@ impl Shaft {
     /// Takes a sample; returns the friction in N and its standard deviation.
     pub(crate) fn take(&mut self, felt: &Felt) -> (f64, f64) {
         let before = self.smooth_n;
-        self.smooth_n += felt.dt_s / (felt.dt_s + SMOOTH_S) * (felt.force_n - before);
+        self.smooth_n += felt.share * (felt.force_n - before);
         if felt.retracting && self.back.is_none() {
             self.turn(felt, before);
         }
@@ -114,7 +116,7 @@ impl Shaft {
     }
 
     fn turn(&mut self, felt: &Felt, force_n: f64) {
-        let pull = (PULL * felt.peak_n).max(felt.noise_n).max(1e-9);
+        let pull = (PULL * felt.peak_n).max(libm::sqrt(felt.noise_n2)).max(1e-9);
         let force = force_n.max(0.05 * pull);
         self.back = Some(Back {
             turn_m: felt.position_m,
