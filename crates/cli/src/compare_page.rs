@@ -10,9 +10,20 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
     let detection = rows.iter().map(|r| {
         let [value, low, high] = r.errors_per_rupture;
         let mut cells = head(r);
-        cells.push(Cell::number(format!("{} / {} of {}", r.missed, r.false_alarms, r.ruptures)).status(Status::at_most(value, 0.001, 0.05)));
-        cells.push(Cell::number(format!("{} to {}", shown(Some(low), 100.0, 2), shown(Some(high), 100.0, 2))));
-        cells.push(Cell::number(format!("{} / {}", shown(r.delay_s.median, 1e3, 2), shown(r.delay_s.p95, 1e3, 2))));
+        cells.push(
+            Cell::number(format!("{} / {} of {}", r.missed, r.false_alarms, r.ruptures))
+                .status(Status::at_most(value, 0.001, 0.05)),
+        );
+        cells.push(Cell::number(format!(
+            "{} to {}",
+            shown(Some(low), 100.0, 2),
+            shown(Some(high), 100.0, 2)
+        )));
+        cells.push(Cell::number(format!(
+            "{} / {}",
+            shown(r.delay_s.median, 1e3, 2),
+            shown(r.delay_s.p95, 1e3, 2)
+        )));
         cells
     });
     let estimates = rows.iter().map(|r| {
@@ -20,7 +31,10 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
         cells.push(Cell::number(list(&r.stiffness_error)));
         cells.push(Cell::number(list(&r.friction_error)));
         let enhancement = Cell::number(shown(r.enhancement_rms_relative, 100.0, 2));
-        cells.push(enhancement.status(r.enhancement_rms_relative.map_or(Status::Plain, |x| Status::at_most(x, 0.05, 0.2))));
+        cells.push(
+            enhancement
+                .status(r.enhancement_rms_relative.map_or(Status::Plain, |x| Status::at_most(x, 0.05, 0.2))),
+        );
         cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
         cells
     });

@@ -60,7 +60,10 @@ fn ripple(t: f64) -> f64 {
 
 fn main() {
     let seeds: u64 = std::env::args().nth(1).and_then(|s| s.parse().ok()).unwrap_or(50);
-    let rate: f64 = std::env::args().nth(3).and_then(|s| s.parse().ok()).unwrap_or(StyletConfig::default().false_alarms_per_hour);
+    let rate: f64 = std::env::args()
+        .nth(3)
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(StyletConfig::default().false_alarms_per_hour);
     let only = std::env::args().nth(2).unwrap_or_default();
     let thin = {
         let mut t = gels();
@@ -69,22 +72,151 @@ fn main() {
     };
     let soft = vec![AnyEffect::SoftBoundary(SoftBoundary { width_m: 0.002 })];
     let rows = vec![
-        Row { name: "constant .02", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 50.0, v: constant },
-        Row { name: "sinus .02", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 15.0, v: sinus },
-        Row { name: "sinus rest .02", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 15.0, v: sinus_rest },
-        Row { name: "constant .1", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.1, rho: 0.0, dur: 50.0, v: constant },
-        Row { name: "sinus .1", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.1, rho: 0.0, dur: 15.0, v: sinus },
-        Row { name: "const AR .05", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.05, rho: 0.9, dur: 50.0, v: constant },
-        Row { name: "sinus AR .05", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.05, rho: 0.9, dur: 15.0, v: sinus },
-        Row { name: "weak .02", tissue: weak(), effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 50.0, v: constant },
-        Row { name: "weak .05", tissue: weak(), effects: vec![], fs: 200.0, noise: 0.05, rho: 0.0, dur: 50.0, v: constant },
-        Row { name: "soft", tissue: gels(), effects: soft, fs: 200.0, noise: 0.02, rho: 0.0, dur: 50.0, v: constant },
-        Row { name: "thin", tissue: thin, effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 36.0, v: constant },
-        Row { name: "hold", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 55.0, v: hold },
-        Row { name: "ripple", tissue: gels(), effects: vec![], fs: 200.0, noise: 0.02, rho: 0.0, dur: 50.0, v: ripple },
-        Row { name: "1kHz .1", tissue: gels(), effects: vec![], fs: 1000.0, noise: 0.1, rho: 0.0, dur: 50.0, v: constant },
+        Row {
+            name: "constant .02",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "sinus .02",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 15.0,
+            v: sinus,
+        },
+        Row {
+            name: "sinus rest .02",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 15.0,
+            v: sinus_rest,
+        },
+        Row {
+            name: "constant .1",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.1,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "sinus .1",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.1,
+            rho: 0.0,
+            dur: 15.0,
+            v: sinus,
+        },
+        Row {
+            name: "const AR .05",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.05,
+            rho: 0.9,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "sinus AR .05",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.05,
+            rho: 0.9,
+            dur: 15.0,
+            v: sinus,
+        },
+        Row {
+            name: "weak .02",
+            tissue: weak(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "weak .05",
+            tissue: weak(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.05,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "soft",
+            tissue: gels(),
+            effects: soft,
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "thin",
+            tissue: thin,
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 36.0,
+            v: constant,
+        },
+        Row {
+            name: "hold",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 55.0,
+            v: hold,
+        },
+        Row {
+            name: "ripple",
+            tissue: gels(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 50.0,
+            v: ripple,
+        },
+        Row {
+            name: "1kHz .1",
+            tissue: gels(),
+            effects: vec![],
+            fs: 1000.0,
+            noise: 0.1,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
     ];
-    println!("{:16} {:>10} {:>12} {:>14} {:>8} cover K b D band", "row", "miss/false", "delay ms", "K %", "enh");
+    println!(
+        "{:16} {:>10} {:>12} {:>14} {:>8} cover K b D band",
+        "row", "miss/false", "delay ms", "K %", "enh"
+    );
     for row in rows.iter().filter(|r| only.is_empty() || r.name.contains(&only)) {
         run(row, seeds, rate);
     }
@@ -111,10 +243,18 @@ fn run(row: &Row, seeds: u64, rate: f64) {
     for seed in 0..seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
         let mut state = LawState::default();
-        let config = EnhanceConfig { algorithm: Algorithm::Stylet, contact: Contact::Detected, stylet: StyletConfig { false_alarms_per_hour: rate, ..StyletConfig::default() }, ..EnhanceConfig::default() };
+        let config = EnhanceConfig {
+            algorithm: Algorithm::Stylet,
+            contact: Contact::Detected,
+            stylet: StyletConfig { false_alarms_per_hour: rate, ..StyletConfig::default() },
+            ..EnhanceConfig::default()
+        };
         let mut core = Enhancer::new(config, 0.0, [Sample::default(); 0]);
         let mut z = -0.005;
-        let mut noise: f64 = { let w: f64 = StandardNormal.sample(&mut rng); w * row.noise };
+        let mut noise: f64 = {
+            let w: f64 = StandardNormal.sample(&mut rng);
+            w * row.noise
+        };
         let mut ruptures: Vec<(f64, f64)> = vec![];
         let mut det: Vec<f64> = vec![];
         let mut est: Vec<LayerEstimate> = vec![];
@@ -125,8 +265,11 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             let mut now = vec![];
             let f = law.step(&mut state, t, z, v, |r| now.push((r.time_s, r.position_m)));
             ruptures.extend(now);
-            let out = core.step(Sample { time_s: t, position_m: z, velocity_mps: v, force_n: f.total_n + noise });
-            if let Some(d) = out.detection { det.push(d.time_s); }
+            let out =
+                core.step(Sample { time_s: t, position_m: z, velocity_mps: v, force_n: f.total_n + noise });
+            if let Some(d) = out.detection {
+                det.push(d.time_s);
+            }
             if let Some(e) = out.estimate {
                 est.retain(|x| x.layer != e.layer);
                 est.push(e);
@@ -137,7 +280,9 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                 tip2 += f.tip_n * f.tip_n;
                 if let Some([lo, hi]) = out.band_n {
                     cover[3][1] += 1.0;
-                    if f.tip_n >= lo && f.tip_n <= hi { cover[3][0] += 1.0; }
+                    if f.tip_n >= lo && f.tip_n <= hi {
+                        cover[3][0] += 1.0;
+                    }
                 }
             }
             let w: f64 = StandardNormal.sample(&mut rng);
@@ -153,7 +298,13 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             dsum += l.friction_ns_per_m2 * l.thickness_m;
             let hit = (0..det.len()).find(|&j| !used[j] && det[j] >= tr - 0.05 && det[j] <= tr + 1.0);
             match hit {
-                None => { missed += 1; if verbose > 0 { verbose -= 1; println!("   missed seed {seed} t {tr:.3} z {zr:.4} det {det:?}"); } }
+                None => {
+                    missed += 1;
+                    if verbose > 0 {
+                        verbose -= 1;
+                        println!("   missed seed {seed} t {tr:.3} z {zr:.4} det {det:?}");
+                    }
+                }
                 Some(j) => {
                     used[j] = true;
                     delays.push(1e3 * (det[j] - tr));
@@ -161,7 +312,9 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                         errors[i].push(100.0 * (e.stiffness_n_per_m / l.stiffness_n_per_m - 1.0).abs());
                         let mut c = |k: usize, x: f64, sd: f64| {
                             cover[k][1] += 1.0;
-                            if x.abs() <= 1.96 * sd { cover[k][0] += 1.0; }
+                            if x.abs() <= 1.96 * sd {
+                                cover[k][0] += 1.0;
+                            }
                         };
                         c(0, e.stiffness_n_per_m - l.stiffness_n_per_m, e.stiffness_sd);
                         c(1, e.friction - l.friction_ns_per_m2, e.friction_sd);
@@ -171,11 +324,26 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             }
         }
         for (j, u) in used.iter().enumerate() {
-            if !u { fals += 1; if verbose > 0 { verbose -= 1; println!("   false seed {seed} t {:.3}", det[j]); } }
+            if !u {
+                fals += 1;
+                if verbose > 0 {
+                    verbose -= 1;
+                    println!("   false seed {seed} t {:.3}", det[j]);
+                }
+            }
         }
     }
     let ks: Vec<String> = errors.iter_mut().map(|e| format!("{:.2}", median(e, 0.5))).collect();
     let cv: Vec<String> = cover.iter().map(|c| format!("{:.1}", 100.0 * c[0] / c[1])).collect();
     let hours = seeds as f64 * row.dur / 3600.0;
-    println!("{:16} {missed:>4}/{fals:<4} of {total:<5} {:>5.1}/{:<5.1} {:>16} {:.4} {}  {:.2}/h over {hours:.1} h", row.name, median(&mut delays.clone(), 0.5), median(&mut delays, 0.95), ks.join(","), median(&mut enh, 0.5), cv.join(" "), f64::from(fals) / hours);
+    println!(
+        "{:16} {missed:>4}/{fals:<4} of {total:<5} {:>5.1}/{:<5.1} {:>16} {:.4} {}  {:.2}/h over {hours:.1} h",
+        row.name,
+        median(&mut delays.clone(), 0.5),
+        median(&mut delays, 0.95),
+        ks.join(","),
+        median(&mut enh, 0.5),
+        cv.join(" "),
+        f64::from(fals) / hours
+    );
 }

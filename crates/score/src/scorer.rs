@@ -217,7 +217,9 @@ impl Scorer {
         let mut coverage = Coverage { band: [sums.in_band, sums.banded], ..Coverage::default() };
         for rupture in ruptures {
             let Some(truth) = rupture.layer.checked_sub(1).and_then(|i| self.layers.get(i)) else { continue };
-            let Some(e) = rupture.detection.and_then(|d| self.estimates.iter().find(|e| e.layer == d)) else { continue };
+            let Some(e) = rupture.detection.and_then(|d| self.estimates.iter().find(|e| e.layer == d)) else {
+                continue;
+            };
             if e.stiffness_sd <= 0.0 {
                 continue;
             }

@@ -44,7 +44,14 @@ pub(crate) struct Layers {
 impl Layers {
     /// At contact at `start_m` with the force `force_n` acting already, known to `sd_n`; stiffness and friction are
     /// unknown on the scale of `slope` N/m.
-    pub(crate) fn contact(start_m: f64, force_n: f64, sd_n: f64, slope: f64, drive: f64, noise: &Noise) -> Self {
+    pub(crate) fn contact(
+        start_m: f64,
+        force_n: f64,
+        sd_n: f64,
+        slope: f64,
+        drive: f64,
+        noise: &Noise,
+    ) -> Self {
         let unit = 1.0 / noise.variance;
         let sd_n = sd_n.min(libm::sqrt(WIDEST / unit));
         let slope = slope.min(libm::sqrt(WIDEST / unit) / MEMORY_M);

@@ -47,7 +47,11 @@ pub(crate) struct Step {
 impl Local {
     /// In the air: the level is the bias, nothing changes with anything.
     pub(crate) fn new(level_n: f64) -> Self {
-        Self { state: Gaussian::new([level_n, 0.0, 0.0, 0.0, 0.0], [1.0, 1e-12, 1e-12, 1e-12, 1e-12]), last_n: level_n, fresh: true }
+        Self {
+            state: Gaussian::new([level_n, 0.0, 0.0, 0.0, 0.0], [1.0, 1e-12, 1e-12, 1e-12, 1e-12]),
+            last_n: level_n,
+            fresh: true,
+        }
     }
 
     /// After contact or a rupture: slopes unknown on the scale of `force_n` per memory; friction as it was, but no better known
@@ -77,10 +81,14 @@ impl Local {
         let Step { dt_s, dz_m, dv_mps, .. } = *step;
         let g = &mut self.state;
         g.shear(L, R, dt_s);
-        if dz_m != 0.0 || dv_mps != 0.0 {
+        if dz_m != 0.0 {
             g.shear(L, S, dz_m);
+        }
+        if dv_mps != 0.0 {
             g.shear(L, B, dv_mps);
             g.shear(S, C, dv_mps);
+        }
+        if dz_m != 0.0 {
             g.shear(B, C, dz_m);
         }
         let slow = noise.slow();

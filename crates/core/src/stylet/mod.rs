@@ -147,8 +147,16 @@ impl Stylet {
     }
 
     pub(crate) fn is_sound(&self) -> bool {
-        let numbers = self.noise.variance + self.noise.rho + self.peak_n + self.misfit + self.texture + self.out.enhanced_n;
-        numbers.is_finite() && self.noise.variance > 0.0 && self.local.state.is_sound() && self.layers.belief.is_sound()
+        let numbers = self.noise.variance
+            + self.noise.rho
+            + self.peak_n
+            + self.misfit
+            + self.texture
+            + self.out.enhanced_n;
+        numbers.is_finite()
+            && self.noise.variance > 0.0
+            && self.local.state.is_sound()
+            && self.layers.belief.is_sound()
     }
 
     pub(crate) fn work(&self) -> u32 {
@@ -227,9 +235,15 @@ impl Stylet {
             return;
         }
         let risen = self.low_passed_n - self.noise.bias_n();
-        let spread = self.noise.variance * self.noise.slow() * self.noise.step_s / (2.0 * search.time_constant_s);
-        let sd = libm::sqrt(spread.min(self.noise.marginal()) + self.noise.bias_variance().min(self.noise.marginal()));
-        if risen > search.noise_sds * sd && sample.force_n > self.noise.bias_n() && sample.velocity_mps > -config.drop.standstill_mps {
+        let spread =
+            self.noise.variance * self.noise.slow() * self.noise.step_s / (2.0 * search.time_constant_s);
+        let sd = libm::sqrt(
+            spread.min(self.noise.marginal()) + self.noise.bias_variance().min(self.noise.marginal()),
+        );
+        if risen > search.noise_sds * sd
+            && sample.force_n > self.noise.bias_n()
+            && sample.velocity_mps > -config.drop.standstill_mps
+        {
             self.above += 1;
         } else {
             self.above = 0;
@@ -240,7 +254,15 @@ impl Stylet {
     }
 
     #[cold]
-    fn touch(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, start_m: f64, force_n: f64, sd_n: f64) {
+    fn touch(
+        &mut self,
+        config: &EnhanceConfig,
+        step: &Step,
+        sample: &Sample,
+        start_m: f64,
+        force_n: f64,
+        sd_n: f64,
+    ) {
         self.in_tissue = true;
         self.first_m = sample.position_m;
         self.alarm = Alarm::new(config.stylet.false_alarms_per_hour, self.noise.step_s);
@@ -268,7 +290,8 @@ impl Stylet {
         self.since = self.since.saturating_add(1);
         self.since_s += step.dt_s;
         let standstill = config.drop.standstill_mps;
-        let forward = sample.velocity_mps > -standstill && sample.position_m > self.deepest_m - config.guard.old_ground_m;
+        let forward = sample.velocity_mps > -standstill
+            && sample.position_m > self.deepest_m - config.guard.old_ground_m;
         if sample.position_m > self.deepest_m {
             self.deepest_m = sample.position_m;
         }
@@ -277,7 +300,8 @@ impl Stylet {
         let below = force_n - self.noise.bias_n() < -SPIKE_SDS * libm::sqrt(self.noise.marginal());
         let odd = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && below);
         // A release of the shaft takes as long as a drop.
-        self.releasing_s = if z > SPIKE_SDS && !forward { LONGEST_DROP_S } else { self.releasing_s - step.dt_s };
+        self.releasing_s =
+            if z > SPIKE_SDS && !forward { LONGEST_DROP_S } else { self.releasing_s - step.dt_s };
         if odd && forward && self.spikes < SPIKE_SAMPLES {
             self.spikes += 1;
             self.local.pass();
@@ -378,7 +402,12 @@ impl Stylet {
     /// Follows a fall from where it began.
     fn fall(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, alarm: bool, begins: bool) {
         let _ = (config, alarm, begins);
-        let fall = self.fall.get_or_insert(Fall { from_n: self.last_level_n, mean_n: sample.force_n, since_s: 0.0, count: 0.0 });
+        let fall = self.fall.get_or_insert(Fall {
+            from_n: self.last_level_n,
+            mean_n: sample.force_n,
+            since_s: 0.0,
+            count: 0.0,
+        });
         fall.since_s += step.dt_s;
         fall.count += 1.0;
         // As many samples as it takes to know the force to a quarter of the drop that counts.
