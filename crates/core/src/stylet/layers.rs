@@ -18,6 +18,7 @@
 use super::gaussian::{Gaussian, WIDEST};
 use super::local::MEMORY_M;
 use super::noise::Noise;
+use crate::compensation::MAX_LAYERS;
 
 pub(crate) const A: usize = 0;
 pub(crate) const K: usize = 1;
@@ -36,6 +37,8 @@ pub(crate) struct Layers {
     pub(crate) passed: usize,
     /// Thickness of the layer before.
     pub(crate) previous_m: f64,
+    /// Start, end and friction per metre of the layers behind, as they were known when the next one gave way.
+    behind: [[f64; 3]; MAX_LAYERS],
     /// Drive at contact.
     drive0: f64,
     last: Option<([f64; N], f64)>,
@@ -70,6 +73,7 @@ impl Layers {
             belief: Gaussian::new(mean, variance),
             start_m,
             passed: 0,
+            behind: [[0.0; 3]; MAX_LAYERS],
             previous_m: 0.0,
             drive0: drive,
             last: None,
@@ -139,6 +143,7 @@ impl Layers {
         }
         let before = self.slope(drive).abs().max(1.0);
         let before = before.min(libm::sqrt(WIDEST / unit) / MEMORY_M);
+        let known = self.belief.x[FP].max(0.0);
         let b = self.belief.x[F].clamp(-before / drive, before / drive);
         // The belief moves on by a linear map; the new layer's stiffness and friction are unknown.
         let mut map = [[0.0; N]; N];
@@ -158,6 +163,13 @@ impl Layers {
         g.p[A][A] += b * b * place;
         g.p[ZERO][ZERO] += before * before * place;
         d += delta;
+        // The layer before this one will not be known better.
+        if let Some(before) = self.passed.checked_sub(1).and_then(|i| self.behind.get_mut(i)) {
+            before[2] = known;
+        }
+        if let Some(slot) = self.behind.get_mut(self.passed) {
+            *slot = [position_m - d, position_m, 0.0];
+        }
         self.start_m = position_m;
         self.previous_m = d;
         self.passed += 1;
@@ -176,5 +188,21 @@ impl Layers {
     /// Variances of `Kp` and `bp` in squared units.
     pub(crate) fn previous_variance(&self, noise: &Noise) -> [f64; 2] {
         [self.belief.p[KP][KP] * noise.variance, self.belief.p[FP][FP] * noise.variance]
+    }
+
+    /// Friction per drive that the passed layers exert with the tip at `z_m` on the way back, each with its friction spread
+    /// evenly over its thickness.
+    pub(crate) fn around_shaft(&self, z_m: f64) -> f64 {
+        let last = self.passed.min(MAX_LAYERS);
+        let (mut whole, mut inside) = (0.0, 0.0);
+        for (i, [start, end, b]) in self.behind.iter().take(last).enumerate() {
+            let b = if i + 1 == self.passed { self.belief.x[FP].max(0.0) } else { *b };
+            whole += b * (end - start);
+            inside += b * (z_m - start).clamp(0.0, end - start);
+        }
+        // The sum is known better than its parts.
+        let all = self.belief.x[A].max(0.0);
+        let share = if whole > 0.0 { inside / whole } else { 1.0 };
+        all * share
     }
 }

@@ -27,6 +27,7 @@ const SPIKE_SAMPLES: u8 = 3;
 const WORK_FRAME: u32 = 60;
 const WORK_LOCAL: u32 = 5 * 14 + 2 * 24 + 2 * 20;
 const WORK_LAYERS: u32 = 2 * 35 + 2 * 27 + 12;
+const WORK_BACK: u32 = 16 * 5;
 const WORK_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
 /// No needle is faster, in m/s, nor farther from the origin, in m: what says so is a fault of the logging.
 const FASTEST_MPS: f64 = 2.0;
@@ -553,6 +554,10 @@ impl Stylet {
             behind = behind.min(fallen.behind(&self.noise).0);
         }
         behind = behind.max(0.0);
+        if retracting && self.in_tissue {
+            self.work += WORK_BACK;
+            behind = self.layers.around_shaft(sample.position_m);
+        }
         let u = sample.velocity_mps;
         let mut friction = behind * u;
         let behind_variance = variance;
