@@ -133,3 +133,39 @@ fn the_way_back_raises_no_alarm_and_takes_the_friction_of_the_passed_layers_away
     let left = rms(&|i| outputs[i].enhanced_n - data.truth[i].tip_n);
     assert!(left < 0.05 * raw, "{left} N of {raw} N is left");
 }
+
+/// Dry friction configured: what the hold and the turn do not change is known as friction.
+#[test]
+fn a_configured_friction_law_takes_dry_friction_away_in_a_hold() {
+    let law = stylet_tissue::Law::new(
+        &gels(),
+        &[stylet_tissue::AnyEffect::CoulombFriction(stylet_tissue::CoulombFriction { c_n_per_m: 20.0 })],
+    )
+    .expect("one effect");
+    let mut state = stylet_tissue::LawState::default();
+    let mut samples = Vec::new();
+    let mut tip_n = Vec::new();
+    let mut z = -0.005;
+    for k in 0..9000 {
+        let time_s = 0.005 * f64::from(k);
+        let velocity_mps = 0.0023 + if time_s > 20.0 { 0.001 * (time_s - 20.0).sin() } else { 0.0 };
+        let force = law.step(&mut state, time_s, z, velocity_mps, |_| {});
+        let noise = 0.01 * (f64::from(k * 7919 % 101) / 50.0 - 1.0);
+        samples.push(stylet_core::Sample {
+            time_s,
+            position_m: z,
+            velocity_mps,
+            force_n: force.total_n + noise,
+        });
+        tip_n.push(force.tip_n);
+        z += velocity_mps * 0.005;
+    }
+    let mut config = stylet();
+    let mean_b = (9000.0 * 28.2 + 12000.0 * 37.7 + 16000.0 * 32.2) / 98.1;
+    config.stylet.law = stylet_core::config::FrictionLaw::CoulombViscous { dry_mps: 20.0 / mean_b };
+    let outputs = enhance(&config, &samples);
+    let last = 6000..6500;
+    let off = last.clone().map(|i| (outputs[i].enhanced_n - tip_n[i]).abs()).sum::<f64>() / 500.0;
+    let raw = last.map(|i| (samples[i].force_n - tip_n[i]).abs()).sum::<f64>() / 500.0;
+    assert!(off < 0.15 * raw, "{off} N off, {raw} N of friction");
+}

@@ -8,7 +8,7 @@ mod local;
 mod noise;
 mod shaft;
 
-use crate::config::{Contact, EnhanceConfig};
+use crate::config::{Contact, EnhanceConfig, FrictionLaw};
 use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
 use alarm::Alarm;
 use layers::{FP, K, KP, Layers};
@@ -32,6 +32,8 @@ const WORK_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
 /// No needle is faster, in m/s, nor farther from the origin, in m: what says so is a fault of the logging.
 const FASTEST_MPS: f64 = 2.0;
 const FARTHEST_M: f64 = 10.0;
+/// Below this the needle stands, in m/s (SPEC section 6).
+const DEAD_MPS: f64 = 1e-5;
 /// Smoothing of the speed that stands for the motion, in s.
 const SPEED_S: f64 = 0.2;
 /// What an ordinary drop lasts at most, in s.
@@ -62,6 +64,10 @@ pub(crate) struct Stylet {
     before: Layers,
     before_m: f64,
     first_m: f64,
+    /// What drives friction, in m/s, its dry state from -1 to 1, and what a steady advance at the usual speed makes of it.
+    drive: f64,
+    xi: f64,
+    steady: f64,
     was_quiet: bool,
     /// The last step's length, and the shares of the low-passes that go with it.
     shares: [f64; 3],
@@ -115,6 +121,9 @@ impl Stylet {
             before: layers,
             before_m: surface_m,
             first_m: surface_m,
+            drive: 0.0,
+            xi: 0.0,
+            steady: 0.0,
             was_quiet: true,
             shares: [0.0; 3],
             in_tissue: false,
@@ -180,6 +189,7 @@ impl Stylet {
         }
         let last = if self.started { self.last } else { sample };
         let step = self.motion(config, &last, &sample);
+        self.drive_friction(config, &step, &sample);
         if self.in_tissue {
             self.feel(config, &step, &sample);
         } else {
@@ -189,6 +199,38 @@ impl Stylet {
         self.started = true;
         self.speak(config, &step, &sample);
         &self.out
+    }
+
+    /// The drive of friction, by the law in force.
+    #[inline(always)]
+    fn drive_friction(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
+        let v = sample.velocity_mps;
+        let (dry_mps, travel_m) = match config.stylet.law {
+            FrictionLaw::Auto | FrictionLaw::Viscous => {
+                self.drive = v;
+                self.steady = step.speed_mps;
+                return;
+            }
+            FrictionLaw::CoulombViscous { dry_mps } => (dry_mps, 0.0),
+            FrictionLaw::Presliding { dry_mps, travel_m } => (dry_mps, travel_m),
+        };
+        let sign = if v > DEAD_MPS {
+            1.0
+        } else if v < -DEAD_MPS {
+            -1.0
+        } else {
+            0.0
+        };
+        self.xi = if travel_m > 0.0 {
+            // Builds up while any shaft is inside; a hold leaves it as it is.
+            let travel = step.dz_m.abs();
+            let inside = self.in_tissue && sign != 0.0 && travel > 0.0;
+            if inside { sign + (self.xi - sign) * libm::exp(-travel / travel_m) } else { self.xi }
+        } else {
+            sign
+        };
+        self.drive = v + dry_mps * self.xi;
+        self.steady = step.speed_mps + dry_mps;
     }
 
     /// How the needle has moved since the last sample.
@@ -267,7 +309,7 @@ impl Stylet {
         self.in_tissue = true;
         self.first_m = sample.position_m;
         self.alarm = Alarm::new(config.stylet.false_alarms_per_hour, self.noise.step_s);
-        let drive = step.speed_mps;
+        let drive = self.steady.max(1e-6);
         self.layers = Layers::contact(start_m, force_n, sd_n, STIFFEST, drive, &self.noise);
         self.before = self.layers;
         self.before_m = sample.position_m;
@@ -356,7 +398,7 @@ impl Stylet {
         } else if forward && sample.position_m >= self.layers.start_m {
             let rho = self.noise.rho_over(step.dt_s);
             self.work += WORK_LAYERS;
-            let (e, s) = self.layers.take(sample.position_m, sample.velocity_mps, force_n, rho);
+            let (e, s) = self.layers.take(sample.position_m, self.drive, force_n, rho);
             let z2 = (e * e / (s * self.noise.variance)).min(400.0);
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
                 let share = share.max((step.dt_s * (0.25 / local::MEMORY_S)).min(0.5));
@@ -463,14 +505,14 @@ impl Stylet {
         let first = span.min(step.dz_m.max(0.0));
         let at_m = self.before_m + 0.5 * first;
         let place_m = if span > 1.5 * first { first.max(0.5 * span) } else { first / libm::sqrt(12.0) };
-        let drive = step.speed_mps;
+        let drive = self.steady.max(1e-6);
         let predicted = self.local.level_n();
         self.layers = self.before;
         self.work += WORK_RUPTURE;
         self.layers.rupture(at_m, place_m, drive, &self.noise);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
-        self.layers.take(sample.position_m, sample.velocity_mps, sample.force_n, 0.0);
+        self.layers.take(sample.position_m, self.drive, sample.force_n, 0.0);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.alarm.rest();
@@ -532,7 +574,7 @@ impl Stylet {
             stiffness_n_per_m: k,
             friction: b,
             drop_n: drop,
-            elastic_share: (k / (k + b * self.speed_mps)).clamp(0.0, 1.0),
+            elastic_share: (k / (k + b * self.steady)).clamp(0.0, 1.0),
             added_friction_ns_per_m: b * d,
             time_s: sample.time_s,
             stiffness_sd: libm::sqrt(vk.max(0.0)),
@@ -558,7 +600,7 @@ impl Stylet {
             self.work += WORK_BACK;
             behind = self.layers.around_shaft(sample.position_m);
         }
-        let u = sample.velocity_mps;
+        let u = self.drive;
         let mut friction = behind * u;
         let behind_variance = variance;
         variance *= u * u;
@@ -575,7 +617,7 @@ impl Stylet {
                 track: config.stylet.track_way_back,
             };
             let (dry_n, sd) = self.shaft.take(&felt);
-            if self.dry {
+            if self.dry && config.stylet.law == FrictionLaw::Auto {
                 (friction, variance) = (dry_n, sd * sd);
             }
         }
