@@ -96,7 +96,8 @@ impl Parts {
     fn score(&self, heard: &[Heard]) {
         let mut scorer = self.scorer();
         for ((s, tip_n), heard) in self.samples.iter().zip(&self.tips).zip(heard) {
-            let moment = Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n };
+            let moment =
+                Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n, total_n: s.force_n };
             scorer.sample(&moment, heard);
         }
         black_box(scorer.finish());

@@ -28,6 +28,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Hold scores against bounds, for CI.
     Gate(GateArgs),
+    /// Run several algorithms on the same simulated insertions, over many seeds.
+    Compare(CompareArgs),
     /// Compare measured data with a scenario: what is wrong, why, and how much better it gets.
     Diagnose(DiagnoseArgs),
     /// List the effects by which reality departs from the base law, or show one.
@@ -36,6 +38,43 @@ pub enum Command {
     Benchmark(BenchmarkArgs),
     /// Re-make the paper's figures and judge its claims, on one page.
     Reproduce(ReproduceArgs),
+}
+
+/// Arguments of `stylet compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet compare scenarios/compare/*.ron --seeds 400
+  stylet compare my_phantom.ron --algorithms Paper,Stylet --seeds 1400 --out out/compare
+
+The folder then holds report.html and compare.json. Scenarios are replayed kinematically; the same seeds give the
+same bytes for any number of threads.")]
+pub struct CompareArgs {
+    /// Scenario files (RON).
+    #[arg(required = true)]
+    pub scenarios: Vec<PathBuf>,
+    /// Algorithms, separated by commas.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "Paper,Stylet", ignore_case = true)]
+    pub algorithms: Vec<Which>,
+    /// Noise seeds per scenario and algorithm.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub seeds: u64,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
+}
+
+/// An algorithm of the online core, by its name in scenarios.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Which {
+    /// The paper's.
+    #[value(name = "Paper")]
+    Paper,
+    /// The paper's to the letter.
+    #[value(name = "Literal")]
+    Literal,
+    /// This project's.
+    #[value(name = "Stylet")]
+    Stylet,
 }
 
 /// Arguments of `stylet reproduce`.

@@ -15,7 +15,7 @@ use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::significant;
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::{EnhanceFile, ron_options};
-use stylet_score::{Trace, model_name};
+use stylet_score::{Trace, algorithm_name, model_name};
 
 /// A detection as `enhance.json` has it.
 #[derive(Serialize)]
@@ -63,6 +63,62 @@ struct EnhanceResult<'a> {
     data_quality: &'a [QualityNote],
 }
 
+/// A drop with its 95 % interval, in N; the interval is missing where the algorithm gives none.
+#[derive(Serialize)]
+struct DropSize {
+    value: Option<f64>,
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+/// A rupture as `events.json` has it.
+#[derive(Serialize)]
+struct Event {
+    time_s: f64,
+    position_m: f64,
+    drop_n: DropSize,
+    /// Probability that it is no false alarm, 0 to 1; missing where the algorithm does not tell.
+    confidence: Option<f64>,
+}
+
+fn events(trace: &Trace) -> Vec<Event> {
+    let told = |x: f64| (x != 0.0).then_some(x);
+    trace
+        .detections
+        .iter()
+        .map(|d| {
+            let estimate = trace.estimates.iter().find(|e| e.layer == d.layer);
+            // What the samples around the drop say; without that, what the layer's estimate says.
+            let (value, sd) = match (told(d.drop_sd_n), estimate) {
+                (Some(sd), _) => (Some(d.drop_n), Some(sd)),
+                (None, Some(e)) => (Some(e.drop_n), told(e.drop_sd_n)),
+                (None, None) => (None, None),
+            };
+            let end = |sign: f64| value.zip(sd).map(|(value, sd)| value + sign * 1.96 * sd);
+            Event {
+                time_s: d.time_s,
+                position_m: d.position_m,
+                drop_n: DropSize { value, low: end(-1.0), high: end(1.0) },
+                confidence: told(d.confidence),
+            }
+        })
+        .collect()
+}
+
+/// The table with the state's name as its last column.
+fn with_state(csv: &[u8], state: &[stylet_core::State]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(csv.len() + 24 * state.len());
+    let mut state = state.iter();
+    for (i, line) in csv.split(|b| *b == b'\n').filter(|line| !line.is_empty()).enumerate() {
+        out.extend_from_slice(line.strip_suffix(b"\r").unwrap_or(line));
+        out.push(b',');
+        let name = if i == 0 { "state" } else { state.next().map_or("", |s| s.name()) };
+        out.extend_from_slice(name.as_bytes());
+        out.push(b'\n');
+    }
+    out
+}
+
 /// The command.
 ///
 /// # Errors
@@ -93,7 +149,7 @@ fn listen(recording: &Recording, config: &EnhanceFile, model: Model) -> Ran {
     let mut enhance = config.enhance.clone();
     enhance.model = model;
     Ran {
-        name: format!("paper/{}/force_torque", model_name(model)),
+        name: format!("{}/{}/force_torque", algorithm_name(enhance.algorithm), model_name(model)),
         sensor: "force_torque",
         trace: Trace::record(recording, &recording.force_n, &enhance, config.surface_m, |_, _| {}),
         config: enhance,
@@ -147,12 +203,15 @@ fn results(
     let file = args.data.display().to_string();
     let mut csv = Vec::new();
     if let Some(first) = ran.first() {
-        let extra: [(&str, &[f64]); 3] = [
+        let extra: [(&str, &[f64]); 5] = [
             ("enhanced_n", &first.trace.enhanced_n),
+            ("low_n", &first.trace.low_n),
+            ("high_n", &first.trace.high_n),
             ("reconstructed_n", &first.trace.reconstructed_n),
             ("estimated_cumulative_friction_ns_per_m", &first.trace.cumulative_friction_ns_per_m),
         ];
         write_csv(recording, None, &extra, &mut csv)?;
+        csv = with_state(&csv, &first.trace.state);
     }
     let hash = hash::of_results(&csv, &ran.iter().map(|r| &r.trace).collect::<Vec<_>>());
     let result = EnhanceResult {
@@ -190,6 +249,10 @@ fn results(
     let mut output = Output::default();
     output.add("enhanced.csv", csv);
     output.add("enhance.json", json);
+    let events: Vec<Event> = ran.first().map(|r| events(&r.trace)).unwrap_or_default();
+    let mut json = serde_json::to_vec_pretty(&events).map_err(|e| internal(&e))?;
+    json.push(b'\n');
+    output.add("events.json", json);
     output.add("figure.svg", report.to_svg(&FigureOptions::default()));
     output.add("report.html", report.to_html());
     Ok((output, hash))

@@ -3,6 +3,8 @@
 
 mod args;
 mod benchmark;
+mod compare;
+mod compare_page;
 mod diagnose;
 mod diagnose_report;
 mod effects;
@@ -37,6 +39,7 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => sweep::sweep(args),
         Command::Replay(args) => sweep::replay(args),
         Command::Gate(args) => sweep::gate(args),
+        Command::Compare(args) => compare::compare(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),

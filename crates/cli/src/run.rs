@@ -13,7 +13,7 @@ use stylet_record::{Recording, write_csv};
 use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::Scenario;
-use stylet_score::{LayerTruth, Score, model_name, score_run};
+use stylet_score::{LayerTruth, Score, algorithm_name, model_name, score_run};
 use stylet_testbed::{Reading, Simulation, VirtualError, simulate};
 
 /// `score.json` of a run.
@@ -82,7 +82,7 @@ pub fn finish(scenario: &Scenario, file: &str, models: &[Model]) -> Result<Finis
         let (trace, score) =
             score_run(&simulation.recording, &reading.force_n, &simulation.truth, &layers, &config);
         Ran {
-            name: format!("paper/{}/{}", model_name(model), reading.sensor),
+            name: format!("{}/{}/{}", algorithm_name(config.algorithm), model_name(model), reading.sensor),
             sensor: reading.sensor,
             config,
             trace,

@@ -281,6 +281,60 @@ pub enum Algorithm {
     /// The paper's to the letter: no blind travel after contact, no motion guards, drop by
     /// extremes. For the record: it diverges on the sinusoid with contact found from the data.
     Literal,
+    /// This project's: calibrated, one pass, with the uncertainty of everything it says (see [`StyletConfig`]).
+    Stylet,
+}
+
+/// The law of the friction along the shaft that [`Algorithm::Stylet`] takes away, `D u`: `u` is what drives it, and the cumulative friction
+/// `D` (N s/m) is learned.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub enum FrictionLaw {
+    /// Found out on the way in: viscous as long as that predicts the force, else dry.
+    #[default]
+    Auto,
+    /// The paper's: `u = v`.
+    Viscous,
+    /// Coulomb and viscous: `u = v + dry_mps sgn v`.
+    CoulombViscous {
+        /// Ratio of dry to viscous friction, `c/b` in m/s, 0 or more.
+        dry_mps: f64,
+    },
+    /// Dry friction that builds up over travel and stays in holds, and viscous: `u = v + dry_mps xi`, `xi' = (v/travel)(1 - xi sgn v)`.
+    Presliding {
+        /// Ratio of dry to viscous friction, `c/b` in m/s, 0 or more.
+        dry_mps: f64,
+        /// Travel over which it builds up, in m, positive.
+        travel_m: f64,
+    },
+}
+
+/// What can be set for [`Algorithm::Stylet`]. Noise, friction law and drop sizes are learned on the way in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct StyletConfig {
+    /// False alarms per hour of insertion that are accepted, above 0.
+    pub false_alarms_per_hour: f64,
+    /// Where the tissue does not follow the law of layers, a fall counts as a rupture from this share of the largest
+    /// force so far, 0 to 1; smaller falls are texture.
+    pub smallest_drop: f64,
+    /// The friction along the shaft.
+    pub law: FrictionLaw,
+    /// Whether slow changes of the force on the way back count as friction; off: only what the way in has taught.
+    pub track_way_back: bool,
+}
+
+impl Default for StyletConfig {
+    fn default() -> Self {
+        Self {
+            false_alarms_per_hour: 0.05,
+            smallest_drop: 0.08,
+            law: FrictionLaw::Auto,
+            track_way_back: true,
+        }
+    }
 }
 
 /// Everything that can be set. The defaults are the paper's values.
@@ -314,6 +368,8 @@ pub struct EnhanceConfig {
     pub contact_search: ContactConfig,
     /// Guards against false ruptures.
     pub guard: GuardConfig,
+    /// What [`Algorithm::Stylet`] is set by.
+    pub stylet: StyletConfig,
 }
 
 impl Default for EnhanceConfig {
@@ -332,6 +388,7 @@ impl Default for EnhanceConfig {
             drop: DropConfig::default(),
             contact_search: ContactConfig::default(),
             guard: GuardConfig::default(),
+            stylet: StyletConfig::default(),
         }
     }
 }

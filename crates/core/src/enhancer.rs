@@ -57,18 +57,9 @@ struct Pending {
     share: f64,
 }
 
-/// The online core.
-///
-/// Configuration is taken once; [`Enhancer::step`] is then called once per sample. It does not
-/// allocate and does a bounded amount of work: one update, at most
-/// [`DropConfig::replay_per_tick`](crate::config::DropConfig::replay_per_tick) replayed samples, and
-/// on the tick that declares a rupture one look back over at most 256 samples.
-///
-/// The storage `B` holds the raw samples of the layer being traversed, for the re-run after its
-/// rupture: a `Vec<Sample>` or an array. When a layer has more samples than the storage, the
-/// re-run begins at the oldest that is left.
+/// The published algorithm.
 #[derive(Clone, Debug)]
-pub struct Enhancer<B> {
+pub(crate) struct Paper<B> {
     config: EnhanceConfig,
     history: History<B>,
     front: Front,
@@ -90,7 +81,7 @@ pub struct Enhancer<B> {
     out: Output,
 }
 
-impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
+impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Paper<B> {
     /// A core with `storage` for the raw samples of a layer. `surface_m` is used when the contact
     /// is [`Contact::Known`].
     pub fn new(mut config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
@@ -151,7 +142,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         self.out
     }
 
-    /// As [`Enhancer::step`] for callers who look at a few fields of millions of samples: nothing is
+    /// As `step` for callers who look at a few fields of millions of samples: nothing is
     /// copied, and of the output only enhanced force, innovation, state, ruptures, contact, detection,
     /// estimate and `used` are kept up to date.
     #[inline]
@@ -162,7 +153,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         &self.out
     }
 
-    /// As [`Enhancer::step_brief`] for many samples at hand; `hear` is told the output for each, and the
+    /// As `step_brief` for many samples at hand; `hear` is told the output for each, and the
     /// last is returned.
     ///
     /// The samples are looked at ahead of the estimator, a block at a time, which is faster than one after
@@ -374,6 +365,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             located_s: located.time_s,
             located_m: located.position_m,
             cause,
+            drop_n: 0.0,
+            drop_sd_n: 0.0,
+            confidence: 0.0,
         });
         self.pending = Some(Pending {
             layer: self.out.ruptures,
@@ -490,6 +484,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             elastic_share: pending.share,
             added_friction_ns_per_m: if self.config.drop.compensate { added } else { 0.0 },
             time_s: sample.time_s,
+            ..LayerEstimate::default()
         };
         self.compensation.add(estimate);
         // The estimate of the layer being traversed was made with the old friction: let it move.

@@ -20,6 +20,7 @@
 
 extern crate alloc;
 
+mod choice;
 mod compensation;
 pub mod config;
 mod contact;
@@ -33,11 +34,13 @@ mod line;
 mod reweigh;
 mod rls;
 mod sample;
+mod stylet;
 mod transition;
 
+pub use choice::Enhancer;
 pub use compensation::MAX_LAYERS;
 pub use config::EnhanceConfig;
-pub use enhancer::Enhancer;
+
 pub use rls::Rls;
 pub use sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
 pub use transition::{TRANSITIONS, Transition, Trigger};

@@ -110,6 +110,12 @@ pub struct Detection {
     pub located_m: f64,
     /// What declared it.
     pub cause: Cause,
+    /// Fall of the force at the declaration in N, and its standard deviation; zero when the algorithm does not tell.
+    pub drop_n: f64,
+    /// See `drop_n`.
+    pub drop_sd_n: f64,
+    /// Probability that it is no false alarm, 0 to 1; zero when the algorithm does not tell.
+    pub confidence: f64,
 }
 
 /// What the core holds of a traversed layer after compensation.
@@ -133,6 +139,16 @@ pub struct LayerEstimate {
     pub added_friction_ns_per_m: f64,
     /// When the estimate became available, in seconds.
     pub time_s: f64,
+    /// Standard deviation of the stiffness in N/m; zero when the algorithm does not tell.
+    pub stiffness_sd: f64,
+    /// Standard deviation of the friction in its unit; zero when the algorithm does not tell.
+    pub friction_sd: f64,
+    /// Standard deviation of the force drop in N; zero when the algorithm does not tell.
+    pub drop_sd_n: f64,
+    /// Cumulative friction `D` behind this layer in N s/m as it is known now; zero when the algorithm does not tell.
+    pub cumulative_ns_per_m: f64,
+    /// Its standard deviation in N s/m; zero when the algorithm does not tell.
+    pub cumulative_sd: f64,
 }
 
 /// Result of one call.
@@ -152,6 +168,11 @@ pub struct Output {
     pub derivative_n_per_s: f64,
     /// Cumulative friction `D` in N s/m.
     pub cumulative_friction_ns_per_m: f64,
+    /// Where the tip's force lies with 95 % probability, in N: around `enhanced_n`, the sensor's noise and what is not known of the friction
+    /// included. `None` when the algorithm does not tell.
+    pub band_n: Option<[f64; 2]>,
+    /// Standard deviations of `theta` and of the cumulative friction; zero when the algorithm does not tell.
+    pub sd: [f64; 3],
     /// State after this sample.
     pub state: State,
     /// Number of ruptures declared so far.

@@ -10,9 +10,10 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::{
-    Algorithm, Contact, ContactConfig, CusumConfig, Depths, DerivativeConfig, DropConfig, GuardConfig, Model,
-    Reset,
+    Algorithm, Contact, ContactConfig, CusumConfig, Depths, DerivativeConfig, DropConfig, FrictionLaw,
+    GuardConfig, Model, Reset, StyletConfig,
 };
+use stylet_tissue::{AnyEffect, Tissue};
 
 /// Where the surface is, and the core's configuration.
 ///
@@ -42,7 +43,10 @@ impl EnhanceFile {
     /// As [`EnhanceFile::load`].
     pub fn parse(file: &str, text: &str) -> Result<Self, InputError> {
         if is_scenario(text) {
-            let Scenario { tissue, enhance, .. } = Scenario::parse(file, text)?;
+            let Scenario { tissue, mut enhance, effects, .. } = Scenario::parse(file, text)?;
+            if enhance.stylet.law == FrictionLaw::Auto {
+                enhance.stylet.law = friction_law(&tissue, &effects);
+            }
             return Ok(Self { surface_m: tissue.surface_m, enhance });
         }
         let loaded: Self = parse(file, text)?;
@@ -50,6 +54,34 @@ impl EnhanceFile {
             .and_then(|()| enhance("", &loaded.enhance))
             .map_err(|problem| problem.in_file(file, text))?;
         Ok(loaded)
+    }
+}
+
+/// The friction law that a scenario's effects describe, as `extended.ron` of a diagnosis has them: dry friction relative to the mean viscous
+/// friction of the layers. `Auto` without dry friction, or when nothing is viscous.
+fn friction_law(tissue: &Tissue, effects: &[AnyEffect]) -> FrictionLaw {
+    let (mut dry, mut travel_m) = (0.0, 0.0f64);
+    for effect in effects {
+        match effect {
+            AnyEffect::CoulombFriction(e) => dry += e.c_n_per_m,
+            AnyEffect::StribeckFriction(e) => dry += e.c_n_per_m,
+            AnyEffect::PreslidingFriction(e) => {
+                dry += e.c_n_per_m;
+                travel_m = travel_m.max(e.delta_m);
+            }
+            _ => {}
+        }
+    }
+    let depth: f64 = tissue.layers.iter().map(|l| l.thickness_m).sum();
+    let viscous: f64 =
+        tissue.layers.iter().map(|l| l.friction_ns_per_m2 * l.thickness_m).sum::<f64>() / depth;
+    let dry_mps = dry / viscous;
+    if dry <= 0.0 || !dry_mps.is_finite() {
+        FrictionLaw::Auto
+    } else if travel_m > 0.0 {
+        FrictionLaw::Presliding { dry_mps, travel_m }
+    } else {
+        FrictionLaw::CoulombViscous { dry_mps }
     }
 }
 
@@ -78,6 +110,7 @@ struct Flat {
     drop: DropConfig,
     contact_search: ContactConfig,
     guard: GuardConfig,
+    stylet: StyletConfig,
 }
 
 impl Default for Flat {
@@ -115,7 +148,8 @@ convert!(
     derivative,
     drop,
     contact_search,
-    guard
+    guard,
+    stylet
 );
 
 #[cfg(test)]

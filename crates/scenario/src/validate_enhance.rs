@@ -2,7 +2,7 @@
 
 use crate::load::Problem;
 use crate::validate::{Checked, check, not_negative, positive};
-use stylet_core::config::{Depths, EnhanceConfig, Reset};
+use stylet_core::config::{Depths, EnhanceConfig, FrictionLaw, Reset};
 
 /// Checks a configuration whose fields stand at `at` in the file; an empty `at` is the top.
 pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
@@ -19,6 +19,24 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> Checked {
             )?;
         }
         Reset::Ruptures => {}
+    }
+    let rate = path("stylet.false_alarms_per_hour");
+    positive(rate, c.stylet.false_alarms_per_hour, "per hour")?;
+    check(
+        path("stylet.smallest_drop"),
+        c.stylet.smallest_drop,
+        (0.0..=1.0).contains(&c.stylet.smallest_drop),
+        "it must lie between 0 and 1",
+    )?;
+    match c.stylet.law {
+        FrictionLaw::Auto | FrictionLaw::Viscous => {}
+        FrictionLaw::CoulombViscous { dry_mps } => {
+            crate::validate::not_negative(path("stylet.law.dry_mps"), dry_mps, "m/s")?;
+        }
+        FrictionLaw::Presliding { dry_mps, travel_m } => {
+            crate::validate::not_negative(path("stylet.law.dry_mps"), dry_mps, "m/s")?;
+            positive(path("stylet.law.travel_m"), travel_m, "metres")?;
+        }
     }
     if let Depths::Known(thicknesses) = &c.depths {
         if thicknesses.is_empty() {

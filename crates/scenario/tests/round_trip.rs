@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::{
     Algorithm, Contact, ContactConfig, CusumConfig, Depths, DerivativeConfig, DerivativeSense, DropConfig,
-    DropEstimator, GuardConfig, Model, Reset,
+    DropEstimator, GuardConfig, Model, Reset, StyletConfig,
 };
 use stylet_scenario::{
     ArmConfig, ForceTorque, Motion, ObserverGain, Robot, Scenario, Segment, Sensor, VirtualSensor,
@@ -224,7 +224,7 @@ fn enhance() -> impl Strategy<Value = EnhanceConfig> {
         },
     );
     let kind = (
-        prop::sample::select(vec![Algorithm::Paper, Algorithm::Literal]),
+        prop::sample::select(vec![Algorithm::Paper, Algorithm::Literal, Algorithm::Stylet]),
         model(),
         prop::sample::select(vec![Contact::Detected, Contact::Known]),
     );
@@ -254,6 +254,7 @@ fn enhance() -> impl Strategy<Value = EnhanceConfig> {
                 drop,
                 contact_search,
                 guard,
+                stylet: StyletConfig { smallest_drop: 0.5 * forgetting, ..StyletConfig::default() },
             }
         },
     )

@@ -78,6 +78,9 @@ mod tests {
             located_s: time_s,
             located_m: time_s * 0.002,
             cause: Cause::Cusum,
+            drop_n: 0.0,
+            drop_sd_n: 0.0,
+            confidence: 0.0,
         }
     }
 

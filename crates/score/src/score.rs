@@ -50,6 +50,9 @@ pub struct LayerScore {
 pub struct EnhancementScore {
     /// RMS of `f_enh - (f - D_true v)` over the RMS of the tip force, first contact to deepest point.
     pub rms_relative: Option<f64>,
+    /// RMS of estimated less true friction over the RMS of the tip force: SPEC section 10's `f_enh - (f - D_true v)` with the
+    /// measured `f` on both sides, so that the sensor's noise cancels.
+    pub friction_rms_relative: Option<f64>,
     /// The same up to the instant at which the tip leaves the last layer.
     pub in_tissue_relative: Option<f64>,
     /// RMS of `f_enh` over RMS of `f` after the tip has left the last layer; `null` if it never does.
@@ -80,6 +83,21 @@ pub struct Score {
     pub enhancement: EnhancementScore,
     /// RMS of the innovation `e` in N, from first contact to the deepest point.
     pub reconstruction_rms_n: Option<f64>,
+    /// How often the truth lay in the intervals that the core gave.
+    pub coverage: Coverage,
+}
+
+/// Counts `[inside, of]` of true values in the core's 95 % intervals; all zero for an algorithm that gives none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// Stiffness of the ruptured layers.
+    pub stiffness: [f64; 2],
+    /// Their friction.
+    pub friction: [f64; 2],
+    /// Cumulative friction behind each.
+    pub cumulative: [f64; 2],
+    /// Tip force, sample by sample from first contact to the deepest point.
+    pub band: [f64; 2],
 }
 
 impl Score {

@@ -1,7 +1,7 @@
 //! Scoring as the samples come, so that a sweep needs no copy of the run.
 
 use crate::detection::match_ruptures;
-use crate::score::{Compared, EnhancementScore, LayerScore, Score};
+use crate::score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
 use stylet_core::config::Model;
 use stylet_core::{Detection, LayerEstimate, Output};
 use stylet_record::TrueRupture;
@@ -32,8 +32,10 @@ pub struct Moment {
     pub position_m: f64,
     /// Measured force in N.
     pub force_n: f64,
-    /// True tip force `f - D v` in N.
+    /// True tip force in N: the tissue's force less all friction of the passed layers.
     pub tip_n: f64,
+    /// True force of the tissue on the needle in N.
+    pub total_n: f64,
 }
 
 /// What the core made of a sample.
@@ -43,14 +45,19 @@ pub struct Heard {
     pub enhanced_n: f64,
     /// Innovation in N.
     pub error_n: f64,
+    /// Where the core says that the tip's force lies, in N.
+    pub band_n: Option<[f64; 2]>,
 }
 
 impl From<&Output> for Heard {
     #[inline]
     fn from(output: &Output) -> Self {
-        Self { enhanced_n: output.enhanced_n, error_n: output.error_n }
+        Self { enhanced_n: output.enhanced_n, error_n: output.error_n, band_n: output.band_n }
     }
 }
+
+/// Half-width of a 95 % interval in standard deviations.
+const Z95: f64 = 1.959_963_985;
 
 /// Sums that the scores are made of.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,6 +65,9 @@ struct Sums {
     samples: f64,
     tip2: f64,
     miss2: f64,
+    friction2: f64,
+    in_band: f64,
+    banded: f64,
     error2: f64,
     inside_tip2: f64,
     inside_miss2: f64,
@@ -110,7 +120,11 @@ impl Scorer {
     /// What happened at a sample: a detection, a layer's estimate. Samples where nothing did may be left out.
     pub fn event(&mut self, output: &Output) {
         self.detections.extend(output.detection);
-        self.estimates.extend(output.estimate);
+        if let Some(estimate) = output.estimate {
+            // A later word on a layer replaces an earlier one.
+            self.estimates.retain(|e| e.layer != estimate.layer);
+            self.estimates.push(estimate);
+        }
     }
 
     /// The position in m at which the core has found contact, if it has.
@@ -137,6 +151,15 @@ impl Scorer {
         sums.samples += 1.0;
         sums.tip2 += moment.tip_n * moment.tip_n;
         sums.miss2 += miss * miss;
+        // Without the sensor's own error: true friction less estimated friction.
+        let friction = miss - (moment.force_n - moment.total_n);
+        sums.friction2 += friction * friction;
+        if let Some([low, high]) = output.band_n {
+            sums.banded += 1.0;
+            if moment.tip_n >= low && moment.tip_n <= high {
+                sums.in_band += 1.0;
+            }
+        }
         sums.error2 += output.error_n * output.error_n;
         if z < self.far_m {
             sums.inside_tip2 += moment.tip_n * moment.tip_n;
@@ -179,12 +202,41 @@ impl Scorer {
             },
             enhancement: EnhancementScore {
                 rms_relative: ratio(sums.miss2, sums.tip2),
+                friction_rms_relative: ratio(sums.friction2, sums.tip2),
                 in_tissue_relative: ratio(sums.inside_miss2, sums.inside_tip2),
                 after_exit_relative: ratio(sums.exit_enhanced2, sums.exit_force2),
             },
             reconstruction_rms_n: ratio(sums.error2, sums.samples),
+            coverage: self.coverage(&ruptures, &sums),
             ruptures,
         }
+    }
+
+    /// How many of the true values lie in the intervals that the core gives.
+    fn coverage(&self, ruptures: &[crate::detection::RuptureScore], sums: &Sums) -> Coverage {
+        let mut coverage = Coverage { band: [sums.in_band, sums.banded], ..Coverage::default() };
+        for rupture in ruptures {
+            let Some(truth) = rupture.layer.checked_sub(1).and_then(|i| self.layers.get(i)) else { continue };
+            let Some(e) = rupture.detection.and_then(|d| self.estimates.iter().find(|e| e.layer == d)) else {
+                continue;
+            };
+            if e.stiffness_sd <= 0.0 {
+                continue;
+            }
+            let along = self.layers.iter().take(rupture.layer);
+            let cumulative: f64 = along.map(|l| l.friction_ns_per_m2 * l.inside_m(rupture.true_m)).sum();
+            for (count, off, sd) in [
+                (&mut coverage.stiffness, e.stiffness_n_per_m - truth.stiffness_n_per_m, e.stiffness_sd),
+                (&mut coverage.friction, e.friction - truth.friction_ns_per_m2, e.friction_sd),
+                (&mut coverage.cumulative, e.cumulative_ns_per_m - cumulative, e.cumulative_sd),
+            ] {
+                count[1] += 1.0;
+                if off.abs() <= Z95 * sd {
+                    count[0] += 1.0;
+                }
+            }
+        }
+        coverage
     }
 
     fn layer(&self, number: usize, rupture_m: f64, detection: Option<usize>) -> Option<LayerScore> {

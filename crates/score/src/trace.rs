@@ -4,7 +4,7 @@
 use crate::offline::{LayerSample, OfflineEstimate, offline};
 use crate::score::Score;
 use crate::scorer::{LayerTruth, Moment, Scorer};
-use stylet_core::config::{EnhanceConfig, Model};
+use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_core::{Detection, Enhancer, LayerEstimate, Sample, State};
 use stylet_record::{Recording, Truth};
 
@@ -16,6 +16,10 @@ pub const STORAGE_SAMPLES: usize = 1 << 18;
 pub struct Trace {
     /// Enhanced force in N.
     pub enhanced_n: Vec<f64>,
+    /// Lower and upper end of the 95 % band on the tip's force in N; not a number when the algorithm gives none.
+    pub low_n: Vec<f64>,
+    /// See `low_n`.
+    pub high_n: Vec<f64>,
     /// Reconstructed force in N.
     pub reconstructed_n: Vec<f64>,
     /// Innovation in N.
@@ -71,6 +75,9 @@ impl Trace {
             each(index, &out);
             let touched = out.theta != [0.0, 0.0];
             trace.enhanced_n.push(out.enhanced_n);
+            let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
+            trace.low_n.push(low);
+            trace.high_n.push(high);
             trace.reconstructed_n.push(out.reconstructed_n);
             trace.error_n.push(out.error_n);
             trace.stiffness_n_per_m.push(if touched { out.theta[0] } else { f64::NAN });
@@ -80,7 +87,11 @@ impl Trace {
             trace.derivative_n_per_s.push(out.derivative_n_per_s);
             trace.state.push(out.state);
             trace.detections.extend(out.detection);
-            trace.estimates.extend(out.estimate);
+            if let Some(estimate) = out.estimate {
+                // A later word on a layer replaces an earlier one.
+                trace.estimates.retain(|e| e.layer != estimate.layer);
+                trace.estimates.push(estimate);
+            }
             trace.contact_m = out.contact_m;
             trace.unused += usize::from(!out.used);
         }
@@ -144,6 +155,7 @@ pub fn score_run(
                 position_m: recording.position_m[index],
                 force_n: force_n[index],
                 tip_n: truth.tip_force_n[index],
+                total_n: truth.tissue_force_n[index],
             },
             &out.into(),
         );
@@ -164,6 +176,16 @@ pub fn score_run(
         }
     }
     (trace, score)
+}
+
+/// Short name of an algorithm, as in `paper/ml/force_torque`.
+#[must_use]
+pub fn algorithm_name(algorithm: Algorithm) -> &'static str {
+    match algorithm {
+        Algorithm::Paper => "paper",
+        Algorithm::Literal => "literal",
+        Algorithm::Stylet => "stylet",
+    }
 }
 
 /// Short name of a model, as in `paper/ml/force_torque`.

@@ -94,10 +94,16 @@ impl Block {
     /// How far that is from the truth.
     #[inline(never)]
     fn score(&self, scorer: &mut Scorer) {
-        let truth = self.points.iter().zip(&self.tip_n);
-        for ((sample, heard), (at, tip_n)) in self.samples.iter().zip(&self.heard).zip(truth).take(self.count)
+        let truth = self.points.iter().zip(self.tip_n.iter().zip(&self.total_n));
+        for ((sample, heard), (at, (tip_n, total_n))) in
+            self.samples.iter().zip(&self.heard).zip(truth).take(self.count)
         {
-            let moment = Moment { position_m: at.position_m, force_n: sample.force_n, tip_n: *tip_n };
+            let moment = Moment {
+                position_m: at.position_m,
+                force_n: sample.force_n,
+                tip_n: *tip_n,
+                total_n: *total_n,
+            };
             scorer.sample(&moment, heard);
         }
     }

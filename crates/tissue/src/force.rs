@@ -13,7 +13,8 @@ pub struct TissueForce {
     pub tip_extra_n: f64,
     /// Cumulative friction of the ruptured layers, `D = sum b_j l_j`, in N s/m.
     pub cumulative_friction_ns_per_m: f64,
-    /// What the tip feels, `f - D v`, in N: what enhancement is after.
+    /// What the tip feels, in N: the force less all friction of the passed layers along the shaft, viscous (`D v`), dry and
+    /// presliding; what enhancement is after.
     pub tip_n: f64,
     /// Active layer, 1-based; number of layers + 1 after the last rupture.
     pub active_layer: usize,

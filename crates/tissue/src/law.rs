@@ -403,18 +403,19 @@ impl Law {
     /// Friction along the shaft, tip effects, and the ground truth that goes with them.
     #[inline]
     pub(crate) fn sum_up(&self, moment: &Moment, elastic_n: f64, memory: &mut Memories) -> TissueForce {
-        let mut inside = 0.0;
-        let mut along = |slabs: &[Slab]| {
-            let mut sum = 0.0;
+        let along = |slabs: &[Slab]| {
+            let (mut sum, mut inside) = (0.0, 0.0);
             for slab in slabs {
                 let length = slab.inside_m(moment.z_m);
                 inside += length;
                 sum += slab.friction_ns_per_m2 * length * (1.0 - slab.gripped);
             }
-            sum
+            (sum, inside)
         };
         let (behind, ahead) = self.slabs.split_at(moment.ruptured.min(self.slabs.len()));
-        let (mut cumulative, mut local) = (along(behind), along(ahead));
+        let (mut cumulative, passed) = along(behind);
+        let (mut local, active) = along(ahead);
+        let inside = passed + active;
         let mut velocity = moment.v_mps;
         let mut tip_extra_n = 0.0;
         let mut dry_n = 0.0;
@@ -440,13 +441,16 @@ impl Law {
         }
         let friction_n = velocity * (cumulative + local) + dry_n + grip_n;
         let total_n = elastic_n + friction_n + tip_extra_n;
+        // Dry friction goes with the length inside.
+        let behind_n = if inside > 0.0 { dry_n * passed / inside } else { 0.0 };
         TissueForce {
             total_n,
             elastic_n,
             friction_n,
             tip_extra_n,
             cumulative_friction_ns_per_m: cumulative,
-            tip_n: total_n - cumulative * moment.v_mps - grip_n,
+            // All friction of the passed layers along the shaft: viscous, dry and presliding, and what holds it.
+            tip_n: total_n - cumulative * velocity - behind_n - grip_n,
             active_layer: moment.ruptured + 1,
         }
     }

@@ -1,0 +1,84 @@
+//! The page of `stylet compare`.
+
+use crate::compare::{Row, shown};
+use stylet_report::{Cell, Page, Section, Status, Table};
+
+/// Tables: detection, estimates, calibration.
+pub fn page(rows: &[Row], seeds: u64) -> Page {
+    let head = |r: &Row| vec![Cell::text(r.scenario.clone()), Cell::text(r.algorithm.clone())];
+    let list = |v: &[Option<f64>]| v.iter().map(|x| shown(*x, 100.0, 2)).collect::<Vec<_>>().join(" / ");
+    let detection = rows.iter().map(|r| {
+        let [value, low, high] = r.errors_per_rupture;
+        let mut cells = head(r);
+        cells.push(
+            Cell::number(format!("{} / {} of {}", r.missed, r.false_alarms, r.ruptures))
+                .status(Status::at_most(value, 0.001, 0.05)),
+        );
+        cells.push(Cell::number(format!(
+            "{} to {}",
+            shown(Some(low), 100.0, 2),
+            shown(Some(high), 100.0, 2)
+        )));
+        cells.push(Cell::number(format!(
+            "{} / {}",
+            shown(r.delay_s.median, 1e3, 2),
+            shown(r.delay_s.p95, 1e3, 2)
+        )));
+        cells
+    });
+    let estimates = rows.iter().map(|r| {
+        let mut cells = head(r);
+        cells.push(Cell::number(list(&r.stiffness_error)));
+        cells.push(Cell::number(list(&r.friction_error)));
+        let enhancement = Cell::number(shown(r.enhancement_rms_relative, 100.0, 2));
+        cells.push(
+            enhancement
+                .status(r.enhancement_rms_relative.map_or(Status::Plain, |x| Status::at_most(x, 0.05, 0.2))),
+        );
+        cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
+        cells
+    });
+    let calibrated = rows.iter().filter(|r| r.coverage.tip_force.is_some()).map(|r| {
+        let mut cells = head(r);
+        let c = &r.coverage;
+        for share in [c.stiffness, c.friction, c.cumulative_friction, c.tip_force] {
+            let status = share.map_or(Status::Plain, |x| Status::at_most((x - 0.94).abs(), 0.04, 0.1));
+            cells.push(Cell::number(shown(share, 100.0, 3)).status(status));
+        }
+        cells
+    });
+    let headers = |all: &[&str]| all.iter().map(|h| (*h).to_owned()).collect();
+    Page::new("Algorithms compared")
+        .subtitle(format!("{seeds} noise seeds per scenario and algorithm; the same insertions for each"))
+        .fact("version", env!("CARGO_PKG_VERSION"))
+        .section(
+            Section::new("Ruptures")
+                .text("A rupture is found by the first detection from 50 ms before to 1 s after it; the interval is Wilson's, of missed and false together.")
+                .table(Table {
+                    title: "Ruptures missed and false alarms".to_owned(),
+                    groups: Vec::new(),
+                    headers: headers(&["scenario", "algorithm", "missed / false", "95 % interval, % of ruptures", "delay median / p95, ms"]),
+                    rows: detection.collect(),
+                }),
+        )
+        .section(
+            Section::new("Estimates")
+                .text("Medians over the seeds. Enhanced force: RMS of estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; beside it the same with the sensor's noise.")
+                .table(Table {
+                    title: "Errors in %".to_owned(),
+                    groups: Vec::new(),
+                    headers: headers(&["scenario", "algorithm", "stiffness, layer by layer", "friction, layer by layer", "enhanced force", "with noise"]),
+                    rows: estimates.collect(),
+                }),
+        )
+        .section(
+            Section::new("Calibration")
+                .text("How often the truth lay in a 95 % interval, in %: over layers and seeds, the tip's force over samples. An algorithm that gives no intervals is not listed.")
+                .table(Table {
+                    title: "Covered, %".to_owned(),
+                    groups: Vec::new(),
+                    headers: headers(&["scenario", "algorithm", "stiffness", "friction", "cumulative friction", "tip force"]),
+                    rows: calibrated.collect(),
+                }),
+        )
+}

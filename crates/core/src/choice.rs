@@ -1,0 +1,98 @@
+//! The core that callers hold: one of the algorithms behind one interface.
+
+use crate::config::{Algorithm, EnhanceConfig};
+use crate::enhancer::Paper;
+use crate::sample::{Output, Sample};
+use crate::stylet::Stylet;
+
+/// The online core.
+///
+/// Configuration is taken once; [`Enhancer::step`] is then called once per sample. It does not allocate and
+/// does a bounded amount of work, whichever [`Algorithm`] runs:
+///
+/// - `Paper`, `Literal`: one update, at most
+///   [`DropConfig::replay_per_tick`](crate::config::DropConfig::replay_per_tick) replayed samples, and
+///   on the tick that declares a rupture one look back over at most 256 samples. The storage `B` holds the raw samples of
+///   the layer being traversed, for the re-run after its rupture: a `Vec<Sample>` or an array. When a layer has more
+///   samples than the storage, the re-run begins at the oldest that is left.
+/// - `Stylet`: two small Gaussian updates; nothing is replayed and the storage stays untouched: an empty array will do.
+#[derive(Clone, Debug)]
+pub struct Enhancer<B> {
+    paper: Paper<B>,
+    stylet: Option<Stylet>,
+    surface_m: f64,
+}
+
+impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
+    /// A core with `storage` for the raw samples of a layer. `surface_m` is used when the contact
+    /// is [`Contact::Known`](crate::config::Contact::Known).
+    pub fn new(config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
+        let stylet = (config.algorithm == Algorithm::Stylet).then(|| Stylet::new(&config, surface_m));
+        Self { paper: Paper::new(config, surface_m, storage), stylet, surface_m }
+    }
+
+    /// The configuration in force.
+    #[must_use]
+    pub fn config(&self) -> &EnhanceConfig {
+        self.paper.config()
+    }
+
+    /// Takes one sample. A sample that is not finite or not later than the one before is passed
+    /// over ([`Output::used`] is false).
+    #[inline]
+    pub fn step(&mut self, sample: Sample) -> Output {
+        match &mut self.stylet {
+            Some(stylet) => {
+                stylet.step(self.paper.config(), self.surface_m, sample);
+                *stylet.complete(&sample)
+            }
+            None => self.paper.step(sample),
+        }
+    }
+
+    /// As [`Enhancer::step`] for callers who look at a few fields of millions of samples: nothing is
+    /// copied, and of the output only enhanced force, innovation, state, ruptures, contact, detection,
+    /// estimate and `used` are kept up to date.
+    #[inline]
+    pub fn step_brief(&mut self, sample: Sample) -> &Output {
+        match &mut self.stylet {
+            Some(stylet) => stylet.step(self.paper.config(), self.surface_m, sample),
+            None => self.paper.step_brief(sample),
+        }
+    }
+
+    /// As [`Enhancer::step_brief`] for many samples at hand; `hear` is told the output for each, and the
+    /// last is returned. The same bits as one call after the other.
+    #[inline]
+    pub fn run(&mut self, samples: &[Sample], mut hear: impl FnMut(&Output)) -> &Output {
+        match &mut self.stylet {
+            Some(stylet) => {
+                for sample in samples {
+                    hear(stylet.step(self.paper.config(), self.surface_m, *sample));
+                }
+                stylet.out()
+            }
+            None => self.paper.run(samples, hear),
+        }
+    }
+
+    /// Whether everything that is remembered is a number and every covariance positive definite. `Stylet` sees to it itself and
+    /// starts afresh where rounding or senseless data have spoilt a belief; this is for tests and monitors.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.stylet.as_ref().is_none_or(Stylet::is_sound)
+    }
+
+    /// What is remembered, for a look at what went wrong.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn inside(&self) -> alloc::string::String {
+        alloc::format!("{:?}", self.stylet)
+    }
+
+    /// Multiplications and additions that `Stylet` did for the last sample, counted where they are done; zero for the others.
+    #[must_use]
+    pub fn work(&self) -> u32 {
+        self.stylet.as_ref().map_or(0, Stylet::work)
+    }
+}

@@ -1,0 +1,166 @@
+//! The sensor's noise, learned while the needle is in the air and kept up to date in the tissue: a first-order
+//! autoregression, `n_k = rho n_(k-1) + w_k`, `w` white with standard deviation `sigma`.
+
+/// Longest memory in the tissue, in samples: 3 % of `sigma`, enough for the false-alarm rate to be right within
+/// a factor two.
+const MEMORY: f64 = 2000.0;
+/// Largest correlation from sample to sample that is believed.
+const RHO_LIMIT: f64 = 0.98;
+/// Squared standardised innovation that counts at most: one event says little about the noise.
+const CLIP: f64 = 16.0;
+/// Samples in the air that are the first to count.
+const FIRST: f64 = 40.0;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noise {
+    /// Correlation from sample to sample at the usual sampling step.
+    pub(crate) rho: f64,
+    /// Variance of `w` in N².
+    pub(crate) variance: f64,
+    /// Usual sampling step in s.
+    pub(crate) step_s: f64,
+    /// Samples that it was learned from.
+    pub(crate) count: f64,
+    first_n: f64,
+    /// Sums of `f`, `f²`, products with the sample before, and count: those that count, those that wait, those that come in.
+    sums: [f64; 4],
+    waiting: [f64; 4],
+    coming: [f64; 4],
+    last_n: f64,
+    last_z: f64,
+    least: f64,
+}
+
+impl Noise {
+    /// Never below a standard deviation of `least_n`.
+    pub(crate) fn new(least_n: f64) -> Self {
+        Self {
+            rho: 0.0,
+            variance: least_n * least_n,
+            step_s: 0.0,
+            count: 0.0,
+            first_n: 0.0,
+            sums: [0.0; 4],
+            waiting: [0.0; 4],
+            coming: [0.0; 4],
+            last_n: 0.0,
+            last_z: 0.0,
+            least: least_n * least_n,
+        }
+    }
+
+    /// Mean force in the air in N: what the sensor shows without load.
+    pub(crate) fn bias_n(&self) -> f64 {
+        if self.sums[3] > 0.0 { self.first_n + self.sums[0] / self.sums[3] } else { 0.0 }
+    }
+
+    /// How well that is known, in N².
+    pub(crate) fn bias_variance(&self) -> f64 {
+        if self.sums[3] > 0.0 { self.variance * self.slow() / self.sums[3] } else { self.variance }
+    }
+
+    /// Samples in the air that counted.
+    pub(crate) fn in_air_count(&self) -> f64 {
+        self.sums[3]
+    }
+
+    #[inline]
+    pub(crate) fn clock(&mut self, dt_s: f64) {
+        if self.step_s == 0.0 {
+            self.step_s = dt_s;
+        } else {
+            let bounded = dt_s.clamp(0.5 * self.step_s, 2.0 * self.step_s);
+            self.step_s += 0.02 * (bounded - self.step_s);
+        }
+    }
+
+    /// A sample in the air. A slow load must not pass for noise: samples count only when at least twice as many have come
+    /// after them without a contact.
+    pub(crate) fn in_air(&mut self, force_n: f64) {
+        if self.sums[3] + self.coming[3] == 0.0 {
+            self.first_n = force_n;
+            self.last_n = 0.0;
+        }
+        let f = force_n - self.first_n;
+        for (sum, x) in self.coming.iter_mut().zip([f, f * f, f * self.last_n, 1.0]) {
+            *sum += x;
+        }
+        self.last_n = f;
+        let first = self.sums[3] == 0.0;
+        if first && self.coming[3] >= FIRST {
+            self.sums = core::mem::take(&mut self.coming);
+            self.learn();
+        } else if !first && self.coming[3] >= self.sums[3] + self.waiting[3] {
+            for (sum, x) in self.sums.iter_mut().zip(self.waiting) {
+                *sum += x;
+            }
+            self.waiting = core::mem::take(&mut self.coming);
+            self.learn();
+        }
+    }
+
+    fn learn(&mut self) {
+        let [sum, square, product, n] = self.sums;
+        self.count = n;
+        let mean = sum / n;
+        let variance = (square / n - mean * mean).max(0.0);
+        let covariance = product / n - mean * mean;
+        // Bartlett: the estimate is low by (1 + 4 rho)/n. What is within two standard errors of none is none.
+        let raw = if variance > 0.0 { covariance / variance } else { 0.0 };
+        let rho = raw + (1.0 + 4.0 * raw.max(0.0)) / n;
+        self.rho = if rho * rho * n < 4.0 { 0.0 } else { rho.clamp(0.0, RHO_LIMIT) };
+        let unbiased = variance * n / (n - (1.0 + self.rho) / (1.0 - self.rho)).max(0.5 * n);
+        self.variance = (unbiased * (1.0 - self.rho * self.rho)).max(self.least);
+    }
+
+    /// A whitened innovation `e` whose variance was `s` times the noise's.
+    #[inline]
+    pub(crate) fn in_tissue(&mut self, e: f64, s: f64) {
+        let z2 = e * e / (s * self.variance);
+        let young = self.count < 50.0;
+        if self.count < MEMORY {
+            self.count += 1.0;
+        }
+        let gain = 1.0 / self.count;
+        let counted = if z2 > CLIP && !young { CLIP } else { z2 };
+        self.variance = (self.variance * (1.0 + gain * (counted - 1.0))).max(self.least);
+        let z = if e > 0.0 { libm::sqrt(counted) } else { -libm::sqrt(counted) };
+        self.rho = (self.rho + gain * z * self.last_z * (1.0 - self.rho * self.rho)).clamp(0.0, RHO_LIMIT);
+        self.last_z = z;
+    }
+
+    /// Correlation over a step of `dt_s`: `rho^(dt/step)` to first order.
+    #[inline(always)]
+    pub(crate) fn rho_over(&self, dt_s: f64) -> f64 {
+        if self.rho == 0.0 {
+            return 0.0;
+        }
+        1.0 / (1.0 + (1.0 / self.rho - 1.0) * dt_s / self.step_s)
+    }
+
+    /// Variance of the noise itself in N².
+    #[inline(always)]
+    pub(crate) fn marginal(&self) -> f64 {
+        if self.rho == 0.0 {
+            return self.variance;
+        }
+        self.variance / (1.0 - self.rho * self.rho)
+    }
+
+    /// What intervals grow by, as a factor of the variance, because the level of slow noise was learned from few samples: with
+    /// `var rho = (1 - rho²)/n` its relative variance is `4 (1 + rho)/((1 - rho) n)`, of which half is above.
+    pub(crate) fn doubt(&self) -> f64 {
+        let n = self.sums[3].max(40.0);
+        1.0 + 2.0 * (1.0 + self.rho) / ((1.0 - self.rho) * n)
+    }
+
+    /// How much more slow noise weighs than white noise of the same innovations: `1/(1 - rho)²`.
+    #[inline(always)]
+    pub(crate) fn slow(&self) -> f64 {
+        if self.rho == 0.0 {
+            return 1.0;
+        }
+        let d = 1.0 - self.rho;
+        1.0 / (d * d)
+    }
+}

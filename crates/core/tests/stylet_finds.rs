@@ -1,0 +1,171 @@
+//! What `algorithm: Stylet` promises on simulated insertions: every rupture within a few samples and nothing else, with loud noise, rippled speed
+//! and holds; stiffness, friction and their intervals; friction taken away soon after a drop.
+
+mod support;
+
+use stylet_core::config::Algorithm;
+use stylet_core::{EnhanceConfig, LayerEstimate, Output};
+use stylet_tissue::{Rupture, Tissue};
+use support::{Insertion, constant, enhance, insertion, sinusoid};
+
+fn stylet() -> EnhanceConfig {
+    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
+}
+
+/// The paper's three layers without latex.
+fn gels() -> Tissue {
+    let mut tissue = Tissue::three_gels();
+    for layer in &mut tissue.layers {
+        layer.puncture_n = None;
+    }
+    tissue
+}
+
+/// Asserts that exactly the true ruptures are found, each at most `latest_s` late.
+fn assert_found(name: &str, ruptures: &[Rupture], outputs: &[Output], latest_s: f64) {
+    let found: Vec<f64> = outputs.iter().filter_map(|o| o.detection).map(|d| d.time_s).collect();
+    assert_eq!(found.len(), ruptures.len(), "{name}: {found:.3?} for {ruptures:?}");
+    for (found, rupture) in found.iter().zip(ruptures) {
+        let delay_s = found - rupture.time_s;
+        assert!(
+            (0.0..=latest_s).contains(&delay_s),
+            "{name}: layer {} found {delay_s} s late",
+            rupture.layer
+        );
+    }
+}
+
+/// The last word on each layer.
+fn estimates(outputs: &[Output]) -> Vec<LayerEstimate> {
+    let mut all: Vec<LayerEstimate> = Vec::new();
+    for e in outputs.iter().filter_map(|o| o.estimate) {
+        all.retain(|x| x.layer != e.layer);
+        all.push(e);
+    }
+    all
+}
+
+#[test]
+fn every_rupture_is_found_and_nothing_else_where_the_papers_algorithm_breaks_down() {
+    let hold = |t: f64| if (22.6..27.6).contains(&t) { 0.0 } else { 0.0023 };
+    let ripple = |t: f64| 0.0023 * (1.0 + 0.6 * (std::f64::consts::TAU * 0.25 * t).sin());
+    for seed in 0..10 {
+        let cases: [(&str, Insertion); 6] = [
+            ("0.02 N", constant(0.02, seed)),
+            ("sinusoid", sinusoid(0.02, seed)),
+            ("0.1 N", constant(0.1, seed)),
+            ("sinusoid, 0.1 N", sinusoid(0.1, seed)),
+            ("hold", insertion(&gels(), -0.005, 55.0, 200.0, 0.02, seed, hold)),
+            ("ripple", insertion(&gels(), -0.005, 50.0, 200.0, 0.02, seed, ripple)),
+        ];
+        for (name, data) in &cases {
+            assert_eq!(data.ruptures.len(), 3, "{name}");
+            assert_found(name, &data.ruptures, &enhance(&stylet(), &data.samples), 0.011);
+        }
+    }
+}
+
+#[test]
+fn stiffness_and_friction_are_right_within_their_intervals() {
+    let tissue = gels();
+    let (mut inside, mut of) = (0, 0);
+    for seed in 0..20 {
+        let data = insertion(&tissue, -0.005, 50.0, 200.0, 0.1, seed, |_| 0.0023);
+        let found = estimates(&enhance(&stylet(), &data.samples));
+        assert_eq!(found.len(), 3, "seed {seed}");
+        for (e, layer) in found.iter().zip(&tissue.layers) {
+            let k = (e.stiffness_n_per_m - layer.stiffness_n_per_m, e.stiffness_sd, layer.stiffness_n_per_m);
+            let b = (e.friction - layer.friction_ns_per_m2, e.friction_sd, layer.friction_ns_per_m2);
+            for (off, sd, truth) in [k, b] {
+                assert!(off.abs() < 0.05 * truth, "seed {seed}: {e:?}");
+                inside += usize::from(off.abs() <= 1.96 * sd);
+                of += 1;
+            }
+        }
+    }
+    assert!((103..=120).contains(&inside), "{inside} of {of} in their 95 % intervals");
+}
+
+#[test]
+fn friction_is_gone_a_twentieth_of_a_second_after_the_drop() {
+    let data = insertion(&gels(), -0.005, 50.0, 200.0, 0.02, 1, |_| 0.0023);
+    let outputs = enhance(&stylet(), &data.samples);
+    for rupture in &data.ruptures {
+        let at = data.samples.iter().position(|s| s.time_s > rupture.time_s + 0.05).expect("it goes on");
+        let off =
+            outputs[at].enhanced_n - data.samples[at].force_n + data.truth[at].total_n - data.truth[at].tip_n;
+        assert!(off.abs() < 0.05, "layer {}: friction is off by {off} N", rupture.layer);
+    }
+}
+
+#[test]
+fn a_fall_that_is_no_drop_estimates_no_layer() {
+    // A step up and back: a knock against the robot, not a rupture.
+    let mut data = insertion(&gels(), -0.005, 14.0, 200.0, 0.02, 1, |_| 0.0023);
+    assert!(data.ruptures.is_empty());
+    for s in &mut data.samples[1800..2000] {
+        s.force_n += 1.0;
+    }
+    let found = estimates(&enhance(&stylet(), &data.samples));
+    assert!(found.iter().all(|e| e.drop_n > 1.96 * e.drop_sd_n && e.drop_n > 0.0), "{found:?}");
+}
+
+#[test]
+fn spikes_of_ten_newton_are_no_ruptures() {
+    let mut data = constant(0.02, 4);
+    for k in (900..9900).step_by(450) {
+        data.samples[k].force_n += if k % 900 == 0 { 10.0 } else { -10.0 };
+    }
+    assert_found("spikes", &data.ruptures, &enhance(&stylet(), &data.samples), 0.016);
+}
+
+#[test]
+fn the_way_back_raises_no_alarm_and_takes_the_friction_of_the_passed_layers_away() {
+    let back = |t: f64| if t < 25.0 { 0.0023 } else { -0.003 };
+    let data = insertion(&gels(), -0.005, 42.0, 200.0, 0.01, 5, back);
+    let outputs = enhance(&stylet(), &data.samples);
+    let turn = 25 * 200;
+    assert!(outputs[turn..].iter().all(|o| o.detection.is_none()));
+    let rms = |v: &dyn Fn(usize) -> f64| {
+        ((turn + 200..8000).map(|i| v(i) * v(i)).sum::<f64>() / (8000 - turn - 200) as f64).sqrt()
+    };
+    let raw = rms(&|i| data.samples[i].force_n - data.truth[i].tip_n);
+    let left = rms(&|i| outputs[i].enhanced_n - data.truth[i].tip_n);
+    assert!(left < 0.05 * raw, "{left} N of {raw} N is left");
+}
+
+/// Dry friction configured: what the hold and the turn do not change is known as friction.
+#[test]
+fn a_configured_friction_law_takes_dry_friction_away_in_a_hold() {
+    let law = stylet_tissue::Law::new(
+        &gels(),
+        &[stylet_tissue::AnyEffect::CoulombFriction(stylet_tissue::CoulombFriction { c_n_per_m: 20.0 })],
+    )
+    .expect("one effect");
+    let mut state = stylet_tissue::LawState::default();
+    let mut samples = Vec::new();
+    let mut tip_n = Vec::new();
+    let mut z = -0.005;
+    for k in 0..9000 {
+        let time_s = 0.005 * f64::from(k);
+        let velocity_mps = 0.0023 + if time_s > 20.0 { 0.001 * (time_s - 20.0).sin() } else { 0.0 };
+        let force = law.step(&mut state, time_s, z, velocity_mps, |_| {});
+        let noise = 0.01 * (f64::from(k * 7919 % 101) / 50.0 - 1.0);
+        samples.push(stylet_core::Sample {
+            time_s,
+            position_m: z,
+            velocity_mps,
+            force_n: force.total_n + noise,
+        });
+        tip_n.push(force.tip_n);
+        z += velocity_mps * 0.005;
+    }
+    let mut config = stylet();
+    let mean_b = (9000.0 * 28.2 + 12000.0 * 37.7 + 16000.0 * 32.2) / 98.1;
+    config.stylet.law = stylet_core::config::FrictionLaw::CoulombViscous { dry_mps: 20.0 / mean_b };
+    let outputs = enhance(&config, &samples);
+    let last = 6000..6500;
+    let off = last.clone().map(|i| (outputs[i].enhanced_n - tip_n[i]).abs()).sum::<f64>() / 500.0;
+    let raw = last.map(|i| (samples[i].force_n - tip_n[i]).abs()).sum::<f64>() / 500.0;
+    assert!(off < 0.15 * raw, "{off} N off, {raw} N of friction");
+}
