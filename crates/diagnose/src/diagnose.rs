@@ -59,7 +59,7 @@ const LEFTOVER_P: f64 = 1e-6;
 /// The unknown dominates when more than this share of what the base law leaves beyond the noise is still left.
 const UNEXPLAINED: f64 = 0.1;
 /// What is left counts when its variance is this share of the noise's.
-const EXCESS: f64 = 0.15;
+const EXCESS: f64 = 0.8;
 /// With one recording, where nothing tells structure from slow noise, it must be so many times the noise's.
 const EXCESS_ALONE: f64 = 3.0;
 /// Beside something unknown a cause stands when so much of what the base law leaves comes back without it ...

@@ -86,10 +86,19 @@ fn limit(recordings: &[&Recording], step: Option<f64>) -> Option<f64> {
     (at >= EXTREMES && at > expected).then_some(most)
 }
 
-/// Isolated samples that stand out of both neighbours.
+/// Half width in samples of the window in which the scatter around a sample is judged: noise may grow with the force.
+const AROUND: usize = 60;
+/// Spikes have one size: the relative spread of their sizes. Tails of a distribution have many.
+const ONE_SIZE: f64 = 0.35;
+/// ... and hardly any outlying sample is smaller: at most this share of their number between a third and two thirds.
+const BETWEEN: f64 = 0.35;
+
+/// Isolated samples that stand out of both neighbours, all by about the same.
 fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Option<(usize, f64, f64)> {
-    let (mut count, mut size, mut seconds) = (0, 0.0, 0.0);
-    for (recording, exclude) in recordings.iter().zip(exclude) {
+    let mut seconds = 0.0;
+    let mut found: Vec<(usize, usize, f64)> = Vec::new();
+    let mut smaller: Vec<f64> = Vec::new();
+    for (r, recording) in recordings.iter().enumerate() {
         let f = &recording.force_n;
         seconds += recording.duration_s();
         if f.len() < 12 {
@@ -100,22 +109,43 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
             around.sort_unstable_by(f64::total_cmp);
             f[i] - 0.5 * (around[1] + around[2])
         };
-        let mut sizes: Vec<f64> = (2..f.len() - 2).map(|i| away(i).abs()).collect();
-        let sd = (median(&mut sizes) * 1.4826).max(step).max(1e-12);
+        let sizes: Vec<f64> = (2..f.len() - 2).map(|i| away(i).abs()).collect();
+        let local: Vec<f64> = (0..sizes.len().div_ceil(AROUND))
+            .map(|k| {
+                let (lo, hi) = ((k * AROUND).saturating_sub(AROUND), ((k + 2) * AROUND).min(sizes.len()));
+                (median(&mut sizes[lo..hi].to_vec()) * 1.4826).max(step).max(1e-12)
+            })
+            .collect();
         for i in 2..f.len() - 2 {
             let s = away(i);
+            let sd = local[(i - 2) / AROUND];
             let (before, after) = (f[i] - f[i - 1], f[i] - f[i + 1]);
-            let both = before.abs().min(after.abs()) > 0.7 * SPIKE_SD * sd && before * after > 0.0;
-            let level = (f[i - 1] - f[i + 1]).abs() < 0.5 * s.abs();
+            let isolated = before * after > 0.0 && (f[i - 1] - f[i + 1]).abs() < 0.5 * s.abs();
             let v = &recording.velocity_mps;
             let moves = (v[i + 1] - v[i - 1]).abs()
                 > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
-            if !moves && s.abs() > SPIKE_SD * sd && both && level && !exclude[i] {
-                exclude[i] = true;
-                count += 1;
-                size += s.abs();
+            if moves || !isolated || exclude[r][i] {
+                continue;
+            }
+            let both = before.abs().min(after.abs()) > 0.7 * SPIKE_SD * sd;
+            if s.abs() > SPIKE_SD * sd && both {
+                found.push((r, i, s.abs()));
+            } else if s.abs() > 0.5 * SPIKE_SD * sd {
+                smaller.push(s.abs());
             }
         }
     }
-    (count >= 2).then(|| (count, size / count.max(1) as f64, seconds))
+    let size = stylet_stats::order::median_of(found.iter().map(|f| f.2));
+    let spread = 1.4826 * stylet_stats::order::median_of(found.iter().map(|f| (f.2 - size).abs()));
+    let all = found.iter().map(|f| f.2).chain(smaller);
+    let between = all.filter(|s| *s > size / 3.0 && *s < 2.0 * size / 3.0).count();
+    let of_one_size = spread < ONE_SIZE * size && (between as f64) <= BETWEEN * found.len() as f64;
+    if found.len() < 2 || !of_one_size {
+        return None;
+    }
+    for (r, i, _) in &found {
+        exclude[*r][*i] = true;
+    }
+    let mean = found.iter().map(|f| f.2).sum::<f64>() / found.len() as f64;
+    Some((found.len(), mean, seconds))
 }

@@ -1,7 +1,7 @@
 //! What is fitted: base parameters, geometry, effects, numbers of each recording's own, instants of ruptures.
 
 use std::sync::Arc;
-use stylet_tissue::{AnyEffect, Effect, EffectInfo, FitScale, Law, Measurement, Tissue};
+use stylet_tissue::{AnyEffect, Effect, EffectInfo, FitScale, Law, Measurement, Place, Tissue};
 
 /// The instant (s) of a rupture that never was.
 pub const NEVER: f64 = f64::INFINITY;
@@ -176,7 +176,7 @@ pub struct Compiled {
     pub delay_s: f64,
     /// A jump of the speed is smeared before it is sampled.
     pub smears: bool,
-    /// Positions (m, relative to the tissue) at which something of an effect's own breaks.
+    /// Positions (m) at which a force at the tip may jump: faces, and where something of an effect's own breaks.
     pub breaks_m: Vec<f64>,
     /// Own puncture force of every layer in N, infinite when only its far face ruptures it.
     pub puncture_n: Vec<f64>,
@@ -246,7 +246,14 @@ impl Model {
             delay_s: chain.delay_s(),
             smears: chain.smears() || law.bends(),
             measures: !chain.is_plain(),
-            breaks_m: effects.iter().filter_map(Effect::break_depth_m).map(|d| surface + d).collect(),
+            breaks_m: {
+                let mut places: Vec<f64> =
+                    effects.iter().filter_map(Effect::break_depth_m).map(|d| surface + d).collect();
+                if effects.iter().any(|e| e.place() == Place::Tip && !e.is_neutral()) {
+                    places.extend(law.slabs().iter().map(stylet_tissue::Slab::far_m));
+                }
+                places
+            },
             puncture_n: law.slabs().iter().map(|s| s.puncture_n).collect(),
             stiffness: law.slabs().iter().map(|s| s.stiffness_n_per_m).collect(),
             law,

@@ -65,7 +65,7 @@ impl Motion {
         let (t, z) = (&recording.time_s, &recording.position_m);
         let told = velocity(t, z);
         let recorded_sd = roughness(&recording.velocity_mps);
-        let mut noise_m = position_noise(z);
+        let mut noise_m = position_noise(t, z);
         let (mut z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
             noise_m = noise_m.min(1e-6);
             (z.clone(), told.v, told.kinks, told.noise_mps)

@@ -46,7 +46,7 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
         let v = stylet_record::differentiate(t, z, 0.1);
         return Settled { z: z.to_vec(), v, kinks: Vec::new(), sd_mps: f64::INFINITY };
     }
-    let noise_m = (position_noise(z) / (q as f64).sqrt()).max(rounding(z) / 12.0_f64.sqrt() / (q as f64).sqrt());
+    let noise_m = (position_noise(t, z) / (q as f64).sqrt()).max(rounding(z) / 12.0_f64.sqrt() / (q as f64).sqrt());
     let dt = step * q as f64;
     // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
     let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (SIDE as f64).powf(1.5));

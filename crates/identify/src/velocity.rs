@@ -48,7 +48,7 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
     }
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
-    let noise_m = position_noise(z);
+    let noise_m = position_noise(t, z);
     // Slope of a straight line over 2 m + 1 samples: sd = noise / (step sqrt(m (m+1) (2m+1) / 3)).
     let gain = |m: usize| 1.0 / (step * ((m * (m + 1) * (2 * m + 1)) as f64 / 3.0).sqrt());
     let half = (1..WIDEST).find(|m| noise_m * gain(*m) <= WANTED_MPS).unwrap_or(WIDEST);
@@ -84,12 +84,25 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
     Velocity { v, noise_mps: noise_m * gain(half), kinks }
 }
 
-/// Standard deviation of positions about a smooth course, by their third differences.
-pub(crate) fn position_noise(z: &[f64]) -> f64 {
-    let mut d: Vec<f64> = z.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
+/// Standard deviation of positions about a smooth course, by their third divided differences: irregular instants are no
+/// noise.
+pub(crate) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
+    let mut d: Vec<f64> = t
+        .windows(4)
+        .zip(z.windows(4))
+        .map(|(t, z)| {
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for i in 0..4 {
+                let product: f64 = (0..4).filter(|j| *j != i).map(|j| t[i] - t[j]).product();
+                sum += z[i] / product;
+                squares += 1.0 / (product * product);
+            }
+            sum.abs() / squares.sqrt()
+        })
+        .collect();
     // Rounded positions of a needle at rest do not differ at all.
     d.retain(|d| *d > 0.0);
-    median(&mut d) * 1.4826 / 20.0_f64.sqrt()
+    median(&mut d) * 1.4826
 }
 
 /// A break of the slope: the sample after it, the instant with position and slope before, the slope after.
