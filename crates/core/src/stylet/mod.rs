@@ -562,7 +562,8 @@ impl Stylet {
         let [vk, vb] = l.previous_variance(&self.noise).map(|v| v * doubt);
         let (cumulative, cumulative_variance) = l.behind(&self.noise);
         let drop = k * d;
-        if !(drop > 1.96 * d * libm::sqrt(vk.max(0.0))) {
+        let certain = drop > 1.96 * d * libm::sqrt(vk.max(0.0));
+        if !certain {
             return;
         }
         self.out.estimate = Some(LayerEstimate {
