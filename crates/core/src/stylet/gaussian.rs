@@ -1,4 +1,5 @@
 //! A small Gaussian belief: mean, covariance, and what a scalar measurement does to them.
+#![allow(clippy::needless_range_loop, reason = "matrices read best with their indices")]
 
 /// Mean and covariance of `N` unknowns; of the covariance the lower triangle. The covariance is in units of a noise variance that the
 /// caller keeps, so that gains do not change when the noise is re-estimated.

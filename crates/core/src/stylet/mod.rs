@@ -197,7 +197,7 @@ impl Stylet {
         }
         self.last = sample;
         self.started = true;
-        self.speak(config, &step, &sample);
+        self.speak(config, &sample);
         &self.out
     }
 
@@ -368,7 +368,7 @@ impl Stylet {
         }
         self.was_quiet = heard.quiet || !forward;
         if forward && !odd && !heard.quiet {
-            self.fall(config, step, sample, heard.alarm, heard.outweighs && self.fall.is_none());
+            self.fall(step, sample);
         }
         if heard.quiet {
             self.fall = None;
@@ -381,7 +381,7 @@ impl Stylet {
                 return;
             }
             if self.is_a_drop(config) {
-                self.rupture(config, step, sample, heard.evidence);
+                self.rupture(step, sample, heard.evidence);
                 return;
             }
         }
@@ -443,8 +443,7 @@ impl Stylet {
     }
 
     /// Follows a fall from where it began.
-    fn fall(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, alarm: bool, begins: bool) {
-        let _ = (config, alarm, begins);
+    fn fall(&mut self, step: &Step, sample: &Sample) {
         let fall = self.fall.get_or_insert(Fall {
             from_n: self.last_level_n,
             mean_n: sample.force_n,
@@ -494,7 +493,7 @@ impl Stylet {
     }
 
     #[cold]
-    fn rupture(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample, evidence: f64) {
+    fn rupture(&mut self, step: &Step, sample: &Sample, evidence: f64) {
         if self.report_at < u32::MAX {
             self.report(sample);
         }
@@ -530,7 +529,6 @@ impl Stylet {
         // Before the sum passed its threshold a rupture was as likely as a false alarm; what is above it counts.
         let confidence = 1.0 / (1.0 + libm::exp(-(evidence + core::f64::consts::LN_2)));
         let (drop_n, drop_sd_n) = self.drop;
-        let _ = config;
         self.out.detection = Some(Detection {
             layer: self.out.ruptures,
             time_s: sample.time_s,
@@ -564,7 +562,8 @@ impl Stylet {
         let [vk, vb] = l.previous_variance(&self.noise).map(|v| v * doubt);
         let (cumulative, cumulative_variance) = l.behind(&self.noise);
         let drop = k * d;
-        if !(drop > 1.96 * d * libm::sqrt(vk.max(0.0))) {
+        let certain = drop > 1.96 * d * libm::sqrt(vk.max(0.0));
+        if !certain {
             return;
         }
         self.out.estimate = Some(LayerEstimate {
@@ -586,7 +585,7 @@ impl Stylet {
     }
 
     #[inline(always)]
-    fn speak(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
+    fn speak(&mut self, config: &EnhanceConfig, sample: &Sample) {
         let standstill = config.drop.standstill_mps;
         let retracting = sample.velocity_mps < -standstill;
         let marginal = self.noise.marginal();
