@@ -1,0 +1,361 @@
+//! Autoregressive noise: `e_t = a_1 e_(t-1) + ... + a_p e_(t-p) + w_t`, `w_t` independent with standard deviation `s`.
+//!
+//! Fitted by Burg's method (Burg 1967), always stationary, over any number of separate stretches of data (recordings, or
+//! the parts of one between gaps). The model keeps the predictors of every lower order, so that the first samples of a
+//! stretch are whitened by what is known of them: the likelihood is that of the stationary process, not conditional on
+//! the first `p` samples.
+
+use crate::moments::Sum;
+use core::f64::consts::TAU;
+
+/// Highest order.
+pub const MAX_ORDER: usize = 32;
+
+/// What chooses the order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Criterion {
+    /// Akaike 1974: `n ln s^2 + 2 p`.
+    Aic,
+    /// Schwarz 1978: `n ln s^2 + p ln n`.
+    Bic,
+}
+
+/// A stationary autoregressive model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ar {
+    order: usize,
+    /// Reflection coefficients (partial autocorrelations), each inside -1 to 1.
+    reflection: [f64; MAX_ORDER],
+    /// Row `k - 1`: the predictor of order `k`, packed one row behind the other.
+    predictors: [f64; MAX_ORDER * (MAX_ORDER + 1) / 2],
+    /// Standard deviation of the process.
+    sd: f64,
+}
+
+const fn row(order: usize) -> usize {
+    order * (order - 1) / 2
+}
+
+impl Ar {
+    /// Independent noise of standard deviation `sd`.
+    #[must_use]
+    pub fn white(sd: f64) -> Self {
+        Self {
+            order: 0,
+            reflection: [0.0; MAX_ORDER],
+            predictors: [0.0; MAX_ORDER * (MAX_ORDER + 1) / 2],
+            sd,
+        }
+    }
+
+    /// Noise of standard deviation `sd` whose neighbours correlate by `phi` (inside -1 to 1).
+    #[must_use]
+    pub fn first_order(phi: f64, sd: f64) -> Self {
+        Self::from_reflection(&[phi], sd)
+    }
+
+    /// From reflection coefficients (partial autocorrelations, clipped to stay stationary; at most [`MAX_ORDER`] are
+    /// taken) and the standard deviation of the process.
+    #[must_use]
+    pub fn from_reflection(reflection: &[f64], sd: f64) -> Self {
+        let mut ar = Self::white(sd);
+        for k in reflection.iter().take(MAX_ORDER) {
+            ar.push(*k);
+        }
+        ar
+    }
+
+    /// From the autocovariances at lags `0..=p` (Levinson and Durbin): the model with exactly these.
+    #[must_use]
+    pub fn from_autocovariance(lags: &[f64]) -> Self {
+        let variance = lags.first().copied().unwrap_or(0.0);
+        let mut ar = Self::white(variance.max(0.0).sqrt());
+        let mut left = variance;
+        for p in 1..lags.len().min(MAX_ORDER + 1) {
+            if left <= 0.0 {
+                break;
+            }
+            let told: f64 = ar.coefficients().iter().enumerate().map(|(j, a)| a * lags[p - 1 - j]).sum();
+            ar.push((lags[p] - told) / left);
+            let k = ar.reflection[p - 1];
+            left *= 1.0 - k * k;
+        }
+        ar
+    }
+
+    /// Burg's fit of order `order` (less where the data are too few: a third of the longest stretch) about zero.
+    #[must_use]
+    pub fn burg(stretches: &[&[f64]], order: usize) -> Self {
+        let mut last = Self::white(0.0);
+        burg(stretches, order, |ar, _| last = *ar);
+        last
+    }
+
+    /// Burg's fit with the order up to `max_order` that the criterion prefers. About zero.
+    #[must_use]
+    pub fn fit(stretches: &[&[f64]], max_order: usize, criterion: Criterion) -> Self {
+        let n: usize = stretches.iter().map(|s| s.len()).sum();
+        let price = match criterion {
+            Criterion::Aic => 2.0,
+            Criterion::Bic => libm::log(n.max(1) as f64),
+        };
+        let (mut best, mut lowest) = (Self::white(0.0), f64::INFINITY);
+        burg(stretches, max_order, |ar, innovations| {
+            let cost = n as f64 * libm::log(innovations.max(f64::MIN_POSITIVE)) + price * ar.order as f64;
+            if cost < lowest {
+                (best, lowest) = (*ar, cost);
+            }
+        });
+        best
+    }
+
+    /// The next order: one more reflection coefficient.
+    fn push(&mut self, k: f64) {
+        /// Keeps the process stationary where rounding or a pure tone would not.
+        const NEARLY_ONE: f64 = 1.0 - 1e-9;
+        let k = if k.is_nan() { 0.0 } else { k.clamp(-NEARLY_ONE, NEARLY_ONE) };
+        let p = self.order + 1;
+        for j in 0..p - 1 {
+            let of = row(p - 1);
+            self.predictors[row(p) + j] = self.predictors[of + j] - k * self.predictors[of + p - 2 - j];
+        }
+        self.predictors[row(p) + p - 1] = k;
+        self.reflection[p - 1] = k;
+        self.order = p;
+    }
+
+    /// The order `p`.
+    #[must_use]
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// `a_1 ... a_p`.
+    #[must_use]
+    pub fn coefficients(&self) -> &[f64] {
+        self.predictor(self.order)
+    }
+
+    fn predictor(&self, order: usize) -> &[f64] {
+        if order == 0 { &[] } else { &self.predictors[row(order)..row(order) + order] }
+    }
+
+    /// Reflection coefficients (partial autocorrelations).
+    #[must_use]
+    pub fn reflection(&self) -> &[f64] {
+        &self.reflection[..self.order]
+    }
+
+    /// Standard deviation of the process.
+    #[must_use]
+    pub fn sd(&self) -> f64 {
+        self.sd
+    }
+
+    /// Standard deviation of the innovations.
+    #[must_use]
+    pub fn innovations_sd(&self) -> f64 {
+        self.sd_after(self.order)
+    }
+
+    /// The same colour at another size: standard deviation of the process.
+    #[must_use]
+    pub fn with_sd(mut self, sd: f64) -> Self {
+        self.sd = sd;
+        self
+    }
+
+    /// Standard deviation of what `known` (at most `p`) samples before leave open of the next.
+    fn sd_after(&self, known: usize) -> f64 {
+        self.sd * self.reflection[..known].iter().map(|k| 1.0 - k * k).product::<f64>().sqrt()
+    }
+
+    /// Autocovariance at lags `0..out.len()`.
+    pub fn autocovariance(&self, out: &mut [f64]) {
+        for lag in 0..out.len() {
+            out[lag] = if lag == 0 {
+                self.sd * self.sd
+            } else {
+                // Beyond the order the predictor of full order holds; below, Levinson backwards.
+                let order = lag.min(self.order);
+                self.predictor(order).iter().enumerate().map(|(j, a)| a * out[lag - 1 - j]).sum()
+            };
+        }
+    }
+
+    /// Whitens one stretch: `out` has mean zero, unit variance, no correlation where `e` is of this model. Linear in `e`, so
+    /// that the same call whitens the columns of a sensitivity. `out` must be as long as `e`; the longer's rest is left.
+    pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
+        let n = e.len().min(out.len());
+        let start = self.order.min(n);
+        for t in 0..start {
+            let told: f64 = self.predictor(t).iter().enumerate().map(|(j, a)| a * e[t - 1 - j]).sum();
+            out[t] = (e[t] - told) / self.sd_after(t);
+        }
+        let per_sd = 1.0 / self.innovations_sd();
+        let a = self.coefficients();
+        for t in start..n {
+            let told: f64 = a.iter().zip(e[t - self.order..t].iter().rev()).map(|(a, e)| a * e).sum();
+            out[t] = (e[t] - told) * per_sd;
+        }
+    }
+
+    /// The next sample's mean and standard deviation, from those before it in one stretch (all that are known, oldest
+    /// first).
+    #[must_use]
+    pub fn predict(&self, before: &[f64]) -> (f64, f64) {
+        let known = self.order.min(before.len());
+        let mean = self.predictor(known).iter().zip(before.iter().rev()).map(|(a, e)| a * e).sum();
+        (mean, self.sd_after(known))
+    }
+
+    /// Sum of the logarithms of the standard deviations by which [`whiten`](Self::whiten) divides a stretch of `n` samples:
+    /// the log-determinant's half.
+    #[must_use]
+    pub fn ln_sd_sum(&self, n: usize) -> f64 {
+        let start = self.order.min(n);
+        let first: f64 = (0..start).map(|t| libm::log(self.sd_after(t))).sum();
+        first + (n - start) as f64 * libm::log(self.innovations_sd())
+    }
+
+    /// Log-likelihood in nats of one stretch, exact for the stationary normal process. `work` is overwritten; it must be as
+    /// long as `e`.
+    #[must_use]
+    pub fn ln_likelihood(&self, e: &[f64], work: &mut [f64]) -> f64 {
+        self.whiten(e, work);
+        let squares: Sum = work[..e.len()].iter().map(|w| w * w).collect();
+        -0.5 * squares.value() - self.ln_sd_sum(e.len()) - 0.5 * e.len() as f64 * libm::log(TAU)
+    }
+}
+
+/// Burg's recursion over several stretches; hands every order from 0 on to `take` with its innovations' variance.
+fn burg(stretches: &[&[f64]], order: usize, mut take: impl FnMut(&Ar, f64)) {
+    let n: usize = stretches.iter().map(|s| s.len()).sum();
+    let longest = stretches.iter().map(|s| s.len()).max().unwrap_or(0);
+    if n == 0 {
+        return take(&Ar::white(f64::NAN), f64::NAN);
+    }
+    let squares: Sum = stretches.iter().flat_map(|s| s.iter()).map(|x| x * x).collect();
+    let variance = squares.value() / n as f64;
+    let mut ar = Ar::white(variance.sqrt());
+    let mut left = variance;
+    take(&ar, left);
+    let mut forward: Vec<f64> = stretches.iter().flat_map(|s| s.iter().copied()).collect();
+    let mut backward = forward.clone();
+    for p in 1..=order.min(MAX_ORDER).min(longest / 3) {
+        let (mut cross, mut power, mut from) = (Sum::default(), Sum::default(), 0);
+        for stretch in stretches {
+            for t in from + p..from + stretch.len() {
+                cross.add(forward[t] * backward[t - 1]);
+                power.add(forward[t] * forward[t] + backward[t - 1] * backward[t - 1]);
+            }
+            from += stretch.len();
+        }
+        if power.value() <= 0.0 {
+            break;
+        }
+        ar.push(2.0 * cross.value() / power.value());
+        let k = ar.reflection[p - 1];
+        let mut from = 0;
+        for stretch in stretches {
+            for t in (from + p..from + stretch.len()).rev() {
+                let (f, b) = (forward[t], backward[t - 1]);
+                forward[t] = f - k * b;
+                backward[t] = b - k * f;
+            }
+            from += stretch.len();
+        }
+        left *= 1.0 - k * k;
+        take(&ar, left);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Normal numbers by the quantile of a small counter-based generator (SplitMix64).
+    fn normals(seed: u64, n: usize) -> Vec<f64> {
+        let mut state = seed;
+        (0..n)
+            .map(|_| {
+                state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+                let mut z = state;
+                z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+                crate::normal::quantile(((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 + 2f64.powi(-54))
+            })
+            .collect()
+    }
+
+    fn coloured(seed: u64, n: usize, a: &[f64], sd: f64) -> Vec<f64> {
+        let mut e = vec![0.0; n + 500];
+        for (t, w) in normals(seed, n + 500).into_iter().enumerate() {
+            let told: f64 = a.iter().enumerate().filter(|(j, _)| *j < t).map(|(j, a)| a * e[t - 1 - j]).sum();
+            e[t] = told + sd * w;
+        }
+        e.split_off(500)
+    }
+
+    #[test]
+    fn whitened_noise_of_the_fitted_model_is_white_with_unit_variance() {
+        let e = coloured(1, 20_000, &[1.2, -0.5, 0.1], 0.02);
+        let ar = Ar::fit(&[&e], 10, Criterion::Bic);
+        assert!((2..=4).contains(&ar.order()), "{}", ar.order());
+        assert!((ar.innovations_sd() / 0.02 - 1.0).abs() < 0.02, "{}", ar.innovations_sd());
+        let mut w = vec![0.0; e.len()];
+        ar.whiten(&e, &mut w);
+        assert!((crate::rms(&w) - 1.0).abs() < 0.01);
+        for lag in 1..20 {
+            let r = w.iter().zip(&w[lag..]).map(|(x, y)| x * y).sum::<f64>() / w.len() as f64;
+            assert!(r.abs() < 4.0 / (w.len() as f64).sqrt(), "lag {lag}: {r}");
+        }
+    }
+
+    #[test]
+    fn bic_calls_white_noise_white() {
+        let wrong =
+            (0..200).filter(|seed| Ar::fit(&[&normals(*seed, 2000)], 8, Criterion::Bic).order() > 0).count();
+        assert!(wrong <= 6, "{wrong} of 200");
+    }
+
+    #[test]
+    fn a_seam_between_recordings_teaches_nothing() {
+        // Many short stretches with a step between them, which a fit across the seams would take for colour.
+        let noise = normals(9, 5000);
+        let stretches: Vec<Vec<f64>> = noise.chunks(50).map(<[f64]>::to_vec).collect();
+        let parts: Vec<&[f64]> = stretches.iter().map(Vec::as_slice).collect();
+        let ar = Ar::burg(&parts, 1);
+        assert!(ar.coefficients()[0].abs() < 0.05);
+        let e = coloured(4, 8000, &[0.9], 1.0);
+        let whole = Ar::burg(&[&e], 1).coefficients()[0];
+        let split: Vec<&[f64]> = e.chunks(200).collect();
+        assert!((Ar::burg(&split, 1).coefficients()[0] - whole).abs() < 0.005);
+    }
+
+    #[test]
+    fn autocovariances_there_and_back() {
+        let ar = Ar::from_reflection(&[0.9, -0.4, 0.2], 0.3);
+        let mut lags = [0.0; 12];
+        ar.autocovariance(&mut lags);
+        let back = Ar::from_autocovariance(&lags[..4]);
+        for (a, b) in ar.coefficients().iter().zip(back.coefficients()) {
+            assert!((a - b).abs() < 1e-12);
+        }
+        assert!((back.innovations_sd() / ar.innovations_sd() - 1.0).abs() < 1e-12);
+        // Seen through more lags than it has: the rest of the reflection coefficients is nothing.
+        let longer = Ar::from_autocovariance(&lags);
+        assert!(longer.reflection()[3..].iter().all(|k| k.abs() < 1e-10));
+    }
+
+    #[test]
+    fn degenerate_data_are_survived() {
+        assert!(Ar::burg(&[], 3).sd().is_nan());
+        assert_eq!(Ar::burg(&[&[0.0; 100]], 3).sd(), 0.0);
+        assert_eq!(Ar::burg(&[&[1.0, 2.0]], 3).order(), 0);
+        let constant = Ar::burg(&[&[1.0; 100]], 3);
+        assert!(constant.reflection().iter().all(|k| k.abs() < 1.0) && constant.innovations_sd() > 0.0);
+        let tone: Vec<f64> = (0..1000).map(|i| libm::sin(0.1 * f64::from(i))).collect();
+        assert!(Ar::fit(&[&tone], 8, Criterion::Aic).innovations_sd().is_finite());
+    }
+}

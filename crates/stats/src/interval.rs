@@ -1,0 +1,78 @@
+//! Numbers with their intervals.
+
+use crate::{Z95, mean, normal, sd, student};
+
+/// A number with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Interval {
+    /// The estimate.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Wilson's 95 % score interval of a rate: `hits` of `of` (Wilson 1927). Of none, the rate is `NaN` and the interval is
+/// everything, 0 to 1.
+#[must_use]
+pub fn wilson(hits: usize, of: usize) -> Interval {
+    score_interval(hits as f64, of as f64, Z95)
+}
+
+/// Wilson's score interval of a rate at any confidence (0 to 1), also for counts that are weighted and thus not whole.
+#[must_use]
+pub fn wilson_at(hits: f64, of: f64, confidence: f64) -> Interval {
+    score_interval(hits, of, normal::quantile(0.5 + confidence / 2.0))
+}
+
+fn score_interval(hits: f64, of: f64, z: f64) -> Interval {
+    if of <= 0.0 {
+        return Interval { value: f64::NAN, low: 0.0, high: 1.0 };
+    }
+    let (p, z2) = (hits / of, z * z);
+    let middle = (p + z2 / (2.0 * of)) / (1.0 + z2 / of);
+    let half = z / (1.0 + z2 / of) * (p * (1.0 - p) / of + z2 / (4.0 * of * of)).sqrt();
+    // Exact at the ends, where rounding would leave a speck.
+    let low = if hits <= 0.0 { 0.0 } else { (middle - half).max(0.0) };
+    let high = if hits >= of { 1.0 } else { (middle + half).min(1.0) };
+    Interval { value: p, low, high }
+}
+
+/// The mean with its 95 % interval by Student's distribution. One value has an interval without ends; `None` of nothing.
+#[must_use]
+pub fn mean_interval(values: &[f64]) -> Option<Interval> {
+    let value = if values.is_empty() { return None } else { mean(values) };
+    let dof = values.len() as f64 - 1.0;
+    if dof < 1.0 {
+        return Some(Interval { value, low: f64::NEG_INFINITY, high: f64::INFINITY });
+    }
+    let half = student::quantile(0.975, dof) * sd(values) / (values.len() as f64).sqrt();
+    Some(Interval { value, low: value - half, high: value + half })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wilson_agrees_with_published_values() {
+        let none = wilson(0, 600);
+        assert!((none.high - 0.006_361).abs() < 1e-5 && none.low == 0.0, "{none:?}");
+        // Newcombe 1998, table I.
+        let some = wilson(81, 263);
+        assert!((some.low - 0.2553).abs() < 5e-5 && (some.high - 0.3662).abs() < 5e-5, "{some:?}");
+        assert_eq!(wilson(9, 9).high, 1.0);
+        assert_eq!((wilson(0, 0).low, wilson(0, 0).high), (0.0, 1.0));
+    }
+
+    #[test]
+    fn the_interval_of_a_mean_is_as_wide_as_few_values_ask() {
+        // Two values: one degree of freedom, 12.706 standard errors.
+        let two = mean_interval(&[1.0, 3.0]).expect("values");
+        assert!((two.high - (2.0 + 12.706_204_736)).abs() < 1e-8, "{two:?}");
+        assert_eq!(mean_interval(&[1.0]).expect("a value").high, f64::INFINITY);
+        assert_eq!(mean_interval(&[]), None);
+    }
+}

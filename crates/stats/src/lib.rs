@@ -1,0 +1,38 @@
+//! Statistics, each in one place.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`order`] | median, quantiles (one definition), MAD scale, interval of a quantile |
+//! | [`interval`] | Wilson interval of a rate, Student interval of a mean |
+//! | [`normal`], [`student`], [`tails`] | distributions: densities, tails, quantiles |
+//! | [`robust`] | Huber and Student losses, weights, M-estimate of location |
+//! | [`ar`] | autoregressive noise: fit, order, exact whitening, likelihood |
+//! | [`moments`] | sums in order, compensated; running mean and variance |
+//! | [`rank`] | ranks and Spearman's correlation |
+//!
+//! Everything is `f64`, deterministic (`libm`, sums in the order given: the same bits on every machine and for any
+//! number of threads), and held against SciPy in `tests/against_scipy.rs`.
+//!
+//! Undefined results are `NaN` (as in NumPy): the median of nothing, a quantile at a probability outside 0 to 1.
+
+pub mod ar;
+pub mod interval;
+pub mod moments;
+pub mod normal;
+pub mod order;
+pub mod rank;
+pub mod robust;
+pub mod student;
+pub mod tails;
+
+pub use ar::{Ar, Criterion};
+pub use interval::{Interval, mean_interval, wilson, wilson_at};
+pub use moments::{Moments, Sum, mean, rms, sd, variance};
+pub use order::{
+    mad_scale, median, median_of, quantile, quantile_interval, quantile_of, quantile_of_sorted, sorted,
+};
+pub use rank::spearman;
+pub use robust::Loss;
+
+/// Half width of the two-sided 95 % interval of a normal distribution, in standard deviations.
+pub const Z95: f64 = 1.959_963_984_540_054;

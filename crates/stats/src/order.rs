@@ -1,0 +1,136 @@
+//! Order statistics.
+//!
+//! The quantile of `n` sorted values at `q` is the linear interpolation between the two values around position
+//! `q (n - 1)` (Hyndman and Fan 1996, type 7; the default of NumPy, R and Excel). The median is the quantile at one half:
+//! the middle value, or the mean of the two in the middle.
+//!
+//! Values are ordered by [`f64::total_cmp`], so that a `NaN` among them counts as the largest; leave them out beforehand.
+
+use crate::{Interval, Z95};
+
+/// The median. Reorders `values`; takes time proportional to their number. `NaN` of nothing.
+#[must_use]
+pub fn median(values: &mut [f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The median of numbers that are not kept. `NaN` of nothing.
+#[must_use]
+pub fn median_of(values: impl IntoIterator<Item = f64>) -> f64 {
+    quantile_of(values, 0.5)
+}
+
+/// The quantile at `q` (0 to 1). Reorders `values`; takes time proportional to their number. `NaN` of nothing.
+#[must_use]
+pub fn quantile(values: &mut [f64], q: f64) -> f64 {
+    let Some((below, share)) = position(values.len(), q) else { return f64::NAN };
+    let (_, &mut low, above) = values.select_nth_unstable_by(below, f64::total_cmp);
+    if share == 0.0 {
+        return low;
+    }
+    let high = above.iter().copied().min_by(f64::total_cmp).unwrap_or(low);
+    between(low, high, share)
+}
+
+/// The quantile at `q` of numbers that are not kept. `NaN` of nothing.
+#[must_use]
+pub fn quantile_of(values: impl IntoIterator<Item = f64>, q: f64) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    quantile(&mut values, q)
+}
+
+/// The quantile at `q` (0 to 1) of values in ascending order: for many quantiles of the same values. `NaN` of nothing.
+#[must_use]
+pub fn quantile_of_sorted(sorted: &[f64], q: f64) -> f64 {
+    let Some((below, share)) = position(sorted.len(), q) else { return f64::NAN };
+    if share == 0.0 {
+        return sorted[below];
+    }
+    between(sorted[below], sorted[(below + 1).min(sorted.len() - 1)], share)
+}
+
+/// The `q` quantile of values in ascending order with its distribution-free 95 % interval between order statistics: the
+/// numbers of values below the quantile are binomial, taken as normal. With too few values for an end, that end is the
+/// extreme of the sample. `None` of nothing.
+#[must_use]
+pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<Interval> {
+    let last = sorted.len().checked_sub(1)?;
+    let n = sorted.len() as f64;
+    let value = quantile_of_sorted(sorted, q);
+    let half = Z95 * (n * q * (1.0 - q)).sqrt();
+    let index = |x: f64| (x.max(0.0) as usize).min(last);
+    let low = sorted[index((n * q - half).floor() - 1.0)].min(value);
+    let high = sorted[index((n * q + half).ceil())].max(value);
+    Some(Interval { value, low, high })
+}
+
+/// A standard deviation that outliers cannot move: the median absolute value times 1.4826, about zero, as for residuals
+/// (centre them first where needed). Reorders and overwrites `residuals`. `NaN` of nothing.
+#[must_use]
+pub fn mad_scale(residuals: &mut [f64]) -> f64 {
+    residuals.iter_mut().for_each(|r| *r = r.abs());
+    median(residuals) * MAD_TO_SD
+}
+
+/// Standard deviation of a normal distribution whose median absolute value is one: `1 / normal::quantile(0.75)`.
+pub const MAD_TO_SD: f64 = 1.482_602_218_505_602;
+
+/// The values in ascending order, without `NaN`.
+#[must_use]
+pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().filter(|x| !x.is_nan()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted
+}
+
+/// Index below the quantile and the share of the way to the next; `None` where there is no quantile.
+fn position(count: usize, q: f64) -> Option<(usize, f64)> {
+    let last = count.checked_sub(1)?;
+    if !(0.0..=1.0).contains(&q) {
+        return None;
+    }
+    let at = q * last as f64;
+    let below = (at.floor() as usize).min(last);
+    Some((below, if below == last { 0.0 } else { at - below as f64 }))
+}
+
+/// Between two values, also where their difference would overflow or one is infinite.
+fn between(low: f64, high: f64, share: f64) -> f64 {
+    if low == high { low } else { low + share * (high - low) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_an_even_count_is_the_mean_of_the_middle_two() {
+        assert_eq!(median(&mut [4.0, 1.0, 2.0, 1e9]), 3.0);
+        assert_eq!(median(&mut [3.0, 1.0, 1e9]), 3.0);
+        assert_eq!(median_of([7.0]), 7.0);
+        assert!(median(&mut []).is_nan());
+    }
+
+    #[test]
+    fn all_ways_to_a_quantile_agree() {
+        let values: Vec<f64> = (0..23).map(|i| f64::from((i * 7) % 23) * 1.3 - 4.0).collect();
+        let sorted = sorted(values.iter().copied());
+        for q in [0.0, 0.05, 0.31, 0.5, 0.77, 0.95, 1.0] {
+            let one = quantile_of(values.iter().copied(), q);
+            assert_eq!(one, quantile(&mut values.clone(), q));
+            assert_eq!(one, quantile_of_sorted(&sorted, q));
+            assert_eq!(one, quantile_interval(&sorted, q).expect("values").value);
+        }
+        assert!(quantile_of([1.0], 1.5).is_nan() && quantile_of([1.0], f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn a_third_of_outliers_leaves_the_scale_finite() {
+        let mut clean: Vec<f64> = (1..1000).map(|i| crate::normal::quantile(f64::from(i) / 1000.0)).collect();
+        let scale = mad_scale(&mut clean.clone());
+        assert!((scale - 1.0).abs() < 0.01, "{scale}");
+        clean.iter_mut().step_by(3).for_each(|x| *x = 1e9);
+        assert!(mad_scale(&mut clean) < 2.0);
+        assert!((MAD_TO_SD * crate::normal::quantile(0.75) - 1.0).abs() < 1e-14);
+    }
+}

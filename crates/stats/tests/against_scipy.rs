@@ -1,0 +1,63 @@
+//! Every function agrees with SciPy. The numbers are in `reference/reference.csv`, the script that made them beside it.
+
+#![allow(clippy::panic, reason = "a test may")]
+
+use std::collections::BTreeMap;
+use stylet_stats::{Ar, normal, quantile_of, spearman, student, tails, wilson_at};
+
+/// Largest relative error against SciPy, per function (absolute where the reference is below one, for those named).
+fn allowed(name: &str) -> f64 {
+    match name {
+        // The references themselves are no better (SciPy's own continued fractions, impulse responses cut off).
+        "student_sf" | "student_ln_pdf" | "f_sf" | "chi_square_sf" | "chi_square_quantile" => 1e-10,
+        "student_quantile" => 1e-9,
+        "ar_ln_likelihood" | "ar_innovations_sd" => 1e-10,
+        _ => 1e-12,
+    }
+}
+
+fn ours(name: &str, x: &[f64]) -> f64 {
+    match name {
+        "normal_cdf" => normal::cdf(x[0]),
+        "normal_sf" => normal::sf(x[0]),
+        "normal_ln_pdf" => normal::ln_pdf(x[0]),
+        "normal_quantile" => normal::quantile(x[0]),
+        "student_quantile" => student::quantile(x[0], x[1]),
+        "student_sf" => student::sf(x[0], x[1]),
+        "student_ln_pdf" => student::ln_pdf(x[0], x[1]),
+        "chi_square_quantile" => tails::chi_square_quantile(x[0], x[1]),
+        "chi_square_sf" => tails::chi_square_sf(x[0], x[1]),
+        "f_sf" => tails::f_sf(x[0], x[1], x[2]),
+        "wilson_low" => wilson_at(x[0], x[1], x[2]).low,
+        "wilson_high" => wilson_at(x[0], x[1], x[2]).high,
+        "quantile" => quantile_of(x[1..].iter().copied(), x[0]),
+        "spearman" => spearman(&x[..x.len() / 2], &x[x.len() / 2..]).map_or(f64::NAN, |s| s.0),
+        "ar_ln_likelihood" => {
+            let order = x[0] as usize;
+            let e = &x[order + 2..];
+            Ar::from_autocovariance(&x[1..order + 2]).ln_likelihood(e, &mut vec![0.0; e.len()])
+        }
+        "ar_innovations_sd" => Ar::from_autocovariance(x).innovations_sd(),
+        _ => panic!("no function for `{name}`"),
+    }
+}
+
+#[test]
+fn every_function_agrees_with_scipy() {
+    let mut worst: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
+    for line in include_str!("reference/reference.csv").lines() {
+        let mut fields = line.split(',');
+        let name = fields.next().expect("a name");
+        let numbers: Vec<f64> = fields.map(|f| f.parse().expect("a number")).collect();
+        let (want, found) = (numbers[0], ours(name, &numbers[1..]));
+        let size = if want.abs() < 1e-300 || name == "wilson_low" { 1.0 } else { want.abs() };
+        let error = if want == found { 0.0 } else { (found - want).abs() / size };
+        assert!(error <= allowed(name), "{line}: {found}, off by {error:e}");
+        let entry = worst.entry(name).or_default();
+        *entry = (entry.0.max(error), entry.1 + 1);
+    }
+    for (name, (error, count)) in &worst {
+        println!("{name}: {count} numbers, worst relative error {error:.1e}");
+    }
+    assert_eq!(worst.len(), 16, "a function without reference numbers");
+}
