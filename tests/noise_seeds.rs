@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use stylet_core::config::{Contact, EnhanceConfig, Model};
 use stylet_scenario::{Motion, Scenario, Sensor};
 use stylet_score::{LayerTruth, Score, score_run};
+use stylet_stats::{Interval, quantile_of, wilson};
 use stylet_testbed::{InsertionSample, Measuring, Simulation, simulate};
 use stylet_tissue::TissueForce;
 
@@ -56,23 +57,6 @@ fn scores(scenario: &Scenario, config: &EnhanceConfig) -> Vec<Score> {
         .collect()
 }
 
-fn quantile(values: impl Iterator<Item = f64>, q: f64) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    // The smallest value that at least the share q does not exceed.
-    let rank = (q * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-}
-
-/// 95 % Wilson interval of a rate.
-fn wilson(hits: usize, of: usize) -> (f64, f64) {
-    let (n, z) = (of as f64, 1.959_964);
-    let p = hits as f64 / n;
-    let centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
-    let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    ((centre - half).max(0.0), centre + half)
-}
-
 struct Summary {
     missed: usize,
     false_alarms: usize,
@@ -88,36 +72,36 @@ fn summarise(name: &str, scores: &[Score]) -> Summary {
     let false_alarms = scores.iter().map(|s| s.false_alarms).sum();
     let delays = || scores.iter().flat_map(|s| &s.ruptures).filter_map(|r| r.delay_s);
     let error = |layer: usize, q: f64, pick: fn(&stylet_score::LayerScore) -> Option<f64>| {
-        quantile(scores.iter().filter_map(|s| s.layers.get(layer)).filter_map(pick), q)
+        quantile_of(scores.iter().filter_map(|s| s.layers.get(layer)).filter_map(pick), q)
     };
     let stiffness =
         |q| (0..3).map(|l| error(l, q, |l| l.stiffness_n_per_m.relative_error)).collect::<Vec<_>>();
     let friction =
         |q| (0..3).map(|l| error(l, q, |l| l.friction_ns_per_m2.relative_error)).collect::<Vec<_>>();
     let percent = |v: &[f64]| v.iter().map(|x| format!("{:.1}", 100.0 * x)).collect::<Vec<_>>().join("/");
-    let (low, high) = wilson(missed, ruptures);
+    let Interval { low, high, .. } = wilson(missed, ruptures);
     println!("{name}: {} seeds, {ruptures} ruptures", scores.len());
     println!("  missed {missed} (95 % interval of the rate {low:.4}-{high:.4}), false {false_alarms}");
     println!(
         "  delay ms: median {:.2}, p95 {:.2}, p99 {:.2}, largest {:.2}",
-        1e3 * quantile(delays(), 0.5),
-        1e3 * quantile(delays(), 0.95),
-        1e3 * quantile(delays(), 0.99),
-        1e3 * quantile(delays(), 1.0)
+        1e3 * quantile_of(delays(), 0.5),
+        1e3 * quantile_of(delays(), 0.95),
+        1e3 * quantile_of(delays(), 0.99),
+        1e3 * quantile_of(delays(), 1.0)
     );
     println!("  K error %: median {}, p95 {}", percent(&stiffness(0.5)), percent(&stiffness(0.95)));
     println!("  b error %: median {}, p95 {}", percent(&friction(0.5)), percent(&friction(0.95)));
     println!(
         "  D error %: median {:.1}; enhancement error: median {:.3} to the deepest point, {:.3} up to the exit",
-        100.0 * quantile(scores.iter().filter_map(|s| s.cumulative_friction_ns_per_m.relative_error), 0.5),
-        quantile(scores.iter().filter_map(|s| s.enhancement.rms_relative), 0.5),
-        quantile(scores.iter().filter_map(|s| s.enhancement.in_tissue_relative), 0.5),
+        100.0 * quantile_of(scores.iter().filter_map(|s| s.cumulative_friction_ns_per_m.relative_error), 0.5),
+        quantile_of(scores.iter().filter_map(|s| s.enhancement.rms_relative), 0.5),
+        quantile_of(scores.iter().filter_map(|s| s.enhancement.in_tissue_relative), 0.5),
     );
     Summary {
         missed,
         false_alarms,
-        median_delay_s: quantile(delays(), 0.5),
-        p99_delay_s: quantile(delays(), 0.99),
+        median_delay_s: quantile_of(delays(), 0.5),
+        p99_delay_s: quantile_of(delays(), 0.99),
         median_stiffness: stiffness(0.5),
         median_friction: friction(0.5),
     }

@@ -3,7 +3,7 @@
 //! as measured on a Panda, the motion starts from rest and the residual is zeroed before it, the claim
 //! does not hold.
 //!
-//! The table with all steps in between: `cargo run --release --example virtual_sensor_table`.
+//! The table with all steps in between: `cargo run --release -p stylet-reproduce --example virtual_sensor_table`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

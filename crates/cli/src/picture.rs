@@ -173,8 +173,7 @@ fn layers(ran: &Ran, multi_layer: bool) -> Vec<report::LayerEstimate> {
 
 fn score(s: &Score, trace: &Trace) -> report::Score {
     let d = s.cumulative_friction_ns_per_m;
-    let mut delays_m: Vec<f64> = s.ruptures.iter().filter_map(|r| r.delay_mm).map(|mm| mm * 1e-3).collect();
-    delays_m.sort_by(f64::total_cmp);
+    let delays_m: Vec<f64> = s.ruptures.iter().filter_map(|r| r.delay_mm).map(|mm| mm * 1e-3).collect();
     report::Score {
         ruptures: s
             .ruptures
@@ -193,7 +192,7 @@ fn score(s: &Score, trace: &Trace) -> report::Score {
         missed: s.missed,
         false_detections: s.false_alarms,
         median_delay_s: s.median_delay_s(),
-        median_delay_m: delays_m.get(delays_m.len() / 2).copied(),
+        median_delay_m: (!delays_m.is_empty()).then(|| stylet_stats::median_of(delays_m)),
         true_cumulative_friction_ns_per_m: Some(d.truth),
         cumulative_friction_ns_per_m: d.estimated,
         cumulative_friction_error: signed(d.truth, d.estimated),

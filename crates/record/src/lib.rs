@@ -35,7 +35,6 @@ pub mod quality;
 pub mod read;
 pub mod recording;
 mod repair;
-mod robust;
 pub mod truth;
 pub mod write;
 

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 use crate::error::RecordError;
-use crate::robust::median;
 
 /// Joints of the arm whose torques a recording may hold.
 pub const JOINTS: usize = 7;
@@ -154,7 +153,7 @@ impl Recording {
 
     /// Median interval between samples (s): robust against gaps. `NaN` with fewer than two samples.
     pub fn median_interval_s(&self) -> f64 {
-        median(self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect())
+        stylet_stats::median_of(self.time_s.windows(2).map(|pair| pair[1] - pair[0]))
     }
 
     /// Typical sampling rate (Hz): the inverse of the median interval. `NaN` with fewer than two samples.

@@ -136,7 +136,7 @@ fn conclude(sweep: &Sweep, columns: &Columns, rows: &[Row], out: &Path, quiet: b
 fn terminal(s: &Summary, out: &Path) -> String {
     use std::fmt::Write;
     let mut text = format!("{}: {} trials of {}\n", s.sweep, s.trials, s.scenario);
-    let mut rate = |name: &str, i: &stylet_sweep::stats::Interval| {
+    let mut rate = |name: &str, i: &stylet_stats::Interval| {
         let _ = writeln!(
             text,
             "  {name:<30} {:>8}   95 % interval {} to {}",

@@ -2,12 +2,13 @@
 //! virtual sensor, at the clean setting and with the joint friction measured on a Panda, in shares of
 //! it, zeroed in motion just before contact and zeroed at rest before the motion.
 //!
-//! `cargo run --release --example virtual_sensor_table [SEEDS]` (20 without it; about two minutes)
+//! `cargo run --release -p stylet-reproduce --example virtual_sensor_table [SEEDS]` (20 without it; about two minutes)
 
 use std::path::Path;
 use std::sync::Mutex;
 use stylet_scenario::{ArmFriction, Robot, Scenario, Sensor, ZeroWindow};
 use stylet_score::{LayerTruth, Score, score_run};
+use stylet_stats::{median_of, wilson};
 use stylet_testbed::simulate;
 
 /// Shares of the measured joint friction.
@@ -61,17 +62,10 @@ fn one(scenario: &Scenario, seed: u64) -> Result<(Vec<Scored>, f64), Failure> {
     Ok((scores.collect(), simulation.virtual_error.map_or(f64::NAN, |e| e.beside_lag_rms_n)))
 }
 
-/// 95 % Wilson interval of a rate, in per cent.
-fn wilson(hits: usize, of: usize) -> String {
-    let (k, n, z2) = (hits as f64, of as f64, 1.96 * 1.96);
-    let middle = (k + z2 / 2.0) / (n + z2);
-    let half = 1.96 / (n + z2) * (k * (n - k) / n + z2 / 4.0).sqrt();
-    format!("{:.0}-{:.0} %", 100.0 * (middle - half).max(0.0), 100.0 * (middle + half).min(1.0))
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+/// A rate's 95 % interval in per cent.
+fn rate(hits: usize, of: usize) -> String {
+    let rate = wilson(hits, of);
+    format!("{:.0}-{:.0} %", 100.0 * rate.low, 100.0 * rate.high)
 }
 
 fn print_row(label: &str, sensor: &str, off_n: Option<f64>, scores: &[&Score]) {
@@ -79,14 +73,14 @@ fn print_row(label: &str, sensor: &str, off_n: Option<f64>, scores: &[&Score]) {
     let missed: usize = scores.iter().map(|s| s.missed).sum();
     let alarms: usize = scores.iter().map(|s| s.false_alarms).sum();
     let disturbed = scores.iter().filter(|s| s.false_alarms > 0).count();
-    let delays = scores.iter().flat_map(|s| s.ruptures.iter().filter_map(|r| r.delay_s)).collect();
-    let delay = median(delays).map_or("-".to_owned(), |d| format!("{:.0}", d * 1e3));
+    let delay = median_of(scores.iter().flat_map(|s| s.ruptures.iter().filter_map(|r| r.delay_s)));
+    let delay = if delay.is_nan() { "-".to_owned() } else { format!("{:.0}", delay * 1e3) };
     println!(
         "  {sensor:<8} {label:<16} {:>8}  {missed:>3} of {ruptures:<3} {:>9}  {alarms:>3} in {disturbed:>2} of {:<2} runs {:>9}  {delay:>5}",
         off_n.map_or("-".to_owned(), |off| format!("{:.0}", off * 1e3)),
-        wilson(missed, ruptures),
+        rate(missed, ruptures),
         scores.len(),
-        wilson(disturbed, scores.len()),
+        rate(disturbed, scores.len()),
     );
 }
 
@@ -95,7 +89,7 @@ fn main() -> Result<(), Failure> {
         Some(text) => text.parse()?,
         None => 20,
     };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     for file in ["bovine_liver_constant_virtual.ron", "abdomen_sinusoidal_virtual.ron"] {
         let base = Scenario::load(&folder.join(file))?;
         let mut settings: Vec<Setting> =
@@ -133,7 +127,12 @@ fn main() -> Result<(), Failure> {
             if setting.label.starts_with("0 ") {
                 print_row("", "F/T", None, &of("force_torque"));
             }
-            print_row(&setting.label, "virtual", median(setting.off_n.clone()), &of("virtual"));
+            print_row(
+                &setting.label,
+                "virtual",
+                (!setting.off_n.is_empty()).then(|| median_of(setting.off_n.iter().copied())),
+                &of("virtual"),
+            );
         }
     }
     println!(

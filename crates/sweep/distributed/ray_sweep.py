@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Run a sweep's shards on a Ray cluster, then merge them.
 
-    python distributed/ray_sweep.py SWEEP.ron --shards 64 --out DIR [--trials N] [--seed S] [--stylet PATH] [--address auto]
+    python crates/sweep/distributed/ray_sweep.py SWEEP.ron --shards 64 --out DIR [--trials N] [--seed S] [--stylet PATH] [--address auto]
 
 Every shard is `stylet sweep run-shard I/N`, the same binary as on a laptop; DIR must be a folder that all nodes see. A shard is a
 pure function of its inputs and is written beside its place, synced and renamed: whatever is killed, starting this script again goes on

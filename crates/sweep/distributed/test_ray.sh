@@ -2,10 +2,10 @@
 # A real local Ray: a worker and then the driver are killed with -9 in the middle, the driver is started again, and the
 # results are compared byte by byte with the sequential run. Makes its Python environment in target/ray.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../../.."
 [ -x target/ray/bin/python ] || python3 -m venv target/ray
 target/ray/bin/python -c "import ray" 2>/dev/null ||
-    target/ray/bin/pip install --quiet --disable-pip-version-check -r distributed/requirements.txt
+    target/ray/bin/pip install --quiet --disable-pip-version-check -r crates/sweep/distributed/requirements.txt
 [ -x target/release/stylet ] || cargo build --release --bin stylet
 export RAY_AUTH_MODE=disabled RAY_USAGE_STATS_ENABLED=0
 stylet="$PWD/target/release/stylet"
@@ -19,7 +19,7 @@ trap '"$ray" stop --force >/dev/null 2>&1 || true; rm -rf "$scratch"' EXIT
 
 "$ray" start --head --port=6399 --num-cpus=2 --include-dashboard=false --disable-usage-stats >/dev/null
 driver() {
-    exec target/ray/bin/python distributed/ray_sweep.py "$sweep" --trials "$trials" --shards 24 --out "$scratch/ray" \
+    exec target/ray/bin/python crates/sweep/distributed/ray_sweep.py "$sweep" --trials "$trials" --shards 24 --out "$scratch/ray" \
         --stylet "$stylet" --address 127.0.0.1:6399
 }
 finished() { find "$scratch/ray/shards" -name '*.shard' 2>/dev/null | wc -l; }

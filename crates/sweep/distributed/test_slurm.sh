@@ -2,7 +2,7 @@
 # A real one-node Slurm (Debian's slurm-wlm and munge; needs root): the array and its merge give the bytes of the sequential
 # run, also when a task is killed with -9 and the array is submitted again. Not part of the default CI.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../../.."
 command -v slurmctld >/dev/null || { apt-get update -qq; DEBIAN_FRONTEND=noninteractive apt-get install -y -qq slurm-wlm munge; }
 [ -x target/release/stylet ] || cargo build --release --bin stylet
 scratch=$(mktemp -d)
@@ -53,7 +53,7 @@ export STYLET="$PWD/target/release/stylet" SWEEP="$PWD/scenarios/sweeps/noise.ro
 "$STYLET" sweep "$SWEEP" --trials "$TRIALS" --out "$scratch/sequential" --threads 1 --quiet
 cd "$scratch"
 sbatch_dir=$OLDPWD
-merge=$(bash "$sbatch_dir/distributed/sweep.sbatch" submit | tail -1)
+merge=$(bash "$sbatch_dir/crates/sweep/distributed/sweep.sbatch" submit | tail -1)
 # Kill a running shard: its task fails, so the merge does not start.
 for _ in $(seq 200); do
     step=$(pgrep -f "$STYLET sweep run-shard .*$scratch/slurm" | head -1 || true)
@@ -65,7 +65,7 @@ for _ in $(seq 240); do squeue -h -t R,PD -o '%i %r' | grep -qv DependencyNeverS
 scancel "$merge" || true
 [ ! -f "$OUT/trials.csv" ] || { echo "the merge ran without the killed shard" >&2; exit 1; }
 echo "$(find "$OUT/shards" -name '*.shard' | wc -l) of $SHARDS shards are there; submitting again"
-bash "$sbatch_dir/distributed/sweep.sbatch" submit >/dev/null
+bash "$sbatch_dir/crates/sweep/distributed/sweep.sbatch" submit >/dev/null
 for _ in $(seq 240); do [ -f "$OUT/trials.csv" ] && [ ! -d "$OUT/shards" ] && break; sleep 0.5; done
 for file in trials.csv summary.json report.html sweep.ron scenario.ron; do cmp "$scratch/sequential/$file" "$OUT/$file"; done
 echo "slurm: the same bytes as the sequential run, after a task was killed"
