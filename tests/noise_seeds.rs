@@ -23,33 +23,8 @@ fn load(name: &str) -> Scenario {
 /// The insertion is simulated once by rapier; each seed only draws other noise.
 fn scores(scenario: &Scenario, config: &EnhanceConfig) -> Vec<Score> {
     let once = simulate(scenario, 1).expect("a simulation");
-    let Sensor::ForceTorque(sensor) = &scenario.sensor else { panic!("a force/torque scenario") };
-    let layers: Vec<LayerTruth> = once
-        .slabs
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
-    let noisy = |seed: u64| -> Vec<f64> {
-        let mut measuring = Measuring::new(&scenario.effects, sensor, seed, scenario.sample_hz);
-        let Simulation { recording, truth, .. } = &once;
-        let samples = recording.samples().zip(&truth.tissue_force_n);
-        samples
-            .map(|(s, &total_n)| {
-                measuring.measure(&InsertionSample {
-                    time_s: s.time_s,
-                    position_m: s.position_m,
-                    velocity_mps: s.velocity_mps,
-                    acceleration_mps2: 0.0,
-                    force: TissueForce { total_n, ..TissueForce::default() },
-                })
-            })
-            .collect()
-    };
+    let layers = once.layers();
+    let noisy = |seed: u64| once.remeasured(seed).expect("a force/torque sensor");
     assert_eq!(noisy(1), once.recording.force_n, "drawing the noise apart must change nothing");
     (1..=SEEDS)
         .into_par_iter()

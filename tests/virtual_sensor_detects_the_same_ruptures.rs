@@ -19,16 +19,7 @@ fn path(file: &str) -> PathBuf {
 
 fn scores(scenario: &Scenario, seed: u64) -> Vec<(&'static str, Score)> {
     let run = simulate(scenario, seed).expect("simulated");
-    let layers: Vec<LayerTruth> = run
-        .slabs
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
+    let layers = run.layers();
     run.readings
         .iter()
         .map(|reading| {

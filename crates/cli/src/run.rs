@@ -63,16 +63,7 @@ pub struct Finished {
 pub fn finish(scenario: &Scenario, file: &str, models: &[Model]) -> Result<Finished, Failure> {
     let simulation =
         simulate(scenario, scenario.seed).map_err(|why| Failure::Simulate { file: file.to_owned(), why })?;
-    let layers: Vec<LayerTruth> = simulation
-        .slabs
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
+    let layers = simulation.layers();
     let listen = |model: Model, reading: &Reading| {
         let mut config = match reading.sensor {
             "virtual" => scenario.enhance_for_virtual().clone(),

@@ -44,5 +44,5 @@ pub use error::RecordError;
 pub use quality::{QualityKind, QualityNote, assess};
 pub use read::{ReadOptions, read_csv, read_csv_bytes};
 pub use recording::{JOINTS, Recording, Sample};
-pub use truth::{TrueRupture, Truth};
+pub use truth::{LayerTruth, TrueRupture, Truth};
 pub use write::write_csv;

@@ -41,16 +41,7 @@ fn setting(base: &Scenario, scale: f64, zero: ZeroWindow, label: &str) -> Settin
 /// Simulates one seed and scores both sensors.
 fn one(scenario: &Scenario, seed: u64) -> Result<(Vec<Scored>, f64), Failure> {
     let simulation = simulate(scenario, seed)?;
-    let layers: Vec<LayerTruth> = simulation
-        .slabs
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
+    let layers = simulation.layers();
     let scores = simulation.readings.iter().map(|reading| {
         let config = match reading.sensor {
             "virtual" => scenario.enhance_for_virtual(),
