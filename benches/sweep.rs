@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 use stylet_core::{Enhancer, Sample};
 use stylet_scenario::{MotionPlan, Scenario};
-use stylet_score::{Heard, LayerTruth, Moment, Scorer};
+use stylet_score::{Heard, Moment, Scorer};
 use stylet_sweep::{Columns, Overrides, Sweep, rows_with, trial};
 use stylet_testbed::Noise;
 use stylet_tissue::{Law, LawState};

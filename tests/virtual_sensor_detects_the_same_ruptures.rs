@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use stylet_scenario::{ArmFriction, Robot, Scenario, Sensor, ZeroWindow};
-use stylet_score::{LayerTruth, Score, score_run};
+use stylet_score::{Score, score_run};
 use stylet_testbed::simulate;
 
 const FILES: [&str; 2] = ["bovine_liver_constant_virtual.ron", "abdomen_sinusoidal_virtual.ron"];

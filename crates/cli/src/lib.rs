@@ -8,9 +8,6 @@ mod diagnose_report;
 mod effects;
 mod enhance;
 pub mod exit;
-mod hash;
-mod output;
-mod picture;
 mod progress;
 mod repeats;
 mod repeats_online;
@@ -25,6 +22,7 @@ use args::{Cli, Command};
 use clap::Parser;
 use exit::Failure;
 use std::process::ExitCode;
+use stylet_api::{hash, output, picture};
 
 /// Runs the command line and returns the exit code (see [`exit`]).
 #[must_use]

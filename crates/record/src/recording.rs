@@ -80,6 +80,22 @@ impl Recording {
         Ok(recording)
     }
 
+    /// A recording from its columns, with the velocity where there is one.
+    ///
+    /// # Errors
+    /// As [`Recording::check`].
+    pub fn from_columns(
+        time_s: Vec<f64>,
+        position_m: Vec<f64>,
+        force_n: Vec<f64>,
+        velocity_mps: Option<Vec<f64>>,
+    ) -> Result<Self, RecordError> {
+        match velocity_mps {
+            Some(velocity_mps) => Self::with_velocity(time_s, position_m, velocity_mps, force_n),
+            None => Self::new(time_s, position_m, force_n),
+        }
+    }
+
     /// Checks the promises of the type: columns of one length, at least two samples, finite values, increasing time.
     ///
     /// # Errors

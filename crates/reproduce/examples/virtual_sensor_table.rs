@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::sync::Mutex;
 use stylet_scenario::{ArmFriction, Robot, Scenario, Sensor, ZeroWindow};
-use stylet_score::{LayerTruth, Score, score_run};
+use stylet_score::{Score, score_run};
 use stylet_stats::{median_of, wilson};
 use stylet_testbed::simulate;
 

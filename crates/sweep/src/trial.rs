@@ -7,7 +7,7 @@
 use stylet_core::{Enhancer, Sample};
 use stylet_record::TrueRupture;
 use stylet_scenario::{MotionPlan, MotionPoint, Scenario, Sensor};
-use stylet_score::{Heard, LayerTruth, Moment, STORAGE_SAMPLES, Score, Scorer};
+use stylet_score::{Heard, Moment, STORAGE_SAMPLES, Score, Scorer};
 use stylet_testbed::{Measuring, Rates, SimulateError, rates};
 use stylet_tissue::{Law, LawState, Rupture};
 

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use stylet_scenario::{Motion, Robot, Scenario, Sensor};
-use stylet_score::{LayerTruth, score_run};
+use stylet_score::score_run;
 use stylet_sweep::{Columns, Distribution, Drawer, Sampling, Sweep, SweepFile, Vary, rows_with, trial};
 use stylet_testbed::simulate;
 

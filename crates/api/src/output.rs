@@ -1,7 +1,7 @@
 //! Writing results so that nothing half-written is ever left behind: every file is written beside
 //! its place under another name and moved there when all are complete.
 
-use crate::exit::Failure;
+use crate::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -17,13 +17,18 @@ impl Output {
         self.files.push((name, content.into()));
     }
 
+    /// Names and contents.
+    pub fn files(&self) -> impl Iterator<Item = (&'static str, &[u8])> {
+        self.files.iter().map(|(name, content)| (*name, content.as_slice()))
+    }
+
     /// Writes all files into `folder`, which is made when it does not exist. Files of the same names
     /// are replaced, others are left alone.
     ///
     /// # Errors
-    /// [`Failure::Output`]; the folder is then as it was before.
-    pub fn write(&self, folder: &Path) -> Result<(), Failure> {
-        let failed = |why| Failure::Output { path: folder.display().to_string(), why };
+    /// [`Error::Output`]; the folder is then as it was before.
+    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+        let failed = |why| Error::Output { path: folder.display().to_string(), why };
         // What is made here goes again when the writing fails.
         let made: Vec<&Path> =
             folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).collect();
