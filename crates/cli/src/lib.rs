@@ -8,6 +8,7 @@ mod diagnose_report;
 mod effects;
 mod enhance;
 pub mod exit;
+mod listen;
 mod progress;
 mod repeats;
 mod repeats_online;
@@ -38,6 +39,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),
+        Command::Listen(args) => listen::listen(args),
         Command::Reproduce(args) => reproduce::reproduce(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
