@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
-# Builds the Python package into an environment of its own (cached in target/python), checks the type stubs, runs pytest and
-# the notebooks. Uses the profile and the target folder of `cargo test`, so that nothing is compiled twice: `--release` for
-# speeds worth reading.
+# Tests the Python package: type stubs, pytest, notebooks, in an environment of its own (cached in target/python). Uses the
+# profile and the target folder of `cargo test`, so that little is compiled twice; `--release` for speeds worth reading.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 target="${CARGO_TARGET_DIR:-$PWD/target}"
@@ -18,8 +17,14 @@ if ! cmp -s crates/python/requirements-test.txt "$stamp"; then
     "$venv/bin/pip" install --quiet --disable-pip-version-check -r crates/python/requirements-test.txt
     cp crates/python/requirements-test.txt "$stamp"
 fi
-export VIRTUAL_ENV="$venv" PATH="$venv/bin:$PATH" MPLBACKEND=agg
-profile=(--profile dev)
-[ "${1:-}" = --release ] && { profile=(--release); shift; }
-(cd crates/python && CARGO_TARGET_DIR="$target" maturin develop --quiet --skip-install "${profile[@]}") || exit 1
-python -m pytest -q crates/python/tests "$@"
+export MPLBACKEND=agg PYTHONPATH="$target/python-module"
+profile=debug
+release=()
+[ "${1:-}" = --release ] && { profile=release; release=(--release); shift; }
+# Built beside the command, so that both share every dependency; maturin would choose other features for them.
+PYO3_PYTHON="$venv/bin/python" cargo build "${release[@]}" -p stylet -p stylet-python --lib --features stylet-python/extension-module
+rm -rf "$target/python-module"
+mkdir -p "$target/python-module"
+cp -r crates/python/python/stylet "$target/python-module/stylet"
+cp "$target/$profile/lib_stylet.so" "$target/python-module/stylet/_stylet.abi3.so"
+"$venv/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
