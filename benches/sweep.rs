@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 use stylet_core::{Enhancer, Sample};
 use stylet_scenario::{MotionPlan, Scenario};
-use stylet_score::{Heard, LayerTruth, Moment, Scorer};
+use stylet_score::{Heard, Moment, Scorer};
 use stylet_sweep::{Columns, Overrides, Sweep, rows_with, trial};
 use stylet_testbed::Noise;
 use stylet_tissue::{Law, LawState};
@@ -104,13 +104,7 @@ impl Parts {
     }
 
     fn scorer(&self) -> Scorer {
-        let truth = |s: &stylet_tissue::Slab| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        };
-        Scorer::new(self.law.slabs().iter().map(truth).collect(), self.scenario.enhance.model)
+        Scorer::new(stylet_testbed::layers(self.law.slabs()), self.scenario.enhance.model)
     }
 }
 

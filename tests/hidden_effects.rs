@@ -84,7 +84,7 @@ fn every_effect_at_three_strengths() {
         let of: Vec<&Result> =
             cases.iter().filter(|c| c.kind == kind && size.is_none_or(|s| c.size == s)).collect();
         let right = of.iter().filter(|c| c.right).count();
-        let highest = stylet_sweep::stats::wilson(right as f64, of.len() as f64).high;
+        let highest = stylet_stats::wilson(right, of.len()).high;
         assert!(of.is_empty() || highest >= bar, "{kind:?} {size:?}: {right} of {}, bar {bar}", of.len());
     }
 }

@@ -8,10 +8,10 @@ mod support;
 
 use rayon::prelude::*;
 use stylet_core::config::{Contact, EnhanceConfig, Model};
-use stylet_scenario::{Motion, Scenario, Sensor};
-use stylet_score::{LayerTruth, Score, score_run};
-use stylet_testbed::{InsertionSample, Measuring, Simulation, simulate};
-use stylet_tissue::TissueForce;
+use stylet_scenario::{Motion, Scenario};
+use stylet_score::{Score, score_run};
+use stylet_stats::{Interval, quantile_of, wilson};
+use stylet_testbed::simulate;
 
 const SEEDS: u64 = 200;
 
@@ -22,55 +22,13 @@ fn load(name: &str) -> Scenario {
 /// The insertion is simulated once by rapier; each seed only draws other noise.
 fn scores(scenario: &Scenario, config: &EnhanceConfig) -> Vec<Score> {
     let once = simulate(scenario, 1).expect("a simulation");
-    let Sensor::ForceTorque(sensor) = &scenario.sensor else { panic!("a force/torque scenario") };
-    let layers: Vec<LayerTruth> = once
-        .slabs
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
-    let noisy = |seed: u64| -> Vec<f64> {
-        let mut measuring = Measuring::new(&scenario.effects, sensor, seed, scenario.sample_hz);
-        let Simulation { recording, truth, .. } = &once;
-        let samples = recording.samples().zip(&truth.tissue_force_n);
-        samples
-            .map(|(s, &total_n)| {
-                measuring.measure(&InsertionSample {
-                    time_s: s.time_s,
-                    position_m: s.position_m,
-                    velocity_mps: s.velocity_mps,
-                    acceleration_mps2: 0.0,
-                    force: TissueForce { total_n, ..TissueForce::default() },
-                })
-            })
-            .collect()
-    };
+    let layers = once.layers();
+    let noisy = |seed: u64| once.remeasured(seed).expect("a force/torque sensor");
     assert_eq!(noisy(1), once.recording.force_n, "drawing the noise apart must change nothing");
     (1..=SEEDS)
         .into_par_iter()
         .map(|seed| score_run(&once.recording, &noisy(seed), &once.truth, &layers, config).1)
         .collect()
-}
-
-fn quantile(values: impl Iterator<Item = f64>, q: f64) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    // The smallest value that at least the share q does not exceed.
-    let rank = (q * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-}
-
-/// 95 % Wilson interval of a rate.
-fn wilson(hits: usize, of: usize) -> (f64, f64) {
-    let (n, z) = (of as f64, 1.959_964);
-    let p = hits as f64 / n;
-    let centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
-    let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    ((centre - half).max(0.0), centre + half)
 }
 
 struct Summary {
@@ -88,36 +46,36 @@ fn summarise(name: &str, scores: &[Score]) -> Summary {
     let false_alarms = scores.iter().map(|s| s.false_alarms).sum();
     let delays = || scores.iter().flat_map(|s| &s.ruptures).filter_map(|r| r.delay_s);
     let error = |layer: usize, q: f64, pick: fn(&stylet_score::LayerScore) -> Option<f64>| {
-        quantile(scores.iter().filter_map(|s| s.layers.get(layer)).filter_map(pick), q)
+        quantile_of(scores.iter().filter_map(|s| s.layers.get(layer)).filter_map(pick), q)
     };
     let stiffness =
         |q| (0..3).map(|l| error(l, q, |l| l.stiffness_n_per_m.relative_error)).collect::<Vec<_>>();
     let friction =
         |q| (0..3).map(|l| error(l, q, |l| l.friction_ns_per_m2.relative_error)).collect::<Vec<_>>();
     let percent = |v: &[f64]| v.iter().map(|x| format!("{:.1}", 100.0 * x)).collect::<Vec<_>>().join("/");
-    let (low, high) = wilson(missed, ruptures);
+    let Interval { low, high, .. } = wilson(missed, ruptures);
     println!("{name}: {} seeds, {ruptures} ruptures", scores.len());
     println!("  missed {missed} (95 % interval of the rate {low:.4}-{high:.4}), false {false_alarms}");
     println!(
         "  delay ms: median {:.2}, p95 {:.2}, p99 {:.2}, largest {:.2}",
-        1e3 * quantile(delays(), 0.5),
-        1e3 * quantile(delays(), 0.95),
-        1e3 * quantile(delays(), 0.99),
-        1e3 * quantile(delays(), 1.0)
+        1e3 * quantile_of(delays(), 0.5),
+        1e3 * quantile_of(delays(), 0.95),
+        1e3 * quantile_of(delays(), 0.99),
+        1e3 * quantile_of(delays(), 1.0)
     );
     println!("  K error %: median {}, p95 {}", percent(&stiffness(0.5)), percent(&stiffness(0.95)));
     println!("  b error %: median {}, p95 {}", percent(&friction(0.5)), percent(&friction(0.95)));
     println!(
         "  D error %: median {:.1}; enhancement error: median {:.3} to the deepest point, {:.3} up to the exit",
-        100.0 * quantile(scores.iter().filter_map(|s| s.cumulative_friction_ns_per_m.relative_error), 0.5),
-        quantile(scores.iter().filter_map(|s| s.enhancement.rms_relative), 0.5),
-        quantile(scores.iter().filter_map(|s| s.enhancement.in_tissue_relative), 0.5),
+        100.0 * quantile_of(scores.iter().filter_map(|s| s.cumulative_friction_ns_per_m.relative_error), 0.5),
+        quantile_of(scores.iter().filter_map(|s| s.enhancement.rms_relative), 0.5),
+        quantile_of(scores.iter().filter_map(|s| s.enhancement.in_tissue_relative), 0.5),
     );
     Summary {
         missed,
         false_alarms,
-        median_delay_s: quantile(delays(), 0.5),
-        p99_delay_s: quantile(delays(), 0.99),
+        median_delay_s: quantile_of(delays(), 0.5),
+        p99_delay_s: quantile_of(delays(), 0.99),
         median_stiffness: stiffness(0.5),
         median_friction: friction(0.5),
     }

@@ -3,12 +3,12 @@
 //! as measured on a Panda, the motion starts from rest and the residual is zeroed before it, the claim
 //! does not hold.
 //!
-//! The table with all steps in between: `cargo run --release --example virtual_sensor_table`.
+//! The table with all steps in between: `cargo run --release -p stylet-reproduce --example virtual_sensor_table`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use stylet_scenario::{ArmFriction, Robot, Scenario, Sensor, ZeroWindow};
-use stylet_score::{LayerTruth, Score, score_run};
+use stylet_score::{Score, score_run};
 use stylet_testbed::simulate;
 
 const FILES: [&str; 2] = ["bovine_liver_constant_virtual.ron", "abdomen_sinusoidal_virtual.ron"];
@@ -19,16 +19,7 @@ fn path(file: &str) -> PathBuf {
 
 fn scores(scenario: &Scenario, seed: u64) -> Vec<(&'static str, Score)> {
     let run = simulate(scenario, seed).expect("simulated");
-    let layers: Vec<LayerTruth> = run
-        .slabs
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
+    let layers = run.layers();
     run.readings
         .iter()
         .map(|reading| {

@@ -36,6 +36,8 @@ pub enum Command {
     Effects(EffectsArgs),
     /// Examine a part of Stylet on many drawn cases.
     Benchmark(BenchmarkArgs),
+    /// Run the online core on a stream of samples: UDP or lines in; JSON by UDP, lines and a live page out.
+    Listen(ListenArgs),
     /// Re-make the paper's figures and judge its claims, on one page.
     Reproduce(ReproduceArgs),
 }
@@ -75,6 +77,50 @@ pub enum Which {
     /// This project's.
     #[value(name = "Stylet")]
     Stylet,
+}
+
+/// Arguments of `stylet listen`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet listen --udp 5005 --page 8080 --forward 127.0.0.1:9870
+  tail -f samples.csv | stylet listen --stdin --page 8080
+
+A sample is a line `time_s,position_m,force_n[,velocity_mps]` or a JSON object with these names, several
+to a datagram if need be. Lines of JSON go to standard output and to --forward (PlotJuggler: UDP server,
+message protocol JSON). A slow reader loses its own oldest lines and never slows the core; how many were
+lost is in every line and in the summary on standard error. The datagram `end` ends the session.")]
+pub struct ListenArgs {
+    /// Hear samples on this UDP port.
+    #[arg(long, value_name = "PORT", conflicts_with = "stdin", required_unless_present = "stdin")]
+    pub udp: Option<u16>,
+    /// Read samples from standard input.
+    #[arg(long)]
+    pub stdin: bool,
+    /// Address to hear and serve on; `0.0.0.0` opens it to the network.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    pub host: String,
+    /// Serve a page with live curves on this port (0: any free one).
+    #[arg(long, value_name = "PORT")]
+    pub page: Option<u16>,
+    /// Send every line as a datagram.
+    #[arg(long, value_name = "HOST:PORT")]
+    pub forward: Option<String>,
+    /// How the core is set: an Enhance(...) or Scenario(...) file.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// End after so many seconds (with --udp).
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub duration_s: Option<f64>,
+    /// Print no lines.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if s > 0.0 && s < 1e9 => Ok(s),
+        _ => Err("must be a positive number of seconds".to_owned()),
+    }
 }
 
 /// Arguments of `stylet reproduce`.

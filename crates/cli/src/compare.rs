@@ -14,7 +14,7 @@ use stylet_core::config::Algorithm;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 use stylet_score::Score;
-use stylet_sweep::stats::{Interval, wilson};
+use stylet_stats::{Interval, wilson_at};
 use stylet_sweep::trial::{self, Workspace};
 
 /// Median and 95th percentile.
@@ -120,7 +120,7 @@ fn row(
     let ruptures: usize = scores.iter().map(|s| s.ruptures.len()).sum();
     let missed: usize = scores.iter().map(|s| s.missed).sum();
     let false_alarms: usize = scores.iter().map(|s| s.false_alarms).sum();
-    let errors: Interval = wilson((missed + false_alarms) as f64, ruptures.max(missed + false_alarms) as f64);
+    let errors: Interval = wilson_at((missed + false_alarms) as f64, ruptures.max(missed + false_alarms) as f64, 0.95);
     let delays: Vec<f64> = scores.iter().flat_map(|s| s.ruptures.iter().filter_map(|r| r.delay_s)).collect();
     let layers = scores.iter().flat_map(|s| s.layers.iter().map(|l| l.layer)).max().unwrap_or(0);
     let of_layers = |what: &dyn Fn(&stylet_score::LayerScore) -> Option<f64>| -> Vec<Option<f64>> {

@@ -8,12 +8,10 @@ use crate::terminal::say;
 use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use stylet_diagnose::outcome::Verdict;
-use stylet_diagnose::{Diagnosis, Evidence, Options};
-use stylet_record::{
-    QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes,
-};
+use stylet_diagnose::{Diagnosis, Evidence};
+use stylet_record::{ReadOptions, read_csv_with_holes};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -22,7 +20,6 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
-    let internal = |e: &dyn std::fmt::Display| Failure::Internal(e.to_string());
     if args.repeats || stylet_repeats::dataset::is_dataset(&args.scenario)? {
         return crate::repeats::diagnose(args);
     }
@@ -38,31 +35,23 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         None => None,
     };
     let options = ReadOptions { columns, repair: args.repair };
-    let read: Vec<_> = args.data.par_iter().map(|path| read_with_holes(path, &options)).collect();
+    let read: Vec<_> = args.data.par_iter().map(|path| read_csv_with_holes(path, &options)).collect();
     let mut evidence = Vec::new();
     for (path, read) in args.data.iter().zip(read) {
         let (recording, notes) = read?;
-        evidence.push(Evidence { name: name_of(path, &args.data), recording, notes });
+        evidence.push(Evidence { name: stylet_api::name_of(path, &args.data), recording, notes });
     }
     let talk = !args.results.quiet && std::io::stderr().is_terminal();
-    let examined = stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |what| {
+    let found = stylet_api::diagnose(&scenario, &evidence, |what| {
         if talk {
             eprintln!("  {what} ...");
         }
     })?;
-    let d = &examined.diagnosis;
-    let mut json = serde_json::to_vec_pretty(d).map_err(|e| internal(&e))?;
-    json.push(b'\n');
-    let ron = format!(
-        "// {} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
-        args.scenario.display(),
-        env!("CARGO_PKG_VERSION"),
-        examined.extended.to_ron().map_err(|e| internal(&e))?
-    );
+    let d = &found.diagnosis;
     let mut output = Output::default();
-    output.add("report.html", diagnose_report::page(&scenario, args, &examined).to_html());
-    output.add("diagnosis.json", json);
-    output.add("extended.ron", ron);
+    output.add("report.html", diagnose_report::page(&scenario, args, &found.examined).to_html());
+    output.add("diagnosis.json", found.json()?);
+    output.add("extended.ron", found.extended_ron(&args.scenario.display().to_string())?);
     let folder = args.results.out.clone().unwrap_or_else(|| {
         let stem =
             args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
@@ -73,54 +62,6 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         say(&format!("{}\nReport: {}\n", summary(d), folder.join("report.html").display()))?;
     }
     Ok(())
-}
-
-/// Reads a recording; rows with a value that is no finite number are cut out and reported.
-fn read_with_holes(path: &Path, options: &ReadOptions) -> Result<(Recording, Vec<QualityNote>), RecordError> {
-    let error = match read_csv(path, options) {
-        Err(error @ RecordError::NotFinite { .. }) => error,
-        other => return other,
-    };
-    let Ok(text) = std::fs::read_to_string(path) else { return Err(error) };
-    let hole = |line: &&str| {
-        line.split([',', ';', '\t']).any(|x| {
-            let x = x.trim().trim_matches('"');
-            x.parse::<f64>().is_ok_and(|x| !x.is_finite())
-        })
-    };
-    let kept: Vec<&str> = text.lines().filter(|l| !hole(l)).collect();
-    let (all, left) = (text.lines().count(), kept.len());
-    if left < 3 {
-        return Err(error);
-    }
-    let (recording, mut notes) = read_csv_bytes((kept.join("\n") + "\n").as_bytes(), path, options)?;
-    let message =
-        format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
-    notes.insert(
-        0,
-        QualityNote {
-            kind: QualityKind::Gaps,
-            message,
-            numbers: [("count".to_owned(), (all - left) as f64)].into_iter().collect(),
-            lines: text
-                .lines()
-                .enumerate()
-                .filter(|(_, l)| hole(l))
-                .take(100)
-                .map(|(k, _)| k as u64 + 1)
-                .collect(),
-        },
-    );
-    Ok((recording, notes))
-}
-
-/// The file's name, with its folder when names repeat.
-fn name_of(path: &Path, all: &[PathBuf]) -> String {
-    let repeated = all.iter().filter(|p| p.file_name() == path.file_name()).count() > 1;
-    match path.file_name() {
-        Some(name) if !repeated => name.to_string_lossy().into_owned(),
-        _ => path.display().to_string(),
-    }
 }
 
 /// The verdict in a sentence.

@@ -15,7 +15,7 @@ use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::significant;
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::{EnhanceFile, ron_options};
-use stylet_score::{Trace, algorithm_name, model_name};
+use stylet_score::Trace;
 
 /// A detection as `enhance.json` has it.
 #[derive(Serialize)]
@@ -131,7 +131,7 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     if args.compare {
         models = vec![Model::MultiLayer, Model::KelvinVoigt];
     }
-    let ran: Vec<Ran> = models.iter().map(|&model| listen(&recording, &config, model)).collect();
+    let ran: Vec<Ran> = models.iter().map(|&model| stylet_api::listen(&recording, &config, model)).collect();
     let (output, hash) = results(args, &config, &recording, &notes, &ran)?;
     let folder = args.results.out.clone().unwrap_or_else(|| default_folder(&args.data));
     output.write(&folder)?;
@@ -143,18 +143,6 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
-}
-
-fn listen(recording: &Recording, config: &EnhanceFile, model: Model) -> Ran {
-    let mut enhance = config.enhance.clone();
-    enhance.model = model;
-    Ran {
-        name: format!("{}/{}/force_torque", algorithm_name(enhance.algorithm), model_name(model)),
-        sensor: "force_torque",
-        trace: Trace::record(recording, &recording.force_n, &enhance, config.surface_m, |_, _| {}),
-        config: enhance,
-        score: None,
-    }
 }
 
 fn found_by(ran: &Ran) -> FoundBy {

@@ -69,6 +69,21 @@ impl From<stylet_scenario::InputError> for Failure {
     }
 }
 
+impl From<stylet_api::Error> for Failure {
+    fn from(error: stylet_api::Error) -> Self {
+        use stylet_api::Error;
+        match error {
+            Error::Input(error) => Self::Input(error),
+            Error::Problem(_) | Error::Trial(_) => Self::Check(error.to_string()),
+            Error::Recording(error) => Self::Recording(error),
+            Error::Simulate { file, why } => Self::Simulate { file, why },
+            Error::Diagnose(error) => Self::Diagnose(error),
+            Error::Output { path, why } => Self::Output { path, why },
+            Error::Internal(what) => Self::Internal(what),
+        }
+    }
+}
+
 impl From<stylet_repeats::dataset::DatasetError> for Failure {
     fn from(error: stylet_repeats::dataset::DatasetError) -> Self {
         match error {

@@ -10,9 +10,7 @@ mod diagnose_report;
 mod effects;
 mod enhance;
 pub mod exit;
-mod hash;
-mod output;
-mod picture;
+mod listen;
 mod progress;
 mod repeats;
 mod repeats_online;
@@ -27,6 +25,7 @@ use args::{Cli, Command};
 use clap::Parser;
 use exit::Failure;
 use std::process::ExitCode;
+use stylet_api::{hash, output, picture};
 
 /// Runs the command line and returns the exit code (see [`exit`]).
 #[must_use]
@@ -43,6 +42,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),
+        Command::Listen(args) => listen::listen(args),
         Command::Reproduce(args) => reproduce::reproduce(args),
     })
     .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));

@@ -2,13 +2,12 @@
 
 use crate::exit::Failure;
 use crate::picture::name_of;
-use crate::run::Finished;
 use std::fmt::Write as _;
 use std::io::Write as _;
+use stylet_api::{Run, virtual_note};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
-use stylet_testbed::Simulation;
 
 /// Prints to standard output. A reader that has gone away, as in `stylet run ... | head`, is no error.
 ///
@@ -30,7 +29,8 @@ fn or_dash(value: Option<String>) -> String {
 
 /// The scorecard of a simulated run, ready to print.
 #[must_use]
-pub fn scorecard(scenario: &Scenario, finished: &Finished, hash: &str) -> String {
+pub fn scorecard(finished: &Run) -> String {
+    let (scenario, hash) = (&finished.scenario, &finished.hash);
     let mut out = String::new();
     let recording = &finished.simulation.recording;
     let _ = writeln!(
@@ -52,19 +52,6 @@ pub fn scorecard(scenario: &Scenario, finished: &Finished, hash: &str) -> String
         summary(&mut out, score);
     }
     out
-}
-
-/// How far the virtual sensor is off, in a sentence.
-#[must_use]
-pub fn virtual_note(simulation: &Simulation) -> Option<String> {
-    simulation.virtual_error.map(|error| {
-        format!(
-            "The virtual sensor lags by {} s; it is off by {} N (rms), by {} N beside its lag.",
-            significant(error.lag_s, 3),
-            significant(error.rms_n, 3),
-            significant(error.beside_lag_rms_n, 3)
-        )
-    })
 }
 
 fn ruptures(out: &mut String, scenario: &Scenario, score: &Score, trace: &Trace) {

@@ -190,10 +190,18 @@ struct Judged {
 
 /// Mean square of a residual beyond the noise, outlying samples cut, in units of the noise.
 fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
-    const LIMIT: f64 = 50.0;
+    // Outlying blocks are nobody's cause, nor are those at a jump of the speed that noisy positions leave open.
+    const LIMIT: f64 = 6.0;
+    const AT_JUMP: usize = 4;
     let (mut sum, mut n) = (0.0, 0.0);
     for (b, e) in search.data.blocks.iter().zip(e) {
-        for k in (0..b.len()).filter(|k| b.used[*k]) {
+        let mut near = vec![false; b.len()];
+        for jump in &b.motion.jumps {
+            let (lo, hi) = (b.at(jump.at_s - jump.doubt_s), b.at(jump.at_s + jump.doubt_s));
+            let (lo, hi) = (lo.saturating_sub(AT_JUMP), (hi + AT_JUMP + 1).min(b.len()));
+            near[lo.min(hi)..hi].fill(true);
+        }
+        for k in (0..b.len()).filter(|k| b.used[*k] && !near[*k]) {
             let noise = &search.data.noise;
             let sd = noise.bins[noise.bin(b.size_n[k]).min(noise.bins.len() - 1)].sd_n;
             sum += (e[k] / sd).powi(2).min(LIMIT * LIMIT);

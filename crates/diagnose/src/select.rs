@@ -11,6 +11,7 @@ use stylet_identify::model::{Choice, Model};
 use stylet_identify::noise::From;
 use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
+use stylet_tissue::Place;
 
 /// Most effects at once.
 pub const MOST: usize = 5;
@@ -80,11 +81,14 @@ impl Search {
         let worth = |m: &Model| cost(m.effect_numbers(), blocks);
         let promises = |s: &[Start]| {
             let numbers = s[0].choice.info.parameters.iter().filter(|p| !p.whole).count();
-            s[0].nats > PROMISE * (cost(numbers, blocks) + LEAST)
+            // What only ruptures show looks like their scatter at first, and that shrinks when it is fitted.
+            s[0].choice.info.place == Place::Puncture || s[0].nats > PROMISE * (cost(numbers, blocks) + LEAST)
         };
         let mut ranked = starts(&look, prepared);
         ranked.retain(|s| promises(s));
-        let tried: Vec<&Start> = ranked.iter().take(SHORT).flatten().collect();
+        let by_ruptures = |s: &&Vec<Start>| s[0].choice.info.place == Place::Puncture;
+        let tried: Vec<&Start> =
+            ranked.iter().take(SHORT).chain(ranked.iter().skip(SHORT).filter(by_ruptures)).flatten().collect();
         let coarse = self.coarse();
         let mut short: Vec<Fit> = tried
             .par_iter()

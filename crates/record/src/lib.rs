@@ -30,20 +30,21 @@
 pub mod columns;
 pub mod differentiate;
 pub mod error;
+pub mod holes;
 mod layout;
-pub mod quality;
+mod quality;
 pub mod read;
 pub mod recording;
 mod repair;
-mod robust;
 pub mod truth;
 pub mod write;
 
 pub use columns::{Column, ColumnMap};
 pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 pub use error::RecordError;
+pub use holes::read_csv_with_holes;
 pub use quality::{QualityKind, QualityNote, assess};
 pub use read::{ReadOptions, read_csv, read_csv_bytes};
 pub use recording::{JOINTS, Recording, Sample};
-pub use truth::{TrueRupture, Truth};
+pub use truth::{LayerTruth, TrueRupture, Truth};
 pub use write::write_csv;

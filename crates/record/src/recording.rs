@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 use crate::error::RecordError;
-use crate::robust::median;
 
 /// Joints of the arm whose torques a recording may hold.
 pub const JOINTS: usize = 7;
@@ -81,6 +80,22 @@ impl Recording {
         Ok(recording)
     }
 
+    /// A recording from its columns, with the velocity where there is one.
+    ///
+    /// # Errors
+    /// As [`Recording::check`].
+    pub fn from_columns(
+        time_s: Vec<f64>,
+        position_m: Vec<f64>,
+        force_n: Vec<f64>,
+        velocity_mps: Option<Vec<f64>>,
+    ) -> Result<Self, RecordError> {
+        match velocity_mps {
+            Some(velocity_mps) => Self::with_velocity(time_s, position_m, velocity_mps, force_n),
+            None => Self::new(time_s, position_m, force_n),
+        }
+    }
+
     /// Checks the promises of the type: columns of one length, at least two samples, finite values, increasing time.
     ///
     /// # Errors
@@ -154,7 +169,7 @@ impl Recording {
 
     /// Median interval between samples (s): robust against gaps. `NaN` with fewer than two samples.
     pub fn median_interval_s(&self) -> f64 {
-        median(self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect())
+        stylet_stats::median_of(self.time_s.windows(2).map(|pair| pair[1] - pair[0]))
     }
 
     /// Typical sampling rate (Hz): the inverse of the median interval. `NaN` with fewer than two samples.

@@ -5,6 +5,28 @@ use serde::{Deserialize, Serialize};
 use crate::error::RecordError;
 use crate::recording::{check_finite, check_length};
 
+/// What is true of a layer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LayerTruth {
+    /// Front face (m).
+    pub front_m: f64,
+    /// Thickness (m).
+    pub thickness_m: f64,
+    /// Stiffness (N/m).
+    pub stiffness_n_per_m: f64,
+    /// Friction (N s/m²).
+    pub friction_ns_per_m2: f64,
+}
+
+impl LayerTruth {
+    /// Length of needle inside the layer (m) with the tip at `z_m`.
+    #[must_use]
+    pub fn inside_m(&self, z_m: f64) -> f64 {
+        (z_m - self.front_m).clamp(0.0, self.thickness_m)
+    }
+}
+
 /// A rupture as it happened in the simulated tissue.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

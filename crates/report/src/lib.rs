@@ -21,6 +21,7 @@
 mod chart;
 mod decimate;
 mod html;
+pub mod live;
 mod number;
 mod page;
 mod palette;

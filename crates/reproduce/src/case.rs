@@ -40,7 +40,7 @@ pub enum Case {
 
 macro_rules! scenario {
     ($name:literal) => {
-        ($name, include_str!(concat!("../../../scenarios/", $name)))
+        ($name, include_str!(concat!("../scenarios/", $name)))
     };
 }
 

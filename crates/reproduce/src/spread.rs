@@ -26,23 +26,18 @@ impl Spread {
     #[must_use]
     pub fn of(values: impl Iterator<Item = Option<f64>>) -> Option<Self> {
         let all: Vec<Option<f64>> = values.collect();
-        let mut sorted: Vec<f64> = all.iter().copied().flatten().filter(|x| x.is_finite()).collect();
-        sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        let n = sorted.len() as f64;
-        let at = |q: f64| {
-            let at = q * last as f64;
-            let (low, high) = (at.floor() as usize, at.ceil() as usize);
-            sorted[low] + (at - at.floor()) * (sorted[high] - sorted[low])
-        };
-        let mean = sorted.iter().sum::<f64>() / n;
-        let variance = sorted.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0).max(1.0);
+        let sorted = stylet_stats::sorted(all.iter().copied().flatten().filter(|x| x.is_finite()));
+        if sorted.is_empty() {
+            return None;
+        }
+        let at = |q: f64| stylet_stats::quantile_of_sorted(&sorted, q);
         Some(Self {
             median: at(0.5),
             p5: at(0.05),
             p95: at(0.95),
-            mean,
-            sd: variance.sqrt(),
+            mean: stylet_stats::mean(&sorted),
+            // Of one seed there is no spread to speak of; zero keeps the tables readable.
+            sd: if sorted.len() > 1 { stylet_stats::sd(&sorted) } else { 0.0 },
             n: sorted.len(),
             of: all.len(),
         })

@@ -10,5 +10,6 @@ mod trace;
 pub use detection::{EARLIEST_S, LATEST_S, RuptureScore, match_ruptures};
 pub use offline::{LayerSample, OfflineEstimate, offline};
 pub use score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
-pub use scorer::{Heard, LayerTruth, Moment, Scorer};
+pub use scorer::{Heard, Moment, Scorer};
+pub use stylet_record::LayerTruth;
 pub use trace::{STORAGE_SAMPLES, Trace, algorithm_name, model_name, score_run};

@@ -104,7 +104,8 @@ impl Score {
     /// Median detection delay in seconds over the detected ruptures.
     #[must_use]
     pub fn median_delay_s(&self) -> Option<f64> {
-        median(self.ruptures.iter().filter_map(|r| r.delay_s))
+        let delays: Vec<f64> = self.ruptures.iter().filter_map(|r| r.delay_s).collect();
+        (!delays.is_empty()).then(|| stylet_stats::median_of(delays))
     }
 
     /// Largest relative error of the stiffness over the layers.
@@ -122,15 +123,4 @@ impl Score {
 
 fn worst(values: impl Iterator<Item = Compared>) -> Option<f64> {
     values.filter_map(|c| c.relative_error).max_by(f64::total_cmp)
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(sorted[middle]),
-        _ => Some((sorted[middle - 1] + sorted[middle]) / 2.0),
-    }
 }

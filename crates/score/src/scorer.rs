@@ -4,26 +4,7 @@ use crate::detection::match_ruptures;
 use crate::score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
 use stylet_core::config::Model;
 use stylet_core::{Detection, LayerEstimate, Output};
-use stylet_record::TrueRupture;
-
-/// What is true of a layer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LayerTruth {
-    /// Front face in m.
-    pub front_m: f64,
-    /// Thickness in m.
-    pub thickness_m: f64,
-    /// Stiffness in N/m.
-    pub stiffness_n_per_m: f64,
-    /// Friction in N s/m².
-    pub friction_ns_per_m2: f64,
-}
-
-impl LayerTruth {
-    fn inside_m(&self, z_m: f64) -> f64 {
-        (z_m - self.front_m).clamp(0.0, self.thickness_m)
-    }
-}
+use stylet_record::{LayerTruth, TrueRupture};
 
 /// One sample of truth, beside what the core made of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

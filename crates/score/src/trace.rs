@@ -3,9 +3,10 @@
 
 use crate::offline::{LayerSample, OfflineEstimate, offline};
 use crate::score::Score;
-use crate::scorer::{LayerTruth, Moment, Scorer};
+use crate::scorer::{Moment, Scorer};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_core::{Detection, Enhancer, LayerEstimate, Sample, State};
+use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
 
 /// Most samples that the core keeps for its re-run; a recording with fewer is kept whole.

@@ -29,7 +29,8 @@ pub use ar::{Ar, Criterion};
 pub use interval::{Interval, mean_interval, wilson, wilson_at};
 pub use moments::{Moments, Sum, mean, rms, sd, variance};
 pub use order::{
-    mad_scale, median, median_of, quantile, quantile_interval, quantile_of, quantile_of_sorted, sorted,
+    extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of, quantile_of_sorted,
+    sorted,
 };
 pub use rank::spearman;
 pub use robust::Loss;

@@ -75,6 +75,12 @@ pub fn mad_scale(residuals: &mut [f64]) -> f64 {
 /// Standard deviation of a normal distribution whose median absolute value is one: `1 / normal::quantile(0.75)`.
 pub const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 
+/// Smallest and largest value, `NaN` left out; `(NaN, NaN)` of nothing.
+#[must_use]
+pub fn extremes(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::NAN, f64::NAN), |(low, high), &value| (low.min(value), high.max(value)))
+}
+
 /// The values in ascending order, without `NaN`.
 #[must_use]
 pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {

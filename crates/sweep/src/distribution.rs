@@ -87,8 +87,10 @@ impl Distribution {
                 let (low, high) = (libm::log(*min), libm::log(*max));
                 libm::exp(low + (high - low) * u).clamp(*min, *max)
             }
-            Self::Normal { mean, sd } => mean + sd * normal_quantile(u),
-            Self::LogNormal { median, sd_log } => median * libm::exp(sd_log * normal_quantile(u)),
+            Self::Normal { mean, sd } => mean + sd * stylet_stats::normal::quantile(u),
+            Self::LogNormal { median, sd_log } => {
+                median * libm::exp(sd_log * stylet_stats::normal::quantile(u))
+            }
             Self::Triangular { min, mode, max } => {
                 let width = max - min;
                 if width <= 0.0 {
@@ -107,52 +109,4 @@ impl Distribution {
             }
         }
     }
-}
-
-/// Quantile of the standard normal distribution: Acklam's rational approximation, then one step of
-/// Halley's method on `erfc`, which leaves an error below 1e-13.
-#[must_use]
-pub fn normal_quantile(u: f64) -> f64 {
-    const A: [f64; 6] = [
-        -3.969_683_028_665_376e1,
-        2.209_460_984_245_205e2,
-        -2.759_285_104_469_687e2,
-        1.383_577_518_672_69e2,
-        -3.066_479_806_614_716e1,
-        2.506_628_277_459_239,
-    ];
-    const B: [f64; 5] = [
-        -5.447_609_879_822_406e1,
-        1.615_858_368_580_409e2,
-        -1.556_989_798_598_866e2,
-        6.680_131_188_771_972e1,
-        -1.328_068_155_288_572e1,
-    ];
-    const C: [f64; 6] = [
-        -7.784_894_002_430_293e-3,
-        -3.223_964_580_411_365e-1,
-        -2.400_758_277_161_838,
-        -2.549_732_539_343_734,
-        4.374_664_141_464_968,
-        2.938_163_982_698_783,
-    ];
-    const D: [f64; 4] =
-        [7.784_695_709_041_462e-3, 3.224_671_290_700_398e-1, 2.445_134_137_142_996, 3.754_408_661_907_416];
-    let horner = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, k| sum * x + k);
-    let tail = |p: f64| {
-        let q = libm::sqrt(-2.0 * libm::log(p));
-        horner(&C, q) / (horner(&D, q) * q + 1.0)
-    };
-    let x = if u < 0.02425 {
-        tail(u)
-    } else if u > 1.0 - 0.02425 {
-        -tail(1.0 - u)
-    } else {
-        let q = u - 0.5;
-        let r = q * q;
-        horner(&A, r) * q / (horner(&B, r) * r + 1.0)
-    };
-    let error = 0.5 * libm::erfc(-x / core::f64::consts::SQRT_2) - u;
-    let step = error * libm::sqrt(core::f64::consts::TAU) * libm::exp(0.5 * x * x);
-    x - step / (1.0 + 0.5 * x * step)
 }

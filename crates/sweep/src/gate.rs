@@ -5,13 +5,13 @@
 
 use crate::row::{Columns, Row};
 use crate::run::{TrialError, rows};
-use crate::stats::{Interval, mean, quantile, sorted, wilson};
 use crate::summary::value;
 use crate::sweep::{Overrides, Sweep, SweepFile};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stylet_scenario::{InputError, Problem, Scenario, closest, parse, read_text};
+use stylet_stats::{Interval, mean_interval, quantile_interval, sorted, wilson};
 
 /// What is made of a score over the insertions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -212,13 +212,13 @@ impl Ready {
         let sum = |score: &str| rows.iter().map(|r| value(columns, r, score)).sum::<f64>();
         let found = match statistic {
             Statistic::Total => Some(exact(all.iter().sum())),
-            Statistic::Rate if e.score == "missed" => Some(wilson(sum("missed"), sum("ruptures"))),
-            Statistic::Rate => {
-                Some(wilson(all.iter().filter(|x| **x > 0.0).count() as f64, all.len() as f64))
+            Statistic::Rate if e.score == "missed" => {
+                Some(wilson(sum("missed") as usize, sum("ruptures") as usize))
             }
-            Statistic::Median => quantile(&all, 0.5),
-            Statistic::P95 => quantile(&all, 0.95),
-            Statistic::Mean => mean(&all),
+            Statistic::Rate => Some(wilson(all.iter().filter(|x| **x > 0.0).count(), all.len())),
+            Statistic::Median => quantile_interval(&all, 0.5),
+            Statistic::P95 => quantile_interval(&all, 0.95),
+            Statistic::Mean => mean_interval(&all),
             Statistic::Worst => all.last().map(|x| exact(*x)),
         };
         // A score that no insertion has passes no bound.

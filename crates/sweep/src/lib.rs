@@ -15,14 +15,14 @@ mod page;
 mod parquet;
 mod row;
 mod run;
+pub mod sensitivity;
 pub mod shard;
-pub mod stats;
 mod summary;
 mod sweep;
 pub mod trial;
 
 pub use design::{Design, SOBOL_DIMENSIONS, Sampling, trial_seed};
-pub use distribution::{Distribution, normal_quantile};
+pub use distribution::Distribution;
 pub use draw::{DrawError, Drawer, Drawn};
 pub use field::Field;
 pub use page::{MapRow, map_rows, map_svg, page};

@@ -1,7 +1,6 @@
 //! `report.html`: the summary as a page, and the robustness map as a picture.
 
 use crate::row::{Columns, Row};
-use crate::stats::{Interval, wilson};
 use crate::summary::{Outcome, Summary, failed, value};
 use crate::sweep::Sweep;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
@@ -9,6 +8,7 @@ use stylet_report::{
     Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile,
     significant,
 };
+use stylet_stats::{Interval, wilson};
 
 /// Bins of a drawn quantity in pictures.
 const BINS: usize = 10;
@@ -201,8 +201,8 @@ fn bins(sweep: &Sweep, columns: &Columns, rows: &[Row], quantity: usize) -> Vec<
     let size = kept.len().div_ceil(BINS).max(1);
     kept.chunks(size)
         .map(|chunk| {
-            let hits = chunk.iter().filter(|r| failed(columns, r)).count() as f64;
-            Bin { middle: chunk[chunk.len() / 2].values[quantity], failed: wilson(hits, chunk.len() as f64) }
+            let hits = chunk.iter().filter(|r| failed(columns, r)).count();
+            Bin { middle: chunk[chunk.len() / 2].values[quantity], failed: wilson(hits, chunk.len()) }
         })
         .collect()
 }

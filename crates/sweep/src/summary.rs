@@ -2,9 +2,10 @@
 //! the failures.
 
 use crate::row::{Columns, Row};
-use crate::stats::{Interval, first_order, quantile, sorted, spearman, wilson};
+use crate::sensitivity::first_order;
 use crate::sweep::Sweep;
 use serde::{Deserialize, Serialize};
+use stylet_stats::{Interval, quantile_interval, sorted, spearman, wilson};
 
 /// How many of the worst trials are listed.
 const WORST: usize = 20;
@@ -127,8 +128,8 @@ fn is_signed(score: &str) -> bool {
 #[must_use]
 pub fn summarise(sweep: &Sweep, columns: &Columns, rows: &[Row], replay: &str) -> Summary {
     let sum = |score: &str| rows.iter().map(|r| value(columns, r, score)).sum::<f64>();
-    let count = |test: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| test(r)).count() as f64;
-    let trials = rows.len() as f64;
+    let count = |test: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| test(r)).count();
+    let trials = rows.len();
     let counted = ["ruptures", "missed", "false", "hits_are_chance"];
     let scores = columns.scores.iter().filter(|s| !counted.contains(&s.as_str()));
     let size = |score: &str, x: f64| if is_signed(score) { x.abs() } else { x };
@@ -143,8 +144,8 @@ pub fn summarise(sweep: &Sweep, columns: &Columns, rows: &[Row], replay: &str) -
             Some(ScoreSummary {
                 score: score.clone(),
                 trials: all.len(),
-                median: quantile(&all, 0.5)?,
-                p95: quantile(&all, 0.95)?,
+                median: quantile_interval(&all, 0.5)?,
+                p95: quantile_interval(&all, 0.95)?,
                 worst: worst.0,
                 worst_trial: worst.1,
             })
@@ -160,7 +161,7 @@ pub fn summarise(sweep: &Sweep, columns: &Columns, rows: &[Row], replay: &str) -
         sampling: format!("{:?}", sweep.file.sampling),
         redrawn: rows.iter().filter(|r| r.redrawn > 0).count(),
         ruptures: sum("ruptures") as u64,
-        missed: wilson(sum("missed"), sum("ruptures")),
+        missed: wilson(sum("missed") as usize, sum("ruptures") as usize),
         false_alarms: sum("false") as u64,
         trials_with_false: wilson(count(&|r| value(columns, r, "false") > 0.0), trials),
         failed: wilson(count(&|r| failed(columns, r)), trials),

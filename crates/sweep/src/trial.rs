@@ -7,7 +7,7 @@
 use stylet_core::{Enhancer, Sample};
 use stylet_record::TrueRupture;
 use stylet_scenario::{MotionPlan, MotionPoint, Scenario, Sensor};
-use stylet_score::{Heard, LayerTruth, Moment, STORAGE_SAMPLES, Score, Scorer};
+use stylet_score::{Heard, Moment, STORAGE_SAMPLES, Score, Scorer};
 use stylet_testbed::{Measuring, Rates, SimulateError, rates};
 use stylet_tissue::{Law, LawState, Rupture};
 
@@ -132,16 +132,7 @@ pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, Simu
     };
     let rates = rates(scenario, plan.duration_s());
     let mut measuring = Measuring::new(&scenario.effects, sensor, scenario.seed, scenario.sample_hz);
-    let layers: Vec<LayerTruth> = law
-        .slabs()
-        .iter()
-        .map(|s| LayerTruth {
-            front_m: s.front_m,
-            thickness_m: s.thickness_m,
-            stiffness_n_per_m: s.stiffness_n_per_m,
-            friction_ns_per_m2: s.friction_ns_per_m2,
-        })
-        .collect();
+    let layers = stylet_testbed::layers(law.slabs());
     let surface_m = layers.first().map_or(0.0, |l| l.front_m);
     let held = rates.samples.min(STORAGE_SAMPLES);
     if workspace.storage.len() < held {

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use stylet_scenario::{Motion, Robot, Scenario, Sensor};
-use stylet_score::{LayerTruth, score_run};
+use stylet_score::score_run;
 use stylet_sweep::{Columns, Distribution, Drawer, Sampling, Sweep, SweepFile, Vary, rows_with, trial};
 use stylet_testbed::simulate;
 
@@ -95,16 +95,7 @@ fn a_trial_has_the_scores_of_the_ordinary_run() {
         let scenario = drawer.draw(k).expect("a valid draw").scenario;
         let ours = trial::run(&scenario, &mut workspace).expect("it runs");
         let run = simulate(&scenario, scenario.seed).expect("it runs");
-        let layers: Vec<LayerTruth> = run
-            .slabs
-            .iter()
-            .map(|s| LayerTruth {
-                front_m: s.front_m,
-                thickness_m: s.thickness_m,
-                stiffness_n_per_m: s.stiffness_n_per_m,
-                friction_ns_per_m2: s.friction_ns_per_m2,
-            })
-            .collect();
+        let layers = run.layers();
         let (_, mut score) =
             score_run(&run.recording, &run.recording.force_n, &run.truth, &layers, &scenario.enhance);
         for layer in &mut score.layers {

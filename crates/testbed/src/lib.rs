@@ -22,7 +22,7 @@ pub use arm_rig::{ArmError, ArmMoment, ArmRig};
 pub use control::LineControl;
 pub use insertion::{InsertionSample, Rates, on_slide, replayed};
 pub use sensor::{Measuring, Noise};
-pub use simulate::{Reading, SimulateError, Simulation, rates, simulate};
+pub use simulate::{Reading, SimulateError, Simulation, layers, rates, simulate};
 pub use slide::{NEEDLE_LENGTH_M, NEEDLE_MASS_KG, Slide};
 pub use virtual_error::VirtualError;
 pub use virtual_sensor::{AxialObserver, TorqueSensors};

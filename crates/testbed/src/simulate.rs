@@ -5,9 +5,9 @@ use crate::arm_rig::ArmError;
 use crate::insertion::{InsertionSample, Rates, on_slide, replayed};
 use crate::sensor::Measuring;
 use crate::virtual_error::VirtualError;
-use stylet_record::{Recording, TrueRupture, Truth};
-use stylet_scenario::{ForceTorque, Problem, Robot, Scenario, Sensor};
-use stylet_tissue::{Effect, Law, Place, Rupture, Slab, TooManyEffects};
+use stylet_record::{LayerTruth, Recording, TrueRupture, Truth};
+use stylet_scenario::{ForceTorque, MotionPoint, Problem, Robot, Scenario, Sensor};
+use stylet_tissue::{AnyEffect, Effect, Law, Place, Rupture, Slab, TooManyEffects};
 
 /// Why a scenario cannot be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +49,52 @@ pub struct Simulation {
     pub readings: Vec<Reading>,
     /// How far the virtual sensor is off, and how late.
     pub virtual_error: Option<VirtualError>,
+    /// How the needle really moved, one row per sample of the recording.
+    pub motion: Vec<MotionPoint>,
+    /// Effects, sensor and sampling rate (Hz) of the force/torque sensor.
+    sensor: Option<(Vec<AnyEffect>, ForceTorque, f64)>,
+}
+
+impl Simulation {
+    /// The layers as the law placed them, as the scores want them.
+    #[must_use]
+    pub fn layers(&self) -> Vec<LayerTruth> {
+        layers(&self.slabs)
+    }
+
+    /// The same insertion as the force/torque sensor records it with the noise of another seed (N, one value per sample):
+    /// its noise moves nothing, so that the motion need not be simulated again. `None` without such a sensor.
+    #[must_use]
+    pub fn remeasured(&self, seed: u64) -> Option<Vec<f64>> {
+        let (effects, sensor, sample_hz) = self.sensor.as_ref()?;
+        Some(self.measured_by(effects, sensor, *sample_hz, seed))
+    }
+
+    /// The same insertion as another force/torque sensor records it (N, one value per sample).
+    #[must_use]
+    pub fn measured_by(
+        &self,
+        effects: &[AnyEffect],
+        sensor: &ForceTorque,
+        sample_hz: f64,
+        seed: u64,
+    ) -> Vec<f64> {
+        let mut measuring = Measuring::new(effects, sensor, seed, sample_hz);
+        let moments = self.recording.time_s.iter().zip(&self.motion).zip(&self.truth.tissue_force_n);
+        moments.map(|((time_s, at), tissue_n)| measuring.measure_force(*time_s, at, *tissue_n)).collect()
+    }
+}
+
+/// What is true of layers that the law placed.
+#[must_use]
+pub fn layers(slabs: &[Slab]) -> Vec<LayerTruth> {
+    let truth = |slab: &Slab| LayerTruth {
+        front_m: slab.front_m,
+        thickness_m: slab.thickness_m,
+        stiffness_n_per_m: slab.stiffness_n_per_m,
+        friction_ns_per_m2: slab.friction_ns_per_m2,
+    };
+    slabs.iter().map(truth).collect()
 }
 
 /// The force of one sensor, as an online algorithm hears it.
@@ -81,9 +127,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     let sensor = match scenario.sensor.force_torque() {
         Some(sensor) => sensor,
         None => {
-            let beside = |e: &stylet_tissue::AnyEffect| {
-                matches!(e.place(), Place::Tool | Place::Sensor) && !e.is_neutral()
-            };
+            let beside = |e: &AnyEffect| matches!(e.place(), Place::Tool | Place::Sensor) && !e.is_neutral();
             if scenario.effects.iter().any(beside) {
                 return Err(SimulateError::NotSupported {
                     what: "an effect of tool or force/torque sensor with `sensor: Virtual`",
@@ -135,7 +179,16 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     let readings = readings(&mut recording, arm, &scenario.sensor);
     let virtual_error = VirtualError::of(&recording, &columns.truth, zeroed_s);
     let slabs = law.slabs().to_vec();
-    Ok(Simulation { recording, truth: columns.truth, slabs, readings, virtual_error })
+    let sensor = scenario.sensor.force_torque().cloned();
+    Ok(Simulation {
+        recording,
+        truth: columns.truth,
+        slabs,
+        readings,
+        virtual_error,
+        motion: columns.motion,
+        sensor: sensor.map(|sensor| (scenario.effects.clone(), sensor, scenario.sample_hz)),
+    })
 }
 
 /// Puts what the arm recorded into the recording, and lists what the sensors say.
@@ -162,6 +215,7 @@ fn readings(recording: &mut Recording, arm: Option<ArmRecord>, sensor: &Sensor) 
 struct Columns {
     recording: Recording,
     truth: Truth,
+    motion: Vec<MotionPoint>,
     surface_m: f64,
 }
 
@@ -176,7 +230,7 @@ impl Columns {
         ] {
             column.reserve_exact(samples);
         }
-        Self { recording, truth: Truth::default(), surface_m }
+        Self { recording, truth: Truth::default(), motion: Vec::with_capacity(samples), surface_m }
     }
 
     /// Recorded position at an instant, in m, interpolated between the samples around it.
@@ -196,6 +250,11 @@ impl Columns {
         self.recording.position_m.push(measuring.position(s.position_m));
         self.recording.velocity_mps.push(measuring.position(s.velocity_mps));
         self.recording.force_n.push(measuring.measure(s));
+        self.motion.push(MotionPoint {
+            position_m: s.position_m,
+            velocity_mps: s.velocity_mps,
+            acceleration_mps2: s.acceleration_mps2,
+        });
         let truth = &mut self.truth;
         truth.tip_force_n.push(s.force.tip_n);
         truth.elastic_n.push(s.force.elastic_n);

@@ -1,7 +1,6 @@
 //! `stylet sweep`, `stylet replay` and `stylet gate`.
 
 pub mod args;
-mod files;
 mod gate;
 mod map;
 
@@ -15,8 +14,8 @@ use crate::exit::Failure;
 use crate::progress::Progress;
 use crate::run::default_folder;
 use args::{SweepArgs, SweepCommand};
-use files::results;
 use std::path::{Path, PathBuf};
+use stylet_api::sweep::{inputs, results};
 use stylet_report::{percent, significant};
 use stylet_sweep::shard::{self, ShardError, ShardNumber};
 use stylet_sweep::{Columns, Row, Summary, Sweep, rows};
@@ -96,7 +95,7 @@ fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool) ->
         );
         return Err(Failure::Check(what));
     }
-    files::inputs(sweep)?.write(out)
+    Ok(inputs(sweep)?.write(out)?)
 }
 
 fn all_shards(
@@ -136,7 +135,7 @@ fn conclude(sweep: &Sweep, columns: &Columns, rows: &[Row], out: &Path, quiet: b
 fn terminal(s: &Summary, out: &Path) -> String {
     use std::fmt::Write;
     let mut text = format!("{}: {} trials of {}\n", s.sweep, s.trials, s.scenario);
-    let mut rate = |name: &str, i: &stylet_sweep::stats::Interval| {
+    let mut rate = |name: &str, i: &stylet_stats::Interval| {
         let _ = writeln!(
             text,
             "  {name:<30} {:>8}   95 % interval {} to {}",

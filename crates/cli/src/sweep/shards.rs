@@ -1,7 +1,7 @@
 //! `stylet sweep plan | run-shard | merge`: a sweep spread over machines.
 
 use super::args::{MergeArgs, PlanArgs, RunShardArgs, Which};
-use super::{conclude, files, folder, with_threads};
+use super::{conclude, folder, with_threads};
 use crate::exit::Failure;
 use std::time::Instant;
 use stylet_report::significant;
@@ -67,6 +67,6 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     for shard in 1..=of {
         all.extend(shard::read(&sweep, &columns, ShardNumber { shard, of }, &out)?);
     }
-    files::inputs(&sweep)?.write(&out)?;
+    stylet_api::sweep::inputs(&sweep)?.write(&out)?;
     conclude(&sweep, &columns, &all, &out, args.results.quiet)
 }

@@ -2,7 +2,7 @@
 
 use super::{QualityKind, QualityNote};
 use crate::recording::Recording;
-use crate::robust::extremes;
+use stylet_stats::extremes;
 
 /// An interval over so many median intervals is a gap.
 const GAP_INTERVALS: f64 = 5.0;

@@ -3,7 +3,7 @@
 use super::{QualityKind, QualityNote};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 use crate::recording::Recording;
-use crate::robust::{extremes, quantile};
+use stylet_stats::{extremes, quantile_of};
 
 /// No needle travels so far (m).
 const FARTHEST_M: f64 = 2.0;
@@ -36,7 +36,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
             "the position ranges over {travel_m:.4} m: it looks like millimetres; give a column map with position scale 1e-3"
         ),
     );
-    let speed_mps = quantile(recording.velocity_mps.iter().map(|v| v.abs()).collect(), PERCENTILE);
+    let speed_mps = quantile_of(recording.velocity_mps.iter().map(|v| v.abs()), PERCENTILE);
     beyond(
         speed_mps,
         FASTEST_MPS,
@@ -45,7 +45,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
          too short by its unit"
         ),
     );
-    let force_n = quantile(recording.force_n.iter().map(|f| f.abs()).collect(), PERCENTILE);
+    let force_n = quantile_of(recording.force_n.iter().map(|f| f.abs()), PERCENTILE);
     beyond(
         force_n,
         STRONGEST_N,

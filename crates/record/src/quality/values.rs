@@ -2,7 +2,7 @@
 
 use super::{QualityKind, QualityNote};
 use crate::recording::Recording;
-use crate::robust::{extremes, median, quantile};
+use stylet_stats::{extremes, mad_scale, median, median_of, quantile_of};
 
 /// Shortest run of equal extremes that counts towards saturation.
 const SHORT_RUN: usize = 5;
@@ -79,8 +79,8 @@ pub(super) fn spikes(what: &str, unit: &str, values: &[f64], time_s: &[f64]) -> 
         return None;
     }
     let away: Vec<f64> = (0..values.len()).map(|index| values[index] - local_median(values, index)).collect();
-    let sd_of_noise = 1.4826 * median(away.iter().map(|away| away.abs()).collect());
-    let range = quantile(values.to_vec(), 0.95) - quantile(values.to_vec(), 0.05);
+    let sd_of_noise = mad_scale(&mut away.clone());
+    let range = quantile_of(values.iter().copied(), 0.95) - quantile_of(values.iter().copied(), 0.05);
     let robust_sd = sd_of_noise.max(LEAST_SD * range);
     let limit = SPIKE_SD * robust_sd;
     let (mut count, mut largest, mut at_s) = (0_u32, 0.0_f64, 0.0);
@@ -116,9 +116,9 @@ fn stands_out(values: &[f64], start: usize, end: usize, limit: f64) -> bool {
         return false;
     }
     let (before, after) = (&values[start - SIDE..start], &values[end..end + SIDE]);
-    let step =
-        median(before.windows(2).chain(after.windows(2)).map(|pair| (pair[1] - pair[0]).abs()).collect());
-    let (before, after) = (median(before[SIDE - 3..].to_vec()), median(after[..3].to_vec()));
+    let step = median_of(before.windows(2).chain(after.windows(2)).map(|pair| (pair[1] - pair[0]).abs()));
+    let (before, after) =
+        (median_of(before[SIDE - 3..].iter().copied()), median_of(after[..3].iter().copied()));
     let limit = limit.max(STEPS * step).max((after - before).abs());
     let run = &values[start..end];
     run.iter().all(|value| value - before > limit && value - after > limit)
@@ -129,16 +129,9 @@ fn stands_out(values: &[f64], start: usize, end: usize, limit: f64) -> bool {
 fn local_median(values: &[f64], index: usize) -> f64 {
     const WINDOW: usize = 2 * SIDE + 1;
     let first = index.saturating_sub(SIDE).min(values.len() - WINDOW);
-    let mut sorted = [0.0; WINDOW];
-    for (filled, &value) in values[first..first + WINDOW].iter().enumerate() {
-        let mut place = filled;
-        while place > 0 && sorted[place - 1] > value {
-            sorted[place] = sorted[place - 1];
-            place -= 1;
-        }
-        sorted[place] = value;
-    }
-    sorted[SIDE]
+    let mut window = [0.0; WINDOW];
+    window.copy_from_slice(&values[first..first + WINDOW]);
+    median(&mut window)
 }
 
 /// Fewest samples from which a grid of values means anything.

@@ -122,11 +122,10 @@ fn robust_range(chart: &Chart) -> Option<(f64, f64)> {
     let settled = extent(settled);
     let (mut low, mut high) = settled.unwrap_or((0.0, 0.0));
     for series in chart.series.iter().filter(|s| s.style == LineStyle::Solid) {
-        let mut values: Vec<f64> = series.y.iter().copied().filter(|v| v.is_finite()).collect();
-        values.sort_by(f64::total_cmp);
-        let at = |part: f64| values.get((part * (values.len().saturating_sub(1)) as f64) as usize).copied();
-        low = low.min(at(0.05).unwrap_or(low));
-        high = high.max(at(0.95).unwrap_or(high));
+        let values = stylet_stats::sorted(series.y.iter().copied().filter(|v| v.is_finite()));
+        // `min` and `max` take the other number where there is no quantile.
+        low = low.min(stylet_stats::quantile_of_sorted(&values, 0.05));
+        high = high.max(stylet_stats::quantile_of_sorted(&values, 0.95));
     }
     if let Some((_, top)) = settled.filter(|(_, top)| *top > 0.0) {
         high = high.min(2.0 * top);

@@ -87,23 +87,18 @@ pub fn strip_chart(chart: &StripChart, options: &FigureOptions) -> String {
 }
 
 fn draw(canvas: &mut Canvas, strip: &Strip, (x, width): (f64, f64), py: &dyn Fn(f64) -> f64) {
-    let mut sorted: Vec<f64> = strip.values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else {
+    let sorted = stylet_stats::sorted(strip.values.iter().copied().filter(|v| v.is_finite()));
+    if sorted.is_empty() {
         canvas.text(x, py(0.0) - 6.0, Anchor::Middle, "t", "none");
         return;
-    };
+    }
     let colour = strip.colour.name();
     // Every value, spread over the strip in a fixed pattern so that equal ones do not hide each other.
     for (index, value) in strip.values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
         let aside = ((index * 7) % 11) as f64 / 10.0 - 0.5;
         canvas.circle(x + aside * width * 0.3, py(*value), 2.2, &format!("faint f-{colour}"));
     }
-    let at = |q: f64| {
-        let at = q * last as f64;
-        sorted[at.floor() as usize]
-            + (at - at.floor()) * (sorted[at.ceil() as usize] - sorted[at.floor() as usize])
-    };
+    let at = |q: f64| stylet_stats::quantile_of_sorted(&sorted, q);
     let (low, middle, high) = (py(at(0.05)), py(at(0.5)), py(at(0.95)));
     let side = x + width * 0.26;
     canvas.path(&[vec![(side, low), (side, high)]], 2.4, &format!("l l-{colour}"));

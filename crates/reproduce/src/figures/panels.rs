@@ -140,9 +140,8 @@ fn truth_line(insertion: &Insertion, value: impl Fn(&stylet_score::LayerTruth) -
 /// A range that shows truth and a posteriori estimates; what the online estimate does beyond is cut.
 fn range(series: &[Series], online: &Series) -> (f64, f64) {
     let high = series.iter().flat_map(|s| &s.y).copied().filter(|y| y.is_finite()).fold(0.0, f64::max);
-    let mut sorted: Vec<f64> = online.y.iter().copied().filter(|y| y.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let typical = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0);
+    let typical = stylet_stats::quantile_of(online.y.iter().copied().filter(|y| y.is_finite()), 0.9);
+    let typical = if typical.is_nan() { 0.0 } else { typical };
     (0.0, (1.15 * high).max(typical.min(4.0 * high)).max(1e-9))
 }
 

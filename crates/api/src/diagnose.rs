@@ -1,0 +1,64 @@
+//! What a scenario gets wrong about measured recordings. The only file here that knows the engine.
+
+use crate::error::Error;
+use std::path::{Path, PathBuf};
+use stylet_diagnose::{Diagnosis, Evidence, Examined, Options};
+use stylet_scenario::Scenario;
+
+/// What a diagnosis gives.
+pub struct Diagnosed {
+    /// Verdict, causes, intervals, gain.
+    pub diagnosis: Diagnosis,
+    /// The scenario with re-fitted parameters and the effects found.
+    pub extended: Scenario,
+    /// All that the engine knows, for the report.
+    pub examined: Examined,
+}
+
+impl Diagnosed {
+    /// `diagnosis.json`.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a value cannot be written.
+    pub fn json(&self) -> Result<Vec<u8>, Error> {
+        let mut json = serde_json::to_vec_pretty(&self.diagnosis).map_err(Error::internal)?;
+        json.push(b'\n');
+        Ok(json)
+    }
+
+    /// `extended.ron`; `believed` names the scenario in its first line.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a value cannot be written.
+    pub fn extended_ron(&self, believed: &str) -> Result<String, Error> {
+        Ok(format!(
+            "// {believed} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
+            env!("CARGO_PKG_VERSION"),
+            self.extended.to_ron().map_err(Error::internal)?
+        ))
+    }
+}
+
+/// Compares what a scenario believes with what was measured; `progress` is told what is being done. At least one recording;
+/// with two or more the gain is measured on recordings left out of the fit.
+///
+/// # Errors
+/// [`Error::Diagnose`] when the recordings do not fit the scenario.
+pub fn diagnose(
+    believed: &Scenario,
+    evidence: &[Evidence],
+    progress: impl FnMut(&str),
+) -> Result<Diagnosed, Error> {
+    let examined = stylet_diagnose::diagnose(believed, evidence, &Options::default(), progress)?;
+    Ok(Diagnosed { diagnosis: examined.diagnosis.clone(), extended: examined.extended.clone(), examined })
+}
+
+/// The file's name, with its folder when names repeat.
+#[must_use]
+pub fn name_of(path: &Path, all: &[PathBuf]) -> String {
+    let repeated = all.iter().filter(|p| p.file_name() == path.file_name()).count() > 1;
+    match path.file_name() {
+        Some(name) if !repeated => name.to_string_lossy().into_owned(),
+        _ => path.display().to_string(),
+    }
+}

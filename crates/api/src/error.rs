@@ -1,0 +1,62 @@
+//! Why a function ends early: what, where, and what would be right.
+
+use miette::Diagnostic;
+
+/// Why a function ended early. The sentence is the one that the command prints.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum Error {
+    /// A scenario or configuration is wrong.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Input(Box<stylet_scenario::InputError>),
+    /// A number of a scenario or sweep that did not come from a file is wrong.
+    #[error("{}: {}", .0.path, .0.what)]
+    Problem(stylet_scenario::Problem),
+    /// A recording is wrong.
+    #[error(transparent)]
+    Recording(#[from] stylet_record::RecordError),
+    /// The scenario asks for what cannot be simulated.
+    #[error("{file}: {why}")]
+    Simulate {
+        /// Scenario file, or its name.
+        file: String,
+        /// Reason and remedy.
+        why: stylet_testbed::SimulateError,
+    },
+    /// Recordings and scenario do not belong together.
+    #[error(transparent)]
+    Diagnose(#[from] stylet_diagnose::DiagnoseError),
+    /// A trial of a sweep gives no row.
+    #[error(transparent)]
+    Trial(#[from] stylet_sweep::TrialError),
+    /// The output cannot be written.
+    #[error("{path}: cannot be written: {why}; nothing was changed there")]
+    Output {
+        /// File or folder.
+        path: String,
+        /// What the system says.
+        why: std::io::Error,
+    },
+    /// A mistake of ours.
+    #[error("internal error: {0}; please report it")]
+    Internal(String),
+}
+
+impl From<stylet_scenario::InputError> for Error {
+    fn from(error: stylet_scenario::InputError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+impl From<stylet_scenario::Problem> for Error {
+    fn from(problem: stylet_scenario::Problem) -> Self {
+        Self::Problem(problem)
+    }
+}
+
+impl Error {
+    /// A mistake of ours, from what was said about it.
+    pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
+        Self::Internal(error.to_string())
+    }
+}

@@ -1,0 +1,37 @@
+//! What the commands of Stylet do, as functions with plain results.
+//!
+//! | function | from | to |
+//! |---|---|---|
+//! | [`simulate`] | [`Scenario`] | [`Run`]: recording, truth, what the core made of it, scores |
+//! | [`enhance`] | [`Recording`] | [`Enhanced`]: enhanced force, ruptures, layers |
+//! | [`diagnose`] | [`Scenario`] and recordings | [`Diagnosed`]: what the scenario gets wrong, and the scenario that does not |
+//! | [`sweep`](fn@sweep) | [`Sweep`] | [`Swept`]: one row per insertion, summary |
+//!
+//! Every result has the files that the command writes, byte for byte, as an [`Output`] that is written at once or not at
+//! all. The command line, the package `stylet` and the Python package are thin layers over this crate.
+#![forbid(unsafe_code)]
+
+mod diagnose;
+mod enhance;
+mod error;
+pub mod hash;
+pub mod output;
+pub mod picture;
+mod predict;
+mod run;
+pub mod sweep;
+
+pub use diagnose::{Diagnosed, diagnose, name_of};
+pub use enhance::{Enhanced, enhance, listen};
+pub use error::Error;
+pub use output::Output;
+pub use picture::Ran;
+pub use predict::predict;
+pub use run::{Run, simulate, simulate_from, virtual_note};
+pub use sweep::{Swept, sweep};
+
+pub use stylet_core::{EnhanceConfig, Enhancer, Sample};
+pub use stylet_diagnose::{Diagnosis, Evidence};
+pub use stylet_record::{ColumnMap, ReadOptions, Recording, read_csv};
+pub use stylet_scenario::{EnhanceFile, Scenario};
+pub use stylet_sweep::{Sweep, SweepFile};

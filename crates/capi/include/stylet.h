@@ -1,0 +1,147 @@
+/* The online core of Stylet for control loops: no allocation, caller's memory. Research software, not a medical device. */
+
+#ifndef STYLET_H
+#define STYLET_H
+
+/* Made from src/lib.rs by cbindgen; do not edit. `cargo test -p stylet-capi -- --ignored` writes it anew. */
+
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+// What a call says.
+typedef enum StyletStatus {
+  // Done.
+  STYLET_OK = 0,
+  // The sample was passed over: not finite, out of range, or not later than the one before. The output repeats the last.
+  STYLET_UNUSED = 1,
+  // A pointer is null, or the memory is not aligned.
+  STYLET_NULL = -1,
+  // The memory is too small: `stylet_size(samples)` bytes are needed.
+  STYLET_TOO_SMALL = -2,
+  // A number of the configuration is not finite or out of its range; `stylet_last_error` says which.
+  STYLET_BAD_CONFIG = -3,
+  // A bug of ours; the core must not be used any more.
+  STYLET_INTERNAL = -4,
+} StyletStatus;
+
+// The core. Its size is `stylet_size`.
+typedef struct StyletCore StyletCore;
+
+// Configuration. Fill it by `stylet_default_config` and change what is to differ.
+typedef struct StyletConfig {
+  // A `StyletModel`.
+  int32_t model;
+  // Not zero: the surface is where `surface_m` says. Zero: it is found in the force.
+  int32_t contact_known;
+  // Position of the surface in m, for `contact_known`.
+  double surface_m;
+  // Forgetting factor of the recursive least squares, above 0 to 1.
+  double forgetting;
+  // Prior variance of the stiffness (N/m)^2.
+  double prior_stiffness;
+  // Prior variance of the friction, in the model's unit squared.
+  double prior_friction;
+  // CUSUM: standard deviation of the error in ordinary insertion, N.
+  double cusum_sigma_ordinary_n;
+  // CUSUM: standard deviation of the error at a rupture, N.
+  double cusum_sigma_rupture_n;
+  // Force derivative that switches the expectation of a rupture on, N/s.
+  double derivative_on_n_per_s;
+  // Force derivative that switches it off, N/s.
+  double derivative_off_n_per_s;
+} StyletConfig;
+
+// What a step gives.
+typedef struct StyletOutput {
+  // Enhanced force in N: the measured one less the friction of the passed layers.
+  double enhanced_n;
+  // Force predicted before this sample's update, in N.
+  double reconstructed_n;
+  // Innovation in N.
+  double error_n;
+  // Stiffness estimate of the layer being traversed in N/m.
+  double stiffness_n_per_m;
+  // Its friction estimate: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
+  double friction;
+  // CUSUM in N^2.
+  double cusum_n2;
+  // Filtered force derivative in N/s.
+  double derivative_n_per_s;
+  // Cumulative friction in N s/m.
+  double cumulative_friction_ns_per_m;
+  // Position of the first contact in m; not a number before.
+  double contact_m;
+  // A `StyletState`.
+  int32_t state;
+  // Ruptures declared so far.
+  uint32_t ruptures;
+  // Not zero at the sample that declares a rupture.
+  int32_t ruptured;
+  // Layer whose estimate became available at this sample, from 1; zero at all others.
+  uint32_t estimated_layer;
+  // That layer's thickness in m.
+  double layer_thickness_m;
+  // That layer's stiffness in N/m.
+  double layer_stiffness_n_per_m;
+  // That layer's friction in the model's unit.
+  double layer_friction;
+} StyletOutput;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// Bytes that a core needs which keeps `samples` samples of a layer (16384: 80 s at 200 Hz).
+size_t stylet_size(size_t samples);
+
+// Alignment of that memory in bytes; what `malloc` returns has it.
+size_t stylet_align(void);
+
+// Version of the library, a text that lives as long as the program.
+const char *stylet_version(void);
+
+// The configuration that `stylet enhance` uses when nothing is said.
+//
+// # Safety
+// `config` is null or points to a `StyletConfig`.
+enum StyletStatus stylet_default_config(struct StyletConfig *config);
+
+// Makes a core in the caller's `memory` of `bytes` bytes; as many samples are kept as fit behind it (at least one).
+// `config` may be null: the defaults. `*core` is then the handle; it lives in the memory and needs no freeing. `*why`, when
+// `why` is not null, is set to a sentence on an error.
+//
+// # Safety
+// `memory` is null or points to `bytes` bytes that nobody else uses while the core lives; `config` is null or points to a
+// `StyletConfig`; `core` is null or points to a pointer; so does `why`.
+enum StyletStatus stylet_init(void *memory,
+                              size_t bytes,
+                              const struct StyletConfig *config,
+                              struct StyletCore **core,
+                              const char **why);
+
+// Takes one sample: time in s (increasing), tip position in m (positive into the tissue), tip velocity in m/s, axial force
+// in N (positive resisting insertion). `out` may be null.
+//
+// # Safety
+// `core` is null or from `stylet_init`, and its memory is still there; `out` is null or points to a `StyletOutput`.
+enum StyletStatus stylet_step(struct StyletCore *core,
+                              double time_s,
+                              double position_m,
+                              double velocity_mps,
+                              double force_n,
+                              struct StyletOutput *out);
+
+// What the last call that did not end well had to say, empty before; a text that lives as long as the program.
+//
+// # Safety
+// `core` is null or from `stylet_init`, and its memory is still there.
+const char *stylet_last_error(const struct StyletCore *core);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* STYLET_H */

@@ -1,0 +1,365 @@
+//! The online core for C and C++ control loops.
+//!
+//! The caller gives the memory: [`stylet_size`] bytes, aligned to [`stylet_align`], hold the core and the samples of a
+//! layer. Nothing allocates; nothing unwinds across the border (a panic, which would be a bug of ours, makes the call
+//! return `STYLET_INTERNAL`). Not for use from two threads at once; two cores are independent.
+//!
+//! `include/stylet.h` is made from this file by cbindgen; `tests/header.rs` checks that it is up to date.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use stylet_core::config::{Contact, EnhanceConfig, Model};
+use stylet_core::{Enhancer, Output, Sample};
+
+/// What a call says.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StyletStatus {
+    /// Done.
+    StyletOk = 0,
+    /// The sample was passed over: not finite, out of range, or not later than the one before. The output repeats the last.
+    StyletUnused = 1,
+    /// A pointer is null, or the memory is not aligned.
+    StyletNull = -1,
+    /// The memory is too small: `stylet_size(samples)` bytes are needed.
+    StyletTooSmall = -2,
+    /// A number of the configuration is not finite or out of its range; `stylet_last_error` says which.
+    StyletBadConfig = -3,
+    /// A bug of ours; the core must not be used any more.
+    StyletInternal = -4,
+}
+
+/// Tissue model.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StyletModel {
+    /// Friction in proportion to the depth inside the layer.
+    StyletMultiLayer = 0,
+    /// A spring and a damper.
+    StyletKelvinVoigt = 1,
+}
+
+/// State of the algorithm.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StyletState {
+    /// Ordinary insertion.
+    StyletNoRupture = 0,
+    /// The force derivative has exceeded its threshold.
+    StyletExpectedRupture = 1,
+    /// A rupture has just been declared; lasts one sample.
+    StyletDetectedRupture = 2,
+    /// Waiting for the drop to be over.
+    StyletForceDropMeasuring = 3,
+    /// The traversed layer is re-estimated and its friction compensated.
+    StyletForceCompensation = 4,
+}
+
+/// Configuration. Fill it by `stylet_default_config` and change what is to differ.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StyletConfig {
+    /// A `StyletModel`.
+    pub model: i32,
+    /// Not zero: the surface is where `surface_m` says. Zero: it is found in the force.
+    pub contact_known: i32,
+    /// Position of the surface in m, for `contact_known`.
+    pub surface_m: f64,
+    /// Forgetting factor of the recursive least squares, above 0 to 1.
+    pub forgetting: f64,
+    /// Prior variance of the stiffness (N/m)^2.
+    pub prior_stiffness: f64,
+    /// Prior variance of the friction, in the model's unit squared.
+    pub prior_friction: f64,
+    /// CUSUM: standard deviation of the error in ordinary insertion, N.
+    pub cusum_sigma_ordinary_n: f64,
+    /// CUSUM: standard deviation of the error at a rupture, N.
+    pub cusum_sigma_rupture_n: f64,
+    /// Force derivative that switches the expectation of a rupture on, N/s.
+    pub derivative_on_n_per_s: f64,
+    /// Force derivative that switches it off, N/s.
+    pub derivative_off_n_per_s: f64,
+}
+
+/// What a step gives.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StyletOutput {
+    /// Enhanced force in N: the measured one less the friction of the passed layers.
+    pub enhanced_n: f64,
+    /// Force predicted before this sample's update, in N.
+    pub reconstructed_n: f64,
+    /// Innovation in N.
+    pub error_n: f64,
+    /// Stiffness estimate of the layer being traversed in N/m.
+    pub stiffness_n_per_m: f64,
+    /// Its friction estimate: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
+    pub friction: f64,
+    /// CUSUM in N^2.
+    pub cusum_n2: f64,
+    /// Filtered force derivative in N/s.
+    pub derivative_n_per_s: f64,
+    /// Cumulative friction in N s/m.
+    pub cumulative_friction_ns_per_m: f64,
+    /// Position of the first contact in m; not a number before.
+    pub contact_m: f64,
+    /// A `StyletState`.
+    pub state: i32,
+    /// Ruptures declared so far.
+    pub ruptures: u32,
+    /// Not zero at the sample that declares a rupture.
+    pub ruptured: i32,
+    /// Layer whose estimate became available at this sample, from 1; zero at all others.
+    pub estimated_layer: u32,
+    /// That layer's thickness in m.
+    pub layer_thickness_m: f64,
+    /// That layer's stiffness in N/m.
+    pub layer_stiffness_n_per_m: f64,
+    /// That layer's friction in the model's unit.
+    pub layer_friction: f64,
+}
+
+/// The core. Its size is `stylet_size`.
+pub struct StyletCore {
+    inner: Enhancer<Storage>,
+    error: &'static std::ffi::CStr,
+}
+
+/// The samples behind the core, in the caller's memory.
+struct Storage {
+    first: *mut Sample,
+    count: usize,
+}
+
+impl AsRef<[Sample]> for Storage {
+    fn as_ref(&self) -> &[Sample] {
+        // SAFETY: `stylet_init` put `count` samples there, inside memory that the caller lends for as long as the core lives.
+        unsafe { std::slice::from_raw_parts(self.first, self.count) }
+    }
+}
+
+impl AsMut<[Sample]> for Storage {
+    fn as_mut(&mut self) -> &mut [Sample] {
+        // SAFETY: as above; the core is the only one that knows the place.
+        unsafe { std::slice::from_raw_parts_mut(self.first, self.count) }
+    }
+}
+
+/// Both alignments divide it, so that the samples follow the core without a gap to reckon with.
+const fn samples_at() -> usize {
+    let align = align_of::<Sample>();
+    size_of::<StyletCore>().div_ceil(align) * align
+}
+
+/// Bytes that a core needs which keeps `samples` samples of a layer (16384: 80 s at 200 Hz).
+#[unsafe(no_mangle)]
+pub extern "C" fn stylet_size(samples: usize) -> usize {
+    samples_at().saturating_add(samples.saturating_mul(size_of::<Sample>()))
+}
+
+/// Alignment of that memory in bytes; what `malloc` returns has it.
+#[unsafe(no_mangle)]
+pub extern "C" fn stylet_align() -> usize {
+    if align_of::<StyletCore>() > align_of::<Sample>() {
+        align_of::<StyletCore>()
+    } else {
+        align_of::<Sample>()
+    }
+}
+
+/// Version of the library, a text that lives as long as the program.
+#[unsafe(no_mangle)]
+pub extern "C" fn stylet_version() -> *const std::ffi::c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+/// The configuration that `stylet enhance` uses when nothing is said.
+///
+/// # Safety
+/// `config` is null or points to a `StyletConfig`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn stylet_default_config(config: *mut StyletConfig) -> StyletStatus {
+    // SAFETY: the caller's promise.
+    let Some(config) = (unsafe { config.as_mut() }) else { return StyletStatus::StyletNull };
+    let from = EnhanceConfig::default();
+    *config = StyletConfig {
+        model: match from.model {
+            Model::MultiLayer => StyletModel::StyletMultiLayer as i32,
+            Model::KelvinVoigt => StyletModel::StyletKelvinVoigt as i32,
+        },
+        contact_known: i32::from(from.contact == Contact::Known),
+        surface_m: 0.0,
+        forgetting: from.forgetting,
+        prior_stiffness: from.prior_stiffness,
+        prior_friction: from.prior_friction,
+        cusum_sigma_ordinary_n: from.cusum.sigma_ordinary_n,
+        cusum_sigma_rupture_n: from.cusum.sigma_rupture_n,
+        derivative_on_n_per_s: from.derivative.on_n_per_s,
+        derivative_off_n_per_s: from.derivative.off_n_per_s,
+    };
+    StyletStatus::StyletOk
+}
+
+/// The core's own configuration, or what is wrong with the caller's.
+fn checked(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CStr> {
+    let model = match config.model {
+        m if m == StyletModel::StyletMultiLayer as i32 => Model::MultiLayer,
+        m if m == StyletModel::StyletKelvinVoigt as i32 => Model::KelvinVoigt,
+        _ => return Err(c"model: must be STYLET_MULTI_LAYER or STYLET_KELVIN_VOIGT"),
+    };
+    let positive = |x: f64| x > 0.0 && x.is_finite();
+    if !config.surface_m.is_finite() {
+        return Err(c"surface_m: must be finite");
+    }
+    if !(positive(config.forgetting) && config.forgetting <= 1.0) {
+        return Err(c"forgetting: must lie above 0 and be at most 1");
+    }
+    if !positive(config.prior_stiffness) {
+        return Err(c"prior_stiffness: must be positive and finite");
+    }
+    if !positive(config.prior_friction) {
+        return Err(c"prior_friction: must be positive and finite");
+    }
+    if !(positive(config.cusum_sigma_ordinary_n) && positive(config.cusum_sigma_rupture_n)) {
+        return Err(c"cusum_sigma_ordinary_n, cusum_sigma_rupture_n: must be positive and finite");
+    }
+    if !(config.derivative_on_n_per_s.is_finite() && config.derivative_off_n_per_s.is_finite()) {
+        return Err(c"derivative_on_n_per_s, derivative_off_n_per_s: must be finite");
+    }
+    let mut core = EnhanceConfig { model, ..EnhanceConfig::default() };
+    core.contact = if config.contact_known != 0 { Contact::Known } else { Contact::Detected };
+    core.forgetting = config.forgetting;
+    core.prior_stiffness = config.prior_stiffness;
+    core.prior_friction = config.prior_friction;
+    core.cusum.sigma_ordinary_n = config.cusum_sigma_ordinary_n;
+    core.cusum.sigma_rupture_n = config.cusum_sigma_rupture_n;
+    core.derivative.on_n_per_s = config.derivative_on_n_per_s;
+    core.derivative.off_n_per_s = config.derivative_off_n_per_s;
+    Ok(core)
+}
+
+/// Makes a core in the caller's `memory` of `bytes` bytes; as many samples are kept as fit behind it (at least one).
+/// `config` may be null: the defaults. `*core` is then the handle; it lives in the memory and needs no freeing. `*why`, when
+/// `why` is not null, is set to a sentence on an error.
+///
+/// # Safety
+/// `memory` is null or points to `bytes` bytes that nobody else uses while the core lives; `config` is null or points to a
+/// `StyletConfig`; `core` is null or points to a pointer; so does `why`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn stylet_init(
+    memory: *mut std::ffi::c_void,
+    bytes: usize,
+    config: *const StyletConfig,
+    core: *mut *mut StyletCore,
+    why: *mut *const std::ffi::c_char,
+) -> StyletStatus {
+    let say = |status: StyletStatus, text: &'static std::ffi::CStr| {
+        // SAFETY: the caller's promise.
+        if let Some(why) = unsafe { why.as_mut() } {
+            *why = text.as_ptr();
+        }
+        status
+    };
+    if memory.is_null() || core.is_null() {
+        return say(StyletStatus::StyletNull, c"memory or core is null");
+    }
+    if !(memory as usize).is_multiple_of(stylet_align()) {
+        return say(StyletStatus::StyletNull, c"memory is not aligned to stylet_align()");
+    }
+    if bytes < stylet_size(1) {
+        return say(StyletStatus::StyletTooSmall, c"the memory is smaller than stylet_size(1)");
+    }
+    // SAFETY: the caller's promise.
+    let config = match unsafe { config.as_ref() } {
+        None => Ok((EnhanceConfig::default(), 0.0)),
+        Some(config) => checked(config).map(|checked| (checked, config.surface_m)),
+    };
+    let (config, surface_m) = match config {
+        Ok(config) => config,
+        Err(text) => return say(StyletStatus::StyletBadConfig, text),
+    };
+    let count = (bytes - samples_at()) / size_of::<Sample>();
+    let made = catch_unwind(AssertUnwindSafe(|| {
+        // SAFETY: aligned, and `samples_at() + count * size_of::<Sample>()` is at most `bytes`.
+        unsafe {
+            let first = memory.cast::<u8>().add(samples_at()).cast::<Sample>();
+            for k in 0..count {
+                first.add(k).write(Sample::default());
+            }
+            let place = memory.cast::<StyletCore>();
+            let inner = Enhancer::new(config, surface_m, Storage { first, count });
+            place.write(StyletCore { inner, error: c"" });
+            *core = place;
+        }
+    }));
+    match made {
+        Ok(()) => say(StyletStatus::StyletOk, c""),
+        Err(_) => say(StyletStatus::StyletInternal, c"internal error; please report it"),
+    }
+}
+
+/// Takes one sample: time in s (increasing), tip position in m (positive into the tissue), tip velocity in m/s, axial force
+/// in N (positive resisting insertion). `out` may be null.
+///
+/// # Safety
+/// `core` is null or from `stylet_init`, and its memory is still there; `out` is null or points to a `StyletOutput`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn stylet_step(
+    core: *mut StyletCore,
+    time_s: f64,
+    position_m: f64,
+    velocity_mps: f64,
+    force_n: f64,
+    out: *mut StyletOutput,
+) -> StyletStatus {
+    // SAFETY: the caller's promise.
+    let Some(core) = (unsafe { core.as_mut() }) else { return StyletStatus::StyletNull };
+    let sample = Sample { time_s, position_m, velocity_mps, force_n };
+    let Ok(output) = catch_unwind(AssertUnwindSafe(|| core.inner.step(sample))) else {
+        core.error = c"internal error; please report it";
+        return StyletStatus::StyletInternal;
+    };
+    // SAFETY: the caller's promise.
+    if let Some(out) = unsafe { out.as_mut() } {
+        *out = plain(&output);
+    }
+    if output.used {
+        return StyletStatus::StyletOk;
+    }
+    core.error = c"the sample was passed over: not finite, out of range, or not later than the one before";
+    StyletStatus::StyletUnused
+}
+
+fn plain(o: &Output) -> StyletOutput {
+    let estimate = o.estimate.unwrap_or_default();
+    StyletOutput {
+        enhanced_n: o.enhanced_n,
+        reconstructed_n: o.reconstructed_n,
+        error_n: o.error_n,
+        stiffness_n_per_m: o.theta[0],
+        friction: o.theta[1],
+        cusum_n2: o.cusum_n2,
+        derivative_n_per_s: o.derivative_n_per_s,
+        cumulative_friction_ns_per_m: o.cumulative_friction_ns_per_m,
+        contact_m: o.contact_m.unwrap_or(f64::NAN),
+        state: o.state as i32,
+        ruptures: o.ruptures as u32,
+        ruptured: i32::from(o.detection.is_some()),
+        estimated_layer: if o.estimate.is_some() { estimate.layer as u32 } else { 0 },
+        layer_thickness_m: estimate.thickness_m,
+        layer_stiffness_n_per_m: estimate.stiffness_n_per_m,
+        layer_friction: estimate.friction,
+    }
+}
+
+/// What the last call that did not end well had to say, empty before; a text that lives as long as the program.
+///
+/// # Safety
+/// `core` is null or from `stylet_init`, and its memory is still there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn stylet_last_error(core: *const StyletCore) -> *const std::ffi::c_char {
+    // SAFETY: the caller's promise.
+    match unsafe { core.as_ref() } {
+        Some(core) => core.error.as_ptr(),
+        None => c"core is null".as_ptr(),
+    }
+}

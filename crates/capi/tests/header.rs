@@ -1,0 +1,28 @@
+//! Promise: `include/stylet.h` says what the library does.
+
+use std::path::Path;
+
+fn made() -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("a configuration");
+    let source = root.join("src/lib.rs");
+    let header = cbindgen::Builder::new().with_config(config).with_src(source).generate().expect("a header");
+    let mut text = Vec::new();
+    header.write(&mut text);
+    String::from_utf8(text).expect("text")
+}
+
+#[test]
+fn the_committed_header_is_up_to_date() {
+    let committed = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/stylet.h"));
+    assert!(
+        committed.expect("a header") == made(),
+        "include/stylet.h is out of date: cargo test -p stylet-capi --test header -- --ignored"
+    );
+}
+
+#[test]
+#[ignore = "writes the header"]
+fn write_the_header() {
+    std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/stylet.h"), made()).expect("written");
+}

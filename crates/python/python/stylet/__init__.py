@@ -1,0 +1,42 @@
+"""Needle insertion into layered tissue: simulated, felt, identified, and put against measured data.
+
+>>> import stylet
+>>> run = stylet.simulate("three_layer_latex_constant.ron")   # doctest: +SKIP
+>>> run.score["missed"], run.to_pandas(), run.plot()          # doctest: +SKIP
+
+SI units everywhere; names carry their unit. Research software, not a medical device.
+"""
+
+from ._core import Enhanced, Enhancer, enhance
+from ._data import read_csv
+from ._diagnosis import Diagnosis, diagnose
+from ._run import Run, Scenario, simulate
+from ._stylet import Output, StyletError, __version__
+from ._sweep import Sweep, sweep
+
+STATES = (
+    "NoRupture",
+    "ExpectedRupture",
+    "DetectedRupture",
+    "ForceDropMeasuring",
+    "ForceCompensation",
+)
+"""Names of the numbers in a column `state`."""
+
+__all__ = [
+    "Diagnosis",
+    "Enhanced",
+    "Enhancer",
+    "Output",
+    "Run",
+    "STATES",
+    "Scenario",
+    "StyletError",
+    "Sweep",
+    "__version__",
+    "diagnose",
+    "enhance",
+    "read_csv",
+    "simulate",
+    "sweep",
+]

@@ -1,0 +1,82 @@
+"""The online core."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import _data, _stylet
+
+
+def _config(config) -> tuple[str, str]:
+    return ("ron", "") if config is None else _data.source(config)
+
+
+class Enhancer:
+    """The online core: one `step` per sample of the force sensor, or `run` over arrays.
+
+    `config` is None (the defaults), a path, RON text (`"Enhance(model: KelvinVoigt)"`) or a dict. `storage` is how many
+    samples of a layer are kept for its re-estimation."""
+
+    def __init__(self, config=None, storage: int = 16384):
+        self._inner = _stylet.Enhancer(*_config(config), storage)
+        self.step = self._inner.step
+        """step(time_s, position_m, velocity_mps, force_n) -> Output"""
+        self.enhanced = self._inner.enhanced
+        """enhanced(time_s, position_m, velocity_mps, force_n) -> enhanced force in N, the quickest way"""
+
+    def run(self, time_s, position_m, force_n, velocity_mps=None) -> dict[str, np.ndarray]:
+        """Many samples; goes on from the last: `enhanced_n`, `error_n`, `state`, `ruptures`, one value per sample. Without a
+        velocity it is the slope of the position."""
+        velocity = None if velocity_mps is None else _data.column(velocity_mps)
+        return self._inner.run(
+            _data.column(time_s), _data.column(position_m), velocity, _data.column(force_n)
+        )
+
+    def reset(self) -> None:
+        """Forgets every sample."""
+        self._inner.reset()
+
+
+class Enhanced:
+    """What the core made of a recording."""
+
+    def __init__(self, time_s, force_n, found):
+        columns, ruptures, layers = found
+        self._columns = {"time_s": time_s, "force_n": force_n, **columns}
+        self.ruptures = [dict(zip(("time_s", "located_m", "cause"), r)) for r in ruptures]
+        """Declared ruptures: instant, position that the drop was traced back to, what declared it."""
+        self.layers = [dict(zip(("layer", "thickness_m", "stiffness_n_per_m", "friction"), e)) for e in layers]
+        """Estimates of the traversed layers."""
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Recording and outputs, one value per sample."""
+        return self._columns
+
+    def to_pandas(self):
+        return _data.frame(self._columns)
+
+    def plot(self, ax=None):
+        """Measured and enhanced force. Returns the axes."""
+        ax = _data.axes(ax)[0]
+        c = self._columns
+        ax.plot(c["time_s"], c["force_n"], color="0.6", lw=1, label="measured")
+        ax.plot(c["time_s"], c["enhanced_n"], color="#0072b2", lw=1.4, label="enhanced")
+        for k, rupture in enumerate(self.ruptures):
+            ax.axvline(rupture["time_s"], color="#d55e00", lw=1, label=None if k else "rupture found")
+        ax.set(xlabel="time (s)", ylabel="force (N)")
+        ax.legend(frameon=False, fontsize="small")
+        return ax
+
+    def __repr__(self) -> str:
+        return f"Enhanced({len(self._columns['time_s'])} samples, {len(self.ruptures)} ruptures)"
+
+
+def enhance(data, config=None) -> Enhanced:
+    """Runs the core over a recording: a data frame or dict of arrays with `time_s`, `position_m`, `force_n` (and
+    `velocity_mps`), a tuple in this order, or the path of a CSV."""
+    if isinstance(data, (str, bytes)) or hasattr(data, "__fspath__"):
+        data = _data.read_csv(data)
+        data.pop("velocity_mps")
+    time_s, position_m, force_n, velocity_mps = _data.columns(data)
+    core = _stylet.Enhancer(*_config(config))
+    return Enhanced(time_s, force_n, core.record(time_s, position_m, force_n, velocity_mps))

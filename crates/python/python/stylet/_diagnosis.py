@@ -1,0 +1,150 @@
+"""What a scenario gets wrong about measured data."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from . import _data, _stylet
+from ._run import Scenario
+
+
+class Diagnosis:
+    """Verdict, causes with intervals, the extended scenario, the gain."""
+
+    def __init__(self, inner, measured):
+        self._inner = inner
+        self._measured = measured
+        self.result: dict = json.loads(inner.json())
+        """`diagnosis.json` as a dict."""
+
+    @property
+    def verdict(self) -> str:
+        """`none`, `named`, `ambiguous` or `unknown`."""
+        return self.result["verdict"]
+
+    @property
+    def gain(self) -> dict:
+        """RMS before, after, floor, in N."""
+        return self.result["gain"]
+
+    @property
+    def causes(self):
+        """A table: effect, parameter, value, low, high, confidence."""
+        return _data.frame(self._rows())
+
+    def _rows(self) -> list[dict]:
+        return [
+            {"effect": cause["effect"], "parameter": name, **{k: p[k] for k in ("value", "low", "high")}}
+            | {"confidence": cause["confidence"]}
+            for cause in self.result["causes"]
+            for name, p in (cause["parameters"] or {"": {"value": np.nan, "low": np.nan, "high": np.nan}}).items()
+        ]
+
+    @property
+    def base_parameters(self):
+        """A table: what was assumed of the layers, what fits."""
+        return _data.frame(self.result["base_parameters"])
+
+    @property
+    def extended(self) -> Scenario:
+        """The scenario with re-fitted parameters and the effects found."""
+        return Scenario(self._inner.extended_ron())
+
+    def extended_ron(self) -> str:
+        """`extended.ron`, the text that the command writes."""
+        return self._inner.extended_ron()
+
+    def json(self) -> bytes:
+        """`diagnosis.json`, the bytes that the command writes."""
+        return bytes(self._inner.json())
+
+    def predict(self, data) -> np.ndarray:
+        """The force in N that the extended scenario gives along a recorded motion (a data frame or dict of arrays)."""
+        time_s = _data.column(data["time_s"])
+        velocity = _data.column(data["velocity_mps"]) if "velocity_mps" in data else None
+        return self._inner.predict(time_s, _data.column(data["position_m"]), velocity)
+
+    def write(self, folder) -> None:
+        """Writes `diagnosis.json` and `extended.ron`."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in (("diagnosis.json", self.json()), ("extended.ron", self.extended_ron().encode())):
+            beside = folder / f".{name}.part"
+            beside.write_bytes(content)
+            os.replace(beside, folder / name)
+
+    def plot(self, ax=None):
+        """Measured force and what the extended scenario predicts, one panel per recording (at most four), the residual
+        below it in the same unit. Returns the axes."""
+        shown = self._measured[:4]
+        axes = _data.axes(ax, len(shown))
+        for ax, (name, data) in zip(axes, shown):
+            predicted = self.predict(data)
+            ax.plot(data["time_s"], data["force_n"], color="0.6", lw=1, label="measured")
+            ax.plot(data["time_s"], predicted, color="#0072b2", lw=1.2, label="extended scenario")
+            ax.plot(data["time_s"], data["force_n"] - predicted, color="#d55e00", lw=0.8, label="residual")
+            ax.set_title(name, loc="left", fontsize="medium")
+            ax.set_ylabel("force (N)")
+        axes[-1].set_xlabel("time (s)")
+        axes[0].legend(frameon=False, fontsize="small")
+        return axes
+
+    def __repr__(self) -> str:
+        names = ", ".join(c["effect"] for c in self.result["causes"]) or "nothing"
+        gain = self.gain
+        return (
+            f"Diagnosis({self.verdict}: {names}; residual {gain['rmse_before_n']:.3g} -> "
+            f"{gain['rmse_after_n']:.3g} N, noise {gain['floor_n']:.3g} N)"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            "<tr>"
+            + "".join(f"<td>{html.escape(f'{v:.4g}' if isinstance(v, float) else str(v))}</td>" for v in row.values())
+            + "</tr>"
+            for row in self._rows()
+        )
+        head = "".join(f"<th>{h}</th>" for h in ("effect", "parameter", "value", "low", "high", "confidence"))
+        return f"<p>{html.escape(repr(self))}</p><table><tr>{head}</tr>{rows}</table>"
+
+
+def diagnose(believed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
+    """Compares what a scenario believes with measured recordings.
+
+    `believed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
+    `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on recordings left out.
+    `columns`: path of a column map for the files. `progress`: True, False, or a callable `(text, count)`; by default shown
+    where tqdm is there. Ctrl-C ends it. The same bytes as `stylet diagnose`."""
+    if isinstance(measured, (str, os.PathLike, dict)) or hasattr(measured, "columns"):
+        measured = [measured]
+    given, kept = [], []
+    for k, one in enumerate(measured):
+        if isinstance(one, (str, os.PathLike)):
+            given.append(os.fspath(one))
+            kept.append((Path(one).name, one))
+        else:
+            name = names[k] if names else f"recording {k + 1}"
+            time_s, position_m, force_n, velocity_mps = _data.columns(one)
+            given.append((name, time_s, position_m, force_n, velocity_mps))
+            data = {"time_s": time_s, "position_m": position_m, "force_n": force_n}
+            kept.append((name, data if velocity_mps is None else data | {"velocity_mps": velocity_mps}))
+    if not given:
+        raise _stylet.StyletError("no recordings: give at least one")
+    kind, text = _data.source(believed)
+    told = _data.Progress(True if progress is None else progress)
+    try:
+        inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, told)
+    finally:
+        told.close()
+    data = []
+    for name, one in kept:
+        if not isinstance(one, dict):
+            one = _stylet.read_csv(os.fspath(one), columns and os.fspath(columns), repair)[0] if len(data) < 4 else None
+        if one is not None:
+            data.append((name, one))
+    return Diagnosis(inner, data)

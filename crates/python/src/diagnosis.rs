@@ -1,0 +1,119 @@
+//! What a scenario gets wrong about measured data.
+
+use crate::arrays::{Column, recording};
+use crate::failure;
+use crate::run::parse;
+use crate::work::beside;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use stylet::record::read_csv_with_holes;
+use stylet::{Diagnosed, Evidence, ReadOptions, Scenario};
+
+/// One recording: a file, or a name with time, position, force and velocity (or none).
+#[derive(FromPyObject)]
+pub enum Measured<'py> {
+    /// A CSV file.
+    File(PathBuf),
+    /// Columns under a name.
+    Columns(String, Column<'py>, Column<'py>, Column<'py>, Option<Column<'py>>),
+}
+
+/// What a diagnosis found.
+#[pyclass(frozen)]
+pub struct Diagnosis {
+    found: Parts,
+    believed: String,
+}
+
+/// What is kept of it; the engine's own state stays on the thread that made it.
+struct Parts {
+    json: Vec<u8>,
+    extended: Scenario,
+    ron: String,
+}
+
+/// Compares what a scenario believes with what was measured.
+#[pyfunction]
+#[pyo3(signature = (kind, source, measured, columns=None, repair=false, progress=None))]
+pub fn diagnose(
+    py: Python<'_>,
+    kind: &str,
+    source: &str,
+    measured: Vec<Measured<'_>>,
+    columns: Option<PathBuf>,
+    repair: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Diagnosis> {
+    let scenario = parse(kind, source)?;
+    let columns = columns.map(|c| stylet::scenario::load(&c)).transpose().map_err(failure)?;
+    let options = ReadOptions { columns, repair };
+    let files: Vec<PathBuf> = measured
+        .iter()
+        .filter_map(|m| match m {
+            Measured::File(path) => Some(path.clone()),
+            Measured::Columns(..) => None,
+        })
+        .collect();
+    let mut evidence = Vec::with_capacity(measured.len());
+    for one in &measured {
+        evidence.push(match one {
+            Measured::File(path) => {
+                let (recording, notes) = read_csv_with_holes(path, &options).map_err(failure)?;
+                Evidence { name: stylet::name_of(path, &files), recording, notes }
+            }
+            Measured::Columns(name, time_s, position_m, force_n, velocity_mps) => Evidence {
+                name: name.clone(),
+                recording: recording(time_s, position_m, force_n, velocity_mps.as_ref())?,
+                notes: Vec::new(),
+            },
+        });
+    }
+    let believed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
+    let named = believed.clone();
+    let found = beside(py, progress, move |told| {
+        let mut done = 0;
+        let found: Result<Diagnosed, stylet::Error> = stylet::diagnose(&scenario, &evidence, |what| {
+            done += 1;
+            told.tell_or_leave(what, done);
+        });
+        found.and_then(|found| {
+            let (json, ron) = (found.json()?, found.extended_ron(&named)?);
+            Ok(Parts { json, ron, extended: found.extended })
+        })
+    })?;
+    Ok(Diagnosis { found: found.map_err(failure)?, believed })
+}
+
+#[pymethods]
+impl Diagnosis {
+    /// `diagnosis.json` as the command writes it.
+    fn json(&self) -> &[u8] {
+        &self.found.json
+    }
+
+    /// `extended.ron` as the command writes it.
+    fn extended_ron(&self) -> &str {
+        &self.found.ron
+    }
+
+    /// The scenario that was believed.
+    #[getter]
+    fn believed(&self) -> &str {
+        &self.believed
+    }
+
+    /// The force (N) that the extended scenario predicts along a recorded motion.
+    #[pyo3(signature = (time_s, position_m, velocity_mps=None))]
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        time_s: Column<'py>,
+        position_m: Column<'py>,
+        velocity_mps: Option<Column<'py>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let motion = recording(&time_s, &position_m, &time_s, velocity_mps.as_ref())?;
+        let force_n = stylet::predict(&self.found.extended, &motion).map_err(failure)?;
+        Ok(PyArray1::from_vec(py, force_n))
+    }
+}

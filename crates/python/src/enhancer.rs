@@ -1,0 +1,238 @@
+//! The online core, sample by sample or over arrays.
+
+use crate::arrays::{Column, recording};
+use crate::failure;
+use crate::run::put_trace;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::Path;
+use stylet::core::{Enhancer as Core, Output as CoreOutput, Sample};
+use stylet::{EnhanceFile, record::differentiate};
+
+/// A configuration from a file (`"path"`), RON text (`"ron"`) or the defaults (empty text).
+fn parse(kind: &str, source: &str) -> PyResult<EnhanceFile> {
+    match kind {
+        "path" => EnhanceFile::load(Path::new(source)).map_err(failure),
+        "json" => {
+            let text = serde_json::from_str::<EnhanceFile>(source)
+                .map_err(|e| failure(format!("config: {e}")))
+                .map(|file| stylet::scenario::ron_options().to_string(&file))?;
+            EnhanceFile::parse("config", &text.map_err(failure)?).map_err(failure)
+        }
+        _ if source.trim().is_empty() => Ok(EnhanceFile::default()),
+        _ => EnhanceFile::parse("config", source).map_err(failure),
+    }
+}
+
+/// Checks a configuration; raises what is wrong.
+#[pyfunction]
+pub fn check_config(kind: &str, source: &str) -> PyResult<()> {
+    parse(kind, source).map(drop)
+}
+
+/// A rupture: time in s, position it was traced back to in m, what declared it.
+type Rupture = (f64, f64, String);
+/// A layer: number, thickness in m, stiffness in N/m, friction in the model's unit.
+type Layer = (usize, f64, f64, f64);
+
+/// What one step gave.
+#[pyclass(frozen)]
+pub struct Output {
+    out: CoreOutput,
+}
+
+#[pymethods]
+impl Output {
+    /// Enhanced force in N.
+    #[getter]
+    fn enhanced_n(&self) -> f64 {
+        self.out.enhanced_n
+    }
+    /// Reconstructed force in N.
+    #[getter]
+    fn reconstructed_n(&self) -> f64 {
+        self.out.reconstructed_n
+    }
+    /// Innovation in N.
+    #[getter]
+    fn error_n(&self) -> f64 {
+        self.out.error_n
+    }
+    /// Stiffness estimate of the layer being traversed in N/m.
+    #[getter]
+    fn stiffness_n_per_m(&self) -> f64 {
+        self.out.theta[0]
+    }
+    /// Friction estimate of the layer being traversed in the model's unit.
+    #[getter]
+    fn friction(&self) -> f64 {
+        self.out.theta[1]
+    }
+    /// Cumulative friction in N s/m.
+    #[getter]
+    fn cumulative_friction_ns_per_m(&self) -> f64 {
+        self.out.cumulative_friction_ns_per_m
+    }
+    /// State by name.
+    #[getter]
+    fn state(&self) -> &'static str {
+        self.out.state.name()
+    }
+    /// Ruptures declared so far.
+    #[getter]
+    fn ruptures(&self) -> usize {
+        self.out.ruptures
+    }
+    /// True at the sample that declares a rupture.
+    #[getter]
+    fn ruptured(&self) -> bool {
+        self.out.detection.is_some()
+    }
+    /// Position of the first contact in m, or None.
+    #[getter]
+    fn contact_m(&self) -> Option<f64> {
+        self.out.contact_m
+    }
+    /// The layer whose estimate became available at this sample: (layer, thickness_m, stiffness_n_per_m, friction), or None.
+    #[getter]
+    fn estimate(&self) -> Option<(usize, f64, f64, f64)> {
+        self.out.estimate.map(|e| (e.layer, e.thickness_m, e.stiffness_n_per_m, e.friction))
+    }
+    /// False when the sample was passed over.
+    #[getter]
+    fn used(&self) -> bool {
+        self.out.used
+    }
+    fn __repr__(&self) -> String {
+        format!(
+            "Output(enhanced_n={}, state={}, ruptures={})",
+            self.out.enhanced_n,
+            self.out.state.name(),
+            self.out.ruptures
+        )
+    }
+}
+
+/// The online core.
+#[pyclass]
+pub struct Enhancer {
+    core: Core<Vec<Sample>>,
+    config: EnhanceFile,
+    storage: usize,
+}
+
+#[pymethods]
+impl Enhancer {
+    #[new]
+    #[pyo3(signature = (kind="ron", source="", storage=16384))]
+    fn new(kind: &str, source: &str, storage: usize) -> PyResult<Self> {
+        let config = parse(kind, source)?;
+        if storage < 2 {
+            return Err(failure("storage: must hold at least 2 samples; 16384 hold 80 s at 200 Hz"));
+        }
+        let core = Core::new(config.enhance.clone(), config.surface_m, vec![Sample::default(); storage]);
+        Ok(Self { core, config, storage })
+    }
+
+    /// Takes one sample.
+    #[inline]
+    fn step(&mut self, time_s: f64, position_m: f64, velocity_mps: f64, force_n: f64) -> Output {
+        Output { out: self.core.step(Sample { time_s, position_m, velocity_mps, force_n }) }
+    }
+
+    /// Takes one sample and returns the enhanced force alone (N), the quickest way.
+    #[inline]
+    fn enhanced(&mut self, time_s: f64, position_m: f64, velocity_mps: f64, force_n: f64) -> f64 {
+        self.core.step_brief(Sample { time_s, position_m, velocity_mps, force_n }).enhanced_n
+    }
+
+    /// Takes many samples; the state goes on from the last.
+    #[pyo3(signature = (time_s, position_m, velocity_mps, force_n))]
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        time_s: Column<'py>,
+        position_m: Column<'py>,
+        velocity_mps: Option<Column<'py>>,
+        force_n: Column<'py>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (t, z, f) = (time_s.as_slice()?, position_m.as_slice()?, force_n.as_slice()?);
+        let differentiated;
+        let v: &[f64] = match &velocity_mps {
+            Some(v) => v.as_slice()?,
+            None => {
+                let (times, places) = (t.to_vec(), z.to_vec());
+                differentiated = differentiate(&times, &places, stylet::record::DEFAULT_HALF_WIDTH_S);
+                &differentiated
+            }
+        };
+        let n = t.len();
+        if z.len() != n || v.len() != n || f.len() != n {
+            return Err(failure(format!(
+                "the columns have different lengths: time_s {n}, position_m {}, velocity_mps {}, force_n {}",
+                z.len(),
+                v.len(),
+                f.len()
+            )));
+        }
+        let (mut enhanced, mut error) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let (mut state, mut ruptures) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let core = &mut self.core;
+        py.detach(|| {
+            /// Samples put together at a time: they stay in the cache.
+            const BLOCK: usize = 256;
+            let mut block = [Sample::default(); BLOCK];
+            let mut from = 0;
+            while from < n {
+                let count = BLOCK.min(n - from);
+                for (k, sample) in block[..count].iter_mut().enumerate() {
+                    let i = from + k;
+                    *sample = Sample { time_s: t[i], position_m: z[i], velocity_mps: v[i], force_n: f[i] };
+                }
+                core.run(&block[..count], |out| {
+                    enhanced.push(out.enhanced_n);
+                    error.push(out.error_n);
+                    state.push(out.state as u8);
+                    ruptures.push(out.ruptures as u32);
+                });
+                from += count;
+            }
+        });
+        let dict = PyDict::new(py);
+        dict.set_item("enhanced_n", PyArray1::from_vec(py, enhanced))?;
+        dict.set_item("error_n", PyArray1::from_vec(py, error))?;
+        dict.set_item("state", PyArray1::from_vec(py, state))?;
+        dict.set_item("ruptures", PyArray1::from_vec(py, ruptures))?;
+        Ok(dict)
+    }
+
+    /// Forgets every sample.
+    fn reset(&mut self) {
+        let storage = vec![Sample::default(); self.storage];
+        self.core = Core::new(self.config.enhance.clone(), self.config.surface_m, storage);
+    }
+
+    /// A whole recording by a fresh core: all outputs, ruptures, layers.
+    #[pyo3(signature = (time_s, position_m, force_n, velocity_mps=None))]
+    fn record<'py>(
+        &self,
+        py: Python<'py>,
+        time_s: Column<'py>,
+        position_m: Column<'py>,
+        force_n: Column<'py>,
+        velocity_mps: Option<Column<'py>>,
+    ) -> PyResult<(Bound<'py, PyDict>, Vec<Rupture>, Vec<Layer>)> {
+        let recording = recording(&time_s, &position_m, &force_n, velocity_mps.as_ref())?;
+        let config = &self.config;
+        let enhanced = py.detach(|| stylet::enhance(&recording, config));
+        let dict = PyDict::new(py);
+        put_trace(py, &dict, &enhanced.trace)?;
+        dict.set_item("velocity_mps", PyArray1::from_slice(py, &recording.velocity_mps))?;
+        let ruptures = enhanced.trace.detections.iter();
+        let ruptures = ruptures.map(|d| (d.time_s, d.located_m, d.cause.name().to_owned())).collect();
+        let layers = enhanced.trace.estimates.iter();
+        let layers = layers.map(|e| (e.layer, e.thickness_m, e.stiffness_n_per_m, e.friction)).collect();
+        Ok((dict, ruptures, layers))
+    }
+}

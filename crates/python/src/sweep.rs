@@ -1,0 +1,88 @@
+//! Many drawn insertions.
+
+use crate::failure;
+use crate::run::parse;
+use crate::work::beside;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use stylet::{Swept, sweep::inputs};
+
+/// The rows and the summary of a sweep.
+#[pyclass(frozen)]
+pub struct Sweep {
+    swept: Swept,
+    sweep: stylet::Sweep,
+}
+
+/// Runs a sweep: a file, or a `Sweep(...)` as JSON over a scenario given apart.
+#[pyfunction]
+#[pyo3(signature = (path=None, json=None, kind="ron", source="", trials=None, seed=None, progress=None))]
+#[allow(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
+pub fn sweep(
+    py: Python<'_>,
+    path: Option<PathBuf>,
+    json: Option<&str>,
+    kind: &str,
+    source: &str,
+    trials: Option<u64>,
+    seed: Option<u64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Sweep> {
+    let sweep = match (path, json) {
+        (Some(path), None) => {
+            stylet::Sweep::load(&path, stylet::sweep::Overrides { trials, seed }).map_err(failure)?
+        }
+        (None, Some(json)) => {
+            let mut file: stylet::SweepFile =
+                serde_json::from_str(json).map_err(|e| failure(format!("sweep: {e}")))?;
+            file.trials = trials.unwrap_or(file.trials);
+            file.seed = seed.unwrap_or(file.seed);
+            let scenario = parse(kind, source)?;
+            stylet::Sweep::new("sweep".to_owned(), file, scenario)
+                .map_err(|p| failure(format!("sweep: {}: {}", p.path, p.what)))?
+        }
+        _ => return Err(failure("a sweep is either a file or a dict")),
+    };
+    let ran = beside(py, progress, move |told| {
+        let swept = stylet::sweep(&sweep, |done| told.tell("trials", done));
+        (sweep, swept)
+    })?;
+    let (sweep, swept) = ran;
+    let swept = swept.map_err(failure)?.ok_or_else(|| failure("the sweep was stopped"))?;
+    Ok(Sweep { swept, sweep })
+}
+
+#[pymethods]
+impl Sweep {
+    /// One row per insertion: trial, seed, drawn quantities, scores.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        let (columns, rows) = (&self.swept.columns, &self.swept.rows);
+        dict.set_item("trial", PyArray1::from_iter(py, rows.iter().map(|r| r.trial)))?;
+        dict.set_item("seed", PyArray1::from_iter(py, rows.iter().map(|r| r.seed)))?;
+        dict.set_item("redrawn", PyArray1::from_iter(py, rows.iter().map(|r| r.redrawn)))?;
+        for (i, name) in columns.drawn.iter().chain(&columns.scores).enumerate() {
+            let column = rows.iter().map(|r| r.values.get(i).copied().unwrap_or(f64::NAN));
+            dict.set_item(name, PyArray1::from_iter(py, column))?;
+        }
+        Ok(dict)
+    }
+
+    /// `summary.json` as the command writes it.
+    fn summary_json(&self) -> PyResult<String> {
+        serde_json::to_string_pretty(&self.swept.summary).map_err(failure)
+    }
+
+    /// The report as one HTML page.
+    fn html(&self) -> String {
+        self.swept.html(&self.sweep)
+    }
+
+    /// `sweep.ron` and `scenario.ron`: what repeats it.
+    fn inputs(&self) -> PyResult<Vec<(String, String)>> {
+        let output = inputs(&self.sweep).map_err(failure)?;
+        Ok(output.files().map(|(n, c)| (n.to_owned(), String::from_utf8_lossy(c).into_owned())).collect())
+    }
+}

@@ -1,0 +1,72 @@
+"""Promises of the results: data frames, plots, reports, dicts as scenarios, sweeps, Ctrl-C."""
+
+import os
+import signal
+import threading
+import time
+
+import pytest
+import stylet
+
+
+def test_a_run_plots_and_shows_itself(two_gels):
+    run = stylet.simulate(two_gels)
+    assert run.score["missed"] == 0 and "ruptures found" in repr(run)
+    frame = run.to_pandas()
+    assert {"time_s", "force_n", "enhanced_n", "true_tip_force_n"} <= set(frame) and len(frame) == 2600
+    axes = run.plot()
+    assert axes.get_xlabel() == "time (s)" and len(axes.lines) >= 3
+    assert "<iframe" in run._repr_html_() and "<html" in run.html().lower()
+
+
+def test_a_dict_is_a_scenario():
+    scenario = {
+        "name": "one gel",
+        "tissue": {"layers": [{"thickness_m": 0.02, "stiffness_n_per_m": 50.0, "friction_ns_per_m2": 9000.0}]},
+        "motion": {"Constant": {"start_m": -0.005, "velocity_mps": 0.005, "duration_s": 6.0}},
+        "robot": "Replay",
+    }
+    whole = stylet.Scenario(scenario)
+    assert stylet.simulate(whole).hash == stylet.simulate(scenario).hash
+    scenario["tissue"]["layers"][0]["stiffness_n_per_m"] = -1.0
+    with pytest.raises(stylet.StyletError, match=r"tissue.layers\[0\].stiffness_n_per_m"):
+        stylet.Scenario(scenario)
+
+
+def test_a_sweep_is_a_data_frame(two_gels):
+    vary = [{"path": "sensor.noise_n", "with": {"Uniform": [0.0, 0.05]}}]
+    swept = stylet.sweep({"trials": 20, "vary": vary}, two_gels, progress=False)
+    frame = swept.to_pandas()
+    assert len(frame) == 20 and frame["sensor.noise_n"].between(0, 0.05).all()
+    assert swept.summary["trials"] == 20
+    again = stylet.sweep({"trials": 20, "vary": vary}, two_gels, progress=False).to_pandas()
+    assert frame.equals(again)
+
+
+def test_ctrl_c_ends_a_sweep_and_progress_is_told(two_gels):
+    vary = [{"path": "sensor.noise_n", "with": {"Uniform": [0.0, 0.05]}}]
+    told = []
+    timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        stylet.sweep({"trials": 1_000_000, "vary": vary}, two_gels, progress=lambda what, done: told.append(done))
+    assert time.monotonic() - start < 20 and told == sorted(told) and told
+
+
+def test_the_interpreter_is_free_during_work(two_gels):
+    ticks = []
+    stop = threading.Event()
+
+    def tick():
+        while not stop.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.005)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    vary = [{"path": "sensor.noise_n", "with": {"Uniform": [0.0, 0.05]}}]
+    stylet.sweep({"trials": 500, "vary": vary}, two_gels, progress=False)
+    stop.set()
+    thread.join()
+    assert len(ticks) >= 3

@@ -1,0 +1,52 @@
+//! Recordings with holes: rows whose values are no finite numbers are cut out and reported.
+
+use crate::error::RecordError;
+use crate::quality::{QualityKind, QualityNote};
+use crate::read::{ReadOptions, read_csv, read_csv_bytes};
+use crate::recording::Recording;
+use std::path::Path;
+
+/// As [`read_csv`](crate::read_csv); rows with a value that is no finite number are cut out and reported.
+///
+/// # Errors
+/// As [`read_csv`](crate::read_csv), but for values that are not finite: those only when hardly a row is left.
+pub fn read_csv_with_holes(
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<(Recording, Vec<QualityNote>), RecordError> {
+    let error = match read_csv(path, options) {
+        Err(error @ RecordError::NotFinite { .. }) => error,
+        other => return other,
+    };
+    let Ok(text) = std::fs::read_to_string(path) else { return Err(error) };
+    let hole = |line: &&str| {
+        line.split([',', ';', '\t']).any(|x| {
+            let x = x.trim().trim_matches('"');
+            x.parse::<f64>().is_ok_and(|x| !x.is_finite())
+        })
+    };
+    let kept: Vec<&str> = text.lines().filter(|l| !hole(l)).collect();
+    let (all, left) = (text.lines().count(), kept.len());
+    if left < 3 {
+        return Err(error);
+    }
+    let (recording, mut notes) = read_csv_bytes((kept.join("\n") + "\n").as_bytes(), path, options)?;
+    let message =
+        format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
+    notes.insert(
+        0,
+        QualityNote {
+            kind: QualityKind::Gaps,
+            message,
+            numbers: [("count".to_owned(), (all - left) as f64)].into_iter().collect(),
+            lines: text
+                .lines()
+                .enumerate()
+                .filter(|(_, l)| hole(l))
+                .take(100)
+                .map(|(k, _)| k as u64 + 1)
+                .collect(),
+        },
+    );
+    Ok((recording, notes))
+}
