@@ -37,6 +37,8 @@ pub enum Number {
     Start,
     /// Noise of the arm's joint torques.
     TorqueNoise,
+    /// `s1` with which the virtual sensor is listened to.
+    VirtualSigma,
 }
 
 /// A number halved or doubled.
@@ -56,7 +58,7 @@ impl Serialize for Change {
 
 impl Number {
     /// All.
-    pub const ALL: [Number; 15] = [
+    pub const ALL: [Number; 16] = [
         Number::Noise,
         Number::GelStiffness,
         Number::GelFriction,
@@ -72,6 +74,7 @@ impl Number {
         Number::AbdomenFriction,
         Number::Start,
         Number::TorqueNoise,
+        Number::VirtualSigma,
     ];
 
     /// As it stands in the protocols.
@@ -93,6 +96,7 @@ impl Number {
             Number::AbdomenFriction => "b of the abdomen",
             Number::Start => "way in air before contact",
             Number::TorqueNoise => "noise of the joint torques",
+            Number::VirtualSigma => "s1 for the virtual sensor",
         }
     }
 
@@ -102,11 +106,12 @@ impl Number {
         [Change { number: self, doubled: false }, Change { number: self, doubled: true }]
     }
 
-    /// Whether the number enters an experiment. The noise of the force/torque sensor is a key of its own.
+    /// Whether the number enters a recording. The noise of the force/torque sensor is a key of its own, and `s1`
+    /// belongs to the algorithm.
     #[must_use]
     pub const fn enters(self, case: Case) -> bool {
         match self {
-            Number::Noise => false,
+            Number::Noise | Number::VirtualSigma => false,
             Number::GelStiffness | Number::GelFriction | Number::GelContrast => case.is_gel(),
             Number::StackStiffness | Number::StackFriction | Number::Latex => case.is_stack(),
             Number::LiverStiffness
@@ -157,7 +162,7 @@ impl Change {
                     layer.puncture_n = layer.puncture_n.map(|f| f * factor);
                 }
                 Number::LiverThickness => layer.thickness_m *= factor,
-                Number::Noise | Number::Start | Number::TorqueNoise => {}
+                Number::Noise | Number::Start | Number::TorqueNoise | Number::VirtualSigma => {}
             }
         }
         match (self.number, &mut scenario.motion) {

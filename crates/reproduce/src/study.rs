@@ -234,7 +234,7 @@ impl Study {
             for (key, outcome) in done.runs {
                 runs.entry(key).or_default().push(outcome);
             }
-            for (recorded, found) in done.offline {
+            if let Some((recorded, found)) = done.offline {
                 offline.entry(recorded).or_default().push(found);
             }
         }

@@ -24,6 +24,10 @@ pub enum Setup {
     NoTrailingEdge,
     /// As `Tuned`, with resets at 6.66 Hz, the laboratory's other frequency.
     SlowReset,
+    /// As `Tuned`, `s1` halved.
+    SigmaHalved,
+    /// As `Tuned`, `s1` doubled.
+    SigmaDoubled,
     /// The scenario's own: for the virtual sensor `s1 = 0.015 N`, which is ours.
     Own,
 }
@@ -108,6 +112,8 @@ impl Variant {
             Setup::Literal => config.algorithm = Algorithm::Literal,
             Setup::FallingForce => config.derivative.sense = DerivativeSense::Drop,
             Setup::NoTrailingEdge => config.derivative.trailing_edge = false,
+            Setup::SigmaHalved => config.cusum.sigma_rupture_n *= 0.5,
+            Setup::SigmaDoubled => config.cusum.sigma_rupture_n *= 2.0,
             Setup::SlowReset => config.reset = Reset::Frequency { hz: 6.66 },
         }
         match self.ablation {

@@ -78,7 +78,15 @@ impl<'a> View<'a> {
             // The force/torque sensor's noise does not reach the virtual one.
             recorded.noise_mn = NOISE_MN;
         }
-        let variant = Variant { kelvin_voigt, setup: self.setup, ablation };
+        let setup = match self.change {
+            Some(Change { number: Number::VirtualSigma, doubled })
+                if sensor == Sensor::Virtual && self.setup == Setup::Tuned =>
+            {
+                if doubled { Setup::SigmaDoubled } else { Setup::SigmaHalved }
+            }
+            _ => self.setup,
+        };
+        let variant = Variant { kelvin_voigt, setup, ablation };
         self.study.runs(Key { recorded, sensor, variant }, self.seeds)
     }
 

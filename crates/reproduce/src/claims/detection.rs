@@ -69,6 +69,7 @@ pub(super) fn definitions() -> [Definition; 2] {
         Number::AbdomenFriction,
         Number::Start,
         Number::TorqueNoise,
+        Number::VirtualSigma,
     ];
     let primary = |v: &View<'_>| found(v, &either_sensor(Setup::Tuned), false);
     let mut sensors = Definition::new(protocol!("f1"), primary, NEARLY_ALL, &numbers)
