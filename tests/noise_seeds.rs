@@ -177,7 +177,10 @@ fn the_reference_lines_are_met_but_for_those_that_are_named() {
     let constant = load("three_layer_latex_constant");
     let sinusoid = from_full_speed();
     let c = summarise("known surface, constant, ML", &scores(&constant, &known(Model::MultiLayer)));
-    let s = summarise("known surface, sinusoid from full speed, ML", &scores(&sinusoid, &known(Model::MultiLayer)));
+    let s = summarise(
+        "known surface, sinusoid from full speed, ML",
+        &scores(&sinusoid, &known(Model::MultiLayer)),
+    );
     let mut lines = Vec::new();
     for (case, found, k, b, enhancement, decimals) in [
         ("constant", &c, [3.6, 1.6, 2.7], [6.6, 1.0, 2.8], 0.155, 3),
@@ -225,11 +228,8 @@ fn from_full_speed() -> Scenario {
 #[test]
 fn kelvin_voigt_is_off_as_in_the_reference_without_the_reweighting_and_less_with_it() {
     let with = |reweight| {
-        let mut config = EnhanceConfig {
-            contact: Contact::Known,
-            model: Model::KelvinVoigt,
-            ..EnhanceConfig::default()
-        };
+        let mut config =
+            EnhanceConfig { contact: Contact::Known, model: Model::KelvinVoigt, ..EnhanceConfig::default() };
         config.drop.reweight = reweight;
         config
     };
@@ -237,12 +237,8 @@ fn kelvin_voigt_is_off_as_in_the_reference_without_the_reweighting_and_less_with
     let run = |name: &str, scenario: &Scenario, reweight: bool| {
         summarise(name, &scores(scenario, &with(reweight))).median_stiffness
     };
-    let predicted: Vec<f64> = constant
-        .tissue
-        .layers
-        .iter()
-        .map(|l| l.friction_ns_per_m2 * 0.0023 / l.stiffness_n_per_m)
-        .collect();
+    let predicted: Vec<f64> =
+        constant.tissue.layers.iter().map(|l| l.friction_ns_per_m2 * 0.0023 / l.stiffness_n_per_m).collect();
     println!("b v / K at 2.3 mm/s: {predicted:.3?}");
     let without = run("constant, KV, not re-weighted", &constant, false);
     for (layer, (found, predicted)) in without.iter().zip(&predicted).enumerate() {

@@ -24,7 +24,8 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     let mut output = Output::default();
     let mut text = String::new();
     for claim in &made.claims {
-        let _ = writeln!(text, "({}) {}: {}\n    {}", claim.id, claim.claim, claim.verdict.word(), claim.reason);
+        let _ =
+            writeln!(text, "({}) {}: {}\n    {}", claim.id, claim.claim, claim.verdict.word(), claim.reason);
     }
     output.add("claims.json", made.claims_json);
     for (name, svg) in made.pictures {

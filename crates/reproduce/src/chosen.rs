@@ -37,11 +37,7 @@ fn row(number: Number, claims: &[Claim]) -> Vec<Cell> {
             .filter(|c| c.trials.iter().any(|t| t.change == change && t.decides))
             .map(|c| c.id.clone())
             .collect();
-        if ids.is_empty() {
-            Cell::text("none")
-        } else {
-            Cell::text(ids.join(", ")).status(Status::Warn)
-        }
+        if ids.is_empty() { Cell::text("none") } else { Cell::text(ids.join(", ")).status(Status::Warn) }
     };
     let tried: Vec<&str> = claims
         .iter()
@@ -81,10 +77,22 @@ pub fn section(claims: &[Claim]) -> Section {
         .collect();
     let fixed = [
         ("duration of the motions", "10 to 50 s", "air behind the target; nothing is asked of it"),
-        ("the 2 mm blind travel, guards, straight-line drops", "Algorithm: Paper", "completions: the switch Literal turns them off, section Switches"),
-        ("our detection for the virtual sensor", "s1 0.015 N", "outside the published range: sensitivity conditions of claim f1 alone"),
+        (
+            "the 2 mm blind travel, guards, straight-line drops",
+            "Algorithm: Paper",
+            "completions: the switch Literal turns them off, section Switches",
+        ),
+        (
+            "our detection for the virtual sensor",
+            "s1 0.015 N",
+            "outside the published range: sensitivity conditions of claim f1 alone",
+        ),
         ("arm", "Panda without joint friction", "sensitivity conditions of claim f1 have the friction"),
-        ("tuning grid and seeds", "s1 0.15, 0.1, 0.05, 0.03 N; beta 0.075, 0.05, 0.15 N/s; 10 seeds", "the published range; the condition \"published default tuning\" does without"),
+        (
+            "tuning grid and seeds",
+            "s1 0.15, 0.1, 0.05, 0.03 N; beta 0.075, 0.05, 0.15 N/s; 10 seeds",
+            "the published range; the condition \"published default tuning\" does without",
+        ),
         ("share of seeds that must give a value", "0.8", "below it there is no effect"),
         ("halving and doubling", "a factor of two", "a guess at how wrong a chosen number can be"),
     ]

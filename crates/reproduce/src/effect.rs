@@ -110,11 +110,7 @@ impl Measured {
         let all: Vec<Option<f64>> = values.collect();
         let some: Vec<f64> = all.iter().copied().flatten().filter(|x| x.is_finite()).collect();
         let enough = some.len() as f64 >= ENOUGH * all.len() as f64;
-        Effect {
-            interval: scale.over_seeds(&some).filter(|_| enough),
-            seeds: some.len(),
-            of: all.len(),
-        }
+        Effect { interval: scale.over_seeds(&some).filter(|_| enough), seeds: some.len(), of: all.len() }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::insertion::Insertion;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use stylet_score::{LayerSample, OfflineEstimate, Score, Scorer, offline, Heard, Moment};
+use stylet_score::{Heard, LayerSample, Moment, OfflineEstimate, Score, Scorer, offline};
 
 /// One run of the algorithm on one recording.
 #[derive(Clone, Debug, PartialEq)]

@@ -33,9 +33,7 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
         .map(|c| {
             let (effect, bar, says) = c.primary.as_ref().map_or_else(
                 || ("–".to_owned(), "–".to_owned(), Cell::text("–")),
-                |p| {
-                    (p.effect.words(), p.bar.words(), Cell::text(p.says.words()).status(said(p.says)))
-                },
+                |p| (p.effect.words(), p.bar.words(), Cell::text(p.says.words()).status(said(p.says))),
             );
             let mut hangs: Vec<&str> = c.hangs_on().map(|t| t.change.number.name()).collect();
             hangs.dedup();

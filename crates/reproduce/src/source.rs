@@ -151,9 +151,27 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
     };
     let [thickness, stiffness, friction, puncture] = tissue(case);
     let number = numbers(case);
-    add("thickness", format!("{} mm", list(scenario, 1e3, |l| l.thickness_m)), thickness.0, thickness.1, number[0]);
-    add("K", format!("{} N/m", list(scenario, 1.0, |l| l.stiffness_n_per_m)), stiffness.0, stiffness.1, number[1]);
-    add("b", format!("{} N s/m²", list(scenario, 1.0, |l| l.friction_ns_per_m2)), friction.0, friction.1, number[2]);
+    add(
+        "thickness",
+        format!("{} mm", list(scenario, 1e3, |l| l.thickness_m)),
+        thickness.0,
+        thickness.1,
+        number[0],
+    );
+    add(
+        "K",
+        format!("{} N/m", list(scenario, 1.0, |l| l.stiffness_n_per_m)),
+        stiffness.0,
+        stiffness.1,
+        number[1],
+    );
+    add(
+        "b",
+        format!("{} N s/m²", list(scenario, 1.0, |l| l.friction_ns_per_m2)),
+        friction.0,
+        friction.1,
+        number[2],
+    );
     if scenario.tissue.layers.iter().any(|l| l.puncture_n.is_some()) {
         let text = |l: &stylet_tissue::Layer| l.puncture_n.map_or("–".to_owned(), |f| significant(f, 3));
         let values: Vec<String> = scenario.tissue.layers.iter().map(text).collect();
@@ -168,7 +186,11 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
             add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, "air behind", None);
         }
         Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, duration_s, .. } => {
-            let motion = format!("{} m at {} Hz, from rest", significant(amplitude_m, 3), significant(frequency_hz, 3));
+            let motion = format!(
+                "{} m at {} Hz, from rest",
+                significant(amplitude_m, 3),
+                significant(frequency_hz, 3)
+            );
             add("motion", motion, Class::Laboratory, "published tuning", None);
             let start = format!("{} mm", significant(-start_m * 1e3, 3));
             add("way in air", start, Class::Ours, "with it the speed at contact", Some(Number::Start));
@@ -178,7 +200,8 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
         _ => {}
     }
     let noise = format!("{NOISE_MN} mN, white");
-    let why = "the laboratory's s0 read as the sensor's noise; the laboratory's range 5 to 20 mN is in the tables";
+    let why =
+        "the laboratory's s0 read as the sensor's noise; the laboratory's range 5 to 20 mN is in the tables";
     add("noise of the force/torque sensor", noise, Class::Ours, why, Some(Number::Noise));
     if let Some(virtual_sensor) = scenario.sensor.virtual_sensor() {
         add("observer gain", "5 /s".to_owned(), Class::Laboratory, "published tuning", None);
@@ -197,9 +220,9 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
 /// The table of a figure's inputs.
 #[must_use]
 pub fn table(case: Case, scenario: &Scenario) -> Sourced {
-    let rows = inputs(case, scenario)
-        .into_iter()
-        .map(|i| vec![Cell::text(i.name), Cell::text(i.value), Cell::text(i.class.words()), Cell::text(i.why)]);
+    let rows = inputs(case, scenario).into_iter().map(|i| {
+        vec![Cell::text(i.name), Cell::text(i.value), Cell::text(i.class.words()), Cell::text(i.why)]
+    });
     Sourced::named(Table {
         title: "What went in".to_owned(),
         headers: ["number", "value", "whose", "source or reason"].map(String::from).to_vec(),
@@ -223,7 +246,12 @@ mod tests {
             for input in &all {
                 assert!(!input.value.is_empty() && !input.why.is_empty(), "{case:?} {}", input.name);
                 assert_ne!(input.class, Class::Computed, "{case:?} {}", input.name);
-                assert!(input.number.is_none_or(|n| matches!(n, Number::Noise | Number::VirtualSigma) || n.enters(case)), "{case:?}");
+                assert!(
+                    input
+                        .number
+                        .is_none_or(|n| matches!(n, Number::Noise | Number::VirtualSigma) || n.enters(case)),
+                    "{case:?}"
+                );
             }
         }
     }

@@ -134,8 +134,7 @@ impl Plan {
     }
 
     fn insertions(&self) -> Result<BTreeMap<Group, Insertion>, ReproduceError> {
-        let groups: BTreeSet<Group> =
-            self.recordings().iter().map(|(r, _)| (r.case, r.change)).collect();
+        let groups: BTreeSet<Group> = self.recordings().iter().map(|(r, _)| (r.case, r.change)).collect();
         let made: Vec<(Group, Insertion)> = groups
             .into_par_iter()
             .map(|(case, change)| {
@@ -277,12 +276,7 @@ impl Study {
     }
 }
 
-fn tune(
-    recorded: Recorded,
-    once: &Insertion,
-    sensor: Sensor,
-    trace: bool,
-) -> Result<Tuning, ReproduceError> {
+fn tune(recorded: Recorded, once: &Insertion, sensor: Sensor, trace: bool) -> Result<Tuning, ReproduceError> {
     if !recorded.case.on_arm() {
         let seeds = TUNING_FIRST_SEED..TUNING_FIRST_SEED + TUNING_SEEDS;
         let recordings: Vec<_> =
@@ -290,10 +284,8 @@ fn tune(
         return Ok(Tuning::of(&recordings, sensor, trace));
     }
     let seeds: Vec<u64> = (TUNING_FIRST_SEED..TUNING_FIRST_SEED + TUNING_SEEDS_ARM).collect();
-    let made: Vec<Insertion> = seeds
-        .par_iter()
-        .map(|seed| Insertion::of(&once.scenario, *seed))
-        .collect::<Result<_, _>>()?;
+    let made: Vec<Insertion> =
+        seeds.par_iter().map(|seed| Insertion::of(&once.scenario, *seed)).collect::<Result<_, _>>()?;
     let recordings: Vec<_> = made
         .iter()
         .zip(&seeds)
@@ -329,8 +321,7 @@ fn one(
             continue;
         }
         let samples = arm_samples(insertion, job.seed, job.recorded.noise_mn, sensor);
-        let tuning =
-            tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
+        let tuning = tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
         let mut shares = Vec::new();
         for key in asked {
             let outcome = insertion.run(&samples, sensor, key.variant, &tuning);

@@ -49,9 +49,8 @@ fn runs<'a>(study: &'a Study, case: Case, way: &Way) -> &'a [Outcome] {
 fn stiffness_errors(runs: &[Outcome]) -> String {
     let layers = runs.iter().map(|o| o.score.layers.len()).max().unwrap_or(0);
     let of = |layer: usize| {
-        let errors = runs
-            .iter()
-            .map(|o| o.score.layers.get(layer).and_then(|l| l.stiffness_n_per_m.relative_error));
+        let errors =
+            runs.iter().map(|o| o.score.layers.get(layer).and_then(|l| l.stiffness_n_per_m.relative_error));
         Spread::of(errors).map_or("–".to_owned(), |s| significant(100.0 * s.median, 2))
     };
     (0..layers).map(of).collect::<Vec<_>>().join(" / ")

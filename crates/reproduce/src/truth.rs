@@ -3,8 +3,8 @@
 
 use crate::case::Case;
 use crate::outcome::Outcome;
-use crate::spread::Spread;
 use crate::source::Sourced;
+use crate::spread::Spread;
 use crate::study::{NOISE_LEVELS_MN, NOISE_MN, Study};
 use crate::variant::{Ablation, Sensor, Setup};
 use crate::view::{SENSITIVITY_SEEDS_ARM, View};
@@ -69,7 +69,9 @@ fn table(study: &Study, title: &str, layers: usize, rows: &[Row]) -> Sourced {
                 Cell::number(format!("{missed} / {alarms} of {of}")),
             ];
             for friction in [false, true] {
-                row.extend((0..layers).map(|i| cell(Spread::of(found.iter().map(|o| error(o, i, friction))))));
+                row.extend(
+                    (0..layers).map(|i| cell(Spread::of(found.iter().map(|o| error(o, i, friction))))),
+                );
             }
             row.push(cell(Spread::of(
                 found.iter().map(|o| o.score.cumulative_friction_ns_per_m.relative_error),

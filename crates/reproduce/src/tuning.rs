@@ -20,20 +20,7 @@ pub const ON_N_PER_S: [f64; 3] = [0.075, 0.05, 0.15];
 /// Thresholds on `trace P` that are tried; the prior's trace is 2e6. At constant velocity the friction's entry
 /// stays near 1e6 and the threshold must lie above that; where the speed varies it falls too.
 pub const TRACE_BELOW: [f64; 14] = [
-    2e5,
-    5e5,
-    9e5,
-    9.9e5,
-    1.000_05e6,
-    1.000_5e6,
-    1.002e6,
-    1.005e6,
-    1.02e6,
-    1.05e6,
-    1.1e6,
-    1.2e6,
-    1.4e6,
-    1.7e6,
+    2e5, 5e5, 9e5, 9.9e5, 1.000_05e6, 1.000_5e6, 1.002e6, 1.005e6, 1.02e6, 1.05e6, 1.1e6, 1.2e6, 1.4e6, 1.7e6,
 ];
 
 /// What was tuned for a phantom, a motion, a noise and a sensor.

@@ -106,8 +106,7 @@ impl Variant {
             Setup::Tuned | Setup::Published | Setup::Own => {}
             Setup::KnownDepth => {
                 config.contact = Contact::Known;
-                config.depths =
-                    Depths::Known(scenario.tissue.layers.iter().map(|l| l.thickness_m).collect());
+                config.depths = Depths::Known(scenario.tissue.layers.iter().map(|l| l.thickness_m).collect());
             }
             Setup::Literal => config.algorithm = Algorithm::Literal,
             Setup::FallingForce => config.derivative.sense = DerivativeSense::Drop,

@@ -75,11 +75,7 @@ mod tests {
     use crate::interval::Interval;
 
     fn effect(value: f64) -> Effect {
-        Effect {
-            interval: Some(Interval { value, low: value - 0.1, high: value + 0.1 }),
-            seeds: 50,
-            of: 50,
-        }
+        Effect { interval: Some(Interval { value, low: value - 0.1, high: value + 0.1 }), seeds: 50, of: 50 }
     }
 
     #[test]

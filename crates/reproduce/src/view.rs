@@ -7,11 +7,11 @@ use crate::study::{Key, NOISE_MN, Recorded, Study};
 use crate::variant::{Ablation, Sensor, Setup, Variant};
 
 /// Seeds on which a halved or doubled number is tried,
-pub const CHANGED_SEEDS: u64 = 20;
+pub const CHANGED_SEEDS: u64 = 12;
 /// the same where the arm takes part,
-pub const CHANGED_SEEDS_ARM: u64 = 3;
+pub const CHANGED_SEEDS_ARM: u64 = 2;
 /// and seeds of sensitivity conditions that need an arm of their own.
-pub const SENSITIVITY_SEEDS_ARM: u64 = 6;
+pub const SENSITIVITY_SEEDS_ARM: u64 = 4;
 
 /// The study under one condition: what was changed, the noise, what the algorithm is told, how many seeds.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +82,11 @@ impl<'a> View<'a> {
             Some(Change { number: Number::VirtualSigma, doubled })
                 if sensor == Sensor::Virtual && self.setup == Setup::Tuned =>
             {
-                if doubled { Setup::SigmaDoubled } else { Setup::SigmaHalved }
+                if doubled {
+                    Setup::SigmaDoubled
+                } else {
+                    Setup::SigmaHalved
+                }
             }
             _ => self.setup,
         };

@@ -67,8 +67,6 @@ pub(super) fn on_the_liver() -> Definition {
             liver(v, Case::Liver, ForceTorque, |o| o.score.enhancement.rms_relative)
         })
         .also("virtual sensor (M Fig. 13)", |v| liver(v, Case::LiverArm, Virtual, elastic))
-        .also("quadratic elasticity (Okamura 2004)", |v| {
-            liver(v, Case::LiverQuadratic, ForceTorque, elastic)
-        })
+        .also("quadratic elasticity (Okamura 2004)", |v| liver(v, Case::LiverQuadratic, ForceTorque, elastic))
         .also(KNOWN, |v| liver(&known(v), Case::Liver, ForceTorque, elastic))
 }

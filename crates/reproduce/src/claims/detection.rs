@@ -23,10 +23,7 @@ fn found(view: &View<'_>, insertions: &[Insertion], kelvin_voigt: bool) -> Measu
 }
 
 const fn stack(setup: Setup) -> [Insertion; 2] {
-    [
-        (Case::LatexConstant, Sensor::ForceTorque, setup),
-        (Case::LatexSinusoidal, Sensor::ForceTorque, setup),
-    ]
+    [(Case::LatexConstant, Sensor::ForceTorque, setup), (Case::LatexSinusoidal, Sensor::ForceTorque, setup)]
 }
 
 const fn either_sensor(setup: Setup) -> [Insertion; 4] {
@@ -42,10 +39,8 @@ const ON_THE_ARM: [Insertion; 2] = [
     (Case::LiverArm, Sensor::ForceTorque, Setup::Tuned),
     (Case::AbdomenArm, Sensor::ForceTorque, Setup::Tuned),
 ];
-const OURS: [Insertion; 2] = [
-    (Case::LiverArm, Sensor::Virtual, Setup::Own),
-    (Case::AbdomenArm, Sensor::Virtual, Setup::Own),
-];
+const OURS: [Insertion; 2] =
+    [(Case::LiverArm, Sensor::Virtual, Setup::Own), (Case::AbdomenArm, Sensor::Virtual, Setup::Own)];
 const WITH_FRICTION: [Insertion; 2] = [
     (Case::LiverArmFriction, Sensor::Virtual, Setup::Own),
     (Case::AbdomenArmFriction, Sensor::Virtual, Setup::Own),

@@ -27,10 +27,7 @@ fn reconstruction(view: &View<'_>) -> Measured {
 fn compensation(view: &View<'_>) -> Measured {
     let parts = TARGETS.iter().map(|&case| {
         let runs = view.without(case, Ablation::NoReweight);
-        Part::new(
-            case.name(),
-            runs.iter().map(|o| if o.estimated > 0 { o.cumulative_ratio } else { None }),
-        )
+        Part::new(case.name(), runs.iter().map(|o| if o.estimated > 0 { o.cumulative_ratio } else { None }))
     });
     Measured { scale: Scale::Mean, parts: parts.collect() }
 }

@@ -109,15 +109,12 @@ fn measured(view: &View<'_>, weighting: Weighting) -> Measured {
 }
 
 pub(super) fn definition() -> Definition {
-    let mut claim =
-        Definition::new(protocol!("j"), |v| measured(v, Weighting::MeanSpeed), ROUNDING, &[])
-            .also("weights that are powers of two, bit for bit", |v| measured(v, Weighting::PowersOfTwo))
-            .also("eq. (11) iterated as printed, Lambda at every step", |v| {
-                measured(v, Weighting::EveryStep)
-            })
-            .also("W P instead of Lambda P Lambda after ten samples (eq. 9 for a full covariance)", |v| {
-                measured(v, Weighting::FullCovariance)
-            });
+    let mut claim = Definition::new(protocol!("j"), |v| measured(v, Weighting::MeanSpeed), ROUNDING, &[])
+        .also("weights that are powers of two, bit for bit", |v| measured(v, Weighting::PowersOfTwo))
+        .also("eq. (11) iterated as printed, Lambda at every step", |v| measured(v, Weighting::EveryStep))
+        .also("W P instead of Lambda P Lambda after ten samples (eq. 9 for a full covariance)", |v| {
+            measured(v, Weighting::FullCovariance)
+        });
     // Bit for bit: any difference that a double can hold is above this.
     if let Some(exact) = claim.sensitivities.first_mut() {
         exact.bar = Bar::Below(f64::MIN_POSITIVE);

@@ -63,13 +63,8 @@ pub(crate) const KNOWN: &str = "depth known";
 pub(crate) const PUBLISHED: &str = "published default tuning (s1 0.15 N, beta 0.075 N/s)";
 
 /// The numbers of the single gels.
-pub(crate) const GELS: [Number; 5] = [
-    Number::Noise,
-    Number::GelStiffness,
-    Number::GelFriction,
-    Number::GelContrast,
-    Number::Start,
-];
+pub(crate) const GELS: [Number; 5] =
+    [Number::Noise, Number::GelStiffness, Number::GelFriction, Number::GelContrast, Number::Start];
 
 impl Definition {
     /// A claim with its primary condition.
@@ -85,13 +80,7 @@ impl Definition {
 
     /// What no simulation can say.
     const fn untestable(protocol: &'static str) -> Self {
-        Self {
-            protocol,
-            primary: None,
-            sensitivities: Vec::new(),
-            numbers: Vec::new(),
-            on_arm: false,
-        }
+        Self { protocol, primary: None, sensitivities: Vec::new(), numbers: Vec::new(), on_arm: false }
     }
 
     /// Adds a condition with the claim's own bar.

@@ -19,8 +19,7 @@ pub(super) fn reason(primary: &Primary, trials: &[Trial], sensitivities: &[Condi
         (Says::Undecided, true) => "the interval holds the bar",
         (Says::Undecided, false) => "too few seeds give a value",
     };
-    let mut text =
-        format!("The primary condition gives {}, asked is {bar}: {says}.", primary.effect.words());
+    let mut text = format!("The primary condition gives {}, asked is {bar}: {says}.", primary.effect.words());
     let others: Vec<&Condition> = primary.parts.iter().filter(|p| p.says != primary.says).collect();
     if primary.parts.len() > 1 && !others.is_empty() {
         let _ = write!(text, " Otherwise alone: {}.", list(others.into_iter()));

@@ -46,7 +46,8 @@ fn peak(facts: &Facts<'_>) -> String {
 }
 
 fn found(facts: &Facts<'_>) -> String {
-    let of = |runs: &[Outcome]| format!("{} of {}", runs.iter().filter(|o| o.found_all()).count(), runs.len());
+    let of =
+        |runs: &[Outcome]| format!("{} of {}", runs.iter().filter(|o| o.found_all()).count(), runs.len());
     format!("exactly the true ruptures in {} seeds (ML), {} (KV)", of(facts.ml), of(facts.kv))
 }
 
@@ -72,14 +73,15 @@ fn elastic(facts: &Facts<'_>) -> String {
 }
 
 fn layers(facts: &Facts<'_>) -> String {
-    let names: Vec<&str> =
-        facts.insertion.scenario.tissue.layers.iter().map(|l| l.name.as_str()).collect();
+    let names: Vec<&str> = facts.insertion.scenario.tissue.layers.iter().map(|l| l.name.as_str()).collect();
     names.join(", ")
 }
 
-const EXIT_WHY: &str = "how large the drop at the exit is follows from K, which is ours: see claim c1's numbers of ours";
+const EXIT_WHY: &str =
+    "how large the drop at the exit is follows from K, which is ours: see claim c1's numbers of ours";
 const TIME_WHY: &str = "our recording begins with 5 mm of air; thickness from this very time";
-const LEFT_WHY: &str = "here noise and the error of b are all that can stay; real friction is not purely viscous";
+const LEFT_WHY: &str =
+    "here noise and the error of b are all that can stay; real friction is not purely viscous";
 
 pub(super) const FIG_3: &[Statement] = &[
     statement("the tip exits at t = 12.5 s", exit, TIME_WHY),
@@ -95,8 +97,16 @@ pub(super) const FIG_4: &[Statement] = &[
 ];
 pub(super) const FIG_5: &[Statement] = &[
     statement("the exit is marked as detected", found, EXIT_WHY),
-    statement("KV over-compensates", cumulative, "see claim d: the sinusoid's friction grows with the speed here, as the model supposes"),
-    statement("no range given", peak, "viscous b from 2.3 mm/s gives four times the force at 10 mm/s; real friction may grow less"),
+    statement(
+        "KV over-compensates",
+        cumulative,
+        "see claim d: the sinusoid's friction grows with the speed here, as the model supposes",
+    ),
+    statement(
+        "no range given",
+        peak,
+        "viscous b from 2.3 mm/s gives four times the force at 10 mm/s; real friction may grow less",
+    ),
 ];
 pub(super) const FIG_6: &[Statement] = &[
     statement("the exit is marked as detected", found, EXIT_WHY),
@@ -104,22 +114,33 @@ pub(super) const FIG_6: &[Statement] = &[
 ];
 pub(super) const FIG_7: &[Statement] = &[
     statement("three ruptures correctly detected", found, "drops of 1.1 to 2.6 N are ours: see claim e"),
-    statement("gels of 20, 50 and 70 % (caption; elsewhere 25 %)", layers, "we follow the text and Fig. 1 of the main paper"),
+    statement(
+        "gels of 20, 50 and 70 % (caption; elsewhere 25 %)",
+        layers,
+        "we follow the text and Fig. 1 of the main paper",
+    ),
     statement("no range given", peak, "viscous b makes the friction five times the drops at full speed"),
 ];
 pub(super) const FIG_8: &[Statement] = &[
     statement("two ruptures correctly detected", found, "puncture forces from the literature: see claim f1"),
     statement("ML renders the elastic part better", elastic, "see claim c2"),
 ];
-pub(super) const FIG_9: &[Statement] =
-    &[statement("two ruptures correctly detected", found, "see claim f1")];
+pub(super) const FIG_9: &[Statement] = &[statement("two ruptures correctly detected", found, "see claim f1")];
 pub(super) const MAIN_12: &[Statement] = &[
     statement("three ruptures at constant velocity", found, "see claim e"),
     statement("no number given", left, LEFT_WHY),
 ];
 pub(super) const MAIN_13: &[Statement] = &[
-    statement("the same two ruptures as in S Fig. 8, by virtual sensor", found, "another arm and assumed noise: see claims f1 and f2"),
-    statement("ML renders the elastic part better", elastic, "see claim c2, sensitivity to the virtual sensor"),
+    statement(
+        "the same two ruptures as in S Fig. 8, by virtual sensor",
+        found,
+        "another arm and assumed noise: see claims f1 and f2",
+    ),
+    statement(
+        "ML renders the elastic part better",
+        elastic,
+        "see claim c2, sensitivity to the virtual sensor",
+    ),
 ];
 pub(super) const MAIN_14: &[Statement] = &[statement(
     "the same two ruptures as in S Fig. 9, by virtual sensor",

@@ -86,7 +86,8 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
         let known = runs(Setup::KnownDepth);
         let mut all = vec![force(&drawn, &known, true)];
         all.extend(coefficients(&drawn.insertion, &known, true));
-        let svg = picture(&all, &title(", surface and depth known"), "the same recording; published defaults");
+        let svg =
+            picture(&all, &title(", surface and depth known"), "the same recording; published defaults");
         pictures.push(svg.clone());
         files.push((file, svg));
     }
