@@ -60,7 +60,7 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
             "The primary condition is the paper's own protocol and decides alone: from it one effect with its 95 % interval over the noise seeds {first} to {last}. \
              Supported: the whole interval on the claim's side of the bar; contradicted: on the other side; undecided: neither. Assumed: a number that we chose \
              decides, because the effect changes sides when it is halved or doubled. Untestable: no simulation can say. Sensitivity conditions say how far a \
-             claim carries and change no verdict. All protocols and bars were written down before the numbers were computed. S: supplement, M: main paper."
+             claim carries and change no verdict. Protocols and bars were written down before the numbers were computed; what was changed afterwards, and why, stands at the end of claims/README.md. S: supplement, M: main paper."
         ))
         .text(
             "The intervals hold the noise of the simulated sensor and nothing else: not the scatter of real gels, not the error of the law. A narrow one says that \
