@@ -127,6 +127,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   stylet reproduce --out out/paper
+  stylet reproduce --out out/again --first-seed 51     other noise, the same verdicts
 
 The folder then holds index.html (open it beside the paper's supplement), claims.json and every figure
 as SVG. The same seeds give the same bytes for any number of threads.")]
@@ -136,6 +137,9 @@ pub struct ReproduceArgs {
     /// Number of noise seeds; fewer than 50 are a quick look.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(2..=100_000))]
     pub seeds: u64,
+    /// First noise seed.
+    #[arg(long, value_name = "SEED", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=900_000))]
+    pub first_seed: u64,
 }
 
 /// Where results go and what is said meanwhile: the same for every command that makes a folder.

@@ -8,7 +8,6 @@ use crate::terminal;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
-use stylet_reproduce::study::Study;
 
 /// The command.
 ///
@@ -17,14 +16,16 @@ use stylet_reproduce::study::Study;
 pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     let folder = args.results.out.clone().unwrap_or_else(|| PathBuf::from("stylet-out/reproduce"));
     let begun = Instant::now();
-    let progress = Progress::new(Study::insertions(args.seeds), "insertions", args.results.quiet);
-    let made = stylet_reproduce::reproduce(args.seeds, &|| progress.advance(1));
+    let plan = stylet_reproduce::plan(args.first_seed, args.seeds);
+    let progress = Progress::new(plan.recordings_in_all(), "recordings", args.results.quiet);
+    let made = stylet_reproduce::reproduce(&plan, &|| progress.advance(1));
     progress.finish();
     let made = made.map_err(|e| Failure::Internal(e.to_string()))?;
     let mut output = Output::default();
     let mut text = String::new();
     for claim in &made.claims {
-        let _ = writeln!(text, "({}) {}\n    {}", claim.id, claim.claim, claim.verdict.words());
+        let _ =
+            writeln!(text, "({}) {}: {}\n    {}", claim.id, claim.claim, claim.verdict.word(), claim.reason);
     }
     output.add("claims.json", made.claims_json);
     for (name, svg) in made.pictures {
@@ -35,9 +36,10 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     if !args.results.quiet {
         let _ = writeln!(
             text,
-            "\n{} noise seeds, {} insertions in {:.0} s\nPage: {}",
+            "\n{} noise seeds, {} recordings, {} runs of the algorithm in {:.0} s\nPage: {}",
             args.seeds,
-            Study::insertions(args.seeds),
+            plan.recordings_in_all(),
+            plan.runs_in_all(),
             begun.elapsed().as_secs_f64(),
             folder.join("index.html").display()
         );

@@ -52,6 +52,57 @@ impl Case {
         [Case::Gel70Constant, Case::Gel70Sinusoidal],
     ];
 
+    /// All.
+    pub const ALL: [Case; 15] = [
+        Case::Gel25Constant,
+        Case::Gel25Sinusoidal,
+        Case::Gel50Constant,
+        Case::Gel50Sinusoidal,
+        Case::Gel70Constant,
+        Case::Gel70Sinusoidal,
+        Case::LatexConstant,
+        Case::LatexSinusoidal,
+        Case::Liver,
+        Case::Abdomen,
+        Case::LiverArm,
+        Case::AbdomenArm,
+        Case::LiverArmFriction,
+        Case::AbdomenArmFriction,
+        Case::LiverQuadratic,
+    ];
+
+    /// One gel.
+    #[must_use]
+    pub const fn is_gel(self) -> bool {
+        matches!(
+            self,
+            Case::Gel25Constant
+                | Case::Gel25Sinusoidal
+                | Case::Gel50Constant
+                | Case::Gel50Sinusoidal
+                | Case::Gel70Constant
+                | Case::Gel70Sinusoidal
+        )
+    }
+
+    /// The stack of three gels.
+    #[must_use]
+    pub const fn is_stack(self) -> bool {
+        matches!(self, Case::LatexConstant | Case::LatexSinusoidal)
+    }
+
+    /// Liver.
+    #[must_use]
+    pub const fn is_liver(self) -> bool {
+        matches!(self, Case::Liver | Case::LiverArm | Case::LiverArmFriction | Case::LiverQuadratic)
+    }
+
+    /// Abdomen.
+    #[must_use]
+    pub const fn is_abdomen(self) -> bool {
+        matches!(self, Case::Abdomen | Case::AbdomenArm | Case::AbdomenArmFriction)
+    }
+
     /// Name of the scenario file that it starts from, and its text.
     #[must_use]
     pub const fn file(self) -> (&'static str, &'static str) {
@@ -136,17 +187,7 @@ mod tests {
 
     #[test]
     fn every_case_is_a_valid_scenario() {
-        for case in Case::GELS.iter().flatten().chain(&[
-            Case::LatexConstant,
-            Case::LatexSinusoidal,
-            Case::Liver,
-            Case::Abdomen,
-            Case::LiverArm,
-            Case::AbdomenArm,
-            Case::LiverArmFriction,
-            Case::AbdomenArmFriction,
-            Case::LiverQuadratic,
-        ]) {
+        for case in Case::ALL {
             case.scenario().expect("a valid file").check().expect("valid numbers");
             assert_eq!(
                 case.on_arm(),

@@ -2,7 +2,7 @@
 
 use crate::case::Case;
 use crate::study::Study;
-use crate::variant::{Protocol, Variant};
+use crate::view::View;
 
 /// An isinglass phantom.
 #[derive(Clone, Copy, Debug)]
@@ -28,34 +28,37 @@ pub const MOTIONS: [&str; 2] = ["constant", "sinusoidal"];
 pub enum Method {
     /// Least squares over the whole layer, all force being friction (supplement sec. III).
     Offline,
+    /// Least squares of K and b over the whole layer, without the drop.
+    OfflineBoth,
     /// The online algorithm, multi-layer model.
-    Online(Protocol),
+    Online,
 }
 
-/// The estimate in N s/m²; none when the online algorithm did not find the exit.
+/// Estimates of b in N s/m² by seed; none where the online algorithm did not find the exit.
 #[must_use]
-pub fn estimate(study: &Study, phantom: usize, motion: usize, method: Method, seed: usize) -> Option<f64> {
-    let case = PHANTOMS.get(phantom)?.cases.get(motion).copied()?;
+pub fn estimates(view: &View<'_>, phantom: usize, motion: usize, method: Method) -> Vec<Option<f64>> {
+    let case = PHANTOMS[phantom].cases[motion];
     match method {
-        Method::Offline => study.at(case, Variant::ml(Protocol::KnownDepth)).get(seed)?.friction_only,
-        Method::Online(protocol) => study.at(case, Variant::ml(protocol)).get(seed)?.online_friction(0),
+        Method::Offline => view.offline(case).iter().map(|o| o.friction_only).collect(),
+        Method::OfflineBoth => view
+            .offline(case)
+            .iter()
+            .map(|o| o.without_drop.first().copied().flatten().map(|e| e.friction_ns_per_m2))
+            .collect(),
+        Method::Online => view.ml(case).iter().map(|o| o.online_friction(0)).collect(),
     }
 }
 
-/// The same over all seeds.
-pub fn estimates(
-    study: &Study,
-    phantom: usize,
-    motion: usize,
-    method: Method,
-) -> impl Iterator<Item = Option<f64>> + '_ {
-    (0..study.seeds as usize).map(move |seed| estimate(study, phantom, motion, method, seed))
+/// One estimate over another, by seed.
+#[must_use]
+pub fn over(a: &[Option<f64>], b: &[Option<f64>]) -> Vec<Option<f64>> {
+    // A clipped estimate of zero has no logarithm.
+    a.iter().zip(b).map(|(a, b)| Some((*a)? / (*b)?).filter(|r| *r > 0.0 && r.is_finite())).collect()
 }
 
 /// The true friction of a phantom in N s/m².
 #[must_use]
 pub fn true_friction(study: &Study, phantom: usize) -> Option<f64> {
-    let case = PHANTOMS.get(phantom)?.cases[0];
-    let outcome = study.at(case, Variant::ml(Protocol::KnownDepth)).first()?;
+    let outcome = View::primary(study).ml(PHANTOMS[phantom].cases[0]).first()?;
     Some(outcome.score.layers.first()?.friction_ns_per_m2.truth)
 }

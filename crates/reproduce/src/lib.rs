@@ -1,26 +1,40 @@
 //! The paper, figure by figure and claim by claim: our analogues of the figures of Ferro, Gaz, Anzidei and
 //! Vendittelli (2021) and its supplement, from the shipped scenarios, and a verdict on every claim.
 //!
-//! - [`case`]: which scenario stands for which experiment; [`variant`]: the ways the algorithm is run.
-//! - [`study`]: all runs over all noise seeds, once.
-//! - [`claims`]: one file per claim; [`verdict`]: the rule that makes a verdict of numbers.
+//! - [`case`]: which scenario stands for which experiment; [`variant`]: the ways the algorithm is run, always the
+//!   paper's; [`tuning`]: its detection, tuned within the published range; [`change`]: numbers of ours, halved
+//!   and doubled.
+//! - [`study`]: all runs over all noise seeds, once; [`view`]: the conditions under which they are looked at.
+//! - [`protocol`]: what was written down for each claim before the numbers; [`claims`]: one file per claim;
+//!   [`effect`], [`interval`] and [`verdict`]: the rule that makes a verdict of numbers.
+//! - [`source`]: whose each number is; [`chosen`]: the verdicts that hang on ours; [`switches`]: the algorithm's.
 //! - [`figures`]: one file per group; [`truth`]: K and b against the truth; [`page`]: all together.
 #![forbid(unsafe_code)]
 
 pub mod case;
+pub mod change;
+pub mod chosen;
 pub mod claims;
+pub mod effect;
 pub mod figures;
 pub mod friction;
+pub mod insertion;
+pub mod interval;
 pub mod outcome;
 pub mod page;
+pub mod protocol;
+pub mod source;
 pub mod spread;
 pub mod study;
+pub mod switches;
 pub mod truth;
+pub mod tuning;
 pub mod variant;
 pub mod verdict;
+pub mod view;
 
 use claims::Claim;
-use study::{ReproduceError, Study};
+use study::{Plan, ReproduceError, Study};
 
 /// Everything that `stylet reproduce` writes.
 #[derive(Clone, Debug)]
@@ -35,18 +49,30 @@ pub struct Reproduction {
     pub pictures: Vec<(&'static str, String)>,
 }
 
-/// Runs every experiment over the noise seeds `1..=seeds`, judges the claims, draws the figures. `done` is
-/// called once for each of [`Study::insertions`]. The same bytes for any number of threads.
+/// Everything that claims, figures and tables look up, over the noise seeds from `first_seed` on.
+#[must_use]
+pub fn plan(first_seed: u64, seeds: u64) -> Plan {
+    let asking = Study::asking(first_seed, seeds);
+    let _ = claims::all(&asking);
+    figures::ask(&asking);
+    let _ = switches::section(&asking);
+    let _ = truth::section(&asking, &truth::pictures(&asking));
+    asking.plan()
+}
+
+/// Runs a plan, judges the claims, draws the figures. `done` is called once for each of
+/// [`Plan::recordings_in_all`]. The same bytes for any number of threads.
 ///
 /// # Errors
 /// [`ReproduceError`] when a shipped scenario is wrong.
-pub fn reproduce(seeds: u64, done: &(dyn Fn() + Sync)) -> Result<Reproduction, ReproduceError> {
-    let study = Study::run(seeds, done)?;
-    let claims = claims::all(&study)?;
+pub fn reproduce(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Reproduction, ReproduceError> {
+    let study = Study::run(plan, done)?;
+    let claims = claims::all(&study);
     let figures = figures::all(&study)?;
     let mut pictures = truth::pictures(&study).to_vec();
-    let html = page::page(&study, &claims, &figures, &pictures).to_html();
+    let files: Vec<_> = figures.iter().flat_map(|f| f.files.clone()).collect();
+    let html = page::page(&study, &claims, figures, &pictures).to_html();
     let claims_json = serde_json::to_string_pretty(&claims)? + "\n";
-    pictures.extend(figures.into_iter().flat_map(|f| f.files));
+    pictures.extend(files);
     Ok(Reproduction { html, claims, claims_json, pictures })
 }

@@ -1,7 +1,8 @@
-//! What is kept of one run: its score and what the claims ask beyond it.
+//! What is kept of one run: its score and what the claims ask beyond it, summed up as the samples come.
 
-use stylet_record::{Recording, Truth};
-use stylet_score::{LayerTruth, Score, Trace};
+use crate::insertion::Insertion;
+use stylet_core::{EnhanceConfig, Enhancer, Sample};
+use stylet_score::{Heard, LayerSample, Moment, OfflineEstimate, Score, Scorer, offline};
 
 /// One run of the algorithm on one recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,9 +19,10 @@ pub struct Outcome {
     pub elastic_error: Option<f64>,
     /// RMS of the reconstruction error over RMS of the measured force, from contact to the end.
     pub reconstruction: Option<f64>,
-    /// Friction in N s/m² of the first layer, offline, under the supplement's assumption that all force
-    /// is friction: least squares of `f` on `dz v`.
-    pub friction_only: Option<f64>,
+    /// Layers that were estimated and compensated.
+    pub estimated: usize,
+    /// Elastic share of the force drop of every true rupture that was found, by layer.
+    pub shares: Vec<Option<f64>>,
 }
 
 fn ratio(over: f64, under: f64) -> Option<f64> {
@@ -28,51 +30,73 @@ fn ratio(over: f64, under: f64) -> Option<f64> {
 }
 
 impl Outcome {
-    /// Collects what is asked.
+    /// Runs a core over the samples of an insertion.
     #[must_use]
-    pub fn of(
-        recording: &Recording,
-        force_n: &[f64],
-        truth: &Truth,
-        layers: &[LayerTruth],
-        trace: &Trace,
-        score: Score,
-    ) -> Self {
+    pub fn of(insertion: &Insertion, samples: &[Sample], config: &EnhanceConfig) -> Self {
+        let truth = &insertion.simulation.truth;
+        let mut scorer = Scorer::new(insertion.layers.clone(), config.model);
+        for rupture in &truth.ruptures {
+            scorer.rupture(*rupture);
+        }
         let contact_s = truth.surface_contact_s.unwrap_or(f64::INFINITY);
-        let exit_s = (truth.ruptures.len() == layers.len())
-            .then(|| truth.ruptures.last().map(|r| r.time_s))
-            .flatten()
-            .unwrap_or(f64::INFINITY);
         let last_rupture_s = truth.ruptures.last().map_or(f64::INFINITY, |r| r.time_s);
-        let from_s = trace.estimates.iter().map(|e| e.time_s).filter(|t| *t > exit_s).fold(exit_s, f64::max);
+        let exit_s =
+            if truth.ruptures.len() == insertion.layers.len() { last_rupture_s } else { f64::INFINITY };
+        let mut core =
+            Enhancer::new(config.clone(), insertion.surface_m(), vec![Sample::default(); samples.len()]);
         let (mut enhanced2, mut after2) = (0.0, 0.0);
         let (mut missed2, mut elastic2) = (0.0, 0.0);
         let (mut error2, mut force2) = (0.0, 0.0);
-        for (i, &time_s) in recording.time_s.iter().enumerate() {
-            let (f, enhanced) = (force_n[i], trace.enhanced_n[i]);
-            if time_s < contact_s || !f.is_finite() {
-                continue;
+        let mut estimates = Vec::new();
+        let mut found = 0.0f64;
+        let mut i = 0;
+        core.run(samples, |out| {
+            let Sample { time_s, position_m, force_n, .. } = samples[i];
+            if out.detection.is_some() || out.estimate.is_some() {
+                scorer.event(out);
             }
-            error2 += trace.error_n[i] * trace.error_n[i];
-            force2 += f * f;
-            if time_s > from_s {
-                enhanced2 += enhanced * enhanced;
-                after2 += f * f;
+            let moment = Moment { position_m, force_n, tip_n: truth.tip_force_n[i] };
+            scorer.sample(&moment, &Heard::from(out));
+            if let Some(estimate) = out.estimate {
+                found = (found + estimate.added_friction_ns_per_m).max(0.0);
+                estimates.push(estimate);
+                if time_s > exit_s {
+                    // From now on the layer that was left is compensated.
+                    (enhanced2, after2) = (0.0, 0.0);
+                }
             }
-            if time_s < last_rupture_s {
-                let elastic = truth.elastic_n[i];
-                missed2 += (enhanced - elastic) * (enhanced - elastic);
-                elastic2 += elastic * elastic;
+            if time_s >= contact_s && force_n.is_finite() {
+                error2 += out.error_n * out.error_n;
+                force2 += force_n * force_n;
+                if time_s > exit_s && out.estimate.is_none() {
+                    enhanced2 += out.enhanced_n * out.enhanced_n;
+                    after2 += force_n * force_n;
+                }
+                if time_s < last_rupture_s {
+                    let elastic = truth.elastic_n[i];
+                    missed2 += (out.enhanced_n - elastic) * (out.enhanced_n - elastic);
+                    elastic2 += elastic * elastic;
+                }
             }
-        }
+            i += 1;
+        });
+        let score = scorer.finish();
+        let shares = score
+            .ruptures
+            .iter()
+            .map(|r| {
+                let found = r.detection?;
+                estimates.iter().find(|e| e.layer == found).map(|e| e.elastic_share)
+            })
+            .collect();
         let cumulative = truth.cumulative_friction_ns_per_m.last().copied().unwrap_or(0.0);
-        let found = trace.cumulative_friction_ns_per_m.last().copied().unwrap_or(0.0);
         Self {
             cumulative_ratio: (cumulative > 0.0).then(|| found / cumulative),
             after_exit: ratio(enhanced2, after2),
             elastic_error: ratio(missed2, elastic2),
             reconstruction: ratio(error2, force2),
-            friction_only: friction_only(recording, force_n, truth, layers),
+            estimated: estimates.len(),
+            shares,
             score,
         }
     }
@@ -90,21 +114,64 @@ impl Outcome {
     }
 }
 
-fn friction_only(
-    recording: &Recording,
-    force_n: &[f64],
-    truth: &Truth,
-    layers: &[LayerTruth],
-) -> Option<f64> {
-    let (layer, rupture) = (layers.first()?, truth.ruptures.first()?);
-    let (mut over, mut under) = (0.0, 0.0);
-    for (s, f) in recording.samples().zip(force_n) {
-        let depth_m = s.position_m - layer.front_m;
-        if depth_m > 0.0 && s.time_s < rupture.time_s && f.is_finite() {
-            let phi = depth_m * s.velocity_mps;
-            over += phi * f;
-            under += phi * phi;
+/// What can be estimated offline from one recording: nothing of the online algorithm is in it but, where it
+/// says so, the drop's share.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Offline {
+    /// Friction in N s/m² of the first layer under the supplement's assumption that all force is friction:
+    /// least squares of `f` on `dz v`.
+    pub friction_only: Option<f64>,
+    /// K and b of every layer that ruptured, without a drop: where the data do not tell the two apart, elastic
+    /// and viscous column weigh the same (the supplement's `W` of eq. 17, `1/v²`).
+    pub without_drop: Vec<Option<OfflineEstimate>>,
+    /// The same with the drop's share, as the online algorithm measured it, deciding the split.
+    pub with_drop: Vec<Option<OfflineEstimate>>,
+}
+
+impl Offline {
+    /// From the samples of an insertion; `shares` are the drops' elastic shares.
+    #[must_use]
+    pub fn of(insertion: &Insertion, samples: &[Sample], shares: &[Option<f64>]) -> Self {
+        let ruptures = &insertion.simulation.truth.ruptures;
+        let mut out = Self::default();
+        let (mut without, mut with) = (0.0, 0.0);
+        for (index, rupture) in ruptures.iter().enumerate() {
+            let Some(layer) = rupture.layer.checked_sub(1).and_then(|l| insertion.layers.get(l)) else {
+                continue;
+            };
+            let inside = || {
+                let from = samples.partition_point(|s| s.position_m <= layer.front_m);
+                samples[from.min(samples.len())..]
+                    .iter()
+                    .take_while(|s| s.time_s < rupture.time_s)
+                    .filter(|s| s.force_n.is_finite() && s.velocity_mps > 0.0)
+                    .map(|s| (s.position_m - layer.front_m, s.velocity_mps, s.force_n))
+            };
+            let (n, speeds) = inside().fold((0.0, 0.0), |(n, sum), (_, v, _)| (n + 1.0, sum + v));
+            if index == 0 {
+                let (over, under) = inside().fold((0.0, 0.0), |(over, under), (z, v, f)| {
+                    let phi = z * v;
+                    (over + phi * f, under + phi * phi)
+                });
+                out.friction_only = (under > 0.0).then(|| over / under);
+            }
+            let ratio = n / speeds;
+            let fit = |cumulative: f64, share: f64| {
+                let layer = inside().map(|(depth_m, velocity_mps, f)| LayerSample {
+                    depth_m,
+                    velocity_mps,
+                    force_n: f - cumulative * velocity_mps,
+                });
+                offline(layer, ((1.0 - share) / share).sqrt() * ratio)
+            };
+            let depth_m = rupture.position_m - layer.front_m;
+            let plain = fit(without, 0.5);
+            without += plain.map_or(0.0, |e| e.friction_ns_per_m2.max(0.0) * depth_m);
+            out.without_drop.push(plain);
+            let split = shares.get(index).copied().flatten().and_then(|share| fit(with, share));
+            with += split.map_or(0.0, |e| e.friction_ns_per_m2.max(0.0) * depth_m);
+            out.with_drop.push(split);
         }
+        out
     }
-    (under > 0.0).then(|| over / under)
 }

@@ -1,18 +1,25 @@
 //! All runs over all seeds, once: claims, tables and figures only read them.
+//!
+//! What has to be run is what they ask for: they are asked first, of a study without any runs, and every
+//! combination that they look up is noted.
 
 use crate::case::Case;
-use crate::outcome::Outcome;
-use crate::variant::{Protocol, Sensor, TRACE_THRESHOLDS, Variant};
+use crate::change::Change;
+use crate::insertion::Insertion;
+use crate::outcome::{Offline, Outcome};
+use crate::tuning::{TUNING_FIRST_SEED, TUNING_SEEDS, TUNING_SEEDS_ARM, Tuning};
+use crate::variant::{Ablation, Sensor, Setup, Variant};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
-use stylet_scenario::{InputError, Scenario};
-use stylet_score::{LayerTruth, Trace, score_run};
-use stylet_testbed::{InsertionSample, Measuring, SimulateError, Simulation, simulate};
-use stylet_tissue::TissueForce;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+use stylet_scenario::InputError;
+use stylet_testbed::SimulateError;
 
-/// Noise of the force/torque sensor in mN where nothing else is said: that of every shipped scenario.
-pub const NOISE_MN: u32 = 20;
-/// Noise levels of the force/torque sensor, in mN, that the comparison with the truth goes through.
+/// Noise of the force/torque sensor, in mN, where nothing else is said: the laboratory's standard deviation of
+/// the error in ordinary insertion.
+pub const NOISE_MN: u32 = 10;
+/// Noise levels of the comparison with the truth, in mN: half, as it is, twice (that of the shipped
+/// scenarios), and one at which the algorithm breaks down.
 pub const NOISE_LEVELS_MN: [u32; 4] = [5, 10, 20, 50];
 
 /// Why nothing could be reproduced: a mistake in what is shipped.
@@ -32,228 +39,300 @@ pub enum ReproduceError {
     Json(#[from] serde_json::Error),
 }
 
-/// What was run: experiment, noise, sensor, variant.
+/// What is recorded: an experiment, perhaps with a changed number, and the noise of the force/torque sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Key {
+pub struct Recorded {
     /// Experiment.
     pub case: Case,
+    /// What was changed in it.
+    pub change: Option<Change>,
     /// Noise of the force/torque sensor in mN.
     pub noise_mn: u32,
+}
+
+/// What was run: a recording, the sensor that is listened to, the way of running.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    /// The recording.
+    pub recorded: Recorded,
     /// Sensor.
     pub sensor: Sensor,
     /// Model and protocol.
     pub variant: Variant,
 }
 
-/// One experiment at one noise level with all that is run on its recordings.
-struct Job {
-    case: Case,
-    noise_mn: u32,
-    sensors: &'static [Sensor],
-    variants: Vec<Variant>,
-}
-
-/// A scenario, simulated, with its layers.
-#[derive(Clone, Debug)]
-pub struct Insertion {
-    /// The scenario.
-    pub scenario: Scenario,
-    /// Recording and truth.
-    pub simulation: Simulation,
-    /// The layers as the law has them.
-    pub layers: Vec<LayerTruth>,
-}
-
-impl Insertion {
-    /// Simulates a scenario with the noise of a seed.
-    ///
-    /// # Errors
-    /// [`SimulateError`] when it cannot be simulated.
-    pub fn of(scenario: &Scenario, seed: u64) -> Result<Self, SimulateError> {
-        let simulation = simulate(scenario, seed)?;
-        let layers = simulation
-            .slabs
-            .iter()
-            .map(|s| LayerTruth {
-                front_m: s.front_m,
-                thickness_m: s.thickness_m,
-                stiffness_n_per_m: s.stiffness_n_per_m,
-                friction_ns_per_m2: s.friction_ns_per_m2,
-            })
-            .collect();
-        Ok(Self { scenario: scenario.clone(), simulation, layers })
-    }
-
-    /// The same insertion as another seed's force/torque sensor records it: on the slide the noise moves
-    /// nothing, so that the motion need not be simulated again.
-    fn reading(&self, seed: u64) -> Vec<f64> {
-        let Some(sensor) = self.scenario.sensor.force_torque() else { return Vec::new() };
-        let mut measuring = Measuring::new(&self.scenario.effects, sensor, seed, self.scenario.sample_hz);
-        let Simulation { recording, truth, .. } = &self.simulation;
-        let samples = recording.samples().zip(&truth.tissue_force_n);
-        samples
-            .map(|(s, &total_n)| {
-                measuring.measure(&InsertionSample {
-                    time_s: s.time_s,
-                    position_m: s.position_m,
-                    velocity_mps: s.velocity_mps,
-                    acceleration_mps2: 0.0,
-                    force: TissueForce { total_n, ..TissueForce::default() },
-                })
-            })
-            .collect()
-    }
-
-    /// Runs the algorithm on a force.
-    #[must_use]
-    pub fn run(&self, force_n: &[f64], sensor: Sensor, variant: Variant) -> (Trace, Outcome) {
-        let Simulation { recording, truth, .. } = &self.simulation;
-        let config = variant.config(&self.scenario, sensor);
-        let (trace, score) = score_run(recording, force_n, truth, &self.layers, &config);
-        let outcome = Outcome::of(recording, force_n, truth, &self.layers, &trace, score);
-        (trace, outcome)
-    }
-
-    /// What a sensor recorded.
-    #[must_use]
-    pub fn force_n(&self, sensor: Sensor) -> &[f64] {
-        self.simulation.readings.iter().find(|r| r.sensor == sensor.key()).map_or(&[], |r| &r.force_n)
-    }
+/// What somebody looked up, and for how many seeds.
+#[derive(Clone, Debug, Default)]
+struct Wanted {
+    runs: BTreeMap<Key, u64>,
+    offline: BTreeMap<Recorded, u64>,
 }
 
 /// The outcomes of every run, by seed.
 #[derive(Debug, Default)]
 pub struct Study {
+    /// First noise seed.
+    pub first_seed: u64,
     /// Number of noise seeds.
     pub seeds: u64,
     runs: BTreeMap<Key, Vec<Outcome>>,
-    none: Vec<Outcome>,
+    offline: BTreeMap<Recorded, Vec<Offline>>,
+    tunings: BTreeMap<(Recorded, Sensor), Tuning>,
+    wanted: Option<Mutex<Wanted>>,
 }
 
-fn plan() -> Vec<Job> {
-    use Protocol::{KnownDepth, NoReweight, NoReweightKnown, OnlyRuptures, Paper, Sensitive};
-    const TOUCH: &[Sensor] = &[Sensor::ForceTorque];
-    const BOTH: &[Sensor] = &[Sensor::ForceTorque, Sensor::Virtual];
-    let both = |p: Protocol| [Variant::kv(p), Variant::ml(p)];
-    let ablations = [Paper, OnlyRuptures, NoReweight].map(Variant::ml);
-    let traces = (0..TRACE_THRESHOLDS.len()).map(|i| Variant::ml(Protocol::Trace(i)));
-    let mut jobs = Vec::new();
-    // The dear ones first, so that no thread is left alone with one at the end.
-    for case in [Case::LiverArm, Case::LiverArmFriction, Case::AbdomenArm, Case::AbdomenArmFriction] {
-        jobs.push(Job { case, noise_mn: NOISE_MN, sensors: BOTH, variants: both(Paper).to_vec() });
-    }
-    let mut on_slide = |case: Case, noise_mn: u32, variants: Vec<Variant>| {
-        jobs.push(Job { case, noise_mn, sensors: TOUCH, variants });
-    };
-    for case in Case::GELS.into_iter().flatten() {
-        let mut variants: Vec<Variant> = [Paper, KnownDepth, Sensitive].into_iter().flat_map(both).collect();
-        variants.extend([OnlyRuptures, NoReweight, NoReweightKnown].map(Variant::ml));
-        if case == Case::Gel70Constant {
-            variants.extend(traces.clone());
+/// Recordings that share one simulation, or on the arm the seeds' simulations.
+type Group = (Case, Option<Change>);
+
+/// One recording of one seed, with all that is asked of it.
+struct Job<'a> {
+    recorded: Recorded,
+    once: &'a Insertion,
+    seed: u64,
+    runs: Vec<Key>,
+    offline: bool,
+}
+
+/// What a job gives.
+#[derive(Default)]
+struct Done {
+    runs: Vec<(Key, Outcome)>,
+    offline: Option<(Recorded, Offline)>,
+}
+
+/// A plan: everything that was asked for.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    first_seed: u64,
+    seeds: u64,
+    wanted: Wanted,
+}
+
+impl Plan {
+    /// The recordings with their number of seeds, dear ones first, so that no thread is left alone at the end.
+    fn recordings(&self) -> Vec<(Recorded, u64)> {
+        let mut all: BTreeMap<Recorded, u64> = self.wanted.offline.clone();
+        for (key, seeds) in &self.wanted.runs {
+            let most = all.entry(key.recorded).or_default();
+            *most = (*most).max(*seeds);
         }
-        on_slide(case, NOISE_MN, variants);
+        let mut list: Vec<(Recorded, u64)> = all.into_iter().collect();
+        list.sort_by_key(|(r, _)| (!r.case.on_arm(), !r.case.is_liver()));
+        list
     }
-    for case in [Case::LatexConstant, Case::LatexSinusoidal, Case::Liver, Case::Abdomen] {
-        for noise_mn in NOISE_LEVELS_MN {
-            let mut variants = both(Paper).to_vec();
-            if noise_mn == NOISE_MN {
-                variants.extend([OnlyRuptures, NoReweight].map(Variant::ml));
-                variants.extend(traces.clone());
-            }
-            on_slide(case, noise_mn, variants);
+
+    /// Number of recordings over all seeds: what progress counts.
+    #[must_use]
+    pub fn recordings_in_all(&self) -> u64 {
+        self.recordings().iter().map(|(_, seeds)| seeds).sum()
+    }
+
+    /// Number of runs of the algorithm over all seeds, without those of the tuning.
+    #[must_use]
+    pub fn runs_in_all(&self) -> u64 {
+        self.wanted.runs.values().sum()
+    }
+
+    fn insertions(&self) -> Result<BTreeMap<Group, Insertion>, ReproduceError> {
+        let groups: BTreeSet<Group> = self.recordings().iter().map(|(r, _)| (r.case, r.change)).collect();
+        let made: Vec<(Group, Insertion)> = groups
+            .into_par_iter()
+            .map(|(case, change)| {
+                let mut scenario = case.scenario()?;
+                if let Some(change) = change {
+                    change.apply(&mut scenario);
+                }
+                Ok::<_, ReproduceError>(((case, change), Insertion::of(&scenario, self.first_seed)?))
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(made.into_iter().collect())
+    }
+
+    /// What has to be tuned, and whether the triggered reset's threshold too.
+    fn to_tune(&self) -> BTreeMap<(Recorded, Sensor), bool> {
+        let mut all = BTreeMap::new();
+        for key in self.wanted.runs.keys().filter(|k| k.variant.is_tuned()) {
+            let trace = all.entry((unchanged_on_arm(key.recorded), key.sensor)).or_insert(false);
+            *trace |= key.variant.ablation == Ablation::Trace;
         }
+        all
     }
-    on_slide(Case::LiverQuadratic, NOISE_MN, ablations.to_vec());
-    jobs
+}
+
+/// On the arm a changed phantom is run with the tuning of the unchanged one.
+fn unchanged_on_arm(recorded: Recorded) -> Recorded {
+    if recorded.case.on_arm() { Recorded { change: None, ..recorded } } else { recorded }
 }
 
 impl Study {
-    /// Number of insertions for a number of seeds: what progress counts.
+    /// A study without runs that notes what is asked of it.
     #[must_use]
-    pub fn insertions(seeds: u64) -> u64 {
-        plan().len() as u64 * seeds
+    pub fn asking(first_seed: u64, seeds: u64) -> Self {
+        Self { first_seed, seeds, wanted: Some(Mutex::default()), ..Self::default() }
     }
 
-    /// Runs everything over the noise seeds `1..=seeds`; `done` is called once per insertion, from any
+    /// Whether it only notes what is asked of it.
+    #[must_use]
+    pub const fn is_asking(&self) -> bool {
+        self.wanted.is_some()
+    }
+
+    /// What was asked of a study made by [`Study::asking`].
+    #[must_use]
+    pub fn plan(self) -> Plan {
+        let wanted = self.wanted.and_then(|w| w.into_inner().ok()).unwrap_or_default();
+        Plan { first_seed: self.first_seed, seeds: self.seeds, wanted }
+    }
+
+    /// Runs everything in a plan; `done` is called once for each of [`Plan::recordings_in_all`], from any
     /// thread. The result does not depend on the number of threads.
     ///
     /// # Errors
     /// [`ReproduceError`] when a shipped scenario is wrong.
-    pub fn run(seeds: u64, done: &(dyn Fn() + Sync)) -> Result<Self, ReproduceError> {
-        let prepared: Vec<(Job, Insertion)> = plan()
+    pub fn run(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Self, ReproduceError> {
+        let insertions = plan.insertions()?;
+        let missing = |r: &Recorded| ReproduceError::NotRun(r.case.name().to_owned());
+        let tunings: Vec<((Recorded, Sensor), Tuning)> = plan
+            .to_tune()
             .into_par_iter()
-            .map(|job| {
-                let mut scenario = job.case.scenario()?;
-                if let stylet_scenario::Sensor::ForceTorque(sensor) = &mut scenario.sensor {
-                    sensor.noise_n = f64::from(job.noise_mn) * 1e-3;
-                }
-                let insertion = Insertion::of(&scenario, 1)?;
-                Ok::<_, ReproduceError>((job, insertion))
+            .map(|((recorded, sensor), trace)| {
+                let once = insertions.get(&(recorded.case, recorded.change));
+                let once = once.ok_or_else(|| missing(&recorded))?;
+                Ok::<_, ReproduceError>(((recorded, sensor), tune(recorded, once, sensor, trace)?))
             })
             .collect::<Result<_, _>>()?;
-        let pairs: Vec<(&Job, &Insertion, u64)> =
-            prepared.iter().flat_map(|(job, once)| (1..=seeds).map(move |seed| (job, once, seed))).collect();
-        let outcomes: Vec<Vec<(Key, Outcome)>> = pairs
+        let tunings: BTreeMap<(Recorded, Sensor), Tuning> = tunings.into_iter().collect();
+        let mut jobs = Vec::new();
+        for (recorded, seeds) in plan.recordings() {
+            let once = insertions.get(&(recorded.case, recorded.change)).ok_or_else(|| missing(&recorded))?;
+            for index in 0..seeds {
+                let wants = |most: &u64| *most > index;
+                let runs = plan.wanted.runs.iter().filter(|(k, n)| k.recorded == recorded && wants(n));
+                jobs.push(Job {
+                    recorded,
+                    once,
+                    seed: plan.first_seed + index,
+                    runs: runs.map(|(k, _)| *k).collect(),
+                    offline: plan.wanted.offline.get(&recorded).is_some_and(wants),
+                });
+            }
+        }
+        let first = plan.first_seed;
+        let outcomes: Vec<Done> = jobs
             .into_par_iter()
             .with_max_len(1)
-            .map(|(job, once, seed)| {
-                let found = one(job, once, seed);
+            .map(|job| {
+                let found = one(&job, first, &tunings);
                 done();
                 found
             })
             .collect::<Result<_, _>>()?;
         let mut runs: BTreeMap<Key, Vec<Outcome>> = BTreeMap::new();
-        for (key, outcome) in outcomes.into_iter().flatten() {
-            runs.entry(key).or_default().push(outcome);
+        let mut offline: BTreeMap<Recorded, Vec<Offline>> = BTreeMap::new();
+        for done in outcomes {
+            for (key, outcome) in done.runs {
+                runs.entry(key).or_default().push(outcome);
+            }
+            if let Some((recorded, found)) = done.offline {
+                offline.entry(recorded).or_default().push(found);
+            }
         }
-        Ok(Self { seeds, runs, none: Vec::new() })
+        Ok(Self { first_seed: first, seeds: plan.seeds, runs, offline, tunings, wanted: None })
     }
 
-    /// The outcomes of one combination, by seed; empty when it was not run.
+    /// The outcomes of one combination, by seed, at most `seeds` of them; notes it in a study that asks.
     #[must_use]
-    pub fn runs(&self, case: Case, noise_mn: u32, sensor: Sensor, variant: Variant) -> &[Outcome] {
-        self.runs.get(&Key { case, noise_mn, sensor, variant }).unwrap_or(&self.none)
+    pub fn runs(&self, key: Key, seeds: u64) -> &[Outcome] {
+        let seeds = seeds.min(self.seeds);
+        if let Some(mut wanted) = self.wanted.as_ref().and_then(|w| w.lock().ok()) {
+            let most = wanted.runs.entry(key).or_default();
+            *most = (*most).max(seeds);
+        }
+        let all = self.runs.get(&key).map_or(&[][..], Vec::as_slice);
+        &all[..all.len().min(seeds as usize)]
     }
 
-    /// The same for the force/torque sensor at the ordinary noise.
+    /// The offline estimates of a recording, as [`Study::runs`].
     #[must_use]
-    pub fn at(&self, case: Case, variant: Variant) -> &[Outcome] {
-        self.runs(case, NOISE_MN, Sensor::ForceTorque, variant)
+    pub fn offline(&self, recorded: Recorded, seeds: u64) -> &[Offline] {
+        let seeds = seeds.min(self.seeds);
+        if let Some(mut wanted) = self.wanted.as_ref().and_then(|w| w.lock().ok()) {
+            let most = wanted.offline.entry(recorded).or_default();
+            *most = (*most).max(seeds);
+        }
+        let all = self.offline.get(&recorded).map_or(&[][..], Vec::as_slice);
+        &all[..all.len().min(seeds as usize)]
+    }
+
+    /// How a phantom's detection was tuned; the published defaults where nothing was.
+    #[must_use]
+    pub fn tuning(&self, recorded: Recorded, sensor: Sensor) -> Tuning {
+        self.tunings.get(&(unchanged_on_arm(recorded), sensor)).copied().unwrap_or_default()
+    }
+
+    /// All tunings.
+    pub fn tunings(&self) -> impl Iterator<Item = (&(Recorded, Sensor), &Tuning)> {
+        self.tunings.iter()
     }
 }
 
-fn one(job: &Job, once: &Insertion, seed: u64) -> Result<Vec<(Key, Outcome)>, ReproduceError> {
-    let mut found = Vec::new();
-    let mut listen = |insertion: &Insertion, force_n: &[f64], sensor: Sensor| {
-        for &variant in &job.variants {
-            let key = Key { case: job.case, noise_mn: job.noise_mn, sensor, variant };
-            found.push((key, insertion.run(force_n, sensor, variant).1));
-        }
-    };
-    if job.case.on_arm() {
-        // The torques' noise moves the arm: each seed is an insertion of its own.
-        let fresh = if seed == 1 { once.clone() } else { Insertion::of(&once.scenario, seed)? };
-        for &sensor in job.sensors {
-            listen(&fresh, fresh.force_n(sensor), sensor);
-        }
+fn tune(recorded: Recorded, once: &Insertion, sensor: Sensor, trace: bool) -> Result<Tuning, ReproduceError> {
+    if !recorded.case.on_arm() {
+        let seeds = TUNING_FIRST_SEED..TUNING_FIRST_SEED + TUNING_SEEDS;
+        let recordings: Vec<_> =
+            seeds.map(|seed| (once, once.samples(&once.reading(seed, recorded.noise_mn)))).collect();
+        return Ok(Tuning::of(&recordings, sensor, trace));
+    }
+    let seeds: Vec<u64> = (TUNING_FIRST_SEED..TUNING_FIRST_SEED + TUNING_SEEDS_ARM).collect();
+    let made: Vec<Insertion> =
+        seeds.par_iter().map(|seed| Insertion::of(&once.scenario, *seed)).collect::<Result<_, _>>()?;
+    let recordings: Vec<_> = made
+        .iter()
+        .zip(&seeds)
+        .map(|(insertion, seed)| (insertion, arm_samples(insertion, *seed, recorded.noise_mn, sensor)))
+        .collect();
+    Ok(Tuning::of(&recordings, sensor, trace))
+}
+
+fn arm_samples(insertion: &Insertion, seed: u64, noise_mn: u32, sensor: Sensor) -> Vec<stylet_core::Sample> {
+    match sensor {
+        Sensor::ForceTorque => insertion.samples(&insertion.reading(seed, noise_mn)),
+        Sensor::Virtual => insertion.samples(insertion.force_n(sensor)),
+    }
+}
+
+fn one(
+    job: &Job<'_>,
+    first_seed: u64,
+    tunings: &BTreeMap<(Recorded, Sensor), Tuning>,
+) -> Result<Done, ReproduceError> {
+    let mut done = Done::default();
+    // On the arm the torques' noise moves the needle: each seed is an insertion of its own.
+    let fresh;
+    let insertion = if job.recorded.case.on_arm() && job.seed != first_seed {
+        fresh = Insertion::of(&job.once.scenario, job.seed)?;
+        &fresh
     } else {
-        listen(once, &once.reading(seed), Sensor::ForceTorque);
-    }
-    Ok(found)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn noise_drawn_apart_is_the_noise_of_a_simulation_of_its_own() {
-        let scenario = Case::Gel25Constant.scenario().expect("valid");
-        let once = Insertion::of(&scenario, 1).expect("a simulation");
-        for seed in [1, 7] {
-            let whole = simulate(&scenario, seed).expect("a simulation");
-            assert_eq!(once.reading(seed), whole.recording.force_n, "seed {seed}");
+        job.once
+    };
+    for sensor in [Sensor::ForceTorque, Sensor::Virtual] {
+        let asked = job.runs.iter().filter(|k| k.sensor == sensor);
+        if !(job.offline && sensor == Sensor::ForceTorque) && asked.clone().next().is_none() {
+            continue;
         }
-        assert_ne!(once.reading(1), once.reading(2));
+        let samples = arm_samples(insertion, job.seed, job.recorded.noise_mn, sensor);
+        let tuning = tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
+        let mut shares = Vec::new();
+        for key in asked {
+            let outcome = insertion.run(&samples, sensor, key.variant, &tuning);
+            if key.variant == Variant::ml(Setup::Tuned) {
+                shares.clone_from(&outcome.shares);
+            }
+            done.runs.push((*key, outcome));
+        }
+        if job.offline && sensor == Sensor::ForceTorque {
+            done.offline = Some((job.recorded, Offline::of(insertion, &samples, &shares)));
+        }
     }
+    Ok(done)
 }

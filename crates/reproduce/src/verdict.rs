@@ -1,117 +1,95 @@
-//! The rule by which numbers become a verdict: one place for all claims.
-//!
-//! A claim is a list of conditions (a phantom, a motion, a sensor, a protocol). In every noise seed the
-//! claim's statement either holds under a condition or does not. A condition *holds* when the statement
-//! does in at least 90 % of the seeds, it *fails* when it does in at most 10 %; between, the noise decides.
-//! All conditions hold: **supported**. All fail: **not supported**. Otherwise: **depends on** what
-//! separates the conditions. The thresholds inside the statements stand in each claim's file; they were set
-//! before the numbers were seen and are not tuned to the verdicts.
+//! The rule by which a primary condition becomes a verdict: one place for all claims (`claims/README.md`).
 
-use serde::{Serialize, Serializer};
+use crate::change::Change;
+use crate::effect::{Bar, Effect, Says};
+use serde::Serialize;
 
-/// Share of the seeds from which on a condition holds.
-pub const HOLDS: f64 = 0.9;
-/// Share of the seeds up to which a condition fails.
-pub const FAILS: f64 = 0.1;
-
-/// In how many seeds a claim's statement holds under a condition.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Condition {
-    /// Under which circumstances.
-    pub name: String,
-    /// Seeds in which the statement holds,
-    pub holds: usize,
-    /// of so many.
-    pub of: usize,
-}
-
-impl Condition {
-    /// Counts.
-    #[must_use]
-    pub fn new(name: impl Into<String>, seeds: impl Iterator<Item = bool>) -> Self {
-        let (mut holds, mut of) = (0, 0);
-        for seed in seeds {
-            of += 1;
-            holds += usize::from(seed);
-        }
-        Self { name: name.into(), holds, of }
-    }
-
-    fn share(&self) -> f64 {
-        if self.of == 0 { 0.0 } else { self.holds as f64 / self.of as f64 }
-    }
-
-    /// The statement holds in nearly every seed.
-    #[must_use]
-    pub fn holds(&self) -> bool {
-        self.share() >= HOLDS
-    }
-
-    /// The statement fails in nearly every seed.
-    #[must_use]
-    pub fn fails(&self) -> bool {
-        self.share() <= FAILS
-    }
-}
-
-/// What our testbed says of a claim.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What the testbed says of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Under every condition.
+    /// The primary condition supports it, and no number of ours decides.
     Supported,
-    /// Under none.
-    NotSupported,
-    /// Under some; on what it depends.
-    DependsOn(String),
+    /// The primary condition contradicts it, and no number of ours decides.
+    Contradicted,
+    /// A number that we chose decides.
+    Assumed,
+    /// The interval holds the bar, or too few seeds give a value.
+    Undecided,
+    /// No simulation can say.
+    Untestable,
 }
 
 impl Verdict {
-    /// From the conditions; `on` names what tells them apart.
+    /// In a word.
     #[must_use]
-    pub fn of(conditions: &[Condition], on: &str) -> Self {
-        if !conditions.is_empty() && conditions.iter().all(Condition::holds) {
-            Self::Supported
-        } else if conditions.iter().all(Condition::fails) {
-            Self::NotSupported
-        } else {
-            Self::DependsOn(on.to_owned())
-        }
-    }
-
-    /// As it stands in `claims.json`.
-    #[must_use]
-    pub fn words(&self) -> String {
+    pub const fn word(self) -> &'static str {
         match self {
-            Self::Supported => "supported".to_owned(),
-            Self::NotSupported => "not supported".to_owned(),
-            Self::DependsOn(on) => format!("depends on {on}"),
+            Verdict::Supported => "supported",
+            Verdict::Contradicted => "contradicted",
+            Verdict::Assumed => "assumed",
+            Verdict::Undecided => "undecided",
+            Verdict::Untestable => "untestable",
         }
     }
 }
 
-impl Serialize for Verdict {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&self.words())
+/// A number of ours halved or doubled, and what becomes of the primary effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trial {
+    /// What was changed.
+    pub change: Change,
+    /// The effect then.
+    pub effect: Effect,
+    /// Whether it lies on the other side of the bar, or exists only with or only without the change.
+    pub decides: bool,
+}
+
+impl Trial {
+    /// Compares with the primary effect.
+    #[must_use]
+    pub fn new(change: Change, effect: Effect, primary: &Effect, bar: Bar) -> Self {
+        let decides = bar.side(&effect) != bar.side(primary);
+        Self { change, effect, decides }
+    }
+}
+
+/// The verdict: what the primary condition says, unless a number of ours decides. Sensitivity conditions are
+/// not asked.
+#[must_use]
+pub fn verdict(primary: Says, trials: &[Trial]) -> Verdict {
+    if trials.iter().any(|t| t.decides) {
+        return Verdict::Assumed;
+    }
+    match primary {
+        Says::Supports => Verdict::Supported,
+        Says::Contradicts => Verdict::Contradicted,
+        Says::Undecided => Verdict::Undecided,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::change::Number;
+    use crate::interval::Interval;
 
-    fn condition(holds: usize) -> Condition {
-        Condition { name: String::new(), holds, of: 50 }
+    fn effect(value: f64) -> Effect {
+        Effect { interval: Some(Interval { value, low: value - 0.1, high: value + 0.1 }), seeds: 50, of: 50 }
     }
 
     #[test]
-    fn the_verdict_follows_from_the_shares() {
-        let verdict = |shares: &[usize]| {
-            Verdict::of(&shares.iter().map(|&h| condition(h)).collect::<Vec<_>>(), "x").words()
-        };
-        assert_eq!(verdict(&[50, 45]), "supported");
-        assert_eq!(verdict(&[0, 5]), "not supported");
-        assert_eq!(verdict(&[50, 0]), "depends on x");
-        assert_eq!(verdict(&[30]), "depends on x");
-        assert_eq!(verdict(&[]), "not supported");
+    fn the_primary_condition_decides_unless_a_chosen_number_does() {
+        let bar = Bar::Below(1.0);
+        let [halved, doubled] = Number::Noise.changes();
+        let trial = |change, value| Trial::new(change, effect(value), &effect(0.5), bar);
+        let (same, other) = (trial(halved, 0.7), trial(doubled, 1.2));
+        assert!(!same.decides && other.decides);
+        assert_eq!(verdict(Says::Supports, std::slice::from_ref(&same)), Verdict::Supported);
+        assert_eq!(verdict(Says::Contradicts, &[]), Verdict::Contradicted);
+        assert_eq!(verdict(Says::Undecided, &[]), Verdict::Undecided);
+        assert_eq!(verdict(Says::Supports, &[same, other]), Verdict::Assumed);
+        let none = Effect { interval: None, seeds: 0, of: 20 };
+        assert!(Trial::new(halved, none, &effect(0.5), bar).decides, "an effect that exists no longer");
     }
 }

@@ -1,70 +1,36 @@
-//! (a) The friction estimates of the three isinglass phantoms do not overlap and grow with concentration.
+//! (a1) The friction estimates of the three isinglass phantoms do not overlap.
 
-use super::{Claim, numbers};
-use crate::friction::{Method, PHANTOMS, estimate};
-use crate::spread::Spread;
-use crate::study::Study;
-use crate::variant::Protocol;
-use crate::verdict::{Condition, Verdict};
+use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
+use crate::effect::{Bar, Measured, Part, Scale};
+use crate::friction::{MOTIONS, Method, PHANTOMS, estimates};
+use crate::view::View;
 
-/// All estimates of each phantom, one value per motion and method, in one seed.
-fn apart(study: &Study, seed: usize, methods: &[Method]) -> bool {
-    let of = |phantom: usize| -> Option<Vec<f64>> {
-        (0..2)
-            .flat_map(|motion| methods.iter().map(move |m| estimate(study, phantom, motion, *m, seed)))
+fn gaps(view: &View<'_>, methods: &[Method]) -> Measured {
+    let of = |phantom: usize| -> Vec<Vec<Option<f64>>> {
+        (0..MOTIONS.len())
+            .flat_map(|motion| methods.iter().map(move |m| estimates(view, phantom, motion, *m)))
             .collect()
     };
-    let all: Option<Vec<Vec<f64>>> = (0..PHANTOMS.len()).map(of).collect();
-    all.is_some_and(|phantoms| {
-        phantoms.windows(2).all(|pair| {
-            pair[0].iter().copied().fold(f64::NEG_INFINITY, f64::max)
-                < pair[1].iter().copied().fold(f64::INFINITY, f64::min)
-        })
-    })
+    let parts = (1..PHANTOMS.len()).map(|stronger| {
+        let (below, above) = (of(stronger - 1), of(stronger));
+        let seeds = below.iter().chain(&above).map(Vec::len).min().unwrap_or(0);
+        let gap = |seed: usize| {
+            let at = |all: &[Vec<Option<f64>>]| all.iter().map(|e| e[seed]).collect::<Option<Vec<f64>>>();
+            let highest = at(&below)?.into_iter().fold(0.0, f64::max);
+            let lowest = at(&above)?.into_iter().fold(f64::INFINITY, f64::min);
+            Some(lowest / highest).filter(|gap| *gap > 0.0 && gap.is_finite())
+        };
+        let name = format!("{} over {}", PHANTOMS[stronger].name, PHANTOMS[stronger - 1].name);
+        Part::new(name, (0..seeds).map(gap))
+    });
+    Measured { scale: Scale::SmallestRatio, parts: parts.collect() }
 }
 
-pub(super) fn claim(study: &Study) -> Claim {
-    let seeds = 0..study.seeds as usize;
-    let condition = |name: &str, methods: &[Method]| {
-        Condition::new(name, seeds.clone().map(|seed| apart(study, seed, methods)))
-    };
-    let online = |protocol| [Method::Offline, Method::Online(protocol)];
-    let conditions = vec![
-        condition("offline alone", &[Method::Offline]),
-        condition("depths known", &online(Protocol::KnownDepth)),
-        condition("depths unknown, s1 = 0.15 N", &online(Protocol::Paper)),
-        condition("depths unknown, s1 = 0.03 N", &online(Protocol::Sensitive)),
-    ];
-    let mut list = Vec::new();
-    for (index, phantom) in PHANTOMS.iter().enumerate() {
-        for (motion, motion_name) in ["constant", "sinusoidal"].iter().enumerate() {
-            for (name, method) in [
-                ("offline", Method::Offline),
-                ("online, depth known", Method::Online(Protocol::KnownDepth)),
-                ("online, depth unknown", Method::Online(Protocol::Paper)),
-                ("online, depth unknown, s1 0.03 N", Method::Online(Protocol::Sensitive)),
-            ] {
-                let values = seeds.clone().map(|seed| estimate(study, index, motion, method, seed));
-                let name = format!("b of {} {motion_name} {name} N s/m²", phantom.name);
-                list.push((name, Spread::of(values)));
-            }
-        }
-    }
-    Claim {
-        id: 'a',
-        claim: "The three isinglass friction estimates do not overlap and grow with concentration.",
-        figure: "S Fig. 2, Table I",
-        rule: "In a seed, all four estimates of a phantom (offline and online, constant and sinusoidal) exist and lie \
-               below all four of the next stronger one."
-            .to_owned(),
-        verdict: Verdict::of(&conditions, "whether the tip's exit from the gel is found: offline and with known depths the three are apart; with unknown \
-             depths the exit's small drop is missed (s1 = 0.15 N) or false alarms come first (s1 = 0.03 N)"),
-        seeds: study.seeds,
-        conditions,
-        numbers: numbers(list),
-        headline: &["b of 25 % constant online, depth known N s/m²", "b of 50 % constant online, depth known N s/m²", "b of 70 % constant online, depth known N s/m²"],
-        remark: "True: 6000, 12 000, 16 000 N s/m². Offline is the supplement's assumption, all force is friction: it takes the \
-                 small elastic force for friction too, K/v on top of b."
-            .to_owned(),
-    }
+const BOTH: [Method; 2] = [Method::Offline, Method::Online];
+
+pub(super) fn definition() -> Definition {
+    Definition::new(protocol!("a1"), |v| gaps(v, &BOTH), Bar::Above(1.0), &GELS)
+        .also("offline alone", |v| gaps(v, &[Method::Offline]))
+        .also(KNOWN, |v| gaps(&known(v), &BOTH))
+        .also(PUBLISHED, |v| gaps(&published(v), &BOTH))
 }

@@ -1,67 +1,68 @@
-//! (b) Friction estimated online, and in sinusoidal motion, is slightly lower.
+//! (b1, b2) Friction estimated online, and in sinusoidal motion, is slightly lower.
 
-use super::{Claim, numbers};
-use crate::friction::{MOTIONS, Method, PHANTOMS, estimate};
-use crate::spread::Spread;
-use crate::study::Study;
-use crate::variant::Protocol;
-use crate::verdict::{Condition, Verdict};
+use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
+use crate::effect::{Bar, Measured, Part, Scale};
+use crate::friction::{MOTIONS, Method, PHANTOMS, estimates, over};
+use crate::view::View;
 
 /// *Slightly* lower: by more than nothing and by less than a quarter.
-const SLIGHTLY: std::ops::Range<f64> = 0.75..1.0;
+const SLIGHTLY: Bar = Bar::Between(0.75, 1.0);
 
-pub(super) fn claim(study: &Study) -> Claim {
-    let seeds = 0..study.seeds as usize;
-    let online = Method::Online(Protocol::KnownDepth);
-    let phantoms = 0..PHANTOMS.len();
-    let online_over_offline = |phantom: usize, motion: usize, seed: usize| {
-        Some(
-            estimate(study, phantom, motion, online, seed)?
-                / estimate(study, phantom, motion, Method::Offline, seed)?,
-        )
-    };
-    let sinusoidal_over_constant = |phantom: usize, method: Method, seed: usize| {
-        Some(estimate(study, phantom, 1, method, seed)? / estimate(study, phantom, 0, method, seed)?)
-    };
-    let slightly = |ratio: Option<f64>| ratio.is_some_and(|r| SLIGHTLY.contains(&r));
-    let mut conditions = Vec::new();
-    let mut list = Vec::new();
-    for (motion, name) in MOTIONS.iter().enumerate() {
-        conditions.push(Condition::new(
-            format!("online below offline, {name}"),
-            seeds
-                .clone()
-                .map(|seed| phantoms.clone().all(|p| slightly(online_over_offline(p, motion, seed)))),
-        ));
-        for p in phantoms.clone() {
-            let values = seeds.clone().map(|seed| online_over_offline(p, motion, seed));
-            list.push((format!("online / offline, {} {name}", PHANTOMS[p].name), Spread::of(values)));
+fn online_over(view: &View<'_>, offline: Method) -> Measured {
+    let mut parts = Vec::new();
+    for (p, phantom) in PHANTOMS.iter().enumerate() {
+        for (m, motion) in MOTIONS.iter().enumerate() {
+            let ratio = over(&estimates(view, p, m, Method::Online), &estimates(view, p, m, offline));
+            parts.push(Part::new(format!("{}, {motion}", phantom.name), ratio));
         }
     }
-    for (name, method) in [("offline", Method::Offline), ("online", online)] {
-        conditions.push(Condition::new(
-            format!("sinusoidal below constant, {name}"),
-            seeds
-                .clone()
-                .map(|seed| phantoms.clone().all(|p| slightly(sinusoidal_over_constant(p, method, seed)))),
-        ));
-        for p in phantoms.clone() {
-            let values = seeds.clone().map(|seed| sinusoidal_over_constant(p, method, seed));
-            list.push((format!("sinusoidal / constant, {} {name}", PHANTOMS[p].name), Spread::of(values)));
+    Measured { scale: Scale::Ratio, parts }
+}
+
+fn sinusoidal_over_constant(view: &View<'_>, methods: &[(Method, &str)]) -> Measured {
+    let mut parts = Vec::new();
+    for (p, phantom) in PHANTOMS.iter().enumerate() {
+        for (method, name) in methods {
+            let ratio = over(&estimates(view, p, 1, *method), &estimates(view, p, 0, *method));
+            parts.push(Part::new(format!("{}, {name}", phantom.name), ratio));
         }
     }
-    Claim {
-        id: 'b',
-        claim: "Online estimates, and those of sinusoidal motion, are slightly lower.",
-        figure: "S Fig. 2, sec. III",
-        rule: "In a seed, for all three phantoms (depths known), the ratio lies between 0.75 and 1.".to_owned(),
-        verdict: Verdict::of(&conditions, "method and motion: offline they are lower, online only the sinusoid's noise decides"),
-        seeds: study.seeds,
-        conditions,
-        numbers: numbers(list),
-        headline: &["online / offline, 50 % constant", "online / offline, 50 % sinusoidal", "sinusoidal / constant, 50 % offline", "sinusoidal / constant, 50 % online"],
-        remark: "Where all force is taken for friction, the estimate is b + K/v on average: a faster motion, as the sinusoid is, \
-                 gives less. That alone makes offline sinusoidal estimates lower, without any property of the gel."
-            .to_owned(),
-    }
+    Measured { scale: Scale::Ratio, parts }
+}
+
+/// Online and sinusoidal together, over the mean of the other three.
+fn together(view: &View<'_>) -> Measured {
+    let parts = PHANTOMS.iter().enumerate().map(|(p, phantom)| {
+        let others = [
+            estimates(view, p, 0, Method::Offline),
+            estimates(view, p, 1, Method::Offline),
+            estimates(view, p, 0, Method::Online),
+        ];
+        let seeds = others.iter().map(Vec::len).min().unwrap_or(0);
+        let mean: Vec<Option<f64>> = (0..seeds)
+            .map(|seed| others.iter().map(|o| o[seed]).sum::<Option<f64>>().map(|sum| sum / 3.0))
+            .collect();
+        Part::new(phantom.name, over(&estimates(view, p, 1, Method::Online), &mean))
+    });
+    Measured { scale: Scale::Ratio, parts: parts.collect() }
+}
+
+const METHODS: [(Method, &str); 2] = [(Method::Offline, "offline"), (Method::Online, "online")];
+
+pub(super) fn online() -> Definition {
+    Definition::new(protocol!("b1"), |v| online_over(v, Method::Offline), SLIGHTLY, &GELS)
+        .also("offline with K estimated too, nothing of the drop in it", |v| {
+            online_over(v, Method::OfflineBoth)
+        })
+        .also(KNOWN, |v| online_over(&known(v), Method::Offline))
+        .also(PUBLISHED, |v| online_over(&published(v), Method::Offline))
+}
+
+pub(super) fn sinusoidal() -> Definition {
+    Definition::new(protocol!("b2"), |v| sinusoidal_over_constant(v, &METHODS), SLIGHTLY, &GELS)
+        .also("offline alone", |v| sinusoidal_over_constant(v, &METHODS[..1]))
+        .also("online alone", |v| sinusoidal_over_constant(v, &METHODS[1..]))
+        .also(KNOWN, |v| sinusoidal_over_constant(&known(v), &METHODS))
+        .also(PUBLISHED, |v| sinusoidal_over_constant(&published(v), &METHODS))
+        .also("online and sinusoidal together, over the mean of the other three", together)
 }

@@ -1,187 +1,187 @@
-//! S Figs 3-9 and M Figs 12-14: measured, predicted and enhanced force, and the coefficients.
+//! S Figs 3-9 and M Figs 12-14: measured, predicted and enhanced force, and the coefficients. Figs 3 to 6 as
+//! captioned, with unknown layer depth, and beside it with known depth.
 
-use super::Figure;
+use super::beside::{self, Facts, Statement};
 use super::panels::{Run, coefficients, force, picture, visited};
+use super::{Draw, Figure};
 use crate::case::Case;
 use crate::outcome::Outcome;
+use crate::source::Sourced;
 use crate::spread::Spread;
-use crate::study::{Insertion, NOISE_MN, ReproduceError, Study};
-use crate::variant::{Protocol, Sensor, Variant};
+use crate::study::{NOISE_MN, ReproduceError, Study};
+use crate::variant::{Ablation, Sensor, Setup, Variant};
+use crate::view::View;
 use rayon::prelude::*;
 use stylet_report::{Cell, Table, percent, significant};
 
-struct Spec {
-    number: &'static str,
-    file: &'static str,
-    case: Case,
-    protocol: Protocol,
-    sensor: Sensor,
-    look: &'static str,
+/// A figure of one insertion.
+pub(super) struct Spec {
+    pub number: &'static str,
+    pub file: &'static str,
+    /// The picture with known depth.
+    pub known: Option<&'static str>,
+    pub case: Case,
+    pub sensor: Sensor,
+    pub says: &'static [Statement],
 }
 
-const fn spec(
+const fn gel(
     number: &'static str,
     file: &'static str,
+    known: &'static str,
     case: Case,
-    protocol: Protocol,
-    look: &'static str,
+    says: &'static [Statement],
 ) -> Spec {
-    Spec { number, file, case, protocol, sensor: Sensor::ForceTorque, look }
+    Spec { number, file, known: Some(known), case, sensor: Sensor::ForceTorque, says }
 }
 
-const SUPPLEMENT: [Spec; 7] = [
-    spec(
-        "S Fig. 3",
-        "figure_s03.svg",
-        Case::Gel25Constant,
-        Protocol::KnownDepth,
-        "Behind the gel only friction is left: the enhanced force should be zero.",
-    ),
-    spec(
-        "S Fig. 4",
-        "figure_s04.svg",
-        Case::Gel50Constant,
-        Protocol::KnownDepth,
-        "Behind the gel only friction is left: the enhanced force should be zero.",
-    ),
-    spec(
-        "S Fig. 5",
-        "figure_s05.svg",
-        Case::Gel25Sinusoidal,
-        Protocol::KnownDepth,
-        "The supplement sees KV over-compensate here.",
-    ),
-    spec(
-        "S Fig. 6",
-        "figure_s06.svg",
-        Case::Gel50Sinusoidal,
-        Protocol::KnownDepth,
-        "As Fig. 5 with the stronger gel.",
-    ),
-    spec(
-        "S Fig. 7",
-        "figure_s07.svg",
-        Case::LatexSinusoidal,
-        Protocol::Paper,
-        "Three ruptures; compare with M Fig. 12, constant velocity.",
-    ),
-    spec(
-        "S Fig. 8",
-        "figure_s08.svg",
-        Case::Liver,
-        Protocol::Paper,
-        "Two ruptures; compare with M Fig. 13, virtual sensor.",
-    ),
-    spec(
-        "S Fig. 9",
-        "figure_s09.svg",
-        Case::Abdomen,
-        Protocol::Paper,
-        "Two ruptures; compare with M Fig. 14, virtual sensor.",
-    ),
-];
+const fn other(
+    number: &'static str,
+    file: &'static str,
+    case: Case,
+    sensor: Sensor,
+    says: &'static [Statement],
+) -> Spec {
+    Spec { number, file, known: None, case, sensor, says }
+}
+
+const SUPPLEMENT: [Spec; 7] = {
+    use Sensor::ForceTorque;
+    [
+        gel("S Fig. 3", "figure_s03.svg", "figure_s03_known.svg", Case::Gel25Constant, beside::FIG_3),
+        gel("S Fig. 4", "figure_s04.svg", "figure_s04_known.svg", Case::Gel50Constant, beside::FIG_4),
+        gel("S Fig. 5", "figure_s05.svg", "figure_s05_known.svg", Case::Gel25Sinusoidal, beside::FIG_5),
+        gel("S Fig. 6", "figure_s06.svg", "figure_s06_known.svg", Case::Gel50Sinusoidal, beside::FIG_6),
+        other("S Fig. 7", "figure_s07.svg", Case::LatexSinusoidal, ForceTorque, beside::FIG_7),
+        other("S Fig. 8", "figure_s08.svg", Case::Liver, ForceTorque, beside::FIG_8),
+        other("S Fig. 9", "figure_s09.svg", Case::Abdomen, ForceTorque, beside::FIG_9),
+    ]
+};
 
 const MAIN: [Spec; 3] = [
-    spec(
-        "M Fig. 12",
-        "figure_m12.svg",
-        Case::LatexConstant,
-        Protocol::Paper,
-        "Three ruptures at constant velocity.",
-    ),
-    Spec {
-        sensor: Sensor::Virtual,
-        ..spec(
-            "M Fig. 13",
-            "figure_m13.svg",
-            Case::LiverArm,
-            Protocol::Paper,
-            "The same two ruptures as in S Fig. 8, felt through the joint torques.",
-        )
-    },
-    Spec {
-        sensor: Sensor::Virtual,
-        ..spec(
-            "M Fig. 14",
-            "figure_m14.svg",
-            Case::AbdomenArm,
-            Protocol::Paper,
-            "The same two ruptures as in S Fig. 9, felt through the joint torques.",
-        )
-    },
+    other("M Fig. 12", "figure_m12.svg", Case::LatexConstant, Sensor::ForceTorque, beside::MAIN_12),
+    other("M Fig. 13", "figure_m13.svg", Case::LiverArm, Sensor::Virtual, beside::MAIN_13),
+    other("M Fig. 14", "figure_m14.svg", Case::AbdomenArm, Sensor::Virtual, beside::MAIN_14),
 ];
 
 fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
-    let scenario = spec.case.scenario()?;
-    let insertion = Insertion::of(&scenario, scenario.seed)?;
-    let runs =
-        [Variant::kv(spec.protocol), Variant::ml(spec.protocol)].map(|v| Run::of(&insertion, spec.sensor, v));
-    let a = force(&insertion, spec.sensor, &runs, true);
-    let b = coefficients(&insertion, &runs, true);
+    let drawn = Draw::of(study, spec.case, spec.sensor)?;
+    let runs = |setup: Setup| [Variant::kv(setup), Variant::ml(setup)].map(|v| Run::of(&drawn, v));
+    let title = |what: &str| format!("{}: {}{what}", spec.number, drawn.insertion.scenario.name);
+    let subtitle = format!(
+        "{} sensor, noise seed {}, {NOISE_MN} mN; s1 {} N and beta {} N/s tuned within the published range",
+        spec.sensor.name(),
+        drawn.seed,
+        drawn.tuning.sigma_rupture_n,
+        drawn.tuning.on_n_per_s
+    );
+    let unknown = runs(Setup::Tuned);
+    let a = force(&drawn, &unknown, true);
+    let b = coefficients(&drawn.insertion, &unknown, true);
     let mut all = vec![a.clone()];
     all.extend(b.iter().cloned());
-    let title = format!("{}: {}", spec.number, scenario.name);
-    let sensor = format!("{} sensor, noise seed {}", spec.sensor.name(), scenario.seed);
-    let nothing =
-        if runs.iter().any(visited) { "" } else { " In this seed nothing is found and nothing compensated." };
+    let mut files = vec![(spec.file, picture(&all, &title(""), &subtitle))];
+    let mut pictures = vec![picture(&b, "", "")];
+    if let Some(file) = spec.known {
+        let known = runs(Setup::KnownDepth);
+        let mut all = vec![force(&drawn, &known, true)];
+        all.extend(coefficients(&drawn.insertion, &known, true));
+        let svg =
+            picture(&all, &title(", surface and depth known"), "the same recording; published defaults");
+        pictures.push(svg.clone());
+        files.push((file, svg));
+    }
+    let nothing = if unknown.iter().any(visited) {
+        ""
+    } else {
+        " In this seed nothing is found and nothing compensated."
+    };
     let caption = format!(
-        "Corresponds to {}. {}{nothing} Scenario: scenarios/{}{}.",
-        if spec.number.starts_with('S') {
-            spec.number.replace("S Fig.", "the supplement's Fig.")
-        } else {
-            spec.number.replace("M Fig.", "the main paper's Fig.")
-        },
-        spec.look,
+        "As captioned: layer depth unknown{}. {subtitle}.{nothing} Scenario: scenarios/{}.",
+        if spec.known.is_some() { ", and below it with surface and depth known" } else { "" },
         spec.case.file().0,
-        if spec.protocol == Protocol::KnownDepth {
-            ", with surface and depth known, because with unknown depth the weak exit is rarely found (table below)"
-        } else {
-            ""
-        }
     );
     Ok(Figure {
         number: spec.number,
-        title: scenario.name.clone(),
+        title: drawn.insertion.scenario.name.clone(),
         caption,
         force: Some(a),
-        pictures: vec![picture(&b, "", "")],
-        files: vec![(spec.file, picture(&all, &title, &sensor))],
-        tables: vec![table(study, spec)],
+        pictures,
+        files,
+        tables: vec![
+            beside::table(
+                spec.says,
+                &Facts {
+                    insertion: &drawn.insertion,
+                    measured_n: &drawn.force_n,
+                    ml: primary(study, spec, false),
+                    kv: primary(study, spec, true),
+                },
+            ),
+            numbers(study, spec),
+            crate::source::table(spec.case, &drawn.insertion.scenario),
+        ],
     })
 }
 
-/// Over all seeds: what of the figure is chance.
-fn table(study: &Study, spec: &Spec) -> Table {
+fn primary<'a>(study: &'a Study, spec: &Spec, kelvin_voigt: bool) -> &'a [Outcome] {
+    View::primary(study).runs(spec.case, spec.sensor, kelvin_voigt, Ablation::None)
+}
+
+/// Over all seeds and the laboratory's range of noise: what of the figure is chance.
+fn numbers(study: &Study, spec: &Spec) -> Sourced {
     let mut rows = Vec::new();
-    let protocols: &[(Protocol, &str)] = match spec.protocol {
-        Protocol::KnownDepth => &[(Protocol::KnownDepth, "depth known"), (Protocol::Paper, "depth unknown")],
-        _ => &[(Protocol::Paper, "depth unknown")],
+    let setups: &[(Setup, &str)] = if spec.known.is_some() {
+        &[(Setup::Tuned, "depth unknown"), (Setup::KnownDepth, "depth known")]
+    } else {
+        &[(Setup::Tuned, "depth unknown")]
     };
+    // Nothing but the joint torques' noise reaches the virtual sensor.
+    let noises: &[u32] = if spec.sensor == Sensor::Virtual { &[NOISE_MN] } else { &[5, NOISE_MN, 20] };
     let show = |s: Option<Spread>, text: &dyn Fn(f64) -> String| {
         Cell::number(
             s.map_or("–".to_owned(), |s| format!("{} ({} to {})", text(s.median), text(s.p5), text(s.p95))),
         )
     };
     let short = |x: f64| significant(x, 3);
-    for (protocol, name) in protocols {
-        for variant in [Variant::kv(*protocol), Variant::ml(*protocol)] {
-            let runs = study.runs(spec.case, NOISE_MN, spec.sensor, variant);
-            let found = runs.iter().filter(|o| o.found_all()).count();
-            let of = |value: &dyn Fn(&Outcome) -> Option<f64>| Spread::of(runs.iter().map(value));
-            rows.push(vec![
-                Cell::text(format!("{}, {name}", variant.model_name())),
-                Cell::number(format!("{found} of {}", runs.len())),
-                show(of(&|o| o.score.median_delay_s().map(|s| s * 1e3)), &short),
-                show(of(&|o| o.cumulative_ratio), &short),
-                show(of(&|o| o.score.enhancement.rms_relative), &percent),
-                show(of(&|o| o.after_exit), &percent),
-            ]);
+    for (setup, name) in setups {
+        for noise_mn in noises {
+            for kelvin_voigt in [true, false] {
+                let view = View::primary(study).setup(*setup).noise(*noise_mn);
+                let runs = view.runs(spec.case, spec.sensor, kelvin_voigt, Ablation::None);
+                let found = runs.iter().filter(|o| o.found_all()).count();
+                let of = |value: &dyn Fn(&Outcome) -> Option<f64>| Spread::of(runs.iter().map(value));
+                let tuning = study.tuning(view.recorded(spec.case), spec.sensor);
+                let model = if kelvin_voigt { "KV" } else { "ML" };
+                let noise = if spec.sensor == Sensor::Virtual {
+                    "virtual".to_owned()
+                } else {
+                    format!("{noise_mn} mN")
+                };
+                rows.push(vec![
+                    Cell::text(format!("{model}, {name}, {noise}")),
+                    Cell::number(if *setup == Setup::Tuned {
+                        significant(tuning.sigma_rupture_n, 2)
+                    } else {
+                        "0.15".to_owned()
+                    }),
+                    Cell::number(format!("{found} of {}", runs.len())),
+                    show(of(&|o| o.score.median_delay_s().map(|s| s * 1e3)), &short),
+                    show(of(&|o| o.cumulative_ratio), &short),
+                    show(of(&|o| o.score.enhancement.rms_relative), &percent),
+                    show(of(&|o| o.after_exit), &percent),
+                ]);
+            }
         }
     }
-    Table {
-        title: format!("Over {} noise seeds: median (5th to 95th percentile)", study.seeds),
+    Sourced::computed(Table {
+        title: format!(
+            "Over {} noise seeds: median (5th to 95th percentile); noise of 5 to 20 mN is the laboratory's range, 20 mN that of the shipped scenarios",
+            study.seeds
+        ),
         headers: [
-            "model",
+            "model, depth, noise",
+            "s1, N",
             "seeds: exactly the true ruptures",
             "delay, ms",
             "D / true D at the end",
@@ -192,6 +192,14 @@ fn table(study: &Study, spec: &Spec) -> Table {
         .to_vec(),
         rows,
         ..Table::default()
+    })
+}
+
+/// Notes what the figures look up.
+pub(super) fn ask(study: &Study) {
+    for spec in SUPPLEMENT.iter().chain(&MAIN) {
+        let _ = numbers(study, spec);
+        let _ = (primary(study, spec, false), primary(study, spec, true));
     }
 }
 

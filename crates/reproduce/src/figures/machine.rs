@@ -1,6 +1,7 @@
 //! S Fig. 1: the state machine, drawn from the core's own table of transitions.
 
 use super::Figure;
+use crate::source::Sourced;
 use stylet_core::{State, TRANSITIONS};
 use stylet_report::svg::{Arrow, Diagram, FigureOptions, Node, state_machine};
 use stylet_report::{Cell, Table};
@@ -82,10 +83,10 @@ pub(super) fn figure() -> Figure {
         force: None,
         pictures: vec![svg.clone()],
         files: vec![("figure_s01.svg", svg)],
-        tables: vec![Table {
+        tables: vec![Sourced::named(Table {
             headers: ["from", "to", "when", "source"].map(String::from).to_vec(),
             rows,
             ..Table::default()
-        }],
+        })],
     }
 }

@@ -1,13 +1,20 @@
 //! The figures: one file per group, each with its number in the supplement (S) or the main paper (M).
 
 mod ablations;
+mod beside;
 mod friction;
 mod insertions;
 mod machine;
 mod panels;
 
-use crate::study::{ReproduceError, Study};
-use stylet_report::{Chart, Table};
+use crate::case::Case;
+use crate::insertion::Insertion;
+use crate::source::Sourced;
+use crate::study::{NOISE_MN, ReproduceError, Study};
+use crate::tuning::Tuning;
+use crate::variant::Sensor;
+use crate::view::View;
+use stylet_report::Chart;
 
 /// A figure of the paper, re-made.
 #[derive(Clone, Debug)]
@@ -25,7 +32,36 @@ pub struct Figure {
     /// Pictures as files, each complete: name and content.
     pub files: Vec<(&'static str, String)>,
     /// Numbers beside it.
-    pub tables: Vec<Table>,
+    pub tables: Vec<Sourced>,
+}
+
+/// The recording that a figure draws: the study's first seed.
+struct Draw {
+    insertion: Insertion,
+    force_n: Vec<f64>,
+    sensor: Sensor,
+    seed: u64,
+    tuning: Tuning,
+}
+
+impl Draw {
+    fn of(study: &Study, case: Case, sensor: Sensor) -> Result<Self, ReproduceError> {
+        let seed = study.first_seed;
+        let insertion = Insertion::of(&case.scenario()?, seed)?;
+        let force_n = match sensor {
+            Sensor::ForceTorque => insertion.reading(seed, NOISE_MN),
+            Sensor::Virtual => insertion.force_n(sensor).to_vec(),
+        };
+        let tuning = study.tuning(View::primary(study).recorded(case), sensor);
+        Ok(Self { insertion, force_n, sensor, seed, tuning })
+    }
+}
+
+/// Notes what the figures look up.
+pub fn ask(study: &Study) {
+    insertions::ask(study);
+    ablations::ask(study);
+    let _ = (friction::figure(study), friction::table_one(study));
 }
 
 /// All figures in the order of the supplement, those of the main paper at the end.

@@ -1,7 +1,8 @@
 //! The panels of an insertion: force above, coefficients below, over one time axis.
 
-use crate::study::Insertion;
-use crate::variant::{Sensor, Variant};
+use super::Draw;
+use crate::insertion::Insertion;
+use crate::variant::Variant;
 use stylet_core::State;
 use stylet_report::svg::{FigureOptions, figure};
 use stylet_report::{Chart, Colour, LineStyle, MarkerSet, Series, Side};
@@ -17,9 +18,10 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn of(insertion: &Insertion, sensor: Sensor, variant: Variant) -> Self {
+    pub(super) fn of(drawn: &Draw, variant: Variant) -> Self {
         let colour = if variant.kelvin_voigt { Colour::Blue } else { Colour::Vermillion };
-        Self { variant, trace: insertion.run(insertion.force_n(sensor), sensor, variant).0, colour }
+        let trace = drawn.insertion.trace(&drawn.force_n, drawn.sensor, variant, &drawn.tuning);
+        Self { variant, trace, colour }
     }
 
     fn name(&self) -> &'static str {
@@ -63,7 +65,8 @@ fn with_instants(chart: Chart, run: &Run, labels: bool) -> Chart {
 }
 
 /// Measured (green), predicted, and the force enhanced by every run; markers of the last run.
-pub(super) fn force(insertion: &Insertion, sensor: Sensor, runs: &[Run], enhanced: bool) -> Chart {
+pub(super) fn force(drawn: &Draw, runs: &[Run], enhanced: bool) -> Chart {
+    let insertion = &drawn.insertion;
     let t = time(insertion);
     let mut chart = Chart::new("(a) Force", TIME, "Force (N)").height(330);
     if let Some(run) = runs.last() {
@@ -78,7 +81,7 @@ pub(super) fn force(insertion: &Insertion, sensor: Sensor, runs: &[Run], enhance
             .with_series(Series::line(name, run.colour, t.clone(), run.trace.enhanced_n.clone()).width(1.3));
     }
     // Above the others: the enhanced force is the measured one until something is compensated.
-    let measured = insertion.force_n(sensor).to_vec();
+    let measured = drawn.force_n.clone();
     chart = chart.with_series(Series::line("measured", Colour::Green, t.clone(), measured).width(1.0));
     if enhanced {
         let truth = insertion.simulation.truth.tip_force_n.clone();

@@ -1,0 +1,50 @@
+//! Promise: the algorithm's switches that the supplement and the laboratory leave open really run: to the
+//! letter it loses what the completions give, and the derivative may act on drops.
+
+use stylet_reproduce::case::Case;
+use stylet_reproduce::outcome::Outcome;
+use stylet_reproduce::study::Study;
+use stylet_reproduce::variant::Setup;
+use stylet_reproduce::view::View;
+
+const CASES: [Case; 2] = [Case::LatexConstant, Case::LatexSinusoidal];
+const SETUPS: [Setup; 3] = [Setup::Tuned, Setup::Literal, Setup::FallingForce];
+
+fn look(study: &Study) -> Vec<Vec<Vec<Outcome>>> {
+    let of = |case: Case, setup: Setup| View::primary(study).setup(setup).ml(case).to_vec();
+    SETUPS.iter().map(|s| CASES.iter().map(|c| of(*c, *s)).collect()).collect()
+}
+
+/// Median over the seeds of the largest relative error of K.
+fn worst_stiffness(runs: &[Outcome]) -> f64 {
+    let mut errors: Vec<f64> = runs.iter().filter_map(|o| o.score.worst_stiffness_error()).collect();
+    errors.sort_by(f64::total_cmp);
+    errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY)
+}
+
+#[test]
+fn to_the_letter_the_estimates_are_worse_and_the_derivative_may_act_on_drops() {
+    let asking = Study::asking(1, 8);
+    let _ = look(&asking);
+    let found = look(&Study::run(&asking.plan(), &|| {}).expect("shipped scenarios"));
+    for (setup, of_setup) in SETUPS.iter().zip(&found) {
+        for (case, runs) in CASES.iter().zip(of_setup) {
+            let all = runs.iter().filter(|o| o.found_all()).count();
+            println!(
+                "{setup:?}, {}: exact in {all} of {}, K off by {:.3}",
+                case.name(),
+                runs.len(),
+                worst_stiffness(runs)
+            );
+            assert_eq!(runs.len(), 8);
+        }
+    }
+    let [tuned, literal, falling] = &found[..] else { panic!("three setups") };
+    assert_ne!(tuned, literal, "the switch does something");
+    for (case, (a, b)) in CASES.iter().zip(tuned.iter().zip(literal)) {
+        assert!(worst_stiffness(b) > worst_stiffness(a), "{case:?}: to the letter is not worse");
+    }
+    for runs in falling {
+        assert!(runs.iter().all(Outcome::found_all), "the latex stack does not need the rising force");
+    }
+}
