@@ -122,7 +122,8 @@ def diagnose(believed, measured, *, columns=None, repair: bool = False, names=No
     where tqdm is there. Ctrl-C ends it. The same bytes as `stylet diagnose`."""
     if isinstance(measured, (str, os.PathLike, dict)) or hasattr(measured, "columns"):
         measured = [measured]
-    given, kept = [], []
+    given: list = []
+    kept: list = []
     for k, one in enumerate(measured):
         if isinstance(one, (str, os.PathLike)):
             given.append(os.fspath(one))
@@ -141,10 +142,9 @@ def diagnose(believed, measured, *, columns=None, repair: bool = False, names=No
         inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, told)
     finally:
         told.close()
-    data = []
-    for name, one in kept:
+    shown: list = []
+    for name, one in kept[:4]:
         if not isinstance(one, dict):
-            one = _stylet.read_csv(os.fspath(one), columns and os.fspath(columns), repair)[0] if len(data) < 4 else None
-        if one is not None:
-            data.append((name, one))
-    return Diagnosis(inner, data)
+            one = _stylet.read_csv(os.fspath(one), columns and os.fspath(columns), repair)[0]
+        shown.append((name, one))
+    return Diagnosis(inner, shown)
