@@ -55,7 +55,8 @@ impl Outcome {
             if out.detection.is_some() || out.estimate.is_some() {
                 scorer.event(out);
             }
-            let moment = Moment { position_m, force_n, tip_n: truth.tip_force_n[i] };
+            let (tip_n, total_n) = (truth.tip_force_n[i], truth.tissue_force_n[i]);
+            let moment = Moment { position_m, force_n, tip_n, total_n };
             scorer.sample(&moment, &Heard::from(out));
             if let Some(estimate) = out.estimate {
                 found = (found + estimate.added_friction_ns_per_m).max(0.0);
