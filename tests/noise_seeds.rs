@@ -12,8 +12,7 @@ use stylet_core::config::{Contact, EnhanceConfig, Model, Reset};
 use stylet_scenario::{Motion, Scenario, Sensor};
 use stylet_score::{Score, score_run};
 use stylet_stats::{Interval, quantile_of, wilson};
-use stylet_testbed::{InsertionSample, Measuring, Simulation, simulate};
-use stylet_tissue::TissueForce;
+use stylet_testbed::simulate;
 
 const SEEDS: u64 = 200;
 

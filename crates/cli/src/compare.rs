@@ -120,7 +120,8 @@ fn row(
     let ruptures: usize = scores.iter().map(|s| s.ruptures.len()).sum();
     let missed: usize = scores.iter().map(|s| s.missed).sum();
     let false_alarms: usize = scores.iter().map(|s| s.false_alarms).sum();
-    let errors: Interval = wilson_at((missed + false_alarms) as f64, ruptures.max(missed + false_alarms) as f64, 0.95);
+    let errors: Interval =
+        wilson_at((missed + false_alarms) as f64, ruptures.max(missed + false_alarms) as f64, 0.95);
     let delays: Vec<f64> = scores.iter().flat_map(|s| s.ruptures.iter().filter_map(|r| r.delay_s)).collect();
     let layers = scores.iter().flat_map(|s| s.layers.iter().map(|l| l.layer)).max().unwrap_or(0);
     let of_layers = |what: &dyn Fn(&stylet_score::LayerScore) -> Option<f64>| -> Vec<Option<f64>> {

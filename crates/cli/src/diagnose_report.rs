@@ -4,8 +4,8 @@ use crate::args::DiagnoseArgs;
 use crate::diagnose::sentence;
 use std::fmt::Write as _;
 use stylet_diagnose::Examined;
-use stylet_diagnose::lines::spectrum;
 use stylet_diagnose::curves::{Curves, binned, by_layer_and_phase, correlations, curves, shown};
+use stylet_diagnose::lines::spectrum;
 use stylet_diagnose::outcome::{Diagnosis, Verdict};
 use stylet_report::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
 use stylet_report::{

@@ -249,7 +249,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             stylet: StyletConfig { false_alarms_per_hour: rate, ..StyletConfig::default() },
             ..EnhanceConfig::default()
         };
-        let mut core = Enhancer::new(config, 0.0, [Sample::default(); 0]);
+        let mut core = Enhancer::new(config, 0.0, []);
         let mut z = -0.005;
         let mut noise: f64 = {
             let w: f64 = StandardNormal.sample(&mut rng);

@@ -11,7 +11,7 @@ use support::constant;
 
 fn core() -> Enhancer<[Sample; 0]> {
     let config = EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() };
-    Enhancer::new(config, 0.0, [Sample::default(); 0])
+    Enhancer::new(config, 0.0, [])
 }
 
 /// An insertion with everything that goes wrong: NaN, infinities, jumps of position, stalls, reversals, jitter of 30 %, repeated and backward

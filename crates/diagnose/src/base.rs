@@ -1,5 +1,6 @@
 //! The base law fitted: drops of the force given to layers, numbers and instants in turn.
 
+use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::assign::assign;
 use stylet_identify::blocks::Blocks;
@@ -9,7 +10,6 @@ use stylet_identify::model::{Belief, Model};
 use stylet_identify::noise::{From, Noise};
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
-use rayon::prelude::*;
 
 /// Recordings made ready, with the drops of their forces.
 #[derive(Clone, Debug)]
@@ -62,13 +62,18 @@ fn roughness(blocks: &[Blocks]) -> f64 {
 pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
-    let mut data = Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide), floor_n: prepared.floor_n };
+    let mut data =
+        Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide), floor_n: prepared.floor_n };
     let mut model = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model);
-        let instants =
-            prepared.blocks.iter().zip(&prepared.drops).map(|(b, d)| assign(from, b, d, trust, rough_n)).collect();
+        let instants = prepared
+            .blocks
+            .iter()
+            .zip(&prepared.drops)
+            .map(|(b, d)| assign(from, b, d, trust, rough_n))
+            .collect();
         let next = Model { instants, ..from.clone() };
         if let Some(new) = fit(&next, &data, Effort { turns: 4, enough: 0.3 })
             && best.as_ref().is_none_or(|b| new.nats() < b.nats())

@@ -5,13 +5,13 @@ use crate::diagnose::{Evidence, Options, belief, diagnose};
 use crate::held_out::{by_its_own, rms};
 use crate::hidden::{self, Drawn, Kind, Size, Sketch};
 use crate::outcome::Verdict;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use std::time::Instant;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
 use stylet_identify::fit::Fit;
 use stylet_identify::model::{Choice, Model};
 use stylet_identify::objective::Data;
-use serde::{Deserialize, Serialize};
-use std::time::Instant;
 use stylet_tissue::{AnyEffect, Effect};
 
 /// What came of one case.

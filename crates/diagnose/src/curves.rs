@@ -36,7 +36,11 @@ pub struct Curves {
 #[must_use]
 pub fn shown(examined: &Examined) -> &Fit {
     let d = &examined.diagnosis;
-    if d.verdict == Verdict::Unknown && d.causes.is_empty() { &examined.search.base } else { &examined.search.best }
+    if d.verdict == Verdict::Unknown && d.causes.is_empty() {
+        &examined.search.base
+    } else {
+        &examined.search.best
+    }
 }
 
 /// Curves of every recording.

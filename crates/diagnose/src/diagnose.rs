@@ -213,7 +213,8 @@ fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
 
 fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
     let left = leftover::test(&search.best, &search.data);
-    let (before, after) = (excess(search, &search.base.residuals.e), excess(search, &search.best.residuals.e));
+    let (before, after) =
+        (excess(search, &search.base.residuals.e), excess(search, &search.best.residuals.e));
     let share = (after.max(0.0) / before.max(1e-9)).min(1.0);
     let alone = search.data.recordings() < 2;
     let unknown = share > UNEXPLAINED
@@ -221,7 +222,8 @@ fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
         && (left.p_value < LEFTOVER_P || alone);
     // Intervals by the noise as it is, structure that is left included.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Whole);
-    let settled = fit(&search.best.model, &whole, Effort { turns: 3, enough: 0.1 }).unwrap_or_else(|| search.best.clone());
+    let settled = fit(&search.best.model, &whole, Effort { turns: 3, enough: 0.1 })
+        .unwrap_or_else(|| search.best.clone());
     let spread = Spread::new(&settled, &whole);
     let mut causes = Vec::new();
     let mut specific = Vec::new();
@@ -236,9 +238,8 @@ fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
         let gain_nats = stage.and_then(|s| s.taken).map_or(0.0, |t| t.1);
         let needed = stage.map_or(0.0, |s| s.needed);
         let second = stage.map_or(0.0, |s| {
-            let others = s.rivals.iter().filter(|r| {
-                r.0 != choice.info.id && !choice.info.nested_in.contains(&r.0)
-            });
+            let others =
+                s.rivals.iter().filter(|r| r.0 != choice.info.id && !choice.info.nested_in.contains(&r.0));
             others.map(|r| r.1).fold(0.0, f64::max) / s.rivals.iter().map(|r| r.1).fold(1e-9, f64::max)
         });
         if second < SPECIFIC {
@@ -382,7 +383,8 @@ fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
 /// The scenario as the diagnosis leaves it.
 fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
     let mut out = scenario.clone();
-    let source = if d.verdict == Verdict::Unknown && d.causes.is_empty() { &search.base } else { &search.best };
+    let source =
+        if d.verdict == Verdict::Unknown && d.causes.is_empty() { &search.base } else { &search.best };
     out.tissue = source.model.tissue.clone();
     let named = |id: &str| d.causes.iter().any(|c| c.effect == id);
     out.effects.extend(source.model.effects.iter().filter(|e| named(e.info.id)).filter_map(|e| e.effect()));

@@ -90,7 +90,10 @@ fn patterns(model: &Model) -> Vec<Choice> {
                     let others = (0..off.len()).filter(|k| *k != l && *k != l + 1);
                     // The last layer's far face may never have been reached.
                     let fits = (off[l + 1] + shift).abs() < PATTERN * shift.abs() || l + 2 == off.len();
-                    if shift.abs() > 2e-5 && fits && others.into_iter().all(|k| off[k].abs() < PATTERN * shift.abs()) {
+                    if shift.abs() > 2e-5
+                        && fits
+                        && others.into_iter().all(|k| off[k].abs() < PATTERN * shift.abs())
+                    {
                         out.push(Choice::new(info, &[(l + 1) as f64, shift]));
                     }
                 }
@@ -98,9 +101,12 @@ fn patterns(model: &Model) -> Vec<Choice> {
             Proposal::Columns(_) if info.place == stylet_tissue::Place::Position => {
                 let ratios: Vec<f64> = off.iter().zip(believed).map(|(o, b)| o / b.thickness_m).collect();
                 let reached = ratios.len().max(2) - 1;
-                let mean = ratios[..reached.min(ratios.len())].iter().sum::<f64>() / reached.min(ratios.len()).max(1) as f64;
+                let mean = ratios[..reached.min(ratios.len())].iter().sum::<f64>()
+                    / reached.min(ratios.len()).max(1) as f64;
                 if mean.abs() > 1e-4
-                    && ratios[..reached.min(ratios.len())].iter().all(|r| (r - mean).abs() < PATTERN * mean.abs())
+                    && ratios[..reached.min(ratios.len())]
+                        .iter()
+                        .all(|r| (r - mean).abs() < PATTERN * mean.abs())
                 {
                     out.push(Choice::new(info, &[mean]));
                 }

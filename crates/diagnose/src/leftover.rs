@@ -4,9 +4,9 @@
 //! recordings is no noise. The cross-recording statistic `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero whatever the noise's
 //! colour, since the noises of two recordings know nothing of each other.
 
+use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Fit;
 use stylet_identify::objective::Data;
-use stylet_identify::blocks::Blocks;
 
 /// Structure that a model leaves.
 #[derive(Clone, Debug, Default)]
@@ -168,7 +168,11 @@ mod tests {
             (-x).exp() * (1.0 + x + x * x / 2.0 + x * x * x / 6.0)
         };
         for z in [1.0, 3.0, 5.0] {
-            assert!((skewed_tail(z, 1.0) / eight(z) - 1.0).abs() < 0.25, "{z}: {}", skewed_tail(z, 1.0) / eight(z));
+            assert!(
+                (skewed_tail(z, 1.0) / eight(z) - 1.0).abs() < 0.25,
+                "{z}: {}",
+                skewed_tail(z, 1.0) / eight(z)
+            );
         }
         assert!((skewed_tail(2.0, 0.0) - stylet_stats::normal::sf(2.0)).abs() < 1e-15);
     }

@@ -40,9 +40,9 @@ pub fn starts(look: &Look, prepared: &Prepared) -> Vec<Vec<Start>> {
 fn of(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<Start> {
     match info.proposal {
         Proposal::Columns(groups) => groups.iter().filter_map(|g| columns(info, look, g)).collect(),
-        Proposal::Faces(shift) => (1..look.fit.model.layers())
-            .filter_map(|l| columns(info, look, &[&[l as f64, shift]]))
-            .collect(),
+        Proposal::Faces(shift) => {
+            (1..look.fit.model.layers()).filter_map(|l| columns(info, look, &[&[l as f64, shift]])).collect()
+        }
         Proposal::Breath => breath(info, look),
         Proposal::Line => lines(info, look),
         Proposal::Break => breaks(info, look, prepared),
@@ -68,7 +68,8 @@ fn start(
     let values = scaled(info, group, &gain.coefficients);
     let choice = Choice::new(info, &values);
     choice.effect().filter(|e| e.check().is_ok())?;
-    let one_sided = info.parameters.iter().all(|p| !p.strength || p.low >= p.neutral || p.neutral == f64::INFINITY);
+    let one_sided =
+        info.parameters.iter().all(|p| !p.strength || p.low >= p.neutral || p.neutral == f64::INFINITY);
     let nats = if one_sided && gain.coefficients.iter().any(|c| *c <= 0.0) {
         // Columns whose coefficient has the wrong sign are of no use; the others may be.
         let kept: Vec<usize> = (0..group.len()).filter(|k| gain.coefficients[*k] > 0.0).collect();
@@ -125,8 +126,11 @@ fn breath(info: &'static EffectInfo, look: &Look) -> Vec<Start> {
         .collect()
 }
 
+/// A value of every block, per recording.
+type PerBlock = Vec<Vec<f64>>;
+
 /// How the predicted force changes with depth (N/m) and with speed (N s/m), block by block.
-fn slopes(look: &Look) -> Option<(Vec<Vec<f64>>, Vec<Vec<f64>>)> {
+fn slopes(look: &Look) -> Option<(PerBlock, PerBlock)> {
     use stylet_identify::forward::{Replayed, imposed};
     use stylet_identify::objective::pieces;
     const DZ_M: f64 = 1e-6;
@@ -145,11 +149,16 @@ fn slopes(look: &Look) -> Option<(Vec<Vec<f64>>, Vec<Vec<f64>>)> {
             }
             imposed(&compiled, b, &moved, &model.instants[r], out);
         }
-        let slope = |x: &[f64], h: f64| -> Vec<f64> { x.iter().zip(&out[0].f).map(|(x, f)| (x - f) / h).collect() };
+        let slope =
+            |x: &[f64], h: f64| -> Vec<f64> { x.iter().zip(&out[0].f).map(|(x, f)| (x - f) / h).collect() };
         fz.push(slope(&out[1].f, DZ_M));
         // Where the speed is small a difference would cross the jump of dry friction.
         let mut v = slope(&out[2].f, DV_MPS);
-        v.iter_mut().for_each(|v| if v.abs() > 1e5 { *v = 0.0 });
+        v.iter_mut().for_each(|v| {
+            if v.abs() > 1e5 {
+                *v = 0.0
+            }
+        });
         fv.push(v);
     }
     Some((fz, fv))

@@ -1,7 +1,7 @@
 //! What the raw numbers say before any law: saturation, quantisation, spikes.
 
-use stylet_stats::order::median;
 use stylet_record::{QualityKind, QualityNote, Recording};
+use stylet_stats::order::median;
 
 /// What was found in the raw force.
 #[derive(Clone, Debug, Default)]

@@ -87,8 +87,12 @@ impl Search {
         let mut ranked = starts(&look, prepared);
         ranked.retain(|s| promises(s));
         let by_ruptures = |s: &&Vec<Start>| s[0].choice.info.place == Place::Puncture;
-        let tried: Vec<&Start> =
-            ranked.iter().take(SHORT).chain(ranked.iter().skip(SHORT).filter(by_ruptures)).flatten().collect();
+        let tried: Vec<&Start> = ranked
+            .iter()
+            .take(SHORT)
+            .chain(ranked.iter().skip(SHORT).filter(by_ruptures))
+            .flatten()
+            .collect();
         let coarse = self.coarse();
         let mut short: Vec<Fit> = tried
             .par_iter()
@@ -103,7 +107,9 @@ impl Search {
             new
         });
         // Rivals far behind are not fitted to the end.
-        if let (Some(first), Some(stood)) = (short.first().map(Fit::nats), residuals(&self.best.model, &coarse)) {
+        if let (Some(first), Some(stood)) =
+            (short.first().map(Fit::nats), residuals(&self.best.model, &coarse))
+        {
             let reach = (1.0 - BEHIND) * (stood.nats - first);
             short.retain(|f| stood.nats - f.nats() >= reach.min(stood.nats - first - 30.0));
         }

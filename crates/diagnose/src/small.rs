@@ -45,7 +45,11 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
         let without_n = rms(&left_out(&without, &search.data), &search.data);
         let gained = (without_n - with_n) / noise_n;
         (gained < LEAST_SHARE).then(|| {
-            let change = if gained < 0.0 { "makes left-out recordings no better" } else { "changes left-out recordings by less than 0.2 % of the noise" };
+            let change = if gained < 0.0 {
+                "makes left-out recordings no better"
+            } else {
+                "changes left-out recordings by less than 0.2 % of the noise"
+            };
             Small { effect: c.effect.clone(), why: change.to_owned() }
         })
     };

@@ -59,7 +59,8 @@ pub fn advice(causes: &[Cause], invisible: &[String]) -> Vec<String> {
             cause.equivalent.join(", ")
         ));
     }
-    let unseen = |place: Place| invisible.iter().any(|i| stylet_tissue::info(i).is_some_and(|e| e.place == place));
+    let unseen =
+        |place: Place| invisible.iter().any(|i| stylet_tissue::info(i).is_some_and(|e| e.place == place));
     if unseen(Place::Friction) {
         advice.push(
             "Laws of friction do not show at one constant speed: vary the speed within each layer, and retract."

@@ -63,9 +63,8 @@ pub fn assign(model: &Model, b: &Blocks, drops: &[Drop], trust: f64, noise_n: f6
     let layers = expected(model, trust);
     let z: Vec<f64> = (0..b.len()).map(|k| b.motion.at(0.5 * (b.from_s[k] + b.to_s[k])).0).collect();
     let deepest = z.iter().fold(f64::NEG_INFINITY, |m, z| m.max(*z));
-    let crossing = |place: f64| {
-        z.iter().position(|z| *z >= place).map_or(NEVER, |k| 0.5 * (b.from_s[k] + b.to_s[k]))
-    };
+    let crossing =
+        |place: f64| z.iter().position(|z| *z >= place).map_or(NEVER, |k| 0.5 * (b.from_s[k] + b.to_s[k]));
     // Candidates of every layer: instant and cost; taking a drop saves what it costs spare.
     let spare = |d: &Drop| (SPARE_SHARE * 0.5 * d.score * d.score).min(MOST);
     let candidates: Vec<Vec<(f64, f64)>> = layers
@@ -110,9 +109,9 @@ pub fn assign(model: &Model, b: &Blocks, drops: &[Drop], trust: f64, noise_n: f6
         cost.push(row);
     }
     let mut out = vec![NEVER; layers.len()];
-    let mut at = cost.last().map_or(0, |row| {
-        (0..row.len()).min_by(|a, b| row[*a].0.total_cmp(&row[*b].0)).unwrap_or(0)
-    });
+    let mut at = cost
+        .last()
+        .map_or(0, |row| (0..row.len()).min_by(|a, b| row[*a].0.total_cmp(&row[*b].0)).unwrap_or(0));
     for l in (0..layers.len()).rev() {
         if !cost[l][at].0.is_finite() {
             break;

@@ -84,8 +84,16 @@ impl Blocks {
             let good = |k: &usize| !exclude.get(*k).copied().unwrap_or(false);
             let kept = (i..to).filter(good).count();
             let sum: f64 = (i..to).filter(good).map(|k| recording.force_n[k]).sum();
-            let from_s = if i > 0 && t[i] - t[i - 1] <= GAP * step_s { 0.5 * (t[i] + t[i - 1]) } else { t[i] - 0.5 * step_s };
-            let to_s = if to < n && t[to] - t[to - 1] <= GAP * step_s { 0.5 * (t[to] + t[to - 1]) } else { t[to - 1] + 0.5 * step_s };
+            let from_s = if i > 0 && t[i] - t[i - 1] <= GAP * step_s {
+                0.5 * (t[i] + t[i - 1])
+            } else {
+                t[i] - 0.5 * step_s
+            };
+            let to_s = if to < n && t[to] - t[to - 1] <= GAP * step_s {
+                0.5 * (t[to] + t[to - 1])
+            } else {
+                t[to - 1] + 0.5 * step_s
+            };
             b.from_s.push(from_s);
             b.to_s.push(to_s);
             b.f.push(if kept > 0 { sum / kept as f64 } else { 0.0 });

@@ -35,7 +35,8 @@ const N: usize = 6;
 pub fn drops(b: &Blocks) -> Vec<Drop> {
     let length_s = b.step_s * b.samples as f64;
     let mut found: Vec<Drop> = Vec::new();
-    let motion: Vec<(f64, f64)> = (0..b.len()).map(|k| b.motion.at(0.5 * (b.from_s[k] + b.to_s[k]))).collect();
+    let motion: Vec<(f64, f64)> =
+        (0..b.len()).map(|k| b.motion.at(0.5 * (b.from_s[k] + b.to_s[k]))).collect();
     for window_s in WINDOWS_S {
         let half = ((window_s / length_s).round() as usize).max(6);
         for drop in peaks(b, &motion, half) {
@@ -62,7 +63,9 @@ fn peaks(b: &Blocks, motion: &[(f64, f64)], half: usize) -> Vec<Drop> {
     }
     let mut sds: Vec<f64> = steps.iter().map(|s| s.2).filter(|s| s.is_finite()).collect();
     let floor = 0.7 * median(&mut sds);
-    let score = |k: usize| if steps[k].1.is_finite() { -steps[k].0 / (steps[k].1 * steps[k].2.max(floor)) } else { 0.0 };
+    let score = |k: usize| {
+        if steps[k].1.is_finite() { -steps[k].0 / (steps[k].1 * steps[k].2.max(floor)) } else { 0.0 }
+    };
     let scores: Vec<f64> = (0..n).map(score).collect();
     let reach = (half / 2).max(3);
     (half..n - half)

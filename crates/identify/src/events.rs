@@ -105,7 +105,11 @@ pub fn judge(event: &Event, scatter: &Scatter) -> Judged {
     let (u_f, u_z) = (event.force / s_f, event.place_m.max(-1e3) / s_z);
     if !event.ruptured {
         let (by_force, by_place) = (if has_force { survived(u_f) } else { 0.0 }, survived(u_z));
-        return Judged { rows: [0.0, 0.0, root(by_place), root(by_force)], nats: by_force + by_place, shares: [0.0; 2] };
+        return Judged {
+            rows: [0.0, 0.0, root(by_place), root(by_force)],
+            nats: by_force + by_place,
+            shares: [0.0; 2],
+        };
     }
     let h = event.step_s.max(1e-6);
     let rate_f = event.force_rate.max(SLOWEST_MPS / 0.01);
@@ -149,7 +153,8 @@ pub fn scatter_of(events: &[Event], start: &Scatter) -> Scatter {
     let mut best = *start;
     let nats = |s: &Scatter| -> f64 {
         // Scatter has to be asked for: half a nat per factor e above the smallest.
-        let prior = 0.5 * libm::log(1.0 + (s.force / 5e-4).powi(2)) + 0.5 * libm::log(1.0 + (s.place_m / 5e-6).powi(2));
+        let prior = 0.5 * libm::log(1.0 + (s.force / 5e-4).powi(2))
+            + 0.5 * libm::log(1.0 + (s.place_m / 5e-6).powi(2));
         events.iter().map(|e| judge(e, s).nats).sum::<f64>() + prior * 0.5
     };
     if events.is_empty() {
@@ -163,7 +168,8 @@ pub fn scatter_of(events: &[Event], start: &Scatter) -> Scatter {
 }
 
 const FORCE_GRID: [f64; 13] = [0.0, 5e-4, 1e-3, 2e-3, 4e-3, 7e-3, 0.012, 0.02, 0.033, 0.055, 0.09, 0.15, 0.3];
-const PLACE_GRID: [f64; 12] = [0.0, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4, 3.2e-4, 6.4e-4, 1.3e-3, 2.5e-3, 5e-3];
+const PLACE_GRID: [f64; 12] =
+    [0.0, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4, 3.2e-4, 6.4e-4, 1.3e-3, 2.5e-3, 5e-3];
 
 fn smallest(nats: impl Fn(f64) -> f64, grid: &[f64]) -> f64 {
     let mut best = (f64::INFINITY, 0.0);

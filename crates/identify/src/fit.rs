@@ -131,8 +131,7 @@ impl Tangent {
             w.iter_mut().zip(&self.roots[r]).for_each(|(w, root)| *w *= root);
             column.w.push(w);
             let rows = replayed.events.iter().zip(&at.events[r]).flat_map(|(now, was)| {
-                let (now, was) =
-                    (rows_like(now, &model.scatter, was), rows_like(was, &model.scatter, was));
+                let (now, was) = (rows_like(now, &model.scatter, was), rows_like(was, &model.scatter, was));
                 (0..4).map(move |k| was[k] - now[k])
             });
             column.rows.push(rows.collect());
@@ -314,8 +313,10 @@ fn step(model: &Model, data: &Data, t: &Tangent, damping: f64) -> Option<Model> 
         let rhs: Vec<f64> = free
             .iter()
             .map(|&i| {
-                let held: f64 =
-                    (0..size).filter(|j| delta[*j] != 0.0 && !free.contains(j)).map(|j| t.matrix.at(i, j) * delta[j]).sum();
+                let held: f64 = (0..size)
+                    .filter(|j| delta[*j] != 0.0 && !free.contains(j))
+                    .map(|j| t.matrix.at(i, j) * delta[j])
+                    .sum();
                 t.slope[i] - held
             })
             .collect();

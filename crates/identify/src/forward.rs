@@ -77,7 +77,8 @@ impl Walk<'_> {
             let jumped = |to: f64, from: f64| (to / from - 1.0).abs() > JUMPED;
             if jumped(s.puncture_n, self.threshold_n) && most < 0.0 && event.force > 0.0 {
                 event.force = 0.0;
-            } else if let Some(next) = after.filter(|_| event.force < 0.0 && piece.to_s - at_s < self.step_s) {
+            } else if let Some(next) = after.filter(|_| event.force < 0.0 && piece.to_s - at_s < self.step_s)
+            {
                 // The speed jumps within a sample of here: so may the threshold.
                 let mut then = f64::INFINITY;
                 let v = next.v_mps * self.model.to_true;

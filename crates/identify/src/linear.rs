@@ -121,10 +121,7 @@ impl Factor {
     /// Logarithm of the determinant over the directions that it holds.
     #[must_use]
     pub fn log_determinant(&self) -> f64 {
-        (0..self.size)
-            .filter(|i| self.live[*i])
-            .map(|i| 2.0 * libm::log(self.l[i * self.size + i]))
-            .sum()
+        (0..self.size).filter(|i| self.live[*i]).map(|i| 2.0 * libm::log(self.l[i * self.size + i])).sum()
     }
 }
 
@@ -162,7 +159,9 @@ mod tests {
     fn a_system_is_solved() {
         let x = matrix().factor().solve(&[1.0, -2.0, 0.5]);
         let back: Vec<f64> = (0..3).map(|i| (0..3).map(|j| matrix().at(i, j) * x[j]).sum()).collect();
-        assert!((back[0] - 1.0).abs() < 1e-12 && (back[1] + 2.0).abs() < 1e-12 && (back[2] - 0.5).abs() < 1e-12);
+        assert!(
+            (back[0] - 1.0).abs() < 1e-12 && (back[1] + 2.0).abs() < 1e-12 && (back[2] - 0.5).abs() < 1e-12
+        );
     }
 
     #[test]

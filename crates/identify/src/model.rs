@@ -339,8 +339,12 @@ impl Model {
     pub fn get(&self, role: Role, r: usize) -> f64 {
         let assumed = &self.belief.tissue;
         match role {
-            Role::Stiffness(l) => self.tissue.layers[l].stiffness_n_per_m / assumed.layers[l].stiffness_n_per_m,
-            Role::Friction(l) => self.tissue.layers[l].friction_ns_per_m2 / assumed.layers[l].friction_ns_per_m2,
+            Role::Stiffness(l) => {
+                self.tissue.layers[l].stiffness_n_per_m / assumed.layers[l].stiffness_n_per_m
+            }
+            Role::Friction(l) => {
+                self.tissue.layers[l].friction_ns_per_m2 / assumed.layers[l].friction_ns_per_m2
+            }
             Role::Puncture(l) => {
                 self.tissue.layers[l].puncture_n.unwrap_or(1.0) / assumed.layers[l].puncture_n.unwrap_or(1.0)
             }
@@ -383,7 +387,11 @@ impl Model {
                     FitScale::Linear => x,
                     FitScale::Log => libm::exp(x),
                     FitScale::Reciprocal => {
-                        if x > 0.0 { 1.0 / x } else { f64::INFINITY }
+                        if x > 0.0 {
+                            1.0 / x
+                        } else {
+                            f64::INFINITY
+                        }
                     }
                 };
                 if let Some(effect) = AnyEffect::from_coordinates(choice.info.id, &at) {

@@ -75,7 +75,8 @@ impl Motion {
         };
         if recording.velocity_measured && sd > NOISY_MPS && recorded_sd < sd {
             let v = &recording.velocity_mps;
-            let sides = |k: &Kink| Kink { v: [v[k.sample.saturating_sub(1)], v[k.sample.min(v.len() - 1)]], ..*k };
+            let sides =
+                |k: &Kink| Kink { v: [v[k.sample.saturating_sub(1)], v[k.sample.min(v.len() - 1)]], ..*k };
             let kinks: Vec<Kink> = kinks.iter().map(sides).collect();
             return Self::from_knots(t, &z, v, &kinks, recorded_sd, noise_m);
         }

@@ -115,7 +115,11 @@ impl Noise {
         let sd_n = (median(&mut all) * 1.4826).max(floor_n);
         let white = Bin { a: [0.0; ORDER], innovation_n: sd_n, sd_n };
         if rows.len() < 40 {
-            return if sd_n.is_finite() { white } else { Bin { a: [0.0; ORDER], innovation_n: 1.0, sd_n: 1.0 } };
+            return if sd_n.is_finite() {
+                white
+            } else {
+                Bin { a: [0.0; ORDER], innovation_n: 1.0, sd_n: 1.0 }
+            };
         }
         let n = rows.len() as f64;
         let mut best: Option<(f64, Bin)> = None;
@@ -141,7 +145,8 @@ impl Noise {
             if !stationary(&a[..order]) {
                 continue;
             }
-            let loss: f64 = rows.iter().map(|row| rho(innovation(row, &a) / s)).sum::<f64>() + n * libm::log(s);
+            let loss: f64 =
+                rows.iter().map(|row| rho(innovation(row, &a) / s)).sum::<f64>() + n * libm::log(s);
             let cost = loss + 0.5 * order as f64 * libm::log(n);
             if best.is_none_or(|b| cost < b.0) {
                 best = Some((cost, Bin { a, innovation_n: s, sd_n }));
@@ -184,7 +189,11 @@ impl Noise {
                 run = if b.restart[k] { 0 } else { run + 1 };
                 if b.used[k] {
                     let bin = &self.bins[self.bin(b.size_n[k]).min(self.bins.len() - 1)];
-                    sum += libm::log(if run >= ORDER { bin.innovation_n } else { bin.sd_n.max(bin.innovation_n) });
+                    sum += libm::log(if run >= ORDER {
+                        bin.innovation_n
+                    } else {
+                        bin.sd_n.max(bin.innovation_n)
+                    });
                 }
             }
         }

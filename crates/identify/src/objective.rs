@@ -133,7 +133,14 @@ pub fn prior_nats(model: &Model) -> f64 {
 
 /// Nats of one recording: residuals and events, with the noise as it is.
 #[must_use]
-pub fn nats_of(model: &Model, compiled: &Compiled, data: &Data, r: usize, instants: &[f64], work: &mut Work) -> f64 {
+pub fn nats_of(
+    model: &Model,
+    compiled: &Compiled,
+    data: &Data,
+    r: usize,
+    instants: &[f64],
+    work: &mut Work,
+) -> f64 {
     let b = &data.blocks[r];
     imposed(compiled, b, &pieces(compiled, b), instants, &mut work.replayed);
     work.e.clear();

@@ -39,14 +39,16 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
     let q = ((CELL_S / step).round() as usize).max(1);
-    let mean = |x: &[f64]| -> Vec<f64> { x.chunks(q).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect() };
+    let mean =
+        |x: &[f64]| -> Vec<f64> { x.chunks(q).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect() };
     let (tc, zc) = (mean(&t[..n]), mean(&z[..n]));
     let cells = tc.len();
     if cells < 2 * SIDE + 2 {
         let v = stylet_record::differentiate(t, z, 0.1);
         return Settled { z: z.to_vec(), v, kinks: Vec::new(), sd_mps: f64::INFINITY };
     }
-    let noise_m = (position_noise(t, z) / (q as f64).sqrt()).max(rounding(z) / 12.0_f64.sqrt() / (q as f64).sqrt());
+    let noise_m =
+        (position_noise(t, z) / (q as f64).sqrt()).max(rounding(z) / 12.0_f64.sqrt() / (q as f64).sqrt());
     let dt = step * q as f64;
     // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
     let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (SIDE as f64).powf(1.5));

@@ -165,11 +165,10 @@ impl Change {
                 Number::Noise | Number::Start | Number::TorqueNoise | Number::VirtualSigma => {}
             }
         }
-        match (self.number, &mut scenario.motion) {
-            (Number::Start, Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. }) => {
-                *start_m *= factor;
-            }
-            _ => {}
+        if let (Number::Start, Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. }) =
+            (self.number, &mut scenario.motion)
+        {
+            *start_m *= factor;
         }
         if let (Number::TorqueNoise, Sensor::Both { virtual_sensor, .. } | Sensor::Virtual(virtual_sensor)) =
             (self.number, &mut scenario.sensor)
@@ -197,7 +196,8 @@ mod tests {
                 if change.number != Number::GelContrast {
                     assert_ne!(changed, plain, "{case:?} {}", change.words());
                 }
-                changed.check().unwrap_or_else(|p| panic!("{case:?} {}: {}", change.words(), p.what));
+                let checked = changed.check().map_err(|p| p.what);
+                assert_eq!(checked, Ok(()), "{case:?} {}", change.words());
             }
         }
     }

@@ -23,7 +23,7 @@ const fn setup(sensor: Sensor) -> Setup {
     }
 }
 
-fn runs<'a>(
+fn runs(
     study: &'a Study,
     case: Case,
     noise_mn: u32,

@@ -286,6 +286,8 @@ fn scenario() -> impl Strategy<Value = Scenario> {
                     sample_hz,
                     physics_hz: sample_hz * f64::from(steps),
                     tolerance,
+                    thickness_tolerance: 0.5 * tolerance,
+                    surface_tolerance_m: 0.01 * tolerance,
                     seed,
                 }
             },

@@ -4,6 +4,11 @@
 //! ```sh
 //! cargo run --release -p stylet-score --example measured_enhancer -- [--force-noise N] [--ar R] [--scale S] [--every K] [--warp W] [-v]
 //! ```
+#![allow(
+    clippy::unwrap_used,
+    clippy::needless_range_loop,
+    reason = "a table for developers: what it cannot read ends it"
+)]
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -98,7 +98,7 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
         .iter()
         .map(|e| {
             let values: Vec<f64> = e.parameters().iter().map(|p| p.1).collect();
-            AnyEffect::from_parameters(e.id(), &values).expect(e.id())
+            AnyEffect::from_parameters(e.id(), &values).expect("an effect of the library")
         })
         .collect();
     let law = Law::new(&stack, &made).expect("a law");
