@@ -82,9 +82,13 @@ fn size_of(fit: &Fit, data: &Data, drawn: &Drawn) -> f64 {
     clean.blocks = Arc::new(blocks);
     let (mut square, mut n) = (0.0, 0.0);
     for r in 0..clean.recordings() {
-        if let Some(left) = by_its_own(&fit.model, &clean, r) {
-            square += left.square_n2 * left.blocks as f64;
-            n += left.blocks as f64;
+        let Some(left) = by_its_own(&fit.model, &clean, r) else { continue };
+        let b = &clean.blocks[r];
+        // A rupture early or late by a part of a sample says nothing of an effect.
+        let near = |k: usize| left.instants.iter().any(|t| t.is_finite() && b.at(*t).abs_diff(k) <= 1);
+        for k in (0..b.len()).filter(|k| b.used[*k] && !near(*k)) {
+            square += left.e[k] * left.e[k];
+            n += 1.0;
         }
     }
     let mut square = square / f64::max(n, 1.0);

@@ -103,7 +103,9 @@ fn patterns(model: &Model) -> Vec<Choice> {
                 let reached = ratios.len().max(2) - 1;
                 let mean = ratios[..reached.min(ratios.len())].iter().sum::<f64>()
                     / reached.min(ratios.len()).max(1) as f64;
-                if mean.abs() > 1e-4
+                // One thickness alone is in proportion to anything.
+                if reached > 1
+                    && mean.abs() > 1e-4
                     && ratios[..reached.min(ratios.len())]
                         .iter()
                         .all(|r| (r - mean).abs() < PATTERN * mean.abs())

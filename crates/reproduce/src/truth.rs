@@ -24,13 +24,13 @@ const fn setup(sensor: Sensor) -> Setup {
 }
 
 fn runs(
-    study: &'a Study,
+    study: &Study,
     case: Case,
     noise_mn: u32,
     sensor: Sensor,
     setup: Setup,
     kelvin_voigt: bool,
-) -> &'a [Outcome] {
+) -> &[Outcome] {
     let mut view = View::primary(study).noise(noise_mn).setup(setup);
     if matches!(case, Case::LiverArmFriction | Case::AbdomenArmFriction) {
         view = view.fewer(SENSITIVITY_SEEDS_ARM);
