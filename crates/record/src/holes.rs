@@ -6,10 +6,10 @@ use crate::read::{ReadOptions, read_csv, read_csv_bytes};
 use crate::recording::Recording;
 use std::path::Path;
 
-/// As [`read_csv`](crate::read_csv); rows with a value that is no finite number are cut out and reported.
+/// As [`crate::read_csv`]; rows with a value that is no finite number are cut out and reported.
 ///
 /// # Errors
-/// As [`read_csv`](crate::read_csv), but for values that are not finite: those only when hardly a row is left.
+/// As [`crate::read_csv`], but for values that are not finite: those only when hardly a row is left.
 pub fn read_csv_with_holes(
     path: &Path,
     options: &ReadOptions,

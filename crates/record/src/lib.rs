@@ -23,7 +23,7 @@
 //! | [`truth`] | [`Truth`]: what a simulation knows and a sensor does not |
 //! | [`columns`] | [`ColumnMap`]: names, units and signs of somebody else's log |
 //! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
-//! | [`quality`] | [`QualityNote`]s: gaps, jitter, saturation, spikes, quantisation, mixed-up units |
+//! | `quality` | [`QualityNote`]s: gaps, jitter, saturation, spikes, quantisation, mixed-up units |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 

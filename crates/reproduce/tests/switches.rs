@@ -39,7 +39,8 @@ fn to_the_letter_the_estimates_are_worse_and_the_derivative_may_act_on_drops() {
             assert_eq!(runs.len(), 8);
         }
     }
-    let [tuned, literal, falling] = &found[..] else { panic!("three setups") };
+    assert_eq!(found.len(), 3);
+    let (tuned, literal, falling) = (&found[0], &found[1], &found[2]);
     assert_ne!(tuned, literal, "the switch does something");
     for (case, (a, b)) in CASES.iter().zip(tuned.iter().zip(literal)) {
         assert!(worst_stiffness(b) > worst_stiffness(a), "{case:?}: to the letter is not worse");

@@ -79,7 +79,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
         } else {
             bar.advance(done.saturating_sub(last) as u64);
         }
-        if done % 20 == 0 && done > 0 {
+        if done.is_multiple_of(20) && done > 0 {
             eprintln!("  {done} of {of} cases");
         }
     };
