@@ -58,7 +58,10 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
     let fits: Vec<Fit> = tried
         .into_par_iter()
         .filter_map(|m| {
-            let first = fit(&m, &search.data, Effort::SHORT)?;
+            // Where the believed faces have the ruptures, not where the free ones had them.
+            let mut start = m;
+            retime(&mut start, &search.data, &times);
+            let first = fit(&start, &search.data, Effort::SHORT)?;
             let mut model = first.model;
             retime(&mut model, &search.data, &times);
             fit(&model, &search.data, Effort::FULL)
@@ -88,8 +91,7 @@ fn patterns(model: &Model) -> Vec<Choice> {
                 for l in 0..off.len().saturating_sub(1) {
                     let shift = off[l];
                     let others = (0..off.len()).filter(|k| *k != l && *k != l + 1);
-                    // The last layer's far face may never have been reached.
-                    let fits = (off[l + 1] + shift).abs() < PATTERN * shift.abs() || l + 2 == off.len();
+                    let fits = (off[l + 1] + shift).abs() < PATTERN * shift.abs();
                     if shift.abs() > 2e-5
                         && fits
                         && others.into_iter().all(|k| off[k].abs() < PATTERN * shift.abs())
