@@ -26,6 +26,8 @@ pub struct Kink {
     pub z: f64,
     /// Velocities in m/s before and after.
     pub v: [f64; 2],
+    /// Standard deviation of the position at which both sides meet, in m.
+    pub sd_m: f64,
 }
 
 /// Velocities, their noise, and their jumps.
@@ -58,7 +60,7 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
     let breaks = breaks(t, z, side, 1.8 * step, doubt);
     let mut kinks = Vec::new();
     for &(i, left, right) in &breaks {
-        kinks.push(Kink { sample: i, t: left.0, z: left.1, v: [left.2, right] });
+        kinks.push(Kink { sample: i, t: left.0, z: left.1, v: [left.2, right], sd_m: noise_m.min(1e-6) });
     }
     let mut edges: Vec<usize> = breaks.iter().map(|b| b.0).collect();
     edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > 1.8 * step));
