@@ -1,7 +1,7 @@
 //! Effects that explain the data as well as a cause: its class.
 
-use crate::judge::cost;
-use crate::select::Search;
+use crate::judge::{cost, gain};
+use crate::select::{Search, extra};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::model::Choice;
@@ -30,7 +30,12 @@ pub fn rivals(search: &mut Search) -> Vec<Vec<Rival>> {
     while k < search.best.model.effects.len() {
         let own = of(search, k);
         let ahead = own.iter().filter(|r| r.1 < -0.5).min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((f, _)) = ahead.filter(|_| swaps < 3) {
+        // More numbers have to be worth it when all that is left is noise.
+        let worth = |f: &Fit| {
+            f.model.effect_numbers() <= search.best.model.effect_numbers()
+                || gain(&search.best, f, &search.data) > extra(&search.best, f, &search.data)
+        };
+        if let Some((f, _)) = ahead.filter(|r| swaps < 3 && worth(&r.0)) {
             search.settle(f.clone());
             swaps += 1;
             (k, out) = (0, Vec::new());

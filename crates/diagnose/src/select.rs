@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
-use stylet_identify::model::{Choice, Model};
+use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::From;
 use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
@@ -138,7 +138,7 @@ impl Search {
             needed: full.first().map_or(0.0, |f| worth(&f.model) - worth(&self.best.model) + LEAST),
             choices: full.iter().filter_map(|f| f.model.effects.last().cloned()).collect(),
         };
-        for f in full.into_iter().take(2) {
+        for f in simpler_first(full, &self.data).into_iter().take(2) {
             let needed = worth(&f.model) - worth(&self.best.model) + LEAST;
             if self.best.nats() - f.nats() < needed {
                 continue;
@@ -209,4 +209,39 @@ impl Search {
             }
         }
     }
+}
+
+/// A special case of the leader goes before it, unless what the leader has beyond it is worth its numbers when all that is
+/// left is noise, and none of these numbers stands at a bound: there an effect is another one.
+fn simpler_first(mut full: Vec<Fit>, data: &Data) -> Vec<Fit> {
+    let Some(leader) = full.first() else { return full };
+    let id = leader.model.effects.last().map_or("", |e| e.info.id);
+    let special = |f: &Fit| f.model.effects.last().is_some_and(|e| e.info.nested_in.contains(&id));
+    let Some(k) = full.iter().position(special) else { return full };
+    if at_a_bound(leader) || gain(&full[k], leader, data) < extra(&full[k], leader, data) {
+        let f = full.remove(k);
+        full.insert(0, f);
+    }
+    full
+}
+
+/// Nats that the numbers which `larger` has beyond `smaller` must gain.
+#[must_use]
+pub fn extra(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
+    let more = larger.model.effect_numbers().saturating_sub(smaller.model.effect_numbers());
+    cost(more, data.compared()) + LEAST
+}
+
+/// Whether a number of the last effect stands where it may not go further.
+#[must_use]
+pub fn at_a_bound(f: &Fit) -> bool {
+    let Some(last) = f.model.effects.len().checked_sub(1) else { return false };
+    f.model.shared().iter().any(|n| match n.role {
+        Role::Effect { effect, .. } if effect == last => {
+            let x = f.model.get(n.role, 0);
+            let near = 1e-6 * (n.high - n.low);
+            near.is_finite() && (x <= n.low + near || x >= n.high - near)
+        }
+        _ => false,
+    })
 }

@@ -17,11 +17,19 @@ pub const HUBER: f64 = 2.5;
 /// Smallest noise in N: rounding of numbers in files.
 const FLOOR_N: f64 = 1e-6;
 
+/// Stretches of blocks before those of the autoregression whose means a slow wander is told by: some tenths of a second,
+/// some seconds (a heterogeneous autoregression: Corsi 2009).
+const SLOW: [(usize, usize); 2] = [(ORDER, 24), (24, 124)];
+/// Numbers of a row: the residual, those before it, the means.
+const ROW: usize = 1 + ORDER + SLOW.len();
+
 /// Noise in one range of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin {
     /// Coefficients, newest first.
     pub a: [f64; ORDER],
+    /// Coefficients of the means of stretches further back.
+    pub slow: [f64; SLOW.len()],
     /// Standard deviation of the innovations in N.
     pub innovation_n: f64,
     /// Standard deviation in N.
@@ -64,7 +72,7 @@ impl Noise {
     /// Independent noise of one size.
     #[must_use]
     pub fn white(sd_n: f64) -> Self {
-        Self { edges_n: Vec::new(), bins: vec![Bin { a: [0.0; ORDER], innovation_n: sd_n, sd_n }] }
+        Self { edges_n: Vec::new(), bins: vec![Bin { a: [0.0; ORDER], slow: [0.0; SLOW.len()], innovation_n: sd_n, sd_n }] }
     }
 
     /// The noise of residuals `e` (N), one column per recording; nowhere less than `floor_n`.
@@ -84,7 +92,7 @@ impl Noise {
             (1..count).map(|k| quantile_of_sorted(&sizes, k as f64 / count as f64)).collect();
         let mut noise = Self { edges_n, bins: Vec::new() };
         for bin in 0..count {
-            noise.bins.push(noise.fit(blocks, &columns, bin, floor_n.max(FLOOR_N)));
+            noise.bins.push(noise.fit(blocks, &columns, bin, from, floor_n.max(FLOOR_N)));
         }
         noise
     }
@@ -96,10 +104,11 @@ impl Noise {
     }
 
     /// Robust least squares of one range.
-    fn fit(&self, blocks: &[Blocks], columns: &[Vec<f64>], bin: usize, floor_n: f64) -> Bin {
-        let mut rows: Vec<[f64; ORDER + 1]> = Vec::new();
+    fn fit(&self, blocks: &[Blocks], columns: &[Vec<f64>], bin: usize, from: From, floor_n: f64) -> Bin {
+        let mut rows: Vec<[f64; ROW]> = Vec::new();
         let mut all: Vec<f64> = Vec::new();
         for (b, e) in blocks.iter().zip(columns) {
+            let sums = sums(e);
             let mut run = 0;
             for k in 0..b.len() {
                 run = if b.restart[k] { 0 } else { run + 1 };
@@ -108,23 +117,21 @@ impl Noise {
                 }
                 all.push(e[k].abs());
                 if run >= ORDER && (1..=ORDER).all(|i| e[k - i].is_finite()) {
-                    rows.push(core::array::from_fn(|i| e[k - i]));
+                    rows.push(row(e, &sums, k, run));
                 }
             }
         }
         let sd_n = (median(&mut all) * 1.4826).max(floor_n);
-        let white = Bin { a: [0.0; ORDER], innovation_n: sd_n, sd_n };
+        let white = Bin { a: [0.0; ORDER], slow: [0.0; SLOW.len()], innovation_n: sd_n, sd_n };
         if rows.len() < 40 {
-            return if sd_n.is_finite() {
-                white
-            } else {
-                Bin { a: [0.0; ORDER], innovation_n: 1.0, sd_n: 1.0 }
-            };
+            return if sd_n.is_finite() { white } else { Bin { innovation_n: 1.0, sd_n: 1.0, ..white } };
         }
         let n = rows.len() as f64;
         let mut best: Option<(f64, Bin)> = None;
-        for order in 0..=ORDER {
-            let mut a = [0.0; ORDER];
+        // Residuals without their smooth course have no slow wander.
+        let most = if from == From::Whole { ORDER + SLOW.len() } else { ORDER };
+        for order in 0..=most {
+            let mut a = [0.0; ORDER + SLOW.len()];
             let mut s = sd_n;
             for _ in 0..4 {
                 let mut h = Symmetric::zeros(order);
@@ -142,14 +149,17 @@ impl Noise {
                 a[..order].copy_from_slice(&x);
                 s = scale(&rows, &a).max(floor_n);
             }
-            if !stationary(&a[..order]) {
+            let (near, slow) = a.split_at(ORDER);
+            if !stationary(near) || (order > ORDER && a.iter().sum::<f64>() > 0.999) {
                 continue;
             }
+            let near: [f64; ORDER] = core::array::from_fn(|i| near[i]);
+            let slow: [f64; SLOW.len()] = core::array::from_fn(|i| slow[i]);
             let loss: f64 =
                 rows.iter().map(|row| rho(innovation(row, &a) / s)).sum::<f64>() + n * libm::log(s);
             let cost = loss + 0.5 * order as f64 * libm::log(n);
             if best.is_none_or(|b| cost < b.0) {
-                best = Some((cost, Bin { a, innovation_n: s, sd_n }));
+                best = Some((cost, Bin { a: near, slow, innovation_n: s, sd_n }));
             }
         }
         best.map_or(white, |b| b.1)
@@ -157,6 +167,8 @@ impl Noise {
 
     /// Normalised innovations of residuals `e` (N); blocks that are not compared give zero.
     pub fn whiten(&self, b: &Blocks, e: &[f64], out: &mut [f64]) {
+        let wander = self.bins.iter().any(|b| b.slow != [0.0; SLOW.len()]);
+        let sums = if wander { sums(e) } else { Vec::new() };
         let mut run = 0;
         for k in 0..b.len() {
             run = if b.restart[k] { 0 } else { run + 1 };
@@ -169,6 +181,11 @@ impl Noise {
             if run >= ORDER {
                 for (i, a) in bin.a.iter().enumerate() {
                     w -= a * e[k - 1 - i];
+                }
+                if wander {
+                    for (mean, slow) in slow_means(&sums, k, run).iter().zip(&bin.slow) {
+                        w -= slow * mean;
+                    }
                 }
                 sd = bin.innovation_n;
             } // else nothing is known of the samples before.
@@ -208,7 +225,33 @@ impl Noise {
     }
 }
 
-fn innovation(row: &[f64; ORDER + 1], a: &[f64; ORDER]) -> f64 {
+/// Running sums of a column; what is not finite counts as nothing.
+fn sums(e: &[f64]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(e.len() + 1);
+    let mut sum = 0.0;
+    out.push(sum);
+    for e in e {
+        sum += if e.is_finite() { *e } else { 0.0 };
+        out.push(sum);
+    }
+    out
+}
+
+/// Means of the slow stretches before block `k`, as far as the memory of `run` blocks reaches.
+fn slow_means(sums: &[f64], k: usize, run: usize) -> [f64; SLOW.len()] {
+    core::array::from_fn(|i| {
+        let (from, to) = SLOW[i];
+        let (lo, hi) = (k - to.min(run), k - from.min(run));
+        (sums[hi] - sums[lo]) / (to - from) as f64
+    })
+}
+
+fn row(e: &[f64], sums: &[f64], k: usize, run: usize) -> [f64; ROW] {
+    let slow = slow_means(sums, k, run);
+    core::array::from_fn(|i| if i <= ORDER { e[k - i] } else { slow[i - ORDER - 1] })
+}
+
+fn innovation(row: &[f64; ROW], a: &[f64; ROW - 1]) -> f64 {
     let mut w = row[0];
     for (i, a) in a.iter().enumerate() {
         w -= a * row[i + 1];
@@ -217,7 +260,7 @@ fn innovation(row: &[f64; ORDER + 1], a: &[f64; ORDER]) -> f64 {
 }
 
 /// Scale of the innovations under Huber's loss: the root of `sum weight w^2 / n` over its value for normal noise.
-fn scale(rows: &[[f64; ORDER + 1]], a: &[f64; ORDER]) -> f64 {
+fn scale(rows: &[[f64; ROW]], a: &[f64; ROW - 1]) -> f64 {
     let mut size: Vec<f64> = rows.iter().map(|row| innovation(row, a).abs()).collect();
     let mut s = (median(&mut size) * 1.4826).max(1e-300);
     for _ in 0..6 {
