@@ -44,7 +44,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let found = stylet_api::diagnose(&scenario, &evidence, |what| {
         if talk {
-            eprintln!("  {what} ...");
+            crate::terminal::tell(&format!("  {what} ...\n"));
         }
     })?;
     let d = &found.diagnosis;

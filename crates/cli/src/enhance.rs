@@ -292,7 +292,10 @@ fn summary(
                 let _ = writeln!(out, "  first contact at {:.2} mm, {t:.3} s", z * 1e3);
             }
             _ => {
-                let _ = writeln!(out, "  no contact found: the force never stands out of its noise in air");
+                // A finding about the recording says it better.
+                let grave = notes.iter().any(|n| n.grave);
+                let why = if grave { "see the note" } else { "the force never stands out of its noise in air" };
+                let _ = writeln!(out, "  no contact found: {why}");
             }
         }
         let _ = writeln!(out, "  {} rupture(s)", r.trace.detections.len());

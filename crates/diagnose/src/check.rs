@@ -7,12 +7,18 @@ use stylet_scenario::Scenario;
 use stylet_tissue::{Law, replay};
 
 /// Fewest samples of a recording.
-const LEAST_SAMPLES: usize = 50;
+const LEAST_SAMPLES: usize = stylet_record::LEAST_SAMPLES;
+/// Most layers: so many were seen to be told apart, with clean data and no cause named.
+const MOST_LAYERS: usize = 40;
 
 /// Checks reach, units and signs.
 pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), DiagnoseError> {
     if evidence.is_empty() {
         return Err(DiagnoseError::NoRecording);
+    }
+    let layers = scenario.tissue.layers.len();
+    if layers > MOST_LAYERS {
+        return Err(DiagnoseError::TooManyLayers { layers, most: MOST_LAYERS });
     }
     let (surface_m, end_m) = (scenario.tissue.surface_m, scenario.tissue.end_m());
     for e in evidence {
@@ -129,5 +135,5 @@ pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
     );
     let numbers =
         [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
-    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new() })
+    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new(), grave: false })
 }

@@ -131,6 +131,10 @@ pub enum RecordError {
     #[error("{samples} sample(s) given; a recording needs at least 2")]
     TooShort { samples: usize },
 
+    /// Recordings from which nothing can be concluded.
+    #[error("{}{}", unusable(*of, wrong.len()), wrong.join("\n"))]
+    Unusable { of: usize, wrong: Vec<String> },
+
     /// An extra column's name cannot stand in a header.
     #[error("the extra column \"{name}\" cannot be written: {why}; choose another name")]
     BadColumnName { name: String, why: &'static str },
@@ -138,6 +142,11 @@ pub enum RecordError {
     /// The destination refuses the text.
     #[error("the recording cannot be written ({0}); check that the destination exists and has room")]
     Write(#[from] io::Error),
+}
+
+/// What comes before the list of recordings that cannot be used; nothing when it is the only one.
+fn unusable(of: usize, wrong: usize) -> String {
+    if of == 1 { String::new() } else { format!("{wrong} of {of} recordings cannot be used; nothing was concluded from any:\n") }
 }
 
 fn shown(text: &str) -> String {
