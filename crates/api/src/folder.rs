@@ -44,7 +44,9 @@ impl Claim {
     /// [`Error::Output`] when it cannot be made, [`Error::Busy`] when another process works there.
     pub fn new(folder: &Path) -> Result<Self, Error> {
         let claim = Self::take(folder, File::try_lock)?;
-        let tidy = fs::remove_dir_all(folder.join(NEW)).or_else(absent).and_then(|()| settle_with(folder, &mut || false));
+        let tidy = fs::remove_dir_all(folder.join(NEW))
+            .or_else(absent)
+            .and_then(|()| settle_with(folder, &mut || false));
         tidy.map_err(|why| failed(folder, why))?;
         Ok(claim)
     }
@@ -68,7 +70,9 @@ impl Claim {
         // Where a folder cannot be locked (not on every system, not on every network disk) nothing keeps others away.
         if let Ok(file) = File::open(folder) {
             match lock(&file) {
-                Err(TryLockError::WouldBlock) => return Err(Error::Busy { path: folder.display().to_string() }),
+                Err(TryLockError::WouldBlock) => {
+                    return Err(Error::Busy { path: folder.display().to_string() });
+                }
                 Ok(()) | Err(TryLockError::Error(_)) => claim._lock = Some(file),
             }
         }
@@ -88,7 +92,11 @@ impl Claim {
     }
 
     /// `killed` is asked before every change of the disk; tests end the work there as a kill would.
-    fn write_until(&self, files: &[(&'static str, Vec<u8>)], killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+    fn write_until(
+        &self,
+        files: &[(&'static str, Vec<u8>)],
+        killed: &mut dyn FnMut() -> bool,
+    ) -> io::Result<()> {
         let folder = &self.folder;
         // A file cannot take the place of a folder of the same name.
         let names = files.iter().map(|(name, _)| *name).chain([MANIFEST]);
@@ -182,7 +190,8 @@ fn settle_with(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()
     if whole.exists() {
         let names = names_in(&whole)?;
         go_on(killed)?;
-        fs::create_dir(&old).or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
+        fs::create_dir(&old)
+            .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
         let moved = move_in(folder, &whole, &old, &names, killed);
         match moved {
             Ok(()) => {}
@@ -211,7 +220,13 @@ fn names_in(whole: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-fn move_in(folder: &Path, whole: &Path, old: &Path, names: &[String], killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+fn move_in(
+    folder: &Path,
+    whole: &Path,
+    old: &Path,
+    names: &[String],
+    killed: &mut dyn FnMut() -> bool,
+) -> io::Result<()> {
     // The old manifest goes first: it does not speak of a folder in between.
     for name in names.iter().rev() {
         let place = folder.join(name);
@@ -293,13 +308,17 @@ mod tests {
     fn held(folder: &Path) -> Option<String> {
         let read = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_default();
         let of = read(NAMES[0]).split(' ').next().unwrap_or_default().to_owned();
-        let all = NAMES.iter().all(|name| read(name) == format!("{of} {name}") || (of.is_empty() && read(name).is_empty()));
+        let all = NAMES
+            .iter()
+            .all(|name| read(name) == format!("{of} {name}") || (of.is_empty() && read(name).is_empty()));
         (all && verify(folder, &NAMES).is_ok()).then_some(of)
     }
 
     fn leftovers(folder: &Path) -> Vec<String> {
-        let all = fs::read_dir(folder).map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect());
-        all.map(|all: Vec<String>| all.into_iter().filter(|name| name.starts_with('.')).collect()).unwrap_or_default()
+        let all = fs::read_dir(folder)
+            .map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect());
+        all.map(|all: Vec<String>| all.into_iter().filter(|name| name.starts_with('.')).collect())
+            .unwrap_or_default()
     }
 
     #[test]
@@ -325,7 +344,11 @@ mod tests {
             }
             // What a kill leaves behind goes with the next set, and that is whole.
             Claim::new(&folder)?.write(&set("next"))?;
-            assert_eq!((held(&folder).as_deref(), leftovers(&folder)), (Some("next"), vec![]), "killed at change {at}");
+            assert_eq!(
+                (held(&folder).as_deref(), leftovers(&folder)),
+                (Some("next"), vec![]),
+                "killed at change {at}"
+            );
             assert_eq!(fs::read_to_string(folder.join("notes.txt")).unwrap_or_default(), "mine");
             if done.is_ok() {
                 break;

@@ -3,6 +3,7 @@
 use crate::args::DiagnoseArgs;
 use crate::diagnose_report;
 use crate::exit::Failure;
+use crate::limits;
 use crate::output::Output;
 use crate::terminal::say;
 use rayon::prelude::*;
@@ -30,6 +31,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         ));
     }
     let scenario = Scenario::load(&args.scenario)?;
+    args.limits.allow(&args.scenario, &limits::of_diagnose(&args.data), args.results.quiet)?;
     let columns = match &args.columns {
         Some(path) => Some(stylet_scenario::load(path)?),
         None => None,

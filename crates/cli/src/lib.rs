@@ -10,6 +10,7 @@ mod diagnose_report;
 mod effects;
 mod enhance;
 pub mod exit;
+mod limits;
 mod listen;
 mod progress;
 mod repeats;

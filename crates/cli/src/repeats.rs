@@ -2,6 +2,7 @@
 
 use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
+use crate::limits;
 use crate::output::Output;
 use crate::repeats_online;
 use crate::repeats_report;
@@ -34,6 +35,7 @@ const FEWEST: usize = 3;
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let set = description(args)?;
     let files = files(args, &set)?;
+    args.limits.allow(&args.scenario, &limits::of_diagnose(&files), args.results.quiet)?;
     let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let mut say = |what: &str| {
         if talk {

@@ -45,12 +45,15 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Di
             return Err(DiagnoseError::PositionUnit { name: name(), deepest: deepest_m, end_m, unit, scale });
         }
         if deepest_m - surface_m < 0.01 * first_m {
-            let remedy = if -lowest_m > surface_m + 0.1 * depth_m {
+            let start_m = usable.first().map_or(deepest_m, |&i| r.position_m[i]);
+            let remedy = if start_m - lowest_m > deepest_m - start_m && -lowest_m > surface_m + 0.1 * depth_m
+            {
                 "the position runs the other way: positive is into the tissue, give a column map with a negative scale"
             } else if deepest_m - lowest_m > 1e-9 && deepest_m - lowest_m < 2e-3 * depth_m {
                 "its whole travel is a thousandth of the tissue: is the position in kilometres, or scaled twice?"
             } else {
-                "is this the right scenario, and does position zero mean the same in both?"
+                "is this the right scenario, and does position zero mean the same in both? a column map shifts it with \
+                 position: (name: \"position_m\", offset: 0.01), or give the scenario the surface_m that the recording has"
             };
             return Err(DiagnoseError::NeverReaches { name: name(), deepest_m, surface_m, remedy });
         }

@@ -109,6 +109,11 @@ pub fn assess(recording: &Recording) -> Vec<QualityNote> {
     if recording.len() < 2 {
         return notes;
     }
+    if let Some(note) = sense::unmeasurable(recording) {
+        // Nothing else can be computed from it.
+        notes.push(note);
+        return notes;
+    }
     notes.extend(units::unit_mix_ups(recording));
     let dead = sense::dead(recording);
     if dead.is_none() && notes.is_empty() {
@@ -135,7 +140,9 @@ pub fn assess(recording: &Recording) -> Vec<QualityNote> {
 ///
 /// # Errors
 /// [`RecordError::Unusable`] with every recording that has a grave note, what is wrong with it and what to do.
-pub fn usable<'a>(recordings: impl IntoIterator<Item = (&'a str, &'a [QualityNote])>) -> Result<(), RecordError> {
+pub fn usable<'a>(
+    recordings: impl IntoIterator<Item = (&'a str, &'a [QualityNote])>,
+) -> Result<(), RecordError> {
     let (mut of, mut wrong) = (0, Vec::new());
     for (name, notes) in recordings {
         of += 1;

@@ -38,7 +38,8 @@ pub fn thin(recording: &Recording) -> Option<(Recording, QualityNote)> {
         {
             end += 1;
         }
-        let mean = |x: &[f64]| x.get(start..end).map_or(0.0, |x| x.iter().sum::<f64>() / x.len().max(1) as f64);
+        let mean =
+            |x: &[f64]| x.get(start..end).map_or(0.0, |x| x.iter().sum::<f64>() / x.len().max(1) as f64);
         out.time_s.push(mean(&recording.time_s));
         out.position_m.push(mean(&recording.position_m));
         out.velocity_mps.push(mean(&recording.velocity_mps));
@@ -68,7 +69,8 @@ mod tests {
     }
 
     #[test]
-    fn a_minute_is_left_alone_at_any_rate_and_hours_become_a_few_ten_thousand_samples() -> Result<(), RecordError> {
+    fn a_minute_is_left_alone_at_any_rate_and_hours_become_a_few_ten_thousand_samples()
+    -> Result<(), RecordError> {
         for hz in [50.0, 200.0, 1000.0] {
             assert!(thin(&recorded((60.0 * hz) as u32, hz)?).is_none(), "{hz} Hz");
         }

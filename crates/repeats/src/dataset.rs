@@ -17,8 +17,8 @@ use crate::run::Run;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use stylet_record::{
-    ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv_bytes, read_csv_with_holes,
-    unlike_the_others, usable,
+    ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv_bytes,
+    read_csv_with_holes, unlike_the_others, usable,
 };
 use stylet_scenario::{InputError, Problem, parse, read_text};
 use stylet_tissue::Tissue;
@@ -188,13 +188,19 @@ impl Dataset {
             }
         } else {
             let grave = |notes: &[QualityNote]| {
-                notes.iter().any(|n| n.grave && !matches!(n.kind, QualityKind::TooShort | QualityKind::InAir | QualityKind::Stuck))
+                notes.iter().any(|n| {
+                    n.grave
+                        && !matches!(n.kind, QualityKind::TooShort | QualityKind::InAir | QualityKind::Stuck)
+                })
             };
             if read.iter().all(|(_, _, notes)| grave(notes)) {
                 usable(read.iter().map(|(name, _, notes)| (name.as_str(), notes.as_slice())))?;
             }
         }
-        Ok(read.into_iter().map(|(name, recording, notes)| Run::new(name, recording, notes, layers)).collect())
+        Ok(read
+            .into_iter()
+            .map(|(name, recording, notes)| Run::new(name, recording, notes, layers))
+            .collect())
     }
 
     fn read(&self, file: &Path) -> Result<Vec<(String, Recording, Vec<QualityNote>)>, DatasetError> {

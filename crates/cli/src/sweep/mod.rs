@@ -11,6 +11,7 @@ pub use gate::gate;
 pub use replay::replay;
 
 use crate::exit::Failure;
+use crate::limits;
 use crate::progress::Progress;
 use crate::run::default_folder;
 use args::{SweepArgs, SweepCommand};
@@ -64,6 +65,8 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     };
     let sweep = Sweep::load(file, args.draws.into())?;
     let columns = Columns::new(&sweep);
+    let need = limits::of_sweep(&sweep, &columns, args.threads.unwrap_or(0));
+    args.limits.allow(file, &need, args.results.quiet)?;
     let out = args.results.out.clone().unwrap_or_else(|| default_folder(file));
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     // Nobody else writes there until the set is whole: the shards, the tables and `sweep.ron` are of one draw.

@@ -33,6 +33,7 @@ pub fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         scenario: out.join("scenario.ron"),
         seed: None,
         compare: false,
+        limits: crate::limits::Limits::default(),
         results: Results { out: Some(out), quiet: args.results.quiet },
     })
 }

@@ -143,11 +143,20 @@ mod tests {
 
     #[test]
     fn the_note_says_what_the_others_have() -> Result<(), RecordError> {
-        let all = [insertion(0.004, 1.0, 0.0)?, insertion(0.004, 1.05, 1.0)?, insertion(0.004, 3.0, 2.0)?, insertion(0.004, 0.95, 3.0)?];
+        let all = [
+            insertion(0.004, 1.0, 0.0)?,
+            insertion(0.004, 1.05, 1.0)?,
+            insertion(0.004, 3.0, 2.0)?,
+            insertion(0.004, 0.95, 3.0)?,
+        ];
         let notes = unlike_the_others(&all.iter().collect::<Vec<_>>());
         let note = notes[2].as_ref().expect("three times as strong");
         let ratio = note.numbers["typical_n"] / note.numbers["others_n"];
-        assert!((2.7..3.3).contains(&ratio) && note.message.contains("not like the others"), "{}", note.message);
+        assert!(
+            (2.7..3.3).contains(&ratio) && note.message.contains("not like the others"),
+            "{}",
+            note.message
+        );
         Ok(())
     }
 }

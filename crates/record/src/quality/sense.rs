@@ -43,6 +43,27 @@ pub(super) fn still(recording: &Recording) -> Option<QualityNote> {
     })
 }
 
+/// No sensor gives such a number, in any unit.
+const UNMEASURABLE: f64 = 1e12;
+
+/// Values like 1e300, which finite arithmetic does not survive.
+pub(super) fn unmeasurable(recording: &Recording) -> Option<QualityNote> {
+    let columns = [
+        ("force_n", &recording.force_n),
+        ("position_m", &recording.position_m),
+        ("velocity_mps", &recording.velocity_mps),
+    ];
+    let first = |values: &[f64]| values.iter().position(|x| x.abs() > UNMEASURABLE);
+    let (name, at, value) =
+        columns.iter().find_map(|(name, values)| first(values).map(|at| (*name, at, values[at])))?;
+    let message = format!(
+        "{name} is {value:e} in sample {} (t = {} s): no sensor gives that; remove the row or correct the value",
+        at + 1,
+        recording.time_s[at]
+    );
+    Some(QualityNote::grave(QualityKind::UnitMixUp, message, [("value", value), ("limit", UNMEASURABLE)]))
+}
+
 /// Longest run of equal forces that passes while the needle moves.
 const LONGEST_RUN: usize = 20;
 /// ... by this share of its whole travel.
@@ -161,7 +182,10 @@ pub(super) fn in_air(recording: &Recording) -> Option<QualityNote> {
         }
         means = means.chunks_exact(2).map(mean).collect();
     }
-    let (low, high) = (quantile_of(recording.force_n.iter().copied(), 0.05), quantile_of(recording.force_n.iter().copied(), 0.95));
+    let (low, high) = (
+        quantile_of(recording.force_n.iter().copied(), 0.05),
+        quantile_of(recording.force_n.iter().copied(), 0.95),
+    );
     let message = format!(
         "the force stays within {low:.4} N and {high:.4} N and is nothing but noise, as in air: the needle touches nothing, or the \
          sensor does not feel it; check that this is an insertion and that the force comes from its sensor"
@@ -228,10 +252,15 @@ mod tests {
     }
 
     #[test]
-    fn a_dead_a_reversed_and_a_millimetre_recording_have_one_name_and_one_remedy_each() -> Result<(), RecordError> {
+    fn a_dead_a_reversed_and_a_millimetre_recording_have_one_name_and_one_remedy_each()
+    -> Result<(), RecordError> {
         let dead = insertion(0.02, |_| 0.0)?;
         assert_eq!(kinds(&dead), [QualityKind::Dead]);
-        assert_eq!(kinds(&insertion(0.02, |_| 1.25)?), [QualityKind::Dead], "a level that never changes is as dead");
+        assert_eq!(
+            kinds(&insertion(0.02, |_| 1.25)?),
+            [QualityKind::Dead],
+            "a level that never changes is as dead"
+        );
         let reversed = insertion(0.02, |f| -f)?;
         assert_eq!(kinds(&reversed), [QualityKind::Reversed]);
         assert_eq!(kinds(&insertion(0.02, |f| -2.0 - f)?), [QualityKind::Reversed], "with a bias");
@@ -283,9 +312,13 @@ mod tests {
         let frozen = recording.force_n[700];
         recording.force_n[700..800].fill(frozen);
         let notes = assess(&recording);
-        let note = notes.iter().find(|note| note.kind == QualityKind::Stuck).expect("half a second stands still");
+        let note =
+            notes.iter().find(|note| note.kind == QualityKind::Stuck).expect("half a second stands still");
         assert!(!note.grave && note.numbers["longest"] == 100.0, "{}", note.message);
-        assert_eq!(assess(&insertion(0.02, |f| f)?).iter().filter(|n| n.kind == QualityKind::Stuck).count(), 0);
+        assert_eq!(
+            assess(&insertion(0.02, |f| f)?).iter().filter(|n| n.kind == QualityKind::Stuck).count(),
+            0
+        );
         Ok(())
     }
 
@@ -293,7 +326,8 @@ mod tests {
     fn a_recording_that_begins_in_the_tissue_and_lets_go_is_not_reversed() -> Result<(), RecordError> {
         // Under load from the start, one rupture after the other, no advance left at the end.
         let good = insertion(0.02, |f| f)?;
-        let force_n = good.time_s.iter().zip(noise(2000, 9)).map(|(t, e)| 2.0 - 0.18 * t + 0.02 * e).collect();
+        let force_n =
+            good.time_s.iter().zip(noise(2000, 9)).map(|(t, e)| 2.0 - 0.18 * t + 0.02 * e).collect();
         let falling = Recording::new(good.time_s, good.position_m, force_n)?;
         assert_eq!(kinds(&falling), []);
         Ok(())

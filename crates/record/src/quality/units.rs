@@ -43,8 +43,8 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
         FASTEST_MPS,
         true,
         format!(
-            "the needle moves at {speed_mps:.4} m/s: position or velocity look like millimetres (scale 1e-3), or the time is \
-         too short by its unit"
+            "the needle moves at {speed_mps:.4} m/s: position or velocity look like millimetres: give a column map with scale 1e-3 \
+         (or the time is too short by its unit)"
         ),
     );
     let force_n = quantile_of(recording.force_n.iter().map(|f| f.abs()), PERCENTILE);
