@@ -132,7 +132,7 @@ fn hold(name: &str, of: u64, corpus: &[Vec<u8>], parser: impl Fn(&[u8]) -> bool)
     }
     // Mutations that all fail in the first line would test nothing.
     assert!(
-        accepted * 50 > count && accepted < count,
+        accepted * 200 > count && accepted < count,
         "{name}: {accepted} of {count} mutations are accepted"
     );
 }
@@ -220,12 +220,8 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_their_pl
     });
     let enhance = [
         b"Enhance(cusum: (sigma_rupture_n: 0.3), model: KelvinVoigt, algorithm: Stylet)".to_vec(),
-        b"Enhance(surface_m: 0.01, derivative: (threshold_n_per_s: -2.0), rls: (forgetting: 0.99))".to_vec(),
+        b"Enhance(surface_m: 0.01, algorithm: Literal, model: MultiLayer)".to_vec(),
     ];
-    let enhance: Vec<Vec<u8>> = enhance
-        .into_iter()
-        .filter(|t| EnhanceFile::parse("a.ron", &String::from_utf8_lossy(t)).is_ok())
-        .collect();
     hold("enhance", 8_000, &enhance, |bytes| {
         std::str::from_utf8(bytes).is_ok_and(|text| told(EnhanceFile::parse("a.ron", text)).is_some())
     });

@@ -64,7 +64,7 @@ pub enum QualityKind {
     /// Force or position takes few values on a grid: fewer than 20 % of the samples are distinct and the steps between the
     /// values are multiples of the smallest one. Numbers: `smallest_step` (SI unit), `distinct`, `distinct_ratio`.
     Quantisation,
-    /// A recording was thinned before it was used ([`crate::thin`]). Numbers: `from`, `to`, `together`.
+    /// A recording was thinned before it was used ([`mod@crate::thin`]). Numbers: `from`, `to`, `together`.
     Thinned,
 }
 
@@ -91,7 +91,7 @@ fn is_false(b: &bool) -> bool {
 
 impl QualityNote {
     /// A remark that forbids conclusions.
-    fn grave<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
+    fn forbidding<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
         Self { grave: true, ..Self::new(kind, message, numbers) }
     }
 

@@ -11,7 +11,7 @@ pub const LEAST_SAMPLES: usize = 50;
 pub(super) fn too_short(samples: usize) -> Option<QualityNote> {
     (samples < LEAST_SAMPLES).then(|| {
         let message = format!("there are {samples} usable sample(s); a diagnosis needs at least {LEAST_SAMPLES}: record the whole insertion");
-        QualityNote::grave(QualityKind::TooShort, message, [("samples", samples as f64), ("least", LEAST_SAMPLES as f64)])
+        QualityNote::forbidding(QualityKind::TooShort, message, [("samples", samples as f64), ("least", LEAST_SAMPLES as f64)])
     })
 }
 
@@ -26,7 +26,7 @@ pub(super) fn dead(recording: &Recording) -> Option<QualityNote> {
              another column; check the cable and the column map, and record again",
             recording.len()
         );
-        QualityNote::grave(QualityKind::Dead, message, [("value", high)])
+        QualityNote::forbidding(QualityKind::Dead, message, [("value", high)])
     })
 }
 
@@ -39,7 +39,7 @@ pub(super) fn still(recording: &Recording) -> Option<QualityNote> {
         let message = format!(
             "the position stands at {high} m: the needle does not move, or this is another column; check the encoder and the column map"
         );
-        QualityNote::grave(QualityKind::Stuck, message, [("value", high), ("travel_m", high - low)])
+        QualityNote::forbidding(QualityKind::Stuck, message, [("value", high), ("travel_m", high - low)])
     })
 }
 
@@ -61,7 +61,7 @@ pub(super) fn unmeasurable(recording: &Recording) -> Option<QualityNote> {
         at + 1,
         recording.time_s[at]
     );
-    Some(QualityNote::grave(QualityKind::UnitMixUp, message, [("value", value), ("limit", UNMEASURABLE)]))
+    Some(QualityNote::forbidding(QualityKind::UnitMixUp, message, [("value", value), ("limit", UNMEASURABLE)]))
 }
 
 /// Longest run of equal forces that passes while the needle moves.
@@ -136,7 +136,7 @@ pub(super) fn reversed(recording: &Recording) -> Option<QualityNote> {
             "the force runs the other way: it falls by {wrong_n:.4} N while the needle goes in, and should be positive when it resists \
              the insertion; give a column map with force: (name: \"force_n\", scale: -1)"
         );
-        QualityNote::grave(QualityKind::Reversed, message, [("wrong_n", wrong_n), ("right_n", right_n)])
+        QualityNote::forbidding(QualityKind::Reversed, message, [("wrong_n", wrong_n), ("right_n", right_n)])
     })
 }
 
@@ -190,7 +190,7 @@ pub(super) fn in_air(recording: &Recording) -> Option<QualityNote> {
         "the force stays within {low:.4} N and {high:.4} N and is nothing but noise, as in air: the needle touches nothing, or the \
          sensor does not feel it; check that this is an insertion and that the force comes from its sensor"
     );
-    Some(QualityNote::grave(QualityKind::InAir, message, [("low_n", low), ("high_n", high)]))
+    Some(QualityNote::forbidding(QualityKind::InAir, message, [("low_n", low), ("high_n", high)]))
 }
 
 fn mean(values: &[f64]) -> f64 {
