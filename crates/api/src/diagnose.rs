@@ -3,6 +3,7 @@
 use crate::error::Error;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::{Diagnosis, Evidence, Examined, Options};
+use stylet_record::{QualityNote, assess, thin, usable};
 use stylet_scenario::Scenario;
 
 /// What a diagnosis gives.
@@ -42,15 +43,34 @@ impl Diagnosed {
 /// Compares what a scenario believes with what was measured; `progress` is told what is being done. At least one recording;
 /// with two or more the gain is measured on recordings left out of the fit.
 ///
+/// Recordings that are too long are thinned first, and the diagnosis says so.
+///
 /// # Errors
+/// [`Error::Recording`] when a recording allows no conclusion (a dead or reversed sensor, millimetres for metres, ...),
 /// [`Error::Diagnose`] when the recordings do not fit the scenario.
 pub fn diagnose(
     believed: &Scenario,
     evidence: &[Evidence],
     progress: impl FnMut(&str),
 ) -> Result<Diagnosed, Error> {
-    let examined = stylet_diagnose::diagnose(believed, evidence, &Options::default(), progress)?;
+    let mut judged: Vec<(&str, Vec<QualityNote>)> = Vec::with_capacity(evidence.len());
+    for e in evidence {
+        // Samples that are no numbers are the engine's to cut out.
+        let notes = if e.recording.check().is_ok() { assess(&e.recording) } else { Vec::new() };
+        judged.push((&e.name, notes));
+    }
+    usable(judged.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
+    let thinned: Vec<Evidence> = evidence.iter().map(within_reach).collect();
+    let examined = stylet_diagnose::diagnose(believed, &thinned, &Options::default(), progress)?;
     Ok(Diagnosed { diagnosis: examined.diagnosis.clone(), extended: examined.extended.clone(), examined })
+}
+
+/// The recording as long as a diagnosis can use it.
+fn within_reach(evidence: &Evidence) -> Evidence {
+    let Some((recording, note)) = thin(&evidence.recording) else { return evidence.clone() };
+    let mut notes = evidence.notes.clone();
+    notes.push(note);
+    Evidence { name: evidence.name.clone(), recording, notes }
 }
 
 /// The file's name, with its folder when names repeat.

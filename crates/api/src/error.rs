@@ -37,6 +37,23 @@ pub enum Error {
         /// What the system says.
         why: std::io::Error,
     },
+    /// Another process writes there.
+    #[error(
+        "{path}: another stylet is writing to this folder; wait until it has ended, or give this one a folder of its own with --out"
+    )]
+    Busy {
+        /// Folder.
+        path: String,
+    },
+    /// A file of a set was changed or replaced.
+    #[error(
+        "{path}: does not belong to the same set of results as the folder's manifest.json: it was changed or replaced; make the \
+         results anew, or put the file back"
+    )]
+    NotOneSet {
+        /// File.
+        path: String,
+    },
     /// A mistake of ours.
     #[error("internal error: {0}; please report it")]
     Internal(String),

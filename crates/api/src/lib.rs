@@ -14,6 +14,7 @@
 mod diagnose;
 mod enhance;
 mod error;
+pub mod folder;
 pub mod hash;
 pub mod output;
 pub mod picture;
@@ -24,6 +25,7 @@ pub mod sweep;
 pub use diagnose::{Diagnosed, diagnose, name_of};
 pub use enhance::{Enhanced, enhance, listen};
 pub use error::Error;
+pub use folder::Claim;
 pub use output::Output;
 pub use picture::Ran;
 pub use predict::predict;

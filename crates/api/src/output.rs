@@ -1,9 +1,8 @@
-//! Writing results so that nothing half-written is ever left behind: every file is written beside
-//! its place under another name and moved there when all are complete.
+//! Files of one output folder, waiting to be written as one set.
 
 use crate::error::Error;
-use std::io;
-use std::path::{Path, PathBuf};
+use crate::folder::Claim;
+use std::path::Path;
 
 /// Files of one output folder, waiting to be written together.
 #[derive(Debug, Default)]
@@ -22,54 +21,20 @@ impl Output {
         self.files.iter().map(|(name, content)| (*name, content.as_slice()))
     }
 
-    /// Writes all files into `folder`, which is made when it does not exist. Files of the same names
-    /// are replaced, others are left alone.
+    /// Writes all files into `folder`, which is made when it does not exist, and `manifest.json` that tells of them. Files of the
+    /// same names are replaced, others are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Output`], [`Error::Busy`]; the folder is then as it was before.
+    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+        self.write_to(&Claim::new(folder)?)
+    }
+
+    /// The same into a folder that is claimed already.
     ///
     /// # Errors
     /// [`Error::Output`]; the folder is then as it was before.
-    pub fn write(&self, folder: &Path) -> Result<(), Error> {
-        let failed = |why| Error::Output { path: folder.display().to_string(), why };
-        // What is made here goes again when the writing fails.
-        let made: Vec<&Path> =
-            folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).collect();
-        let result = self
-            .no_folder_in_the_way(folder)
-            .and_then(|()| std::fs::create_dir_all(folder))
-            .and_then(|()| self.write_beside(folder));
-        if result.is_err() {
-            for folder in made {
-                // Only empty folders go.
-                let _ = std::fs::remove_dir(folder);
-            }
-        }
-        result.map_err(failed)
-    }
-
-    /// A file cannot take the place of a folder of the same name.
-    fn no_folder_in_the_way(&self, folder: &Path) -> io::Result<()> {
-        match self.files.iter().map(|(name, _)| folder.join(name)).find(|place| place.is_dir()) {
-            Some(place) => Err(io::Error::other(format!("{} is a folder", place.display()))),
-            None => Ok(()),
-        }
-    }
-
-    fn write_beside(&self, folder: &Path) -> io::Result<()> {
-        let beside: Vec<(PathBuf, PathBuf)> = self
-            .files
-            .iter()
-            .map(|(name, _)| (folder.join(format!(".{name}.{}.part", std::process::id())), folder.join(name)))
-            .collect();
-        let written = beside
-            .iter()
-            .zip(&self.files)
-            .try_for_each(|((part, _), (_, content))| std::fs::write(part, content));
-        let moved =
-            written.and_then(|()| beside.iter().try_for_each(|(part, place)| std::fs::rename(part, place)));
-        if moved.is_err() {
-            for (part, _) in &beside {
-                let _ = std::fs::remove_file(part);
-            }
-        }
-        moved
+    pub fn write_to(&self, claim: &Claim) -> Result<(), Error> {
+        claim.write(&self.files)
     }
 }

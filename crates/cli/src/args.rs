@@ -1,5 +1,6 @@
 //! What can be typed.
 
+use crate::limits::Limits;
 use crate::sweep::args::{GateArgs, ReplayArgs, SweepArgs};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -174,6 +175,9 @@ pub struct RunArgs {
     /// Where the results go.
     #[command(flatten)]
     pub results: Results,
+    /// How much it may take.
+    #[command(flatten)]
+    pub limits: Limits,
 }
 
 /// Arguments of `stylet enhance`.
@@ -206,6 +210,9 @@ pub struct EnhanceArgs {
     /// Where the results go.
     #[command(flatten)]
     pub results: Results,
+    /// How much it may take.
+    #[command(flatten)]
+    pub limits: Limits,
 }
 
 /// Arguments of `stylet diagnose`.
@@ -238,6 +245,9 @@ pub struct DiagnoseArgs {
     /// Where the results go.
     #[command(flatten)]
     pub results: Results,
+    /// How much it may take.
+    #[command(flatten)]
+    pub limits: Limits,
 }
 
 /// Arguments of `stylet effects`.
@@ -317,7 +327,7 @@ pub struct BenchmarkDiagnoseArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
     /// Cases run side by side [default: as many as there are cores].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::limits::threads)]
     pub threads: Option<usize>,
     /// Run nothing: write table and page of the asked-for cases that the folder's cases.jsonl holds already.
     #[arg(long)]

@@ -3,6 +3,7 @@
 use crate::args::DiagnoseArgs;
 use crate::diagnose_report;
 use crate::exit::Failure;
+use crate::limits;
 use crate::output::Output;
 use crate::terminal::say;
 use rayon::prelude::*;
@@ -30,6 +31,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         ));
     }
     let scenario = Scenario::load(&args.scenario)?;
+    args.limits.allow(&args.scenario, &limits::of_diagnose(&args.data), args.results.quiet)?;
     let columns = match &args.columns {
         Some(path) => Some(stylet_scenario::load(path)?),
         None => None,
@@ -44,7 +46,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let found = stylet_api::diagnose(&scenario, &evidence, |what| {
         if talk {
-            eprintln!("  {what} ...");
+            crate::terminal::tell(&format!("  {what} ...\n"));
         }
     })?;
     let d = &found.diagnosis;

@@ -2,6 +2,7 @@
 
 use crate::args::EnhanceArgs;
 use crate::exit::Failure;
+use crate::limits;
 use crate::output::Output;
 use crate::picture::{self, Ran};
 use crate::run::default_folder;
@@ -126,6 +127,9 @@ fn with_state(csv: &[u8], state: &[stylet_core::State]) -> Vec<u8> {
 pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let config = args.config.as_deref().map(EnhanceFile::load).transpose()?.unwrap_or_default();
     let columns: Option<ColumnMap> = args.columns.as_deref().map(stylet_scenario::load).transpose()?;
+    if let Some(need) = limits::of_enhance(&args.data, if args.compare { 2 } else { 1 }) {
+        args.limits.allow(&args.data, &need, args.results.quiet)?;
+    }
     let (recording, notes) = read_csv(&args.data, &ReadOptions { columns, repair: args.repair })?;
     let mut models = vec![config.enhance.model];
     if args.compare {
@@ -292,7 +296,11 @@ fn summary(
                 let _ = writeln!(out, "  first contact at {:.2} mm, {t:.3} s", z * 1e3);
             }
             _ => {
-                let _ = writeln!(out, "  no contact found: the force never stands out of its noise in air");
+                // A finding about the recording says it better.
+                let grave = notes.iter().any(|n| n.grave);
+                let why =
+                    if grave { "see the note" } else { "the force never stands out of its noise in air" };
+                let _ = writeln!(out, "  no contact found: {why}");
             }
         }
         let _ = writeln!(out, "  {} rupture(s)", r.trace.detections.len());

@@ -38,6 +38,12 @@ pub enum Failure {
         /// What the system says.
         why: std::io::Error,
     },
+    /// Standard output cannot be written.
+    #[error(
+        "standard output cannot be written: {0}; files in the output folder are complete, only what would be printed is lost: make room \
+         where it goes, or use --quiet"
+    )]
+    Say(std::io::Error),
     /// What was asked for cannot be done with what was given; the sentence says why and what would.
     #[error("{0}")]
     Check(String),
@@ -74,7 +80,9 @@ impl From<stylet_api::Error> for Failure {
         use stylet_api::Error;
         match error {
             Error::Input(error) => Self::Input(error),
-            Error::Problem(_) | Error::Trial(_) => Self::Check(error.to_string()),
+            Error::Problem(_) | Error::Trial(_) | Error::Busy { .. } | Error::NotOneSet { .. } => {
+                Self::Check(error.to_string())
+            }
             Error::Recording(error) => Self::Recording(error),
             Error::Simulate { file, why } => Self::Simulate { file, why },
             Error::Diagnose(error) => Self::Diagnose(error),
@@ -103,6 +111,7 @@ impl Failure {
             | Failure::Recording(_)
             | Failure::Simulate { .. }
             | Failure::Output { .. }
+            | Failure::Say(_)
             | Failure::Check(_)
             | Failure::Diagnose(_)
             | Failure::Dataset(_)

@@ -10,6 +10,7 @@ mod diagnose_report;
 mod effects;
 mod enhance;
 pub mod exit;
+mod limits;
 mod listen;
 mod progress;
 mod repeats;
@@ -50,8 +51,16 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::from(exit::DONE),
         Err(failure) => {
             let code = failure.code();
-            eprintln!("{:?}", miette::Report::new(failure));
+            terminal::tell(&rendered(failure));
             code
         }
     }
+}
+
+/// The error as it is shown: with its place in the source where that can be drawn, else the sentence alone.
+fn rendered(failure: Failure) -> String {
+    let sentence = failure.to_string();
+    let report = miette::Report::new(failure);
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| format!("{report:?}\n")))
+        .unwrap_or_else(|_| format!("{sentence}\n"))
 }

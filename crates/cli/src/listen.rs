@@ -40,7 +40,7 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         let page = TcpListener::bind((args.host.as_str(), port));
         let page = page.map_err(|e| bind(&format!("--page {port}: cannot be served"), e))?;
         let address = page.local_addr().map_err(|e| bind("--page", e))?;
-        eprintln!("live page: http://{address}/");
+        crate::terminal::tell(&format!("live page: http://{address}/\n"));
         let hub = hub.clone();
         std::thread::spawn(move || stylet_live::serve(page, hub));
     }
@@ -54,14 +54,14 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         let _ = reader.join();
     }
     let json = serde_json::to_string(&session.counts()).map_err(|e| Failure::Internal(e.to_string()))?;
-    eprintln!("{json}");
+    crate::terminal::tell(&format!("{json}\n"));
     Ok(())
 }
 
 fn complain(bad: &stylet_live::BadLine, told: &mut bool) {
     // Once: a stream of nonsense would bury everything else. The count is in the summary.
     if !std::mem::replace(told, true) {
-        eprintln!("{bad} (further ones are counted)");
+        crate::terminal::tell(&format!("{bad} (further ones are counted)\n"));
     }
 }
 

@@ -2,13 +2,14 @@
 
 use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
+use crate::limits;
 use crate::output::Output;
 use crate::repeats_online;
 use crate::repeats_report;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use stylet_record::{Recording, read_csv};
+use stylet_record::{QualityKind, Recording, read_csv};
 use stylet_repeats::dataset::{Dataset, DatasetError, find, is_dataset};
 use stylet_repeats::instrument::Instrument;
 use stylet_repeats::run::Run;
@@ -34,10 +35,11 @@ const FEWEST: usize = 3;
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let set = description(args)?;
     let files = files(args, &set)?;
+    args.limits.allow(&args.scenario, &limits::of_diagnose(&files), args.results.quiet)?;
     let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let mut say = |what: &str| {
         if talk {
-            eprintln!("  {what}");
+            crate::terminal::tell(&format!("  {what}\n"));
         }
     };
     let layers = set.tissue.layers.len();
@@ -109,6 +111,16 @@ fn description(args: &DiagnoseArgs) -> Result<Dataset, Failure> {
         Dataset::load(&args.scenario)?
     } else {
         let scenario = Scenario::load(&args.scenario)?;
+        if !scenario.effects.is_empty() {
+            use stylet_tissue::Effect as _;
+            let names: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
+            return Err(Failure::Check(format!(
+                "{}: believes in {}, and repeats are held against the base law alone: take `effects` out of the scenario, or diagnose \
+                 the recordings without --repeats",
+                args.scenario.display(),
+                names.join(", ")
+            )));
+        }
         Dataset {
             name: scenario.name,
             source: scenario.source,
@@ -119,8 +131,10 @@ fn description(args: &DiagnoseArgs) -> Result<Dataset, Failure> {
             air: None,
             load: None,
             parts: Vec::new(),
+            repair: false,
         }
     };
+    set.repair = args.repair;
     if let Some(path) = &args.columns {
         set.columns = Some(stylet_scenario::load(path)?);
     }
@@ -245,6 +259,9 @@ fn summary(study: &Study) -> String {
     }
     for q in d.data_quality.iter().filter(|q| q.recording.starts_with("all at")) {
         let _ = writeln!(out, "  data: {}", q.note.message);
+    }
+    for q in d.data_quality.iter().filter(|q| q.note.kind == QualityKind::NotLikeTheOthers) {
+        let _ = writeln!(out, "  note: {}: {}", q.recording, q.note.message);
     }
     out
 }

@@ -2,6 +2,7 @@
 
 use crate::args::RunArgs;
 use crate::exit::Failure;
+use crate::limits;
 use crate::terminal;
 use std::path::{Path, PathBuf};
 use stylet_core::config::Model;
@@ -19,6 +20,9 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     if args.compare {
         scenario.compare = vec![Model::MultiLayer, Model::KelvinVoigt];
+    }
+    if let Some(need) = limits::of_run(&scenario) {
+        args.limits.allow(&args.scenario, &need, args.results.quiet)?;
     }
     let run = stylet_api::simulate_from(&scenario, &file)?;
     let folder = args.results.out.clone().unwrap_or_else(|| default_folder(&args.scenario));

@@ -12,15 +12,18 @@ use stylet_score::{Compared, Score, Trace};
 /// Prints to standard output. A reader that has gone away, as in `stylet run ... | head`, is no error.
 ///
 /// # Errors
-/// [`Failure::Output`] when standard output cannot be written.
+/// [`Failure::Say`] when standard output cannot be written, as on a full disk.
 pub fn say(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(why) if why.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::Output { path: "standard output".to_owned(), why })
-        }
+        Err(why) if why.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Say(why)),
         _ => Ok(()),
     }
+}
+
+/// Tells on standard error how it goes, or what went wrong. Nobody listening is no error: there is nowhere to say so.
+pub fn tell(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
 fn or_dash(value: Option<String>) -> String {

@@ -7,12 +7,18 @@ use stylet_scenario::Scenario;
 use stylet_tissue::{Law, replay};
 
 /// Fewest samples of a recording.
-const LEAST_SAMPLES: usize = 50;
+const LEAST_SAMPLES: usize = stylet_record::LEAST_SAMPLES;
+/// Most layers: so many were seen to be told apart, with clean data and no cause named.
+const MOST_LAYERS: usize = 40;
 
 /// Checks reach, units and signs.
 pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), DiagnoseError> {
     if evidence.is_empty() {
         return Err(DiagnoseError::NoRecording);
+    }
+    let layers = scenario.tissue.layers.len();
+    if layers > MOST_LAYERS {
+        return Err(DiagnoseError::TooManyLayers { layers, most: MOST_LAYERS });
     }
     let (surface_m, end_m) = (scenario.tissue.surface_m, scenario.tissue.end_m());
     for e in evidence {
@@ -39,12 +45,15 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Di
             return Err(DiagnoseError::PositionUnit { name: name(), deepest: deepest_m, end_m, unit, scale });
         }
         if deepest_m - surface_m < 0.01 * first_m {
-            let remedy = if -lowest_m > surface_m + 0.1 * depth_m {
+            let start_m = usable.first().map_or(deepest_m, |&i| r.position_m[i]);
+            let remedy = if start_m - lowest_m > deepest_m - start_m && -lowest_m > surface_m + 0.1 * depth_m
+            {
                 "the position runs the other way: positive is into the tissue, give a column map with a negative scale"
             } else if deepest_m - lowest_m > 1e-9 && deepest_m - lowest_m < 2e-3 * depth_m {
                 "its whole travel is a thousandth of the tissue: is the position in kilometres, or scaled twice?"
             } else {
-                "is this the right scenario, and does position zero mean the same in both?"
+                "is this the right scenario, and does position zero mean the same in both? a column map shifts it with \
+                 position: (name: \"position_m\", offset: 0.01), or give the scenario the surface_m that the recording has"
             };
             return Err(DiagnoseError::NeverReaches { name: name(), deepest_m, surface_m, remedy });
         }
@@ -129,5 +138,5 @@ pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
     );
     let numbers =
         [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
-    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new() })
+    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new(), grave: false })
 }

@@ -6,6 +6,16 @@ pub enum DiagnoseError {
     /// No recording.
     #[error("no recording was given; name at least one with --data")]
     NoRecording,
+    /// More layers than a diagnosis tells apart.
+    #[error(
+        "the scenario has {layers} layers; a diagnosis tells up to {most} apart: take neighbouring layers of one tissue together"
+    )]
+    TooManyLayers {
+        /// Layers of the scenario.
+        layers: usize,
+        /// Most.
+        most: usize,
+    },
     /// Too few samples.
     #[error("{name}: {samples} usable sample(s); a diagnosis needs at least {least}")]
     TooShort {

@@ -49,6 +49,13 @@ pub enum RecordError {
         suggestion: Option<String>,
     },
 
+    /// Numbers where the names of the columns should stand.
+    #[error(
+        "{}: line {line}: the header is missing: the first line holds the numbers {}; begin the file with a line of names such as time_s,position_m,force_n",
+        path.display(), list(found)
+    )]
+    NoHeader { path: PathBuf, line: u64, found: Vec<String> },
+
     /// A column that is read has a name that occurs more than once.
     #[error("{}: line {line}: the header names the column \"{column}\" twice; rename the one that is not meant", path.display())]
     AmbiguousColumn { path: PathBuf, line: u64, column: String },
@@ -69,10 +76,17 @@ pub enum RecordError {
 
     /// A row with more or fewer fields than the header.
     #[error(
-        "{}: line {line}: the row has {found} fields, the header has {expected}; complete or remove the row (the last line of an interrupted log is often cut short)",
+        "{}: line {line}: the row has {found} fields, the header has {expected}; {remedy}",
         path.display()
     )]
-    RaggedRow { path: PathBuf, line: u64, found: usize, expected: usize },
+    RaggedRow { path: PathBuf, line: u64, found: usize, expected: usize, remedy: &'static str },
+
+    /// The slope of the position overflows.
+    #[error(
+        "{}: line {line}: the velocity, which is the slope of the position, is no finite number here: positions are too large or time stamps too close; correct the row, or the scales of time and position in the column map",
+        path.display()
+    )]
+    NoSlope { path: PathBuf, line: u64 },
 
     /// Time runs backward.
     #[error(
@@ -131,6 +145,10 @@ pub enum RecordError {
     #[error("{samples} sample(s) given; a recording needs at least 2")]
     TooShort { samples: usize },
 
+    /// Recordings from which nothing can be concluded.
+    #[error("{}{}", unusable(*of, wrong.len()), wrong.join("\n"))]
+    Unusable { of: usize, wrong: Vec<String> },
+
     /// An extra column's name cannot stand in a header.
     #[error("the extra column \"{name}\" cannot be written: {why}; choose another name")]
     BadColumnName { name: String, why: &'static str },
@@ -138,6 +156,15 @@ pub enum RecordError {
     /// The destination refuses the text.
     #[error("the recording cannot be written ({0}); check that the destination exists and has room")]
     Write(#[from] io::Error),
+}
+
+/// What comes before the list of recordings that cannot be used; nothing when it is the only one.
+fn unusable(of: usize, wrong: usize) -> String {
+    if of == 1 {
+        String::new()
+    } else {
+        format!("{wrong} of {of} recordings cannot be used; nothing was concluded from any:\n")
+    }
 }
 
 fn shown(text: &str) -> String {

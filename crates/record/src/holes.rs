@@ -46,6 +46,7 @@ pub fn read_csv_with_holes(
                 .take(100)
                 .map(|(k, _)| k as u64 + 1)
                 .collect(),
+            grave: false,
         },
     );
     Ok((recording, notes))

@@ -7,7 +7,7 @@ use crate::error::RecordError;
 use crate::recording::JOINTS;
 
 /// Delimiters that are looked for; the header decides.
-const DELIMITERS: [u8; 3] = [b',', b';', b'\t'];
+const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
 
 /// What a column of the file feeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,11 +58,16 @@ pub(crate) fn read_layout(
         std::cmp::Reverse(first_line.iter().filter(|byte| *byte == delimiter).count())
     });
     let mut first_error = None;
+    let all_numbers =
+        |names: &[String]| names.len() > 1 && names.iter().all(|name| name.parse::<f64>().is_ok());
     for delimiter in candidates {
         let names = header_names(text, delimiter, path, line)?;
         match locate(&names, path, line, map) {
             Ok(sources) => {
                 return Ok(Layout { delimiter, width: names.len(), sources });
+            }
+            Err(RecordError::MissingColumn { .. }) if all_numbers(&names) => {
+                return Err(RecordError::NoHeader { path: path.to_owned(), line, found: names });
             }
             Err(error) => first_error = first_error.or(Some(error)),
         }

@@ -13,7 +13,7 @@
 //! assert_eq!(recording.len(), 3);
 //! assert!((recording.velocity_mps[1] - 0.2).abs() < 1e-12);
 //! assert!(!recording.velocity_measured);
-//! assert!(notes.is_empty());
+//! assert!(notes[0].message.contains("3 usable sample(s)"));
 //! # Ok::<(), stylet_record::RecordError>(())
 //! ```
 //!
@@ -23,7 +23,8 @@
 //! | [`truth`] | [`Truth`]: what a simulation knows and a sensor does not |
 //! | [`columns`] | [`ColumnMap`]: names, units and signs of somebody else's log |
 //! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
-//! | `quality` | [`QualityNote`]s: gaps, jitter, saturation, spikes, quantisation, mixed-up units |
+//! | `quality` | [`QualityNote`]s: dead, reversed, in air, mixed-up units, stuck, gaps, jitter, saturation, spikes, quantisation, unlike its repeats |
+//! | [`thin`](mod@thin) | recordings of hours, thinned |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 
@@ -36,6 +37,7 @@ mod quality;
 pub mod read;
 pub mod recording;
 mod repair;
+pub mod thin;
 pub mod truth;
 pub mod write;
 
@@ -43,8 +45,9 @@ pub use columns::{Column, ColumnMap};
 pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 pub use error::RecordError;
 pub use holes::read_csv_with_holes;
-pub use quality::{QualityKind, QualityNote, assess};
+pub use quality::{LEAST_SAMPLES, QualityKind, QualityNote, assess, unlike_the_others, usable};
 pub use read::{ReadOptions, read_csv, read_csv_bytes};
 pub use recording::{JOINTS, Recording, Sample};
+pub use thin::thin;
 pub use truth::{LayerTruth, TrueRupture, Truth};
 pub use write::write_csv;

@@ -1,15 +1,23 @@
 //! Remarks on the quality of a recording: what the reader of a result should know about its data.
 //!
-//! A note is no error: the recording is used as it is, nothing is corrected. The thresholds stand in [`QualityKind`].
+//! One list for every way in: `enhance`, `diagnose`, repeats and data sets ask [`assess`] and nothing else. A note is no error: the
+//! recording is used as it is, nothing is corrected. But from a recording with a *grave* note ([`QualityNote::grave`]) no cause may be
+//! named; [`usable`] turns it into an error that says what to do. The thresholds stand in [`QualityKind`].
 
+mod likeness;
+mod sense;
 mod timing;
 mod units;
 mod values;
+
+pub use likeness::unlike_the_others;
+pub use sense::LEAST_SAMPLES;
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::RecordError;
 use crate::recording::Recording;
 
 /// What a [`QualityNote`] is about, most consequential first. Serialises in snake case.
@@ -17,11 +25,27 @@ use crate::recording::Recording;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum QualityKind {
+    /// The force is one number in all samples: the sensor is dead. Grave. Numbers: `value`.
+    Dead,
+    /// The force falls while the needle goes in, by 8 times its noise and 3 times what it rises, and is negative there. Grave.
+    /// Numbers: `wrong_n`, `right_n`.
+    Reversed,
+    /// Means over 0.1 s and more follow each other like noise: the needle touches nothing. Grave. Numbers: `low_n`, `high_n`.
+    InAir,
+    /// Fewer than 50 samples. Grave. Numbers: `samples`, `least`.
+    TooShort,
+    /// The position never moves by a micrometre (grave), or the force stands still for over 20 samples while the needle moves.
+    /// Numbers: `value` and `travel_m`, or `runs`, `longest`, `at_s`, `value`.
+    Stuck,
+    /// Among repeats: the force over depth is over 5 robust standard deviations (root mean square over 24 depths) from the others'.
+    /// Numbers: `distance`, `typical_n`, `others_n`.
+    NotLikeTheOthers,
     /// Rows were dropped because their time stamps ran backward or repeated.
     /// Numbers: `dropped`, `kept`; `lines` names them.
     RepairedRows,
     /// A quantity looks as if it came in another unit: position over more than 2 m, speed above 1 m/s (99th percentile),
-    /// force beyond 500 N, a median interval above 1 s, or a measured velocity that is not the slope of the position.
+    /// force beyond 500 N, a median interval above 1 s, or a measured velocity that is not the slope of the position. Grave, but for
+    /// the interval (there are slow logs) and a velocity within 20 times the slope.
     /// Numbers: `value` (what was found) and `limit`.
     UnitMixUp,
     /// Intervals over five median intervals. Numbers: `count`, `largest_s`, `at_s` (start of the largest),
@@ -40,6 +64,8 @@ pub enum QualityKind {
     /// Force or position takes few values on a grid: fewer than 20 % of the samples are distinct and the steps between the
     /// values are multiples of the smallest one. Numbers: `smallest_step` (SI unit), `distinct`, `distinct_ratio`.
     Quantisation,
+    /// A recording was thinned before it was used ([`mod@crate::thin`]). Numbers: `from`, `to`, `together`.
+    Thinned,
 }
 
 /// One remark on the quality of a recording.
@@ -54,12 +80,24 @@ pub struct QualityNote {
     /// Lines of the file (1-based) that the remark is about; only for [`QualityKind::RepairedRows`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<u64>,
+    /// No cause may be named from such a recording.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub grave: bool,
+}
+
+fn is_false(b: &bool) -> bool {
+    !b
 }
 
 impl QualityNote {
-    fn new<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
+    /// A remark that forbids conclusions.
+    fn forbidding<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
+        Self { grave: true, ..Self::new(kind, message, numbers) }
+    }
+
+    pub(crate) fn new<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
         let numbers = numbers.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-        Self { kind, message, numbers, lines: Vec::new() }
+        Self { kind, message, numbers, lines: Vec::new(), grave: false }
     }
 }
 
@@ -67,10 +105,24 @@ impl QualityNote {
 ///
 /// Expects what [`Recording::check`] promises; takes `O(n log n)`.
 pub fn assess(recording: &Recording) -> Vec<QualityNote> {
+    let mut notes: Vec<QualityNote> = sense::too_short(recording.len()).into_iter().collect();
     if recording.len() < 2 {
-        return Vec::new();
+        return notes;
     }
-    let mut notes = units::unit_mix_ups(recording);
+    if let Some(note) = sense::unmeasurable(recording) {
+        // Nothing else can be computed from it.
+        notes.push(note);
+        return notes;
+    }
+    notes.extend(units::unit_mix_ups(recording));
+    let dead = sense::dead(recording);
+    if dead.is_none() && notes.is_empty() {
+        notes.extend(sense::reversed(recording));
+        notes.extend(sense::in_air(recording));
+    }
+    notes.extend(dead);
+    notes.extend(sense::still(recording));
+    notes.extend(sense::stuck(recording));
     notes.extend(timing::gaps(recording));
     notes.extend(timing::jitter(recording));
     notes.extend(values::saturation(recording));
@@ -82,6 +134,23 @@ pub fn assess(recording: &Recording) -> Vec<QualityNote> {
     }
     notes.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| a.message.cmp(&b.message)));
     notes
+}
+
+/// Whether conclusions may be drawn from recordings.
+///
+/// # Errors
+/// [`RecordError::Unusable`] with every recording that has a grave note, what is wrong with it and what to do.
+pub fn usable<'a>(
+    recordings: impl IntoIterator<Item = (&'a str, &'a [QualityNote])>,
+) -> Result<(), RecordError> {
+    let (mut of, mut wrong) = (0, Vec::new());
+    for (name, notes) in recordings {
+        of += 1;
+        if let Some(note) = notes.iter().find(|note| note.grave) {
+            wrong.push(format!("{name}: {}", note.message));
+        }
+    }
+    if wrong.is_empty() { Ok(()) } else { Err(RecordError::Unusable { of, wrong }) }
 }
 
 /// The note on rows that were dropped; `lines` in the order of the file.

@@ -9,7 +9,7 @@ use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 use crate::error::RecordError;
 use crate::layout::{Layout, Role, Source, read_layout};
 use crate::quality::{QualityNote, assess, repaired_rows};
-use crate::recording::{JOINTS, Recording, check_finite};
+use crate::recording::{JOINTS, Recording};
 use crate::repair::{kept, rows_to_keep};
 
 /// How to read a CSV file.
@@ -26,7 +26,7 @@ pub struct ReadOptions {
 ///
 /// The header (the first line that is not blank) names the columns: `time_s`, `position_m`, `force_n`, optionally `velocity_mps`,
 /// `force_virtual_n` and `joint_torque_1_nm` to `joint_torque_7_nm` (all or none), or the names of the column map. Other columns are
-/// ignored. The delimiter is a comma, a semicolon or a tab; a byte order mark, CRLF line ends, quotation marks, spaces
+/// ignored. The delimiter is a comma, a semicolon, a tab or a `|`; a byte order mark, CRLF line ends, quotation marks, spaces
 /// around names and numbers, blank lines and a last line without its end are accepted. Without a velocity column the
 /// position is differentiated ([`mod@crate::differentiate`]).
 ///
@@ -74,11 +74,15 @@ pub fn read_csv_bytes(
     let layout = read_layout(&bytes[header..], path, place.line(header), options.columns.as_ref())?;
     let mut rows = Rows::read(&place, &layout, options.repair)?;
     let dropped_lines = rows.repair(&place);
+    let offsets = rows.offsets.clone();
     let mut recording = rows.into_recording(&place, &layout)?;
     if !recording.velocity_measured {
         recording.velocity_mps =
             differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
-        check_finite("velocity_mps (differentiated from the position)", &recording.velocity_mps)?;
+        if let Some(row) = recording.velocity_mps.iter().position(|v| !v.is_finite()) {
+            let line = place.line(offsets.get(row).copied().unwrap_or(header));
+            return Err(RecordError::NoSlope { path: path.to_owned(), line });
+        }
     }
     let mut notes = assess(&recording);
     if !dropped_lines.is_empty() {
@@ -187,6 +191,7 @@ impl Rows {
                     line: place.line(offset),
                     found: row.len(),
                     expected: layout.width,
+                    remedy: remedy_for_row(&row, layout),
                 });
             }
             for (column, source) in columns.iter_mut().zip(&layout.sources) {
@@ -272,9 +277,23 @@ fn number(place: &Place<'_>, offset: usize, source: &Source, field: &[u8]) -> Re
     })
 }
 
+/// Why a row may have another number of fields than the header.
+fn remedy_for_row(row: &csv::ByteRecord, layout: &Layout) -> &'static str {
+    let integer = |field: &[u8]| !field.is_empty() && field.iter().all(|b| b.is_ascii_digit() || *b == b'-');
+    if row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r')) {
+        "a quotation mark that is left open takes the following lines along: close or remove it, or complete or remove the row"
+    } else if layout.delimiter == b',' && row.len() > layout.width && row.iter().skip(1).any(integer) {
+        "write decimal points instead of decimal commas, or put semicolons between the columns"
+    } else {
+        "complete or remove the row (the last line of an interrupted log is often cut short)"
+    }
+}
+
 fn remedy(text: &str) -> &'static str {
     if text.is_empty() {
         "fill in the value or remove the row"
+    } else if text.contains(['\n', '\r']) {
+        "a quotation mark that is left open takes the following lines along: close or remove it"
     } else if text.replace(',', ".").parse::<f64>().is_ok() {
         "write a decimal point instead of the decimal comma"
     } else {

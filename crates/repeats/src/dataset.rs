@@ -16,7 +16,10 @@
 use crate::run::Run;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use stylet_record::{ColumnMap, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes};
+use stylet_record::{
+    ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv_bytes,
+    read_csv_with_holes, unlike_the_others, usable,
+};
 use stylet_scenario::{InputError, Problem, parse, read_text};
 use stylet_tissue::Tissue;
 
@@ -71,6 +74,9 @@ pub struct Dataset {
     /// Recordings of single layers.
     #[serde(default)]
     pub parts: Vec<Part>,
+    /// Rows with backward or repeated time stamps are dropped and told, as the command line asks.
+    #[serde(skip)]
+    pub repair: bool,
 }
 
 /// Why a data set cannot be used.
@@ -159,28 +165,49 @@ impl Dataset {
     /// How its files are read.
     #[must_use]
     pub fn options(&self) -> ReadOptions {
-        ReadOptions { columns: self.columns.clone(), repair: false }
+        ReadOptions { columns: self.columns.clone(), repair: self.repair }
     }
 
-    /// Reads runs of `layers` layers.
+    /// Reads runs of `layers` layers. Each is judged by itself and beside the others, as every recording is
+    /// ([`stylet_record::assess`], [`unlike_the_others`]).
     ///
     /// # Errors
-    /// [`DatasetError`].
+    /// [`DatasetError`]; [`RecordError::Unusable`] names every recording from which nothing can be concluded. Of specimens in one file
+    /// ([`Dataset::split_by`]), which share columns and sensor, those that are too short or never touched are left to the study.
     pub fn runs(&self, files: &[PathBuf], layers: usize) -> Result<Vec<Run>, DatasetError> {
-        let mut out = Vec::with_capacity(files.len());
+        let mut read = Vec::with_capacity(files.len());
         for file in files {
-            for (name, recording, notes) in self.read(file)? {
-                out.push(Run::new(name, recording, notes, layers));
+            read.extend(self.read(file)?);
+        }
+        if self.split_by.is_empty() {
+            usable(read.iter().map(|(name, _, notes)| (name.as_str(), notes.as_slice())))?;
+            let recordings: Vec<&Recording> = read.iter().map(|(_, recording, _)| recording).collect();
+            let unlike = unlike_the_others(&recordings);
+            for ((_, _, notes), unlike) in read.iter_mut().zip(unlike) {
+                notes.extend(unlike);
+            }
+        } else {
+            let grave = |notes: &[QualityNote]| {
+                notes.iter().any(|n| {
+                    n.grave
+                        && !matches!(n.kind, QualityKind::TooShort | QualityKind::InAir | QualityKind::Stuck)
+                })
+            };
+            if read.iter().all(|(_, _, notes)| grave(notes)) {
+                usable(read.iter().map(|(name, _, notes)| (name.as_str(), notes.as_slice())))?;
             }
         }
-        Ok(out)
+        Ok(read
+            .into_iter()
+            .map(|(name, recording, notes)| Run::new(name, recording, notes, layers))
+            .collect())
     }
 
     fn read(&self, file: &Path) -> Result<Vec<(String, Recording, Vec<QualityNote>)>, DatasetError> {
         let name =
             file.file_name().map_or_else(|| file.display().to_string(), |n| n.to_string_lossy().into_owned());
         if self.split_by.is_empty() {
-            let (recording, notes) = read_csv(file, &self.options())?;
+            let (recording, notes) = read_csv_with_holes(file, &self.options())?;
             return Ok(vec![(name, recording, notes)]);
         }
         let text = read_text_of(file)?;

@@ -647,6 +647,7 @@ fn quality(runs: &[&Run]) -> Vec<Quality> {
                 message,
                 numbers: numbers.into_iter().map(|(k, v)| (k.to_owned(), v)).collect(),
                 lines: Vec::new(),
+                grave: false,
             },
         });
     }
@@ -662,6 +663,7 @@ fn quality(runs: &[&Run]) -> Vec<Quality> {
                 message,
                 numbers: BTreeMap::new(),
                 lines: Vec::new(),
+                grave: false,
             },
         });
     }

@@ -36,14 +36,27 @@ impl InputError {
         let before = &text[..start];
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+        let shown = fits_a_screen(text, start, end);
         Self {
             place: format!("{file}:{line}:{column}"),
             what: what.into(),
             position: Some((line, column)),
-            source_code: Some(Arc::new(NamedSource::new(file, text.to_owned()))),
-            span: Some(SourceSpan::new(start.into(), end - start)),
+            source_code: shown.then(|| Arc::new(NamedSource::new(file, text.to_owned()))),
+            span: shown.then(|| SourceSpan::new(start.into(), end - start)),
         }
     }
+}
+
+/// Longest line, in bytes, that is shown with an error: a label in column 70 000 helps nobody, and what draws it gives up there.
+const LONGEST_LINE: usize = 1000;
+/// Lines around the place that are shown too.
+const AROUND: usize = 1;
+
+/// Whether the lines about the bytes `start..end` are short enough to be shown; without them line and column stand in the message.
+fn fits_a_screen(text: &str, start: usize, end: usize) -> bool {
+    let first = text[..start].matches('\n').count().saturating_sub(AROUND);
+    let last = text[..end].matches('\n').count() + AROUND;
+    text.split('\n').take(last + 1).skip(first).all(|line| line.len() <= LONGEST_LINE)
 }
 
 fn floor_char_boundary(text: &str, index: usize) -> usize {

@@ -8,6 +8,8 @@ use crate::validate::{Checked, check, finite, positive};
 /// More samples, or a thousand times more physics steps, are refused: a mistyped rate or duration.
 const MOST_SAMPLES: f64 = 5e7;
 const MOST_STEPS: f64 = 1e9;
+/// Steps shorter than 10 us tell nothing more of a needle's motion and take minutes per second.
+const FASTEST_PHYSICS_HZ: f64 = 1e5;
 
 /// Speeds above this, in m/s, are taken for mm/s.
 const FASTEST_MPS: f64 = 1.0;
@@ -99,6 +101,14 @@ fn reaches(s: &Scenario) -> Checked {
         );
         return Err(Problem::new("physics_hz", what));
     }
+    check(
+        "physics_hz",
+        s.physics_hz,
+        s.physics_hz <= FASTEST_PHYSICS_HZ,
+        &format!(
+            "steps of less than 10 us tell nothing more: at most {FASTEST_PHYSICS_HZ:.0e} Hz, for example 1000.0"
+        ),
+    )?;
     let (furthest_m, surface_m) = (plan.deepest_m(), s.tissue.surface_m);
     if furthest_m > surface_m {
         return Ok(());

@@ -63,7 +63,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
         PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}-{}", plan.world, plan.seed))
     });
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
-    std::fs::create_dir_all(&folder).map_err(failed)?;
+    let claim = stylet_api::Claim::new(&folder)?;
     let journal = folder.join("cases.jsonl");
     let mut cases = plan.cases();
     if args.look {
@@ -80,7 +80,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
             bar.advance(done.saturating_sub(last) as u64);
         }
         if done.is_multiple_of(20) && done > 0 {
-            eprintln!("  {done} of {of} cases");
+            crate::terminal::tell(&format!("  {done} of {of} cases\n"));
         }
     };
     let pool = rayon::ThreadPoolBuilder::new()
@@ -102,7 +102,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     for (hide, svg) in page::maps(&plan, &cells) {
         output.add(map_name(hide), svg);
     }
-    output.write(&folder)?;
+    output.write_to(&claim)?;
     crate::terminal::say(&format!("{text}\nReport: {}\n", folder.join("report.html").display()))
 }
 

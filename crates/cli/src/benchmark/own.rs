@@ -18,7 +18,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
         PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{}", args.cases.seed))
     });
     let failed = |why| Failure::Output { path: folder.display().to_string(), why };
-    std::fs::create_dir_all(&folder).map_err(failed)?;
+    let _claim = stylet_api::Claim::new(&folder)?;
     let path = folder.join("cases.jsonl");
     let mut done: Vec<Case> = Vec::new();
     if let Ok(file) = std::fs::File::open(&path) {
@@ -32,7 +32,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     }
     let missing: Vec<u64> = (0..args.cases.cases).filter(|i| !done.iter().any(|d| d.index == *i)).collect();
     let kept: String = done.iter().filter_map(|d| serde_json::to_string(d).ok()).map(|l| l + "\n").collect();
-    std::fs::write(&path, kept).map_err(failed)?;
+    stylet_api::folder::write_file(&path, kept.as_bytes())?;
     let file = std::fs::OpenOptions::new().append(true).open(&path).map_err(failed)?;
     let file = Mutex::new((file, done.len()));
     let new: Vec<Option<Case>> = missing
@@ -43,7 +43,7 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
                 let _ = writeln!(file.0, "{line}");
                 file.1 += 1;
                 if file.1 % 20 == 0 {
-                    eprintln!("  {} of {} cases", file.1, args.cases.cases);
+                    crate::terminal::tell(&format!("  {} of {} cases\n", file.1, args.cases.cases));
                 }
             }
             Some(case)
@@ -53,6 +53,6 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     done.retain(|d| d.index < args.cases.cases);
     done.sort_by_key(|d| d.index);
     let text = summary(&done);
-    std::fs::write(folder.join("summary.txt"), &text).map_err(failed)?;
+    stylet_api::folder::write_file(&folder.join("summary.txt"), text.as_bytes())?;
     crate::terminal::say(&format!("{text}\nCases: {}\n", path.display()))
 }

@@ -1,6 +1,7 @@
 //! Arguments of `stylet sweep`, `stylet replay` and `stylet gate`.
 
 use crate::args::Results;
+use crate::limits::Limits;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use stylet_sweep::Overrides;
@@ -46,7 +47,7 @@ pub struct SweepArgs {
     #[command(flatten)]
     pub draws: Draws,
     /// Threads [default: one per core].
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", value_parser = crate::limits::threads)]
     pub threads: Option<usize>,
     /// Go on where an interrupted sweep stopped.
     #[arg(long)]
@@ -54,6 +55,9 @@ pub struct SweepArgs {
     /// Where the results go.
     #[command(flatten)]
     pub results: Results,
+    /// How much it may take.
+    #[command(flatten)]
+    pub limits: Limits,
 }
 
 /// The parts of a sweep that is spread over machines.
@@ -100,7 +104,7 @@ pub struct RunShardArgs {
     #[command(flatten)]
     pub which: Which,
     /// Threads [default: one per core].
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", value_parser = crate::limits::threads)]
     pub threads: Option<usize>,
     /// Folder for the results [default: stylet-out/<sweep>].
     #[arg(long, value_name = "DIR")]
@@ -173,7 +177,7 @@ pub struct GateArgs {
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
     /// Threads [default: one per core].
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", value_parser = crate::limits::threads)]
     pub threads: Option<usize>,
     /// Write the results as JUnit XML.
     #[arg(long, value_name = "FILE")]

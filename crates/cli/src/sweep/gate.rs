@@ -4,7 +4,10 @@ use super::args::GateArgs;
 use super::with_threads;
 use crate::exit::Failure;
 use crate::progress::Progress;
-use std::path::{Path, PathBuf};
+use crate::terminal::say;
+use std::fmt::Write as _;
+use std::path::Path;
+use stylet_api::folder::write_file;
 use stylet_sweep::gate::{Baseline, Judged, baseline, changes, describe, junit, load};
 
 /// The command.
@@ -22,38 +25,43 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
         all.map(|all| all.concat())
     })??;
     progress.finish();
+    let mut text = String::new();
     let mut heading = String::new();
     for j in &judged {
         if j.gate != heading {
             heading.clone_from(&j.gate);
-            println!("{heading}");
+            let _ = writeln!(text, "{heading}");
         }
-        println!("  {} {}", if j.passed { "pass" } else { "FAIL" }, describe(j));
+        let _ = writeln!(text, "  {} {}", if j.passed { "pass" } else { "FAIL" }, describe(j));
     }
     let new = baseline(&judged);
     if let Some(old) = &old {
         let changes = changes(old, &new);
         if changes.is_empty() {
-            println!("No number differs from {}.", at.display());
+            let _ = writeln!(text, "No number differs from {}.", at.display());
         } else {
-            println!("Against {}:", at.display());
-            changes.iter().for_each(|line| println!("  {line}"));
+            let _ = writeln!(text, "Against {}:", at.display());
+            for line in changes {
+                let _ = writeln!(text, "  {line}");
+            }
         }
     } else if !args.update {
-        println!("There is no baseline {}; --update writes one.", at.display());
+        let _ = writeln!(text, "There is no baseline {}; --update writes one.", at.display());
     }
     if args.update {
-        write(&at, &json(&new)?)?;
-        println!("{} is the baseline now.", at.display());
+        write_file(&at, &json(&new)?)?;
+        let _ = writeln!(text, "{} is the baseline now.", at.display());
     }
     if let Some(path) = &args.junit {
-        write(path, junit(&judged).as_bytes())?;
+        write_file(path, junit(&judged).as_bytes())?;
     }
     if let Some(path) = &args.json {
-        write(path, &json(&judged)?)?;
+        write_file(path, &json(&judged)?)?;
     }
+    let said = say(&text);
     let failed = judged.iter().filter(|j| !j.passed).count();
-    if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { Ok(()) }
+    // A verdict outweighs that nobody could be told of it.
+    if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { said }
 }
 
 fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Failure> {
@@ -71,14 +79,4 @@ fn read(path: &Path) -> Result<Option<Baseline>, Failure> {
     };
     let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
     serde_json::from_slice(&bytes).map(Some).map_err(|e| wrong(e.to_string()))
-}
-
-/// Beside its place, then renamed.
-fn write(path: &PathBuf, content: &[u8]) -> Result<(), Failure> {
-    let part = path.with_extension(format!("{}.part", std::process::id()));
-    let failed = |why| {
-        let _ = std::fs::remove_file(&part);
-        Failure::Output { path: path.display().to_string(), why }
-    };
-    std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path)).map_err(failed)
 }

@@ -4,6 +4,7 @@ use super::args::MapArgs;
 use super::with_threads;
 use crate::exit::Failure;
 use crate::progress::Progress;
+use std::fmt::Write as _;
 use stylet_sweep::{Columns, MapRow, Overrides, Sweep, map_rows, map_svg, rows};
 
 /// The command.
@@ -19,16 +20,15 @@ pub fn map(args: &MapArgs) -> Result<(), Failure> {
         map.push((sweep.name.clone(), map_rows(sweep, &columns, &rows)));
     }
     progress.finish();
+    let mut text = String::new();
     for (name, rows) in &map {
-        println!("{name}");
+        let _ = writeln!(text, "{name}");
         for row in rows {
             let cells: String = row.failed_percent.iter().map(|percent| format!("{percent:>4}")).collect();
-            println!("  {:<62}{cells} %", row.name);
+            let _ = writeln!(text, "  {:<62}{cells} %", row.name);
         }
     }
     let map: Vec<MapRow> = map.into_iter().flat_map(|(_, rows)| rows).collect();
-    let failed = |why| Failure::Output { path: args.svg.display().to_string(), why };
-    std::fs::write(&args.svg, map_svg(&map)).map_err(failed)?;
-    println!("{}", args.svg.display());
-    Ok(())
+    stylet_api::folder::write_file(&args.svg, map_svg(&map).as_bytes())?;
+    crate::terminal::say(&format!("{text}{}\n", args.svg.display()))
 }

@@ -11,11 +11,13 @@ pub use gate::gate;
 pub use replay::replay;
 
 use crate::exit::Failure;
+use crate::limits;
 use crate::progress::Progress;
 use crate::run::default_folder;
 use args::{SweepArgs, SweepCommand};
 use std::path::{Path, PathBuf};
-use stylet_api::sweep::{inputs, results};
+use stylet_api::Claim;
+use stylet_api::sweep::results;
 use stylet_report::{percent, significant};
 use stylet_sweep::shard::{self, ShardError, ShardNumber};
 use stylet_sweep::{Columns, Row, Summary, Sweep, rows};
@@ -63,17 +65,21 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     };
     let sweep = Sweep::load(file, args.draws.into())?;
     let columns = Columns::new(&sweep);
+    let need = limits::of_sweep(&sweep, &columns, args.threads.unwrap_or(0));
+    args.limits.allow(file, &need, args.results.quiet)?;
     let out = args.results.out.clone().unwrap_or_else(|| default_folder(file));
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
+    // Nobody else writes there until the set is whole: the shards, the tables and `sweep.ron` are of one draw.
+    let claim = Claim::new(&out)?;
     begin(&sweep, &columns, &out, of, args.resume)?;
     let progress = Progress::new(sweep.trials(), "trials", args.results.quiet);
     let rows =
         with_threads(args.threads.unwrap_or(0), || all_shards(&sweep, &columns, &out, of, &progress))??;
     progress.finish();
-    conclude(&sweep, &columns, &rows, &out, args.results.quiet)
+    conclude(&sweep, &columns, &rows, (&claim, &out), args.results.quiet)
 }
 
-/// Makes the folder and writes the sweep into it; refuses to mix with what is unfinished there.
+/// Refuses to mix with what is unfinished in the folder.
 fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool) -> Result<(), Failure> {
     let unfinished = shard::split_of(out);
     if let (Ok(split), false) = (&unfinished, resume) {
@@ -95,7 +101,7 @@ fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool) ->
         );
         return Err(Failure::Check(what));
     }
-    Ok(inputs(sweep)?.write(out)?)
+    Ok(())
 }
 
 fn all_shards(
@@ -122,9 +128,15 @@ fn all_shards(
 }
 
 /// Writes the results, removes the shards, prints the summary.
-fn conclude(sweep: &Sweep, columns: &Columns, rows: &[Row], out: &Path, quiet: bool) -> Result<(), Failure> {
+fn conclude(
+    sweep: &Sweep,
+    columns: &Columns,
+    rows: &[Row],
+    (claim, out): (&Claim, &Path),
+    quiet: bool,
+) -> Result<(), Failure> {
     let (output, summary) = results(sweep, columns, rows)?;
-    output.write(out)?;
+    output.write_to(claim)?;
     let _ = std::fs::remove_dir_all(out.join(shard::FOLDER));
     if !quiet {
         crate::terminal::say(&terminal(&summary, out))?;

@@ -16,6 +16,8 @@ pub fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         let what = format!("{}: is not the folder of a sweep (it holds no sweep.ron)", args.dir.display());
         return Err(Failure::Check(what));
     }
+    stylet_api::folder::settle(&args.dir)?;
+    stylet_api::folder::verify(&args.dir, &["scenario.ron", "sweep.ron", "trials.csv"])?;
     let sweep = Sweep::load(&file, Overrides::default())?;
     if args.trial >= sweep.trials() {
         let what = format!("trial {}: the sweep has trials 0 to {}", args.trial, sweep.trials() - 1);
@@ -31,6 +33,7 @@ pub fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         scenario: out.join("scenario.ron"),
         seed: None,
         compare: false,
+        limits: crate::limits::Limits::default(),
         results: Results { out: Some(out), quiet: args.results.quiet },
     })
 }

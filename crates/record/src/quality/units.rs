@@ -13,18 +13,18 @@ const FASTEST_MPS: f64 = 1.0;
 const STRONGEST_N: f64 = 500.0;
 /// No log is so slow (s).
 const SLOWEST_S: f64 = 1.0;
+/// A measured velocity so many times the slope of the position (or of the other sign) is in another unit; a noisy one is not.
+const GRAVE_FACTOR: f64 = 20.0;
 /// Single bad samples shall not look like a unit.
 const PERCENTILE: f64 = 0.99;
 
 pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
     let mut notes = Vec::new();
-    let mut beyond = |value: f64, limit: f64, message: String| {
+    let mut beyond = |value: f64, limit: f64, grave: bool, message: String| {
         if value > limit {
-            notes.push(QualityNote::new(
-                QualityKind::UnitMixUp,
-                message,
-                [("value", value), ("limit", limit)],
-            ));
+            let note =
+                QualityNote::new(QualityKind::UnitMixUp, message, [("value", value), ("limit", limit)]);
+            notes.push(QualityNote { grave, ..note });
         }
     };
     let (low, high) = extremes(&recording.position_m);
@@ -32,6 +32,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
     beyond(
         travel_m,
         FARTHEST_M,
+        true,
         format!(
             "the position ranges over {travel_m:.4} m: it looks like millimetres; give a column map with position scale 1e-3"
         ),
@@ -40,15 +41,17 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
     beyond(
         speed_mps,
         FASTEST_MPS,
+        true,
         format!(
-            "the needle moves at {speed_mps:.4} m/s: position or velocity look like millimetres (scale 1e-3), or the time is \
-         too short by its unit"
+            "the needle moves at {speed_mps:.4} m/s: position or velocity look like millimetres: give a column map with scale 1e-3 \
+         (or the time is too short by its unit)"
         ),
     );
     let force_n = quantile_of(recording.force_n.iter().map(|f| f.abs()), PERCENTILE);
     beyond(
         force_n,
         STRONGEST_N,
+        true,
         format!(
             "the force reaches {force_n:.1} N: it looks like millinewtons; give a column map with force scale 1e-3"
         ),
@@ -57,6 +60,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
     beyond(
         interval_s,
         SLOWEST_S,
+        false,
         format!(
             "the typical sampling interval is {interval_s:.4} s: the time looks like milliseconds (scale 1e-3) or microseconds \
          (scale 1e-6)"
@@ -80,9 +84,11 @@ fn velocity_against_position(recording: &Recording) -> Option<QualityNote> {
     let factor = together / alone;
     (alone > 0.0 && !(0.5..=2.0).contains(&factor)).then(|| {
         let message = format!(
-            "the measured velocity is {factor:.4} times the slope of the position: check the units and signs of both"
+            "the measured velocity is {factor:.4} times the slope of the position: check the units and signs of both, or leave the velocity out of the \
+             column map"
         );
-        QualityNote::new(QualityKind::UnitMixUp, message, [("value", factor), ("limit", 2.0)])
+        let note = QualityNote::new(QualityKind::UnitMixUp, message, [("value", factor), ("limit", 2.0)]);
+        QualityNote { grave: !(1.0 / GRAVE_FACTOR..=GRAVE_FACTOR).contains(&factor), ..note }
     })
 }
 

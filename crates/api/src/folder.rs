@@ -1,0 +1,412 @@
+//! An output folder while a command works in it: nobody else writes there, and a set of results appears as one.
+//!
+//! A set is written into a folder of its own inside the output folder, synced, and announced by one rename; then its files are
+//! moved to their places, the manifest last. Whoever is killed before that rename leaves the old set, whoever is killed after it the
+//! new one: the next command that looks at the folder ends what was begun ([`settle`]).
+
+use crate::error::Error;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+/// The file that says which files make the set; written last.
+pub const MANIFEST: &str = "manifest.json";
+/// Where a set is being written.
+const NEW: &str = ".stylet-new";
+/// A set that is whole, on its way to its places.
+const WHOLE: &str = ".stylet-set";
+/// What stood there before, while the new files come in.
+const OLD: &str = ".stylet-old";
+
+/// `manifest.json`: the files of a set with the SHA-256 of each.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Manifest {
+    stylet: String,
+    sha256: BTreeMap<String, String>,
+}
+
+/// An output folder that this process alone writes to, until it is dropped.
+#[derive(Debug)]
+pub struct Claim {
+    folder: PathBuf,
+    /// Folders that were made for it; those that are still empty at the end go again.
+    made: Vec<PathBuf>,
+    _lock: Option<File>,
+}
+
+impl Claim {
+    /// Makes the folder when it is not there and keeps others from writing to it.
+    ///
+    /// # Errors
+    /// [`Error::Output`] when it cannot be made, [`Error::Busy`] when another process works there.
+    pub fn new(folder: &Path) -> Result<Self, Error> {
+        let claim = Self::take(folder, File::try_lock)?;
+        let tidy = fs::remove_dir_all(folder.join(NEW))
+            .or_else(absent)
+            .and_then(|()| settle_with(folder, &mut || false));
+        tidy.map_err(|why| failed(folder, why))?;
+        Ok(claim)
+    }
+
+    /// The same beside others that write files of their own there, as shards of a sweep.
+    ///
+    /// # Errors
+    /// As [`Claim::new`].
+    pub fn shared(folder: &Path) -> Result<Self, Error> {
+        Self::take(folder, File::try_lock_shared)
+    }
+
+    fn take(folder: &Path, lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self, Error> {
+        let made: Vec<PathBuf> = folder
+            .ancestors()
+            .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
+            .map(Path::to_path_buf)
+            .collect();
+        let mut claim = Self { folder: folder.to_path_buf(), made, _lock: None };
+        fs::create_dir_all(folder).map_err(|why| failed(folder, why))?;
+        // Where a folder cannot be locked (not on every system, not on every network disk) nothing keeps others away.
+        if let Ok(file) = File::open(folder) {
+            match lock(&file) {
+                Err(TryLockError::WouldBlock) => {
+                    return Err(Error::Busy { path: folder.display().to_string() });
+                }
+                Ok(()) | Err(TryLockError::Error(_)) => claim._lock = Some(file),
+            }
+        }
+        Ok(claim)
+    }
+
+    /// Writes a set of files. Files of the same names are replaced, others are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Output`]; the folder then holds what it held before.
+    pub fn write(&self, files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
+        let written = self.write_until(files, &mut || false);
+        if written.is_err() {
+            let _ = fs::remove_dir_all(self.folder.join(NEW));
+        }
+        written.map_err(|why| failed(&self.folder, why))
+    }
+
+    /// `killed` is asked before every change of the disk; tests end the work there as a kill would.
+    fn write_until(
+        &self,
+        files: &[(&'static str, Vec<u8>)],
+        killed: &mut dyn FnMut() -> bool,
+    ) -> io::Result<()> {
+        let folder = &self.folder;
+        // A file cannot take the place of a folder of the same name.
+        let names = files.iter().map(|(name, _)| *name).chain([MANIFEST]);
+        if let Some(place) = names.map(|name| folder.join(name)).find(|place| place.is_dir()) {
+            return Err(io::Error::other(format!("{} is a folder", place.display())));
+        }
+        let new = folder.join(NEW);
+        go_on(killed)?;
+        fs::create_dir(&new)?;
+        let mut manifest = Manifest { stylet: env!("CARGO_PKG_VERSION").to_owned(), ..Manifest::default() };
+        for (name, content) in files {
+            go_on(killed)?;
+            synced(&new.join(name), content)?;
+            manifest.sha256.insert((*name).to_owned(), sum(content));
+        }
+        let mut text = serde_json::to_vec_pretty(&manifest).map_err(io::Error::other)?;
+        text.push(b'\n');
+        go_on(killed)?;
+        synced(&new.join(MANIFEST), &text)?;
+        sync_names(&new);
+        go_on(killed)?;
+        // From here on it is the new set.
+        fs::rename(&new, folder.join(WHOLE))?;
+        sync_names(folder);
+        settle_with(folder, killed)
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        for folder in &self.made {
+            // Only empty folders go.
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// Ends what a killed command had begun in a folder: afterwards it holds one set. Does nothing in a folder where nothing is begun.
+///
+/// # Errors
+/// [`Error::Output`], [`Error::Busy`] when the other command is still at it.
+pub fn settle(folder: &Path) -> Result<(), Error> {
+    if folder.join(WHOLE).exists() {
+        Claim::new(folder)?;
+    }
+    Ok(())
+}
+
+/// Whether the files are those that the folder's manifest tells of; a folder without manifest is not judged.
+///
+/// # Errors
+/// [`Error::NotOneSet`] naming the first file that is not.
+pub fn verify(folder: &Path, names: &[&str]) -> Result<(), Error> {
+    let Ok(text) = fs::read(folder.join(MANIFEST)) else { return Ok(()) };
+    let manifest: Manifest = serde_json::from_slice(&text).unwrap_or_default();
+    for name in names {
+        let path = folder.join(name);
+        let found = fs::read(&path).map(|content| sum(&content)).ok();
+        if manifest.sha256.get(*name) != found.as_ref() {
+            return Err(Error::NotOneSet { path: path.display().to_string() });
+        }
+    }
+    Ok(())
+}
+
+/// Writes one file: beside its place, synced, then renamed.
+///
+/// # Errors
+/// [`Error::Output`]; what stood there before still does.
+pub fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(format!(".{}.part", std::process::id()));
+    let part = PathBuf::from(part);
+    let written = synced(&part, content).and_then(|()| fs::rename(&part, path));
+    if let Some(folder) = path.parent() {
+        sync_names(folder);
+    }
+    written.map_err(|why| {
+        let _ = fs::remove_file(&part);
+        failed(path, why)
+    })
+}
+
+fn failed(path: &Path, why: io::Error) -> Error {
+    Error::Output { path: path.display().to_string(), why }
+}
+
+/// A set that is whole goes to its places; what it replaces waits aside until all are there.
+fn settle_with(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+    let (whole, old) = (folder.join(WHOLE), folder.join(OLD));
+    if whole.exists() {
+        let names = names_in(&whole)?;
+        go_on(killed)?;
+        fs::create_dir(&old)
+            .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
+        let moved = move_in(folder, &whole, &old, &names, killed);
+        match moved {
+            Ok(()) => {}
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => return Err(e),
+            Err(e) => {
+                move_back(folder, &whole, &old)?;
+                fs::remove_dir_all(&whole)?;
+                return Err(e);
+            }
+        }
+        sync_names(folder);
+        go_on(killed)?;
+        fs::remove_dir_all(&whole)?;
+    }
+    go_on(killed)?;
+    fs::remove_dir_all(&old).or_else(absent)
+}
+
+/// The files of a set, its manifest last.
+fn names_in(whole: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(whole)? {
+        names.push(entry?.file_name().to_string_lossy().into_owned());
+    }
+    names.sort_by_key(|name| (name == MANIFEST, name.clone()));
+    Ok(names)
+}
+
+fn move_in(
+    folder: &Path,
+    whole: &Path,
+    old: &Path,
+    names: &[String],
+    killed: &mut dyn FnMut() -> bool,
+) -> io::Result<()> {
+    // The old manifest goes first: it does not speak of a folder in between.
+    for name in names.iter().rev() {
+        let place = folder.join(name);
+        // What was put aside before a kill is the older one.
+        if place.exists() && !old.join(name).exists() {
+            go_on(killed)?;
+            fs::rename(&place, old.join(name))?;
+        }
+    }
+    for name in names {
+        go_on(killed)?;
+        fs::rename(whole.join(name), folder.join(name))?;
+    }
+    Ok(())
+}
+
+/// As it was before [`move_in`].
+fn move_back(folder: &Path, whole: &Path, old: &Path) -> io::Result<()> {
+    for name in names_in(old)? {
+        let place = folder.join(&name);
+        if place.exists() {
+            fs::rename(&place, whole.join(&name))?;
+        }
+        fs::rename(old.join(&name), &place)?;
+    }
+    fs::remove_dir_all(old).or_else(absent)
+}
+
+fn go_on(killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+    if killed() { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
+}
+
+fn absent(why: io::Error) -> io::Result<()> {
+    if why.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(why) }
+}
+
+fn synced(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(content)?;
+    file.sync_all()
+}
+
+/// Names survive a power cut too, where the system can sync a folder.
+fn sync_names(folder: &Path) {
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
+
+fn sum(content: &[u8]) -> String {
+    Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Scratch(PathBuf);
+
+    impl Scratch {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("stylet-folder-{}-{name}", std::process::id()));
+            let _ = fs::remove_dir_all(&path);
+            Self(path)
+        }
+    }
+
+    impl Drop for Scratch {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    const NAMES: [&str; 3] = ["a.csv", "b.json", "c.html"];
+
+    fn set(of: &str) -> Vec<(&'static str, Vec<u8>)> {
+        NAMES.iter().map(|name| (*name, format!("{of} {name}").into_bytes())).collect()
+    }
+
+    /// Which set the folder holds; `None` for a mixture.
+    fn held(folder: &Path) -> Option<String> {
+        let read = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_default();
+        let of = read(NAMES[0]).split(' ').next().unwrap_or_default().to_owned();
+        let all = NAMES
+            .iter()
+            .all(|name| read(name) == format!("{of} {name}") || (of.is_empty() && read(name).is_empty()));
+        (all && verify(folder, &NAMES).is_ok()).then_some(of)
+    }
+
+    fn leftovers(folder: &Path) -> Vec<String> {
+        let all = fs::read_dir(folder)
+            .map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect());
+        all.map(|all: Vec<String>| all.into_iter().filter(|name| name.starts_with('.')).collect())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn killed_at_any_change_of_the_disk_the_folder_holds_the_old_set_or_the_new_one() -> Result<(), Error> {
+        let scratch = Scratch::new("kills");
+        let (mut olds, mut news, mut at) = (0, 0, 0);
+        loop {
+            let folder = scratch.0.join(format!("{at}"));
+            Claim::new(&folder)?.write(&set("old"))?;
+            fs::write(folder.join("notes.txt"), "mine").map_err(|e| failed(&folder, e))?;
+            let claim = Claim::new(&folder)?;
+            let mut left = at;
+            let done = claim.write_until(&set("new"), &mut || {
+                left -= 1;
+                left < 0
+            });
+            drop(claim);
+            settle(&folder)?;
+            let now = held(&folder);
+            assert!(matches!(now.as_deref(), Some("old" | "new")), "killed at change {at}: {now:?}");
+            if now.as_deref() == Some("old") {
+                olds += 1;
+            } else {
+                news += 1;
+            }
+            // What a kill leaves behind goes with the next set, and that is whole.
+            Claim::new(&folder)?.write(&set("next"))?;
+            assert_eq!(
+                (held(&folder).as_deref(), leftovers(&folder)),
+                (Some("next"), vec![]),
+                "killed at change {at}"
+            );
+            assert_eq!(fs::read_to_string(folder.join("notes.txt")).unwrap_or_default(), "mine");
+            if done.is_ok() {
+                break;
+            }
+            at += 1;
+        }
+        assert!(olds >= 5 && news >= 8, "the kills fell on both sides: {olds} old, {news} new");
+        Ok(())
+    }
+
+    #[test]
+    fn a_move_that_fails_half_way_gives_everything_back() -> Result<(), Error> {
+        let scratch = Scratch::new("back");
+        Claim::new(&scratch.0)?.write(&set("old"))?;
+        let claim = Claim::new(&scratch.0)?;
+        let mut killed = claim.write_until(&set("new"), &mut {
+            let folder = scratch.0.clone();
+            move || folder.join(WHOLE).exists()
+        });
+        assert!(killed.is_err() && scratch.0.join(WHOLE).exists());
+        // The second file of the set vanishes: its rename fails after the first one's.
+        fs::remove_file(scratch.0.join(WHOLE).join(NAMES[1])).map_err(|e| failed(&scratch.0, e))?;
+        let names: Vec<String> = NAMES.iter().map(|n| (*n).to_owned()).chain([MANIFEST.to_owned()]).collect();
+        let (whole, old) = (scratch.0.join(WHOLE), scratch.0.join(OLD));
+        fs::create_dir(&old).map_err(|e| failed(&old, e))?;
+        killed = move_in(&scratch.0, &whole, &old, &names, &mut || false);
+        assert!(killed.is_err(), "the rename of a file that is not there");
+        move_back(&scratch.0, &whole, &old).map_err(|e| failed(&old, e))?;
+        assert_eq!(held(&scratch.0).as_deref(), Some("old"));
+        Ok(())
+    }
+
+    #[test]
+    fn two_commands_do_not_write_to_one_folder_and_shards_do() -> Result<(), Error> {
+        let scratch = Scratch::new("lock");
+        let first = Claim::new(&scratch.0)?;
+        for second in [Claim::new(&scratch.0), Claim::shared(&scratch.0)] {
+            let said = second.map(|_| ()).expect_err("it is taken").to_string();
+            assert!(said.contains("another stylet") && said.contains("--out"), "{said}");
+        }
+        drop(first);
+        let (one, two) = (Claim::shared(&scratch.0)?, Claim::shared(&scratch.0)?);
+        assert!(Claim::new(&scratch.0).is_err(), "shards are being written");
+        drop((one, two));
+        assert!(!scratch.0.exists(), "a folder that was made and stayed empty goes again");
+        Ok(())
+    }
+
+    #[test]
+    fn a_set_with_a_changed_file_is_told() -> Result<(), Error> {
+        let scratch = Scratch::new("changed");
+        Claim::new(&scratch.0)?.write(&set("old"))?;
+        assert!(verify(&scratch.0, &NAMES).is_ok());
+        fs::write(scratch.0.join(NAMES[1]), "other").map_err(|e| failed(&scratch.0, e))?;
+        let said = verify(&scratch.0, &NAMES).expect_err("b.json is another").to_string();
+        assert!(said.contains("b.json") && said.contains("same set"), "{said}");
+        Ok(())
+    }
+}

@@ -1,0 +1,262 @@
+//! Promise: a recording from which nothing can be concluded is told in the same words wherever it enters, with what to do, before
+//! any cause is named: `enhance`, `diagnose`, repeats and data sets. What a recording needs (repair, thinning) it gets everywhere.
+
+mod support;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use support::{Scratch, said, stylet};
+
+const BELIEVED: &str = r#"Scenario(
+    name: "one gel",
+    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
+    motion: Program(start_m: -0.004, segments: [Move(velocity_mps: 0.004, duration_s: 4.0), Move(velocity_mps: -0.004, duration_s: 3.0)]),
+    robot: Replay,
+)"#;
+
+fn text(path: &Path) -> String {
+    path.to_str().expect("a path").to_owned()
+}
+
+fn flat(output: &Output) -> String {
+    let all = format!("{}\n{}", said(output), String::from_utf8_lossy(&output.stdout));
+    all.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+type Row = [f64; 3];
+
+/// An insertion, simulated with this noise seed, as rows of time, position and force.
+fn simulated(scratch: &Scratch, seed: u32) -> Vec<Row> {
+    let believed = scratch.file("believed.ron", BELIEVED);
+    let out = scratch.path().join(format!("made-{seed}"));
+    let output =
+        stylet(&["run", &text(&believed), "--seed", &seed.to_string(), "--quiet", "--out", &text(&out)]);
+    assert!(output.status.success(), "{}", said(&output));
+    let csv = fs::read_to_string(out.join("recording.csv")).expect("a recording");
+    let row = |line: &str| {
+        let mut numbers = line.split(',').filter_map(|x| x.parse().ok());
+        [numbers.next(), numbers.next(), numbers.next()].map(|x| x.expect("three numbers"))
+    };
+    csv.lines().skip(1).map(row).collect()
+}
+
+fn csv(rows: impl IntoIterator<Item = Row>) -> String {
+    let mut text = "time_s,position_m,force_n\n".to_owned();
+    for [t, z, f] in rows {
+        let _ = writeln!(text, "{t},{z},{f}");
+    }
+    text
+}
+
+/// Noise as of a sensor that touches nothing.
+fn air(i: usize) -> f64 {
+    let mut x = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    0.04 * ((x >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+}
+
+#[test]
+fn one_bad_recording_among_good_ones_is_named_in_the_same_words_wherever_it_enters() {
+    let scratch = Scratch::new("alike");
+    let good: Vec<String> = (1..=3)
+        .map(|seed| text(&scratch.file(&format!("good{seed}.csv"), csv(simulated(&scratch, seed)))))
+        .collect();
+    let rows = simulated(&scratch, 4);
+    let with =
+        |change: &dyn Fn(usize, Row) -> Row| csv(rows.iter().enumerate().map(|(i, row)| change(i, *row)));
+    let cases: [(&str, String, &[&str]); 7] = [
+        ("dead.csv", with(&|_, [t, z, _]| [t, z, 0.0]), &["the force stands at 0 N", "check the cable"]),
+        ("reversed.csv", with(&|_, [t, z, f]| [t, z, -f]), &["the force runs the other way", "scale: -1"]),
+        ("millimetres.csv", with(&|_, [t, z, f]| [t, 1e3 * z, f]), &["look like millimetres", "column map"]),
+        (
+            "millinewtons.csv",
+            with(&|_, [t, z, f]| [t, z, 1e3 * f]),
+            &["looks like millinewtons", "column map"],
+        ),
+        (
+            "air.csv",
+            with(&|i, [t, z, _]| [t, z, air(i)]),
+            &["nothing but noise", "check that this is an insertion"],
+        ),
+        (
+            "short.csv",
+            csv(rows.iter().copied().take(3)),
+            &["3 usable sample(s)", "record the whole insertion"],
+        ),
+        (
+            "huge.csv",
+            with(&|i, [t, z, f]| [t, z, if i == 700 { 1e300 } else { f }]),
+            &["force_n is 1e300", "remove the row"],
+        ),
+    ];
+    let believed = text(&scratch.path().join("believed.ron"));
+    let set = scratch.file(
+        "set.ron",
+        r#"Dataset(
+    name: "four insertions",
+    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
+    recordings: ["good*.csv", "BAD"],
+)"#,
+    );
+    for (name, content, words) in cases {
+        let bad = text(&scratch.file(name, content));
+        let out = scratch.path().join("out");
+        let folder = text(&out);
+        let all = [&good[0], &good[1], &good[2], &bad].map(String::as_str);
+        let alone = stylet(&["diagnose", &believed, "--data", &bad, "--out", &folder]);
+        let several = stylet(&[&["diagnose", &believed, "--out", &folder, "--data"], &all[..]].concat());
+        let repeats =
+            stylet(&[&["diagnose", &believed, "--repeats", "--out", &folder, "--data"], &all[..]].concat());
+        let this = fs::read_to_string(&set).expect("the set").replace("BAD", name);
+        let this = scratch.file("this.ron", this);
+        let of_set = Command::new(env!("CARGO_BIN_EXE_stylet"))
+            .args(["diagnose", &text(&this), "--out", &folder])
+            .env("STYLET_MEASURED", scratch.path())
+            .env("NO_COLOR", "1")
+            .output()
+            .expect("it starts");
+        for (how, output) in
+            [("alone", alone), ("diagnose", several), ("--repeats", repeats), ("data set", of_set)]
+        {
+            let said = flat(&output);
+            assert_eq!(output.status.code(), Some(2), "{name}, {how}: {said}");
+            for word in words.iter().chain(&[name]) {
+                assert!(said.contains(word), "{name}, {how}: does not say {word}: {said}");
+            }
+            assert!(
+                how == "alone" || said.contains("1 of 4 recordings cannot be used"),
+                "{name}, {how}: {said}"
+            );
+            assert!(!said.contains("lacks"), "{name}, {how}: names a cause: {said}");
+            assert!(!out.exists(), "{name}, {how}: left a folder");
+        }
+        let enhanced = stylet(&["enhance", &bad, "--out", &folder]);
+        let said = flat(&enhanced);
+        assert!(enhanced.status.success(), "{name}: enhance shows what there is: {said}");
+        for word in words {
+            assert!(said.contains(word), "{name}, enhance: does not say {word}: {said}");
+        }
+        assert!(!said.contains("never stands out"), "{name}: {said}");
+        fs::remove_dir_all(&out).expect("it was made");
+    }
+}
+
+#[test]
+fn repeats_are_repaired_as_asked_and_tell_who_is_not_like_the_others() {
+    let scratch = Scratch::new("alike-repeats");
+    let mut files = Vec::new();
+    for seed in 1..=4 {
+        let mut rows = simulated(&scratch, seed);
+        if seed == 2 {
+            // A logger that writes a row twice.
+            let again = rows[600];
+            rows.insert(601, again);
+        }
+        if seed == 4 {
+            // Another needle's recording.
+            rows.iter_mut().for_each(|row| row[2] *= 3.0);
+        }
+        files.push(text(&scratch.file(&format!("run{seed}.csv"), csv(rows))));
+    }
+    let believed = text(&scratch.path().join("believed.ron"));
+    let folder = text(&scratch.path().join("out"));
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let command = [&["diagnose", &believed, "--repeats", "--out", &folder, "--data"], &files[..]].concat();
+    let refused = stylet(&command);
+    assert_eq!(refused.status.code(), Some(2), "{}", flat(&refused));
+    assert!(
+        flat(&refused).contains("run2.csv: line 603") && flat(&refused).contains("--repair"),
+        "{}",
+        flat(&refused)
+    );
+    let repaired = stylet(&[&command[..], &["--repair"]].concat());
+    let said = flat(&repaired);
+    assert!(repaired.status.success(), "{said}");
+    assert!(said.contains("run4.csv: it is not like the others"), "{said}");
+    for good in ["run1.csv", "run2.csv", "run3.csv"] {
+        assert!(!said.contains(&format!("{good}: it is not like")), "{said}");
+    }
+    let json = fs::read_to_string(Path::new(&folder).join("diagnosis.json")).expect("results");
+    assert!(json.contains("\"repaired_rows\"") && json.contains("\"not_like_the_others\""));
+}
+
+#[test]
+fn repeats_do_not_forget_in_silence_what_the_scenario_believes() {
+    let scratch = Scratch::new("alike-effects");
+    let run = text(&scratch.file("run.csv", csv(simulated(&scratch, 1))));
+    let with =
+        BELIEVED.replace("    motion:", "    effects: [CoulombFriction(c_n_per_m: 6.0)],\n    motion:");
+    let believed = text(&scratch.file("with.ron", with));
+    let output = stylet(&["diagnose", &believed, "--repeats", "--data", &run, &run, &run]);
+    assert_eq!(output.status.code(), Some(2), "{}", flat(&output));
+    for word in ["with.ron", "coulomb_friction", "without --repeats"] {
+        assert!(flat(&output).contains(word), "{}", flat(&output));
+    }
+}
+
+#[test]
+fn a_recording_too_long_to_be_compared_is_thinned_and_that_is_said() {
+    let scratch = Scratch::new("alike-long");
+    let rows = simulated(&scratch, 1);
+    // The insertion at 200 Hz as a logger at 20 kHz would have it.
+    let dense = rows.windows(2).flat_map(|pair| {
+        let [a, b] = [pair[0], pair[1]];
+        (0..100).map(move |k| {
+            let s = f64::from(k) / 100.0;
+            [0, 1, 2].map(|i| a[i] + s * (b[i] - a[i]))
+        })
+    });
+    let long = text(&scratch.file("long.csv", csv(dense)));
+    let believed = text(&scratch.path().join("believed.ron"));
+    let output =
+        stylet(&["diagnose", &believed, "--data", &long, "--out", &text(&scratch.path().join("out"))]);
+    let said = flat(&output);
+    assert!(output.status.success(), "{said}");
+    assert!(
+        said.contains("139900 samples are more than a diagnosis can use: each 2 were averaged"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_stack_of_layers_is_told_apart_up_to_the_limit_that_is_stated() {
+    let scratch = Scratch::new("alike-layers");
+    let many = |layers: u32| {
+        let thickness_m = 0.02 / f64::from(layers);
+        let each: Vec<String> = (0..layers)
+            .map(|i| {
+                format!(
+                    "(thickness_m: {thickness_m}, stiffness_n_per_m: {}.0, friction_ns_per_m2: {}.0)",
+                    60 + 40 * (i % 3),
+                    9000 + 500 * i
+                )
+            })
+            .collect();
+        let tissue = format!("tissue: (layers: [{}])", each.join(", "));
+        let from = BELIEVED.find("tissue:").expect("a tissue");
+        let to = BELIEVED.find(",\n    motion").expect("a motion");
+        scratch.file(&format!("{layers}.ron"), format!("{}{tissue}{}", &BELIEVED[..from], &BELIEVED[to..]))
+    };
+    let diagnosed = |layers: u32| {
+        let believed = text(&many(layers));
+        let out = text(&scratch.path().join(format!("made-{layers}")));
+        let made = stylet(&["run", &believed, "--quiet", "--out", &out]);
+        assert!(made.status.success(), "{}", said(&made));
+        stylet(&[
+            "diagnose",
+            &believed,
+            "--data",
+            &format!("{out}/recording.csv"),
+            "--out",
+            &format!("{out}-d"),
+        ])
+    };
+    let eighteen = diagnosed(18);
+    assert!(flat(&eighteen).contains("The simulation agrees with the data"), "{}", flat(&eighteen));
+    let over = diagnosed(41);
+    assert_eq!(over.status.code(), Some(2), "{}", flat(&over));
+    assert!(flat(&over).contains("41 layers") && flat(&over).contains("up to 40"), "{}", flat(&over));
+}

@@ -1,0 +1,131 @@
+//! Promise: results appear as one set. A command that fails, is killed, or meets another one in its folder leaves the old set or the
+//! new one, never a mixture; what says what was drawn and what came of it are always of the same draw.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use support::{Scratch, root, said, scenario, stylet};
+
+fn text(path: &Path) -> String {
+    path.to_str().expect("a path").to_owned()
+}
+
+/// Every file of a folder, hidden ones too.
+fn held(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = fs::read_dir(folder).expect("a folder").flatten().filter(|e| e.path().is_file());
+    files
+        .map(|e| (e.file_name().to_string_lossy().into_owned(), fs::read(e.path()).expect("a file")))
+        .collect()
+}
+
+fn noise() -> String {
+    text(&root().join("scenarios/sweeps/noise.ron"))
+}
+
+/// A sweep that runs until it is killed, waited for until its first shard is there.
+fn begun(out: &str, seed: &str) -> Child {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .args(["sweep", &noise(), "--trials", "200000", "--seed", seed, "--threads", "1", "--out", out])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let deadline = Instant::now() + Duration::from_secs(120);
+    let shards = || fs::read_dir(Path::new(out).join("shards")).map_or(0, Iterator::count);
+    while shards() == 0 && Instant::now() < deadline && child.try_wait().expect("a state").is_none() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(child.try_wait().expect("a state").is_none(), "it is still running");
+    child
+}
+
+#[test]
+fn a_disk_that_fills_half_way_leaves_the_old_results_as_they_were() {
+    let scratch = Scratch::new("set-full");
+    let out = scratch.path().join("out");
+    let file = text(&scenario("three_layer_latex_constant"));
+    let first = stylet(&["run", &file, "--seed", "1", "--quiet", "--out", &text(&out)]);
+    assert!(first.status.success(), "{}", said(&first));
+    let old = held(&out);
+    assert!(old.contains_key("manifest.json") && old.contains_key("report.html"), "{:?}", old.keys());
+    // Room for the small files, not for the large ones.
+    let command = format!(
+        "trap '' XFSZ; ulimit -f 64; '{}' run '{file}' --seed 2 --out '{}'",
+        env!("CARGO_BIN_EXE_stylet"),
+        out.display()
+    );
+    let output = Command::new("bash").args(["-c", &command]).env("NO_COLOR", "1").output().expect("bash");
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(
+        said(&output).contains("cannot be written") && said(&output).contains("nothing was changed"),
+        "{}",
+        said(&output)
+    );
+    assert!(held(&out) == old, "something was changed");
+    let third = stylet(&["run", &file, "--seed", "2", "--quiet", "--out", &text(&out)]);
+    assert!(third.status.success() && held(&out) != old);
+}
+
+#[test]
+fn a_killed_sweep_over_an_older_folder_leaves_the_draw_that_its_tables_tell_of() {
+    let scratch = Scratch::new("set-killed");
+    let out = scratch.path().join("out");
+    let folder = text(&out);
+    let first = stylet(&["sweep", &noise(), "--trials", "20", "--seed", "1", "--quiet", "--out", &folder]);
+    assert!(first.status.success(), "{}", said(&first));
+    let old = held(&out);
+    let mut killed = begun(&folder, "2");
+    killed.kill().expect("it is ours");
+    killed.wait().expect("it ends");
+    assert!(held(&out) == old, "the tables and what was drawn are of one sweep");
+    let replayed = stylet(&["replay", &folder, "3", "--quiet"]);
+    assert!(replayed.status.success(), "{}", said(&replayed));
+    let seed = |csv: &[u8]| {
+        let text = String::from_utf8_lossy(csv).into_owned();
+        text.lines().nth(4).and_then(|row| row.split(',').nth(1)).expect("trial 3").to_owned()
+    };
+    let drawn = fs::read_to_string(out.join("trial-3/scenario.ron")).expect("its scenario");
+    assert!(drawn.contains(&seed(&old["trials.csv"])), "trial 3 has the seed of its row");
+}
+
+#[test]
+fn two_sweeps_do_not_share_a_folder() {
+    let scratch = Scratch::new("set-two");
+    let folder = text(&scratch.path().join("out"));
+    let mut first = begun(&folder, "1");
+    let second = stylet(&["sweep", &noise(), "--trials", "20", "--seed", "2", "--out", &folder]);
+    let merge = stylet(&["sweep", "merge", &noise(), "--trials", "20", "--out", &folder]);
+    let run = stylet(&["run", &text(&scenario("three_layer_latex_constant")), "--out", &folder]);
+    first.kill().expect("it is ours");
+    first.wait().expect("it ends");
+    for other in [second, merge, run] {
+        assert_eq!(other.status.code(), Some(2), "{}", said(&other));
+        assert!(
+            said(&other).contains("another stylet") && said(&other).contains("--out"),
+            "{}",
+            said(&other)
+        );
+    }
+    // The lock went with its holder.
+    let run = stylet(&["run", &text(&scenario("three_layer_latex_constant")), "--quiet", "--out", &folder]);
+    assert!(run.status.success(), "{}", said(&run));
+}
+
+#[test]
+fn a_draw_that_was_exchanged_under_its_tables_is_not_replayed() {
+    let scratch = Scratch::new("set-exchanged");
+    let out = scratch.path().join("out");
+    let folder = text(&out);
+    let first = stylet(&["sweep", &noise(), "--trials", "20", "--quiet", "--out", &folder]);
+    assert!(first.status.success(), "{}", said(&first));
+    let draw = fs::read_to_string(out.join("sweep.ron")).expect("the draw");
+    assert!(draw.contains("seed: 1"), "{draw}");
+    fs::write(out.join("sweep.ron"), draw.replace("seed: 1", "seed: 2")).expect("it can be written");
+    let output = stylet(&["replay", &folder, "3", "--quiet"]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("sweep.ron") && said(&output).contains("same set"), "{}", said(&output));
+}

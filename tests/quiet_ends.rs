@@ -1,0 +1,212 @@
+//! Promise: however a command ends, it ends with a sentence and its exit code: readers that go away, full disks behind standard
+//! output, errors far to the right, work that is too much. Nothing panics (101), nothing runs for ever in silence.
+
+mod support;
+
+use std::fs::File;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use support::{Scratch, root, said, scenario, stylet};
+
+const ONE_GEL: &str = r#"Scenario(
+    name: "one gel",
+    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
+    motion: Constant(start_m: -0.004, velocity_mps: 0.008, duration_s: 2.0),
+    robot: Replay,
+)"#;
+
+fn text(path: &Path) -> String {
+    path.to_str().expect("a path").to_owned()
+}
+
+/// Exit code and standard error of a command whose standard output is `out`.
+fn ended(arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .args(arguments)
+        .env("NO_COLOR", "1")
+        .stdout(out)
+        .stderr(Stdio::piped())
+        .output()
+        .expect("the binary starts");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// A pipe whose reader has gone away, as behind `| head`.
+fn gone() -> Stdio {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    writer.into()
+}
+
+fn full() -> Option<Stdio> {
+    File::options().write(true).open("/dev/full").ok().map(Stdio::from)
+}
+
+#[test]
+fn a_reader_that_goes_away_changes_no_exit_code_and_a_full_disk_is_told_in_a_sentence() {
+    let scratch = Scratch::new("pipes");
+    let gel = scratch.file("gel.ron", ONE_GEL);
+    let sweep = scratch.file(
+        "sweep.ron",
+        r#"Sweep(scenario: "gel.ron", trials: 8, vary: [(path: "sensor.noise_n", with: Uniform(0.01, 0.02))])"#,
+    );
+    let gate = |name: &str, at_most: f64| {
+        let text = format!(
+            r#"Gates([(run: "gel.ron", seeds: 4, expect: [(score: "missed", at_most: {at_most})])])"#
+        );
+        scratch.file(name, text)
+    };
+    let (holds, fails) = (gate("holds.ron", 9.0), gate("fails.ron", -1.0));
+    let (gel, sweep, holds, fails) = (text(&gel), text(&sweep), text(&holds), text(&fails));
+    let (out, svg) = (text(&scratch.path().join("out")), text(&scratch.path().join("map.svg")));
+    let commands: [(&[&str], i32); 8] = [
+        (&["effects"], 0),
+        (&["run", &gel, "--out", &out], 0),
+        (&["sweep", &sweep, "--out", &out], 0),
+        (&["sweep", "plan", &sweep, "--shards", "4"], 0),
+        (&["sweep", "map", &sweep, "--svg", &svg], 0),
+        (&["gate", &holds], 0),
+        (&["gate", &fails], 1),
+        (&["compare", &gel, "--seeds", "2", "--out", &out], 0),
+    ];
+    for (command, code) in commands {
+        let (found, said) = ended(command, gone());
+        assert_eq!(found, Some(code), "{command:?} into a pipe that nobody reads: {said}");
+        assert!(!said.contains("panicked") && !said.contains("please report"), "{command:?}: {said}");
+        let Some(full) = full() else { continue };
+        let (found, said) = ended(command, full);
+        assert!(!said.contains("panicked"), "{command:?}: {said}");
+        // A verdict outweighs that it could not be printed.
+        assert_eq!(found, Some(if code == 1 { 1 } else { 2 }), "{command:?} onto a full disk: {said}");
+        assert!(code == 1 || said.contains("standard output cannot be written"), "{command:?}: {said}");
+    }
+}
+
+#[test]
+fn nobody_hears_the_error_and_the_exit_code_is_still_the_right_one() {
+    let (Some(out), Ok(err)) = (full(), File::options().write(true).open("/dev/full")) else { return };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
+    let status = command.args(["run", "nowhere.ron"]).stdout(out).stderr(err).status().expect("it starts");
+    assert_eq!(status.code(), Some(2));
+}
+
+#[test]
+fn an_error_seventy_thousand_columns_to_the_right_is_told_with_its_place() {
+    let scratch = Scratch::new("wide");
+    let wide = ONE_GEL.replace('\n', " ").replace("robot", &format!("{}robbot", " ".repeat(70_000)));
+    let file = scratch.file("wide.ron", wide);
+    let output = stylet(&["run", &text(&file)]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("wide.ron:1:70"), "{}", said(&output));
+    assert!(said(&output).contains("robbot") && said(&output).contains("robot"), "{}", said(&output));
+    // A line that fits a screen is shown, with what is wrong underlined.
+    let short = scratch.file("short.ron", ONE_GEL.replace("robot", "robbot"));
+    let output = stylet(&["run", &text(&short)]);
+    assert!(said(&output).contains("── here"), "{}", said(&output));
+}
+
+#[test]
+fn too_much_work_is_refused_before_it_begins_with_what_would_help() {
+    let scratch = Scratch::new("limits");
+    let gel = scratch.file("gel.ron", ONE_GEL);
+    let rates = |name: &str, line: &str| {
+        text(&scratch.file(name, ONE_GEL.replace("robot: Replay", &format!("robot: Slide, {line}"))))
+    };
+    let many = rates("many.ron", "sample_hz: 2e7");
+    let fast = rates("fast.ron", "physics_hz: 1.4e7");
+    let slow = rates("slow.ron", "physics_hz: 1e5");
+    let sweep = text(&scratch.file(
+        "sweep.ron",
+        r#"Sweep(scenario: "gel.ron", trials: 100000000, vary: [(path: "sensor.noise_n", with: Uniform(0.01, 0.02))])"#,
+    ));
+    let row = "0.123456789,0.123456789,0.123456789\n";
+    let log = text(&scratch.file("log.csv", format!("time_s,position_m,force_n\n{}", row.repeat(20_000))));
+    let gel = text(&gel);
+    let out = scratch.path().join("out");
+    let folder = text(&out);
+    let cases: [(&[&str], &[&str]); 9] = [
+        (&["run", &many], &["many.ron", "samples", "40 GB", "2 GB", "--limit-memory", "sample_hz"]),
+        (&["run", &fast], &["fast.ron", "physics_hz", "at most 1e5", "1000.0"]),
+        (&["run", &slow, "--limit-time", "0.1s"], &["slow.ron", "physics steps", "--limit-time"]),
+        (&["sweep", &sweep], &["sweep.ron", "trials", "--trials", "--limit-memory"]),
+        (&["sweep", &sweep, "--trials", "8", "--threads", "100000"], &["100000", "up to 1024"]),
+        (&["sweep", "run-shard", "1/2", &sweep, "--threads", "100000"], &["100000", "up to 1024"]),
+        (&["enhance", &log, "--limit-memory", "1MB"], &["log.csv", "samples", "1 MB", "--limit-memory"]),
+        (&["diagnose", &gel, "--data", &log, "--limit-memory", "1MB"], &["samples", "--limit-memory"]),
+        (&["run", &gel, "--limit-memory", "lots"], &["lots", "500MB"]),
+    ];
+    for (command, words) in cases {
+        let output = stylet(&[command, &["--out", &folder]].concat());
+        assert_eq!(output.status.code(), Some(2), "{command:?}: {}", said(&output));
+        // The terminal breaks lines between words and after hyphens.
+        let said = said(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        let said = said.replace("- ", "-");
+        for word in words {
+            assert!(said.contains(word), "{command:?} does not say {word}: {said}");
+        }
+        assert!(!out.exists(), "{command:?} left a folder");
+    }
+    let output =
+        stylet(&["run", &gel, "--limit-memory", "10MB", "--limit-time", "1h", "--quiet", "--out", &folder]);
+    assert!(output.status.success(), "what is within the limits runs: {}", said(&output));
+}
+
+#[test]
+fn a_refused_sweep_leaves_no_folder() {
+    let scratch = Scratch::new("refused");
+    let file = scratch.file(
+        "hopeless.ron",
+        format!(
+            r#"Sweep(scenario: {:?}, trials: 8, vary: [(path: "sensor.noise_n", with: Uniform(-0.02, -0.01))])"#,
+            text(&scenario("three_layer_latex_constant"))
+        ),
+    );
+    let out = scratch.path().join("made/for/it");
+    let output = stylet(&["sweep", &text(&file), "--out", &text(&out)]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(!scratch.path().join("made").exists(), "an empty folder stays behind");
+    let merged =
+        stylet(&["sweep", "merge", &text(&root().join("scenarios/sweeps/noise.ron")), "--out", &text(&out)]);
+    assert_eq!(merged.status.code(), Some(2), "{}", said(&merged));
+    assert!(!scratch.path().join("made").exists(), "an empty folder stays behind");
+}
+
+#[test]
+fn what_is_wrong_with_a_log_is_told_with_file_line_and_remedy() {
+    let scratch = Scratch::new("messages");
+    let rows = "0.0,0.0,0.1\n0.01,0.001,0.2\n0.02,0.002,0.1\n";
+    let head = "time_s,position_m,force_n\n";
+    let cases: [(&str, String, &[&str]); 5] = [
+        ("no_header.csv", rows.to_owned(), &["line 1", "header is missing", "time_s,position_m,force_n"]),
+        (
+            "comma.csv",
+            format!("{head}0,00,0,001,0,1\n0,01,0,002,0,2\n"),
+            &["line 2", "decimal points", "semicolons"],
+        ),
+        (
+            "quote.csv",
+            format!("{head}0.0,0.0,\"0.1\n0.01,0.001,0.2\n"),
+            &["line 2", "quotation mark", "close or remove"],
+        ),
+        (
+            "steep.csv",
+            format!("{head}0,0,0\n1e-300,1e300,0\n"),
+            &["line 2", "slope of the position", "column map"],
+        ),
+        ("wide.csv", format!("{head}0.0,0.0\n"), &["line 2", "2 fields", "complete or remove"]),
+    ];
+    let out = scratch.path().join("out");
+    for (name, content, words) in cases {
+        let file = scratch.file(name, content);
+        let output = stylet(&["enhance", &text(&file), "--out", &text(&out)]);
+        let said = said(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
+        for word in words.iter().chain(&[name]) {
+            assert!(said.contains(word), "{name} does not say {word}: {said}");
+        }
+    }
+    // Bars between the columns are read like commas.
+    let bars = scratch.file("bars.csv", format!("{head}{rows}").replace(',', "|"));
+    let output = stylet(&["enhance", &text(&bars), "--quiet", "--out", &text(&out)]);
+    assert!(output.status.success(), "{}", said(&output));
+}
