@@ -40,6 +40,8 @@ pub(crate) struct Step {
     pub(crate) dt_s: f64,
     pub(crate) dz_m: f64,
     pub(crate) dv_mps: f64,
+    /// Correlation of the noise over it.
+    pub(crate) rho: f64,
     /// Typical speed of the last travel, positive.
     pub(crate) speed_mps: f64,
 }
@@ -106,7 +108,7 @@ impl Local {
             let r = 1.0 / (1.0 - noise.rho * noise.rho);
             return self.state.innovation([L], [1.0], force_n, r);
         }
-        let rho = noise.rho_over(step.dt_s);
+        let rho = step.rho;
         if rho == 0.0 {
             return self.state.innovation([L], [1.0], force_n, 1.0);
         }

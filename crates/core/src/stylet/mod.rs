@@ -11,7 +11,8 @@ mod shaft;
 use crate::config::{Contact, EnhanceConfig, FrictionLaw};
 use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
 use alarm::Alarm;
-use layers::{FP, K, KP, Layers};
+use gaussian::{at_least, at_most};
+use layers::{Behind, FP, K, KP, Layers};
 use local::{Local, Step};
 use noise::Noise;
 use shaft::{Felt, Shaft};
@@ -41,6 +42,8 @@ const LONGEST_DROP_S: f64 = 0.1;
 /// Misfit at which the law of layers does not hold; it has to be shown that it does.
 const UNPROVEN: f64 = 3.0;
 
+/// Samples that the level of a fall is averaged over at most.
+const MOST_AVERAGED: f64 = 16.0;
 /// Samples in a row above the threshold that are a contact.
 const CONTACT_SAMPLES: u32 = 5;
 
@@ -63,6 +66,7 @@ pub(crate) struct Stylet {
     /// The estimator as it was when the alarm's sums left zero, and the position then.
     before: Layers,
     before_m: f64,
+    behind: Behind,
     first_m: f64,
     /// What drives friction, in m/s, its dry state from -1 to 1, and what a steady advance at the usual speed makes of it.
     drive: f64,
@@ -120,6 +124,7 @@ impl Stylet {
             layers,
             before: layers,
             before_m: surface_m,
+            behind: Behind::default(),
             first_m: surface_m,
             drive: 0.0,
             xi: 0.0,
@@ -255,7 +260,8 @@ impl Stylet {
             dt_s,
             dz_m: sample.position_m - last.position_m,
             dv_mps: sample.velocity_mps - last.velocity_mps,
-            speed_mps: self.speed_mps.max(config.drop.standstill_mps),
+            rho: self.noise.rho_over(dt_s),
+            speed_mps: at_least(config.drop.standstill_mps, self.speed_mps),
         }
     }
 
@@ -357,8 +363,9 @@ impl Stylet {
             self.local.renew(force_n, force.max(sd), &self.noise, step.speed_mps, false);
         }
         self.spikes = 0;
-        let rough = 1.0 + self.rough * (self.texture - 1.0).max(0.0);
-        let heard = self.alarm.take(if forward && !odd { z / libm::sqrt(rough) } else { 0.0 });
+        let rough = 1.0 + self.rough * at_least(0.0, self.texture - 1.0);
+        let smoothed = if rough > 1.0 { z / libm::sqrt(rough) } else { z };
+        let heard = self.alarm.take(if forward && !odd { smoothed } else { 0.0 });
         if !forward {
             self.alarm.rest();
         }
@@ -388,7 +395,7 @@ impl Stylet {
         if !odd {
             self.noise.in_tissue(innovation.e, innovation.s);
             self.local.take(&innovation, force_n);
-            self.texture += share * ((z * z).min(36.0) - self.texture);
+            self.texture += share * (at_most(36.0, z * z) - self.texture);
         }
         self.falling = self.fallen.is_some() && self.settle(step);
         if self.falling {
@@ -396,17 +403,17 @@ impl Stylet {
                 self.layers = fallen;
             }
         } else if forward && sample.position_m >= self.layers.start_m {
-            let rho = self.noise.rho_over(step.dt_s);
             self.work += WORK_LAYERS;
-            let (e, s) = self.layers.take(sample.position_m, self.drive, force_n, rho);
-            let z2 = (e * e / (s * self.noise.variance)).min(400.0);
+            let (e, s) = self.layers.take(sample.position_m, self.drive, force_n, step.rho);
+            let z2 = at_most(400.0, e * e / (s * self.noise.variance));
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
-                let share = share.max((step.dt_s * (0.25 / local::MEMORY_S)).min(0.5));
+                let share = at_least(share, at_most(0.5, step.dt_s * (0.25 / local::MEMORY_S)));
                 self.misfit += share * (z2 - self.misfit);
             }
-            self.peak_n = self.peak_n.max(self.local.level_n() - self.noise.bias_n());
+            self.peak_n = at_least(self.peak_n, self.local.level_n() - self.noise.bias_n());
             // Where the law of layers does not hold, small falls are texture.
-            let weight = ((self.misfit - 0.5 * UNPROVEN) / (UNPROVEN - 0.5 * UNPROVEN - 1.0)).clamp(0.0, 1.0);
+            let weight = (self.misfit - 0.5 * UNPROVEN) / (UNPROVEN - 0.5 * UNPROVEN - 1.0);
+            let weight = at_most(1.0, at_least(0.0, weight));
             self.rough = weight;
             // A law that has failed is not trusted again.
             if self.misfit >= UNPROVEN && self.deepest_m - self.first_m >= config.guard.blind_travel_m {
@@ -443,6 +450,7 @@ impl Stylet {
     }
 
     /// Follows a fall from where it began.
+    #[inline(always)]
     fn fall(&mut self, step: &Step, sample: &Sample) {
         let fall = self.fall.get_or_insert(Fall {
             from_n: self.last_level_n,
@@ -453,8 +461,12 @@ impl Stylet {
         fall.since_s += step.dt_s;
         fall.count += 1.0;
         // As many samples as it takes to know the force to a quarter of the drop that counts.
-        let ratio = 4.0 * libm::sqrt(self.noise.marginal()) / self.least_n.max(1e-12);
-        let most = (ratio * ratio).clamp(1.0, 16.0);
+        let most = if self.least_n > 0.0 {
+            16.0 * self.noise.marginal() / (self.least_n * self.least_n)
+        } else {
+            MOST_AVERAGED
+        };
+        let most = most.clamp(1.0, MOST_AVERAGED);
         fall.mean_n += (sample.force_n - fall.mean_n) / fall.count.min(most);
         if fall.since_s > LONGEST_DROP_S && self.least_n > 0.0 && fall.from_n - fall.mean_n < self.least_n {
             // Too slow, or too small: not a rupture.
@@ -471,7 +483,7 @@ impl Stylet {
         if self.rough > 0.0 && self.deepest_m - self.first_m < config.guard.blind_travel_m {
             return false;
         }
-        let effective = (fall.count.min(16.0) / libm::sqrt(self.noise.slow())).max(1.0);
+        let effective = (fall.count.min(MOST_AVERAGED) / libm::sqrt(self.noise.slow())).max(1.0);
         let noise = 2.0 * libm::sqrt(self.noise.marginal() / effective);
         let size = fall.from_n - fall.mean_n;
         self.drop = (size, noise / 2.0);
@@ -508,7 +520,7 @@ impl Stylet {
         let predicted = self.local.level_n();
         self.layers = self.before;
         self.work += WORK_RUPTURE;
-        self.layers.rupture(at_m, place_m, drive, &self.noise);
+        self.layers.rupture(at_m, place_m, drive, &self.noise, &mut self.behind);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
         self.layers.take(sample.position_m, self.drive, sample.force_n, 0.0);
@@ -594,10 +606,10 @@ impl Stylet {
             // As long as elastic force may be left, friction is no more than what was expected of it.
             behind = behind.min(fallen.behind(&self.noise).0);
         }
-        behind = behind.max(0.0);
+        behind = at_least(0.0, behind);
         if retracting && self.in_tissue {
             self.work += WORK_BACK;
-            behind = self.layers.around_shaft(sample.position_m);
+            behind = self.layers.around_shaft(&self.behind, sample.position_m);
         }
         let u = self.drive;
         let mut friction = behind * u;
@@ -626,7 +638,7 @@ impl Stylet {
         let out = &mut self.out;
         out.cumulative_friction_ns_per_m = behind;
         out.enhanced_n = sample.force_n - friction;
-        let half = 1.96 * libm::sqrt(marginal + variance.max(0.0));
+        let half = 1.96 * libm::sqrt(marginal + at_least(0.0, variance));
         out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
     }
 
