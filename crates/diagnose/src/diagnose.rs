@@ -1,6 +1,7 @@
 //! The diagnosis from end to end.
 
 use crate::base::{Prepared, base};
+use crate::varied::varied;
 use crate::error::DiagnoseError;
 use crate::held_out::{Left, floor, left_out, rms};
 use crate::intervals::Spread;
@@ -98,6 +99,7 @@ pub fn diagnose(
         borrowed.par_iter().zip(&raw.exclude).map(|(r, x)| Blocks::new(r, x, BLOCK_S)).collect();
     let prepared = Prepared::new(Arc::new(belief(scenario)), blocks, raw.step_n.unwrap_or(0.0) * UNIFORM_SD);
     let (fitted, data) = base(&prepared).ok_or(DiagnoseError::NoFit)?;
+    let (fitted, data) = varied(fitted, data);
     let mut search = Search::run(&prepared, fitted, data, &mut progress);
     let classes = rivals(&mut search);
     progress("judging");

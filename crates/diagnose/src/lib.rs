@@ -40,7 +40,8 @@ pub mod raw;
 pub mod rivals;
 pub mod select;
 pub mod small;
-pub mod visible;
+pub mod varied;
+mod visible;
 
 pub use diagnose::{Evidence, Examined, Options, belief, diagnose};
 pub use error::DiagnoseError;

@@ -2,7 +2,9 @@
 
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex;
+use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Fit;
+use stylet_identify::linear::Symmetric;
 use stylet_identify::objective::Data;
 use stylet_stats::order::median;
 
@@ -19,7 +21,12 @@ const LEAST_HZ: f64 = 0.3;
 
 /// Power of the residual of a fit at the recordings' own rate, in N²/Hz: the width of a bin in Hz, and the bins.
 fn power(fit: &Fit, data: &Data, padding: usize) -> (f64, Vec<f64>) {
-    let longest = data.blocks.iter().map(|b| b.raw_f.len()).max().unwrap_or(0);
+    let samples = |b: &Blocks| {
+        let span_s = b.raw_t.last().zip(b.raw_t.first()).map_or(0.0, |(b, a)| b - a);
+        // Long gaps are cut short: no line is worth so much memory.
+        ((span_s / b.step_s) as usize + 1).min(2 * b.raw_t.len() + 1)
+    };
+    let longest = data.blocks.iter().map(samples).max().unwrap_or(0);
     let size = (longest * padding).next_power_of_two();
     let mut power = vec![0.0; size / 2];
     let mut planner = FftPlannerScalar::new();
@@ -34,16 +41,18 @@ fn power(fit: &Fit, data: &Data, padding: usize) -> (f64, Vec<f64>) {
         let mut sizes: Vec<f64> = e.iter().map(|e| e.abs()).collect();
         let limit = 6.0 * median(&mut sizes).max(1e-9);
         e.iter_mut().for_each(|e| *e = e.clamp(-limit, limit));
+        // On a regular grid: a sample that is missing tells nothing.
+        let first = b.raw_t.first().copied().unwrap_or(0.0);
+        let place = |k: usize| ((b.raw_t[k] - first) / b.step_s).round() as usize;
         let n = e.len() as f64;
-        let mut buffer: Vec<Complex<f64>> = e
-            .iter()
-            .enumerate()
-            .map(|(k, e)| {
-                let taper = 0.5 - 0.5 * libm::cos(core::f64::consts::TAU * (k as f64 + 0.5) / n);
-                Complex::new(taper * e, 0.0)
-            })
-            .collect();
-        buffer.resize(size, Complex::new(0.0, 0.0));
+        let long = (place(e.len() - 1) + 1).min(size) as f64;
+        let mut buffer = vec![Complex::new(0.0, 0.0); size];
+        for (k, e) in e.iter().enumerate() {
+            if let Some(slot) = buffer.get_mut(place(k)) {
+                let taper = 0.5 - 0.5 * libm::cos(core::f64::consts::TAU * (place(k) as f64 + 0.5) / long);
+                *slot = Complex::new(taper * e, 0.0);
+            }
+        }
         fft.process(&mut buffer);
         // One-sided; the taper keeps three eighths of the power.
         let scale = 2.0 * step_s / (0.375 * n);
@@ -68,6 +77,35 @@ pub fn spectrum(fit: &Fit, data: &Data) -> (Vec<f64>, Vec<f64>) {
             (hz, (c.iter().sum::<f64>() / c.len() as f64).sqrt())
         })
         .unzip()
+}
+
+/// Residuals (N) of a fit less their lines, each with an amplitude and a phase of every recording's own; `None` without
+/// lines.
+#[must_use]
+pub fn without(fit: &Fit, data: &Data) -> Option<Vec<Vec<f64>>> {
+    let found = lines(fit, data);
+    if found.is_empty() {
+        return None;
+    }
+    let mut e = fit.residuals.e.clone();
+    for (b, e) in data.blocks.iter().zip(&mut e) {
+        for hz in &found {
+            let wave: Vec<(f64, f64)> = (0..b.len())
+                .map(|k| libm::sincos(core::f64::consts::TAU * hz * 0.5 * (b.from_s[k] + b.to_s[k])))
+                .collect();
+            let (mut h, mut g) = (Symmetric::zeros(2), [0.0; 2]);
+            for (k, (s, c)) in wave.iter().enumerate().filter(|(k, _)| b.used[*k]) {
+                h.add(0, 0, s * s);
+                h.add(1, 0, s * c);
+                h.add(1, 1, c * c);
+                g[0] += s * e[k];
+                g[1] += c * e[k];
+            }
+            let x = h.factor().solve(&g);
+            e.iter_mut().zip(&wave).for_each(|(e, (s, c))| *e -= x[0] * s + x[1] * c);
+        }
+    }
+    Some(e)
 }
 
 /// Frequencies (Hz) at which the residual of a fit has lines, strongest first.

@@ -11,7 +11,7 @@ use stylet_identify::model::{Choice, Model};
 use stylet_identify::noise::From;
 use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
-use stylet_tissue::Place;
+use stylet_tissue::{Place, Proposal};
 
 /// Most effects at once.
 pub const MOST: usize = 5;
@@ -66,6 +66,9 @@ impl Search {
             }
         }
         search.prune();
+        if !search.best.model.effects.is_empty() {
+            (search.best, search.data) = crate::varied::varied(search.best.clone(), search.data.clone());
+        }
         let told = crate::geometry::tighten(&mut search, prepared);
         if told {
             search.prune();
@@ -75,6 +78,7 @@ impl Search {
 
     /// Takes one more effect; false when none is worth it.
     fn grow(&mut self, prepared: &Prepared) -> bool {
+        self.see_lines();
         let look = Look::new(&self.best, &self.data);
         let times = prepared.drop_times();
         let blocks = self.data.compared();
@@ -150,6 +154,20 @@ impl Search {
         let any = stage.taken.is_some();
         self.stages.push(stage);
         any
+    }
+
+    /// Strong lines of the residual's spectrum are no noise: an autoregression would take them for its own colour.
+    fn see_lines(&mut self) {
+        let line = |id: &str| stylet_tissue::info(id).is_some_and(|i| matches!(i.proposal, Proposal::Line));
+        if self.best.model.effects.iter().any(|e| line(e.info.id)) {
+            return;
+        }
+        let Some(less) = crate::lines::without(&self.best, &self.data) else { return };
+        let data = self.data.judged_by(&less, From::Calm);
+        if let Some(left) = residuals(&self.best.model, &data) {
+            self.best.residuals = left;
+            self.data = data;
+        }
     }
 
     /// The data averaged further, with the noise of the best, to rank starts.

@@ -11,6 +11,8 @@ use stylet_record::Recording;
 pub const BLOCK_S: f64 = 0.02;
 /// A time step of more than so many sampling steps is a gap.
 const GAP: f64 = 1.8;
+/// A longer gap, in s, is left open.
+const BRIDGED_S: f64 = 2.0;
 /// A sample so near (share of a step) to a jump of the speed may have either speed.
 const AT_A_JUMP: f64 = 0.03;
 /// Standard deviation of a number spread evenly over one.
@@ -35,6 +37,8 @@ pub struct Blocks {
     pub size_n: Vec<f64>,
     /// Standard deviation in N of what sampling leaves open of the block's mean where the speed jumps.
     pub doubt_n: Vec<f64>,
+    /// Times in s as they were recorded.
+    pub raw_t: Arc<Vec<f64>>,
     /// Forces in N as they were recorded.
     pub raw_f: Arc<Vec<f64>>,
     /// The block of every recorded force.
@@ -67,6 +71,7 @@ impl Blocks {
             restart: Vec::new(),
             size_n: Vec::new(),
             doubt_n: Vec::new(),
+            raw_t: Arc::new(recording.time_s.clone()),
             raw_f: Arc::new(recording.force_n.clone()),
             raw_block: Arc::default(),
             samples: q,
@@ -94,6 +99,7 @@ impl Blocks {
             } else {
                 t[to - 1] + 0.5 * step_s
             };
+            b.bridge(from_s, length_s);
             b.from_s.push(from_s);
             b.to_s.push(to_s);
             b.f.push(if kept > 0 { sum / kept as f64 } else { 0.0 });
@@ -105,6 +111,23 @@ impl Blocks {
         b.leave_out_jumps(t);
         b.finish();
         b
+    }
+
+    /// Blocks that are not compared from the end so far to `to_s` (s): a law goes on where nothing was recorded, and may
+    /// rupture there.
+    fn bridge(&mut self, to_s: f64, length_s: f64) {
+        let (Some(&end), Some(&force)) = (self.to_s.last(), self.f.last()) else { return };
+        let gap_s = to_s - end;
+        if gap_s < 0.01 * self.step_s || gap_s > BRIDGED_S {
+            return;
+        }
+        let count = (gap_s / length_s).ceil().max(1.0);
+        for k in 0..count as usize {
+            self.from_s.push(end + gap_s * k as f64 / count);
+            self.to_s.push(end + gap_s * (k + 1) as f64 / count);
+            self.f.push(force);
+            self.used.push(false);
+        }
     }
 
     /// A sample at the very instant of a jump of the speed has either; so have all within the doubt about the instant.

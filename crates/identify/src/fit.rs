@@ -4,7 +4,8 @@ use crate::events::{rows_like, scatter_of};
 use crate::linear::{Factor, Symmetric, dot};
 use crate::model::{Model, NEVER, Number, Role};
 use crate::noise::weight;
-use crate::objective::{Data, Residuals, nats, replay, residuals};
+use crate::forward::Replayed;
+use crate::objective::{Data, Residuals, Trail, nats, replay, residuals};
 use rayon::prelude::*;
 
 /// A fitted model.
@@ -91,13 +92,22 @@ impl Tangent {
             roots,
         };
         let numbers: Vec<Number> = t.shared.iter().chain(&t.own).copied().collect();
-        t.columns = numbers.par_iter().map(|n| t.derivative(model, data, at, n)).collect();
+        let trails: Vec<Option<Trail>> =
+            (0..data.recordings()).into_par_iter().map(|r| Trail::new(model, data, r)).collect();
+        t.columns = numbers.par_iter().map(|n| t.derivative(model, data, at, n, &trails)).collect();
         t.assemble(model, data.recordings());
         t
     }
 
     /// The column of a number by a forward difference.
-    fn derivative(&self, model: &Model, data: &Data, at: &Residuals, n: &Number) -> Column {
+    fn derivative(
+        &self,
+        model: &Model,
+        data: &Data,
+        at: &Residuals,
+        n: &Number,
+        trails: &[Option<Trail>],
+    ) -> Column {
         let mut moved = model.clone();
         let mut steps = Vec::new();
         for r in 0..if n.role.is_own() { data.recordings() } else { 1 } {
@@ -109,7 +119,13 @@ impl Tangent {
             }
         }
         let h = |r: usize| steps.get(r).copied().unwrap_or(steps[0]);
-        let mut column = self.difference(model, data, at, &moved).unwrap_or_default();
+        // An effect may act from the first sample on.
+        let whole = matches!(n.role, Role::Effect { .. });
+        let replayed = |r: usize| match trails.get(r).and_then(Option::as_ref).filter(|_| !whole) {
+            Some(trail) => trail.replay(&moved, data, r),
+            None => replay(&moved, data, r),
+        };
+        let mut column = self.change(model, data, at, replayed).unwrap_or_default();
         for (r, (w, rows)) in column.w.iter_mut().zip(&mut column.rows).enumerate() {
             let scale = 1.0 / h(r);
             w.iter_mut().chain(rows).for_each(|x| *x *= scale);
@@ -120,9 +136,20 @@ impl Tangent {
     /// What changes between `model` and another one, as a column: predicted force weighted and whitened, rows of events.
     #[must_use]
     pub fn difference(&self, model: &Model, data: &Data, at: &Residuals, other: &Model) -> Option<Column> {
+        self.change(model, data, at, |r| replay(other, data, r))
+    }
+
+    /// The same with the other model's replays.
+    fn change(
+        &self,
+        model: &Model,
+        data: &Data,
+        at: &Residuals,
+        other: impl Fn(usize) -> Option<Replayed>,
+    ) -> Option<Column> {
         let mut column = Column::default();
         for (r, b) in data.blocks.iter().enumerate() {
-            let replayed = replay(other, data, r)?;
+            let replayed = other(r)?;
             // Predicted now less predicted before = residual before less residual now.
             let change: Vec<f64> =
                 replayed.f.iter().zip(&at.e[r]).zip(&b.f).map(|((f, e), y)| f - (y - e)).collect();

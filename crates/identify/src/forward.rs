@@ -21,7 +21,7 @@ struct Walk<'a> {
     state: LawState,
     chain: Option<MeasurementState>,
     done: usize,
-    events: &'a mut [Event],
+    events: &'a mut Vec<Event>,
     step_s: f64,
     /// Puncture force in N of the active layer at the span before.
     threshold_n: f64,
@@ -36,7 +36,7 @@ impl Walk<'_> {
         let t = 0.5 * (from_s + to_s);
         let (z, v) = piece.at(t);
         let (z, v) = (z * self.model.to_true, v * self.model.to_true);
-        let events = &mut *self.events;
+        let events = &mut self.events[..];
         let threshold = &mut self.threshold_n;
         let force = self.model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| {
             note(events, &s);
@@ -63,7 +63,7 @@ impl Walk<'_> {
         let (mut strained, mut tip_v) = (None, v);
         // The force just before.
         let most = self.events.get(layer).map_or(f64::NEG_INFINITY, |e| e.force);
-        let before = &mut *self.events;
+        let before = &mut self.events[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
             note(before, &s);
             if s.layer == layer + 1 {
@@ -102,7 +102,7 @@ impl Walk<'_> {
         }
         self.done += 1;
         // And just after: what the layer lets go.
-        let after = &mut *self.events;
+        let after = &mut self.events[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.done, |s| {
             if s.layer > layer + 1 {
                 note(after, &s);
@@ -122,24 +122,235 @@ fn note(events: &mut [Event], s: &Strain) {
 
 /// Replays a law with the ruptures at `instants` (s; [`NEVER`] for those that never were).
 pub fn imposed(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[f64], out: &mut Replayed) {
-    let layers = model.puncture_n.len();
-    out.f.clear();
-    out.f.resize(blocks.len(), 0.0);
-    out.events.clear();
-    out.events.resize(layers, Event { step_s: blocks.step_s, ..Event::UNSEEN });
-    let mut walk = Walk {
-        model,
+    begin(model, blocks, out);
+    let first = Saved {
+        piece: 0,
         state: LawState::default(),
         chain: model.measures.then(|| model.chain.start(0.0)),
         done: 0,
+        threshold_n: f64::INFINITY,
+        broken: vec![false; model.breaks_m.len()],
+        block: 0,
+        sum: 0.0,
+        events: out.events.clone(),
+    };
+    go_on(model, blocks, pieces, instants, first, out, &mut |_| true);
+}
+
+/// Room for a replay.
+fn begin(model: &Compiled, blocks: &Blocks, out: &mut Replayed) {
+    out.f.clear();
+    out.f.resize(blocks.len(), 0.0);
+    out.events.clear();
+    out.events.resize(model.puncture_n.len(), Event { step_s: blocks.step_s, ..Event::UNSEEN });
+}
+
+/// All that a replay remembers before a piece.
+#[derive(Clone, Debug)]
+struct Saved {
+    piece: usize,
+    state: LawState,
+    chain: Option<MeasurementState>,
+    done: usize,
+    threshold_n: f64,
+    broken: Vec<bool>,
+    block: u32,
+    sum: f64,
+    events: Vec<Event>,
+}
+
+/// Where a replay stands before a piece.
+struct Here<'a, 'b> {
+    piece: usize,
+    walk: &'a Walk<'b>,
+    broken: &'a [bool],
+    block: u32,
+    sum: f64,
+}
+
+impl Here<'_, '_> {
+    fn saved(&self) -> Saved {
+        Saved {
+            piece: self.piece,
+            state: self.walk.state,
+            chain: self.walk.chain.clone(),
+            done: self.walk.done,
+            threshold_n: self.walk.threshold_n,
+            broken: self.broken.to_vec(),
+            block: self.block,
+            sum: self.sum,
+            events: self.walk.events.clone(),
+        }
+    }
+
+    /// Whether everything from here on is the same.
+    fn leads_on_like(&self, other: &Saved) -> bool {
+        let walk = self.walk;
+        self.piece == other.piece
+            && walk.done == other.done
+            && self.block == other.block
+            && self.sum == other.sum
+            && walk.threshold_n == other.threshold_n
+            && walk.state == other.state
+            && walk.chain == other.chain
+            && self.broken == other.broken
+            && walk.events.get(walk.done..) == other.events.get(other.done..)
+    }
+}
+
+/// Pieces from one saved state to the next.
+const EVERY: usize = 24;
+
+/// A replay with what it remembered on the way: neighbours of its model need only the part that differs.
+#[derive(Clone, Debug, Default)]
+pub struct Track {
+    replayed: Replayed,
+    saved: Vec<Saved>,
+    instants: Vec<f64>,
+}
+
+impl Track {
+    /// Replays a law and remembers.
+    #[must_use]
+    pub fn new(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[f64]) -> Self {
+        let mut track = Self { instants: instants.to_vec(), ..Self::default() };
+        begin(model, blocks, &mut track.replayed);
+        let first = Saved {
+            piece: 0,
+            state: LawState::default(),
+            chain: model.measures.then(|| model.chain.start(0.0)),
+            done: 0,
+            threshold_n: f64::INFINITY,
+            broken: vec![false; model.breaks_m.len()],
+            block: 0,
+            sum: 0.0,
+            events: track.replayed.events.clone(),
+        };
+        let saved = &mut track.saved;
+        go_on(model, blocks, pieces, instants, first, &mut track.replayed, &mut |here| {
+            saved.push(here.saved());
+            true
+        });
+        track
+    }
+
+    /// What [`imposed`] gives for a neighbour: the same effects and pieces, another number of the base law or instant. `was` is
+    /// the model of the track. The part before a difference can show is taken over, and the part after both are the same again.
+    #[must_use]
+    pub fn neighbour(
+        &self,
+        was: &Compiled,
+        now: &Compiled,
+        blocks: &Blocks,
+        pieces: &[Piece],
+        instants: &[f64],
+    ) -> Replayed {
+        let first = self.first_difference(was, now, pieces, instants);
+        let at = self.saved.partition_point(|s| s.piece <= first).saturating_sub(1);
+        let mut out = self.replayed.clone();
+        let Some(start) = self.saved.get(at) else {
+            imposed(now, blocks, pieces, instants, &mut out);
+            return out;
+        };
+        out.events.clone_from(&start.events);
+        let done_with = done_with(was, now);
+        // Before both instants have passed nothing has happened yet.
+        let moved = self.instants.iter().zip(instants).filter(|(a, b)| a != b);
+        let passed_s = moved.map(|(a, b)| a.max(*b)).fold(f64::NEG_INFINITY, f64::max);
+        let mut same: Option<(usize, usize)> = None;
+        let mut next = at;
+        go_on(now, blocks, pieces, instants, start.clone(), &mut out, &mut |s| {
+            let known = self.saved.get(next);
+            next += 1;
+            // The first one is the start itself: nothing has happened yet.
+            let passed = pieces.get(s.piece).is_some_and(|p| p.from_s > passed_s);
+            if passed && next > at + 1 && s.walk.done >= done_with && known.is_some_and(|k| s.leads_on_like(k)) {
+                same = Some((s.block as usize, s.walk.done));
+                return false;
+            }
+            true
+        });
+        if let Some((block, done)) = same {
+            out.f[block..].copy_from_slice(&self.replayed.f[block..]);
+            if let (Some(to), Some(from)) = (out.events.get_mut(done..), self.replayed.events.get(done..)) {
+                to.copy_from_slice(from);
+            }
+        }
+        out
+    }
+
+    /// The piece from which on a difference can show.
+    fn first_difference(&self, was: &Compiled, now: &Compiled, pieces: &[Piece], instants: &[f64]) -> usize {
+        let mut first = pieces.len();
+        let of = |t: f64| pieces.partition_point(|p| p.to_s < t).saturating_sub(1);
+        for (a, b) in self.instants.iter().zip(instants).filter(|(a, b)| a != b) {
+            first = first.min(of(a.min(*b)));
+        }
+        let differs = was.law.slabs().iter().zip(now.law.slabs()).position(|(a, b)| a != b);
+        if let Some(l) = differs {
+            if !now.law.keeps_place() || was.to_true != now.to_true {
+                return 0;
+            }
+            let front = was.law.slabs()[l].front_m.min(now.law.slabs()[l].front_m) - AHEAD_M;
+            let reached = |p: &Piece| {
+                let half = 0.5 * (p.to_s - p.from_s);
+                (p.z_m + p.v_mps.abs() * half + p.a_mps2.abs() * half * half) * now.to_true >= front
+            };
+            first = first.min(pieces.iter().position(reached).unwrap_or(pieces.len()));
+            // A layer is strained, if only by nothing, from the rupture of the one before.
+            if let Some(before) = l.checked_sub(1).and_then(|k| self.instants.get(k)).filter(|t| **t < NEVER) {
+                first = first.min(of(*before));
+            }
+        }
+        first
+    }
+}
+
+/// After so many ruptures two laws are the same: stiffness and puncture force of a layer that has given way are of the past.
+fn done_with(was: &Compiled, now: &Compiled) -> usize {
+    let pairs = || was.law.slabs().iter().zip(now.law.slabs());
+    let Some(last) = pairs().rposition(|(a, b)| a != b) else { return 0 };
+    let lasting = pairs().any(|(a, b)| {
+        a.front_m != b.front_m
+            || a.thickness_m != b.thickness_m
+            || a.friction_ns_per_m2 != b.friction_ns_per_m2
+            || a.gripped != b.gripped
+    });
+    if lasting || !now.law.keeps_place() { usize::MAX } else { last + 1 }
+}
+
+/// A layer is felt at most so far in m before its front.
+const AHEAD_M: f64 = 1e-5;
+
+/// Goes on from a saved state; `visit` is called every [`EVERY`] pieces and ends it by `false`.
+fn go_on(
+    model: &Compiled,
+    blocks: &Blocks,
+    pieces: &[Piece],
+    instants: &[f64],
+    from: Saved,
+    out: &mut Replayed,
+    visit: &mut impl FnMut(&Here) -> bool,
+) {
+    let Saved { piece: first, state, chain, done, threshold_n, mut broken, mut block, mut sum, events } = from;
+    out.events = events;
+    let mut walk = Walk {
+        model,
+        state,
+        chain,
+        done,
         events: &mut out.events,
         step_s: blocks.step_s,
-        threshold_n: f64::INFINITY,
+        threshold_n,
     };
-    let mut broken = vec![false; model.breaks_m.len()];
-    let (mut block, mut sum) = (0_u32, 0.0);
     let end_s = pieces.last().map_or(0.0, |p| p.to_s);
-    for (index, piece) in pieces.iter().enumerate() {
+    for (index, piece) in pieces.iter().enumerate().skip(first) {
+        if index % EVERY == 0 {
+            let here = Here { piece: index, walk: &walk, broken: &broken, block, sum };
+            if !visit(&here) {
+                return;
+            }
+        }
         if piece.block != block {
             let k = block as usize;
             out.f[k] = sum / (blocks.to_s[k] - blocks.from_s[k]);

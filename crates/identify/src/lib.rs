@@ -21,6 +21,7 @@
 
 pub mod assign;
 pub mod blocks;
+mod course;
 pub mod drops;
 pub mod events;
 pub mod fit;

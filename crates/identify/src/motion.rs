@@ -98,7 +98,7 @@ impl Motion {
                         m.exact.push(at_s, kink.z, side);
                         m.sampled.push(between_s, kink.z + side * (between_s - at_s), side);
                     }
-                    let doubt_s = noise_m / (kink.v[1] - kink.v[0]).abs().max(1e-6);
+                    let doubt_s = kink.sd_m / (kink.v[1] - kink.v[0]).abs().max(1e-6);
                     m.jumps.push(Jump { at_s, between_s, doubt_s });
                 }
             }

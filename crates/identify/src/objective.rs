@@ -2,7 +2,7 @@
 
 use crate::blocks::Blocks;
 use crate::events::{Event, judge};
-use crate::forward::{Replayed, imposed};
+use crate::forward::{Replayed, Track, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
 use crate::motion::{Piece, Shown};
 use crate::noise::{From, Noise, rho};
@@ -84,6 +84,33 @@ pub fn replay(model: &Model, data: &Data, r: usize) -> Option<Replayed> {
     let blocks = &data.blocks[r];
     imposed(&compiled, blocks, &pieces(&compiled, blocks), &model.instants[r], &mut out);
     out.f.iter().all(|f| f.is_finite()).then_some(out)
+}
+
+/// A replay of a model with what it remembered, per recording: what neighbours of the model are computed from.
+pub struct Trail {
+    compiled: Compiled,
+    track: Track,
+}
+
+impl Trail {
+    /// The trail of one recording.
+    #[must_use]
+    pub fn new(model: &Model, data: &Data, r: usize) -> Option<Self> {
+        let compiled = model.compile(r)?;
+        let blocks = &data.blocks[r];
+        let track = Track::new(&compiled, blocks, &pieces(&compiled, blocks), &model.instants[r]);
+        Some(Self { compiled, track })
+    }
+
+    /// As [`replay`], of a model that differs in a number of the base law, of its geometry, or in an instant.
+    #[must_use]
+    pub fn replay(&self, model: &Model, data: &Data, r: usize) -> Option<Replayed> {
+        let compiled = model.compile(r)?;
+        let blocks = &data.blocks[r];
+        let seen = pieces(&compiled, blocks);
+        let out = self.track.neighbour(&self.compiled, &compiled, blocks, &seen, &model.instants[r]);
+        out.f.iter().all(|f| f.is_finite()).then_some(out)
+    }
 }
 
 /// What a model leaves of all recordings; `None` when it cannot be replayed.

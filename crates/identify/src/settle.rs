@@ -1,11 +1,12 @@
 //! Position and velocity from noisy or coarsely rounded positions: as wide a window as the course allows.
 //!
 //! Samples are averaged in cells of about 20 ms. Jumps of the speed are where parabolas on both sides of a gap between
-//! cells meet with clearly different slopes. Between jumps every cell takes the widest of a ladder of windows whose
+//! cells meet with clearly different slopes. A stretch between two jumps is what a robot was told to do ([`crate::course`])
+//! when that leaves white noise. Else every cell takes the widest of a ladder of windows whose
 //! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
-//! A stretch between two jumps that does not move is at rest exactly.
 
-use crate::velocity::{Kink, breaks, parabola, position_noise};
+use crate::course::{Course, FEWEST};
+use crate::velocity::{Break, Kink, breaks, parabola, position_noise};
 use stylet_stats::order::median;
 
 /// Length of a cell in s.
@@ -16,8 +17,12 @@ const SIDE: usize = 15;
 const LADDER: [usize; 8] = [3, 5, 8, 12, 18, 27, 40, 60];
 /// Width of the confidence intervals in standard deviations.
 const GAMMA: f64 = 2.2;
-/// A stretch is at rest when it moves less than this many standard deviations.
-const REST_SD: f64 = 4.0;
+/// What leaves so many times the positions' noise is no form.
+const NO_NOISE: f64 = 2.0;
+/// A frequency (1/s) for a union of stretches of which none has one: too slow to matter.
+const NO_HINT: f64 = 1e-3;
+/// Cells within which the instant of a jump is moved to where both sides meet.
+const REACH: usize = 25;
 
 /// A smoothed course at the times of the samples.
 #[derive(Clone, Debug, Default)]
@@ -55,44 +60,208 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     let found = breaks(&tc, &zc, SIDE, 1.8 * dt, doubt);
     let mut edges: Vec<usize> = found.iter().map(|b| b.0).collect();
     edges.extend([0, cells]);
-    edges.dedup();
     edges.sort_unstable();
     edges.dedup();
-    let (mut zs, mut vs) = (vec![0.0; cells], vec![0.0; cells]);
-    let mut sds = Vec::new();
-    for piece in edges.windows(2) {
-        let (from, to) = (piece[0], piece[1]);
-        if at_rest(&tc[from..to], &zc[from..to], noise_m) {
-            let rest = zc[from..to].iter().sum::<f64>() / (to - from) as f64;
-            zs[from..to].fill(rest);
-            continue;
+    let cells = Cells { t: &tc, z: &zc, dt, noise_m };
+    let first = edges.windows(2).map(|e| Stretch::new(&cells, (e[0], e[1]), &[])).collect();
+    let stretches = moved(&cells, joined(&cells, split(&cells, joined(&cells, first))));
+    let kinks: Vec<Kink> = stretches.windows(2).map(|p| meet(&p[0], &p[1], &found, &cells, t)).collect();
+    let mut course = 0;
+    let (z, v): (Vec<f64>, Vec<f64>) = (0..n)
+        .map(|i| {
+            while kinks.get(course).is_some_and(|k| k.t <= t[i]) {
+                course += 1;
+            }
+            stretches[course.min(stretches.len() - 1)].at(&tc, t[i])
+        })
+        .unzip();
+    let mut sds: Vec<f64> = stretches.iter().flat_map(|s| s.sds.iter().copied()).collect();
+    Settled { z, v, kinks, sd_mps: median(&mut sds).max(1e-9) }
+}
+
+/// Means of samples: middle (s), position (m), length (s), standard deviation of the noise (m).
+#[derive(Clone, Copy)]
+struct Cells<'a> {
+    t: &'a [f64],
+    z: &'a [f64],
+    dt: f64,
+    noise_m: f64,
+}
+
+/// What happens between two jumps of the speed.
+struct Stretch {
+    from: usize,
+    to: usize,
+    /// A form that leaves white noise.
+    course: Option<Course>,
+    /// Else position and velocity per cell.
+    local: Vec<(f64, f64)>,
+    /// Standard deviation of the velocity in m/s per cell.
+    sds: Vec<f64>,
+    /// Nats of the residual and of the numbers spent; infinite without a form.
+    cost: f64,
+}
+
+impl Stretch {
+    fn new(cells: &Cells, (from, to): (usize, usize), hints: &[f64]) -> Self {
+        let Cells { t: tc, z: zc, dt, noise_m } = *cells;
+        // A cell beside a jump has both speeds.
+        let (lo, hi) = (if from > 0 { from + 1 } else { 0 }, if to < tc.len() { to - 1 } else { to });
+        let course = if hi > lo + FEWEST { Course::of(&tc[lo..hi], &zc[lo..hi], dt, hints) } else { None };
+        let course = course.filter(|c| c.white && c.sd_m < NO_NOISE * noise_m);
+        if let Some(course) = course {
+            let cells = (hi - lo) as f64;
+            // Slope of a line, doubled for a curved one.
+            let slope = 2.0 * course.sd_m * (12.0 / cells).sqrt() / (cells * dt);
+            let sd = if course.rests() { 0.0 } else { slope };
+            let cost = course.cost;
+            return Self {
+                from,
+                to,
+                course: Some(course),
+                local: Vec::new(),
+                sds: vec![sd; to - from],
+                cost,
+            };
         }
+        let (mut local, mut sds) = (Vec::new(), Vec::new());
         for i in from..to {
-            let (z, v, sd) = widest(&tc, &zc, i, (from, to), noise_m);
-            (zs[i], vs[i]) = (z, v);
+            let (z, v, sd) = widest(tc, zc, i, (from, to), noise_m);
+            local.push((z, v));
             sds.push(sd);
         }
+        Self { from, to, course: None, local, sds, cost: f64::INFINITY }
     }
-    let at = |i: usize| {
-        let c = (i / q).min(cells - 1);
-        // Towards the neighbour on the sample's side, not across a jump.
-        let other = if t[i] < tc[c] { c.wrapping_sub(1) } else { c + 1 };
-        let apart = other >= cells || edges.iter().any(|e| (*e > c.min(other)) && (*e <= c.max(other)));
-        if apart {
-            return (zs[c] + vs[c] * (t[i] - tc[c]), vs[c]);
+
+    /// Position and velocity at an instant within.
+    fn at(&self, tc: &[f64], t: f64) -> (f64, f64) {
+        if let Some(course) = &self.course {
+            return course.at(t);
         }
-        let share = (t[i] - tc[c]) / (tc[other] - tc[c]);
-        (zs[c] + share * (zs[other] - zs[c]), vs[c] + share * (vs[other] - vs[c]))
+        let after = tc[self.from..self.to].partition_point(|c| *c < t);
+        let (z1, v1) = self.local[after.min(self.local.len() - 1)];
+        let t1 = tc[self.from + after.min(self.local.len() - 1)];
+        if after == 0 || after == self.local.len() {
+            return (z1 + v1 * (t - t1), v1);
+        }
+        let (z0, v0) = self.local[after - 1];
+        let t0 = tc[self.from + after - 1];
+        let share = (t - t0) / (t1 - t0);
+        (z0 + share * (z1 - z0), v0 + share * (v1 - v0))
+    }
+}
+
+/// Neighbours that are one form together were no neighbours: a fast ripple looks like a chain of jumps.
+fn joined(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
+    loop {
+        let before = stretches.len();
+        let mut out: Vec<Stretch> = Vec::new();
+        for next in stretches {
+            if let Some(last) = out.last_mut() {
+                let hints: Vec<f64> = [&*last, &next]
+                    .iter()
+                    .flat_map(|s| s.course.iter().flat_map(Course::frequencies))
+                    .collect();
+                let hints = if hints.is_empty() { vec![NO_HINT] } else { hints };
+                let both = Stretch::new(cells, (last.from, next.to), &hints);
+                if both.course.is_some() && both.cost < last.cost + next.cost {
+                    *last = both;
+                    continue;
+                }
+            }
+            out.push(next);
+        }
+        if out.len() == before {
+            return out;
+        }
+        stretches = out;
+    }
+}
+
+/// Cuts what is no form where its beginning ceases to be one: a small jump of the speed is not seen in a short window.
+fn split(cells: &Cells, stretches: Vec<Stretch>) -> Vec<Stretch> {
+    let mut out = Vec::new();
+    let mut todo: Vec<Stretch> = stretches.into_iter().rev().collect();
+    while let Some(stretch) = todo.pop() {
+        let (from, to) = (stretch.from, stretch.to);
+        let (mut good, mut bad) = (from + 2 * FEWEST, to);
+        let part = |end: usize| Stretch::new(cells, (from, end), &[]);
+        if stretch.course.is_some() || good + 2 * FEWEST > to || part(good).course.is_none() {
+            out.push(stretch);
+            continue;
+        }
+        while bad - good > 2 {
+            let middle = usize::midpoint(good, bad);
+            if part(middle).course.is_some() { good = middle } else { bad = middle }
+        }
+        if good + FEWEST > to {
+            out.push(stretch);
+            continue;
+        }
+        out.push(part(good));
+        todo.push(Stretch::new(cells, (good, to), &[]));
+    }
+    out
+}
+
+/// Moves borders to where both forms meet.
+fn moved(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
+    for _ in 0..2 {
+        for k in 1..stretches.len() {
+            let (left, right) = (&stretches[k - 1], &stretches[k]);
+            let Some(at) = meeting(left, right, cells) else { continue };
+            let edge = cells.t.partition_point(|t| *t < at);
+            let apart = edge.abs_diff(right.from);
+            if apart == 0 || edge < left.from + FEWEST || edge + FEWEST > right.to {
+                continue;
+            }
+            let hints = |s: &Stretch| -> Vec<f64> { s.course.iter().flat_map(Course::frequencies).collect() };
+            let one = Stretch::new(cells, (left.from, edge), &hints(left));
+            let two = Stretch::new(cells, (edge, right.to), &hints(right));
+            if one.course.is_some() && two.course.is_some() {
+                stretches[k - 1] = one;
+                stretches[k] = two;
+            }
+        }
+    }
+    stretches
+}
+
+/// The instant near their border at which two forms agree about the position.
+fn meeting(left: &Stretch, right: &Stretch, cells: &Cells) -> Option<f64> {
+    let (Some(a), Some(b)) = (&left.course, &right.course) else { return None };
+    let near = cells.t[right.from] - 0.5 * cells.dt;
+    let reach = REACH as f64 * cells.dt;
+    let mut at = near;
+    for _ in 0..12 {
+        let slope = a.at(at).1 - b.at(at).1;
+        if slope.abs() > 1e-7 {
+            at = (at - (a.at(at).0 - b.at(at).0) / slope).clamp(near - reach, near + reach);
+        }
+    }
+    Some(at)
+}
+
+/// The jump of the speed between two stretches.
+fn meet(left: &Stretch, right: &Stretch, found: &[Break], cells: &Cells, t: &[f64]) -> Kink {
+    let kink = |at: f64, z: f64, v: [f64; 2], sd_m: f64| {
+        let sample = t.partition_point(|t| *t < at).clamp(1, t.len() - 1);
+        Kink { sample, t: at, z, v, sd_m }
     };
-    let (z, v): (Vec<f64>, Vec<f64>) = (0..n).map(at).unzip();
-    let kinks = found
-        .iter()
-        .map(|&(c, left, _)| {
-            let sample = t.partition_point(|t| *t < left.0).max(1);
-            Kink { sample, t: left.0, z: left.1, v: [vs[c - 1], vs[c.min(cells - 1)]] }
-        })
-        .collect();
-    Settled { z, v, kinks, sd_mps: median(&mut sds).max(1e-9) }
+    if let (Some(a), Some(b), Some(at)) = (&left.course, &right.course, meeting(left, right, cells)) {
+        // A value at the end of a curved form, over that many cells.
+        let end = |s: &Stretch, c: &Course| 3.0 * c.sd_m / ((s.to - s.from) as f64).sqrt();
+        let sd_m = end(left, a).hypot(end(right, b));
+        return kink(at, 0.5 * (a.at(at).0 + b.at(at).0), [a.at(at).1, b.at(at).1], sd_m);
+    }
+    match found.iter().find(|b| b.0 == right.from) {
+        Some(&(_, (at, z, before), after)) => kink(at, z, [before, after], cells.noise_m),
+        None => {
+            let at = cells.t[right.from] - 0.5 * cells.dt;
+            let (one, two) = (left.at(cells.t, at), right.at(cells.t, at));
+            kink(at, 0.5 * (one.0 + two.0), [one.1, two.1], cells.noise_m)
+        }
+    }
 }
 
 /// The step of rounded positions, zero when they take (nearly) as many values as there are samples.
@@ -105,21 +274,6 @@ fn rounding(z: &[f64]) -> f64 {
     steps.retain(|s| *s > 1e-12);
     steps.sort_unstable_by(f64::total_cmp);
     steps.get(steps.len() / 10).copied().unwrap_or(0.0)
-}
-
-/// Whether a stretch does not move: neither a slope nor a spread beyond the noise.
-fn at_rest(t: &[f64], z: &[f64], noise_m: f64) -> bool {
-    let n = t.len();
-    if n < 4 {
-        return false;
-    }
-    let middle = t[n / 2];
-    let line = parabola(t, z, middle).0;
-    let span = t[n - 1] - t[0];
-    let travel_sd = noise_m * (12.0 / n as f64).sqrt();
-    let mean = z.iter().sum::<f64>() / n as f64;
-    let spread = (z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
-    (line[1] * span).abs() < REST_SD * travel_sd + 2e-7 && spread < 1.6 * noise_m + 1e-7
 }
 
 /// Position, velocity and its standard deviation at cell `i` from the widest window that agrees with all narrower ones.
@@ -167,7 +321,7 @@ mod tests {
         }
     }
 
-    fn error(noise: impl Fn(usize) -> f64, round_m: f64) -> (f64, usize) {
+    fn error(course: impl Fn(f64) -> (f64, f64), noise: impl Fn(usize) -> f64, round_m: f64) -> (f64, usize) {
         let t: Vec<f64> = (0..2400).map(|k| k as f64 / 200.0).collect();
         let round = |z: f64| if round_m > 0.0 { (z / round_m).round() * round_m } else { z };
         let z: Vec<f64> = t.iter().enumerate().map(|(k, t)| round(course(*t).0 + noise(k))).collect();
@@ -190,16 +344,48 @@ mod tests {
     }
 
     #[test]
-    fn positions_with_20_um_of_noise_give_the_velocity_to_a_tenth_of_a_millimetre_per_second() {
-        let (off, kinks) = error(|k| 2e-5 * rough(k), 0.0);
-        assert!(off < 1e-4, "{off}");
+    fn positions_with_20_um_of_noise_give_the_velocity_to_a_hundredth_of_a_millimetre_per_second() {
+        let (off, kinks) = error(course, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 1e-5, "{off}");
         assert_eq!(kinks, 2);
     }
 
     #[test]
     fn so_do_positions_in_steps_of_50_um() {
-        let (off, kinks) = error(|_| 0.0, 5e-5);
-        assert!(off < 1e-4, "{off}");
+        let (off, kinks) = error(course, |_| 0.0, 5e-5);
+        assert!(off < 1e-5, "{off}");
         assert_eq!(kinks, 2);
+    }
+
+    #[test]
+    fn a_fast_ripple_is_no_chain_of_jumps() {
+        let w = core::f64::consts::TAU * 1.4;
+        let rippled = move |t: f64| {
+            let s = (t - 5.0).max(0.0);
+            (0.003 * t + 0.002 / w * (1.0 - (w * s).cos()), 0.003 + 0.002 * (w * s).sin())
+        };
+        let (off, kinks) = error(rippled, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 2e-5, "{off}");
+        assert!(kinks <= 1, "{kinks}");
+    }
+
+    #[test]
+    fn a_jump_of_a_third_of_a_millimetre_per_second_is_found() {
+        let bent = |t: f64| {
+            if t < 6.0 { (0.003 * t, 0.003) } else { (0.018 + 0.0033 * (t - 6.0), 0.0033) }
+        };
+        let (off, kinks) = error(bent, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 1e-5, "{off}");
+        assert_eq!(kinks, 1);
+    }
+
+    #[test]
+    fn a_motion_of_no_known_form_is_followed_by_windows() {
+        // Speed that grows by steps of acceleration: no polynomial of low degree and no sinusoid.
+        let drawn = |t: f64| {
+            (0.002 * t + 4e-4 * (1.0 + (0.3 * t * t).sin()), 0.002 + 2.4e-4 * t * (0.3 * t * t).cos())
+        };
+        let (off, _) = error(drawn, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 8e-4, "{off}");
     }
 }

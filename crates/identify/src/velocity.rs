@@ -12,6 +12,8 @@ use stylet_stats::order::median;
 const WANTED_MPS: f64 = 5e-6;
 /// Widest half window in samples.
 const WIDEST: usize = 12;
+/// No window reaches across a gap of more than so many steps; a jump in a smaller one is where both sides meet.
+const GAP: f64 = 5.5;
 /// Smallest jump of the velocity in m/s that is looked for.
 const LEAST_JUMP_MPS: f64 = 2e-5;
 
@@ -26,6 +28,8 @@ pub struct Kink {
     pub z: f64,
     /// Velocities in m/s before and after.
     pub v: [f64; 2],
+    /// Standard deviation of the position at which both sides meet, in m.
+    pub sd_m: f64,
 }
 
 /// Velocities, their noise, and their jumps.
@@ -55,13 +59,13 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
     let side = (2 * half + 2).max(6);
     // Slope at the end of a parabola over `side` samples: sd = noise sqrt(192/side^3)/step. Five of them.
     let doubt = 70.0 * noise_m / (step * (side as f64).powf(1.5));
-    let breaks = breaks(t, z, side, 1.8 * step, doubt);
+    let breaks = breaks(t, z, side, GAP * step, doubt);
     let mut kinks = Vec::new();
     for &(i, left, right) in &breaks {
-        kinks.push(Kink { sample: i, t: left.0, z: left.1, v: [left.2, right] });
+        kinks.push(Kink { sample: i, t: left.0, z: left.1, v: [left.2, right], sd_m: noise_m.min(1e-6) });
     }
     let mut edges: Vec<usize> = breaks.iter().map(|b| b.0).collect();
-    edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > 1.8 * step));
+    edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > GAP * step));
     edges.extend([0, n]);
     edges.sort_unstable();
     edges.dedup();

@@ -114,6 +114,14 @@ impl Law {
         &self.slabs
     }
 
+    /// Whether the tip is where the needle's base says and no layer is felt before its front: no effect moves the one
+    /// against the other or looks at the layers ahead.
+    #[must_use]
+    pub fn keeps_place(&self) -> bool {
+        let moves = [Place::Kinematics, Place::Tip, Place::Release].iter().any(|p| !self.at(*p).is_empty());
+        !moves && !self.bends()
+    }
+
     /// Whether the needle gives.
     #[must_use]
     pub fn bends(&self) -> bool {

@@ -1,0 +1,67 @@
+//! Numbers of each recording's own: a surface touched a little higher or lower, a needle more or less slippery.
+//!
+//! Like the geometry they are no causes. They enter when they gain more than as many fitted numbers cost, and leave when
+//! an effect has taken their work over.
+
+use crate::judge::{LEAST, cost, gain};
+use rayon::prelude::*;
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::model::{Free, Model, Own};
+use stylet_identify::noise::From;
+use stylet_identify::objective::Data;
+
+/// Nats that numbers of each recording's own have to gain per number, for they take from every shared number.
+fn price(free: Free, data: &Data) -> f64 {
+    let kinds = usize::from(free.own_surface) + usize::from(free.own_friction);
+    let numbers = kinds * data.recordings().saturating_sub(1);
+    cost(numbers, data.compared()) + LEAST * kinds as f64
+}
+
+/// A model with other numbers of each recording's own.
+fn with(model: &Model, own_surface: bool, own_friction: bool) -> Model {
+    let mut m = model.clone();
+    m.free = Free { own_surface, own_friction, ..m.free };
+    for own in &mut m.own {
+        *own = Own {
+            surface_m: if own_surface { own.surface_m } else { 0.0 },
+            friction: if own_friction { own.friction } else { 0.0 },
+        };
+    }
+    m
+}
+
+/// The best choice of what each recording has of its own, with the noise that it leaves.
+#[must_use]
+pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
+    if data.recordings() < 2 {
+        return (best, data);
+    }
+    let now = best.model.free;
+    let choices: Vec<(bool, bool)> = [(false, false), (true, false), (false, true), (true, true)]
+        .into_iter()
+        .filter(|c| *c != (now.own_surface, now.own_friction))
+        .collect();
+    let fits: Vec<Fit> = choices
+        .par_iter()
+        .filter_map(|c| fit(&with(&best.model, c.0, c.1), &data, Effort { turns: 6, enough: 0.3 }))
+        .collect();
+    let own = |f: &Fit| f.nats() + price(f.model.free, &data);
+    let Some(other) = fits.into_iter().min_by(|a, b| own(a).total_cmp(&own(b))) else { return (best, data) };
+    if own(&other) >= own(&best) {
+        return (best, data);
+    }
+    // Under the noise that the larger of both leaves.
+    let kinds = |f: &Fit| usize::from(f.model.free.own_surface) + usize::from(f.model.free.own_friction);
+    let paid = price(other.model.free, &data) - price(now, &data);
+    let gained = if kinds(&other) >= kinds(&best) {
+        gain(&best, &other, &data)
+    } else {
+        -gain(&other, &best, &data)
+    };
+    if gained <= paid {
+        return (best, data);
+    }
+    let data = data.judged_by(&other.residuals.e, From::Calm);
+    let settled = fit(&other.model, &data, Effort::FULL).unwrap_or(other);
+    (settled, data)
+}

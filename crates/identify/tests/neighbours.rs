@@ -1,0 +1,98 @@
+//! A column of the fit is computed from what a replay remembered: it must be that of a whole replay, bit for bit, whatever
+//! effect the model has.
+
+use std::sync::Arc;
+use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_identify::model::{Belief, Choice, Model};
+use stylet_identify::noise::Noise;
+use stylet_identify::objective::{Data, Trail, replay};
+use stylet_record::Recording;
+use stylet_tissue::{Layer, Tissue, library};
+
+fn belief() -> Belief {
+    let layer = |k: f64, b: f64, f: Option<f64>, d: f64| Layer {
+        thickness_m: d,
+        stiffness_n_per_m: k,
+        friction_ns_per_m2: b,
+        puncture_n: f,
+        name: String::new(),
+    };
+    Belief {
+        tissue: Tissue {
+            surface_m: 0.002,
+            layers: vec![
+                layer(90.0, 4000.0, Some(0.6), 0.012),
+                layer(150.0, 9000.0, None, 0.01),
+                layer(60.0, 6000.0, Some(1.1), 0.03),
+            ],
+        },
+        given: Vec::new(),
+        tolerance: vec![0.3; 3],
+        thickness_tolerance: vec![0.1; 3],
+        surface_tolerance_m: 0.002,
+    }
+}
+
+/// In with a ripple, a hold, in again, out.
+fn recording() -> Recording {
+    let (mut t, mut z, mut at) = (Vec::new(), Vec::new(), -0.002);
+    for k in 0..4000 {
+        let s = f64::from(k) / 200.0;
+        let v = match s {
+            s if s < 7.0 => 0.004 + 0.002 * (4.0 * s).sin(),
+            s if s < 8.5 => 0.0,
+            s if s < 14.0 => 0.004,
+            _ => -0.005,
+        };
+        at += v / 200.0;
+        t.push(s);
+        z.push(at);
+    }
+    let f = vec![0.0; t.len()];
+    Recording::new(t, z, f).expect("a recording")
+}
+
+#[test]
+fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
+    let belief = Arc::new(belief());
+    let r = recording();
+    let blocks = vec![Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)];
+    let data = Data { blocks: Arc::new(blocks), noise: Arc::new(Noise::white(0.02)), floor_n: 0.0 };
+    let mut models = vec![("none", Model::base(Arc::clone(&belief), 1))];
+    for info in library() {
+        let values: Vec<f64> = info
+            .parameters
+            .iter()
+            .map(|p| if p.whole { 1.0 } else { 0.5 * (p.search.0 + p.search.1) })
+            .collect();
+        let choice = Choice::new(info, &values);
+        if choice.effect().is_some() {
+            models.push((info.id, models[0].1.with(choice)));
+        }
+    }
+    assert!(models.len() > 20, "{}", models.len());
+    let mut compared = 0;
+    // Instants anywhere between two saved states.
+    let instants = (0..24).map(|k| vec![2.1 + 0.02 * f64::from(k), 4.6 + 0.03 * f64::from(k), 9.7 + 0.07 * f64::from(k)]);
+    for ((name, mut model), instants) in models.into_iter().zip(instants.cycle()) {
+        model.instants = vec![instants];
+        model.free.own_surface = true;
+        model.free.own_friction = true;
+        let Some(trail) = Trail::new(&model, &data, 0) else { continue };
+        for n in model.shared().iter().chain(&model.own_numbers()) {
+            if matches!(n.role, stylet_identify::model::Role::Effect { .. }) {
+                continue;
+            }
+            let mut moved = model.clone();
+            moved.set(n.role, 0, model.get(n.role, 0) + n.step);
+            let (Some(whole), Some(part)) = (replay(&moved, &data, 0), trail.replay(&moved, &data, 0)) else {
+                continue;
+            };
+            let differ = whole.f.iter().zip(&part.f).position(|(a, b)| a.to_bits() != b.to_bits());
+            assert_eq!(differ, None, "{name}, {:?}: {:?}", n.role, differ.map(|k| (whole.f[k], part.f[k])));
+            assert_eq!(whole.events, part.events, "{name}, {:?}", n.role);
+            compared += 1;
+        }
+    }
+    assert!(compared > 300, "{compared}");
+}
