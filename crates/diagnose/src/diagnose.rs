@@ -63,10 +63,10 @@ const UNEXPLAINED: f64 = 0.1;
 const EXCESS: f64 = 0.8;
 /// With one recording, where nothing tells structure from slow noise, it must be so many times the noise's.
 const EXCESS_ALONE: f64 = 3.0;
-/// Beside something unknown a cause stands when so much of what the base law leaves comes back without it ...
-const KEPT_SHARE: f64 = 0.25;
-/// ... and its best rival explained less than this share of it.
-const SPECIFIC: f64 = 0.7;
+/// Beside something unknown a cause stands when recordings left out lose so much of their misfit by it ...
+const BORNE: f64 = 0.27;
+/// ... and its strengths are the same whichever recording is left out, to this share.
+const SAME: f64 = 0.12;
 
 /// Compares what a scenario believes with what was measured.
 ///
@@ -122,7 +122,11 @@ pub fn diagnose(
     let unknown = judged.unknown && !coarse;
     let mut causes = judged.causes;
     if unknown {
-        causes.retain(|c| c.share > KEPT_SHARE && judged.specific.contains(&c.effect));
+        let borne = crate::held_out::borne(&search.best, &search.data, noise_n);
+        let effects = search.best.model.effects.iter().zip(&borne);
+        let kept: Vec<&str> =
+            effects.filter(|(_, b)| b.gain > BORNE && b.spread < SAME).map(|(e, _)| e.info.id).collect();
+        causes.retain(|c| kept.contains(&c.effect.as_str()));
     }
     let verdict = if unknown {
         Verdict::Unknown
@@ -186,8 +190,6 @@ struct Judged {
     base_parameters: Vec<BaseParameter>,
     leftover: LeftoverReport,
     unknown: bool,
-    /// Effects that no other one came near to.
-    specific: Vec<String>,
 }
 
 /// Mean square of a residual beyond the noise, outlying samples cut, in units of the noise.
@@ -228,7 +230,6 @@ fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
         .unwrap_or_else(|| search.best.clone());
     let spread = Spread::new(&settled, &whole);
     let mut causes = Vec::new();
-    let mut specific = Vec::new();
     for (k, choice) in settled.model.effects.iter().enumerate() {
         let none = Vec::new();
         let rivals = classes.get(k).unwrap_or(&none);
@@ -239,14 +240,6 @@ fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
         let stage = search.stages.iter().rev().find(|s| s.taken.is_some_and(|t| t.0 == choice.info.id));
         let gain_nats = stage.and_then(|s| s.taken).map_or(0.0, |t| t.1);
         let needed = stage.map_or(0.0, |s| s.needed);
-        let second = stage.map_or(0.0, |s| {
-            let others =
-                s.rivals.iter().filter(|r| r.0 != choice.info.id && !choice.info.nested_in.contains(&r.0));
-            others.map(|r| r.1).fold(0.0, f64::max) / s.rivals.iter().map(|r| r.1).fold(1e-9, f64::max)
-        });
-        if second < SPECIFIC {
-            specific.push(choice.info.id.to_owned());
-        }
         let weights: f64 = rivals.iter().map(|r| libm::exp(-r.behind.max(-3.0))).sum();
         let without = fit(&search.best.model.without(k), &search.data, Effort { turns: 3, enough: 1.0 });
         let back = without.map_or(0.0, |f| excess(search, &f.residuals.e) - after);
@@ -267,7 +260,7 @@ fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
         nats: left.nats,
         share,
     };
-    Judged { causes, base_parameters, leftover, unknown, specific }
+    Judged { causes, base_parameters, leftover, unknown }
 }
 
 /// Moves causes that are too small to `traces`.

@@ -67,6 +67,53 @@ pub fn left_out(best: &Fit, data: &Data) -> Vec<Option<Left>> {
         .collect()
 }
 
+/// How a cause fares when one recording is left out of the fit.
+#[derive(Clone, Debug, Default)]
+pub struct Borne {
+    /// Standard error of its strengths by the jackknife, relative to them; the largest.
+    pub spread: f64,
+    /// Share of what the model without it leaves on left-out recordings, beyond `with`, in mean square.
+    pub gain: f64,
+}
+
+/// How the effects of a fit fare on recordings left out; `floor_n` is the noise.
+#[must_use]
+pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
+    let n = data.recordings();
+    if n < 2 {
+        return vec![Borne::default(); best.model.effects.len()];
+    }
+    let square = |left: &[Option<Left>]| {
+        let (sum, blocks) = left.iter().flatten().fold((0.0, 0.0), |(s, n), l| {
+            (s + l.square_n2 * l.blocks as f64, n + l.blocks as f64)
+        });
+        sum / f64::max(blocks, 1.0)
+    };
+    let models: Vec<Option<Model>> = (0..n).into_par_iter().map(|r| without(best, data, r)).collect();
+    let with: Vec<Option<Left>> =
+        models.iter().enumerate().map(|(r, m)| by_its_own(m.as_ref()?, data, r)).collect();
+    let with = square(&with);
+    (0..best.model.effects.len())
+        .map(|k| {
+            let choice = &best.model.effects[k];
+            let mut spread = 0.0_f64;
+            for (p, _) in choice.info.parameters.iter().enumerate().filter(|(_, p)| p.strength) {
+                let values: Vec<f64> = models.iter().flatten().map(|m| m.effects[k].values[p]).collect();
+                let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+                let sum: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+                let count = values.len() as f64;
+                spread = spread.max((sum * (count - 1.0) / count).sqrt() / mean.abs().max(1e-300));
+            }
+            let gain = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 })
+                .map_or(0.0, |f| {
+                    let less = square(&left_out(&f, data));
+                    (less - with) / (less - floor_n * floor_n).max(1e-12)
+                });
+            Borne { spread, gain }
+        })
+        .collect()
+}
+
 /// The model fitted to all recordings but one; that one has nothing of its own.
 fn without(best: &Fit, data: &Data, r: usize) -> Option<Model> {
     let others: Vec<usize> = (0..data.recordings()).filter(|k| *k != r).collect();
