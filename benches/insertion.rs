@@ -70,7 +70,7 @@ fn bare_core(samples: &[Sample]) -> f64 {
 }
 
 fn our_core(samples: &[Sample], storage: &mut [Sample]) -> f64 {
-    let mut core = Enhancer::new(EnhanceConfig::default(), 0.0, storage);
+    let mut core = Enhancer::new(EnhanceConfig::paper(), 0.0, storage);
     let mut sum = 0.0;
     let mut ruptures = 0;
     for s in samples {

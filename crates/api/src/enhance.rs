@@ -21,7 +21,7 @@ pub fn listen(recording: &Recording, config: &EnhanceFile, model: Model) -> Enha
     let mut enhance = config.enhance.clone();
     enhance.model = model;
     Ran {
-        name: format!("{}/{}/force_torque", algorithm_name(enhance.algorithm), model_name(model)),
+        name: format!("{}/{}/force_torque", algorithm_name(enhance.in_force()), model_name(model)),
         sensor: "force_torque",
         trace: Trace::record(recording, &recording.force_n, &enhance, config.surface_m, |_, _| {}),
         config: enhance,

@@ -29,7 +29,7 @@ pub use folder::Claim;
 pub use output::Output;
 pub use picture::Ran;
 pub use predict::predict;
-pub use run::{Run, simulate, simulate_from, virtual_note};
+pub use run::{Run, settings_note, simulate, simulate_from, virtual_note};
 pub use sweep::{Swept, sweep};
 
 pub use stylet_core::{EnhanceConfig, Enhancer, Sample};

@@ -1,6 +1,6 @@
 //! From results to the structures that the report draws.
 
-use stylet_core::config::{EnhanceConfig, Model};
+use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_record::{Recording, Truth};
 use stylet_report::run as report;
 use stylet_scenario::Scenario;
@@ -78,6 +78,7 @@ pub fn name_of(scenario: &Scenario, index: usize) -> String {
 fn combination(recording: &Recording, ran: &Ran) -> report::Combination {
     let (trace, config) = (&ran.trace, &ran.config);
     let multi_layer = config.model == Model::MultiLayer;
+    let ours = config.in_force() == Algorithm::Stylet;
     let of = |wanted: bool, column: &[f64]| if wanted { column.to_vec() } else { Vec::new() };
     report::Combination {
         name: ran.name.clone(),
@@ -90,10 +91,12 @@ fn combination(recording: &Recording, ran: &Ran) -> report::Combination {
         friction_ns_per_m: of(!multi_layer, &trace.friction),
         cumulative_friction_ns_per_m: trace.cumulative_friction_ns_per_m.clone(),
         cusum_n2: trace.cusum_n2.clone(),
-        cusum_threshold_n2: Some(config.cusum.threshold_n2()),
-        force_derivative_n_per_s: trace.derivative_n_per_s.clone(),
-        derivative_on_n_per_s: Some(config.derivative.on_n_per_s),
-        derivative_off_n_per_s: Some(config.derivative.off_n_per_s),
+        // Ours says the largest of its sums as a share of its threshold, and looks at no derivative.
+        cusum_threshold_n2: Some(if ours { 1.0 } else { config.cusum.threshold_n2() }),
+        cusum_is_share: ours,
+        force_derivative_n_per_s: of(!ours, &trace.derivative_n_per_s),
+        derivative_on_n_per_s: (!ours).then_some(config.derivative.on_n_per_s),
+        derivative_off_n_per_s: (!ours).then_some(config.derivative.off_n_per_s),
         states: spans(recording, trace),
         detections: trace
             .detections

@@ -6,12 +6,12 @@ use crate::output::Output;
 use crate::picture::{self, Ran};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use stylet_core::config::Model;
+use stylet_core::config::{Algorithm, Model};
 use stylet_record::{LayerTruth, Recording, write_csv};
 use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::significant;
 use stylet_report::svg::FigureOptions;
-use stylet_scenario::Scenario;
+use stylet_scenario::{Scenario, without_effect};
 use stylet_score::{Score, algorithm_name, model_name, score_run};
 use stylet_testbed::{Reading, Simulation, VirtualError};
 
@@ -86,7 +86,7 @@ pub fn simulate_from(scenario: &Scenario, file: &str) -> Result<Run, Error> {
         let (trace, score) =
             score_run(&simulation.recording, &reading.force_n, &simulation.truth, &layers, &config);
         Ran {
-            name: format!("{}/{}/{}", algorithm_name(config.algorithm), model_name(model), reading.sensor),
+            name: format!("{}/{}/{}", algorithm_name(config.in_force()), model_name(model), reading.sensor),
             sensor: reading.sensor,
             config,
             trace,
@@ -163,7 +163,7 @@ impl Run {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 hash: hash.clone(),
             },
-            notes: virtual_note(simulation).into_iter().collect(),
+            notes: virtual_note(simulation).into_iter().chain(settings_note(ran)).collect(),
             truth: Some(picture::truth(&simulation.truth, scenario, layers)),
             ..picture::report(&simulation.recording, forces.collect(), ran)
         })
@@ -194,6 +194,28 @@ pub fn virtual_note(simulation: &Simulation) -> Option<String> {
             significant(error.lag_s, 3),
             significant(error.rms_n, 3),
             significant(error.beside_lag_rms_n, 3)
+        )
+    })
+}
+
+/// Settings that were changed and have no effect on the algorithms that ran, in a sentence.
+#[must_use]
+pub fn settings_note(ran: &[Ran]) -> Option<String> {
+    let mut idle: Vec<&str> = ran.iter().flat_map(|r| without_effect(&r.config)).collect();
+    idle.sort_unstable();
+    idle.dedup();
+    // What one of several looks at does have an effect.
+    idle.retain(|name| ran.iter().all(|r| without_effect(&r.config).contains(name)));
+    let first = ran.first()?;
+    let other = match first.config.in_force() {
+        Algorithm::Stylet => "Paper",
+        Algorithm::Paper | Algorithm::Literal => "Stylet",
+    };
+    (!idle.is_empty()).then(|| {
+        format!(
+            "Set, but without effect: {}. The algorithm that ran, {}, has no such thing; write algorithm: {other} if it was meant for that.",
+            idle.join(", "),
+            algorithm_name(first.config.in_force()),
         )
     })
 }

@@ -27,17 +27,53 @@ typedef enum StyletStatus {
   STYLET_INTERNAL = -4,
 } StyletStatus;
 
+// Algorithm.
+typedef enum StyletAlgorithm {
+  // The paper's.
+  STYLET_PAPER = 0,
+  // The paper's to the letter.
+  STYLET_LITERAL = 1,
+  // This project's. It knows the multi-layer model alone: with the Kelvin-Voigt model the paper's runs.
+  STYLET_STYLET = 2,
+} StyletAlgorithm;
+
+// Tissue model.
+typedef enum StyletModel {
+  // Friction in proportion to the depth inside the layer.
+  STYLET_MULTI_LAYER = 0,
+  // A spring and a damper.
+  STYLET_KELVIN_VOIGT = 1,
+} StyletModel;
+
+// State of the algorithm.
+typedef enum StyletState {
+  // Ordinary insertion.
+  STYLET_NO_RUPTURE = 0,
+  // The force derivative has exceeded its threshold.
+  STYLET_EXPECTED_RUPTURE = 1,
+  // A rupture has just been declared; lasts one sample.
+  STYLET_DETECTED_RUPTURE = 2,
+  // Waiting for the drop to be over.
+  STYLET_FORCE_DROP_MEASURING = 3,
+  // The traversed layer is re-estimated and its friction compensated.
+  STYLET_FORCE_COMPENSATION = 4,
+} StyletState;
+
 // The core. Its size is `stylet_size`.
 typedef struct StyletCore StyletCore;
 
 // Configuration. Fill it by `stylet_default_config` and change what is to differ.
 typedef struct StyletConfig {
+  // A `StyletAlgorithm`.
+  int32_t algorithm;
   // A `StyletModel`.
   int32_t model;
   // Not zero: the surface is where `surface_m` says. Zero: it is found in the force.
   int32_t contact_known;
   // Position of the surface in m, for `contact_known`.
   double surface_m;
+  // False alarms per hour of insertion that are accepted, above 0. What follows belongs to the paper's algorithm.
+  double false_alarms_per_hour;
   // Forgetting factor of the recursive least squares, above 0 to 1.
   double forgetting;
   // Prior variance of the stiffness (N/m)^2.
@@ -58,6 +94,10 @@ typedef struct StyletConfig {
 typedef struct StyletOutput {
   // Enhanced force in N: the measured one less the friction of the passed layers.
   double enhanced_n;
+  // Lower end of the band that holds the tip's force with 95 % probability, in N; not a number where the algorithm gives none.
+  double low_n;
+  // Its upper end in N.
+  double high_n;
   // Force predicted before this sample's update, in N.
   double reconstructed_n;
   // Innovation in N.
@@ -66,9 +106,9 @@ typedef struct StyletOutput {
   double stiffness_n_per_m;
   // Its friction estimate: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
   double friction;
-  // CUSUM in N^2.
+  // CUSUM in N^2; for `StyletStylet` the largest of its sums as a share of its threshold.
   double cusum_n2;
-  // Filtered force derivative in N/s.
+  // Filtered force derivative in N/s; zero for `StyletStylet`, which needs none.
   double derivative_n_per_s;
   // Cumulative friction in N s/m.
   double cumulative_friction_ns_per_m;

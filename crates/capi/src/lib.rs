@@ -7,7 +7,7 @@
 //! `include/stylet.h` is made from this file by cbindgen; `tests/header.rs` checks that it is up to date.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use stylet_core::config::{Contact, EnhanceConfig, Model};
+use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model};
 use stylet_core::{Enhancer, Output, Sample};
 
 /// What a call says.
@@ -26,6 +26,18 @@ pub enum StyletStatus {
     StyletBadConfig = -3,
     /// A bug of ours; the core must not be used any more.
     StyletInternal = -4,
+}
+
+/// Algorithm.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StyletAlgorithm {
+    /// The paper's.
+    StyletPaper = 0,
+    /// The paper's to the letter.
+    StyletLiteral = 1,
+    /// This project's. It knows the multi-layer model alone: with the Kelvin-Voigt model the paper's runs.
+    StyletStylet = 2,
 }
 
 /// Tissue model.
@@ -58,12 +70,16 @@ pub enum StyletState {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StyletConfig {
+    /// A `StyletAlgorithm`.
+    pub algorithm: i32,
     /// A `StyletModel`.
     pub model: i32,
     /// Not zero: the surface is where `surface_m` says. Zero: it is found in the force.
     pub contact_known: i32,
     /// Position of the surface in m, for `contact_known`.
     pub surface_m: f64,
+    /// False alarms per hour of insertion that are accepted, above 0. What follows belongs to the paper's algorithm.
+    pub false_alarms_per_hour: f64,
     /// Forgetting factor of the recursive least squares, above 0 to 1.
     pub forgetting: f64,
     /// Prior variance of the stiffness (N/m)^2.
@@ -86,6 +102,10 @@ pub struct StyletConfig {
 pub struct StyletOutput {
     /// Enhanced force in N: the measured one less the friction of the passed layers.
     pub enhanced_n: f64,
+    /// Lower end of the band that holds the tip's force with 95 % probability, in N; not a number where the algorithm gives none.
+    pub low_n: f64,
+    /// Its upper end in N.
+    pub high_n: f64,
     /// Force predicted before this sample's update, in N.
     pub reconstructed_n: f64,
     /// Innovation in N.
@@ -94,9 +114,9 @@ pub struct StyletOutput {
     pub stiffness_n_per_m: f64,
     /// Its friction estimate: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
     pub friction: f64,
-    /// CUSUM in N^2.
+    /// CUSUM in N^2; for `StyletStylet` the largest of its sums as a share of its threshold.
     pub cusum_n2: f64,
-    /// Filtered force derivative in N/s.
+    /// Filtered force derivative in N/s; zero for `StyletStylet`, which needs none.
     pub derivative_n_per_s: f64,
     /// Cumulative friction in N s/m.
     pub cumulative_friction_ns_per_m: f64,
@@ -182,12 +202,18 @@ pub unsafe extern "C" fn stylet_default_config(config: *mut StyletConfig) -> Sty
     let Some(config) = (unsafe { config.as_mut() }) else { return StyletStatus::StyletNull };
     let from = EnhanceConfig::default();
     *config = StyletConfig {
+        algorithm: match from.algorithm {
+            Algorithm::Paper => StyletAlgorithm::StyletPaper as i32,
+            Algorithm::Literal => StyletAlgorithm::StyletLiteral as i32,
+            Algorithm::Stylet => StyletAlgorithm::StyletStylet as i32,
+        },
         model: match from.model {
             Model::MultiLayer => StyletModel::StyletMultiLayer as i32,
             Model::KelvinVoigt => StyletModel::StyletKelvinVoigt as i32,
         },
         contact_known: i32::from(from.contact == Contact::Known),
         surface_m: 0.0,
+        false_alarms_per_hour: from.stylet.false_alarms_per_hour,
         forgetting: from.forgetting,
         prior_stiffness: from.prior_stiffness,
         prior_friction: from.prior_friction,
@@ -201,6 +227,12 @@ pub unsafe extern "C" fn stylet_default_config(config: *mut StyletConfig) -> Sty
 
 /// The core's own configuration, or what is wrong with the caller's.
 fn checked(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CStr> {
+    let algorithm = match config.algorithm {
+        a if a == StyletAlgorithm::StyletPaper as i32 => Algorithm::Paper,
+        a if a == StyletAlgorithm::StyletLiteral as i32 => Algorithm::Literal,
+        a if a == StyletAlgorithm::StyletStylet as i32 => Algorithm::Stylet,
+        _ => return Err(c"algorithm: must be STYLET_PAPER, STYLET_LITERAL or STYLET_STYLET"),
+    };
     let model = match config.model {
         m if m == StyletModel::StyletMultiLayer as i32 => Model::MultiLayer,
         m if m == StyletModel::StyletKelvinVoigt as i32 => Model::KelvinVoigt,
@@ -209,6 +241,9 @@ fn checked(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CS
     let positive = |x: f64| x > 0.0 && x.is_finite();
     if !config.surface_m.is_finite() {
         return Err(c"surface_m: must be finite");
+    }
+    if !positive(config.false_alarms_per_hour) {
+        return Err(c"false_alarms_per_hour: must be positive and finite");
     }
     if !(positive(config.forgetting) && config.forgetting <= 1.0) {
         return Err(c"forgetting: must lie above 0 and be at most 1");
@@ -225,8 +260,9 @@ fn checked(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CS
     if !(config.derivative_on_n_per_s.is_finite() && config.derivative_off_n_per_s.is_finite()) {
         return Err(c"derivative_on_n_per_s, derivative_off_n_per_s: must be finite");
     }
-    let mut core = EnhanceConfig { model, ..EnhanceConfig::default() };
+    let mut core = EnhanceConfig { algorithm, model, ..EnhanceConfig::default() };
     core.contact = if config.contact_known != 0 { Contact::Known } else { Contact::Detected };
+    core.stylet.false_alarms_per_hour = config.false_alarms_per_hour;
     core.forgetting = config.forgetting;
     core.prior_stiffness = config.prior_stiffness;
     core.prior_friction = config.prior_friction;
@@ -331,8 +367,11 @@ pub unsafe extern "C" fn stylet_step(
 
 fn plain(o: &Output) -> StyletOutput {
     let estimate = o.estimate.unwrap_or_default();
+    let [low_n, high_n] = o.band_n.unwrap_or([f64::NAN; 2]);
     StyletOutput {
         enhanced_n: o.enhanced_n,
+        low_n,
+        high_n,
         reconstructed_n: o.reconstructed_n,
         error_n: o.error_n,
         stiffness_n_per_m: o.theta[0],

@@ -32,6 +32,8 @@ fn wrong_configurations_are_named() {
     let mut room = memory(16);
     let bytes = stylet_size(16);
     for (wrong, named) in [
+        (StyletConfig { algorithm: 9, ..default() }, "algorithm"),
+        (StyletConfig { false_alarms_per_hour: 0.0, ..default() }, "false_alarms_per_hour"),
         (StyletConfig { model: 7, ..default() }, "model"),
         (StyletConfig { forgetting: 1.5, ..default() }, "forgetting"),
         (StyletConfig { surface_m: f64::NAN, ..default() }, "surface_m"),

@@ -48,17 +48,25 @@ pub enum Command {
 #[command(after_help = "Examples:
   stylet compare scenarios/compare/*.ron --seeds 400
   stylet compare my_phantom.ron --algorithms Paper,Stylet --seeds 1400 --out out/compare
+  stylet compare --world rich --seeds 200
 
-The folder then holds report.html and compare.json. Scenarios are replayed kinematically; the same seeds give the
+With --world the insertions are those that `stylet benchmark diagnose` draws, with beliefs that are right: a tissue law of another
+form than the one that the algorithms were made for. The folder then holds report.html and compare.json. Scenarios are replayed kinematically; the same seeds give the
 same bytes for any number of threads.")]
 pub struct CompareArgs {
     /// Scenario files (RON).
-    #[arg(required = true)]
+    #[arg(required_unless_present = "world")]
     pub scenarios: Vec<PathBuf>,
+    /// Also the insertions of this world of the referee: plain or rich.
+    #[arg(long, value_name = "WORLD")]
+    pub world: Option<String>,
+    /// With --world: what departs from the base law there; a row for each.
+    #[arg(long, value_delimiter = ',', value_name = "WORDS", default_value = "clean,one,two,three")]
+    pub hide: Vec<String>,
     /// Algorithms, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "Paper,Stylet", ignore_case = true)]
     pub algorithms: Vec<Which>,
-    /// Noise seeds per scenario and algorithm.
+    /// Noise seeds per scenario and algorithm; with --world drawn cases per row.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub seeds: u64,
     /// Where the results go.

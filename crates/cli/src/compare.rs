@@ -2,6 +2,7 @@
 
 use crate::args::CompareArgs;
 use crate::compare_page::page;
+use crate::compare_world;
 use crate::exit::Failure;
 use crate::output::Output;
 use crate::progress::Progress;
@@ -14,18 +15,18 @@ use stylet_core::config::Algorithm;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 use stylet_score::Score;
-use stylet_stats::{Interval, wilson_at};
+use stylet_stats::{Interval, Z95, quantile_interval, wilson};
 use stylet_sweep::trial::{self, Workspace};
 
 /// Median and 95th percentile.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Spread {
     pub median: Option<f64>,
     pub p95: Option<f64>,
 }
 
 /// Shares of true values in the core's 95 % intervals; `null` for an algorithm that gives none.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Coverage {
     pub stiffness: Option<f64>,
     pub friction: Option<f64>,
@@ -34,7 +35,7 @@ pub struct Coverage {
 }
 
 /// One row of the table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Row {
     pub scenario: String,
     pub algorithm: String,
@@ -43,13 +44,16 @@ pub struct Row {
     pub missed: usize,
     #[serde(rename = "false")]
     pub false_alarms: usize,
-    /// Missed and false per rupture, with its 95 % Wilson interval.
+    /// Missed and false per rupture, with its 95 % interval.
     pub errors_per_rupture: [f64; 3],
     pub delay_s: Spread,
     /// Median relative error per layer.
     pub stiffness_error: Vec<Option<f64>>,
+    /// The medians' 95 % intervals.
+    pub stiffness_error_interval: Vec<Option<[f64; 2]>>,
     pub friction_error: Vec<Option<f64>>,
     pub enhancement_rms_relative: Option<f64>,
+    pub enhancement_interval: Option<[f64; 2]>,
     /// The same against the noise-free tip force.
     pub enhancement_with_noise: Option<f64>,
     pub coverage: Coverage,
@@ -62,8 +66,9 @@ pub struct Row {
 pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let algorithms = &args.algorithms;
     let scenarios = args.scenarios.iter().map(|path| Scenario::load(path)).collect::<Result<Vec<_>, _>>()?;
+    let worlds = compare_world::rows(args)?;
     let progress = Progress::new(
-        (scenarios.len() * algorithms.len()) as u64 * args.seeds,
+        ((scenarios.len() + worlds.len()) * algorithms.len()) as u64 * args.seeds,
         "insertions",
         args.results.quiet,
     );
@@ -77,6 +82,9 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
                 .map_err(|why| Failure::Simulate { file: path.display().to_string(), why })?;
             rows.push(row);
         }
+    }
+    for world in &worlds {
+        rows.extend(world.listen(algorithms, &progress)?);
     }
     progress.finish();
     let _ = writeln!(
@@ -100,6 +108,44 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The scores of one row.
+pub struct Scored {
+    pub missed: usize,
+    pub false_alarms: usize,
+    pub delays_s: Vec<f64>,
+    pub ruptures: usize,
+}
+
+impl Row {
+    /// A row with what every row has; estimates are added where there is a truth for them.
+    pub fn new(scenario: &str, algorithm: &str, seeds: u64, scored: &Scored) -> Self {
+        let delays = stylet_stats::sorted(scored.delays_s.iter().copied());
+        let quantile = |q| Some(stylet_stats::quantile_of_sorted(&delays, q)).filter(|x| x.is_finite());
+        Self {
+            scenario: scenario.to_owned(),
+            algorithm: algorithm.to_owned(),
+            seeds,
+            ruptures: scored.ruptures,
+            missed: scored.missed,
+            false_alarms: scored.false_alarms,
+            errors_per_rupture: per_rupture(scored.missed + scored.false_alarms, scored.ruptures),
+            delay_s: Spread { median: quantile(0.5), p95: quantile(0.95) },
+            ..Self::default()
+        }
+    }
+}
+
+/// Errors per rupture with a 95 % interval: Wilson's of a share, or a count's (normal) where there are more errors than ruptures.
+fn per_rupture(errors: usize, ruptures: usize) -> [f64; 3] {
+    let (n, of) = (errors as f64, ruptures as f64);
+    if errors <= ruptures {
+        let share = wilson(errors, ruptures);
+        return [share.value, share.low, share.high];
+    }
+    let half = Z95 * n.sqrt();
+    [n, (n - half).max(0.0), n + half].map(|x| x / of)
+}
+
 fn row(
     scenario: &Scenario,
     algorithm: &str,
@@ -117,18 +163,18 @@ fn row(
             score
         })
         .collect::<Result<_, _>>()?;
-    let ruptures: usize = scores.iter().map(|s| s.ruptures.len()).sum();
-    let missed: usize = scores.iter().map(|s| s.missed).sum();
-    let false_alarms: usize = scores.iter().map(|s| s.false_alarms).sum();
-    let errors: Interval =
-        wilson_at((missed + false_alarms) as f64, ruptures.max(missed + false_alarms) as f64, 0.95);
-    let delays: Vec<f64> = scores.iter().flat_map(|s| s.ruptures.iter().filter_map(|r| r.delay_s)).collect();
+    let scored = Scored {
+        ruptures: scores.iter().map(|s| s.ruptures.len()).sum(),
+        missed: scores.iter().map(|s| s.missed).sum(),
+        false_alarms: scores.iter().map(|s| s.false_alarms).sum(),
+        delays_s: scores.iter().flat_map(|s| s.ruptures.iter().filter_map(|r| r.delay_s)).collect(),
+    };
     let layers = scores.iter().flat_map(|s| s.layers.iter().map(|l| l.layer)).max().unwrap_or(0);
-    let of_layers = |what: &dyn Fn(&stylet_score::LayerScore) -> Option<f64>| -> Vec<Option<f64>> {
+    let of_layers = |what: &dyn Fn(&stylet_score::LayerScore) -> Option<f64>| -> Vec<Option<Interval>> {
         (1..=layers)
             .map(|number| {
                 let all = scores.iter().flat_map(|s| s.layers.iter().filter(|l| l.layer == number));
-                quantile(all.filter_map(what).collect(), 0.5)
+                median(all.filter_map(what))
             })
             .collect()
     };
@@ -139,41 +185,32 @@ fn row(
         });
         (all > 0.0).then(|| inside / all)
     };
+    let value = |x: &Option<Interval>| x.map(|x| x.value);
+    let ends = |x: &Option<Interval>| x.map(|x| [x.low, x.high]);
+    let stiffness = of_layers(&|l| l.stiffness_n_per_m.relative_error);
+    let friction = of_layers(&|l| l.friction_ns_per_m2.relative_error);
+    let enhancement = median(scores.iter().filter_map(|s| s.enhancement.friction_rms_relative));
+    let with_noise = median(scores.iter().filter_map(|s| s.enhancement.rms_relative));
     Ok(Row {
-        scenario: scenario.name.clone(),
-        algorithm: algorithm.to_owned(),
-        seeds,
-        ruptures,
-        missed,
-        false_alarms,
-        errors_per_rupture: [errors.value, errors.low, errors.high],
-        delay_s: Spread { median: quantile(delays.clone(), 0.5), p95: quantile(delays, 0.95) },
-        stiffness_error: of_layers(&|l| l.stiffness_n_per_m.relative_error),
-        friction_error: of_layers(&|l| l.friction_ns_per_m2.relative_error),
-        enhancement_rms_relative: quantile(
-            scores.iter().filter_map(|s| s.enhancement.friction_rms_relative).collect(),
-            0.5,
-        ),
-        enhancement_with_noise: quantile(
-            scores.iter().filter_map(|s| s.enhancement.rms_relative).collect(),
-            0.5,
-        ),
+        stiffness_error: stiffness.iter().map(value).collect(),
+        stiffness_error_interval: stiffness.iter().map(ends).collect(),
+        friction_error: friction.iter().map(value).collect(),
+        enhancement_rms_relative: value(&enhancement),
+        enhancement_interval: ends(&enhancement),
+        enhancement_with_noise: value(&with_noise),
         coverage: Coverage {
             stiffness: share(&|c| c.stiffness),
             friction: share(&|c| c.friction),
             cumulative_friction: share(&|c| c.cumulative),
             tip_force: share(&|c| c.band),
         },
+        ..Row::new(&scenario.name, algorithm, seeds, &scored)
     })
 }
 
-/// A quantile between the order statistics.
-fn quantile(mut values: Vec<f64>, q: f64) -> Option<f64> {
-    values.retain(|x| x.is_finite());
-    values.sort_by(f64::total_cmp);
-    let at = values.len().checked_sub(1)? as f64 * q;
-    let (low, high) = (*values.get(at.floor() as usize)?, *values.get(at.ceil() as usize)?);
-    Some(low + (high - low) * (at - at.floor()))
+/// The median with its 95 % interval between order statistics.
+fn median(values: impl Iterator<Item = f64>) -> Option<Interval> {
+    quantile_interval(&stylet_stats::sorted(values.filter(|x| x.is_finite())), 0.5)
 }
 
 /// Thousandths or percent for people; a dash for nothing.
@@ -198,7 +235,7 @@ fn line(r: &Row) -> String {
 }
 
 impl crate::args::Which {
-    fn algorithm(self) -> Algorithm {
+    pub fn algorithm(self) -> Algorithm {
         match self {
             Self::Paper => Algorithm::Paper,
             Self::Literal => Algorithm::Literal,
@@ -206,7 +243,7 @@ impl crate::args::Which {
         }
     }
 
-    fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "Paper",
             Self::Literal => "Literal",

@@ -3,10 +3,20 @@
 use crate::compare::{Row, shown};
 use stylet_report::{Cell, Page, Section, Status, Table};
 
+fn percent(x: f64) -> String {
+    shown(Some(x), 100.0, 2)
+}
+
 /// Tables: detection, estimates, calibration.
 pub fn page(rows: &[Row], seeds: u64) -> Page {
     let head = |r: &Row| vec![Cell::text(r.scenario.clone()), Cell::text(r.algorithm.clone())];
     let list = |v: &[Option<f64>]| v.iter().map(|x| shown(*x, 100.0, 2)).collect::<Vec<_>>().join(" / ");
+    let intervals = |v: &[Option<[f64; 2]>]| {
+        let one = |x: &Option<[f64; 2]>| {
+            x.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", percent(low), percent(high)))
+        };
+        v.iter().map(one).collect::<Vec<_>>().join(" / ")
+    };
     let detection = rows.iter().map(|r| {
         let [value, low, high] = r.errors_per_rupture;
         let mut cells = head(r);
@@ -26,15 +36,18 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
         )));
         cells
     });
-    let estimates = rows.iter().map(|r| {
+    // Only where there is a truth for them.
+    let estimates = rows.iter().filter(|r| r.enhancement_rms_relative.is_some()).map(|r| {
         let mut cells = head(r);
         cells.push(Cell::number(list(&r.stiffness_error)));
+        cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
         cells.push(Cell::number(list(&r.friction_error)));
         let enhancement = Cell::number(shown(r.enhancement_rms_relative, 100.0, 2));
         cells.push(
             enhancement
                 .status(r.enhancement_rms_relative.map_or(Status::Plain, |x| Status::at_most(x, 0.05, 0.2))),
         );
+        cells.push(Cell::number(intervals(&[r.enhancement_interval])));
         cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
         cells
     });
@@ -53,7 +66,7 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
         .fact("version", env!("CARGO_PKG_VERSION"))
         .section(
             Section::new("Ruptures")
-                .text("A rupture is found by the first detection from 50 ms before to 1 s after it; the interval is Wilson's, of missed and false together.")
+                .text("A rupture is found by the first detection from 50 ms before to 1 s after it; the interval is that of missed and false together, Wilson's (a count's where there are more than ruptures).")
                 .table(Table {
                     title: "Ruptures missed and false alarms".to_owned(),
                     groups: Vec::new(),
@@ -63,11 +76,11 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
         )
         .section(
             Section::new("Estimates")
-                .text("Medians over the seeds. Enhanced force: RMS of estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; beside it the same with the sensor's noise.")
+                .text("Medians over the seeds, with their intervals between order statistics. Enhanced force: RMS of estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; beside it the same with the sensor's noise.")
                 .table(Table {
                     title: "Errors in %".to_owned(),
                     groups: Vec::new(),
-                    headers: headers(&["scenario", "algorithm", "stiffness, layer by layer", "friction, layer by layer", "enhanced force", "with noise"]),
+                    headers: headers(&["scenario", "algorithm", "stiffness, layer by layer", "its 95 % intervals", "friction, layer by layer", "enhanced force", "its 95 % interval", "with noise"]),
                     rows: estimates.collect(),
                 }),
         )

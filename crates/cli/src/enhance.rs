@@ -231,7 +231,7 @@ fn results(
             version: env!("CARGO_PKG_VERSION").to_owned(),
             hash: hash.clone(),
         },
-        notes: notes.iter().map(|n| n.message.clone()).collect(),
+        notes: notes.iter().map(|n| n.message.clone()).chain(stylet_api::settings_note(ran)).collect(),
         ..picture::report(
             recording,
             vec![ForceTrace { sensor: "force_torque".to_owned(), force_n: recording.force_n.clone() }],
@@ -287,6 +287,9 @@ fn summary(
     );
     for note in notes {
         let _ = writeln!(out, "  note: {}", note.message);
+    }
+    if let Some(note) = stylet_api::settings_note(ran) {
+        let _ = writeln!(out, "  note: {note}");
     }
     for r in ran {
         let unit = if r.config.model == Model::MultiLayer { "N s/m²" } else { "N s/m" };

@@ -5,6 +5,7 @@ mod args;
 mod benchmark;
 mod compare;
 mod compare_page;
+mod compare_world;
 mod diagnose;
 mod diagnose_report;
 mod effects;

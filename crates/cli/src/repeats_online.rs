@@ -47,7 +47,7 @@ pub fn listen(runs: &[&Run], study: &Study) -> Vec<Online> {
 
 fn one(run: &Run, study: &Study, i: usize) -> Online {
     let r = &run.recording;
-    let trace = Trace::record(r, &r.force_n, &EnhanceConfig::default(), 0.0, |_, _| {});
+    let trace = Trace::record(r, &r.force_n, &EnhanceConfig::paper(), 0.0, |_, _| {});
     let phases = phases(r);
     let seen = drops(r, &phases);
     let mut taken = vec![false; trace.detections.len()];

@@ -4,7 +4,7 @@ use crate::exit::Failure;
 use crate::picture::name_of;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use stylet_api::{Run, virtual_note};
+use stylet_api::{Run, settings_note, virtual_note};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
@@ -46,6 +46,9 @@ pub fn scorecard(finished: &Run) -> String {
     );
     if let Some(note) = virtual_note(&finished.simulation) {
         let _ = writeln!(out, "{note}");
+    }
+    if let Some(note) = settings_note(&finished.ran) {
+        let _ = writeln!(out, "note: {note}");
     }
     for ran in &finished.ran {
         let Some(score) = &ran.score else { continue };

@@ -27,7 +27,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// A core with `storage` for the raw samples of a layer. `surface_m` is used when the contact
     /// is [`Contact::Known`](crate::config::Contact::Known).
     pub fn new(config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
-        let stylet = (config.algorithm == Algorithm::Stylet).then(|| Stylet::new(&config, surface_m));
+        let stylet = (config.in_force() == Algorithm::Stylet).then(|| Stylet::new(&config, surface_m));
         Self { paper: Paper::new(config, surface_m, storage), stylet, surface_m }
     }
 

@@ -276,12 +276,13 @@ impl Default for GuardConfig {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Algorithm {
     /// The paper's, with the completions marked \[D\].
-    #[default]
     Paper,
     /// The paper's to the letter: no blind travel after contact, no motion guards, drop by
     /// extremes. For the record: it diverges on the sinusoid with contact found from the data.
     Literal,
-    /// This project's: calibrated, one pass, with the uncertainty of everything it says (see [`StyletConfig`]).
+    /// This project's: calibrated, one pass, with the uncertainty of everything it says (see [`StyletConfig`]). It knows the
+    /// multi-layer law alone and finds depths itself: with [`Model::KelvinVoigt`] or [`Depths::Known`] the paper's runs.
+    #[default]
     Stylet,
 }
 
@@ -337,7 +338,7 @@ impl Default for StyletConfig {
     }
 }
 
-/// Everything that can be set. The defaults are the paper's values.
+/// Everything that can be set. The numbers of the paper's algorithm are the paper's by default.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -370,6 +371,25 @@ pub struct EnhanceConfig {
     pub guard: GuardConfig,
     /// What [`Algorithm::Stylet`] is set by.
     pub stylet: StyletConfig,
+}
+
+impl EnhanceConfig {
+    /// The paper's algorithm with the paper's numbers.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self { algorithm: Algorithm::Paper, ..Self::default() }
+    }
+
+    /// The algorithm that runs: [`Algorithm::Stylet`] has no Kelvin-Voigt model and takes no known depths.
+    #[must_use]
+    pub fn in_force(&self) -> Algorithm {
+        match self.algorithm {
+            Algorithm::Stylet if self.model == Model::KelvinVoigt || self.depths != Depths::Unknown => {
+                Algorithm::Paper
+            }
+            chosen => chosen,
+        }
+    }
 }
 
 impl Default for EnhanceConfig {

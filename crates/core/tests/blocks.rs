@@ -17,7 +17,7 @@ fn kept(out: &Output) -> Kept {
 }
 
 fn core() -> Enhancer<Vec<Sample>> {
-    Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 10_000])
+    Enhancer::new(EnhanceConfig::paper(), 0.0, vec![Sample::default(); 10_000])
 }
 
 /// Spoils some samples: not a number, not later than the one before, beyond what a needle can have.
@@ -62,7 +62,7 @@ fn an_estimate_that_overflows_starts_anew_and_no_output_is_spoilt() {
     let config = EnhanceConfig {
         forgetting: 0.5,
         reset: stylet_core::config::Reset::Ruptures,
-        ..EnhanceConfig::default()
+        ..EnhanceConfig::paper()
     };
     let mut core = Enhancer::new(config, 0.0, vec![Sample::default(); 10_000]);
     let mut anew = 0;

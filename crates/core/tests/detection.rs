@@ -20,20 +20,20 @@ fn assert_found(data: &Insertion, config: &EnhanceConfig, latest_s: f64) {
 #[test]
 fn constant_insertion_detects_all_three_ruptures() {
     for seed in 0..10 {
-        assert_found(&constant(0.02, seed), &EnhanceConfig::default(), 0.05);
+        assert_found(&constant(0.02, seed), &EnhanceConfig::paper(), 0.05);
     }
 }
 
 #[test]
 fn sinusoidal_insertion_detects_all_three_ruptures() {
     for seed in 0..10 {
-        assert_found(&sinusoid(0.02, seed), &EnhanceConfig::default(), 0.05);
+        assert_found(&sinusoid(0.02, seed), &EnhanceConfig::paper(), 0.05);
     }
 }
 
 #[test]
 fn a_known_surface_serves_as_well_as_one_found_from_the_data() {
-    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::default() };
+    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::paper() };
     assert_found(&constant(0.02, 1), &config, 0.05);
     assert_found(&sinusoid(0.02, 1), &config, 0.05);
 }
@@ -41,7 +41,7 @@ fn a_known_surface_serves_as_well_as_one_found_from_the_data() {
 #[test]
 fn contact_is_found_within_half_a_millimetre() {
     for (name, data) in [("constant", constant(0.02, 3)), ("sinusoid", sinusoid(0.02, 3))] {
-        let outputs = enhance(&EnhanceConfig::default(), &data.samples);
+        let outputs = enhance(&EnhanceConfig::paper(), &data.samples);
         let found = outputs.last().and_then(|o| o.contact_m).expect("contact");
         assert!(found.abs() < 5e-4, "{name}: surface at 0, found at {found} m");
     }
@@ -51,7 +51,7 @@ fn contact_is_found_within_half_a_millimetre() {
 fn without_cusum_the_trailing_edge_of_the_derivative_finds_the_ruptures_later() {
     let config = EnhanceConfig {
         cusum: CusumConfig { enabled: false, ..CusumConfig::default() },
-        ..EnhanceConfig::default()
+        ..EnhanceConfig::paper()
     };
     assert_found(&constant(0.005, 1), &config, 1.0);
     let outputs = enhance(&config, &constant(0.005, 1).samples);
@@ -66,7 +66,7 @@ fn with_both_detectors_off_nothing_is_found() {
     let config = EnhanceConfig {
         cusum: CusumConfig { enabled: false, ..CusumConfig::default() },
         derivative: DerivativeConfig { enabled: false, ..DerivativeConfig::default() },
-        ..EnhanceConfig::default()
+        ..EnhanceConfig::paper()
     };
     assert!(detections(&enhance(&config, &constant(0.02, 1).samples)).is_empty());
 }
@@ -74,7 +74,7 @@ fn with_both_detectors_off_nothing_is_found() {
 #[test]
 fn the_states_follow_one_another_as_in_the_papers_figure() {
     use State::*;
-    let outputs = enhance(&EnhanceConfig::default(), &constant(0.02, 1).samples);
+    let outputs = enhance(&EnhanceConfig::paper(), &constant(0.02, 1).samples);
     let mut visited = [false; 5];
     for pair in outputs.windows(2) {
         let (from, to) = (pair[0].state, pair[1].state);
@@ -98,7 +98,7 @@ fn the_states_follow_one_another_as_in_the_papers_figure() {
 fn every_reset_policy_and_model_runs_to_the_end_with_finite_numbers() {
     for model in [Model::KelvinVoigt, Model::MultiLayer] {
         for reset in [Reset::Frequency { hz: 6.66 }, Reset::Trace { below: 1.001e6 }, Reset::Ruptures] {
-            let config = EnhanceConfig { model, reset, ..EnhanceConfig::default() };
+            let config = EnhanceConfig { model, reset, ..EnhanceConfig::paper() };
             for data in [constant(0.02, 1), sinusoid(0.02, 1)] {
                 for out in enhance(&config, &data.samples) {
                     let numbers = [out.enhanced_n, out.error_n, out.theta[0], out.theta[1], out.cusum_n2];

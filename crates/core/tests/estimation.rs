@@ -18,7 +18,7 @@ fn estimates(config: &EnhanceConfig, samples: &[Sample]) -> Vec<LayerEstimate> {
 fn constant_insertion_without_noise_gives_stiffness_and_friction_back() {
     // The third layer is entered 1 mm late, because the second ruptured before its far face.
     let expected = [(40.0, 9000.0, 0.002), (60.0, 12000.0, 0.002), (80.0, 16000.0, 0.04)];
-    let found = estimates(&EnhanceConfig::default(), &constant(0.0, 1).samples);
+    let found = estimates(&EnhanceConfig::paper(), &constant(0.0, 1).samples);
     assert_eq!(found.len(), 3);
     for (e, (k, b, within)) in found.iter().zip(expected) {
         assert!((e.stiffness_n_per_m / k - 1.0).abs() < within, "{e:?} against K {k}");
@@ -32,7 +32,7 @@ fn the_work_per_tick_changes_when_an_estimate_comes_not_what_it_is() {
     let with = |replay_per_tick| {
         let config = EnhanceConfig {
             drop: DropConfig { replay_per_tick, ..DropConfig::default() },
-            ..EnhanceConfig::default()
+            ..EnhanceConfig::paper()
         };
         estimates(&config, &data.samples)
     };
@@ -48,7 +48,7 @@ fn the_work_per_tick_changes_when_an_estimate_comes_not_what_it_is() {
 #[test]
 fn storage_shorter_than_a_layer_still_gives_an_estimate() {
     let data = constant(0.0, 1);
-    let mut core = Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 1024]);
+    let mut core = Enhancer::new(EnhanceConfig::paper(), 0.0, vec![Sample::default(); 1024]);
     let found: Vec<LayerEstimate> = data.samples.iter().filter_map(|s| core.step(*s).estimate).collect();
     assert_eq!(found.len(), 3);
     assert!((found[0].stiffness_n_per_m - 40.0).abs() < 0.5, "{found:?}");
@@ -58,7 +58,7 @@ fn storage_shorter_than_a_layer_still_gives_an_estimate() {
 fn without_reweighting_the_friction_is_negligible_and_compensates_nothing() {
     let config = EnhanceConfig {
         drop: DropConfig { reweight: false, ..DropConfig::default() },
-        ..EnhanceConfig::default()
+        ..EnhanceConfig::paper()
     };
     for e in estimates(&config, &constant(0.02, 1).samples) {
         assert!(e.added_friction_ns_per_m < 1.0, "{e:?}");
@@ -68,8 +68,8 @@ fn without_reweighting_the_friction_is_negligible_and_compensates_nothing() {
 #[test]
 fn samples_that_are_not_numbers_or_not_later_are_passed_over() {
     let data = constant(0.02, 1);
-    let clean = enhance(&EnhanceConfig::default(), &data.samples);
-    let mut core = Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 16384]);
+    let clean = enhance(&EnhanceConfig::paper(), &data.samples);
+    let mut core = Enhancer::new(EnhanceConfig::paper(), 0.0, vec![Sample::default(); 16384]);
     for (sample, expected) in data.samples.iter().zip(&clean) {
         assert_eq!(core.step(*sample), *expected);
         for spoiled in [
@@ -124,7 +124,7 @@ fn kelvin_voigt_and_multi_layer_reset_only_at_ruptures_agree_on_a_layer_without_
     tissue.layers[0].friction_ns_per_m2 = 0.0;
     let data = support::insertion(&tissue, -0.005, 20.0, 200.0, 0.0, 1, |_| 0.0023);
     for model in [Model::KelvinVoigt, Model::MultiLayer] {
-        let config = EnhanceConfig { model, reset: Reset::Ruptures, ..EnhanceConfig::default() };
+        let config = EnhanceConfig { model, reset: Reset::Ruptures, ..EnhanceConfig::paper() };
         let found = estimates(&config, &data.samples);
         assert_eq!(found.len(), 1, "{model:?}");
         assert!((found[0].stiffness_n_per_m / 40.0 - 1.0).abs() < 0.02, "{model:?}: {found:?}");

@@ -12,7 +12,7 @@ fn a_million_steps_with_ruptures_allocate_nothing() {
     let mut ruptures = 0usize;
     let mut estimates = 0u64;
     for _ in 0..100 {
-        let mut core = Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 8192]);
+        let mut core = Enhancer::new(EnhanceConfig::paper(), 0.0, vec![Sample::default(); 8192]);
         let counted = allocation_counter::measure(|| {
             for sample in &data.samples {
                 let out = core.step(*sample);

@@ -10,7 +10,7 @@ use support::{detections, enhance, insertion};
 /// Runs a velocity profile and returns (true, found) rupture times.
 fn run(duration_s: f64, seed: u64, velocity_mps: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
     let data = insertion(&Tissue::three_gels(), -0.005, duration_s, 200.0, 0.01, seed, velocity_mps);
-    let found = detections(&enhance(&EnhanceConfig::default(), &data.samples));
+    let found = detections(&enhance(&EnhanceConfig::paper(), &data.samples));
     (data.ruptures.iter().map(|r| r.time_s).collect(), found)
 }
 

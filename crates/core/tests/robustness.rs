@@ -42,7 +42,7 @@ fn noise_on_position_and_velocity_hides_no_rupture() {
                 ..*s
             })
             .collect();
-        let found = detections(&enhance(&EnhanceConfig::default(), &noisy));
+        let found = detections(&enhance(&EnhanceConfig::paper(), &noisy));
         assert_three(&format!("{hz} Hz, position sd {z_sd} m, velocity sd {v_sd} m/s"), &data, &found);
     }
 }
@@ -51,7 +51,7 @@ fn noise_on_position_and_velocity_hides_no_rupture() {
 fn a_short_way_in_air_is_enough_to_find_the_contact() {
     for (start_m, v) in [(-0.0006, 0.0023), (-0.0003, 0.0023), (0.0, 0.0023), (-0.005, 0.015)] {
         let data = insertion(&Tissue::three_gels(), start_m, 0.115 / v, 200.0, 0.01, 1, move |_| v);
-        let outputs = enhance(&EnhanceConfig::default(), &data.samples);
+        let outputs = enhance(&EnhanceConfig::paper(), &data.samples);
         let contact = outputs.last().and_then(|o| o.contact_m);
         assert!(
             contact.is_some_and(|z| z.abs() < 1.5e-3),
@@ -69,7 +69,7 @@ fn the_estimates_mean_the_same_at_every_sampling_rate() {
             0.12 * omega * (omega * t).sin()
         });
         let mut core =
-            stylet_core::Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 1 << 17]);
+            stylet_core::Enhancer::new(EnhanceConfig::paper(), 0.0, vec![Sample::default(); 1 << 17]);
         let outputs: Vec<Output> = data.samples.iter().map(|s| core.step(*s)).collect();
         assert_three(&format!("{hz} Hz"), &data, &detections(&outputs));
         for (e, k) in estimates(&outputs).iter().zip([40.0, 60.0, 80.0]) {
@@ -84,7 +84,7 @@ fn resets_come_at_their_frequency_also_where_it_does_not_divide_the_sampling_rat
     // from one reset every second sample.
     let data = insertion(&Tissue::three_gels(), -0.005, 12.0, 100.0, 0.01, 1, |_| 0.0023);
     let with = |hz| {
-        let config = EnhanceConfig { reset: Reset::Frequency { hz }, ..EnhanceConfig::default() };
+        let config = EnhanceConfig { reset: Reset::Frequency { hz }, ..EnhanceConfig::paper() };
         enhance(&config, &data.samples).last().map(|o| o.theta)
     };
     assert_ne!(with(40.0), with(50.0));
@@ -93,11 +93,11 @@ fn resets_come_at_their_frequency_also_where_it_does_not_divide_the_sampling_rat
 #[test]
 fn a_sample_that_cannot_be_changes_nothing() {
     let data = constant(0.01, 1);
-    let clean = enhance(&EnhanceConfig::default(), &data.samples);
+    let clean = enhance(&EnhanceConfig::paper(), &data.samples);
     for (force_n, velocity_mps) in [(1e308, 0.0023), (-1e100, 0.0023), (0.5, 1e200)] {
         let mut samples = data.samples.clone();
         samples.insert(3000, Sample { time_s: 14.9975, force_n, velocity_mps, ..samples[2999] });
-        let mut outputs = enhance(&EnhanceConfig::default(), &samples);
+        let mut outputs = enhance(&EnhanceConfig::paper(), &samples);
         assert!(!outputs.remove(3000).used);
         assert_eq!(outputs.last(), clean.last());
     }
@@ -105,7 +105,7 @@ fn a_sample_that_cannot_be_changes_nothing() {
 
 #[test]
 fn a_needle_known_to_start_inside_the_tissue_is_not_a_rupture() {
-    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::default() };
+    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::paper() };
     let data = insertion(&Tissue::three_gels(), 0.01, 45.0, 200.0, 0.01, 1, |_| 0.0023);
     assert_three("starting 10 mm inside", &data, &detections(&enhance(&config, &data.samples)));
 }
@@ -114,7 +114,7 @@ fn a_needle_known_to_start_inside_the_tissue_is_not_a_rupture() {
 fn going_in_again_is_compensated_by_the_friction_around_the_shaft_only() {
     let v = |t: f64| if (35.0..45.0).contains(&t) { -0.004 } else { 0.0023 };
     let data = insertion(&Tissue::three_gels(), -0.005, 75.0, 200.0, 0.0, 1, v);
-    let outputs = enhance(&EnhanceConfig::default(), &data.samples);
+    let outputs = enhance(&EnhanceConfig::paper(), &data.samples);
     // Two layers are through at 35 s; on the way back and in again only friction acts until the third.
     let worst =
         (36 * 200..50 * 200).map(|k| (outputs[k].enhanced_n - data.truth[k].tip_n).abs()).fold(0.0, f64::max);
@@ -133,7 +133,7 @@ fn known_depths_end_a_layer_at_its_face_at_the_latest() {
     let config = EnhanceConfig {
         contact: Contact::Known,
         depths: Depths::Known(vec![0.0282, 0.0377, 0.0322]),
-        ..EnhanceConfig::default()
+        ..EnhanceConfig::paper()
     };
     let data = insertion(&tissue, -0.005, 50.0, 200.0, 0.01, 1, |_| 0.0023);
     let outputs = enhance(&config, &data.samples);
@@ -145,7 +145,7 @@ fn known_depths_end_a_layer_at_its_face_at_the_latest() {
 
 #[test]
 fn covariance_reset_only_at_ruptures_alarms_no_more_often_than_there_are_ruptures_at_constant_speed() {
-    let config = EnhanceConfig { reset: Reset::Ruptures, ..EnhanceConfig::default() };
+    let config = EnhanceConfig { reset: Reset::Ruptures, ..EnhanceConfig::paper() };
     let data = constant(0.01, 1);
     assert_three("reset at ruptures", &data, &detections(&enhance(&config, &data.samples)));
 }

@@ -18,7 +18,7 @@ fn number(state: State) -> usize {
 fn runs() -> Vec<Vec<Output>> {
     let mut runs = Vec::new();
     for model in [Model::MultiLayer, Model::KelvinVoigt] {
-        let config = EnhanceConfig { model, ..EnhanceConfig::default() };
+        let config = EnhanceConfig { model, ..EnhanceConfig::paper() };
         for seed in 1..4 {
             runs.push(enhance(&config, &constant(0.02, seed).samples));
             runs.push(enhance(&config, &sinusoid(0.02, seed).samples));
@@ -38,7 +38,7 @@ fn runs() -> Vec<Vec<Output>> {
             &insertion(&Tissue::three_gels(), -0.005, 50.0, 200.0, 0.02, 1, hold).samples,
         ));
     }
-    let config = EnhanceConfig::default();
+    let config = EnhanceConfig::paper();
     let forward = constant(0.02, 1);
     let found =
         enhance(&config, &forward.samples).iter().position(|o| o.detection.is_some()).expect("a rupture");

@@ -4,7 +4,7 @@
 mod support;
 
 use stylet_core::config::Algorithm;
-use stylet_core::{EnhanceConfig, LayerEstimate, Output};
+use stylet_core::{EnhanceConfig, LayerEstimate, Output, Sample};
 use stylet_tissue::{Rupture, Tissue};
 use support::{Insertion, constant, enhance, insertion, sinusoid};
 
@@ -61,6 +61,39 @@ fn every_rupture_is_found_and_nothing_else_where_the_papers_algorithm_breaks_dow
         for (name, data) in &cases {
             assert_eq!(data.ruptures.len(), 3, "{name}");
             assert_found(name, &data.ruptures, &enhance(&stylet(), &data.samples), 0.011);
+        }
+    }
+}
+
+/// Velocities as logs have them: averaged over a tenth of a second, or late by a first-order lag.
+fn smoothed(samples: &[Sample], late: bool) -> Vec<Sample> {
+    let mut lagged = samples[0].velocity_mps;
+    (0..samples.len())
+        .map(|k| {
+            lagged += 0.1 * (samples[k].velocity_mps - lagged);
+            let window = &samples[k.saturating_sub(10)..(k + 11).min(samples.len())];
+            let mean = window.iter().map(|s| s.velocity_mps).sum::<f64>() / window.len() as f64;
+            Sample { velocity_mps: if late { lagged } else { mean }, ..samples[k] }
+        })
+        .collect()
+}
+
+#[test]
+fn a_stop_or_start_whose_logged_velocity_is_smoothed_or_late_is_no_rupture() {
+    // Stops, starts and steps of the speed within one sample: the friction goes and comes at once.
+    let speed = |t: f64| match t % 10.0 {
+        t if t < 4.0 => 0.0023 + 0.001 * (1.3 * t).sin(),
+        t if t < 5.0 => 0.0,
+        t if t < 8.0 => 0.0035,
+        _ => 0.0015,
+    };
+    for seed in 0..10 {
+        // No layer ends within 0.3 s of a change: as long as log and positions disagree, nothing is declared.
+        let data = insertion(&gels(), -0.006, 50.0, 200.0, 0.02, seed, speed);
+        assert_eq!(data.ruptures.len(), 3);
+        for late in [false, true] {
+            let outputs = enhance(&stylet(), &smoothed(&data.samples, late));
+            assert_found(if late { "late" } else { "smoothed" }, &data.ruptures, &outputs, 0.011);
         }
     }
 }

@@ -138,7 +138,7 @@ const ROWS: &[Row] = &[
         "enhance.algorithm",
         "",
         "Paper, Literal, Stylet",
-        "the paper with or without its completions, or Stylet's own",
+        "Stylet's own (default), or the paper's with or without its completions",
     ),
     ("enhance.model", "", "MultiLayer, KelvinVoigt", "regressor"),
     ("enhance.reset", "", "Frequency, Trace, Ruptures", "when the covariance goes back to its prior"),

@@ -32,6 +32,7 @@ mod validate_arm;
 mod validate_effects;
 mod validate_enhance;
 mod validate_motion;
+mod without_effect;
 
 pub use arm_line::{Approach, ArmLine};
 pub use describe::describe;
@@ -45,3 +46,4 @@ pub use plan::MotionPlan;
 pub use robot::{ArmConfig, ArmController, Robot};
 pub use scenario::Scenario;
 pub use sensor::{ForceTorque, Sensor, VirtualSensor, WrenchFrom, ZeroWindow};
+pub use without_effect::without_effect;

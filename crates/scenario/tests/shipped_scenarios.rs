@@ -187,6 +187,7 @@ fn the_stack_at_constant_velocity_is_the_specifications_example() {
             (name: "isinglass 70 %", thickness_m: 0.0322, stiffness_n_per_m: 80.0, friction_ns_per_m2: 16000.0),
         ]),
         motion: Constant(start_m: -0.005, velocity_mps: 0.0023, duration_s: 50.0),
+        enhance: (algorithm: Paper),
     )"#;
     assert_eq!(
         Scenario::parse("full.ron", &text).unwrap(),

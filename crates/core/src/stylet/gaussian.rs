@@ -24,7 +24,7 @@ impl<const N: usize> Gaussian<N> {
     pub(crate) fn new(x: [f64; N], variance: [f64; N]) -> Self {
         let mut p = [[0.0; N]; N];
         for (i, v) in variance.into_iter().enumerate() {
-            p[i][i] = if v > TINY { v } else { TINY };
+            p[i][i] = at_least(TINY, v);
         }
         Self { x, p }
     }
@@ -58,7 +58,7 @@ impl<const N: usize> Gaussian<N> {
             e -= h[k] * self.x[columns[k]];
         }
         // Never less than the noise alone, whatever rounding does.
-        Innovation { e, s: if s > r { s } else { r }, ph }
+        Innovation { e, s: at_least(r, s), ph }
     }
 
     /// Takes the measurement: `x += P h e/s`, `P -= (P h)(P h)'/s`.
@@ -74,7 +74,7 @@ impl<const N: usize> Gaussian<N> {
             }
             // What rounding may take from a variance that is known very well.
             let variance = self.p[i][i] - k * ph[i];
-            self.p[i][i] = if variance > TINY { variance } else { TINY };
+            self.p[i][i] = at_least(TINY, variance);
         }
     }
 
@@ -152,16 +152,28 @@ impl<const N: usize> Gaussian<N> {
         self.x.iter().chain(self.p.iter().flatten()).sum::<f64>().is_finite()
     }
 
-    /// The diagonal is positive and finite, and so is the mean: cheap enough for every sample.
+    /// Variances and means are numbers: cheap enough for every sample. A variance that is a number is positive, because
+    /// [`Gaussian::take`] sees to it.
     #[inline(always)]
     pub(crate) fn is_usable(&self) -> bool {
-        let (mut least, mut sum) = (f64::MAX, 0.0);
+        let mut sum = 0.0;
         for i in 0..N {
-            least = if self.p[i][i] < least { self.p[i][i] } else { least };
             sum += self.p[i][i] + self.x[i];
         }
-        least > 0.0 && sum.is_finite()
+        sum.is_finite()
     }
+}
+
+/// `x`, and the bound where `x` is less or no number: one instruction, where `f64::max` takes several.
+#[inline(always)]
+pub(crate) fn at_least(bound: f64, x: f64) -> f64 {
+    if x > bound { x } else { bound }
+}
+
+/// `x`, and the bound where `x` is more or no number.
+#[inline(always)]
+pub(crate) fn at_most(bound: f64, x: f64) -> f64 {
+    if x < bound { x } else { bound }
 }
 
 /// Largest variance of a force that a prior may state, in units of the noise's: wide enough to be no prior at all, and far enough from

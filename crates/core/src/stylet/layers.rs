@@ -37,12 +37,14 @@ pub(crate) struct Layers {
     pub(crate) passed: usize,
     /// Thickness of the layer before.
     pub(crate) previous_m: f64,
-    /// Start, end and friction per metre of the layers behind, as they were known when the next one gave way.
-    behind: [[f64; 3]; MAX_LAYERS],
     /// Drive at contact.
     drive0: f64,
-    last: Option<([f64; N], f64)>,
+    /// Depth, drive and force of the sample before.
+    last: Option<[f64; 3]>,
 }
+
+/// Start, end and friction per metre of the layers behind, as they were known when the next one gave way.
+pub(crate) type Behind = [[f64; 3]; MAX_LAYERS];
 
 impl Layers {
     /// At contact at `start_m` with the force `force_n` acting already, known to `sd_n`; stiffness and friction are
@@ -73,7 +75,6 @@ impl Layers {
             belief: Gaussian::new(mean, variance),
             start_m,
             passed: 0,
-            behind: [[0.0; 3]; MAX_LAYERS],
             previous_m: 0.0,
             drive0: drive,
             last: None,
@@ -81,8 +82,7 @@ impl Layers {
     }
 
     #[inline(always)]
-    fn regressor(&self, position_m: f64, drive: f64) -> [f64; N] {
-        let x = position_m - self.start_m;
+    fn regressor(&self, x: f64, drive: f64) -> [f64; N] {
         let (a, q) = if self.passed > 0 { (drive, 0.0) } else { (1.0, drive) };
         [a, x, x * drive, q, 0.0, 1.0]
     }
@@ -90,26 +90,25 @@ impl Layers {
     /// Takes a sample; returns the innovation in N and its variance in units of the noise's.
     #[inline(always)]
     pub(crate) fn take(&mut self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> (f64, f64) {
-        let h = self.regressor(position_m, drive);
-        let (w, y, r) = match &self.last {
-            None => (h, force_n, 1.0 / (1.0 - rho * rho)),
-            Some((before, force_before)) => {
-                let mut w = h;
-                if rho != 0.0 {
-                    for (w, before) in w.iter_mut().zip(before) {
-                        *w -= rho * before;
-                    }
+        let x = position_m - self.start_m;
+        let (mut w, mut y, mut r) = (self.regressor(x, drive), force_n, 1.0);
+        if rho != 0.0 {
+            if let Some([x, drive, force_n]) = self.last {
+                for (w, before) in w.iter_mut().zip(self.regressor(x, drive)) {
+                    *w -= rho * before;
                 }
-                (w, force_n - rho * force_before, 1.0)
+                y -= rho * force_n;
+            } else {
+                r = 1.0 / (1.0 - rho * rho);
             }
-        };
+        }
         let innovation = if self.passed > 0 {
             self.belief.innovation([A, K, F, ZERO], [w[A], w[K], w[F], w[ZERO]], y, r)
         } else {
             self.belief.innovation([A, K, F, KP, ZERO], [w[A], w[K], w[F], w[KP], w[ZERO]], y, r)
         };
         self.belief.take(&innovation);
-        self.last = Some((h, force_n));
+        self.last = Some([x, drive, force_n]);
         (innovation.e, innovation.s)
     }
 
@@ -123,7 +122,14 @@ impl Layers {
     }
 
     /// A rupture at `position_m`, known to `sd_m`.
-    pub(crate) fn rupture(&mut self, position_m: f64, sd_m: f64, drive: f64, noise: &Noise) {
+    pub(crate) fn rupture(
+        &mut self,
+        position_m: f64,
+        sd_m: f64,
+        drive: f64,
+        noise: &Noise,
+        behind: &mut Behind,
+    ) {
         let unit = 1.0 / noise.variance;
         let mut d = (position_m - self.start_m).max(1e-6);
         let first = self.passed == 0;
@@ -164,10 +170,10 @@ impl Layers {
         g.p[ZERO][ZERO] += before * before * place;
         d += delta;
         // The layer before this one will not be known better.
-        if let Some(before) = self.passed.checked_sub(1).and_then(|i| self.behind.get_mut(i)) {
+        if let Some(before) = self.passed.checked_sub(1).and_then(|i| behind.get_mut(i)) {
             before[2] = known;
         }
-        if let Some(slot) = self.behind.get_mut(self.passed) {
+        if let Some(slot) = behind.get_mut(self.passed) {
             *slot = [position_m - d, position_m, 0.0];
         }
         self.start_m = position_m;
@@ -192,10 +198,10 @@ impl Layers {
 
     /// Friction per drive that the passed layers exert with the tip at `z_m` on the way back, each with its friction spread
     /// evenly over its thickness.
-    pub(crate) fn around_shaft(&self, z_m: f64) -> f64 {
+    pub(crate) fn around_shaft(&self, behind: &Behind, z_m: f64) -> f64 {
         let last = self.passed.min(MAX_LAYERS);
         let (mut whole, mut inside) = (0.0, 0.0);
-        for (i, [start, end, b]) in self.behind.iter().take(last).enumerate() {
+        for (i, [start, end, b]) in behind.iter().take(last).enumerate() {
             let b = if i + 1 == self.passed { self.belief.x[FP].max(0.0) } else { *b };
             whole += b * (end - start);
             inside += b * (z_m - start).clamp(0.0, end - start);

@@ -40,6 +40,10 @@ pub(crate) struct Step {
     pub(crate) dt_s: f64,
     pub(crate) dz_m: f64,
     pub(crate) dv_mps: f64,
+    /// Correlation of the noise over it.
+    pub(crate) rho: f64,
+    /// The speed has changed within it, nobody knows when.
+    pub(crate) sudden: bool,
     /// Typical speed of the last travel, positive.
     pub(crate) speed_mps: f64,
 }
@@ -106,7 +110,7 @@ impl Local {
             let r = 1.0 / (1.0 - noise.rho * noise.rho);
             return self.state.innovation([L], [1.0], force_n, r);
         }
-        let rho = noise.rho_over(step.dt_s);
+        let rho = step.rho;
         if rho == 0.0 {
             return self.state.innovation([L], [1.0], force_n, 1.0);
         }
@@ -119,6 +123,13 @@ impl Local {
         self.state.take(innovation);
         self.last_n = force_n;
         self.fresh = false;
+    }
+
+    /// The level begins anew at a measured force; what the slopes are stays.
+    pub(crate) fn level(&mut self, measured_n: f64, noise: &Noise) {
+        self.state.renew(L, measured_n, 1.0 / (1.0 - noise.rho * noise.rho));
+        self.last_n = measured_n;
+        self.fresh = true;
     }
 
     /// Passes a sample over.

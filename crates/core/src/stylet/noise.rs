@@ -1,6 +1,8 @@
 //! The sensor's noise, learned while the needle is in the air and kept up to date in the tissue: a first-order
 //! autoregression, `n_k = rho n_(k-1) + w_k`, `w` white with standard deviation `sigma`.
 
+use super::gaussian::{at_least, at_most};
+
 /// Longest memory in the tissue, in samples: 3 % of `sigma`, enough for the false-alarm rate to be right within
 /// a factor two.
 const MEMORY: f64 = 2000.0;
@@ -29,6 +31,10 @@ pub(crate) struct Noise {
     last_n: f64,
     last_z: f64,
     least: f64,
+    /// What follows from the above and is asked for with every sample: mean in the air, `1/(1 - rho)²`, `variance/(1 - rho²)`.
+    bias_n: f64,
+    slow: f64,
+    marginal: f64,
 }
 
 impl Noise {
@@ -46,17 +52,21 @@ impl Noise {
             last_n: 0.0,
             last_z: 0.0,
             least: least_n * least_n,
+            bias_n: 0.0,
+            slow: 1.0,
+            marginal: least_n * least_n,
         }
     }
 
     /// Mean force in the air in N: what the sensor shows without load.
+    #[inline(always)]
     pub(crate) fn bias_n(&self) -> f64 {
-        if self.sums[3] > 0.0 { self.first_n + self.sums[0] / self.sums[3] } else { 0.0 }
+        self.bias_n
     }
 
     /// How well that is known, in N².
     pub(crate) fn bias_variance(&self) -> f64 {
-        if self.sums[3] > 0.0 { self.variance * self.slow() / self.sums[3] } else { self.variance }
+        if self.sums[3] > 0.0 { self.variance * self.slow / self.sums[3] } else { self.variance }
     }
 
     /// Samples in the air that counted.
@@ -111,10 +121,29 @@ impl Noise {
         self.rho = if rho * rho * n < 4.0 { 0.0 } else { rho.clamp(0.0, RHO_LIMIT) };
         let unbiased = variance * n / (n - (1.0 + self.rho) / (1.0 - self.rho)).max(0.5 * n);
         self.variance = (unbiased * (1.0 - self.rho * self.rho)).max(self.least);
+        self.bias_n = self.first_n + mean;
+        self.follow();
+    }
+
+    /// Colour that is within two standard errors of none, `1/sqrt(count)`, is none.
+    #[inline(always)]
+    fn colour(&self) -> f64 {
+        if self.rho * self.rho * self.count < 4.0 { 0.0 } else { self.rho }
+    }
+
+    #[inline(always)]
+    fn follow(&mut self) {
+        let rho = self.colour();
+        (self.slow, self.marginal) = (1.0, self.variance);
+        if rho != 0.0 {
+            let d = 1.0 - rho;
+            self.slow = 1.0 / (d * d);
+            self.marginal = self.variance / (1.0 - rho * rho);
+        }
     }
 
     /// A whitened innovation `e` whose variance was `s` times the noise's.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn in_tissue(&mut self, e: f64, s: f64) {
         let z2 = e * e / (s * self.variance);
         let young = self.count < 50.0;
@@ -122,29 +151,30 @@ impl Noise {
             self.count += 1.0;
         }
         let gain = 1.0 / self.count;
-        let counted = if z2 > CLIP && !young { CLIP } else { z2 };
-        self.variance = (self.variance * (1.0 + gain * (counted - 1.0))).max(self.least);
-        let z = if e > 0.0 { libm::sqrt(counted) } else { -libm::sqrt(counted) };
-        self.rho = (self.rho + gain * z * self.last_z * (1.0 - self.rho * self.rho)).clamp(0.0, RHO_LIMIT);
+        let counted = if young { z2 } else { at_most(CLIP, z2) };
+        self.variance = at_least(self.least, self.variance * (1.0 + gain * (counted - 1.0)));
+        let z = libm::copysign(libm::sqrt(counted), e);
+        let rho = self.rho + gain * z * self.last_z * (1.0 - self.rho * self.rho);
+        self.rho = at_most(RHO_LIMIT, at_least(0.0, rho));
         self.last_z = z;
+        self.follow();
     }
 
     /// Correlation over a step of `dt_s`: `rho^(dt/step)` to first order.
     #[inline(always)]
     pub(crate) fn rho_over(&self, dt_s: f64) -> f64 {
-        if self.rho == 0.0 {
+        let rho = self.colour();
+        if rho == 0.0 {
             return 0.0;
         }
-        1.0 / (1.0 + (1.0 / self.rho - 1.0) * dt_s / self.step_s)
+        let weighed = rho * self.step_s;
+        weighed / (weighed + (1.0 - rho) * dt_s)
     }
 
     /// Variance of the noise itself in N².
     #[inline(always)]
     pub(crate) fn marginal(&self) -> f64 {
-        if self.rho == 0.0 {
-            return self.variance;
-        }
-        self.variance / (1.0 - self.rho * self.rho)
+        self.marginal
     }
 
     /// What intervals grow by, as a factor of the variance, because the level of slow noise was learned from few samples: with
@@ -157,10 +187,6 @@ impl Noise {
     /// How much more slow noise weighs than white noise of the same innovations: `1/(1 - rho)²`.
     #[inline(always)]
     pub(crate) fn slow(&self) -> f64 {
-        if self.rho == 0.0 {
-            return 1.0;
-        }
-        let d = 1.0 - self.rho;
-        1.0 / (d * d)
+        self.slow
     }
 }

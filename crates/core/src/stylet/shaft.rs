@@ -13,6 +13,7 @@
 //!   What the way back itself shows is added by a tracker: changes over more than [`TRACK_M`] count as friction, faster ones as the tip's, and a sudden
 //!   release of the pull, which a tip that is only pulled cannot make, as friction.
 
+use super::gaussian::{at_least, at_most};
 use super::local::MEMORY_M;
 
 /// Pull of the friction on the way back as a share of the largest force: with a puncture that leaves half of its force as friction, and a pull of
@@ -83,6 +84,7 @@ impl Shaft {
     }
 
     /// Takes a sample; returns the friction in N and its standard deviation.
+    #[inline(always)]
     pub(crate) fn take(&mut self, felt: &Felt) -> (f64, f64) {
         let before = self.smooth_n;
         self.smooth_n += felt.share * (felt.force_n - before);
@@ -110,11 +112,12 @@ impl Shaft {
         } else if before > 0.0 {
             self.level_n *= (self.smooth_n / before).clamp(0.0, 2.0);
         }
-        self.level_n = self.level_n.min(self.smooth_n).max(0.0);
+        self.level_n = at_least(0.0, at_most(self.smooth_n, self.level_n));
         // Friction may still build up, or have been the new layer's force: not known better than to a quarter.
         (self.level_n, 0.25 * self.level_n)
     }
 
+    #[cold]
     fn turn(&mut self, felt: &Felt, force_n: f64) {
         let pull = (PULL * felt.peak_n).max(libm::sqrt(felt.noise_n2)).max(1e-9);
         let force = force_n.max(0.05 * pull);
@@ -133,6 +136,7 @@ impl Shaft {
 }
 
 impl Back {
+    #[inline(never)]
     fn take(&mut self, felt: &Felt) -> (f64, f64) {
         let travel = (self.deepest_back_m - felt.position_m).max(0.0);
         if travel > 0.0 {

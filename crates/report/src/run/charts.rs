@@ -133,13 +133,19 @@ pub(super) fn layer_bands(report: &RunReport) -> Vec<Band> {
     spans.enumerate().map(band).collect()
 }
 
+/// Nothing to draw.
+static NONE: Vec<f64> = Vec::new();
+
 pub(super) fn detection_section(report: &RunReport) -> Section {
-    let statistic = with_curves(
-        Chart::new("CUSUM of the reconstruction error", TIME_LABEL, "g (N²)").caption(BENT),
-        report,
-        |c| &c.cusum_n2,
-        |c| vec![(c.cusum_threshold_n2, "alarm")],
-    );
+    let statistic = |share: bool, chart: Chart| {
+        let column = |c: &Combination| c.cusum_is_share == share;
+        with_curves(
+            chart.caption(BENT),
+            report,
+            |c| if column(c) { &c.cusum_n2 } else { &NONE },
+            |c| vec![(c.cusum_threshold_n2.filter(|_| column(c)), "alarm")],
+        )
+    };
     let derivative = with_curves(
         Chart::new("Force derivative", TIME_LABEL, "df/dt (N/s)").caption(BENT),
         report,
@@ -150,10 +156,20 @@ pub(super) fn detection_section(report: &RunReport) -> Section {
         let linear_below = chart.levels.iter().map(|level| level.y).find(|y| *y > 0.0);
         Chart { scale: linear_below.map_or(Scale::Linear, Scale::Asinh), ..chart }
     };
-    Section::new("Detection")
-        .chart(state_chart(report))
-        .chart(with_events(bent(statistic), report, false))
-        .chart(with_events(bent(derivative), report, false))
+    let mut section = Section::new("Detection").chart(state_chart(report));
+    if report.combinations.iter().any(|c| c.cusum_is_share) {
+        let chart = Chart::new("Alarm: the largest CUSUM as a share of its threshold", TIME_LABEL, "g");
+        section = section.chart(with_events(bent(statistic(true, chart)), report, false));
+    }
+    if report.combinations.iter().all(|c| c.cusum_is_share) && !report.combinations.is_empty() {
+        return section;
+    }
+    let chart = Chart::new("CUSUM of the reconstruction error", TIME_LABEL, "g (N²)");
+    section.chart(with_events(bent(statistic(false, chart)), report, false)).chart(with_events(
+        bent(derivative),
+        report,
+        false,
+    ))
 }
 
 /// One curve per combination and each distinct threshold once.

@@ -203,6 +203,9 @@ pub struct Combination {
     pub cusum_n2: Vec<f64>,
     /// Its alarm threshold.
     pub cusum_threshold_n2: Option<f64>,
+    /// The statistic is a share of its threshold, without a unit.
+    #[serde(default)]
+    pub cusum_is_share: bool,
     /// Filtered force derivative.
     pub force_derivative_n_per_s: Vec<f64>,
     /// Derivative threshold that expects a rupture.

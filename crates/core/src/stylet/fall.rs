@@ -1,0 +1,136 @@
+//! A fall of the force: whether it is a rupture, and what a rupture does.
+
+use super::local::Step;
+use super::{LONGEST_DROP_S, Stylet, WORK_RUPTURE};
+use crate::config::EnhanceConfig;
+use crate::sample::{Cause, Detection, Sample};
+
+/// Samples that the level of a fall is averaged over at most.
+const MOST_AVERAGED: f64 = 16.0;
+
+/// A fall of the force that may become a rupture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fall {
+    from_n: f64,
+    mean_n: f64,
+    since_s: f64,
+    count: f64,
+}
+
+impl Stylet {
+    /// Follows a fall from where it began.
+    #[inline(always)]
+    pub(super) fn fall(&mut self, step: &Step, sample: &Sample) {
+        let fall = self.fall.get_or_insert(Fall {
+            from_n: self.last_level_n,
+            mean_n: sample.force_n,
+            since_s: 0.0,
+            count: 0.0,
+        });
+        fall.since_s += step.dt_s;
+        fall.count += 1.0;
+        // As many samples as it takes to know the force to a quarter of the drop that counts.
+        let most = if self.least_n > 0.0 {
+            16.0 * self.noise.marginal() / (self.least_n * self.least_n)
+        } else {
+            MOST_AVERAGED
+        };
+        let most = most.clamp(1.0, MOST_AVERAGED);
+        fall.mean_n += (sample.force_n - fall.mean_n) / fall.count.min(most);
+        if fall.since_s > LONGEST_DROP_S && self.least_n > 0.0 && fall.from_n - fall.mean_n < self.least_n {
+            // Too slow, or too small: not a rupture.
+            self.fall = None;
+            self.alarm.rest();
+            self.was_quiet = true;
+        }
+    }
+
+    /// Whether the fall so far is a drop: larger than what the noise may feign, and than texture.
+    pub(super) fn is_a_drop(&mut self, config: &EnhanceConfig) -> bool {
+        let Some(fall) = self.fall else { return false };
+        // As long as the law has not been seen to hold, the first travel after contact is no layer.
+        if self.rough > 0.0 && self.deepest_m - self.first_m < config.guard.blind_travel_m {
+            return false;
+        }
+        let effective = (fall.count.min(MOST_AVERAGED) / libm::sqrt(self.noise.slow())).max(1.0);
+        let noise = 2.0 * libm::sqrt(self.noise.marginal() / effective);
+        let size = fall.from_n - fall.mean_n;
+        self.drop = (size, noise / 2.0);
+        size >= self.least_n.max(noise)
+    }
+
+    pub(super) fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {
+        let force = (sample.force_n - self.noise.bias_n()).abs().max(sd);
+        self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
+        self.alarm.rest();
+        self.was_quiet = true;
+        self.fall = None;
+        if let Some(fallen) = self.fallen {
+            self.layers = fallen;
+        }
+        self.before = self.layers;
+        self.before_m = sample.position_m;
+        self.shaft.rupture(sample.position_m, sample.force_n - self.noise.bias_n());
+    }
+
+    #[cold]
+    pub(super) fn rupture(&mut self, step: &Step, sample: &Sample, evidence: f64) {
+        if self.report_at < u32::MAX {
+            self.report(sample);
+        }
+        let bias = self.noise.bias_n();
+        let span = (sample.position_m - self.before_m).max(0.0);
+        // One sample that says it all lies half a step behind the rupture; a sum over many began where it left zero, give or take
+        // a step.
+        let first = span.min(step.dz_m.max(0.0));
+        let at_m = self.before_m + 0.5 * first;
+        let place_m = if span > 1.5 * first { first.max(0.5 * span) } else { first / libm::sqrt(12.0) };
+        let drive = self.steady.max(1e-6);
+        let predicted = self.local.level_n();
+        self.layers = self.before;
+        self.work += WORK_RUPTURE;
+        self.layers.rupture(at_m, place_m, drive, &self.noise, &mut self.behind);
+        self.fallen = Some(self.layers);
+        self.since_s = 0.0;
+        self.layers.take(sample.position_m, self.drive, sample.force_n, 0.0);
+        let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
+        self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
+        self.alarm.rest();
+        self.was_quiet = true;
+        self.fall = None;
+        self.before = self.layers;
+        self.before_m = sample.position_m;
+        self.since = 0;
+        self.report_at = 16;
+        if self.out.ruptures == 0 {
+            self.out.contact_m = Some(self.layers.start_m - self.layers.previous_m);
+        }
+        self.out.ruptures += 1;
+        self.shaft.rupture(sample.position_m, sample.force_n - bias);
+        // Before the sum passed its threshold a rupture was as likely as a false alarm; what is above it counts.
+        let confidence = 1.0 / (1.0 + libm::exp(-(evidence + core::f64::consts::LN_2)));
+        let (drop_n, drop_sd_n) = self.drop;
+        self.out.detection = Some(Detection {
+            layer: self.out.ruptures,
+            time_s: sample.time_s,
+            position_m: sample.position_m,
+            located_s: sample.time_s,
+            located_m: at_m,
+            cause: Cause::Cusum,
+            drop_n,
+            drop_sd_n,
+            confidence,
+        });
+    }
+
+    /// Whether the drop still goes on; once it is over, that is settled.
+    pub(super) fn settle(&mut self, step: &Step) -> bool {
+        let (rate, variance) = self.local.rate(step.speed_mps);
+        let sd = libm::sqrt(variance * self.noise.variance);
+        let falling = rate < -3.0 * sd;
+        if self.since_s > LONGEST_DROP_S && rate > -2.0 * sd {
+            self.fallen = None;
+        }
+        falling
+    }
+}
