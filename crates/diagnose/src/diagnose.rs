@@ -1,7 +1,6 @@
 //! The diagnosis from end to end.
 
 use crate::base::{Prepared, base};
-use crate::varied::varied;
 use crate::error::DiagnoseError;
 use crate::held_out::{Left, floor, left_out, rms};
 use crate::intervals::Spread;
@@ -11,6 +10,7 @@ use crate::raw;
 use crate::rivals::{CLASS_NATS, Rival, rivals};
 use crate::select::Search;
 use crate::small::{self, Small};
+use crate::varied::varied;
 use crate::visible;
 use rayon::prelude::*;
 use std::collections::BTreeMap;

@@ -84,9 +84,10 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
         return vec![Borne::default(); best.model.effects.len()];
     }
     let square = |left: &[Option<Left>]| {
-        let (sum, blocks) = left.iter().flatten().fold((0.0, 0.0), |(s, n), l| {
-            (s + l.square_n2 * l.blocks as f64, n + l.blocks as f64)
-        });
+        let (sum, blocks) = left
+            .iter()
+            .flatten()
+            .fold((0.0, 0.0), |(s, n), l| (s + l.square_n2 * l.blocks as f64, n + l.blocks as f64));
         sum / f64::max(blocks, 1.0)
     };
     let models: Vec<Option<Model>> = (0..n).into_par_iter().map(|r| without(best, data, r)).collect();
@@ -104,11 +105,10 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
                 let count = values.len() as f64;
                 spread = spread.max((sum * (count - 1.0) / count).sqrt() / mean.abs().max(1e-300));
             }
-            let gain = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 })
-                .map_or(0.0, |f| {
-                    let less = square(&left_out(&f, data));
-                    (less - with) / (less - floor_n * floor_n).max(1e-12)
-                });
+            let gain = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 }).map_or(0.0, |f| {
+                let less = square(&left_out(&f, data));
+                (less - with) / (less - floor_n * floor_n).max(1e-12)
+            });
             Borne { spread, gain }
         })
         .collect()

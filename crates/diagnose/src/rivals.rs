@@ -1,7 +1,7 @@
 //! Effects that explain the data as well as a cause: its class.
 
 use crate::judge::{cost, gain};
-use crate::select::{Search, extra};
+use crate::select::{Search, at_a_bound, extra};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::model::Choice;
@@ -33,7 +33,8 @@ pub fn rivals(search: &mut Search) -> Vec<Vec<Rival>> {
         // More numbers have to be worth it when all that is left is noise.
         let worth = |f: &Fit| {
             f.model.effect_numbers() <= search.best.model.effect_numbers()
-                || gain(&search.best, f, &search.data) > extra(&search.best, f, &search.data)
+                || (!at_a_bound(f, k)
+                    && gain(&search.best, f, &search.data) > extra(&search.best, f, &search.data))
         };
         if let Some((f, _)) = ahead.filter(|r| swaps < 3 && worth(&r.0)) {
             search.settle(f.clone());
@@ -60,7 +61,9 @@ fn of(search: &Search, k: usize) -> Vec<(Fit, f64)> {
         .zip(&stage.rivals)
         .filter(|(c, r)| {
             let close = best - r.1 < (FAR * best).max(NEAR_NATS);
-            close && model.effects.iter().all(|e| e.info.id != c.info.id)
+            // A special case may have been behind only for what came into the model since.
+            let special = c.info.nested_in.contains(&own.info.id);
+            (close || special) && model.effects.iter().all(|e| e.info.id != c.info.id)
         })
         .map(|(c, _)| c.clone())
         .collect();

@@ -218,7 +218,8 @@ fn simpler_first(mut full: Vec<Fit>, data: &Data) -> Vec<Fit> {
     let id = leader.model.effects.last().map_or("", |e| e.info.id);
     let special = |f: &Fit| f.model.effects.last().is_some_and(|e| e.info.nested_in.contains(&id));
     let Some(k) = full.iter().position(special) else { return full };
-    if at_a_bound(leader) || gain(&full[k], leader, data) < extra(&full[k], leader, data) {
+    let last = leader.model.effects.len().saturating_sub(1);
+    if at_a_bound(leader, last) || gain(&full[k], leader, data) < extra(&full[k], leader, data) {
         let f = full.remove(k);
         full.insert(0, f);
     }
@@ -232,12 +233,11 @@ pub fn extra(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
     cost(more, data.compared()) + LEAST
 }
 
-/// Whether a number of the last effect stands where it may not go further.
+/// Whether a number of an effect stands where it may not go further.
 #[must_use]
-pub fn at_a_bound(f: &Fit) -> bool {
-    let Some(last) = f.model.effects.len().checked_sub(1) else { return false };
+pub fn at_a_bound(f: &Fit, which: usize) -> bool {
     f.model.shared().iter().any(|n| match n.role {
-        Role::Effect { effect, .. } if effect == last => {
+        Role::Effect { effect, .. } if effect == which => {
             let x = f.model.get(n.role, 0);
             let near = 1e-6 * (n.high - n.low);
             near.is_finite() && (x <= n.low + near || x >= n.high - near)

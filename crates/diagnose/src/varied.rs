@@ -53,11 +53,8 @@ pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
     // Under the noise that the larger of both leaves.
     let kinds = |f: &Fit| usize::from(f.model.free.own_surface) + usize::from(f.model.free.own_friction);
     let paid = price(other.model.free, &data) - price(now, &data);
-    let gained = if kinds(&other) >= kinds(&best) {
-        gain(&best, &other, &data)
-    } else {
-        -gain(&other, &best, &data)
-    };
+    let gained =
+        if kinds(&other) >= kinds(&best) { gain(&best, &other, &data) } else { -gain(&other, &best, &data) };
     if gained <= paid {
         return (best, data);
     }

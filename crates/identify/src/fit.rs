@@ -1,10 +1,10 @@
 //! Bounded, damped least squares of all numbers of a model, the instants of its ruptures included.
 
 use crate::events::{rows_like, scatter_of};
+use crate::forward::Replayed;
 use crate::linear::{Factor, Symmetric, dot};
 use crate::model::{Model, NEVER, Number, Role};
 use crate::noise::weight;
-use crate::forward::Replayed;
 use crate::objective::{Data, Residuals, Trail, nats, replay, residuals};
 use rayon::prelude::*;
 

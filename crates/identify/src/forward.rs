@@ -264,7 +264,11 @@ impl Track {
             next += 1;
             // The first one is the start itself: nothing has happened yet.
             let passed = pieces.get(s.piece).is_some_and(|p| p.from_s > passed_s);
-            if passed && next > at + 1 && s.walk.done >= done_with && known.is_some_and(|k| s.leads_on_like(k)) {
+            if passed
+                && next > at + 1
+                && s.walk.done >= done_with
+                && known.is_some_and(|k| s.leads_on_like(k))
+            {
                 same = Some((s.block as usize, s.walk.done));
                 return false;
             }
@@ -298,7 +302,8 @@ impl Track {
             };
             first = first.min(pieces.iter().position(reached).unwrap_or(pieces.len()));
             // A layer is strained, if only by nothing, from the rupture of the one before.
-            if let Some(before) = l.checked_sub(1).and_then(|k| self.instants.get(k)).filter(|t| **t < NEVER) {
+            if let Some(before) = l.checked_sub(1).and_then(|k| self.instants.get(k)).filter(|t| **t < NEVER)
+            {
                 first = first.min(of(*before));
             }
         }
@@ -332,17 +337,11 @@ fn go_on(
     out: &mut Replayed,
     visit: &mut impl FnMut(&Here) -> bool,
 ) {
-    let Saved { piece: first, state, chain, done, threshold_n, mut broken, mut block, mut sum, events } = from;
+    let Saved { piece: first, state, chain, done, threshold_n, mut broken, mut block, mut sum, events } =
+        from;
     out.events = events;
-    let mut walk = Walk {
-        model,
-        state,
-        chain,
-        done,
-        events: &mut out.events,
-        step_s: blocks.step_s,
-        threshold_n,
-    };
+    let mut walk =
+        Walk { model, state, chain, done, events: &mut out.events, step_s: blocks.step_s, threshold_n };
     let end_s = pieces.last().map_or(0.0, |p| p.to_s);
     for (index, piece) in pieces.iter().enumerate().skip(first) {
         if index % EVERY == 0 {

@@ -72,7 +72,10 @@ impl Noise {
     /// Independent noise of one size.
     #[must_use]
     pub fn white(sd_n: f64) -> Self {
-        Self { edges_n: Vec::new(), bins: vec![Bin { a: [0.0; ORDER], slow: [0.0; SLOW.len()], innovation_n: sd_n, sd_n }] }
+        Self {
+            edges_n: Vec::new(),
+            bins: vec![Bin { a: [0.0; ORDER], slow: [0.0; SLOW.len()], innovation_n: sd_n, sd_n }],
+        }
     }
 
     /// The noise of residuals `e` (N), one column per recording; nowhere less than `floor_n`.

@@ -73,7 +73,8 @@ fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
     assert!(models.len() > 20, "{}", models.len());
     let mut compared = 0;
     // Instants anywhere between two saved states.
-    let instants = (0..24).map(|k| vec![2.1 + 0.02 * f64::from(k), 4.6 + 0.03 * f64::from(k), 9.7 + 0.07 * f64::from(k)]);
+    let instants = (0..24)
+        .map(|k| vec![2.1 + 0.02 * f64::from(k), 4.6 + 0.03 * f64::from(k), 9.7 + 0.07 * f64::from(k)]);
     for ((name, mut model), instants) in models.into_iter().zip(instants.cycle()) {
         model.instants = vec![instants];
         model.free.own_surface = true;

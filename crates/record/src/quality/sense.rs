@@ -61,7 +61,11 @@ pub(super) fn unmeasurable(recording: &Recording) -> Option<QualityNote> {
         at + 1,
         recording.time_s[at]
     );
-    Some(QualityNote::forbidding(QualityKind::UnitMixUp, message, [("value", value), ("limit", UNMEASURABLE)]))
+    Some(QualityNote::forbidding(
+        QualityKind::UnitMixUp,
+        message,
+        [("value", value), ("limit", UNMEASURABLE)],
+    ))
 }
 
 /// Longest run of equal forces that passes while the needle moves.
