@@ -88,11 +88,10 @@ impl Course {
             for w in hints {
                 best = better(best, frame.refined(&[], w / TAU, narrow));
             }
-            if if union { 2.0 * frame.half < SHORT_S } else { !best.white } {
-                if let Some(one) = frame.wave(&[]) {
-                    let two = if one.white { None } else { frame.wave(&[one.waves[0][0]]) };
-                    best = better(better(best, Some(one)), two);
-                }
+            let wanted = if union { 2.0 * frame.half < SHORT_S } else { !best.white };
+            if wanted && let Some(one) = frame.wave(&[]) {
+                let two = if one.white { None } else { frame.wave(&[one.waves[0][0]]) };
+                best = better(better(best, Some(one)), two);
             }
         }
         Some(best)
