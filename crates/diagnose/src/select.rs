@@ -23,6 +23,8 @@ const FULL: usize = 4;
 const PROMISE: f64 = 0.5;
 /// A rival that gains less than the best by more than this share is not fitted to the end.
 const BEHIND: f64 = 0.5;
+/// The best so far is begun anew at most so often.
+const RESTARTS: usize = 4;
 /// Blocks of the search are averaged by so many to rank starts.
 const COARSER: usize = 3;
 
@@ -51,13 +53,15 @@ pub struct Search {
     pub data: Data,
     /// What was tried.
     pub stages: Vec<Stage>,
+    /// How often the best may still be begun anew from a rival's numbers.
+    restarts: usize,
 }
 
 impl Search {
     /// From the base law on.
     #[must_use]
     pub fn run(prepared: &Prepared, base: Fit, data: Data, progress: &mut impl FnMut(&str)) -> Self {
-        let mut search = Self { best: base.clone(), base, data, stages: Vec::new() };
+        let mut search = Self { best: base.clone(), base, data, stages: Vec::new(), restarts: RESTARTS };
         loop {
             let stands = search.best.model.effects.len();
             progress(&format!("looking for {} effect", if stands == 0 { "an" } else { "another" }));
@@ -127,6 +131,9 @@ impl Search {
             })
             .collect();
         full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
+        if self.started_too_far(&full) {
+            return self.grow(prepared);
+        }
         let name = |f: &Fit| f.model.effects.last().map_or("", |e| e.info.id);
         let mut stage = Stage {
             stood: self.best.model.effects.iter().map(|e| e.info.id).collect(),
@@ -154,6 +161,26 @@ impl Search {
         let any = stage.taken.is_some();
         self.stages.push(stage);
         any
+    }
+
+    /// Whether the leader owes its gain to a better start: the best so far, begun from the leader's numbers, is then better
+    /// than it was and takes its own place.
+    fn started_too_far(&mut self, full: &[Fit]) -> bool {
+        let Some(leader) = full.first() else { return false };
+        let Some(last) = leader.model.effects.len().checked_sub(1) else { return false };
+        if self.restarts == 0 || self.best.nats() - leader.nats() < LEAST {
+            return false;
+        }
+        let Some(again) = fit(&leader.model.without(last), &self.data, Effort::FULL) else { return false };
+        if self.best.nats() - again.nats() < LEAST {
+            return false;
+        }
+        self.restarts -= 1;
+        self.settle(again);
+        if self.best.model.effects.is_empty() {
+            self.base = self.best.clone();
+        }
+        true
     }
 
     /// Strong lines of the residual's spectrum are no noise: an autoregression would take them for its own colour.
