@@ -6,7 +6,7 @@
 //!
 //! | module | what lives there |
 //! |---|---|
-//! | [`velocity`], [`settle`] | velocity and its jumps from exact and from noisy positions |
+//! | [`velocity`], [`settle`], `course` | velocity and its jumps from exact and from noisy positions |
 //! | [`motion`], [`blocks`] | the motion between samples; a recording as means over blocks of 20 ms |
 //! | [`model`] | what is fitted: numbers with their priors and bounds |
 //! | [`forward`] | the law replayed with imposed ruptures, or its own |
