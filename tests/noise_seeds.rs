@@ -137,7 +137,7 @@ const NOT_MET: &[&str] = &[
 /// The specification's reference cases: surface known, the sinusoid starting at full speed.
 #[test]
 fn the_reference_lines_are_met_but_for_those_that_are_named() {
-    let known = |model| EnhanceConfig { contact: Contact::Known, model, ..EnhanceConfig::default() };
+    let known = |model| EnhanceConfig { contact: Contact::Known, model, ..EnhanceConfig::paper() };
     let constant = load("three_layer_latex_constant");
     let sinusoid = from_full_speed();
     let c = summarise("known surface, constant, ML", &scores(&constant, &known(Model::MultiLayer)));
@@ -198,7 +198,7 @@ fn kelvin_voigt_is_off_as_in_the_reference_without_covariance_resets_and_less_wi
             contact: Contact::Known,
             model: Model::KelvinVoigt,
             reset,
-            ..EnhanceConfig::default()
+            ..EnhanceConfig::paper()
         };
         config.drop.reweight = reweight;
         summarise(name, &scores(scenario, &config)).median_stiffness
@@ -232,7 +232,7 @@ const NOISE_NOT_MET: &[&str] = &["0.03 N: false", "0.1 N: missed", "0.1 N: false
 /// 1985 at 0.1 N.
 #[test]
 fn above_twenty_millinewtons_of_noise_it_breaks_down_as_in_the_reference() {
-    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::default() };
+    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::paper() };
     let mut constant = load("three_layer_latex_constant");
     let mut not_met = Vec::new();
     for (noise_n, missed, alarms) in [(0.03, 37, 138), (0.1, 256, 1985)] {
