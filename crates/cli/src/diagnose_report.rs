@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use stylet_diagnose::Examined;
 use stylet_diagnose::curves::{Curves, binned, by_layer_and_phase, correlations, curves, shown};
 use stylet_diagnose::lines::spectrum;
-use stylet_diagnose::outcome::{Diagnosis, Verdict};
+use stylet_diagnose::outcome::{BaseParameter, Diagnosis, Verdict};
 use stylet_report::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
 use stylet_report::{
     Block, Cell, Chart, Code, Colour, Level, LineStyle, MarkerSet, Page, Scale, Scorecard, Section, Series,
@@ -121,13 +121,12 @@ fn equation(examined: &Examined) -> Section {
         .iter()
         .map(|b| {
             vec![
-                Cell::text(format!("layer {}", b.layer)),
+                Cell::text(if b.layer > 0 { format!("layer {}", b.layer) } else { "tissue".to_owned() }),
                 Cell::text(b.name.clone()),
                 Cell::number(number(b.assumed)),
                 Cell::number(number(b.value)),
                 Cell::number(format!("{} to {}", number(b.low), number(b.high))),
-                Cell::number(format!("{:+.1} %", 100.0 * (b.value / b.assumed - 1.0)))
-                    .status(if b.at_bound { Status::Warn } else { Status::Plain }),
+                Cell::number(change(b)).status(if b.at_bound { Status::Warn } else { Status::Plain }),
             ]
         })
         .collect();
@@ -461,4 +460,14 @@ fn repeat(args: &DiagnoseArgs, examined: &Examined) -> Section {
             text: examined.extended.to_ron().unwrap_or_default(),
             folded: true,
         }))
+}
+
+/// By how much a re-fitted number differs from the one assumed, and whether it may go no further.
+fn change(b: &BaseParameter) -> String {
+    let by = if b.name.ends_with("_m") {
+        format!("{:+.2} mm", 1e3 * (b.value - b.assumed))
+    } else {
+        format!("{:+.1} %", 100.0 * (b.value / b.assumed - 1.0))
+    };
+    if b.at_bound { format!("{by}, at its bound") } else { by }
 }
