@@ -4,7 +4,7 @@
 //! A window that is narrow enough for a ripple of 1 Hz leaves a tenth of a millimetre per second of encoder noise in the
 //! velocity, and friction makes that the force's largest error. When a whole stretch is one of these forms, a handful of
 //! numbers are estimated from all its samples, and the velocity is known a hundred times better. A stretch
-//! that is none of them (its residual is coloured) is left to local windows ([`crate::settle`]).
+//! that is none of them (its residual is coloured) is left to local windows (`settle`).
 
 use crate::linear::Symmetric;
 use core::f64::consts::{PI, TAU};

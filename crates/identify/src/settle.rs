@@ -1,7 +1,7 @@
 //! Position and velocity from noisy or coarsely rounded positions: as wide a window as the course allows.
 //!
 //! Samples are averaged in cells of about 20 ms. Jumps of the speed are where parabolas on both sides of a gap between
-//! cells meet with clearly different slopes. A stretch between two jumps is what a robot was told to do ([`crate::course`])
+//! cells meet with clearly different slopes. A stretch between two jumps is what a robot was told to do (`course`)
 //! when that leaves white noise. Else every cell takes the widest of a ladder of windows whose
 //! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
 
