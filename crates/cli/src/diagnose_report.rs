@@ -464,7 +464,8 @@ fn repeat(args: &DiagnoseArgs, examined: &Examined) -> Section {
 
 /// By how much a re-fitted number differs from the one assumed, and whether it may go no further.
 fn change(b: &BaseParameter) -> String {
-    let by = if b.name.ends_with("_m") {
+    let place = matches!(b.name.as_str(), "surface_m" | "thickness_m");
+    let by = if place {
         format!("{:+.2} mm", 1e3 * (b.value - b.assumed))
     } else {
         format!("{:+.1} %", 100.0 * (b.value / b.assumed - 1.0))

@@ -231,7 +231,7 @@ fn median(v: &mut [f64], q: f64) -> f64 {
 }
 
 fn run(row: &Row, seeds: u64, rate: f64) {
-    let law = Law::new(&row.tissue, &row.effects).unwrap();
+    let law = Law::new(&row.tissue, &row.effects).expect("few effects");
     let dt = 1.0 / row.fs;
     let n = (row.dur * row.fs) as usize;
     let (mut missed, mut fals, mut total) = (0, 0, 0);

@@ -79,17 +79,13 @@ pub fn spectrum(fit: &Fit, data: &Data) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-/// Residuals (N) of a fit less their lines, each with an amplitude and a phase of every recording's own; `None` without
-/// lines.
+/// Residuals (N) of a fit less the lines at these frequencies (Hz), each with an amplitude and a phase of every
+/// recording's own.
 #[must_use]
-pub fn without(fit: &Fit, data: &Data) -> Option<Vec<Vec<f64>>> {
-    let found = lines(fit, data);
-    if found.is_empty() {
-        return None;
-    }
+pub fn without(fit: &Fit, data: &Data, lines: &[f64]) -> Vec<Vec<f64>> {
     let mut e = fit.residuals.e.clone();
     for (b, e) in data.blocks.iter().zip(&mut e) {
-        for hz in &found {
+        for hz in lines {
             let wave: Vec<(f64, f64)> = (0..b.len())
                 .map(|k| libm::sincos(core::f64::consts::TAU * hz * 0.5 * (b.from_s[k] + b.to_s[k])))
                 .collect();
@@ -105,7 +101,7 @@ pub fn without(fit: &Fit, data: &Data) -> Option<Vec<Vec<f64>>> {
             e.iter_mut().zip(&wave).for_each(|(e, (s, c))| *e -= x[0] * s + x[1] * c);
         }
     }
-    Some(e)
+    e
 }
 
 /// Frequencies (Hz) at which the residual of a fit has lines, strongest first.

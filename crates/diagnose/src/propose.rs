@@ -18,15 +18,15 @@ pub struct Start {
     pub visible: f64,
 }
 
-/// The best starts of every effect, best effect first, at most two of each.
+/// The best starts of every effect, best effect first, at most two of each; `lines` (Hz) are those of the residual's spectrum.
 #[must_use]
-pub fn starts(look: &Look, prepared: &Prepared) -> Vec<Vec<Start>> {
+pub fn starts(look: &Look, prepared: &Prepared, lines: &[f64]) -> Vec<Vec<Start>> {
     let taken: Vec<&str> = look.fit.model.effects.iter().map(|e| e.info.id).collect();
     let entries: Vec<&'static EffectInfo> = library().filter(|i| !taken.contains(&i.id)).collect();
     let mut all: Vec<Vec<Start>> = entries
         .par_iter()
         .map(|info| {
-            let mut own = of(info, look, prepared);
+            let mut own = of(info, look, prepared, lines);
             own.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             own.truncate(2);
             own
@@ -37,14 +37,14 @@ pub fn starts(look: &Look, prepared: &Prepared) -> Vec<Vec<Start>> {
     all
 }
 
-fn of(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<Start> {
+fn of(info: &'static EffectInfo, look: &Look, prepared: &Prepared, hz: &[f64]) -> Vec<Start> {
     match info.proposal {
         Proposal::Columns(groups) => groups.iter().filter_map(|g| columns(info, look, g)).collect(),
         Proposal::Faces(shift) => {
             (1..look.fit.model.layers()).filter_map(|l| columns(info, look, &[&[l as f64, shift]])).collect()
         }
         Proposal::Breath => breath(info, look),
-        Proposal::Line => lines(info, look),
+        Proposal::Line => lines(info, look, hz),
         Proposal::Break => breaks(info, look, prepared),
         Proposal::Raw | Proposal::PerLayer => Vec::new(),
     }
@@ -165,10 +165,10 @@ fn slopes(look: &Look) -> Option<(PerBlock, PerBlock)> {
 }
 
 /// Lines of the residual's spectrum.
-fn lines(info: &'static EffectInfo, look: &Look) -> Vec<Start> {
-    crate::lines::lines(look.fit, look.data)
-        .into_iter()
-        .filter_map(|hz| {
+fn lines(info: &'static EffectInfo, look: &Look, found: &[f64]) -> Vec<Start> {
+    found
+        .iter()
+        .filter_map(|&hz| {
             let quarter = core::f64::consts::FRAC_PI_2;
             let columns: Vec<Column> = [[1e-3, hz, 0.0], [1e-3, hz, quarter]]
                 .iter()

@@ -82,7 +82,7 @@ impl Search {
 
     /// Takes one more effect; false when none is worth it.
     fn grow(&mut self, prepared: &Prepared) -> bool {
-        self.see_lines();
+        let lines = self.see_lines();
         let look = Look::new(&self.best, &self.data);
         let times = prepared.drop_times();
         let blocks = self.data.compared();
@@ -92,7 +92,7 @@ impl Search {
             // What only ruptures show looks like their scatter at first, and that shrinks when it is fitted.
             s[0].choice.info.place == Place::Puncture || s[0].nats > PROMISE * (cost(numbers, blocks) + LEAST)
         };
-        let mut ranked = starts(&look, prepared);
+        let mut ranked = starts(&look, prepared, &lines);
         ranked.retain(|s| promises(s));
         let by_ruptures = |s: &&Vec<Start>| s[0].choice.info.place == Place::Puncture;
         let tried: Vec<&Start> = ranked
@@ -183,18 +183,23 @@ impl Search {
         true
     }
 
-    /// Strong lines of the residual's spectrum are no noise: an autoregression would take them for its own colour.
-    fn see_lines(&mut self) {
+    /// Frequencies (Hz) of strong lines of the residual's spectrum. They are no noise: an autoregression would take them for
+    /// its own colour.
+    fn see_lines(&mut self) -> Vec<f64> {
         let line = |id: &str| stylet_tissue::info(id).is_some_and(|i| matches!(i.proposal, Proposal::Line));
         if self.best.model.effects.iter().any(|e| line(e.info.id)) {
-            return;
+            return Vec::new();
         }
-        let Some(less) = crate::lines::without(&self.best, &self.data) else { return };
-        let data = self.data.judged_by(&less, From::Calm);
-        if let Some(left) = residuals(&self.best.model, &data) {
-            self.best.residuals = left;
-            self.data = data;
+        let found = crate::lines::lines(&self.best, &self.data);
+        if !found.is_empty() {
+            let less = crate::lines::without(&self.best, &self.data, &found);
+            let data = self.data.judged_by(&less, From::Calm);
+            if let Some(left) = residuals(&self.best.model, &data) {
+                self.best.residuals = left;
+                self.data = data;
+            }
         }
+        found
     }
 
     /// The data averaged further, with the noise of the best, to rank starts.

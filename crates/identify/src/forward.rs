@@ -122,8 +122,17 @@ fn note(events: &mut [Event], s: &Strain) {
 
 /// Replays a law with the ruptures at `instants` (s; [`NEVER`] for those that never were).
 pub fn imposed(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[f64], out: &mut Replayed) {
-    begin(model, blocks, out);
-    let first = Saved {
+    let first = begin(model, blocks, out);
+    go_on(model, blocks, pieces, instants, first, out, &mut |_| true);
+}
+
+/// Room for a replay, and where it begins.
+fn begin(model: &Compiled, blocks: &Blocks, out: &mut Replayed) -> Saved {
+    out.f.clear();
+    out.f.resize(blocks.len(), 0.0);
+    out.events.clear();
+    out.events.resize(model.puncture_n.len(), Event { step_s: blocks.step_s, ..Event::UNSEEN });
+    Saved {
         piece: 0,
         state: LawState::default(),
         chain: model.measures.then(|| model.chain.start(0.0)),
@@ -133,16 +142,7 @@ pub fn imposed(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[
         block: 0,
         sum: 0.0,
         events: out.events.clone(),
-    };
-    go_on(model, blocks, pieces, instants, first, out, &mut |_| true);
-}
-
-/// Room for a replay.
-fn begin(model: &Compiled, blocks: &Blocks, out: &mut Replayed) {
-    out.f.clear();
-    out.f.resize(blocks.len(), 0.0);
-    out.events.clear();
-    out.events.resize(model.puncture_n.len(), Event { step_s: blocks.step_s, ..Event::UNSEEN });
+    }
 }
 
 /// All that a replay remembers before a piece.
@@ -214,18 +214,7 @@ impl Track {
     #[must_use]
     pub fn new(model: &Compiled, blocks: &Blocks, pieces: &[Piece], instants: &[f64]) -> Self {
         let mut track = Self { instants: instants.to_vec(), ..Self::default() };
-        begin(model, blocks, &mut track.replayed);
-        let first = Saved {
-            piece: 0,
-            state: LawState::default(),
-            chain: model.measures.then(|| model.chain.start(0.0)),
-            done: 0,
-            threshold_n: f64::INFINITY,
-            broken: vec![false; model.breaks_m.len()],
-            block: 0,
-            sum: 0.0,
-            events: track.replayed.events.clone(),
-        };
+        let first = begin(model, blocks, &mut track.replayed);
         let saved = &mut track.saved;
         go_on(model, blocks, pieces, instants, first, &mut track.replayed, &mut |here| {
             saved.push(here.saved());

@@ -381,7 +381,7 @@ mod tests {
 
     #[test]
     fn a_motion_of_no_known_form_is_followed_by_windows() {
-        // Speed that grows by steps of acceleration: no polynomial of low degree and no sinusoid.
+        // A ripple that gets faster and faster: no polynomial of low degree and no sinusoid.
         let drawn = |t: f64| {
             (0.002 * t + 4e-4 * (1.0 + (0.3 * t * t).sin()), 0.002 + 2.4e-4 * t * (0.3 * t * t).cos())
         };

@@ -128,7 +128,7 @@ fn main() {
     for file in &files {
         let (mut r, _) =
             read_csv(file, &ReadOptions { columns: Some(map.clone()), repair: true }).expect("recording");
-        let name = file.file_stem().unwrap().to_string_lossy().into_owned();
+        let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for f in &mut r.force_n {
             *f *= scale;
         }
@@ -142,10 +142,14 @@ fn main() {
             r.force_n = keep(&r.force_n);
         }
         r.velocity_mps = differentiate(&r.time_s, &r.position_m, 0.05);
-        let deepest = (0..r.len()).max_by(|a, b| r.position_m[*a].total_cmp(&r.position_m[*b])).unwrap();
-        let end_z = r.position_m[deepest] - 5e-5;
-        let stop = (0..r.len()).find(|&i| r.position_m[i] >= end_z).unwrap();
-        let turn = (0..r.len()).rev().find(|&i| r.position_m[i] >= end_z).unwrap();
+        let end_z = r.position_m.iter().fold(f64::NEG_INFINITY, |m, z| m.max(*z)) - 5e-5;
+        let there = |z: &f64| *z >= end_z;
+        let (Some(stop), Some(turn)) =
+            (r.position_m.iter().position(there), r.position_m.iter().rposition(there))
+        else {
+            eprintln!("{name}: no position");
+            continue;
+        };
         let all: Vec<Fall> = falls(&r, 1.0, scale).into_iter().filter(|f| f.at < turn).collect();
         let less: Vec<Fall> = falls(&r, 0.4, scale).into_iter().filter(|f| f.at < turn).collect();
         let mut noisy = r.clone();
@@ -224,7 +228,7 @@ fn main() {
                         };
                         f(a).total_cmp(&f(b))
                     })
-                    .unwrap();
+                    .unwrap_or(first.at);
                 if name.starts_with("skin_") {
                     alone.push((
                         rms((from..turn).map(|i| trace.enhanced_n[i])),
@@ -284,8 +288,9 @@ fn main() {
                         / 0.5
                         / scale,
                 );
-                let i = (turn..r.len()).find(|&i| x(i) >= at + 0.001).unwrap();
-                steps.push((stepped[i] - trace.enhanced_n[i]) / -0.5 / scale);
+                if let Some(i) = (turn..r.len()).find(|&i| x(i) >= at + 0.001) {
+                    steps.push((stepped[i] - trace.enhanced_n[i]) / -0.5 / scale);
+                }
             }
         }
         let contact = trace.contact_m.unwrap_or(f64::NAN);
@@ -297,10 +302,11 @@ fn main() {
         if sets.last().is_none_or(|s| s.0 != set) {
             sets.push((set, vec![], vec![], 0.0));
         }
-        let last = sets.last_mut().unwrap();
-        last.1.push(raw);
-        last.2.push(enh);
-        last.3 = last.3.max(spike);
+        if let Some(last) = sets.last_mut() {
+            last.1.push(raw);
+            last.2.push(enh);
+            last.3 = last.3.max(spike);
+        }
         if verbose || !line.is_empty() {
             println!(
                 "{name}: contact {:.2} mm, {} detections, back raw {raw:.3} enh {enh:.3} spike {spike:.2}{line}",
@@ -322,9 +328,11 @@ fn main() {
                     sigma[i]
                 );
             }
-            std::fs::write(format!("{dir}/{name}.csv"), s).unwrap();
+            let path = format!("{dir}/{name}.csv");
+            if let Err(why) = std::fs::write(&path, s) {
+                eprintln!("{path}: {why}");
+            }
         }
-        let _ = stop;
     }
     delays.sort_by(f64::total_cmp);
     let q = |p: f64| delays.get(((delays.len().max(1) - 1) as f64 * p) as usize).copied().unwrap_or(f64::NAN);

@@ -101,6 +101,7 @@ pub fn text(outcomes: &[Outcome]) -> String {
             c.p90_s
         );
     }
+    together(&mut out, outcomes);
     said(&mut out, outcomes);
     held(&mut out, outcomes);
     confident(&mut out, outcomes);
@@ -111,6 +112,20 @@ pub fn text(outcomes: &[Outcome]) -> String {
             writeln!(out, "\n{} cases without an answer, the first {}: {why}", failed.len(), first.id.name());
     }
     out
+}
+
+/// What is hidden, over all rows.
+fn together(out: &mut String, outcomes: &[Outcome]) {
+    let mut by: BTreeMap<_, Vec<&Outcome>> = BTreeMap::new();
+    for o in outcomes {
+        by.entry((o.id.world, o.id.hide, o.id.size)).or_default().push(o);
+    }
+    let _ = writeln!(out, "\nall rows together: right, and alone; a wrong name");
+    for ((world, hide, size), all) in by {
+        let right = Rate::of(&all, |o| o.worth.right);
+        let wrong = Rate::of(&all, |o| o.worth.wrong_name);
+        let _ = writeln!(out, "    {:<48}{right:<28}{wrong}", format!("{world}: {hide}, {size}"));
+    }
 }
 
 /// What was said where the answer was not right.
