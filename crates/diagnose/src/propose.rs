@@ -139,10 +139,10 @@ fn slopes(look: &Look) -> Option<(PerBlock, PerBlock)> {
     let (mut fz, mut fv) = (Vec::new(), Vec::new());
     for (r, b) in look.data.blocks.iter().enumerate() {
         let compiled = model.compile(r)?;
-        let course = pieces(&compiled, b).into_owned();
+        let course = pieces(&compiled, b);
         let mut out = [Replayed::default(), Replayed::default(), Replayed::default()];
         for (out, (dz, dv)) in out.iter_mut().zip([(0.0, 0.0), (DZ_M, 0.0), (0.0, DV_MPS)]) {
-            let mut moved = course.clone();
+            let mut moved = (*course).clone();
             for p in &mut moved {
                 p.z_m += dz;
                 p.v_mps += dv;
