@@ -62,8 +62,7 @@ fn roughness(blocks: &[Blocks]) -> f64 {
 pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
-    let mut data =
-        Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide), floor_n: prepared.floor_n };
+    let mut data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
     let mut model = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {

@@ -4,7 +4,6 @@ use crate::base::Prepared;
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
-use std::sync::Arc;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role};
@@ -204,8 +203,7 @@ impl Search {
 
     /// The data averaged further, with the noise of the best, to rank starts.
     fn coarse(&self) -> Data {
-        let blocks = Arc::new(self.data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
-        let coarse = Data { blocks, ..self.data.clone() };
+        let coarse = self.data.on(self.data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
         match residuals(&self.best.model, &coarse) {
             Some(left) => coarse.judged_by(&left.e, From::Calm),
             None => coarse,

@@ -5,9 +5,9 @@ use crate::events::{Event, judge};
 use crate::forward::{Replayed, Track, free, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
 use crate::motion::Piece;
-use crate::noise::{From, Noise, rho};
+use crate::noise::{From, Laid, Noise, rho};
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Recordings in blocks and the noise by which they are judged.
 #[derive(Clone, Debug)]
@@ -18,13 +18,28 @@ pub struct Data {
     pub noise: Arc<Noise>,
     /// The noise is nowhere less, in N: what the recorded force is rounded to leaves open.
     pub floor_n: f64,
+    /// How each recording is whitened.
+    laid: Arc<OnceLock<Vec<Laid>>>,
 }
 
 impl Data {
+    /// Recordings judged by a noise that is nowhere less than `floor_n`.
+    #[must_use]
+    pub fn new(blocks: Arc<Vec<Blocks>>, noise: Noise, floor_n: f64) -> Self {
+        Self { blocks, noise: Arc::new(noise), floor_n, laid: Arc::default() }
+    }
+
+    /// Normalised innovations of residuals `e` (N) of recording `r`; blocks that are not compared give zero.
+    #[must_use]
+    pub fn whiten(&self, r: usize, e: &[f64]) -> Vec<f64> {
+        let laid = self.laid.get_or_init(|| self.blocks.iter().map(|b| self.noise.laid(b)).collect());
+        self.noise.whiten(&laid[r], e)
+    }
+
     /// The same recordings judged by another noise.
     #[must_use]
     pub fn with_noise(&self, noise: Noise) -> Self {
-        Self { blocks: Arc::clone(&self.blocks), noise: Arc::new(noise), floor_n: self.floor_n }
+        Self::new(Arc::clone(&self.blocks), noise, self.floor_n)
     }
 
     /// The same recordings judged by the noise that residuals tell.
@@ -36,8 +51,13 @@ impl Data {
     /// Some of the recordings.
     #[must_use]
     pub fn only(&self, which: &[usize]) -> Self {
-        let blocks = which.iter().map(|k| self.blocks[*k].clone()).collect();
-        Self { blocks: Arc::new(blocks), noise: Arc::clone(&self.noise), floor_n: self.floor_n }
+        self.on(which.iter().map(|k| self.blocks[*k].clone()).collect())
+    }
+
+    /// Other recordings judged by the same noise.
+    #[must_use]
+    pub fn on(&self, blocks: Vec<Blocks>) -> Self {
+        Self { blocks: Arc::new(blocks), laid: Arc::default(), ..self.clone() }
     }
 
     /// Number of blocks compared.
@@ -121,8 +141,7 @@ impl Trail {
         let b = &data.blocks[r];
         let now = self.track.neighbour(&self.compiled, &self.compiled, b, &self.seen, instants);
         let e: Vec<f64> = b.f.iter().zip(&now.f).map(|(y, f)| y - f).collect();
-        let mut w = vec![0.0; e.len()];
-        data.noise.whiten(b, &e, &mut w);
+        let w = data.whiten(r, &e);
         let events: f64 = now.events.iter().map(|e| judge(e, &model.scatter).nats).sum();
         let sum = w.iter().map(|w| rho(*w)).sum::<f64>() + events;
         if sum.is_finite() { sum } else { NEVER }
@@ -141,8 +160,7 @@ pub fn residuals(model: &Model, data: &Data) -> Option<Residuals> {
     let one = |(r, b): (usize, &Blocks)| {
         let replayed = replay(model, data, r)?;
         let e: Vec<f64> = b.f.iter().zip(&replayed.f).map(|(y, f)| y - f).collect();
-        let mut w = vec![0.0; e.len()];
-        data.noise.whiten(b, &e, &mut w);
+        let w = data.whiten(r, &e);
         Some((e, w, replayed.events))
     };
     let each: Vec<Option<_>> = data.blocks.par_iter().enumerate().map(one).collect();
