@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use stylet_identify::fit::Column;
 use stylet_identify::look::{Gain, Look, scaled};
 use stylet_identify::model::Choice;
-use stylet_tissue::{EffectInfo, Proposal, library};
+use stylet_tissue::{EffectInfo, Place, Proposal, library};
 
 /// A start with what it gains to first order.
 #[derive(Clone, Debug)]
@@ -27,6 +27,9 @@ pub fn starts(look: &Look, prepared: &Prepared, lines: &[f64]) -> Vec<Vec<Start>
         .par_iter()
         .map(|info| {
             let mut own = of(info, look, prepared, lines);
+            if info.place == Place::Puncture {
+                own.extend(crate::at_ruptures::start(info, look));
+            }
             own.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             own.truncate(2);
             own
