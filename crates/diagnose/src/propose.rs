@@ -4,7 +4,7 @@ use crate::base::Prepared;
 use rayon::prelude::*;
 use stylet_identify::fit::Column;
 use stylet_identify::look::{Gain, Look, scaled};
-use stylet_identify::model::Choice;
+use stylet_identify::model::{Choice, Model};
 use stylet_tissue::{EffectInfo, Place, Proposal, library};
 
 /// A start with what it gains to first order.
@@ -16,6 +16,16 @@ pub struct Start {
     pub nats: f64,
     /// Nats that the effect at its probe would show.
     pub visible: f64,
+    /// The model to fit from, where it is not the one so far with the effect.
+    pub model: Option<Model>,
+}
+
+impl Start {
+    /// The model to fit from, beside the one so far.
+    #[must_use]
+    pub fn beside(&self, stood: &Model) -> Model {
+        self.model.clone().unwrap_or_else(|| stood.with(self.choice.clone()))
+    }
 }
 
 /// The best starts of every effect, best effect first, at most two of each; `lines` (Hz) are those of the residual's spectrum.
@@ -28,7 +38,7 @@ pub fn starts(look: &Look, prepared: &Prepared, lines: &[f64]) -> Vec<Vec<Start>
         .map(|info| {
             let mut own = of(info, look, prepared, lines);
             if info.place == Place::Puncture {
-                own.extend(crate::at_ruptures::start(info, look));
+                own.extend(crate::at_ruptures::start(info, look, &prepared.drop_times()));
             }
             own.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             own.truncate(2);
@@ -86,7 +96,7 @@ fn start(
     } else {
         gain.nats
     };
-    Some(Start { choice, nats, visible: gain.visible })
+    Some(Start { choice, nats, visible: gain.visible, model: None })
 }
 
 /// Lowest and highest frequency in Hz of a breath.
@@ -124,6 +134,7 @@ fn breath(info: &'static EffectInfo, look: &Look) -> Vec<Start> {
                 choice: Choice::new(info, &[amplitude, hz, libm::atan2(b, a)]),
                 nats: gain.nats,
                 visible: gain.visible,
+                model: None,
             })
         })
         .collect()
@@ -184,6 +195,7 @@ fn lines(info: &'static EffectInfo, look: &Look, found: &[f64]) -> Vec<Start> {
                 choice: Choice::new(info, &[amplitude, hz, libm::atan2(b, a)]),
                 nats: gain.nats,
                 visible: gain.visible,
+                model: None,
             })
         })
         .collect()
@@ -238,6 +250,7 @@ fn breaks(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<St
                     choice: Choice::new(info, &[depth - stretch, k, k * stretch]),
                     nats: gain.nats,
                     visible: gain.visible,
+                    model: None,
                 })
             })
         })

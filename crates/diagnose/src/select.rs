@@ -103,7 +103,7 @@ impl Search {
         let coarse = self.coarse();
         let mut short: Vec<Fit> = tried
             .par_iter()
-            .filter_map(|s| fit(&self.best.model.with(s.choice.clone()), &coarse, Effort::SHORT))
+            .filter_map(|s| fit(&s.beside(&self.best.model), &coarse, Effort::SHORT))
             .collect();
         short.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
         let mut names: Vec<&str> = Vec::new();
