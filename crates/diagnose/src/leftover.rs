@@ -2,8 +2,11 @@
 //!
 //! Residuals are averaged in bins of depth, time, speed, phase and travel since reversal; what is the same in several
 //! recordings is no noise. The cross-recording statistic `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero whatever the noise's
-//! colour, since the noises of two recordings know nothing of each other.
+//! colour, since the noises of two recordings know nothing of each other; how far it strays depends on the colour, for slow
+//! noise makes neighbouring bins alike: its variance is `sum_(r<s) sum_(b,b') C_r(b,b') C_s(b,b')`, `C_r` from the
+//! autocovariance of what is left of a recording when the others' means are taken away (Bartlett 1935 for two series).
 
+use rayon::prelude::*;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Fit;
 use stylet_identify::objective::Data;
@@ -83,7 +86,7 @@ fn bins(feature: usize, b: &Blocks, deepest: f64) -> Vec<usize> {
 pub fn test(fit: &Fit, data: &Data) -> Leftover {
     let deepest = data.blocks.iter().flat_map(|b| b.pieces.iter()).fold(0.0_f64, |m, p| m.max(p.z_m));
     let mut found: Vec<(String, f64, f64)> = FEATURES
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(feature, name)| {
             let (p, nats) = structure(feature, data, &fit.residuals.w, deepest);
@@ -97,28 +100,50 @@ pub fn test(fit: &Fit, data: &Data) -> Leftover {
     Leftover { p_value, depends_on: found.into_iter().map(|f| (f.0, f.1)).collect(), nats }
 }
 
+/// What a recording, or half of one, has in the bins of a feature.
+struct Part {
+    /// Sum and count of every bin.
+    sums: Vec<(f64, f64)>,
+    /// The bin of every block, where it is compared.
+    bins: Vec<Option<usize>>,
+    /// Normalised residuals, outlying ones cut.
+    w: Vec<f64>,
+}
+
+/// The parts that are compared: the recordings, or every other half second of a single one.
+fn parts(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> Vec<Part> {
+    let mut parts = Vec::new();
+    let halves = if data.recordings() == 1 { 2 } else { 1 };
+    for (b, w) in data.blocks.iter().zip(w) {
+        let first = b.from_s.first().copied().unwrap_or(0.0);
+        let all = bins(feature, b, deepest);
+        for half in 0..halves {
+            let own = |i: usize| halves == 1 || ((b.from_s[i] - first) / 0.5) as usize % 2 == half;
+            let mut part = Part {
+                sums: vec![(0.0, 0.0); BINS],
+                bins: Vec::with_capacity(b.len()),
+                w: w.iter().map(|w| w.clamp(-4.0, 4.0)).collect(),
+            };
+            for (i, bin) in all.iter().enumerate() {
+                let bin = Some(*bin).filter(|bin| b.used[i] && own(i) && *bin < BINS);
+                if let Some(bin) = bin {
+                    part.sums[bin].0 += part.w[i];
+                    part.sums[bin].1 += 1.0;
+                }
+                part.bins.push(bin);
+            }
+            parts.push(part);
+        }
+    }
+    parts
+}
+
 /// p-value and nats of one feature.
 fn structure(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> (f64, f64) {
-    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new(); // per recording and bin: sum, count
-    for (b, w) in data.blocks.iter().zip(w) {
-        // A single recording is compared with itself: every other half second.
-        let halves = if data.recordings() == 1 { 2 } else { 1 };
-        let mut sums = vec![vec![(0.0, 0.0); BINS]; halves];
-        let first = b.from_s.first().copied().unwrap_or(0.0);
-        for (i, bin) in bins(feature, b, deepest).into_iter().enumerate() {
-            if b.used[i] {
-                let half = if halves == 2 { ((b.from_s[i] - first) / 0.5) as usize % 2 } else { 0 };
-                if let Some(slot) = sums[half].get_mut(bin) {
-                    slot.0 += w[i].clamp(-4.0, 4.0);
-                    slot.1 += 1.0;
-                }
-            }
-        }
-        parts.extend(sums);
-    }
-    let (mut t, mut variance, mut third, mut pooled, mut used) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let parts = parts(feature, data, w, deepest);
+    let (mut t, mut variance, mut third, mut pooled, mut used) = (0.0, 0.0_f64, 0.0, 0.0, 0.0);
     for bin in 0..BINS {
-        let z: Vec<(f64, f64)> = parts.iter().map(|p| p[bin]).filter(|s| s.1 >= LEAST).collect();
+        let z: Vec<(f64, f64)> = parts.iter().map(|p| p.sums[bin]).filter(|s| s.1 >= LEAST).collect();
         let all: (f64, f64) = z.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         if all.1 > 0.0 {
             pooled += all.0 * all.0 / all.1;
@@ -138,7 +163,83 @@ fn structure(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> (f64,
     if variance == 0.0 {
         return (1.0, 0.0);
     }
-    (skewed_tail(t / f64::sqrt(variance), third / variance.powf(1.5)), 0.5 * (pooled - used))
+    let nats = 0.5 * (pooled - used);
+    let skewness = third / variance.powf(1.5);
+    let white = skewed_tail(t / f64::sqrt(variance), skewness);
+    if white > REPORTED || data.recordings() < 2 {
+        return (white, nats);
+    }
+    let told = coloured_variance(&parts).max(variance);
+    // Bins that go together count as fewer.
+    (skewed_tail(t / told.sqrt(), skewness * (told / variance).sqrt()), nats)
+}
+
+/// Lags in blocks at which an autocovariance is looked at, each for so many of them.
+fn lags() -> impl Iterator<Item = (usize, f64)> {
+    const NEAR: usize = 25;
+    const FAR: usize = 500;
+    const STEP: usize = 5;
+    (0..NEAR).map(|k| (k, 1.0)).chain((NEAR..FAR).step_by(STEP).map(|k| (k + STEP / 2, STEP as f64)))
+}
+
+/// Variance of the cross-recording statistic for noise of the colour that the recordings have.
+fn coloured_variance(parts: &[Part]) -> f64 {
+    let mut total = vec![(0.0, 0.0); BINS];
+    for p in parts {
+        for (t, s) in total.iter_mut().zip(&p.sums) {
+            *t = (t.0 + s.0, t.1 + s.1);
+        }
+    }
+    let kept: Vec<usize> =
+        (0..BINS).filter(|b| parts.iter().filter(|p| p.sums[*b].1 >= LEAST).count() > 1).collect();
+    let covariances: Vec<Vec<f64>> = parts.par_iter().map(|p| covariance(p, &total, &kept)).collect();
+    let mut sum = 0.0;
+    for (k, a) in covariances.iter().enumerate() {
+        for b in &covariances[..k] {
+            sum += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
+    sum
+}
+
+/// Covariances of a part's standardised sums in the bins kept, row by row; zero where it has too few blocks.
+fn covariance(part: &Part, total: &[(f64, f64)], kept: &[usize]) -> Vec<f64> {
+    let left: Vec<f64> = part
+        .w
+        .iter()
+        .zip(&part.bins)
+        .map(|(w, bin)| {
+            let Some(bin) = *bin else { return 0.0 };
+            let others = (total[bin].0 - part.sums[bin].0, total[bin].1 - part.sums[bin].1);
+            if others.1 >= LEAST { w - others.0 / others.1 } else { *w }
+        })
+        .collect();
+    let mut place = vec![usize::MAX; BINS];
+    for (k, bin) in kept.iter().enumerate().filter(|(_, b)| part.sums[**b].1 >= LEAST) {
+        place[*bin] = k;
+    }
+    let of = |i: usize| part.bins[i].map_or(usize::MAX, |b| place[b]);
+    let n = kept.len();
+    let mut c = vec![0.0; n * n];
+    for (lag, weight) in lags() {
+        let pairs = || (0..left.len().saturating_sub(lag)).map(|i| (i, i + lag));
+        let both = || pairs().filter(|(i, j)| part.bins[*i].is_some() && part.bins[*j].is_some());
+        let (sum, count) = both().fold((0.0, 0.0), |(s, n), (i, j)| (s + left[i] * left[j], n + 1.0));
+        let gamma = weight * sum / f64::max(count, 1.0);
+        for (a, b) in both().map(|(i, j)| (of(i), of(j))).filter(|(a, b)| *a < n && *b < n) {
+            c[a * n + b] += gamma;
+            if lag > 0 {
+                c[b * n + a] += gamma;
+            }
+        }
+    }
+    for (a, x) in kept.iter().enumerate() {
+        for (b, y) in kept.iter().enumerate() {
+            let both = part.sums[*x].1 * part.sums[*y].1;
+            c[a * n + b] /= both.max(1.0).sqrt();
+        }
+    }
+    c
 }
 
 /// Upper tail at `z` of a standardised variable of this skewness: a sum of few products has far longer tails than a
