@@ -22,6 +22,15 @@ pub struct Leftover {
     pub nats: f64,
 }
 
+/// What a model leaves, as slow noise and as none.
+#[derive(Clone, Debug, Default)]
+pub struct Told {
+    /// Held against noise of the colour that the residual has: what is sure.
+    pub sure: Leftover,
+    /// Held against noise of the data's own colour: slow noise of each recording's own shows too.
+    pub at_sight: Leftover,
+}
+
 /// Features with their binning.
 const FEATURES: [&str; 7] = [
     "depth",
@@ -83,15 +92,20 @@ fn bins(feature: usize, b: &Blocks, deepest: f64) -> Vec<usize> {
 
 /// Tests what a model leaves under the noise of the data.
 #[must_use]
-pub fn test(fit: &Fit, data: &Data) -> Leftover {
+pub fn test(fit: &Fit, data: &Data) -> Told {
     let deepest = data.blocks.iter().flat_map(|b| b.pieces.iter()).fold(0.0_f64, |m, p| m.max(p.z_m));
+    let all: Vec<Structure> = (0..FEATURES.len())
+        .into_par_iter()
+        .map(|feature| structure(feature, data, &fit.residuals.w, deepest))
+        .collect();
+    Told { sure: sum_up(&all, |s| s.coloured), at_sight: sum_up(&all, |s| s.white) }
+}
+
+fn sum_up(all: &[Structure], p: impl Fn(&Structure) -> f64) -> Leftover {
     let mut found: Vec<(String, f64, f64)> = FEATURES
-        .par_iter()
-        .enumerate()
-        .map(|(feature, name)| {
-            let (p, nats) = structure(feature, data, &fit.residuals.w, deepest);
-            ((*name).to_owned(), (p * FEATURES.len() as f64).min(1.0), nats)
-        })
+        .iter()
+        .zip(all)
+        .map(|(name, s)| ((*name).to_owned(), (p(s) * FEATURES.len() as f64).min(1.0), s.nats))
         .collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1).then(b.2.total_cmp(&a.2)));
     let p_value = found.first().map_or(1.0, |f| f.1);
@@ -138,9 +152,15 @@ fn parts(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> Vec<Part>
     parts
 }
 
-/// p-value and nats of one feature.
-fn structure(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> (f64, f64) {
-    let parts = parts(feature, data, w, deepest);
+/// The cross-recording statistic and what white noise would make of it.
+struct Statistic {
+    t: f64,
+    variance: f64,
+    skewness: f64,
+    nats: f64,
+}
+
+fn statistic(parts: &[Part]) -> Statistic {
     let (mut t, mut variance, mut third, mut pooled, mut used) = (0.0, 0.0_f64, 0.0, 0.0, 0.0);
     for bin in 0..BINS {
         let z: Vec<(f64, f64)> = parts.iter().map(|p| p.sums[bin]).filter(|s| s.1 >= LEAST).collect();
@@ -160,18 +180,32 @@ fn structure(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> (f64,
             }
         }
     }
-    if variance == 0.0 {
-        return (1.0, 0.0);
+    let skewness = if variance > 0.0 { third / variance.powf(1.5) } else { 0.0 };
+    Statistic { t, variance, skewness, nats: 0.5 * (pooled - used) }
+}
+
+/// p-values and nats of one feature.
+struct Structure {
+    /// As if neighbouring blocks knew nothing of each other.
+    white: f64,
+    /// With the colour of what is left.
+    coloured: f64,
+    nats: f64,
+}
+
+fn structure(feature: usize, data: &Data, w: &[Vec<f64>], deepest: f64) -> Structure {
+    let parts = parts(feature, data, w, deepest);
+    let s = statistic(&parts);
+    if s.variance == 0.0 {
+        return Structure { white: 1.0, coloured: 1.0, nats: 0.0 };
     }
-    let nats = 0.5 * (pooled - used);
-    let skewness = third / variance.powf(1.5);
-    let white = skewed_tail(t / f64::sqrt(variance), skewness);
+    let white = skewed_tail(s.t / s.variance.sqrt(), s.skewness);
     if white > REPORTED || data.recordings() < 2 {
-        return (white, nats);
+        return Structure { white, coloured: white, nats: s.nats };
     }
-    let told = coloured_variance(&parts).max(variance);
-    // Bins that go together count as fewer.
-    (skewed_tail(t / told.sqrt(), skewness * (told / variance).sqrt()), nats)
+    let (told, fewer) = coloured(&parts);
+    let coloured = skewed_tail(s.t / told.max(s.variance).sqrt(), s.skewness * fewer.max(1.0).sqrt());
+    Structure { white, coloured, nats: s.nats }
 }
 
 /// Lags in blocks at which an autocovariance is looked at, each for so many of them.
@@ -182,8 +216,9 @@ fn lags() -> impl Iterator<Item = (usize, f64)> {
     (0..NEAR).map(|k| (k, 1.0)).chain((NEAR..FAR).step_by(STEP).map(|k| (k + STEP / 2, STEP as f64)))
 }
 
-/// Variance of the cross-recording statistic for noise of the colour that the recordings have.
-fn coloured_variance(parts: &[Part]) -> f64 {
+/// Variance of the cross-recording statistic for noise of the colour that the recordings have, and by which factor the bins
+/// count as fewer, since they go together.
+fn coloured(parts: &[Part]) -> (f64, f64) {
     let mut total = vec![(0.0, 0.0); BINS];
     for p in parts {
         for (t, s) in total.iter_mut().zip(&p.sums) {
@@ -192,14 +227,16 @@ fn coloured_variance(parts: &[Part]) -> f64 {
     }
     let kept: Vec<usize> =
         (0..BINS).filter(|b| parts.iter().filter(|p| p.sums[*b].1 >= LEAST).count() > 1).collect();
+    let n = kept.len();
     let covariances: Vec<Vec<f64>> = parts.par_iter().map(|p| covariance(p, &total, &kept)).collect();
-    let mut sum = 0.0;
+    let (mut variance, mut apart) = (0.0, 0.0);
     for (k, a) in covariances.iter().enumerate() {
         for b in &covariances[..k] {
-            sum += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            variance += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            apart += (0..n).map(|i| a[i * (n + 1)] * b[i * (n + 1)]).sum::<f64>();
         }
     }
-    sum
+    (variance, variance / apart.max(1e-300))
 }
 
 /// Covariances of a part's standardised sums in the bins kept, row by row; zero where it has too few blocks.
@@ -256,7 +293,81 @@ pub fn skewed_tail(z: f64, skewness: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::skewed_tail;
+    use super::{FEATURES, parts, skewed_tail, statistic, structure, tail};
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
+    use stylet_record::Recording;
+
+    /// Four insertions with holds, at speeds of their own.
+    fn insertions() -> Data {
+        let one = |speed: f64| {
+            let t: Vec<f64> = (0..8000).map(|k| f64::from(k) / 200.0).collect();
+            let (mut at, mut z) = (0.0, Vec::new());
+            for t in &t {
+                at += if (t * 0.35).sin() > -0.6 { speed / 200.0 } else { 0.0 };
+                z.push(at);
+            }
+            let f = vec![0.0; t.len()];
+            let r = Recording::new(t, z, f).expect("a recording");
+            Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)
+        };
+        let blocks = [1.2e-3, 1.5e-3, 1.9e-3, 2.3e-3].map(one).to_vec();
+        Data::new(Arc::new(blocks), Noise::white(1.0), 0.0)
+    }
+
+    /// White noise of unit variance and a wander of each recording's own, twice as large, that lasts some seconds.
+    fn wandering(data: &Data, seed: u64) -> Vec<Vec<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = move || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        data.blocks
+            .iter()
+            .map(|b| {
+                let (mut slow, keep) = (2.0 * normal(), 0.995_f64);
+                (0..b.len())
+                    .map(|_| {
+                        slow = keep * slow + 2.0 * (1.0 - keep * keep).sqrt() * normal();
+                        slow + normal()
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_slow_wander_of_each_recordings_own_is_no_structure() {
+        let data = insertions();
+        let (mut seen, mut by_white) = (0, 0);
+        for seed in 0..40 {
+            let w = wandering(&data, seed);
+            for feature in 0..FEATURES.len() {
+                seen += usize::from(structure(feature, &data, &w, 0.09).coloured < 1e-4);
+                // As if neighbouring blocks knew nothing of each other.
+                let s = statistic(&parts(feature, &data, &w, 0.09));
+                by_white += usize::from(tail(s.t / s.variance.sqrt()) < 1e-4);
+            }
+        }
+        assert!(seen <= 1, "{seen} of 280");
+        assert!(by_white >= 30, "the noise would not have misled anybody: {by_white} of 280");
+    }
+
+    #[test]
+    fn what_is_the_same_at_every_depth_is_structure_under_a_slow_wander_too() {
+        let data = insertions();
+        for seed in 100..104 {
+            let mut w = wandering(&data, seed);
+            for (b, w) in data.blocks.iter().zip(&mut w) {
+                for (p, w) in b.pieces.iter().zip(w) {
+                    *w += 5.0 * (p.z_m * 1.5e3).sin();
+                }
+            }
+            let p = structure(0, &data, &w, 0.09).coloured;
+            assert!(p < 1e-6, "seed {seed}: {p:e}");
+        }
+    }
 
     /// Against the exact upper tails of chi-square with 2 and 8 degrees of freedom (`exp(-x/2)` and its series).
     #[test]
