@@ -9,7 +9,6 @@ use stylet_identify::events::{Event, FORCE_GRID, judge, scatter_prior};
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role, Scatter};
 use stylet_identify::objective::replay;
-use stylet_identify::retime::retime;
 use stylet_tissue::EffectInfo;
 
 /// Strengths tried over the range in which a search starts, and again around the best of them ...
@@ -21,7 +20,7 @@ const MOST_NATS: f64 = 12.0;
 
 /// The best start of a one-parameter effect by the ruptures alone; `None` where it gains nothing.
 #[must_use]
-pub fn start(info: &'static EffectInfo, look: &Look, drops: &[Vec<f64>]) -> Option<Start> {
+pub fn start(info: &'static EffectInfo, look: &Look) -> Option<Start> {
     let [parameter] = info.parameters else { return None };
     let stands = told(look, look.fit.model.clone())?.0;
     let mut best: Option<(f64, f64, Model)> = None;
@@ -43,13 +42,11 @@ pub fn start(info: &'static EffectInfo, look: &Look, drops: &[Vec<f64>]) -> Opti
         let at = best.as_ref()?.0;
         (low, high) = ((at - step).max(parameter.low), (at + step).min(parameter.high));
     }
-    let (x, nats, mut model) = best?;
+    let (x, nats, model) = best?;
     let gained = stands - nats;
     if gained <= 0.0 {
         return None;
     }
-    // The law with the effect ruptures elsewhere where the speed jumps.
-    retime(&mut model, look.data, drops);
     Some(Start { choice: Choice::new(info, &[x]), nats: gained, visible: gained, model: Some(model) })
 }
 

@@ -56,11 +56,25 @@ pub fn by_its_own(model: &Model, data: &Data, r: usize) -> Option<Left> {
 /// Predicts every recording from a fit to the others; with one recording the fit itself is used.
 #[must_use]
 pub fn left_out(best: &Fit, data: &Data) -> Vec<Option<Left>> {
+    left_out_with(best, data, |_| Own::default())
+}
+
+/// As [`left_out`], with the numbers of its own (surface, friction) of the recording that is left out granted: what a cause is
+/// worth does not hang on where the needle touched.
+#[must_use]
+pub fn left_out_granted(best: &Fit, data: &Data) -> Vec<Option<Left>> {
+    left_out_with(best, data, |r| best.model.own[r])
+}
+
+fn left_out_with(best: &Fit, data: &Data, own: impl Fn(usize) -> Own + Sync) -> Vec<Option<Left>> {
     let n = data.recordings();
     (0..n)
         .into_par_iter()
         .map(|r| {
-            let model = if n < 2 { best.model.clone() } else { without(best, data, r)? };
+            let mut model = if n < 2 { best.model.clone() } else { without(best, data, r)? };
+            if n > 1 {
+                model.own[r] = own(r);
+            }
             by_its_own(&model, data, r)
         })
         .collect()

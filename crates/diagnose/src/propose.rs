@@ -16,16 +16,8 @@ pub struct Start {
     pub nats: f64,
     /// Nats that the effect at its probe would show.
     pub visible: f64,
-    /// The model to fit from, where it is not the one so far with the effect.
+    /// The model to fit from, where it is not the one so far with the effect: ranked without a short fit.
     pub model: Option<Model>,
-}
-
-impl Start {
-    /// The model to fit from, beside the one so far.
-    #[must_use]
-    pub fn beside(&self, stood: &Model) -> Model {
-        self.model.clone().unwrap_or_else(|| stood.with(self.choice.clone()))
-    }
 }
 
 /// The best starts of every effect, best effect first, at most two of each; `lines` (Hz) are those of the residual's spectrum.
@@ -38,7 +30,7 @@ pub fn starts(look: &Look, prepared: &Prepared, lines: &[f64]) -> Vec<Vec<Start>
         .map(|info| {
             let mut own = of(info, look, prepared, lines);
             if info.place == Place::Puncture {
-                own.extend(crate::at_ruptures::start(info, look, &prepared.drop_times()));
+                own.extend(crate::at_ruptures::start(info, look));
             }
             own.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             own.truncate(2);
