@@ -32,10 +32,8 @@ pub fn check(
     let mut order: Vec<usize> = (0..ground.candidates.len()).collect();
     order.sort_by(|a, b| ground.candidates[*b].weight.total_cmp(&ground.candidates[*a].weight));
     order.truncate(MOST);
-    let mut tried: Vec<Tried> = order
-        .iter()
-        .map(|k| Tried { candidate: ground.name(*k).to_owned(), of: 0, decided: 0 })
-        .collect();
+    let mut tried: Vec<Tried> =
+        order.iter().map(|k| Tried { candidate: ground.name(*k).to_owned(), of: 0, decided: 0 }).collect();
     let sd_n = sensor_noise(ground, believed);
     'rounds: for round in 0..ROUNDS {
         for (k, tried) in order.iter().zip(&mut tried) {
@@ -44,9 +42,7 @@ pub fn check(
             }
             progress(&format!("simulating and diagnosing: {} ({})", tried.candidate, round + 1));
             let mut evidence = old.to_vec();
-            if evidence.is_empty()
-                && believed.motion.plan().is_some()
-            {
+            if evidence.is_empty() && believed.motion.plan().is_some() {
                 evidence.push(simulated(believed, ground, *k, &believed.motion, sd_n, 7 + round)?);
             }
             evidence.push(simulated(believed, ground, *k, &plan.motion, sd_n, 1000 + round)?);
@@ -60,7 +56,8 @@ pub fn check(
     if sum > 0.0 {
         // One success and one failure beforehand (Laplace): a few insertions make nobody sure.
         let share = |t: &Tried| (t.decided as f64 + 1.0) / (t.of as f64 + 2.0);
-        let seen: f64 = tried.iter().filter(|t| t.of > 0).map(|t| weight(&t.candidate) * share(t)).sum::<f64>() / sum;
+        let seen: f64 =
+            tried.iter().filter(|t| t.of > 0).map(|t| weight(&t.candidate) * share(t)).sum::<f64>() / sum;
         let count: usize = tried.iter().map(|t| t.of).sum();
         // Gaps weigh as much as six insertions.
         let n = count as f64;
@@ -74,7 +71,12 @@ pub fn check(
 /// Standard deviation of a sample's noise in N.
 fn sensor_noise(ground: &Ground, believed: &Scenario) -> f64 {
     let samples = (stylet_identify::blocks::BLOCK_S * ground.sample_hz).round().max(1.0);
-    believed.sensor.force_torque().map_or(0.0, |s| s.noise_n).min(ground.noise.sd_n() * samples.sqrt()).max(1e-4)
+    believed
+        .sensor
+        .force_torque()
+        .map_or(0.0, |s| s.noise_n)
+        .min(ground.noise.sd_n() * samples.sqrt())
+        .max(1e-4)
 }
 
 fn simulated(
@@ -103,5 +105,6 @@ fn right(said: &Diagnosis, ground: &Ground, which: usize) -> bool {
     if candidate.name == NONE {
         return beside.next().is_none();
     }
-    beside.next().is_some_and(|c| c.effect == candidate.name && c.equivalent.is_empty()) && beside.next().is_none()
+    beside.next().is_some_and(|c| c.effect == candidate.name && c.equivalent.is_empty())
+        && beside.next().is_none()
 }

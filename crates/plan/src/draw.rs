@@ -151,7 +151,8 @@ fn built(
             let hz = log_between(number(part, 4), RIPPLE_HZ);
             // Both the speed and the acceleration bound the amplitude; whole periods change the frequency by half of one.
             let periods = way_m / speed * hz;
-            let most = (most_mps - speed).min(WITHIN * limits.acceleration_mps2 / (TAU * hz * (1.0 + 0.5 / periods.max(0.5))));
+            let most = (most_mps - speed)
+                .min(WITHIN * limits.acceleration_mps2 / (TAU * hz * (1.0 + 0.5 / periods.max(0.5))));
             let wanted = speed * between(number(part, 3), (0.2, 1.6));
             let amplitude = wanted.min(most);
             if number(part, 0) > 0.45 && amplitude > 0.05 * speed && periods > 0.8 {

@@ -22,7 +22,9 @@ use stylet_scenario::Motion;
 /// Motions are compared over blocks of so many s ...
 const COARSE_S: f64 = 0.06;
 /// ... or of a share of their duration, so that a long one costs no more.
-const MOST_BLOCKS: f64 = 1500.0;
+const MOST_BLOCKS: f64 = 800.0;
+/// A planned motion is known exactly: so many samples per second are enough to see it.
+const LOOK_HZ: f64 = 50.0;
 /// What a slow autoregression leaves of one at least: beyond, its sum is not known.
 const LEAST_LEFT: f64 = 0.1;
 /// Insertions scatter at least so much, relative, until three have shown how much they do.
@@ -155,7 +157,8 @@ impl Ground {
                     let h = if x + n.step > n.high { -n.step } else { n.step };
                     moved.set(n.role, 0, x + h);
                     let mut column = change(&moved)?;
-                    for (now, was) in column.w.iter_mut().zip(&whole.w).chain(column.rows.iter_mut().zip(&whole.rows))
+                    for (now, was) in
+                        column.w.iter_mut().zip(&whole.w).chain(column.rows.iter_mut().zip(&whole.rows))
                     {
                         now.iter_mut().zip(was).for_each(|(now, was)| *now = (*now - was) / h);
                     }
@@ -164,7 +167,8 @@ impl Ground {
                 Some(columns)
             })
             .collect();
-        let mut more: Vec<Column> = of.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
+        let mut more: Vec<Column> =
+            of.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
         if let Some(size_n) = self.unknown_n {
             let mut column = Column::default();
             for (r, b) in data.blocks.iter().enumerate() {
@@ -194,7 +198,13 @@ impl Ground {
     /// What is known once a motion has been made as well; none when the law cannot be replayed along it.
     #[must_use]
     pub fn after(&self, motion: &Motion) -> Option<Shown> {
-        let (blocks, data) = self.planned(motion)?;
+        self.after_blocks(&self.blocks(motion)?)
+    }
+
+    /// The same of a motion in blocks.
+    #[must_use]
+    pub fn after_blocks(&self, blocks: &Blocks) -> Option<Shown> {
+        let (blocks, data) = self.planned(blocks)?;
         let leader = self.candidates.first().map_or_else(|| self.stem.clone(), |c| c.model(&self.stem));
         let leader = alone(&leader, Vec::new());
         let instants = free(&leader.compile(0)?, &blocks.pieces);
@@ -202,37 +212,43 @@ impl Ground {
         Some(self.shown(sum(&self.before, &self.seen(&stem, data)?)))
     }
 
-    /// A motion in blocks, judged by the noise of their length.
-    fn planned(&self, motion: &Motion) -> Option<(Blocks, Data)> {
-        let recording = sampled(motion, self.sample_hz)?;
-        let length_s = COARSE_S.max(recording.duration_s() / MOST_BLOCKS);
-        let mut blocks = Blocks::new(&recording, &[], length_s);
+    /// A motion in blocks, without forces; none for one that is recorded.
+    #[must_use]
+    pub fn blocks(&self, motion: &Motion) -> Option<Blocks> {
+        let recording = sampled(motion, self.sample_hz.min(LOOK_HZ))?;
+        Some(Blocks::new(&recording, &[], COARSE_S.max(recording.duration_s() / MOST_BLOCKS)))
+    }
+
+    /// Blocks with the forces of the likeliest candidate, judged by the noise of their length.
+    fn planned(&self, blocks: &Blocks) -> Option<(Blocks, Data)> {
+        let mut blocks = blocks.clone();
         let leader = self.candidates.first().map_or_else(|| self.stem.clone(), |c| c.model(&self.stem));
         let (f, _) = forces(&leader, &blocks)?;
         blocks.size_n.clone_from(&f.iter().map(|f| f.abs()).collect());
         blocks.f = f;
-        let data = Data::new(Arc::new(vec![blocks.clone()]), coarser(&self.noise, length_s / BLOCK_S), 0.0);
+        let times = blocks.step_s * blocks.samples as f64 / BLOCK_S;
+        let data = Data::new(Arc::new(vec![blocks.clone()]), coarser(&self.noise, times), 0.0);
         Some((blocks, data))
     }
 
-    /// Largest force in N along a motion under every candidate, in their order.
+    /// Largest force in N along a motion in blocks under every candidate, in their order.
     #[must_use]
-    pub fn largest_n(&self, motion: &Motion) -> Option<Vec<f64>> {
-        let blocks = Blocks::new(&sampled(motion, self.sample_hz)?, &[], COARSE_S);
-        self.candidates
-            .iter()
-            .map(|c| Some(forces(&c.model(&self.stem), &blocks)?.0.iter().fold(0.0, |m: f64, f| m.max(f.abs()))))
-            .collect()
+    pub fn largest_n(&self, blocks: &Blocks) -> Option<Vec<f64>> {
+        let largest = |f: &[f64]| f.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
+        self.candidates.iter().map(|c| Some(largest(&forces(&c.model(&self.stem), blocks)?.0))).collect()
     }
 
     /// Forces in N along a motion under every candidate, with the times (s) and positions (m) of the blocks.
     #[must_use]
     pub fn expected(&self, motion: &Motion) -> Option<Expected> {
-        let blocks = Blocks::new(&sampled(motion, self.sample_hz)?, &[], COARSE_S);
+        let blocks = self.blocks(motion)?;
         let time_s: Vec<f64> = blocks.from_s.iter().zip(&blocks.to_s).map(|(a, b)| 0.5 * (a + b)).collect();
         let position_m = time_s.iter().map(|t| blocks.motion.at(*t).0).collect();
-        let force_n =
-            self.candidates.iter().map(|c| Some(forces(&c.model(&self.stem), &blocks)?.0)).collect::<Option<_>>()?;
+        let force_n = self
+            .candidates
+            .iter()
+            .map(|c| Some(forces(&c.model(&self.stem), &blocks)?.0))
+            .collect::<Option<_>>()?;
         Some(Expected { time_s, position_m, force_n })
     }
 
@@ -272,7 +288,11 @@ impl Ground {
     #[must_use]
     pub fn against(&self, shown: &Shown, truth: usize, other: usize) -> f64 {
         let at = |k: usize| -> Option<usize> {
-            if k >= self.candidates.len() { Some(shown.left.size.saturating_sub(1)) } else { self.place(k).map(|p| p.0) }
+            if k >= self.candidates.len() {
+                Some(shown.left.size.saturating_sub(1))
+            } else {
+                self.place(k).map(|p| p.0)
+            }
         };
         let mut x: Vec<(usize, f64)> = Vec::new();
         x.extend(at(truth).map(|k| (k, 1.0)));
@@ -291,7 +311,9 @@ impl Ground {
         let (Some((i, _)), Some((j, _))) = (self.place(a), self.place(b)) else { return 0.0 };
         let g = &shown.left;
         let size = (g.at(i, i) * g.at(j, j)).sqrt();
-        let whole = (shown.all.at(shown.shared + i, shown.shared + i) * shown.all.at(shown.shared + j, shown.shared + j)).sqrt();
+        let whole = (shown.all.at(shown.shared + i, shown.shared + i)
+            * shown.all.at(shown.shared + j, shown.shared + j))
+        .sqrt();
         if size > 1e-8 * whole && size > 0.0 { (g.at(i, j) / size).clamp(-1.0, 1.0) } else { 0.0 }
     }
 }
@@ -363,7 +385,8 @@ fn coarser(noise: &Noise, times: f64) -> Noise {
     let mut noise = noise.clone();
     for bin in &mut noise.bins {
         let left = 1.0 - bin.a.iter().chain(&bin.slow).sum::<f64>();
-        let sd_n = (bin.innovation_n / left.clamp(LEAST_LEFT, 4.0)).max(0.3 * bin.sd_n) / times.max(1.0).sqrt();
+        let sd_n =
+            (bin.innovation_n / left.clamp(LEAST_LEFT, 4.0)).max(0.3 * bin.sd_n) / times.max(1.0).sqrt();
         (bin.innovation_n, bin.sd_n) = (sd_n, sd_n);
         bin.a.fill(0.0);
         bin.slow.fill(0.0);

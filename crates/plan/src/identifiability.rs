@@ -50,11 +50,14 @@ const PLAUSIBLE: f64 = 30.0;
 #[must_use]
 pub fn identifiability(ground: &Ground) -> Identifiability {
     let shown = ground.known();
-    let of: Vec<usize> = (0..ground.candidates.len()).filter(|k| !ground.candidates[*k].choices.is_empty()).collect();
+    let of: Vec<usize> =
+        (0..ground.candidates.len()).filter(|k| !ground.candidates[*k].choices.is_empty()).collect();
     let null = ground.candidates.iter().position(|c| c.name == NONE);
     let nats: Vec<Vec<f64>> = of
         .iter()
-        .map(|i| of.iter().map(|j| if i == j { 0.0 } else { ground.nats(&shown, *i.min(j), *i.max(j)) }).collect())
+        .map(|i| {
+            of.iter().map(|j| if i == j { 0.0 } else { ground.nats(&shown, *i.min(j), *i.max(j)) }).collect()
+        })
         .collect();
     let correlation =
         of.iter().map(|i| of.iter().map(|j| ground.correlation(&shown, *i, *j)).collect()).collect();

@@ -120,16 +120,24 @@ pub fn decided(nats: f64) -> f64 {
     if nats <= 0.0 { 0.0 } else { normal((nats - CLASS_NATS) / (2.0 * nats).sqrt()) }
 }
 
-/// Probability that the diagnosis names what is the case and nothing else, whatever that is.
+/// Probability that the diagnosis names what is the case and nothing else, whatever that is among what motions within the limits
+/// can tell (`told`: pairs).
 #[must_use]
-pub fn probability(ground: &Ground, shown: &Shown) -> f64 {
-    let n = ground.candidates.len();
-    let mut sum = 0.0;
+pub fn probability(ground: &Ground, shown: &Shown, told: &[(usize, usize)]) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
     for (i, c) in ground.candidates.iter().enumerate() {
-        let of = |j: usize| decided(ground.nats(shown, i.min(j), i.max(j)));
-        sum += c.weight * (0..n).filter(|j| *j != i).map(of).fold(1.0, f64::min);
+        let of: Vec<f64> = told
+            .iter()
+            .filter(|(a, b)| *a == i || *b == i)
+            .map(|(a, b)| decided(ground.nats(shown, *a, *b)))
+            .collect();
+        if of.is_empty() {
+            continue;
+        }
+        sum += c.weight * of.into_iter().fold(1.0, f64::min);
+        weights += c.weight;
     }
-    sum * SEEN_AND_RIGHT
+    if weights > 0.0 { SEEN_AND_RIGHT * sum / weights } else { SEEN_AND_RIGHT }
 }
 
 /// Plans the next insertion.
@@ -168,19 +176,20 @@ pub fn plan(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<(Plan, Se
         .skip(1)
         .map(|f| Alternative {
             worst_nats: if found.told.is_empty() { 0.0 } else { worst(f) },
-            probability_decided: probability(ground, &f.shown),
+            probability_decided: probability(ground, &f.shown, &found.told),
             force_n: f.force_n,
             duration_s: f.motion.plan().map_or(0.0, |p| p.duration_s()),
             motion: f.motion.clone(),
         })
         .collect();
     let first = |a: usize, b: usize| if ground.name(a) == crate::candidate::NONE { Some(b) } else { None };
-    let never = found.never.iter().filter_map(|(a, b)| first(*a, *b)).map(|k| ground.name(k).to_owned()).collect();
+    let never =
+        found.never.iter().filter_map(|(a, b)| first(*a, *b)).map(|k| ground.name(k).to_owned()).collect();
     let course = best.motion.plan();
     let plan = Plan {
         pairs,
-        probability_decided: probability(ground, &best.shown),
-        probability_now: probability(ground, &known),
+        probability_decided: probability(ground, &best.shown, &found.told),
+        probability_now: probability(ground, &known, &found.told),
         probability_from: "gaps".to_owned(),
         simulated: Vec::new(),
         candidates: ground.candidates.iter().map(|c| (c.name.clone(), c.weight)).collect(),
@@ -214,9 +223,11 @@ fn intervals(ground: &Ground, before: &Shown, after: &Shown) -> Vec<Sharper> {
                 Role::Puncture(l) => format!("layer {} puncture_n", l + 1),
                 Role::Thickness(l) => format!("layer {} thickness_m", l + 1),
                 Role::Surface => "surface_m".to_owned(),
-                Role::Effect { effect, parameter } => ground.stem.effects.get(effect).map_or_else(String::new, |e| {
-                    format!("{}.{}", e.info.id, e.info.parameters.get(parameter).map_or("", |p| p.path))
-                }),
+                Role::Effect { effect, parameter } => {
+                    ground.stem.effects.get(effect).map_or_else(String::new, |e| {
+                        format!("{}.{}", e.info.id, e.info.parameters.get(parameter).map_or("", |p| p.path))
+                    })
+                }
                 Role::OwnSurface | Role::OwnFriction | Role::Instant(_) => String::new(),
             },
             before: Z95 * before,

@@ -5,14 +5,15 @@ use crate::error::PlanError;
 use crate::ground::{Ground, Shown};
 use crate::limits::Limits;
 use rayon::prelude::*;
+use stylet_identify::blocks::Blocks;
 use stylet_scenario::Motion;
 
 /// Motions drawn.
-const DRAWN: usize = 320;
+const DRAWN: usize = 200;
 /// The best that are refined, and steps of the refinement; every step tries some neighbours at once.
-const REFINED: usize = 3;
-const STEPS: usize = 5;
-const NEIGHBOURS: usize = 12;
+const REFINED: usize = 2;
+const STEPS: usize = 4;
+const NEIGHBOURS: usize = 8;
 /// A pair is asked for when some motion tells it apart by so many nats.
 pub const TELLING_NATS: f64 = 10.0;
 /// More nats than this between two candidates add nothing to a verdict.
@@ -84,15 +85,18 @@ pub fn search(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<Searche
             remedy: "give it more time, or allow a higher speed or acceleration".to_owned(),
         });
     }
-    let forces: Vec<Option<f64>> = drawn.par_iter().map(|(_, m)| force_n(ground, m)).collect();
+    let seen: Vec<Option<Blocks>> = drawn.par_iter().map(|(_, m)| ground.blocks(m)).collect();
+    let forces: Vec<Option<f64>> =
+        seen.par_iter().map(|b| b.as_ref().and_then(|b| force_n(ground, b))).collect();
     if forces.iter().all(Option::is_none) {
         return Err(PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()));
     }
     let weakest = forces.iter().flatten().fold(f64::INFINITY, |m: f64, f| m.min(*f));
-    let safe: Vec<((Vec<f64>, Motion), f64)> = drawn
+    let safe: Vec<((Vec<f64>, Motion), Blocks, f64)> = drawn
         .into_iter()
+        .zip(seen)
         .zip(forces)
-        .filter_map(|(d, f)| f.filter(|f| *f <= limits.force_n).map(|f| (d, f)))
+        .filter_map(|((d, b), f)| Some((d, b?, f.filter(|f| *f <= limits.force_n)?)))
         .collect();
     if safe.is_empty() {
         return Err(PlanError::Impossible {
@@ -106,8 +110,8 @@ pub fn search(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<Searche
     }
     let shown: Vec<_> = safe
         .into_par_iter()
-        .filter_map(|((point, motion), force_n)| {
-            let shown = ground.after(&motion)?;
+        .filter_map(|((point, motion), blocks, force_n)| {
+            let shown = ground.after_blocks(&blocks)?;
             Some(Found { motion, shown, score: 0.0, force_n, point })
         })
         .collect();
@@ -116,10 +120,8 @@ pub fn search(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<Searche
         .into_iter()
         .partition(|(a, b)| shown.iter().any(|f| ground.nats(&f.shown, *a, *b) >= TELLING_NATS));
     let known = ground.known().knowledge();
-    let mut all: Vec<Found> = shown
-        .into_par_iter()
-        .map(|f| Found { score: score(ground, &f.shown, &told, known), ..f })
-        .collect();
+    let mut all: Vec<Found> =
+        shown.into_par_iter().map(|f| Found { score: score(ground, &f.shown, &told, known), ..f }).collect();
     if all.is_empty() {
         return Err(PlanError::NoForce("no motion can be compared".to_owned()));
     }
@@ -136,8 +138,8 @@ pub fn search(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<Searche
 }
 
 /// Largest force in N expected under any candidate, three standard deviations of the noise included.
-fn force_n(ground: &Ground, motion: &Motion) -> Option<f64> {
-    let most = ground.largest_n(motion)?.into_iter().fold(0.0, f64::max);
+fn force_n(ground: &Ground, blocks: &Blocks) -> Option<f64> {
+    let most = ground.largest_n(blocks)?.into_iter().fold(0.0, f64::max);
     Some(most + 3.0 * ground.noise.sd_n())
 }
 
@@ -163,8 +165,9 @@ fn refined(
                     .map(|i| (best.point[i] + reach * (2.0 * u[i] - 1.0)).clamp(0.0, 1.0))
                     .collect();
                 let motion = motion(&point, limits, begin)?;
-                let force_n = force_n(ground, &motion).filter(|f| *f <= limits.force_n)?;
-                let shown = ground.after(&motion)?;
+                let blocks = ground.blocks(&motion)?;
+                let force_n = force_n(ground, &blocks).filter(|f| *f <= limits.force_n)?;
+                let shown = ground.after_blocks(&blocks)?;
                 let score = score(ground, &shown, told, known);
                 Some(Found { motion, shown, score, force_n, point })
             })

@@ -68,12 +68,24 @@ pub fn from_diagnosis(scenario: &Scenario, examined: &Examined) -> Result<(Groun
         .filter(|i| candidates.iter().all(|c| c.name != i.id))
         .filter_map(typical)
         .collect();
-    let unseen = if hidden.is_empty() { 0.0 } else if ambiguous.is_some() { 0.5 * UNSEEN } else { UNSEEN };
+    let unseen = if hidden.is_empty() {
+        0.0
+    } else if ambiguous.is_some() {
+        0.5 * UNSEEN
+    } else {
+        UNSEEN
+    };
     candidates.iter_mut().for_each(|c| c.weight *= (1.0 - unseen) / sum);
     let each = unseen / hidden.len().max(1) as f64;
     candidates.extend(hidden.into_iter().map(|c| Candidate::of(c, each)));
     let unknown = (d.verdict == Verdict::Unknown).then_some(d.gain.rmse_after_n.max(d.noise.sd_n));
-    let start = search.data.blocks.iter().filter_map(|b| b.pieces.first()).map(|p| p.z_m).fold(f64::INFINITY, f64::min);
+    let start = search
+        .data
+        .blocks
+        .iter()
+        .filter_map(|b| b.pieces.first())
+        .map(|p| p.z_m)
+        .fold(f64::INFINITY, f64::min);
     let ground = Ground::new(
         stem,
         candidates,
@@ -84,6 +96,21 @@ pub fn from_diagnosis(scenario: &Scenario, examined: &Examined) -> Result<(Groun
     )
     .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))?;
     Ok((ground, begin(scenario, start.is_finite().then_some(start))))
+}
+
+/// Every effect of the library at its typical size beside what a diagnosis settled, over the recordings at hand: what they can show.
+///
+/// # Errors
+/// [`PlanError::NoForce`] when the model cannot be replayed.
+pub fn of_recordings(scenario: &Scenario, examined: &Examined) -> Result<Ground, PlanError> {
+    let search = &examined.search;
+    let stem = search.best.model.clone();
+    let mut candidates = vec![Candidate::none(1.0 - UNSEEN)];
+    let found = |id: &str| stem.effects.iter().any(|e| e.info.id == id);
+    candidates.extend(library().filter(|i| !found(i.id)).filter_map(typical).map(|c| Candidate::of(c, 0.02)));
+    let noise = (*search.data.noise).clone();
+    Ground::new(stem, candidates, None, &search.data.blocks, noise, scenario.sample_hz)
+        .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))
 }
 
 /// What may be the case before any measurement: nothing, or any one effect of the library at its typical size. The scenario's own
@@ -107,7 +134,8 @@ pub fn from_scenario(scenario: &Scenario, made: Option<&Motion>) -> Result<(Grou
     let each = UNSEEN / choices.len().max(1) as f64;
     let mut candidates = vec![Candidate::none(1.0 - UNSEEN)];
     candidates.extend(choices.into_iter().map(|c| Candidate::of(c, each)));
-    let ground = Ground::new(stem, candidates, None, &old, noise(scenario), scenario.sample_hz).ok_or_else(failed)?;
+    let ground =
+        Ground::new(stem, candidates, None, &old, noise(scenario), scenario.sample_hz).ok_or_else(failed)?;
     Ok((ground, begin(scenario, start)))
 }
 

@@ -91,7 +91,8 @@ pub fn plan(args: &BenchmarkPlanArgs) -> Result<(), Failure> {
         let (mut next, most) = (0, args.cases * DRAWS);
         let open = |cases: &[Case]| cases.iter().filter(|c| c.open.is_some()).count() as u64;
         while open(&cases) < args.cases && next < most {
-            let batch: Vec<CaseId> = (next..next + 8).map(|index| CaseId { index, hide: Hide::One, ..base }).collect();
+            let batch: Vec<CaseId> =
+                (next..next + 8).map(|index| CaseId { index, hide: Hide::One, ..base }).collect();
             next += 8;
             let new: Vec<Case> = pool.install(|| {
                 batch
@@ -127,7 +128,11 @@ pub fn plan(args: &BenchmarkPlanArgs) -> Result<(), Failure> {
             "{}: {}{}",
             base.world,
             base.wrong.word(),
-            if base.wrong == stylet_examine::Wrong::Nothing { String::new() } else { format!(", {}", base.grade) }
+            if base.wrong == stylet_examine::Wrong::Nothing {
+                String::new()
+            } else {
+                format!(", {}", base.grade)
+            }
         );
         table(&mut text, &row, &cases);
         rows.push((row, cases));
@@ -174,7 +179,8 @@ fn go_through(id: &CaseId, case: &mut Case) -> Result<(), String> {
         stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {}).map_err(|e| text(&e))?;
     let d = &examined.diagnosis;
     let in_class = d.causes.iter().any(|c| {
-        !c.equivalent.is_empty() && (c.effect == case.hidden || c.equivalent.iter().any(|e| *e == case.hidden))
+        !c.equivalent.is_empty()
+            && (c.effect == case.hidden || c.equivalent.iter().any(|e| *e == case.hidden))
     });
     case.open = if in_class {
         Some("class".to_owned())
