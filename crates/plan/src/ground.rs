@@ -48,6 +48,8 @@ pub struct Ground {
     pub noise: Noise,
     /// Samples per second of what is planned.
     pub sample_hz: f64,
+    /// The candidates' models, the law's numbers re-fitted to the recordings at hand.
+    models: Vec<Model>,
     /// Products over the recordings at hand, priors included.
     before: Symmetric,
     /// Number of shared numbers.
@@ -89,6 +91,7 @@ impl Ground {
             unknown_n,
             noise,
             sample_hz,
+            models: Vec::new(),
             before: Symmetric::zeros(0),
         };
         let mut before = Symmetric::zeros(ground.shared + ground.extra());
@@ -100,7 +103,29 @@ impl Ground {
             before = sum(&before, &ground.seen(&ground.stem, data)?);
         }
         ground.before = before;
+        ground.models = (0..ground.candidates.len()).map(|k| ground.refitted(k)).collect();
         Some(ground)
+    }
+
+    /// A candidate's model with the law's numbers where, to first order, the recordings at hand have them beside it: what a
+    /// candidate adds was imitated by these numbers when the stem was fitted.
+    fn refitted(&self, which: usize) -> Model {
+        let mut model = self.candidates[which].model(&self.stem);
+        let Some((at, _)) = self.place(which) else { return model };
+        let rows: Vec<usize> = (0..self.shared).collect();
+        let with: Vec<f64> = rows.iter().map(|k| -self.before.at(*k, self.shared + at)).collect();
+        let moves = self.before.part(&rows).factor().solve(&with);
+        for (n, by) in self.stem.shared().iter().zip(moves).filter(|(_, by)| by.is_finite()) {
+            let x = self.stem.get(n.role, 0) + by;
+            model.set(n.role, 0, x.clamp(n.low, n.high));
+        }
+        model
+    }
+
+    /// The model of a candidate, the law's numbers re-fitted beside it; the stem for what the library lacks.
+    #[must_use]
+    pub fn model(&self, which: usize) -> &Model {
+        self.models.get(which).unwrap_or(&self.stem)
     }
 
     /// Columns beside those of the shared numbers.
@@ -205,8 +230,7 @@ impl Ground {
     #[must_use]
     pub fn after_blocks(&self, blocks: &Blocks) -> Option<Shown> {
         let (blocks, data) = self.planned(blocks)?;
-        let leader = self.candidates.first().map_or_else(|| self.stem.clone(), |c| c.model(&self.stem));
-        let leader = alone(&leader, Vec::new());
+        let leader = alone(self.model(0), Vec::new());
         let instants = free(&leader.compile(0)?, &blocks.pieces);
         let stem = alone(&self.stem, instants);
         Some(self.shown(sum(&self.before, &self.seen(&stem, data)?)))
@@ -222,8 +246,7 @@ impl Ground {
     /// Blocks with the forces of the likeliest candidate, judged by the noise of their length.
     fn planned(&self, blocks: &Blocks) -> Option<(Blocks, Data)> {
         let mut blocks = blocks.clone();
-        let leader = self.candidates.first().map_or_else(|| self.stem.clone(), |c| c.model(&self.stem));
-        let (f, _) = forces(&leader, &blocks)?;
+        let (f, _) = forces(self.model(0), &blocks)?;
         blocks.size_n.clone_from(&f.iter().map(|f| f.abs()).collect());
         blocks.f = f;
         let times = blocks.step_s * blocks.samples as f64 / BLOCK_S;
@@ -235,7 +258,7 @@ impl Ground {
     #[must_use]
     pub fn largest_n(&self, blocks: &Blocks) -> Option<Vec<f64>> {
         let largest = |f: &[f64]| f.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-        self.candidates.iter().map(|c| Some(largest(&forces(&c.model(&self.stem), blocks)?.0))).collect()
+        self.models.iter().map(|m| Some(largest(&forces(m, blocks)?.0))).collect()
     }
 
     /// Forces in N along a motion under every candidate, with the times (s) and positions (m) of the blocks.
@@ -244,11 +267,7 @@ impl Ground {
         let blocks = self.blocks(motion)?;
         let time_s: Vec<f64> = blocks.from_s.iter().zip(&blocks.to_s).map(|(a, b)| 0.5 * (a + b)).collect();
         let position_m = time_s.iter().map(|t| blocks.motion.at(*t).0).collect();
-        let force_n = self
-            .candidates
-            .iter()
-            .map(|c| Some(forces(&c.model(&self.stem), &blocks)?.0))
-            .collect::<Option<_>>()?;
+        let force_n = self.models.iter().map(|m| Some(forces(m, &blocks)?.0)).collect::<Option<_>>()?;
         Some(Expected { time_s, position_m, force_n })
     }
 

@@ -151,8 +151,8 @@ fn noise(scenario: &Scenario) -> Noise {
 /// A candidate as a scenario that can be simulated.
 #[must_use]
 pub fn scenario_of(believed: &Scenario, ground: &Ground, which: usize, motion: &Motion) -> Scenario {
-    let model = ground.candidates.get(which).map_or_else(|| ground.stem.clone(), |c| c.model(&ground.stem));
+    let model = ground.model(which);
     let mut effects: Vec<AnyEffect> = believed.effects.clone();
     effects.extend(model.effects.iter().filter_map(Choice::effect));
-    Scenario { tissue: model.tissue, effects, motion: motion.clone(), ..believed.clone() }
+    Scenario { tissue: model.tissue.clone(), effects, motion: motion.clone(), ..believed.clone() }
 }
