@@ -121,7 +121,7 @@ fn motion(plan: &Plan, ground: &Ground) -> Section {
             .group("plan")
             .height(320);
         let mut differ = Chart::new("Where they differ", "Time (s)", "Force less that of the likeliest (N)")
-            .caption("At the same numbers of the base law. What re-fitting them takes back is left out of the nats, not of this picture.")
+            .caption("Every candidate with the law's numbers that fit what is at hand. What re-fitting them once more takes back is left out of the nats, not of this picture.")
             .group("plan")
             .height(260);
         for (k, f) in e.force_n.iter().enumerate().take(DRAWN) {

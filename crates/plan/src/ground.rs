@@ -54,6 +54,8 @@ pub struct Ground {
     before: Symmetric,
     /// Number of shared numbers.
     shared: usize,
+    /// Whether the scatter between insertions is assumed: too few have been made to show it.
+    pub scatter_assumed: bool,
 }
 
 /// What a motion would show.
@@ -79,6 +81,7 @@ impl Ground {
         sample_hz: f64,
     ) -> Option<Self> {
         let mut stem = stem;
+        let scatter_assumed = old.len() < SHOWS_SCATTER && stem.scatter.force <= UNSEEN_SCATTER;
         if old.len() < SHOWS_SCATTER {
             stem.scatter.force = stem.scatter.force.max(UNSEEN_SCATTER);
             stem.scatter.place_m = stem.scatter.place_m.max(UNSEEN_PLACE_M);
@@ -92,6 +95,7 @@ impl Ground {
             noise,
             sample_hz,
             models: Vec::new(),
+            scatter_assumed,
             before: Symmetric::zeros(0),
         };
         let mut before = Symmetric::zeros(ground.shared + ground.extra());

@@ -6,6 +6,7 @@ use crate::search::TELLING_NATS;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use stylet_diagnose::CLASS_NATS;
+use stylet_identify::model::Choice;
 
 /// One effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,6 +47,11 @@ pub struct Identifiability {
 /// An effect must be at most so many times its typical size to be seen at all: beyond, it is not plausible.
 const PLAUSIBLE: f64 = 30.0;
 
+/// Whether the library admits these numbers.
+fn valid(choice: &Choice, values: &[f64]) -> bool {
+    Choice::new(choice.info, values).effect().is_some_and(|e| e.check().is_ok())
+}
+
 /// What the experiment behind a ground can show.
 #[must_use]
 pub fn identifiability(ground: &Ground) -> Identifiability {
@@ -75,7 +81,9 @@ pub fn identifiability(ground: &Ground) -> Identifiability {
             nats: seen,
             visible: seen >= TELLING_NATS,
             typical: named(&choice.values),
-            smallest: (times <= PLAUSIBLE).then(|| named(&stronger(choice, times))),
+            smallest: Some(stronger(choice, times))
+                .filter(|x| times <= PLAUSIBLE && valid(choice, x))
+                .map(|x| named(&x)),
             like: Vec::new(),
             nearest: of
                 .iter()

@@ -201,7 +201,7 @@ pub fn plan(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<(Plan, Se
         alternatives,
         never,
         intervals: intervals(ground, &known, &best.shown),
-        repeats: repeats(&ground.stem, limits),
+        repeats: if ground.scatter_assumed { None } else { repeats(&ground.stem, limits) },
         looked_at: found.looked_at,
     };
     Ok((plan, found))

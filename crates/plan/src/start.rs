@@ -79,13 +79,8 @@ pub fn from_diagnosis(scenario: &Scenario, examined: &Examined) -> Result<(Groun
     let each = unseen / hidden.len().max(1) as f64;
     candidates.extend(hidden.into_iter().map(|c| Candidate::of(c, each)));
     let unknown = (d.verdict == Verdict::Unknown).then_some(d.gain.rmse_after_n.max(d.noise.sd_n));
-    let start = search
-        .data
-        .blocks
-        .iter()
-        .filter_map(|b| b.pieces.first())
-        .map(|p| p.z_m)
-        .fold(f64::INFINITY, f64::min);
+    let first = |b: &Blocks| b.raw_t.first().map(|t| b.motion.at(*t).0);
+    let start = search.data.blocks.iter().filter_map(first).fold(f64::INFINITY, f64::min);
     let ground = Ground::new(
         stem,
         candidates,
