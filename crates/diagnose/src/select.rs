@@ -4,7 +4,7 @@ use crate::base::Prepared;
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::From;
@@ -213,7 +213,7 @@ impl Search {
     /// Makes a fit the best, with the noise that it leaves.
     pub fn settle(&mut self, f: Fit) {
         self.data = self.data.judged_by(&f.residuals.e, From::Calm);
-        self.best = fit(&f.model, &self.data, Effort::FULL).unwrap_or(f);
+        self.best = fit_sharp(&f.model, &self.data, Effort::FULL).unwrap_or(f);
     }
 
     /// Drops effects that the others can do without.

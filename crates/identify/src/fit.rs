@@ -266,10 +266,37 @@ pub fn fit(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
 /// As [`fit`], but given up where it would not come below `wanted` nats if every step left gained as much as the last.
 #[must_use]
 pub fn fit_below(model: &Model, data: &Data, effort: Effort, wanted: f64) -> Option<Fit> {
+    descend(model, data, effort, wanted, rescatter)
+}
+
+/// As [`fit`]; where ruptures scatter, also from numbers under which they do not. Under a wide scatter what is a little off
+/// costs nothing, and stays.
+#[must_use]
+pub fn fit_sharp(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
+    let wide = fit(model, data, effort)?;
+    let mut none = wide.model.clone();
+    (none.scatter.force, none.scatter.place_m) = (0.0, 0.0);
+    if none.scatter == wide.model.scatter {
+        return Some(wide);
+    }
+    let held = Effort { turns: 2, ..effort };
+    let sharp =
+        descend(&none, data, held, f64::INFINITY, |_, _| ()).and_then(|f| fit(&f.model, data, effort));
+    Some(sharp.filter(|f| f.nats() < wide.nats()).unwrap_or(wide))
+}
+
+/// Steps downhill; after each the scatter is told by `scatter`.
+fn descend(
+    model: &Model,
+    data: &Data,
+    effort: Effort,
+    wanted: f64,
+    scatter: impl Fn(&mut Model, &mut Residuals),
+) -> Option<Fit> {
     let mut best = model.clone();
     clamp(&mut best);
     let mut at = residuals(&best, data)?;
-    rescatter(&mut best, &mut at);
+    scatter(&mut best, &mut at);
     let mut damping = 1e-4;
     for turn in 1..=effort.turns {
         let tangent = Tangent::new(&best, data, &at);
@@ -283,7 +310,7 @@ pub fn fit_below(model: &Model, data: &Data, effort: Effort, wanted: f64) -> Opt
             };
             let mut next = next;
             if left.nats < at.nats {
-                rescatter(&mut next, &mut left);
+                scatter(&mut next, &mut left);
                 (best, at) = (next, left);
                 damping = (damping * 0.1).max(1e-9);
                 gained = true;
