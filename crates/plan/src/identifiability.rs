@@ -96,8 +96,8 @@ pub fn identifiability(ground: &Ground) -> Identifiability {
     let visible: Vec<bool> = effects.iter().map(|e| e.visible).collect();
     let like = |i: usize, j: usize| i != j && visible[i] && visible[j] && nats[i][j] < CLASS_NATS;
     let names: Vec<String> = effects.iter().map(|e| e.effect.clone()).collect();
-    for i in 0..effects.len() {
-        effects[i].like = (0..names.len()).filter(|j| like(i, *j)).map(|j| names[j].clone()).collect();
+    for (i, effect) in effects.iter_mut().enumerate() {
+        effect.like = (0..names.len()).filter(|j| like(i, *j)).map(|j| names[j].clone()).collect();
     }
     // Classes: what a chain of likenesses joins.
     let mut class: Vec<usize> = (0..names.len()).collect();

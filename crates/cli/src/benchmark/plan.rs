@@ -179,8 +179,7 @@ fn go_through(id: &CaseId, case: &mut Case) -> Result<(), String> {
         stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {}).map_err(|e| text(&e))?;
     let d = &examined.diagnosis;
     let in_class = d.causes.iter().any(|c| {
-        !c.equivalent.is_empty()
-            && (c.effect == case.hidden || c.equivalent.iter().any(|e| *e == case.hidden))
+        !c.equivalent.is_empty() && (c.effect == case.hidden || c.equivalent.contains(&case.hidden))
     });
     case.open = if in_class {
         Some("class".to_owned())
