@@ -151,7 +151,7 @@ fn one(id: &CaseId) -> Case {
         id: *id,
         hidden: String::new(),
         open: None,
-        predicted: f64::NAN,
+        predicted: 0.0,
         planned: None,
         sinusoid: None,
         plan_s: 0.0,
@@ -267,7 +267,7 @@ fn table(out: &mut String, row: &str, cases: &[Case]) {
         open.iter().filter(|c| c.open.as_deref() == Some("class")).count(),
         open.iter().filter(|c| c.open.as_deref() == Some("invisible")).count()
     );
-    let predicted: Vec<f64> = open.iter().map(|c| c.predicted).filter(|p| p.is_finite()).collect();
+    let predicted: Vec<f64> = open.iter().filter(|c| c.planned.is_some()).map(|c| c.predicted).collect();
     let mean = predicted.iter().sum::<f64>() / predicted.len().max(1) as f64;
     let _ = writeln!(out, "  right single cause, planned second insertion   {}", rate(&open, &planned));
     let _ = writeln!(out, "  right single cause, the paper's sinusoid       {}", rate(&open, &sinusoid));
