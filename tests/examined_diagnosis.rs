@@ -10,8 +10,11 @@ use stylet_scenario::{Motion, Scenario, Segment};
 fn asked(question: &Question) -> Result<(Scenario, Vec<Evidence>), String> {
     let scenario = Scenario::parse("believed.ron", &question.believed_ron).map_err(|e| e.to_string())?;
     let evidence = question.recordings.iter();
-    let evidence =
-        evidence.map(|r| Evidence { name: r.name.clone(), recording: r.recording.clone(), notes: Vec::new() });
+    let evidence = evidence.map(|r| Evidence {
+        name: r.name.clone(),
+        recording: r.recording.clone(),
+        notes: Vec::new(),
+    });
     Ok((scenario, evidence.collect()))
 }
 

@@ -115,7 +115,12 @@ fn summary(p: &Prediction) -> String {
             let _ = writeln!(out, "    friction x {}", significant(factor, 3));
         }
     }
-    let _ = writeln!(out, "\n  noise {} N; the band holds {}", significant(p.floor_n, 3), p.band_holds.join(", "));
+    let _ = writeln!(
+        out,
+        "\n  noise {} N; the band holds {}",
+        significant(p.floor_n, 3),
+        p.band_holds.join(", ")
+    );
     if !p.held_out {
         let _ = writeln!(
             out,

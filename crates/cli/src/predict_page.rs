@@ -75,25 +75,24 @@ fn overview(found: &Foretold) -> Section {
             ]
         })
         .collect();
-    let mut section =
-        Section::new("How good it is").block(Block::Scorecard(Scorecard { title: String::new(), tiles })).table(
-            Table {
-                title: "Each recording".to_owned(),
-                groups: Vec::new(),
-                headers: [
-                    "",
-                    "left, N",
-                    "left by what was believed, N",
-                    "in the band",
-                    "largest force: measured less predicted, N",
-                    "surface",
-                    "friction",
-                ]
-                .map(str::to_owned)
-                .to_vec(),
-                rows,
-            },
-        );
+    let mut section = Section::new("How good it is")
+        .block(Block::Scorecard(Scorecard { title: String::new(), tiles }))
+        .table(Table {
+            title: "Each recording".to_owned(),
+            groups: Vec::new(),
+            headers: [
+                "",
+                "left, N",
+                "left by what was believed, N",
+                "in the band",
+                "largest force: measured less predicted, N",
+                "surface",
+                "friction",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
+            rows,
+        });
     if !p.held_out {
         let said = "Surface or friction were fitted to the recording that they predict: what is left is less than for the next one. \
                     Two or more recordings are each predicted by what the others say.";

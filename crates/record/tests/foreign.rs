@@ -29,8 +29,11 @@ fn is_the_insertion(name: &str, options: &ReadOptions, samples: usize) {
 
 #[test]
 fn a_matlab_file_with_a_struct_and_a_matrix_is_read() {
-    let options =
-        mapped(Column::scaled("time", 1e-3), Column::scaled("pz", 1e-3), Column::scaled("log.wrench.3", -1.0));
+    let options = mapped(
+        Column::scaled("time", 1e-3),
+        Column::scaled("pz", 1e-3),
+        Column::scaled("log.wrench.3", -1.0),
+    );
     is_the_insertion("matlab.mat", &options, 60);
 }
 
@@ -78,8 +81,7 @@ fn round_trips_keep_every_sample() {
         force_virtual: Some(Column::si("/insertion.force_virtual_n")),
     };
     let options = ReadOptions { columns: Some(columns), repair: false };
-    let (mcap, _) =
-        read_csv_bytes(&to_mcap(&r, path).expect("written"), path, &options).expect("read");
+    let (mcap, _) = read_csv_bytes(&to_mcap(&r, path).expect("written"), path, &options).expect("read");
     assert_eq!(mcap, r);
 }
 
@@ -103,7 +105,11 @@ fn broken_files_are_refused_with_their_name_and_never_stop_the_program() {
         ("table.parquet", ReadOptions::default()),
         (
             "json.mcap",
-            mapped(Column::si("/ft.sensor.log_time"), Column::si("/pose.position.z"), Column::si("/ft.sensor.f.2")),
+            mapped(
+                Column::si("/ft.sensor.log_time"),
+                Column::si("/pose.position.z"),
+                Column::si("/ft.sensor.f.2"),
+            ),
         ),
         (
             "ros2.mcap",

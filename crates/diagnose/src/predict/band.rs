@@ -124,8 +124,8 @@ impl Known {
             layer.friction_ns_per_m2 *= (1.0 + b * normal()).max(0.0);
             let factor = (1.0 + f * normal()) * (1.0 + self.differences.puncture * normal());
             layer.puncture_n = layer.puncture_n.map(|f| f * factor.max(0.01));
-            let moved =
-                self.thickness_m.get(l).copied().unwrap_or(0.0) * normal() + self.differences.face_m * normal();
+            let moved = self.thickness_m.get(l).copied().unwrap_or(0.0) * normal()
+                + self.differences.face_m * normal();
             layer.thickness_m = (layer.thickness_m + moved).max(0.05 * layer.thickness_m);
         }
         out.own[r].surface_m += self.differences.surface_m * normal();
@@ -135,7 +135,8 @@ impl Known {
                 let info = e.info();
                 let mut values = e.parameters();
                 for (value, p) in values.iter_mut().zip(info.parameters) {
-                    let known = self.effects.iter().find(|(effect, path, _)| effect == info.id && path == p.path);
+                    let known =
+                        self.effects.iter().find(|(effect, path, _)| effect == info.id && path == p.path);
                     if let Some((_, _, sd)) = known.filter(|_| !p.whole) {
                         *value = (*value + sd * normal()).clamp(p.low, p.high);
                     }
@@ -184,7 +185,8 @@ impl Band<'_> {
 
 /// Equally likely values of noise of standard deviation `sd_n`.
 fn noise(sd_n: f64) -> [f64; NOISE] {
-    let at: [f64; NOISE] = std::array::from_fn(|k| stylet_stats::normal::quantile((k as f64 + 0.5) / NOISE as f64));
+    let at: [f64; NOISE] =
+        std::array::from_fn(|k| stylet_stats::normal::quantile((k as f64 + 0.5) / NOISE as f64));
     let scale = (at.iter().map(|x| x * x).sum::<f64>() / NOISE as f64).sqrt();
     at.map(|x| x / scale * sd_n)
 }

@@ -202,9 +202,8 @@ fn one(
         inside: within as f64,
     };
     let predicted_n = less(&left.e);
-    let peak = |f: &[f64]| {
-        f.iter().zip(&b.used).filter(|(_, u)| **u).fold(f64::NEG_INFINITY, |m, (f, _)| m.max(*f))
-    };
+    let peak =
+        |f: &[f64]| f.iter().zip(&b.used).filter(|(_, u)| **u).fold(f64::NEG_INFINITY, |m, (f, _)| m.max(*f));
     let count = sums.blocks.max(1.0);
     let predicted = Predicted {
         name: name.to_owned(),
@@ -236,4 +235,3 @@ fn by_itself(model: &Model, data: &Data, r: usize) -> Option<Vec<f64>> {
     at.instants[r] = trail.own_instants();
     Some(replay(&at, data, r)?.f)
 }
-

@@ -72,9 +72,11 @@ impl Columns for File {
 
     fn fetch(&self, wanted: &[&str], _main: &str) -> Result<Vec<Vec<f64>>, String> {
         let one = |name: &&str| {
-            let column = self.columns.iter().find(|c| c.name == *name).ok_or_else(|| format!("no \"{name}\""))?;
+            let column =
+                self.columns.iter().find(|c| c.name == *name).ok_or_else(|| format!("no \"{name}\""))?;
             let dataset = self.file.dataset(&column.path).map_err(damaged)?;
-            let values = dataset.read_f64().map_err(|e| format!("\"{name}\" is no column of numbers ({e})"))?;
+            let values =
+                dataset.read_f64().map_err(|e| format!("\"{name}\" is no column of numbers ({e})"))?;
             Ok(match column.part {
                 None => values,
                 Some((k, parts)) => {

@@ -2,10 +2,12 @@
 
 use super::ros::{Definition, MOST};
 use super::table::Columns;
-use mcap::read::Options;
-use mcap::{Channel, MessageStream};
+use mcap::Channel;
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::io::Cursor;
 
 /// The time at which a message was logged, as a field of every topic.
 const LOG_TIME: &str = "log_time";
@@ -80,9 +82,19 @@ pub(super) struct File<'a> {
     topics: BTreeMap<String, Topic>,
 }
 
-fn stream(bytes: &[u8]) -> Result<MessageStream<'_>, String> {
-    // A log that was cut off ends without its footer.
-    MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into()).map_err(|e| format!("it cannot be read ({e})"))
+/// The messages of a file. A chunk is checked before it is looked into, and none may be larger than is sensible for the file:
+/// a damaged one asks for any amount of memory.
+fn stream(bytes: &[u8]) -> MessageReader<Cursor<&[u8]>> {
+    const LEAST: usize = 1 << 24;
+    const MOST: usize = 1 << 30;
+    let options = LinearReaderOptions {
+        // A log that was cut off ends without its footer.
+        skip_end_magic: true,
+        prevalidate_chunk_crcs: true,
+        record_length_limit: Some(bytes.len().saturating_mul(100).clamp(LEAST, MOST)),
+        ..LinearReaderOptions::default()
+    };
+    MessageReader::new_with_options(Cursor::new(bytes), options)
 }
 
 fn seconds(nanoseconds: u64) -> f64 {
@@ -93,7 +105,7 @@ impl<'a> File<'a> {
     pub(super) fn open(bytes: &'a [u8]) -> Result<Self, String> {
         let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
         let mut numbers = Vec::new();
-        for (k, message) in stream(bytes)?.enumerate() {
+        for (k, message) in stream(bytes).enumerate() {
             let message = message.map_err(|e| format!("message {} cannot be read ({e})", k + 1))?;
             if topics.contains_key(&message.channel.topic) {
                 continue;
@@ -140,8 +152,8 @@ impl Columns for File<'_> {
         let (main_topic, _) = self.split(main).ok_or_else(|| format!("no \"{main}\""))?;
         let mut logged: Vec<Logged> = wanted.iter().map(|_| Logged::default()).collect();
         let mut numbers = Vec::new();
-        let zero_s = stream(self.bytes)?.next().and_then(Result::ok).map_or(0, |m| m.log_time);
-        for (k, message) in stream(self.bytes)?.enumerate() {
+        let zero_s = stream(self.bytes).next().and_then(Result::ok).map_or(0, |m| m.log_time);
+        for (k, message) in stream(self.bytes).enumerate() {
             let message = message.map_err(|e| format!("message {} cannot be read ({e})", k + 1))?;
             let topic = message.channel.topic.as_str();
             if !parts.iter().any(|(t, _)| *t == topic) {

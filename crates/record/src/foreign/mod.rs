@@ -47,7 +47,8 @@ impl Kind {
     pub(crate) fn of(bytes: &[u8]) -> Option<Self> {
         const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
         // MATLAB keeps a block of its own before the HDF5 part.
-        let hdf5 = [0, 512, 1024, 2048].iter().any(|at| bytes.get(*at..).is_some_and(|b| b.starts_with(HDF5)));
+        let hdf5 =
+            [0, 512, 1024, 2048].iter().any(|at| bytes.get(*at..).is_some_and(|b| b.starts_with(HDF5)));
         match bytes {
             b if b.starts_with(b"\x89MCAP0\r\n") => Some(Self::Mcap),
             b if b.starts_with(b"PAR1") => Some(Self::Parquet),

@@ -67,16 +67,24 @@ impl Columns for File {
             let index = names.iter().position(|n| n == name).ok_or_else(|| format!("no \"{name}\""))?;
             let optional = schema.column(index).max_def_level() > 0;
             if schema.column(index).max_rep_level() > 0 {
-                return Err(format!("\"{name}\" holds lists; a column of a recording has one number per row"));
+                return Err(format!(
+                    "\"{name}\" holds lists; a column of a recording has one number per row"
+                ));
             }
             let mut out = Vec::new();
             for group in 0..self.reader.num_row_groups() {
                 let group = self.reader.get_row_group(group).map_err(damaged)?;
                 match group.get_column_reader(index).map_err(damaged)? {
                     ColumnReader::DoubleColumnReader(mut r) => read(&mut r, optional, &mut out, |x| *x)?,
-                    ColumnReader::FloatColumnReader(mut r) => read(&mut r, optional, &mut out, |x| f64::from(*x))?,
-                    ColumnReader::Int32ColumnReader(mut r) => read(&mut r, optional, &mut out, |x| f64::from(*x))?,
-                    ColumnReader::Int64ColumnReader(mut r) => read(&mut r, optional, &mut out, |x| *x as f64)?,
+                    ColumnReader::FloatColumnReader(mut r) => {
+                        read(&mut r, optional, &mut out, |x| f64::from(*x))?
+                    }
+                    ColumnReader::Int32ColumnReader(mut r) => {
+                        read(&mut r, optional, &mut out, |x| f64::from(*x))?
+                    }
+                    ColumnReader::Int64ColumnReader(mut r) => {
+                        read(&mut r, optional, &mut out, |x| *x as f64)?
+                    }
                     ColumnReader::BoolColumnReader(mut r) => {
                         read(&mut r, optional, &mut out, |x| f64::from(u8::from(*x)))?;
                     }

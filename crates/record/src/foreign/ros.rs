@@ -20,7 +20,8 @@ pub(super) struct Definition {
 impl Definition {
     /// Reads a definition.
     pub(super) fn new(name: &str, text: &[u8]) -> Result<Self, String> {
-        let text = std::str::from_utf8(text).map_err(|e| format!("the definition of {name} is no text ({e})"))?;
+        let text =
+            std::str::from_utf8(text).map_err(|e| format!("the definition of {name} is no text ({e})"))?;
         let schema = MessageSchema::parse(name, text)
             .map_err(|e| format!("the definition of {name} cannot be understood ({e})"))?;
         Ok(Self { schema })

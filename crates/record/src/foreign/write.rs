@@ -34,7 +34,11 @@ fn columns(r: &Recording) -> Vec<(String, Vec<f64>)> {
 }
 
 fn failed(path: &Path, why: impl std::fmt::Display) -> RecordError {
-    RecordError::Foreign { path: path.to_owned(), kind: "a recording", what: format!("it cannot be written ({why})") }
+    RecordError::Foreign {
+        path: path.to_owned(),
+        kind: "a recording",
+        what: format!("it cannot be written ({why})"),
+    }
 }
 
 /// The recording as a Parquet file, one column of doubles per quantity; the same bytes for the same recording. `path` only
@@ -49,7 +53,8 @@ pub fn to_parquet(recording: &Recording, path: &Path) -> Result<Vec<u8>, RecordE
 fn parquet_bytes(columns: &[(String, Vec<f64>)]) -> Result<Vec<u8>, parquet::errors::ParquetError> {
     let mut fields = Vec::new();
     for (name, _) in columns {
-        let field = Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::REQUIRED);
+        let field =
+            Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::REQUIRED);
         fields.push(Arc::new(field.build()?));
     }
     let schema = Arc::new(Type::group_type_builder("recording").with_fields(fields).build()?);
@@ -82,7 +87,8 @@ pub fn to_mcap(recording: &Recording, path: &Path) -> Result<Vec<u8>, RecordErro
 }
 
 fn mcap_bytes(columns: &[(String, Vec<f64>)], bytes: &mut Vec<u8>) -> mcap::McapResult<()> {
-    let names: Vec<String> = columns.iter().map(|(n, _)| format!("\"{n}\": {{\"type\": \"number\"}}")).collect();
+    let names: Vec<String> =
+        columns.iter().map(|(n, _)| format!("\"{n}\": {{\"type\": \"number\"}}")).collect();
     let schema = format!("{{\"type\": \"object\", \"properties\": {{{}}}}}", names.join(", "));
     let mut writer = mcap::WriteOptions::new().library("stylet").create(Cursor::new(bytes))?;
     let schema = writer.add_schema("stylet.Recording", "jsonschema", schema.as_bytes())?;
