@@ -16,7 +16,7 @@ fn mapped(time: Column, position: Column, force: Column) -> ReadOptions {
 
 /// Position 1 mm + 4 mm/s and force 0.5 N + 2 N/s at 100 Hz: what `tests/foreign/make.py` wrote.
 fn is_the_insertion(name: &str, options: &ReadOptions, samples: usize) {
-    let (r, _) = read_csv(file(name), options).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let (r, _) = read_csv(file(name), options).expect(name);
     assert_eq!(r.len(), samples, "{name}");
     for k in 0..r.len() {
         let t = k as f64 / 100.0;
