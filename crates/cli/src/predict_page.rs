@@ -138,7 +138,7 @@ fn residual(r: &Predicted, s: &Shown, floor_n: f64) -> Chart {
         colour: Colour::Grey,
         style: LineStyle::Dotted,
     };
-    Chart::new(format!("{}: what is left", r.name), "Time (s)", "Measured less predicted (N)")
+    Chart::new(format!("{}: what is left", r.name), "Time (s)", "Left (N)")
         .group(r.name.clone())
         .height(200)
         .with_series(Series::line("left", Colour::Blue, s.time_s.clone(), left).width(1.0))
