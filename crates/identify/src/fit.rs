@@ -79,6 +79,19 @@ impl Tangent {
     /// The linear picture of `model` whose residuals are `at`.
     #[must_use]
     pub fn new(model: &Model, data: &Data, at: &Residuals) -> Self {
+        Self::wide(model, data, at, &|_| None)
+    }
+
+    /// As [`Tangent::new`], with the changes over steps as wide as `step` says (both ways, per unit) in place of derivatives. A force
+    /// that bends at a face moves by a jump to first order; moved by as much as the face is uncertain it goes up a ramp, which a slow
+    /// noise hides far better.
+    #[must_use]
+    pub fn wide(
+        model: &Model,
+        data: &Data,
+        at: &Residuals,
+        step: &(dyn Fn(&Number) -> Option<f64> + Sync),
+    ) -> Self {
         let (shared, own) = (model.shared(), model.own_numbers());
         let roots: Vec<Vec<f64>> =
             at.w.iter().map(|w| w.iter().map(|w| weight(*w).sqrt()).collect()).collect();
@@ -94,7 +107,19 @@ impl Tangent {
         let numbers: Vec<Number> = t.shared.iter().chain(&t.own).copied().collect();
         let trails: Vec<Option<Trail>> =
             (0..data.recordings()).into_par_iter().map(|r| Trail::new(model, data, r)).collect();
-        t.columns = numbers.par_iter().map(|n| t.derivative(model, data, at, n, &trails)).collect();
+        let column = |n: &Number| match step(n) {
+            None => t.derivative(model, data, at, n, &trails),
+            Some(step) => {
+                let [mut up, down] =
+                    [step, -step].map(|step| t.derivative(model, data, at, &Number { step, ..*n }, &trails));
+                let both = up.w.iter_mut().zip(down.w).chain(up.rows.iter_mut().zip(down.rows));
+                for (up, down) in both {
+                    up.iter_mut().zip(down).for_each(|(a, b)| *a = 0.5 * (*a + b));
+                }
+                up
+            }
+        };
+        t.columns = numbers.par_iter().map(column).collect();
         t.assemble(model, data.recordings());
         t
     }
