@@ -56,6 +56,5 @@ fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once(
     let (clean, one): (Vec<_>, Vec<_>) = outcomes.iter().partition(|o| o.id.hide == Hide::Clean);
     assert_eq!((clean.len(), one.len()), (4, 4));
     assert!(clean.iter().all(|o| o.worth.right), "{table}");
-    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.all_found), "{table}");
-    assert!(one.iter().filter(|o| o.worth.right).count() >= 3, "{table}");
+    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.right), "{table}");
 }

@@ -199,7 +199,9 @@ impl Noise {
             From::Whole => ORDER + SEARCHED,
             From::Lasting => ORDER + SLOW.len(),
         };
-        for order in 0..=most {
+        // An interval reckons with a wander that cannot be excluded: there it is the largest order that holds.
+        let largest = from == From::Lasting;
+        for order in (0..=most).map(|k| if largest { most - k } else { k }) {
             let columns: Vec<usize> = (0..order).collect();
             let (a, s) = foretold(&rows, &columns, sd_n, floor_n);
             let (near, slow) = a.split_at(ORDER);
@@ -210,12 +212,13 @@ impl Noise {
             let slow: [f64; SLOW.len()] = core::array::from_fn(|i| slow[i]);
             let loss: f64 =
                 rows.iter().map(|row| rho(innovation(row, &a) / s)).sum::<f64>() + n * libm::log(s);
-            // An interval reckons with a wander that cannot be excluded.
-            let price = if from == From::Lasting { 0.0 } else { 0.5 * order as f64 * libm::log(n) };
-            let cost = loss + price;
+            let cost = loss + 0.5 * order as f64 * libm::log(n);
             if best.is_none_or(|b| cost < b.0) {
                 let first = [First::unknown(sd_n.max(s)); ORDER];
                 best = Some((cost, Bin { a: near, slow, innovation_n: s, sd_n, first }));
+            }
+            if largest {
+                break;
             }
         }
         let mut best = best.map_or_else(|| Bin::white(sd_n), |b| b.1);
