@@ -3,7 +3,7 @@
 
 use stylet_diagnose::predict::{Refit, predict};
 use stylet_diagnose::{Evidence, Options};
-use stylet_examine::{Answer, Grade, Hide, Plan, Question, Wrong, run, table};
+use stylet_examine::{Answer, CaseId, Grade, Hide, Plan, Question, Size, World, Wrong, run, table};
 use stylet_scenario::{Motion, Scenario, Segment};
 
 /// What is believed, and what was measured.
@@ -41,26 +41,30 @@ fn in_a_world_that_it_did_not_make_clean_data_are_not_accused_and_strong_effects
     assert!(outcomes.iter().any(|o| o.strength_sd > 5.0));
 }
 
-/// In each of these it was taken for scatter between insertions once. (With the noisy encoder `nonlinear_elasticity` is named
-/// beside it, wrongly: it was a trace before dry friction knew the instants of smooth turns.)
+/// In these worlds it was taken for scatter between insertions once.
 #[test]
 fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once() {
-    let wrong = vec![Wrong::Growing, Wrong::Encoder, Wrong::SurfaceEach, Wrong::ScatterFriction];
-    let plan = Plan {
-        wrong,
-        grades: vec![Grade::Large],
-        hide: vec![Hide::One, Hide::Clean],
-        cases: 2,
-        seed: 3,
-        ..Plan::default()
+    let rows =
+        [(Wrong::Growing, 11), (Wrong::Encoder, 17), (Wrong::SurfaceEach, 18), (Wrong::ScatterFriction, 13)];
+    let of = |(wrong, index): (Wrong, u64)| {
+        let id = |hide, index| CaseId {
+            world: World::Plain,
+            wrong,
+            grade: Grade::Large,
+            hide,
+            size: Size::Strong,
+            seed: 3,
+            index,
+        };
+        [id(Hide::One, index), id(Hide::Clean, 0)]
     };
-    let outcomes = run(&plan.cases(), None, &answer, &|_, _| {}).expect("a run");
+    let cases: Vec<CaseId> = rows.into_iter().flat_map(of).collect();
+    let outcomes = run(&cases, None, &answer, &|_, _| {}).expect("a run");
     let table = table::text(&outcomes);
     let (clean, one): (Vec<_>, Vec<_>) = outcomes.iter().partition(|o| o.id.hide == Hide::Clean);
     assert_eq!((clean.len(), one.len()), (4, 4));
     assert!(clean.iter().all(|o| o.worth.right), "{table}");
-    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.all_found), "{table}");
-    assert!(one.iter().filter(|o| o.worth.right).count() >= 3, "{table}");
+    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.right), "{table}");
 }
 
 #[test]

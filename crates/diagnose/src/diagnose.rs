@@ -246,8 +246,8 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let at_sight = after > EXCESS_SLOW && told.at_sight.p_value < LEFTOVER_P;
     let unknown = share > UNEXPLAINED && (sure || at_sight);
     let left = if unknown && !sure { &told.at_sight } else { &told.sure };
-    // Intervals by the noise as it is, structure that is left included.
-    let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Whole);
+    // Intervals by the noise as it is, structure that is left included, however slow.
+    let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
     let settled = fit(&search.best.model, &whole, Effort { turns: 3, enough: 0.1 })
         .unwrap_or_else(|| search.best.clone());
     let spread = Spread::new(&settled, &whole);
@@ -301,8 +301,8 @@ fn base_parameters(search: &Search, spread: &Spread) -> Vec<BaseParameter> {
     let mut out = Vec::new();
     let believed = &search.best.model.belief.tissue;
     let mut add = |layer: usize, name: &str, role: Role, assumed: f64, scale: f64| {
-        let Some((x, sd)) = spread.of(role) else { return };
-        let (value, half) = (x * scale, 1.96 * sd * scale);
+        let Some((x, half)) = spread.of(role) else { return };
+        let (value, half) = (x * scale, half * scale);
         let (low, high) = (value - half, value + half);
         out.push(BaseParameter {
             layer,
@@ -372,17 +372,16 @@ fn step(stage: &crate::select::Stage) -> EvidenceStep {
 /// Causes that the raw numbers show.
 fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
     let mut causes = Vec::new();
-    let mut add = |effect: AnyEffect, spreads: &[f64]| {
+    let mut add = |effect: AnyEffect, intervals: &[(f64, f64)]| {
         use stylet_tissue::Effect;
         let info = effect.info();
         let parameters = info
             .parameters
             .iter()
             .zip(effect.parameters())
-            .zip(spreads)
-            .map(|((p, value), sd)| {
-                let half = 1.96 * sd;
-                (p.path.to_owned(), Estimate { value, low: (value - half).max(0.0), high: value + half })
+            .zip(intervals)
+            .map(|((p, value), (low, high))| {
+                (p.path.to_owned(), Estimate { value, low: low.max(0.0), high: *high })
             })
             .collect();
         causes.push(Cause {
@@ -394,16 +393,16 @@ fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
             share: 0.0,
         });
     };
+    let about = |value: f64, sd: f64| (value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd);
     if let Some(limit_n) = raw.limit_n {
-        add(stylet_tissue::Saturation { limit_n }.into(), &[1e-6 * limit_n]);
+        add(stylet_tissue::Saturation { limit_n }.into(), &[about(limit_n, 1e-6 * limit_n)]);
     }
     if let Some(step_n) = raw.step_n.filter(|s| *s > 0.3 * noise_n) {
-        add(stylet_tissue::Quantisation { step_n }.into(), &[1e-4 * step_n]);
+        add(stylet_tissue::Quantisation { step_n }.into(), &[about(step_n, 1e-4 * step_n)]);
     }
-    if let Some((count, size_n, seconds)) = raw.spikes {
-        let rate_hz = count as f64 / seconds.max(1e-9);
-        let root = (count as f64).sqrt();
-        add(stylet_tissue::ForceSpikes { rate_hz, size_n }.into(), &[rate_hz / root, 1.5 * noise_n / root]);
+    if let Some(s) = &raw.spikes {
+        let effect = stylet_tissue::ForceSpikes { rate_hz: s.rate_hz(), size_n: s.size_n };
+        add(effect.into(), &[s.rate_interval_hz(), s.size_interval_n()]);
     }
     causes
 }

@@ -1,40 +1,112 @@
 //! Intervals of all numbers by the curvature of the likelihood, the instants of ruptures marginalised.
+//!
+//! Where insertions differ from one another (a surface, a friction, a puncture force of each recording's own) a shared number is a
+//! mean of few, and how much they differ is told by the same few: the variance is taken with as many degrees of freedom as are left
+//! of them (restricted likelihood: Patterson and Thompson 1971), and the interval is Student's with those of Satterthwaite (1946),
+//! `nu = V^2 / sum(V_k^2/nu_k)`, `V_k` the part of the variance `V` that comes from the scatter `k`.
+//!
+//! The noise is what is left, its slow wander over tens of seconds and through breaks included
+//! ([`From::Lasting`](stylet_identify::noise::From)); and where a face lies is told by moving it as far as it is uncertain.
 
 use crate::outcome::Estimate;
+use stylet_identify::events::{judge, spreads};
 use stylet_identify::fit::{Fit, Tangent};
-use stylet_identify::linear::Factor;
-use stylet_identify::model::Role;
+use stylet_identify::linear::{Factor, Symmetric};
+use stylet_identify::model::{Number, Role};
 use stylet_identify::objective::Data;
+use stylet_stats::student;
 use stylet_tissue::FitScale;
 
-/// Half width of a 95 % interval in standard deviations.
-const Z95: f64 = 1.959_963_985;
+/// Probability below the upper end of a 95 % interval.
+const UPPER: f64 = 0.975;
+/// A scatter's variance is raised by this share to see what comes from it.
+const RAISED: f64 = 0.02;
+/// The curvature is taken anew at most so often over the standard deviations that it gave ...
+const WIDER: usize = 4;
+/// ... until none changes by more than this share.
+const SETTLED: f64 = 0.1;
+/// More degrees of freedom are as good as infinitely many.
+const MANY: f64 = 1e4;
 
 /// The curvature at an optimum.
 pub struct Spread<'a> {
     fit: &'a Fit,
     tangent: Tangent,
     factor: Factor,
+    /// The same with one scatter raised, and its degrees of freedom.
+    raised: Vec<(Factor, f64)>,
 }
+
+/// A scatter between insertions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    OwnSurface,
+    OwnFriction,
+    Force,
+    Place,
+}
+
+const KINDS: [Kind; 4] = [Kind::OwnSurface, Kind::OwnFriction, Kind::Force, Kind::Place];
 
 impl<'a> Spread<'a> {
     /// Of a fit.
     #[must_use]
     pub fn new(fit: &'a Fit, data: &Data) -> Self {
-        let tangent = Tangent::new(&fit.model, data, &fit.residuals);
-        let factor = tangent.factor();
-        Self { fit, tangent, factor }
+        let mut tangent = Tangent::new(&fit.model, data, &fit.residuals);
+        let mut wide_m = 0.0;
+        for _ in 0..WIDER {
+            let Some(next_m) = uncertainty_m(&tangent) else { break };
+            if (next_m / wide_m - 1.0).abs() < SETTLED {
+                break;
+            }
+            wide_m = next_m;
+            // All by the same: what moves one face there and back again has to stay where it is.
+            let step = |n: &Number| bends(n.role).then_some(wide_m.min(0.25 * (n.high - n.low)));
+            tangent = tangent.widened(&fit.model, data, &fit.residuals, &step);
+        }
+        let told: Vec<(Kind, f64, f64)> = KINDS
+            .into_iter()
+            .filter_map(|kind| of_scatter(kind, fit).map(|(count, freedom)| (kind, count, freedom)))
+            .collect();
+        // Variances as the degrees of freedom that are left tell them.
+        let mut matrix = tangent.matrix.clone();
+        for (kind, count, freedom) in &told {
+            raise(&mut matrix, &tangent, fit, *kind, (1.0, count / freedom));
+        }
+        let raised = told
+            .iter()
+            .map(|(kind, count, freedom)| {
+                let mut more = matrix.clone();
+                let now = count / freedom;
+                raise(&mut more, &tangent, fit, *kind, (now, now * (1.0 + RAISED)));
+                (more.factor(), *freedom)
+            })
+            .collect();
+        Self { fit, factor: matrix.factor(), tangent, raised }
     }
 
-    /// Value and standard deviation of a shared number, in the scale of the fit; `None` when it is not free.
+    /// Half the width of the 95 % interval of a combination of the numbers.
+    fn half_width(&self, gradient: &[f64]) -> f64 {
+        let variance = |f: &Factor| f.half(gradient).iter().map(|y| y * y).sum::<f64>();
+        let all = variance(&self.factor);
+        let mut lost = 0.0;
+        for (more, freedom) in &self.raised {
+            let part = ((variance(more) - all) / RAISED).clamp(0.0, all);
+            lost += part * part / freedom;
+        }
+        let freedom = if lost > 0.0 { all * all / lost } else { f64::INFINITY };
+        all.sqrt() * student::quantile(UPPER, freedom.clamp(1.0, MANY))
+    }
+
+    /// Value and half width of the 95 % interval of a shared number, in the scale of the fit; `None` when it is not free.
     #[must_use]
     pub fn of(&self, role: Role) -> Option<(f64, f64)> {
         let i = self.tangent.shared.iter().position(|n| n.role == role)?;
         let mut unit = vec![0.0; self.tangent.matrix.size];
         unit[i] = 1.0;
-        let variance: f64 = self.factor.half(&unit).iter().map(|y| y * y).sum();
-        let sd = if variance > 0.0 { variance.sqrt() } else { self.tangent.shared[i].sd };
-        Some((self.fit.model.get(role, 0), sd))
+        let half = self.half_width(&unit);
+        let by_prior = || self.tangent.shared[i].sd * student::quantile(UPPER, MANY);
+        Some((self.fit.model.get(role, 0), if half > 0.0 { half } else { by_prior() }))
     }
 
     /// Whether a shared number stands at a bound.
@@ -70,17 +142,206 @@ impl<'a> Spread<'a> {
             gradient[i] = if change.is_finite() { change } else { 0.0 };
             let _ = k;
         }
-        let variance: f64 = self.factor.half(&gradient).iter().map(|y| y * y).sum();
-        let sd = variance.sqrt() * Z95;
+        let half = self.half_width(&gradient);
         let (low, high) = match p.fit_scale() {
-            FitScale::Log => (value * libm::exp(-sd / value), value * libm::exp(sd / value)),
+            FitScale::Log => (value * libm::exp(-half / value), value * libm::exp(half / value)),
             FitScale::Reciprocal => {
                 // Evenly about the reciprocal.
-                let (x, half) = (1.0 / value, sd / (value * value));
+                let (x, half) = (1.0 / value, half / (value * value));
                 (1.0 / (x + half), if x > half { 1.0 / (x - half) } else { f64::INFINITY })
             }
-            FitScale::Linear => (value - sd, value + sd),
+            FitScale::Linear => (value - half, value + half),
         };
         Estimate { value, low: low.max(p.low), high: high.min(p.high).min(1e300) }
+    }
+}
+
+/// How uncertain in m the faces are at which the force bends: the middle one.
+fn uncertainty_m(tangent: &Tangent) -> Option<f64> {
+    let variances = tangent.factor().inverse_diagonal();
+    let bent = tangent.shared.iter().zip(variances).filter(|(n, v)| bends(n.role) && v.is_finite());
+    let mut sd: Vec<f64> = bent.filter(|(n, v)| v.sqrt() > n.step).map(|(_, v)| v.sqrt()).collect();
+    (!sd.is_empty()).then(|| stylet_stats::order::median(&mut sd))
+}
+
+/// Whether the force bends where such a number puts a face.
+fn bends(role: Role) -> bool {
+    matches!(role, Role::Surface | Role::Thickness(_) | Role::OwnSurface)
+}
+
+/// How many numbers tell a scatter of a fit, and how many degrees of freedom are left of them; `None` where there is no such
+/// scatter.
+fn of_scatter(kind: Kind, fit: &Fit) -> Option<(f64, f64)> {
+    let model = &fit.model;
+    let recordings = model.own.len() as f64;
+    // Per layer, how many ruptures tell this scatter: the share of each that it has.
+    let told = |risk: usize| -> Vec<f64> {
+        (0..model.layers())
+            .map(|l| {
+                let events = fit.residuals.events.iter().filter_map(|e| e.get(l)).filter(|e| e.ruptured);
+                events.map(|e| judge(e, &model.scatter).shares[risk].powi(2)).sum()
+            })
+            .collect()
+    };
+    let (count, fitted) = match kind {
+        Kind::OwnSurface if model.free.own_surface => (recordings, f64::from(model.free.surface)),
+        Kind::OwnFriction if model.free.own_friction => (recordings, 1.0),
+        Kind::Force if model.scatter.force > 0.0 => {
+            let told = told(0);
+            (told.iter().sum(), told.iter().filter(|n| **n > 0.5).count() as f64)
+        }
+        Kind::Place if model.scatter.place_m > 0.0 => {
+            let told = told(1);
+            let faces = told.iter().filter(|n| **n > 0.5).count() as f64;
+            (told.iter().sum(), if model.free.thickness { faces } else { 0.0 })
+        }
+        _ => return None,
+    };
+    (count > 0.0).then(|| (count, (count - fitted).clamp(1.0_f64.min(count), count)))
+}
+
+/// Changes a normal matrix as if the variance of a scatter were `to` times what the fit has, where it was `from` times that.
+fn raise(matrix: &mut Symmetric, tangent: &Tangent, fit: &Fit, kind: Kind, (from, to): (f64, f64)) {
+    let shared = tangent.shared.len();
+    let (role, row) = match kind {
+        Kind::OwnSurface => (Some(Role::OwnSurface), 0),
+        Kind::OwnFriction => (Some(Role::OwnFriction), 0),
+        Kind::Force => (None, 0),
+        Kind::Place => (None, 1),
+    };
+    if let Some(role) = role {
+        let Some(o) = tangent.own.iter().position(|n| n.role == role) else { return };
+        let information = 1.0 / (tangent.own[o].sd * tangent.own[o].sd);
+        for r in 0..fit.model.own.len() {
+            let i = tangent.place(o, r);
+            matrix.add(i, i, information * (1.0 / to - 1.0 / from));
+        }
+        return;
+    }
+    let scatter = &fit.model.scatter;
+    for (r, events) in fit.residuals.events.iter().enumerate() {
+        for (l, event) in events.iter().enumerate() {
+            let (force, place) = spreads(event, scatter);
+            let (all, own) =
+                if kind == Kind::Force { (force, scatter.force) } else { (place, scatter.place_m) };
+            let weight = |times: f64| all * all / (all * all + (times - 1.0) * own * own);
+            let change = weight(to) - weight(from);
+            let at = |k: usize| tangent.columns[k].rows.get(r).and_then(|c| c.get(4 * l + row)).copied();
+            let numbers = (0..shared).map(|i| (i, i));
+            let own_numbers = (0..tangent.own.len()).map(|o| (tangent.place(o, r), shared + o));
+            let told: Vec<(usize, f64)> = numbers
+                .chain(own_numbers)
+                .filter_map(|(i, k)| at(k).filter(|c| *c != 0.0).map(|c| (i, c)))
+                .collect();
+            for (n, (i, a)) in told.iter().enumerate() {
+                told[..=n].iter().for_each(|(j, b)| matrix.add(*i, *j, change * a * b));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Spread;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::{Effort, Tangent, fit};
+    use stylet_identify::model::{Belief, Model, Role};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, Trail, replay};
+    use stylet_record::Recording;
+    use stylet_stats::student;
+    use stylet_tissue::{Layer, Tissue};
+
+    fn belief() -> Belief {
+        let layer = Layer {
+            thickness_m: 0.02,
+            stiffness_n_per_m: 90.0,
+            friction_ns_per_m2: 6000.0,
+            puncture_n: None,
+            name: String::new(),
+        };
+        Belief {
+            tissue: Tissue { surface_m: 0.002, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.05,
+        }
+    }
+
+    /// Half way into the layer, and out again.
+    fn blocks() -> Blocks {
+        let (mut t, mut z, mut at) = (Vec::new(), Vec::new(), -0.004);
+        for k in 0..1600 {
+            let s = f64::from(k) / 200.0;
+            at += if s < 5.0 { 0.003 + 0.001 * (3.0 * s).sin() } else { -0.004 } / 200.0;
+            t.push(s);
+            z.push(at);
+        }
+        let f = vec![0.0; t.len()];
+        let r = Recording::new(t, z, f).expect("a recording");
+        Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)
+    }
+
+    /// Insertions that differ in what one number of each recording's own is told by `set`, with a little noise.
+    fn insertions(own: &[f64], set: impl Fn(&mut Model, f64)) -> (Model, Data) {
+        let blank = Data::new(Arc::new(vec![blocks(); own.len()]), Noise::white(1e-3), 0.0);
+        let model = Model::base(Arc::new(belief()), own.len());
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut full: Vec<Blocks> = blank.blocks.to_vec();
+        for (r, x) in own.iter().enumerate() {
+            let mut there = model.clone();
+            set(&mut there, *x);
+            let instants = Trail::new(&there, &blank, r).expect("a trail").own_instants();
+            there.instants[r] = instants;
+            full[r].f = replay(&there, &blank, r).expect("a replay").f;
+            full[r].f.iter_mut().for_each(|f| *f += 3.4e-3 * (rng.random::<f64>() - 0.5));
+        }
+        (model, Data::new(Arc::new(full), Noise::white(1e-3), 0.0))
+    }
+
+    /// The mean of four that differ is known as well as four numbers tell a mean: Student's interval of three degrees of freedom.
+    #[test]
+    fn a_number_that_differs_between_insertions_has_the_interval_of_a_mean_of_few() {
+        let own = [-4e-4, 7e-4, 1e-4, -8e-4];
+        let wanted = |own: &[f64]| student::quantile(0.975, 3.0) * stylet_stats::sd(own) / 2.0;
+        let (mut model, data) = insertions(&own, |m, x| m.tissue.surface_m += x);
+        model.free.own_surface = true;
+        model.own.iter_mut().zip(own).for_each(|(o, x)| o.surface_m = x);
+        let told = fit(&model, &data, Effort::FULL).expect("a fit");
+        let (_, half) = Spread::new(&told, &data).of(Role::Surface).expect("free");
+        assert!((half / wanted(&own) - 1.0).abs() < 0.1, "{half} for {}", wanted(&own));
+
+        let own = [-0.03, 0.05, 0.02, -0.05];
+        let (mut model, data) =
+            insertions(&own, |m, x| m.tissue.layers[0].friction_ns_per_m2 *= libm::exp(x));
+        model.free.own_friction = true;
+        model.own.iter_mut().zip(own).for_each(|(o, x)| o.friction = x);
+        let told = fit(&model, &data, Effort::FULL).expect("a fit");
+        let (_, half) = Spread::new(&told, &data).of(Role::Friction(0)).expect("free");
+        assert!((half / wanted(&own) - 1.0).abs() < 0.1, "{half} for {}", wanted(&own));
+    }
+    /// Under a slow noise the place at which a force bends is far less sure than a derivative says, which sees a jump there; under a white
+    /// one both agree.
+    #[test]
+    fn the_place_of_a_bend_is_as_sure_as_the_noise_lets_it_be_and_not_surer() {
+        let (mut model, mut data) = insertions(&[0.0, 0.0], |_, _| ());
+        // The far face is never reached.
+        model.free.thickness = false;
+        for (slow, least, most) in [(0.0, 0.97, 1.06), (0.98, 1.5, 20.0)] {
+            let mut noise = Noise::white(0.02);
+            noise.bins[0].a[0] = slow;
+            data = data.with_noise(noise);
+            let told = fit(&model, &data, Effort::FULL).expect("a fit");
+            let tangent = Tangent::new(&told.model, &data, &told.residuals);
+            let at = tangent.shared.iter().position(|n| n.role == Role::Surface).expect("free");
+            let by_derivative = stylet_stats::Z95 * tangent.factor().inverse_diagonal()[at].sqrt();
+            let (_, half) = Spread::new(&told, &data).of(Role::Surface).expect("free");
+            let ratio = half / by_derivative;
+            assert!(ratio > least && ratio < most, "{slow}: {ratio}");
+        }
     }
 }

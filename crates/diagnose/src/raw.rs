@@ -12,8 +12,45 @@ pub struct Raw {
     pub limit_n: Option<f64>,
     /// Step of the recorded force in N.
     pub step_n: Option<f64>,
-    /// Spikes: how many, mean size in N, seconds recorded.
-    pub spikes: Option<(usize, f64, f64)>,
+    /// Spikes.
+    pub spikes: Option<Spikes>,
+}
+
+/// Spikes of one size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spikes {
+    /// How many.
+    pub count: usize,
+    /// Mean size in N.
+    pub size_n: f64,
+    /// Standard deviation of the sizes in N: what the noise makes of them.
+    pub size_sd_n: f64,
+    /// Seconds in which a spike would have been seen.
+    pub seen_s: f64,
+}
+
+impl Spikes {
+    /// Spikes per second.
+    #[must_use]
+    pub fn rate_hz(&self) -> f64 {
+        self.count as f64 / self.seen_s.max(1e-9)
+    }
+
+    /// 95 % interval of the rate in Hz: the score interval of a Poisson number, `n + z^2/2 -+ z sqrt(n + z^2/4)`.
+    #[must_use]
+    pub fn rate_interval_hz(&self) -> (f64, f64) {
+        let (n, z) = (self.count as f64, stylet_stats::Z95);
+        let (middle, half) = (n + 0.5 * z * z, z * (n + 0.25 * z * z).sqrt());
+        ((middle - half) / self.seen_s.max(1e-9), (middle + half) / self.seen_s.max(1e-9))
+    }
+
+    /// 95 % interval of the mean size in N.
+    #[must_use]
+    pub fn size_interval_n(&self) -> (f64, f64) {
+        let n = self.count as f64;
+        let half = stylet_stats::student::quantile(0.975, (n - 1.0).max(1.0)) * self.size_sd_n / n.sqrt();
+        (self.size_n - half, self.size_n + half)
+    }
 }
 
 /// Fewest equal extremes that make a saturation.
@@ -94,16 +131,16 @@ const ONE_SIZE: f64 = 0.35;
 const BETWEEN: f64 = 0.35;
 
 /// Isolated samples that stand out of both neighbours, all by about the same.
-fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Option<(usize, f64, f64)> {
-    let mut seconds = 0.0;
+fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Option<Spikes> {
+    let mut seen_s = 0.0;
     let mut found: Vec<(usize, usize, f64)> = Vec::new();
     let mut smaller: Vec<f64> = Vec::new();
     for (r, recording) in recordings.iter().enumerate() {
         let f = &recording.force_n;
-        seconds += recording.duration_s();
         if f.len() < 12 {
             continue;
         }
+        let interval_s = median(&mut recording.time_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>());
         let away = |i: usize| {
             let mut around = [f[i - 2], f[i - 1], f[i + 1], f[i + 2]];
             around.sort_unstable_by(f64::total_cmp);
@@ -124,7 +161,12 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
             let v = &recording.velocity_mps;
             let moves = (v[i + 1] - v[i - 1]).abs()
                 > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
-            if moves || !isolated || exclude[r][i] {
+            if moves || exclude[r][i] {
+                continue;
+            }
+            // Only here would one have been seen; what is missing from a recording has none.
+            seen_s += interval_s;
+            if !isolated {
                 continue;
             }
             let both = before.abs().min(after.abs()) > 0.7 * SPIKE_SD * sd;
@@ -146,6 +188,40 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
     for (r, i, _) in &found {
         exclude[*r][*i] = true;
     }
-    let mean = found.iter().map(|f| f.2).sum::<f64>() / found.len() as f64;
-    Some((found.len(), mean, seconds))
+    let sizes: Vec<f64> = found.iter().map(|f| f.2).collect();
+    let (size_n, size_sd_n) = (stylet_stats::moments::mean(&sizes), stylet_stats::moments::sd(&sizes));
+    Some(Spikes { count: found.len(), size_n, size_sd_n, seen_s })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::look;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+    use stylet_record::Recording;
+
+    /// Half of the samples are missing: the rate is that of the samples that are there. The size is as sure as the spikes agree.
+    #[test]
+    fn spikes_are_counted_over_the_samples_that_are_there_and_their_size_is_as_sure_as_they_agree() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let (mut t, mut f, mut count) = (Vec::new(), Vec::new(), 0);
+        for k in 0..40_000 {
+            let spike = if k % 400 == 7 { 3.0 + 0.8 * (rng.random::<f64>() - 0.5) } else { 0.0 };
+            let noise = 0.05 * (rng.random::<f64>() - 0.5);
+            if (k / 200) % 2 == 0 {
+                t.push(f64::from(k) / 200.0);
+                f.push(noise + spike);
+                count += usize::from(spike > 0.0);
+            }
+        }
+        let r = Recording::new(t.clone(), vec![0.0; t.len()], f).expect("a recording");
+        let spikes = look(&[&r], &[Vec::new()]).spikes.expect("spikes");
+        assert_eq!(spikes.count, count);
+        assert!((spikes.rate_hz() - count as f64 / 100.0).abs() < 0.01, "{spikes:?}");
+        let (low, high) = spikes.rate_interval_hz();
+        // A hundred of a Poisson number, by the score interval.
+        assert!((low - 0.8223).abs() < 1e-3 && (high - 1.2161).abs() < 1e-3, "{low} {high}");
+        let (low, high) = spikes.size_interval_n();
+        assert!(low < 3.0 && high > 3.0 && high - low > 0.05 && high - low < 0.13, "{low} {high}");
+    }
 }

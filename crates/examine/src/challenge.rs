@@ -5,7 +5,7 @@ use crate::judge::outcome::Outcome;
 use crate::plan::Plan;
 use crate::reality::effect::{FURTHER_IDS, IDS};
 use crate::world::case::case;
-use crate::world::id::CaseId;
+use crate::world::id::{CaseId, DRAWING, first_drawing};
 use core::fmt::Write as _;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 /// What only the judge has: which case hides behind which number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Key {
+    /// The drawing that they are of ([`DRAWING`]).
+    #[serde(default = "first_drawing")]
+    pub drawing: u32,
     /// Cases by their numbers.
     pub cases: BTreeMap<String, CaseId>,
 }
@@ -83,7 +86,7 @@ pub fn export(plan: &Plan, folder: &Path) -> Result<usize, ChallengeError> {
         written?;
         std::fs::write(part.join("README.md"), readme(numbered.len())).map_err(failed)?;
         std::fs::write(part.join("names.txt"), names()).map_err(failed)?;
-        let key = Key { cases: numbered.iter().cloned().collect() };
+        let key = Key { drawing: DRAWING, cases: numbered.iter().cloned().collect() };
         let text = serde_json::to_vec_pretty(&key).map_err(|e| failed(e.into()))?;
         std::fs::write(key_path(folder), text).map_err(failed)?;
         std::fs::rename(&part, folder).map_err(failed)
@@ -151,6 +154,13 @@ Judged with `stylet benchmark judge FOLDER answers.json` by whoever has the key.
 pub fn judge(folder: &Path, answers: &Path) -> Result<Vec<Outcome>, ChallengeError> {
     let key_file = key_path(folder);
     let key: Key = json(&key_file, "it should be the key that the export wrote beside the folder")?;
+    if key.drawing != DRAWING {
+        let why = format!(
+            "is of drawing {} of the referee, and this is drawing {DRAWING}: export the challenge anew",
+            key.drawing
+        );
+        return Err(ChallengeError::Content { path: key_file.display().to_string(), why });
+    }
     let answers_given: BTreeMap<String, serde_json::Value> =
         json(answers, "it should be an object: case number -> diagnosis, as the challenge's README says")?;
     if let Some(stray) = answers_given.keys().find(|k| !key.cases.contains_key(*k)) {

@@ -6,12 +6,12 @@
 //! it: of the crates of this project it depends on `record` alone.
 //!
 //! ```
-//! use stylet_examine::{Answer, Plan, run, table};
+//! use stylet_examine::{Answer, Hide, Plan, run, table};
 //!
 //! let plan = Plan { cases: 3, ..Plan::default() };
 //! // An engine that never finds anything.
 //! let outcomes = run(&plan.cases(), None, &|_question| Ok(Answer::none()), &|_, _| {})?;
-//! assert_eq!(outcomes.iter().filter(|o| o.worth.right).count(), 1); // the clean one
+//! assert!(outcomes.iter().filter(|o| o.id.hide == Hide::Clean).all(|o| o.worth.right));
 //! println!("{}", table::text(&outcomes));
 //! # Ok::<(), stylet_examine::RunError>(())
 //! ```

@@ -3,7 +3,7 @@
 use crate::judge::answer::Answer;
 use crate::judge::outcome::Outcome;
 use crate::world::case::{Question, case};
-use crate::world::id::CaseId;
+use crate::world::id::{CaseId, DRAWING};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
@@ -93,7 +93,7 @@ pub fn run(
 /// The outcomes that a journal holds.
 ///
 /// # Errors
-/// What the system says, unless the file is not there.
+/// What the system says, unless the file is not there; outcomes of another [`DRAWING`].
 pub fn read(path: &Path) -> std::io::Result<BTreeMap<CaseId, Outcome>> {
     let file = match std::fs::File::open(path) {
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
@@ -102,8 +102,42 @@ pub fn read(path: &Path) -> std::io::Result<BTreeMap<CaseId, Outcome>> {
     let mut out = BTreeMap::new();
     for line in std::io::BufReader::new(file).lines() {
         if let Ok(outcome) = serde_json::from_str::<Outcome>(&line?) {
+            if outcome.drawing != DRAWING {
+                let why = format!(
+                    "holds outcomes of drawing {} of the referee, and this is drawing {DRAWING}: the same numbers are other \
+                     cases; name another folder",
+                    outcome.drawing
+                );
+                return Err(std::io::Error::new(std::io::ErrorKind::InvalidData, why));
+            }
             out.insert(outcome.id, outcome);
         }
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::read;
+    use crate::judge::answer::Answer;
+    use crate::plan::Plan;
+
+    #[test]
+    fn a_journal_of_another_drawing_is_refused_and_not_overwritten() {
+        let plan = Plan { cases: 1, hide: vec![crate::Hide::Clean], ..Plan::default() };
+        let path = std::env::temp_dir().join(format!("stylet-drawing-{}.jsonl", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        let none = |_: &crate::Question| Ok(Answer::none());
+        super::run(&plan.cases(), Some(&path), &none, &|_, _| {}).expect("a run");
+        assert_eq!(read(&path).expect("a journal").len(), 1);
+        let text = std::fs::read_to_string(&path).expect("text");
+        let old = text.replace(&format!("\"drawing\":{}", super::DRAWING), "\"drawing\":1");
+        assert_ne!(old, text);
+        std::fs::write(&path, &old).expect("written");
+        let why = read(&path).expect_err("another drawing").to_string();
+        assert!(why.contains("name another folder"), "{why}");
+        assert!(super::run(&plan.cases(), Some(&path), &none, &|_, _| {}).is_err());
+        assert_eq!(std::fs::read_to_string(&path).expect("text"), old);
+        let _ = std::fs::remove_file(&path);
+    }
 }

@@ -92,11 +92,42 @@ impl Tangent {
             roots,
         };
         let numbers: Vec<Number> = t.shared.iter().chain(&t.own).copied().collect();
-        let trails: Vec<Option<Trail>> =
-            (0..data.recordings()).into_par_iter().map(|r| Trail::new(model, data, r)).collect();
+        let trails = trails(model, data);
         t.columns = numbers.par_iter().map(|n| t.derivative(model, data, at, n, &trails)).collect();
         t.assemble(model, data.recordings());
         t
+    }
+
+    /// The same with some numbers' changes over steps as wide as `step` says (both ways, per unit) in place of derivatives. A force
+    /// that bends at a face moves by a jump to first order; moved by as much as the face is uncertain it goes up a ramp, which a slow
+    /// noise hides far better.
+    #[must_use]
+    pub fn widened(
+        mut self,
+        model: &Model,
+        data: &Data,
+        at: &Residuals,
+        step: &(dyn Fn(&Number) -> Option<f64> + Sync),
+    ) -> Self {
+        let trails = trails(model, data);
+        let of = |n: &Number, step: f64| self.derivative(model, data, at, &Number { step, ..*n }, &trails);
+        let wide = |n: &Number| {
+            let step = step(n)?;
+            let (mut up, down) = (of(n, step), of(n, -step));
+            for (up, down) in up.w.iter_mut().zip(down.w).chain(up.rows.iter_mut().zip(down.rows)) {
+                up.iter_mut().zip(down).for_each(|(a, b)| *a = 0.5 * (*a + b));
+            }
+            Some(up)
+        };
+        let numbers: Vec<Number> = self.shared.iter().chain(&self.own).copied().collect();
+        let columns: Vec<Option<Column>> = numbers.par_iter().map(wide).collect();
+        for (column, wide) in self.columns.iter_mut().zip(columns) {
+            if let Some(wide) = wide {
+                *column = wide;
+            }
+        }
+        self.assemble(model, data.recordings());
+        self
     }
 
     /// The column of a number by a forward difference.
@@ -223,6 +254,11 @@ impl Tangent {
     pub fn factor(&self) -> Factor {
         self.matrix.factor()
     }
+}
+
+/// The trails of all recordings.
+fn trails(model: &Model, data: &Data) -> Vec<Option<Trail>> {
+    (0..data.recordings()).into_par_iter().map(|r| Trail::new(model, data, r)).collect()
 }
 
 fn weighted(w: &[Vec<f64>], roots: &[Vec<f64>]) -> Vec<Vec<f64>> {

@@ -18,8 +18,10 @@ pub const HUBER: f64 = 2.5;
 const FLOOR_N: f64 = 1e-6;
 
 /// Stretches of blocks before those of the autoregression whose means a slow wander is told by: some tenths of a second,
-/// some seconds (a heterogeneous autoregression: Corsi 2009).
-const SLOW: [(usize, usize); 2] = [(ORDER, 24), (24, 124)];
+/// some seconds, ten seconds (a heterogeneous autoregression: Corsi 2009).
+const SLOW: [(usize, usize); 3] = [(ORDER, 24), (24, 124), (124, 624)];
+/// So many of them hold what a search calls noise; a law that moves over tens of seconds would be lost in the others.
+const SEARCHED: usize = 2;
 /// Numbers of a row: the residual, those before it, the means.
 const ROW: usize = 1 + ORDER + SLOW.len();
 
@@ -34,6 +36,45 @@ pub struct Bin {
     pub innovation_n: f64,
     /// Standard deviation in N.
     pub sd_n: f64,
+    /// How a block is foretold that has fewer than [`ORDER`] before it since a break: none, one ...
+    pub first: [First; ORDER],
+}
+
+/// How a block is foretold soon after a break.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct First {
+    /// Coefficients, newest first; as many as there are blocks since the break.
+    pub a: [f64; ORDER],
+    /// Coefficients of the means of stretches further back.
+    pub slow: [f64; SLOW.len()],
+    /// Standard deviation in N of what is not foretold.
+    pub sd_n: f64,
+}
+
+impl First {
+    /// Nothing is known of what was before.
+    fn unknown(sd_n: f64) -> Self {
+        Self { a: [0.0; ORDER], slow: [0.0; SLOW.len()], sd_n }
+    }
+}
+
+impl Bin {
+    /// Independent noise of one size.
+    fn white(sd_n: f64) -> Self {
+        let none = First::unknown(sd_n);
+        Self { a: none.a, slow: none.slow, innovation_n: sd_n, sd_n, first: [none; ORDER] }
+    }
+
+    /// Whether it has a slow wander.
+    fn wanders(&self) -> bool {
+        let none = [0.0; SLOW.len()];
+        self.slow != none || self.first.iter().any(|f| f.slow != none)
+    }
+
+    /// Standard deviation in N of what is not foretold of a block with so many before it since a break.
+    fn size_n(&self, run: usize) -> f64 {
+        self.first.get(run).map_or(self.innovation_n, |f| f.sd_n)
+    }
 }
 
 /// The noise of a set of recordings.
@@ -43,6 +84,8 @@ pub struct Noise {
     pub edges_n: Vec<f64>,
     /// The ranges.
     pub bins: Vec<Bin>,
+    /// The memory of a slow wander reaches through breaks of the recording, such as jumps of the speed.
+    pub lasting: bool,
 }
 
 /// How the blocks of one recording are whitened.
@@ -60,6 +103,8 @@ struct Row {
     bin: u32,
     /// Blocks that are known before it, without a break.
     run: u32,
+    /// Blocks before it to which the memory of a slow wander reaches.
+    reach: u32,
     /// Standard deviation of its innovation in N; infinite when it is not compared.
     sd_n: f64,
 }
@@ -83,6 +128,8 @@ pub fn weight(w: f64) -> f64 {
 pub enum From {
     /// As they are: everything that is left is noise.
     Whole,
+    /// As they are, and however slow: what intervals have to reckon with.
+    Lasting,
     /// Less what is smooth over a second, in the calmer windows: structure that a law lacks is no noise.
     Calm,
 }
@@ -91,17 +138,14 @@ impl Noise {
     /// Independent noise of one size.
     #[must_use]
     pub fn white(sd_n: f64) -> Self {
-        Self {
-            edges_n: Vec::new(),
-            bins: vec![Bin { a: [0.0; ORDER], slow: [0.0; SLOW.len()], innovation_n: sd_n, sd_n }],
-        }
+        Self { edges_n: Vec::new(), bins: vec![Bin::white(sd_n)], lasting: false }
     }
 
     /// The noise of residuals `e` (N), one column per recording; nowhere less than `floor_n`.
     #[must_use]
     pub fn estimate(blocks: &[Blocks], e: &[Vec<f64>], from: From, floor_n: f64) -> Self {
         let columns: Vec<Vec<f64>> = match from {
-            From::Whole => e.to_vec(),
+            From::Whole | From::Lasting => e.to_vec(),
             From::Calm => blocks.iter().zip(e).map(|(b, e)| calm(b, e)).collect(),
         };
         let mut sizes: Vec<f64> = Vec::new();
@@ -112,7 +156,7 @@ impl Noise {
         let count = (sizes.len() / LEAST).clamp(1, BINS);
         let edges_n: Vec<f64> =
             (1..count).map(|k| quantile_of_sorted(&sizes, k as f64 / count as f64)).collect();
-        let mut noise = Self { edges_n, bins: Vec::new() };
+        let mut noise = Self { edges_n, bins: Vec::new(), lasting: from == From::Lasting };
         for bin in 0..count {
             noise.bins.push(noise.fit(blocks, &columns, bin, from, floor_n.max(FLOOR_N)));
         }
@@ -130,7 +174,7 @@ impl Noise {
         let mut rows: Vec<[f64; ROW]> = Vec::new();
         let mut all: Vec<f64> = Vec::new();
         for (b, e) in blocks.iter().zip(columns) {
-            let sums = sums(e);
+            let sums = if self.lasting { sums(e, |k| b.used[k]) } else { sums(e, |_| true) };
             let mut run = 0;
             for k in 0..b.len() {
                 run = if b.restart[k] { 0 } else { run + 1 };
@@ -139,38 +183,27 @@ impl Noise {
                 }
                 all.push(e[k].abs());
                 if run >= ORDER && (1..=ORDER).all(|i| e[k - i].is_finite()) {
-                    rows.push(row(e, &sums, k, run));
+                    rows.push(row(e, &sums, k, if self.lasting { k } else { run }));
                 }
             }
         }
         let sd_n = (median(&mut all) * 1.4826).max(floor_n);
-        let white = Bin { a: [0.0; ORDER], slow: [0.0; SLOW.len()], innovation_n: sd_n, sd_n };
         if rows.len() < 40 {
-            return if sd_n.is_finite() { white } else { Bin { innovation_n: 1.0, sd_n: 1.0, ..white } };
+            return Bin::white(if sd_n.is_finite() { sd_n } else { 1.0 });
         }
         let n = rows.len() as f64;
         let mut best: Option<(f64, Bin)> = None;
         // Residuals without their smooth course have no slow wander.
-        let most = if from == From::Whole { ORDER + SLOW.len() } else { ORDER };
-        for order in 0..=most {
-            let mut a = [0.0; ORDER + SLOW.len()];
-            let mut s = sd_n;
-            for _ in 0..4 {
-                let mut h = Symmetric::zeros(order);
-                let mut g = vec![0.0; order];
-                for row in &rows {
-                    let w = weight(innovation(row, &a) / s);
-                    for i in 0..order {
-                        g[i] += w * row[i + 1] * row[0];
-                        for j in 0..=i {
-                            h.add(i, j, w * row[i + 1] * row[j + 1]);
-                        }
-                    }
-                }
-                let x = h.factor().solve(&g);
-                a[..order].copy_from_slice(&x);
-                s = scale(&rows, &a).max(floor_n);
-            }
+        let most = match from {
+            From::Calm => ORDER,
+            From::Whole => ORDER + SEARCHED,
+            From::Lasting => ORDER + SLOW.len(),
+        };
+        // An interval reckons with a wander that cannot be excluded: there it is the largest order that holds.
+        let largest = from == From::Lasting;
+        for order in (0..=most).map(|k| if largest { most - k } else { k }) {
+            let columns: Vec<usize> = (0..order).collect();
+            let (a, s) = foretold(&rows, &columns, sd_n, floor_n);
             let (near, slow) = a.split_at(ORDER);
             if !stationary(near) || (order > ORDER && a.iter().sum::<f64>() > 0.999) {
                 continue;
@@ -181,49 +214,70 @@ impl Noise {
                 rows.iter().map(|row| rho(innovation(row, &a) / s)).sum::<f64>() + n * libm::log(s);
             let cost = loss + 0.5 * order as f64 * libm::log(n);
             if best.is_none_or(|b| cost < b.0) {
-                best = Some((cost, Bin { a: near, slow, innovation_n: s, sd_n }));
+                let first = [First::unknown(sd_n.max(s)); ORDER];
+                best = Some((cost, Bin { a: near, slow, innovation_n: s, sd_n, first }));
+            }
+            if largest {
+                break;
             }
         }
-        best.map_or(white, |b| b.1)
+        let mut best = best.map_or_else(|| Bin::white(sd_n), |b| b.1);
+        if from == From::Lasting {
+            // The first blocks after a break go on where those before it ended, and with one another.
+            for (run, first) in best.first.iter_mut().enumerate() {
+                let columns: Vec<usize> = (0..run).chain(ORDER..ORDER + SLOW.len()).collect();
+                let (a, s) = foretold(&rows, &columns, sd_n, floor_n);
+                let (near, slow) = a.split_at(ORDER);
+                *first = First {
+                    a: core::array::from_fn(|i| near[i]),
+                    slow: core::array::from_fn(|i| slow[i]),
+                    sd_n: s.max(best.innovation_n),
+                };
+            }
+        }
+        best
     }
 
     /// How the blocks of a recording are whitened.
     #[must_use]
     pub fn laid(&self, b: &Blocks) -> Laid {
         let mut run = 0;
+        let lasting = self.lasting;
         let rows = (0..b.len()).map(|k| {
             run = if b.restart[k] { 0 } else { run + 1 };
             if !b.used[k] {
-                return Row { bin: 0, run: 0, sd_n: f64::INFINITY };
+                return Row { bin: 0, run: 0, reach: 0, sd_n: f64::INFINITY };
             }
             let bin = self.bin(b.size_n[k]).min(self.bins.len() - 1);
             let of = &self.bins[bin];
-            // At the beginning nothing is known of the samples before.
-            let sd = if run >= ORDER { of.innovation_n } else { of.sd_n.max(of.innovation_n) };
+            let sd = of.size_n(run);
             let sd_n = if b.doubt_n[k] > 0.0 { libm::hypot(sd, b.doubt_n[k]) } else { sd };
-            Row { bin: bin as u32, run: run as u32, sd_n }
+            Row { bin: bin as u32, run: run as u32, reach: if lasting { k as u32 } else { run as u32 }, sd_n }
         });
-        Laid { rows: rows.collect(), wander: self.bins.iter().any(|b| b.slow != [0.0; SLOW.len()]) }
+        Laid { rows: rows.collect(), wander: self.bins.iter().any(Bin::wanders) }
     }
 
     /// Normalised innovations of residuals `e` (N) of a recording; blocks that are not compared give zero.
     #[must_use]
     pub fn whiten(&self, laid: &Laid, e: &[f64]) -> Vec<f64> {
-        let sums = if laid.wander { sums(e) } else { Vec::new() };
+        let sums = match (laid.wander, self.lasting) {
+            (false, _) => Vec::new(),
+            (true, false) => sums(e, |_| true),
+            (true, true) => sums(e, |k| laid.rows[k].sd_n.is_finite()),
+        };
         let one = |(k, row): (usize, &Row)| {
             if row.sd_n == f64::INFINITY {
                 return 0.0;
             }
             let (bin, run) = (&self.bins[row.bin as usize], row.run as usize);
+            let (near, slow) = bin.first.get(run).map_or((&bin.a, &bin.slow), |f| (&f.a, &f.slow));
             let mut w = e[k];
-            if run >= ORDER {
-                for (a, before) in bin.a.iter().zip(e[k - ORDER..k].iter().rev()) {
-                    w -= a * before;
-                }
-                if laid.wander {
-                    for (mean, slow) in slow_means(&sums, k, run).iter().zip(&bin.slow) {
-                        w -= slow * mean;
-                    }
+            for (a, before) in near.iter().zip(e[k - ORDER.min(run)..k].iter().rev()) {
+                w -= a * before;
+            }
+            if laid.wander && *slow != [0.0; SLOW.len()] {
+                for (mean, slow) in slow_means(&sums, k, row.reach as usize).iter().zip(slow) {
+                    w -= slow * mean;
                 }
             }
             w / row.sd_n
@@ -241,11 +295,7 @@ impl Noise {
                 run = if b.restart[k] { 0 } else { run + 1 };
                 if b.used[k] {
                     let bin = &self.bins[self.bin(b.size_n[k]).min(self.bins.len() - 1)];
-                    sum += libm::log(if run >= ORDER {
-                        bin.innovation_n
-                    } else {
-                        bin.sd_n.max(bin.innovation_n)
-                    });
+                    sum += libm::log(bin.size_n(run));
                 }
             }
         }
@@ -260,29 +310,29 @@ impl Noise {
     }
 }
 
-/// Running sums of a column; what is not finite counts as nothing.
-fn sums(e: &[f64]) -> Vec<f64> {
+/// Running sums of a column; what is not finite or not used counts as nothing.
+fn sums(e: &[f64], used: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut out = Vec::with_capacity(e.len() + 1);
     let mut sum = 0.0;
     out.push(sum);
-    for e in e {
-        sum += if e.is_finite() { *e } else { 0.0 };
+    for (k, e) in e.iter().enumerate() {
+        sum += if e.is_finite() && used(k) { *e } else { 0.0 };
         out.push(sum);
     }
     out
 }
 
-/// Means of the slow stretches before block `k`, as far as the memory of `run` blocks reaches.
-fn slow_means(sums: &[f64], k: usize, run: usize) -> [f64; SLOW.len()] {
+/// Means of the slow stretches before block `k`, as far as a memory of `reach` blocks goes.
+fn slow_means(sums: &[f64], k: usize, reach: usize) -> [f64; SLOW.len()] {
     core::array::from_fn(|i| {
         let (from, to) = SLOW[i];
-        let (lo, hi) = (k - to.min(run), k - from.min(run));
+        let (lo, hi) = (k - to.min(reach), k - from.min(reach));
         (sums[hi] - sums[lo]) / (to - from) as f64
     })
 }
 
-fn row(e: &[f64], sums: &[f64], k: usize, run: usize) -> [f64; ROW] {
-    let slow = slow_means(sums, k, run);
+fn row(e: &[f64], sums: &[f64], k: usize, reach: usize) -> [f64; ROW] {
+    let slow = slow_means(sums, k, reach);
     core::array::from_fn(|i| if i <= ORDER { e[k - i] } else { slow[i - ORDER - 1] })
 }
 
@@ -292,6 +342,31 @@ fn innovation(row: &[f64; ROW], a: &[f64; ROW - 1]) -> f64 {
         w -= a * row[i + 1];
     }
     w
+}
+
+/// Coefficients of some columns of rows, and the standard deviation in N of what they do not foretell, by robust least squares; the
+/// noise is nowhere less than `floor_n`.
+fn foretold(rows: &[[f64; ROW]], columns: &[usize], sd_n: f64, floor_n: f64) -> ([f64; ROW - 1], f64) {
+    let mut a = [0.0; ROW - 1];
+    let mut s = sd_n;
+    for _ in 0..4 {
+        let mut h = Symmetric::zeros(columns.len());
+        let mut g = vec![0.0; columns.len()];
+        for row in rows {
+            let w = weight(innovation(row, &a) / s);
+            for (i, x) in columns.iter().enumerate() {
+                g[i] += w * row[x + 1] * row[0];
+                for (j, y) in columns.iter().enumerate().take(i + 1) {
+                    h.add(i, j, w * row[x + 1] * row[y + 1]);
+                }
+            }
+        }
+        for (x, value) in columns.iter().zip(h.factor().solve(&g)) {
+            a[*x] = value;
+        }
+        s = scale(rows, &a).max(floor_n);
+    }
+    (a, s)
 }
 
 /// Scale of the innovations under Huber's loss: the root of `sum weight w^2 / n` over its value for normal noise.
@@ -379,4 +454,51 @@ fn calm(b: &Blocks, e: &[f64]) -> Vec<f64> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{From, Noise};
+    use crate::blocks::{BLOCK_S, Blocks};
+    use stylet_record::Recording;
+
+    /// A wander that lasts some seconds goes on after a break: what is left of the first blocks there is small, and those of one
+    /// break know nothing of one another. As if they began anew they would count as many times what they tell.
+    #[test]
+    fn a_slow_wander_lasts_through_a_break() {
+        let n = 12_000;
+        let t: Vec<f64> = (0..4 * n).map(|k| f64::from(k) / 200.0).collect();
+        let zero = vec![0.0; t.len()];
+        let r = Recording::new(t, zero.clone(), zero).expect("a recording");
+        let mut b = Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S);
+        for k in (0..b.len()).filter(|k| k % 40 == 0) {
+            b.used[k] = false;
+            b.restart[k + 1] = true;
+        }
+        // Twelve even numbers of a linear congruence (Knuth's MMIX) make a normal one.
+        let mut state = 11_u64;
+        let mut even = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut normal = || (0..12).map(|_| even()).sum::<f64>() - 6.0;
+        let mut slow = 0.0;
+        let e: Vec<f64> = (0..b.len())
+            .map(|_| {
+                slow = 0.998 * slow + 0.063 * 0.03 * normal();
+                slow + 0.01 * normal()
+            })
+            .collect();
+        let spread = |from: From| {
+            let blocks = [b.clone()];
+            let noise = Noise::estimate(&blocks, std::slice::from_ref(&e), from, 0.0);
+            let w = noise.whiten(&noise.laid(&b), &e);
+            let sums: Vec<f64> =
+                (0..b.len() / 40).map(|k| w[40 * k + 1..40 * k + 5].iter().sum::<f64>()).collect();
+            sums[20..].iter().map(|s| s * s / 4.0).sum::<f64>() / (sums.len() - 20) as f64
+        };
+        let (anew, lasting) = (spread(From::Whole), spread(From::Lasting));
+        assert!(anew > 2.0, "{anew}");
+        assert!(lasting > 0.6 && lasting < 1.5, "{lasting}");
+    }
 }

@@ -4,7 +4,7 @@ use super::answer::{Answer, Verdict};
 use super::answers::{Expected, Worth, expected, judge};
 use crate::reality::effect::Effect;
 use crate::world::case::Case;
-use crate::world::id::CaseId;
+use crate::world::id::{CaseId, DRAWING, first_drawing};
 use crate::world::ingredients;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +17,12 @@ pub struct Number {
     pub truth: f64,
     /// The answer.
     pub value: f64,
+    /// Lower end of its 95 % interval.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub low: Option<f64>,
+    /// Upper end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub high: Option<f64>,
     /// Whether the 95 % interval holds the truth; none without an interval.
     pub held: Option<bool>,
 }
@@ -26,6 +32,9 @@ pub struct Number {
 pub struct Outcome {
     /// The case.
     pub id: CaseId,
+    /// The drawing that it is of ([`DRAWING`]).
+    #[serde(default = "first_drawing")]
+    pub drawing: u32,
     /// What was hidden, by name.
     pub hidden: Vec<String>,
     /// With which numbers.
@@ -79,6 +88,7 @@ impl Outcome {
         };
         Self {
             id: case.id,
+            drawing: DRAWING,
             hidden,
             values,
             strength_sd: case.setup.strength_sd,
@@ -162,5 +172,5 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
 
 fn number(name: String, truth: f64, value: f64, low: Option<f64>, high: Option<f64>) -> Number {
     let held = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
-    Number { name, truth, value, held }
+    Number { name, truth, value, low, high, held }
 }

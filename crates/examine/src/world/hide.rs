@@ -74,13 +74,15 @@ pub fn hide(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64)
         let effect = (0..200u64).find_map(|turn| {
             let which = match (id.hide, k) {
                 // Every effect equally often; where one does not fit, the next.
-                (Hide::One, _) => (shuffled(id.seed, id.index, IDS.len()) + turn as usize) % IDS.len(),
-                (Hide::Instrument, _) => number_of(INSTRUMENT[(id.index + turn) as usize % INSTRUMENT.len()]),
-                (Hide::Beside, _) if id.world == World::Rich => {
-                    number_of(INSTRUMENT[1 + (id.index + turn) as usize % (INSTRUMENT.len() - 1)])
+                (Hide::Instrument, _) => {
+                    let n = INSTRUMENT.len();
+                    number_of(INSTRUMENT[(in_turn(id, n) + turn as usize) % n])
                 }
-                (Hide::Beside, _) => (id.index as usize * 7 + turn as usize) % IDS.len(),
-                (_, 0) => (shuffled(id.seed, id.index, IDS.len()) + turn as usize) % IDS.len(),
+                (Hide::Beside, _) if id.world == World::Rich => {
+                    let n = INSTRUMENT.len() - 1;
+                    number_of(INSTRUMENT[1 + (in_turn(id, n) + turn as usize) % n])
+                }
+                (_, 0) => (in_turn(id, IDS.len()) + turn as usize) % IDS.len(),
                 _ => rng.random_range(0..IDS.len()),
             };
             let e = hidden::draw(rng, which, &case);
@@ -95,7 +97,7 @@ pub fn hide(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64)
     if id.hide == Hide::Outside || (id.hide == Hide::Beside && id.world == World::Plain) {
         let mut u = [0.0; 6];
         u.iter_mut().for_each(|x| *x = rng.random());
-        let kind = id.index as usize % SHAPES.len();
+        let kind = in_turn(id, SHAPES.len());
         let mut shape = Shape::new(kind, u, sd);
         for _ in 0..2 {
             let left = left_n(setup, &[], Some(&shape), Beside::Common);
@@ -122,7 +124,7 @@ fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
     let mut all = Ingredients::default();
     for k in 0..count {
         let turn = if k == 0 { 0 } else { rng.random_range(1..INGREDIENTS.len()) };
-        let which = (shuffled(id.seed, id.index, INGREDIENTS.len()) + turn) % INGREDIENTS.len();
+        let which = (in_turn(id, INGREDIENTS.len()) + turn) % INGREDIENTS.len();
         let mut one = Ingredients::default();
         ingredients::add(rng, which, &truth, id.size, &mut one);
         for _ in 0..5 {
@@ -139,15 +141,27 @@ fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
     setup.rich = all;
 }
 
-/// A permutation of `0..n` that changes with every round: the `index`-th entry.
-fn shuffled(seed: u64, index: u64, n: usize) -> usize {
-    let round = index / n as u64;
-    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ round.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+/// Which of `n` things the case hides. In every row each comes once in `n` cases, in an order that the seed shuffles anew for
+/// every round; rows begin at different places of it (a cyclic Latin square with its rows shuffled), so that the same number of
+/// another row is another thing and a few cases of all rows hold everything about equally often. The grade does not
+/// enter: the same insertion is judged with little and with much of what is wrong.
+fn in_turn(id: &CaseId, n: usize) -> usize {
+    let round = id.index / n as u64;
+    let world = if id.world == World::Plain { 0 } else { 0x6a09_e667_f3bc_c909 };
+    let order = shuffled(id.seed ^ world ^ round.wrapping_mul(0x9e37_79b9_7f4a_7c15), n);
+    let starts = shuffled(id.seed ^ world ^ n as u64 ^ 0xbb67_ae85_84ca_a73b, n);
+    let start = starts[id.wrong as usize % n];
+    order[((id.index % n as u64) as usize + start) % n]
+}
+
+/// The numbers `0..n` in an order of the seed's.
+fn shuffled(seed: u64, n: usize) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut order: Vec<usize> = (0..n).collect();
     for k in (1..n).rev() {
         order.swap(k, rng.random_range(0..=k));
     }
-    order[(index % n as u64) as usize]
+    order
 }
 
 /// The effect at the strength aimed at, as nearly as plausible numbers allow.
@@ -165,4 +179,72 @@ fn strengthened(setup: &Setup, effect: Effect, target_n: f64, largest_n: f64) ->
         }
     }
     effect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::id::{Grade, Size, Wrong};
+    use crate::world::setup::set_up;
+    use rayon::prelude::*;
+
+    fn id(wrong: Wrong, hide: Hide, index: u64) -> CaseId {
+        CaseId { world: World::Plain, wrong, grade: Grade::Large, hide, size: Size::Strong, seed: 77, index }
+    }
+
+    /// How often each of `n` things is drawn in `cases` of every row.
+    fn counts(n: usize, cases: u64) -> Vec<usize> {
+        let mut of = vec![0; n];
+        for wrong in Wrong::ALL {
+            (0..cases).for_each(|k| of[in_turn(&id(*wrong, Hide::One, k), n)] += 1);
+        }
+        of
+    }
+
+    #[test]
+    fn in_every_row_each_thing_comes_once_a_round() {
+        for n in [IDS.len(), SHAPES.len(), INGREDIENTS.len(), INSTRUMENT.len()] {
+            for wrong in Wrong::ALL {
+                for round in 0..2 {
+                    let from = round * n as u64;
+                    let mut drawn: Vec<usize> =
+                        (from..from + n as u64).map(|k| in_turn(&id(*wrong, Hide::One, k), n)).collect();
+                    drawn.sort_unstable();
+                    assert_eq!(drawn, (0..n).collect::<Vec<_>>(), "{wrong}, round {round}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_number_of_another_row_hides_something_else() {
+        // A few cases of every row hold every effect and every shape, each about as often.
+        for n in [IDS.len(), SHAPES.len()] {
+            for cases in [1, 2, 4, 7] {
+                let of = counts(n, cases);
+                let mean = (Wrong::ALL.len() as u64 * cases) as f64 / n as f64;
+                assert!(of.iter().all(|c| (*c as f64 - mean).abs() <= cases as f64), "{n}, {cases}: {of:?}");
+            }
+            assert!(counts(n, 2).iter().all(|c| *c > 0));
+        }
+    }
+
+    #[test]
+    fn all_effects_and_all_outside_shapes_are_hidden_in_two_cases_of_every_row() {
+        let first = |what: usize, n: usize| {
+            let mut all = Wrong::ALL.iter().flat_map(|w| [(*w, 0), (*w, 1)]);
+            all.find(|(wrong, k)| in_turn(&id(*wrong, Hide::One, *k), n) == what)
+        };
+        (0..IDS.len() + SHAPES.len()).into_par_iter().for_each(|k| {
+            let (hide, what, n) = match k.checked_sub(IDS.len()) {
+                None => (Hide::One, k, IDS.len()),
+                Some(shape) => (Hide::Outside, shape, SHAPES.len()),
+            };
+            let (wrong, index) = first(what, n).expect("one of the cases");
+            let setup = set_up(&id(wrong, hide, index));
+            let hidden = setup.effects.first().map(Effect::id).or(setup.shape.as_ref().map(Shape::name));
+            let wanted = if hide == Hide::One { IDS[what] } else { SHAPES[what] };
+            assert_eq!(hidden, Some(wanted), "{wrong} {index}");
+        });
+    }
 }

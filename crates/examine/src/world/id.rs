@@ -106,6 +106,15 @@ words! {
     }
 }
 
+/// Which drawing this is: under another number the same name may stand for another case, and outcomes do not mix. 2: every row
+/// hides other effects than its neighbours under the same index.
+pub const DRAWING: u32 = 2;
+
+/// The drawing of files that do not say it.
+pub(crate) fn first_drawing() -> u32 {
+    1
+}
+
 /// A case by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct CaseId {
