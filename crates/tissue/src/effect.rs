@@ -178,6 +178,9 @@ pub trait Effect {
     /// [`Place::Friction`]: the effect along a shaft that is `factor` times as rough; for effects whose strength no layer holds.
     fn rubbed(&mut self, _factor: f64) {}
 
+    /// [`Place::Puncture`]: the effect in a layer (1-based) that is `factor` times as tough; for effects that hold a puncture force.
+    fn toughened(&mut self, _layer: usize, _factor: f64) {}
+
     /// [`Place::Friction`]: a force in N with which a punctured layer holds the shaft. `sliding_mps` is
     /// the velocity that friction feels at this tip velocity, all factors included.
     fn grip(&self, _moment: &Moment, _slabs: &[Slab], _sliding_mps: f64, _memory: &mut Memory) -> f64 {

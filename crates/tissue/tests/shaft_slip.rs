@@ -40,7 +40,7 @@ fn in_hold_out(depth_m: f64, speed_mps: f64, rate: f64) -> Vec<Sample> {
 #[test]
 fn steady_sliding_takes_the_hold_times_the_root_of_the_speed() {
     for (exponent, speed) in [(1.0, 2e-3), (4.0, 3e-3), (10.0, 1e-3), (10.0, 4e-3), (60.0, 2e-3)] {
-        let effect = slip(exponent);
+        let effect = ShaftSlip { rate: -0.2, ..slip(exponent) };
         let motion = in_hold_out(0.1, speed, 100.0);
         let f = forces(&skin(), &[effect.clone().into()], &motion);
         let in_slides = (0.095 / speed * 100.0) as usize;

@@ -79,6 +79,11 @@ impl Effect for DelayedPuncture {
     fn remembers(&self) -> bool {
         true
     }
+    fn toughened(&mut self, layer: usize, factor: f64) {
+        if layer == self.layer {
+            self.force_n *= factor;
+        }
+    }
     fn shape(&self, slabs: &mut [Slab]) {
         if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
             slab.reach_m = f64::INFINITY;

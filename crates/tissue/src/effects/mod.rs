@@ -142,6 +142,9 @@ macro_rules! effects {
         fn rubbed(&mut self, factor: f64) {
             match self { $(Self::$name(effect) => effect.rubbed(factor),)* }
         }
+        fn toughened(&mut self, layer: usize, factor: f64) {
+            match self { $(Self::$name(effect) => effect.toughened(layer, factor),)* }
+        }
     };
     (@hook [$($name:ident)*] $hook:ident [$($parameters:tt)*] $call:tt $result:ty) => {
         #[inline]

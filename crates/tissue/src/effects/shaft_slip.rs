@@ -5,6 +5,10 @@ use crate::slab::Slab;
 
 /// Reference speed `v0` of the slip in m/s (1 mm/s).
 const V0_MPS: f64 = 1e-3;
+/// Slower than this in m/s (0.1 mm/s) the contact is at rest.
+const REST_MPS: f64 = 1e-4;
+/// Travel in m over which the contact comes to know another speed (1 mm, a few widths of a shaft's contact: Dieterich 1979).
+const RENEWED_M: f64 = 1e-3;
 /// Travel in m within which the contact ends when the tip comes back to where the layer lets go (0.2 mm, a tip's edge).
 const EDGE_M: f64 = 2e-4;
 /// Longest travel in m of one implicit step: a tenth of the millimetres over which the contact loads.
@@ -26,12 +30,13 @@ const TURNS: usize = 80;
 /// `E = K w + b w |w|`, `q_j' = (g_j E - q_j)/tau_j`, `F = E - q_1 - q_2`.
 ///
 /// - *Pressed*, before the rupture, `w = max(0, z - s_i)`: `F` is the layer's elastic force.
-/// - *At the rupture* `w` falls back so that `F = r C`, or stays when `F` is less; the `q_j` stay.
+/// - *At the rupture* `w` falls back so that `F = r C (v/v0)^a`, or stays when `F` is less; the `q_j` stay.
 /// - *Broken*, the shaft drags the tissue along and slips: `w' = z' - v0 sgn(F) (abs(F)/L)^m` with `v0` = 1 mm/s,
-///   `L = C max(0.2, 1 - d s)` when it is pushed (`s` is how far it has slipped so) and `L = S` when it is pulled.
+///   `L = C (v/v0)^a max(0.2, 1 - d s)` when it is pushed (`s` is how far it has slipped so, `v` the speed, which the contact
+///   comes to know over a millimetre of travel and does not forget at rest) and `L = S (v/v0)^a` when it is pulled.
 ///
 /// Far below `L` nothing slips, which is presliding; steady sliding at speed `v` takes `F = L (v/v0)^(1/m)`: a large `m` is
-/// dry friction, `m` = 1 viscous. In a hold, `F` creeps down by slip and by relaxation. When the tip comes back to where the layer
+/// dry friction, `m` = 1 viscous; the net exponent of the plateau is `a + 1/m`. In a hold, `F` creeps down by slip and by relaxation. When the tip comes back to where the layer
 /// lets go (its front face, or as `let_go` says), `F` ends within 0.2 mm. The layer's viscous friction `b_i l_i v` is replaced.
 ///
 /// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation; the error falls with the step
@@ -56,6 +61,8 @@ pub struct ShaftSlip {
     pub exponent: f64,
     /// Loss `d` of hold per metre of slip, 0 to 1e4 1/m.
     pub wear_per_m: f64,
+    /// Exponent `a` of the speed in the holds, -2 to 2: below zero it weakens with speed.
+    pub rate: f64,
     /// Curvature `b` of the spring in N/m², 0 to 1e9.
     pub curve_n_per_m2: f64,
     /// Shares `g_j` of the spring's force that relax, each 0 to 1, together at most 1.
@@ -74,6 +81,7 @@ impl Default for ShaftSlip {
             kept: 1.0,
             exponent: 10.0,
             wear_per_m: 0.0,
+            rate: 0.0,
             curve_n_per_m2: 0.0,
             fractions: [0.0; 2],
             time_constants_s: [1.0, 10.0],
@@ -90,6 +98,8 @@ const FRACTION: ParameterInfo =
     ParameterInfo::shape("fractions.0", "", "share of the force that relaxes").allowed(0.0, 1.0).search(
         0.2, 0.0, 0.9,
     );
+/// Place of the second relaxing share among the parameters.
+const SECOND: usize = 9;
 const TIME: ParameterInfo = ParameterInfo::shape("time_constants_s.0", "s", "its time constant")
     .allowed(1e-3, 1e4)
     .neutral(1.0)
@@ -118,13 +128,16 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("wear_per_m", "1/m", "loss of hold per metre of slip")
             .allowed(0.0, 1e4)
             .search(50.0, 0.0, 400.0),
+        ParameterInfo::shape("rate", "", "exponent of the speed in the holds")
+            .allowed(-2.0, 2.0)
+            .search(0.0, -0.5, 0.5),
         ParameterInfo::shape("curve_n_per_m2", "N/m2", "curvature of the spring")
             .allowed(0.0, 1e9)
             .search(3e4, 0.0, 3e5),
         FRACTION,
         ParameterInfo { path: "fractions.1", ..FRACTION },
         TIME,
-        ParameterInfo { path: "time_constants_s.1", ..TIME }.neutral(10.0).search(10.0, 2.0, 60.0),
+        ParameterInfo { path: "time_constants_s.1", ..TIME }.neutral(10.0).search(10.0, 5.0, 60.0),
     ],
     larger: None,
     proposal: Proposal::PerLayer,
@@ -141,6 +154,7 @@ impl Described for ShaftSlip {
             self.kept,
             self.exponent,
             self.wear_per_m,
+            self.rate,
             self.curve_n_per_m2,
             g1,
             g2,
@@ -149,7 +163,7 @@ impl Described for ShaftSlip {
         ]
     }
     fn from_values(values: &[f64]) -> Option<Self> {
-        let [layer, push_n, pull_n, kept, exponent, wear_per_m, curve_n_per_m2, g1, g2, t1, t2] = *values
+        let [layer, push_n, pull_n, kept, exponent, wear_per_m, rate, curve_n_per_m2, g1, g2, t1, t2] = *values
         else {
             return None;
         };
@@ -162,10 +176,23 @@ impl Described for ShaftSlip {
             kept,
             exponent,
             wear_per_m,
+            rate,
             curve_n_per_m2,
             fractions,
             time_constants_s,
         })
+    }
+    /// The second relaxing share as a share of what the first leaves: both in 0 to 1 are then allowed.
+    fn coordinates(&self) -> alloc::vec::Vec<f64> {
+        let mut out = self.values();
+        let left = 1.0 - self.fractions[0];
+        out[SECOND] = if left > 0.0 { (self.fractions[1] / left).min(1.0) } else { 0.0 };
+        out
+    }
+    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
+        let mut out = Self::from_values(coordinates)?;
+        out.fractions[1] *= 1.0 - out.fractions[0];
+        Some(out)
     }
     fn check_together(&self) -> Result<(), ParameterError> {
         let [first, second] = self.fractions;
@@ -174,6 +201,20 @@ impl Described for ShaftSlip {
             return Err(ParameterError { effect: INFO.id, path: "fractions.1", value: second, allowed });
         }
         Ok(())
+    }
+}
+
+/// Place of the speed in the memory.
+const SPEED: usize = 7;
+
+/// The speed that the contact knows follows the tip's over the travel in which the contact renews itself.
+fn renew(known_mps: &mut f64, moment: &Moment) {
+    let now = moment.v_mps.abs();
+    if *known_mps <= 0.0 {
+        *known_mps = now;
+    } else if now > REST_MPS {
+        let share = -libm::expm1(-moment.dz_m.abs() / RENEWED_M);
+        *known_mps *= libm::exp(share * libm::log(now / *known_mps));
     }
 }
 
@@ -192,17 +233,22 @@ struct Contact {
     fall_n: f64,
     /// Whether `fall_n` is to be taken.
     broke: bool,
+    /// Speed of the last motion in m/s.
+    speed_mps: f64,
 }
 
 impl Contact {
     fn of(memory: &Memory) -> Self {
-        let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, _] = *memory;
-        Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, broke: broke != 0.0 }
+        let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, speed_mps] = *memory;
+        Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, broke: broke != 0.0, speed_mps }
     }
     fn keep(self, memory: &mut Memory) {
+        *memory = self.memory();
+    }
+    fn memory(self) -> Memory {
         let broke = if self.broke { 1.0 } else { 0.0 };
         let [q1, q2] = self.q_n;
-        *memory = [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, broke, 0.0];
+        [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, broke, self.speed_mps]
     }
 }
 
@@ -229,6 +275,11 @@ impl Spring {
 }
 
 impl ShaftSlip {
+    /// The factor `(v/v0)^a` on the holds.
+    fn fast(&self, speed_mps: f64) -> f64 {
+        libm::exp(self.rate * libm::log(speed_mps.max(REST_MPS) / V0_MPS))
+    }
+
     /// `(keep, ramp)` of both terms for a step; see [`lag_weights`].
     fn weights(&self, dt_s: f64) -> [(f64, f64); 2] {
         core::array::from_fn(|j| {
@@ -247,8 +298,9 @@ impl ShaftSlip {
 
     /// One implicit step of a broken layer.
     fn drag(&self, c: &mut Contact, spring: Spring, dt_s: f64, dz_m: f64, weights: [(f64, f64); 2]) {
-        let push = (self.push_n * (1.0 - self.wear_per_m * c.slipped_m).max(LEAST_HOLD)).max(LEAST_N);
-        let pull = self.pull_n.max(LEAST_N);
+        let fast = self.fast(c.speed_mps);
+        let push = (self.push_n * fast * (1.0 - self.wear_per_m * c.slipped_m).max(LEAST_HOLD)).max(LEAST_N);
+        let pull = (self.pull_n * fast).max(LEAST_N);
         let at_rest = self.relaxed(c.q_n, weights, c.spring_n, 0.0);
         let rest = at_rest[0] + at_rest[1];
         // q_j at the end is linear in the spring's force there.
@@ -325,12 +377,14 @@ impl Effect for ShaftSlip {
     }
     fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut Memory) {
         if layer == self.layer {
-            let fall_n = released_n.min(self.kept * self.push_n);
-            Contact { fall_n, broke: true, slipped_m: 0.0, ..Contact::of(memory) }.keep(memory);
+            let c = Contact::of(memory);
+            let fall_n = released_n.min(self.kept * self.push_n * self.fast(c.speed_mps));
+            Contact { fall_n, broke: true, slipped_m: 0.0, ..c }.keep(memory);
         }
     }
     fn grip(&self, moment: &Moment, slabs: &[Slab], _sliding_mps: f64, memory: &mut Memory) -> f64 {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
+        renew(&mut memory[SPEED], moment);
         if moment.ruptured < self.layer {
             return 0.0;
         }
@@ -338,7 +392,7 @@ impl Effect for ShaftSlip {
         let end_m = if moment.v_mps < 0.0 { slab.release_m } else { slab.release_m.min(0.0) };
         let held = ((moment.z_m - slab.front_m - end_m) / EDGE_M).clamp(0.0, 1.0);
         if held == 0.0 {
-            *memory = [0.0; 8];
+            *memory = Contact { speed_mps: memory[SPEED], ..Contact::of(&[0.0; 8]) }.memory();
             return 0.0;
         }
         let mut c = Contact::of(memory);
@@ -365,10 +419,11 @@ impl ShaftSlip {
     /// Force in N of steady sliding at `v_mps`, without relaxation and wear.
     #[must_use]
     pub fn plateau_n(&self, v_mps: f64) -> f64 {
-        let hold = if v_mps >= 0.0 { self.push_n } else { -self.pull_n };
         if sgn(v_mps) == 0.0 {
             return 0.0;
         }
-        hold * libm::exp(libm::log(v_mps.abs() / V0_MPS) / self.exponent)
+        let ln_v = libm::log(v_mps.abs() / V0_MPS);
+        let slips = libm::exp(ln_v * (self.rate + 1.0 / self.exponent));
+        if v_mps > 0.0 { self.push_n * slips } else { -self.pull_n * slips }
     }
 }
