@@ -25,7 +25,7 @@
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod dataset;
-pub mod events;
+pub use stylet_identify::phases as events;
 pub mod fit;
 pub mod forward;
 pub mod frame;
