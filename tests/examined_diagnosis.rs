@@ -2,7 +2,7 @@
 //! strong. A sample of `stylet benchmark diagnose`, which examines as many cases as you like.
 
 use stylet_diagnose::{Evidence, Options};
-use stylet_examine::{Answer, Hide, Plan, Question, run, table};
+use stylet_examine::{Answer, Grade, Hide, Plan, Question, Wrong, run, table};
 use stylet_scenario::Scenario;
 
 fn answer(question: &Question) -> Result<Answer, String> {
@@ -31,4 +31,22 @@ fn in_a_world_that_it_did_not_make_clean_data_are_not_accused_and_strong_effects
     assert!(found >= 3, "{table}");
     // Something was hidden, and it mattered.
     assert!(outcomes.iter().any(|o| o.strength_sd > 5.0));
+}
+
+/// Each of these was answered wrongly once (puncture forces that grow with the speed, seen as scatter).
+#[test]
+fn what_it_got_wrong_once_in_other_worlds_it_gets_right() {
+    let wrong = vec![Wrong::Growing, Wrong::Encoder, Wrong::SurfaceEach, Wrong::ScatterFriction];
+    let plan = Plan {
+        wrong,
+        grades: vec![Grade::Large],
+        hide: vec![Hide::One, Hide::Clean],
+        cases: 2,
+        seed: 3,
+        ..Plan::default()
+    };
+    let outcomes = run(&plan.cases(), None, &answer, &|_, _| {}).expect("a run");
+    let table = table::text(&outcomes);
+    assert_eq!(outcomes.iter().filter(|o| !o.hidden.is_empty()).count(), 4);
+    assert!(outcomes.iter().all(|o| o.worth.right), "{table}");
 }

@@ -97,6 +97,28 @@ pub fn sentence(d: &Diagnosis) -> String {
     }
 }
 
+/// What differs from insertion to insertion so much that a simulation of the next one will miss it.
+pub fn differ(d: &Diagnosis) -> Option<String> {
+    let x = &d.differences;
+    let mut what = Vec::new();
+    let percent = |share: f64| significant(100.0 * share, 2);
+    let millimetres = |m: f64| significant(1e3 * m, 2);
+    if x.puncture >= 0.01 {
+        what.push(format!("puncture forces by {} %", percent(x.puncture)));
+    }
+    if x.face_m >= 1e-4 {
+        what.push(format!("places at which layers give way by {} mm", millimetres(x.face_m)));
+    }
+    if x.surface_m >= 1e-4 {
+        what.push(format!("the surface by {} mm", millimetres(x.surface_m)));
+    }
+    if x.friction >= 0.01 {
+        what.push(format!("friction by {} %", percent(x.friction)));
+    }
+    let differ = format!("from insertion to insertion differ (one standard deviation): {}", what.join(", "));
+    (!what.is_empty()).then_some(differ)
+}
+
 fn summary(d: &Diagnosis) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "{}", sentence(d));
@@ -128,6 +150,9 @@ fn summary(d: &Diagnosis) -> String {
         significant(g.rmse_after_n, 3),
         significant(g.floor_n, 3)
     );
+    if let Some(differ) = differ(d) {
+        let _ = writeln!(out, "  {differ}");
+    }
     if d.leftover.p_value < 1e-3 {
         let _ = writeln!(
             out,

@@ -402,7 +402,14 @@ fn remains(d: &Diagnosis, all: &[Curves]) -> Section {
         let (x, y) = binned(&mm, &c.extended_n, &c.used, 60);
         chart = chart.with_series(Series::line(name.clone(), Colour::nth(k), x, y));
     }
-    Section::new("What remains").text(text).chart(chart)
+    let section = Section::new("What remains").text(text);
+    let section = match crate::diagnose::differ(d) {
+        Some(differ) => section.text(format!(
+            "Fitted, and no cause: {differ}. A simulation that does not know them misses the next insertion by as much."
+        )),
+        None => section,
+    };
+    section.chart(chart)
 }
 
 fn unseen(d: &Diagnosis) -> Section {

@@ -131,6 +131,7 @@ fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
             .collect(),
         evidence: Vec::new(),
         noise: NoiseReport { sd_n: noise, ar: [0.0; 2], from_air: false },
+        differences: Default::default(),
         advice: vec![
             "Nothing is retracted or punctured here: friction and puncture cannot be seen.".to_owned(),
         ],

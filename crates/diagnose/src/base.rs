@@ -5,7 +5,7 @@ use std::sync::Arc;
 use stylet_identify::assign::assign;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::drops::{Drop, drops};
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
 use stylet_identify::model::{Belief, Model};
 use stylet_identify::noise::{From, Noise};
 use stylet_identify::objective::Data;
@@ -62,8 +62,7 @@ fn roughness(blocks: &[Blocks]) -> f64 {
 pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
-    let mut data =
-        Data { blocks: Arc::clone(&prepared.blocks), noise: Arc::new(wide), floor_n: prepared.floor_n };
+    let mut data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
     let mut model = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
@@ -92,6 +91,6 @@ pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
         best = fit(&model, &data, if round == 2 { Effort::FULL } else { Effort { turns: 5, enough: 0.3 } })?;
     }
     data = data.judged_by(&best.residuals.e, From::Calm);
-    best = fit(&best.model, &data, Effort::FULL)?;
+    best = fit_sharp(&best.model, &data, Effort::FULL)?;
     Some((best, data))
 }

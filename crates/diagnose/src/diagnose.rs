@@ -63,6 +63,8 @@ const UNEXPLAINED: f64 = 0.1;
 const EXCESS: f64 = 0.8;
 /// With one recording, where nothing tells structure from slow noise, it must be so many times the noise's.
 const EXCESS_ALONE: f64 = 3.0;
+/// Slow noise of more than two and a half times the fast one is none any more, whatever its colour.
+const EXCESS_SLOW: f64 = 6.0;
 /// Beside something unknown a cause stands when recordings left out lose so much of their misfit by it ...
 const BORNE: f64 = 0.27;
 /// ... and its strengths are the same whichever recording is left out, to this share.
@@ -162,6 +164,7 @@ pub fn diagnose(
         data_quality,
         evidence: search.stages.iter().map(step).collect(),
         noise: NoiseReport { sd_n: noise_n, ar: colour(&search), from_air: false },
+        differences: differences(&search),
         causes,
     };
     let extended = extended(scenario, &search, &diagnosis);
@@ -216,14 +219,15 @@ fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
 }
 
 fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
-    let left = leftover::test(&search.best, &search.data);
+    let told = leftover::test(&search.best, &search.data);
     let (before, after) =
         (excess(search, &search.base.residuals.e), excess(search, &search.best.residuals.e));
     let share = (after.max(0.0) / before.max(1e-9)).min(1.0);
     let alone = search.data.recordings() < 2;
-    let unknown = share > UNEXPLAINED
-        && after > if alone { EXCESS_ALONE } else { EXCESS }
-        && (left.p_value < LEFTOVER_P || alone);
+    let sure = if alone { after > EXCESS_ALONE } else { after > EXCESS && told.sure.p_value < LEFTOVER_P };
+    let at_sight = after > EXCESS_SLOW && told.at_sight.p_value < LEFTOVER_P;
+    let unknown = share > UNEXPLAINED && (sure || at_sight);
+    let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Whole);
     let settled = fit(&search.best.model, &whole, Effort { turns: 3, enough: 0.1 })
@@ -311,6 +315,17 @@ fn each(before: &[Option<Left>], after: &[Option<Left>], search: &Search) -> Vec
         l.as_ref().map_or(f64::NAN, |l| (l.square_n2 + search.data.blocks[k].within_n().powi(2)).sqrt())
     };
     before.iter().zip(after).enumerate().map(|(k, (b, a))| (one(b, k), one(a, k))).collect()
+}
+
+/// What differs from recording to recording, by the best model.
+fn differences(search: &Search) -> Differences {
+    let (s, free) = (&search.best.model.scatter, &search.best.model.free);
+    Differences {
+        puncture: s.force,
+        face_m: s.place_m,
+        surface_m: if free.own_surface { s.surface_m } else { 0.0 },
+        friction: if free.own_friction { s.friction } else { 0.0 },
+    }
 }
 
 /// First two coefficients of the noise per block, in the calmest range of the force.

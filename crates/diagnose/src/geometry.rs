@@ -9,7 +9,7 @@ use crate::base::Prepared;
 use crate::judge::{LEAST, cost};
 use crate::select::Search;
 use rayon::prelude::*;
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit, fit_below};
 use stylet_identify::model::{Choice, Free, Model};
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
@@ -18,11 +18,15 @@ use stylet_tissue::{Proposal, library};
 /// A pattern counts when the free numbers follow it to this share of its size.
 const PATTERN: f64 = 0.2;
 
-/// Nats of a fit and what its effects and free geometry cost.
-fn price(f: &Fit, data: &Data) -> f64 {
-    let m = &f.model;
+/// Nats that the effects and the free geometry of a model cost.
+fn price(m: &Model, data: &Data) -> f64 {
     let geometry = usize::from(m.free.surface) + if m.free.thickness { m.layers() } else { 0 };
-    f.nats() + cost(m.effect_numbers() + geometry, data.compared()) + LEAST * m.effects.len() as f64
+    cost(m.effect_numbers() + geometry, data.compared()) + LEAST * m.effects.len() as f64
+}
+
+/// Nats of a fit with that price.
+fn priced(f: &Fit, data: &Data) -> f64 {
+    f.nats() + price(&f.model, data)
 }
 
 /// A model with its geometry as believed, but for what stays free.
@@ -55,6 +59,7 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
             tried.push(fixed(&best.model, f).with(choice.clone()));
         }
     }
+    let stands = priced(best, &search.data);
     let fits: Vec<Fit> = tried
         .into_par_iter()
         .filter_map(|m| {
@@ -64,12 +69,14 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
             let first = fit(&start, &search.data, Effort::SHORT)?;
             let mut model = first.model;
             retime(&mut model, &search.data, &times);
-            fit(&model, &search.data, Effort::FULL)
+            let wanted = stands - price(&model, &search.data);
+            fit_below(&model, &search.data, Effort::FULL, wanted)
         })
         .collect();
-    let cheapest = fits.into_iter().min_by(|a, b| price(a, &search.data).total_cmp(&price(b, &search.data)));
+    let cheapest =
+        fits.into_iter().min_by(|a, b| priced(a, &search.data).total_cmp(&priced(b, &search.data)));
     match cheapest {
-        Some(f) if price(&f, &search.data) < price(best, &search.data) => {
+        Some(f) if priced(&f, &search.data) < stands => {
             let new = f.model.effects.len() > best.model.effects.len();
             search.best = f;
             new

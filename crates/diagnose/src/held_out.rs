@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
-use stylet_identify::forward::free;
 use stylet_identify::model::{Model, NEVER, Own};
-use stylet_identify::objective::{Data, Work, nats_of, pieces, replay};
+use stylet_identify::objective::{Data, Trail, replay};
 
 /// Samples by which a rupture may be early or late without counting as an error.
 const FORGIVEN: f64 = 2.0;
@@ -25,10 +24,10 @@ pub struct Left {
 /// Residual of a model with its own ruptures, each as early or late by a sample or two as fits best.
 #[must_use]
 pub fn by_its_own(model: &Model, data: &Data, r: usize) -> Option<Left> {
-    let compiled = model.compile(r)?;
+    let mut trail = Trail::new(model, data, r)?;
     let b = &data.blocks[r];
-    let mut instants = free(&compiled, &pieces(&compiled, b));
-    let mut work = Work::default();
+    let mut instants = trail.own_instants();
+    trail.stand(data, r, &instants);
     let (first, last) = b.span_s();
     for layer in 0..instants.len() {
         let own = instants[layer];
@@ -38,7 +37,7 @@ pub fn by_its_own(model: &Model, data: &Data, r: usize) -> Option<Left> {
         let mut best = (f64::INFINITY, own);
         for k in [0.0, -0.5, 0.5, -1.0, 1.0, -FORGIVEN, FORGIVEN] {
             instants[layer] = (own + k * b.step_s).clamp(first, last);
-            let nats = nats_of(model, &compiled, data, r, &instants, &mut work);
+            let nats = trail.nats_at(model, data, r, &instants);
             if nats < best.0 {
                 best = (nats, instants[layer]);
             }
@@ -57,11 +56,25 @@ pub fn by_its_own(model: &Model, data: &Data, r: usize) -> Option<Left> {
 /// Predicts every recording from a fit to the others; with one recording the fit itself is used.
 #[must_use]
 pub fn left_out(best: &Fit, data: &Data) -> Vec<Option<Left>> {
+    left_out_with(best, data, |_| Own::default())
+}
+
+/// As [`left_out`], with the numbers of its own (surface, friction) of the recording that is left out granted: what a cause is
+/// worth does not hang on where the needle touched.
+#[must_use]
+pub fn left_out_granted(best: &Fit, data: &Data) -> Vec<Option<Left>> {
+    left_out_with(best, data, |r| best.model.own[r])
+}
+
+fn left_out_with(best: &Fit, data: &Data, own: impl Fn(usize) -> Own + Sync) -> Vec<Option<Left>> {
     let n = data.recordings();
     (0..n)
         .into_par_iter()
         .map(|r| {
-            let model = if n < 2 { best.model.clone() } else { without(best, data, r)? };
+            let mut model = if n < 2 { best.model.clone() } else { without(best, data, r)? };
+            if n > 1 {
+                model.own[r] = own(r);
+            }
             by_its_own(&model, data, r)
         })
         .collect()

@@ -1,6 +1,6 @@
 //! Whether a larger model is worth its numbers: both under the noise that the larger one leaves.
 
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit_sharp};
 use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
 
@@ -12,8 +12,8 @@ pub const LEAST: f64 = 4.0;
 pub fn gain(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
     let own = data.judged_by(&larger.residuals.e, From::Whole);
     let effort = Effort { turns: 3, enough: 0.2 };
-    let (a, b) = rayon::join(|| fit(&smaller.model, &own, effort), || fit(&larger.model, &own, effort));
-    match (a, b) {
+    let under = |f: &Fit| fit_sharp(&f.model, &own, effort);
+    match rayon::join(|| under(smaller), || under(larger)) {
         (Some(a), Some(b)) => a.nats() - b.nats(),
         _ => f64::NEG_INFINITY,
     }

@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
+mod at_ruptures;
 pub mod base;
 #[cfg(feature = "own_world")]
 pub mod benchmark;

@@ -147,6 +147,19 @@ pub struct NoiseReport {
     pub from_air: bool,
 }
 
+/// How insertions differ from one another beyond what the law says: standard deviations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Differences {
+    /// Of the force at which a layer is punctured, relative.
+    pub puncture: f64,
+    /// Of the place at which a layer gives way, in m.
+    pub face_m: f64,
+    /// Of the surface, in m; 0 where one surface does for all.
+    pub surface_m: f64,
+    /// Of friction, relative; 0 where one does for all.
+    pub friction: f64,
+}
+
 /// A remark on the data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
@@ -181,6 +194,9 @@ pub struct Diagnosis {
     pub evidence: Vec<EvidenceStep>,
     /// Noise.
     pub noise: NoiseReport,
+    /// What differs from insertion to insertion.
+    #[serde(default)]
+    pub differences: Differences,
     /// What would split an ambiguous class or show what is invisible.
     pub advice: Vec<String>,
 }

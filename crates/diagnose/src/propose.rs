@@ -4,8 +4,8 @@ use crate::base::Prepared;
 use rayon::prelude::*;
 use stylet_identify::fit::Column;
 use stylet_identify::look::{Gain, Look, scaled};
-use stylet_identify::model::Choice;
-use stylet_tissue::{EffectInfo, Proposal, library};
+use stylet_identify::model::{Choice, Model};
+use stylet_tissue::{EffectInfo, Place, Proposal, library};
 
 /// A start with what it gains to first order.
 #[derive(Clone, Debug)]
@@ -16,6 +16,8 @@ pub struct Start {
     pub nats: f64,
     /// Nats that the effect at its probe would show.
     pub visible: f64,
+    /// The model to fit from, where it is not the one so far with the effect: ranked without a short fit.
+    pub model: Option<Model>,
 }
 
 /// The best starts of every effect, best effect first, at most two of each; `lines` (Hz) are those of the residual's spectrum.
@@ -27,6 +29,9 @@ pub fn starts(look: &Look, prepared: &Prepared, lines: &[f64]) -> Vec<Vec<Start>
         .par_iter()
         .map(|info| {
             let mut own = of(info, look, prepared, lines);
+            if info.place == Place::Puncture {
+                own.extend(crate::at_ruptures::start(info, look));
+            }
             own.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             own.truncate(2);
             own
@@ -83,7 +88,7 @@ fn start(
     } else {
         gain.nats
     };
-    Some(Start { choice, nats, visible: gain.visible })
+    Some(Start { choice, nats, visible: gain.visible, model: None })
 }
 
 /// Lowest and highest frequency in Hz of a breath.
@@ -121,6 +126,7 @@ fn breath(info: &'static EffectInfo, look: &Look) -> Vec<Start> {
                 choice: Choice::new(info, &[amplitude, hz, libm::atan2(b, a)]),
                 nats: gain.nats,
                 visible: gain.visible,
+                model: None,
             })
         })
         .collect()
@@ -139,10 +145,10 @@ fn slopes(look: &Look) -> Option<(PerBlock, PerBlock)> {
     let (mut fz, mut fv) = (Vec::new(), Vec::new());
     for (r, b) in look.data.blocks.iter().enumerate() {
         let compiled = model.compile(r)?;
-        let course = pieces(&compiled, b).into_owned();
+        let course = pieces(&compiled, b);
         let mut out = [Replayed::default(), Replayed::default(), Replayed::default()];
         for (out, (dz, dv)) in out.iter_mut().zip([(0.0, 0.0), (DZ_M, 0.0), (0.0, DV_MPS)]) {
-            let mut moved = course.clone();
+            let mut moved = (*course).clone();
             for p in &mut moved {
                 p.z_m += dz;
                 p.v_mps += dv;
@@ -181,6 +187,7 @@ fn lines(info: &'static EffectInfo, look: &Look, found: &[f64]) -> Vec<Start> {
                 choice: Choice::new(info, &[amplitude, hz, libm::atan2(b, a)]),
                 nats: gain.nats,
                 visible: gain.visible,
+                model: None,
             })
         })
         .collect()
@@ -235,6 +242,7 @@ fn breaks(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<St
                     choice: Choice::new(info, &[depth - stretch, k, k * stretch]),
                     nats: gain.nats,
                     visible: gain.visible,
+                    model: None,
                 })
             })
         })

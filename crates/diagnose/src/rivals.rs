@@ -3,7 +3,7 @@
 use crate::judge::{cost, gain};
 use crate::select::{Search, at_a_bound, extra};
 use rayon::prelude::*;
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit_below};
 use stylet_identify::model::Choice;
 
 /// Rivals within so many nats of the best form one class.
@@ -12,6 +12,8 @@ pub const CLASS_NATS: f64 = 3.0;
 const FAR: f64 = 0.05;
 /// ... unless it was behind by less than so many nats.
 const NEAR_NATS: f64 = 25.0;
+/// A rival that cannot come nearer than so many nats is not fitted to the end.
+const OUT_OF_SIGHT: f64 = 40.0;
 
 /// A rival of a cause: its name and by how many nats it is behind, numbers paid for (negative: ahead).
 #[derive(Clone, Debug)]
@@ -75,7 +77,8 @@ fn of(search: &Search, k: usize) -> Vec<(Fit, f64)> {
         .filter_map(|choice| {
             let mut other = model.clone();
             other.effects[k] = choice;
-            let f = fit(&other, &search.data, Effort::FULL)?;
+            let wanted = mine + OUT_OF_SIGHT - cost(other.effect_numbers(), blocks);
+            let f = fit_below(&other, &search.data, Effort::FULL, wanted)?;
             let behind = price(&f) - mine;
             // What holds the one named as a special case has to pay for its numbers, and did not.
             let nested = own.info.nested_in.contains(&f.model.effects[k].info.id);

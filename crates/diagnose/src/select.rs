@@ -4,8 +4,7 @@ use crate::base::Prepared;
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
-use std::sync::Arc;
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::From;
@@ -102,18 +101,15 @@ impl Search {
             .flatten()
             .collect();
         let coarse = self.coarse();
+        // What was started from numbers of its own goes to the end.
+        let (begun, tried): (Vec<&Start>, Vec<&Start>) = tried.into_iter().partition(|s| s.model.is_some());
         let mut short: Vec<Fit> = tried
             .par_iter()
             .filter_map(|s| fit(&self.best.model.with(s.choice.clone()), &coarse, Effort::SHORT))
             .collect();
         short.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
         let mut names: Vec<&str> = Vec::new();
-        short.retain(|f| {
-            let name = f.model.effects.last().map_or("", |e| e.info.id);
-            let new = !names.contains(&name);
-            names.push(name);
-            new
-        });
+        short.retain(|f| first_of(&mut names, f));
         // Rivals far behind are not fitted to the end.
         if let (Some(first), Some(stood)) =
             (short.first().map(Fit::nats), residuals(&self.best.model, &coarse))
@@ -121,16 +117,25 @@ impl Search {
             let reach = (1.0 - BEHIND) * (stood.nats - first);
             short.retain(|f| stood.nats - f.nats() >= reach.min(stood.nats - first - 30.0));
         }
-        let mut full: Vec<Fit> = short
-            .par_iter()
-            .take(FULL)
-            .filter_map(|f| {
-                let mut model = f.model.clone();
-                retime(&mut model, &self.data, &times);
-                fit(&model, &self.data, Effort::FULL)
-            })
-            .collect();
+        short.truncate(FULL);
+        let to_the_end = |model: &Model| {
+            let mut model = model.clone();
+            retime(&mut model, &self.data, &times);
+            fit(&model, &self.data, Effort::FULL)
+        };
+        // With the scatter that was told ruptures move far; with the one that they show where they are they stay near.
+        let near = |model: &Model| fit(model, &self.data, Effort::SHORT).and_then(|f| to_the_end(&f.model));
+        let far = |model: &Model| {
+            let mut model = model.clone();
+            retime(&mut model, &self.data, &times);
+            fit(&model, &coarse, Effort::SHORT).and_then(|f| to_the_end(&f.model))
+        };
+        let begun = begun.par_iter().filter_map(|s| s.model.as_ref());
+        let mut full: Vec<Fit> = short.par_iter().filter_map(|f| to_the_end(&f.model)).collect();
+        full.extend(begun.flat_map_iter(|m| [far(m), near(m)]).flatten().collect::<Vec<_>>());
         full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
+        let mut names: Vec<&str> = Vec::new();
+        full.retain(|f| first_of(&mut names, f));
         if self.started_too_far(&full) {
             return self.grow(prepared);
         }
@@ -204,8 +209,7 @@ impl Search {
 
     /// The data averaged further, with the noise of the best, to rank starts.
     fn coarse(&self) -> Data {
-        let blocks = Arc::new(self.data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
-        let coarse = Data { blocks, ..self.data.clone() };
+        let coarse = self.data.on(self.data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
         match residuals(&self.best.model, &coarse) {
             Some(left) => coarse.judged_by(&left.e, From::Calm),
             None => coarse,
@@ -215,7 +219,7 @@ impl Search {
     /// Makes a fit the best, with the noise that it leaves.
     pub fn settle(&mut self, f: Fit) {
         self.data = self.data.judged_by(&f.residuals.e, From::Calm);
-        self.best = fit(&f.model, &self.data, Effort::FULL).unwrap_or(f);
+        self.best = fit_sharp(&f.model, &self.data, Effort::FULL).unwrap_or(f);
     }
 
     /// Drops effects that the others can do without.
@@ -241,6 +245,14 @@ impl Search {
             }
         }
     }
+}
+
+/// Whether the last effect of a fit is not among the names yet; it then is.
+fn first_of(names: &mut Vec<&'static str>, f: &Fit) -> bool {
+    let name = f.model.effects.last().map_or("", |e| e.info.id);
+    let new = !names.contains(&name);
+    names.push(name);
+    new
 }
 
 /// A special case of the leader goes before it, unless what the leader has beyond it is worth its numbers when all that is

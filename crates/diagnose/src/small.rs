@@ -1,6 +1,6 @@
 //! Effects that were found and are too small to matter: traces.
 
-use crate::held_out::{Left, left_out, rms};
+use crate::held_out::{Left, left_out_granted, rms};
 use crate::outcome::Cause;
 use crate::select::Search;
 use rayon::prelude::*;
@@ -29,7 +29,12 @@ const ASKED: f64 = 0.3;
 #[must_use]
 pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<Small> {
     let noise_n = crate::held_out::floor(&search.data);
-    let with_n = rms(after, &search.data);
+    let free = search.best.model.free;
+    let with_n = if free.own_surface || free.own_friction {
+        rms(&left_out_granted(&search.best, &search.data), &search.data)
+    } else {
+        rms(after, &search.data)
+    };
     let effects = &search.best.model.effects;
     let one = |c: &Cause| -> Option<Small> {
         let k = effects.iter().position(|e| e.info.id == c.effect)?;
@@ -42,7 +47,7 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
         if lost > ASKED {
             return None;
         }
-        let without_n = rms(&left_out(&without, &search.data), &search.data);
+        let without_n = rms(&left_out_granted(&without, &search.data), &search.data);
         let gained = (without_n - with_n) / noise_n;
         (gained < LEAST_SHARE).then(|| {
             let change = if gained < 0.0 {

@@ -5,7 +5,7 @@
 
 use crate::judge::{LEAST, cost, gain};
 use rayon::prelude::*;
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::{Effort, Fit, fit, fit_below};
 use stylet_identify::model::{Free, Model, Own};
 use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
@@ -42,11 +42,14 @@ pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
         .into_iter()
         .filter(|c| *c != (now.own_surface, now.own_friction))
         .collect();
+    let own = |f: &Fit| f.nats() + price(f.model.free, &data);
     let fits: Vec<Fit> = choices
         .par_iter()
-        .filter_map(|c| fit(&with(&best.model, c.0, c.1), &data, Effort { turns: 6, enough: 0.3 }))
+        .filter_map(|c| {
+            let m = with(&best.model, c.0, c.1);
+            fit_below(&m, &data, Effort { turns: 6, enough: 0.3 }, own(&best) - price(m.free, &data))
+        })
         .collect();
-    let own = |f: &Fit| f.nats() + price(f.model.free, &data);
     let Some(other) = fits.into_iter().min_by(|a, b| own(a).total_cmp(&own(b))) else { return (best, data) };
     if own(&other) >= own(&best) {
         return (best, data);

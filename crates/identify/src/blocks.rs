@@ -4,7 +4,7 @@
 //! continuous in the instant of the rupture; and a recording at 1 kHz costs as much as one at 200 Hz.
 
 use crate::motion::{Motion, Piece, Shown};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use stylet_record::Recording;
 
 /// Length of a block in s: short against layers, relaxation and ripple, long against samples at 200 Hz and more.
@@ -51,6 +51,8 @@ pub struct Blocks {
     pub motion: Arc<Motion>,
     /// Pieces of smooth motion, no delay.
     pub pieces: Arc<Vec<Piece>>,
+    /// Those of a force that shows the instants of the speed's jumps, no delay.
+    smeared: Arc<OnceLock<Arc<Vec<Piece>>>>,
 }
 
 impl Blocks {
@@ -78,6 +80,7 @@ impl Blocks {
             step_s,
             motion,
             pieces: Arc::default(),
+            smeared: Arc::default(),
         };
         let mut i = 0;
         let mut raw_block = Vec::with_capacity(n);
@@ -148,7 +151,12 @@ impl Blocks {
     /// Blocks of `m` blocks each, for screening.
     #[must_use]
     pub fn coarser(&self, m: usize) -> Self {
-        let mut b = Self { samples: self.samples * m, pieces: Arc::default(), ..self.clone() };
+        let mut b = Self {
+            samples: self.samples * m,
+            pieces: Arc::default(),
+            smeared: Arc::default(),
+            ..self.clone()
+        };
         for column in [&mut b.from_s, &mut b.to_s, &mut b.f, &mut b.size_n, &mut b.doubt_n] {
             column.clear();
         }
@@ -199,9 +207,20 @@ impl Blocks {
         self.pieces = Arc::new(self.pieces_shown(Shown::Sampled));
     }
 
-    /// Pieces of smooth motion.
+    /// Pieces of smooth motion as a force sees them that is late by so many s and, if it is `smeared` or late, shows the
+    /// instants at which the speed jumps.
     #[must_use]
-    pub fn pieces_shown(&self, shown: Shown) -> Vec<Piece> {
+    pub fn pieces_seen(&self, smeared: bool, late_s: f64) -> Arc<Vec<Piece>> {
+        if late_s > 0.0 {
+            Arc::new(self.pieces_shown(Shown::Late(late_s)))
+        } else if smeared {
+            Arc::clone(self.smeared.get_or_init(|| Arc::new(self.pieces_shown(Shown::Late(0.0)))))
+        } else {
+            Arc::clone(&self.pieces)
+        }
+    }
+
+    fn pieces_shown(&self, shown: Shown) -> Vec<Piece> {
         self.motion.pieces(self.from_s.iter().copied().zip(self.to_s.iter().copied()), shown)
     }
 

@@ -151,12 +151,8 @@ fn rows(u_f: f64, u_z: f64, [w_f, w_z]: [f64; 2], has_force: bool) -> [f64; 4] {
 #[must_use]
 pub fn scatter_of(events: &[Event], start: &Scatter) -> Scatter {
     let mut best = *start;
-    let nats = |s: &Scatter| -> f64 {
-        // Scatter has to be asked for: half a nat per factor e above the smallest.
-        let prior = 0.5 * libm::log(1.0 + (s.force / 5e-4).powi(2))
-            + 0.5 * libm::log(1.0 + (s.place_m / 5e-6).powi(2));
-        events.iter().map(|e| judge(e, s).nats).sum::<f64>() + prior * 0.5
-    };
+    let nats =
+        |s: &Scatter| -> f64 { events.iter().map(|e| judge(e, s).nats).sum::<f64>() + scatter_prior(s) };
     if events.is_empty() {
         return best;
     }
@@ -167,7 +163,16 @@ pub fn scatter_of(events: &[Event], start: &Scatter) -> Scatter {
     best
 }
 
-const FORCE_GRID: [f64; 13] = [0.0, 5e-4, 1e-3, 2e-3, 4e-3, 7e-3, 0.012, 0.02, 0.033, 0.055, 0.09, 0.15, 0.3];
+/// Scatter has to be asked for: half a nat per factor e above the smallest.
+#[must_use]
+pub fn scatter_prior(s: &Scatter) -> f64 {
+    let of = |ratio: f64| 0.25 * libm::log(1.0 + ratio * ratio);
+    of(s.force / 5e-4) + of(s.place_m / 5e-6)
+}
+
+/// Scatters of the force (relative) that are tried.
+pub const FORCE_GRID: [f64; 13] =
+    [0.0, 5e-4, 1e-3, 2e-3, 4e-3, 7e-3, 0.012, 0.02, 0.033, 0.055, 0.09, 0.15, 0.3];
 const PLACE_GRID: [f64; 12] =
     [0.0, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4, 3.2e-4, 6.4e-4, 1.3e-3, 2.5e-3, 5e-3];
 

@@ -157,8 +157,7 @@ impl Tangent {
             // Predicted now less predicted before = residual before less residual now.
             let change: Vec<f64> =
                 replayed.f.iter().zip(&at.e[r]).zip(&b.f).map(|((f, e), y)| f - (y - e)).collect();
-            let mut w = vec![0.0; change.len()];
-            data.noise.whiten(b, &change, &mut w);
+            let mut w = data.whiten(r, &change);
             w.iter_mut().zip(&self.roots[r]).for_each(|(w, root)| *w *= root);
             column.w.push(w);
             let rows = replayed.events.iter().zip(&at.events[r]).flat_map(|(now, was)| {
@@ -268,12 +267,45 @@ const INSTANT_BLOCKS: f64 = 1.5;
 /// Fits a model from where it stands.
 #[must_use]
 pub fn fit(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
+    fit_below(model, data, effort, f64::INFINITY)
+}
+
+/// As [`fit`], but given up where it would not come below `wanted` nats if every step left gained as much as the last.
+#[must_use]
+pub fn fit_below(model: &Model, data: &Data, effort: Effort, wanted: f64) -> Option<Fit> {
+    descend(model, data, effort, wanted, rescatter)
+}
+
+/// As [`fit`]; where ruptures scatter, also from numbers under which they do not. Under a wide scatter what is a little off
+/// costs nothing, and stays.
+#[must_use]
+pub fn fit_sharp(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
+    let wide = fit(model, data, effort)?;
+    let mut none = wide.model.clone();
+    (none.scatter.force, none.scatter.place_m) = (0.0, 0.0);
+    if none.scatter == wide.model.scatter {
+        return Some(wide);
+    }
+    let held = Effort { turns: 2, ..effort };
+    let sharp =
+        descend(&none, data, held, f64::INFINITY, |_, _| ()).and_then(|f| fit(&f.model, data, effort));
+    Some(sharp.filter(|f| f.nats() < wide.nats()).unwrap_or(wide))
+}
+
+/// Steps downhill; after each the scatter is told by `scatter`.
+fn descend(
+    model: &Model,
+    data: &Data,
+    effort: Effort,
+    wanted: f64,
+    scatter: impl Fn(&mut Model, &mut Residuals),
+) -> Option<Fit> {
     let mut best = model.clone();
     clamp(&mut best);
     let mut at = residuals(&best, data)?;
-    rescatter(&mut best, &mut at);
+    scatter(&mut best, &mut at);
     let mut damping = 1e-4;
-    for _ in 0..effort.turns {
+    for turn in 1..=effort.turns {
         let tangent = Tangent::new(&best, data, &at);
         let before = at.nats;
         let mut gained = false;
@@ -285,7 +317,7 @@ pub fn fit(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
             };
             let mut next = next;
             if left.nats < at.nats {
-                rescatter(&mut next, &mut left);
+                scatter(&mut next, &mut left);
                 (best, at) = (next, left);
                 damping = (damping * 0.1).max(1e-9);
                 gained = true;
@@ -293,7 +325,9 @@ pub fn fit(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
             }
             damping = (damping * 8.0).max(1e-6);
         }
-        if !gained || before - at.nats < effort.enough {
+        let gain = before - at.nats;
+        let reach = at.nats - gain * (effort.turns - turn) as f64;
+        if !gained || gain < effort.enough || (turn > 1 && reach > wanted) {
             break;
         }
     }

@@ -85,9 +85,8 @@ impl<'a> Look<'a> {
     #[must_use]
     pub fn of_force(&self, force: &[Vec<f64>]) -> Column {
         let mut column = Column::default();
-        for (r, b) in self.data.blocks.iter().enumerate() {
-            let mut w = vec![0.0; b.len()];
-            self.data.noise.whiten(b, &force[r], &mut w);
+        for (r, force) in force.iter().enumerate() {
+            let mut w = self.data.whiten(r, force);
             w.iter_mut().zip(&self.fit.residuals.w[r]).for_each(|(w, at)| *w *= weight(*at).sqrt());
             column.w.push(w);
             column.rows.push(vec![0.0; 4 * self.fit.residuals.events[r].len()]);

@@ -143,11 +143,11 @@ impl Motion {
                     Some(j) if j < to - 1e-6 * whole => j,
                     _ => to,
                 };
+                // Slope of the velocity from means over both halves.
                 let (z0, v0) = knots.sums(at - late_s, &mut near);
+                let (_, vm) = knots.sums(0.5 * (at + end) - late_s, &mut near);
                 let (z1, v1) = knots.sums(end - late_s, &mut near);
                 let dt = (end - at).max(1e-12);
-                // Slope of the velocity from means over both halves.
-                let (_, vm) = knots.sums(0.5 * (at + end) - late_s, &mut near);
                 let a = ((v1 - vm) - (vm - v0)) / (0.25 * dt * dt);
                 out.push(Piece {
                     block: block as u32,

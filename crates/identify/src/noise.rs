@@ -45,6 +45,25 @@ pub struct Noise {
     pub bins: Vec<Bin>,
 }
 
+/// How the blocks of one recording are whitened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Laid {
+    rows: Vec<Row>,
+    /// Some range has a slow wander.
+    wander: bool,
+}
+
+/// How one block is whitened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Row {
+    /// Range of the force.
+    bin: u32,
+    /// Blocks that are known before it, without a break.
+    run: u32,
+    /// Standard deviation of its innovation in N; infinite when it is not compared.
+    sd_n: f64,
+}
+
 /// Huber's loss of a normalised residual, in nats.
 #[must_use]
 pub fn rho(w: f64) -> f64 {
@@ -168,35 +187,48 @@ impl Noise {
         best.map_or(white, |b| b.1)
     }
 
-    /// Normalised innovations of residuals `e` (N); blocks that are not compared give zero.
-    pub fn whiten(&self, b: &Blocks, e: &[f64], out: &mut [f64]) {
-        let wander = self.bins.iter().any(|b| b.slow != [0.0; SLOW.len()]);
-        let sums = if wander { sums(e) } else { Vec::new() };
+    /// How the blocks of a recording are whitened.
+    #[must_use]
+    pub fn laid(&self, b: &Blocks) -> Laid {
         let mut run = 0;
-        for k in 0..b.len() {
+        let rows = (0..b.len()).map(|k| {
             run = if b.restart[k] { 0 } else { run + 1 };
             if !b.used[k] {
-                out[k] = 0.0;
-                continue;
+                return Row { bin: 0, run: 0, sd_n: f64::INFINITY };
             }
-            let bin = &self.bins[self.bin(b.size_n[k]).min(self.bins.len() - 1)];
-            let (mut w, mut sd) = (e[k], bin.sd_n.max(bin.innovation_n));
+            let bin = self.bin(b.size_n[k]).min(self.bins.len() - 1);
+            let of = &self.bins[bin];
+            // At the beginning nothing is known of the samples before.
+            let sd = if run >= ORDER { of.innovation_n } else { of.sd_n.max(of.innovation_n) };
+            let sd_n = if b.doubt_n[k] > 0.0 { libm::hypot(sd, b.doubt_n[k]) } else { sd };
+            Row { bin: bin as u32, run: run as u32, sd_n }
+        });
+        Laid { rows: rows.collect(), wander: self.bins.iter().any(|b| b.slow != [0.0; SLOW.len()]) }
+    }
+
+    /// Normalised innovations of residuals `e` (N) of a recording; blocks that are not compared give zero.
+    #[must_use]
+    pub fn whiten(&self, laid: &Laid, e: &[f64]) -> Vec<f64> {
+        let sums = if laid.wander { sums(e) } else { Vec::new() };
+        let one = |(k, row): (usize, &Row)| {
+            if row.sd_n == f64::INFINITY {
+                return 0.0;
+            }
+            let (bin, run) = (&self.bins[row.bin as usize], row.run as usize);
+            let mut w = e[k];
             if run >= ORDER {
-                for (i, a) in bin.a.iter().enumerate() {
-                    w -= a * e[k - 1 - i];
+                for (a, before) in bin.a.iter().zip(e[k - ORDER..k].iter().rev()) {
+                    w -= a * before;
                 }
-                if wander {
+                if laid.wander {
                     for (mean, slow) in slow_means(&sums, k, run).iter().zip(&bin.slow) {
                         w -= slow * mean;
                     }
                 }
-                sd = bin.innovation_n;
-            } // else nothing is known of the samples before.
-            if b.doubt_n[k] > 0.0 {
-                sd = libm::hypot(sd, b.doubt_n[k]);
             }
-            out[k] = w / sd;
-        }
+            w / row.sd_n
+        };
+        laid.rows.iter().enumerate().map(one).collect()
     }
 
     /// Sum of the logarithms of the innovations' standard deviations, `ln(s/N)`, over the blocks compared.

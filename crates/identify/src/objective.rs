@@ -2,12 +2,12 @@
 
 use crate::blocks::Blocks;
 use crate::events::{Event, judge};
-use crate::forward::{Replayed, Track, imposed};
+use crate::forward::{Replayed, Track, free, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
-use crate::motion::{Piece, Shown};
-use crate::noise::{From, Noise, rho};
-use std::borrow::Cow;
-use std::sync::Arc;
+use crate::motion::Piece;
+use crate::noise::{From, Laid, Noise, rho};
+use rayon::prelude::*;
+use std::sync::{Arc, OnceLock};
 
 /// Recordings in blocks and the noise by which they are judged.
 #[derive(Clone, Debug)]
@@ -18,13 +18,28 @@ pub struct Data {
     pub noise: Arc<Noise>,
     /// The noise is nowhere less, in N: what the recorded force is rounded to leaves open.
     pub floor_n: f64,
+    /// How each recording is whitened.
+    laid: Arc<OnceLock<Vec<Laid>>>,
 }
 
 impl Data {
+    /// Recordings judged by a noise that is nowhere less than `floor_n`.
+    #[must_use]
+    pub fn new(blocks: Arc<Vec<Blocks>>, noise: Noise, floor_n: f64) -> Self {
+        Self { blocks, noise: Arc::new(noise), floor_n, laid: Arc::default() }
+    }
+
+    /// Normalised innovations of residuals `e` (N) of recording `r`; blocks that are not compared give zero.
+    #[must_use]
+    pub fn whiten(&self, r: usize, e: &[f64]) -> Vec<f64> {
+        let laid = self.laid.get_or_init(|| self.blocks.iter().map(|b| self.noise.laid(b)).collect());
+        self.noise.whiten(&laid[r], e)
+    }
+
     /// The same recordings judged by another noise.
     #[must_use]
     pub fn with_noise(&self, noise: Noise) -> Self {
-        Self { blocks: Arc::clone(&self.blocks), noise: Arc::new(noise), floor_n: self.floor_n }
+        Self::new(Arc::clone(&self.blocks), noise, self.floor_n)
     }
 
     /// The same recordings judged by the noise that residuals tell.
@@ -36,8 +51,13 @@ impl Data {
     /// Some of the recordings.
     #[must_use]
     pub fn only(&self, which: &[usize]) -> Self {
-        let blocks = which.iter().map(|k| self.blocks[*k].clone()).collect();
-        Self { blocks: Arc::new(blocks), noise: Arc::clone(&self.noise), floor_n: self.floor_n }
+        self.on(which.iter().map(|k| self.blocks[*k].clone()).collect())
+    }
+
+    /// Other recordings judged by the same noise.
+    #[must_use]
+    pub fn on(&self, blocks: Vec<Blocks>) -> Self {
+        Self { blocks: Arc::new(blocks), laid: Arc::default(), ..self.clone() }
     }
 
     /// Number of blocks compared.
@@ -68,12 +88,8 @@ pub struct Residuals {
 
 /// The pieces of smooth motion that a model sees.
 #[must_use]
-pub fn pieces<'a>(model: &Compiled, blocks: &'a Blocks) -> Cow<'a, [Piece]> {
-    if model.smears || model.delay_s > 0.0 {
-        Cow::Owned(blocks.pieces_shown(Shown::Late(model.delay_s)))
-    } else {
-        Cow::Borrowed(&blocks.pieces)
-    }
+pub fn pieces(model: &Compiled, blocks: &Blocks) -> Arc<Vec<Piece>> {
+    blocks.pieces_seen(model.smears, model.delay_s)
 }
 
 /// Replays one recording.
@@ -89,6 +105,7 @@ pub fn replay(model: &Model, data: &Data, r: usize) -> Option<Replayed> {
 /// A replay of a model with what it remembered, per recording: what neighbours of the model are computed from.
 pub struct Trail {
     compiled: Compiled,
+    seen: Arc<Vec<Piece>>,
     track: Track,
 }
 
@@ -98,18 +115,41 @@ impl Trail {
     pub fn new(model: &Model, data: &Data, r: usize) -> Option<Self> {
         let compiled = model.compile(r)?;
         let blocks = &data.blocks[r];
-        let track = Track::new(&compiled, blocks, &pieces(&compiled, blocks), &model.instants[r]);
-        Some(Self { compiled, track })
+        let seen = pieces(&compiled, blocks);
+        let track = Track::new(&compiled, blocks, &seen, &model.instants[r]);
+        Some(Self { compiled, seen, track })
     }
 
     /// As [`replay`], of a model that differs in a number of the base law, of its geometry, or in an instant.
     #[must_use]
     pub fn replay(&self, model: &Model, data: &Data, r: usize) -> Option<Replayed> {
         let compiled = model.compile(r)?;
-        let blocks = &data.blocks[r];
-        let seen = pieces(&compiled, blocks);
-        let out = self.track.neighbour(&self.compiled, &compiled, blocks, &seen, &model.instants[r]);
+        let out =
+            self.track.neighbour(&self.compiled, &compiled, &data.blocks[r], &self.seen, &model.instants[r]);
         out.f.iter().all(|f| f.is_finite()).then_some(out)
+    }
+
+    /// The instants (s) at which the law itself ruptures.
+    #[must_use]
+    pub fn own_instants(&self) -> Vec<f64> {
+        free(&self.compiled, &self.seen)
+    }
+
+    /// Nats of the recording with its ruptures at other instants: residuals and events, with the noise as it is.
+    #[must_use]
+    pub fn nats_at(&self, model: &Model, data: &Data, r: usize, instants: &[f64]) -> f64 {
+        let b = &data.blocks[r];
+        let now = self.track.neighbour(&self.compiled, &self.compiled, b, &self.seen, instants);
+        let e: Vec<f64> = b.f.iter().zip(&now.f).map(|(y, f)| y - f).collect();
+        let w = data.whiten(r, &e);
+        let events: f64 = now.events.iter().map(|e| judge(e, &model.scatter).nats).sum();
+        let sum = w.iter().map(|w| rho(*w)).sum::<f64>() + events;
+        if sum.is_finite() { sum } else { NEVER }
+    }
+
+    /// Goes on from other instants.
+    pub fn stand(&mut self, data: &Data, r: usize, instants: &[f64]) {
+        self.track = Track::new(&self.compiled, &data.blocks[r], &self.seen, instants);
     }
 }
 
@@ -117,14 +157,18 @@ impl Trail {
 #[must_use]
 pub fn residuals(model: &Model, data: &Data) -> Option<Residuals> {
     let mut all = Residuals::default();
-    for (r, b) in data.blocks.iter().enumerate() {
+    let one = |(r, b): (usize, &Blocks)| {
         let replayed = replay(model, data, r)?;
         let e: Vec<f64> = b.f.iter().zip(&replayed.f).map(|(y, f)| y - f).collect();
-        let mut w = vec![0.0; e.len()];
-        data.noise.whiten(b, &e, &mut w);
+        let w = data.whiten(r, &e);
+        Some((e, w, replayed.events))
+    };
+    let each: Vec<Option<_>> = data.blocks.par_iter().enumerate().map(one).collect();
+    for left in each {
+        let (e, w, events) = left?;
         all.e.push(e);
         all.w.push(w);
-        all.events.push(replayed.events);
+        all.events.push(events);
     }
     all.nats = nats(model, &all);
     Some(all)
@@ -156,34 +200,4 @@ pub fn prior_nats(model: &Model) -> f64 {
         .map(|n| (0..model.own.len()).map(|r| of(n, model.get(n.role, r))).sum::<f64>())
         .sum();
     shared + own
-}
-
-/// Nats of one recording: residuals and events, with the noise as it is.
-#[must_use]
-pub fn nats_of(
-    model: &Model,
-    compiled: &Compiled,
-    data: &Data,
-    r: usize,
-    instants: &[f64],
-    work: &mut Work,
-) -> f64 {
-    let b = &data.blocks[r];
-    imposed(compiled, b, &pieces(compiled, b), instants, &mut work.replayed);
-    work.e.clear();
-    work.e.extend(b.f.iter().zip(&work.replayed.f).map(|(y, f)| y - f));
-    work.w.clear();
-    work.w.resize(work.e.len(), 0.0);
-    data.noise.whiten(b, &work.e, &mut work.w);
-    let events: f64 = work.replayed.events.iter().map(|e| judge(e, &model.scatter).nats).sum();
-    let sum = work.w.iter().map(|w| rho(*w)).sum::<f64>() + events;
-    if sum.is_finite() { sum } else { NEVER }
-}
-
-/// Buffers of [`nats_of`].
-#[derive(Default)]
-pub struct Work {
-    replayed: Replayed,
-    e: Vec<f64>,
-    w: Vec<f64>,
 }

@@ -1,8 +1,7 @@
 //! Ruptures moved to where a model wants them: a derivative sees only the block in which an instant lies.
 
-use crate::forward::free;
 use crate::model::{Model, NEVER};
-use crate::objective::{Data, Work, nats_of, pieces};
+use crate::objective::{Data, Trail};
 use rayon::prelude::*;
 
 /// Moves in blocks that are tried in either direction.
@@ -28,21 +27,20 @@ pub fn retime(model: &mut Model, data: &Data, drops: &[Vec<f64>]) -> bool {
 
 fn one(model: &Model, data: &Data, r: usize, drops: &[f64]) -> (Vec<f64>, bool) {
     let mut instants = model.instants[r].clone();
-    let Some(compiled) = model.compile(r) else { return (instants, false) };
+    let Some(mut trail) = Trail::new(model, data, r) else { return (instants, false) };
     let b = &data.blocks[r];
     let block_s = b.step_s * b.samples as f64;
     let (first, last) = b.span_s();
-    let own = free(&compiled, &pieces(&compiled, b));
-    let mut work = Work::default();
-    let mut nats = |instants: &[f64]| nats_of(model, &compiled, data, r, instants, &mut work);
-    let mut best = nats(&instants);
+    let own = trail.own_instants();
+    let mut best = trail.nats_at(model, data, r, &instants);
     let mut moved = false;
     // The law's own ruptures all at once: an earlier one carries the later ones along.
     if own.iter().zip(&instants).any(|(a, b)| a != b) {
-        let value = nats(&own);
+        let value = trail.nats_at(model, data, r, &own);
         if value < best - WORTH {
             (best, moved) = (value, true);
             instants.clone_from(&own);
+            trail.stand(data, r, &instants);
         }
     }
     for layer in 0..instants.len() {
@@ -65,9 +63,10 @@ fn one(model: &Model, data: &Data, r: usize, drops: &[f64]) -> (Vec<f64>, bool) 
                 continue;
             }
             let was = std::mem::replace(&mut instants[layer], t);
-            let value = nats(&instants);
+            let value = trail.nats_at(model, data, r, &instants);
             if value < best - WORTH {
                 (best, moved) = (value, true);
+                trail.stand(data, r, &instants);
             } else {
                 instants[layer] = was;
             }

@@ -57,7 +57,7 @@ fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
     let belief = Arc::new(belief());
     let r = recording();
     let blocks = vec![Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)];
-    let data = Data { blocks: Arc::new(blocks), noise: Arc::new(Noise::white(0.02)), floor_n: 0.0 };
+    let data = Data::new(Arc::new(blocks), Noise::white(0.02), 0.0);
     let mut models = vec![("none", Model::base(Arc::clone(&belief), 1))];
     for info in library() {
         let values: Vec<f64> = info

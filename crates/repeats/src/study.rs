@@ -501,6 +501,7 @@ fn diagnosis(
             ar: [instrument.ar1.unwrap_or(0.0), 0.0],
             from_air: instrument.noise_n.is_some(),
         },
+        differences: Default::default(),
         advice: Vec::new(),
     }
 }

@@ -84,6 +84,6 @@ impl Law {
         ruptured: usize,
         on_strain: impl FnMut(Strain),
     ) -> TissueForce {
-        self.advance(state, time_s, z_m, v_mps, &mut Imposed { ruptured, on_strain })
+        self.decided(state, time_s, z_m, v_mps, &mut Imposed { ruptured, on_strain })
     }
 }

@@ -156,10 +156,7 @@ impl Law {
         v_mps: f64,
         mut on_rupture: impl FnMut(Rupture),
     ) -> TissueForce {
-        if self.plain && (time_s + z_m + v_mps).is_finite() {
-            return self.step_plain(state, time_s, z_m, v_mps, &mut on_rupture);
-        }
-        self.advance(state, time_s, z_m, v_mps, &mut ByLaw(on_rupture))
+        self.decided(state, time_s, z_m, v_mps, &mut ByLaw(&mut on_rupture))
     }
 
     /// [`Law::step`] for many samples, each `[time_s, z_m, v_mps]`; `hear` is told the force of each.
@@ -176,14 +173,31 @@ impl Law {
         }
         for [time_s, z_m, v_mps] in samples {
             if (time_s + z_m + v_mps).is_finite() {
-                hear(&self.step_plain(state, time_s, z_m, v_mps, &mut on_rupture));
+                hear(&self.step_plain(state, time_s, z_m, v_mps, &mut ByLaw(&mut on_rupture)));
             } else {
                 hear(&TissueForce::unknown(state.ruptured + 1));
             }
         }
     }
 
-    /// [`Law::step`] with somebody who decides on ruptures. Kept out of line, so that the base law
+    /// [`Law::step`] with somebody who decides on ruptures.
+    #[inline]
+    pub(crate) fn decided(
+        &self,
+        state: &mut LawState,
+        time_s: f64,
+        z_m: f64,
+        v_mps: f64,
+        breaking: &mut impl Breaking,
+    ) -> TissueForce {
+        if self.plain && (time_s + z_m + v_mps).is_finite() {
+            self.step_plain(state, time_s, z_m, v_mps, breaking)
+        } else {
+            self.advance(state, time_s, z_m, v_mps, breaking)
+        }
+    }
+
+    /// The law with all its effects. Kept out of line, so that the base law
     /// alone stays small enough to be inlined.
     #[inline(never)]
     pub(crate) fn advance(
@@ -222,7 +236,7 @@ impl Law {
         time_s: f64,
         z: f64,
         v: f64,
-        on_rupture: &mut impl FnMut(Rupture),
+        breaking: &mut impl Breaking,
     ) -> TissueForce {
         if !state.started {
             state.begin(time_s, z, v);
@@ -233,7 +247,14 @@ impl Law {
         while let Some(slab) = self.slabs.get(state.ruptured) {
             let x = z - slab.front_m;
             elastic_n = slab.stiffness_n_per_m * if x > 0.0 { x } else { 0.0 };
-            if elastic_n < slab.puncture_n && z < slab.far_m() {
+            let strain = Strain {
+                layer: state.ruptured + 1,
+                elastic_n,
+                puncture_n: slab.puncture_n,
+                tip_m: z,
+                far_m: slab.far_m(),
+            };
+            if !breaking.breaks(&strain) {
                 break;
             }
             let dt = time_s - state.time_s;
@@ -242,7 +263,7 @@ impl Law {
             state.ruptured += 1;
             state.elastic_n = 0.0;
             elastic_n = 0.0;
-            on_rupture(rupture);
+            breaking.broken(rupture);
         }
         state.time_s = time_s;
         state.z_m = z;

@@ -67,7 +67,7 @@ impl Effect for LowPassLag {
         memory[1] = force_n;
         memory[0]
     }
-    /// Memory: output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
+    /// Memory: span and what of a step is through after it, output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
     /// `y` follows from `tau y' = x - y` integrated over the span.
     fn sense_mean(&self, _time_s: f64, span_s: f64, _samples: f64, force_n: f64, memory: &mut Memory) -> f64 {
         if memory[7] == 0.0 {
@@ -79,7 +79,10 @@ impl Effect for LowPassLag {
             return before;
         }
         let ratio = span_s / self.time_constant_s;
-        let change = -libm::expm1(-ratio) * (force_n - before);
+        if !same_step(span_s, memory[3]) {
+            (memory[3], memory[4]) = (span_s, -libm::expm1(-ratio));
+        }
+        let change = memory[4] * (force_n - before);
         memory[6] = before + change;
         force_n - change / ratio
     }
