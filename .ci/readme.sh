@@ -25,6 +25,7 @@ done
 printf 'Columns(time: (name: "time", scale: 1e-6), position: (name: "pz", scale: 1e-3), force: (name: "fz"))\n' >map.ron
 awk -F, 'NR == 1 { print "time,pz,fz"; next } { printf "%.0f,%.9f,%.9f\n", $1 * 1e6, $2 * 1e3, $3 }' a.csv >log.csv
 head -500 a.csv >samples.csv
+printf 'Limits(depth_m: 0.022, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 6.0)\n' >limits.ron
 
 why_not() {
     case "$1" in

@@ -33,6 +33,10 @@ pub enum Command {
     Compare(CompareArgs),
     /// Compare measured data with a scenario: what is wrong, why, and how much better it gets.
     Diagnose(DiagnoseArgs),
+    /// Tell what an experiment can show: which effects, from which size on, and which it cannot tell apart.
+    Identifiability(IdentifiabilityArgs),
+    /// Plan the next insertion: the motion within limits that tells the remaining causes apart.
+    Plan(PlanArgs),
     /// List the effects by which reality departs from the base law, or show one.
     Effects(EffectsArgs),
     /// Examine a part of Stylet on many drawn cases.
@@ -177,6 +181,9 @@ pub struct RunArgs {
     /// Seed of the noise, in place of the scenario's.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Another motion (RON), such as one that `stylet plan` wrote.
+    #[arg(long, value_name = "FILE")]
+    pub motion: Option<PathBuf>,
     /// Run both the multi-layer and the Kelvin-Voigt model on the same data.
     #[arg(long)]
     pub compare: bool,
@@ -258,6 +265,78 @@ pub struct DiagnoseArgs {
     pub limits: Limits,
 }
 
+/// Arguments of `stylet identifiability`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet identifiability scenario.ron
+  stylet identifiability scenario.ron --motion plan.ron --out out/with-plan
+  stylet identifiability scenario.ron --data a.csv b.csv
+
+The folder then holds report.html, identifiability.json and matrix.svg. Sizes are those that `stylet effects` calls typical.")]
+pub struct IdentifiabilityArgs {
+    /// Scenario: what the simulation believes, and the motion of the experiment.
+    pub scenario: PathBuf,
+    /// Another motion (RON), such as one that `stylet plan` wrote.
+    #[arg(long, value_name = "FILE", conflicts_with = "data")]
+    pub motion: Option<PathBuf>,
+    /// Recordings (CSV with header) in place of a motion: their motions and their noise.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub data: Vec<PathBuf>,
+    /// Column map for foreign logs (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
+    /// How much it may take.
+    #[command(flatten)]
+    pub resources: Limits,
+}
+
+/// Arguments of `stylet plan`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet plan out/diagnosis --limits limits.ron --out plan.ron
+  stylet plan scenario.ron --data a.csv --limits limits.ron --out plan.ron
+  stylet plan scenario.ron --limits limits.ron --quick
+
+limits.ron: Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)
+
+Beside plan.ron stand plan.json and plan.html. The plan is a motion: `stylet run scenario.ron --motion plan.ron` simulates it; when
+it has been made, `stylet diagnose` takes the old and the new recordings together. Without recordings the scenario's own motion counts
+as made. The exit code is 2 when no motion keeps the limits; the message says why.")]
+pub struct PlanArgs {
+    /// Folder of a diagnosis, or a scenario (RON).
+    pub from: PathBuf,
+    /// What the insertion may do (RON).
+    #[arg(long, value_name = "FILE")]
+    pub limits: PathBuf,
+    /// Where the motion goes [default: stylet-out/<name>-plan/plan.ron].
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// With a scenario: recordings made so far (CSV with header).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub data: Vec<PathBuf>,
+    /// Column map for foreign logs (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    /// Do not simulate and diagnose the planned insertion: seconds instead of up to a minute.
+    #[arg(long)]
+    pub quick: bool,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// How much it may take.
+    #[command(flatten)]
+    pub resources: Limits,
+}
+
 /// Arguments of `stylet effects`.
 #[derive(Debug, Args)]
 pub struct EffectsArgs {
@@ -282,6 +361,8 @@ pub enum BenchmarkWhat {
     Export(BenchmarkExportArgs),
     /// Judge anybody's answers to exported cases with the same table.
     Judge(BenchmarkJudgeArgs),
+    /// Insert again, as planned, where one insertion at constant speed leaves the cause open: how often is it found then?
+    Plan(BenchmarkPlanArgs),
 }
 
 /// Which cases: the same for every command about them.
@@ -359,6 +440,43 @@ pub struct BenchmarkExportArgs {
     /// Folder for the challenge; it must not be there yet.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+/// Arguments of `stylet benchmark plan`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet benchmark plan --cases 60 --seed 7
+  stylet benchmark plan --wrong thickness --grade medium --cases 30 --seed 7
+
+A case hides one strong effect (never force_gain, which no motion shows). Its first insertion has one constant speed and no way
+back; cases in which the diagnosis then has the effect in a class or lists it as invisible are left open. These get a second
+insertion from the same reality: the planned one, and, for comparison, the paper's sinusoid. The folder then holds table.txt
+(rates with 95 % Wilson intervals), cases.json and cases.jsonl: cases in it are not run again.")]
+pub struct BenchmarkPlanArgs {
+    /// Which law the tissue follows: plain or rich.
+    #[arg(long, value_name = "WORLD", default_value = "plain")]
+    pub world: String,
+    /// What the believed simulation or the sensor has wrong, row by row (words of `stylet benchmark diagnose`).
+    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
+    pub wrong: Vec<String>,
+    /// How much of it: small, medium, large.
+    #[arg(long, value_name = "WORD", default_value = "medium")]
+    pub grade: String,
+    /// Open cases per row.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub cases: u64,
+    /// Seed of the drawing.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Cases run side by side [default: as many as there are cores].
+    #[arg(long, value_name = "N", value_parser = crate::limits::threads)]
+    pub threads: Option<usize>,
+    /// Run nothing: write the table of the cases that the folder's cases.jsonl holds already.
+    #[arg(long)]
+    pub look: bool,
+    /// Folder for the results [default: stylet-out/benchmark-plan-<world>-<seed>].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of `stylet benchmark judge`.

@@ -53,6 +53,13 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let mut output = Output::default();
     output.add("report.html", diagnose_report::page(&scenario, args, &found.examined).to_html());
     output.add("diagnosis.json", found.json()?);
+    let inputs = crate::plan::Inputs {
+        scenario: args.scenario.clone(),
+        data: args.data.clone(),
+        columns: args.columns.clone(),
+        repair: args.repair,
+    };
+    output.add(crate::plan::INPUTS, inputs.absolute().json()?);
     output.add("extended.ron", found.extended_ron(&args.scenario.display().to_string())?);
     let folder = args.results.out.clone().unwrap_or_else(|| {
         let stem =

@@ -13,6 +13,8 @@ mod enhance;
 pub mod exit;
 mod limits;
 mod listen;
+mod plan;
+mod plan_report;
 mod progress;
 mod repeats;
 mod repeats_online;
@@ -42,6 +44,8 @@ pub fn main() -> ExitCode {
         Command::Gate(args) => sweep::gate(args),
         Command::Compare(args) => compare::compare(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
+        Command::Identifiability(args) => plan::identifiability(args),
+        Command::Plan(args) => plan::plan(args),
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),
         Command::Listen(args) => listen::listen(args),

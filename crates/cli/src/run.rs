@@ -18,6 +18,10 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     if let Some(seed) = args.seed {
         scenario.seed = seed;
     }
+    if let Some(path) = &args.motion {
+        scenario.motion = crate::plan::load_motion(path)?;
+        scenario.check().map_err(|p| Failure::Check(format!("{}: {p}", path.display())))?;
+    }
     if args.compare {
         scenario.compare = vec![Model::MultiLayer, Model::KelvinVoigt];
     }

@@ -49,6 +49,8 @@ pub struct Examined {
     pub extended: Scenario,
     /// The search.
     pub search: Search,
+    /// The rivals of every effect of the best model, in its order.
+    pub classes: Vec<Vec<Rival>>,
     /// The base law on every recording left out.
     pub before: Vec<Option<Left>>,
     /// The extended law on every recording left out.
@@ -105,7 +107,7 @@ pub fn diagnose(
     let mut search = Search::run(&prepared, fitted, data, &mut progress);
     let classes = rivals(&mut search);
     progress("judging");
-    let mut judged = judge(&mut search, classes);
+    let mut judged = judge(&mut search, &classes);
     let names: Vec<String> = evidence.iter().map(|e| e.name.clone()).collect();
     let (before, after) = if options.brief {
         (Vec::new(), Vec::new())
@@ -168,7 +170,7 @@ pub fn diagnose(
         causes,
     };
     let extended = extended(scenario, &search, &diagnosis);
-    Ok(Examined { diagnosis, extended, search, before, after })
+    Ok(Examined { diagnosis, extended, search, classes, before, after })
 }
 
 /// Standard deviation of a number spread evenly over one.
@@ -218,7 +220,7 @@ fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
     sum / f64::max(n, 1.0) - 1.0
 }
 
-fn judge(search: &mut Search, classes: Vec<Vec<Rival>>) -> Judged {
+fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let told = leftover::test(&search.best, &search.data);
     let (before, after) =
         (excess(search, &search.base.residuals.e), excess(search, &search.best.residuals.e));

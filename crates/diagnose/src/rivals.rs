@@ -22,6 +22,8 @@ pub struct Rival {
     pub name: &'static str,
     /// Nats behind.
     pub behind: f64,
+    /// The effect with its values.
+    pub choice: Choice,
 }
 
 /// The rivals of every cause of the best model. A rival that is ahead takes the cause's place.
@@ -45,7 +47,12 @@ pub fn rivals(search: &mut Search) -> Vec<Vec<Rival>> {
             continue;
         }
         let name = |f: &Fit| f.model.effects[k].info.id;
-        out.push(own.iter().map(|(f, behind)| Rival { name: name(f), behind: *behind }).collect());
+        let rival = |(f, behind): &(Fit, f64)| Rival {
+            name: name(f),
+            behind: *behind,
+            choice: f.model.effects[k].clone(),
+        };
+        out.push(own.iter().map(rival).collect());
         k += 1;
     }
     out

@@ -38,5 +38,6 @@ pub use judge::outcome::Outcome;
 pub use judge::table;
 pub use plan::Plan;
 pub use run::{RunError, run};
+pub use world::again::Again;
 pub use world::case::{Case, Named, Question, case};
 pub use world::id::{CaseId, Grade, Hide, Size, World, Wrong};

@@ -4,6 +4,7 @@
 use crate::settle::settle;
 use crate::velocity::{Kink, position_noise, velocity};
 use stylet_record::Recording;
+use stylet_tissue::effect::sgn;
 
 /// The motion of one recording.
 #[derive(Clone, Debug, Default)]
@@ -14,6 +15,9 @@ pub struct Motion {
     sampled: Knots,
     /// Jumps of the speed.
     pub jumps: Vec<Jump>,
+    /// Instants at which the speed smoothly changes its sign, and the middles between the samples around them, in s: dry
+    /// friction jumps there.
+    turns: Vec<(f64, f64)>,
     /// Standard deviation in m/s of what the positions leave open of the velocity.
     pub velocity_sd_mps: f64,
     /// Standard deviation of the positions' noise in m.
@@ -105,7 +109,28 @@ impl Motion {
             m.exact.push(t[i], z[i], v[i]);
             m.sampled.push(t[i], z[i], v[i]);
         }
+        // Noisy positions do not tell a turn from a hold.
+        if sd <= NOISY_MPS {
+            m.find_turns(t);
+        }
         m
+    }
+
+    /// Where the sign of the speed changes between two samples without a jump.
+    fn find_turns(&mut self, t: &[f64]) {
+        let mut near = 0;
+        let mut before: Option<(f64, f64)> = None;
+        for &now in t {
+            let v = self.sampled.speed(now, &mut near);
+            if let Some((then, was)) = before
+                && sgn(v) != sgn(was)
+                && !self.jumps.iter().any(|j| j.at_s >= then && j.at_s <= now)
+            {
+                let share = if v == was { 0.5 } else { (was / (was - v)).clamp(0.0, 1.0) };
+                self.turns.push((then + share * (now - then), 0.5 * (then + now)));
+            }
+            before = Some((now, v));
+        }
     }
 
     /// Position in m and velocity in m/s at an instant.
@@ -131,7 +156,10 @@ impl Motion {
         let at_of = |j: &Jump| if shown == Shown::Sampled { j.between_s } else { j.at_s + late_s };
         let mut out = Vec::new();
         let mut near = 0;
-        let mut jump = 0;
+        let turn_at = |(at_s, between_s): &(f64, f64)| {
+            if shown == Shown::Sampled { *between_s } else { at_s + late_s }
+        };
+        let (mut jump, mut turn) = (0, 0);
         for (block, (from, to)) in spans.enumerate() {
             let mut at = from;
             let whole = to - from;
@@ -139,10 +167,11 @@ impl Motion {
                 while self.jumps.get(jump).is_some_and(|j| at_of(j) <= at + 1e-6 * whole) {
                     jump += 1;
                 }
-                let end = match self.jumps.get(jump).map(at_of) {
-                    Some(j) if j < to - 1e-6 * whole => j,
-                    _ => to,
-                };
+                while self.turns.get(turn).is_some_and(|t| turn_at(t) <= at + 1e-6 * whole) {
+                    turn += 1;
+                }
+                let cut = |next: Option<f64>| next.filter(|j| *j < to - 1e-6 * whole).unwrap_or(to);
+                let end = cut(self.jumps.get(jump).map(at_of)).min(cut(self.turns.get(turn).map(turn_at)));
                 // Slope of the velocity from means over both halves.
                 let (z0, v0) = knots.sums(at - late_s, &mut near);
                 let (_, vm) = knots.sums(0.5 * (at + end) - late_s, &mut near);
@@ -180,6 +209,14 @@ impl Knots {
         self.v.push(v);
         self.sum_z.push(sum_z);
         self.sum_v.push(sum_v);
+    }
+
+    /// Velocity in m/s at a knot, searched from knot `near` on.
+    fn speed(&self, at_s: f64, near: &mut usize) -> f64 {
+        while self.t.get(*near + 1).is_some_and(|t| *t <= at_s) {
+            *near += 1;
+        }
+        self.v.get(*near).copied().unwrap_or(0.0)
     }
 
     /// The last knot at or before `at_s`; the first one when there is none.

@@ -39,7 +39,7 @@ pub use describe::describe;
 pub use enhance_file::EnhanceFile;
 pub use error::{InputError, closest};
 pub use joint_friction::{ArmFriction, CoulombViscous, Sigmoid};
-pub use load::{Problem, load, parse, read_text, ron_options};
+pub use load::{Problem, load, motion_to_ron, parse, read_text, ron_options};
 pub use motion::{FROM_REST_RAD, Motion, MotionPoint, Segment};
 pub use observer_gain::ObserverGain;
 pub use plan::MotionPlan;

@@ -132,6 +132,15 @@ pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputErro
     ron_options().from_str(text).map_err(|error| explain(file, text, &error))
 }
 
+/// A motion as RON in the dialect of scenarios: a file that [`load`] reads again.
+///
+/// # Errors
+/// When a value cannot be written as RON.
+pub fn motion_to_ron(motion: &crate::motion::Motion) -> Result<String, ron::Error> {
+    let pretty = ron::ser::PrettyConfig::new().struct_names(true).depth_limit(3);
+    ron_options().to_string_pretty(motion, pretty)
+}
+
 /// Reads and parses a RON file.
 ///
 /// # Errors

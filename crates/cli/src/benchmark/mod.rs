@@ -5,6 +5,7 @@ mod engine;
 mod examine;
 mod own;
 mod page;
+mod plan;
 
 use crate::args::{BenchmarkArgs, BenchmarkWhat};
 use crate::exit::Failure;
@@ -19,5 +20,6 @@ pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
         BenchmarkWhat::Diagnose(args) => examine::diagnose(args),
         BenchmarkWhat::Export(args) => challenge::export(args),
         BenchmarkWhat::Judge(args) => challenge::judge(args),
+        BenchmarkWhat::Plan(args) => plan::plan(args),
     }
 }

@@ -30,6 +30,7 @@ pub fn replay(args: &ReplayArgs) -> Result<(), Failure> {
     output.add("scenario.ron", text);
     output.write(&out)?;
     crate::run::run(&RunArgs {
+        motion: None,
         scenario: out.join("scenario.ron"),
         seed: None,
         compare: false,

@@ -132,7 +132,7 @@ fn instants(path: &Path, amounts: &Amounts, rng: &mut ChaCha8Rng) -> Vec<f64> {
     out
 }
 
-fn measured(
+pub(crate) fn measured(
     setup: &Setup,
     path: &Path,
     rng: &mut ChaCha8Rng,

@@ -1,5 +1,6 @@
 //! Which cases there are: what is believed, what is true, what is wrong between them.
 
+pub mod again;
 pub mod amounts;
 pub mod case;
 pub mod draw;

@@ -1,0 +1,349 @@
+//! The pages of a plan and of what an experiment can show.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use stylet_plan::identifiability::Identifiability;
+use stylet_plan::{Ground, Plan};
+use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
+use stylet_report::{
+    Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile,
+    significant,
+};
+use stylet_scenario::{Motion, Scenario, Segment};
+
+/// Candidates whose forces are drawn.
+const DRAWN: usize = 7;
+
+fn spaced(id: &str) -> String {
+    id.replace('_', " ")
+}
+
+/// An effect's numbers with their units.
+pub fn numbers(effect: &str, values: &BTreeMap<String, f64>) -> String {
+    let unit = |path: &str| {
+        stylet_tissue::info(effect)
+            .and_then(|i| i.parameters.iter().find(|p| p.path == path))
+            .map_or("", |p| p.unit)
+    };
+    let one = |(path, x): (&String, &f64)| {
+        format!("{path} = {} {}", significant(*x, 2), unit(path)).trim_end().to_owned()
+    };
+    let strength = |path: &str| {
+        stylet_tissue::info(effect)
+            .and_then(|i| i.parameters.iter().find(|p| p.path == path))
+            .is_some_and(|p| p.strength)
+    };
+    values.iter().filter(|(p, _)| strength(p)).map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// The page of a plan.
+pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &Ground, plan: &Plan) -> Page {
+    let percent = |p: f64| format!("{:.0} %", 100.0 * p);
+    let mut tiles = vec![
+        Tile::new(
+            "Right single cause",
+            format!("{} → {}", percent(plan.probability_now), percent(plan.probability_decided)),
+            if plan.probability_from == "simulated" {
+                "probability now and after the insertion, by simulated insertions and expected gaps"
+            } else {
+                "probability now and after the insertion, by expected gaps alone"
+            },
+        ),
+        Tile::new(
+            "Duration",
+            format!("{} s", significant(plan.duration_s, 3)),
+            format!("limit {} s", plan.limits.duration_s),
+        ),
+        Tile::new(
+            "Depth",
+            format!("{:.1} mm", 1e3 * plan.depth_m),
+            format!("limit {:.1} mm", 1e3 * plan.limits.depth_m),
+        ),
+        Tile::new(
+            "Largest force",
+            format!("{} N", significant(plan.force_n, 3)),
+            format!("expected under any candidate, noise included; limit {} N", plan.limits.force_n),
+        ),
+    ];
+    if let Some(r) = &plan.repeats {
+        tiles.push(Tile::new(
+            "Repeats",
+            r.insertions.to_string(),
+            format!(
+                "forces at rupture scatter by {:.1} %: half at {} and half at {} mm/s give their mean to {:.1} %",
+                100.0 * r.scatter,
+                significant(1e3 * r.speeds_mps[0], 2),
+                significant(1e3 * r.speeds_mps[1], 2),
+                100.0 * r.mean_within
+            ),
+        ));
+    }
+    let mut page = Page::new(format!("The next insertion: {}", scenario.name))
+        .subtitle(verdict.unwrap_or_else(|| {
+            "Before any measurement: every effect of the library may be there.".to_owned()
+        }))
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .fact("motions looked at", plan.looked_at.to_string())
+        .section(Section::new("Plan").block(Block::Scorecard(Scorecard { title: String::new(), tiles })));
+    page = page.section(motion(plan, ground)).section(pairs(plan));
+    if !plan.simulated.is_empty() {
+        let rows = plan
+            .simulated
+            .iter()
+            .map(|t| {
+                vec![Cell::text(spaced(&t.candidate)), Cell::number(format!("{} of {}", t.decided, t.of))]
+            })
+            .collect();
+        page = page.section(
+            Section::new("Simulated and diagnosed").table(Table {
+                title: "Planned insertions simulated under each candidate and diagnosed with what is at hand"
+                    .to_owned(),
+                headers: ["what was simulated", "named, and alone"].map(str::to_owned).to_vec(),
+                rows,
+                ..Table::default()
+            }),
+        );
+    }
+    page.section(intervals(plan)).section(alternatives(plan))
+}
+
+fn motion(plan: &Plan, ground: &Ground) -> Section {
+    let mut section = Section::new("Proposed motion");
+    if let Some(e) = ground.expected(&plan.motion) {
+        let mm: Vec<f64> = e.position_m.iter().map(|z| 1e3 * z).collect();
+        section = section.chart(
+            Chart::new("Position", "Time (s)", "Position (mm)")
+                .group("plan")
+                .height(220)
+                .with_series(Series::line("tip", Colour::Blue, e.time_s.clone(), mm)),
+        );
+        let mut forces = Chart::new("Expected force under each candidate", "Time (s)", "Force (N)")
+            .group("plan")
+            .height(320);
+        let mut differ = Chart::new("Where they differ", "Time (s)", "Force less that of the likeliest (N)")
+            .caption("Every candidate with the law's numbers that fit what is at hand. What re-fitting them once more takes back is left out of the nats, not of this picture.")
+            .group("plan")
+            .height(260);
+        for (k, f) in e.force_n.iter().enumerate().take(DRAWN) {
+            let name = spaced(ground.name(k));
+            forces = forces.with_series(
+                Series::line(name.clone(), Colour::nth(k), e.time_s.clone(), f.clone()).width(1.3),
+            );
+            if k > 0 {
+                let less: Vec<f64> = f.iter().zip(&e.force_n[0]).map(|(f, g)| f - g).collect();
+                differ =
+                    differ.with_series(Series::line(name, Colour::nth(k), e.time_s.clone(), less).width(1.3));
+            }
+        }
+        section = section.chart(forces);
+        if e.force_n.len() > 1 {
+            section = section.chart(differ);
+        }
+    }
+    let mut text = String::new();
+    if let Motion::Program { start_m, segments } = &plan.motion {
+        let _ = writeln!(text, "from {:.2} mm", 1e3 * start_m);
+        for s in segments {
+            let _ = match *s {
+                Segment::Move { velocity_mps, duration_s } => {
+                    writeln!(
+                        text,
+                        "move    {:>8.3} mm/s            for {duration_s:.3} s",
+                        1e3 * velocity_mps
+                    )
+                }
+                Segment::Hold { duration_s } => {
+                    writeln!(text, "hold                             for {duration_s:.3} s")
+                }
+                Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s }
+                    if frequency_hz * duration_s <= 0.2501 =>
+                {
+                    writeln!(
+                        text,
+                        "change  {:>8.3} to {:>6.3} mm/s    in  {duration_s:.3} s",
+                        1e3 * velocity_mps,
+                        1e3 * (velocity_mps + amplitude_mps)
+                    )
+                }
+                Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s } => {
+                    writeln!(
+                        text,
+                        "ripple  {:>8.3} +- {:>6.3} mm/s    for {duration_s:.3} s at {frequency_hz:.3} Hz",
+                        1e3 * velocity_mps,
+                        1e3 * amplitude_mps
+                    )
+                }
+            };
+        }
+    }
+    section.block(Block::Code(Code { title: "segments".to_owned(), text, folded: false }))
+}
+
+fn pairs(plan: &Plan) -> Section {
+    let mut all: Vec<_> = plan.pairs.iter().collect();
+    all.sort_by(|a, b| a.nats_after.total_cmp(&b.nats_after));
+    let rows = all
+        .iter()
+        .take(60)
+        .map(|p| {
+            let status = if !p.told { Status::Plain } else { Status::at_most(-p.nats_after, -10.0, -3.0) };
+            vec![
+                Cell::text(spaced(&p.a)),
+                Cell::text(spaced(&p.b)),
+                Cell::number(significant(p.nats_before, 3)),
+                Cell::number(significant(p.nats_after, 3)).status(status),
+                Cell::number(format!("{:.0} %", 100.0 * p.right_before)),
+                Cell::number(format!("{:.0} %", 100.0 * p.right_after)),
+                Cell::text(if p.told { "" } else { "told apart by no motion within the limits" }),
+            ]
+        })
+        .collect();
+    let mut section = Section::new("Pair by pair").text(
+        "The expected gap of the log-likelihoods, in nats: the truth against the other re-fitted together with all numbers of the base \
+         law. Three nats are a class, ten are seen. The probability is that of naming the right one of the two.",
+    );
+    if all.is_empty() {
+        section =
+            section.text("Nothing is left to tell apart: the motion was chosen for the sharpest intervals.");
+    }
+    section.table(Table {
+        title: "Hardest first, at most 60".to_owned(),
+        groups: vec![
+            (String::new(), 2),
+            ("nats".to_owned(), 2),
+            ("right of the two".to_owned(), 2),
+            (String::new(), 1),
+        ],
+        headers: ["one", "other", "now", "then", "now", "then", ""].map(str::to_owned).to_vec(),
+        rows,
+    })
+}
+
+fn intervals(plan: &Plan) -> Section {
+    let rows = plan
+        .intervals
+        .iter()
+        .map(|i| {
+            vec![
+                Cell::text(i.name.clone()),
+                Cell::number(significant(i.before, 2)),
+                Cell::number(significant(i.after, 2)),
+            ]
+        })
+        .collect();
+    Section::new("Intervals").table(Table {
+        title: "Half widths of 95 % intervals: of K, b and F relative, of places in m".to_owned(),
+        headers: ["number", "now", "then"].map(str::to_owned).to_vec(),
+        rows,
+        ..Table::default()
+    })
+}
+
+fn alternatives(plan: &Plan) -> Section {
+    let rows = plan
+        .alternatives
+        .iter()
+        .map(|a| {
+            let segments = if let Motion::Program { segments, .. } = &a.motion { segments.len() } else { 0 };
+            vec![
+                Cell::number(segments.to_string()),
+                Cell::number(significant(a.duration_s, 3)),
+                Cell::number(significant(a.force_n, 3)),
+                Cell::number(significant(a.worst_nats, 3)),
+                Cell::number(format!("{:.0} %", 100.0 * a.probability_decided)),
+            ]
+        })
+        .collect();
+    Section::new("Next best").table(Table {
+        title: "Other motions; their segments stand in plan.json".to_owned(),
+        headers: ["segments", "seconds", "largest N", "worst pair, nats", "decided, by gaps"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows,
+        ..Table::default()
+    })
+}
+
+/// The matrix of what an experiment can tell apart.
+pub fn matrix(scenario: &Scenario, shown: &Identifiability) -> String {
+    let visible: Vec<usize> = (0..shown.effects.len()).filter(|k| shown.effects[*k].visible).collect();
+    let names: Vec<String> = visible.iter().map(|k| spaced(&shown.effects[*k].effect)).collect();
+    let map = HeatMap {
+        row_label: String::new(),
+        column_label: "absolute correlation in per cent, the base law's numbers taken out".to_owned(),
+        rows: names.clone(),
+        columns: names,
+        values: visible
+            .iter()
+            .map(|i| {
+                visible
+                    .iter()
+                    .map(|j| if i == j { f64::NAN } else { shown.correlation[*i][*j].abs() })
+                    .collect()
+            })
+            .collect(),
+        shares: true,
+    };
+    let options = FigureOptions {
+        title: "What this experiment can tell apart".to_owned(),
+        subtitle: format!("{}; effects that it shows at their typical size", scenario.name),
+        width_px: 1200.0,
+        ..FigureOptions::default()
+    };
+    heat_map(&map, &options)
+}
+
+/// The page of what an experiment can show.
+pub fn identifiability_page(scenario: &Scenario, shown: &Identifiability) -> Page {
+    let rows = shown
+        .effects
+        .iter()
+        .map(|e| {
+            let status = if e.visible { Status::Good } else { Status::Warn };
+            vec![
+                Cell::text(spaced(&e.effect)),
+                Cell::text(numbers(&e.effect, &e.typical)),
+                Cell::number(significant(e.nats, 3)).status(status),
+                Cell::text(
+                    e.smallest
+                        .as_ref()
+                        .map_or_else(|| "no plausible size".to_owned(), |s| numbers(&e.effect, s)),
+                ),
+                Cell::text(e.like.iter().map(|l| spaced(l)).collect::<Vec<_>>().join(", ")),
+                Cell::text(e.nearest.as_ref().map_or_else(String::new, |(n, nats)| {
+                    format!("{} ({} nats)", spaced(n), significant(*nats, 2))
+                })),
+            ]
+        })
+        .collect();
+    let table = Table {
+        title: "Effect by effect".to_owned(),
+        headers: ["effect", "typical size", "nats at it", "seen from", "explained as well by", "nearest"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows,
+        ..Table::default()
+    };
+    let mut summary = Section::new("What it shows").text(format!(
+        "Every effect at its typical size beside the base law, everything that is fitted taken out, at a noise of {} N in blocks of 20 ms. \
+         Ten nats are seen; effects within three nats of one another form a class.",
+        significant(shown.noise_n, 2)
+    ));
+    if !shown.invisible.is_empty() {
+        let names: Vec<String> = shown.invisible.iter().map(|n| spaced(n)).collect();
+        summary = summary.text(format!("Invisible: {}.", names.join(", ")));
+    }
+    for c in &shown.classes {
+        let names: Vec<String> = c.iter().map(|n| spaced(n)).collect();
+        summary = summary.text(format!("Cannot be told apart: {}.", names.join(", ")));
+    }
+    let figure = SvgImage {
+        description: "Absolute correlation of effects after projecting out the base law".to_owned(),
+        markup: matrix(scenario, shown),
+    };
+    Page::new(format!("What can be identified: {}", scenario.name))
+        .subtitle("Which effects this experiment shows, from which size on, and which it cannot tell apart.")
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(summary.table(table))
+        .section(Section::new("Which resemble one another").block(Block::Svg(figure)))
+}

@@ -1,0 +1,124 @@
+//! What an experiment can show: which effects, from which strength on, and which it cannot tell apart.
+
+use crate::candidate::{NONE, stronger};
+use crate::ground::Ground;
+use crate::search::TELLING_NATS;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use stylet_diagnose::CLASS_NATS;
+use stylet_identify::model::Choice;
+
+/// One effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Seen {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Nats that it would show at its typical size, everything that is fitted taken out.
+    pub nats: f64,
+    /// Whether that is enough to see it.
+    pub visible: bool,
+    /// Its numbers at the typical size.
+    pub typical: BTreeMap<String, f64>,
+    /// Its numbers at the smallest size that can be seen; none when no plausible size can.
+    pub smallest: Option<BTreeMap<String, f64>>,
+    /// Effects that would explain it as well, to within a class's width, at the typical size.
+    pub like: Vec<String>,
+    /// The effect that is nearest, and the nats by which it stays behind.
+    pub nearest: Option<(String, f64)>,
+}
+
+/// What an experiment can show: `identifiability.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Identifiability {
+    /// Effects in the order of the library.
+    pub effects: Vec<Seen>,
+    /// Effects that cannot be seen at their typical size.
+    pub invisible: Vec<String>,
+    /// Effects that cannot be told apart at their typical sizes, each class by itself.
+    pub classes: Vec<Vec<String>>,
+    /// Correlations of the effects' columns, the base law's numbers taken out, in the order of `effects`.
+    pub correlation: Vec<Vec<f64>>,
+    /// Nats by which the effects of a row and a column differ, in the order of `effects`.
+    pub nats: Vec<Vec<f64>>,
+    /// Standard deviation of the noise of a block of 20 ms, in N.
+    pub noise_n: f64,
+}
+
+/// An effect must be at most so many times its typical size to be seen at all: beyond, it is not plausible.
+const PLAUSIBLE: f64 = 30.0;
+
+/// Whether the library admits these numbers.
+fn valid(choice: &Choice, values: &[f64]) -> bool {
+    Choice::new(choice.info, values).effect().is_some_and(|e| e.check().is_ok())
+}
+
+/// What the experiment behind a ground can show.
+#[must_use]
+pub fn identifiability(ground: &Ground) -> Identifiability {
+    let shown = ground.known();
+    let of: Vec<usize> =
+        (0..ground.candidates.len()).filter(|k| !ground.candidates[*k].choices.is_empty()).collect();
+    let null = ground.candidates.iter().position(|c| c.name == NONE);
+    let nats: Vec<Vec<f64>> = of
+        .iter()
+        .map(|i| {
+            of.iter().map(|j| if i == j { 0.0 } else { ground.nats(&shown, *i.min(j), *i.max(j)) }).collect()
+        })
+        .collect();
+    let correlation =
+        of.iter().map(|i| of.iter().map(|j| ground.correlation(&shown, *i, *j)).collect()).collect();
+    let mut effects = Vec::new();
+    for (row, k) in of.iter().enumerate() {
+        let c = &ground.candidates[*k];
+        let Some(choice) = c.choices.last() else { continue };
+        let seen = null.map_or(0.0, |n| ground.nats(&shown, n.min(*k), n.max(*k)));
+        let named = |values: &[f64]| -> BTreeMap<String, f64> {
+            choice.info.parameters.iter().zip(values).map(|(p, x)| (p.path.to_owned(), *x)).collect()
+        };
+        let times = (TELLING_NATS / seen.max(1e-12)).sqrt();
+        effects.push(Seen {
+            effect: c.name.clone(),
+            nats: seen,
+            visible: seen >= TELLING_NATS,
+            typical: named(&choice.values),
+            smallest: Some(stronger(choice, times))
+                .filter(|x| times <= PLAUSIBLE && valid(choice, x))
+                .map(|x| named(&x)),
+            like: Vec::new(),
+            nearest: of
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != row)
+                .map(|(other, j)| (ground.name(*j).to_owned(), nats[row][other]))
+                .min_by(|a, b| a.1.total_cmp(&b.1)),
+        });
+    }
+    let visible: Vec<bool> = effects.iter().map(|e| e.visible).collect();
+    let like = |i: usize, j: usize| i != j && visible[i] && visible[j] && nats[i][j] < CLASS_NATS;
+    let names: Vec<String> = effects.iter().map(|e| e.effect.clone()).collect();
+    for (i, effect) in effects.iter_mut().enumerate() {
+        effect.like = (0..names.len()).filter(|j| like(i, *j)).map(|j| names[j].clone()).collect();
+    }
+    // Classes: what a chain of likenesses joins.
+    let mut class: Vec<usize> = (0..names.len()).collect();
+    for i in 0..names.len() {
+        for j in 0..i {
+            if like(i, j) && class[i] != class[j] {
+                let (from, to) = (class[i], class[j]);
+                class.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
+            }
+        }
+    }
+    let classes = (0..names.len())
+        .map(|k| (0..names.len()).filter(|i| class[*i] == k).map(|i| names[i].clone()).collect::<Vec<_>>())
+        .filter(|c| c.len() > 1)
+        .collect();
+    Identifiability {
+        invisible: effects.iter().filter(|e| !e.visible).map(|e| e.effect.clone()).collect(),
+        effects,
+        classes,
+        correlation,
+        nats,
+        noise_n: ground.noise.sd_n(),
+    }
+}

@@ -1,0 +1,55 @@
+//! Repeats: how many insertions, and at which speeds, when the forces at which layers give way scatter.
+
+use crate::limits::Limits;
+use serde::Serialize;
+use stylet_identify::model::Model;
+
+/// Repeats of an insertion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Repeats {
+    /// Standard deviation of a puncture force between insertions, relative.
+    pub scatter: f64,
+    /// How many insertions, all speeds together.
+    pub insertions: usize,
+    /// The speeds in m/s, equally often each: the ends of the range tell a slope best.
+    pub speeds_mps: [f64; 2],
+    /// Half width of the 95 % interval of a mean puncture force after these, relative.
+    pub mean_within: f64,
+    /// Change of the puncture force per factor e in speed that they show with ten nats.
+    pub shows_alpha: f64,
+}
+
+/// Scatter below this, relative, is not worth repeats.
+const LEAST_SCATTER: f64 = 0.003;
+/// Change of the puncture force per factor e in speed that repeats have to show, and the nats that show it.
+const ALPHA: f64 = 0.05;
+const NATS: f64 = 10.0;
+/// A mean puncture force has to be known to this, relative.
+const MEAN: f64 = 0.02;
+/// Fewest and most insertions that are proposed.
+const INSERTIONS: (f64, f64) = (4.0, 60.0);
+/// Speeds span at most this factor: slower insertions take too long.
+const SPAN: f64 = 8.0;
+
+/// The repeats for a model whose layers give way by force; none when nothing scatters.
+#[must_use]
+pub fn repeats(model: &Model, limits: &Limits) -> Option<Repeats> {
+    let s = model.scatter.force;
+    if s < LEAST_SCATTER || model.tissue.layers.iter().all(|l| l.puncture_n.is_none()) {
+        return None;
+    }
+    let span = SPAN.min((limits.depth_m.abs() * 2.0 / limits.duration_s / limits.speed_mps).recip()).max(1.5);
+    // Half of n insertions at either end: sum of (ln v - mean)^2 = n (ln span / 2)^2, gap = alpha^2 sum / (2 s^2).
+    let half = 0.5 * libm::log(span);
+    let for_slope = 2.0 * NATS * s * s / (ALPHA * half).powi(2);
+    let for_mean = (1.96 * s / MEAN).powi(2);
+    let n = 2.0 * (0.5 * for_slope.max(for_mean).clamp(INSERTIONS.0, INSERTIONS.1)).ceil();
+    let fast = 0.95 * limits.speed_mps;
+    Some(Repeats {
+        scatter: s,
+        insertions: n as usize,
+        speeds_mps: [fast / span, fast],
+        mean_within: 1.96 * s / n.sqrt(),
+        shows_alpha: (2.0 * NATS / n).sqrt() * s / half,
+    })
+}

@@ -1,0 +1,84 @@
+//! A planned insertion tells apart what one at constant speed leaves open, and the diagnosis of both together names it.
+
+use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
+use stylet_plan::{Limits, from_diagnosis, from_scenario, identifiability, plan};
+use stylet_scenario::{Motion, Scenario};
+
+const LIMITS: Limits =
+    Limits { depth_m: 0.05, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 20.0 };
+
+fn believed() -> Scenario {
+    Scenario::parse(
+        "test",
+        r#"Scenario(name: "two gels", tissue: (layers: [
+            (thickness_m: 0.02, stiffness_n_per_m: 50.0, friction_ns_per_m2: 9000.0, puncture_n: 0.8),
+            (thickness_m: 0.03, stiffness_n_per_m: 90.0, friction_ns_per_m2: 14000.0)]),
+            motion: Constant(start_m: -0.005, velocity_mps: 0.0025, duration_s: 22.0), robot: Replay)"#,
+    )
+    .expect("a scenario")
+}
+
+fn measured(motion: &Motion, seed: u64) -> Evidence {
+    let mut there = believed();
+    there
+        .effects
+        .push(stylet_tissue::AnyEffect::from_parameters("coulomb_friction", &[5.0]).expect("an effect"));
+    there.tissue.layers[0].friction_ns_per_m2 *= 0.95;
+    there.motion = motion.clone();
+    let recording = stylet_testbed::simulate(&there, seed).expect("simulated").recording;
+    Evidence { name: format!("{seed}.csv"), recording, notes: Vec::new() }
+}
+
+#[test]
+fn constant_speed_hides_friction_laws_and_a_planned_motion_shows_them() {
+    let scenario = believed();
+    let (before, begin) = from_scenario(&scenario, None).expect("a ground");
+    let seen = identifiability(&before);
+    for hidden in ["coulomb_friction", "stribeck_friction", "force_gain"] {
+        assert!(
+            seen.invisible.iter().any(|i| i == hidden),
+            "{hidden} at one constant speed: {:?}",
+            seen.invisible
+        );
+    }
+    assert!(!seen.invisible.iter().any(|i| i == "periodic_interference"));
+    let planned = plan(&before, &LIMITS, &begin).expect("a plan").0;
+    let after = identifiability(&from_scenario(&scenario, Some(&planned.motion)).expect("a ground").0);
+    for shown in ["coulomb_friction", "stribeck_friction"] {
+        assert!(!after.invisible.iter().any(|i| i == shown), "{shown}: {:?}", after.invisible);
+    }
+    // What no motion can show stays so.
+    assert!(
+        after.invisible.iter().any(|i| i == "force_gain") && planned.never.iter().any(|n| n == "force_gain")
+    );
+}
+
+#[test]
+fn the_planned_insertion_leads_to_the_right_single_cause() {
+    let scenario = believed();
+    let first = measured(&scenario.motion, 1);
+    let blind =
+        diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
+    assert_eq!(blind.diagnosis.verdict, Verdict::None);
+    assert!(blind.diagnosis.invisible.iter().any(|i| i == "coulomb_friction"));
+    let (ground, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
+    let planned = plan(&ground, &LIMITS, &begin).expect("a plan").0;
+    assert!(planned.probability_decided > planned.probability_now + 0.3);
+    // Old and new recordings have different motions.
+    let both = [first, measured(&planned.motion, 2)];
+    let told = diagnose(&scenario, &both, &Options { brief: true }, |_| {}).expect("a diagnosis").diagnosis;
+    assert_eq!(told.verdict, Verdict::Named, "{:?}", told.causes);
+    assert_eq!(told.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>(), ["coulomb_friction"]);
+}
+
+#[test]
+fn the_plan_does_not_depend_on_the_number_of_threads() {
+    let one = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let (ground, begin) = from_scenario(&believed(), None).expect("a ground");
+            plan(&ground, &LIMITS, &begin).expect("a plan").0
+        })
+    };
+    assert_eq!(one(1), one(3));
+}
