@@ -163,8 +163,7 @@ pub fn fitted(believed: &Tissue, runs: &[&Insertion], starts: usize, rng: &mut C
     let drops: Vec<Vec<f64>> =
         runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let largest = fine.iter().flat_map(|b| &b.size_n).fold(1e-6_f64, |m, f| m.max(*f));
-    let wide = Arc::new(Noise::white(FIRST_SHARE * largest));
-    let of = |blocks: Vec<Blocks>| Data { blocks: Arc::new(blocks), noise: Arc::clone(&wide), floor_n: 1e-3 };
+    let of = |blocks: Vec<Blocks>| Data::new(Arc::new(blocks), Noise::white(FIRST_SHARE * largest), 1e-3);
     let coarse = of(fine.iter().map(|b| b.coarser(COARSE)).collect());
     let guesses: Vec<Guess> = (0..starts.max(1)).map(|k| guess(k, rng)).collect();
     let mut found: Vec<(f64, Model)> = guesses
