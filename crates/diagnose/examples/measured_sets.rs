@@ -10,7 +10,8 @@ use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use stylet_diagnose::set::left_out::{PARTS, Score, day_left_out, floor, one_left_out};
+use stylet_diagnose::raw::Raw;
+use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_out};
 use stylet_diagnose::set::{Insertion, first, fitted};
 use stylet_record::{ColumnMap, ReadOptions, read_csv_with_holes};
 use stylet_tissue::{Layer, Tissue};
@@ -85,7 +86,13 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
         .collect();
     let runs: Vec<&Insertion> = moved.iter().collect();
     let began = Instant::now();
-    let fit = fitted::fitted(&believed(layers), &runs, STARTS, &mut ChaCha8Rng::seed_from_u64(SEED));
+    let fit = fitted::fitted(
+        &believed(layers),
+        &runs,
+        &Raw::default(),
+        STARTS,
+        &mut ChaCha8Rng::seed_from_u64(SEED),
+    );
     let fit = fit.ok_or("no law could be fitted")?;
     println!("\n# {name}: {} runs", runs.len());
     println!(
@@ -127,7 +134,7 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
             day.friction
         );
     }
-    let (floors, one, day) = (floor(&runs), one_left_out(&fit, &runs), day_left_out(&fit, &runs));
+    let (floors, one, day) = (floor(&runs), one_left_out(&fit, &runs), speeds_out(&fit, &runs));
     println!("| mm/s | floor | floor, not inflated | left out | in band | speed left out | in band |");
     let mean = |g: &[usize], f: &dyn Fn(usize) -> Option<f64>| {
         let known: Vec<f64> = g.iter().filter_map(|i| f(*i)).collect();

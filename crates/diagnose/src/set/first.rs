@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 use stylet_identify::model::{Belief, Bound, Choice, Day, Free, Model, NEVER};
-use stylet_identify::phases::{Phases, contact_m, drops, phases, releases, ruptures};
-use stylet_record::Recording;
+use stylet_identify::phases::{Drop, Phases, contact_m, drops, noise_n, phases, releases, ruptures};
+use stylet_record::{QualityNote, Recording};
 use stylet_stats::order::median_of;
 use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, LetGo, ShaftSlip, Tissue};
 
@@ -13,8 +13,12 @@ const SAME_SPEED: f64 = 0.1;
 const SAME_STROKE_M: f64 = 1e-3;
 /// Standard deviation of the surface about where the force first rises, in m.
 const SURFACE_SD_M: f64 = 1.5e-3;
+/// The same where a blunt tool comes to rest on soft tissue before it presses.
+const PRESSED_SD_M: f64 = 2e-3;
 /// Relative standard deviation of a thickness about what is believed or seen.
 const THICKNESS_SD: f64 = 0.2;
+/// Friction in the base law bears this share of the load before a rupture.
+const PLAIN_FRICTION: f64 = 0.3;
 /// Stiffness may be so many times what the first guess says, more or less.
 const STIFFNESS_TIMES: f64 = 4.0;
 
@@ -30,6 +34,8 @@ pub struct Insertion {
     pub name: String,
     /// All samples.
     pub recording: Recording,
+    /// Remarks on them.
+    pub notes: Vec<QualityNote>,
     /// When it moves where.
     pub phases: Phases,
     /// Median speed of the advance in m/s.
@@ -70,9 +76,24 @@ impl Insertion {
             loads_n: seen.iter().map(|i| i.map(|i| force[i.saturating_sub(4)])).collect(),
             releases_m,
             phases: at,
+            notes: Vec::new(),
             name,
             recording,
         }
+    }
+}
+
+impl Insertion {
+    /// Sudden falls of the force until the way back begins.
+    #[must_use]
+    pub fn drops(&self) -> Vec<Drop> {
+        drops(&self.recording, &self.phases)
+    }
+
+    /// Standard deviation of the sensor's noise in N.
+    #[must_use]
+    pub fn noise_n(&self) -> f64 {
+        noise_n(&self.recording.force_n)
     }
 }
 
@@ -127,53 +148,43 @@ pub struct Guess {
     pub gives_way_m: Option<f64>,
 }
 
-impl Default for Guess {
-    /// What a search over laws for skin and muscle phantoms found.
-    fn default() -> Self {
-        Self {
-            straight: 0.1,
-            hold: 0.6,
-            pull: 0.5,
-            kept: 0.69,
-            exponent: 9.7,
-            wear_per_m: [2.0, 100.0],
-            rate: -0.2,
-            fractions: [0.2, 0.2],
-            times_s: [1.2, 11.7],
-            waits: 10.0,
-            surface_m: -5e-4,
-            gives_way_m: Some(3e-3),
-        }
-    }
+/// What can be said before any fit: faces, and per layer the load before its rupture and the indentation under it.
+struct Frame {
+    tissue: Tissue,
+    fronts_m: Vec<f64>,
+    loads_n: Vec<f64>,
+    indented_m: Vec<f64>,
 }
 
-/// A model of these insertions, with its instants where the force shows drops.
-#[must_use]
-pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
-    let of = |what: &dyn Fn(&Insertion) -> Option<f64>| -> Option<f64> {
-        let all: Vec<f64> = runs.iter().filter_map(|r| what(r)).collect();
-        (!all.is_empty()).then(|| median_of(all))
-    };
+/// Median over the insertions that show something.
+fn of_all(runs: &[&Insertion], what: &dyn Fn(&Insertion) -> Option<f64>) -> Option<f64> {
+    let all: Vec<f64> = runs.iter().filter_map(|r| what(r)).collect();
+    (!all.is_empty()).then(|| median_of(all))
+}
+
+/// The frame of a believed tissue, its surface so far beyond where the force first rises.
+fn frame(believed: &Tissue, runs: &[&Insertion], beyond_m: f64) -> Frame {
+    let of = |what: &dyn Fn(&Insertion) -> Option<f64>| of_all(runs, what);
     let contact = of(&|r| Some(r.contact_m)).unwrap_or(believed.surface_m);
     let deepest = of(&|r| Some(r.stroke_m)).unwrap_or(contact + 0.01);
     let largest = runs.iter().flat_map(|r| &r.recording.force_n).fold(1e-3_f64, |most, f| most.max(f.abs()));
     let layers = believed.layers.len();
-    let surface_m = contact + guess.surface_m;
-    let mut fronts = vec![surface_m];
+    let surface_m = contact + beyond_m;
+    let mut fronts_m = vec![surface_m];
     for l in 1..layers {
         let told = believed.front_m(l) - believed.surface_m + contact;
         let front = of(&|r| r.releases_m[l]).map_or(told, |z| z - 5e-4);
-        fronts.push(front.clamp(fronts[l - 1] + 1e-3, (deepest - 1e-3).max(fronts[l - 1] + 2e-3)));
+        let low = fronts_m[l - 1] + 1e-3;
+        fronts_m.push(front.clamp(low, (deepest - 1e-3).max(low + 1e-3)));
     }
     let mut tissue = believed.clone();
     tissue.surface_m = surface_m;
-    let mut effects: Vec<AnyEffect> = Vec::new();
-    let mut bound = Vec::new();
+    let (mut loads_n, mut indented_m) = (Vec::new(), Vec::new());
     for (l, layer) in tissue.layers.iter_mut().enumerate() {
         if l + 1 < layers {
-            layer.thickness_m = fronts[l + 1] - fronts[l];
+            layer.thickness_m = fronts_m[l + 1] - fronts_m[l];
         } else {
-            layer.thickness_m = layer.thickness_m.max(deepest - fronts[l] + 0.02);
+            layer.thickness_m = layer.thickness_m.max(deepest - fronts_m[l] + 0.02);
         }
         // Deeper layers share the force with friction of those before them.
         let share = if l == 0 { 1.0 } else { 0.6 };
@@ -184,7 +195,63 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
             let k = r.recording.time_s.partition_point(|x| *x < t);
             (t < NEVER).then(|| r.recording.position_m[k.min(r.recording.len() - 1)])
         });
-        let x = (at.unwrap_or(deepest) - fronts[l]).max(2e-3);
+        loads_n.push(load);
+        indented_m.push((at.unwrap_or(deepest) - fronts_m[l]).max(2e-3));
+    }
+    Frame { tissue, fronts_m, loads_n, indented_m }
+}
+
+/// What is believed of an indentation that punctures nothing: one spring where the force says.
+#[must_use]
+pub fn pressed(believed: &Tissue, run: &Insertion) -> Belief {
+    let frame = frame(believed, &[run], 0.0);
+    let mut tissue = frame.tissue;
+    for (layer, (load, x)) in tissue.layers.iter_mut().zip(frame.loads_n.iter().zip(&frame.indented_m)) {
+        layer.stiffness_n_per_m = (load / x).max(1.0);
+        layer.friction_ns_per_m2 = 0.0;
+        layer.puncture_n = None;
+    }
+    Belief { surface_tolerance_m: PRESSED_SD_M, ..wide(tissue) }
+}
+
+/// What is believed before the base law is fitted to a set: springs, friction and thresholds where the raw forces say, surely
+/// known to a factor of a few.
+#[must_use]
+pub fn plain(believed: &Tissue, runs: &[&Insertion]) -> Belief {
+    let frame = frame(believed, runs, 0.0);
+    let speed = of_all(runs, &|r| Some(r.speed_mps)).unwrap_or(1e-3).max(1e-5);
+    let mut tissue = frame.tissue;
+    for (l, layer) in tissue.layers.iter_mut().enumerate() {
+        let (load, x) = (frame.loads_n[l], frame.indented_m[l]);
+        let seen = runs.iter().filter(|r| r.ruptures_s[l].is_finite()).count();
+        layer.stiffness_n_per_m = (load / x).max(1.0);
+        layer.friction_ns_per_m2 = PLAIN_FRICTION * load / (speed * x);
+        layer.puncture_n = (2 * seen >= runs.len()).then_some(load);
+    }
+    wide(tissue)
+}
+
+/// A belief in this tissue that leaves it all freedom but the scale.
+fn wide(tissue: Tissue) -> Belief {
+    let layers = tissue.layers.len();
+    Belief {
+        given: Vec::new(),
+        tolerance: vec![STIFFNESS_TIMES; layers],
+        thickness_tolerance: (0..layers).map(|l| if l + 1 < layers { THICKNESS_SD } else { 0.0 }).collect(),
+        surface_tolerance_m: SURFACE_SD_M,
+        tissue,
+    }
+}
+
+/// A model of these insertions, with its instants where the force shows drops.
+#[must_use]
+pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
+    let Frame { mut tissue, fronts_m: fronts, loads_n, indented_m } = frame(believed, runs, guess.surface_m);
+    let days = groups(runs);
+    let mut effects: Vec<AnyEffect> = Vec::new();
+    let mut bound = Vec::new();
+    for (l, layer) in tissue.layers.iter_mut().enumerate() {
+        let (load, x) = (loads_n[l], indented_m[l]);
         layer.stiffness_n_per_m = (guess.straight * load / x).max(1.0);
         layer.friction_ns_per_m2 = 0.0;
         layer.puncture_n = None;
@@ -215,20 +282,14 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
             .into(),
         );
         effects.push(DelayedPuncture { layer: l + 1, force_n: load, exponent: guess.waits }.into());
-        let depth_m = of(&|r| r.releases_m[l]).map_or(0.0, |z| z - fronts[l]);
+        let depth_m = of_all(runs, &|r| r.releases_m[l]).map_or(0.0, |z| z - fronts[l]);
         effects.push(LetGo { layer: l + 1, depth_m }.into());
     }
-    let belief = Belief {
-        given: Vec::new(),
-        tolerance: vec![STIFFNESS_TIMES; layers],
-        thickness_tolerance: (0..layers).map(|l| if l + 1 < layers { THICKNESS_SD } else { 0.0 }).collect(),
-        surface_tolerance_m: SURFACE_SD_M,
-        tissue,
-    };
+    let layers = tissue.layers.len();
+    let belief = wide(tissue);
     let mut model = Model::base(Arc::new(belief), runs.len());
     model.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
     model.bound = bound;
-    let days = groups(runs);
     model.free = Free {
         surface: true,
         thickness: true,

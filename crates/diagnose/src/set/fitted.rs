@@ -1,5 +1,6 @@
 //! The fit of a set from several starts: the objective has many optima, and one start in three finds the best.
 
+use crate::raw::Raw;
 use crate::set::first::{DAY_FRICTION, DAY_SURFACE_M, Guess, Insertion, first};
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rayon::prelude::*;
@@ -43,6 +44,13 @@ impl Fitted {
     pub fn rms_n(&self) -> f64 {
         rms(&self.fit, &self.data)
     }
+
+    /// The same recordings with another law, fitted from where it stands.
+    #[must_use]
+    pub fn with(&self, model: &Model) -> Option<Self> {
+        let (fit, data) = settle(model, self.data.clone(), &self.drops, &[6])?;
+        Some(Self { fit, data, drops: self.drops.clone(), starts: self.starts })
+    }
 }
 
 fn rms(fit: &Fit, data: &Data) -> f64 {
@@ -56,29 +64,53 @@ fn rms(fit: &Fit, data: &Data) -> f64 {
     (sum / f64::max(n, 1.0)).sqrt()
 }
 
-/// The recordings in blocks.
-fn blocks(runs: &[&Insertion]) -> Vec<Blocks> {
-    runs.par_iter().map(|r| Blocks::new(&r.recording, &vec![false; r.recording.len()], SET_BLOCK_S)).collect()
+/// The recordings in blocks, without the samples that the raw force excludes.
+#[must_use]
+pub fn blocks(runs: &[&Insertion], raw: &Raw) -> Vec<Blocks> {
+    let none = Vec::new();
+    runs.par_iter()
+        .enumerate()
+        .map(|(r, run)| Blocks::new(&run.recording, raw.exclude.get(r).unwrap_or(&none), SET_BLOCK_S))
+        .collect()
 }
 
-/// What start `k` begins with; the first one with what phantoms have shown so far.
+/// The first noise: misfits of a share of the largest force.
+fn unsettled(blocks: Vec<Blocks>) -> Data {
+    let largest = blocks.iter().flat_map(|b| &b.size_n).fold(1e-6_f64, |m, f| m.max(*f));
+    Data::new(Arc::new(blocks), Noise::white(FIRST_SHARE * largest), 1e-3)
+}
+
+/// A model fitted to recordings from where it stands, by the set's own noise.
+#[must_use]
+pub fn refitted(model: &Model, blocks: Vec<Blocks>, drops: Vec<Vec<f64>>) -> Option<Fitted> {
+    let (fit, data) = settle(model, unsettled(blocks), &drops, &[6, 8])?;
+    Some(Fitted { fit, data, drops, starts: (1, 1) })
+}
+
+/// What start `k` begins with: the first in the middle of what is thought possible, the others anywhere in it.
 fn guess(k: usize, rng: &mut ChaCha8Rng) -> Guess {
-    let mut within = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
-    let drawn = Guess {
-        straight: within(0.1, 0.9),
-        hold: within(0.3, 0.9),
-        pull: within(0.3, 0.9),
-        kept: within(0.4, 1.0),
-        exponent: within(4.0_f64.ln(), 18.0_f64.ln()).exp(),
-        wear_per_m: [within(0.0, 80.0), within(0.0, 120.0)],
-        rate: within(-0.3, 0.1),
-        fractions: [within(0.02, 0.4), within(0.02, 0.4)],
-        times_s: [within(0.03_f64.ln(), 3.0_f64.ln()).exp(), within(4.0_f64.ln(), 20.0_f64.ln()).exp()],
-        waits: within(6.0_f64.ln(), 20.0_f64.ln()).exp(),
-        surface_m: within(-1.5e-3, 5e-4),
-        gives_way_m: Some(within(-4e-3, 6e-3)).filter(|m| *m > 0.0),
+    let mut within = |(low, high): (f64, f64)| {
+        let drawn = rng.random::<f64>();
+        low + (high - low) * if k == 0 { 0.5 } else { drawn }
     };
-    if k == 0 { Guess::default() } else { drawn }
+    let mut times = |(low, high): (f64, f64)| libm::exp(within((libm::log(low), libm::log(high))));
+    let (exponent, fast, slow, waits) =
+        (times((4.0, 18.0)), times((0.03, 3.0)), times((4.0, 20.0)), times((6.0, 20.0)));
+    Guess {
+        straight: within((0.1, 0.9)),
+        hold: within((0.3, 0.9)),
+        pull: within((0.3, 0.9)),
+        kept: within((0.4, 1.0)),
+        exponent,
+        wear_per_m: [within((0.0, 80.0)), within((0.0, 120.0))],
+        rate: within((-0.3, 0.1)),
+        fractions: [within((0.02, 0.4)), within((0.02, 0.4))],
+        times_s: [fast, slow],
+        waits,
+        surface_m: within((-1.5e-3, 5e-4)),
+        // Deeper layers rupture where the force drops, or shortly behind their front without a drop of their own.
+        gives_way_m: Some(within((-4e-3, 6e-3))).filter(|m| *m > 0.0),
+    }
 }
 
 /// Fits in rounds, the noise being what the round before has left.
@@ -158,13 +190,17 @@ fn spreads(model: &mut Model, data: &Data, at: &Fit) {
 ///
 /// Deterministic for any number of threads; `rng` draws what the starts begin with.
 #[must_use]
-pub fn fitted(believed: &Tissue, runs: &[&Insertion], starts: usize, rng: &mut ChaCha8Rng) -> Option<Fitted> {
-    let fine = blocks(runs);
+pub fn fitted(
+    believed: &Tissue,
+    runs: &[&Insertion],
+    raw: &Raw,
+    starts: usize,
+    rng: &mut ChaCha8Rng,
+) -> Option<Fitted> {
+    let fine = blocks(runs, raw);
     let drops: Vec<Vec<f64>> =
         runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
-    let largest = fine.iter().flat_map(|b| &b.size_n).fold(1e-6_f64, |m, f| m.max(*f));
-    let of = |blocks: Vec<Blocks>| Data::new(Arc::new(blocks), Noise::white(FIRST_SHARE * largest), 1e-3);
-    let coarse = of(fine.iter().map(|b| b.coarser(COARSE)).collect());
+    let coarse = unsettled(fine.iter().map(|b| b.coarser(COARSE)).collect());
     let guesses: Vec<Guess> = (0..starts.max(1)).map(|k| guess(k, rng)).collect();
     let mut found: Vec<(f64, Model)> = guesses
         .par_iter()
@@ -176,10 +212,11 @@ pub fn fitted(believed: &Tissue, runs: &[&Insertion], starts: usize, rng: &mut C
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = found.first()?.0;
     let agree = found.iter().filter(|f| f.0 < best * (1.0 + AGREE)).count();
-    let whole = of(fine);
+    let whole = unsettled(fine);
     let (fit, data) = found
         .iter()
         .take(2)
+        .filter(|(error, _)| *error < best * (1.0 + AGREE))
         .filter_map(|(_, model)| settle(model, whole.clone(), &drops, &[4, 8, 10]))
         .min_by(|a, b| rms(&a.0, &a.1).total_cmp(&rms(&b.0, &b.1)))?;
     Some(Fitted { fit, data, drops, starts: (found.len(), agree) })

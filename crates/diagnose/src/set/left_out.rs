@@ -63,24 +63,42 @@ pub fn without(all: &Fitted, runs: &[&Insertion], out: &[usize], rounds: &[usize
     Some(Population::of(&fitted, &some))
 }
 
+/// A recording predicted by a fit without it.
+#[derive(Clone, Debug, Default)]
+pub struct Out {
+    /// How well.
+    pub score: Score,
+    /// The prediction.
+    pub prediction: Prediction,
+    /// The law and its population without this recording; none when it cannot be fitted.
+    pub population: Option<Population>,
+}
+
 /// Every recording predicted by a fit without it.
 #[must_use]
 pub fn one_left_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
+    runs_out(all, runs).into_iter().map(|o| o.score).collect()
+}
+
+/// The same with the predictions and the laws.
+#[must_use]
+pub fn runs_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Out> {
     (0..runs.len())
         .into_par_iter()
         .map(|r| {
-            let alone = runs.len() > 1
-                && all.fit.model.day_of.iter().filter(|d| **d == all.fit.model.day_of[r]).count() > 1;
-            let day = alone.then(|| all.fit.model.day_of[r]);
-            let population = without(all, runs, &[r], &[5]);
-            population.map_or_else(Score::default, |p| score(runs[r], &predict(&p, runs[r], day, DRAWS)))
+            let day_of = &all.fit.model.day_of;
+            // A day is known when another recording was made on it.
+            let day = day_of.get(r).copied().filter(|day| day_of.iter().filter(|d| *d == day).count() > 1);
+            let Some(population) = without(all, runs, &[r], &[5]) else { return Out::default() };
+            let prediction = predict(&population, runs[r], day, DRAWS);
+            Out { score: score(runs[r], &prediction), prediction, population: Some(population) }
         })
         .collect()
 }
 
 /// Every recording predicted by a fit without its whole day (speed and stroke); empty when there is one day only.
 #[must_use]
-pub fn day_left_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
+pub fn speeds_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
     let groups = groups(runs);
     if groups.len() < 2 {
         return Vec::new();

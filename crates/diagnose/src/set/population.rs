@@ -3,6 +3,7 @@
 use crate::set::first::Insertion;
 use crate::set::fitted::Fitted;
 use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
+use stylet_record::Recording;
 use stylet_stats::normal::quantile;
 use stylet_tissue::{Effect, LawState, Reading};
 
@@ -188,4 +189,23 @@ pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, dra
         out.high.push(all[high]);
     }
     out
+}
+
+/// Friction along the shaft in N as the mean law has it, a layer counting as ruptured from the next of these instants (s) on and
+/// not before: what a compensation may take from a measured force at every instant.
+#[must_use]
+pub fn friction(population: &Population, recording: &Recording, instants: &[f64]) -> Option<Vec<f64>> {
+    let mut model = population.law.clone();
+    model.own = vec![Own::default()];
+    model.day_of = Vec::new();
+    let law = model.compile(0)?.law;
+    let layers = model.layers();
+    let mut state = LawState::default();
+    let (r, mut out) = (recording, Vec::with_capacity(recording.len()));
+    for i in 0..r.len() {
+        let ruptured = instants.iter().take(layers).take_while(|t| **t <= r.time_s[i]).count();
+        let (t, z, v) = (r.time_s[i], r.position_m[i], r.velocity_mps[i]);
+        out.push(law.step_imposed(&mut state, t, z, v, ruptured, |_| {}).friction_n);
+    }
+    Some(out)
 }
