@@ -127,8 +127,8 @@ fn causes(study: &Study) -> Section {
     Section::new("The causes, and what each buys")
         .text(
             "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that cling to the shaft, \
-             slip, give way after a while and let go. The one that predicts thirds of the runs left out best was taken, a simpler one where 2 % is \
-             all there is between them. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
+             slip, give way after a while and let go. The one that predicts thirds of the runs left out best was taken, the base law where the others are \
+             better by less than 2 %. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
         )
         .block(Block::Svg(SvgImage {
             description: "Error on runs left out of every law, and without every part".to_owned(),

@@ -31,7 +31,7 @@ const COARSE: usize = 3;
 const TURNS: usize = 5;
 /// and it is drawn so many times.
 const DRAWS: usize = 16;
-/// A law with more numbers has to predict recordings left out better by this share.
+/// A law has to predict recordings left out better than the base law by this share.
 const WORTH: f64 = 0.02;
 /// A part of a law stays when recordings left out are predicted worse by this share without it.
 const PART_WORTH: f64 = 0.01;
@@ -93,7 +93,7 @@ pub struct Laws {
     pub library: Option<Law>,
     /// The law of a shaft that slips, where it could be fitted.
     pub slip: Option<Law>,
-    /// Which of them predicts recordings left out best, the simpler one within a small share.
+    /// Which of them predicts recordings left out best; the base law where the others are hardly better.
     pub best: Law,
     /// The parts of the best.
     pub parts: Vec<Part>,
@@ -137,7 +137,8 @@ pub fn laws(
     let slip = fitted(believed, runs, raw, STARTS, rng).map(|f| Law::new(Kind::Slip, f, runs));
     let mut best = base.clone();
     for law in library.iter().chain(&slip) {
-        if law.left_out_n() < (1.0 - WORTH) * best.left_out_n() {
+        let worth = law.left_out_n() < (1.0 - WORTH) * base.left_out_n();
+        if worth && law.left_out_n() < best.left_out_n() {
             best = law.clone();
         }
     }

@@ -8,7 +8,7 @@ use crate::outcome::{
 use crate::raw;
 use crate::set::first::{Insertion, groups};
 use crate::set::instrument::Instrument;
-use crate::set::laws::{Kind, Law, Laws, STARTS, effects, laws, several};
+use crate::set::laws::{Kind, Law, Laws, effects, laws, several};
 use crate::set::left_out::{Out, floor, runs_out, speeds_out};
 use crate::set::numbers::{Told, base_parameters, estimates};
 use crate::set::repeats::{Bought, Repeats, Standing, repeats};
@@ -92,7 +92,7 @@ fn bought(laws: &Laws) -> Vec<Bought> {
         kept: law.kind == laws.best.kind,
     };
     if let Some(law) = &laws.library {
-        out.push(of(format!("base law with {}", effects(&law.fitted.fit.model).join(", ")), law));
+        out.push(of("base law with what the library adds".to_owned(), law));
     }
     if let Some(law) = &laws.slip {
         out.push(of("a shaft that slips".to_owned(), law));
@@ -268,7 +268,7 @@ fn advice(best: &Law, told: &[Told]) -> Vec<String> {
     let (starts, agree) = best.fitted.starts;
     if best.kind == Kind::Slip && 2 * agree < starts {
         out.push(format!(
-            "Only {agree} of {starts} starts (of {STARTS}) came to this optimum: more insertions would make it surer."
+            "Only {agree} of {starts} starts came to this optimum: more insertions would make it surer."
         ));
     }
     out
