@@ -1,17 +1,25 @@
 //! Promise: in a world that it did not make and in which nothing is wrong, the diagnosis accuses nobody, and finds most of what is
 //! strong. A sample of `stylet benchmark diagnose`, which examines as many cases as you like.
 
+use stylet_diagnose::predict::{Refit, predict};
 use stylet_diagnose::{Evidence, Options};
 use stylet_examine::{Answer, Grade, Hide, Plan, Question, Wrong, run, table};
-use stylet_scenario::Scenario;
+use stylet_scenario::{Motion, Scenario, Segment};
+
+/// What is believed, and what was measured.
+fn asked(question: &Question) -> Result<(Scenario, Vec<Evidence>), String> {
+    let scenario = Scenario::parse("believed.ron", &question.believed_ron).map_err(|e| e.to_string())?;
+    let evidence = question.recordings.iter();
+    let evidence = evidence.map(|r| Evidence {
+        name: r.name.clone(),
+        recording: r.recording.clone(),
+        notes: Vec::new(),
+    });
+    Ok((scenario, evidence.collect()))
+}
 
 fn answer(question: &Question) -> Result<Answer, String> {
-    let scenario = Scenario::parse("believed.ron", &question.believed_ron).map_err(|e| e.to_string())?;
-    let evidence: Vec<Evidence> = question
-        .recordings
-        .iter()
-        .map(|r| Evidence { name: r.name.clone(), recording: r.recording.clone(), notes: Vec::new() })
-        .collect();
+    let (scenario, evidence) = asked(question)?;
     let examined = stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {})
         .map_err(|e| e.to_string())?;
     let json = serde_json::to_string(&examined.diagnosis).map_err(|e| e.to_string())?;
@@ -53,4 +61,56 @@ fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once(
     assert!(clean.iter().all(|o| o.worth.right), "{table}");
     assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.all_found), "{table}");
     assert!(one.iter().filter(|o| o.worth.right).count() >= 3, "{table}");
+}
+
+#[test]
+fn the_model_of_a_diagnosis_predicts_a_recording_that_took_no_part_to_about_its_noise() {
+    let plan = Plan { hide: vec![Hide::One], cases: 2, seed: 1, ..Plan::default() };
+    for id in plan.cases() {
+        let case = stylet_examine::case(&id).expect("a case");
+        let (believed, mut evidence) = asked(&case.question).expect("a scenario");
+        let kept = evidence.split_off(evidence.len() - 1);
+        let found = stylet_diagnose::diagnose(&believed, &evidence, &Options { brief: true }, |_| {})
+            .expect("a diagnosis");
+        let foretold = predict(&found.extended, Some(&found.diagnosis), Some(&believed), &[], &kept)
+            .expect("a prediction");
+        let p = &foretold.prediction;
+        println!("{:?}: {p:?}", case.setup.effects);
+        assert!(p.rmse_n < 1.25 * p.floor_n && p.held_out, "{p:?}");
+        assert!((0.8..=0.98).contains(&p.band_coverage), "{p:?}");
+        assert!(p.believed_rmse_n.expect("of the believed scenario") > 5.0 * p.rmse_n, "{p:?}");
+    }
+}
+
+/// A needle with 30 % more friction on a phantom that stands 1.5 mm nearer.
+#[test]
+fn friction_and_surface_of_another_needle_are_fitted_again_and_everything_else_stands() {
+    let text = "Scenario(name: \"two gels\", tissue: (layers: [
+        (thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0, puncture_n: 0.8),
+        (thickness_m: 0.02, stiffness_n_per_m: 90.0, friction_ns_per_m2: 12000.0)]),
+        motion: Program(start_m: -0.004, segments: [Move(velocity_mps: 0.004, duration_s: 8.0)]), robot: Replay)";
+    let model = Scenario::parse("model.ron", text).expect("a scenario");
+    let other = |seed: u64, velocity_mps: f64| {
+        let mut scenario = model.clone();
+        scenario.seed = seed;
+        scenario.tissue.surface_m -= 1.5e-3;
+        scenario.tissue.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= 1.3);
+        let duration_s = 0.032 / velocity_mps;
+        let segments = vec![Segment::Move { velocity_mps, duration_s }];
+        scenario.motion = Motion::Program { start_m: -0.004, segments };
+        let recording = stylet_testbed::simulate(&scenario, seed).expect("an insertion").recording;
+        Evidence { name: format!("{seed}"), recording, notes: Vec::new() }
+    };
+    let evidence = [other(1, 0.004), other(2, 0.003)];
+    let both = [Refit::Surface, Refit::Friction];
+    let without = predict(&model, None, None, &[], &evidence).expect("a prediction").prediction;
+    let with = predict(&model, None, None, &both, &evidence).expect("a prediction").prediction;
+    assert!(without.rmse_n > 3.0 * without.floor_n && without.band_coverage < 0.6, "{without:?}");
+    assert!(with.rmse_n < 1.15 * with.floor_n && with.band_coverage > 0.8 && with.held_out, "{with:?}");
+    for r in &with.recordings {
+        let (shift, factor) = (r.surface_shift_m.expect("a shift"), r.friction_factor.expect("a factor"));
+        assert!((shift + 1.5e-3).abs() < 1e-4 && (factor - 1.3).abs() < 0.03, "{r:?}");
+    }
+    let alone = predict(&model, None, None, &both, &evidence[..1]).expect("a prediction").prediction;
+    assert!(!alone.held_out && alone.rmse_n < 1.15 * alone.floor_n, "{alone:?}");
 }

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use std::path::{Path, PathBuf};
+use stylet_diagnose::predict::{Foretold, Refit};
 use stylet_diagnose::{Diagnosis, Evidence, Examined, Options};
 use stylet_record::{QualityNote, assess, thin, usable};
 use stylet_scenario::Scenario;
@@ -53,6 +54,30 @@ pub fn diagnose(
     evidence: &[Evidence],
     progress: impl FnMut(&str),
 ) -> Result<Diagnosed, Error> {
+    let thinned = within_reach_all(evidence)?;
+    let examined = stylet_diagnose::diagnose(believed, &thinned, &Options::default(), progress)?;
+    Ok(Diagnosed { diagnosis: examined.diagnosis.clone(), extended: examined.extended.clone(), examined })
+}
+
+/// How well a scenario predicts recordings that took no part in making it. `diagnosis` is the one it came from, for noise,
+/// scatter and intervals; `believed` is what was believed before; what is in `refit` is fitted to the recordings first, and
+/// with two or more each is predicted by what the others say.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn forecast(
+    model: &Scenario,
+    diagnosis: Option<&Diagnosis>,
+    believed: Option<&Scenario>,
+    refit: &[Refit],
+    evidence: &[Evidence],
+) -> Result<Foretold, Error> {
+    let thinned = within_reach_all(evidence)?;
+    Ok(stylet_diagnose::predict::predict(model, diagnosis, believed, refit, &thinned)?)
+}
+
+/// The recordings as long as the engine can use them, if it can.
+fn within_reach_all(evidence: &[Evidence]) -> Result<Vec<Evidence>, Error> {
     let mut judged: Vec<(&str, Vec<QualityNote>)> = Vec::with_capacity(evidence.len());
     for e in evidence {
         // Samples that are no numbers are the engine's to cut out.
@@ -60,9 +85,7 @@ pub fn diagnose(
         judged.push((&e.name, notes));
     }
     usable(judged.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
-    let thinned: Vec<Evidence> = evidence.iter().map(within_reach).collect();
-    let examined = stylet_diagnose::diagnose(believed, &thinned, &Options::default(), progress)?;
-    Ok(Diagnosed { diagnosis: examined.diagnosis.clone(), extended: examined.extended.clone(), examined })
+    Ok(evidence.iter().map(within_reach).collect())
 }
 
 /// The recording as long as a diagnosis can use it.

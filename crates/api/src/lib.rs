@@ -5,6 +5,7 @@
 //! | [`simulate`] | [`Scenario`] | [`Run`]: recording, truth, what the core made of it, scores |
 //! | [`enhance`] | [`Recording`] | [`Enhanced`]: enhanced force, ruptures, layers |
 //! | [`diagnose`] | [`Scenario`] and recordings | [`Diagnosed`]: what the scenario gets wrong, and the scenario that does not |
+//! | [`forecast`] | [`Scenario`] and recordings that took no part | [`Foretold`]: errors beside the noise, coverage of the band |
 //! | [`sweep`](fn@sweep) | [`Sweep`] | [`Swept`]: one row per insertion, summary |
 //!
 //! Every result has the files that the command writes, byte for byte, as an [`Output`] that is written at once or not at
@@ -22,7 +23,7 @@ mod predict;
 mod run;
 pub mod sweep;
 
-pub use diagnose::{Diagnosed, diagnose, name_of};
+pub use diagnose::{Diagnosed, diagnose, forecast, name_of};
 pub use enhance::{Enhanced, enhance, listen};
 pub use error::Error;
 pub use folder::Claim;
@@ -33,6 +34,7 @@ pub use run::{Run, settings_note, simulate, simulate_from, virtual_note};
 pub use sweep::{Swept, sweep};
 
 pub use stylet_core::{EnhanceConfig, Enhancer, Sample};
+pub use stylet_diagnose::predict::{Foretold, Prediction, Refit};
 pub use stylet_diagnose::{Diagnosis, Evidence};
 pub use stylet_record::{ColumnMap, ReadOptions, Recording, read_csv};
 pub use stylet_scenario::{EnhanceFile, Scenario};

@@ -23,6 +23,8 @@ pub enum Command {
     Run(RunArgs),
     /// Run the online algorithm on a measured recording.
     Enhance(EnhanceArgs),
+    /// Write a recording in another format: CSV, Parquet, MCAP.
+    Convert(ConvertArgs),
     /// Thousands of insertions with drawn quantities: rates, intervals, what explains the failures.
     Sweep(SweepArgs),
     /// Run one trial of a sweep again, with a full report.
@@ -33,6 +35,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Compare measured data with a scenario: what is wrong, why, and how much better it gets.
     Diagnose(DiagnoseArgs),
+    /// Predict recordings that took no part in a diagnosis by the model that it gave.
+    Predict(PredictArgs),
     /// Tell what an experiment can show: which effects, from which size on, and which it cannot tell apart.
     Identifiability(IdentifiabilityArgs),
     /// Plan the next insertion: the motion within limits that tells the remaining causes apart.
@@ -230,6 +234,33 @@ pub struct EnhanceArgs {
     pub limits: Limits,
 }
 
+/// Arguments of `stylet convert`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet convert bag.mcap insertion.csv --columns map.ron
+  stylet convert out/recording.csv insertion.parquet
+
+A column map for a log of a robot, force and position on topics of their own:
+  Columns(time: (name: \"/ft_sensor/wrench.log_time\"), force: (name: \"/ft_sensor/wrench.wrench.force.z\"),
+          position: (name: \"/tip.pose.position.z\"))
+
+Every command reads CSV, and with the feature `formats` also MCAP (JSON, ROS 2 messages), MATLAB v7.3 and Parquet.")]
+pub struct ConvertArgs {
+    /// Recording.
+    pub from: PathBuf,
+    /// Where it goes; the ending .csv, .parquet or .mcap says how.
+    pub to: PathBuf,
+    /// Column map for a foreign log (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and say which.
+    #[arg(long)]
+    pub repair: bool,
+    /// Say nothing.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
 /// Arguments of `stylet diagnose`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -263,6 +294,52 @@ pub struct DiagnoseArgs {
     /// How much it may take.
     #[command(flatten)]
     pub limits: Limits,
+}
+
+/// Arguments of `stylet predict`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet predict out/diagnosis/extended.ron --data next_day.csv
+  stylet predict out/diagnosis/extended.ron --data d.csv e.csv --refit friction,surface
+  stylet predict phantom.ron --data a.csv --out out/phantom
+
+The folder then holds report.html and predict.json: what the model leaves of each recording beside the sensor's noise, and how
+much of the force lies in the band that should hold 90 %. diagnosis.json and inputs.json beside the model tell noise, scatter,
+intervals, and what was believed before. The exit code is 0 however bad the prediction is.")]
+pub struct PredictArgs {
+    /// The model: extended.ron of a diagnosis, or any scenario (RON).
+    pub model: PathBuf,
+    /// Recordings (CSV with header) that took no part in making the model.
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    pub data: Vec<PathBuf>,
+    /// What was believed before (RON), for comparison [default: what inputs.json beside the model names].
+    #[arg(long, value_name = "FILE")]
+    pub believed: Option<PathBuf>,
+    /// Numbers that may be fitted to the new recordings first; with two or more recordings each is predicted by what the
+    /// others say.
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
+    pub refit: Vec<Again>,
+    /// Column map for foreign logs (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: Results,
+    /// How much it may take.
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// A number that another needle or another day may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Again {
+    /// Friction: one factor for all layers.
+    Friction,
+    /// The position of the surface.
+    Surface,
 }
 
 /// Arguments of `stylet identifiability`.

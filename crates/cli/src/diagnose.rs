@@ -6,13 +6,12 @@ use crate::exit::Failure;
 use crate::limits;
 use crate::output::Output;
 use crate::terminal::say;
-use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
+use stylet_diagnose::Diagnosis;
 use stylet_diagnose::outcome::Verdict;
-use stylet_diagnose::{Diagnosis, Evidence};
-use stylet_record::{ReadOptions, read_csv_with_holes};
+use stylet_record::ReadOptions;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -37,12 +36,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         None => None,
     };
     let options = ReadOptions { columns, repair: args.repair };
-    let read: Vec<_> = args.data.par_iter().map(|path| read_csv_with_holes(path, &options)).collect();
-    let mut evidence = Vec::new();
-    for (path, read) in args.data.iter().zip(read) {
-        let (recording, notes) = read?;
-        evidence.push(Evidence { name: stylet_api::name_of(path, &args.data), recording, notes });
-    }
+    let evidence = crate::plan::read_all(&args.data, &options)?;
     let talk = !args.results.quiet && std::io::stderr().is_terminal();
     let found = stylet_api::diagnose(&scenario, &evidence, |what| {
         if talk {

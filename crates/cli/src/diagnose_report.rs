@@ -27,12 +27,15 @@ pub fn page(scenario: &Scenario, args: &DiagnoseArgs, examined: &Examined) -> Pa
         .fact("samples", samples.to_string())
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(verdict(d))
-        .section(equation(examined))
+        .section(differs(scenario, d, &all))
+        .section(causes(d))
+        .section(moved(scenario, d))
+        .section(traces(d))
+        .section(unseen(d))
+        .section(remains(d, &all))
         .section(gain(d, &all))
         .section(residual(d, examined, &all))
         .section(evidence(d))
-        .section(remains(d, &all))
-        .section(unseen(d))
         .section(quality(d))
         .section(repeat(args, examined))
 }
@@ -89,58 +92,200 @@ fn verdict(d: &Diagnosis) -> Section {
     section
 }
 
-/// The extended law in the notation of SPEC section 1.
-fn equation(examined: &Examined) -> Section {
-    let d = &examined.diagnosis;
+/// What was believed, and what of it the measured force contradicts: the recording that the base law predicts worst.
+fn differs(scenario: &Scenario, d: &Diagnosis, all: &[Curves]) -> Section {
+    let percent = |share: f64| significant(100.0 * share, 2);
+    let beliefs = format!(
+        "Believed: {} layer{}, stiffness, friction and puncture force to {} %, thickness to {} %, the surface to {} mm{}. Within that the base law was fitted.",
+        scenario.tissue.layers.len(),
+        if scenario.tissue.layers.len() == 1 { "" } else { "s" },
+        percent(scenario.tolerance),
+        percent(scenario.thickness_tolerance),
+        significant(1e3 * scenario.surface_tolerance_m, 2),
+        match scenario.effects.len() {
+            0 => String::new(),
+            n => format!(", {n} effect{} beyond the base law", if n == 1 { "" } else { "s" }),
+        }
+    );
+    let section = Section::new("What was believed, and what differs").text(beliefs);
+    let square = |c: &Curves| {
+        c.base_n.iter().zip(&c.used).filter(|(_, u)| **u).map(|(e, _)| e * e).sum::<f64>()
+            / c.used.iter().filter(|u| **u).count().max(1) as f64
+    };
+    let worst = all.iter().zip(&d.gain.recordings).max_by(|a, b| square(a.0).total_cmp(&square(b.0)));
+    let Some((c, name)) = worst else { return section };
+    let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, c.time_s.clone(), y.to_vec());
+    let level = |y: f64, label: &str| Level {
+        y,
+        label: label.to_owned(),
+        colour: Colour::Grey,
+        style: LineStyle::Dotted,
+    };
+    section.chart(
+        Chart::new(format!("{name}: measured less predicted"), "Time (s)", "Residual (N)")
+            .caption("The recording that the base law fits worst: what it leaves, and what the extended model leaves.")
+            .group(name.clone())
+            .height(260)
+            .with_series(line("base law, re-fitted", Colour::Vermillion, &c.base_n).width(1.2))
+            .with_series(line("extended model", Colour::Blue, &c.extended_n).width(1.0))
+            .with_level(level(2.0 * d.noise.sd_n, "twice the noise"))
+            .with_level(level(-2.0 * d.noise.sd_n, "")),
+    )
+}
+
+/// What the simulation lacks, with the extended law in the notation of SPEC section 1.
+fn causes(d: &Diagnosis) -> Section {
+    let section = Section::new("Causes");
+    if d.causes.is_empty() {
+        return section
+            .text("None: the base law, re-fitted, is as good as any extension of it that was tried.");
+    }
     let mut text = String::from(
         "f   = f_K + f_B            until layer a = r + 1 ruptures: f_K >= F_a, or z >= s_a + d_a\nf_K = K_a max(0, z - s_a)\nf_B = v sum_i b_i l_i,      l_i = clamp(z - s_i, 0, d_i)\n",
     );
+    let mut rows = Vec::new();
     for c in &d.causes {
-        if let Some(info) = stylet_tissue::info(&c.effect) {
-            let _ = write!(text, "\n{}:\n    {}\n    with ", c.effect, info.equation);
-            let numbers: Vec<String> = info
-                .parameters
-                .iter()
-                .filter_map(|p| c.parameters.get(p.path).map(|e| (p, e)))
-                .map(|(p, e)| {
-                    format!(
-                        "{} = {} {} ({} to {})",
-                        p.path,
-                        number(e.value),
-                        p.unit,
-                        number(e.low),
-                        number(e.high)
-                    )
-                })
-                .collect();
-            let _ = writeln!(text, "{}", numbers.join("\n         "));
+        let info = stylet_tissue::info(&c.effect);
+        if let Some(info) = info {
+            let _ = write!(text, "\n{}:\n    {}\n", c.effect, info.equation);
+        }
+        let unit = |path: &str| {
+            info.and_then(|i| i.parameters.iter().find(|p| p.path == path)).map_or("", |p| p.unit)
+        };
+        for (k, (path, e)) in c.parameters.iter().enumerate() {
+            let first = |text: String| Cell::text(if k == 0 { text } else { String::new() });
+            rows.push(vec![
+                first(c.effect.replace('_', " ")),
+                first(c.equivalent.join(", ").replace('_', " ")),
+                first(significant(c.confidence, 3)),
+                first(if c.share > 0.0 { format!("{:.0} %", 100.0 * c.share) } else { "-".to_owned() }),
+                Cell::text(path.clone()),
+                Cell::number(format!("{} {}", number(e.value), unit(path))),
+                Cell::number(format!("{} to {}", number(e.low), number(e.high))),
+            ]);
         }
     }
-    let rows = d
-        .base_parameters
+    let g = &d.gain;
+    let what =
+        if g.held_out { "recordings left out of the fit" } else { "the recording, which was also fitted" };
+    section
+        .table(Table {
+            title: format!(
+                "What the simulation lacks; together it brings {} down from {} N to {} N rms, the noise being {} N",
+                what,
+                significant(g.rmse_before_n, 3),
+                significant(g.rmse_after_n, 3),
+                significant(g.floor_n, 3)
+            ),
+            groups: Vec::new(),
+            headers: [
+                "cause",
+                "as good",
+                "confidence",
+                "of what the base law leaves",
+                "number",
+                "value",
+                "95 % interval",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
+            rows,
+        })
+        .block(Block::Code(Code { title: "equation".to_owned(), text, folded: false }))
+}
+
+/// Base numbers, those that moved first.
+fn moved(scenario: &Scenario, d: &Diagnosis) -> Section {
+    let mut order: Vec<&BaseParameter> = d.base_parameters.iter().collect();
+    order.sort_by_key(|b| (!b.changed, !b.at_bound));
+    let count = order.iter().filter(|b| b.changed).count();
+    let rows = order
         .iter()
         .map(|b| {
+            let status = match (b.at_bound, b.changed) {
+                (true, _) => Status::Warn,
+                (false, true) => Status::Good,
+                (false, false) => Status::Plain,
+            };
             vec![
                 Cell::text(if b.layer > 0 { format!("layer {}", b.layer) } else { "tissue".to_owned() }),
                 Cell::text(b.name.clone()),
                 Cell::number(number(b.assumed)),
                 Cell::number(number(b.value)),
                 Cell::number(format!("{} to {}", number(b.low), number(b.high))),
-                Cell::number(change(b)).status(if b.at_bound { Status::Warn } else { Status::Plain }),
+                Cell::number(change(b)).status(status),
             ]
         })
         .collect();
-    let table = Table {
-        title: "Base parameters, re-fitted within the scenario's tolerance".to_owned(),
+    let mut section = Section::new("Numbers of the base law that moved").table(Table {
+        title: format!(
+            "{count} of {} differ from what was assumed by more than their interval",
+            d.base_parameters.len()
+        ),
         groups: Vec::new(),
         headers: ["", "parameter", "assumed", "fitted", "95 % interval", "change"]
             .map(str::to_owned)
             .to_vec(),
         rows,
+    });
+    let mut aloud = Vec::new();
+    let bounds = order.iter().filter(|b| b.at_bound).count();
+    if bounds > 0 {
+        aloud.push(format!(
+            "{bounds} number{} at the bound of what was believed: the tolerance is too narrow, or something else takes its work. Widen `tolerance` in the scenario and ask again.",
+            if bounds == 1 { " stands" } else { "s stand" }
+        ));
+    }
+    let tolerance = |b: &BaseParameter| match b.name.as_str() {
+        "surface_m" => scenario.surface_tolerance_m,
+        "thickness_m" => scenario.thickness_tolerance * b.assumed,
+        _ => scenario.tolerance * b.assumed,
     };
-    Section::new("The extended model")
-        .block(Block::Code(Code { title: "equation".to_owned(), text, folded: false }))
-        .table(table)
+    let blind: Vec<String> = order
+        .iter()
+        .filter(|b| b.high - b.low > BLIND * 2.0 * 1.96 * tolerance(b) && tolerance(b) > 0.0)
+        .map(|b| format!("{} of layer {}", b.name, b.layer))
+        .collect();
+    if !blind.is_empty() {
+        aloud.push(format!(
+            "These recordings say next to nothing of {}: the interval is the belief's own.",
+            blind.join(", ")
+        ));
+    }
+    if !aloud.is_empty() {
+        section = section.block(Block::Text(Text { paragraphs: aloud, status: Status::Warn }));
+    }
+    section
+}
+
+/// An interval so large a share of what was believed before is the belief's own.
+const BLIND: f64 = 0.8;
+
+/// What was found and is no cause.
+fn traces(d: &Diagnosis) -> Section {
+    let section = Section::new("Traces");
+    if d.traces.is_empty() {
+        return section
+            .text("Nothing was found that is too small to matter or does not pay on recordings left out.");
+    }
+    let rows = d
+        .traces
+        .iter()
+        .map(|t| {
+            let numbers = t.parameters.iter().map(|(p, e)| format!("{p} = {}", number(e.value)));
+            vec![
+                Cell::text(t.effect.replace('_', " ")),
+                Cell::text(numbers.collect::<Vec<_>>().join(", ")),
+                Cell::text(t.why.clone()),
+            ]
+        })
+        .collect();
+    section.table(Table {
+        title: "Found, and no cause".to_owned(),
+        groups: Vec::new(),
+        headers: ["effect", "numbers", "why it is no cause"].map(str::to_owned).to_vec(),
+        rows,
+    })
 }
 
 fn gain(d: &Diagnosis, all: &[Curves]) -> Section {

@@ -6,6 +6,7 @@ mod benchmark;
 mod compare;
 mod compare_page;
 mod compare_world;
+mod convert;
 mod diagnose;
 mod diagnose_report;
 mod effects;
@@ -15,6 +16,8 @@ mod limits;
 mod listen;
 mod plan;
 mod plan_report;
+mod predict;
+mod predict_page;
 mod progress;
 mod reproduce;
 mod run;
@@ -39,11 +42,13 @@ pub fn main() -> ExitCode {
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Enhance(args) => enhance::enhance(args),
+        Command::Convert(args) => convert::convert(args),
         Command::Sweep(args) => sweep::sweep(args),
         Command::Replay(args) => sweep::replay(args),
         Command::Gate(args) => sweep::gate(args),
         Command::Compare(args) => compare::compare(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
+        Command::Predict(args) => predict::predict(args),
         Command::Identifiability(args) => plan::identifiability(args),
         Command::Plan(args) => plan::plan(args),
         Command::Effects(args) => effects::effects(args),

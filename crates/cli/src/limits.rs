@@ -31,6 +31,8 @@ const ARM_S: f64 = 25e-6;
 const TRIAL_SAMPLE_S: f64 = 1.5e-7;
 /// Seconds per sample that a diagnosis compares; the search makes more or less of it.
 const DIAGNOSE_S: f64 = 2e-4;
+/// A prediction takes this share of a diagnosis' time.
+const PREDICT_SHARE: f64 = 0.1;
 
 /// What is said without being asked: so many bytes, so many seconds.
 const MUCH_BYTES: f64 = 5e8;
@@ -157,6 +159,12 @@ pub fn of_diagnose(data: &[PathBuf]) -> Need {
         seconds: used * DIAGNOSE_S,
         remedy: "cut the recordings to the insertion",
     }
+}
+
+/// What `stylet predict` needs for these recordings.
+pub fn of_predict(data: &[PathBuf]) -> Need {
+    let need = of_diagnose(data);
+    Need { seconds: need.seconds * PREDICT_SHARE, ..need }
 }
 
 /// Samples of a CSV file, by its size and the length of its first lines. Nothing for what is no plain file.

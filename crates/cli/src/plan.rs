@@ -3,6 +3,7 @@
 use crate::args::{IdentifiabilityArgs, PlanArgs};
 use crate::exit::Failure;
 use crate::{limits, plan_report};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
@@ -52,7 +53,11 @@ impl Inputs {
         Ok(json)
     }
 
-    fn of_folder(folder: &Path) -> Result<Self, Failure> {
+    /// What the diagnosis in a folder was made of.
+    ///
+    /// # Errors
+    /// When the folder does not say.
+    pub fn of_folder(folder: &Path) -> Result<Self, Failure> {
         let path = folder.join(INPUTS);
         let text = std::fs::read_to_string(&path).map_err(|_| {
             Failure::Check(format!(
@@ -70,14 +75,21 @@ impl Inputs {
             None => None,
         };
         let options = ReadOptions { columns, repair: self.repair };
-        self.data
-            .iter()
-            .map(|path| {
-                let (recording, notes) = read_csv_with_holes(path, &options)?;
-                Ok(Evidence { name: stylet_api::name_of(path, &self.data), recording, notes })
-            })
-            .collect()
+        read_all(&self.data, &options)
     }
+}
+
+/// Reads recordings, several at once.
+///
+/// # Errors
+/// [`Failure`] with file and line.
+pub fn read_all(data: &[PathBuf], options: &ReadOptions) -> Result<Vec<Evidence>, Failure> {
+    let read: Vec<_> = data.par_iter().map(|path| read_csv_with_holes(path, options)).collect();
+    let named = data.iter().zip(read).map(|(path, read)| {
+        let (recording, notes) = read?;
+        Ok(Evidence { name: stylet_api::name_of(path, data), recording, notes })
+    });
+    named.collect()
 }
 
 /// Where planning stands.

@@ -1,5 +1,5 @@
 //! The state machine as a table: what a drawing of it is made from, and what a test holds against the
-//! transitions seen in runs (`tests/state_machine.rs`).
+//! transitions seen in runs (`tests/promises/state_machine.rs`).
 
 use crate::sample::State;
 

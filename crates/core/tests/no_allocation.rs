@@ -1,6 +1,7 @@
 //! Promise: the core allocates nothing after construction, over a million steps with ruptures,
 //! re-runs and compensation among them.
 
+#[path = "promises/support/mod.rs"]
 mod support;
 
 use stylet_core::{EnhanceConfig, Enhancer, Sample};

@@ -49,7 +49,7 @@ impl Prepared {
 const FIRST_SHARE: f64 = 0.03;
 
 /// Standard deviation in N of blocks about their neighbours.
-fn roughness(blocks: &[Blocks]) -> f64 {
+pub(crate) fn roughness(blocks: &[Blocks]) -> f64 {
     let third = |b: &Blocks| -> Vec<f64> {
         b.f.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect()
     };

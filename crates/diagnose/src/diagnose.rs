@@ -83,24 +83,10 @@ pub fn diagnose(
     mut progress: impl FnMut(&str),
 ) -> Result<Examined, DiagnoseError> {
     crate::check::check(scenario, evidence)?;
-    let mut notes: Vec<Vec<QualityNote>> = Vec::new();
-    let mut recordings: Vec<Recording> = Vec::new();
-    for e in evidence {
-        let mut own = e.notes.clone();
-        own.extend(crate::check::holes(&e.recording));
-        for note in assess(&e.recording) {
-            if !own.contains(&note) {
-                own.push(note);
-            }
-        }
-        notes.push(own);
-        recordings.push(crate::check::finite(&e.recording));
-    }
-    let borrowed: Vec<&Recording> = recordings.iter().collect();
-    let raw = raw::look(&borrowed, &notes);
+    let Ready { recordings, notes, raw } = ready(evidence);
     progress("fitting the base law");
     let blocks: Vec<Blocks> =
-        borrowed.par_iter().zip(&raw.exclude).map(|(r, x)| Blocks::new(r, x, BLOCK_S)).collect();
+        recordings.par_iter().zip(&raw.exclude).map(|(r, x)| Blocks::new(r, x, BLOCK_S)).collect();
     let prepared = Prepared::new(Arc::new(belief(scenario)), blocks, raw.step_n.unwrap_or(0.0) * UNIFORM_SD);
     let (fitted, data) = base(&prepared).ok_or(DiagnoseError::NoFit)?;
     let (fitted, data) = varied(fitted, data);
@@ -171,6 +157,36 @@ pub fn diagnose(
     };
     let extended = extended(scenario, &search, &diagnosis);
     Ok(Examined { diagnosis, extended, search, classes, before, after })
+}
+
+/// Recordings as the engine takes them.
+pub(crate) struct Ready {
+    /// Without samples that are no numbers.
+    pub recordings: Vec<Recording>,
+    /// Remarks on each.
+    pub notes: Vec<Vec<QualityNote>>,
+    /// What the raw numbers show.
+    pub raw: raw::Raw,
+}
+
+/// Reads quality and raw numbers of recordings.
+pub(crate) fn ready(evidence: &[Evidence]) -> Ready {
+    let mut notes: Vec<Vec<QualityNote>> = Vec::new();
+    let mut recordings: Vec<Recording> = Vec::new();
+    for e in evidence {
+        let mut own = e.notes.clone();
+        own.extend(crate::check::holes(&e.recording));
+        for note in assess(&e.recording) {
+            if !own.contains(&note) {
+                own.push(note);
+            }
+        }
+        notes.push(own);
+        recordings.push(crate::check::finite(&e.recording));
+    }
+    let borrowed: Vec<&Recording> = recordings.iter().collect();
+    let raw = raw::look(&borrowed, &notes);
+    Ready { recordings, notes, raw }
 }
 
 /// Standard deviation of a number spread evenly over one.

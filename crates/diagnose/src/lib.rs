@@ -14,6 +14,7 @@
 //! | [`intervals`] | intervals of every number |
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
 //! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
+//! | [`predict`] | a model against recordings that took no part |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
 //! | `hidden`, `benchmark` (feature `own_world`) | cases drawn with this law, for comparison with older tables |
 #![forbid(unsafe_code)]
@@ -36,6 +37,7 @@ pub mod judge;
 pub mod leftover;
 pub mod lines;
 pub mod outcome;
+pub mod predict;
 pub mod propose;
 pub mod raw;
 pub mod rivals;

@@ -37,7 +37,7 @@
 //!   pushes with `F = -f u`: the axial force of the rest of the project is `f = -wrench.along(u)`.
 //!
 //! # Accuracy and cost
-//! `tests/reference.rs` holds torques, mass matrix, Jacobian and momentum terms against Pinocchio and MuJoCo
+//! `tests/promises/reference.rs` holds torques, mass matrix, Jacobian and momentum terms against Pinocchio and MuJoCo
 //! at 1000 random states; `examples/time_observer.rs` prints the cost of one observer step;
 //! `tests/no_allocation.rs` counts allocations (only the error of a failing line check makes one). Sines and
 //! exponentials come from `libm` and all matrices have fixed sizes, so that results do not hang on the

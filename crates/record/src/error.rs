@@ -35,6 +35,10 @@ pub enum RecordError {
     #[error("{}: not a text file in UTF-8: {what} at byte {byte} (line {line}); export the data as CSV text in UTF-8", path.display())]
     NotText { path: PathBuf, byte: usize, line: u64, what: &'static str },
 
+    /// A file of another program.
+    #[error("{}: {kind}: {what}", path.display())]
+    Foreign { path: PathBuf, kind: &'static str, what: String },
+
     /// A column is needed and the header has no such name.
     #[error(
         "{}: line {line}: the header has no column \"{column}\" ({what}); it has {}{}; rename the column or give a column map",

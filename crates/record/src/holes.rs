@@ -1,6 +1,7 @@
 //! Recordings with holes: rows whose values are no finite numbers are cut out and reported.
 
 use crate::error::RecordError;
+use crate::foreign::{Kind, as_csv};
 use crate::quality::{QualityKind, QualityNote};
 use crate::read::{ReadOptions, read_csv, read_csv_bytes};
 use crate::recording::Recording;
@@ -18,7 +19,12 @@ pub fn read_csv_with_holes(
         Err(error @ RecordError::NotFinite { .. }) => error,
         other => return other,
     };
-    let Ok(text) = std::fs::read_to_string(path) else { return Err(error) };
+    let Ok(bytes) = std::fs::read(path) else { return Err(error) };
+    let bytes = match Kind::of(&bytes) {
+        Some(kind) => as_csv(kind, &bytes, path, options.columns.as_ref())?,
+        None => bytes,
+    };
+    let Ok(text) = String::from_utf8(bytes) else { return Err(error) };
     let hole = |line: &&str| {
         line.split([',', ';', '\t']).any(|x| {
             let x = x.trim().trim_matches('"');

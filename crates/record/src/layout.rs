@@ -88,7 +88,7 @@ fn header_names(text: &[u8], delimiter: u8, path: &Path, line: u64) -> Result<Ve
     Ok(header.iter().map(|name| name.trim().to_owned()).collect())
 }
 
-fn locate(
+pub(crate) fn locate(
     names: &[String],
     path: &Path,
     line: u64,

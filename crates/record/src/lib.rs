@@ -23,6 +23,7 @@
 //! | [`truth`] | [`Truth`]: what a simulation knows and a sensor does not |
 //! | [`columns`] | [`ColumnMap`]: names, units and signs of somebody else's log |
 //! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
+//! | [`foreign`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
 //! | `quality` | [`QualityNote`]s: dead, reversed, in air, mixed-up units, stuck, gaps, jitter, saturation, spikes, quantisation, unlike its repeats |
 //! | [`thin`](mod@thin) | recordings of hours, thinned |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
@@ -31,6 +32,7 @@
 pub mod columns;
 pub mod differentiate;
 pub mod error;
+pub mod foreign;
 pub mod holes;
 mod layout;
 mod quality;

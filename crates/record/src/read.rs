@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::columns::{Column, ColumnMap};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 use crate::error::RecordError;
+use crate::foreign::{Kind, as_csv};
 use crate::layout::{Layout, Role, Source, read_layout};
 use crate::quality::{QualityNote, assess, repaired_rows};
 use crate::recording::{JOINTS, Recording};
@@ -28,7 +29,8 @@ pub struct ReadOptions {
 /// `force_virtual_n` and `joint_torque_1_nm` to `joint_torque_7_nm` (all or none), or the names of the column map. Other columns are
 /// ignored. The delimiter is a comma, a semicolon, a tab or a `|`; a byte order mark, CRLF line ends, quotation marks, spaces
 /// around names and numbers, blank lines and a last line without its end are accepted. Without a velocity column the
-/// position is differentiated ([`mod@crate::differentiate`]).
+/// position is differentiated ([`mod@crate::differentiate`]). MCAP, MATLAB v7.3 and Parquet files are known by their first
+/// bytes ([`mod@crate::foreign`]).
 ///
 /// The notes are those of [`assess`], preceded by the repaired rows.
 ///
@@ -60,6 +62,10 @@ pub fn read_csv_bytes(
 ) -> Result<(Recording, Vec<QualityNote>), RecordError> {
     if let Some(map) = &options.columns {
         map.check()?;
+    }
+    if let Some(kind) = Kind::of(bytes) {
+        let text = as_csv(kind, bytes, path, options.columns.as_ref())?;
+        return read_csv_bytes(&text, path, options);
     }
     check_text(bytes, path)?;
     let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };

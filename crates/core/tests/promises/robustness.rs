@@ -1,15 +1,13 @@
 //! Promise: what real logs bring does not silence or spoil the core: noisy position and velocity, a
 //! short way in air, other sampling rates, samples that cannot be, a second way in.
 
-mod support;
-
+use crate::support::{Insertion, constant, detections, enhance, insertion};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stylet_core::config::{Contact, Depths, Reset};
 use stylet_core::{EnhanceConfig, LayerEstimate, Output, Sample};
 use stylet_tissue::Tissue;
-use support::{Insertion, constant, detections, enhance, insertion};
 
 fn estimates(outputs: &[Output]) -> Vec<LayerEstimate> {
     outputs.iter().filter_map(|o| o.estimate).collect()

@@ -2,13 +2,12 @@
 //! storage do not change them, weighting the covariance equals scaling the regressor (supplement
 //! eqs. 8-12), and what is not a number is passed over.
 
-mod support;
-
+use crate::support;
+use crate::support::{constant, enhance, sinusoid};
 use proptest::prelude::*;
 use stylet_core::config::{DropConfig, Model, Reset};
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Rls, Sample};
 use stylet_tissue::Tissue;
-use support::{constant, enhance, sinusoid};
 
 fn estimates(config: &EnhanceConfig, samples: &[Sample]) -> Vec<LayerEstimate> {
     enhance(config, samples).iter().filter_map(|o| o.estimate).collect()

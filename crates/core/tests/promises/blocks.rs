@@ -1,8 +1,7 @@
 //! Promise: many samples at once give the bits that they give one by one, wherever they are cut into
 //! blocks, with samples among them that cannot be used.
 
-mod support;
-
+use crate::support;
 use stylet_core::{EnhanceConfig, Enhancer, Output, Sample};
 
 /// What is kept up to date sample by sample, as bits.

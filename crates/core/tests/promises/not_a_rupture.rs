@@ -1,11 +1,9 @@
 //! Promise: a hold, a reversal, a sudden change of the commanded speed and a rippled speed are not
 //! ruptures, and the ruptures that do come are still found.
 
-mod support;
-
+use crate::support::{detections, enhance, insertion};
 use stylet_core::EnhanceConfig;
 use stylet_tissue::Tissue;
-use support::{detections, enhance, insertion};
 
 /// Runs a velocity profile and returns (true, found) rupture times.
 fn run(duration_s: f64, seed: u64, velocity_mps: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {

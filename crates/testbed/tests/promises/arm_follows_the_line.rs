@@ -1,9 +1,7 @@
 //! Promise: the arm keeps the needle's tip on its line, within 50 um RMS of where the motion commands
 //! it, through air, tissue and ruptures; in any direction that it can reach.
 
-mod common;
-
-use common::{FILES, noiseless, with_arm};
+use crate::common::{FILES, noiseless, with_arm};
 use stylet_scenario::{ArmConfig, ArmController};
 use stylet_testbed::simulate;
 

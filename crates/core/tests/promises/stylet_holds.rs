@@ -1,13 +1,11 @@
 //! `algorithm: Stylet` stays finite, its covariances positive definite and its work bounded, whatever a robot or a logger does to it; and
 //! it allocates nothing.
 
-mod support;
-
+use crate::support::constant;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use support::constant;
 
 fn core() -> Enhancer<[Sample; 0]> {
     let config = EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() };

@@ -2,9 +2,7 @@
 //! the mass matrix is symmetric and positive definite, `dM/dt = C + C^T`, momentum and power balance, and the
 //! algorithms agree with each other.
 
-mod common;
-
-use common::states;
+use crate::common::states;
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 use stylet_dynamics::{
     Arm, ArmModel, EARTH_GRAVITY_MPS2, JointLimits, JointVector, Link, Pose, RigidBody, Tool, Wrench, panda,

@@ -5,9 +5,7 @@
 //! the raw truth, 42 mN for the liver's 2.3 N in 30 s at 50 /s. No observer of that gain comes below it;
 //! so the bar is held against the truth behind the lag, and against the raw truth away from the ruptures.
 
-mod common;
-
-use common::{FILES, noiseless, with_arm};
+use crate::common::{FILES, noiseless, with_arm};
 use stylet_scenario::{ArmConfig, ArmFriction, VirtualSensor, ZeroWindow};
 use stylet_testbed::{Simulation, VirtualError, simulate};
 

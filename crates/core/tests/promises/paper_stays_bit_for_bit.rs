@@ -1,11 +1,9 @@
 //! `algorithm: Paper` is the published algorithm: whatever is added beside it, its outputs stay what they were,
 //! bit for bit. The hashes were printed by this test before `Stylet` existed.
 
-mod support;
-
+use crate::support::{Insertion, constant, enhance, insertion, sinusoid};
 use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model};
 use stylet_core::{Output, Sample};
-use support::{Insertion, constant, enhance, insertion, sinusoid};
 
 /// FNV-1a over the bits of everything the core says.
 fn hash(outputs: &[Output]) -> u64 {

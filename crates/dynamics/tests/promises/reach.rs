@@ -2,8 +2,7 @@
 
 #![allow(clippy::panic)] // how a test fails
 
-mod common;
-
+use crate::common;
 use nalgebra::Vector3;
 use stylet_dynamics::{
     Arm, Error, IkConfig, JointVector, Pose, Quantity, panda,

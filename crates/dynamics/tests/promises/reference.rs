@@ -3,11 +3,10 @@
 //! with Pinocchio's Coriolis matrix.
 //!
 //! Relative error of a quantity at a state: largest absolute difference of its entries over the largest
-//! absolute entry. `cargo test -p stylet-dynamics --test reference -- --nocapture` prints the largest errors.
+//! absolute entry. `cargo test -p stylet-dynamics --test promises reference -- --nocapture` prints the largest errors.
 
-mod common;
-
-use common::{rows, states};
+use crate::common;
+use crate::common::{rows, states};
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, panda};
 
 const TOLERANCE: f64 = 1e-10;
@@ -51,7 +50,7 @@ fn compare(peer: &str, bytes: &[u8], quantities: &[(&str, std::ops::Range<usize>
 fn torques_mass_matrix_jacobian_and_coriolis_terms_agree_with_pinocchio() {
     compare(
         "Pinocchio",
-        include_bytes!("../reference/pinocchio.f64"),
+        include_bytes!("../../reference/pinocchio.f64"),
         &[("torques", 0..7), ("mass matrix", 7..35), ("Jacobian", 35..77), ("C^T qd", 77..84)],
     );
 }
@@ -60,7 +59,7 @@ fn torques_mass_matrix_jacobian_and_coriolis_terms_agree_with_pinocchio() {
 fn torques_mass_matrix_and_jacobian_agree_with_mujoco() {
     compare(
         "MuJoCo",
-        include_bytes!("../reference/mujoco.f64"),
+        include_bytes!("../../reference/mujoco.f64"),
         &[("torques", 0..7), ("mass matrix", 7..35), ("Jacobian", 35..77)],
     );
 }
@@ -70,7 +69,7 @@ fn the_comparison_notices_a_payload_that_is_a_gram_heavier() {
     let mut model = panda::with_needle();
     model.tool.payload.mass_kg += 1e-3;
     let arm = Arm::new(&model).expect("valid");
-    let bytes = include_bytes!("../reference/pinocchio.f64");
+    let bytes = include_bytes!("../../reference/pinocchio.f64");
     let wrong = states().into_iter().zip(rows(bytes, 84)).filter(|(state, theirs)| {
         let ours = ours(&arm, state);
         let size = theirs[..7].iter().fold(0.0_f64, |m, x| m.max(x.abs()));

@@ -1,11 +1,9 @@
 //! Promise: the three ruptures of the latex stack are found at constant and at sinusoidal velocity,
 //! with contact known or found, and nothing else is.
 
-mod support;
-
+use crate::support::{Insertion, constant, detections, enhance, sinusoid};
 use stylet_core::config::{Contact, CusumConfig, DerivativeConfig, Model, Reset};
 use stylet_core::{Cause, EnhanceConfig, State};
-use support::{Insertion, constant, detections, enhance, sinusoid};
 
 fn assert_found(data: &Insertion, config: &EnhanceConfig, latest_s: f64) {
     let found = detections(&enhance(config, &data.samples));

@@ -14,7 +14,7 @@ pub struct State {
 }
 
 pub fn states() -> Vec<State> {
-    let text = include_str!("../../reference/states.csv");
+    let text = include_str!("../../../reference/states.csv");
     let states: Vec<State> = text
         .lines()
         .map(|line| {

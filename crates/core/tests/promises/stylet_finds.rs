@@ -1,12 +1,10 @@
 //! What `algorithm: Stylet` promises on simulated insertions: every rupture within a few samples and nothing else, with loud noise, rippled speed
 //! and holds; stiffness, friction and their intervals; friction taken away soon after a drop.
 
-mod support;
-
+use crate::support::{Insertion, constant, enhance, insertion, sinusoid};
 use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, LayerEstimate, Output, Sample};
 use stylet_tissue::{Rupture, Tissue};
-use support::{Insertion, constant, enhance, insertion, sinusoid};
 
 fn stylet() -> EnhanceConfig {
     EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }

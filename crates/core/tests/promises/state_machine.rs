@@ -1,13 +1,11 @@
 //! Promise: the table of transitions, from which the state machine is drawn, is what the core does: runs make
 //! no other transition, and every one of the table is made, for the reason that it gives.
 
-mod support;
-
+use crate::support::{constant, enhance, insertion, sinusoid};
 use std::collections::BTreeSet;
 use stylet_core::config::{Depths, Model};
 use stylet_core::{Cause, EnhanceConfig, Output, State, TRANSITIONS, Trigger};
 use stylet_tissue::Tissue;
-use support::{constant, enhance, insertion, sinusoid};
 
 fn number(state: State) -> usize {
     State::ALL.iter().position(|s| *s == state).expect("a state")

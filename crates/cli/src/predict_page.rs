@@ -1,0 +1,147 @@
+//! The page of a prediction.
+
+use crate::args::PredictArgs;
+use crate::predict::sentence;
+use stylet_api::Foretold;
+use stylet_diagnose::predict::{Predicted, Shown};
+use stylet_report::{
+    Block, Cell, Chart, Colour, Level, LineStyle, MarkerSet, Page, Scorecard, Section, Series, Side, Status,
+    Table, Text, Tile, significant,
+};
+use stylet_scenario::Scenario;
+
+/// Recordings that are drawn.
+const DRAWN: usize = 12;
+
+/// The page.
+pub fn page(model: &Scenario, args: &PredictArgs, found: &Foretold) -> Page {
+    let p = &found.prediction;
+    let mut page = Page::new(format!("Prediction: {}", model.name))
+        .subtitle(sentence(p))
+        .fact("model", args.model.display().to_string())
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(overview(found));
+    let mut section = Section::new("Predicted and measured");
+    for (r, shown) in p.recordings.iter().zip(&found.shown).take(DRAWN) {
+        section = section.chart(force(r, shown)).chart(residual(r, shown, p.floor_n));
+    }
+    if p.recordings.len() > DRAWN {
+        section = section.text(format!("The other {} are in the table alone.", p.recordings.len() - DRAWN));
+    }
+    page = page.section(section);
+    page
+}
+
+fn overview(found: &Foretold) -> Section {
+    let p = &found.prediction;
+    let mut tiles = vec![
+        Tile::new(
+            "Left of the force",
+            format!("{} N", significant(p.rmse_n, 3)),
+            format!("root mean square; the noise is {} N", significant(p.floor_n, 3)),
+        )
+        .status(Status::at_most(p.rmse_n, 1.2 * p.floor_n, 2.0 * p.floor_n)),
+        Tile::new(
+            "In the band",
+            format!("{:.0} %", 100.0 * p.band_coverage),
+            format!("90 % would be right; it holds {}", p.band_holds.join(", ")),
+        )
+        .status(Status::at_most((p.band_coverage - 0.9).abs(), 0.06, 0.15)),
+    ];
+    if let Some(before) = p.believed_rmse_n {
+        tiles.push(Tile::new(
+            "Believed before",
+            format!("{} N", significant(before, 3)),
+            "left by the scenario that the diagnosis began with".to_owned(),
+        ));
+    }
+    let rows = p
+        .recordings
+        .iter()
+        .map(|r| {
+            let or_dash = |x: Option<String>| Cell::number(x.unwrap_or_else(|| "-".to_owned()));
+            vec![
+                Cell::text(r.name.clone()),
+                Cell::number(significant(r.rmse_n, 3)).status(Status::at_most(
+                    r.rmse_n,
+                    1.2 * p.floor_n,
+                    2.0 * p.floor_n,
+                )),
+                or_dash(r.believed_rmse_n.map(|x| significant(x, 3))),
+                Cell::number(format!("{:.0} %", 100.0 * r.band_coverage)),
+                Cell::number(significant(r.peak_error_n, 2)),
+                or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m))),
+                or_dash(r.friction_factor.map(|x| significant(x, 3))),
+            ]
+        })
+        .collect();
+    let mut section = Section::new("How good it is")
+        .block(Block::Scorecard(Scorecard { title: String::new(), tiles }))
+        .table(Table {
+            title: "Each recording".to_owned(),
+            groups: Vec::new(),
+            headers: [
+                "",
+                "left, N",
+                "left by what was believed, N",
+                "in the band",
+                "largest force: measured less predicted, N",
+                "surface",
+                "friction",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
+            rows,
+        });
+    if !p.held_out {
+        let said = "Surface or friction were fitted to the recording that they predict: what is left is less than for the next one. \
+                    Two or more recordings are each predicted by what the others say.";
+        section =
+            section.block(Block::Text(Text { paragraphs: vec![said.to_owned()], status: Status::Warn }));
+    }
+    section
+}
+
+fn force(r: &Predicted, s: &Shown) -> Chart {
+    let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, s.time_s.clone(), y.to_vec());
+    let ruptures = MarkerSet {
+        name: "predicted ruptures".to_owned(),
+        colour: Colour::Grey,
+        style: LineStyle::Dashed,
+        side: Side::Right,
+        marks: s.ruptures_s.iter().enumerate().map(|(k, t)| (*t, format!("layer {}", k + 1))).collect(),
+    };
+    let mut chart = Chart::new(r.name.clone(), "Time (s)", "Force (N)")
+        .caption(format!(
+            "Measured and predicted; {} N rms are left. Thin lines should hold 90 %; they hold {:.0} %.",
+            significant(r.rmse_n, 3),
+            100.0 * r.band_coverage
+        ))
+        .group(r.name.clone())
+        .height(320)
+        .with_series(line("measured", Colour::Grey, &s.measured_n).width(3.0));
+    if let Some(before) = &s.believed_n {
+        chart = chart.with_series(line("believed before", Colour::Vermillion, before).width(1.0));
+    }
+    chart
+        .with_series(line("predicted", Colour::Blue, &s.predicted_n).width(1.4))
+        .with_series(line("5 %", Colour::SkyBlue, &s.low_n).width(0.8).styled(LineStyle::Dashed))
+        .with_series(line("95 %", Colour::SkyBlue, &s.high_n).width(0.8).styled(LineStyle::Dashed))
+        .with_markers(ruptures)
+}
+
+fn residual(r: &Predicted, s: &Shown, floor_n: f64) -> Chart {
+    let left: Vec<f64> = s.measured_n.iter().zip(&s.predicted_n).map(|(y, f)| y - f).collect();
+    let level = |y: f64, label: &str| Level {
+        y,
+        label: label.to_owned(),
+        colour: Colour::Grey,
+        style: LineStyle::Dotted,
+    };
+    Chart::new(format!("{}: what is left", r.name), "Time (s)", "Left (N)")
+        .group(r.name.clone())
+        .height(200)
+        .with_series(Series::line("left", Colour::Blue, s.time_s.clone(), left).width(1.0))
+        .with_level(level(2.0 * floor_n, "twice the noise"))
+        .with_level(level(-2.0 * floor_n, ""))
+}

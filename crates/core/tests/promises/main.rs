@@ -1,0 +1,12 @@
+//! The promises of the online core, one file each; one program, because linking takes longer than testing.
+
+mod blocks;
+mod detection;
+mod estimation;
+mod not_a_rupture;
+mod paper_stays_bit_for_bit;
+mod robustness;
+mod state_machine;
+mod stylet_finds;
+mod stylet_holds;
+mod support;
