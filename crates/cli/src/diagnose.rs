@@ -20,8 +20,8 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
-    if args.repeats || stylet_repeats::dataset::is_dataset(&args.scenario)? {
-        return crate::repeats::diagnose(args);
+    if args.repeats || stylet_diagnose::set::dataset::is_dataset(&args.scenario)? {
+        return crate::sets::diagnose(args);
     }
     if args.data.is_empty() {
         return Err(Failure::Argument(

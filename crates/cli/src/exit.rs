@@ -60,7 +60,7 @@ pub enum Failure {
     Diagnose(#[from] stylet_diagnose::DiagnoseError),
     /// A data set cannot be used.
     #[error(transparent)]
-    Dataset(stylet_repeats::dataset::DatasetError),
+    Dataset(stylet_diagnose::set::dataset::DatasetError),
     /// An argument names what there is not.
     #[error("{0}")]
     Argument(String),
@@ -92,11 +92,11 @@ impl From<stylet_api::Error> for Failure {
     }
 }
 
-impl From<stylet_repeats::dataset::DatasetError> for Failure {
-    fn from(error: stylet_repeats::dataset::DatasetError) -> Self {
+impl From<stylet_diagnose::set::dataset::DatasetError> for Failure {
+    fn from(error: stylet_diagnose::set::dataset::DatasetError) -> Self {
         match error {
-            stylet_repeats::dataset::DatasetError::Input(error) => Self::Input(error),
-            stylet_repeats::dataset::DatasetError::Recording(error) => Self::Recording(error),
+            stylet_diagnose::set::dataset::DatasetError::Input(error) => Self::Input(error),
+            stylet_diagnose::set::dataset::DatasetError::Recording(error) => Self::Recording(error),
             other => Self::Dataset(other),
         }
     }

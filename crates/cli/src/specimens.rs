@@ -8,11 +8,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use stylet_diagnose::Diagnosis;
 use stylet_diagnose::outcome::{Cause, Estimate, Gain, LeftoverReport, NoiseReport, Quality, Verdict};
-use stylet_repeats::dataset::{Dataset, DatasetError};
-use stylet_repeats::events;
-use stylet_repeats::run::Run;
-use stylet_repeats::specimens::{Specimens, look};
-use stylet_repeats::stats::median;
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::dataset::{Dataset, DatasetError};
+use stylet_diagnose::set::specimens::{Specimens, look};
 use stylet_report::svg::{Bar, BarChart, FigureOptions, bar_chart};
 use stylet_report::{
     Block, Cell, Colour, Page, Scorecard, Section, SvgImage, Table, Text, Tile, significant,
@@ -26,7 +24,7 @@ struct Written<'a> {
 }
 
 /// The command, for a data set with `split_by`.
-pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Run]) -> Result<(), Failure> {
+pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Insertion]) -> Result<(), Failure> {
     let found = look(&set.tissue, runs).ok_or_else(|| {
         Failure::Dataset(DatasetError::TooLittle(
             "no specimen is indented and held for 3 s with 50 samples or more".to_owned(),
@@ -76,18 +74,13 @@ fn sentence(found: &Specimens) -> String {
     format!("The simulation lacks {} in {} specimens; {puncture}.", names.join(" and "), found.used)
 }
 
-fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
+fn diagnosis(found: &Specimens, runs: &[Insertion]) -> Diagnosis {
     let of = |effect: &str| {
         found
             .numbers
             .iter()
             .filter(|n| (effect == "stress_relaxation") == n.name.starts_with("terms."))
-            .map(|n| {
-                (
-                    n.name.trim_start_matches("layer.1.").to_owned(),
-                    Estimate { value: n.mean, low: n.low, high: n.high },
-                )
-            })
+            .map(|n| (n.name.clone(), Estimate { value: n.mean, low: n.low, high: n.high }))
             .collect()
     };
     let causes: Vec<Cause> = kept(found)
@@ -106,14 +99,13 @@ fn diagnosis(found: &Specimens, runs: &[Run]) -> Diagnosis {
         })
         .collect();
     let last = found.rungs.iter().rfind(|r| r.kept).map_or(0.0, |r| r.left_out_n);
-    let mut noises: Vec<f64> = runs.iter().map(|r| events::noise_n(&r.recording.force_n)).collect();
-    let noise = median(&mut noises);
+    let noise = stylet_stats::median_of(runs.iter().map(Insertion::noise_n));
     Diagnosis {
         traces: Vec::new(),
         verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
         causes,
         base_parameters: Vec::new(),
-        invisible: ["power_law_friction", "viscoelastic_presliding", "rate_dependent_puncture"]
+        invisible: ["power_law_friction", "shaft_slip", "rate_dependent_puncture"]
             .map(str::to_owned)
             .to_vec(),
         gain: Gain {

@@ -370,7 +370,7 @@ fn step(stage: &crate::select::Stage) -> EvidenceStep {
 }
 
 /// Causes that the raw numbers show.
-fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
+pub(crate) fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
     let mut causes = Vec::new();
     let mut add = |effect: AnyEffect, intervals: &[(f64, f64)]| {
         use stylet_tissue::Effect;

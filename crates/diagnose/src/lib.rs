@@ -42,6 +42,7 @@ pub mod propose;
 pub mod raw;
 pub mod rivals;
 pub mod select;
+pub mod set;
 pub mod small;
 pub mod varied;
 mod visible;

@@ -25,6 +25,7 @@ fn with(model: &Model, own_surface: bool, own_friction: bool) -> Model {
         *own = Own {
             surface_m: if own_surface { own.surface_m } else { 0.0 },
             friction: if own_friction { own.friction } else { 0.0 },
+            ..*own
         };
     }
     m

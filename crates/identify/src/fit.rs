@@ -151,7 +151,11 @@ impl Tangent {
         }
         let h = |r: usize| steps.get(r).copied().unwrap_or(steps[0]);
         // An effect may act from the first sample on.
-        let whole = matches!(n.role, Role::Effect { .. });
+        let whole = match n.role {
+            Role::Effect { .. } | Role::OwnEffect(_) => true,
+            Role::OwnFriction | Role::DayFriction(_) => model.has_friction_effects(),
+            _ => false,
+        };
         let replayed = |r: usize| match trails.get(r).and_then(Option::as_ref).filter(|_| !whole) {
             Some(trail) => trail.replay(&moved, data, r),
             None => replay(&moved, data, r),
@@ -274,6 +278,9 @@ fn event_rows(model: &Model, now: &Residuals, at: &Residuals) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// A spread between insertions is at least this share of the typical one: it is not known to be nothing.
+const LEAST_SPREAD: f64 = 0.1;
+
 /// How long a fit goes on.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -377,6 +384,16 @@ fn rescatter(model: &mut Model, at: &mut Residuals) {
     }
     if model.free.own_friction {
         friction = spread(&|r| model.own[r].friction, 1e-4);
+    }
+    if model.steady {
+        at.nats = nats(model, at);
+        return;
+    }
+    if model.free.own_effects {
+        for k in 0..model.differing().count() {
+            let least = LEAST_SPREAD * model.differing_said(k);
+            model.scatter.differing[k] = spread(&|r| model.own[r].differing[k], least);
+        }
     }
     (model.scatter.surface_m, model.scatter.friction) = (surface_m, friction);
     at.nats = nats(model, at);

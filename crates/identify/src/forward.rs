@@ -309,6 +309,8 @@ fn done_with(was: &Compiled, now: &Compiled) -> usize {
             || a.thickness_m != b.thickness_m
             || a.friction_ns_per_m2 != b.friction_ns_per_m2
             || a.gripped != b.gripped
+            // What clings to the shaft is dragged by the layer's own spring.
+            || (a.gripped > 0.0 && a != b)
     });
     if lasting || !now.law.keeps_place() { usize::MAX } else { last + 1 }
 }

@@ -12,7 +12,9 @@
 //! | [`forward`] | the law replayed with imposed ruptures, or its own |
 //! | [`events`] | the likelihood of a rupture: by force or by place |
 //! | [`noise`] | autoregressive noise per range of the force, whitening |
+//! | [`discrepancy`](mod@discrepancy) | what an unfinished law leaves, as noise |
 //! | [`objective`], [`fit`], [`retime`] | the likelihood, its optimum, instants moved |
+//! | [`phases`] | advance, hold and way back; sudden falls and releases in the raw force |
 //! | [`drops`], [`assign`] | drops of the force, and which layer each belongs to |
 //! | [`look`] | what every effect would gain, to first order |
 //! | [`linear`] | small dense algebra |
@@ -22,6 +24,7 @@
 pub mod assign;
 pub mod blocks;
 mod course;
+pub mod discrepancy;
 pub mod drops;
 pub mod events;
 pub mod fit;
@@ -32,6 +35,7 @@ pub mod model;
 pub mod motion;
 pub mod noise;
 pub mod objective;
+pub mod phases;
 pub mod retime;
 pub mod settle;
 pub mod velocity;

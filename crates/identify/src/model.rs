@@ -59,7 +59,16 @@ pub struct Free {
     pub own_surface: bool,
     /// Friction of each recording's own.
     pub own_friction: bool,
+    /// Of each recording's own what effects say differs between insertions ([`stylet_tissue::ParameterInfo::differs`]).
+    pub own_effects: bool,
+    /// A surface of each day's own.
+    pub day_surface: bool,
+    /// Friction of each day's own.
+    pub day_friction: bool,
 }
+
+/// Most numbers of effects that differ between insertions in one model.
+pub const DIFFERING: usize = 8;
 
 /// Numbers of one recording's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -68,6 +77,28 @@ pub struct Own {
     pub surface_m: f64,
     /// Natural logarithm of the factor on friction.
     pub friction: f64,
+    /// What effects say differs between insertions, beyond the common value, in the order of [`Model::differing`].
+    pub differing: [f64; 8],
+}
+
+/// Numbers of one day's own: of recordings that were made with one set-up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Day {
+    /// Position of the surface beyond the common one, in m.
+    pub surface_m: f64,
+    /// Natural logarithm of the factor on friction.
+    pub friction: f64,
+}
+
+/// A number of an effect that is not fitted by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bound {
+    /// Which effect of the model.
+    pub effect: usize,
+    /// Which of its parameters.
+    pub parameter: usize,
+    /// The effect whose same parameter it always equals; none: it stays as it is.
+    pub like: Option<usize>,
 }
 
 /// How much insertions differ from one another, beyond the law: estimated with each model.
@@ -81,12 +112,26 @@ pub struct Scatter {
     pub surface_m: f64,
     /// Standard deviation of the logarithm of friction.
     pub friction: f64,
+    /// Standard deviations of what differs by effects, in the order of [`Model::differing`]; zero: as the library says.
+    pub differing: [f64; 8],
+    /// Standard deviation of the surface between days, in m.
+    pub day_surface_m: f64,
+    /// Standard deviation of the logarithm of friction between days.
+    pub day_friction: f64,
 }
 
 impl Default for Scatter {
-    /// None, and for the numbers of a recording's own wide first guesses.
+    /// None, and for the numbers of a recording's or day's own wide first guesses.
     fn default() -> Self {
-        Self { force: 0.0, place_m: 0.0, surface_m: 1e-3, friction: 0.05 }
+        Self {
+            force: 0.0,
+            place_m: 0.0,
+            surface_m: 1e-3,
+            friction: 0.05,
+            differing: [0.0; 8],
+            day_surface_m: 1e-3,
+            day_friction: 0.1,
+        }
     }
 }
 
@@ -114,6 +159,12 @@ pub enum Role {
     OwnSurface,
     /// Friction of each recording's own.
     OwnFriction,
+    /// One of the numbers that differ between insertions ([`Model::differing`]).
+    OwnEffect(usize),
+    /// Surface of a day.
+    DaySurface(usize),
+    /// Friction of a day.
+    DayFriction(usize),
     /// The instant of a layer's rupture (0-based), one number per recording.
     Instant(usize),
 }
@@ -122,7 +173,7 @@ impl Role {
     /// Whether every recording has such a number of its own.
     #[must_use]
     pub fn is_own(self) -> bool {
-        matches!(self, Role::OwnSurface | Role::OwnFriction | Role::Instant(_))
+        matches!(self, Role::OwnSurface | Role::OwnFriction | Role::OwnEffect(_) | Role::Instant(_))
     }
 }
 
@@ -160,6 +211,14 @@ pub struct Model {
     pub scatter: Scatter,
     /// Instants (s) at which the recorded force shows the rupture of each layer, per recording.
     pub instants: Vec<Vec<f64>>,
+    /// Numbers of effects that are not fitted by themselves.
+    pub bound: Vec<Bound>,
+    /// Per recording the day on which it was made; empty: nobody asks.
+    pub day_of: Vec<usize>,
+    /// Numbers of each day's own.
+    pub days: Vec<Day>,
+    /// Spreads between recordings and days stay as they are in a fit: somebody else tells them.
+    pub steady: bool,
 }
 
 /// A model ready to be replayed over one recording.
@@ -196,8 +255,38 @@ impl Model {
             own: vec![Own::default(); recordings],
             scatter: Scatter::default(),
             instants: vec![vec![NEVER; layers]; recordings],
+            bound: Vec::new(),
+            day_of: Vec::new(),
+            days: Vec::new(),
+            steady: false,
             belief,
         }
+    }
+
+    /// The same law for some of the recordings; days keep their numbers.
+    #[must_use]
+    pub fn only(&self, which: &[usize]) -> Self {
+        let mut model = self.clone();
+        model.own = which.iter().map(|r| self.own[*r]).collect();
+        model.instants = which.iter().map(|r| self.instants[*r].clone()).collect();
+        if !self.day_of.is_empty() {
+            model.day_of = which.iter().map(|r| self.day_of[*r]).collect();
+        }
+        model
+    }
+
+    /// The numbers that differ between insertions as their effects say: effect and parameter.
+    pub fn differing(&self) -> impl Iterator<Item = (usize, usize)> {
+        let all = self.effects.iter().enumerate().flat_map(|(effect, choice)| {
+            let own = choice.info.parameters.iter().enumerate().filter(|(_, p)| p.differs > 0.0);
+            own.map(move |(parameter, _)| (effect, parameter))
+        });
+        all.take(DIFFERING)
+    }
+
+    /// The day of a recording.
+    fn day(&self, recording: usize) -> Day {
+        self.day_of.get(recording).and_then(|d| self.days.get(*d)).copied().unwrap_or_default()
     }
 
     /// The same with one more effect.
@@ -213,6 +302,12 @@ impl Model {
     pub fn without(&self, effect: usize) -> Self {
         let mut model = self.clone();
         model.effects.remove(effect);
+        model.bound.retain(|b| b.effect != effect && b.like != Some(effect));
+        let down = |e: &mut usize| *e -= usize::from(*e > effect);
+        for b in &mut model.bound {
+            down(&mut b.effect);
+            b.like.as_mut().map(down);
+        }
         model
     }
 
@@ -226,16 +321,26 @@ impl Model {
     #[must_use]
     pub fn compile(&self, recording: usize) -> Option<Compiled> {
         let mut effects = self.belief.given.clone();
+        let own = self.own.get(recording).copied().unwrap_or_default();
+        let day = self.day(recording);
         for choice in &self.effects {
             effects.push(choice.effect()?);
         }
-        let own = self.own.get(recording).copied().unwrap_or_default();
-        let law = if own == Own::default() {
+        if self.free.own_effects {
+            let given = self.belief.given.len();
+            for ((effect, parameter), beyond) in self.differing().zip(own.differing) {
+                let mut choice = self.effects[effect].clone();
+                choice.values[parameter] += beyond;
+                effects[given + effect] = choice.effect()?;
+            }
+        }
+        let law = if own == Own::default() && day == Day::default() {
             Law::new(&self.tissue, &effects).ok()?
         } else {
             let mut tissue = self.tissue.clone();
-            tissue.surface_m += own.surface_m;
-            let factor = libm::exp(own.friction);
+            tissue.surface_m += own.surface_m + day.surface_m;
+            let factor = libm::exp(own.friction + day.friction);
+            effects.iter_mut().for_each(|e| e.rubbed(factor));
             tissue.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= factor);
             Law::new(&tissue, &effects).ok()?
         };
@@ -270,7 +375,7 @@ impl Model {
             let tolerance = b.tolerance[layer];
             let mut relative = |role, size: f64| {
                 if size > 0.0 {
-                    let (low, high) = (1.0 - tolerance, 1.0 + tolerance);
+                    let (low, high) = ((1.0 - tolerance).max(LEAST_SHARE), 1.0 + tolerance);
                     out.push(Number { role, low, high, mean: 1.0, sd: tolerance, step: 1e-5 });
                 }
             };
@@ -295,6 +400,9 @@ impl Model {
         for (effect, choice) in self.effects.iter().enumerate() {
             let at = choice.coordinates();
             for (parameter, p) in choice.info.parameters.iter().enumerate().filter(|(_, p)| !p.whole) {
+                if self.bound.iter().any(|b| b.effect == effect && b.parameter == parameter) {
+                    continue;
+                }
                 let role = Role::Effect { effect, parameter };
                 let (from, to) = p.search;
                 let (low, high, step) = match p.fit_scale() {
@@ -315,7 +423,42 @@ impl Model {
                 out.push(Number { role, low, high, mean: 0.0, sd: f64::INFINITY, step });
             }
         }
+        let mut of_day = |role, sd, step| {
+            let infinity = f64::INFINITY;
+            out.push(Number { role, low: -infinity, high: infinity, mean: 0.0, sd, step });
+        };
+        for day in 0..self.days.len() {
+            if self.free.day_surface {
+                of_day(Role::DaySurface(day), self.scatter.day_surface_m, 1e-7);
+            }
+            if self.free.day_friction {
+                of_day(Role::DayFriction(day), self.scatter.day_friction, 1e-5);
+            }
+        }
         out
+    }
+
+    /// Standard deviation of the `k`-th number that differs between insertions.
+    #[must_use]
+    pub fn differing_sd(&self, k: usize) -> f64 {
+        let known = self.scatter.differing.get(k).copied().unwrap_or(0.0);
+        if known > 0.0 { known } else { self.differing_said(k) }
+    }
+
+    /// The same as the library has it, before any data.
+    #[must_use]
+    pub fn differing_said(&self, k: usize) -> f64 {
+        self.differing().nth(k).map_or(1.0, |(e, p)| self.effects[e].info.parameters[p].differs)
+    }
+
+    /// Whether some effect acts along the shaft.
+    #[must_use]
+    pub fn has_friction_effects(&self) -> bool {
+        self.effects
+            .iter()
+            .filter_map(Choice::effect)
+            .chain(self.belief.given.iter().cloned())
+            .any(|e| e.place() == Place::Friction)
     }
 
     /// The numbers that each recording has of its own.
@@ -329,6 +472,12 @@ impl Model {
         }
         if self.free.own_friction {
             out.push(number(Role::OwnFriction, self.scatter.friction, 1e-5));
+        }
+        if self.free.own_effects {
+            for (k, (e, p)) in self.differing().enumerate() {
+                let step = 1e-3 * self.effects[e].info.parameters[p].differs;
+                out.push(number(Role::OwnEffect(k), self.differing_sd(k), step));
+            }
         }
         out.extend((0..self.layers()).map(|layer| number(Role::Instant(layer), infinity, 1e-5)));
         out
@@ -361,6 +510,9 @@ impl Model {
             }
             Role::OwnSurface => self.own[r].surface_m,
             Role::OwnFriction => self.own[r].friction,
+            Role::OwnEffect(k) => self.own[r].differing[k],
+            Role::DaySurface(d) => self.days[d].surface_m,
+            Role::DayFriction(d) => self.days[d].friction,
             Role::Instant(l) => self.instants[r][l],
         }
     }
@@ -397,9 +549,16 @@ impl Model {
                 if let Some(effect) = AnyEffect::from_coordinates(choice.info.id, &at) {
                     choice.values = effect.parameters();
                 }
+                let values = choice.values.clone();
+                for b in self.bound.iter().filter(|b| b.like == Some(effect)) {
+                    self.effects[b.effect].values[b.parameter] = values[b.parameter];
+                }
             }
             Role::OwnSurface => self.own[r].surface_m = x,
             Role::OwnFriction => self.own[r].friction = x,
+            Role::OwnEffect(k) => self.own[r].differing[k] = x,
+            Role::DaySurface(d) => self.days[d].surface_m = x,
+            Role::DayFriction(d) => self.days[d].friction = x,
             Role::Instant(l) => self.instants[r][l] = x,
         }
     }
@@ -411,5 +570,7 @@ impl Model {
     }
 }
 
+/// Smallest share of what is believed that a stiffness, friction or puncture force may have.
+const LEAST_SHARE: f64 = 0.02;
 /// How many standard deviations of their priors surface and thicknesses may go.
 const BEYOND: f64 = 2.0;

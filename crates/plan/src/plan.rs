@@ -228,7 +228,9 @@ fn intervals(ground: &Ground, before: &Shown, after: &Shown) -> Vec<Sharper> {
                         format!("{}.{}", e.info.id, e.info.parameters.get(parameter).map_or("", |p| p.path))
                     })
                 }
-                Role::OwnSurface | Role::OwnFriction | Role::Instant(_) => String::new(),
+                Role::DaySurface(day) => format!("day {} surface_m", day + 1),
+                Role::DayFriction(day) => format!("day {} friction", day + 1),
+                Role::OwnSurface | Role::OwnFriction | Role::OwnEffect(_) | Role::Instant(_) => String::new(),
             },
             before: Z95 * before,
             after: Z95 * after,

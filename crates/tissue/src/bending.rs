@@ -120,7 +120,7 @@ impl Law {
             if let Some(slab) = self.slabs.get(state.ruptured) {
                 elastic = match force {
                     Some(force) => force.elastic_n,
-                    None => self.elastic(slab, dt, z, &mut state.memory),
+                    None => self.elastic(state.ruptured, slab, dt, z, &mut state.memory),
                 };
                 if let Some(rupture) = self.give_way(state, slab, dt, (z, v), elastic, 0.0, breaking) {
                     let share = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
@@ -172,7 +172,7 @@ impl Law {
     fn trial(&self, state: &mut LawState, step: &Step, u: f64) -> TissueForce {
         let (z_m, v_mps) = step.tip(u);
         let elastic = match self.slabs.get(state.ruptured) {
-            Some(slab) => self.elastic(slab, step.dt, z_m, &mut state.memory),
+            Some(slab) => self.elastic(state.ruptured, slab, step.dt, z_m, &mut state.memory),
             None => 0.0,
         };
         self.sum_up(&state.moment(state.time_s + step.dt, z_m, v_mps), elastic, &mut state.memory)

@@ -127,6 +127,19 @@ pub trait Effect {
         threshold_n
     }
 
+    /// [`Place::Puncture`]: force in N at which layer `layer` (1-based) ruptures, given what it bore: told of its elastic force in
+    /// every step of `dt_s`.
+    fn endure(
+        &self,
+        _layer: usize,
+        _dt_s: f64,
+        _elastic_n: f64,
+        threshold_n: f64,
+        _memory: &mut Memory,
+    ) -> f64 {
+        threshold_n
+    }
+
     /// [`Place::Release`]: the part in N of the force released at a rupture that this effect keeps
     /// back for good; the release effects after it see what is left.
     fn withheld(&self, _released_n: f64) -> f64 {
@@ -156,6 +169,17 @@ pub trait Effect {
     /// [`Place::Friction`]: told of every rupture, with the layer (1-based) and the elastic force in N
     /// that the release effects did not keep back.
     fn on_layer_rupture(&self, _layer: usize, _released_n: f64, _memory: &mut Memory) {}
+
+    /// [`Place::Friction`]: the force in N that is left of the elastic force of layer `layer` (1-based) while it is pressed.
+    fn press(&self, _layer: usize, _dt_s: f64, elastic_n: f64, _memory: &mut Memory) -> f64 {
+        elastic_n
+    }
+
+    /// [`Place::Friction`]: the effect along a shaft that is `factor` times as rough; for effects whose strength no layer holds.
+    fn rubbed(&mut self, _factor: f64) {}
+
+    /// [`Place::Puncture`]: the effect in a layer (1-based) that is `factor` times as tough; for effects that hold a puncture force.
+    fn toughened(&mut self, _layer: usize, _factor: f64) {}
 
     /// [`Place::Friction`]: a force in N with which a punctured layer holds the shaft. `sliding_mps` is
     /// the velocity that friction feels at this tip velocity, all factors included.

@@ -88,6 +88,8 @@ pub struct ParameterInfo {
     pub log: bool,
     /// True when only whole numbers make sense.
     pub whole: bool,
+    /// Standard deviation with which it typically differs from one insertion to the next; zero for a number of the law.
+    pub differs: f64,
 }
 
 impl ParameterInfo {
@@ -116,6 +118,7 @@ impl ParameterInfo {
             search: (0.0, 1.0),
             log: false,
             whole: false,
+            differs: 0.0,
         }
     }
 
@@ -142,6 +145,11 @@ impl ParameterInfo {
     /// To be searched in the logarithm.
     pub(crate) const fn log(self) -> Self {
         Self { log: true, ..self }
+    }
+
+    /// Another value in every insertion, with this standard deviation.
+    pub(crate) const fn differs(self, sd: f64) -> Self {
+        Self { differs: sd, ..self }
     }
 
     /// Whole numbers only.
@@ -179,7 +187,15 @@ impl core::error::Error for ParameterError {}
 
 /// Effects that measured insertions asked for beyond the general library. They describe one layer at a
 /// time, so that a search over single effects has no use for them.
-const PER_LAYER: [&str; 3] = ["deep_indentation", "layer_stiffening", "viscoelastic_presliding"];
+const PER_LAYER: [&str; 7] = [
+    "deep_indentation",
+    "layer_coupling",
+    "layer_stiffening",
+    "let_go",
+    "delayed_puncture",
+    "viscoelastic_presliding",
+    "shaft_slip",
+];
 
 /// The general effects in the order of the chain, one entry per row of SPEC section 6.
 pub fn library() -> impl Iterator<Item = &'static EffectInfo> {

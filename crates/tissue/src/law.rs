@@ -89,7 +89,7 @@ impl Law {
         law.jumps = active.iter().any(|e| e.place() >= Place::Release);
         law.plain = active.is_empty()
             && law.needle_n_per_m == f64::INFINITY
-            && law.slabs.iter().all(|slab| slab.reach_m == 0.0 && slab.kappa_per_m == 0.0);
+            && law.slabs.iter().all(|slab| slab.is_plain());
         law.effects = active;
         Ok(law)
     }
@@ -296,7 +296,7 @@ impl Law {
     fn load(&self, state: &mut LawState, dt: f64, z: f64, v: f64, breaking: &mut impl Breaking) -> f64 {
         let mut done = 0.0; // share of the step that the ruptures so far have used up
         while let Some(slab) = self.slabs.get(state.ruptured) {
-            let elastic = self.elastic(slab, (1.0 - done) * dt, z, &mut state.memory);
+            let elastic = self.elastic(state.ruptured, slab, (1.0 - done) * dt, z, &mut state.memory);
             match self.give_way(state, slab, dt, (z, v), elastic, done, breaking) {
                 None => return elastic,
                 Some(rupture) => {
@@ -309,17 +309,20 @@ impl Law {
 
     /// Elastic force of a layer as the effects of shape and history leave it.
     #[inline]
-    pub(crate) fn elastic(&self, slab: &Slab, dt: f64, z: f64, memory: &mut Memories) -> f64 {
+    pub(crate) fn elastic(&self, index: usize, slab: &Slab, dt: f64, z: f64, memory: &mut Memories) -> f64 {
         let x = z - slab.front_m;
-        let x = if x > 0.0 { x } else { 0.0 };
+        let x = slab.indented_m(if x > 0.0 { x } else { 0.0 });
         let mut elastic = slab.stiffness_n_per_m * x;
-        if slab.kappa_per_m != 0.0 || !self.effects.is_empty() {
+        if slab.is_curved() || !self.effects.is_empty() {
             for effect in self.at(Place::Elastic) {
                 elastic = effect.elastic(slab.stiffness_n_per_m, x, elastic);
             }
-            elastic += slab.stiffness_n_per_m * x * slab.kappa_per_m * x;
+            elastic += slab.stiffness_n_per_m * x * slab.kappa_per_m * x + slab.curve_n_per_m2 * x * x;
             for (effect, memory) in self.remembering(Place::Relaxation, memory) {
                 elastic = effect.relax(dt, elastic, memory);
+            }
+            for (effect, memory) in self.remembering(Place::Friction, memory) {
+                elastic = effect.press(index + 1, dt, elastic, memory);
             }
         }
         elastic
@@ -340,8 +343,10 @@ impl Law {
         breaking: &mut impl Breaking,
     ) -> Option<Rupture> {
         let mut threshold = slab.puncture_n;
-        for effect in self.at(Place::Puncture) {
+        let layer = state.ruptured + 1;
+        for (effect, memory) in self.remembering(Place::Puncture, &mut state.memory) {
             threshold = effect.puncture(threshold, v);
+            threshold = effect.endure(layer, (1.0 - done) * dt, elastic, threshold, memory);
         }
         let strain = Strain {
             layer: state.ruptured + 1,
@@ -432,18 +437,18 @@ impl Law {
     /// Friction along the shaft, tip effects, and the ground truth that goes with them.
     #[inline]
     pub(crate) fn sum_up(&self, moment: &Moment, elastic_n: f64, memory: &mut Memories) -> TissueForce {
-        let along = |slabs: &[Slab]| {
+        let along = |slabs: &[Slab], back_mps: f64| {
             let (mut sum, mut inside) = (0.0, 0.0);
             for slab in slabs {
-                let length = slab.inside_m(moment.z_m);
+                let length = slab.rubs_m(moment.z_m, back_mps);
                 inside += length;
                 sum += slab.friction_ns_per_m2 * length * (1.0 - slab.gripped);
             }
             (sum, inside)
         };
         let (behind, ahead) = self.slabs.split_at(moment.ruptured.min(self.slabs.len()));
-        let (mut cumulative, passed) = along(behind);
-        let (mut local, active) = along(ahead);
+        let (mut cumulative, passed) = along(behind, moment.v_mps);
+        let (mut local, active) = along(ahead, 0.0);
         let inside = passed + active;
         let mut velocity = moment.v_mps;
         let mut tip_extra_n = 0.0;

@@ -22,9 +22,28 @@ pub struct Slab {
     pub kappa_per_m: f64,
     /// Share of the friction that effects have taken over from `b_i l_i v`, 0 to 1.
     pub gripped: f64,
+    /// Curvature of this layer alone in N/m²: `b_i x^2` is added to its elastic force.
+    pub curve_n_per_m2: f64,
+    /// Compliance in m/N of the ground that the layer presses into.
+    pub ground_m_per_n: f64,
+    /// Where the layer lets go of the shaft on the way back, in metres beyond its front face.
+    pub release_m: f64,
 }
 
 impl Slab {
+    /// Whether effects have left the layer as the base law has it.
+    #[must_use]
+    pub(crate) fn is_plain(&self) -> bool {
+        self.reach_m == 0.0 && !self.is_curved() && self.ground_m_per_n == 0.0 && self.release_m == 0.0
+    }
+
+    /// Whether the layer's own spring is curved.
+    #[must_use]
+    #[inline]
+    pub(crate) fn is_curved(&self) -> bool {
+        self.kappa_per_m != 0.0 || self.curve_n_per_m2 != 0.0
+    }
+
     /// Far face in metres.
     #[must_use]
     #[inline]
@@ -50,6 +69,28 @@ impl Slab {
         if inside < self.thickness_m { inside } else { self.thickness_m }
     }
 
+    /// How far in metres the layer itself is indented when the tip is `x_m` beyond its front face: less than that when
+    /// its ground gives.
+    #[must_use]
+    #[inline]
+    pub fn indented_m(&self, x_m: f64) -> f64 {
+        let c = self.ground_m_per_n;
+        if c == 0.0 {
+            return x_m;
+        }
+        let slope = 1.0 + c * self.stiffness_n_per_m;
+        let curve = c * (self.curve_n_per_m2 + self.stiffness_n_per_m * self.kappa_per_m);
+        // c b x'^2 + (1 + c K) x' = x, written so that it holds for b = 0.
+        2.0 * x_m / (slope + libm::sqrt((slope * slope + 4.0 * curve * x_m).max(0.0)))
+    }
+
+    /// Length of needle in metres that rubs against the layer once it has ruptured: nothing beyond where it lets go on the way back.
+    #[must_use]
+    #[inline]
+    pub fn rubs_m(&self, z_m: f64, v_mps: f64) -> f64 {
+        if v_mps < 0.0 && z_m < self.front_m + self.release_m { 0.0 } else { self.inside_m(z_m) }
+    }
+
     /// Places the layers of a tissue in space.
     #[must_use]
     pub fn stack(tissue: &Tissue) -> Vec<Slab> {
@@ -66,6 +107,9 @@ impl Slab {
                 reach_m: 0.0,
                 kappa_per_m: 0.0,
                 gripped: 0.0,
+                curve_n_per_m2: 0.0,
+                ground_m_per_n: 0.0,
+                release_m: 0.0,
             })
             .collect()
     }

@@ -28,7 +28,13 @@ fn in_hold_out() -> Vec<Sample> {
 
 #[test]
 fn neutral_effects_leave_the_base_law_bit_for_bit() {
-    let neutral: [AnyEffect; 4] = [
+    let neutral: [AnyEffect; 9] = [
+        ShaftSlip { exponent: 3.0, curve_n_per_m2: 1e5, fractions: [0.5, 0.1], ..ShaftSlip::default() }
+            .into(),
+        ShaftSlip { layer: 9, push_n: 2.0, pull_n: 1.0, ..ShaftSlip::default() }.into(), // there is no such layer
+        DelayedPuncture { layer: 2, force_n: f64::INFINITY, exponent: 3.0 }.into(),
+        LayerCoupling { layer: 1, compliance_m_per_n: 0.0 }.into(),
+        LetGo { layer: 1, depth_m: 0.0 }.into(),
         DeepIndentation { reach_m: 0.0 }.into(),
         LayerStiffening { layer: 2, kappa_per_m: 0.0 }.into(),
         holds(0.0, 0.005, 2.0),

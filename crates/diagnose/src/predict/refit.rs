@@ -44,6 +44,7 @@ pub fn own(model: &Model, data: &Data, refit: &[Refit]) -> Option<Vec<Own>> {
         thickness: false,
         own_surface: refit.contains(&Refit::Surface),
         own_friction: refit.contains(&Refit::Friction),
+        ..Free::default()
     };
     (model.scatter.surface_m, model.scatter.friction) = (WIDE_M, WIDE);
     let noise_n = roughness(&data.blocks);
@@ -66,5 +67,9 @@ pub fn lent(own: &[Own], r: usize) -> Own {
         sum.friction += o.friction;
         n += 1.0;
     }
-    Own { surface_m: sum.surface_m / f64::max(n, 1.0), friction: sum.friction / f64::max(n, 1.0) }
+    Own {
+        surface_m: sum.surface_m / f64::max(n, 1.0),
+        friction: sum.friction / f64::max(n, 1.0),
+        ..Own::default()
+    }
 }

@@ -111,12 +111,14 @@ macro_rules! effects {
             fn elastic(k_n_per_m: f64, x_m: f64, force_n: f64) -> f64;
             fn relax(dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64;
             fn puncture(threshold_n: f64, v_mps: f64) -> f64;
+            fn endure(layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, memory: &mut Memory) -> f64;
             fn withheld(released_n: f64) -> f64;
             fn on_rupture(released_n: f64, z_m: f64, memory: &mut Memory) -> ();
             fn friction_velocity(v_mps: f64) -> f64;
             fn friction_factor(v_mps: f64) -> f64;
             fn shaft_force(moment: &Moment, inside_m: f64, memory: &mut Memory) -> f64;
             fn on_layer_rupture(layer: usize, released_n: f64, memory: &mut Memory) -> ();
+            fn press(layer: usize, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64;
             fn grip(moment: &Moment, slabs: &[Slab], sliding_mps: f64, memory: &mut Memory) -> f64;
             fn breaks(z_m: f64, slabs: &[Slab], memory: &mut Memory) -> bool;
             fn tip_force(moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64;
@@ -133,6 +135,15 @@ macro_rules! effects {
     (@delegate $names:tt $(fn $hook:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
         impl Effect for AnyEffect {
             $(effects!(@hook $names $hook [$($argument: $type),*] ($($argument),*) $result);)*
+            effects!(@rubbed $names);
+        }
+    };
+    (@rubbed [$($name:ident)*]) => {
+        fn rubbed(&mut self, factor: f64) {
+            match self { $(Self::$name(effect) => effect.rubbed(factor),)* }
+        }
+        fn toughened(&mut self, layer: usize, factor: f64) {
+            match self { $(Self::$name(effect) => effect.toughened(layer, factor),)* }
         }
     };
     (@hook [$($name:ident)*] $hook:ident [$($parameters:tt)*] $call:tt $result:ty) => {
@@ -146,12 +157,15 @@ macro_rules! effects {
 effects! {
     boundary_shift::BoundaryShift,
     deep_indentation::DeepIndentation,
+    layer_coupling::LayerCoupling,
     layer_stiffening::LayerStiffening,
+    let_go::LetGo,
     respiration::Respiration,
     needle_compliance::NeedleCompliance,
     nonlinear_elasticity::NonlinearElasticity,
     stress_relaxation::StressRelaxation,
     rate_dependent_puncture::RateDependentPuncture,
+    delayed_puncture::DelayedPuncture,
     incomplete_release::IncompleteRelease,
     soft_boundary::SoftBoundary,
     power_law_friction::PowerLawFriction,
@@ -160,6 +174,7 @@ effects! {
     stribeck_friction::StribeckFriction,
     presliding_friction::PreslidingFriction,
     viscoelastic_presliding::ViscoelasticPresliding,
+    shaft_slip::ShaftSlip,
     cutting_force::CuttingForce,
     hidden_membrane::HiddenMembrane,
     tool_inertia::ToolInertia,

@@ -2,12 +2,12 @@
 //! buys, the extended law, and how well it predicts runs that took no part.
 
 use crate::args::DiagnoseArgs;
-use crate::repeats::{or_dash, sentence};
-use crate::repeats_online::{self, Online};
+use crate::set_online::{self, Online};
+use crate::sets::{or_dash, sentence};
 use std::fmt::Write as _;
-use stylet_repeats::dataset::Dataset;
-use stylet_repeats::run::Run;
-use stylet_repeats::study::Study;
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::dataset::Dataset;
+use stylet_diagnose::set::study::{Study, speeds};
 use stylet_report::svg::{Bar, BarChart, FigureOptions, bar_chart};
 use stylet_report::{
     Block, Cell, Chart, Code, Colour, Level, LineStyle, Page, Scorecard, Section, Series, Status, SvgImage,
@@ -15,7 +15,13 @@ use stylet_report::{
 };
 
 /// The page.
-pub fn page(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study, online: &[Online]) -> Page {
+pub fn page(
+    args: &DiagnoseArgs,
+    set: &Dataset,
+    runs: &[&Insertion],
+    study: &Study,
+    online: &[Online],
+) -> Page {
     let samples: usize = runs.iter().map(|r| r.recording.len()).sum();
     Page::new(format!("Diagnosis: {}", set.name))
         .subtitle(sentence(study))
@@ -29,7 +35,7 @@ pub fn page(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study, on
         .section(law(study))
         .section(residual(runs, study))
         .section(repeats(study))
-        .section(repeats_online::section(online))
+        .section(set_online::section(online))
         .section(instrument(study))
         .section(quality(study))
         .section(how(args, runs))
@@ -66,14 +72,15 @@ fn verdict(study: &Study) -> Section {
 
 fn bars(study: &Study) -> Vec<Bar> {
     let bar = |name: String, value: f64, colour| Bar { name, value, interval: None, colour };
-    let mut bars = vec![bar("base law".to_owned(), study.ladder.base_left_out_n, Colour::Vermillion)];
+    let mut bars = vec![bar("base law".to_owned(), study.laws.base.left_out_n(), Colour::Vermillion)];
     for b in &study.repeats.bought {
-        let name = format!("+ {}", b.step);
-        bars.push(bar(name, b.left_out_n, Colour::Blue));
+        let colour = if b.kept { Colour::Blue } else { Colour::Grey };
+        match b.without_n {
+            None => bars.push(bar(b.step.clone(), b.left_out_n, colour)),
+            Some(e) => bars.push(bar(format!("without {}", b.step), e, Colour::SkyBlue)),
+        }
     }
-    if let Some(last) = bars.last_mut().filter(|_| !study.repeats.bought.is_empty()) {
-        last.colour = Colour::Green;
-    }
+    bars.push(bar("the law".to_owned(), study.laws.best.left_out_n(), Colour::Green));
     if let Some(floor) = study.repeats.mean.floor_n {
         bars.push(bar("mean of the other runs".to_owned(), floor, Colour::Grey));
     }
@@ -92,68 +99,53 @@ pub fn gain_figure(study: &Study) -> String {
 }
 
 fn causes(study: &Study) -> Section {
-    let mut section = Section::new("The causes, in the order of what they buy").text(
-        "At each step every candidate was added to what stood, fitted together with everything else to all runs, and the one whose mean \
-         prediction was best was fitted again without each fifth of the runs; it was taken when those were predicted better by 1 %. In the end \
-         whatever could go without losing 2 % went. The bars show what stayed, from the base law on in the order of what each buys.",
-    );
-    section = section.block(Block::Svg(SvgImage {
-        description: "Error on runs left out after each step".to_owned(),
-        markup: gain_figure(study),
-    }));
     let rows = study
         .diagnosis
         .causes
         .iter()
         .map(|c| {
-            let without = study
-                .ladder
-                .without
-                .iter()
-                .filter(|(i, _)| i.id() == c.effect)
-                .map(|(_, e)| *e)
-                .fold(f64::NAN, f64::max);
             vec![
                 Cell::text(c.effect.clone()),
-                Cell::number(or_dash(Some(without))),
-                Cell::number(significant(c.gain_nats, 3)),
+                Cell::number(format!("{:.0} %", 100.0 * c.share)),
                 Cell::number(significant(c.confidence, 3)),
             ]
         })
         .collect();
-    section = section.table(Table {
-        title: "What the extended law would lose".to_owned(),
-        groups: Vec::new(),
-        headers: ["effect", "N on runs left out, without it", "nats when taken", "confidence"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows,
-    });
-    for step in &study.ladder.steps {
-        let rows = step
-            .tried
-            .iter()
-            .take(6)
-            .map(|t| {
-                vec![
-                    Cell::text(t.ingredient.label()),
-                    Cell::number(format!("{:.3}", t.error_n)),
-                    Cell::number(significant(t.nats, 3)),
-                ]
-            })
-            .collect();
-        let title = match step.taken {
-            Some(taken) => format!("Candidates when {} was taken", taken.label()),
-            None => "Candidates of which none was worth it".to_owned(),
-        };
-        section = section.table(Table {
-            title,
+    let parts = study
+        .repeats
+        .bought
+        .iter()
+        .filter_map(|b| {
+            let without = b.without_n?;
+            Some(vec![
+                Cell::text(b.step.clone()),
+                Cell::number(format!("{without:.3}")),
+                Cell::text(if b.kept { "kept" } else { "left out" }),
+            ])
+        })
+        .collect();
+    Section::new("The causes, and what each buys")
+        .text(
+            "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that cling to the shaft, \
+             slip, give way after a while and let go. The one that predicts thirds of the runs left out best was taken, the base law where the others are \
+             better by less than 2 %. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
+        )
+        .block(Block::Svg(SvgImage {
+            description: "Error on runs left out of every law, and without every part".to_owned(),
+            markup: gain_figure(study),
+        }))
+        .table(Table {
+            title: "Causes: what comes back of the base law's error without each, and how sure it is that new runs need it".to_owned(),
             groups: Vec::new(),
-            headers: ["", "mean prediction of the fitted runs, N", "nats"].map(str::to_owned).to_vec(),
+            headers: ["effect", "of the error", "confidence"].map(str::to_owned).to_vec(),
             rows,
-        });
-    }
-    section
+        })
+        .table(Table {
+            title: format!("Without a part of the law, N on thirds left out; with all of them {:.3}", study.laws.best.left_out_n()),
+            groups: Vec::new(),
+            headers: ["part", "without it, N", ""].map(str::to_owned).to_vec(),
+            rows: parts,
+        })
 }
 
 fn law(study: &Study) -> Section {
@@ -184,21 +176,23 @@ fn law(study: &Study) -> Section {
                 Cell::number(significant(b.assumed, 4)),
                 Cell::number(significant(b.value, 4)),
                 Cell::number(format!("{} to {}", significant(b.low, 3), significant(b.high, 3))),
+                Cell::text(if b.at_bound { "at its bound" } else { "" }),
             ]
         })
         .collect();
     Section::new("The extended law")
         .text("Values of the mean insertion; intervals of 95 % by the jackknife over runs, which counts what one law cannot say about all of them.")
         .block(Block::Code(Code { title: "equation".to_owned(), text, folded: false }))
+        .block(Block::Text(Text { paragraphs: study.diagnosis.advice.clone(), status: Status::Plain }))
         .table(Table {
             title: "Base parameters".to_owned(),
             groups: Vec::new(),
-            headers: ["", "parameter", "believed", "fitted", "95 % interval"].map(str::to_owned).to_vec(),
+            headers: ["", "parameter", "believed", "fitted", "95 % interval", ""].map(str::to_owned).to_vec(),
             rows,
         })
 }
 
-fn before_and_after(runs: &[&Run], study: &Study) -> Section {
+fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
     let r = &study.repeats;
     let rows = r
         .speeds
@@ -262,12 +256,12 @@ fn before_and_after(runs: &[&Run], study: &Study) -> Section {
         section = section.block(Block::Text(Text { paragraphs, status: Status::Plain }));
     }
     // The middle run of each speed: neither the best nor the worst.
-    let groups = stylet_repeats::gain::speeds(runs);
+    let groups = speeds(runs);
     for (v, members) in groups {
         let mut order = members.clone();
         order.sort_by(|a, b| r.runs[*a].extended_n.total_cmp(&r.runs[*b].extended_n));
         let i = order[order.len() / 2];
-        let (run, p) = (runs[i], &study.predictions[i]);
+        let (run, p) = (runs[i], &&study.out[i].prediction);
         let t = &run.recording.time_s;
         let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, t.clone(), y.to_vec());
         section = section.chart(
@@ -278,7 +272,7 @@ fn before_and_after(runs: &[&Run], study: &Study) -> Section {
                 ))
                 .height(320)
                 .with_series(line("measured", Colour::Grey, &run.recording.force_n).width(3.0))
-                .with_series(line("base law", Colour::Vermillion, &study.base_predictions[i].mean).width(1.1))
+                .with_series(line("base law", Colour::Vermillion, &study.base_out[i].prediction.mean).width(1.1))
                 .with_series(line("extended law", Colour::Blue, &p.mean).width(1.5))
                 .with_series(line("5 %", Colour::SkyBlue, &p.low).width(0.8).styled(LineStyle::Dashed))
                 .with_series(line("95 %", Colour::SkyBlue, &p.high).width(0.8).styled(LineStyle::Dashed)),
@@ -287,7 +281,7 @@ fn before_and_after(runs: &[&Run], study: &Study) -> Section {
     section
 }
 
-fn residual(runs: &[&Run], study: &Study) -> Section {
+fn residual(runs: &[&Insertion], study: &Study) -> Section {
     let zero = || Level { y: 0.0, label: String::new(), colour: Colour::Grey, style: LineStyle::Solid };
     let mut section = Section::new("What remains").text(format!(
         "Measured less predicted force of runs left out, averaged in 60 pieces of depth. The residual that all fitted runs have in common depends on {} \
@@ -297,18 +291,17 @@ fn residual(runs: &[&Run], study: &Study) -> Section {
     ));
     for (title, back) in [("Residual on the way in", false), ("Residual on the way back", true)] {
         let mut chart = Chart::new(title, "Depth (mm)", "Residual (N)").height(280).with_level(zero());
-        for (name, colour, predictions) in [
-            ("base law", Colour::Vermillion, &study.base_predictions),
-            ("extended law", Colour::Blue, &study.predictions),
-        ] {
+        for (name, colour, predictions) in
+            [("base law", Colour::Vermillion, &study.base_out), ("extended law", Colour::Blue, &study.out)]
+        {
             let (mut x, mut y) = (Vec::new(), Vec::new());
-            for (run, p) in runs.iter().zip(predictions) {
+            for (run, p) in runs.iter().zip(predictions).map(|(run, out)| (run, &out.prediction)) {
                 let r = &run.recording;
                 for i in 0..r.len() {
                     let here = if back { i >= run.phases.back } else { i <= run.phases.deepest };
                     if here {
                         x.push(1e3 * r.position_m[i]);
-                        y.push(r.force_n[i] - p.mean[i]);
+                        y.push(r.force_n[i] - p.mean.get(i).copied().unwrap_or(f64::NAN));
                     }
                 }
             }
@@ -347,27 +340,48 @@ fn repeats(study: &Study) -> Section {
             ]
         })
         .collect();
+    let p = &r.population;
     let mut text = vec![format!(
-        "From run to run the surface shifts by {:.2} mm and friction varies by {:.1} % (standard deviations).",
-        1e3 * r.population.shift_sd_m,
-        100.0 * r.population.friction_sd
+        "From run to run the surface shifts by {:.2} mm, friction varies by {:.1} % and what a layer bears by {:.1} %; from day to day (a speed, a \
+         stroke) the surface by {:.2} mm and friction by {:.1} % (standard deviations).",
+        1e3 * p.surface_m,
+        100.0 * p.friction,
+        100.0 * p.puncture,
+        1e3 * p.day_surface_m,
+        100.0 * p.day_friction
     )];
-    for (i, layer) in r.population.layers.iter().enumerate() {
-        let puncture = layer.puncture_log.map_or("no run shows its puncture".to_owned(), |p| {
-            format!("punctured at {:.2} N, give or take {:.0} %", p.exp(), 100.0 * layer.puncture_sd)
-        });
-        let release = layer.release_m.map_or(String::new(), |z| {
-            format!("; lets go at {:.2} mm, give or take {:.2} mm", 1e3 * z, 1e3 * layer.release_sd_m)
+    for (i, drops) in p.drops.iter().enumerate() {
+        let release = p.lets_go_m.get(i).copied().flatten().map_or(String::new(), |(z, sd)| {
+            format!("; lets go at {:.2} mm, give or take {:.2} mm", 1e3 * z, 1e3 * sd)
         });
         text.push(format!(
-            "Layer {}: {puncture}, with a drop in {} of {} runs{release}.",
+            "Layer {}: its rupture is a drop in {drops} of {} runs{release}.",
             i + 1,
-            layer.drops.0,
-            layer.drops.1
+            r.runs.len()
         ));
     }
+    if r.starts.0 > 1 {
+        text.push(format!("The fit was begun {} times; {} starts agree.", r.starts.0, r.starts.1));
+    }
+    let by_part = r
+        .parts_of_insertion
+        .iter()
+        .map(|p| {
+            vec![
+                Cell::text(p.part),
+                Cell::number(or_dash(p.floor_n)),
+                Cell::number(format!("{:.3}", p.extended_n)),
+            ]
+        })
+        .collect();
     Section::new("What varies from run to run")
         .block(Block::Text(Text { paragraphs: text, status: Status::Plain }))
+        .table(Table {
+            title: "By part of an insertion, on runs left out (N rms)".to_owned(),
+            groups: Vec::new(),
+            headers: ["", "mean of the others", "extended law"].map(str::to_owned).to_vec(),
+            rows: by_part,
+        })
         .table(Table {
             title: "Runs".to_owned(),
             groups: Vec::new(),
@@ -391,29 +405,27 @@ fn repeats(study: &Study) -> Section {
 
 fn instrument(study: &Study) -> Section {
     let i = &study.repeats.instrument;
-    let rows = i
-        .excluded
-        .iter()
-        .map(|e| {
-            vec![
-                Cell::text(e.effect.clone()),
-                Cell::number(format!("{:.1} mN", 1e3 * e.size_n)),
-                Cell::text(e.evidence.clone()),
-            ]
-        })
-        .collect::<Vec<_>>();
-    if rows.is_empty() {
-        return Section::new("The instrument")
-            .text("No recording in air and no known load: nothing of the sensor can be excluded.");
+    let row = |effect: &str, size_n: f64, evidence: &str| {
+        vec![Cell::text(effect), Cell::number(format!("{:.1} mN", 1e3 * size_n)), Cell::text(evidence)]
+    };
+    let excluded: Vec<_> = i.excluded.iter().map(|e| row(&e.effect, e.size_n, &e.evidence)).collect();
+    let shown: Vec<_> = i.shown.iter().map(|e| row(&e.effect, e.size_n, &e.evidence)).collect();
+    let mut section = Section::new("The instrument");
+    if excluded.is_empty() && shown.is_empty() {
+        return section.text("No recording in air and no known load: nothing of the sensor can be excluded.");
     }
-    Section::new("The instrument")
-        .text("A motion in air and a known load were recorded with the same sensor; what they exclude was not searched for in the insertions.")
-        .table(Table {
-            title: "Excluded as causes".to_owned(),
-            groups: Vec::new(),
-            headers: ["effect", "at most", "evidence"].map(str::to_owned).to_vec(),
-            rows,
-        })
+    section = section.text("A motion in air and a known load were recorded with the same sensor.");
+    for (title, rows) in [("Shown: a cause", shown), ("Excluded as causes", excluded)] {
+        if !rows.is_empty() {
+            section = section.table(Table {
+                title: title.to_owned(),
+                groups: Vec::new(),
+                headers: ["effect", "force here", "evidence"].map(str::to_owned).to_vec(),
+                rows,
+            });
+        }
+    }
+    section
 }
 
 fn quality(study: &Study) -> Section {
@@ -431,7 +443,7 @@ fn quality(study: &Study) -> Section {
     })
 }
 
-fn how(args: &DiagnoseArgs, runs: &[&Run]) -> Section {
+fn how(args: &DiagnoseArgs, runs: &[&Insertion]) -> Section {
     let mut text = format!("stylet diagnose {}", args.scenario.display());
     if !args.data.is_empty() {
         let _ = write!(text, " --data ...  # {} recordings", runs.len());

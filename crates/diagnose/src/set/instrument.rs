@@ -1,12 +1,17 @@
 //! What the instrument does by itself: a motion in air and a known load show which effects of the sensor
 //! and the drive cannot explain a residual.
 
-use crate::stats::{mean_sd, median, rms};
+use crate::outcome::{Cause, Estimate};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use stylet_record::{DEFAULT_HALF_WIDTH_S, Recording};
+use stylet_stats::{mean, median, rms};
 
 /// Amplitudes (N) below this share of the residual to be explained explain nothing of it.
 pub const NOTHING: f64 = 0.2;
+
+/// Confidence in what a check of the instrument shows by itself.
+const SEEN: f64 = 0.99;
 
 /// What the instrument was seen to do.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -27,6 +32,37 @@ pub struct Instrument {
     pub gain: Option<f64>,
     /// Effects that this excludes, with what was found.
     pub excluded: Vec<Excluded>,
+    /// Effects that this shows.
+    #[serde(default)]
+    pub shown: Vec<Shown>,
+}
+
+/// An effect that the instrument's checks show.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Its parameters by their paths.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Largest force in N that it makes here.
+    pub size_n: f64,
+    /// What was found.
+    pub evidence: String,
+}
+
+impl Shown {
+    /// As a cause: it was seen without a law.
+    #[must_use]
+    pub fn cause(&self) -> Cause {
+        Cause {
+            effect: self.effect.clone(),
+            equivalent: Vec::new(),
+            confidence: SEEN,
+            parameters: self.parameters.clone(),
+            gain_nats: 0.0,
+            share: 0.0,
+        }
+    }
 }
 
 /// An effect that the instrument's checks exclude.
@@ -57,40 +93,61 @@ impl Instrument {
             let mut force = recording.force_n.clone();
             out.gain = Some(median(&mut force) / known - 1.0);
         }
-        let mut exclude = |effect: &str, size_n: Option<f64>, evidence: String| {
-            if let Some(size_n) = size_n.filter(|s| s.abs() < NOTHING * residual_n) {
-                out.excluded.push(Excluded { effect: effect.to_owned(), size_n: size_n.abs(), evidence });
+        let (mut excluded, mut shown) = (Vec::new(), Vec::new());
+        let mut judge = |effect: &str, size_n: Option<f64>, numbers: &[(&str, f64)], evidence: String| {
+            let Some(size_n) = size_n else { return };
+            let effect = effect.to_owned();
+            if size_n.abs() < NOTHING * residual_n {
+                excluded.push(Excluded { effect, size_n: size_n.abs(), evidence });
+            } else {
+                // What noise leaves open of a mean is far below what is worth a word.
+                let of = |value: f64| Estimate { value, low: value, high: value };
+                let parameters = numbers.iter().map(|(k, x)| ((*k).to_owned(), of(*x))).collect();
+                shown.push(Shown { effect, parameters, size_n: size_n.abs(), evidence });
             }
         };
         let mn = |x: Option<f64>| format!("{:.1} mN", 1e3 * x.unwrap_or(0.0));
         let gain = out.gain;
-        exclude(
+        judge(
             "force_gain",
             gain.map(|g| g * force_n),
+            &[("eps", gain.unwrap_or(0.0))],
             format!("a known load is measured {:+.2} % off", 100.0 * gain.unwrap_or(0.0)),
         );
-        exclude("force_bias", out.bias_n, format!("mean force in air {}", mn(out.bias_n)));
-        exclude("force_drift", out.drift_n, format!("change over the recording in air {}", mn(out.drift_n)));
-        exclude(
+        let bias = out.bias_n.unwrap_or(0.0);
+        judge(
+            "force_bias",
+            out.bias_n,
+            &[("force_n", bias)],
+            format!("mean force in air {}", mn(out.bias_n)),
+        );
+        let rate = out.drift_n.unwrap_or(0.0) / air.map_or(1.0, Recording::duration_s).max(1e-9);
+        judge(
+            "force_drift",
+            out.drift_n,
+            &[("rate_n_per_s", rate)],
+            format!("change over the recording in air {}", mn(out.drift_n)),
+        );
+        let (amplitude_n, hz) = out.line.unwrap_or((0.0, 0.0));
+        judge(
             "periodic_interference",
             out.line.map(|l| l.0),
-            format!(
-                "strongest line in air {} at {:.1} Hz",
-                mn(out.line.map(|l| l.0)),
-                out.line.map_or(0.0, |l| l.1)
-            ),
+            &[("amplitude_n", amplitude_n), ("frequency_hz", hz)],
+            format!("strongest line in air {} at {hz:.1} Hz", mn(Some(amplitude_n))),
         );
-        exclude(
+        judge(
             "drive_friction",
             out.drive_n,
+            &[("force_n", out.drive_n.unwrap_or(0.0))],
             format!("half the difference between in and out, in air, {}", mn(out.drive_n)),
         );
+        (out.excluded, out.shown) = (excluded, shown);
         out
     }
 
     fn in_air(&mut self, air: &Recording) {
         let (t, f) = (&air.time_s, &air.force_n);
-        let (mean, _) = mean_sd(f);
+        let mean = mean(f);
         self.bias_n = Some(mean);
         let middle = 0.5 * (t[0] + t[t.len() - 1]);
         let (tt, tf) = t.iter().zip(f).fold((0.0, 0.0), |(tt, tf), (t, f)| {
@@ -107,7 +164,7 @@ impl Instrument {
         let of = |sign: f64| {
             let moving: Vec<f64> =
                 air.velocity_mps.iter().zip(f).filter(|(v, _)| **v * sign > 2e-4).map(|(_, f)| *f).collect();
-            (moving.len() > 20).then(|| mean_sd(&moving).0)
+            (moving.len() > 20).then(|| stylet_stats::mean(&moving))
         };
         if let (Some(to), Some(fro)) = (of(1.0), of(-1.0)) {
             self.drive_n = Some(0.5 * (to - fro));

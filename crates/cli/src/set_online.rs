@@ -4,13 +4,12 @@
 use serde::Serialize;
 use std::fmt::Write as _;
 use stylet_core::EnhanceConfig;
-use stylet_repeats::events::{drops, phases};
-use stylet_repeats::forward;
-use stylet_repeats::run::Run;
-use stylet_repeats::stats::{mean_sd, rms};
-use stylet_repeats::study::Study;
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::population::friction;
+use stylet_diagnose::set::study::Study;
 use stylet_report::{Cell, Section, Table};
 use stylet_score::Trace;
+use stylet_stats::rms;
 
 /// A detection belongs to a drop that it follows by at most this (s).
 const LATEST_S: f64 = 1.0;
@@ -41,15 +40,15 @@ pub struct Online {
 }
 
 /// Runs the core over all runs.
-pub fn listen(runs: &[&Run], study: &Study) -> Vec<Online> {
+pub fn listen(runs: &[&Insertion], study: &Study) -> Vec<Online> {
     runs.iter().enumerate().map(|(i, run)| one(run, study, i)).collect()
 }
 
-fn one(run: &Run, study: &Study, i: usize) -> Online {
+fn one(run: &Insertion, study: &Study, i: usize) -> Online {
     let r = &run.recording;
     let trace = Trace::record(r, &r.force_n, &EnhanceConfig::paper(), 0.0, |_, _| {});
-    let phases = phases(r);
-    let seen = drops(r, &phases);
+    let phases = run.phases;
+    let seen = run.drops();
     let mut taken = vec![false; trace.detections.len()];
     let mut found = 0;
     for drop in &seen {
@@ -71,13 +70,9 @@ fn one(run: &Run, study: &Study, i: usize) -> Online {
         lost.filter(|(d, _)| d.time_s >= from && d.time_s < to).count()
     };
     // Causally: a layer counts as punctured from the sample at which the core says so.
-    let mut data = run.columns();
-    let layers = data.ruptures.len();
-    data.ruptures = (0..layers)
-        .map(|k| trace.detections.get(k).and_then(|d| r.time_s.iter().position(|t| *t >= d.time_s)))
-        .collect();
-    let (fit, population) = &study.left_out[i];
-    let friction = forward::friction(&fit.shape, &fit.x, &population.mean(), &data);
+    let instants: Vec<f64> = trace.detections.iter().map(|d| d.time_s).collect();
+    let population = study.out.get(i).and_then(|o| o.population.as_ref());
+    let friction = population.and_then(|p| friction(p, r, &instants));
     let inside: Vec<usize> = (phases.back..r.len()).filter(|i| r.position_m[*i] > run.contact_m).collect();
     let of = |what: &dyn Fn(usize) -> f64| rms(&inside.iter().map(|i| what(*i)).collect::<Vec<_>>());
     Online {
@@ -99,7 +94,7 @@ fn sums(all: &[Online]) -> [usize; 5] {
 }
 
 fn mean(all: &[Online], what: impl Fn(&Online) -> f64) -> f64 {
-    mean_sd(&all.iter().map(what).collect::<Vec<_>>()).0
+    stylet_stats::mean(&all.iter().map(what).collect::<Vec<_>>())
 }
 
 /// For the terminal.

@@ -4,25 +4,29 @@ use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
 use crate::limits;
 use crate::output::Output;
-use crate::repeats_online;
-use crate::repeats_report;
+use crate::set_online;
+use crate::set_report;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
+use stylet_diagnose::outcome::{Diagnosis, Verdict};
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::compose::compose;
+use stylet_diagnose::set::dataset::{Dataset, DatasetError, find, is_dataset};
+use stylet_diagnose::set::instrument::Instrument;
+use stylet_diagnose::set::repeats::{Alone, Repeats};
+use stylet_diagnose::set::study::{Study, study};
 use stylet_record::{QualityKind, Recording, read_csv};
-use stylet_repeats::dataset::{Dataset, DatasetError, find, is_dataset};
-use stylet_repeats::instrument::Instrument;
-use stylet_repeats::run::Run;
-use stylet_repeats::study::{self, Study, Written};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
 /// `diagnosis.json`.
 #[derive(serde::Serialize)]
-struct WithOnline<'a> {
+struct Written<'a> {
     #[serde(flatten)]
-    written: Written<'a>,
-    online: &'a [repeats_online::Online],
+    diagnosis: &'a Diagnosis,
+    repeats: &'a Repeats,
+    online: &'a [set_online::Online],
 }
 
 /// Fewest recordings that can be told from a law.
@@ -58,9 +62,9 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let air = optional(&set, set.air.as_deref(), given)?;
     let load = optional(&set, set.load.as_ref().map(|l| l.file.as_str()), given)?;
     let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));
-    let refs: Vec<&Run> = runs.iter().collect();
+    let refs: Vec<&Insertion> = runs.iter().collect();
     let look = |force_n: f64, residual_n: f64| Instrument::look(air.as_ref(), known, force_n, residual_n);
-    let mut study = study::study(&set.name, &set.tissue, &refs, look, &mut say)
+    let mut study = study(&set.name, &set.tissue, &refs, look, &mut say)
         .ok_or_else(|| Failure::Internal("no law could be fitted to these recordings".to_owned()))?;
     if !set.parts.is_empty() {
         say("layers measured alone, put together");
@@ -69,13 +73,10 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     write(args, &set, &refs, &study)
 }
 
-fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Result<(), Failure> {
+fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Insertion], study: &Study) -> Result<(), Failure> {
     let internal = |e: &dyn std::fmt::Display| Failure::Internal(e.to_string());
-    let online = repeats_online::listen(runs, study);
-    let written = WithOnline {
-        written: Written { diagnosis: &study.diagnosis, repeats: &study.repeats },
-        online: &online,
-    };
+    let online = set_online::listen(runs, study);
+    let written = Written { diagnosis: &study.diagnosis, repeats: &study.repeats, online: &online };
     let mut json = serde_json::to_vec_pretty(&written).map_err(|e| internal(&e))?;
     json.push(b'\n');
     let ron = format!(
@@ -85,10 +86,10 @@ fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Re
         study.extended.to_ron().map_err(|e| internal(&e))?
     );
     let mut output = Output::default();
-    output.add("report.html", repeats_report::page(args, set, runs, study, &online).to_html());
+    output.add("report.html", set_report::page(args, set, runs, study, &online).to_html());
     output.add("diagnosis.json", json);
     output.add("extended.ron", ron);
-    output.add("gain.svg", repeats_report::gain_figure(study));
+    output.add("gain.svg", set_report::gain_figure(study));
     let folder = args.results.out.clone().unwrap_or_else(|| {
         let stem =
             args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
@@ -99,7 +100,7 @@ fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Run], study: &Study) -> Re
         crate::terminal::say(&format!(
             "{}{}\nReport: {}\n",
             summary(study),
-            repeats_online::summary(&online),
+            set_online::summary(&online),
             folder.join("report.html").display()
         ))?;
     }
@@ -169,8 +170,8 @@ fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Rec
     Ok(Some(read_csv(first, &set.options())?.0))
 }
 
-fn parts(set: &Dataset, study: &Study, whole: &[&Run], given: bool) -> Result<Option<study::Parts>, Failure> {
-    let mut alone: Vec<(String, Vec<Run>)> = Vec::new();
+fn parts(set: &Dataset, study: &Study, whole: &[&Insertion], given: bool) -> Result<Option<Alone>, Failure> {
+    let mut alone: Vec<(String, Vec<Insertion>)> = Vec::new();
     for layer in 1..=set.tissue.layers.len() {
         let Some(part) = set.parts.iter().find(|p| p.layer == layer) else { return Ok(None) };
         let mut files = Vec::new();
@@ -183,16 +184,24 @@ fn parts(set: &Dataset, study: &Study, whole: &[&Run], given: bool) -> Result<Op
         }
         alone.push((part.name.clone(), set.runs(&files, 1)?));
     }
-    Ok(study::compose(study, &set.tissue, &alone, whole))
+    Ok(compose(study.laws.best.kind, &set.tissue, &alone, whole))
 }
 
 /// The verdict in a sentence.
 pub fn sentence(study: &Study) -> String {
-    let names: Vec<&str> = study.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
-    if names.is_empty() {
-        return "The base law predicts new insertions as well as any extension of it.".to_owned();
+    let d = &study.diagnosis;
+    let names: Vec<&str> = d.causes.iter().map(|c| c.effect.as_str()).collect();
+    match (d.verdict, names.is_empty()) {
+        (Verdict::Unknown, true) => {
+            "The insertions hold structure that no effect of the library explains.".to_owned()
+        }
+        (Verdict::Unknown, false) => format!(
+            "The insertions hold structure that no effect of the library explains; beside it the simulation lacks {}.",
+            names.join(", ")
+        ),
+        (_, true) => "The base law predicts new insertions as well as any extension of it.".to_owned(),
+        (_, false) => format!("The simulation lacks {}.", names.join(", ")),
     }
-    format!("The simulation lacks {}.", names.join(", "))
 }
 
 /// Three digits, or a dash.
@@ -206,12 +215,20 @@ fn summary(study: &Study) -> String {
     let _ = writeln!(out, "{}\n", sentence(study));
     let _ = writeln!(
         out,
-        "  what each step buys (N on runs left out, five groups)\n    {:<40} {:.3}",
-        "base law", study.ladder.base_left_out_n
+        "  what each law and each part of the best one buys (N on a third of the runs left out)\n    {:<40} {:.3}",
+        "base law",
+        study.laws.base.left_out_n()
     );
     for b in &r.bought {
-        let without = b.without_n.map_or("-".to_owned(), |e| format!("{e:.3} without it"));
-        let _ = writeln!(out, "    + {:<38} {:.3}   ({without})", b.step, b.left_out_n);
+        let line = match b.without_n {
+            None => format!("{:<40} {:.3}", b.step, b.left_out_n),
+            Some(e) => format!(
+                "{:<40}       {e:.3} without it{}",
+                format!("  {}", b.step),
+                if b.kept { "" } else { ", so that it was left out" }
+            ),
+        };
+        let _ = writeln!(out, "    {line}");
     }
     for c in &d.causes {
         let _ = writeln!(out, "\n  {}", c.effect);
@@ -248,11 +265,31 @@ fn summary(study: &Study) -> String {
     let m = &r.mean;
     line("mean".to_owned(), r.runs.len(), m.floor_n, m.base_n, m.extended_n, m.covered, m.speed_left_out_n);
     let _ = writeln!(out, "  base law with a whole speed left out: {} N", or_dash(m.base_speed_left_out_n));
+    let _ = writeln!(
+        out,
+        "  the floor is the mean of the others, which scatters itself; without that: {} N",
+        or_dash(m.floor_bare_n)
+    );
+    if let Some(covered) = m.speed_covered {
+        let _ = writeln!(out, "  in the band of a speed that took no part: {:.1} %", 100.0 * covered);
+    }
+    for p in &r.parts_of_insertion {
+        let _ = writeln!(out, "  {:<28} {:.3} N, floor {}", p.part, p.extended_n, or_dash(p.floor_n));
+    }
+    if r.starts.0 > 1 {
+        let _ = writeln!(out, "  {} of {} starts of the fit agree", r.starts.1, r.starts.0);
+    }
+    for said in &d.advice {
+        let _ = writeln!(out, "  {said}");
+    }
     if let Some(parts) = &r.parts {
         for (name, floor, error) in &parts.alone {
             let _ = writeln!(out, "  {name}: {error:.3} N on runs left out, floor {}", or_dash(*floor));
         }
         let _ = writeln!(out, "  put together, on the whole: {:.3} N", parts.mean_n);
+    }
+    for e in &r.instrument.shown {
+        let _ = writeln!(out, "  shown by the instrument: {}: {}", e.effect, e.evidence);
     }
     for e in &r.instrument.excluded {
         let _ = writeln!(out, "  excluded: {}: {}", e.effect, e.evidence);

@@ -13,7 +13,7 @@
 //! File names are relative to the folder `STYLET_MEASURED`, by default `../shared/measured`; a `*` in the last part
 //! stands for anything.
 
-use crate::run::Run;
+use crate::set::first::Insertion;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use stylet_record::{
@@ -174,7 +174,7 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError`]; [`RecordError::Unusable`] names every recording from which nothing can be concluded. Of specimens in one file
     /// ([`Dataset::split_by`]), which share columns and sensor, those that are too short or never touched are left to the study.
-    pub fn runs(&self, files: &[PathBuf], layers: usize) -> Result<Vec<Run>, DatasetError> {
+    pub fn runs(&self, files: &[PathBuf], layers: usize) -> Result<Vec<Insertion>, DatasetError> {
         let mut read = Vec::with_capacity(files.len());
         for file in files {
             read.extend(self.read(file)?);
@@ -199,7 +199,7 @@ impl Dataset {
         }
         Ok(read
             .into_iter()
-            .map(|(name, recording, notes)| Run::new(name, recording, notes, layers))
+            .map(|(name, recording, notes)| Insertion { notes, ..Insertion::new(name, recording, layers) })
             .collect())
     }
 

@@ -1,0 +1,174 @@
+//! Sets of measured insertions on the one engine: what `docs/measured.md` says of it.
+//!
+//! ```sh
+//! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example measured_sets
+//! ```
+//! Files are `needle_phantom/{skin-on-muscle,skin,muscle}_*.csv` in that folder; names after `--` choose some of the three, `shifted` adds
+//! the stack with the runs of its second speed moved by 1.5 mm. Prints tables, writes nothing.
+
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use stylet_diagnose::raw::Raw;
+use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_out};
+use stylet_diagnose::set::{Insertion, first, fitted};
+use stylet_record::{ColumnMap, ReadOptions, read_csv_with_holes};
+use stylet_tissue::{Layer, Tissue};
+
+/// Starts of every fit.
+const STARTS: usize = 8;
+/// Seed of what they begin with.
+const SEED: u64 = 15;
+/// By how much the runs of one speed are moved, in m.
+const SHIFT_M: f64 = 1.5e-3;
+/// Columns of the recordings.
+const COLUMNS: &str =
+    r#"(time: (name: "time", scale: 1e-6), position: (name: "pz", scale: 1e-3), force: (name: "fz"))"#;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder =
+        std::env::var_os("STYLET_MEASURED").ok_or("set STYLET_MEASURED to the folder of recordings")?;
+    let folder = PathBuf::from(folder).join("needle_phantom");
+    let chosen: Vec<String> = std::env::args().skip(1).collect();
+    for (name, layers, shift_m) in
+        [("skin-on-muscle", 2, 0.0), ("skin", 1, 0.0), ("muscle", 1, 0.0), ("shifted", 2, SHIFT_M)]
+    {
+        if chosen.iter().any(|c| c == name) || (chosen.is_empty() && name != "shifted") {
+            let files = if name == "shifted" { "skin-on-muscle" } else { name };
+            study(name, &read(&folder, files, layers)?, layers, shift_m)?;
+        }
+    }
+    Ok(())
+}
+
+fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<Insertion>, Box<dyn Error>> {
+    let columns: ColumnMap = stylet_scenario::parse("columns", COLUMNS)?;
+    let options = ReadOptions { columns: Some(columns), ..ReadOptions::default() };
+    let start = format!("{name}_");
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)?.flatten().map(|e| e.path()).collect();
+    files.retain(|f| f.file_name().is_some_and(|n| n.to_string_lossy().starts_with(&start)));
+    files.sort();
+    let mut out = Vec::new();
+    for file in files {
+        let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        out.push(Insertion::new(name, read_csv_with_holes(&file, &options)?.0, layers));
+    }
+    Ok(out)
+}
+
+/// What one would guess before any insertion.
+fn believed(layers: usize) -> Tissue {
+    let layer = |thickness_m| Layer {
+        name: String::new(),
+        thickness_m,
+        stiffness_n_per_m: 300.0,
+        friction_ns_per_m2: 0.0,
+        puncture_n: Some(4.0),
+    };
+    let thick = if layers > 1 { vec![layer(0.011), layer(0.08)] } else { vec![layer(0.08)] };
+    Tissue { surface_m: 0.004, layers: thick }
+}
+
+fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(), Box<dyn Error>> {
+    let plain: Vec<&Insertion> = all.iter().collect();
+    let groups = first::groups(&plain);
+    let moved: Vec<Insertion> = all
+        .iter()
+        .enumerate()
+        .map(|(i, run)| {
+            let mut recording = run.recording.clone();
+            if shift_m != 0.0 && groups.get(1).is_some_and(|g| g.contains(&i)) {
+                recording.position_m.iter_mut().for_each(|z| *z += shift_m);
+            }
+            Insertion::new(run.name.clone(), recording, layers)
+        })
+        .collect();
+    let runs: Vec<&Insertion> = moved.iter().collect();
+    let began = Instant::now();
+    let fit = fitted::fitted(
+        &believed(layers),
+        &runs,
+        &Raw::default(),
+        STARTS,
+        &mut ChaCha8Rng::seed_from_u64(SEED),
+    );
+    let fit = fit.ok_or("no law could be fitted")?;
+    println!("\n# {name}: {} runs", runs.len());
+    println!(
+        "left by the fit {:.3} N; {} of {} starts agree; {:.1} s on the wall",
+        fit.rms_n(),
+        fit.starts.1,
+        fit.starts.0,
+        began.elapsed().as_secs_f64()
+    );
+    let model = &fit.fit.model;
+    println!("surface {:.2} mm", 1e3 * model.tissue.surface_m);
+    for (layer, choice) in model.tissue.layers.iter().zip(0..) {
+        println!(
+            "layer {}: {:.1} mm, {:.0} N/m",
+            choice + 1,
+            1e3 * layer.thickness_m,
+            layer.stiffness_n_per_m
+        );
+    }
+    for choice in &model.effects {
+        let numbers =
+            choice.info.parameters.iter().zip(&choice.values).map(|(p, v)| format!("{} {v:.4}", p.path));
+        println!("{}: {}", choice.info.id, numbers.collect::<Vec<_>>().join(", "));
+    }
+    let s = &model.scatter;
+    println!(
+        "between runs: surface {:.2} mm, friction {:.1} %, puncture {:.1} %; between days: surface {:.2} mm, friction {:.1} %",
+        1e3 * s.surface_m,
+        1e2 * s.friction,
+        1e2 * s.force,
+        1e3 * s.day_surface_m,
+        1e2 * s.day_friction
+    );
+    for (day, g) in model.days.iter().zip(&groups) {
+        let speed = 1e3 * runs[g[0]].speed_mps;
+        println!(
+            "day of {speed:.2} mm/s: surface {:+.2} mm, friction {:+.3}",
+            1e3 * day.surface_m,
+            day.friction
+        );
+    }
+    let (floors, one, day) = (floor(&runs), one_left_out(&fit, &runs), speeds_out(&fit, &runs));
+    println!("| mm/s | floor | floor, not inflated | left out | in band | speed left out | in band |");
+    let mean = |g: &[usize], f: &dyn Fn(usize) -> Option<f64>| {
+        let known: Vec<f64> = g.iter().filter_map(|i| f(*i)).collect();
+        if known.is_empty() {
+            "-".to_owned()
+        } else {
+            format!("{:.3}", known.iter().sum::<f64>() / known.len() as f64)
+        }
+    };
+    let line = |name: String, g: &[usize]| {
+        let inflated = |i: usize| floors[i].as_ref().map(|f| f.0.rmse_n);
+        let bare = |i: usize| floors[i].as_ref().map(|f| f.0.rmse_n * (f.1 as f64 / (f.1 + 1) as f64).sqrt());
+        println!(
+            "| {name} | {} | {} | {} | {} | {} | {} |",
+            mean(g, &inflated),
+            mean(g, &bare),
+            mean(g, &|i| Some(one[i].rmse_n)),
+            mean(g, &|i| Some(one[i].covered)),
+            mean(g, &|i| day.get(i).map(|s| s.rmse_n)),
+            mean(g, &|i| day.get(i).map(|s| s.covered))
+        );
+    };
+    for g in &groups {
+        line(format!("{:.2}", 1e3 * runs[g[0]].speed_mps), g);
+    }
+    line("all".to_owned(), &(0..runs.len()).collect::<Vec<_>>());
+    println!("| part | floor | left out | of the floor |");
+    let pooled = |scores: &mut dyn Iterator<Item = &Score>, k: usize| {
+        let (sum, n) = scores.fold((0.0, 0.0), |(s, n), x| (s + x.parts[k].0, n + x.parts[k].1));
+        (sum / f64::max(n, 1.0)).sqrt()
+    };
+    for (k, name) in PARTS.iter().enumerate() {
+        let (f, o) = (pooled(&mut floors.iter().flatten().map(|f| &f.0), k), pooled(&mut one.iter(), k));
+        println!("| {name} | {f:.3} | {o:.3} | {:.2} |", o / f.max(1e-9));
+    }
+    Ok(())
+}

@@ -1,0 +1,116 @@
+//! Layers measured alone, put together: does a layer behave alone as it does in a stack?
+
+use crate::raw::{self, Raw};
+use crate::set::first::{Insertion, plain};
+use crate::set::fitted::{Fitted, blocks, fitted, refitted};
+use crate::set::laws::{Kind, STARTS};
+use crate::set::left_out::{floor, one_left_out, score};
+use crate::set::population::{DRAWS, Population, predict};
+use crate::set::repeats::Alone;
+use crate::set::study::speeds;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use rayon::prelude::*;
+use std::sync::Arc;
+use stylet_identify::model::{Belief, Choice, Day, Model};
+use stylet_record::Recording;
+use stylet_tissue::Tissue;
+
+/// Seed of what the starts begin with.
+const SEED: u64 = 2;
+/// A layer is at least so thick, in m.
+const LEAST_M: f64 = 1e-3;
+
+/// Fits every layer alone with the kind of law that the whole needs, puts the laws together and predicts the whole.
+///
+/// `alone` holds per layer of the whole the runs of that layer alone. What belongs to no layer is taken from the first.
+#[must_use]
+pub fn compose(
+    kind: Kind,
+    believed: &Tissue,
+    alone: &[(String, Vec<Insertion>)],
+    whole: &[&Insertion],
+) -> Option<Alone> {
+    let mut told = Vec::new();
+    let mut fits = Vec::new();
+    for (i, (name, runs)) in alone.iter().enumerate() {
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let tissue = Tissue { surface_m: believed.front_m(i), layers: vec![believed.layers.get(i)?.clone()] };
+        let fit = by_itself(kind, &tissue, &runs)?;
+        let floors: Option<Vec<f64>> = floor(&runs).iter().map(|f| f.as_ref().map(|f| f.0.rmse_n)).collect();
+        let errors: Vec<f64> = one_left_out(&fit, &runs).iter().map(|s| s.rmse_n).collect();
+        told.push((name.clone(), floors.map(|f| stylet_stats::mean(&f)), stylet_stats::mean(&errors)));
+        fits.push((Population::of(&fit, &runs), fit));
+    }
+    let models: Vec<&Model> = fits.iter().map(|(_, f)| &f.fit.model).collect();
+    let population = Population { law: together(believed, &models)?, residual_n: fits.first()?.0.residual_n };
+    let errors: Vec<f64> =
+        whole.par_iter().map(|run| score(run, &predict(&population, run, None, DRAWS)).rmse_n).collect();
+    let of =
+        |members: &[usize]| members.iter().map(|i| errors[*i]).sum::<f64>() / members.len().max(1) as f64;
+    let composed_n: Vec<f64> = speeds(whole).iter().map(|(_, members)| of(members)).collect();
+    let mean_n = stylet_stats::mean(&composed_n);
+    Some(Alone { alone: told, composed_n, mean_n })
+}
+
+fn by_itself(kind: Kind, tissue: &Tissue, runs: &[&Insertion]) -> Option<Fitted> {
+    let recordings: Vec<&Recording> = runs.iter().map(|r| &r.recording).collect();
+    let notes: Vec<_> = runs.iter().map(|r| r.notes.clone()).collect();
+    let raw: Raw = raw::look(&recordings, &notes);
+    if kind == Kind::Slip {
+        return fitted(tissue, runs, &raw, STARTS, &mut ChaCha8Rng::seed_from_u64(SEED));
+    }
+    let mut model = Model::base(Arc::new(plain(tissue, runs)), runs.len());
+    (model.free.own_surface, model.free.own_friction) = (true, true);
+    model.instants = runs.iter().map(|r| r.ruptures_s.clone()).collect();
+    let drops = runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect());
+    refitted(&model, blocks(runs, &raw), drops.collect())
+}
+
+/// One model of the layers of several, each where it was found.
+fn together(believed: &Tissue, alone: &[&Model]) -> Option<Model> {
+    let first = *alone.first()?;
+    let mut model = first.only(&[]);
+    let mut tissue = Tissue { surface_m: first.tissue.surface_m, layers: Vec::new() };
+    model.effects.clear();
+    model.bound.clear();
+    let mut sds = [0.0; 8];
+    for (i, part) in alone.iter().enumerate() {
+        let mut layer = part.tissue.layers.first()?.clone();
+        layer.name.clone_from(&believed.layers.get(i)?.name);
+        if let Some(next) = alone.get(i + 1) {
+            layer.thickness_m = (next.tissue.surface_m - part.tissue.surface_m).max(LEAST_M);
+        }
+        tissue.layers.push(layer);
+        let differs: Vec<(usize, usize)> = part.differing().collect();
+        for (e, choice) in part.effects.iter().enumerate() {
+            let of_layer = choice.info.parameters.first().is_some_and(|p| p.path == "layer");
+            if !of_layer && i > 0 {
+                continue;
+            }
+            let mut values = choice.values.clone();
+            if of_layer {
+                values[0] = (i + 1) as f64;
+            }
+            model.effects.push(Choice::new(choice.info, &values));
+            for k in (0..differs.len()).filter(|k| differs[*k].0 == e) {
+                let place = model.differing().count();
+                if let Some(sd) = place.checked_sub(1).and_then(|p| sds.get_mut(p)) {
+                    *sd = part.differing_sd(k);
+                }
+            }
+        }
+    }
+    let layers = tissue.layers.len();
+    model.belief = Arc::new(Belief {
+        tissue: tissue.clone(),
+        given: Vec::new(),
+        tolerance: vec![first.belief.tolerance.first().copied().unwrap_or(1.0); layers],
+        thickness_tolerance: vec![0.0; layers],
+        surface_tolerance_m: first.belief.surface_tolerance_m,
+    });
+    model.tissue = tissue;
+    model.scatter.differing = sds;
+    model.days = Vec::<Day>::new();
+    model.day_of = Vec::new();
+    Some(model)
+}

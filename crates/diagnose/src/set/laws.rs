@@ -1,0 +1,331 @@
+//! Which law a set needs: the base law, what the library adds to it, or a shaft that slips; and what each part of it is worth on
+//! recordings left out.
+
+use crate::base::{Prepared, base};
+use crate::raw::Raw;
+use crate::select::Search;
+use crate::set::first::{Insertion, groups, plain};
+use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks, fitted, refitted};
+use crate::set::left_out::{score, without};
+use crate::set::population::predict;
+use crate::varied::varied;
+use rand::rngs::ChaCha8Rng;
+use rayon::prelude::*;
+use std::sync::Arc;
+use stylet_identify::blocks::Blocks;
+use stylet_identify::fit::{Effort, fit as fitted_on};
+use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
+use stylet_tissue::{Effect, Tissue};
+
+/// Starts of the law of a shaft that slips.
+pub const STARTS: usize = 8;
+/// The library is searched for what it adds with about so many insertions.
+const SEARCHED: usize = 6;
+/// Standard deviation of a number spread evenly over one.
+const EVENLY_SD: f64 = 0.289;
+/// A law is judged by so many parts of the set, each left out once.
+const FOLDS: usize = 3;
+/// Blocks are averaged by so many to judge a law,
+const COARSE: usize = 3;
+/// its fits go on for so many steps at most,
+const TURNS: usize = 5;
+/// and it is drawn so many times.
+const DRAWS: usize = 16;
+/// A law has to predict recordings left out better than the base law by this share.
+const WORTH: f64 = 0.02;
+/// A part of a law stays when recordings left out are predicted worse by this share without it.
+const PART_WORTH: f64 = 0.01;
+
+/// Where a law comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The base law with its numbers of each recording's own.
+    Base,
+    /// The base law and the effects that the search over the library adds to it.
+    Library,
+    /// Layers that cling to the shaft and slip, give way after a while, let go at depths of their own.
+    Slip,
+}
+
+/// A law that was fitted and judged.
+#[derive(Clone, Debug)]
+pub struct Law {
+    /// Where it comes from.
+    pub kind: Kind,
+    /// The fit.
+    pub fitted: Fitted,
+    /// Error (N) on every recording when its part of the set is left out.
+    pub errors_n: Vec<f64>,
+}
+
+impl Law {
+    fn new(kind: Kind, fitted: Fitted, runs: &[&Insertion]) -> Self {
+        let errors_n = judged(&fitted, runs);
+        Self { kind, fitted, errors_n }
+    }
+
+    /// Mean error (N) on parts left out.
+    #[must_use]
+    pub fn left_out_n(&self) -> f64 {
+        stylet_stats::mean(&self.errors_n)
+    }
+}
+
+/// A part of a law, and what it is worth.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The effect that it is or belongs to.
+    pub effect: &'static str,
+    /// What it is called.
+    pub name: String,
+    /// Error (N) on every recording left out, without it.
+    pub without_n: Vec<f64>,
+    /// Whether it stayed.
+    pub kept: bool,
+}
+
+/// Laws of a set.
+#[derive(Clone, Debug)]
+pub struct Laws {
+    /// The base law.
+    pub base: Law,
+    /// With what the library adds to it, where that is something.
+    pub library: Option<Law>,
+    /// The law of a shaft that slips, where it could be fitted.
+    pub slip: Option<Law>,
+    /// Which of them predicts recordings left out best; the base law where the others are hardly better.
+    pub best: Law,
+    /// The parts of the best.
+    pub parts: Vec<Part>,
+}
+
+/// Finds the law of a set. `None` when not even the base law can be fitted.
+#[must_use]
+pub fn laws(
+    believed: &Tissue,
+    runs: &[&Insertion],
+    raw: &Raw,
+    rng: &mut ChaCha8Rng,
+    progress: &mut impl FnMut(&str),
+) -> Option<Laws> {
+    progress("fitting the base law");
+    let prepared = Prepared::new(
+        Arc::new(plain(believed, runs)),
+        blocks(runs, raw),
+        raw.step_n.unwrap_or(0.0) * EVENLY_SD,
+    );
+    let (fit, data) = base(&prepared)?;
+    let (fit, data) = varied(fit, data);
+    let (searched, which) = some(&prepared, runs);
+    let fewer = data.only(&which);
+    let fit = fitted_on(&fit.model.only(&which), &fewer, Effort::FULL)?;
+    let search = Search::run(&searched, fit, fewer, progress);
+    let drops = prepared.drop_times();
+    let on = |model: &Model| {
+        let mut model = model.clone();
+        model.own = vec![Own::default(); runs.len()];
+        model.instants = runs.iter().map(|r| r.ruptures_s.clone()).collect();
+        (model.free.own_surface, model.free.own_friction) = (true, true);
+        refitted(&model, prepared.blocks.to_vec(), drops.clone())
+    };
+    let base = Law::new(Kind::Base, on(&search.base.model)?, runs);
+    let library = (!search.best.model.effects.is_empty())
+        .then(|| on(&search.best.model))
+        .flatten()
+        .map(|f| Law::new(Kind::Library, f, runs));
+    progress("fitting a shaft that slips, from several starts");
+    let slip = fitted(believed, runs, raw, STARTS, rng).map(|f| Law::new(Kind::Slip, f, runs));
+    let mut best = base.clone();
+    for law in library.iter().chain(&slip) {
+        let worth = law.left_out_n() < (1.0 - WORTH) * base.left_out_n();
+        if worth && law.left_out_n() < best.left_out_n() {
+            best = law.clone();
+        }
+    }
+    progress("what each part of the law is worth");
+    let parts = parts(&mut best, runs);
+    Some(Laws { base, library, slip, best, parts })
+}
+
+/// Some of the insertions, as many of every speed and stroke: what the library adds is searched for in these.
+fn some(prepared: &Prepared, runs: &[&Insertion]) -> (Prepared, Vec<usize>) {
+    let groups = groups(runs);
+    let each = (SEARCHED / groups.len().max(1)).max(1);
+    let mut which: Vec<usize> = groups.iter().flat_map(|g| g.iter().take(each).copied()).collect();
+    which.sort_unstable();
+    let part = Prepared {
+        belief: Arc::clone(&prepared.belief),
+        blocks: Arc::new(which.iter().map(|r| prepared.blocks[*r].clone()).collect()),
+        drops: which.iter().map(|r| prepared.drops[*r].clone()).collect(),
+        floor_n: prepared.floor_n,
+    };
+    (part, which)
+}
+
+/// The same on longer blocks; what is on them already stays.
+fn coarse(fitted: &Fitted) -> Fitted {
+    let long = |b: &Blocks| b.samples as f64 * b.step_s > 1.5 * SET_BLOCK_S;
+    if fitted.data.blocks.iter().all(long) {
+        return fitted.clone();
+    }
+    let blocks: Vec<Blocks> = fitted.data.blocks.par_iter().map(|b| b.coarser(COARSE)).collect();
+    Fitted { data: fitted.data.on(blocks), ..fitted.clone() }
+}
+
+/// Error (N) on every recording, its part of the set left out.
+fn judged(fitted: &Fitted, runs: &[&Insertion]) -> Vec<f64> {
+    let at = coarse(fitted);
+    let folds: Vec<Vec<usize>> = (0..FOLDS).map(|k| (k..runs.len()).step_by(FOLDS).collect()).collect();
+    let done: Vec<Vec<(usize, f64)>> = folds
+        .par_iter()
+        .map(|fold| {
+            let Some(p) = without(&at, runs, fold, &[TURNS]) else { return Vec::new() };
+            let day = |r: usize| at.fit.model.day_of.get(r).copied();
+            fold.iter()
+                .map(|r| (*r, score(runs[*r], &predict(&p, runs[*r], day(*r), DRAWS)).rmse_n))
+                .collect()
+        })
+        .collect();
+    let mut out = vec![f64::INFINITY; runs.len()];
+    for (r, e) in done.into_iter().flatten() {
+        out[r] = if e.is_finite() { e } else { f64::INFINITY };
+    }
+    out
+}
+
+/// What a law may do without.
+fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
+    let mut out = Vec::new();
+    let slips = model.effects.iter().any(|c| c.info.id == "shaft_slip");
+    let mut seen: Vec<&str> = Vec::new();
+    for id in model.effects.iter().map(|c| c.info.id) {
+        if seen.contains(&id) || id == "shaft_slip" {
+            continue;
+        }
+        seen.push(id);
+        out.push((id, id.to_owned(), less(model, id)));
+    }
+    if slips {
+        let neutral: [(&str, &[(&str, f64)]); 4] = [
+            ("curved spring", &[("curve_n_per_m2", 0.0)]),
+            (
+                "relaxation",
+                &[
+                    ("fractions.0", 0.0),
+                    ("fractions.1", 0.0),
+                    ("time_constants_s.0", 1.0),
+                    ("time_constants_s.1", 10.0),
+                ],
+            ),
+            ("wear", &[("wear_per_m", 0.0)]),
+            ("rate of the hold", &[("rate", 0.0)]),
+        ];
+        for (name, numbers) in neutral {
+            if let Some(model) = held(model, numbers) {
+                out.push(("shaft_slip", format!("shaft_slip: {name}"), model));
+            }
+        }
+    }
+    out
+}
+
+/// A model without any effect of this id; layers that waited give way at a force.
+fn less(model: &Model, id: &str) -> Model {
+    let mut out = model.clone();
+    let mut tissue = out.belief.tissue.clone();
+    while let Some(k) = out.effects.iter().position(|c| c.info.id == id) {
+        if id == "delayed_puncture" {
+            let (layer, force) = (out.effects[k].values[0] as usize, out.effects[k].values[1]);
+            for t in [&mut tissue, &mut out.tissue] {
+                if let Some(l) = layer.checked_sub(1).and_then(|l| t.layers.get_mut(l)) {
+                    l.puncture_n = Some(force);
+                }
+            }
+        }
+        out = out.without(k);
+    }
+    // What differed from insertion to insertion goes by the order of the effects.
+    out.own.iter_mut().for_each(|o| o.differing = Default::default());
+    out.scatter.differing = Default::default();
+    out.belief = Arc::new(Belief { tissue, ..(*out.belief).clone() });
+    out
+}
+
+/// A model with numbers of its `shaft_slip` held where they do nothing; `None` when they are already.
+fn held(model: &Model, numbers: &[(&str, f64)]) -> Option<Model> {
+    let mut out = model.clone();
+    let mut any = false;
+    for effect in 0..out.effects.len() {
+        let choice = &out.effects[effect];
+        if choice.info.id != "shaft_slip" {
+            continue;
+        }
+        let mut values = choice.values.clone();
+        for (path, neutral) in numbers {
+            let parameter = choice.info.parameters.iter().position(|p| p.path == *path)?;
+            any |= values[parameter] != *neutral;
+            values[parameter] = *neutral;
+            if !model.bound.iter().any(|b| b.effect == effect && b.parameter == parameter) {
+                out.bound.push(Bound { effect, parameter, like: None });
+            }
+        }
+        out.effects[effect] = Choice::new(model.effects[effect].info, &values);
+    }
+    any.then_some(out)
+}
+
+/// Says what each part of a law is worth, and takes away what recordings left out do not miss.
+fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
+    let stands = best.left_out_n();
+    let at = coarse(&best.fitted);
+    let mut out: Vec<Part> = candidates(&at.fit.model)
+        .into_par_iter()
+        .map(|(effect, name, model)| {
+            let errors = at.with(&model).map_or_else(Vec::new, |f| judged(&f, runs));
+            Part { effect, name, without_n: errors, kept: true }
+        })
+        .collect();
+    let mut order: Vec<usize> = (0..out.len()).collect();
+    let loss = |p: &Part| stylet_stats::mean(&p.without_n) / stands - 1.0;
+    order.sort_by(|a, b| loss(&out[*a]).total_cmp(&loss(&out[*b])));
+    for k in order {
+        if loss(&out[k]) >= PART_WORTH || out[k].without_n.is_empty() {
+            break;
+        }
+        // Beside what went before it.
+        let Some((_, _, model)) =
+            candidates(&best.fitted.fit.model).into_iter().find(|(_, name, _)| *name == out[k].name)
+        else {
+            continue;
+        };
+        let Some(smaller) = best.fitted.with(&model) else { continue };
+        let smaller = Law::new(best.kind, smaller, runs);
+        if smaller.left_out_n() < (1.0 + PART_WORTH) * stands {
+            *best = smaller;
+            out[k].kept = false;
+        }
+    }
+    if best.fitted.fit.model.effects.is_empty() {
+        best.kind = Kind::Base;
+    }
+    out
+}
+
+/// Whether the insertions were made at several speeds or strokes.
+#[must_use]
+pub fn several(runs: &[&Insertion]) -> bool {
+    groups(runs).len() > 1
+}
+
+/// Effects that a law has, each once.
+#[must_use]
+pub fn effects(model: &Model) -> Vec<&'static str> {
+    let mut out: Vec<&str> = Vec::new();
+    for c in &model.effects {
+        let neutral = c.effect().is_none_or(|e| e.is_neutral());
+        if !neutral && !out.contains(&c.info.id) {
+            out.push(c.info.id);
+        }
+    }
+    out
+}

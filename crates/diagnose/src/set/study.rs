@@ -1,0 +1,282 @@
+//! The whole: from a set of insertions to its diagnosis, with the error on insertions that took no part.
+
+use crate::leftover;
+use crate::outcome::{
+    Cause, Diagnosis, Differences, Estimate, EvidenceStep, Gain, LeftoverReport, NoiseReport, Rival, Trace,
+    Verdict,
+};
+use crate::raw;
+use crate::set::first::{Insertion, groups};
+use crate::set::instrument::Instrument;
+use crate::set::laws::{Kind, Law, Laws, effects, laws, several};
+use crate::set::left_out::{Out, floor, runs_out, speeds_out};
+use crate::set::numbers::{Told, base_parameters, estimates};
+use crate::set::repeats::{Bought, Repeats, Standing, repeats};
+use crate::set::scenario::extended;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use std::collections::BTreeMap;
+use stylet_identify::phases::noise_n;
+use stylet_record::Recording;
+use stylet_scenario::Scenario;
+use stylet_tissue::Tissue;
+
+/// Seed of what the starts begin with.
+const SEED: u64 = 1;
+/// The unknown dominates when more than this share of what the base law leaves beyond the floor is still left,
+const UNEXPLAINED: f64 = 0.1;
+/// and insertions left out are predicted worse than by another one by this share.
+const BEYOND_FLOOR: f64 = 0.2;
+/// An effect of which a number stands where it may not go further is sure to this degree at most.
+const AT_A_BOUND: f64 = 0.9;
+
+/// The study of a set.
+pub struct Study {
+    /// Laws that were tried.
+    pub laws: Laws,
+    /// Every run predicted without it by the best law.
+    pub out: Vec<Out>,
+    /// And by the base law.
+    pub base_out: Vec<Out>,
+    /// The verdict and all that goes with it.
+    pub diagnosis: Diagnosis,
+    /// What repeats add.
+    pub repeats: Repeats,
+    /// The mean insertion as a scenario.
+    pub extended: Scenario,
+}
+
+/// Studies insertions. `instrument` looks at the checks once the largest force and the residual to be explained (N) are known.
+#[must_use]
+pub fn study(
+    name: &str,
+    believed: &Tissue,
+    runs: &[&Insertion],
+    instrument: impl Fn(f64, f64) -> Instrument,
+    mut progress: impl FnMut(&str),
+) -> Option<Study> {
+    let recordings: Vec<&Recording> = runs.iter().map(|r| &r.recording).collect();
+    let notes: Vec<_> = runs.iter().map(|r| r.notes.clone()).collect();
+    let raw = raw::look(&recordings, &notes);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let laws = laws(believed, runs, &raw, &mut rng, &mut progress)?;
+    progress("every run predicted without it");
+    let out = runs_out(&laws.best.fitted, runs);
+    let base_out = if laws.best.kind == Kind::Base { out.clone() } else { runs_out(&laws.base.fitted, runs) };
+    let by_speed = |law: &Law| several(runs).then(|| speeds_out(&law.fitted, runs));
+    let (speed_out, base_speed_out) = (by_speed(&laws.best), by_speed(&laws.base));
+    let force_n = recordings.iter().flat_map(|r| &r.force_n).fold(0.0_f64, |most, f| most.max(f.abs()));
+    let instrument = instrument(force_n, laws.base.left_out_n());
+    let floors = floor(runs);
+    let standing = Standing {
+        runs,
+        law: &laws.best,
+        out: &out,
+        base_out: &base_out,
+        speed_out: speed_out.as_deref(),
+        base_speed_out: base_speed_out.as_deref(),
+        floors: &floors,
+    };
+    let repeats = repeats(&standing, bought(&laws), instrument);
+    let diagnosis = diagnosis(&laws, runs, believed, &out, &repeats, &raw);
+    let extended = extended(name, &laws.best.fitted.fit.model, runs, &repeats.instrument);
+    Some(Study { laws, out, base_out, diagnosis, repeats, extended })
+}
+
+/// What each law and each part of the best one buys.
+fn bought(laws: &Laws) -> Vec<Bought> {
+    let mut out = Vec::new();
+    let of = |step: String, law: &Law| Bought {
+        step,
+        left_out_n: law.left_out_n(),
+        without_n: None,
+        kept: law.kind == laws.best.kind,
+    };
+    if let Some(law) = &laws.library {
+        out.push(of("base law with what the library adds".to_owned(), law));
+    }
+    if let Some(law) = &laws.slip {
+        out.push(of("a shaft that slips".to_owned(), law));
+    }
+    for part in &laws.parts {
+        out.push(Bought {
+            step: part.name.clone(),
+            left_out_n: laws.best.left_out_n(),
+            without_n: Some(stylet_stats::mean(&part.without_n)).filter(|e| e.is_finite()),
+            kept: part.kept,
+        });
+    }
+    out
+}
+
+/// Probability that errors `without` something are larger on new runs than those `with` it (normal, one-sided, paired).
+fn confidence(without: &[f64], with: &[f64]) -> f64 {
+    let worth: Vec<f64> = without.iter().zip(with).map(|(a, b)| a - b).filter(|d| d.is_finite()).collect();
+    if worth.len() < 2 {
+        return f64::from(u8::from(!without.is_empty() && worth.is_empty()));
+    }
+    let error = stylet_stats::sd(&worth) / (worth.len() as f64).sqrt();
+    stylet_stats::normal::cdf(stylet_stats::mean(&worth) / error.max(1e-9))
+}
+
+fn diagnosis(
+    laws: &Laws,
+    runs: &[&Insertion],
+    believed: &Tissue,
+    out: &[Out],
+    repeats: &Repeats,
+    raw: &raw::Raw,
+) -> Diagnosis {
+    let best = &laws.best;
+    let model = &best.fitted.fit.model;
+    let told = estimates(&best.fitted, out);
+    let mean = &repeats.mean;
+    let noise = repeats
+        .instrument
+        .noise_n
+        .unwrap_or_else(|| stylet_stats::median_of(runs.iter().map(|r| noise_n(&r.recording.force_n))));
+    let mut causes: Vec<Cause> = effects(model)
+        .into_iter()
+        .map(|id| {
+            let whole = if id == "shaft_slip" { Some(laws.base.errors_n.clone()) } else { None };
+            let without = whole
+                .or_else(|| laws.parts.iter().find(|p| p.kept && p.name == id).map(|p| p.without_n.clone()))
+                .unwrap_or_default();
+            cause(id, &told, confidence(&without, &best.errors_n), &without, best, &laws.base)
+        })
+        .collect();
+    causes.sort_by(|a, b| b.share.total_cmp(&a.share));
+    causes.extend(repeats.instrument.shown.iter().map(|s| s.cause()));
+    causes.extend(crate::diagnose::raw_causes(raw, noise));
+    let floor_n = mean.floor_n.unwrap_or(noise);
+    let beyond = |e: f64| (e * e - floor_n * floor_n).max(0.0);
+    let share = if best.kind == Kind::Base {
+        1.0
+    } else {
+        (beyond(mean.extended_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
+    };
+    let unknown =
+        share > UNEXPLAINED && mean.extended_n > (1.0 + BEYOND_FLOOR) * floor_n && mean.floor_n.is_some();
+    let told_left = leftover::test(&best.fitted.fit, &best.fitted.data).sure;
+    let verdict = match (unknown, causes.is_empty()) {
+        (true, _) => Verdict::Unknown,
+        (false, true) => Verdict::None,
+        (false, false) => Verdict::Named,
+    };
+    let scatter = &model.scatter;
+    Diagnosis {
+        verdict,
+        causes,
+        base_parameters: base_parameters(&told, believed),
+        invisible: if several(runs) {
+            Vec::new()
+        } else {
+            vec!["power_law_friction".to_owned(), "rate_dependent_puncture".to_owned()]
+        },
+        gain: Gain {
+            held_out: true,
+            recordings: runs.iter().map(|r| r.name.clone()).collect(),
+            rmse_before_n: mean.base_n,
+            rmse_after_n: mean.extended_n,
+            floor_n,
+            each_n: repeats.runs.iter().map(|r| (r.base_n, r.extended_n)).collect(),
+        },
+        traces: dropped(laws),
+        leftover: LeftoverReport {
+            p_value: told_left.p_value,
+            depends_on: told_left.depends_on.iter().map(|d| d.0.clone()).collect(),
+            nats: told_left.nats,
+            share: if unknown || best.kind != Kind::Base { share } else { 0.0 },
+        },
+        data_quality: crate::set::repeats::quality(runs),
+        evidence: vec![evidence(laws)],
+        noise: NoiseReport {
+            sd_n: noise,
+            ar: [repeats.instrument.ar1.unwrap_or(0.0), 0.0],
+            from_air: repeats.instrument.noise_n.is_some(),
+        },
+        differences: Differences {
+            puncture: scatter.force,
+            face_m: scatter.place_m,
+            surface_m: scatter.surface_m,
+            friction: scatter.friction,
+        },
+        advice: advice(best, &told),
+    }
+}
+
+fn cause(id: &str, told: &[Told], confidence: f64, without: &[f64], best: &Law, base: &Law) -> Cause {
+    let parameters: BTreeMap<String, Estimate> =
+        told.iter().filter(|t| t.owner == id).map(|t| (t.path.clone(), t.estimate())).collect();
+    let bound = told.iter().any(|t| t.owner == id && t.at_bound);
+    let square = |e: &[f64]| stylet_stats::mean(&e.iter().map(|e| e * e).collect::<Vec<_>>());
+    let explained = (square(&base.errors_n) - square(&best.errors_n)).max(1e-12);
+    let share = (square(without) - square(&best.errors_n)) / explained;
+    Cause {
+        effect: id.to_owned(),
+        equivalent: Vec::new(),
+        confidence: if bound { confidence.min(AT_A_BOUND) } else { confidence },
+        parameters,
+        gain_nats: (base.fitted.fit.nats() - best.fitted.fit.nats()).max(0.0),
+        share: if share.is_finite() { share.clamp(0.0, 1.0) } else { 1.0 },
+    }
+}
+
+/// Parts that the law was found to do without.
+fn dropped(laws: &Laws) -> Vec<Trace> {
+    let part = |p: &crate::set::laws::Part| Trace {
+        effect: p.effect.to_owned(),
+        parameters: BTreeMap::new(),
+        why: format!(
+            "{}: recordings left out are predicted to {:.3} N without it, {:.3} N with it",
+            p.name,
+            stylet_stats::mean(&p.without_n),
+            laws.best.left_out_n()
+        ),
+    };
+    laws.parts.iter().filter(|p| !p.kept).map(part).collect()
+}
+
+fn evidence(laws: &Laws) -> EvidenceStep {
+    let rival = |name: &str, law: &Law| Rival {
+        effect: name.to_owned(),
+        gain_nats: laws.base.fitted.fit.nats() - law.fitted.fit.nats(),
+        parameters: law.fitted.fit.model.effect_numbers(),
+        screened_only: false,
+    };
+    let mut rivals = Vec::new();
+    rivals.extend(laws.slip.as_ref().map(|l| rival("shaft_slip", l)));
+    rivals.extend(laws.library.as_ref().map(|l| rival(&effects(&l.fitted.fit.model).join(", "), l)));
+    EvidenceStep {
+        standing: Vec::new(),
+        rivals,
+        needed_nats: 0.0,
+        taken: (laws.best.kind != Kind::Base).then(|| effects(&laws.best.fitted.fit.model).join(", ")),
+    }
+}
+
+/// What a reader should know before believing the numbers.
+fn advice(best: &Law, told: &[Told]) -> Vec<String> {
+    let mut out = Vec::new();
+    let bounds: Vec<String> =
+        told.iter().filter(|t| t.at_bound).map(|t| format!("{} of {}", t.path, t.owner)).collect();
+    if !bounds.is_empty() {
+        out.push(format!(
+            "These numbers stand where they may not go further, so that their values say little: {}.",
+            bounds.join(", ")
+        ));
+    }
+    let (starts, agree) = best.fitted.starts;
+    if best.kind == Kind::Slip && 2 * agree < starts {
+        out.push(format!(
+            "Only {agree} of {starts} starts came to this optimum: more insertions would make it surer."
+        ));
+    }
+    out
+}
+
+/// Groups of one speed and stroke with their mean speed, slowest first.
+#[must_use]
+pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
+    let mean = |g: &[usize]| g.iter().map(|i| runs[*i].speed_mps).sum::<f64>() / g.len().max(1) as f64;
+    groups(runs).into_iter().map(|g| (mean(&g), g)).collect()
+}

@@ -1,0 +1,58 @@
+//! Promise: a set of repeated insertions is explained by one law with numbers of each run's and each day's own. From insertions drawn
+//! with a known law the fit finds that law, a surface that is shifted on one day, and predicts an insertion that took no part as well as
+//! the insertions scatter; whatever the number of threads, with the same bits.
+
+mod drawn;
+
+use drawn::{Drawn, EXPONENT, SHIFT_M, believed};
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use stylet_diagnose::raw::Raw;
+use stylet_diagnose::set::fitted::{Fitted, fitted};
+use stylet_diagnose::set::left_out::{floor, one_left_out};
+use stylet_diagnose::set::{Insertion, first};
+
+fn drawn(seed: u64) -> Vec<Insertion> {
+    drawn::drawn(&Drawn { seed, ..Drawn::default() })
+}
+
+fn fit(runs: &[Insertion], threads: usize) -> Fitted {
+    let runs: Vec<&Insertion> = runs.iter().collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    pool.install(|| fitted(&believed(), &runs, &Raw::default(), 4, &mut rng)).expect("a fit")
+}
+
+#[test]
+fn a_drawn_set_gives_its_law_back_and_the_surface_that_is_shifted_on_one_day() {
+    let all = drawn(7);
+    let runs: Vec<&Insertion> = all.iter().collect();
+    assert_eq!(first::groups(&runs), vec![vec![0, 1, 2, 3], vec![4, 5, 6, 7]]);
+    assert!(runs.iter().all(|r| r.ruptures_s[0].is_finite()), "every run shows its rupture");
+    let found = fit(&all, 2);
+    assert!(found.rms_n() < 0.05, "{} N left", found.rms_n());
+    let model = &found.fit.model;
+    let slip = &model.effects[0];
+    let of = |path: &str| {
+        let k = slip.info.parameters.iter().position(|p| p.path == path).expect("a parameter");
+        slip.values[k]
+    };
+    assert!((of("push_n") / 1.8 - 1.0).abs() < 0.1, "{}", of("push_n"));
+    assert!((of("pull_n") / 1.1 - 1.0).abs() < 0.1, "{}", of("pull_n"));
+    assert!((of("exponent") / EXPONENT - 1.0).abs() < 0.35, "{}", of("exponent"));
+    let shift = model.days[1].surface_m - model.days[0].surface_m;
+    assert!((shift - SHIFT_M).abs() < 3e-4, "the surface is shifted by {shift} m");
+    // Without the run itself: no worse than another insertion as the predictor.
+    let scores = one_left_out(&found, &runs);
+    let floors: Vec<f64> = floor(&runs).into_iter().flatten().map(|f| f.0.rmse_n).collect();
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let errors: Vec<f64> = scores.iter().map(|s| s.rmse_n).collect();
+    assert!(floors.len() == 8 && mean(&errors) < 1.1 * mean(&floors), "{errors:?} {floors:?}");
+}
+
+#[test]
+fn the_fit_of_a_set_does_not_depend_on_the_number_of_threads() {
+    let some: Vec<Insertion> = drawn(8).into_iter().skip(1).step_by(3).collect();
+    let (one, many) = (fit(&some, 1), fit(&some, 3));
+    assert_eq!(one.fit.residuals.e, many.fit.residuals.e);
+    assert_eq!(one.starts, many.starts);
+}

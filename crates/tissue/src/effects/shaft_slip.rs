@@ -1,0 +1,429 @@
+use super::Described;
+use crate::effect::{Effect, Memory, Moment, Place, lag_weights, sgn};
+use crate::info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
+use crate::slab::Slab;
+
+/// Reference speed `v0` of the slip in m/s (1 mm/s).
+const V0_MPS: f64 = 1e-3;
+/// Slower than this in m/s (0.1 mm/s) the contact is at rest.
+const REST_MPS: f64 = 1e-4;
+/// Travel in m over which the contact comes to know another speed (1 mm, a few widths of a shaft's contact: Dieterich 1979).
+const RENEWED_M: f64 = 1e-3;
+/// Travel in m within which the contact ends when the tip comes back to where the layer lets go (0.2 mm, a tip's edge).
+const EDGE_M: f64 = 2e-4;
+/// Longest travel in m of one implicit step: a tenth of the millimetres over which the contact loads.
+const SUBSTEP_M: f64 = 1.5e-4;
+/// Most implicit steps in a sample.
+const MOST_STEPS: f64 = 64.0;
+/// The contact keeps at least this share of its hold however far it has slipped.
+const LEAST_HOLD: f64 = 0.2;
+/// Smallest hold in N; less is none.
+const LEAST_N: f64 = 1e-3;
+/// Turns of the solver at most; it needs two or three.
+const TURNS: usize = 80;
+
+/// A layer that clings to the shaft, is stretched, relaxes and slips by a power of the force.
+///
+/// `w` is the displacement of the layer's tissue against its rest, positive when pushed in. Its force is that of a curved
+/// spring with two relaxing terms,
+///
+/// `E = K w + b w |w|`, `q_j' = (g_j E - q_j)/tau_j`, `F = E - q_1 - q_2`.
+///
+/// - *Pressed*, before the rupture, `w = max(0, z - s_i)`: `F` is the layer's elastic force.
+/// - *At the rupture* `w` falls back so that `F = r C (v/v0)^a`, or stays when `F` is less; the `q_j` stay.
+/// - *Broken*, the shaft drags the tissue along and slips: `w' = z' - v0 sgn(F) (abs(F)/L)^m` with `v0` = 1 mm/s,
+///   `L = C (v/v0)^a max(0.2, 1 - d s)` when it is pushed (`s` is how far it has slipped so, `v` the speed, which the contact
+///   comes to know over a millimetre of travel and does not forget at rest) and `L = S (v/v0)^a` when it is pulled.
+///
+/// Far below `L` nothing slips, which is presliding; steady sliding at speed `v` takes `F = L (v/v0)^(1/m)`: a large `m` is
+/// dry friction, `m` = 1 viscous; the net exponent of the plateau is `a + 1/m`. In a hold, `F` creeps down by slip and by relaxation. When the tip comes back to where the layer
+/// lets go (its front face, or as `let_go` says), `F` ends within 0.2 mm. The layer's viscous friction `b_i l_i v` is replaced.
+///
+/// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation; the error falls with the step
+/// (`crates/tissue/tests/shaft_slip.rs`). `m`, `b`, `g_j`, `tau_j` have no effect without `C` and `S`.
+///
+/// Source: creep of dragged contacts by a power of the stress (Persson 2000, section 12; Norton's law), Maxwell relaxation; fitted to
+/// insertions into skin and muscle phantoms. Signature: after a stop the force falls at once and then stays; after a reversal it
+/// follows travel over millimetres; the plateau while sliding hardly depends on speed.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ShaftSlip {
+    /// Layer `i`, 1-based; one that is not there changes nothing.
+    pub layer: usize,
+    /// Hold `C` in N when pushed at 1 mm/s, zero or positive. Neutral: 0, with `pull_n` 0.
+    pub push_n: f64,
+    /// Hold `S` in N when pulled at 1 mm/s, zero or positive.
+    pub pull_n: f64,
+    /// Share `r` of `push_n` that the layer holds right after its rupture, 0 to 2.
+    pub kept: f64,
+    /// Exponent `m` of the slip, 1 (viscous) to 200 (dry).
+    pub exponent: f64,
+    /// Loss `d` of hold per metre of slip, 0 to 1e4 1/m.
+    pub wear_per_m: f64,
+    /// Exponent `a` of the speed in the holds, -2 to 2: below zero it weakens with speed.
+    pub rate: f64,
+    /// Curvature `b` of the spring in N/m², 0 to 1e9.
+    pub curve_n_per_m2: f64,
+    /// Shares `g_j` of the spring's force that relax, each 0 to 1, together at most 1.
+    pub fractions: [f64; 2],
+    /// Their time constants `tau_j` in s, 0.001 to 10 000.
+    pub time_constants_s: [f64; 2],
+}
+
+impl Default for ShaftSlip {
+    /// The neutral effect.
+    fn default() -> Self {
+        Self {
+            layer: 1,
+            push_n: 0.0,
+            pull_n: 0.0,
+            kept: 1.0,
+            exponent: 10.0,
+            wear_per_m: 0.0,
+            rate: 0.0,
+            curve_n_per_m2: 0.0,
+            fractions: [0.0; 2],
+            time_constants_s: [1.0, 10.0],
+        }
+    }
+}
+
+const LAYER: ParameterInfo = ParameterInfo::shape("layer", "", "layer, 1-based")
+    .allowed(1.0, 1000.0)
+    .neutral(1.0)
+    .search(1.0, 1.0, 10.0)
+    .whole();
+const FRACTION: ParameterInfo =
+    ParameterInfo::shape("fractions.0", "", "share of the force that relaxes").allowed(0.0, 1.0).search(
+        0.2, 0.0, 0.9,
+    );
+/// Place of the second relaxing share among the parameters.
+const SECOND: usize = 9;
+const TIME: ParameterInfo = ParameterInfo::shape("time_constants_s.0", "s", "its time constant")
+    .allowed(1e-3, 1e4)
+    .neutral(1.0)
+    .search(1.0, 0.1, 6.0)
+    .log();
+
+static INFO: EffectInfo = EffectInfo {
+    id: "shaft_slip",
+    equation: "F = E - q1 - q2, E = K w + b w|w|, w' = z' - v0 sgn(F) (|F|/L)^m once broken, w = z - s_i before; F = r C at the rupture",
+    source: "Power-law creep of dragged contacts (Persson 2000) with Maxwell relaxation; measured skin and muscle phantoms",
+    signature: "A flat hold after a fast first fall, a reversal that takes millimetres, a plateau that hardly knows the speed.",
+    place: Place::Friction,
+    parameters: &[
+        LAYER,
+        ParameterInfo::strength("push_n", "N", "hold when pushed at 1 mm/s").search(2.0, 0.05, 8.0),
+        ParameterInfo::strength("pull_n", "N", "hold when pulled at 1 mm/s").search(1.0, 0.05, 8.0),
+        ParameterInfo::shape("kept", "", "share of that hold right after the rupture")
+            .allowed(0.0, 2.0)
+            .neutral(1.0)
+            .search(0.8, 0.0, 1.5),
+        ParameterInfo::shape("exponent", "", "exponent of the slip in the force")
+            .allowed(1.0, 200.0)
+            .neutral(10.0)
+            .search(10.0, 2.0, 30.0)
+            .log(),
+        ParameterInfo::shape("wear_per_m", "1/m", "loss of hold per metre of slip")
+            .allowed(0.0, 1e4)
+            .search(50.0, 0.0, 400.0),
+        ParameterInfo::shape("rate", "", "exponent of the speed in the holds")
+            .allowed(-2.0, 2.0)
+            .search(0.0, -0.5, 0.5),
+        ParameterInfo::shape("curve_n_per_m2", "N/m2", "curvature of the spring")
+            .allowed(0.0, 1e9)
+            .search(3e4, 0.0, 3e5),
+        FRACTION,
+        ParameterInfo { path: "fractions.1", ..FRACTION },
+        TIME,
+        ParameterInfo { path: "time_constants_s.1", ..TIME }.neutral(10.0).search(10.0, 5.0, 60.0),
+    ],
+    larger: None,
+    proposal: Proposal::PerLayer,
+    nested_in: &[],
+};
+
+impl Described for ShaftSlip {
+    fn values(&self) -> alloc::vec::Vec<f64> {
+        let ([g1, g2], [t1, t2]) = (self.fractions, self.time_constants_s);
+        alloc::vec![
+            self.layer as f64,
+            self.push_n,
+            self.pull_n,
+            self.kept,
+            self.exponent,
+            self.wear_per_m,
+            self.rate,
+            self.curve_n_per_m2,
+            g1,
+            g2,
+            t1,
+            t2
+        ]
+    }
+    fn from_values(values: &[f64]) -> Option<Self> {
+        let [layer, push_n, pull_n, kept, exponent, wear_per_m, rate, curve_n_per_m2, g1, g2, t1, t2] = *values
+        else {
+            return None;
+        };
+        let layer = libm::round(layer) as usize; // saturates, and NaN is zero, which is no layer
+        let (fractions, time_constants_s) = ([g1, g2], [t1, t2]);
+        Some(Self {
+            layer,
+            push_n,
+            pull_n,
+            kept,
+            exponent,
+            wear_per_m,
+            rate,
+            curve_n_per_m2,
+            fractions,
+            time_constants_s,
+        })
+    }
+    /// The second relaxing share as a share of what the first leaves: both in 0 to 1 are then allowed.
+    fn coordinates(&self) -> alloc::vec::Vec<f64> {
+        let mut out = self.values();
+        let left = 1.0 - self.fractions[0];
+        out[SECOND] = if left > 0.0 { (self.fractions[1] / left).min(1.0) } else { 0.0 };
+        out
+    }
+    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
+        let mut out = Self::from_values(coordinates)?;
+        out.fractions[1] *= 1.0 - out.fractions[0];
+        Some(out)
+    }
+    fn check_together(&self) -> Result<(), ParameterError> {
+        let [first, second] = self.fractions;
+        if first + second > 1.0 {
+            let allowed = (0.0, 1.0 - first);
+            return Err(ParameterError { effect: INFO.id, path: "fractions.1", value: second, allowed });
+        }
+        Ok(())
+    }
+}
+
+/// Place of the speed in the memory.
+const SPEED: usize = 7;
+
+/// The speed that the contact knows follows the tip's over the travel in which the contact renews itself.
+fn renew(known_mps: &mut f64, moment: &Moment) {
+    let now = moment.v_mps.abs();
+    if *known_mps <= 0.0 {
+        *known_mps = now;
+    } else if now > REST_MPS {
+        let share = -libm::expm1(-moment.dz_m.abs() / RENEWED_M);
+        *known_mps *= libm::exp(share * libm::log(now / *known_mps));
+    }
+}
+
+/// What a layer remembers, in the order of [`Memory`].
+#[derive(Clone, Copy)]
+struct Contact {
+    /// Displacement in m.
+    w_m: f64,
+    /// Relaxed parts of the force in N.
+    q_n: [f64; 2],
+    /// The spring's force in N.
+    spring_n: f64,
+    /// How far the shaft has slipped while pushed, in m.
+    slipped_m: f64,
+    /// Force in N to fall back to: the layer has just broken.
+    fall_n: f64,
+    /// Whether `fall_n` is to be taken.
+    broke: bool,
+    /// Speed of the last motion in m/s.
+    speed_mps: f64,
+}
+
+impl Contact {
+    fn of(memory: &Memory) -> Self {
+        let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, speed_mps] = *memory;
+        Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, broke: broke != 0.0, speed_mps }
+    }
+    fn keep(self, memory: &mut Memory) {
+        *memory = self.memory();
+    }
+    fn memory(self) -> Memory {
+        let broke = if self.broke { 1.0 } else { 0.0 };
+        let [q1, q2] = self.q_n;
+        [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, broke, self.speed_mps]
+    }
+}
+
+/// The spring of a layer: `K w + b w |w|`.
+#[derive(Clone, Copy)]
+struct Spring {
+    k_n_per_m: f64,
+    b_n_per_m2: f64,
+}
+
+impl Spring {
+    fn force(self, w: f64) -> f64 {
+        w * (self.k_n_per_m + self.b_n_per_m2 * w.abs())
+    }
+    fn slope(self, w: f64) -> f64 {
+        self.k_n_per_m + 2.0 * self.b_n_per_m2 * w.abs()
+    }
+    /// The displacement at a force; zero without a spring.
+    fn at(self, force_n: f64) -> f64 {
+        let (k, b, f) = (self.k_n_per_m, self.b_n_per_m2, force_n.abs());
+        let root = k + libm::sqrt(k * k + 4.0 * b * f);
+        if root > 0.0 { 2.0 * force_n / root } else { 0.0 }
+    }
+}
+
+impl ShaftSlip {
+    /// The factor `(v/v0)^a` on the holds.
+    fn fast(&self, speed_mps: f64) -> f64 {
+        libm::exp(self.rate * libm::log(speed_mps.max(REST_MPS) / V0_MPS))
+    }
+
+    /// `(keep, ramp)` of both terms for a step; see [`lag_weights`].
+    fn weights(&self, dt_s: f64) -> [(f64, f64); 2] {
+        core::array::from_fn(|j| {
+            if self.fractions[j] == 0.0 { (1.0, 0.0) } else { lag_weights(dt_s, self.time_constants_s[j]) }
+        })
+    }
+
+    /// The relaxed parts at the end of a step in which the spring's force goes from `before` to `now`.
+    fn relaxed(&self, q_n: [f64; 2], weights: [(f64, f64); 2], before: f64, now: f64) -> [f64; 2] {
+        core::array::from_fn(|j| {
+            let (g, (keep, ramp)) = (self.fractions[j], weights[j]);
+            let end = g * before;
+            end + keep * (q_n[j] - end) + ramp * g * (now - before)
+        })
+    }
+
+    /// One implicit step of a broken layer.
+    fn drag(&self, c: &mut Contact, spring: Spring, dt_s: f64, dz_m: f64, weights: [(f64, f64); 2]) {
+        let fast = self.fast(c.speed_mps);
+        let push = (self.push_n * fast * (1.0 - self.wear_per_m * c.slipped_m).max(LEAST_HOLD)).max(LEAST_N);
+        let pull = (self.pull_n * fast).max(LEAST_N);
+        let at_rest = self.relaxed(c.q_n, weights, c.spring_n, 0.0);
+        let rest = at_rest[0] + at_rest[1];
+        // q_j at the end is linear in the spring's force there.
+        let kept = 1.0 - weights[0].1 * self.fractions[0] - weights[1].1 * self.fractions[1];
+        // Slip in the step and its derivative by the force.
+        let slip = |force: f64| {
+            let hold = if force >= 0.0 { push } else { pull };
+            let ratio = force.abs() / hold;
+            if ratio < 1e-30 || dt_s <= 0.0 {
+                return (0.0, 0.0);
+            }
+            let size = dt_s * V0_MPS * libm::exp((self.exponent * libm::log(ratio)).min(300.0));
+            (size.copysign(force), self.exponent * size / force.abs())
+        };
+        // w - w0 - dz + slip(F(w)) rises with w: Newton inside a bracket.
+        let goal = c.w_m + dz_m;
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut w = c.w_m;
+        let mut slipped = 0.0;
+        for _ in 0..TURNS {
+            let force = spring.force(w) * kept - rest;
+            let (s, ds) = slip(force);
+            let surplus = w - goal + s;
+            slipped = s;
+            let change = surplus / (1.0 + ds * spring.slope(w) * kept);
+            if change.abs() <= 1e-15 + 1e-13 * w.abs() {
+                break;
+            }
+            *(if surplus > 0.0 { &mut high } else { &mut low }) = w;
+            w -= change;
+            if !(w > low && w < high) {
+                w = if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { goal };
+            }
+        }
+        let now = spring.force(w);
+        c.q_n = self.relaxed(c.q_n, weights, c.spring_n, now);
+        c.slipped_m += slipped.max(0.0);
+        (c.w_m, c.spring_n) = (w, now);
+    }
+}
+
+impl Effect for ShaftSlip {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_neutral(&self) -> bool {
+        self.push_n == 0.0 && self.pull_n == 0.0
+    }
+    fn remembers(&self) -> bool {
+        true
+    }
+    fn rubbed(&mut self, factor: f64) {
+        self.push_n *= factor;
+        self.pull_n *= factor;
+    }
+    fn shape(&self, slabs: &mut [Slab]) {
+        if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
+            slab.gripped = 1.0;
+            slab.curve_n_per_m2 += self.curve_n_per_m2;
+        }
+    }
+    /// Pressed, the layer relaxes as it will when it is dragged.
+    fn press(&self, layer: usize, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64 {
+        if layer != self.layer {
+            return elastic_n;
+        }
+        let mut c = Contact::of(memory);
+        if dt_s > 0.0 && (elastic_n != 0.0 || c.q_n != [0.0; 2] || c.spring_n != 0.0) {
+            c.q_n = self.relaxed(c.q_n, self.weights(dt_s), c.spring_n, elastic_n);
+        }
+        c.spring_n = elastic_n;
+        c.keep(memory);
+        elastic_n - c.q_n[0] - c.q_n[1]
+    }
+    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut Memory) {
+        if layer == self.layer {
+            let c = Contact::of(memory);
+            let fall_n = released_n.min(self.kept * self.push_n * self.fast(c.speed_mps));
+            Contact { fall_n, broke: true, slipped_m: 0.0, ..c }.keep(memory);
+        }
+    }
+    fn grip(&self, moment: &Moment, slabs: &[Slab], _sliding_mps: f64, memory: &mut Memory) -> f64 {
+        let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
+        renew(&mut memory[SPEED], moment);
+        if moment.ruptured < self.layer {
+            return 0.0;
+        }
+        let spring = Spring { k_n_per_m: slab.stiffness_n_per_m, b_n_per_m2: slab.curve_n_per_m2 };
+        let end_m = if moment.v_mps < 0.0 { slab.release_m } else { slab.release_m.min(0.0) };
+        let held = ((moment.z_m - slab.front_m - end_m) / EDGE_M).clamp(0.0, 1.0);
+        if held == 0.0 {
+            *memory = Contact { speed_mps: memory[SPEED], ..Contact::of(&[0.0; 8]) }.memory();
+            return 0.0;
+        }
+        let mut c = Contact::of(memory);
+        if c.broke {
+            // The step in which it broke ends here.
+            c.broke = false;
+            c.w_m = spring.at(c.fall_n + c.q_n[0] + c.q_n[1]);
+            c.spring_n = spring.force(c.w_m);
+        } else if moment.dt_s > 0.0 || moment.dz_m != 0.0 {
+            let steps = libm::ceil(moment.dz_m.abs() / SUBSTEP_M).clamp(1.0, MOST_STEPS);
+            let (dt, dz) = (moment.dt_s / steps, moment.dz_m / steps);
+            let weights = self.weights(dt);
+            for _ in 0..steps as usize {
+                self.drag(&mut c, spring, dt, dz, weights);
+            }
+        }
+        c.keep(memory);
+        held * (c.spring_n - c.q_n[0] - c.q_n[1])
+    }
+}
+
+/// Speed exponent of the steady plateau: `F ~ v^(1/m)`.
+impl ShaftSlip {
+    /// Force in N of steady sliding at `v_mps`, without relaxation and wear.
+    #[must_use]
+    pub fn plateau_n(&self, v_mps: f64) -> f64 {
+        if sgn(v_mps) == 0.0 {
+            return 0.0;
+        }
+        let ln_v = libm::log(v_mps.abs() / V0_MPS);
+        let slips = libm::exp(ln_v * (self.rate + 1.0 / self.exponent));
+        if v_mps > 0.0 { self.push_n * slips } else { -self.pull_n * slips }
+    }
+}
