@@ -57,6 +57,7 @@ fn causes(json: &serde_json::Value) -> Vec<&str> {
 }
 
 #[test]
+#[ignore = "minutes; tests/measured_sets.sh runs it"]
 fn a_left_out_insertion_is_predicted_about_as_well_as_by_another_real_one() {
     let Some(done) = skin_on_muscle("a_left_out_insertion_is_predicted_about_as_well_as_by_another_real_one")
     else {
@@ -75,6 +76,7 @@ fn a_left_out_insertion_is_predicted_about_as_well_as_by_another_real_one() {
 }
 
 #[test]
+#[ignore = "minutes; tests/measured_sets.sh runs it"]
 fn the_verdict_names_what_the_base_law_lacks_and_not_what_the_instrument_excludes() {
     let Some(done) =
         skin_on_muscle("the_verdict_names_what_the_base_law_lacks_and_not_what_the_instrument_excludes")
@@ -118,6 +120,7 @@ fn the_verdict_names_what_the_base_law_lacks_and_not_what_the_instrument_exclude
 }
 
 #[test]
+#[ignore = "minutes; tests/measured_sets.sh runs it"]
 fn the_data_quality_names_the_real_rates_the_gaps_and_where_the_strokes_end() {
     let Some(done) =
         skin_on_muscle("the_data_quality_names_the_real_rates_the_gaps_and_where_the_strokes_end")
@@ -142,6 +145,7 @@ fn the_data_quality_names_the_real_rates_the_gaps_and_where_the_strokes_end() {
 }
 
 #[test]
+#[ignore = "minutes; tests/measured_sets.sh runs it"]
 fn the_extended_law_can_be_simulated() {
     let Some(done) = skin_on_muscle("the_extended_law_can_be_simulated") else { return };
     let scratch = Scratch::new("repeats-extended");
@@ -159,6 +163,7 @@ fn the_extended_law_can_be_simulated() {
 }
 
 #[test]
+#[ignore = "minutes; tests/measured_sets.sh runs it"]
 fn the_skin_alone_is_predicted_to_within_a_fifth_of_the_floor_whatever_the_number_of_threads() {
     let name = "the_skin_alone_is_predicted_to_within_a_fifth_of_the_floor_whatever_the_number_of_threads";
     let Some(folder) = measured(name, "needle_phantom", TESTS) else { return };

@@ -1,0 +1,5 @@
+#!/usr/bin/env bash
+# The promises on measured sets of insertions that take minutes; STYLET_MEASURED names the folder of recordings.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+cargo test --release --test measured_repeats -- --include-ignored
