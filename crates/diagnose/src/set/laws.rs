@@ -23,8 +23,10 @@ pub const STARTS: usize = 8;
 const SEARCHED: usize = 6;
 /// Standard deviation of a number spread evenly over one.
 const EVENLY_SD: f64 = 0.289;
-/// A law is judged by so many parts of the set, each left out once.
+/// A law is judged by so many parts of the set, each left out once ...
 const FOLDS: usize = 3;
+/// ... and by single recordings left out when there are no more than so many: two thirds of few say little of a law.
+const FEW: usize = 8;
 /// Blocks are averaged by so many to judge a law,
 const COARSE: usize = 3;
 /// its fits go on for so many steps at most,
@@ -175,7 +177,8 @@ fn coarse(fitted: &Fitted) -> Fitted {
 /// Error (N) on every recording, its part of the set left out.
 fn judged(fitted: &Fitted, runs: &[&Insertion]) -> Vec<f64> {
     let at = coarse(fitted);
-    let folds: Vec<Vec<usize>> = (0..FOLDS).map(|k| (k..runs.len()).step_by(FOLDS).collect()).collect();
+    let count = if runs.len() <= FEW { runs.len() } else { FOLDS };
+    let folds: Vec<Vec<usize>> = (0..count).map(|k| (k..runs.len()).step_by(count.max(1)).collect()).collect();
     let done: Vec<Vec<(usize, f64)>> = folds
         .par_iter()
         .map(|fold| {
