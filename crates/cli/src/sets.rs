@@ -13,7 +13,7 @@ use stylet_diagnose::outcome::{Diagnosis, Verdict};
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::compose::compose;
 use stylet_diagnose::set::dataset::{Dataset, DatasetError, find, is_dataset};
-use stylet_diagnose::set::instrument::Instrument;
+use stylet_diagnose::set::instrument::Checks;
 use stylet_diagnose::set::repeats::{Alone, Repeats};
 use stylet_diagnose::set::study::{Study, study};
 use stylet_record::{QualityKind, Recording, read_csv};
@@ -63,14 +63,15 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let load = optional(&set, set.load.as_ref().map(|l| l.file.as_str()), given)?;
     let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));
     let refs: Vec<&Insertion> = runs.iter().collect();
-    let look = |force_n: f64, residual_n: f64| Instrument::look(air.as_ref(), known, force_n, residual_n);
-    let mut study = study(&set.name, &set.tissue, &refs, look, &mut say)
+    let checks = Checks { air: air.as_ref(), load: known };
+    let mut study = study(&set.name, &set.tissue, &refs, &checks, &mut say)
         .ok_or_else(|| Failure::Internal("no law could be fitted to these recordings".to_owned()))?;
     if !set.parts.is_empty() {
         say("layers measured alone, put together");
-        study.repeats.parts = parts(&set, &study, &refs, given)?;
+        study.repeats.parts = parts(&set, &study, given)?;
     }
-    write(args, &set, &refs, &study)
+    let studied: Vec<&Insertion> = study.runs.iter().collect();
+    write(args, &set, &studied, &study)
 }
 
 fn write(args: &DiagnoseArgs, set: &Dataset, runs: &[&Insertion], study: &Study) -> Result<(), Failure> {
@@ -170,7 +171,7 @@ fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Rec
     Ok(Some(read_csv(first, &set.options())?.0))
 }
 
-fn parts(set: &Dataset, study: &Study, whole: &[&Insertion], given: bool) -> Result<Option<Alone>, Failure> {
+fn parts(set: &Dataset, study: &Study, given: bool) -> Result<Option<Alone>, Failure> {
     let mut alone: Vec<(String, Vec<Insertion>)> = Vec::new();
     for layer in 1..=set.tissue.layers.len() {
         let Some(part) = set.parts.iter().find(|p| p.layer == layer) else { return Ok(None) };
@@ -182,9 +183,12 @@ fn parts(set: &Dataset, study: &Study, whole: &[&Insertion], given: bool) -> Res
                 Err(error) => return Err(error.into()),
             }
         }
-        alone.push((part.name.clone(), set.runs(&files, 1)?));
+        let runs = set.runs(&files, 1)?;
+        let undone = study.repeats.instrument.undo(&runs.iter().collect::<Vec<_>>());
+        alone.push((part.name.clone(), undone.runs));
     }
-    Ok(compose(study.laws.best.kind, &set.tissue, &alone, whole))
+    let whole: Vec<&Insertion> = study.runs.iter().collect();
+    Ok(compose(study.laws.best.kind, &set.tissue, &alone, &whole))
 }
 
 /// The verdict in a sentence.

@@ -12,12 +12,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use stylet_diagnose::raw::Raw;
 use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_out};
-use stylet_diagnose::set::{Insertion, first, fitted};
+use stylet_diagnose::set::{Insertion, first, laws};
 use stylet_record::{ColumnMap, ReadOptions, read_csv_with_holes};
 use stylet_tissue::{Layer, Tissue};
 
-/// Starts of every fit.
-const STARTS: usize = 8;
 /// Seed of what they begin with.
 const SEED: u64 = 15;
 /// By how much the runs of one speed are moved, in m.
@@ -86,14 +84,8 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
         .collect();
     let runs: Vec<&Insertion> = moved.iter().collect();
     let began = Instant::now();
-    let fit = fitted::fitted(
-        &believed(layers),
-        &runs,
-        &Raw::default(),
-        STARTS,
-        &mut ChaCha8Rng::seed_from_u64(SEED),
-    );
-    let fit = fit.ok_or("no law could be fitted")?;
+    let law = laws::slipping(&believed(layers), &runs, &Raw::default(), &mut ChaCha8Rng::seed_from_u64(SEED));
+    let fit = law.ok_or("no law could be fitted")?.fitted;
     println!("\n# {name}: {} runs", runs.len());
     println!(
         "left by the fit {:.3} N; {} of {} starts agree; {:.1} s on the wall",

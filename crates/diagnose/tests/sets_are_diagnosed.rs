@@ -6,12 +6,12 @@ mod drawn;
 use drawn::{Drawn, drawn, plain};
 use stylet_diagnose::Verdict;
 use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::instrument::Instrument;
+use stylet_diagnose::set::instrument::Checks;
 use stylet_diagnose::set::study::{Study, study};
 
 fn look(runs: &[Insertion]) -> Study {
     let refs: Vec<&Insertion> = runs.iter().collect();
-    study("known", &drawn::believed(), &refs, |_, _| Instrument::default(), |_| {}).expect("a study")
+    study("known", &drawn::believed(), &refs, &Checks::default(), |_| {}).expect("a study")
 }
 
 #[test]

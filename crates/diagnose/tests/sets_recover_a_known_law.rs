@@ -19,7 +19,10 @@ fn fit(runs: &[Insertion], threads: usize) -> Fitted {
     let runs: Vec<&Insertion> = runs.iter().collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    pool.install(|| fitted(&believed(), &runs, &Raw::default(), 4, &mut rng)).expect("a fit")
+    pool.install(|| fitted(&believed(), &runs, &Raw::default(), 4, &mut rng))
+        .into_iter()
+        .next()
+        .expect("a fit")
 }
 
 #[test]

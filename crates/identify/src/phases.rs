@@ -142,7 +142,10 @@ pub fn releases(recording: &Recording, phases: &Phases, layers: usize) -> Vec<Re
         }
         if f[j] - f[i] > least && f[i] < 0.0 {
             let at = (i..j).max_by(|a, b| (f[a + 1] - f[*a]).total_cmp(&(f[b + 1] - f[*b]))).unwrap_or(i) + 1;
-            steps.push((z[at], f[(at + 4).min(f.len() - 1)] - f[at.saturating_sub(4)]));
+            let size = f[(at + 4).min(f.len() - 1)] - f[at.saturating_sub(4)];
+            if size > 0.0 {
+                steps.push((z[at], size));
+            }
             i = j.max(at + 4);
         } else {
             i += 1;

@@ -2,8 +2,8 @@
 
 use crate::raw::{self, Raw};
 use crate::set::first::{Insertion, plain};
-use crate::set::fitted::{Fitted, blocks, fitted, refitted};
-use crate::set::laws::{Kind, STARTS};
+use crate::set::fitted::{Fitted, blocks, refitted};
+use crate::set::laws::{Kind, slipping};
 use crate::set::left_out::{floor, one_left_out, score};
 use crate::set::population::{DRAWS, Population, predict};
 use crate::set::repeats::Alone;
@@ -57,7 +57,7 @@ fn by_itself(kind: Kind, tissue: &Tissue, runs: &[&Insertion]) -> Option<Fitted>
     let notes: Vec<_> = runs.iter().map(|r| r.notes.clone()).collect();
     let raw: Raw = raw::look(&recordings, &notes);
     if kind == Kind::Slip {
-        return fitted(tissue, runs, &raw, STARTS, &mut ChaCha8Rng::seed_from_u64(SEED));
+        return slipping(tissue, runs, &raw, &mut ChaCha8Rng::seed_from_u64(SEED)).map(|l| l.fitted);
     }
     let mut model = Model::base(Arc::new(plain(tissue, runs)), runs.len());
     (model.free.own_surface, model.free.own_friction) = (true, true);

@@ -50,6 +50,8 @@ pub struct Insertion {
     pub loads_n: Vec<Option<f64>>,
     /// Per layer where it lets go on the way back, in m, where the force shows it.
     pub releases_m: Vec<Option<f64>>,
+    /// Largest force (N) that the sensor can show, where it was reached: nothing beyond can be compared.
+    pub limit_n: Option<f64>,
 }
 
 impl Insertion {
@@ -76,6 +78,7 @@ impl Insertion {
             loads_n: seen.iter().map(|i| i.map(|i| force[i.saturating_sub(4)])).collect(),
             releases_m,
             phases: at,
+            limit_n: None,
             notes: Vec::new(),
             name,
             recording,
@@ -322,9 +325,11 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     let differing: Vec<(usize, usize)> = model.differing().collect();
     for (k, (effect, parameter)) in differing.into_iter().enumerate() {
         let common = model.effects[effect].values[parameter];
+        let range = model.effects[effect].info.parameters[parameter];
         for (r, run) in runs.iter().enumerate() {
             if let Some(z) = run.releases_m.get(k).copied().flatten() {
-                model.own[r].differing[k] = z - fronts[k.min(layers - 1)] - common;
+                let depth_m = z - fronts[k.min(layers - 1)];
+                model.own[r].differing[k] = depth_m.clamp(range.low, range.high) - common;
             }
         }
     }

@@ -22,6 +22,18 @@ const COARSE: usize = 3;
 const FIRST_SHARE: f64 = 0.1;
 /// The spread between days that is expected counts as that of so many days.
 const EXPECTED_DAYS: f64 = 4.0;
+/// Turns of the fits of a first look, and of those that go on;
+const FIRST_LOOK: [usize; 2] = [6, 6];
+/// the latter start from numbers that stand.
+const LONG_LOOK: [usize; 2] = [6, 8];
+/// One start of so many goes on.
+const GO_ON: usize = 3;
+/// So many fits that differ by more than a share are looked at closely,
+const FEW_FITS: usize = 4;
+/// that share,
+const SAME: f64 = 0.002;
+/// if they leave less than so many times what the best one leaves.
+const WITHIN: f64 = 1.4;
 /// Fits agree when their errors differ by less than this share.
 const AGREE: f64 = 0.03;
 
@@ -186,9 +198,21 @@ fn spreads(model: &mut Model, data: &Data, at: &Fit) {
     model.scatter.day_friction = spread(days[1], DAY_FRICTION);
 }
 
-/// Fits a set from `starts` starts.
+/// Fits from every start, those that leave least first.
+fn from_all(models: &[Model], data: &Data, drops: &[Vec<f64>], rounds: &[usize]) -> Vec<(f64, Model)> {
+    let one = |model: &Model| {
+        let (fit, data) = settle(model, data.clone(), drops, rounds)?;
+        Some((rms(&fit, &data), fit.model))
+    };
+    let mut found: Vec<(f64, Model)> = models.par_iter().filter_map(one).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
+}
+
+/// Fits of a set from `starts` starts: the best few that differ, those that leave least first.
 ///
-/// Deterministic for any number of threads; `rng` draws what the starts begin with.
+/// What leaves least need not predict best: which of them stands is for recordings left out to say. Deterministic for any number of
+/// threads; `rng` draws what the starts begin with.
 #[must_use]
 pub fn fitted(
     believed: &Tissue,
@@ -196,28 +220,35 @@ pub fn fitted(
     raw: &Raw,
     starts: usize,
     rng: &mut ChaCha8Rng,
-) -> Option<Fitted> {
+) -> Vec<Fitted> {
     let fine = blocks(runs, raw);
     let drops: Vec<Vec<f64>> =
         runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let coarse = unsettled(fine.iter().map(|b| b.coarser(COARSE)).collect());
     let guesses: Vec<Guess> = (0..starts.max(1)).map(|k| guess(k, rng)).collect();
-    let mut found: Vec<(f64, Model)> = guesses
+    let began: Vec<Model> = guesses.iter().map(|g| first(believed, runs, g)).collect();
+    // Most starts are given up after a look; those that promise most go on.
+    let mut found = from_all(&began, &coarse, &drops, &FIRST_LOOK);
+    found.truncate(starts.div_ceil(GO_ON).max(1));
+    let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
+    let found = from_all(&promising, &coarse, &drops, &LONG_LOOK);
+    let Some(best) = found.first().map(|f| f.0) else { return Vec::new() };
+    let agree = found.iter().filter(|f| f.0 < best * (1.0 + AGREE)).count();
+    let mut apart: Vec<&(f64, Model)> = Vec::new();
+    for one in found.iter().filter(|f| f.0 < best * WITHIN) {
+        if apart.len() < FEW_FITS && apart.iter().all(|f| one.0 > f.0 * (1.0 + SAME)) {
+            apart.push(one);
+        }
+    }
+    let whole = unsettled(fine);
+    let models: Vec<Model> = apart.into_iter().map(|f| f.1.clone()).collect();
+    let mut out: Vec<Fitted> = models
         .par_iter()
-        .filter_map(|g| {
-            let (fit, data) = settle(&first(believed, runs, g), coarse.clone(), &drops, &[6, 6, 8])?;
-            Some((rms(&fit, &data), fit.model))
+        .filter_map(|model| {
+            let (fit, data) = settle(model, whole.clone(), &drops, &[4, 8, 10])?;
+            Some(Fitted { fit, data, drops: drops.clone(), starts: (found.len(), agree) })
         })
         .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let best = found.first()?.0;
-    let agree = found.iter().filter(|f| f.0 < best * (1.0 + AGREE)).count();
-    let whole = unsettled(fine);
-    let (fit, data) = found
-        .iter()
-        .take(2)
-        .filter(|(error, _)| *error < best * (1.0 + AGREE))
-        .filter_map(|(_, model)| settle(model, whole.clone(), &drops, &[4, 8, 10]))
-        .min_by(|a, b| rms(&a.0, &a.1).total_cmp(&rms(&b.0, &b.1)))?;
-    Some(Fitted { fit, data, drops, starts: (found.len(), agree) })
+    out.sort_by(|a, b| a.rms_n().total_cmp(&b.rms_n()));
+    out
 }

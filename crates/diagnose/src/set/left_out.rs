@@ -29,10 +29,12 @@ pub fn score(run: &Insertion, p: &Prediction) -> Score {
     let mut out = Score::default();
     let first = run.ruptures_s.iter().copied().fold(NEVER, f64::min);
     let (mut sum, mut inside) = (0.0, 0.0);
+    let limit_n = run.limit_n.unwrap_or(f64::INFINITY);
+    let shown = |f: f64| f.clamp(-limit_n, limit_n);
     for i in 0..r.len().min(p.mean.len()) {
-        let e = r.force_n[i] - p.mean[i];
+        let e = r.force_n[i] - shown(p.mean[i]);
         sum += e * e;
-        let within = |(l, h): (&f64, &f64)| *l <= r.force_n[i] && r.force_n[i] <= *h;
+        let within = |(l, h): (&f64, &f64)| shown(*l) <= r.force_n[i] && r.force_n[i] <= shown(*h);
         inside += f64::from(u8::from(p.low.get(i).zip(p.high.get(i)).is_some_and(within)));
         let t = r.time_s[i];
         let near = run.ruptures_s.iter().any(|at| (t - at).abs() < WINDOW_S);

@@ -30,7 +30,7 @@ pub fn extended(name: &str, model: &Model, runs: &[&Insertion], instrument: &Ins
         name: format!("{name}, as measured: the mean insertion"),
         source: "fitted to measured insertions by stylet diagnose".to_owned(),
         tissue: model.tissue.clone(),
-        effects: model.effects.iter().filter_map(Choice::effect).collect(),
+        effects: model.effects.iter().filter_map(Choice::effect).chain(instrument.effects()).collect(),
         motion: Motion::Program { start_m: start, segments },
         robot: Robot::Replay,
         sensor: Sensor::ForceTorque(ForceTorque {

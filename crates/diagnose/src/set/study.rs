@@ -7,7 +7,7 @@ use crate::outcome::{
 };
 use crate::raw;
 use crate::set::first::{Insertion, groups};
-use crate::set::instrument::Instrument;
+use crate::set::instrument::{Checks, Instrument, Undone};
 use crate::set::laws::{Kind, Law, Laws, effects, laws, several};
 use crate::set::left_out::{Out, floor, runs_out, speeds_out};
 use crate::set::numbers::{Told, base_parameters, estimates};
@@ -16,7 +16,6 @@ use crate::set::scenario::extended;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::collections::BTreeMap;
 use stylet_identify::phases::noise_n;
-use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_tissue::Tissue;
 
@@ -43,20 +42,23 @@ pub struct Study {
     pub repeats: Repeats,
     /// The mean insertion as a scenario.
     pub extended: Scenario,
+    /// The insertions as they were studied: what the instrument shows is undone.
+    pub runs: Vec<Insertion>,
 }
 
-/// Studies insertions. `instrument` looks at the checks once the largest force and the residual to be explained (N) are known.
+/// Studies insertions. What the instrument shows by itself is undone first.
 #[must_use]
 pub fn study(
     name: &str,
     believed: &Tissue,
     runs: &[&Insertion],
-    instrument: impl Fn(f64, f64) -> Instrument,
+    checks: &Checks,
     mut progress: impl FnMut(&str),
 ) -> Option<Study> {
-    let recordings: Vec<&Recording> = runs.iter().map(|r| &r.recording).collect();
-    let notes: Vec<_> = runs.iter().map(|r| r.notes.clone()).collect();
-    let raw = raw::look(&recordings, &notes);
+    let instrument = Instrument::look(checks, runs, believed.surface_m);
+    let Undone { runs: undone, raw } = instrument.undo(runs);
+    let runs: Vec<&Insertion> = undone.iter().collect();
+    let runs = runs.as_slice();
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let laws = laws(believed, runs, &raw, &mut rng, &mut progress)?;
     progress("every run predicted without it");
@@ -64,8 +66,6 @@ pub fn study(
     let base_out = if laws.best.kind == Kind::Base { out.clone() } else { runs_out(&laws.base.fitted, runs) };
     let by_speed = |law: &Law| several(runs).then(|| speeds_out(&law.fitted, runs));
     let (speed_out, base_speed_out) = (by_speed(&laws.best), by_speed(&laws.base));
-    let force_n = recordings.iter().flat_map(|r| &r.force_n).fold(0.0_f64, |most, f| most.max(f.abs()));
-    let instrument = instrument(force_n, laws.base.left_out_n());
     let floors = floor(runs);
     let standing = Standing {
         runs,
@@ -79,7 +79,7 @@ pub fn study(
     let repeats = repeats(&standing, bought(&laws), instrument);
     let diagnosis = diagnosis(&laws, runs, believed, &out, &repeats, &raw);
     let extended = extended(name, &laws.best.fitted.fit.model, runs, &repeats.instrument);
-    Some(Study { laws, out, base_out, diagnosis, repeats, extended })
+    Some(Study { laws, out, base_out, diagnosis, repeats, extended, runs: undone })
 }
 
 /// What each law and each part of the best one buys.

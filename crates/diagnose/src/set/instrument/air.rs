@@ -1,0 +1,141 @@
+//! A sensor that touches nothing: what it shows in air, in a recording of its own or before an insertion reaches the tissue.
+
+use crate::set::first::Insertion;
+use stylet_identify::linear::Symmetric;
+use stylet_identify::phases::noise_n;
+use stylet_record::Recording;
+use stylet_stats::{mean, median_of, rms};
+
+/// Share of the way to the believed surface that counts as air: the surface may be nearer than believed.
+const AIR_SHARE: f64 = 0.5;
+/// Fewest samples of it.
+const AIR_SAMPLES: usize = 20;
+/// Force that scatters about its line by more than so many standard deviations of its noise is no air.
+const AIR_NOISES: f64 = 2.0;
+/// Speed (m/s) from which the drive moves.
+const MOVES_MPS: f64 = 2e-4;
+
+/// A straight line through a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Force (N) at the first instant.
+    pub first_n: f64,
+    /// Slope (N/s).
+    pub rate_n_per_s: f64,
+    /// Standard deviation about it (N).
+    pub sd_n: f64,
+}
+
+/// The line of least squares.
+#[must_use]
+pub fn line(t: &[f64], f: &[f64]) -> Line {
+    let (middle, level) = (mean(t), mean(f));
+    let (tt, tf) = t.iter().zip(f).fold((0.0, 0.0), |(tt, tf), (t, f)| {
+        (tt + (t - middle) * (t - middle), tf + (t - middle) * (f - level))
+    });
+    let rate = tf / tt.max(1e-12);
+    let rest: Vec<f64> = t.iter().zip(f).map(|(t, f)| f - level - rate * (t - middle)).collect();
+    Line { first_n: level + rate * (t[0] - middle), rate_n_per_s: rate, sd_n: rms(&rest) }
+}
+
+/// What a recording in air shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// Its line.
+    pub line: Line,
+    /// Correlation of neighbouring noise samples.
+    pub ar1: f64,
+    /// Amplitude (N) and frequency (Hz) of the strongest line of its spectrum.
+    pub tone: Option<(f64, f64)>,
+    /// Half the difference (N) between moving in and moving out.
+    pub drive_n: Option<f64>,
+}
+
+impl Air {
+    /// Looks at a recording in air.
+    #[must_use]
+    pub fn of(air: &Recording) -> Self {
+        let (t, f) = (&air.time_s, &air.force_n);
+        let way =
+            |sign: f64| air.velocity_mps.iter().filter(|v| **v * sign > MOVES_MPS).count() > AIR_SAMPLES;
+        let moves = way(1.0) && way(-1.0);
+        let drive = |i: usize| match air.velocity_mps[i] {
+            v if !moves || v.abs() <= MOVES_MPS => 0.0,
+            v => v.signum(),
+        };
+        // Offset, drift and drive at once: the way in comes before the way out, as the early part of a drift before the late one.
+        let middle = mean(t);
+        let mut a = Symmetric::zeros(3);
+        let mut b = [0.0; 3];
+        let row = |i: usize| [1.0, t[i] - middle, drive(i)];
+        for i in 0..t.len() {
+            let row = row(i);
+            for j in 0..3 {
+                b[j] += row[j] * f[i];
+                (j..3).for_each(|k| a.add(j, k, row[j] * row[k]));
+            }
+        }
+        let x = a.factor().solve(&b);
+        let rest: Vec<f64> =
+            (0..t.len()).map(|i| f[i] - row(i).iter().zip(&x).map(|(r, x)| r * x).sum::<f64>()).collect();
+        let lagged: f64 = rest.windows(2).map(|p| p[0] * p[1]).sum();
+        Self {
+            line: Line { first_n: x[0] + x[1] * (t[0] - middle), rate_n_per_s: x[1], sd_n: rms(&rest) },
+            ar1: lagged / rest.iter().map(|x| x * x).sum::<f64>().max(1e-300),
+            tone: tone(t, &rest),
+            drive_n: moves.then_some(x[2]),
+        }
+    }
+}
+
+/// The line of the force before each insertion reaches the tissue, where that can be told from the tissue's own: it is straight.
+#[must_use]
+pub fn before_contact(runs: &[&Insertion], surface_m: f64) -> Vec<Line> {
+    runs.iter()
+        .filter_map(|run| {
+            let r = &run.recording;
+            let from = r.position_m[0];
+            let end = r.position_m.iter().position(|z| *z > from + AIR_SHARE * (surface_m - from))?;
+            if end < AIR_SAMPLES || surface_m <= from {
+                return None;
+            }
+            let at = line(&r.time_s[..end], &r.force_n[..end]);
+            (at.sd_n <= AIR_NOISES * noise_n(&r.force_n[..end]).max(1e-9)).then_some(at)
+        })
+        .collect()
+}
+
+/// The middle of a number that the insertions have in common: nothing when they do not agree on it.
+#[must_use]
+pub fn common(values: &[f64]) -> f64 {
+    let middle = median_of(values.iter().copied());
+    let apart = median_of(values.iter().map(|x| (x - middle).abs()));
+    if apart < 0.5 * middle.abs() { middle } else { 0.0 }
+}
+
+/// The strongest sinusoid (amplitude, frequency) up to half the sampling rate, on the time stamps as they are.
+fn tone(t: &[f64], e: &[f64]) -> Option<(f64, f64)> {
+    let duration = t[t.len() - 1] - t[0];
+    if duration <= 0.0 || t.len() < AIR_SAMPLES {
+        return None;
+    }
+    let most = 0.5 * t.len() as f64 / duration;
+    let step = 0.5 / duration;
+    let mut best = (0.0, 0.0);
+    let mut k = 2.0;
+    while k * step < most {
+        let omega = std::f64::consts::TAU * k * step;
+        let (mut c, mut s) = (0.0, 0.0);
+        for (at, e) in t.iter().zip(e) {
+            let (sin, cos) = libm::sincos(omega * (at - t[0]));
+            c += e * cos;
+            s += e * sin;
+        }
+        let amplitude = 2.0 * libm::sqrt(c * c + s * s) / t.len() as f64;
+        if amplitude > best.0 {
+            best = (amplitude, k * step);
+        }
+        k += 1.0;
+    }
+    Some(best)
+}

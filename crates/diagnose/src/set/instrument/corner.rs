@@ -1,0 +1,241 @@
+//! A force that comes late: where the needle stops and where its way back begins, the motion has a corner, and the force answers at once
+//! unless the sensor or the clock is late (a corner that is moved) or slow (a corner that is rounded).
+//!
+//! Before a corner the force goes on as a line. Behind the second one a spring and a friction that builds up over a length `delta`
+//! answer the way `u` back: `f = a + b t + c L[u] + d L[1 - exp(-u / delta)]`, with the delay in `u` and the lag in `L`; behind the first one
+//! the tissue relaxes, with the time since the stop for `u`. The coefficients are every recording's own; `delta` and the delay
+//! or the lag are those of all.
+
+use crate::set::first::Insertion;
+use rayon::prelude::*;
+use stylet_identify::linear::Symmetric;
+use stylet_record::Recording;
+use stylet_stats::{sd, student};
+
+/// Stretch (s) before the corner, and behind it.
+const AROUND_S: (f64, f64) = (1.0, 0.8);
+/// Delays and lags are tried up to so much (s), in these steps.
+const MOST_S: f64 = 0.8;
+/// Steps (s).
+const STEP_S: f64 = 0.02;
+/// Shorter ones are no matter of a sensor: play and rounded corners of the drive make them (s).
+const LEAST_S: f64 = 0.08;
+/// Lengths over which an answer builds up: friction on the way back (m), relaxation after a stop (s).
+const DELTA: [[f64; 5]; 2] = [[3e-4, 6e-4, 8e-4, 1e-3, 1.5e-3], [0.1, 0.2, 0.4, 0.8, 1.6]];
+/// A late force leaves so much less (mean square) of the corners than one in time; without one, no delay or lag is better at all.
+const BETTER: f64 = 0.9;
+
+/// How the force comes late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum How {
+    /// All of it later: `time_delay`.
+    Delayed,
+    /// Rounded: `low_pass_lag`.
+    Slow,
+}
+
+/// A force that comes late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Late {
+    /// How.
+    pub how: How,
+    /// By how much (s), with its 95 % interval over the recordings.
+    pub by_s: f64,
+    /// Lower end (s).
+    pub low_s: f64,
+    /// Upper end (s).
+    pub high_s: f64,
+}
+
+/// Whether the force of these insertions comes late.
+#[must_use]
+pub fn late(runs: &[&Insertion]) -> Option<Late> {
+    let corners = |at: At| -> Vec<Corner> { runs.iter().filter_map(|r| Corner::of(r, at)).collect() };
+    let corners: Vec<Vec<Corner>> = [At::Back, At::Stop]
+        .into_iter()
+        .map(corners)
+        .filter(|c| c.len() >= 2 && 2 * c.len() >= runs.len())
+        .collect();
+    if corners.is_empty() {
+        return None;
+    }
+    let samples: f64 = corners.iter().flatten().map(|c| c.time_s.len() as f64).sum();
+    [How::Delayed, How::Slow]
+        .into_iter()
+        .map(|how| {
+            let left: Vec<Vec<Left>> =
+                corners.iter().map(|c| c.par_iter().map(|c| c.left(how)).collect()).collect();
+            (how, together(&left, None), left)
+        })
+        .min_by(|a, b| lowest(&a.1).1.total_cmp(&lowest(&b.1).1))
+        .and_then(|(how, all, left)| {
+            let (by_s, height) = lowest(&all);
+            // The jackknife over recordings.
+            let n = runs.len() as f64;
+            let others: Vec<f64> = runs.iter().map(|r| lowest(&together(&left, Some(&r.name))).0).collect();
+            let half = student::quantile(0.975, n - 1.0) * sd(&others) * (n - 1.0) / n.sqrt();
+            let shows = by_s > LEAST_S && height - all[0] < samples * libm::log(BETTER);
+            shows.then_some(Late { how, by_s, low_s: (by_s - half).max(0.0), high_s: by_s + half })
+        })
+}
+
+/// Per length of [`DELTA`] and delay or lag, samples times the logarithm of the mean square that is left.
+struct Left {
+    name: String,
+    by: [Vec<f64>; 5],
+}
+
+/// The sum over corners and recordings but one, each kind of corner at the length that suits it best.
+fn together(left: &[Vec<Left>], but: Option<&str>) -> Vec<f64> {
+    let at = |kind: &[Left], k: usize| {
+        let of = |d: usize| -> f64 {
+            kind.iter().filter(|l| Some(l.name.as_str()) != but).map(|l| l.by[d][k]).sum()
+        };
+        (0..5).map(of).fold(f64::INFINITY, f64::min)
+    };
+    (0..left[0][0].by[0].len()).map(|k| left.iter().map(|kind| at(kind, k)).sum()).collect()
+}
+
+/// Place (s) and height of the lowest point of a curve over steps of [`STEP_S`], between its points.
+fn lowest(curve: &[f64]) -> (f64, f64) {
+    let k = (0..curve.len()).min_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
+    let mut at = k as f64;
+    if k > 0 && k + 1 < curve.len() {
+        let (before, here, after) = (curve[k - 1], curve[k], curve[k + 1]);
+        let bend = before - 2.0 * here + after;
+        if bend > 0.0 {
+            at += 0.5 * (before - after) / bend;
+        }
+    }
+    (at * STEP_S, curve[k])
+}
+
+/// Where a motion has its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum At {
+    /// Where the way back begins.
+    Back,
+    /// Where the advance ends.
+    Stop,
+}
+
+/// The force around a corner of one recording.
+struct Corner<'a> {
+    name: &'a str,
+    recording: &'a Recording,
+    at: At,
+    /// Instant (s) of the corner and where it lies (m).
+    at_s: f64,
+    turned_m: f64,
+    /// First of the samples.
+    first: usize,
+    time_s: &'a [f64],
+    force_n: &'a [f64],
+}
+
+impl<'a> Corner<'a> {
+    fn of(run: &'a Insertion, at: At) -> Option<Self> {
+        let r = &run.recording;
+        let time = |k: usize| r.time_s.get(k).copied();
+        let (stop_s, back_s) = (time(run.phases.deepest)?, time(run.phases.back).unwrap_or(f64::INFINITY));
+        let at_s = if at == At::Back { back_s } else { stop_s };
+        let (from_s, to_s) = (at_s - AROUND_S.0, at_s + AROUND_S.1);
+        let alone = r.time_s[r.len() - 1] > to_s
+            && match at {
+                At::Stop => back_s > to_s,
+                At::Back => stop_s < from_s || back_s - stop_s < LEAST_S,
+            };
+        let first = r.time_s.partition_point(|t| *t < from_s);
+        let end = r.time_s.partition_point(|t| *t < to_s);
+        // A rupture that a late sensor shows inside is elsewhere.
+        let torn = run.ruptures_s.iter().any(|t| (from_s - MOST_S..to_s).contains(t));
+        let turned_m = r.position_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        (alone && !torn && end - first > 4 * COLUMNS).then(|| Self {
+            name: &run.name,
+            recording: r,
+            at,
+            at_s,
+            turned_m,
+            first,
+            time_s: &r.time_s[first..end],
+            force_n: &r.force_n[first..end],
+        })
+    }
+
+    /// What is left over all lengths and delays or lags.
+    fn left(&self, how: How) -> Left {
+        let n = self.time_s.len() as f64;
+        let by = DELTA[self.at as usize].map(|delta| {
+            let at = |k: usize| self.squares(how, k as f64 * STEP_S, delta);
+            (0..=(MOST_S / STEP_S) as usize).map(|k| n * libm::log((at(k) / n).max(1e-30))).collect()
+        });
+        Left { name: self.name.to_owned(), by }
+    }
+
+    /// Sum of squares (N²) that is left with this delay or lag.
+    fn squares(&self, how: How, by_s: f64, delta: f64) -> f64 {
+        let (delay_s, lag_s) = match how {
+            How::Delayed => (by_s, 0.0),
+            How::Slow => (0.0, by_s),
+        };
+        let mut place = self.first.saturating_sub(1);
+        while place > 0 && self.recording.time_s[place] > self.time_s[0] - delay_s {
+            place -= 1;
+        }
+        let mut slow = [0.0; 2];
+        let mut rows: Vec<[f64; COLUMNS]> = Vec::with_capacity(self.time_s.len());
+        for (i, t) in self.time_s.iter().enumerate() {
+            let at_s = t - delay_s;
+            let u = match self.at {
+                At::Stop => (at_s - self.at_s).max(0.0),
+                At::Back if at_s < self.at_s - 0.2 * AROUND_S.0 => 0.0,
+                At::Back => (self.turned_m - self.position(at_s, &mut place)).max(0.0),
+            };
+            let answers = [u / delta, 1.0 - libm::exp(-u / delta)];
+            let share = match (lag_s > 0.0, i) {
+                (false, _) | (_, 0) => 1.0,
+                _ => 1.0 - libm::exp(-(t - self.time_s[i - 1]) / lag_s),
+            };
+            for (s, x) in slow.iter_mut().zip(answers) {
+                *s += (x - *s) * share;
+            }
+            rows.push([1.0, t - self.at_s, slow[0], slow[1]]);
+        }
+        least_squares(&rows, self.force_n)
+    }
+
+    /// Where the needle is at a time, linear between samples.
+    fn position(&self, t: f64, place: &mut usize) -> f64 {
+        let (time, z) = (&self.recording.time_s, &self.recording.position_m);
+        while *place + 2 < time.len() && time[*place + 1] < t {
+            *place += 1;
+        }
+        let share = (t - time[*place]) / (time[*place + 1] - time[*place]).max(1e-12);
+        z[*place] + share.clamp(0.0, 1.0) * (z[*place + 1] - z[*place])
+    }
+}
+
+/// Columns of the regression.
+const COLUMNS: usize = 4;
+
+/// Sum of squares that the best combination of columns leaves.
+fn least_squares(rows: &[[f64; COLUMNS]], y: &[f64]) -> f64 {
+    let mut a = Symmetric::zeros(COLUMNS);
+    let mut b = [0.0; COLUMNS];
+    for (row, y) in rows.iter().zip(y) {
+        for i in 0..COLUMNS {
+            b[i] += row[i] * y;
+            for j in i..COLUMNS {
+                a.add(i, j, row[i] * row[j]);
+            }
+        }
+    }
+    let x = a.factor().solve(&b);
+    rows.iter()
+        .zip(y)
+        .map(|(row, y)| {
+            let e = y - row.iter().zip(&x).map(|(r, x)| r * x).sum::<f64>();
+            e * e
+        })
+        .sum()
+}

@@ -1,0 +1,248 @@
+//! What the instrument does by itself, seen without a law: a motion in air, a known load, the air before an insertion reaches the
+//! tissue and the corner where its way back begins. What it shows is undone before any law is fitted; what it does not show
+//! explains no residual.
+
+mod air;
+mod corner;
+mod undo;
+
+pub use undo::Undone;
+
+use crate::outcome::{Cause, Estimate};
+use crate::set::first::Insertion;
+use air::{Air, Line, before_contact, common, line};
+use corner::How;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use stylet_record::{DEFAULT_HALF_WIDTH_S, Recording};
+use stylet_stats::median;
+
+/// Forces below this share of the largest one explain nothing: laws of insertions leave several times as much.
+pub const NOTHING: f64 = 0.02;
+/// A load of which so large a share reads the same is at the end of what the sensor can show, or of its steps.
+const STUCK: f64 = 0.3;
+
+/// Confidence in what a check of the instrument shows by itself.
+const SEEN: f64 = 0.99;
+
+/// What the instrument was seen to do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Instrument {
+    /// Standard deviation of the noise in air (N).
+    pub noise_n: Option<f64>,
+    /// Correlation of neighbouring noise samples.
+    pub ar1: Option<f64>,
+    /// Mean force in air (N).
+    pub bias_n: Option<f64>,
+    /// Change of the force over the recording in air (N).
+    pub drift_n: Option<f64>,
+    /// Amplitude (N) and frequency (Hz) of the strongest line in air.
+    pub line: Option<(f64, f64)>,
+    /// Half the difference (N) between moving in and moving out, in air.
+    pub drive_n: Option<f64>,
+    /// Measured over known force, less one.
+    pub gain: Option<f64>,
+    /// By how much the force comes late at corners of the motion, all of it (s).
+    #[serde(default)]
+    pub delay_s: Option<f64>,
+    /// The same, rounded (s).
+    #[serde(default)]
+    pub lag_s: Option<f64>,
+    /// Effects that this excludes, with what was found.
+    pub excluded: Vec<Excluded>,
+    /// Effects that this shows.
+    #[serde(default)]
+    pub shown: Vec<Shown>,
+}
+
+/// An effect that the instrument's checks show.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Its parameters by their paths.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Largest force in N that it makes here.
+    pub size_n: f64,
+    /// What was found.
+    pub evidence: String,
+}
+
+impl Shown {
+    /// As a cause: it was seen without a law.
+    #[must_use]
+    pub fn cause(&self) -> Cause {
+        Cause {
+            effect: self.effect.clone(),
+            equivalent: Vec::new(),
+            confidence: SEEN,
+            parameters: self.parameters.clone(),
+            gain_nats: 0.0,
+            share: 0.0,
+        }
+    }
+}
+
+/// An effect that the instrument's checks exclude.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Excluded {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Largest force in N that it can make here.
+    pub size_n: f64,
+    /// What was found.
+    pub evidence: String,
+}
+
+/// Recordings of the instrument by itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Checks<'a> {
+    /// A motion in air.
+    pub air: Option<&'a Recording>,
+    /// A load of so many newtons.
+    pub load: Option<(&'a Recording, f64)>,
+}
+
+impl Instrument {
+    /// Looks at the checks and at what insertions show by themselves of a tissue that is believed to begin at `surface_m`.
+    #[must_use]
+    pub fn look(checks: &Checks, runs: &[&Insertion], surface_m: f64) -> Self {
+        let force_n =
+            runs.iter().flat_map(|r| &r.recording.force_n).fold(0.0_f64, |most, f| most.max(f.abs()));
+        let duration_s = stylet_stats::median_of(runs.iter().map(|r| r.recording.duration_s()));
+        let mut out = Self::default();
+        let air = checks.air.map(Air::of);
+        let lines = before_contact(runs, surface_m);
+        let seen = (2 * lines.len() >= runs.len().max(2)).then_some(lines.as_slice());
+        out.of_sensor(air.as_ref(), seen, checks.air.map_or(duration_s, Recording::duration_s), force_n);
+        out.gain = checks.load.and_then(|(recording, known)| {
+            let zero = air.as_ref().map_or(out.bias_n.unwrap_or(0.0), |a| a.line.first_n);
+            load(recording, known, zero, out.drift_n.is_some_and(|d| d.abs() > NOTHING * force_n))
+        });
+        let late = corner::late(runs);
+        match late.map(|l| (l.how, l.by_s)) {
+            Some((How::Delayed, by_s)) => out.delay_s = Some(by_s),
+            Some((How::Slow, by_s)) => out.lag_s = Some(by_s),
+            None => {}
+        }
+        out.judge(force_n, duration_s, checks.air.is_some(), late);
+        out
+    }
+
+    /// Bias, drift, noise and tones: of the insertions themselves where they tell them, of the check in air otherwise.
+    fn of_sensor(&mut self, air: Option<&Air>, before: Option<&[Line]>, air_s: f64, force_n: f64) {
+        if let Some(air) = air {
+            (self.noise_n, self.ar1) = (Some(air.line.sd_n), Some(air.ar1));
+            (self.bias_n, self.drift_n) = (Some(air.line.first_n), Some(air.line.rate_n_per_s * air_s));
+            (self.line, self.drive_n) = (air.tone, air.drive_n);
+        }
+        let Some(lines) = before else { return };
+        let of = |what: fn(&Line) -> f64| lines.iter().map(what).collect::<Vec<_>>();
+        let bias = common(&of(|l| l.first_n));
+        if air.is_none() || bias.abs() > NOTHING * force_n {
+            self.bias_n = Some(bias);
+        }
+        if air.is_none() {
+            self.noise_n = Some(stylet_stats::median_of(lines.iter().map(|l| l.sd_n)));
+            self.drift_n = Some(common(&of(|l| l.rate_n_per_s)) * air_s);
+        }
+    }
+
+    /// What is excluded, and what is shown.
+    fn judge(&mut self, force_n: f64, duration_s: f64, in_air: bool, late: Option<corner::Late>) {
+        let (mut excluded, mut shown) = (Vec::new(), Vec::new());
+        let mut judge = |effect: &str, size_n: Option<f64>, numbers: &[(&str, f64)], evidence: String| {
+            let Some(size_n) = size_n else { return };
+            let effect = effect.to_owned();
+            if size_n.abs() < NOTHING * force_n {
+                excluded.push(Excluded { effect, size_n: size_n.abs(), evidence });
+            } else {
+                // What noise leaves open of a mean is far below what is worth a word.
+                let of = |value: f64| Estimate { value, low: value, high: value };
+                let parameters = numbers.iter().map(|(k, x)| ((*k).to_owned(), of(*x))).collect();
+                shown.push(Shown { effect, parameters, size_n: size_n.abs(), evidence });
+            }
+        };
+        let mn = |x: f64| format!("{:.1} mN", 1e3 * x);
+        let gain = self.gain.unwrap_or(0.0);
+        judge(
+            "force_gain",
+            self.gain.map(|g| g * force_n),
+            &[("eps", gain)],
+            format!("a known load is measured {:+.2} % off", 100.0 * gain),
+        );
+        let bias = self.bias_n.unwrap_or(0.0);
+        judge("force_bias", self.bias_n, &[("force_n", bias)], format!("force in air {}", mn(bias)));
+        let drift = self.drift_n.unwrap_or(0.0);
+        judge(
+            "force_drift",
+            self.drift_n,
+            &[("rate_n_per_s", drift / duration_s.max(1e-9))],
+            format!("change over a recording in air {}", mn(drift)),
+        );
+        if in_air {
+            let (amplitude_n, hz) = self.line.unwrap_or((0.0, 0.0));
+            judge(
+                "periodic_interference",
+                self.line.map(|l| l.0),
+                &[("amplitude_n", amplitude_n), ("frequency_hz", hz)],
+                format!("strongest line in air {} at {hz:.1} Hz", mn(amplitude_n)),
+            );
+            let drive = self.drive_n.unwrap_or(0.0);
+            judge(
+                "drive_friction",
+                self.drive_n,
+                &[("force_n", drive)],
+                format!("half the difference between in and out, in air, {}", mn(drive)),
+            );
+        }
+        if let Some(late) = late {
+            let (effect, path, how) = match late.how {
+                How::Delayed => ("time_delay", "delay_s", "later"),
+                How::Slow => ("low_pass_lag", "time_constant_s", "rounded, by a time constant of"),
+            };
+            let estimate = Estimate { value: late.by_s, low: late.low_s, high: late.high_s };
+            shown.push(Shown {
+                effect: effect.to_owned(),
+                parameters: [(path.to_owned(), estimate)].into(),
+                size_n: force_n,
+                evidence: format!(
+                    "where the way back begins the force answers {how} {:.2} s ({:.2} to {:.2} s)",
+                    late.by_s, late.low_s, late.high_s
+                ),
+            });
+        }
+        (self.excluded, self.shown) = (excluded, shown);
+    }
+}
+
+/// Measured over known force, less one; nothing when the sensor cannot show the load.
+fn load(recording: &Recording, known: f64, zero_n: f64, drifts: bool) -> Option<f64> {
+    let f = &recording.force_n;
+    let most = f.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = f.iter().copied().fold(f64::INFINITY, f64::min);
+    let same = |at: f64| f.iter().filter(|f| (**f - at).abs() <= 1e-12).count() as f64;
+    if same(most).max(same(least)) > STUCK * f.len() as f64 {
+        return None;
+    }
+    let level = if drifts { line(&recording.time_s, f).first_n } else { median(&mut f.clone()) };
+    Some((level - zero_n) / known - 1.0)
+}
+
+/// Remarks on the timing and the stroke of a run, for the data-quality section.
+#[must_use]
+pub fn timing(recording: &Recording) -> String {
+    let n = recording.len();
+    let mean_hz = (n - 1) as f64 / recording.duration_s();
+    let largest = recording.time_s.windows(2).map(|p| p[1] - p[0]).fold(0.0, f64::max);
+    let deepest = recording.position_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let first = recording.position_m[0];
+    format!(
+        "{n} samples kept at their own instants: {mean_hz:.1} Hz on the average (median interval {:.2} ms), largest gap {:.1} ms; stroke \
+         ends at {:.1} mm; velocity is the slope of the position within {:.0} ms",
+        1e3 * recording.median_interval_s(),
+        1e3 * largest,
+        1e3 * (deepest - first),
+        1e3 * DEFAULT_HALF_WIDTH_S
+    )
+}
