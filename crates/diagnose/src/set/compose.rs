@@ -42,7 +42,7 @@ pub fn compose(
         fits.push((Population::of(&fit, &runs), fit));
     }
     let models: Vec<&Model> = fits.iter().map(|(_, f)| &f.fit.model).collect();
-    let population = Population { law: together(believed, &models)?, residual_n: fits.first()?.0.residual_n };
+    let population = Population { law: together(believed, &models)?, ..fits.first()?.0.clone() };
     let errors: Vec<f64> =
         whole.par_iter().map(|run| score(run, &predict(&population, run, None, DRAWS)).rmse_n).collect();
     let of =

@@ -2,9 +2,11 @@
 
 use crate::set::first::Insertion;
 use crate::set::fitted::Fitted;
+use crate::set::instrument::line;
 use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
 use stylet_record::Recording;
 use stylet_stats::normal::quantile;
+use stylet_stats::{median_of, student};
 use stylet_tissue::{Effect, LawState, Reading};
 
 /// Draws of a prediction.
@@ -28,8 +30,10 @@ pub enum Part {
 pub struct Population {
     /// The law with no recording of its own.
     pub law: Model,
-    /// Root mean square (N) of what is left, by [`Part`].
+    /// Root mean square (N) of what is left, by [`Part`], of a recording that takes part in the fit; single samples with their noise.
     pub residual_n: [f64; 4],
+    /// Recordings that the law was fitted to: what varies between them is known as well as so many can tell.
+    pub recordings: usize,
 }
 
 /// Radical inverse of `k` in a base: points of the Halton sequence.
@@ -61,16 +65,28 @@ impl Population {
                 sums[part].1 += 1.0;
             }
         }
-        Self { law: model.only(&[]), residual_n: sums.map(|(s, n)| (s / f64::max(n, 1.0)).sqrt()) }
+        // Blocks average the noise of single samples away.
+        let noise_n = median_of(runs.iter().map(|r| single(&r.recording)));
+        let of = |(s, n): (f64, f64)| (s / f64::max(n, 1.0) + noise_n * noise_n).sqrt();
+        Self { law: model.only(&[]), residual_n: sums.map(of), recordings: runs.len() }
+    }
+
+    /// What is left of a recording that takes no part, over what is left of one that does: about a mean of `n` values another one scatters
+    /// by `sqrt((n + 1)/n)` of their standard deviation, they by `sqrt((n - 1)/n)`.
+    fn beyond(&self) -> f64 {
+        let n = self.recordings.max(2) as f64;
+        ((n + 1.0) / (n - 1.0)).sqrt()
     }
 
     /// The `k`-th drawn insertion, from 1 on; on a known day or on one that is drawn too.
     fn draw(&self, k: usize, day: Option<usize>) -> Model {
         let mut dimension = 0;
+        // A spread that few recordings tell is drawn from Student's distribution, about a mean that they tell no better.
+        let n = self.recordings.max(2) as f64;
         let mut normal = || {
             let base = PRIMES[dimension % PRIMES.len()];
             dimension += 1;
-            quantile(halton(k, base))
+            student::quantile(halton(k, base), n - 1.0) * (1.0 + 1.0 / n).sqrt()
         };
         let mut model = self.law.clone();
         let s = &self.law.scatter;
@@ -113,6 +129,16 @@ impl Population {
         model.instants = vec![vec![NEVER; model.layers()]];
         model
     }
+}
+
+/// Samples of a window in which single ones scatter about a line.
+const WINDOW: usize = 8;
+
+/// Standard deviation (N) of single samples about what a block follows.
+fn single(recording: &Recording) -> f64 {
+    let (t, f) = (&recording.time_s, &recording.force_n);
+    let of = |(t, f): (&[f64], &[f64])| line(t, f).sd_n * (WINDOW as f64 / (WINDOW as f64 - 2.0)).sqrt();
+    median_of(t.chunks_exact(WINDOW).zip(f.chunks_exact(WINDOW)).map(of))
 }
 
 /// The part of an insertion at a time, its first rupture being at `first_s`.
@@ -170,6 +196,7 @@ pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, dra
     if forces.is_empty() {
         return Prediction::default();
     }
+    let beyond = population.beyond();
     // Quantiles of a normal distribution in five pieces of equal share.
     let pieces: Vec<f64> = (0..5).map(|k| quantile(0.1 + 0.2 * f64::from(k))).collect();
     let mut out = Prediction::default();
@@ -178,7 +205,7 @@ pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, dra
         out.mean.push(forces.iter().map(|f| f.0[i]).sum::<f64>() / forces.len() as f64);
         all.clear();
         for (force, first_s) in &forces {
-            let scatter = population.residual_n[part(run, r.time_s[i], *first_s) as usize];
+            let scatter = beyond * population.residual_n[part(run, r.time_s[i], *first_s) as usize];
             all.extend(pieces.iter().map(|q| force[i] + scatter * q));
         }
         let n = all.len();

@@ -10,7 +10,8 @@ pub use undo::Undone;
 
 use crate::outcome::{Cause, Estimate};
 use crate::set::first::Insertion;
-use air::{Air, Line, before_contact, common, line};
+pub(crate) use air::line;
+use air::{Air, Line, before_contact, common};
 use corner::How;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
