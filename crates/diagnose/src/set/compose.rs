@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::model::{Belief, Choice, Day, Model};
 use stylet_record::Recording;
+use stylet_stats::median_of;
 use stylet_tissue::Tissue;
 
 /// Seed of what the starts begin with.
@@ -42,7 +43,10 @@ pub fn compose(
         fits.push((Population::of(&fit, &runs), fit));
     }
     let models: Vec<&Model> = fits.iter().map(|(_, f)| &f.fit.model).collect();
-    let population = Population { law: together(believed, &models)?, ..fits.first()?.0.clone() };
+    // Where the whole lies is a matter of its set-up: it begins where its force does.
+    let begins = |runs: &mut dyn Iterator<Item = &Insertion>| median_of(runs.map(|r| r.contact_m));
+    let moved_m = begins(&mut whole.iter().copied()) - begins(&mut alone.first()?.1.iter());
+    let population = Population { law: together(believed, &models, moved_m)?, ..fits.first()?.0.clone() };
     let errors: Vec<f64> =
         whole.par_iter().map(|run| score(run, &predict(&population, run, None, DRAWS)).rmse_n).collect();
     let of =
@@ -67,10 +71,10 @@ fn by_itself(kind: Kind, tissue: &Tissue, runs: &[&Insertion]) -> Option<Fitted>
 }
 
 /// One model of the layers of several, each where it was found.
-fn together(believed: &Tissue, alone: &[&Model]) -> Option<Model> {
+fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> {
     let first = *alone.first()?;
     let mut model = first.only(&[]);
-    let mut tissue = Tissue { surface_m: first.tissue.surface_m, layers: Vec::new() };
+    let mut tissue = Tissue { surface_m: first.tissue.surface_m + moved_m, layers: Vec::new() };
     model.effects.clear();
     model.bound.clear();
     let mut sds = [0.0; 8];

@@ -15,6 +15,9 @@ const SAME_STROKE_M: f64 = 1e-3;
 const SURFACE_SD_M: f64 = 1.5e-3;
 /// The same where a blunt tool comes to rest on soft tissue before it presses.
 const PRESSED_SD_M: f64 = 2e-3;
+/// Places of the exponent of the speed in `shaft_slip` and of the exponent in `delayed_puncture`.
+const RATE: usize = 6;
+const WAITS: usize = 2;
 /// Relative standard deviation of a thickness about what is believed or seen.
 const THICKNESS_SD: f64 = 0.2;
 /// Friction in the base law bears this share of the load before a rupture.
@@ -251,6 +254,8 @@ fn wide(tissue: Tissue) -> Belief {
 pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     let Frame { mut tissue, fronts_m: fronts, loads_n, indented_m } = frame(believed, runs, guess.surface_m);
     let days = groups(runs);
+    let slowest = days.first().map_or(0.0, |g| runs[g[0]].speed_mps);
+    let one_speed = days.iter().flatten().all(|r| runs[*r].speed_mps < slowest * (1.0 + SAME_SPEED));
     let mut effects: Vec<AnyEffect> = Vec::new();
     let mut bound = Vec::new();
     for (l, layer) in tissue.layers.iter_mut().enumerate() {
@@ -259,8 +264,13 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
         layer.friction_ns_per_m2 = 0.0;
         layer.puncture_n = None;
         let hold = guess.hold * load;
+        let here = effects.len();
+        if l == 0 && one_speed {
+            // One speed tells nothing of what a rate does, nor of how long a puncture waits.
+            bound.push(Bound { effect: here, parameter: RATE, like: None });
+            bound.push(Bound { effect: here + 1, parameter: WAITS, like: None });
+        }
         if l > 0 {
-            let here = effects.len();
             // What the material of the shaft decides is common to the layers.
             bound.push(Bound { effect: here + 1, parameter: 2, like: Some(1) });
             bound.extend([3, 4, 6, 8, 9, 10, 11].map(|parameter| Bound {
@@ -277,7 +287,7 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
                 kept: guess.kept,
                 exponent: guess.exponent,
                 wear_per_m: guess.wear_per_m[l.min(1)],
-                rate: guess.rate,
+                rate: if one_speed { 0.0 } else { guess.rate },
                 curve_n_per_m2: (1.0 - guess.straight) * load / (x * x),
                 fractions: guess.fractions,
                 time_constants_s: guess.times_s,
