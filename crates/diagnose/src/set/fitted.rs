@@ -26,8 +26,8 @@ const EXPECTED_DAYS: f64 = 4.0;
 const FIRST_LOOK: [usize; 2] = [6, 6];
 /// the latter start from numbers that stand.
 const LONG_LOOK: [usize; 2] = [6, 8];
-/// One start of so many goes on.
-const GO_ON: usize = 3;
+/// So many starts go on.
+const GO_ON: usize = 8;
 /// So many fits that differ by more than a share are looked at closely,
 const FEW_FITS: usize = 4;
 /// that share,
@@ -229,7 +229,7 @@ pub fn fitted(
     let began: Vec<Model> = guesses.iter().map(|g| first(believed, runs, g)).collect();
     // Most starts are given up after a look; those that promise most go on.
     let mut found = from_all(&began, &coarse, &drops, &FIRST_LOOK);
-    found.truncate(starts.div_ceil(GO_ON).max(1));
+    found.truncate(GO_ON);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
     let found = from_all(&promising, &coarse, &drops, &LONG_LOOK);
     let Some(best) = found.first().map(|f| f.0) else { return Vec::new() };

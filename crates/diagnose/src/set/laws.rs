@@ -17,8 +17,10 @@ use stylet_identify::fit::{Effort, fit as fitted_on};
 use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
 use stylet_tissue::{Effect, Tissue};
 
-/// Starts of the law of a shaft that slips: about one in five comes near the best optimum.
+/// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
 pub const STARTS: usize = 24;
+/// and as many more as make so many fits of one recording: small sets have worse starts and cheaper fits.
+const START_FITS: usize = 300;
 /// The library is searched for what it adds with about so many insertions.
 const SEARCHED: usize = 6;
 /// Standard deviation of a number spread evenly over one.
@@ -35,6 +37,10 @@ const TURNS: usize = 5;
 const DRAWS: usize = 16;
 /// A law has to predict recordings left out better than the base law by this share.
 const WORTH: f64 = 0.02;
+/// More effects than this, each with a story of its own, are taken for a shaft that slips
+const ONE_STORY: usize = 2;
+/// only when they predict recordings left out better by this share.
+const MANY_STORIES: f64 = 0.1;
 /// A part of a law stays when recordings left out are predicted worse by this share without it.
 const PART_WORTH: f64 = 0.01;
 
@@ -138,9 +144,13 @@ pub fn laws(
     progress("fitting a shaft that slips, from several starts");
     let slip = slipping(believed, runs, raw, rng);
     let mut best = base.clone();
-    for law in library.iter().chain(&slip) {
+    for law in slip.iter().chain(&library) {
         let worth = law.left_out_n() < (1.0 - WORTH) * base.left_out_n();
-        if worth && law.left_out_n() < best.left_out_n() {
+        let many = law.kind == Kind::Library
+            && best.kind == Kind::Slip
+            && effects(&law.fitted.fit.model).len() > ONE_STORY;
+        let margin = if many { MANY_STORIES } else { 0.0 };
+        if worth && law.left_out_n() < (1.0 - margin) * best.left_out_n() {
             best = law.clone();
         }
     }
@@ -152,7 +162,8 @@ pub fn laws(
 /// The law of a shaft that slips: of the best fits, the one that predicts recordings left out best.
 #[must_use]
 pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut ChaCha8Rng) -> Option<Law> {
-    fitted(believed, runs, raw, STARTS, rng)
+    let starts = (START_FITS / runs.len().max(1)).clamp(STARTS, 3 * STARTS);
+    fitted(believed, runs, raw, starts, rng)
         .into_iter()
         .map(|f| Law::new(Kind::Slip, f, runs))
         .min_by(|a, b| a.left_out_n().total_cmp(&b.left_out_n()))

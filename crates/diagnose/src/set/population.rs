@@ -5,8 +5,8 @@ use crate::set::fitted::Fitted;
 use crate::set::instrument::line;
 use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
 use stylet_record::Recording;
+use stylet_stats::median_of;
 use stylet_stats::normal::quantile;
-use stylet_stats::{median_of, student};
 use stylet_tissue::{Effect, LawState, Reading};
 
 /// Draws of a prediction.
@@ -81,12 +81,12 @@ impl Population {
     /// The `k`-th drawn insertion, from 1 on; on a known day or on one that is drawn too.
     fn draw(&self, k: usize, day: Option<usize>) -> Model {
         let mut dimension = 0;
-        // A spread that few recordings tell is drawn from Student's distribution, about a mean that they tell no better.
+        // What varies is drawn about a mean that so many recordings tell no better.
         let n = self.recordings.max(2) as f64;
         let mut normal = || {
             let base = PRIMES[dimension % PRIMES.len()];
             dimension += 1;
-            student::quantile(halton(k, base), n - 1.0) * (1.0 + 1.0 / n).sqrt()
+            quantile(halton(k, base)) * (1.0 + 1.0 / n).sqrt()
         };
         let mut model = self.law.clone();
         let s = &self.law.scatter;
@@ -141,6 +141,33 @@ fn single(recording: &Recording) -> f64 {
     median_of(t.chunks_exact(WINDOW).zip(f.chunks_exact(WINDOW)).map(of))
 }
 
+/// The force (N) of the `k`-th drawn insertion (from 1 on), moved as `run` was, without what the law leaves.
+#[must_use]
+pub fn drawn(population: &Population, run: &Insertion, k: usize, day: Option<usize>) -> Option<Vec<f64>> {
+    force(population, run, k, day).map(|f| f.0)
+}
+
+/// The same with the instant (s) of its first rupture.
+fn force(population: &Population, run: &Insertion, k: usize, day: Option<usize>) -> Option<(Vec<f64>, f64)> {
+    let r = &run.recording;
+    let model = population.draw(k, day).compile(0)?;
+    let mut chain = model.chain.start(2.0 * r.sample_hz());
+    let mut state = LawState::default();
+    let mut first_s = NEVER;
+    let force = (0..r.len())
+        .map(|i| {
+            let (t, z, v) = (r.time_s[i], r.position_m[i] * model.to_true, r.velocity_mps[i] * model.to_true);
+            let f = model.law.step(&mut state, t, z, v, |at| first_s = first_s.min(at.time_s)).total_n;
+            if !model.measures {
+                return f;
+            }
+            let reading = Reading { time_s: t, velocity_mps: v, tissue_n: f, ..Reading::default() };
+            model.chain.step(&mut chain, &reading)
+        })
+        .collect::<Vec<f64>>();
+    force.iter().all(|f| f.is_finite()).then_some((force, first_s))
+}
+
 /// The part of an insertion at a time, its first rupture being at `first_s`.
 #[must_use]
 pub fn part(run: &Insertion, time_s: f64, first_s: f64) -> Part {
@@ -171,28 +198,7 @@ pub struct Prediction {
 #[must_use]
 pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, draws: usize) -> Prediction {
     let r = &run.recording;
-    let mut forces: Vec<(Vec<f64>, f64)> = Vec::with_capacity(draws);
-    for k in 1..=draws {
-        let Some(model) = population.draw(k, day).compile(0) else { continue };
-        let mut chain = model.chain.start(2.0 * r.sample_hz());
-        let mut state = LawState::default();
-        let mut first_s = NEVER;
-        let force = (0..r.len())
-            .map(|i| {
-                let (t, z, v) =
-                    (r.time_s[i], r.position_m[i] * model.to_true, r.velocity_mps[i] * model.to_true);
-                let f = model.law.step(&mut state, t, z, v, |at| first_s = first_s.min(at.time_s)).total_n;
-                if !model.measures {
-                    return f;
-                }
-                let reading = Reading { time_s: t, velocity_mps: v, tissue_n: f, ..Reading::default() };
-                model.chain.step(&mut chain, &reading)
-            })
-            .collect::<Vec<f64>>();
-        if force.iter().all(|f| f.is_finite()) {
-            forces.push((force, first_s));
-        }
-    }
+    let forces: Vec<(Vec<f64>, f64)> = (1..=draws).filter_map(|k| force(population, run, k, day)).collect();
     if forces.is_empty() {
         return Prediction::default();
     }

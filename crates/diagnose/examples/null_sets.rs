@@ -1,0 +1,110 @@
+//! Sets drawn from the law that a measured set was found to follow: is any of them accused of an effect that it does not have, and is
+//! what it has found?
+//!
+//! ```sh
+//! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example null_sets -- scenarios/measured/skin.ron 40
+//! ```
+//! Every drawn set has the motions of the measured one; what the law leaves is drawn beside it as slow noise, and the sensor's as white noise.
+//! The belief is the base law, so that every effect of the law is one that is taken away from it.
+
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::{Distribution, StandardNormal};
+use std::error::Error;
+use std::path::Path;
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::dataset::{Dataset, find};
+use stylet_diagnose::set::instrument::Checks;
+use stylet_diagnose::set::laws::effects;
+use stylet_diagnose::set::population::{Population, drawn, part};
+use stylet_diagnose::set::study::study;
+use stylet_stats::wilson;
+
+/// Seed of what is drawn.
+const SEED: u64 = 125;
+/// Correlation time (s) of what the law leaves.
+const SLOW_S: f64 = 0.5;
+/// Noise of the sensor (N).
+const NOISE_N: f64 = 0.012;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut words = std::env::args().skip(1);
+    let file = words.next().ok_or("name a data set")?;
+    let sets: usize = words.next().map_or(Ok(40), |w| w.parse())?;
+    let set = Dataset::load(Path::new(&file))?;
+    let mut files = Vec::new();
+    for pattern in &set.recordings {
+        files.extend(find(pattern)?);
+    }
+    let layers = set.tissue.layers.len();
+    let measured = set.runs(&files, layers)?;
+    let refs: Vec<&Insertion> = measured.iter().collect();
+    let found = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}).ok_or("no law")?;
+    let has = effects(&found.laws.best.fitted.fit.model);
+    let population = Population::of(&found.laws.best.fitted, &refs);
+    println!("{file}: {} runs follow {}", refs.len(), has.join(", "));
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let (mut accused, mut named) = (0, vec![0; has.len()]);
+    for k in 0..sets {
+        let runs: Vec<Insertion> = refs
+            .iter()
+            .enumerate()
+            .filter_map(|(r, run)| one(&population, run, k * refs.len() + r + 1, layers, &mut rng))
+            .collect();
+        let refs: Vec<&Insertion> = runs.iter().collect();
+        let Some(s) = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}) else {
+            println!("{k}: no law");
+            continue;
+        };
+        let names: Vec<&str> = s.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
+        let wrong = names.iter().any(|n| !has.contains(n));
+        accused += usize::from(wrong);
+        for (n, effect) in named.iter_mut().zip(&has) {
+            *n += usize::from(names.contains(effect));
+        }
+        let m = &s.repeats.mean;
+        println!(
+            "{k}: {:?} {} (thirds out: base law {:.3}, library {:.3}, slip {:.3}); {:.3} N on runs left out, floor {:.3} N, in band {:.2}",
+            s.diagnosis.verdict,
+            names.join(", "),
+            s.laws.base.left_out_n(),
+            s.laws.library.as_ref().map_or(f64::NAN, |l| l.left_out_n()),
+            s.laws.slip.as_ref().map_or(f64::NAN, |l| l.left_out_n()),
+            m.extended_n,
+            m.floor_n.unwrap_or(f64::NAN),
+            m.covered
+        );
+    }
+    let rate = |hits: usize| {
+        let i = wilson(hits, sets);
+        format!("{hits} of {sets} ({:.0} to {:.0} %)", 100.0 * i.low, 100.0 * i.high)
+    };
+    println!("accused of an effect that it does not have: {}", rate(accused));
+    for (n, effect) in named.iter().zip(&has) {
+        println!("{effect} named: {}", rate(*n));
+    }
+    Ok(())
+}
+
+/// A drawn insertion.
+fn one(
+    population: &Population,
+    run: &Insertion,
+    k: usize,
+    layers: usize,
+    rng: &mut ChaCha8Rng,
+) -> Option<Insertion> {
+    let mut recording = run.recording.clone();
+    recording.force_n = drawn(population, run, k, Some(0).filter(|_| !population.law.days.is_empty()))?;
+    let mut slow: f64 = StandardNormal.sample(rng);
+    let first_s = run.ruptures_s.iter().copied().fold(f64::INFINITY, f64::min);
+    for i in 0..recording.len() {
+        let t = recording.time_s[i];
+        let keep = if i > 0 { libm::exp(-(t - recording.time_s[i - 1]) / SLOW_S) } else { 0.0 };
+        let (shock, white): (f64, f64) = (StandardNormal.sample(rng), StandardNormal.sample(rng));
+        slow = keep * slow + (1.0 - keep * keep).max(0.0).sqrt() * shock;
+        let left_n = population.residual_n[part(run, t, first_s) as usize];
+        let touches = recording.position_m[i] > population.law.tissue.surface_m;
+        recording.force_n[i] += if touches { left_n * slow } else { 0.0 } + NOISE_N * white;
+    }
+    Some(Insertion::new(format!("{} {k}", run.name), recording, layers))
+}

@@ -1,0 +1,90 @@
+//! Promise: what an instrument does wrong is seen in insertions without any law: a force that comes late or is rounded where the way back
+//! begins, a force in air that is not zero; and nothing is seen where nothing is wrong.
+
+mod drawn;
+
+use drawn::{Drawn, believed, drawn};
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::instrument::{Checks, Instrument};
+use stylet_record::Recording;
+
+/// Insertions whose force an instrument has changed.
+fn with(change: impl Fn(&Recording) -> Vec<f64>) -> Vec<Insertion> {
+    drawn(&Drawn { seed: 31, shift_m: 0.0 })
+        .into_iter()
+        .map(|run| {
+            let mut recording = run.recording.clone();
+            recording.force_n = change(&run.recording);
+            Insertion::new(run.name, recording, 1)
+        })
+        .collect()
+}
+
+fn look(runs: &[Insertion]) -> Instrument {
+    let refs: Vec<&Insertion> = runs.iter().collect();
+    Instrument::look(&Checks::default(), &refs, believed().surface_m)
+}
+
+fn shown(instrument: &Instrument) -> Vec<&str> {
+    instrument.shown.iter().map(|s| s.effect.as_str()).collect()
+}
+
+#[test]
+fn a_good_instrument_shows_nothing_and_changes_nothing() {
+    let runs = with(|r| r.force_n.clone());
+    let seen = look(&runs);
+    assert!(seen.shown.is_empty(), "{:?}", seen.shown);
+    let undone = seen.undo(&runs.iter().collect::<Vec<_>>());
+    for (a, b) in undone.runs.iter().zip(&runs) {
+        assert_eq!(a.recording, b.recording);
+    }
+}
+
+#[test]
+fn a_late_force_is_told_from_a_rounded_one_and_undone() {
+    let late_s = 0.3;
+    let late = look(&with(|r| {
+        let at = |t: f64| r.time_s.partition_point(|x| *x < t).min(r.len() - 1);
+        r.time_s.iter().map(|t| r.force_n[at(t - late_s)]).collect()
+    }));
+    assert_eq!(shown(&late), ["time_delay"]);
+    assert!((late.delay_s.expect("a delay") - late_s).abs() < 0.05, "{late:?}");
+
+    let rounded = |r: &Recording| {
+        let mut y = r.force_n[0];
+        let mut out = Vec::with_capacity(r.len());
+        for (i, f) in r.force_n.iter().enumerate() {
+            let dt = if i > 0 { r.time_s[i] - r.time_s[i - 1] } else { 0.0 };
+            y += (f - y) * (1.0 - (-dt / late_s).exp());
+            out.push(y);
+        }
+        out
+    };
+    let runs = with(rounded);
+    let slow = look(&runs);
+    assert_eq!(shown(&slow), ["low_pass_lag"]);
+    assert!((slow.lag_s.expect("a lag") - late_s).abs() < 0.15, "{slow:?}");
+}
+
+#[test]
+fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
+    let biased = with(|r| r.force_n.iter().map(|f| 1.1 * f + 0.3).collect());
+    let refs: Vec<&Insertion> = biased.iter().collect();
+    let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+    let wobble = |k: usize| 1e-3 * ((k * 7919) % 101) as f64 / 101.0;
+    let of = |level: f64| {
+        let f = (0..t.len()).map(|k| 1.1 * level + 0.3 + wobble(k)).collect();
+        Recording::new(t.clone(), vec![0.0; t.len()], f).expect("clean columns")
+    };
+    let (air, load) = (of(0.0), of(5.0));
+    let checks = Checks { air: Some(&air), load: Some((&load, 5.0)) };
+    let seen = Instrument::look(&checks, &refs, believed().surface_m);
+    assert_eq!(shown(&seen), ["force_gain", "force_bias"], "{seen:?}");
+    assert!((seen.gain.expect("a gain") - 0.1).abs() < 0.005);
+    let clean = with(|r| r.force_n.clone());
+    for (a, b) in seen.undo(&refs).runs.iter().zip(&clean) {
+        for (a, b) in a.recording.force_n.iter().zip(&b.recording.force_n) {
+            assert!((a - b).abs() < 0.01 + 0.005 * b.abs(), "{a} is not {b}");
+        }
+    }
+}
