@@ -128,6 +128,7 @@ fn contrary() -> Sensitivity {
 }
 
 #[test]
+#[ignore = "every claim under every condition"]
 fn no_verdict_changes_when_a_sensitivity_condition_is_added_or_removed() {
     let cheap: Vec<Definition> = definitions().into_iter().filter(|d| !d.on_arm).collect();
     let asking = Study::asking(1, FEW);
