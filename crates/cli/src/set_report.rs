@@ -127,7 +127,7 @@ fn causes(study: &Study) -> Section {
     Section::new("The causes, and what each buys")
         .text(
             "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that cling to the shaft, \
-             slip, give way after a while and let go. The one that predicts thirds of the runs left out best was taken, the base law where the others are \
+             slip, give way after a while and let go. The one that predicts parts of the set left out best was taken, the base law where the others are \
              better by less than 2 %. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
         )
         .block(Block::Svg(SvgImage {
@@ -141,7 +141,7 @@ fn causes(study: &Study) -> Section {
             rows,
         })
         .table(Table {
-            title: format!("Without a part of the law, N on thirds left out; with all of them {:.3}", study.laws.best.left_out_n()),
+            title: format!("Without a part of the law, N on parts of the set left out; with all of them {:.3}", study.laws.best.left_out_n()),
             groups: Vec::new(),
             headers: ["part", "without it, N", ""].map(str::to_owned).to_vec(),
             rows: parts,
@@ -412,9 +412,18 @@ fn instrument(study: &Study) -> Section {
     let shown: Vec<_> = i.shown.iter().map(|e| row(&e.effect, e.size_n, &e.evidence)).collect();
     let mut section = Section::new("The instrument");
     if excluded.is_empty() && shown.is_empty() {
-        return section.text("No recording in air and no known load: nothing of the sensor can be excluded.");
+        return section.text("No recording in air, no known load, no air before contact: nothing of the sensor can be excluded.");
     }
-    section = section.text("A motion in air and a known load were recorded with the same sensor.");
+    section = section.text(
+        "Seen without a law: a motion in air and a known load where they were recorded, the force before the needle reaches the tissue, and whether \
+         the force answers at once where the needle stops or its way back begins.",
+    );
+    if !shown.is_empty() {
+        section = section.text(
+            "What it shows was undone before any law was fitted (but tones and the drive's friction): the forces on this page are the corrected ones, and \
+             the extended scenario has these effects in its sensor.",
+        );
+    }
     for (title, rows) in [("Shown: a cause", shown), ("Excluded as causes", excluded)] {
         if !rows.is_empty() {
             section = section.table(Table {
@@ -429,6 +438,10 @@ fn instrument(study: &Study) -> Section {
 }
 
 fn quality(study: &Study) -> Section {
+    let title = match study.repeats.instrument.shown.is_empty() {
+        true => "Remarks; nothing was corrected or resampled",
+        false => "Remarks; but for what the instrument shows nothing was corrected or resampled",
+    };
     let rows = study
         .diagnosis
         .data_quality
@@ -436,7 +449,7 @@ fn quality(study: &Study) -> Section {
         .map(|q| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())])
         .collect();
     Section::new("Data quality").table(Table {
-        title: "Remarks; nothing was corrected or resampled".to_owned(),
+        title: title.to_owned(),
         groups: Vec::new(),
         headers: ["recording", "remark"].map(str::to_owned).to_vec(),
         rows,

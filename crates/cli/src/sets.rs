@@ -219,7 +219,7 @@ fn summary(study: &Study) -> String {
     let _ = writeln!(out, "{}\n", sentence(study));
     let _ = writeln!(
         out,
-        "  what each law and each part of the best one buys (N on a third of the runs left out)\n    {:<40} {:.3}",
+        "  what each law and each part of the best one buys (N on parts of the set left out)\n    {:<40} {:.3}",
         "base law",
         study.laws.base.left_out_n()
     );

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::{Effort, fit as fitted_on};
 use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
-use stylet_tissue::{Effect, Tissue};
+use stylet_tissue::{AnyEffect, Effect, EffectInfo, ShaftSlip, Tissue};
 
 /// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
 pub const STARTS: usize = 24;
@@ -217,13 +217,19 @@ fn judged(fitted: &Fitted, runs: &[&Insertion]) -> Vec<f64> {
     out
 }
 
+/// The effect that a shaft that slips is.
+#[must_use]
+pub fn slip() -> &'static EffectInfo {
+    ShaftSlip::default().info()
+}
+
 /// What a law may do without.
 fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
     let mut out = Vec::new();
-    let slips = model.effects.iter().any(|c| c.info.id == "shaft_slip");
+    let slips = model.effects.iter().any(|c| c.info.id == slip().id);
     let mut seen: Vec<&str> = Vec::new();
     for id in model.effects.iter().map(|c| c.info.id) {
-        if seen.contains(&id) || id == "shaft_slip" {
+        if seen.contains(&id) || id == slip().id {
             continue;
         }
         seen.push(id);
@@ -246,7 +252,7 @@ fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
         ];
         for (name, numbers) in neutral {
             if let Some(model) = held(model, numbers) {
-                out.push(("shaft_slip", format!("shaft_slip: {name}"), model));
+                out.push((slip().id, format!("{}: {name}", slip().id), model));
             }
         }
     }
@@ -258,11 +264,10 @@ fn less(model: &Model, id: &str) -> Model {
     let mut out = model.clone();
     let mut tissue = out.belief.tissue.clone();
     while let Some(k) = out.effects.iter().position(|c| c.info.id == id) {
-        if id == "delayed_puncture" {
-            let (layer, force) = (out.effects[k].values[0] as usize, out.effects[k].values[1]);
+        if let Some(AnyEffect::DelayedPuncture(waits)) = out.effects[k].effect() {
             for t in [&mut tissue, &mut out.tissue] {
-                if let Some(l) = layer.checked_sub(1).and_then(|l| t.layers.get_mut(l)) {
-                    l.puncture_n = Some(force);
+                if let Some(l) = waits.layer.checked_sub(1).and_then(|l| t.layers.get_mut(l)) {
+                    l.puncture_n = Some(waits.force_n);
                 }
             }
         }
@@ -281,7 +286,7 @@ fn held(model: &Model, numbers: &[(&str, f64)]) -> Option<Model> {
     let mut any = false;
     for effect in 0..out.effects.len() {
         let choice = &out.effects[effect];
-        if choice.info.id != "shaft_slip" {
+        if choice.info.id != slip().id {
             continue;
         }
         let mut values = choice.values.clone();

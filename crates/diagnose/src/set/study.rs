@@ -8,7 +8,7 @@ use crate::outcome::{
 use crate::raw;
 use crate::set::first::{Insertion, groups};
 use crate::set::instrument::{Checks, Instrument, Undone};
-use crate::set::laws::{Kind, Law, Laws, effects, laws, several};
+use crate::set::laws::{Kind, Law, Laws, effects, laws, several, slip};
 use crate::set::left_out::{Out, floor, runs_out, speeds_out};
 use crate::set::numbers::{Told, base_parameters, estimates};
 use crate::set::repeats::{Bought, Repeats, Standing, repeats};
@@ -137,7 +137,7 @@ fn diagnosis(
     let mut causes: Vec<Cause> = effects(model)
         .into_iter()
         .map(|id| {
-            let whole = if id == "shaft_slip" { Some(laws.base.errors_n.clone()) } else { None };
+            let whole = if id == slip().id { Some(laws.base.errors_n.clone()) } else { None };
             let without = whole
                 .or_else(|| laws.parts.iter().find(|p| p.kept && p.name == id).map(|p| p.without_n.clone()))
                 .unwrap_or_default();
@@ -244,7 +244,7 @@ fn evidence(laws: &Laws) -> EvidenceStep {
         screened_only: false,
     };
     let mut rivals = Vec::new();
-    rivals.extend(laws.slip.as_ref().map(|l| rival("shaft_slip", l)));
+    rivals.extend(laws.slip.as_ref().map(|l| rival(slip().id, l)));
     rivals.extend(laws.library.as_ref().map(|l| rival(&effects(&l.fitted.fit.model).join(", "), l)));
     EvidenceStep {
         standing: Vec::new(),

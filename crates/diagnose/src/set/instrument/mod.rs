@@ -16,7 +16,11 @@ use corner::How;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::{DEFAULT_HALF_WIDTH_S, Recording};
-use stylet_stats::median;
+use stylet_stats::{mean_interval, median};
+use stylet_tissue::{
+    AnyEffect, DriveFriction, Effect, ForceBias, ForceDrift, ForceGain, LowPassLag, PeriodicInterference,
+    TimeDelay,
+};
 
 /// Forces below this share of the largest one explain nothing: laws of insertions leave several times as much.
 pub const NOTHING: f64 = 0.02;
@@ -67,6 +71,9 @@ pub struct Shown {
     pub size_n: f64,
     /// What was found.
     pub evidence: String,
+    /// The effect itself, which is undone.
+    #[serde(skip)]
+    pub itself: Option<AnyEffect>,
 }
 
 impl Shown {
@@ -145,72 +152,70 @@ impl Instrument {
         }
         if air.is_none() {
             self.noise_n = Some(stylet_stats::median_of(lines.iter().map(|l| l.sd_n)));
-            self.drift_n = Some(common(&of(|l| l.rate_n_per_s)) * air_s);
+            // A short stretch of air tells a slope, but not what becomes of it until the end.
+            let rates = of(|l| l.rate_n_per_s);
+            self.drift_n = mean_interval(&rates)
+                .filter(|i| 0.5 * (i.high - i.low) * air_s < NOTHING * force_n)
+                .map(|_| common(&rates) * air_s);
         }
     }
 
     /// What is excluded, and what is shown.
     fn judge(&mut self, force_n: f64, duration_s: f64, in_air: bool, late: Option<corner::Late>) {
         let (mut excluded, mut shown) = (Vec::new(), Vec::new());
-        let mut judge = |effect: &str, size_n: Option<f64>, numbers: &[(&str, f64)], evidence: String| {
-            let Some(size_n) = size_n else { return };
-            let effect = effect.to_owned();
+        let mut judge = |itself: AnyEffect, size_n: f64, told: usize, evidence: String| {
+            let effect = itself.info().id.to_owned();
             if size_n.abs() < NOTHING * force_n {
                 excluded.push(Excluded { effect, size_n: size_n.abs(), evidence });
-            } else {
-                // What noise leaves open of a mean is far below what is worth a word.
-                let of = |value: f64| Estimate { value, low: value, high: value };
-                let parameters = numbers.iter().map(|(k, x)| ((*k).to_owned(), of(*x))).collect();
-                shown.push(Shown { effect, parameters, size_n: size_n.abs(), evidence });
+                return;
             }
+            // What noise leaves open of a mean is far below what is worth a word.
+            let of = |value: f64| Estimate { value, low: value, high: value };
+            let values = itself.parameters();
+            let named = itself.info().parameters.iter().zip(values).take(told);
+            let parameters = named.map(|(p, x)| (p.path.to_owned(), of(x))).collect();
+            shown.push(Shown { effect, parameters, size_n: size_n.abs(), evidence, itself: Some(itself) });
         };
         let mn = |x: f64| format!("{:.1} mN", 1e3 * x);
-        let gain = self.gain.unwrap_or(0.0);
-        judge(
-            "force_gain",
-            self.gain.map(|g| g * force_n),
-            &[("eps", gain)],
-            format!("a known load is measured {:+.2} % off", 100.0 * gain),
-        );
-        let bias = self.bias_n.unwrap_or(0.0);
-        judge("force_bias", self.bias_n, &[("force_n", bias)], format!("force in air {}", mn(bias)));
-        let drift = self.drift_n.unwrap_or(0.0);
-        judge(
-            "force_drift",
-            self.drift_n,
-            &[("rate_n_per_s", drift / duration_s.max(1e-9))],
-            format!("change over a recording in air {}", mn(drift)),
-        );
-        if in_air {
-            let (amplitude_n, hz) = self.line.unwrap_or((0.0, 0.0));
-            judge(
-                "periodic_interference",
-                self.line.map(|l| l.0),
-                &[("amplitude_n", amplitude_n), ("frequency_hz", hz)],
-                format!("strongest line in air {} at {hz:.1} Hz", mn(amplitude_n)),
-            );
-            let drive = self.drive_n.unwrap_or(0.0);
-            judge(
-                "drive_friction",
-                self.drive_n,
-                &[("force_n", drive)],
-                format!("half the difference between in and out, in air, {}", mn(drive)),
-            );
+        if let Some(eps) = self.gain {
+            let said = format!("a known load is measured {:+.2} % off", 100.0 * eps);
+            judge(ForceGain { eps }.into(), eps * force_n, 1, said);
+        }
+        if let Some(bias_n) = self.bias_n {
+            judge(ForceBias { force_n: bias_n }.into(), bias_n, 1, format!("force in air {}", mn(bias_n)));
+        }
+        if let Some(drift_n) = self.drift_n {
+            let rate_n_per_s = drift_n / duration_s.max(1e-9);
+            let said = format!("change over a recording in air {}", mn(drift_n));
+            judge(ForceDrift { rate_n_per_s }.into(), drift_n, 1, said);
+        }
+        if let Some((amplitude_n, frequency_hz)) = self.line.filter(|_| in_air) {
+            let tone = PeriodicInterference { amplitude_n, frequency_hz, phase_rad: 0.0 };
+            let said = format!("strongest line in air {} at {frequency_hz:.1} Hz", mn(amplitude_n));
+            // Its phase is every recording's own.
+            judge(tone.into(), amplitude_n, 2, said);
+        }
+        if let Some(drive_n) = self.drive_n.filter(|_| in_air) {
+            let said = format!("half the difference between in and out, in air, {}", mn(drive_n));
+            judge(DriveFriction { force_n: drive_n }.into(), drive_n, 1, said);
         }
         if let Some(late) = late {
-            let (effect, path, how) = match late.how {
-                How::Delayed => ("time_delay", "delay_s", "later"),
-                How::Slow => ("low_pass_lag", "time_constant_s", "rounded, by a time constant of"),
+            let (itself, how): (AnyEffect, _) = match late.how {
+                How::Delayed => (TimeDelay { delay_s: late.by_s }.into(), "later"),
+                How::Slow => {
+                    (LowPassLag { time_constant_s: late.by_s }.into(), "rounded, by a time constant of")
+                }
             };
             let estimate = Estimate { value: late.by_s, low: late.low_s, high: late.high_s };
             shown.push(Shown {
-                effect: effect.to_owned(),
-                parameters: [(path.to_owned(), estimate)].into(),
+                effect: itself.info().id.to_owned(),
+                parameters: itself.info().parameters.iter().map(|p| (p.path.to_owned(), estimate)).collect(),
                 size_n: force_n,
                 evidence: format!(
-                    "where the way back begins the force answers {how} {:.2} s ({:.2} to {:.2} s)",
+                    "where the needle stops or its way back begins the force answers {how} {:.2} s ({:.2} to {:.2} s)",
                     late.by_s, late.low_s, late.high_s
                 ),
+                itself: Some(itself),
             });
         }
         (self.excluded, self.shown) = (excluded, shown);

@@ -1,19 +1,11 @@
 //! Insertions as an instrument without its faults would have measured them.
 
-use super::{Instrument, NOTHING, Shown};
+use super::{Instrument, NOTHING};
 use crate::raw::{self, Raw};
 use crate::set::first::Insertion;
 use stylet_record::Recording;
 use stylet_tissue::AnyEffect;
 
-/// Effects that are undone, and their number.
-const UNDONE: [(&str, &str); 5] = [
-    ("time_delay", "delay_s"),
-    ("low_pass_lag", "time_constant_s"),
-    ("force_drift", "rate_n_per_s"),
-    ("force_bias", "force_n"),
-    ("force_gain", "eps"),
-];
 /// The slope of the force is taken over so many samples to either side.
 const SLOPE: usize = 3;
 
@@ -30,7 +22,8 @@ impl Instrument {
     /// Undoes what it shows: a delay first, the lag, then drift, bias and gain. Without anything shown the insertions stay as they are.
     #[must_use]
     pub fn undo(&self, runs: &[&Insertion]) -> Undone {
-        let delay_s = self.number("time_delay", "delay_s");
+        let of = |e: &AnyEffect| if let AnyEffect::TimeDelay(d) = e { d.delay_s } else { 0.0 };
+        let delay_s: f64 = self.effects().iter().map(of).sum();
         let shifted: Vec<Recording> = runs.iter().map(|r| earlier(&r.recording, delay_s)).collect();
         let notes: Vec<_> = runs.iter().map(|r| r.notes.clone()).collect();
         let mut raw = raw::look(&shifted.iter().collect::<Vec<_>>(), &notes);
@@ -55,18 +48,20 @@ impl Instrument {
 
     /// What is undone, as effects of a simulation; tones, which blocks average away, and the drive stay out of it.
     pub(crate) fn effects(&self) -> Vec<AnyEffect> {
-        UNDONE
-            .iter()
-            .filter_map(|(effect, path)| {
-                let at = self.number(effect, path);
-                (at != 0.0).then(|| AnyEffect::from_parameters(effect, &[at])).flatten()
-            })
-            .collect()
+        let undone =
+            |e: &AnyEffect| !matches!(e, AnyEffect::PeriodicInterference(_) | AnyEffect::DriveFriction(_));
+        self.shown.iter().filter_map(|s| s.itself.clone()).filter(undone).collect()
     }
 
     fn undo_force(&self, recording: &mut Recording) {
-        quick(recording, self.number("low_pass_lag", "time_constant_s"));
-        let rate = self.number("force_drift", "rate_n_per_s");
+        let effects = self.effects();
+        for e in &effects {
+            if let AnyEffect::LowPassLag(lag) = e {
+                quick(recording, lag.time_constant_s);
+            }
+        }
+        let of = |e: &AnyEffect| if let AnyEffect::ForceDrift(d) = e { d.rate_n_per_s } else { 0.0 };
+        let rate: f64 = effects.iter().map(of).sum();
         let began = recording.time_s[0];
         for (f, t) in recording.force_n.iter_mut().zip(&recording.time_s) {
             *f = self.without_gain(*f - rate * (t - began));
@@ -74,13 +69,15 @@ impl Instrument {
     }
 
     fn without_gain(&self, force_n: f64) -> f64 {
-        (force_n - self.number("force_bias", "force_n")) / (1.0 + self.number("force_gain", "eps"))
-    }
-
-    /// A number of an effect that is shown; zero when it is not.
-    fn number(&self, effect: &str, path: &str) -> f64 {
-        let of = |s: &Shown| s.parameters.get(path).map(|e| e.value);
-        self.shown.iter().find(|s| s.effect == effect).and_then(of).unwrap_or(0.0)
+        let (mut bias_n, mut gain) = (0.0, 0.0);
+        for e in self.shown.iter().filter_map(|s| s.itself.as_ref()) {
+            match e {
+                AnyEffect::ForceBias(b) => bias_n = b.force_n,
+                AnyEffect::ForceGain(g) => gain = g.eps,
+                _ => {}
+            }
+        }
+        (force_n - bias_n) / (1.0 + gain)
     }
 }
 
