@@ -88,3 +88,34 @@ fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
         }
     }
 }
+
+#[test]
+fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
+    let ramp_s = 0.4;
+    let speed = |t: f64| match t {
+        t if t < 10.0 => 2e-3,
+        t if t < 10.0 + ramp_s => 2e-3 * (1.0 - (t - 10.0) / ramp_s),
+        t if t < 14.0 => 0.0,
+        t if t < 14.0 + ramp_s => -2e-3 * (t - 14.0) / ramp_s,
+        t if t < 22.0 => -2e-3,
+        _ => 0.0,
+    };
+    let runs: Vec<Insertion> = (0..4)
+        .map(|run| {
+            let mut noise = 17 + run;
+            let (mut z, mut t, mut out) = (0.0, 0.0, (Vec::new(), Vec::new(), Vec::new()));
+            while t < 23.0 {
+                noise = (noise * 1_103_515_245_u64 + 12_345) % 2_147_483_648;
+                let white = 0.02 * (noise as f64 / 2_147_483_648.0 - 0.5);
+                out.0.push(t);
+                out.1.push(z);
+                out.2.push(200.0 * f64::max(z - 0.004, 0.0) + white);
+                z += 0.01 * speed(t);
+                t += 0.01;
+            }
+            let recording = Recording::new(out.0, out.1, out.2).expect("clean columns");
+            Insertion::new(format!("run {run}"), recording, 1)
+        })
+        .collect();
+    assert!(look(&runs).shown.is_empty(), "{:?}", look(&runs).shown);
+}

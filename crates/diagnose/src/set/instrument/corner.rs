@@ -1,7 +1,7 @@
 //! A force that comes late: where the needle stops and where its way back begins, the motion has a corner, and the force answers at once
 //! unless the sensor or the clock is late (a corner that is moved) or slow (a corner that is rounded).
 //!
-//! Before a corner the force goes on as a line. Behind the second one a spring and a friction that builds up over a length `delta`
+//! Before a corner the force goes on as a line, in the way when the needle stops and in time when it turns. Behind the second one a spring and a friction that builds up over a length `delta`
 //! answer the way `u` back: `f = a + b t + c L[u] + d L[1 - exp(-u / delta)]`, with the delay in `u` and the lag in `L`; behind the first one
 //! the tissue relaxes, with the time since the stop for `u`. The coefficients are every recording's own; `delta` and the delay
 //! or the lag are those of all.
@@ -22,6 +22,8 @@ const STEP_S: f64 = 0.02;
 const LEAST_S: f64 = 0.08;
 /// Lengths over which an answer builds up: friction on the way back (m), relaxation after a stop (s).
 const DELTA: [[f64; 5]; 2] = [[3e-4, 6e-4, 8e-4, 1e-3, 1.5e-3], [0.1, 0.2, 0.4, 0.8, 1.6]];
+/// A filter has forgotten what was so many time constants ago.
+const MEMORY: f64 = 5.0;
 /// A late force leaves so much less (mean square) of the corners than one in time; without one, no delay or lag is better at all.
 const BETTER: f64 = 0.9;
 
@@ -178,28 +180,33 @@ impl<'a> Corner<'a> {
             How::Delayed => (by_s, 0.0),
             How::Slow => (0.0, by_s),
         };
-        let mut place = self.first.saturating_sub(1);
-        while place > 0 && self.recording.time_s[place] > self.time_s[0] - delay_s {
-            place -= 1;
-        }
-        let mut slow = [0.0; 2];
+        let (time, z) = (&self.recording.time_s, &self.recording.position_m);
+        // The filter forgets how it began before the window opens.
+        let from = time.partition_point(|t| *t < self.time_s[0] - MEMORY * lag_s);
+        let mut place = time.partition_point(|t| *t < time[from] - delay_s).saturating_sub(1);
+        let mut slow = [z[from], 0.0, 0.0];
         let mut rows: Vec<[f64; COLUMNS]> = Vec::with_capacity(self.time_s.len());
-        for (i, t) in self.time_s.iter().enumerate() {
-            let at_s = t - delay_s;
+        for i in from..self.first + self.time_s.len() {
+            let at_s = time[i] - delay_s;
+            let at_m = self.position(at_s, &mut place);
             let u = match self.at {
                 At::Stop => (at_s - self.at_s).max(0.0),
                 At::Back if at_s < self.at_s - 0.2 * AROUND_S.0 => 0.0,
-                At::Back => (self.turned_m - self.position(at_s, &mut place)).max(0.0),
+                At::Back => (self.turned_m - at_m).max(0.0),
             };
-            let answers = [u / delta, 1.0 - libm::exp(-u / delta)];
-            let share = match (lag_s > 0.0, i) {
-                (false, _) | (_, 0) => 1.0,
-                _ => 1.0 - libm::exp(-(t - self.time_s[i - 1]) / lag_s),
+            let share = match (lag_s > 0.0, i == from) {
+                (false, _) | (_, true) => 1.0,
+                _ => 1.0 - libm::exp(-(time[i] - time[i - 1]) / lag_s),
             };
-            for (s, x) in slow.iter_mut().zip(answers) {
+            for (s, x) in slow.iter_mut().zip([at_m, u / delta, 1.0 - libm::exp(-u / delta)]) {
                 *s += (x - *s) * share;
             }
-            rows.push([1.0, t - self.at_s, slow[0], slow[1]]);
+            if i >= self.first {
+                // Until it stops the needle goes on, slower and slower; before its way back time alone passes.
+                let before =
+                    if self.at == At::Stop { 1e3 * (slow[0] - self.turned_m) } else { time[i] - self.at_s };
+                rows.push([1.0, before, slow[1], slow[2]]);
+            }
         }
         least_squares(&rows, self.force_n)
     }
