@@ -136,8 +136,9 @@ pub fn section(all: &[Online]) -> Section {
              own viscous estimate. After: the friction of the extended law fitted to the other runs, a layer counting as punctured from the moment \
              the core says so.",
         )
+        .text(summary(all).lines().map(|l| format!("All: {}.", l.trim())).collect::<Vec<_>>().join(" "))
         .table(Table {
-            title: summary(all).lines().map(str::trim).collect::<Vec<_>>().join("; "),
+            title: "By run".to_owned(),
             groups: vec![(String::new(), 3), ("force on the way back, N rms".to_owned(), 3)],
             headers: ["", "drops found", "false: in / hold / back", "measured", "core", "extended law"].map(str::to_owned).to_vec(),
             rows,

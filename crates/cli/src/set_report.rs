@@ -361,7 +361,10 @@ fn repeats(study: &Study) -> Section {
         ));
     }
     if r.starts.0 > 1 {
-        text.push(format!("The fit was begun {} times; {} starts agree.", r.starts.0, r.starts.1));
+        text.push(format!(
+            "{} starts of the fit went on after a first look; of these, {} starts agree.",
+            r.starts.0, r.starts.1
+        ));
     }
     let by_part = r
         .parts_of_insertion
