@@ -128,7 +128,7 @@ fn causes(study: &Study) -> Section {
         .text(
             "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that cling to the shaft, \
              slip, give way after a while and let go. The one that predicts parts of the set left out best was taken, the base law where the others are \
-             better by less than 2 %. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
+             better by less than 2 %, and more than two effects of the library only when they are better than a slipping shaft by a tenth. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
         )
         .block(Block::Svg(SvgImage {
             description: "Error on runs left out of every law, and without every part".to_owned(),

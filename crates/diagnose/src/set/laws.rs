@@ -18,7 +18,7 @@ use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
 use stylet_tissue::{AnyEffect, Effect, EffectInfo, ShaftSlip, Tissue};
 
 /// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
-pub const STARTS: usize = 24;
+const STARTS: usize = 24;
 /// and as many more as make so many fits of one recording: small sets have worse starts and cheaper fits.
 const START_FITS: usize = 300;
 /// The library is searched for what it adds with about so many insertions.

@@ -38,6 +38,24 @@ pub fn line(t: &[f64], f: &[f64]) -> Line {
     Line { first_n: level + rate * (t[0] - middle), rate_n_per_s: rate, sd_n: rms(&rest) }
 }
 
+/// Coefficients of the combination of columns that leaves least squares, and what it leaves.
+pub fn regress<const N: usize>(rows: &[[f64; N]], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut a = Symmetric::zeros(N);
+    let mut b = [0.0; N];
+    for (row, y) in rows.iter().zip(y) {
+        for i in 0..N {
+            b[i] += row[i] * y;
+            for j in i..N {
+                a.add(i, j, row[i] * row[j]);
+            }
+        }
+    }
+    let x = a.factor().solve(&b);
+    let of = |row: &[f64; N]| row.iter().zip(&x).map(|(r, x)| r * x).sum::<f64>();
+    let rest = rows.iter().zip(y).map(|(row, y)| y - of(row)).collect();
+    (x, rest)
+}
+
 /// What a recording in air shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
@@ -65,19 +83,8 @@ impl Air {
         };
         // Offset, drift and drive at once: the way in comes before the way out, as the early part of a drift before the late one.
         let middle = mean(t);
-        let mut a = Symmetric::zeros(3);
-        let mut b = [0.0; 3];
-        let row = |i: usize| [1.0, t[i] - middle, drive(i)];
-        for i in 0..t.len() {
-            let row = row(i);
-            for j in 0..3 {
-                b[j] += row[j] * f[i];
-                (j..3).for_each(|k| a.add(j, k, row[j] * row[k]));
-            }
-        }
-        let x = a.factor().solve(&b);
-        let rest: Vec<f64> =
-            (0..t.len()).map(|i| f[i] - row(i).iter().zip(&x).map(|(r, x)| r * x).sum::<f64>()).collect();
+        let rows: Vec<[f64; 3]> = (0..t.len()).map(|i| [1.0, t[i] - middle, drive(i)]).collect();
+        let (x, rest) = regress(&rows, f);
         let lagged: f64 = rest.windows(2).map(|p| p[0] * p[1]).sum();
         Self {
             line: Line { first_n: x[0] + x[1] * (t[0] - middle), rate_n_per_s: x[1], sd_n: rms(&rest) },

@@ -6,9 +6,9 @@
 //! the tissue relaxes, with the time since the stop for `u`. The coefficients are every recording's own; `delta` and the delay
 //! or the lag are those of all.
 
+use super::air::regress;
 use crate::set::first::Insertion;
 use rayon::prelude::*;
-use stylet_identify::linear::Symmetric;
 use stylet_record::Recording;
 use stylet_stats::{sd, student};
 
@@ -208,7 +208,7 @@ impl<'a> Corner<'a> {
                 rows.push([1.0, before, slow[1], slow[2]]);
             }
         }
-        least_squares(&rows, self.force_n)
+        regress(&rows, self.force_n).1.iter().map(|e| e * e).sum()
     }
 
     /// Where the needle is at a time, linear between samples.
@@ -224,25 +224,3 @@ impl<'a> Corner<'a> {
 
 /// Columns of the regression.
 const COLUMNS: usize = 4;
-
-/// Sum of squares that the best combination of columns leaves.
-fn least_squares(rows: &[[f64; COLUMNS]], y: &[f64]) -> f64 {
-    let mut a = Symmetric::zeros(COLUMNS);
-    let mut b = [0.0; COLUMNS];
-    for (row, y) in rows.iter().zip(y) {
-        for i in 0..COLUMNS {
-            b[i] += row[i] * y;
-            for j in i..COLUMNS {
-                a.add(i, j, row[i] * row[j]);
-            }
-        }
-    }
-    let x = a.factor().solve(&b);
-    rows.iter()
-        .zip(y)
-        .map(|(row, y)| {
-            let e = y - row.iter().zip(&x).map(|(r, x)| r * x).sum::<f64>();
-            e * e
-        })
-        .sum()
-}

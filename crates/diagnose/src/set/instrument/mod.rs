@@ -37,7 +37,7 @@ pub struct Instrument {
     pub noise_n: Option<f64>,
     /// Correlation of neighbouring noise samples.
     pub ar1: Option<f64>,
-    /// Mean force in air (N).
+    /// Force in air where a recording begins (N).
     pub bias_n: Option<f64>,
     /// Change of the force over the recording in air (N).
     pub drift_n: Option<f64>,
