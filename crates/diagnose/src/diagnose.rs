@@ -12,6 +12,7 @@ use crate::select::Search;
 use crate::small::{self, Small};
 use crate::varied::varied;
 use crate::visible;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -71,6 +72,9 @@ const EXCESS_SLOW: f64 = 6.0;
 const BORNE: f64 = 0.27;
 /// ... and its strengths are the same whichever recording is left out, to this share.
 const SAME: f64 = 0.12;
+
+/// What is drawn is the same for the same recordings.
+const SEED: u64 = 1;
 
 /// Compares what a scenario believes with what was measured.
 ///
@@ -248,9 +252,9 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included, however slow.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
-    let settled = fit(&search.best.model, &whole, Effort { turns: 3, enough: 0.1 })
+    let settled = fit(&crate::geometry::unsure(&search.best.model), &whole, Effort { turns: 3, enough: 0.1 })
         .unwrap_or_else(|| search.best.clone());
-    let spread = Spread::new(&settled, &whole);
+    let spread = Spread::new(&settled, &whole, &mut ChaCha8Rng::seed_from_u64(SEED));
     let mut causes = Vec::new();
     for (k, choice) in settled.model.effects.iter().enumerate() {
         let none = Vec::new();

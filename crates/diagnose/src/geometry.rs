@@ -13,7 +13,7 @@ use stylet_identify::fit::{Effort, Fit, fit, fit_below};
 use stylet_identify::model::{Choice, Free, Model};
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
-use stylet_tissue::{Proposal, library};
+use stylet_tissue::{EffectInfo, Place, Proposal, library};
 
 /// A pattern counts when the free numbers follow it to this share of its size.
 const PATTERN: f64 = 0.2;
@@ -85,6 +85,18 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
     }
 }
 
+/// A model with its geometry as unsure as it is believed to be: numbers whose intervals suppose faces that nobody measured are too
+/// sure. Where an effect stands for moved faces they stay, for it is told by nothing else.
+#[must_use]
+pub fn unsure(model: &Model) -> Model {
+    let moves = |i: &EffectInfo| matches!(i.proposal, Proposal::Faces(_)) || i.place == Place::Position;
+    let mut m = model.clone();
+    if !m.effects.iter().any(|e| moves(e.info)) {
+        m.free = Free { surface: true, thickness: true, ..m.free };
+    }
+    m
+}
+
 /// Effects that would move the faces as the free geometry has moved them.
 fn patterns(model: &Model) -> Vec<Choice> {
     let believed = &model.belief.tissue.layers;
@@ -107,7 +119,7 @@ fn patterns(model: &Model) -> Vec<Choice> {
                     }
                 }
             }
-            Proposal::Columns(_) if info.place == stylet_tissue::Place::Position => {
+            Proposal::Columns(_) if info.place == Place::Position => {
                 let ratios: Vec<f64> = off.iter().zip(believed).map(|(o, b)| o / b.thickness_m).collect();
                 let reached = ratios.len().max(2) - 1;
                 let mean = ratios[..reached.min(ratios.len())].iter().sum::<f64>()

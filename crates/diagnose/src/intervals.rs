@@ -6,9 +6,12 @@
 //! `nu = V^2 / sum(V_k^2/nu_k)`, `V_k` the part of the variance `V` that comes from the scatter `k`.
 //!
 //! The noise is what is left, its slow wander over tens of seconds and through breaks included
-//! ([`From::Lasting`](stylet_identify::noise::From)); and where a face lies is told by moving it as far as it is uncertain.
+//! ([`From::Lasting`](stylet_identify::noise::From)), and as much as the fitted numbers have taken from it is given back
+//! ([`told_again`](crate::told_again)); and where a face lies is told by moving it as far as it is uncertain.
 
 use crate::outcome::Estimate;
+use crate::told_again::told_again;
+use rand::Rng;
 use stylet_identify::events::{judge, spreads};
 use stylet_identify::fit::{Fit, Tangent};
 use stylet_identify::linear::{Factor, Symmetric};
@@ -32,9 +35,12 @@ const MANY: f64 = 1e4;
 pub struct Spread<'a> {
     fit: &'a Fit,
     tangent: Tangent,
+    matrix: Symmetric,
     factor: Factor,
     /// The same with one scatter raised, and its degrees of freedom.
     raised: Vec<(Factor, f64)>,
+    /// Under noises estimated again.
+    again: Vec<Factor>,
 }
 
 /// A scatter between insertions.
@@ -49,9 +55,16 @@ enum Kind {
 const KINDS: [Kind; 4] = [Kind::OwnSurface, Kind::OwnFriction, Kind::Force, Kind::Place];
 
 impl<'a> Spread<'a> {
-    /// Of a fit.
+    /// Of a fit to recordings whose noise is told by what the fit leaves.
     #[must_use]
-    pub fn new(fit: &'a Fit, data: &Data) -> Self {
+    pub fn new(fit: &'a Fit, data: &Data, rng: &mut impl Rng) -> Self {
+        let mut it = Self::known(fit, data);
+        it.again = told_again(&it.tangent, data, &it.matrix, rng).iter().map(Symmetric::factor).collect();
+        it
+    }
+
+    /// Of a fit to recordings whose noise is known.
+    fn known(fit: &'a Fit, data: &Data) -> Self {
         let mut tangent = Tangent::new(&fit.model, data, &fit.residuals);
         let mut wide_m = 0.0;
         for _ in 0..WIDER {
@@ -82,7 +95,7 @@ impl<'a> Spread<'a> {
                 (more.factor(), *freedom)
             })
             .collect();
-        Self { fit, factor: matrix.factor(), tangent, raised }
+        Self { fit, factor: matrix.factor(), matrix, tangent, raised, again: Vec::new() }
     }
 
     /// Half the width of the 95 % interval of a combination of the numbers.
@@ -94,7 +107,15 @@ impl<'a> Spread<'a> {
             let part = ((variance(more) - all) / RAISED).clamp(0.0, all);
             lost += part * part / freedom;
         }
+        // What becomes of a variance when the noise is told anew by what the fit leaves of it: how much too small, and how variable.
+        let again: Vec<f64> = self.again.iter().map(|f| variance(f) / all).collect();
+        let (mean, sd) = (stylet_stats::mean(&again), stylet_stats::sd(&again));
+        let told = mean > 0.0 && sd.is_finite();
+        if told {
+            lost += 0.5 * (all * sd / mean).powi(2);
+        }
         let freedom = if lost > 0.0 { all * all / lost } else { f64::INFINITY };
+        let all = if told { all / mean.min(1.0) } else { all };
         all.sqrt() * student::quantile(UPPER, freedom.clamp(1.0, MANY))
     }
 
@@ -312,7 +333,7 @@ mod tests {
         model.free.own_surface = true;
         model.own.iter_mut().zip(own).for_each(|(o, x)| o.surface_m = x);
         let told = fit(&model, &data, Effort::FULL).expect("a fit");
-        let (_, half) = Spread::new(&told, &data).of(Role::Surface).expect("free");
+        let (_, half) = Spread::known(&told, &data).of(Role::Surface).expect("free");
         assert!((half / wanted(&own) - 1.0).abs() < 0.1, "{half} for {}", wanted(&own));
 
         let own = [-0.03, 0.05, 0.02, -0.05];
@@ -321,7 +342,7 @@ mod tests {
         model.free.own_friction = true;
         model.own.iter_mut().zip(own).for_each(|(o, x)| o.friction = x);
         let told = fit(&model, &data, Effort::FULL).expect("a fit");
-        let (_, half) = Spread::new(&told, &data).of(Role::Friction(0)).expect("free");
+        let (_, half) = Spread::known(&told, &data).of(Role::Friction(0)).expect("free");
         assert!((half / wanted(&own) - 1.0).abs() < 0.1, "{half} for {}", wanted(&own));
     }
     /// Under a slow noise the place at which a force bends is far less sure than a derivative says, which sees a jump there; under a white
@@ -339,7 +360,7 @@ mod tests {
             let tangent = Tangent::new(&told.model, &data, &told.residuals);
             let at = tangent.shared.iter().position(|n| n.role == Role::Surface).expect("free");
             let by_derivative = stylet_stats::Z95 * tangent.factor().inverse_diagonal()[at].sqrt();
-            let (_, half) = Spread::new(&told, &data).of(Role::Surface).expect("free");
+            let (_, half) = Spread::known(&told, &data).of(Role::Surface).expect("free");
             let ratio = half / by_derivative;
             assert!(ratio > least && ratio < most, "{slow}: {ratio}");
         }

@@ -92,8 +92,21 @@ impl Factor {
     /// Solves `A x = b`.
     #[must_use]
     pub fn solve(&self, b: &[f64]) -> Vec<f64> {
+        self.back(&self.half(b))
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Solves `L' x = y`: independent numbers of variance one become ones with the covariance `A^-1`.
+    #[must_use]
+    pub fn back(&self, y: &[f64]) -> Vec<f64> {
         let n = self.size;
-        let mut x = self.half(b);
+        let mut x: Vec<f64> =
+            y.iter().zip(&self.live).map(|(y, live)| if *live { *y } else { 0.0 }).collect();
         for i in (0..n).rev() {
             if self.live[i] {
                 let sum: f64 = (i + 1..n).map(|k| self.l[k * n + i] * x[k]).sum();

@@ -269,10 +269,9 @@ impl Noise {
             if row.sd_n == f64::INFINITY {
                 return 0.0;
             }
-            let (bin, run) = (&self.bins[row.bin as usize], row.run as usize);
-            let (near, slow) = bin.first.get(run).map_or((&bin.a, &bin.slow), |f| (&f.a, &f.slow));
+            let (near, slow) = self.memory(row);
             let mut w = e[k];
-            for (a, before) in near.iter().zip(e[k - ORDER.min(run)..k].iter().rev()) {
+            for (a, before) in near.iter().zip(e[k - ORDER.min(row.run as usize)..k].iter().rev()) {
                 w -= a * before;
             }
             if laid.wander && *slow != [0.0; SLOW.len()] {
@@ -283,6 +282,37 @@ impl Noise {
             w / row.sd_n
         };
         laid.rows.iter().enumerate().map(one).collect()
+    }
+
+    /// Residuals (N) of a recording whose normalised innovations are `w`: the inverse of [`whiten`](Self::whiten), nothing where blocks
+    /// are not compared.
+    #[must_use]
+    pub fn colour(&self, laid: &Laid, w: &[f64]) -> Vec<f64> {
+        let mut e = vec![0.0; w.len()];
+        let mut sums = vec![0.0; w.len() + 1];
+        for (k, row) in laid.rows.iter().enumerate() {
+            if row.sd_n.is_finite() {
+                let (near, slow) = self.memory(row);
+                let run = ORDER.min(row.run as usize);
+                let mut x = w[k] * row.sd_n;
+                for (a, before) in near.iter().zip(e[k - run..k].iter().rev()) {
+                    x += a * before;
+                }
+                if laid.wander {
+                    let means = slow_means(&sums, k, row.reach as usize);
+                    x += means.iter().zip(slow).map(|(mean, slow)| slow * mean).sum::<f64>();
+                }
+                e[k] = x;
+            }
+            sums[k + 1] = sums[k] + e[k];
+        }
+        e
+    }
+
+    /// How a block is foretold: coefficients of those before it, and of the means of stretches further back.
+    fn memory(&self, row: &Row) -> (&[f64; ORDER], &[f64; SLOW.len()]) {
+        let bin = &self.bins[row.bin as usize];
+        bin.first.get(row.run as usize).map_or((&bin.a, &bin.slow), |f| (&f.a, &f.slow))
     }
 
     /// Sum of the logarithms of the innovations' standard deviations, `ln(s/N)`, over the blocks compared.

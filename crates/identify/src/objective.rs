@@ -32,8 +32,17 @@ impl Data {
     /// Normalised innovations of residuals `e` (N) of recording `r`; blocks that are not compared give zero.
     #[must_use]
     pub fn whiten(&self, r: usize, e: &[f64]) -> Vec<f64> {
-        let laid = self.laid.get_or_init(|| self.blocks.iter().map(|b| self.noise.laid(b)).collect());
-        self.noise.whiten(&laid[r], e)
+        self.noise.whiten(&self.laid()[r], e)
+    }
+
+    /// Residuals (N) of recording `r` whose normalised innovations are `w`.
+    #[must_use]
+    pub fn colour(&self, r: usize, w: &[f64]) -> Vec<f64> {
+        self.noise.colour(&self.laid()[r], w)
+    }
+
+    fn laid(&self) -> &[Laid] {
+        self.laid.get_or_init(|| self.blocks.iter().map(|b| self.noise.laid(b)).collect())
     }
 
     /// The same recordings judged by another noise.
