@@ -5,7 +5,7 @@ use crate::outcome::Cause;
 use crate::select::Search;
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, fit};
-use stylet_tissue::{Place, Proposal};
+use stylet_tissue::{EffectInfo, Place, Proposal};
 
 /// A trace.
 #[derive(Clone, Debug)]
@@ -25,6 +25,10 @@ const OF_ENCODER: f64 = 0.1;
 /// A cause that brings back less than this share of the noise's variance is asked whether it pays.
 const ASKED: f64 = 0.3;
 
+/// A law is right to this share of the force that it explains: what gains less beside it may be its error. Motions are recorded with steps
+/// and noise, and a simulation integrates.
+const LAW_ERROR: f64 = 0.05;
+
 /// Causes that are traces.
 #[must_use]
 pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<Small> {
@@ -36,6 +40,7 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
         rms(after, &search.data)
     };
     let effects = &search.best.model.effects;
+    let compared = search.data.compared() as f64;
     let one = |c: &Cause| -> Option<Small> {
         let k = effects.iter().position(|e| e.info.id == c.effect)?;
         let why = |why: String| Some(Small { effect: c.effect.clone(), why });
@@ -43,7 +48,12 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
             return why(reason);
         }
         let without = fit(&search.best.model.without(k), &search.data, Effort { turns: 4, enough: 0.5 })?;
-        let lost = (without.nats() - search.best.nats()) / search.data.compared() as f64;
+        let lost = (without.nats() - search.best.nats()) / compared;
+        let explained =
+            causes.iter().filter(|o| o.effect != c.effect).map(|o| o.gain_nats).fold(0.0, f64::max);
+        if at_every_sample(effects[k].info) && lost * compared < LAW_ERROR * LAW_ERROR * explained {
+            return why("no more than the error that the law of a far greater cause may have".to_owned());
+        }
         if lost > ASKED {
             return None;
         }
@@ -59,6 +69,12 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
         })
     };
     causes.par_iter().filter_map(one).collect()
+}
+
+/// Whether an effect shows in every sample, and not only where something gives way.
+fn at_every_sample(info: &EffectInfo) -> bool {
+    !matches!(info.place, Place::Puncture | Place::Release | Place::Geometry)
+        && !matches!(info.proposal, Proposal::Break | Proposal::Raw)
 }
 
 /// Why the number of an effect lies below what the instrument resolves.
