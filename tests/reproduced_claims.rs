@@ -262,8 +262,12 @@ fn every_number_on_the_page_has_its_source_class() {
     }
     assert!(numbers > 300, "{numbers} cells with numbers");
     // Figs 2 to 15 of the supplement, Table I and Figs 12 to 14 of the main paper; Fig. 1 has no experiment.
-    assert_eq!(html.matches("What went in").count(), 18, "the inputs of the figures");
-    assert_eq!(html.matches("Beside the supplement").count(), 19, "every figure beside the supplement");
+    assert_eq!(html.matches("<caption>What went in").count(), 18, "the inputs of the figures");
+    assert_eq!(
+        html.matches("<caption>Beside the supplement").count(),
+        19,
+        "every figure beside the supplement"
+    );
     assert!(html.contains("Numbers of ours, and the verdicts that hang on them"));
 }
 
