@@ -192,7 +192,7 @@ impl Study {
     pub fn run(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Self, ReproduceError> {
         let insertions = plan.insertions()?;
         let missing = |r: &Recorded| ReproduceError::NotRun(r.case.name().to_owned());
-        let tunings: Vec<Vec<((Recorded, Sensor), Tuning)>> = plan
+        let tunings: Vec<Vec<Tuned>> = plan
             .to_tune()
             .into_par_iter()
             .map(|(recorded, sensors)| {
@@ -275,12 +275,15 @@ impl Study {
     }
 }
 
+/// What was tuned, and how.
+type Tuned = ((Recorded, Sensor), Tuning);
+
 /// The tunings of a recording; on the arm one simulation of each tuning seed serves every sensor.
 fn tune(
     recorded: Recorded,
     once: &Insertion,
     sensors: &BTreeMap<Sensor, bool>,
-) -> Result<Vec<((Recorded, Sensor), Tuning)>, ReproduceError> {
+) -> Result<Vec<Tuned>, ReproduceError> {
     let on_arm = recorded.case.on_arm();
     let seeds: Vec<u64> = (0..if on_arm { TUNING_SEEDS_ARM } else { TUNING_SEEDS })
         .map(|index| TUNING_FIRST_SEED + index)
