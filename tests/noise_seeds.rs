@@ -8,7 +8,7 @@
 mod support;
 
 use rayon::prelude::*;
-use stylet_core::config::{Contact, EnhanceConfig, Model, Reset};
+use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model, Reset};
 use stylet_scenario::{Motion, Scenario, Sensor};
 use stylet_score::{Score, score_run};
 use stylet_stats::{Interval, quantile_of, wilson};
@@ -187,10 +187,48 @@ fn from_full_speed() -> Scenario {
     sinusoid
 }
 
+/// Least squares of the force less the true cumulative friction on `[dz, v]` over every whole layer, by nothing but
+/// the normal equations, friction not below zero: relative error of K, layer by layer, median over the seeds.
+fn kelvin_voigt_by_least_squares(scenario: &Scenario) -> Vec<f64> {
+    let once = simulate(scenario, 1).expect("a simulation");
+    let layers = once.layers();
+    let errors: Vec<Vec<f64>> = (1..=SEEDS)
+        .into_par_iter()
+        .map(|seed| {
+            let force_n = once.remeasured(seed).expect("a force/torque sensor");
+            let of = |(layer, rupture): (&stylet_score::LayerTruth, &stylet_record::TrueRupture)| {
+                let [mut zz, mut zv, mut vv, mut zf, mut vf] = [0.0; 5];
+                let all =
+                    once.recording.samples().zip(&force_n).zip(&once.truth.cumulative_friction_ns_per_m);
+                for ((sample, force_n), cumulative) in all {
+                    let (dz, v) = (sample.position_m - layer.front_m, sample.velocity_mps);
+                    if dz <= 0.0 || sample.time_s >= rupture.time_s {
+                        continue;
+                    }
+                    let y = force_n - cumulative * v;
+                    zz += dz * dz;
+                    zv += dz * v;
+                    vv += v * v;
+                    zf += dz * y;
+                    vf += v * y;
+                }
+                let determinant = zz * vv - zv * zv;
+                let friction = (vf * zz - zf * zv) / determinant;
+                // Neither is below zero: with the friction at its end the stiffness takes all.
+                let stiffness = if friction > 0.0 { (zf * vv - vf * zv) / determinant } else { zf / zz };
+                (stiffness / layer.stiffness_n_per_m - 1.0).abs()
+            };
+            layers.iter().zip(&once.truth.ruptures).map(of).collect()
+        })
+        .collect();
+    (0..layers.len()).map(|layer| quantile_of(errors.iter().map(|e| e[layer]), 0.5)).collect()
+}
+
 /// The reference's Kelvin-Voigt errors, K 46 to 52 % (constant) and 150 to 280 % (sinusoid), are those of least
 /// squares over the whole layer, without covariance resets: the speed's column is then a mere offset, all local
-/// friction goes into K, and K is off by `b v / K`. With resets at 40 Hz and no re-weighting it is less, with
-/// both, as the algorithm is written, a tenth.
+/// friction goes into K, and K is off by `b v / K`; in the sinusoid by more, because the speed is higher.
+/// With resets at 40 Hz and no re-weighting it is less in constant motion, with both, as the algorithm is written, a
+/// tenth.
 #[test]
 fn kelvin_voigt_is_off_as_in_the_reference_without_covariance_resets_and_less_with_them() {
     let run = |name: &str, scenario: &Scenario, reset: Reset, reweight: bool| {
@@ -219,34 +257,85 @@ fn kelvin_voigt_is_off_as_in_the_reference_without_covariance_resets_and_less_wi
     for layer in 0..3 {
         assert!(both[layer] < 0.5 * plain[layer] && plain[layer] < whole[layer], "K{}", layer + 1);
     }
-    let whole = run("sinusoid, KV, no resets within a layer", &sinusoid, Reset::Ruptures, true);
-    println!("reference: K 150-280 %, ours {whole:.2?}");
-    run("sinusoid, KV, 40 Hz, re-weighted", &sinusoid, frequent, true);
+    // Without a recursion: the reference's lines as they stand, 46 to 52 % and 150 to 280 %, layer by layer. The third
+    // layer in the sinusoid, 135 %, lies below the reference's range.
+    let least = kelvin_voigt_by_least_squares(&constant);
+    println!(
+        "constant, KV, least squares over the whole layer: K off by {least:.3?}, reference 0.46 to 0.52"
+    );
+    assert!(least.iter().all(|error| (0.455..0.525).contains(error)), "constant: {least:?}");
+    let least = kelvin_voigt_by_least_squares(&sinusoid);
+    println!("sinusoid, KV, least squares over the whole layer: K off by {least:.3?}, reference 1.5 to 2.8");
+    assert!(least[..2].iter().all(|error| (1.495..2.805).contains(error)), "sinusoid: {least:?}");
+    assert!((1.2..1.495).contains(&least[2]), "sinusoid: {least:?}");
+    // The recursion without resets misses ruptures in the sinusoid, and what it misses it does not estimate.
+    run("sinusoid, KV, no resets within a layer", &sinusoid, Reset::Ruptures, true);
+    let both = run("sinusoid, KV, 40 Hz, re-weighted", &sinusoid, frequent, true);
+    assert!(both[0] > 1.495 && both[1] > 1.495 && both[2] < 1.495, "the third layer is better: {both:?}");
 }
 
 /// The lines of the reference above 0.02 N that are not met. At 0.03 N as many are missed and 153 false where it
-/// has 138; at 0.1 N ours is worse, 502 missed and 2902 false where it has 256 and 1985. Why has not been found out.
+/// has 138; at 0.1 N ours is worse, 502 missed and 2902 false where it has 256 and 1985.
 const NOISE_NOT_MET: &[&str] = &["0.03 N: false", "0.1 N: missed", "0.1 N: false"];
 
+/// The same with the 2 mm without a rupture counted from the end of the 7.5 mm in which detection is off anyway, not
+/// from the rupture as the specification words it.
+const LATER_NOT_MET: &[&str] = &["0.03 N: missed"];
+
 /// Above 0.02 N the algorithm breaks down: in the reference 37 of 600 missed and 138 false at 0.03 N, 256 and
-/// 1985 at 0.1 N.
+/// 1985 at 0.1 N. At 0.1 N it alarms whenever it may, so that the counts are those of the travel between two alarms:
+/// 7.5 mm here. With 9.5 mm both lines of 0.1 N are met, and the false ones of 0.03 N.
 #[test]
 fn above_twenty_millinewtons_of_noise_it_breaks_down_as_in_the_reference() {
-    let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::paper() };
     let mut constant = load("three_layer_latex_constant");
-    let mut not_met = Vec::new();
-    for (noise_n, missed, alarms) in [(0.03, 37, 138), (0.1, 256, 1985)] {
-        if let Sensor::ForceTorque(sensor) = &mut constant.sensor {
-            sensor.noise_n = noise_n;
-        }
-        let s = summarise(&format!("constant, ML, noise {noise_n} N"), &scores(&constant, &config));
-        for (what, reference, ours) in [("missed", missed, s.missed), ("false", alarms, s.false_alarms)] {
-            println!("  {what}: reference {reference}, ours {ours}");
-            if ours > reference {
-                not_met.push(format!("{noise_n} N: {what}"));
+    let detection_off_m = {
+        let drop = EnhanceConfig::paper().drop;
+        drop.travel_m + drop.compensation_travel_m
+    };
+    let plain = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::paper() };
+    let mut later = plain.clone();
+    later.guard.blind_travel_m += detection_off_m;
+    for (name, config, expected) in [
+        ("2 mm from the rupture", &plain, NOISE_NOT_MET),
+        ("2 mm from the end of 7.5 mm", &later, LATER_NOT_MET),
+    ] {
+        let mut not_met = Vec::new();
+        for (noise_n, missed, alarms) in [(0.03, 37, 138), (0.1, 256, 1985)] {
+            if let Sensor::ForceTorque(sensor) = &mut constant.sensor {
+                sensor.noise_n = noise_n;
             }
+            let s =
+                summarise(&format!("constant, ML, noise {noise_n} N, {name}"), &scores(&constant, config));
+            for (what, reference, ours) in [("missed", missed, s.missed), ("false", alarms, s.false_alarms)] {
+                println!("  {what}: reference {reference}, ours {ours}");
+                if ours > reference {
+                    not_met.push(format!("{noise_n} N: {what}"));
+                }
+            }
+            assert!(s.false_alarms > 100, "it breaks down: {}", s.false_alarms);
         }
-        assert!(s.false_alarms > 100, "it breaks down: {}", s.false_alarms);
+        assert_eq!(not_met, expected, "{name}");
     }
-    assert_eq!(not_met, NOISE_NOT_MET);
+}
+
+/// To the letter, without blind travel after contact, nearly every insertion whose contact is found from the data has a false
+/// rupture right after it, and from rest K of the first layer is off by half; it does not diverge further. With the
+/// surface known there is none.
+#[test]
+fn to_the_letter_an_insertion_with_contact_found_from_the_data_has_a_false_rupture() {
+    let sinusoid = load("three_layer_latex_sinusoidal");
+    let with = |algorithm: Algorithm, contact: Contact| {
+        let config = EnhanceConfig { algorithm, contact, ..EnhanceConfig::paper() };
+        summarise(
+            &format!("sinusoid from rest, {algorithm:?}, {:?}", config.contact),
+            &scores(&sinusoid, &config),
+        )
+    };
+    let completed = with(Algorithm::Paper, Contact::Detected);
+    let literal = with(Algorithm::Literal, Contact::Detected);
+    let known = with(Algorithm::Literal, Contact::Known);
+    assert_eq!((completed.false_alarms, known.false_alarms), (0, 0));
+    assert!(literal.false_alarms as f64 >= 0.95 * SEEDS as f64, "{}", literal.false_alarms);
+    assert!((0.4..0.6).contains(&literal.median_stiffness[0]), "{:?}", literal.median_stiffness);
+    assert!(literal.median_stiffness[0] > 3.0 * completed.median_stiffness[0]);
 }

@@ -146,8 +146,8 @@ fn seconds(text: &str) -> Result<f64, String> {
   stylet reproduce --out out/paper
   stylet reproduce --out out/again --first-seed 51     other noise, the same verdicts
 
-The folder then holds index.html (open it beside the paper's supplement), claims.json and every figure
-as SVG. The same seeds give the same bytes for any number of threads.")]
+The folder then holds index.html (open it beside the paper's supplement), claims.json, switches.json
+and every figure as SVG. The same seeds give the same bytes for any number of threads.")]
 pub struct ReproduceArgs {
     #[command(flatten)]
     pub results: Results,

@@ -28,6 +28,7 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
             writeln!(text, "({}) {}: {}\n    {}", claim.id, claim.claim, claim.verdict.word(), claim.reason);
     }
     output.add("claims.json", made.claims_json);
+    output.add("switches.json", made.switches_json);
     for (name, svg) in made.pictures {
         output.add(name, svg);
     }

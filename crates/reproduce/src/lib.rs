@@ -45,6 +45,8 @@ pub struct Reproduction {
     pub claims: Vec<Claim>,
     /// The same as JSON.
     pub claims_json: String,
+    /// What the algorithm's switches do, as JSON.
+    pub switches_json: String,
     /// Pictures: file name and SVG.
     pub pictures: Vec<(&'static str, String)>,
 }
@@ -73,6 +75,7 @@ pub fn reproduce(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Reproduction, 
     let files: Vec<_> = figures.iter().flat_map(|f| f.files.clone()).collect();
     let html = page::page(&study, &claims, figures, &pictures).to_html();
     let claims_json = serde_json::to_string_pretty(&claims)? + "\n";
+    let switches_json = serde_json::to_string_pretty(&switches::record(&study))? + "\n";
     pictures.extend(files);
-    Ok(Reproduction { html, claims, claims_json, pictures })
+    Ok(Reproduction { html, claims, claims_json, switches_json, pictures })
 }

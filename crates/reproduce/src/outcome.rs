@@ -176,3 +176,31 @@ impl Offline {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+
+    #[test]
+    fn the_offline_estimate_without_the_drop_takes_nothing_from_the_online_algorithm() {
+        for case in [Case::LatexConstant, Case::LatexSinusoidal] {
+            let insertion = Insertion::of(&case.scenario().expect("valid"), 1).expect("a simulation");
+            let samples = insertion.samples(&insertion.reading(1, 10));
+            let of = |shares: &[Option<f64>]| Offline::of(&insertion, &samples, shares);
+            let (none, some, other) = (of(&[]), of(&[Some(0.3); 3]), of(&[Some(0.6); 3]));
+            assert_eq!(none.without_drop.len(), 3, "{case:?}");
+            assert!(none.without_drop.iter().all(Option::is_some), "{case:?}");
+            assert_eq!(none.without_drop, some.without_drop, "{case:?}");
+            assert_eq!(none.without_drop, other.without_drop, "{case:?}");
+            assert_eq!(none.friction_only, other.friction_only, "{case:?}");
+            assert!(none.with_drop.iter().all(Option::is_none), "{case:?}");
+        }
+        // Where the data do not tell K from b the drop decides, so that the two estimates really differ.
+        let insertion =
+            Insertion::of(&Case::LatexConstant.scenario().expect("valid"), 1).expect("a simulation");
+        let samples = insertion.samples(&insertion.reading(1, 10));
+        let of = |share: f64| Offline::of(&insertion, &samples, &[Some(share); 3]).with_drop;
+        assert_ne!(of(0.3), of(0.6));
+    }
+}

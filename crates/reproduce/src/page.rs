@@ -69,13 +69,13 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
         .table(
             Sourced::named(Table {
                 headers: [
-                    "claim",
-                    "verdict",
+                    "claim (the paper's)",
+                    "verdict (computed)",
                     "effect (computed)",
                     "bar (ours)",
-                    "primary condition",
-                    "hangs on numbers of ours",
-                    "sensitivity conditions in which it holds",
+                    "primary condition (computed)",
+                    "hangs on numbers of ours (computed)",
+                    "sensitivity conditions in which it holds (computed)",
                 ]
                 .map(String::from)
                 .to_vec(),
@@ -224,7 +224,8 @@ pub fn page(
                 "Our analogues of the supplement's Figs 1 to 15 and, as far as the supplement describes them, of the main paper's Table I and Figs 12, 13, 14. \
                  The phantoms are simulated, the algorithm is our own implementation of the paper's. Behind every table stands in brackets whose its numbers \
                  are: the paper's (printed in the supplement), the laboratory's (published with its software, facts only), literature (measured by others), \
-                 ours (chosen), computed (printed by this program from runs). The figures were compared with the supplement's text and captions, which is what \
+                 ours (chosen), computed (printed by this program from runs). Curves and dots in the figures are computed; the numbers that went \
+                 into them stand under each with their class. In running text the paper's numbers follow `The paper says`, ours `Assumed`. The figures were compared with the supplement's text and captions, which is what \
                  was at hand: curves and axes of the printed figures could not be measured.",
             )
             .text(
@@ -234,7 +235,7 @@ pub fn page(
             ),
     );
     page = page.section(summary(claims, study));
-    page = page.section(chosen::section(claims).table(tunings(study)));
+    page = page.section(chosen::section(study, claims).table(tunings(study)));
     for f in figures {
         page = page.section(figure(f));
     }

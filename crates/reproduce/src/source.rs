@@ -231,6 +231,37 @@ pub fn table(case: Case, scenario: &Scenario) -> Sourced {
     })
 }
 
+/// The inputs of several experiments in one table: what they share stands once.
+#[must_use]
+pub fn table_of(cases: &[Case]) -> Sourced {
+    let mut all: Vec<(Input, Vec<&str>)> = Vec::new();
+    for case in cases {
+        let Ok(scenario) = case.scenario() else { continue };
+        for input in inputs(*case, &scenario) {
+            match all.iter_mut().find(|(other, _)| *other == input) {
+                Some((_, names)) => names.push(case.name()),
+                None => all.push((input, vec![case.name()])),
+            }
+        }
+    }
+    let rows = all.into_iter().map(|(i, names)| {
+        let of = if names.len() == cases.len() { "all".to_owned() } else { names.join("; ") };
+        vec![
+            Cell::text(i.name),
+            Cell::text(of),
+            Cell::text(i.value),
+            Cell::text(i.class.words()),
+            Cell::text(i.why),
+        ]
+    });
+    Sourced::named(Table {
+        title: "What went in".to_owned(),
+        headers: ["number", "of", "value", "whose", "source or reason"].map(String::from).to_vec(),
+        rows: rows.collect(),
+        ..Table::default()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

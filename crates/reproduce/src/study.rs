@@ -148,12 +148,12 @@ impl Plan {
         Ok(made.into_iter().collect())
     }
 
-    /// What has to be tuned, and whether the triggered reset's threshold too.
-    fn to_tune(&self) -> BTreeMap<(Recorded, Sensor), bool> {
-        let mut all = BTreeMap::new();
+    /// What has to be tuned, for which sensors, and whether the triggered reset's threshold too.
+    fn to_tune(&self) -> BTreeMap<Recorded, BTreeMap<Sensor, bool>> {
+        let mut all: BTreeMap<Recorded, BTreeMap<Sensor, bool>> = BTreeMap::new();
         for key in self.wanted.runs.keys().filter(|k| k.variant.is_tuned()) {
-            let trace = all.entry((unchanged_on_arm(key.recorded), key.sensor)).or_insert(false);
-            *trace |= key.variant.ablation == Ablation::Trace;
+            let sensors = all.entry(unchanged_on_arm(key.recorded)).or_default();
+            *sensors.entry(key.sensor).or_default() |= key.variant.ablation == Ablation::Trace;
         }
         all
     }
@@ -192,16 +192,15 @@ impl Study {
     pub fn run(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Self, ReproduceError> {
         let insertions = plan.insertions()?;
         let missing = |r: &Recorded| ReproduceError::NotRun(r.case.name().to_owned());
-        let tunings: Vec<((Recorded, Sensor), Tuning)> = plan
+        let tunings: Vec<Vec<Tuned>> = plan
             .to_tune()
             .into_par_iter()
-            .map(|((recorded, sensor), trace)| {
+            .map(|(recorded, sensors)| {
                 let once = insertions.get(&(recorded.case, recorded.change));
-                let once = once.ok_or_else(|| missing(&recorded))?;
-                Ok::<_, ReproduceError>(((recorded, sensor), tune(recorded, once, sensor, trace)?))
+                tune(recorded, once.ok_or_else(|| missing(&recorded))?, &sensors)
             })
             .collect::<Result<_, _>>()?;
-        let tunings: BTreeMap<(Recorded, Sensor), Tuning> = tunings.into_iter().collect();
+        let tunings: BTreeMap<(Recorded, Sensor), Tuning> = tunings.into_iter().flatten().collect();
         let mut jobs = Vec::new();
         for (recorded, seeds) in plan.recordings() {
             let once = insertions.get(&(recorded.case, recorded.change)).ok_or_else(|| missing(&recorded))?;
@@ -276,25 +275,36 @@ impl Study {
     }
 }
 
-fn tune(recorded: Recorded, once: &Insertion, sensor: Sensor, trace: bool) -> Result<Tuning, ReproduceError> {
-    if !recorded.case.on_arm() {
-        let seeds = TUNING_FIRST_SEED..TUNING_FIRST_SEED + TUNING_SEEDS;
-        let recordings: Vec<_> =
-            seeds.map(|seed| (once, once.samples(&once.reading(seed, recorded.noise_mn)))).collect();
-        return Ok(Tuning::of(&recordings, sensor, trace));
-    }
-    let seeds: Vec<u64> = (TUNING_FIRST_SEED..TUNING_FIRST_SEED + TUNING_SEEDS_ARM).collect();
-    let made: Vec<Insertion> =
-        seeds.par_iter().map(|seed| Insertion::of(&once.scenario, *seed)).collect::<Result<_, _>>()?;
-    let recordings: Vec<_> = made
-        .iter()
-        .zip(&seeds)
-        .map(|(insertion, seed)| (insertion, arm_samples(insertion, *seed, recorded.noise_mn, sensor)))
+/// What was tuned, and how.
+type Tuned = ((Recorded, Sensor), Tuning);
+
+/// The tunings of a recording; on the arm one simulation of each tuning seed serves every sensor.
+fn tune(
+    recorded: Recorded,
+    once: &Insertion,
+    sensors: &BTreeMap<Sensor, bool>,
+) -> Result<Vec<Tuned>, ReproduceError> {
+    let on_arm = recorded.case.on_arm();
+    let seeds: Vec<u64> = (0..if on_arm { TUNING_SEEDS_ARM } else { TUNING_SEEDS })
+        .map(|index| TUNING_FIRST_SEED + index)
         .collect();
-    Ok(Tuning::of(&recordings, sensor, trace))
+    let made: Vec<Insertion> = if on_arm {
+        seeds.par_iter().map(|seed| Insertion::of(&once.scenario, *seed)).collect::<Result<_, _>>()?
+    } else {
+        Vec::new()
+    };
+    let of = |sensor: Sensor, trace: bool| {
+        let recording = |(index, seed): (usize, &u64)| {
+            let insertion = made.get(index).unwrap_or(once);
+            (insertion, samples_of(insertion, *seed, recorded.noise_mn, sensor))
+        };
+        let recordings: Vec<_> = seeds.iter().enumerate().map(recording).collect();
+        ((recorded, sensor), Tuning::of(&recordings, sensor, trace))
+    };
+    Ok(sensors.iter().map(|(sensor, trace)| of(*sensor, *trace)).collect())
 }
 
-fn arm_samples(insertion: &Insertion, seed: u64, noise_mn: u32, sensor: Sensor) -> Vec<stylet_core::Sample> {
+fn samples_of(insertion: &Insertion, seed: u64, noise_mn: u32, sensor: Sensor) -> Vec<stylet_core::Sample> {
     match sensor {
         Sensor::ForceTorque => insertion.samples(&insertion.reading(seed, noise_mn)),
         Sensor::Virtual => insertion.samples(insertion.force_n(sensor)),
@@ -320,7 +330,7 @@ fn one(
         if !(job.offline && sensor == Sensor::ForceTorque) && asked.clone().next().is_none() {
             continue;
         }
-        let samples = arm_samples(insertion, job.seed, job.recorded.noise_mn, sensor);
+        let samples = samples_of(insertion, job.seed, job.recorded.noise_mn, sensor);
         let tuning = tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
         let mut shares = Vec::new();
         for key in asked {

@@ -4,12 +4,14 @@
 
 use crate::case::Case;
 use crate::effect::{Measured, Part, Scale};
+use crate::interval::Interval;
 use crate::outcome::Outcome;
 use crate::source::Sourced;
 use crate::spread::Spread;
 use crate::study::Study;
 use crate::variant::{Ablation, Sensor, Setup};
 use crate::view::View;
+use serde::Serialize;
 use stylet_report::{Cell, Section, Table, percent, significant};
 
 /// A way of running that is compared.
@@ -46,47 +48,93 @@ fn runs<'a>(study: &'a Study, case: Case, way: &Way) -> &'a [Outcome] {
     view.runs(case, Sensor::ForceTorque, way.kelvin_voigt, way.ablation)
 }
 
-/// Median over the seeds of the relative errors of a layer's K.
-fn stiffness_errors(runs: &[Outcome]) -> String {
+/// Median over the seeds of the relative errors of K, layer by layer.
+fn stiffness_errors(runs: &[Outcome]) -> Vec<Option<f64>> {
     let layers = runs.iter().map(|o| o.score.layers.len()).max().unwrap_or(0);
     let of = |layer: usize| {
         let errors =
             runs.iter().map(|o| o.score.layers.get(layer).and_then(|l| l.stiffness_n_per_m.relative_error));
-        Spread::of(errors).map_or("–".to_owned(), |s| significant(100.0 * s.median, 2))
+        Spread::of(errors).map(|s| s.median)
     };
-    (0..layers).map(of).collect::<Vec<_>>().join(" / ")
+    (0..layers).map(of).collect()
+}
+
+/// `1.2 / 3.4 / –`.
+fn percents(errors: &[Option<f64>]) -> String {
+    let text = |e: &Option<f64>| e.map_or("–".to_owned(), |e| significant(100.0 * e, 2));
+    errors.iter().map(text).collect::<Vec<_>>().join(" / ")
+}
+
+/// What one way of running makes of an experiment: a row of `switches.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Ablated {
+    /// Experiment.
+    pub experiment: &'static str,
+    /// What was switched.
+    pub name: &'static str,
+    /// Noise seeds.
+    pub seeds: usize,
+    /// True ruptures over all seeds,
+    pub ruptures: usize,
+    /// missed of them,
+    pub missed: usize,
+    /// and false ones.
+    pub false_alarms: usize,
+    /// Median over the seeds of the relative error of K, layer by layer; none where nothing was estimated.
+    pub stiffness_error: Vec<Option<f64>>,
+    /// Cumulative friction at the end over the true one.
+    pub cumulative_ratio: Option<Interval>,
+    /// Enhanced force off by, relative.
+    pub enhancement: Option<Interval>,
+    /// RMS reconstruction error in N.
+    pub reconstruction_rms_n: Option<Interval>,
+}
+
+fn ablated(study: &Study, case: Case, way: &Way) -> Ablated {
+    let runs = runs(study, case, way);
+    let sum = |of: fn(&Outcome) -> usize| runs.iter().map(of).sum::<usize>();
+    let mean = |value: fn(&Outcome) -> Option<f64>| {
+        let parts = vec![Part::new("", runs.iter().map(value))];
+        Measured { scale: Scale::Mean, parts }.effect().interval
+    };
+    Ablated {
+        experiment: case.name(),
+        name: way.name,
+        seeds: runs.len(),
+        ruptures: sum(|o| o.score.ruptures.len()),
+        missed: sum(|o| o.score.missed),
+        false_alarms: sum(|o| o.score.false_alarms),
+        stiffness_error: stiffness_errors(runs),
+        cumulative_ratio: mean(|o| o.cumulative_ratio),
+        enhancement: mean(|o| o.score.enhancement.rms_relative),
+        reconstruction_rms_n: mean(|o| o.score.reconstruction_rms_n),
+    }
+}
+
+/// Every way of running on every experiment, for the record.
+#[must_use]
+pub fn record(study: &Study) -> Vec<Ablated> {
+    CASES.iter().flat_map(|case| WAYS.iter().map(|way| ablated(study, *case, way))).collect()
 }
 
 fn table(study: &Study, case: Case) -> Sourced {
     let rows = WAYS
         .iter()
         .map(|way| {
-            let runs = runs(study, case, way);
-            let sum = |of: fn(&Outcome) -> usize| runs.iter().map(of).sum::<usize>();
-            let shown = |value: fn(&Outcome) -> Option<f64>| {
-                let effect =
-                    Measured { scale: Scale::Mean, parts: vec![Part::new("", runs.iter().map(value))] };
-                effect.effect().interval
-            };
-            let show = |value, text: &dyn Fn(f64) -> String| {
-                let i = shown(value);
-                Cell::number(i.map_or("–".to_owned(), |i| {
+            let found = ablated(study, case, way);
+            let show = |interval: Option<Interval>, text: &dyn Fn(f64) -> String| {
+                Cell::number(interval.map_or("–".to_owned(), |i| {
                     format!("{} ({} to {})", text(i.value), text(i.low), text(i.high))
                 }))
             };
             let short = |x: f64| significant(x, 3);
             vec![
                 Cell::text(way.name),
-                Cell::number(format!(
-                    "{} / {} of {}",
-                    sum(|o| o.score.missed),
-                    sum(|o| o.score.false_alarms),
-                    sum(|o| o.score.ruptures.len())
-                )),
-                Cell::number(stiffness_errors(runs)),
-                show(|o| o.cumulative_ratio, &short),
-                show(|o| o.score.enhancement.rms_relative, &percent),
-                show(|o| o.score.reconstruction_rms_n, &short),
+                Cell::number(format!("{} / {} of {}", found.missed, found.false_alarms, found.ruptures)),
+                Cell::number(percents(&found.stiffness_error)),
+                show(found.cumulative_ratio, &short),
+                show(found.enhancement, &percent),
+                show(found.reconstruction_rms_n, &short),
             ]
         })
         .collect();
@@ -165,7 +213,9 @@ fn kelvin_voigt(study: &Study) -> Sourced {
         ("40 Hz, not re-weighted", &WAYS[9]),
         ("no resets within a layer", &WAYS[10]),
     ]
-    .map(|(name, way)| vec![Cell::text(name), Cell::number(stiffness_errors(runs(study, case, way)))]);
+    .map(|(name, way)| {
+        vec![Cell::text(name), Cell::number(percents(&stiffness_errors(runs(study, case, way))))]
+    });
     let predicted = case.scenario().map(|s| {
         let speed = match s.motion {
             stylet_scenario::Motion::Constant { velocity_mps, .. } => velocity_mps,

@@ -49,3 +49,15 @@ fn to_the_letter_the_estimates_are_worse_and_the_derivative_may_act_on_drops() {
         assert!(runs.iter().all(Outcome::found_all), "the latex stack does not need the rising force");
     }
 }
+
+#[test]
+fn where_the_drop_is_small_the_derivative_on_drops_finds_none_of_what_the_rising_force_finds() {
+    let of = |study: &Study, setup: Setup| View::primary(study).setup(setup).ml(Case::Gel50Constant).to_vec();
+    let asking = Study::asking(1, 8);
+    let _ = (of(&asking, Setup::Tuned), of(&asking, Setup::FallingForce));
+    let study = Study::run(&asking.plan(), &|| {}).expect("shipped scenarios");
+    let (rising, falling) = (of(&study, Setup::Tuned), of(&study, Setup::FallingForce));
+    assert_eq!((rising.len(), falling.len()), (8, 8));
+    assert!(rising.iter().all(Outcome::found_all));
+    assert!(falling.iter().all(|o| o.score.missed == 1 && o.score.false_alarms == 0));
+}

@@ -55,6 +55,7 @@ macro_rules! protocol {
         include_str!(concat!("../../claims/", $name, ".md"))
     };
 }
+pub(crate) use d_kelvin_voigt_over::VISIBLY;
 pub(crate) use protocol;
 
 /// The name of the condition with everything known.
@@ -265,6 +266,38 @@ mod tests {
                 ["The paper says", "Source", "Primary condition", "Effect", "Assumed", "Untestable"]
             {
                 assert!(!protocol.section(heading).is_empty(), "{}: {heading}", protocol.id);
+            }
+        }
+    }
+
+    /// Per seed one value, the same in every view.
+    fn constant(view: &View<'_>, value: f64) -> Measured {
+        let values = vec![Some(value); view.seeds as usize];
+        Measured {
+            scale: crate::effect::Scale::Mean,
+            parts: vec![crate::effect::Part::new("made up", values)],
+        }
+    }
+
+    #[test]
+    fn sensitivity_conditions_decide_nothing_whatever_they_say() {
+        let study = Study::asking(1, 10);
+        let (holds, fails): (Measure, Measure) = (|v| constant(v, 0.0), |v| constant(v, 2.0));
+        // Contradicted alone when the noise is doubled: the number decides.
+        let hangs: Measure = |v| constant(v, if v.noise_mn > crate::study::NOISE_MN { 2.0 } else { 0.0 });
+        for (primary, numbers, expected) in [
+            (holds, &[Number::Noise][..], Verdict::Supported),
+            (fails, &[Number::Noise], Verdict::Contradicted),
+            (hangs, &[Number::Noise], Verdict::Assumed),
+            (hangs, &[], Verdict::Supported),
+        ] {
+            let plain = Definition::new(protocol!("e"), primary, Bar::Below(1.0), numbers);
+            let alone = plain.judge(&study);
+            assert_eq!(alone.verdict, expected);
+            for more in [plain.clone().also("holds", holds), plain.clone().also("fails", fails)] {
+                let judged = more.judge(&study);
+                assert_eq!((judged.verdict, &judged.primary), (expected, &alone.primary));
+                assert_eq!(judged.sensitivities.len(), 1);
             }
         }
     }

@@ -1,5 +1,6 @@
 //! What the supplement says of a figure, beside what is seen here, and why the two differ.
 
+use super::panels::Run;
 use crate::insertion::Insertion;
 use crate::outcome::Outcome;
 use crate::source::Sourced;
@@ -12,6 +13,8 @@ pub(super) struct Facts<'a> {
     pub measured_n: &'a [f64],
     pub ml: &'a [Outcome],
     pub kv: &'a [Outcome],
+    /// The seed that is drawn, model by model.
+    pub drawn: &'a [Run],
 }
 
 /// A statement of the supplement about a figure.
@@ -148,18 +151,49 @@ pub(super) const MAIN_14: &[Statement] = &[statement(
     "another arm and assumed noise: see claims f1 and f2",
 )];
 
-/// The table of a figure.
-pub(super) fn table(statements: &[Statement], facts: &Facts<'_>) -> Sourced {
-    let rows = statements
-        .iter()
-        .map(|s| vec![Cell::text(s.says), Cell::text((s.here)(facts)), Cell::text(s.why)])
-        .collect();
+/// When the drawn runs declared a rupture.
+fn declared(runs: &[Run]) -> String {
+    let of = |run: &Run| {
+        let at: Vec<String> = run.trace.detections.iter().map(|d| significant(d.time_s, 4)).collect();
+        let at = if at.is_empty() { "none".to_owned() } else { format!("{} s", at.join(", ")) };
+        format!("{} {at}", run.variant.model_name())
+    };
+    runs.iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// What can be said of every figure of an insertion by looking at it.
+pub(super) fn looks(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
+    [
+        (
+            "(b) shows the elastic, the local friction and the cumulative friction coefficients",
+            format!("{panels}; thin online, thick a posteriori, dashed true"),
+            "b has another unit in each model (N s/m and N s/m²): one axis would mislead",
+        ),
+        (
+            "one pair of vertical lines per rupture",
+            format!("in (a) those of ML, the other model's in its own panel; declared in the seed drawn: {}", declared(runs)),
+            "the models need not find a rupture at the same instant; the supplement does not say whose its lines are",
+        ),
+    ]
+    .map(|(says, here, why)| [says.to_owned(), here, why.to_owned()])
+    .into()
+}
+
+/// The table of a figure from rows: what the supplement says, what is seen here, what makes the difference.
+pub(super) fn listed(rows: Vec<[String; 3]>) -> Sourced {
     Sourced::named(Table {
         title: "Beside the supplement".to_owned(),
-        headers: ["the supplement says (the paper's)", "here (computed)", "what differs, and why"]
+        headers: ["the supplement says (the paper's)", "here (computed)", "what differs, and why (ours)"]
             .map(String::from)
             .to_vec(),
-        rows,
+        rows: rows.into_iter().map(|row| row.map(Cell::text).into()).collect(),
         ..Table::default()
     })
+}
+
+/// The table of a figure of an insertion.
+pub(super) fn table(statements: &[Statement], facts: &Facts<'_>) -> Sourced {
+    let said = statements.iter().map(|s| [s.says.to_owned(), (s.here)(facts), s.why.to_owned()]);
+    let panels = "K, b of ML, b of KV, D";
+    listed(said.chain(looks(facts.drawn, panels)).collect())
 }

@@ -116,6 +116,7 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
                     measured_n: &drawn.force_n,
                     ml: primary(study, spec, false),
                     kv: primary(study, spec, true),
+                    drawn: &unknown,
                 },
             ),
             numbers(study, spec),

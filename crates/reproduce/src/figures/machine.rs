@@ -1,10 +1,11 @@
 //! S Fig. 1: the state machine, drawn from the core's own table of transitions.
 
-use super::Figure;
-use crate::source::Sourced;
-use stylet_core::{State, TRANSITIONS};
+use super::{Figure, beside};
+use crate::source::{Class, Sourced};
+use stylet_core::config::DerivativeSense;
+use stylet_core::{EnhanceConfig, State, TRANSITIONS};
 use stylet_report::svg::{Arrow, Diagram, FigureOptions, Node, state_machine};
-use stylet_report::{Cell, Table};
+use stylet_report::{Cell, Table, significant};
 
 /// Where a state stands in the drawing: the only thing that is not read from the core.
 const fn place(state: State) -> (f64, f64) {
@@ -44,6 +45,35 @@ fn lines(state: State) -> Vec<String> {
     }
 }
 
+/// What sec. I of the supplement says of the machine, and what ours does.
+fn statements() -> Vec<[String; 3]> {
+    let derivative = EnhanceConfig::paper().derivative;
+    let completions = TRANSITIONS.iter().filter(|t| !t.in_supplement).count();
+    [
+        (
+            "a rupture is detected when the CUSUM raises, or expected when the force derivative does, and then detected by the CUSUM or \
+             the derivative's trailing edge",
+            format!("{} transitions, {completions} of them not in the supplement", TRANSITIONS.len()),
+            "a needle that turns back or rests is no rupture; a known far face ends a layer in Stylet",
+        ),
+        (
+            "eq. (1): the force of one sample less that of the one before, above beta; the text speaks of force drops",
+            format!(
+                "the low-passed derivative in N/s, acting on the {} force",
+                if derivative.sense == DerivativeSense::Rise { "rising" } else { "falling" }
+            ),
+            "as in the laboratory's tuning; the falling force is the switch Drop, see Switches",
+        ),
+        (
+            "the machine waits for a time T_drop,i",
+            format!("{} mm of travel", significant(1e3 * EnhanceConfig::paper().drop.travel_m, 3)),
+            "the laboratory waits for a travel; at constant velocity the two are the same",
+        ),
+    ]
+    .map(|(says, here, why)| [says.to_owned(), here, why.to_owned()])
+    .into()
+}
+
 pub(super) fn figure() -> Figure {
     let index = |state: State| State::ALL.iter().position(|s| *s == state).unwrap_or_default();
     let diagram = Diagram {
@@ -70,7 +100,7 @@ pub(super) fn figure() -> Figure {
                 Cell::text(t.from.name()),
                 Cell::text(t.to.name()),
                 Cell::text(words.join(" · ")),
-                Cell::text(if t.in_supplement { "supplement" } else { "completion" }),
+                Cell::text(if t.in_supplement { Class::Paper } else { Class::Ours }.words()),
             ]
         })
         .collect();
@@ -83,10 +113,13 @@ pub(super) fn figure() -> Figure {
         force: None,
         pictures: vec![svg.clone()],
         files: vec![("figure_s01.svg", svg)],
-        tables: vec![Sourced::named(Table {
-            headers: ["from", "to", "when", "source"].map(String::from).to_vec(),
-            rows,
-            ..Table::default()
-        })],
+        tables: vec![
+            beside::listed(statements()),
+            Sourced::named(Table {
+                headers: ["from", "to", "when", "whose"].map(String::from).to_vec(),
+                rows,
+                ..Table::default()
+            }),
+        ],
     }
 }

@@ -140,12 +140,14 @@ fn truth_line(insertion: &Insertion, value: impl Fn(&stylet_score::LayerTruth) -
     Series::line("true", Colour::Ink, x, y).styled(LineStyle::Dashed).width(1.6)
 }
 
-/// A range that shows truth and a posteriori estimates; what the online estimate does beyond is cut.
-fn range(series: &[Series], online: &Series) -> (f64, f64) {
+/// A range that shows truth and a posteriori estimates; what the online estimate does beyond is cut, but for a
+/// run without any a posteriori estimate, of which nothing else is to be seen.
+fn range(series: &[Series], online: &Series, estimated: bool) -> (f64, f64) {
     let high = series.iter().flat_map(|s| &s.y).copied().filter(|y| y.is_finite()).fold(0.0, f64::max);
     let typical = stylet_stats::quantile_of(online.y.iter().copied().filter(|y| y.is_finite()), 0.9);
     let typical = if typical.is_nan() { 0.0 } else { typical };
-    (0.0, (1.15 * high).max(typical.min(4.0 * high)).max(1e-9))
+    let beyond = if estimated { typical.min(4.0 * high) } else { 1.15 * typical };
+    (0.0, (1.15 * high).max(beyond).max(1e-9))
 }
 
 fn coefficient(
@@ -169,7 +171,7 @@ fn coefficient(
         .width(0.8);
         let (x, y) = afterwards(insertion, run, &estimate);
         kept.push(Series::line(format!("{} a posteriori", run.name()), run.colour, x, y).width(3.2));
-        high = high.max(range(&kept, &online).1);
+        high = high.max(range(&kept, &online, !run.trace.estimates.is_empty()).1);
         chart = chart.with_series(online);
     }
     for series in kept {
