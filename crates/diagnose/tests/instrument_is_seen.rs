@@ -119,3 +119,32 @@ fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
         .collect();
     assert!(look(&runs).shown.is_empty(), "{:?}", look(&runs).shown);
 }
+
+/// A zero that runs away by so much a second does so for longer in a long insertion than in a short recording of air; and one that moves by
+/// as much in every recording, however long it lasts, is undone in each by its own.
+#[test]
+fn a_drift_is_undone_by_what_each_insertion_shows_of_it() {
+    let (rate_n_per_s, whole_n) = (0.01, 0.4);
+    let began = |r: &Recording, t: f64| t - r.time_s[0];
+    let by_time =
+        with(|r| r.time_s.iter().zip(&r.force_n).map(|(t, f)| f + rate_n_per_s * began(r, *t)).collect());
+    let by_recording = with(|r| {
+        let share = |t: f64| began(r, t) / r.duration_s();
+        r.time_s.iter().zip(&r.force_n).map(|(t, f)| f + whole_n * share(*t)).collect()
+    });
+    let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+    let f = (0..t.len()).map(|k| rate_n_per_s * t[k] + 1e-3 * ((k * 7919) % 101) as f64 / 101.0).collect();
+    let air = Recording::new(t.clone(), vec![0.0; t.len()], f).expect("clean columns");
+    let checks = Checks { air: Some(&air), load: None };
+    let clean = with(|r| r.force_n.clone());
+    for runs in [by_time, by_recording] {
+        let refs: Vec<&Insertion> = runs.iter().collect();
+        let seen = Instrument::look(&checks, &refs, believed().surface_m);
+        assert_eq!(shown(&seen), ["force_drift"], "{seen:?}");
+        for (a, b) in seen.undo(&refs).runs.iter().zip(&clean) {
+            for (a, b) in a.recording.force_n.iter().zip(&b.recording.force_n) {
+                assert!((a - b).abs() < 0.03, "{a} is not {b}");
+            }
+        }
+    }
+}

@@ -95,21 +95,49 @@ impl Air {
     }
 }
 
+/// Depth (m) up to which a recording counts as air.
+fn in_air_m(r: &Recording, surface_m: f64) -> f64 {
+    let from = r.position_m[0];
+    from + AIR_SHARE * (surface_m - from)
+}
+
+/// The line of some samples' force, where it is straight.
+fn straight(r: &Recording, samples: std::ops::Range<usize>) -> Option<Line> {
+    if samples.len() < AIR_SAMPLES {
+        return None;
+    }
+    let (t, f) = (&r.time_s[samples.clone()], &r.force_n[samples]);
+    let at = line(t, f);
+    (at.sd_n <= AIR_NOISES * noise_n(f).max(1e-9)).then_some(at)
+}
+
+/// The samples of an insertion before it reaches the tissue.
+fn way_there(r: &Recording, surface_m: f64) -> Option<std::ops::Range<usize>> {
+    let end = r.position_m.iter().position(|z| *z > in_air_m(r, surface_m))?;
+    (surface_m > r.position_m[0]).then_some(0..end)
+}
+
 /// The line of the force before each insertion reaches the tissue, where that can be told from the tissue's own: it is straight.
 #[must_use]
 pub fn before_contact(runs: &[&Insertion], surface_m: f64) -> Vec<Line> {
-    runs.iter()
-        .filter_map(|run| {
-            let r = &run.recording;
-            let from = r.position_m[0];
-            let end = r.position_m.iter().position(|z| *z > from + AIR_SHARE * (surface_m - from))?;
-            if end < AIR_SAMPLES || surface_m <= from {
-                return None;
-            }
-            let at = line(&r.time_s[..end], &r.force_n[..end]);
-            (at.sd_n <= AIR_NOISES * noise_n(&r.force_n[..end]).max(1e-9)).then_some(at)
-        })
-        .collect()
+    runs.iter().filter_map(|run| straight(&run.recording, way_there(&run.recording, surface_m)?)).collect()
+}
+
+/// Change of the force in air (N/s) from before an insertion to after it, where the needle comes back into the air.
+#[must_use]
+pub fn between(run: &Insertion, surface_m: f64) -> Option<f64> {
+    let r = &run.recording;
+    let there = way_there(r, surface_m)?;
+    let back = r.position_m.iter().rposition(|z| *z > in_air_m(r, surface_m))? + 1;
+    // What a slow sensor still has of the tissue fades first.
+    let late = back + (r.len() - back) / 2;
+    let (before, after) = (straight(r, there.clone())?, straight(r, late..r.len())?);
+    let level = |l: Line, from: usize, to: usize| {
+        l.first_n + l.rate_n_per_s * 0.5 * (r.time_s[to - 1] - r.time_s[from])
+    };
+    let middle = |from: usize, to: usize| 0.5 * (r.time_s[to - 1] + r.time_s[from]);
+    let change = level(after, late, r.len()) - level(before, 0, there.end);
+    Some(change / (middle(late, r.len()) - middle(0, there.end)))
 }
 
 /// The middle of a number that the insertions have in common: nothing when they do not agree on it.

@@ -39,8 +39,11 @@ pub struct Instrument {
     pub ar1: Option<f64>,
     /// Force in air where a recording begins (N).
     pub bias_n: Option<f64>,
-    /// Change of the force over the recording in air (N).
+    /// Change of the force in air over an insertion (N).
     pub drift_n: Option<f64>,
+    /// The same of each insertion that begins and ends in air (N/s).
+    #[serde(skip)]
+    pub drifts_n_per_s: Vec<Option<f64>>,
     /// Amplitude (N) and frequency (Hz) of the strongest line in air.
     pub line: Option<(f64, f64)>,
     /// Half the difference (N) between moving in and moving out, in air.
@@ -122,7 +125,12 @@ impl Instrument {
         let air = checks.air.map(Air::of);
         let lines = before_contact(runs, surface_m);
         let seen = (2 * lines.len() >= runs.len().max(2)).then_some(lines.as_slice());
-        out.of_sensor(air.as_ref(), seen, checks.air.map_or(duration_s, Recording::duration_s), force_n);
+        out.of_sensor(air.as_ref(), seen, duration_s, force_n);
+        out.drifts_n_per_s = runs.iter().map(|run| air::between(run, surface_m)).collect();
+        let told: Vec<f64> = out.drifts_n_per_s.iter().copied().flatten().collect();
+        if 2 * told.len() >= runs.len().max(2) {
+            out.drift_n = Some(common(&told) * duration_s);
+        }
         out.gain = checks.load.and_then(|(recording, known)| {
             let zero = air.as_ref().map_or(out.bias_n.unwrap_or(0.0), |a| a.line.first_n);
             load(recording, known, zero, out.drift_n.is_some_and(|d| d.abs() > NOTHING * force_n))
@@ -138,10 +146,10 @@ impl Instrument {
     }
 
     /// Bias, drift, noise and tones: of the insertions themselves where they tell them, of the check in air otherwise.
-    fn of_sensor(&mut self, air: Option<&Air>, before: Option<&[Line]>, air_s: f64, force_n: f64) {
+    fn of_sensor(&mut self, air: Option<&Air>, before: Option<&[Line]>, duration_s: f64, force_n: f64) {
         if let Some(air) = air {
             (self.noise_n, self.ar1) = (Some(air.line.sd_n), Some(air.ar1));
-            (self.bias_n, self.drift_n) = (Some(air.line.first_n), Some(air.line.rate_n_per_s * air_s));
+            (self.bias_n, self.drift_n) = (Some(air.line.first_n), Some(air.line.rate_n_per_s * duration_s));
             (self.line, self.drive_n) = (air.tone, air.drive_n);
         }
         let Some(lines) = before else { return };
@@ -155,8 +163,8 @@ impl Instrument {
             // A short stretch of air tells a slope, but not what becomes of it until the end.
             let rates = of(|l| l.rate_n_per_s);
             self.drift_n = mean_interval(&rates)
-                .filter(|i| 0.5 * (i.high - i.low) * air_s < NOTHING * force_n)
-                .map(|_| common(&rates) * air_s);
+                .filter(|i| 0.5 * (i.high - i.low) * duration_s < NOTHING * force_n)
+                .map(|_| common(&rates) * duration_s);
         }
     }
 
@@ -186,7 +194,7 @@ impl Instrument {
         }
         if let Some(drift_n) = self.drift_n {
             let rate_n_per_s = drift_n / duration_s.max(1e-9);
-            let said = format!("change over a recording in air {}", mn(drift_n));
+            let said = format!("change in air over an insertion {}", mn(drift_n));
             judge(ForceDrift { rate_n_per_s }.into(), drift_n, 1, said);
         }
         if let Some((amplitude_n, frequency_hz)) = self.line.filter(|_| in_air) {

@@ -33,12 +33,13 @@ impl Instrument {
         let runs = runs
             .iter()
             .zip(shifted)
-            .map(|(run, mut recording)| {
+            .enumerate()
+            .map(|(k, (run, mut recording))| {
                 let limit_n = raw.limit_n.map(|limit| self.without_gain(limit));
                 if self.shown.is_empty() {
                     return Insertion { limit_n, ..(*run).clone() };
                 }
-                self.undo_force(&mut recording);
+                self.undo_force(&mut recording, self.drifts_n_per_s.get(k).copied().flatten());
                 let notes = run.notes.clone();
                 Insertion { notes, limit_n, ..Insertion::new(run.name.clone(), recording, layers) }
             })
@@ -53,7 +54,8 @@ impl Instrument {
         self.shown.iter().filter_map(|s| s.itself.clone()).filter(undone).collect()
     }
 
-    fn undo_force(&self, recording: &mut Recording) {
+    /// `drift_n_per_s` is the recording's own, where it tells it.
+    fn undo_force(&self, recording: &mut Recording, drift_n_per_s: Option<f64>) {
         let effects = self.effects();
         for e in &effects {
             if let AnyEffect::LowPassLag(lag) = e {
@@ -61,7 +63,8 @@ impl Instrument {
             }
         }
         let of = |e: &AnyEffect| if let AnyEffect::ForceDrift(d) = e { d.rate_n_per_s } else { 0.0 };
-        let rate: f64 = effects.iter().map(of).sum();
+        let shown: f64 = effects.iter().map(of).sum();
+        let rate = if shown == 0.0 { 0.0 } else { drift_n_per_s.unwrap_or(shown) };
         let began = recording.time_s[0];
         for (f, t) in recording.force_n.iter_mut().zip(&recording.time_s) {
             *f = self.without_gain(*f - rate * (t - began));
