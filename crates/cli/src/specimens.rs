@@ -7,7 +7,6 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use stylet_diagnose::Diagnosis;
-use stylet_diagnose::outcome::{Cause, Estimate, Gain, LeftoverReport, NoiseReport, Quality, Verdict};
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::dataset::{Dataset, DatasetError};
 use stylet_diagnose::set::specimens::{Specimens, look};
@@ -30,7 +29,7 @@ pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Insertion]) -> Resul
             "no specimen is indented and held for 3 s with 50 samples or more".to_owned(),
         ))
     })?;
-    let d = diagnosis(&found, runs);
+    let d = found.diagnosis(runs);
     let written = Written { diagnosis: &d, specimens: &found };
     let mut json = serde_json::to_vec_pretty(&written).map_err(|e| Failure::Internal(e.to_string()))?;
     json.push(b'\n');
@@ -52,18 +51,8 @@ pub fn diagnose(args: &DiagnoseArgs, set: &Dataset, runs: &[Insertion]) -> Resul
     Ok(())
 }
 
-fn kept(found: &Specimens) -> impl Iterator<Item = &str> {
-    let mut seen: Vec<&str> = Vec::new();
-    for effect in found.rungs.iter().filter(|r| r.kept).filter_map(|r| r.effect.as_deref()) {
-        if !seen.contains(&effect) {
-            seen.push(effect);
-        }
-    }
-    seen.into_iter()
-}
-
 fn sentence(found: &Specimens) -> String {
-    let names: Vec<&str> = kept(found).collect();
+    let names: Vec<&str> = found.kept().collect();
     let puncture = match found.punctured.len() {
         0 => "no specimen is punctured".to_owned(),
         n => format!("{n} specimen(s) show a drop as at a puncture"),
@@ -72,62 +61,6 @@ fn sentence(found: &Specimens) -> String {
         return format!("The base law says what {} specimens do; {puncture}.", found.used);
     }
     format!("The simulation lacks {} in {} specimens; {puncture}.", names.join(" and "), found.used)
-}
-
-fn diagnosis(found: &Specimens, runs: &[Insertion]) -> Diagnosis {
-    let of = |effect: &str| {
-        found
-            .numbers
-            .iter()
-            .filter(|n| (effect == "stress_relaxation") == n.name.starts_with("terms."))
-            .map(|n| (n.name.clone(), Estimate { value: n.mean, low: n.low, high: n.high }))
-            .collect()
-    };
-    let causes: Vec<Cause> = kept(found)
-        .map(|effect| Cause {
-            share: 0.0,
-            effect: effect.to_owned(),
-            equivalent: Vec::new(),
-            confidence: found
-                .rungs
-                .iter()
-                .filter(|r| r.kept && r.effect.as_deref() == Some(effect))
-                .map(|r| r.better)
-                .fold(0.0, f64::max),
-            parameters: of(effect),
-            gain_nats: 0.0,
-        })
-        .collect();
-    let last = found.rungs.iter().rfind(|r| r.kept).map_or(0.0, |r| r.left_out_n);
-    let noise = stylet_stats::median_of(runs.iter().map(Insertion::noise_n));
-    Diagnosis {
-        traces: Vec::new(),
-        verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
-        causes,
-        base_parameters: Vec::new(),
-        invisible: ["power_law_friction", "shaft_slip", "rate_dependent_puncture"]
-            .map(str::to_owned)
-            .to_vec(),
-        gain: Gain {
-            held_out: true,
-            recordings: runs.iter().map(|r| r.name.clone()).collect(),
-            rmse_before_n: found.rungs.first().map_or(0.0, |r| r.left_out_n),
-            rmse_after_n: last,
-            floor_n: noise,
-            each_n: Vec::new(),
-        },
-        leftover: LeftoverReport { p_value: 1.0, depends_on: Vec::new(), nats: 0.0, share: 0.0 },
-        data_quality: runs
-            .iter()
-            .flat_map(|r| r.notes.iter().map(|n| Quality { recording: r.name.clone(), note: n.clone() }))
-            .collect(),
-        evidence: Vec::new(),
-        noise: NoiseReport { sd_n: noise, ar: [0.0; 2], from_air: false },
-        differences: Default::default(),
-        advice: vec![
-            "Nothing is retracted or punctured here: friction and puncture cannot be seen.".to_owned(),
-        ],
-    }
 }
 
 fn summary(found: &Specimens, d: &Diagnosis) -> String {

@@ -10,6 +10,7 @@
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use stylet_stats::interpolate;
 
 /// Change of a force column: times in s, forces in N.
 type Fault = fn(&[f64], &[f64]) -> Vec<f64>;
@@ -28,7 +29,7 @@ const FAULTS: [(&str, Fault); 8] = [
     }),
     ("saturation", |_, f| f.iter().map(|f| f.clamp(-LIMIT_N, LIMIT_N)).collect()),
     ("steps", |_, f| f.iter().map(|f| 0.25 * (f / 0.25).round()).collect()),
-    ("delay", |t, f| t.iter().map(|at| before(t, f, at - 0.3)).collect()),
+    ("delay", |t, f| t.iter().map(|at| interpolate(t, f, at - 0.3)).collect()),
     ("lag", |t, f| {
         let mut y = f[0];
         let mut out = vec![y];
@@ -43,16 +44,6 @@ const FAULTS: [(&str, Fault); 8] = [
 const HUM_HZ: f64 = 17.0;
 /// Range of the saturated sensor in N.
 const LIMIT_N: f64 = 3.5;
-
-/// The force at a time, linear between samples.
-fn before(t: &[f64], f: &[f64], at: f64) -> f64 {
-    let k = t.partition_point(|t| *t <= at);
-    if k == 0 || k == t.len() {
-        return f[k.min(t.len() - 1)];
-    }
-    let share = (at - t[k - 1]) / (t[k] - t[k - 1]).max(1e-12);
-    f[k - 1] + share * (f[k] - f[k - 1])
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder =

@@ -113,7 +113,7 @@ pub fn aim(sketch: &Sketch) -> Drawn {
     let mut made = Vec::new();
     for effect in all {
         let mut e = effect;
-        if e.id() == "force_gain" {
+        if e.id() == gain() {
             made.push(e);
             continue;
         }
@@ -163,9 +163,7 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Result> {
     let right = match kind {
         Kind::Clean => d.verdict == Verdict::None,
         Kind::Outside => d.verdict == Verdict::Unknown,
-        _ if hidden_ids == ["force_gain"] => {
-            d.invisible.contains(&hidden_ids[0]) && d.verdict == Verdict::None
-        }
+        _ if hidden_ids == [gain()] => d.invisible.contains(&hidden_ids[0]) && d.verdict == Verdict::None,
         // What a single recording cannot show has to be listed as invisible.
         _ if drawn.motions == hidden::Motions::One && d.verdict == Verdict::None => {
             hidden_ids.iter().all(|h| d.invisible.contains(h))
@@ -274,15 +272,15 @@ pub fn summary(cases: &[Result]) -> String {
     line(&mut out, "clean, called clean", of(Kind::Clean).collect());
     for size in [Size::Strong, Size::Medium, Size::Faint] {
         let single: Vec<&Result> = of(Kind::Single)
-            .filter(|c| c.size == size && c.hidden != ["force_gain"])
+            .filter(|c| c.size == size && c.hidden != [gain()])
             .filter(|c| size != Size::Faint || c.right || c.truth_nats.is_none_or(|n| n > 20.0))
             .collect();
         line(&mut out, &format!("one effect, {size:?}: named, or in its class"), single);
     }
     line(
         &mut out,
-        "force_gain: listed as invisible",
-        of(Kind::Single).filter(|c| c.hidden == ["force_gain"]).collect(),
+        &format!("{}: listed as invisible", gain()),
+        of(Kind::Single).filter(|c| c.hidden == [gain()]).collect(),
     );
     line(&mut out, "two effects, both named", of(Kind::Two).collect());
     for size in [Size::Strong, Size::Medium, Size::Faint] {
@@ -408,4 +406,9 @@ pub fn summary(cases: &[Result]) -> String {
         let _ = writeln!(out, "    {hidden:<34} -> {said:<60} {n}");
     }
     out
+}
+
+/// What no law of the tissue can tell from a stiffer tissue.
+fn gain() -> &'static str {
+    stylet_tissue::ForceGain { eps: 0.0 }.info().id
 }

@@ -16,6 +16,7 @@
 //! Undefined results are `NaN` (as in NumPy): the median of nothing, a quantile at a probability outside 0 to 1.
 
 pub mod ar;
+pub mod curve;
 pub mod interval;
 pub mod moments;
 pub mod normal;
@@ -26,6 +27,7 @@ pub mod student;
 pub mod tails;
 
 pub use ar::{Ar, Criterion};
+pub use curve::interpolate;
 pub use interval::{Interval, mean_interval, wilson, wilson_at};
 pub use moments::{Moments, Sum, mean, rms, sd, variance};
 pub use order::{

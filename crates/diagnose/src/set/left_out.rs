@@ -5,6 +5,7 @@ use crate::set::fitted::{Fitted, settle};
 use crate::set::population::{DRAWS, Part, Population, Prediction, part, predict};
 use rayon::prelude::*;
 use stylet_identify::model::NEVER;
+use stylet_stats::interpolate;
 
 /// Half of the window around a rupture, in s: what happens in it depends on when it comes.
 const WINDOW_S: f64 = 0.5;
@@ -137,27 +138,14 @@ pub fn floor(runs: &[&Insertion]) -> Vec<Option<(Score, usize)>> {
                 return None;
             }
             let start = |r: &Insertion| r.recording.time_s[r.phases.start];
-            let mut places = vec![0usize; others.len()];
             let mean = runs[i].recording.time_s.iter().map(|t| {
-                let all = others.iter().zip(&mut places);
-                all.map(|(o, place)| between(o, t - start(runs[i]) + start(o), place)).sum::<f64>()
-                    / others.len() as f64
+                let at = |o: &Insertion| {
+                    interpolate(&o.recording.time_s, &o.recording.force_n, t - start(runs[i]) + start(o))
+                };
+                others.iter().map(|o| at(o)).sum::<f64>() / others.len() as f64
             });
             let p = Prediction { mean: mean.collect(), ..Prediction::default() };
             Some((score(runs[i], &p), others.len()))
         })
         .collect()
-}
-
-/// Force of a run at a time, linear between samples, constant beyond its ends.
-fn between(run: &Insertion, t: f64, place: &mut usize) -> f64 {
-    let (time, force) = (&run.recording.time_s, &run.recording.force_n);
-    while *place + 1 < time.len() && time[*place + 1] < t {
-        *place += 1;
-    }
-    let (i, j) = (*place, (*place + 1).min(time.len() - 1));
-    if i == j || t <= time[i] {
-        return force[i];
-    }
-    force[i] + ((t - time[i]) / (time[j] - time[i])).clamp(0.0, 1.0) * (force[j] - force[i])
 }

@@ -17,7 +17,7 @@ use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::collections::BTreeMap;
 use stylet_identify::phases::noise_n;
 use stylet_scenario::Scenario;
-use stylet_tissue::Tissue;
+use stylet_tissue::{Effect, PowerLawFriction, RateDependentPuncture, Tissue};
 
 /// Seed of what the starts begin with.
 const SEED: u64 = 1;
@@ -170,7 +170,10 @@ fn diagnosis(
         invisible: if several(runs) {
             Vec::new()
         } else {
-            vec!["power_law_friction".to_owned(), "rate_dependent_puncture".to_owned()]
+            vec![
+                PowerLawFriction { exponent: 1.0 }.info().id.to_owned(),
+                RateDependentPuncture { alpha: 0.0 }.info().id.to_owned(),
+            ]
         },
         gain: Gain {
             held_out: true,

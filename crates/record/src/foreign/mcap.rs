@@ -197,21 +197,8 @@ fn joined(parts: &[(&str, &str)], main: &str, logged: Vec<Logged>) -> Vec<Vec<f6
             if *topic == main {
                 kept.iter().map(|k| l.values[*k]).collect()
             } else {
-                kept.iter().map(|k| between(&l, times[*k])).collect()
+                kept.iter().map(|k| stylet_stats::interpolate(&l.at_s, &l.values, times[*k])).collect()
             }
         })
         .collect()
-}
-
-/// The value at an instant, on the line between its neighbours.
-fn between(l: &Logged, at_s: f64) -> f64 {
-    let after = l.at_s.partition_point(|t| *t < at_s);
-    match (after.checked_sub(1), l.at_s.get(after)) {
-        (Some(before), Some(t1)) => {
-            let (t0, y0, y1) = (l.at_s[before], l.values[before], l.values[after]);
-            y0 + (y1 - y0) * ((at_s - t0) / (t1 - t0).max(1e-300))
-        }
-        (None, Some(_)) => l.values[after],
-        (before, None) => before.map_or(f64::NAN, |k| l.values[k]),
-    }
 }

@@ -10,7 +10,7 @@ use super::air::regress;
 use crate::set::first::Insertion;
 use rayon::prelude::*;
 use stylet_record::Recording;
-use stylet_stats::{sd, student};
+use stylet_stats::{interpolate, sd, student};
 
 /// Stretch (s) before the corner, and behind it.
 const AROUND_S: (f64, f64) = (1.0, 0.8);
@@ -183,12 +183,11 @@ impl<'a> Corner<'a> {
         let (time, z) = (&self.recording.time_s, &self.recording.position_m);
         // The filter forgets how it began before the window opens.
         let from = time.partition_point(|t| *t < self.time_s[0] - MEMORY * lag_s);
-        let mut place = time.partition_point(|t| *t < time[from] - delay_s).saturating_sub(1);
         let mut slow = [z[from], 0.0, 0.0];
         let mut rows: Vec<[f64; COLUMNS]> = Vec::with_capacity(self.time_s.len());
         for i in from..self.first + self.time_s.len() {
             let at_s = time[i] - delay_s;
-            let at_m = self.position(at_s, &mut place);
+            let at_m = interpolate(time, z, at_s);
             let u = match self.at {
                 At::Stop => (at_s - self.at_s).max(0.0),
                 At::Back if at_s < self.at_s - 0.2 * AROUND_S.0 => 0.0,
@@ -209,16 +208,6 @@ impl<'a> Corner<'a> {
             }
         }
         regress(&rows, self.force_n).1.iter().map(|e| e * e).sum()
-    }
-
-    /// Where the needle is at a time, linear between samples.
-    fn position(&self, t: f64, place: &mut usize) -> f64 {
-        let (time, z) = (&self.recording.time_s, &self.recording.position_m);
-        while *place + 2 < time.len() && time[*place + 1] < t {
-            *place += 1;
-        }
-        let share = (t - time[*place]) / (time[*place + 1] - time[*place]).max(1e-12);
-        z[*place] + share.clamp(0.0, 1.0) * (z[*place + 1] - z[*place])
     }
 }
 

@@ -4,6 +4,8 @@
 //! Every specimen is a material of its own, so that nothing is shared between them. A law is fitted to the
 //! ramp and the first part of the hold; the rest of the hold took no part.
 
+mod diagnosis;
+
 use crate::set::first::{Insertion, pressed};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -23,8 +25,6 @@ const FITTED: f64 = 0.6;
 const LEAST_GAIN: f64 = 0.1;
 /// in at least this share of the specimens.
 const LEAST_SHARE: f64 = 0.75;
-/// The effect of a curved spring.
-const CURVATURE: &str = "nonlinear_elasticity";
 /// Length of a block in s.
 const BLOCK_S: f64 = 0.08;
 /// What a law leaves counts as noise of so many times the sensor's, at least of this share of the largest force.
@@ -92,22 +92,29 @@ struct One {
     straight: (f64, f64),
 }
 
+/// The effect of a curved spring.
+fn curvature() -> &'static str {
+    NonlinearElasticity { kappa_per_m: 0.0 }.info().id
+}
+
+/// Relaxation with these terms (fraction, time constant in s).
+fn relaxing(terms: &[(f64, f64)]) -> AnyEffect {
+    let term = |&(fraction, time_constant_s): &(f64, f64)| PronyTerm { fraction, time_constant_s };
+    StressRelaxation { terms: terms.iter().map(term).collect() }.into()
+}
+
 /// The rungs, each with the one before: what is called how, and where its fits start.
 fn rungs() -> [(&'static str, Vec<AnyEffect>); 4] {
-    let relaxing = |terms: &[(f64, f64)]| -> AnyEffect {
-        let term = |&(fraction, time_constant_s): &(f64, f64)| PronyTerm { fraction, time_constant_s };
-        StressRelaxation { terms: terms.iter().map(term).collect() }.into()
-    };
     [
         ("base law", Vec::new()),
         (
-            "nonlinear_elasticity",
+            curvature(),
             vec![
                 NonlinearElasticity { kappa_per_m: 20.0 }.into(),
                 NonlinearElasticity { kappa_per_m: 200.0 }.into(),
             ],
         ),
-        ("stress_relaxation", vec![relaxing(&[(0.3, 0.7)]), relaxing(&[(0.3, 4.0)])]),
+        (relaxing(&[]).info().id, vec![relaxing(&[(0.3, 0.7)]), relaxing(&[(0.3, 4.0)])]),
         (
             "stress_relaxation (second term)",
             vec![
@@ -168,7 +175,7 @@ pub fn look(believed: &Tissue, runs: &[Insertion]) -> Option<Specimens> {
         let with = median_of(each.iter().map(|o| both(o.errors[last])));
         let without = median_of(each.iter().map(|o| both(o.straight)));
         let better = each.iter().filter(|o| both(o.errors[last]) < both(o.straight)).count() as f64;
-        if let Some(rung) = done.iter_mut().find(|r| r.effect.as_deref() == Some(CURVATURE)) {
+        if let Some(rung) = done.iter_mut().find(|r| r.effect.as_deref() == Some(curvature())) {
             rung.kept |= with < (1.0 - LEAST_GAIN) * without && better >= LEAST_SHARE * each.len() as f64;
         }
     }
@@ -231,7 +238,7 @@ fn one(believed: &Tissue, run: &Insertion) -> Option<One> {
         model = fitted.model.clone();
         out.laws.push(fitted.model);
     }
-    if let Some(k) = model.effects.iter().position(|c| c.info.id == CURVATURE) {
+    if let Some(k) = model.effects.iter().position(|c| c.info.id == curvature()) {
         out.straight = errors(&fit(&model.without(k), &first, EFFORT)?.model)?;
     }
     Some(out)
