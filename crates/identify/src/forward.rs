@@ -25,7 +25,16 @@ struct Walk<'a> {
     step_s: f64,
     /// Puncture force in N of the active layer at the span before.
     threshold_n: f64,
+    /// Until then (s) the tip of a needle that gives is still on its way to where a jump sends it.
+    restless_s: f64,
 }
+
+/// So long in s after a jump of the speed or a rupture the force of a needle that gives changes within a block as well.
+const RESTLESS_S: f64 = 0.3;
+/// A smaller change of the speed in m/s is no jump.
+const LEAST_JUMP_MPS: f64 = 2e-5;
+/// The two places in a span, as shares of it, whose mean is right for a cubic (Gauss and Legendre).
+const TWO: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// A threshold that changes by this share from one span to the next has jumped.
 const JUMPED: f64 = 0.01;
@@ -34,25 +43,46 @@ impl Walk<'_> {
     /// Law and chain over a span of smooth motion: mean force times the span.
     fn span(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
         let t = 0.5 * (from_s + to_s);
-        let (z, v) = piece.at(t);
-        let (z, v) = (z * self.model.to_true, v * self.model.to_true);
-        let events = &mut self.events[..];
-        let threshold = &mut self.threshold_n;
-        let force = self.model.law.step_imposed(&mut self.state, t, z, v, self.done, |s| {
-            note(events, &s);
-            *threshold = s.puncture_n;
-        });
+        let total_n = if from_s < self.restless_s {
+            TWO.iter().map(|share| self.stand(piece, from_s + share * (to_s - from_s))).sum::<f64>() / 2.0
+        } else {
+            self.stand(piece, t)
+        };
         let span_s = to_s - from_s;
-        let Some(chain) = &mut self.chain else { return force.total_n * span_s };
+        let Some(chain) = &mut self.chain else { return total_n * span_s };
         let cell = Cell {
             time_s: t,
             span_s,
             samples: span_s / self.step_s,
-            velocity_mps: v,
+            velocity_mps: piece.at(t).1 * self.model.to_true,
             acceleration_mps2: piece.a_mps2 * self.model.to_true,
-            tissue_n: force.total_n,
+            tissue_n: total_n,
         };
         self.model.chain.mean(chain, &cell) * span_s
+    }
+
+    /// The law at an instant of a piece: its force in N.
+    fn stand(&mut self, piece: &Piece, at_s: f64) -> f64 {
+        let (z, v) = piece.at(at_s);
+        let (z, v) = (z * self.model.to_true, v * self.model.to_true);
+        let events = &mut self.events[..];
+        let threshold = &mut self.threshold_n;
+        let note = |s: Strain| {
+            note(events, &s);
+            *threshold = s.puncture_n;
+        };
+        self.state.set_base_acceleration(piece.a_mps2 * self.model.to_true);
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.done, note).total_n
+    }
+
+    /// From one piece of smooth motion to the next: a needle that gives begins to follow another speed at that instant, and not in the
+    /// middle between the blocks.
+    fn pass(&mut self, before: &Piece, next: &Piece) {
+        let jump_mps = (next.at(next.from_s).1 - before.at(before.to_s).1).abs();
+        if self.model.law.bends() && jump_mps > LEAST_JUMP_MPS {
+            self.stand(before, before.to_s);
+            self.restless_s = before.to_s + RESTLESS_S;
+        }
     }
 
     /// The rupture of the active layer at an instant.
@@ -101,6 +131,9 @@ impl Walk<'_> {
                 if s.puncture_n.is_finite() { stiffness * tip_v.max(0.0) / s.puncture_n } else { 0.0 };
         }
         self.done += 1;
+        if self.model.law.bends() {
+            self.restless_s = at_s + RESTLESS_S;
+        }
         // And just after: what the layer lets go.
         let after = &mut self.events[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.done, |s| {
@@ -138,6 +171,7 @@ fn begin(model: &Compiled, blocks: &Blocks, out: &mut Replayed) -> Saved {
         chain: model.measures.then(|| model.chain.start(0.0)),
         done: 0,
         threshold_n: f64::INFINITY,
+        restless_s: f64::NEG_INFINITY,
         broken: vec![false; model.breaks_m.len()],
         block: 0,
         sum: 0.0,
@@ -153,6 +187,7 @@ struct Saved {
     chain: Option<MeasurementState>,
     done: usize,
     threshold_n: f64,
+    restless_s: f64,
     broken: Vec<bool>,
     block: u32,
     sum: f64,
@@ -176,6 +211,7 @@ impl Here<'_, '_> {
             chain: self.walk.chain.clone(),
             done: self.walk.done,
             threshold_n: self.walk.threshold_n,
+            restless_s: self.walk.restless_s,
             broken: self.broken.to_vec(),
             block: self.block,
             sum: self.sum,
@@ -191,6 +227,7 @@ impl Here<'_, '_> {
             && self.block == other.block
             && self.sum == other.sum
             && walk.threshold_n == other.threshold_n
+            && walk.restless_s == other.restless_s
             && walk.state == other.state
             && walk.chain == other.chain
             && self.broken == other.broken
@@ -328,11 +365,29 @@ fn go_on(
     out: &mut Replayed,
     visit: &mut impl FnMut(&Here) -> bool,
 ) {
-    let Saved { piece: first, state, chain, done, threshold_n, mut broken, mut block, mut sum, events } =
-        from;
+    let Saved {
+        piece: first,
+        state,
+        chain,
+        done,
+        threshold_n,
+        restless_s,
+        mut broken,
+        mut block,
+        mut sum,
+        events,
+    } = from;
     out.events = events;
-    let mut walk =
-        Walk { model, state, chain, done, events: &mut out.events, step_s: blocks.step_s, threshold_n };
+    let mut walk = Walk {
+        model,
+        state,
+        chain,
+        done,
+        events: &mut out.events,
+        step_s: blocks.step_s,
+        threshold_n,
+        restless_s,
+    };
     let end_s = pieces.last().map_or(0.0, |p| p.to_s);
     for (index, piece) in pieces.iter().enumerate().skip(first) {
         if index % EVERY == 0 {
@@ -345,6 +400,9 @@ fn go_on(
             let k = block as usize;
             out.f[k] = sum / (blocks.to_s[k] - blocks.from_s[k]);
             (block, sum) = (piece.block, 0.0);
+        }
+        if let Some(before) = index.checked_sub(1).and_then(|k| pieces.get(k)) {
+            walk.pass(before, piece);
         }
         let mut at = piece.from_s;
         loop {

@@ -47,6 +47,8 @@ struct Step {
     base_m: f64,
     from_m: f64,
     v_before: f64,
+    /// Added to the travel, so that a tip that follows an accelerating base is where it belongs.
+    lead_m: f64,
 }
 
 /// The weight of the velocity at the end of a step of `dt_s` for a relaxation with `tau_s`.
@@ -65,7 +67,7 @@ impl Step {
     /// Position and velocity of the tip at the value `u` of the unknown.
     fn tip(&self, u: f64) -> (f64, f64) {
         if self.dt > 0.0 {
-            (self.from_m + self.dt * ((1.0 - self.theta) * self.v_before + self.theta * u), u)
+            (self.from_m + self.lead_m + self.dt * ((1.0 - self.theta) * self.v_before + self.theta * u), u)
         } else {
             (u, self.v_before)
         }
@@ -107,7 +109,10 @@ impl Law {
             let dt = time_s - state.time_s;
             let (viscous, stiffness) = self.resistance(state);
             let tau = viscous / (self.needle_n_per_m + stiffness);
-            let step = Step { dt, theta: theta(dt, tau), base_m, from_m: state.z_m, v_before: state.v_mps };
+            let theta = theta(dt, tau);
+            // The tip's speed changes as the base's does: its travel is the mean of both speeds.
+            let lead_m = (0.5 - theta) * state.base_mps2 * dt * dt;
+            let step = Step { dt, theta, base_m, from_m: state.z_m, v_before: state.v_mps, lead_m };
             let Balance { z, v, force, stuck_n } = if let_go && dt <= 0.0 && viscous > 0.0 {
                 Balance { z: state.z_m, v: state.v_mps, force: None, stuck_n: None }
             } else {
@@ -153,7 +158,8 @@ impl Law {
         let (viscous, _) = self.resistance(state);
         if viscous > 0.0 {
             let memory = state.memory;
-            let here = Step { dt: 0.0, theta: 1.0, base_m, from_m: state.z_m, v_before: state.v_mps };
+            let here =
+                Step { dt: 0.0, theta: 1.0, base_m, from_m: state.z_m, v_before: state.v_mps, lead_m: 0.0 };
             let force = self.trial(state, &here, state.z_m);
             state.memory = memory;
             state.v_mps += ((base_m - state.z_m) * self.needle_n_per_m - force.total_n) / viscous;

@@ -20,6 +20,8 @@ pub struct LawState {
     /// Position of the base, and whether it is known; only a needle that gives asks for them.
     pub(crate) base_m: f64,
     pub(crate) bent: bool,
+    /// Acceleration of the base, zero where nobody tells it; only a needle that gives asks for it.
+    pub(crate) base_mps2: f64,
     pub(crate) memory: Memories,
 }
 
@@ -35,6 +37,7 @@ impl Default for LawState {
             elastic_n: 0.0,
             base_m: 0.0,
             bent: false,
+            base_mps2: 0.0,
             memory: [[0.0; 8]; MAX_EFFECTS],
         }
     }
@@ -58,6 +61,12 @@ impl LawState {
     #[must_use]
     pub fn tip_velocity_mps(&self) -> f64 {
         self.v_mps
+    }
+
+    /// Tells the acceleration of the base (m/s²) up to the next sample: a needle that gives follows it exactly then, however
+    /// long the steps; without it late by a share of the step.
+    pub fn set_base_acceleration(&mut self, base_mps2: f64) {
+        self.base_mps2 = base_mps2;
     }
 
     /// Begins with the first sample.
