@@ -50,7 +50,7 @@ pub fn told_again(tangent: &Tangent, data: &Data, matrix: &Symmetric, rng: &mut 
                 w[c.recording].iter_mut().zip(&c.w).for_each(|(w, x)| *w -= followed[c.at] * x);
             }
             let e: Vec<Vec<f64>> = w.iter().enumerate().map(|(r, w)| data.colour(r, w)).collect();
-            under(&columns, matrix, &data.judged_by(&e, From::Lasting))
+            under(&columns, matrix, &data.judged_by(&e, From::Drawn))
         })
         .collect()
 }

@@ -10,6 +10,8 @@ use stylet_stats::order::{median, quantile_of_sorted};
 pub const ORDER: usize = 4;
 /// Most ranges of the force.
 const BINS: usize = 5;
+/// Turns of robust least squares.
+const TURNS: usize = 4;
 /// Fewest blocks of a range: a size is then known to a twentieth.
 const LEAST: usize = 220;
 /// Beyond so many standard deviations a residual counts linearly (Huber).
@@ -130,8 +132,17 @@ pub enum From {
     Whole,
     /// As they are, and however slow: what intervals have to reckon with.
     Lasting,
+    /// The same of noise that was drawn: it is normal, so that plain least squares do.
+    Drawn,
     /// Less what is smooth over a second, in the calmer windows: structure that a law lacks is no noise.
     Calm,
+}
+
+impl From {
+    /// Whether a wander's memory reaches through breaks of the recording.
+    fn lasts(self) -> bool {
+        matches!(self, Self::Lasting | Self::Drawn)
+    }
 }
 
 impl Noise {
@@ -145,7 +156,7 @@ impl Noise {
     #[must_use]
     pub fn estimate(blocks: &[Blocks], e: &[Vec<f64>], from: From, floor_n: f64) -> Self {
         let columns: Vec<Vec<f64>> = match from {
-            From::Whole | From::Lasting => e.to_vec(),
+            From::Whole | From::Lasting | From::Drawn => e.to_vec(),
             From::Calm => blocks.iter().zip(e).map(|(b, e)| calm(b, e)).collect(),
         };
         let mut sizes: Vec<f64> = Vec::new();
@@ -156,7 +167,7 @@ impl Noise {
         let count = (sizes.len() / LEAST).clamp(1, BINS);
         let edges_n: Vec<f64> =
             (1..count).map(|k| quantile_of_sorted(&sizes, k as f64 / count as f64)).collect();
-        let mut noise = Self { edges_n, bins: Vec::new(), lasting: from == From::Lasting };
+        let mut noise = Self { edges_n, bins: Vec::new(), lasting: from.lasts() };
         for bin in 0..count {
             noise.bins.push(noise.fit(blocks, &columns, bin, from, floor_n.max(FLOOR_N)));
         }
@@ -197,13 +208,14 @@ impl Noise {
         let most = match from {
             From::Calm => ORDER,
             From::Whole => ORDER + SEARCHED,
-            From::Lasting => ORDER + SLOW.len(),
+            From::Lasting | From::Drawn => ORDER + SLOW.len(),
         };
         // An interval reckons with a wander that cannot be excluded: there it is the largest order that holds.
-        let largest = from == From::Lasting;
+        let largest = from.lasts();
+        let turns = if from == From::Drawn { 1 } else { TURNS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
             let columns: Vec<usize> = (0..order).collect();
-            let (a, s) = foretold(&rows, &columns, sd_n, floor_n);
+            let (a, s) = foretold(&rows, &columns, (sd_n, floor_n), turns);
             let (near, slow) = a.split_at(ORDER);
             if !stationary(near) || (order > ORDER && a.iter().sum::<f64>() > 0.999) {
                 continue;
@@ -222,11 +234,11 @@ impl Noise {
             }
         }
         let mut best = best.map_or_else(|| Bin::white(sd_n), |b| b.1);
-        if from == From::Lasting {
+        if from.lasts() {
             // The first blocks after a break go on where those before it ended, and with one another.
             for (run, first) in best.first.iter_mut().enumerate() {
                 let columns: Vec<usize> = (0..run).chain(ORDER..ORDER + SLOW.len()).collect();
-                let (a, s) = foretold(&rows, &columns, sd_n, floor_n);
+                let (a, s) = foretold(&rows, &columns, (sd_n, floor_n), turns);
                 let (near, slow) = a.split_at(ORDER);
                 *first = First {
                     a: core::array::from_fn(|i| near[i]),
@@ -375,11 +387,16 @@ fn innovation(row: &[f64; ROW], a: &[f64; ROW - 1]) -> f64 {
 }
 
 /// Coefficients of some columns of rows, and the standard deviation in N of what they do not foretell, by robust least squares; the
-/// noise is nowhere less than `floor_n`.
-fn foretold(rows: &[[f64; ROW]], columns: &[usize], sd_n: f64, floor_n: f64) -> ([f64; ROW - 1], f64) {
+/// noise is nowhere less than `floor_n`. With one turn by plain least squares.
+fn foretold(
+    rows: &[[f64; ROW]],
+    columns: &[usize],
+    (sd_n, floor_n): (f64, f64),
+    turns: usize,
+) -> ([f64; ROW - 1], f64) {
     let mut a = [0.0; ROW - 1];
-    let mut s = sd_n;
-    for _ in 0..4 {
+    let mut s = if turns == 1 { f64::INFINITY } else { sd_n };
+    for _ in 0..turns {
         let mut h = Symmetric::zeros(columns.len());
         let mut g = vec![0.0; columns.len()];
         for row in rows {
@@ -394,9 +411,14 @@ fn foretold(rows: &[[f64; ROW]], columns: &[usize], sd_n: f64, floor_n: f64) -> 
         for (x, value) in columns.iter().zip(h.factor().solve(&g)) {
             a[*x] = value;
         }
-        s = scale(rows, &a).max(floor_n);
+        s = if turns == 1 { plain_scale(rows, &a) } else { scale(rows, &a) }.max(floor_n);
     }
     (a, s)
+}
+
+/// Root mean square of the innovations.
+fn plain_scale(rows: &[[f64; ROW]], a: &[f64; ROW - 1]) -> f64 {
+    (rows.iter().map(|row| innovation(row, a).powi(2)).sum::<f64>() / rows.len() as f64).sqrt()
 }
 
 /// Scale of the innovations under Huber's loss: the root of `sum weight w^2 / n` over its value for normal noise.
