@@ -176,19 +176,6 @@ fn no_verdict_changes_when_a_sensitivity_condition_is_added_or_removed() {
     assert!(tried > 50, "{tried}");
 }
 
-/// The command's own work over fifty seeds, with as many threads as the promise has cores. Beside other load it may
-/// take longer than the promise.
-#[test]
-#[ignore = "fifty seeds against the clock"]
-fn the_page_over_fifty_seeds_takes_less_than_a_minute_on_two_threads() {
-    let begun = std::time::Instant::now();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
-    let made = pool.install(|| reproduce(&plan(1, 50), &|| {})).expect("shipped scenarios");
-    let seconds = begun.elapsed().as_secs_f64();
-    println!("{} claims in {seconds:.1} s", made.claims.len());
-    assert!(seconds < 60.0, "{seconds} s");
-}
-
 /// Text between tags, entities left as they are.
 fn text_of(html: &str) -> String {
     let mut inside = false;
