@@ -214,7 +214,7 @@ A scenario file serves too: its `enhance` part and its surface are used.")]
 pub struct EnhanceArgs {
     /// Recording (CSV with header).
     pub data: PathBuf,
-    /// Configuration of the core (RON); the paper's values without it.
+    /// Configuration of the core (RON); without it the algorithm `Stylet` with its defaults.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Column map for a foreign log (RON).
