@@ -21,6 +21,9 @@ use crate::state::LawState;
 /// Largest surplus in metres that counts as balance.
 const TOLERANCE_M: f64 = 1e-13;
 
+/// Share of the forces in play that may be missing when a tip slips.
+const NEARLY: f64 = 1e-9;
+
 /// Evaluations of the law per search at most.
 const MAX_TRIALS: usize = 80;
 
@@ -157,14 +160,45 @@ impl Law {
         state.time_s = rupture.time_s;
         let (viscous, _) = self.resistance(state);
         if viscous > 0.0 {
-            let memory = state.memory;
-            let here =
-                Step { dt: 0.0, theta: 1.0, base_m, from_m: state.z_m, v_before: state.v_mps, lead_m: 0.0 };
-            let force = self.trial(state, &here, state.z_m);
-            state.memory = memory;
-            state.v_mps += ((base_m - state.z_m) * self.needle_n_per_m - force.total_n) / viscous;
+            state.v_mps = self.slip_speed(state, base_m, viscous);
             state.dv_mps = 0.0;
         }
+    }
+
+    /// The tip's velocity, where it is, at which friction is what the needle presses with.
+    ///
+    /// Plain viscous friction tells it at once. Where friction is more than that at such a speed
+    /// (`power_law_friction` above 1), a lower one is looked for: false position (Illinois) in between.
+    /// Where it is less, the plain one stays: the tip would be faster still, by any factor for friction
+    /// that hardly grows with speed, but its travel to the new balance is the same.
+    fn slip_speed(&self, state: &mut LawState, base_m: f64, viscous: f64) -> f64 {
+        let memory = state.memory;
+        let (at_m, v_mps) = (state.z_m, state.v_mps);
+        let pressed_n = (base_m - at_m) * self.needle_n_per_m;
+        let mut missing = |v_before: f64| {
+            let step = Step { dt: 0.0, theta: 1.0, base_m, from_m: at_m, v_before, lead_m: 0.0 };
+            let force = self.trial(state, &step, at_m);
+            state.memory = memory;
+            pressed_n - force.total_n
+        };
+        let (mut from, mut lacks) = (v_mps, missing(v_mps));
+        let mut to = from + lacks / viscous;
+        let close = NEARLY * (f64::abs(pressed_n) + f64::abs(lacks));
+        let mut left = missing(to);
+        for _ in 0..MAX_TRIALS {
+            if left.abs() <= close || to == from || (lacks > 0.0) == (left > 0.0) {
+                break;
+            }
+            let mid = from + (to - from) * lacks / (lacks - left);
+            let there = missing(mid);
+            if (there > 0.0) == (left > 0.0) {
+                lacks *= 0.5;
+            } else {
+                (from, lacks) = (to, left);
+            }
+            (to, left) = (mid, there);
+        }
+        to
     }
 
     /// Viscous friction in N s/m and stiffness in N/m that the tip feels where it is.
