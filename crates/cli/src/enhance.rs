@@ -39,6 +39,38 @@ struct Layer {
     friction_unit: &'static str,
     drop_n: f64,
     cumulative_friction_added_ns_per_m: f64,
+    /// 95 % intervals, and friction along the shaft as the layer gave way; missing where the algorithm gives none.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    certain: Option<Certain>,
+}
+
+/// What an algorithm that knows its uncertainty says beside.
+#[derive(Serialize)]
+struct Certain {
+    stiffness_interval: [f64; 2],
+    friction_interval: [f64; 2],
+    drop_interval: [f64; 2],
+    cumulative_friction_ns_per_m: f64,
+    cumulative_friction_interval: [f64; 2],
+}
+
+impl Certain {
+    fn of(e: &LayerEstimate) -> Option<Self> {
+        let around = |value: f64, sd: f64| [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd];
+        (e.stiffness_sd > 0.0).then(|| Self {
+            stiffness_interval: around(e.stiffness_n_per_m, e.stiffness_sd),
+            friction_interval: around(e.friction, e.friction_sd),
+            drop_interval: around(e.drop_n, e.drop_sd_n),
+            cumulative_friction_ns_per_m: e.cumulative_ns_per_m,
+            cumulative_friction_interval: around(e.cumulative_ns_per_m, e.cumulative_sd),
+        })
+    }
+}
+
+/// A number with what it may be off by with 95 % probability, where that is known.
+fn with_doubt(value: f64, sd: f64) -> String {
+    let value = significant(value, 3);
+    if sd > 0.0 { format!("{value} ± {}", significant(stylet_stats::Z95 * sd, 2)) } else { value }
 }
 
 /// What the core found, per model.
@@ -163,6 +195,7 @@ fn found_by(ran: &Ran) -> FoundBy {
         friction_unit,
         drop_n: e.drop_n,
         cumulative_friction_added_ns_per_m: e.added_friction_ns_per_m,
+        certain: Certain::of(e),
     };
     FoundBy {
         model: ran.name.clone(),
@@ -323,10 +356,13 @@ fn summary(
                 "  layer {}: {:.2} mm, K {} N/m, b {} {unit}, drop {} N",
                 e.layer,
                 e.thickness_m * 1e3,
-                significant(e.stiffness_n_per_m, 3),
-                significant(e.friction, 3),
-                significant(e.drop_n, 3),
+                with_doubt(e.stiffness_n_per_m, e.stiffness_sd),
+                with_doubt(e.friction, e.friction_sd),
+                with_doubt(e.drop_n, e.drop_sd_n),
             );
+        }
+        if r.trace.estimates.iter().any(|e| e.stiffness_sd > 0.0) {
+            let _ = writeln!(out, "  (± 95 %)");
         }
     }
     out

@@ -3,6 +3,7 @@
 use super::alarm::Alarm;
 use super::layers::Layers;
 use super::local::{self, Local, Step};
+use super::slack::Slack;
 use super::{STIFFEST, Stylet};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::Sample;
@@ -71,6 +72,7 @@ impl Stylet {
         self.layers = Layers::contact(start_m, force_n, sd_n, STIFFEST, drive, &self.noise);
         self.before = self.layers;
         self.before_m = sample.position_m;
+        self.slack = Slack::new(config.stylet.false_alarms_per_hour, self.noise.step_s, &self.layers);
         self.local = Local::new(sample.force_n);
         self.local.renew(sample.force_n, STIFFEST * local::MEMORY_M, &self.noise, step.speed_mps, true);
         self.out.contact_m = Some(start_m);

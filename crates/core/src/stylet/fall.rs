@@ -1,12 +1,16 @@
 //! A fall of the force: whether it is a rupture, and what a rupture does.
 
-use super::local::Step;
+use super::local::{MEMORY_M, Step};
+use super::motion::SPEED_S;
 use super::{LONGEST_DROP_S, Stylet, WORK_RUPTURE};
 use crate::config::EnhanceConfig;
 use crate::sample::{Cause, Detection, Sample};
 
 /// Samples that the level of a fall is averaged over at most.
 const MOST_AVERAGED: f64 = 16.0;
+
+/// Standard deviations that a fall has to have where the tip was free: one in 30 000.
+const FREE_SDS: f64 = 4.0;
 
 /// A fall of the force that may become a rupture.
 #[derive(Clone, Copy, Debug)]
@@ -17,16 +21,31 @@ pub(super) struct Fall {
     count: f64,
 }
 
+/// How large a fall is, its standard deviation, and the least that is a rupture, in N.
+struct Size {
+    fall_n: f64,
+    sd_n: f64,
+    least_n: f64,
+}
+
 impl Stylet {
-    /// Follows a fall from where it began.
+    /// Follows a fall from where it began: anew where this sample alone says more than all before.
     #[inline(always)]
-    pub(super) fn fall(&mut self, step: &Step, sample: &Sample) {
+    pub(super) fn fall(&mut self, step: &Step, sample: &Sample, outweighs: bool) {
+        if outweighs {
+            // What was summed up before was noise.
+            (self.fall, self.last_level_n) = (None, self.local.level_n());
+        }
         let fall = self.fall.get_or_insert(Fall {
             from_n: self.last_level_n,
             mean_n: sample.force_n,
             since_s: 0.0,
             count: 0.0,
         });
+        // A change of speed changes the friction behind: what was measured before counts as it would be at this speed.
+        let change_n = self.layers.behind(sample.position_m, &self.noise).0 * step.dv_mps;
+        fall.from_n += change_n;
+        fall.mean_n += change_n;
         fall.since_s += step.dt_s;
         fall.count += 1.0;
         // As many samples as it takes to know the force to a quarter of the drop that counts.
@@ -37,7 +56,8 @@ impl Stylet {
         };
         let most = most.clamp(1.0, MOST_AVERAGED);
         fall.mean_n += (sample.force_n - fall.mean_n) / fall.count.min(most);
-        if fall.since_s > LONGEST_DROP_S && self.least_n > 0.0 && fall.from_n - fall.mean_n < self.least_n {
+        let over = fall.since_s > LONGEST_DROP_S && (self.least_n > 0.0 || self.layers.free);
+        if over && self.size().is_none_or(|size| size.fall_n < size.least_n) {
             // Too slow, or too small: not a rupture.
             self.fall = None;
             self.alarm.rest();
@@ -47,16 +67,28 @@ impl Stylet {
 
     /// Whether the fall so far is a drop: larger than what the noise may feign, and than texture.
     pub(super) fn is_a_drop(&mut self, config: &EnhanceConfig) -> bool {
-        let Some(fall) = self.fall else { return false };
         // As long as the law has not been seen to hold, the first travel after contact is no layer.
         if self.rough > 0.0 && self.deepest_m - self.first_m < config.guard.blind_travel_m {
             return false;
         }
+        let Some(size) = self.size() else { return false };
+        self.drop = (size.fall_n, size.sd_n);
+        size.fall_n >= size.least_n
+    }
+
+    /// Size of the fall so far, how well it is known, and what it would have to be.
+    fn size(&self) -> Option<Size> {
+        let fall = self.fall?;
         let effective = (fall.count.min(MOST_AVERAGED) / libm::sqrt(self.noise.slow())).max(1.0);
-        let noise = 2.0 * libm::sqrt(self.noise.marginal() / effective);
-        let size = fall.from_n - fall.mean_n;
-        self.drop = (size, noise / 2.0);
-        size >= self.least_n.max(noise)
+        let sd_n = libm::sqrt(self.noise.marginal() / effective);
+        // A free tip has nothing to lose, but where friction stops to grow the sums alarm: the force is below what the
+        // predictor's memory makes of the growth.
+        let least_n = if self.layers.free {
+            FREE_SDS * sd_n + self.layers.growth(self.steady) * MEMORY_M
+        } else {
+            2.0 * sd_n
+        };
+        Some(Size { fall_n: fall.from_n - fall.mean_n, sd_n, least_n: self.least_n.max(least_n) })
     }
 
     pub(super) fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {
@@ -124,8 +156,11 @@ impl Stylet {
     }
 
     /// Whether the drop still goes on; once it is over, that is settled.
-    pub(super) fn settle(&mut self, step: &Step) -> bool {
-        let (rate, variance) = self.local.rate(step.speed_mps);
+    pub(super) fn settle(&mut self, step: &Step, sample: &Sample) -> bool {
+        // How the speed changes: by as much as it is away from its low-passed self.
+        let accel_mps2 = (sample.velocity_mps - step.speed_mps) / SPEED_S;
+        let friction = self.layers.behind(sample.position_m, &self.noise).0;
+        let (rate, variance) = self.local.rate(step.speed_mps, accel_mps2, friction);
         let sd = libm::sqrt(variance * self.noise.variance);
         let falling = rate < -3.0 * sd;
         if self.since_s > LONGEST_DROP_S && rate > -2.0 * sd {

@@ -80,7 +80,7 @@ impl Stylet {
         }
         self.was_quiet = heard.quiet || !forward;
         if forward && !odd && !heard.quiet {
-            self.fall(step, sample);
+            self.fall(step, sample, heard.outweighs);
         }
         if heard.quiet {
             self.fall = None;
@@ -102,15 +102,27 @@ impl Stylet {
             self.local.take(&innovation, force_n);
             self.texture += share * (at_most(36.0, z * z) - self.texture);
         }
-        self.falling = self.fallen.is_some() && self.settle(step);
+        self.falling = self.fallen.is_some() && self.settle(step, sample);
         if self.falling {
             if let Some(fallen) = self.fallen {
                 self.layers = fallen;
             }
         } else if forward && sample.position_m >= self.layers.start_m {
             self.work += WORK_LAYERS;
+            let before = self.layers.free.then_some(self.layers);
             let (e, s) = self.layers.take(sample.position_m, self.drive, force_n, step.rho);
-            let z2 = at_most(400.0, e * e / (s * self.noise.variance));
+            let standard = e / libm::sqrt(s * self.noise.variance);
+            let z2 = at_most(400.0, standard * standard);
+            if self.fallen.is_none() {
+                self.work += self.slack.follow(
+                    &mut self.layers,
+                    (before, self.last.position_m),
+                    (sample.position_m, standard, at_least(1e-6, self.steady)),
+                    self.since,
+                    &self.noise,
+                    &mut self.behind,
+                );
+            }
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
                 let share = at_least(share, at_most(0.5, step.dt_s * (0.25 / local::MEMORY_S)));
                 self.misfit += share * (z2 - self.misfit);

@@ -84,7 +84,7 @@ impl<const N: usize> Gaussian<N> {
             self.p[i][j] = 0.0;
             self.p[j][i] = 0.0;
         }
-        self.p[i][i] = variance;
+        self.p[i][i] = at_least(TINY, variance);
         self.x[i] = mean;
     }
 

@@ -15,7 +15,7 @@
 //! *before* it (the force that is left is friction), and every sample before about `D` after: the joint least-squares solution without
 //! buffer or replay.
 
-use super::gaussian::{Gaussian, WIDEST};
+use super::gaussian::{Gaussian, WIDEST, at_least};
 use super::local::MEMORY_M;
 use super::noise::Noise;
 use crate::compensation::MAX_LAYERS;
@@ -37,6 +37,20 @@ pub(crate) struct Layers {
     pub(crate) passed: usize,
     /// Thickness of the layer before.
     pub(crate) previous_m: f64,
+    /// The tip is in a gap, or behind the last layer: what grows with travel is friction.
+    pub(super) free: bool,
+    /// See [`super::slack`]: the densities when the active layer began, friction as that of the layer before, and none.
+    pub(super) free_before: [f64; 2],
+    /// It is beyond doubt that a layer has begun.
+    pub(super) settled: bool,
+    /// Travel of the gap behind the layer before, in which its friction went on to grow, and how well it is known.
+    gap_m: f64,
+    gap_sd_m: f64,
+    /// How well the begin of the active layer is known, and that of the layer before was, in m.
+    start_sd_m: f64,
+    pub(super) previous_sd_m: f64,
+    /// Slope that the active layer was thought to have at its begin, in N/m.
+    scale: f64,
     /// Drive at contact.
     drive0: f64,
     /// Depth, drive and force of the sample before.
@@ -76,6 +90,14 @@ impl Layers {
             start_m,
             passed: 0,
             previous_m: 0.0,
+            free: false,
+            free_before: [0.0; 2],
+            settled: false,
+            gap_m: 0.0,
+            gap_sd_m: 0.0,
+            start_sd_m: 0.0,
+            previous_sd_m: 0.0,
+            scale: slope,
             drive0: drive,
             last: None,
         }
@@ -147,7 +169,7 @@ impl Layers {
                 self.belief.take(&constraint);
             }
         }
-        let before = self.slope(drive).abs().max(1.0);
+        let before = if self.free { self.scale } else { self.slope(drive).abs().max(1.0) };
         let before = before.min(libm::sqrt(WIDEST / unit) / MEMORY_M);
         let known = self.belief.x[FP].max(0.0);
         let b = self.belief.x[F].clamp(-before / drive, before / drive);
@@ -159,15 +181,13 @@ impl Layers {
         map[FP][F] = 1.0;
         map[ZERO][ZERO] = 1.0;
         self.belief = self.belief.mapped(&map);
-        let wide = (3.0 * before).min(libm::sqrt(WIDEST / unit) / MEMORY_M);
-        let g = &mut self.belief;
-        g.renew(K, 0.5 * before, wide * wide * unit);
-        g.renew(F, 0.5 * before / drive, wide * wide / (drive * drive) * unit);
-        // Where exactly it gave way is not known better than the samples lie: that much friction more or less, and
-        // that much force of the new layer, which looks like an error of the zero.
-        let place = sd_m * sd_m * unit;
-        g.p[A][A] += b * b * place;
-        g.p[ZERO][ZERO] += before * before * place;
+        if self.start_sd_m > 0.0 {
+            // What looked like an error of the zero was the begin of the layer that is gone.
+            self.belief.renew(ZERO, noise.bias_n(), noise.bias_variance() * unit);
+        }
+        self.begin(before, sd_m, b, drive, unit);
+        (self.previous_sd_m, self.start_sd_m, self.gap_m) = (self.start_sd_m, 0.0, 0.0);
+        self.gap_sd_m = 0.0;
         d += delta;
         // The layer before this one will not be known better.
         if let Some(before) = self.passed.checked_sub(1).and_then(|i| behind.get_mut(i)) {
@@ -180,15 +200,100 @@ impl Layers {
         self.previous_m = d;
         self.passed += 1;
         self.last = None;
+        self.free_before =
+            [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
     }
 
-    /// Friction behind the tip per drive, and its variance in squared units (N s/m for a viscous drive).
+    /// A layer of unknown stiffness and friction begins at a place that is known to `sd_m`: on either side of it friction per
+    /// drive grows by `friction` more or less.
+    fn begin(&mut self, scale: f64, sd_m: f64, friction: f64, drive: f64, unit: f64) {
+        let wide = (3.0 * scale).min(libm::sqrt(WIDEST / unit) / MEMORY_M);
+        let g = &mut self.belief;
+        g.renew(K, 0.5 * scale, wide * wide * unit);
+        g.renew(F, 0.5 * scale / drive, wide * wide / (drive * drive) * unit);
+        // Where exactly it gave way is not known better than the samples lie: that much friction more or less, and
+        // that much force of the new layer, which looks like an error of the zero.
+        let place = sd_m * sd_m * unit;
+        g.p[A][A] += friction * friction * place;
+        g.p[ZERO][ZERO] += scale * scale * place;
+        (self.free, self.settled, self.scale) = (false, false, scale);
+    }
+
+    /// The force has bent at `position_m` while the tip was free: upwards where a layer begins, downwards where the layer before has
+    /// ended and friction stops to grow.
+    pub(super) fn bend(
+        &mut self,
+        position_m: f64,
+        sd_m: f64,
+        up: bool,
+        drive: f64,
+        noise: &Noise,
+        behind: &mut Behind,
+    ) {
+        let unit = 1.0 / noise.variance;
+        let travel = (position_m - self.start_m).max(0.0);
+        let b = self.belief.x[F];
+        let mut map = [[0.0; N]; N];
+        for (i, row) in map.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        map[A][F] = travel;
+        self.belief = self.belief.mapped(&map);
+        // The layer before goes on to here as far as its friction did.
+        if let Some(slot) = self.passed.checked_sub(1).and_then(|i| behind.get_mut(i))
+            && b > 0.5 * self.belief.x[FP]
+        {
+            slot[1] = position_m;
+            self.gap_m += travel;
+            self.gap_sd_m = sd_m;
+        }
+        if up {
+            self.start_sd_m = sd_m;
+            self.begin(self.scale, sd_m, b, drive, unit);
+        } else {
+            let g = &mut self.belief;
+            g.renew(F, 0.0, b * b * unit);
+            g.p[A][A] += b * b * sd_m * sd_m * unit;
+        }
+        self.start_m = position_m;
+        self.last = None;
+    }
+
+    /// Friction per drive that has come on since the layer before gave way, with the tip still free.
     #[inline(always)]
-    pub(crate) fn behind(&self, noise: &Noise) -> (f64, f64) {
+    pub(crate) fn entered(&self, position_m: f64) -> f64 {
+        if self.free { self.belief.x[F] * at_least(0.0, position_m - self.start_m) } else { 0.0 }
+    }
+
+    /// Friction along the shaft that the tip does not feel, per drive, with the tip at `position_m`; and its variance in squared
+    /// units (N s/m for a viscous drive).
+    #[inline(always)]
+    pub(crate) fn behind(&self, position_m: f64, noise: &Noise) -> (f64, f64) {
         if self.passed == 0 {
             return (0.0, 0.0);
         }
-        (self.belief.x[A], self.belief.p[A][A] * noise.variance)
+        let g = &self.belief;
+        let (mut behind, mut variance) = (g.x[A], g.p[A][A]);
+        if self.free {
+            let x = at_least(0.0, position_m - self.start_m);
+            behind += g.x[F] * x;
+            variance += x * (2.0 * g.cov(F, A) + x * g.p[F][F]);
+        }
+        (behind, variance * noise.variance)
+    }
+
+    /// Friction per drive behind the layer before as it gave way, and its variance in squared units.
+    pub(crate) fn when_it_gave_way(&self, noise: &Noise) -> (f64, f64) {
+        let (g, gap) = (&self.belief, self.gap_m);
+        let place = g.x[FP] * self.gap_sd_m;
+        let known = g.p[A][A] - gap * (2.0 * g.cov(FP, A) - gap * g.p[FP][FP]);
+        let variance = known + place * place / noise.variance;
+        (g.x[A] - gap * g.x[FP], variance * noise.variance)
+    }
+
+    /// How friction grows with travel while the shaft enters the layer before, in N/m.
+    pub(crate) fn growth(&self, drive: f64) -> f64 {
+        (self.belief.x[FP] * drive).abs()
     }
 
     /// Variances of `Kp` and `bp` in squared units.
@@ -198,7 +303,7 @@ impl Layers {
 
     /// Friction per drive that the passed layers exert with the tip at `z_m` on the way back, each with its friction spread
     /// evenly over its thickness.
-    pub(crate) fn around_shaft(&self, behind: &Behind, z_m: f64) -> f64 {
+    pub(crate) fn around_shaft(&self, behind: &Behind, z_m: f64, deepest_m: f64) -> f64 {
         let last = self.passed.min(MAX_LAYERS);
         let (mut whole, mut inside) = (0.0, 0.0);
         for (i, [start, end, b]) in behind.iter().take(last).enumerate() {
@@ -207,7 +312,7 @@ impl Layers {
             inside += b * (z_m - start).clamp(0.0, end - start);
         }
         // The sum is known better than its parts.
-        let all = self.belief.x[A].max(0.0);
+        let all = (self.belief.x[A] + self.entered(deepest_m)).max(0.0);
         let share = if whole > 0.0 { inside / whole } else { 1.0 };
         all * share
     }

@@ -137,11 +137,15 @@ impl Local {
         self.fresh = true;
     }
 
-    /// Change of the force with time at a speed, in N/s, and its variance in units of the noise's.
-    pub(crate) fn rate(&self, speed_mps: f64) -> (f64, f64) {
+    /// Change of the force with time at a speed and an acceleration, in N/s, less what a friction `known_ns_per_m` makes of the
+    /// acceleration; and its variance in units of the noise's. While speed changes evenly the parts are not told from each other, but
+    /// their sum is.
+    pub(crate) fn rate(&self, speed_mps: f64, accel_mps2: f64, known_ns_per_m: f64) -> (f64, f64) {
         let g = &self.state;
-        let v = speed_mps;
-        (g.x[R] + v * g.x[S], g.p[R][R] + 2.0 * v * g.cov(R, S) + v * v * g.p[S][S])
+        let (v, a) = (speed_mps, accel_mps2);
+        let rate = g.x[R] + v * g.x[S] + a * (g.x[B] - known_ns_per_m);
+        let alone = g.p[R][R] + v * (2.0 * g.cov(R, S) + v * g.p[S][S]);
+        (rate, alone + a * (2.0 * (g.cov(R, B) + v * g.cov(S, B)) + a * g.p[B][B]))
     }
 
     /// Predicted force in N.

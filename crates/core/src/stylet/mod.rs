@@ -12,6 +12,7 @@ mod local;
 mod motion;
 mod noise;
 mod shaft;
+mod slack;
 mod speak;
 
 use crate::config::EnhanceConfig;
@@ -24,6 +25,7 @@ use layers::{Behind, Layers};
 use local::{Local, Step};
 use noise::Noise;
 use shaft::Shaft;
+use slack::Slack;
 
 /// Stiffest tissue that a needle is pushed into, in N/m: how wide a slope is before it is known.
 const STIFFEST: f64 = 2000.0;
@@ -47,6 +49,7 @@ pub(crate) struct Stylet {
     before: Layers,
     before_m: f64,
     behind: Behind,
+    slack: Slack,
     first_m: f64,
     /// What drives friction, in m/s, its dry state from -1 to 1, and what a steady advance at the usual speed makes of it.
     drive: f64,
@@ -106,6 +109,7 @@ impl Stylet {
             before: layers,
             before_m: surface_m,
             behind: Behind::default(),
+            slack: Slack::new(config.stylet.false_alarms_per_hour, 0.005, &layers),
             first_m: surface_m,
             drive: 0.0,
             xi: 0.0,

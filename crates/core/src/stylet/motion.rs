@@ -7,7 +7,7 @@ use crate::config::{EnhanceConfig, FrictionLaw};
 use crate::sample::Sample;
 
 /// Smoothing of the speed that stands for the motion, in s.
-const SPEED_S: f64 = 0.2;
+pub(super) const SPEED_S: f64 = 0.2;
 /// Below this the needle stands, in m/s (SPEC section 6).
 const DEAD_MPS: f64 = 1e-5;
 

@@ -18,10 +18,11 @@ impl Stylet {
         let [k, b] = [l.belief.x[KP], l.belief.x[FP]];
         let doubt = self.noise.doubt();
         let [vk, vb] = l.previous_variance(&self.noise).map(|v| v * doubt);
-        let (cumulative, cumulative_variance) = l.behind(&self.noise);
+        let (cumulative, cumulative_variance) = l.when_it_gave_way(&self.noise);
         let drop = k * d;
-        let certain = drop > 1.96 * d * libm::sqrt(vk.max(0.0));
-        if !certain {
+        // The stiffness over the travel, which is as uncertain as the layer's begin.
+        let drop_sd = libm::sqrt(d * d * at_least(0.0, vk) + k * k * l.previous_sd_m * l.previous_sd_m);
+        if drop <= 1.96 * drop_sd {
             return;
         }
         self.out.estimate = Some(LayerEstimate {
@@ -36,7 +37,7 @@ impl Stylet {
             time_s: sample.time_s,
             stiffness_sd: libm::sqrt(vk.max(0.0)),
             friction_sd: libm::sqrt(vb.max(0.0)),
-            drop_sd_n: d * libm::sqrt(vk.max(0.0)),
+            drop_sd_n: drop_sd,
             cumulative_ns_per_m: cumulative,
             cumulative_sd: libm::sqrt((cumulative_variance * doubt).max(0.0)),
         });
@@ -47,15 +48,15 @@ impl Stylet {
         let standstill = config.drop.standstill_mps;
         let retracting = sample.velocity_mps < -standstill;
         let marginal = self.noise.marginal();
-        let (mut behind, mut variance) = self.layers.behind(&self.noise);
+        let (mut behind, mut variance) = self.layers.behind(sample.position_m, &self.noise);
         if let (Some(fallen), true) = (&self.fallen, self.falling) {
             // As long as elastic force may be left, friction is no more than what was expected of it.
-            behind = behind.min(fallen.behind(&self.noise).0);
+            behind = behind.min(fallen.behind(sample.position_m, &self.noise).0);
         }
         behind = at_least(0.0, behind);
         if retracting && self.in_tissue {
             self.work += WORK_BACK;
-            behind = self.layers.around_shaft(&self.behind, sample.position_m);
+            behind = self.layers.around_shaft(&self.behind, sample.position_m, self.deepest_m);
         }
         let u = self.drive;
         let mut friction = behind * u;
