@@ -1,5 +1,6 @@
 //! A fall of the force: whether it is a rupture, and what a rupture does.
 
+use super::gaussian::at_most;
 use super::local::{MEMORY_M, Step};
 use super::motion::SPEED_S;
 use super::{LONGEST_DROP_S, Stylet, WORK_RUPTURE};
@@ -9,14 +10,16 @@ use crate::sample::{Cause, Detection, Sample};
 /// Samples that the level of a fall is averaged over at most.
 const MOST_AVERAGED: f64 = 16.0;
 
-/// Standard deviations that a fall has to have where the tip was free: one in 30 000.
-const FREE_SDS: f64 = 4.0;
+/// Standard deviations that a fall below the law has to have: whatever else set off the alarm, noise makes it so low once in 30 000 looks.
+const SURE_SDS: f64 = 4.0;
 
 /// A fall of the force that may become a rupture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fall {
     from_n: f64,
     mean_n: f64,
+    /// What the law of layers said before it began, less what is measured.
+    missing_n: f64,
     since_s: f64,
     count: f64,
 }
@@ -39,13 +42,16 @@ impl Stylet {
         let fall = self.fall.get_or_insert(Fall {
             from_n: self.last_level_n,
             mean_n: sample.force_n,
+            missing_n: 0.0,
             since_s: 0.0,
             count: 0.0,
         });
-        // A change of speed changes the friction behind: what was measured before counts as it would be at this speed.
-        let change_n = self.layers.behind(sample.position_m, &self.noise).0 * step.dv_mps;
-        fall.from_n += change_n;
-        fall.mean_n += change_n;
+        if self.rough == 0.0 {
+            // A change of speed changes the friction: what was measured before counts as it would be at this speed.
+            let change_n = self.before.friction(sample.position_m) * step.dv_mps;
+            fall.from_n += change_n;
+            fall.mean_n += change_n;
+        }
         fall.since_s += step.dt_s;
         fall.count += 1.0;
         // As many samples as it takes to know the force to a quarter of the drop that counts.
@@ -55,8 +61,11 @@ impl Stylet {
             MOST_AVERAGED
         };
         let most = most.clamp(1.0, MOST_AVERAGED);
-        fall.mean_n += (sample.force_n - fall.mean_n) / fall.count.min(most);
-        let over = fall.since_s > LONGEST_DROP_S && (self.least_n > 0.0 || self.layers.free);
+        let share = 1.0 / fall.count.min(most);
+        fall.mean_n += share * (sample.force_n - fall.mean_n);
+        let missing_n = self.before.says(sample.position_m, self.drive) - sample.force_n;
+        fall.missing_n += share * (missing_n - fall.missing_n);
+        let over = fall.since_s > LONGEST_DROP_S && (self.least_n > 0.0 || self.rough == 0.0);
         if over && self.size().is_none_or(|size| size.fall_n < size.least_n) {
             // Too slow, or too small: not a rupture.
             self.fall = None;
@@ -81,14 +90,17 @@ impl Stylet {
         let fall = self.fall?;
         let effective = (fall.count.min(MOST_AVERAGED) / libm::sqrt(self.noise.slow())).max(1.0);
         let sd_n = libm::sqrt(self.noise.marginal() / effective);
-        // A free tip has nothing to lose, but where friction stops to grow the sums alarm: the force is below what the
-        // predictor's memory makes of the growth.
-        let least_n = if self.layers.free {
-            FREE_SDS * sd_n + self.layers.growth(self.steady) * MEMORY_M
-        } else {
-            2.0 * sd_n
-        };
-        Some(Size { fall_n: fall.from_n - fall.mean_n, sd_n, least_n: self.least_n.max(least_n) })
+        let fallen_n = fall.from_n - fall.mean_n;
+        if self.rough > 0.0 {
+            let least_n = self.least_n.max(2.0 * sd_n);
+            return Some(Size { fall_n: fallen_n, sd_n, least_n });
+        }
+        // Where the law of layers holds it knows what the force would be; and the force has to have fallen, too. A free tip has nothing to
+        // lose, but where friction stops to grow the force is below what the predictor's memory makes of the growth.
+        let fall_n = at_most(fall.missing_n, fallen_n);
+        let growth_n = if self.layers.free { self.layers.growth(self.steady) * MEMORY_M } else { 0.0 };
+        let least_n = SURE_SDS * sd_n + growth_n;
+        Some(Size { fall_n, sd_n, least_n })
     }
 
     pub(super) fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {

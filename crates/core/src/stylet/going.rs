@@ -14,6 +14,9 @@ const LEAST_SHARE: f64 = 0.005;
 /// Time over which the usual difference is learned, in s: much longer than smoothing or a lag, so that these do not become usual.
 pub(crate) const LEARNED_S: f64 = 2.0;
 
+/// What is said to be below this in m/s is rest (SPEC section 6).
+pub(crate) const DEAD_MPS: f64 = 1e-5;
+
 /// Samples in a row that have to agree.
 const AGREEING: u8 = 2;
 
@@ -22,6 +25,8 @@ pub(crate) struct Going {
     /// Mean square of the usual difference in (m/s)².
     usual: f64,
     said_mps: f64,
+    /// The needle stands: it has not moved, and was not said to.
+    standing: bool,
     /// They disagree for at least this many samples more: where the positions' speed jumps it may cross a smoothed one.
     apart: u8,
 }
@@ -40,8 +45,17 @@ impl Going {
         let said = sample.velocity_mps;
         let dt_s = sample.time_s - last.time_s;
         let stepped_m = sample.position_m - last.position_m;
+        if stepped_m == 0.0 && (self.standing || said.abs() <= DEAD_MPS) {
+            // A velocity that was smoothed in both directions of time rises before the needle has moved.
+            (self.standing, self.said_mps) = (true, said);
+            return (0.0, false);
+        }
+        let starts = core::mem::take(&mut self.standing);
         let before = self.said_mps;
         self.said_mps = said;
+        if starts {
+            return (said, true);
+        }
         let off_m = stepped_m - 0.5 * (said + before) * dt_s;
         let least = LEAST_SHARE * speed_mps;
         let limit = DISAGREEMENT * at_least(least * least, self.usual);

@@ -109,6 +109,19 @@ impl Layers {
         [a, x, x * drive, q, 0.0, 1.0]
     }
 
+    /// Friction per drive, what the tip feels of it included.
+    pub(crate) fn friction(&self, position_m: f64) -> f64 {
+        let behind = self.belief.x[if self.passed > 0 { A } else { KP }];
+        behind + self.belief.x[F] * (position_m - self.start_m)
+    }
+
+    /// The force that the law says.
+    #[inline(always)]
+    pub(crate) fn says(&self, position_m: f64, drive: f64) -> f64 {
+        let w = self.regressor(position_m - self.start_m, drive);
+        w.iter().zip(&self.belief.x).map(|(w, x)| w * x).sum()
+    }
+
     /// Takes a sample; returns the innovation in N and its variance in units of the noise's.
     #[inline(always)]
     pub(crate) fn take(&mut self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> (f64, f64) {

@@ -180,6 +180,7 @@ impl Stylet {
         }
         let last = if self.started { self.last } else { sample };
         let (velocity_mps, sudden) = self.going.speed(&last, &sample, self.speed_mps, self.shares[3]);
+        let (velocity_mps, sudden) = self.set_off(&last, &sample, velocity_mps, sudden);
         let sample = Sample { velocity_mps, ..sample };
         let step = self.motion(config, &last, &sample, sudden);
         self.drive_friction(config, &step, &sample);

@@ -1,15 +1,13 @@
 //! How the needle moves, and what drives the friction along its shaft.
 
 use super::gaussian::at_least;
-use super::going::LEARNED_S;
+use super::going::{DEAD_MPS, LEARNED_S};
 use super::{Step, Stylet, shaft};
 use crate::config::{EnhanceConfig, FrictionLaw};
 use crate::sample::Sample;
 
 /// Smoothing of the speed that stands for the motion, in s.
 pub(super) const SPEED_S: f64 = 0.2;
-/// Below this the needle stands, in m/s (SPEC section 6).
-const DEAD_MPS: f64 = 1e-5;
 
 impl Stylet {
     /// The drive of friction, by the law in force.
@@ -42,6 +40,24 @@ impl Stylet {
         };
         self.drive = v + dry_mps * self.xi;
         self.steady = step.speed_mps + dry_mps;
+    }
+
+    /// A needle that is said to have set off but has not moved yet: a log of exact velocities, or one that was smoothed? The force knows: with
+    /// the speed friction is there at once.
+    #[inline(always)]
+    pub(super) fn set_off(&self, last: &Sample, sample: &Sample, mps: f64, sudden: bool) -> (f64, bool) {
+        let said = sample.velocity_mps;
+        if mps != 0.0 || said.abs() <= DEAD_MPS || !self.in_tissue {
+            return (mps, sudden);
+        }
+        let (moves, stands) =
+            (self.layers.says(sample.position_m, said), self.layers.says(sample.position_m, 0.0));
+        let jumped = sample.force_n - last.force_n;
+        if (jumped > 0.0) == (said > 0.0) && jumped.abs() > 0.5 * (moves - stands).abs() {
+            (said, true)
+        } else {
+            (mps, sudden)
+        }
     }
 
     /// How the needle has moved since the last sample.
