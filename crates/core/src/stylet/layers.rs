@@ -213,8 +213,7 @@ impl Layers {
         self.previous_m = d;
         self.passed += 1;
         self.last = None;
-        self.free_before =
-            [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
+        self.free_before = [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
     }
 
     /// A layer of unknown stiffness and friction begins at a place that is known to `sd_m`: on either side of it friction per

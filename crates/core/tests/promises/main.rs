@@ -8,5 +8,6 @@ mod paper_stays_bit_for_bit;
 mod robustness;
 mod state_machine;
 mod stylet_finds;
+mod stylet_gaps;
 mod stylet_holds;
 mod support;

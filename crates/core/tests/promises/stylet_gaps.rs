@@ -1,0 +1,114 @@
+//! What `algorithm: Stylet` promises where a layer gives way before its far face: behind the drop the tip is free until the next face, and the
+//! core knows.
+
+use crate::support::{Insertion, enhance, insertion};
+use stylet_core::config::Algorithm;
+use stylet_core::{EnhanceConfig, LayerEstimate, Output};
+use stylet_tissue::Tissue;
+
+fn stylet() -> EnhanceConfig {
+    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
+}
+
+const DROPS_N: [f64; 3] = [0.9, 1.7, 2.1];
+
+/// The paper's three layers, each of which gives way 6 to 9 mm before its far face.
+fn early(noise_n: f64, seed: u64, velocity_mps: fn(f64) -> f64, duration_s: f64) -> Insertion {
+    let mut tissue = Tissue::three_gels();
+    for (layer, drop_n) in tissue.layers.iter_mut().zip(DROPS_N) {
+        layer.puncture_n = Some(drop_n);
+    }
+    insertion(&tissue, -0.005, duration_s, 200.0, noise_n, seed, velocity_mps)
+}
+
+fn slowing(t: f64) -> f64 {
+    let omega = std::f64::consts::TAU * 0.0167;
+    0.12 * omega * (omega * t).cos()
+}
+
+/// Enhanced less true tip force without the sensor's noise, RMS over samples whose number `keep` allows, in N.
+fn off_n(data: &Insertion, outputs: &[Output], keep: impl Fn(usize) -> bool) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for k in (0..outputs.len()).filter(|k| keep(*k)) {
+        let noise_n = data.samples[k].force_n - data.truth[k].total_n;
+        let off = outputs[k].enhanced_n - noise_n - data.truth[k].tip_n;
+        sum += off * off;
+        count += 1.0;
+    }
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
+#[test]
+fn a_free_tip_feels_nothing_and_the_next_layer_is_found_where_it_begins() {
+    for (name, speed, duration_s) in
+        [("constant", (|_| 0.0023) as fn(f64) -> f64, 50.0), ("slowing", slowing, 15.0)]
+    {
+        for seed in 0..10 {
+            let data = early(0.02, seed, speed, duration_s);
+            let outputs = enhance(&stylet(), &data.samples);
+            let found: Vec<_> = outputs.iter().filter_map(|o| o.detection).collect();
+            assert_eq!(found.len(), 3, "{name}, seed {seed}: {found:?}");
+            // In the gaps, from a quarter of a second after the drop on.
+            let last_s = |k: usize| {
+                let t = data.samples[k].time_s;
+                data.ruptures.iter().map(|r| r.time_s).filter(|r| *r <= t).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let gap = |k: usize| data.truth[k].elastic_n == 0.0 && data.samples[k].time_s > last_s(k) + 0.25;
+            let off = off_n(&data, &outputs, |k| last_s(k) > 0.0 && gap(k));
+            assert!(off < 0.05, "{name}, seed {seed}: {off} N in the gaps");
+            // Of up to 5 N.
+            let whole = off_n(&data, &outputs, |_| true);
+            assert!(whole < 0.1, "{name}, seed {seed}: {whole} N over the whole insertion");
+        }
+    }
+}
+
+#[test]
+fn stiffness_friction_and_drops_are_right_within_their_intervals() {
+    let tissue = Tissue::three_gels();
+    let (mut inside, mut of, mut drops) = (0, 0, 0);
+    for seed in 0..20 {
+        let data = early(0.02, seed, |_| 0.0023, 50.0);
+        let outputs = enhance(&stylet(), &data.samples);
+        let mut layers: Vec<LayerEstimate> = Vec::new();
+        for e in outputs.iter().filter_map(|o| o.estimate) {
+            layers.retain(|x| x.layer != e.layer);
+            layers.push(e);
+        }
+        assert_eq!(layers.len(), 3, "seed {seed}");
+        for (e, layer) in layers.iter().zip(&tissue.layers) {
+            for (off, sd, truth) in [
+                (e.stiffness_n_per_m - layer.stiffness_n_per_m, e.stiffness_sd, layer.stiffness_n_per_m),
+                (e.friction - layer.friction_ns_per_m2, e.friction_sd, layer.friction_ns_per_m2),
+            ] {
+                assert!(off.abs() < 0.03 * truth, "seed {seed}: {e:?}");
+                inside += usize::from(off.abs() <= 1.96 * sd);
+                of += 1;
+            }
+        }
+        // The fall of the force as it is told at once.
+        for (d, truth) in outputs.iter().filter_map(|o| o.detection).zip(DROPS_N) {
+            assert!((d.drop_n - truth).abs() < 0.1, "seed {seed}: {d:?} for a drop of {truth} N");
+            drops += usize::from((d.drop_n - truth).abs() <= 1.96 * d.drop_sd_n);
+        }
+    }
+    // 90 to 100 % of 120, of 60.
+    assert!(inside >= 108, "{inside} of {of} in their 95 % intervals");
+    assert!(drops >= 54, "{drops} of 60 drops in their 95 % intervals");
+}
+
+#[test]
+fn a_needle_that_has_not_moved_yet_stands_whatever_a_smoothed_velocity_says() {
+    // Smoothed in both directions of time: the velocity rises before the needle has moved.
+    let stop = |t: f64| if (13.0..16.0).contains(&t) { 0.0 } else { 0.0023 };
+    for seed in 0..10 {
+        let mut data = early(0.01, seed, stop, 53.0);
+        let said: Vec<f64> = data.samples.iter().map(|s| s.velocity_mps).collect();
+        for (k, sample) in data.samples.iter_mut().enumerate() {
+            let window = &said[k.saturating_sub(10)..(k + 11).min(said.len())];
+            sample.velocity_mps = window.iter().sum::<f64>() / window.len() as f64;
+        }
+        let found = enhance(&stylet(), &data.samples).iter().filter(|o| o.detection.is_some()).count();
+        assert_eq!(found, 3, "seed {seed}");
+    }
+}
