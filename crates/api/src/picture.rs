@@ -86,6 +86,8 @@ fn combination(recording: &Recording, ran: &Ran) -> report::Combination {
         contact_s: trace.contact_s,
         reconstructed_force_n: trace.reconstructed_n.clone(),
         enhanced_force_n: trace.enhanced_n.clone(),
+        low_n: trace.low_n.clone(),
+        high_n: trace.high_n.clone(),
         stiffness_n_per_m: trace.stiffness_n_per_m.clone(),
         friction_ns_per_m2: of(multi_layer, &trace.friction),
         friction_ns_per_m: of(!multi_layer, &trace.friction),
@@ -150,6 +152,8 @@ fn layers(ran: &Ran, multi_layer: bool) -> Vec<report::LayerEstimate> {
         friction_ns_per_m2: multi_layer.then_some(e.friction),
         friction_ns_per_m: (!multi_layer).then_some(e.friction),
         thickness_m: Some(e.thickness_m),
+        stiffness_doubt: (e.stiffness_sd > 0.0).then_some(stylet_stats::Z95 * e.stiffness_sd),
+        friction_doubt: (e.friction_sd > 0.0).then_some(stylet_stats::Z95 * e.friction_sd),
         ..report::LayerEstimate::default()
     };
     let Some(score) = &ran.score else {

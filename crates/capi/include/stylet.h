@@ -57,6 +57,8 @@ typedef enum StyletState {
   STYLET_FORCE_DROP_MEASURING = 3,
   // The traversed layer is re-estimated and its friction compensated.
   STYLET_FORCE_COMPENSATION = 4,
+  // `Stylet` alone: the tip is in a gap or behind the last layer and feels nothing.
+  STYLET_FREE_TIP = 5,
 } StyletState;
 
 // The core. Its size is `stylet_size`.

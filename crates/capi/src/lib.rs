@@ -64,6 +64,8 @@ pub enum StyletState {
     StyletForceDropMeasuring = 3,
     /// The traversed layer is re-estimated and its friction compensated.
     StyletForceCompensation = 4,
+    /// `Stylet` alone: the tip is in a gap or behind the last layer and feels nothing.
+    StyletFreeTip = 5,
 }
 
 /// Configuration. Fill it by `stylet_default_config` and change what is to differ.

@@ -277,7 +277,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Paper<B> {
     fn advance(&mut self, sample: Sample, seen: Seen, before: [f64; 2]) {
         let dt_s = seen.dt_s;
         match self.out.state {
-            State::NoRupture | State::ExpectedRupture => {
+            State::NoRupture | State::ExpectedRupture | State::FreeTip => {
                 self.watch(sample, seen, before);
             }
             State::DetectedRupture => {

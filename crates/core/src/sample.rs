@@ -30,7 +30,7 @@ impl Sample {
     }
 }
 
-/// The states of the supplement's Fig. 1.
+/// The states of the supplement's Fig. 1, and one of this project's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum State {
@@ -45,10 +45,12 @@ pub enum State {
     ForceDropMeasuring,
     /// The traversed layer is re-estimated and its friction compensated.
     ForceCompensation,
+    /// `Stylet` alone, not in the supplement: the tip is in a gap or behind the last layer and feels nothing.
+    FreeTip,
 }
 
 impl State {
-    /// Every state, in the order of the supplement's Fig. 1.
+    /// Every state of the paper's algorithm, in the order of the supplement's Fig. 1.
     pub const ALL: [State; 5] = [
         State::NoRupture,
         State::ExpectedRupture,
@@ -57,7 +59,7 @@ impl State {
         State::ForceCompensation,
     ];
 
-    /// The name in the supplement's Fig. 1, without blanks.
+    /// The name, that of the supplement's Fig. 1 without blanks where it is there.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -66,6 +68,7 @@ impl State {
             State::DetectedRupture => "DetectedRupture",
             State::ForceDropMeasuring => "ForceDropMeasuring",
             State::ForceCompensation => "ForceCompensation",
+            State::FreeTip => "FreeTip",
         }
     }
 }

@@ -80,7 +80,13 @@ impl Stylet {
             }
         }
         let out = &mut self.out;
-        out.state = if out.detection.is_some() { State::DetectedRupture } else { State::NoRupture };
+        out.state = if out.detection.is_some() {
+            State::DetectedRupture
+        } else if self.layers.free && !retracting && !self.dry {
+            State::FreeTip
+        } else {
+            State::NoRupture
+        };
         self.behind_variance = behind_variance;
         let out = &mut self.out;
         out.cumulative_friction_ns_per_m = behind;

@@ -20,6 +20,7 @@ STATES = (
     "DetectedRupture",
     "ForceDropMeasuring",
     "ForceCompensation",
+    "FreeTip",
 )
 """Names of the numbers in a column `state`."""
 

@@ -9,6 +9,8 @@ use crate::palette::Colour;
 /// Charts over time move together under this name.
 pub(super) const TIME: &str = "time";
 pub(super) const TIME_LABEL: &str = "Time (s)";
+/// The state in which the tip feels nothing.
+const FREE: &str = "FreeTip";
 const BENT: &str = "Proportional up to the threshold, logarithmic beyond.";
 
 pub(super) fn force_section(report: &RunReport) -> Section {
@@ -41,13 +43,20 @@ pub(super) fn force_chart(report: &RunReport) -> Chart {
         let name = report.label(combination, "enhanced");
         let series = Series::line(name, Colour::nth(index), report.time_s.clone(), force).width(1.8);
         chart = chart.with_series(report.visible_below(series, index));
+        if single {
+            // Where the tip's force lies with 95 % probability.
+            for (name, edge_n) in [("2.5 %", &combination.low_n), ("97.5 %", &combination.high_n)] {
+                let edge = Series::line(name, Colour::SkyBlue, report.time_s.clone(), edge_n.clone());
+                chart = chart.with_series(edge.width(0.8).styled(LineStyle::Dashed));
+            }
+        }
     }
     if let Some(truth) = &report.truth {
         let tip =
             Series::line("true tip force", Colour::Ink, report.time_s.clone(), truth.tip_force_n.clone());
         chart = chart.with_series(tip.styled(LineStyle::Dashed).width(1.6));
     }
-    chart.series.retain(|series| !series.y.is_empty());
+    chart.series.retain(|series| series.y.iter().any(|y| y.is_finite()));
     if report.truth.is_none() {
         chart.caption = "No truth is known; shaded: the layers as found.".to_owned();
     }
@@ -129,8 +138,15 @@ pub(super) fn layer_bands(report: &RunReport) -> Vec<Band> {
     let mut faces = vec![contact];
     faces.extend(combination.detections.iter().map(|d| d.time_s));
     faces.push(end);
-    let spans = faces.windows(2).enumerate().map(|(i, pair)| (pair[0], pair[1], format!("layer {}", i + 1)));
-    spans.enumerate().map(band).collect()
+    // In a gap, and behind the last layer, there is no layer.
+    let free = |from: f64, to: f64| {
+        combination.states.iter().find(move |s| s.state == FREE && s.from_s >= from && s.from_s < to)
+    };
+    let spans = faces.windows(2).enumerate().map(|(i, pair)| {
+        let from = free(pair[0], pair[1]).map_or(pair[0], |s| s.to_s.min(pair[1]));
+        (from, pair[1], format!("layer {}", i + 1))
+    });
+    spans.enumerate().map(band).filter(|b| b.to > b.from).collect()
 }
 
 /// Nothing to draw.

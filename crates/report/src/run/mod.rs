@@ -118,12 +118,18 @@ pub struct LayerEstimate {
     pub time_s: f64,
     /// Re-weighted stiffness.
     pub stiffness_n_per_m: Option<f64>,
+    /// Half its 95 % interval, where the algorithm tells.
+    #[serde(default)]
+    pub stiffness_doubt: Option<f64>,
     /// Its relative error.
     pub stiffness_error: Option<f64>,
     /// Re-weighted friction per metre of needle (ML model).
     pub friction_ns_per_m2: Option<f64>,
     /// Re-weighted friction of the whole layer (KV model).
     pub friction_ns_per_m: Option<f64>,
+    /// Half the 95 % interval of the friction, where the algorithm tells.
+    #[serde(default)]
+    pub friction_doubt: Option<f64>,
     /// Relative error of the friction.
     pub friction_error: Option<f64>,
     /// Estimated thickness.
@@ -191,6 +197,12 @@ pub struct Combination {
     pub reconstructed_force_n: Vec<f64>,
     /// Enhanced force `f - D v`.
     pub enhanced_force_n: Vec<f64>,
+    /// Where the tip's force lies with 95 % probability; not numbers where the algorithm does not tell.
+    #[serde(default)]
+    pub low_n: Vec<f64>,
+    /// See `low_n`.
+    #[serde(default)]
+    pub high_n: Vec<f64>,
     /// Online stiffness.
     pub stiffness_n_per_m: Vec<f64>,
     /// Online friction per metre of needle (ML model); empty for KV.

@@ -20,6 +20,12 @@ fn number(value: Option<f64>, scale: f64) -> Cell {
     value.map_or_else(dash, |v| Cell::number(significant(v * scale, 4)))
 }
 
+/// A number with what it may be off by with 95 % probability, where that is known.
+fn doubted(value: Option<f64>, doubt: Option<f64>, scale: f64) -> Cell {
+    let (Some(v), Some(d)) = (value, doubt) else { return number(value, scale) };
+    Cell::number(format!("{} ± {}", significant(v * scale, 4), significant(d * scale, 2)))
+}
+
 fn error(value: Option<f64>) -> Cell {
     value.map_or_else(dash, |e| Cell::number(percent(e)).status(error_status(e)))
 }
@@ -100,6 +106,7 @@ struct Row {
     scale: f64,
     truth: fn(&super::TrueLayer) -> f64,
     estimate: fn(&LayerEstimate) -> Option<f64>,
+    doubt: fn(&LayerEstimate) -> Option<f64>,
     offline: fn(&LayerEstimate) -> Option<f64>,
     error: fn(&LayerEstimate) -> Option<f64>,
 }
@@ -110,6 +117,7 @@ const ROWS: [Row; 4] = [
         scale: 1.0,
         truth: |l| l.stiffness_n_per_m,
         estimate: |l| l.stiffness_n_per_m,
+        doubt: |l| l.stiffness_doubt,
         offline: |l| l.offline_stiffness_n_per_m,
         error: |l| l.stiffness_error,
     },
@@ -118,6 +126,7 @@ const ROWS: [Row; 4] = [
         scale: 1.0,
         truth: |l| l.friction_ns_per_m2,
         estimate: |l| l.friction_ns_per_m2,
+        doubt: |l| l.friction_doubt,
         offline: |l| l.offline_friction_ns_per_m2,
         error: |l| l.friction_error,
     },
@@ -126,6 +135,7 @@ const ROWS: [Row; 4] = [
         scale: 1.0,
         truth: |l| l.friction_ns_per_m2 * l.thickness_m,
         estimate: |l| l.friction_ns_per_m,
+        doubt: |_| None,
         offline: |l| l.offline_friction_ns_per_m,
         error: |l| l.friction_error,
     },
@@ -134,6 +144,7 @@ const ROWS: [Row; 4] = [
         scale: 1e3,
         truth: |l| l.thickness_m,
         estimate: |l| l.thickness_m,
+        doubt: |_| None,
         offline: |_| None,
         error: |l| l.thickness_error,
     },
@@ -164,7 +175,7 @@ fn layer_table(report: &RunReport) -> Table {
             }
             for estimate in estimates {
                 let value = estimate.and_then(quantity.estimate);
-                row.push(number(value, quantity.scale));
+                row.push(doubted(value, estimate.and_then(quantity.doubt), quantity.scale));
                 if known {
                     row.push(error(value.and(estimate.and_then(quantity.error))));
                 }

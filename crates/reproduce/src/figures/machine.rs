@@ -15,6 +15,8 @@ const fn place(state: State) -> (f64, f64) {
         State::DetectedRupture => (950.0, 160.0),
         State::ForceDropMeasuring => (950.0, 360.0),
         State::ForceCompensation => (170.0, 360.0),
+        // Not one of the paper's, and not drawn.
+        State::FreeTip => (0.0, 0.0),
     }
 }
 
