@@ -236,6 +236,7 @@ fn combination(
             offline_stiffness_n_per_m: Some(layer.stiffness_n_per_m * (1.0 + 0.4 * k)),
             offline_friction_ns_per_m2: (!kv).then_some(layer.friction_ns_per_m2 * (1.0 - 0.3 * b)),
             offline_friction_ns_per_m: None,
+            ..Default::default()
         });
         out.score.get_or_insert_default().ruptures.push(RuptureScore {
             layer: i + 1,
