@@ -7,7 +7,7 @@
 //!
 //! The noise is what is left, its slow wander over tens of seconds and through breaks included
 //! ([`From::Lasting`](stylet_identify::noise::From)), and as much as the fitted numbers have taken from it is given back
-//! ([`told_again`](crate::told_again)); and where a face lies is told by moving it as far as it is uncertain.
+//! (`told_again`); and where a face lies is told by moving it as far as it is uncertain.
 
 use crate::outcome::Estimate;
 use crate::told_again::told_again;

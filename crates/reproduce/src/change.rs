@@ -35,6 +35,8 @@ pub enum Number {
     AbdomenFriction,
     /// Way in air between start and contact.
     Start,
+    /// Time that the motion goes on for after the target has been passed.
+    Behind,
     /// Noise of the arm's joint torques.
     TorqueNoise,
     /// `s1` with which the virtual sensor is listened to.
@@ -58,7 +60,7 @@ impl Serialize for Change {
 
 impl Number {
     /// All.
-    pub const ALL: [Number; 16] = [
+    pub const ALL: [Number; 17] = [
         Number::Noise,
         Number::GelStiffness,
         Number::GelFriction,
@@ -73,6 +75,7 @@ impl Number {
         Number::AbdomenStiffness,
         Number::AbdomenFriction,
         Number::Start,
+        Number::Behind,
         Number::TorqueNoise,
         Number::VirtualSigma,
     ];
@@ -95,6 +98,7 @@ impl Number {
             Number::AbdomenStiffness => "K of the abdomen",
             Number::AbdomenFriction => "b of the abdomen",
             Number::Start => "way in air before contact",
+            Number::Behind => "time behind the target",
             Number::TorqueNoise => "noise of the joint torques",
             Number::VirtualSigma => "s1 for the virtual sensor",
         }
@@ -120,6 +124,8 @@ impl Number {
             | Number::LiverThickness => case.is_liver(),
             Number::AbdomenStiffness | Number::AbdomenFriction => case.is_abdomen(),
             Number::Start => true,
+            // The abdomen's motion ends in the kidney.
+            Number::Behind => !case.is_abdomen(),
             Number::TorqueNoise => case.on_arm(),
         }
     }
@@ -162,7 +168,11 @@ impl Change {
                     layer.puncture_n = layer.puncture_n.map(|f| f * factor);
                 }
                 Number::LiverThickness => layer.thickness_m *= factor,
-                Number::Noise | Number::Start | Number::TorqueNoise | Number::VirtualSigma => {}
+                Number::Noise
+                | Number::Start
+                | Number::Behind
+                | Number::TorqueNoise
+                | Number::VirtualSigma => {}
             }
         }
         if let (Number::Start, Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. }) =
@@ -170,12 +180,35 @@ impl Change {
         {
             *start_m *= factor;
         }
+        if let (Number::Behind, Some(out_s)) = (self.number, out_of_the_target_s(scenario))
+            && let Motion::Constant { duration_s, .. } | Motion::Sinusoidal { duration_s, .. } =
+                &mut scenario.motion
+        {
+            *duration_s = out_s + factor * (*duration_s - out_s);
+        }
         if let (Number::TorqueNoise, Sensor::Both { virtual_sensor, .. } | Sensor::Virtual(virtual_sensor)) =
             (self.number, &mut scenario.sensor)
         {
             virtual_sensor.torque_noise_nm *= factor;
         }
     }
+}
+
+/// When the ideal motion passes the last far face, in s; `None` when it never does.
+fn out_of_the_target_s(scenario: &Scenario) -> Option<f64> {
+    let tissue = &scenario.tissue;
+    let far_m = tissue.surface_m + tissue.layers.iter().map(|l| l.thickness_m).sum::<f64>();
+    let plan = scenario.motion.plan()?;
+    let end_s = plan.duration_s();
+    if plan.at(end_s).position_m <= far_m {
+        return None;
+    }
+    let (mut before_s, mut after_s) = (0.0, end_s);
+    for _ in 0..60 {
+        let mid_s = 0.5 * (before_s + after_s);
+        *if plan.at(mid_s).position_m > far_m { &mut after_s } else { &mut before_s } = mid_s;
+    }
+    Some(after_s)
 }
 
 #[cfg(test)]

@@ -149,9 +149,9 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
         .collect();
     let fixed: [(&str, &str, String); 10] = [
         (
-            "duration of the motions",
-            "10 to 50 s",
-            "not tried; the air behind the target is in the RMS of claims c1, g, h1 and i, over and under the line alike".to_owned(),
+            "duration of the abdomen's motion",
+            "15 s",
+            "not tried: it ends in the kidney, before the last face; the durations of all others are in the table above".to_owned(),
         ),
         (
             "the 2 mm blind travel, guards, straight-line drops",

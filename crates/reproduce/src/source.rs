@@ -177,13 +177,14 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
         let values: Vec<String> = scenario.tissue.layers.iter().map(text).collect();
         add("puncture force", format!("{} N", values.join(" / ")), puncture.0, puncture.1, number[3]);
     }
+    let behind = Number::Behind.enters(case).then_some(Number::Behind);
     match scenario.motion {
         Motion::Constant { start_m, velocity_mps, duration_s } => {
             let speed = format!("{} mm/s", significant(velocity_mps * 1e3, 3));
             add("speed", speed, Class::Paper, "S sec. III", None);
             let start = format!("{} mm", significant(-start_m * 1e3, 3));
             add("way in air", start, Class::Ours, "air to learn the noise in", Some(Number::Start));
-            add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, "air behind", None);
+            add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, "air behind", behind);
         }
         Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, duration_s, .. } => {
             let motion = format!(
@@ -195,7 +196,7 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
             let start = format!("{} mm", significant(-start_m * 1e3, 3));
             add("way in air", start, Class::Ours, "with it the speed at contact", Some(Number::Start));
             let why = "a quarter period or less";
-            add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, why, None);
+            add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, why, behind);
         }
         _ => {}
     }

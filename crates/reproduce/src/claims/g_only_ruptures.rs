@@ -14,7 +14,7 @@ const POORLY: Bar = Bar::Above(2.0);
 const TARGETS: [Case; 3] = [Case::Gel70Constant, Case::LatexSinusoidal, Case::Liver];
 
 /// The numbers of ours in one gel, stack and liver.
-pub(super) const NUMBERS: [Number; 12] = [
+pub(super) const NUMBERS: [Number; 13] = [
     Number::Noise,
     Number::GelStiffness,
     Number::GelFriction,
@@ -27,6 +27,7 @@ pub(super) const NUMBERS: [Number; 12] = [
     Number::LiverPuncture,
     Number::LiverThickness,
     Number::Start,
+    Number::Behind,
 ];
 
 fn ratio(view: &View<'_>, cases: &[Case]) -> Measured {

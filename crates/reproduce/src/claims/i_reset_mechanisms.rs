@@ -43,7 +43,7 @@ fn enhanced(outcome: &Outcome) -> Option<f64> {
     outcome.score.enhancement.rms_relative
 }
 
-const NUMBERS: [Number; 14] = [
+const NUMBERS: [Number; 15] = [
     Number::Noise,
     Number::GelStiffness,
     Number::GelFriction,
@@ -58,6 +58,7 @@ const NUMBERS: [Number; 14] = [
     Number::AbdomenStiffness,
     Number::AbdomenFriction,
     Number::Start,
+    Number::Behind,
 ];
 
 pub(super) fn definition() -> Definition {
