@@ -44,7 +44,7 @@ pub(crate) struct Layers {
     /// It is beyond doubt that a layer has begun.
     pub(super) settled: bool,
     /// Travel of the gap behind the layer before, in which its friction went on to grow, and how well it is known.
-    gap_m: f64,
+    pub(super) gap_m: f64,
     gap_sd_m: f64,
     /// How well the begin of the active layer is known, and that of the layer before was, in m.
     start_sd_m: f64,

@@ -33,7 +33,7 @@ impl Stylet {
             friction: b,
             drop_n: drop,
             elastic_share: (k / (k + b * self.steady)).clamp(0.0, 1.0),
-            added_friction_ns_per_m: b * d,
+            added_friction_ns_per_m: b * (d + l.gap_m),
             time_s: sample.time_s,
             stiffness_sd: libm::sqrt(vk.max(0.0)),
             friction_sd: libm::sqrt(vb.max(0.0)),

@@ -86,6 +86,10 @@ fn stiffness_friction_and_drops_are_right_within_their_intervals() {
                 of += 1;
             }
         }
+        // With what the shaft has gone on to enter in the gap.
+        let added: f64 = layers.iter().map(|e| e.added_friction_ns_per_m).sum();
+        let whole: f64 = tissue.layers.iter().map(|l| l.friction_ns_per_m2 * l.thickness_m).sum();
+        assert!((added - whole).abs() < 0.03 * whole, "seed {seed}: {added} of {whole} N s/m");
         // The fall of the force as it is told at once.
         for (d, truth) in outputs.iter().filter_map(|o| o.detection).zip(DROPS_N) {
             assert!((d.drop_n - truth).abs() < 0.1, "seed {seed}: {d:?} for a drop of {truth} N");
