@@ -13,8 +13,8 @@ use stylet_core::LayerEstimate;
 use stylet_core::config::Model;
 use stylet_record::{ColumnMap, QualityNote, ReadOptions, Recording, read_csv, write_csv};
 use stylet_report::run::{ForceTrace, Provenance, RunReport};
-use stylet_report::significant;
 use stylet_report::svg::FigureOptions;
+use stylet_report::{plus_minus, significant};
 use stylet_scenario::{EnhanceFile, ron_options};
 use stylet_score::Trace;
 
@@ -56,7 +56,6 @@ struct Certain {
 
 impl Certain {
     fn of(e: &LayerEstimate) -> Option<Self> {
-        let around = |value: f64, sd: f64| [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd];
         (e.stiffness_sd > 0.0).then(|| Self {
             stiffness_interval: around(e.stiffness_n_per_m, e.stiffness_sd),
             friction_interval: around(e.friction, e.friction_sd),
@@ -67,10 +66,9 @@ impl Certain {
     }
 }
 
-/// A number with what it may be off by with 95 % probability, where that is known.
-fn with_doubt(value: f64, sd: f64) -> String {
-    let value = significant(value, 3);
-    if sd > 0.0 { format!("{value} ± {}", significant(stylet_stats::Z95 * sd, 2)) } else { value }
+/// The 95 % interval of a number with this standard deviation.
+fn around(value: f64, sd: f64) -> [f64; 2] {
+    [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd]
 }
 
 /// What the core found, per model.
@@ -127,11 +125,11 @@ fn events(trace: &Trace) -> Vec<Event> {
                 (None, Some(e)) => (Some(e.drop_n), told(e.drop_sd_n)),
                 (None, None) => (None, None),
             };
-            let end = |sign: f64| value.zip(sd).map(|(value, sd)| value + sign * 1.96 * sd);
+            let interval = value.zip(sd).map(|(value, sd)| around(value, sd));
             Event {
                 time_s: d.time_s,
                 position_m: d.position_m,
-                drop_n: DropSize { value, low: end(-1.0), high: end(1.0) },
+                drop_n: DropSize { value, low: interval.map(|i| i[0]), high: interval.map(|i| i[1]) },
                 confidence: told(d.confidence),
             }
         })
@@ -351,14 +349,16 @@ fn summary(
             );
         }
         for e in &r.trace.estimates {
+            let shown =
+                |value: f64, sd: f64| plus_minus(value, (sd > 0.0).then_some(stylet_stats::Z95 * sd), 3);
             let _ = writeln!(
                 out,
                 "  layer {}: {:.2} mm, K {} N/m, b {} {unit}, drop {} N",
                 e.layer,
                 e.thickness_m * 1e3,
-                with_doubt(e.stiffness_n_per_m, e.stiffness_sd),
-                with_doubt(e.friction, e.friction_sd),
-                with_doubt(e.drop_n, e.drop_sd_n),
+                shown(e.stiffness_n_per_m, e.stiffness_sd),
+                shown(e.friction, e.friction_sd),
+                shown(e.drop_n, e.drop_sd_n),
             );
         }
         if r.trace.estimates.iter().any(|e| e.stiffness_sd > 0.0) {

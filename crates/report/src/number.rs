@@ -13,6 +13,13 @@ pub fn significant(value: f64, digits: usize) -> String {
     out
 }
 
+/// A number with what it may be off by, where that is known: `40 ± 0.15`.
+#[must_use]
+pub fn plus_minus(value: f64, doubt: Option<f64>, digits: usize) -> String {
+    let value = significant(value, digits);
+    doubt.map_or_else(|| value.clone(), |d| format!("{value} ± {}", significant(d, 2)))
+}
+
 /// A ratio as percentage with two significant digits (three from 10 % on): `0.0361` gives `3.6 %`.
 #[must_use]
 pub fn percent(ratio: f64) -> String {

@@ -271,12 +271,6 @@ impl Layers {
         self.last = None;
     }
 
-    /// Friction per drive that has come on since the layer before gave way, with the tip still free.
-    #[inline(always)]
-    pub(crate) fn entered(&self, position_m: f64) -> f64 {
-        if self.free { self.belief.x[F] * at_least(0.0, position_m - self.start_m) } else { 0.0 }
-    }
-
     /// Friction along the shaft that the tip does not feel, per drive, with the tip at `position_m`; and its variance in squared
     /// units (N s/m for a viscous drive).
     #[inline(always)]
@@ -315,7 +309,7 @@ impl Layers {
 
     /// Friction per drive that the passed layers exert with the tip at `z_m` on the way back, each with its friction spread
     /// evenly over its thickness.
-    pub(crate) fn around_shaft(&self, behind: &Behind, z_m: f64, deepest_m: f64) -> f64 {
+    pub(crate) fn around_shaft(&self, behind: &Behind, z_m: f64, deepest_m: f64, noise: &Noise) -> f64 {
         let last = self.passed.min(MAX_LAYERS);
         let (mut whole, mut inside) = (0.0, 0.0);
         for (i, [start, end, b]) in behind.iter().take(last).enumerate() {
@@ -324,7 +318,7 @@ impl Layers {
             inside += b * (z_m - start).clamp(0.0, end - start);
         }
         // The sum is known better than its parts.
-        let all = (self.belief.x[A] + self.entered(deepest_m)).max(0.0);
+        let all = self.behind(deepest_m, noise).0.max(0.0);
         let share = if whole > 0.0 { inside / whole } else { 1.0 };
         all * share
     }

@@ -56,7 +56,7 @@ impl Stylet {
         behind = at_least(0.0, behind);
         if retracting && self.in_tissue {
             self.work += WORK_BACK;
-            behind = self.layers.around_shaft(&self.behind, sample.position_m, self.deepest_m);
+            behind = self.layers.around_shaft(&self.behind, sample.position_m, self.deepest_m, &self.noise);
         }
         let u = self.drive;
         let mut friction = behind * u;
@@ -82,7 +82,7 @@ impl Stylet {
         let out = &mut self.out;
         out.state = if out.detection.is_some() {
             State::DetectedRupture
-        } else if self.layers.free && !retracting && !self.dry {
+        } else if self.layers.free && !self.dry {
             State::FreeTip
         } else {
             State::NoRupture

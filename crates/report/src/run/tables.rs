@@ -2,7 +2,7 @@
 
 use super::scorecard::{delay_status, error_status, millimetres, milliseconds};
 use super::{Combination, LayerEstimate, RunReport, Score};
-use crate::number::{percent, significant};
+use crate::number::{percent, plus_minus, significant};
 use crate::page::{Cell, Section, Status, Table};
 
 pub(super) fn section(report: &RunReport) -> Section {
@@ -17,13 +17,12 @@ fn dash() -> Cell {
 }
 
 fn number(value: Option<f64>, scale: f64) -> Cell {
-    value.map_or_else(dash, |v| Cell::number(significant(v * scale, 4)))
+    doubted(value, None, scale)
 }
 
 /// A number with what it may be off by with 95 % probability, where that is known.
 fn doubted(value: Option<f64>, doubt: Option<f64>, scale: f64) -> Cell {
-    let (Some(v), Some(d)) = (value, doubt) else { return number(value, scale) };
-    Cell::number(format!("{} ± {}", significant(v * scale, 4), significant(d * scale, 2)))
+    value.map_or_else(dash, |v| Cell::number(plus_minus(v * scale, doubt.map(|d| d * scale), 4)))
 }
 
 fn error(value: Option<f64>) -> Cell {

@@ -1,7 +1,7 @@
 //! (c1) Behind the layer the multi-layer model's enhanced force is nearer to zero than Kelvin-Voigt's; (c2) on
 //! the liver the multi-layer model renders the elastic part better.
 
-use super::{Definition, GELS_AND_BEHIND, KNOWN, PUBLISHED, known, protocol, published};
+use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
 use crate::case::Case;
 use crate::change::Number;
 use crate::effect::{Bar, Measured, Part, Scale};
@@ -35,10 +35,15 @@ const CONSTANT: [Case; 2] = [Case::Gel25Constant, Case::Gel50Constant];
 const SINUSOIDAL: [Case; 2] = [Case::Gel25Sinusoidal, Case::Gel50Sinusoidal];
 
 pub(super) fn behind_the_gel() -> Definition {
-    Definition::new(protocol!("c1"), |v| behind(v, &CONSTANT), Bar::Below(1.0), &GELS_AND_BEHIND)
-        .also("sinusoidal velocity (Figs 5 and 6)", |v| behind(v, &SINUSOIDAL))
-        .also(KNOWN, |v| behind(&known(v), &CONSTANT))
-        .also(PUBLISHED, |v| behind(&published(v), &CONSTANT))
+    Definition::new(
+        protocol!("c1"),
+        |v| behind(v, &CONSTANT),
+        Bar::Below(1.0),
+        &[&GELS[..], &[Number::Behind]].concat(),
+    )
+    .also("sinusoidal velocity (Figs 5 and 6)", |v| behind(v, &SINUSOIDAL))
+    .also(KNOWN, |v| behind(&known(v), &CONSTANT))
+    .also(PUBLISHED, |v| behind(&published(v), &CONSTANT))
 }
 
 fn liver(view: &View<'_>, case: Case, sensor: Sensor, value: fn(&Outcome) -> Option<f64>) -> Measured {

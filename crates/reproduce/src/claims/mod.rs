@@ -66,15 +66,6 @@ pub(crate) const PUBLISHED: &str = "published default tuning (s1 0.15 N, beta 0.
 /// The numbers of the single gels.
 pub(crate) const GELS: [Number; 5] =
     [Number::Noise, Number::GelStiffness, Number::GelFriction, Number::GelContrast, Number::Start];
-/// Those of claims whose errors go on behind the target.
-pub(crate) const GELS_AND_BEHIND: [Number; 6] = [
-    Number::Noise,
-    Number::GelStiffness,
-    Number::GelFriction,
-    Number::GelContrast,
-    Number::Start,
-    Number::Behind,
-];
 
 impl Definition {
     /// A claim with its primary condition.
