@@ -484,6 +484,7 @@ pub struct CaseArgs {
 Words for --wrong:
   nothing thickness surface surface_each coefficients encoder encoder_steps jitter dropped late growing tails ar1
   ar2 wander hum bits rate layers no_air recordings scatter_puncture scatter_friction scatter_surface five
+  geometry
 Words for --hide: clean one two three outside beside instrument.
 
 The folder then holds report.html with the map of where the diagnosis fails, the same as SVG, table.txt (rates with 95 %

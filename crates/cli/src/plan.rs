@@ -153,10 +153,10 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
     let tell = talker(args.quiet);
     let stand = stand(&inputs, None, &tell)?;
     tell("looking for the motion that tells most");
-    let (mut plan, _) =
+    let (mut plan, found) =
         stylet_plan::plan(&stand.ground, &bounds, &stand.begin).map_err(|e| failed(&args.limits, e))?;
     if !args.quick {
-        stylet_plan::check(&mut plan, &stand.scenario, &stand.ground, &stand.evidence, &tell)
+        plan = stylet_plan::check(&found, &bounds, &stand.scenario, &stand.ground, &stand.evidence, &tell)
             .map_err(|e| failed(&inputs.scenario, e))?;
     }
     let out = args.out.clone().unwrap_or_else(|| {

@@ -96,8 +96,10 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &Ground, plan:
             .collect();
         page = page.section(
             Section::new("Simulated and diagnosed").table(Table {
-                title: "Planned insertions simulated under each candidate and diagnosed with what is at hand"
-                    .to_owned(),
+                title:
+                    "The chosen motion simulated under each candidate and diagnosed with what is at hand; \
+                        these insertions had no part in the choice"
+                        .to_owned(),
                 headers: ["what was simulated", "named, and alone"].map(str::to_owned).to_vec(),
                 rows,
                 ..Table::default()
@@ -251,14 +253,26 @@ fn alternatives(plan: &Plan) -> Section {
                 Cell::number(significant(a.force_n, 3)),
                 Cell::number(significant(a.worst_nats, 3)),
                 Cell::number(format!("{:.0} %", 100.0 * a.probability_decided)),
+                Cell::number(if a.simulated > 0 {
+                    format!("{} of {}", a.decided, a.simulated)
+                } else {
+                    "-".to_owned()
+                }),
             ]
         })
         .collect();
     Section::new("Next best").table(Table {
         title: "Other motions; their segments stand in plan.json".to_owned(),
-        headers: ["segments", "seconds", "largest N", "worst pair, nats", "decided, by gaps"]
-            .map(str::to_owned)
-            .to_vec(),
+        headers: [
+            "segments",
+            "seconds",
+            "largest N",
+            "worst pair, nats",
+            "decided, by gaps",
+            "right, simulated",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
         rows,
         ..Table::default()
     })

@@ -1,71 +1,150 @@
-//! The honest probability: planned insertions simulated under every candidate and diagnosed together with what is at hand.
+//! The honest probability: the best motions simulated under every candidate and diagnosed together with what is at hand. The one after
+//! which the diagnosis is right most often is taken; insertions that had no part in that choice say how often it decides.
 
 use crate::candidate::NONE;
 use crate::error::PlanError;
 use crate::ground::Ground;
-use crate::plan::{Plan, Tried};
+use crate::limits::Limits;
+use crate::plan::{Plan, Tried, chosen};
+use crate::search::Searched;
 use crate::start::scenario_of;
-use std::time::Instant;
+use rayon::prelude::*;
 use stylet_diagnose::{Diagnosis, Evidence, Options, Verdict, diagnose};
-use stylet_scenario::{ForceTorque, Robot, Scenario, Sensor};
+use stylet_scenario::{ForceTorque, Motion, Robot, Scenario, Sensor};
 
-/// A check ends after so many s at the latest, once each of the likeliest candidates has been tried.
-const LONGEST_S: f64 = 45.0;
-/// Candidates that are tried, likeliest first.
-const MOST: usize = 6;
-/// Rounds at most.
-const ROUNDS: u64 = 3;
+/// Candidates under which the best motions are set against each other, likeliest first.
+const RACED: usize = 4;
+/// Candidates under which the chosen motion is tried, and how often each.
+const TRIED: usize = 6;
+const ROUNDS: u64 = 2;
+/// Samples that are diagnosed in all: some 40 s of two cores. Longer recordings mean fewer simulated insertions.
+const SAMPLES: f64 = 1.2e6;
+/// What the expected gaps count for, in simulated insertions.
+const GAPS_WEIGH: f64 = 6.0;
+/// Seeds of the insertions that choose, and of those that judge.
+const CHOOSE: u64 = 1000;
+const JUDGE: u64 = 2000;
 
-/// Simulates the planned insertion and diagnoses it with the recordings at hand; without any the scenario's own motion is
-/// simulated first. Fills the plan's `simulated` and its probability. `progress` is told what is being done.
+/// What is at hand when a motion is simulated.
+struct Bench<'a> {
+    believed: &'a Scenario,
+    ground: &'a Ground,
+    old: &'a [Evidence],
+    noise_n: f64,
+}
+
+/// Simulates the best motions of a search under the likeliest candidates, diagnoses each with the recordings at hand (without any the
+/// scenario's own motion is simulated first), and gives the plan with the motion after which most are right; ties go to the better
+/// score. `simulated` and the probability come from insertions that were not used to choose. `progress` is told what is being done.
+/// The same inputs give the same plan, whatever the machine's speed.
 ///
 /// # Errors
 /// [`PlanError`] when a planned insertion can be neither simulated nor diagnosed.
 pub fn check(
-    plan: &mut Plan,
+    found: &Searched,
+    limits: &Limits,
     believed: &Scenario,
     ground: &Ground,
     old: &[Evidence],
     mut progress: impl FnMut(&str),
-) -> Result<(), PlanError> {
-    let begun = Instant::now();
+) -> Result<Plan, PlanError> {
+    let bench = Bench { believed, ground, old, noise_n: sensor_noise(ground, believed) };
     let mut order: Vec<usize> = (0..ground.candidates.len()).collect();
     order.sort_by(|a, b| ground.candidates[*b].weight.total_cmp(&ground.candidates[*a].weight));
-    order.truncate(MOST);
-    let mut tried: Vec<Tried> =
-        order.iter().map(|k| Tried { candidate: ground.name(*k).to_owned(), of: 0, decided: 0 }).collect();
-    let sd_n = sensor_noise(ground, believed);
-    'rounds: for round in 0..ROUNDS {
-        for (k, tried) in order.iter().zip(&mut tried) {
-            if round > 0 && begun.elapsed().as_secs_f64() > LONGEST_S * round as f64 / (round + 1) as f64 {
-                break 'rounds;
-            }
-            progress(&format!("simulating and diagnosing: {} ({})", tried.candidate, round + 1));
-            let mut evidence = old.to_vec();
-            if evidence.is_empty() && believed.motion.plan().is_some() {
-                evidence.push(simulated(believed, ground, *k, &believed.motion, sd_n, 7 + round)?);
-            }
-            evidence.push(simulated(believed, ground, *k, &plan.motion, sd_n, 1000 + round)?);
-            let said = diagnose(believed, &evidence, &Options { brief: true }, |_| {})?.diagnosis;
-            tried.of += 1;
-            tried.decided += usize::from(right(&said, ground, *k));
+    order.truncate(TRIED);
+    // What the chosen motion's own insertions leave goes into the choice.
+    let affordable = (SAMPLES / samples(found, ground, old)).max(1.0) as usize;
+    let rounds = ((affordable / 2 / order.len().max(1)) as u64).clamp(1, ROUNDS);
+    let left = affordable.saturating_sub(rounds as usize * order.len());
+    let raced = &order[..order.len().min(RACED)];
+    let racing = (left / raced.len().max(1)).min(found.best.len());
+    let mut outcomes: Vec<Vec<bool>> = Vec::new();
+    if racing > 1 {
+        for (k, motion) in found.best.iter().take(racing).enumerate() {
+            progress(&format!(
+                "motion {} of {racing}: simulating and diagnosing {} candidates",
+                k + 1,
+                raced.len()
+            ));
+            let jobs: Vec<(usize, u64)> = raced.iter().map(|c| (*c, CHOOSE)).collect();
+            outcomes.push(bench.try_all(&motion.motion, &jobs)?);
         }
     }
-    let weight = |name: &str| ground.candidates.iter().find(|c| c.name == name).map_or(0.0, |c| c.weight);
-    let sum: f64 = tried.iter().filter(|t| t.of > 0).map(|t| weight(&t.candidate)).sum();
+    // Weighed by how likely each candidate is; the first of equals.
+    let worth = |of: &[bool]| -> f64 {
+        raced.iter().zip(of).filter(|(_, right)| **right).map(|(c, _)| ground.candidates[*c].weight).sum()
+    };
+    let which = outcomes
+        .iter()
+        .enumerate()
+        .fold((0, f64::NEG_INFINITY), |best, (k, of)| {
+            let worth = worth(of);
+            if worth > best.1 + 1e-9 { (k, worth) } else { best }
+        })
+        .0;
+    let mut plan = chosen(ground, limits, found, which)?;
+    let others = (0..found.best.len()).filter(|k| *k != which);
+    for (alternative, k) in plan.alternatives.iter_mut().zip(others) {
+        let of = outcomes.get(k).map_or(&[][..], Vec::as_slice);
+        alternative.simulated = of.len();
+        alternative.decided = of.iter().filter(|right| **right).count();
+    }
+    let mut tried: Vec<Tried> =
+        order.iter().map(|c| Tried { candidate: ground.name(*c).to_owned(), of: 0, decided: 0 }).collect();
+    for round in 0..rounds {
+        progress(&format!("the chosen motion, {} of {rounds}: {} candidates", round + 1, order.len()));
+        let jobs: Vec<(usize, u64)> = order.iter().map(|c| (*c, JUDGE + round)).collect();
+        for (tried, right) in tried.iter_mut().zip(bench.try_all(&plan.motion, &jobs)?) {
+            tried.of += 1;
+            tried.decided += usize::from(right);
+        }
+    }
+    let weights: Vec<f64> = order.iter().map(|c| ground.candidates[*c].weight).collect();
+    let sum: f64 = weights.iter().sum();
     if sum > 0.0 {
         // One success and one failure beforehand (Laplace): a few insertions make nobody sure.
         let share = |t: &Tried| (t.decided as f64 + 1.0) / (t.of as f64 + 2.0);
-        let seen: f64 =
-            tried.iter().filter(|t| t.of > 0).map(|t| weight(&t.candidate) * share(t)).sum::<f64>() / sum;
-        let count: usize = tried.iter().map(|t| t.of).sum();
-        // Gaps weigh as much as six insertions.
-        let n = count as f64;
-        plan.probability_decided = (n * seen + 6.0 * plan.probability_decided) / (n + 6.0);
+        let seen = tried.iter().zip(&weights).map(|(t, w)| w * share(t)).sum::<f64>() / sum;
+        let n = tried.iter().map(|t| t.of).sum::<usize>() as f64;
+        plan.probability_decided = (n * seen + GAPS_WEIGH * plan.probability_decided) / (n + GAPS_WEIGH);
         plan.probability_from = "simulated".to_owned();
     }
     plan.simulated = tried;
-    Ok(())
+    Ok(plan)
+}
+
+/// Samples of one diagnosis: the recordings at hand and the longest of the motions.
+fn samples(found: &Searched, ground: &Ground, old: &[Evidence]) -> f64 {
+    let longest =
+        found.best.iter().filter_map(|f| f.motion.plan()).map(|p| p.duration_s()).fold(0.0, f64::max);
+    let known: usize = old.iter().map(|e| e.recording.len()).sum();
+    known as f64 + longest * ground.sample_hz * if old.is_empty() { 2.0 } else { 1.0 }
+}
+
+impl Bench<'_> {
+    /// Whether the diagnosis is right after one insertion, per candidate and seed.
+    fn try_all(&self, motion: &Motion, jobs: &[(usize, u64)]) -> Result<Vec<bool>, PlanError> {
+        jobs.par_iter().map(|(candidate, seed)| self.once(motion, *candidate, *seed)).collect()
+    }
+
+    fn once(&self, motion: &Motion, candidate: usize, seed: u64) -> Result<bool, PlanError> {
+        let mut evidence = self.old.to_vec();
+        if evidence.is_empty() && self.believed.motion.plan().is_some() {
+            evidence.push(self.simulated(candidate, &self.believed.motion, seed + 7)?);
+        }
+        evidence.push(self.simulated(candidate, motion, seed)?);
+        let said = diagnose(self.believed, &evidence, &Options { brief: true }, |_| {})?.diagnosis;
+        Ok(right(&said, self.ground, candidate))
+    }
+
+    fn simulated(&self, candidate: usize, motion: &Motion, seed: u64) -> Result<Evidence, PlanError> {
+        let mut scenario = scenario_of(self.believed, self.ground, candidate, motion);
+        scenario.robot = Robot::Replay;
+        scenario.sensor =
+            Sensor::ForceTorque(ForceTorque { noise_n: self.noise_n, ..ForceTorque::default() });
+        let recording = stylet_testbed::simulate(&scenario, seed)?.recording;
+        Ok(Evidence { name: format!("planned {seed}"), recording, notes: Vec::new() })
+    }
 }
 
 /// Standard deviation of a sample's noise in N.
@@ -77,21 +156,6 @@ fn sensor_noise(ground: &Ground, believed: &Scenario) -> f64 {
         .map_or(0.0, |s| s.noise_n)
         .min(ground.noise.sd_n() * samples.sqrt())
         .max(1e-4)
-}
-
-fn simulated(
-    believed: &Scenario,
-    ground: &Ground,
-    which: usize,
-    motion: &stylet_scenario::Motion,
-    noise_n: f64,
-    seed: u64,
-) -> Result<Evidence, PlanError> {
-    let mut scenario = scenario_of(believed, ground, which, motion);
-    scenario.robot = Robot::Replay;
-    scenario.sensor = Sensor::ForceTorque(ForceTorque { noise_n, ..ForceTorque::default() });
-    let recording = stylet_testbed::simulate(&scenario, seed)?.recording;
-    Ok(Evidence { name: format!("planned {seed}"), recording, notes: Vec::new() })
 }
 
 /// Whether a diagnosis names the candidate, and beside it only what the stem has.

@@ -54,6 +54,10 @@ pub struct Alternative {
     pub force_n: f64,
     /// Duration in s.
     pub duration_s: f64,
+    /// Insertions simulated and diagnosed when the best motions were set against each other.
+    pub simulated: usize,
+    /// Those after which the diagnosis was right and alone.
+    pub decided: usize,
 }
 
 /// One candidate's simulated insertions.
@@ -79,7 +83,7 @@ pub struct Plan {
     /// Where that number comes from: `gaps` (the expected gaps and how often the diagnosis is right when everything can be
     /// seen) or `simulated` (insertions simulated and diagnosed).
     pub probability_from: String,
-    /// Simulated insertions.
+    /// Simulated insertions, none of which helped to choose the motion.
     pub simulated: Vec<Tried>,
     /// Candidates with their probabilities before.
     pub candidates: Vec<(String, f64)>,
@@ -146,7 +150,21 @@ pub fn probability(ground: &Ground, shown: &Shown, told: &[(usize, usize)]) -> f
 /// [`PlanError`] when limits cannot be kept or the law cannot be replayed.
 pub fn plan(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<(Plan, Searched), PlanError> {
     let found = search(ground, limits, begin)?;
-    let Some(best) = found.best.first() else {
+    let plan = chosen(ground, limits, &found, 0)?;
+    Ok((plan, found))
+}
+
+/// The plan with one of the motions that were found.
+///
+/// # Errors
+/// [`PlanError::NoForce`] when there is no such motion.
+pub(crate) fn chosen(
+    ground: &Ground,
+    limits: &Limits,
+    found: &Searched,
+    which: usize,
+) -> Result<Plan, PlanError> {
+    let Some(best) = found.best.get(which) else {
         return Err(PlanError::NoForce("no motion can be compared".to_owned()));
     };
     let known = ground.known();
@@ -173,20 +191,23 @@ pub fn plan(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<(Plan, Se
     let alternatives = found
         .best
         .iter()
-        .skip(1)
-        .map(|f| Alternative {
+        .enumerate()
+        .filter(|(k, _)| *k != which)
+        .map(|(_, f)| Alternative {
             worst_nats: if found.told.is_empty() { 0.0 } else { worst(f) },
             probability_decided: probability(ground, &f.shown, &found.told),
             force_n: f.force_n,
             duration_s: f.motion.plan().map_or(0.0, |p| p.duration_s()),
             motion: f.motion.clone(),
+            simulated: 0,
+            decided: 0,
         })
         .collect();
     let first = |a: usize, b: usize| if ground.name(a) == crate::candidate::NONE { Some(b) } else { None };
     let never =
         found.never.iter().filter_map(|(a, b)| first(*a, *b)).map(|k| ground.name(k).to_owned()).collect();
     let course = best.motion.plan();
-    let plan = Plan {
+    Ok(Plan {
         pairs,
         probability_decided: probability(ground, &best.shown, &found.told),
         probability_now: probability(ground, &known, &found.told),
@@ -203,8 +224,7 @@ pub fn plan(ground: &Ground, limits: &Limits, begin: &Begin) -> Result<(Plan, Se
         intervals: intervals(ground, &known, &best.shown),
         repeats: if ground.scatter_assumed { None } else { repeats(&ground.stem, limits) },
         looked_at: found.looked_at,
-    };
-    Ok((plan, found))
+    })
 }
 
 /// Half width of a 95 % interval in standard deviations.

@@ -1,7 +1,7 @@
 //! A planned insertion tells apart what one at constant speed leaves open, and the diagnosis of both together names it.
 
 use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
-use stylet_plan::{Limits, from_diagnosis, from_scenario, identifiability, plan};
+use stylet_plan::{Limits, check, from_diagnosis, from_scenario, identifiability, plan};
 use stylet_scenario::{Motion, Scenario};
 
 const LIMITS: Limits =
@@ -81,4 +81,32 @@ fn the_plan_does_not_depend_on_the_number_of_threads() {
         })
     };
     assert_eq!(one(1), one(3));
+}
+
+#[test]
+fn the_best_motions_are_set_against_each_other_and_other_insertions_judge_the_winner() {
+    let scenario = believed();
+    let first = measured(&scenario.motion, 1);
+    let blind =
+        diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
+    let (ground, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
+    let (by_gaps, mut found) = plan(&ground, &LIMITS, &begin).expect("a plan");
+    found.best.truncate(2);
+    let mut told = Vec::new();
+    let checked = check(&found, &LIMITS, &scenario, &ground, std::slice::from_ref(&first), |what| {
+        told.push(what.to_owned());
+    })
+    .expect("a plan");
+    assert_eq!(checked.probability_from, "simulated");
+    assert!(found.best.iter().any(|f| f.motion == checked.motion));
+    // The other motion was simulated as well, and was not better.
+    let other = &checked.alternatives[0];
+    assert!(other.simulated > 0 && other.decided <= other.simulated);
+    assert!(checked.simulated.iter().all(|t| t.of > 0 && t.decided <= t.of));
+    // Most simulated insertions decide, and the probability printed is no other than they say.
+    let (of, decided) = checked.simulated.iter().fold((0, 0), |(n, d), t| (n + t.of, d + t.decided));
+    assert!(2 * decided > of, "{:?}", checked.simulated);
+    assert!((checked.probability_decided - decided as f64 / of as f64).abs() < 0.25);
+    assert!(checked.probability_decided > by_gaps.probability_now);
+    assert!(told.iter().any(|what| what.starts_with("motion 2 of 2")));
 }

@@ -124,6 +124,10 @@ impl Amounts {
             Wrong::ScatterPuncture => it.scatter_puncture = pick([0.01, 0.03, 0.06]),
             Wrong::ScatterFriction => it.scatter_friction = pick([0.01, 0.03, 0.06]),
             Wrong::ScatterSurface => it.scatter_surface = pick([0.01, 0.03, 0.06]),
+            Wrong::Geometry => {
+                it.thickness = pick([0.02, 0.05, 0.10]);
+                it.surface_m = pick([0.5e-3, 1e-3, 2e-3]);
+            }
             Wrong::Five => {
                 it.thickness = 0.5 * pick([0.02, 0.05, 0.10]);
                 it.surface_m = 0.5 * pick([0.5e-3, 1e-3, 2e-3]);

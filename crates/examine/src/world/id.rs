@@ -72,6 +72,7 @@ words! {
         ScatterFriction = "scatter_friction": "friction scatters by 1, 3, 6 % between recordings",
         ScatterSurface = "scatter_surface": "the surface scatters by 1, 3, 6 % of the first layer between recordings",
         Five = "five": "thickness, surface, coefficients, encoder and growing noise at once, at half the size",
+        Geometry = "geometry": "thickness and surface off at once, each as much as in its own row",
     }
 }
 
