@@ -2,7 +2,9 @@
 //!
 //! ```sh
 //! cargo run --release -p stylet-core --example speed
+//! cargo run --release -p stylet-core --example speed -- samples.bin    # the default algorithm over given samples
 //! ```
+//! `samples.bin`: four little-endian doubles a sample: s, m, m/s, N. `crates/python/speed.py` compares itself with that.
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -11,7 +13,40 @@ use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 use stylet_tissue::{Law, LawState, Tissue};
 
-fn main() {
+/// Seconds per sample of whole insertions, the least of many.
+fn least(samples: &[Sample], mut one: impl FnMut(&mut Enhancer<Vec<Sample>>) -> f64) -> (f64, f64) {
+    let (mut least, mut sum) = (f64::INFINITY, 0.0);
+    for _ in 0..100 {
+        let mut core = Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 16_384]);
+        let start = Instant::now();
+        sum += one(&mut core);
+        least = least.min(start.elapsed().as_secs_f64() / samples.len() as f64);
+    }
+    (least, sum)
+}
+
+fn given(path: &str) -> std::io::Result<()> {
+    let bytes = std::fs::read(path)?;
+    let numbers: Vec<f64> =
+        bytes.chunks_exact(8).filter_map(|b| b.try_into().ok().map(f64::from_le_bytes)).collect();
+    let samples: Vec<Sample> = numbers
+        .chunks_exact(4)
+        .map(|n| Sample { time_s: n[0], position_m: n[1], velocity_mps: n[2], force_n: n[3] })
+        .collect();
+    let (step, a) = least(&samples, |core| samples.iter().map(|s| core.step(*s).enhanced_n).sum());
+    let (run, b) = least(&samples, |core| {
+        let mut sum = 0.0;
+        core.run(&samples, |out| sum += out.enhanced_n);
+        sum
+    });
+    println!("step_ns {:.1} run_ns {:.1} ({a:.0}, {b:.0})", 1e9 * step, 1e9 * run);
+    Ok(())
+}
+
+fn main() -> std::io::Result<()> {
+    if let Some(path) = std::env::args().nth(1) {
+        return given(&path);
+    }
     let law = Law::base(&Tissue::three_gels());
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut state = LawState::default();
@@ -57,4 +92,5 @@ fn main() {
             q(0.999)
         );
     }
+    Ok(())
 }

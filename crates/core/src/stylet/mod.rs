@@ -35,6 +35,10 @@ const WORK_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
 /// No needle is faster, in m/s, nor farther from the origin, in m: what says so is a fault of the logging.
 const FASTEST_MPS: f64 = 2.0;
 const FARTHEST_M: f64 = 10.0;
+/// Samples as close as this share of the usual interval, but not 0.1 ms, are of one instant; so are those of the same microsecond.
+const SAME_INSTANT: f64 = 0.02;
+const SAME_INSTANT_S: f64 = 1e-4;
+const LEAST_STEP_S: f64 = 1e-6;
 /// What an ordinary drop lasts at most, in s.
 const LONGEST_DROP_S: f64 = 0.1;
 
@@ -174,7 +178,10 @@ impl Stylet {
         self.out.estimate = None;
         self.work = WORK_FRAME;
         let robot = sample.velocity_mps.abs() < FASTEST_MPS && sample.position_m.abs() < FARTHEST_M;
-        self.out.used = sample.is_usable() && robot && (!self.started || sample.time_s > self.last.time_s);
+        // Two samples at one instant say nothing of how fast the needle goes; a clock's digits do not make two of it.
+        let instant_s = (SAME_INSTANT * self.noise.step_s).clamp(LEAST_STEP_S, SAME_INSTANT_S);
+        let later = sample.time_s - self.last.time_s > instant_s;
+        self.out.used = sample.is_usable() && robot && (!self.started || later);
         if !self.out.used {
             return &self.out;
         }

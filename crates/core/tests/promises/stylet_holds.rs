@@ -62,9 +62,30 @@ fn torture(seed: u64, samples: usize, mut each: impl FnMut(Sample)) {
     }
 }
 
+/// How many insertions of 12 000 samples are tortured: `STYLET_TORTURED=8400` makes 10^8 samples.
+fn tortured(usual: u64) -> u64 {
+    std::env::var("STYLET_TORTURED").ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
+}
+
+#[test]
+fn the_papers_algorithm_survives_the_same_torture() {
+    for seed in 0..tortured(30) {
+        let config = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::default() };
+        let mut core = Enhancer::new(config, 0.0, vec![Sample::default(); 4096]);
+        let mut used = 0;
+        torture(seed, 12_000, |sample| {
+            let out = core.step(sample);
+            let numbers = [out.enhanced_n, out.reconstructed_n, out.error_n, out.theta[0], out.theta[1]];
+            assert!(numbers.iter().all(|x| x.is_finite()), "seed {seed} at {sample:?}: {out:?}");
+            used += usize::from(out.used);
+        });
+        assert!(used > 10_000, "seed {seed}: {used} samples used");
+    }
+}
+
 #[test]
 fn nothing_that_a_robot_or_a_logger_does_spoils_the_beliefs() {
-    for seed in 0..60 {
+    for seed in 0..tortured(60) {
         let mut core = core();
         let (mut used, mut bounded, mut last) = (0, 0, None);
         torture(seed, 12_000, |sample| {
@@ -131,4 +152,17 @@ fn ten_million_steps_allocate_nothing() {
         assert!(ruptures >= 3 * (steps / length), "it really worked: {ruptures} ruptures");
     });
     assert_eq!(info.count_total, 0, "{info:?}");
+}
+
+#[test]
+fn a_sample_a_clocks_digit_after_the_last_is_no_speed_of_a_million_metres_per_second() {
+    // Found by torture: 20 ps and 15 um after the last sample.
+    let (mut undisturbed, mut disturbed) = (core(), core());
+    for sample in constant(0.02, 3).samples {
+        let (left, right) = (undisturbed.step(sample), disturbed.step(sample));
+        assert_eq!(left.enhanced_n.to_bits(), right.enhanced_n.to_bits(), "at {} s", sample.time_s);
+        let again = Sample { time_s: sample.time_s + 2e-11, position_m: sample.position_m - 15e-6, ..sample };
+        assert!(!disturbed.step(again).used);
+        assert!(disturbed.is_sound());
+    }
 }
