@@ -54,7 +54,7 @@ pub(crate) fn roughness(blocks: &[Blocks]) -> f64 {
         b.f.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect()
     };
     let mut all: Vec<f64> = blocks.iter().flat_map(third).collect();
-    (stylet_stats::order::median(&mut all) * 1.4826 / 20.0_f64.sqrt()).max(1e-6)
+    (stylet_stats::order::median(&mut all) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()).max(1e-6)
 }
 
 /// Fits the base law; returns it with the noise by which it is judged. `None` when it cannot be replayed.

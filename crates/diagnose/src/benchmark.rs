@@ -238,23 +238,13 @@ fn wilson(right: usize, of: usize) -> String {
     if of == 0 {
         return "-".to_owned();
     }
-    let (n, p, z) = (of as f64, right as f64 / of as f64, 1.96);
-    let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
-    let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+    let rate = stylet_stats::wilson(right, of);
     format!(
         "{right}/{of} = {:.1} % ({:.1} to {:.1})",
-        100.0 * p,
-        100.0 * (middle - half).max(0.0),
-        100.0 * (middle + half).min(1.0)
+        100.0 * rate.value,
+        100.0 * rate.low,
+        100.0 * rate.high
     )
-}
-
-fn quantile(x: &mut [f64], q: f64) -> f64 {
-    if x.is_empty() {
-        return f64::NAN;
-    }
-    x.sort_unstable_by(f64::total_cmp);
-    x[((x.len() - 1) as f64 * q).round() as usize]
 }
 
 /// Rates, confusion matrix, power and calibration of examined cases, as text.
@@ -300,8 +290,8 @@ pub fn summary(cases: &[Result]) -> String {
     let _ = writeln!(
         out,
         "\nparameter error, strong: median {:.3} %, p90 {:.3} %",
-        100.0 * quantile(&mut errors, 0.5),
-        100.0 * quantile(&mut errors, 0.9)
+        100.0 * stylet_stats::quantile(&mut errors, 0.5),
+        100.0 * stylet_stats::quantile(&mut errors, 0.9)
     );
     for size in [Size::Strong, Size::Medium, Size::Faint] {
         let held: Vec<bool> = of(Kind::Single)
@@ -328,8 +318,8 @@ pub fn summary(cases: &[Result]) -> String {
     let _ = writeln!(
         out,
         "held-out gain over the possible one, strong: p10 {:.4}, median {:.4}",
-        quantile(&mut gains, 0.1),
-        quantile(&mut gains, 0.5)
+        stylet_stats::quantile(&mut gains, 0.1),
+        stylet_stats::quantile(&mut gains, 0.5)
     );
     let worse = of(Kind::Clean).filter(|c| c.rms_n[1] > 1.01 * c.rms_n[0]).count();
     let _ = writeln!(
@@ -341,8 +331,8 @@ pub fn summary(cases: &[Result]) -> String {
     let _ = writeln!(
         out,
         "seconds per case (cases run side by side): median {:.2}, p90 {:.2}",
-        quantile(&mut seconds, 0.5),
-        quantile(&mut seconds, 0.9)
+        stylet_stats::quantile(&mut seconds, 0.5),
+        stylet_stats::quantile(&mut seconds, 0.9)
     );
     // Confidence.
     let _ = writeln!(out, "\nconfidence against truth (one effect):");

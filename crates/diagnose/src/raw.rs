@@ -150,7 +150,7 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
         let local: Vec<f64> = (0..sizes.len().div_ceil(AROUND))
             .map(|k| {
                 let (lo, hi) = ((k * AROUND).saturating_sub(AROUND), ((k + 2) * AROUND).min(sizes.len()));
-                (median(&mut sizes[lo..hi].to_vec()) * 1.4826).max(step).max(1e-12)
+                (median(&mut sizes[lo..hi].to_vec()) * stylet_stats::MAD_TO_SD).max(step).max(1e-12)
             })
             .collect();
         for i in 2..f.len() - 2 {
@@ -178,7 +178,8 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
         }
     }
     let size = stylet_stats::order::median_of(found.iter().map(|f| f.2));
-    let spread = 1.4826 * stylet_stats::order::median_of(found.iter().map(|f| (f.2 - size).abs()));
+    let spread =
+        stylet_stats::MAD_TO_SD * stylet_stats::order::median_of(found.iter().map(|f| (f.2 - size).abs()));
     let all = found.iter().map(|f| f.2).chain(smaller);
     let between = all.filter(|s| *s > size / 3.0 && *s < 2.0 * size / 3.0).count();
     let of_one_size = spread < ONE_SIZE * size && (between as f64) <= BETWEEN * found.len() as f64;

@@ -22,7 +22,8 @@ pub fn discrepancy(blocks: &[Blocks], e: &[Vec<f64>], floor_n: f64) -> Noise {
     for (b, e) in blocks.iter().zip(e) {
         sizes.extend(e.iter().zip(&b.used).filter(|(e, u)| **u && e.is_finite()).map(|(e, _)| e.abs()));
     }
-    let limit = CUT * 1.4826 * stylet_stats::order::median(&mut sizes).max(floor_n).max(1e-9);
+    let limit =
+        CUT * stylet_stats::MAD_TO_SD * stylet_stats::order::median(&mut sizes).max(floor_n).max(1e-9);
     let cut = |e: f64| e.clamp(-limit, limit);
     let (mut square, mut n) = (0.0, 0.0);
     for (b, e) in blocks.iter().zip(e) {

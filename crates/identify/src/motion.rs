@@ -274,5 +274,5 @@ impl Piece {
 /// Standard deviation of a column about a smooth course, by its third differences.
 fn roughness(x: &[f64]) -> f64 {
     let mut d: Vec<f64> = x.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
-    stylet_stats::order::median(&mut d) * 1.4826 / 20.0_f64.sqrt()
+    stylet_stats::order::median(&mut d) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()
 }

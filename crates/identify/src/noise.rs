@@ -198,7 +198,7 @@ impl Noise {
                 }
             }
         }
-        let sd_n = (median(&mut all) * 1.4826).max(floor_n);
+        let sd_n = (median(&mut all) * stylet_stats::MAD_TO_SD).max(floor_n);
         if rows.len() < 40 {
             return Bin::white(if sd_n.is_finite() { sd_n } else { 1.0 });
         }
@@ -424,7 +424,7 @@ fn plain_scale(rows: &[[f64; ROW]], a: &[f64; ROW - 1]) -> f64 {
 /// Scale of the innovations under Huber's loss: the root of `sum weight w^2 / n` over its value for normal noise.
 fn scale(rows: &[[f64; ROW]], a: &[f64; ROW - 1]) -> f64 {
     let mut size: Vec<f64> = rows.iter().map(|row| innovation(row, a).abs()).collect();
-    let mut s = (median(&mut size) * 1.4826).max(1e-300);
+    let mut s = (median(&mut size) * stylet_stats::MAD_TO_SD).max(1e-300);
     for _ in 0..6 {
         let sum: f64 = rows
             .iter()

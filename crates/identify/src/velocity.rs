@@ -106,7 +106,7 @@ pub(crate) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
         .collect();
     // Rounded positions of a needle at rest do not differ at all.
     d.retain(|d| *d > 0.0);
-    median(&mut d) * 1.4826
+    median(&mut d) * stylet_stats::MAD_TO_SD
 }
 
 /// A break of the slope: the sample after it, the instant with position and slope before, the slope after.

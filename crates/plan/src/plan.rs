@@ -113,15 +113,10 @@ pub struct Plan {
 /// `docs/diagnosis.md`, "The present engine". No plan is surer than that.
 pub const SEEN_AND_RIGHT: f64 = 0.93;
 
-/// Upper tail of the normal distribution at `-x`.
-fn normal(x: f64) -> f64 {
-    0.5 * libm::erfc(-x * core::f64::consts::FRAC_1_SQRT_2)
-}
-
 /// Probability that a gap expected to be `nats` comes out above a class's width: it scatters by `sqrt(2 nats)`.
 #[must_use]
 pub fn decided(nats: f64) -> f64 {
-    if nats <= 0.0 { 0.0 } else { normal((nats - CLASS_NATS) / (2.0 * nats).sqrt()) }
+    if nats <= 0.0 { 0.0 } else { stylet_stats::normal::cdf((nats - CLASS_NATS) / (2.0 * nats).sqrt()) }
 }
 
 /// Probability that the diagnosis names what is the case and nothing else, whatever that is among what motions within the limits
@@ -227,9 +222,6 @@ pub(crate) fn chosen(
     })
 }
 
-/// Half width of a 95 % interval in standard deviations.
-const Z95: f64 = 1.959_963_985;
-
 fn intervals(ground: &Ground, before: &Shown, after: &Shown) -> Vec<Sharper> {
     let numbers = ground.stem.shared();
     numbers
@@ -252,8 +244,8 @@ fn intervals(ground: &Ground, before: &Shown, after: &Shown) -> Vec<Sharper> {
                 Role::DayFriction(day) => format!("day {} friction", day + 1),
                 Role::OwnSurface | Role::OwnFriction | Role::OwnEffect(_) | Role::Instant(_) => String::new(),
             },
-            before: Z95 * before,
-            after: Z95 * after,
+            before: stylet_stats::Z95 * before,
+            after: stylet_stats::Z95 * after,
         })
         .collect()
 }

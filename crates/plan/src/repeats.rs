@@ -42,14 +42,14 @@ pub fn repeats(model: &Model, limits: &Limits) -> Option<Repeats> {
     // Half of n insertions at either end: sum of (ln v - mean)^2 = n (ln span / 2)^2, gap = alpha^2 sum / (2 s^2).
     let half = 0.5 * libm::log(span);
     let for_slope = 2.0 * NATS * s * s / (ALPHA * half).powi(2);
-    let for_mean = (1.96 * s / MEAN).powi(2);
+    let for_mean = (stylet_stats::Z95 * s / MEAN).powi(2);
     let n = 2.0 * (0.5 * for_slope.max(for_mean).clamp(INSERTIONS.0, INSERTIONS.1)).ceil();
     let fast = 0.95 * limits.speed_mps;
     Some(Repeats {
         scatter: s,
         insertions: n as usize,
         speeds_mps: [fast / span, fast],
-        mean_within: 1.96 * s / n.sqrt(),
+        mean_within: stylet_stats::Z95 * s / n.sqrt(),
         shows_alpha: (2.0 * NATS / n).sqrt() * s / half,
     })
 }

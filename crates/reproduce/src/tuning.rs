@@ -66,11 +66,6 @@ fn reconstruction_n(insertion: &Insertion, samples: &[Sample], config: &EnhanceC
     (sum / samples.len().max(1) as f64).sqrt()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 impl Tuning {
     /// Tunes on recordings, each with the insertion it belongs to; `trace` asks for the reset's threshold too.
     #[must_use]
@@ -97,7 +92,7 @@ impl Tuning {
         if trace {
             let rms = |tuning: &Tuning, ablation| {
                 let Some(config) = with(tuning, ablation) else { return f64::NAN };
-                median(recordings.iter().map(|(once, s)| reconstruction_n(once, s, &config)).collect())
+                stylet_stats::median_of(recordings.iter().map(|(once, s)| reconstruction_n(once, s, &config)))
             };
             let aim = rms(&best, Ablation::None);
             let off = |below: f64| {

@@ -37,9 +37,6 @@ impl From<&Output> for Heard {
     }
 }
 
-/// Half-width of a 95 % interval in standard deviations.
-const Z95: f64 = 1.959_963_985;
-
 /// Sums that the scores are made of.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -212,7 +209,7 @@ impl Scorer {
                 (&mut coverage.cumulative, e.cumulative_ns_per_m - cumulative, e.cumulative_sd),
             ] {
                 count[1] += 1.0;
-                if off.abs() <= Z95 * sd {
+                if off.abs() <= stylet_stats::Z95 * sd {
                     count[0] += 1.0;
                 }
             }

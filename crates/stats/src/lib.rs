@@ -31,8 +31,8 @@ pub use curve::interpolate;
 pub use interval::{Interval, mean_interval, wilson, wilson_at};
 pub use moments::{Moments, Sum, mean, rms, sd, variance};
 pub use order::{
-    extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of, quantile_of_sorted,
-    sorted,
+    MAD_TO_SD, extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of,
+    quantile_of_sorted, sorted,
 };
 pub use rank::spearman;
 pub use robust::Loss;

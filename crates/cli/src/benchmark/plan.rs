@@ -13,7 +13,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 use stylet_diagnose::{Evidence, Options};
 use stylet_examine::reality::motion::{Path, Piece};
-use stylet_examine::stats::{Rate, quantile};
+use stylet_examine::stats::Rate;
 use stylet_examine::{Again, Answer, CaseId, Hide, Question};
 use stylet_plan::Limits;
 use stylet_scenario::{Motion, Scenario, Segment};
@@ -274,15 +274,15 @@ fn table(out: &mut String, row: &str, cases: &[Case]) {
     let named = |c: &Case| c.planned.as_ref().is_some_and(|s| s.right && s.named);
     let _ = writeln!(out, "  ... and by its name (planned)                  {}", rate(&open, &named));
     let _ = writeln!(out, "  predicted for the planned one                  {:.0} %", 100.0 * mean);
-    let seconds: Vec<f64> = open.iter().map(|c| c.plan_s).collect();
-    let all: Vec<f64> = open.iter().map(|c| c.seconds).collect();
+    let mut seconds: Vec<f64> = open.iter().map(|c| c.plan_s).collect();
+    let mut all: Vec<f64> = open.iter().map(|c| c.seconds).collect();
     let _ = writeln!(
         out,
         "  seconds of planning: median {:.1}, p90 {:.1}, longest {:.1}; of a whole case: median {:.1}",
-        quantile(&seconds, 0.5),
-        quantile(&seconds, 0.9),
-        quantile(&seconds, 1.0),
-        quantile(&all, 0.5)
+        stylet_stats::quantile(&mut seconds, 0.5),
+        stylet_stats::quantile(&mut seconds, 0.9),
+        stylet_stats::quantile(&mut seconds, 1.0),
+        stylet_stats::quantile(&mut all, 0.5)
     );
     let failed = cases.iter().filter(|c| c.failed.is_some()).count();
     if failed > 0 {

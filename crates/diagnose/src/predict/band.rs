@@ -40,7 +40,7 @@ pub struct Known {
 }
 
 fn sd(low: f64, high: f64) -> f64 {
-    ((high - low) / (2.0 * 1.96)).max(0.0)
+    ((high - low) / (2.0 * stylet_stats::Z95)).max(0.0)
 }
 
 impl Known {

@@ -2,11 +2,12 @@
 
 use super::answer::Verdict;
 use super::outcome::Outcome;
-use crate::stats::{Rate, quantile};
+use crate::stats::Rate;
 use crate::world::id::{Grade, Hide, Size, World, Wrong};
 use core::fmt::Write as _;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use stylet_stats::quantile_of;
 
 /// A cell: cases of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -65,8 +66,8 @@ pub fn cells(outcomes: &[Outcome]) -> Vec<Cell> {
                 all_found: Rate::of(&all, |o| o.worth.all_found),
                 wrong_name: Rate::of(&all, |o| o.worth.wrong_name),
                 unknown: Rate::of(&all, |o| o.verdict == Verdict::Unknown && o.failed.is_none()),
-                median_s: quantile(&seconds, 0.5),
-                p90_s: quantile(&seconds, 0.9),
+                median_s: quantile_of(seconds.iter().copied(), 0.5),
+                p90_s: quantile_of(seconds.iter().copied(), 0.9),
             }
         })
         .collect()

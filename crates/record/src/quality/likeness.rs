@@ -34,7 +34,7 @@ pub fn unlike_the_others(recordings: &[&Recording]) -> Vec<Option<QualityNote>> 
             continue;
         }
         let middle = median_of(here.iter().copied());
-        let scatter = 1.4826 * median_of(here.iter().map(|f| (f - middle).abs()));
+        let scatter = stylet_stats::MAD_TO_SD * median_of(here.iter().map(|f| (f - middle).abs()));
         let scale = scatter.max(USUAL * middle.abs()).max(USUAL * size_n).max(f64::MIN_POSITIVE);
         for (sum, profile) in squares.iter_mut().zip(&profiles) {
             if let Some(f) = profile[k] {

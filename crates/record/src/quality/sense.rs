@@ -146,7 +146,8 @@ pub(super) fn reversed(recording: &Recording) -> Option<QualityNote> {
 
 /// Standard deviation of the noise from the differences of neighbours: motion and ruptures hardly show in their median.
 fn noise_n(force_n: &[f64]) -> f64 {
-    median_of(force_n.windows(2).map(|pair| (pair[1] - pair[0]).abs())) * 1.4826 / core::f64::consts::SQRT_2
+    median_of(force_n.windows(2).map(|pair| (pair[1] - pair[0]).abs())) * stylet_stats::MAD_TO_SD
+        / core::f64::consts::SQRT_2
 }
 
 fn correlation(recording: &Recording, at: &[usize]) -> f64 {
@@ -176,7 +177,7 @@ const LIKE_NOISE: f64 = 1.0;
 pub(super) fn in_air(recording: &Recording) -> Option<QualityNote> {
     let step_s = recording.median_interval_s();
     let least = ((STRETCH_S / step_s).ceil().max(1.0) as usize).max(1);
-    let mut means: Vec<f64> = recording.force_n.chunks_exact(least).map(mean).collect();
+    let mut means: Vec<f64> = recording.force_n.chunks_exact(least).map(stylet_stats::mean).collect();
     if means.len() < STRETCHES || recording.duration_s() < STRETCH_S * STRETCHES as f64 {
         return None;
     }
@@ -184,7 +185,7 @@ pub(super) fn in_air(recording: &Recording) -> Option<QualityNote> {
         if neumann(&means) < LIKE_NOISE {
             return None;
         }
-        means = means.chunks_exact(2).map(mean).collect();
+        means = means.chunks_exact(2).map(stylet_stats::mean).collect();
     }
     let (low, high) = (
         quantile_of(recording.force_n.iter().copied(), 0.05),
@@ -197,13 +198,9 @@ pub(super) fn in_air(recording: &Recording) -> Option<QualityNote> {
     Some(QualityNote::forbidding(QualityKind::InAir, message, [("low_n", low), ("high_n", high)]))
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Von Neumann's ratio.
 fn neumann(x: &[f64]) -> f64 {
-    let middle = mean(x);
+    let middle = stylet_stats::mean(x);
     let steps: f64 = x.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
     let all: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
     if all > 0.0 { steps / all * x.len() as f64 / (x.len() - 1) as f64 } else { 2.0 }
