@@ -1,9 +1,9 @@
 //! The scorecard on the terminal.
 
 use crate::exit::Failure;
-use crate::picture::name_of;
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
+use stylet_api::picture::name_of;
 use stylet_api::{Run, settings_note, virtual_note};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
@@ -24,6 +24,16 @@ pub fn say(text: &str) -> Result<(), Failure> {
 /// Tells on standard error how it goes, or what went wrong. Nobody listening is no error: there is nowhere to say so.
 pub fn tell(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// Tells on standard error what is being done, with `after` behind it, when somebody looks at a terminal.
+pub fn teller(quiet: bool, after: &'static str) -> impl Fn(&str) {
+    let talk = !quiet && std::io::stderr().is_terminal();
+    move |what| {
+        if talk {
+            tell(&format!("  {what}{after}\n"));
+        }
+    }
 }
 
 fn or_dash(value: Option<String>) -> String {
