@@ -32,7 +32,7 @@ pub enum Error {
     Diagnose(#[from] stylet_diagnose::DiagnoseError),
     /// A data set cannot be used.
     #[error(transparent)]
-    Dataset(DatasetError),
+    Dataset(Box<DatasetError>),
     /// What was asked for cannot be done with what was given; the sentence says why and what would.
     #[error("{0}")]
     Request(String),
@@ -86,7 +86,7 @@ impl From<DatasetError> for Error {
         match error {
             DatasetError::Input(error) => Self::Input(error),
             DatasetError::Recording(error) => Self::Recording(error),
-            other => Self::Dataset(other),
+            other => Self::Dataset(Box::new(other)),
         }
     }
 }

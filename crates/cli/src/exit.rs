@@ -18,7 +18,7 @@ pub enum Failure {
     /// What was asked for could not be done.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Work(#[from] stylet_api::Error),
+    Work(Box<stylet_api::Error>),
     /// Standard output cannot be written.
     #[error(
         "standard output cannot be written: {0}; files in the output folder are complete, only what would be printed is lost: make room \
@@ -38,18 +38,19 @@ pub enum Failure {
     },
 }
 
-/// Errors of the crates below [`stylet_api`], which has a place for each.
+/// Errors of [`stylet_api`], and of the crates below it, for each of which it has a place.
 macro_rules! from {
     ($($error:ty),*) => {
         $(impl From<$error> for Failure {
             fn from(error: $error) -> Self {
-                Self::Work(error.into())
+                Self::Work(Box::new(error.into()))
             }
         })*
     };
 }
 
 from!(
+    stylet_api::Error,
     stylet_scenario::InputError,
     stylet_record::RecordError,
     stylet_diagnose::set::dataset::DatasetError,
@@ -59,14 +60,14 @@ from!(
 impl Failure {
     /// A mistake of ours, from what was said about it.
     pub fn internal(error: impl std::fmt::Display) -> Self {
-        Self::Work(stylet_api::Error::Internal(error.to_string()))
+        stylet_api::Error::Internal(error.to_string()).into()
     }
 
     /// The exit code that goes with it.
     #[must_use]
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Failure::Work(stylet_api::Error::Internal(_)) => INTERNAL,
+            Failure::Work(why) if matches!(**why, stylet_api::Error::Internal(_)) => INTERNAL,
             Failure::Work(_) | Failure::Say(_) | Failure::Check(_) => INPUT_WRONG,
             Failure::Gate { .. } => CHECK_FAILED,
         })

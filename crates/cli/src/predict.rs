@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use stylet_api::prediction::{Origin, output};
 use stylet_api::{Prediction, Refit, need, read_all, read_options};
 use stylet_pages::prediction::sentence;
+use stylet_pages::words::shown;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -39,7 +40,7 @@ fn summary(p: &Prediction) -> String {
         "recording", "left, N", "believed", "in the band", "peak off, N"
     );
     for r in &p.recordings {
-        let before = r.believed_rmse_n.map_or("-".to_owned(), |x| significant(x, 3));
+        let before = shown(r.believed_rmse_n, 1.0, 3);
         let _ = writeln!(
             out,
             "  {:<24} {:>10} {:>10} {:>10.0} % {:>12}",

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::io::{IsTerminal as _, Write as _};
 use stylet_api::picture::name_of;
 use stylet_api::{Run, settings_note, virtual_note};
+use stylet_pages::words::{or_dash, shown};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
@@ -34,10 +35,6 @@ pub fn teller(quiet: bool, after: &'static str) -> impl Fn(&str) {
             tell(&format!("  {what}{after}\n"));
         }
     }
-}
-
-fn or_dash(value: Option<String>) -> String {
-    value.unwrap_or_else(|| "-".to_owned())
 }
 
 /// The scorecard of a simulated run, ready to print.
@@ -109,9 +106,9 @@ fn layers(out: &mut String, score: &Score) {
             out,
             "    {name:<12} {:>8} {:>8} {:>8} {:>8}",
             significant(c.truth, 4),
-            or_dash(c.estimated.map(|x| significant(x, 4))),
+            shown(c.estimated, 1.0, 4),
             or_dash(c.relative_error.map(percent)),
-            or_dash(offline.map(|x| significant(x, 4))),
+            shown(offline, 1.0, 4),
         );
     };
     for l in &score.layers {
@@ -138,9 +135,5 @@ fn summary(out: &mut String, score: &Score) {
         share(score.enhancement.in_tissue_relative),
         share(score.enhancement.after_exit_relative),
     );
-    let _ = writeln!(
-        out,
-        "  reconstruction  {} N rms",
-        or_dash(score.reconstruction_rms_n.map(|x| significant(x, 3)))
-    );
+    let _ = writeln!(out, "  reconstruction  {} N rms", shown(score.reconstruction_rms_n, 1.0, 3));
 }

@@ -1,5 +1,6 @@
 //! The page of a prediction.
 
+use crate::words::{or_dash, shown};
 use stylet_diagnose::predict::{Foretold, Predicted, Prediction, Shown};
 use stylet_report::{
     Cell, Chart, Colour, Level, LineStyle, MarkerSet, Page, Section, Series, Side, Status, Table, Tile,
@@ -77,7 +78,6 @@ fn overview(found: &Foretold) -> Section {
         .recordings
         .iter()
         .map(|r| {
-            let or_dash = |x: Option<String>| Cell::number(x.unwrap_or_else(|| "-".to_owned()));
             vec![
                 Cell::text(r.name.clone()),
                 Cell::number(significant(r.rmse_n, 3)).status(Status::at_most(
@@ -85,11 +85,11 @@ fn overview(found: &Foretold) -> Section {
                     1.2 * p.floor_n,
                     2.0 * p.floor_n,
                 )),
-                or_dash(r.believed_rmse_n.map(|x| significant(x, 3))),
+                Cell::number(shown(r.believed_rmse_n, 1.0, 3)),
                 Cell::number(format!("{:.0} %", 100.0 * r.band_coverage)),
                 Cell::number(significant(r.peak_error_n, 2)),
-                or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m))),
-                or_dash(r.friction_factor.map(|x| significant(x, 3))),
+                Cell::number(or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m)))),
+                Cell::number(shown(r.friction_factor, 1.0, 3)),
             ]
         })
         .collect();

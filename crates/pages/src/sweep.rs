@@ -1,5 +1,6 @@
 //! The page of a sweep: the summary, and the robustness map as a picture.
 
+use crate::words::shown;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
 use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, percent, significant};
 use stylet_stats::Interval;
@@ -111,7 +112,7 @@ fn explained(outcomes: &[Outcome]) -> Section {
 }
 
 fn table(outcome: &Outcome) -> Table {
-    let or_dash = |x: Option<f64>| x.map_or("-".to_owned(), |x| significant(x, 3));
+    let number = |x: Option<f64>| shown(x, 1.0, 3);
     Table::new(
         outcome.outcome.clone(),
         &["quantity", "first-order index", "rank correlation", "p-value"],
@@ -121,11 +122,11 @@ fn table(outcome: &Outcome) -> Table {
             .map(|e| {
                 vec![
                     Cell::text(e.quantity.clone()),
-                    Cell::number(or_dash(e.first_order)),
-                    Cell::number(or_dash(e.rank_correlation)),
+                    Cell::number(number(e.first_order)),
+                    Cell::number(number(e.rank_correlation)),
                     Cell::number(match e.p_value {
                         Some(p) if p < 1e-15 => "< 1e-15".to_owned(),
-                        p => or_dash(p),
+                        p => number(p),
                     }),
                 ]
             })

@@ -1,15 +1,22 @@
 //! Words and numbers that several pages and the terminal share.
 
 use std::collections::BTreeMap;
-use stylet_report::significant;
+use stylet_diagnose::outcome::Quality;
+use stylet_report::{Cell, Table, significant};
 
 /// The base law in the notation of SPEC section 1.
 pub(crate) const BASE_LAW: &str = "f   = f_K + f_B            until layer a = r + 1 ruptures: f_K >= F_a, or z >= s_a + d_a\nf_K = K_a max(0, z - s_a)\nf_B = v sum_i b_i l_i,      l_i = clamp(z - s_i, 0, d_i)\n";
 
+/// What there is, or a dash.
+#[must_use]
+pub fn or_dash(value: Option<String>) -> String {
+    value.unwrap_or_else(|| "-".to_owned())
+}
+
 /// Three decimals, or a dash.
 #[must_use]
 pub fn three(x: Option<f64>) -> String {
-    x.filter(|x| x.is_finite()).map_or("-".to_owned(), |x| format!("{x:.3}"))
+    or_dash(x.filter(|x| x.is_finite()).map(|x| format!("{x:.3}")))
 }
 
 /// An effect's name as words.
@@ -39,5 +46,11 @@ pub fn numbers(effect: &str, values: &BTreeMap<String, f64>) -> String {
 /// A number in another unit (`unit` of them make one), with so many digits; a dash for nothing.
 #[must_use]
 pub fn shown(value: Option<f64>, unit: f64, digits: usize) -> String {
-    value.map_or_else(|| "-".to_owned(), |x| significant(x * unit, digits))
+    or_dash(value.map(|x| significant(x * unit, digits)))
+}
+
+/// What is remarkable about recordings.
+pub(crate) fn remarks(title: &str, quality: &[Quality]) -> Table {
+    let row = |q: &Quality| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())];
+    Table::new(title, &["recording", "remark"], quality.iter().map(row).collect())
 }

@@ -16,6 +16,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use stylet_api::sweep_folder::{SHARD_TRIALS, all_shards, begin, conclude};
 use stylet_api::{Claim, need};
+use stylet_pages::words::shown;
 use stylet_report::{percent, significant};
 use stylet_sweep::{Columns, Row, Summary, Sweep};
 
@@ -101,13 +102,12 @@ fn terminal(s: &Summary, out: &Path) -> String {
     if let Some(outcome) = s.explained.first() {
         let _ = writeln!(text, "  {} explained by (first-order index, rank correlation)", outcome.outcome);
         for e in outcome.by.iter().take(5) {
-            let or_dash = |x: Option<f64>| x.map_or("-".to_owned(), |x| significant(x, 2));
             let _ = writeln!(
                 text,
                 "    {:<44} {:>6}  {:>6}",
                 e.quantity,
-                or_dash(e.first_order),
-                or_dash(e.rank_correlation)
+                shown(e.first_order, 1.0, 2),
+                shown(e.rank_correlation, 1.0, 2)
             );
         }
     }

@@ -40,23 +40,15 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
     let g = &d.gain;
     let what =
         if g.held_out { "recordings left out of the fit" } else { "the recording, which was also fitted" };
-    section
-        .table(Table::new(format!(
-                "What the simulation lacks; together it brings {} down from {} N to {} N rms, the noise being {} N",
-                what,
-                significant(g.rmse_before_n, 3),
-                significant(g.rmse_after_n, 3),
-                significant(g.floor_n, 3)
-            ), &[
-                "cause",
-                "as good",
-                "confidence",
-                "of what the base law leaves",
-                "number",
-                "value",
-                "95 % interval",
-            ], rows))
-        .code("equation", text)
+    let title = format!(
+        "What the simulation lacks; together it brings {what} down from {} N to {} N rms, the noise being {} N",
+        significant(g.rmse_before_n, 3),
+        significant(g.rmse_after_n, 3),
+        significant(g.floor_n, 3)
+    );
+    let headers =
+        ["cause", "as good", "confidence", "of what the base law leaves", "number", "value", "95 % interval"];
+    section.table(Table::new(title, &headers, rows)).code("equation", text)
 }
 
 /// Base numbers, those that moved first.

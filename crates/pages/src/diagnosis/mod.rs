@@ -7,6 +7,7 @@ mod words;
 
 pub use words::{differ, sentence};
 
+use crate::words::remarks;
 use causes::{causes, moved, traces, unseen};
 use evidence::evidence;
 use residual::{differs, gain, remains, residual};
@@ -14,7 +15,7 @@ use std::fmt::Write as _;
 use stylet_diagnose::Examined;
 use stylet_diagnose::curves::curves;
 use stylet_diagnose::outcome::{Diagnosis, Verdict};
-use stylet_report::{Cell, Page, Section, Status, Table, Tile, significant};
+use stylet_report::{Page, Section, Status, Tile, significant};
 use stylet_scenario::Scenario;
 
 /// The page of a diagnosis of `scenario`, which was read from `file`; `command` repeats it.
@@ -95,17 +96,12 @@ fn verdict(d: &Diagnosis) -> Section {
 }
 
 fn quality(d: &Diagnosis) -> Section {
-    let rows = d
-        .data_quality
-        .iter()
-        .map(|q| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())])
-        .collect();
     let section = Section::new("Data quality");
     if d.data_quality.is_empty() {
         return section
             .text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
     }
-    section.table(Table::new("", &["recording", "remark"], rows))
+    section.table(remarks("", &d.data_quality))
 }
 
 fn repeat(command: String, examined: &Examined) -> Section {

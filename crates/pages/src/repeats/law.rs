@@ -61,15 +61,26 @@ pub(super) fn causes(study: &Study) -> Section {
             ])
         })
         .collect();
+    let causes = Table::new(
+        "Causes: what comes back of the base law's error without each, and how sure it is that new runs need it",
+        &["effect", "of the error", "confidence"],
+        rows,
+    );
+    let title = format!(
+        "Without a part of the law, N on parts of the set left out; with all of them {:.3}",
+        study.laws.best.left_out_n()
+    );
     Section::new("The causes, and what each buys")
         .text(
-            "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that cling to the shaft, \
-             slip, give way after a while and let go. The one that predicts parts of the set left out best was taken, the base law where the others are \
-             better by less than 2 %, and more than two effects of the library only when they are better than a slipping shaft by a tenth. Then every part of it went in turn, and stayed away where the others do without it to 1 %.",
+            "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that \
+             cling to the shaft, slip, give way after a while and let go. The one that predicts parts of the set left out best \
+             was taken, the base law where the others are better by less than 2 %, and more than two effects of the library \
+             only when they are better than a slipping shaft by a tenth. Then every part of it went in turn, and stayed away \
+             where the others do without it to 1 %.",
         )
         .picture("Error on runs left out of every law, and without every part", gain_figure(study))
-        .table(Table::new("Causes: what comes back of the base law's error without each, and how sure it is that new runs need it", &["effect", "of the error", "confidence"], rows))
-        .table(Table::new(format!("Without a part of the law, N on parts of the set left out; with all of them {:.3}", study.laws.best.left_out_n()), &["part", "without it, N", ""], parts))
+        .table(causes)
+        .table(Table::new(title, &["part", "without it, N", ""], parts))
 }
 
 pub(super) fn law(study: &Study) -> Section {
@@ -102,9 +113,13 @@ pub(super) fn law(study: &Study) -> Section {
             ]
         })
         .collect();
+    let headers = ["", "parameter", "believed", "fitted", "95 % interval", ""];
     Section::new("The extended law")
-        .text("Values of the mean insertion; intervals of 95 % by the jackknife over runs, which counts what one law cannot say about all of them.")
+        .text(
+            "Values of the mean insertion; intervals of 95 % by the jackknife over runs, which counts what one law cannot say \
+             about all of them.",
+        )
         .code("equation", text)
         .texts(study.diagnosis.advice.clone())
-        .table(Table::new("Base parameters", &["", "parameter", "believed", "fitted", "95 % interval", ""], rows))
+        .table(Table::new("Base parameters", &headers, rows))
 }

@@ -8,7 +8,7 @@ mod runs;
 
 pub use law::gain_figure;
 
-use crate::words::three;
+use crate::words::{remarks, three};
 use law::{causes, law};
 use left_out::{before_and_after, residual};
 use runs::{instrument, repeats};
@@ -16,7 +16,7 @@ use stylet_diagnose::outcome::Verdict;
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::dataset::Dataset;
 use stylet_diagnose::set::study::Study;
-use stylet_report::{Cell, Page, Section, Status, Table, Tile};
+use stylet_report::{Page, Section, Status, Tile};
 use stylet_score::Online;
 
 /// The page of a study of the data set `set`, which was read from `file`, with what the online core heard in its runs; `commands`
@@ -93,11 +93,5 @@ fn quality(study: &Study) -> Section {
         true => "Remarks; nothing was corrected or resampled",
         false => "Remarks; but for what the instrument shows nothing was corrected or resampled",
     };
-    let rows = study
-        .diagnosis
-        .data_quality
-        .iter()
-        .map(|q| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())])
-        .collect();
-    Section::new("Data quality").table(Table::new(title.to_owned(), &["recording", "remark"], rows))
+    Section::new("Data quality").table(remarks(title, &study.diagnosis.data_quality))
 }

@@ -46,12 +46,15 @@ pub(super) fn section(all: &[Online]) -> Section {
             ]
         })
         .collect();
+    let said = summary(all).lines().map(|l| format!("All: {}.", l.trim())).collect::<Vec<_>>().join(" ");
+    let headers = ["", "drops found", "false: in / hold / back", "measured", "core", "extended law"];
+    let groups = [("", 3), ("force on the way back, N rms", 3)];
     Section::new("The online core on these insertions")
         .text(
-            "On the way back nothing pushes the tip: all force there is friction, and an enhanced force should be zero. Before: the core with its \
-             own viscous estimate. After: the friction of the extended law fitted to the other runs, a layer counting as punctured from the moment \
-             the core says so.",
+            "On the way back nothing pushes the tip: all force there is friction, and an enhanced force should be zero. \
+             Before: the core with its own viscous estimate. After: the friction of the extended law fitted to the other \
+             runs, a layer counting as punctured from the moment the core says so.",
         )
-        .text(summary(all).lines().map(|l| format!("All: {}.", l.trim())).collect::<Vec<_>>().join(" "))
-        .table(Table::new("By run", &["", "drops found", "false: in / hold / back", "measured", "core", "extended law"], rows).grouped(&[("", 3), ("force on the way back, N rms", 3)]))
+        .text(said)
+        .table(Table::new("By run", &headers, rows).grouped(&groups))
 }
