@@ -1,7 +1,8 @@
 //! What a scenario gets wrong about measured recordings. The only file here that knows the engine.
 
 use crate::error::Error;
-use std::path::{Path, PathBuf};
+use crate::inputs::{INPUTS, Inputs};
+use crate::output::{Output, json};
 use stylet_diagnose::predict::{Foretold, Refit};
 use stylet_diagnose::{Diagnosis, Evidence, Examined, Options};
 use stylet_record::{QualityNote, assess, thin, usable};
@@ -23,9 +24,7 @@ impl Diagnosed {
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
     pub fn json(&self) -> Result<Vec<u8>, Error> {
-        let mut json = serde_json::to_vec_pretty(&self.diagnosis).map_err(Error::internal)?;
-        json.push(b'\n');
-        Ok(json)
+        json(&self.diagnosis)
     }
 
     /// `extended.ron`; `believed` names the scenario in its first line.
@@ -38,6 +37,21 @@ impl Diagnosed {
             env!("CARGO_PKG_VERSION"),
             self.extended.to_ron().map_err(Error::internal)?
         ))
+    }
+
+    /// All files that `stylet diagnose` writes for single recordings; `believed` was read from the inputs' scenario.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a value cannot be written.
+    pub fn output(&self, believed: &Scenario, inputs: &Inputs) -> Result<Output, Error> {
+        let file = inputs.scenario.display().to_string();
+        let page = stylet_pages::diagnosis::page(believed, &file, inputs.command(), &self.examined);
+        let mut output = Output::default();
+        output.add("report.html", page.to_html());
+        output.add("diagnosis.json", self.json()?);
+        output.add_json(INPUTS, &inputs.absolute())?;
+        output.add("extended.ron", self.extended_ron(&file)?);
+        Ok(output)
     }
 }
 
@@ -94,14 +108,4 @@ fn within_reach(evidence: &Evidence) -> Evidence {
     let mut notes = evidence.notes.clone();
     notes.push(note);
     Evidence { name: evidence.name.clone(), recording, notes }
-}
-
-/// The file's name, with its folder when names repeat.
-#[must_use]
-pub fn name_of(path: &Path, all: &[PathBuf]) -> String {
-    let repeated = all.iter().filter(|p| p.file_name() == path.file_name()).count() > 1;
-    match path.file_name() {
-        Some(name) if !repeated => name.to_string_lossy().into_owned(),
-        _ => path.display().to_string(),
-    }
 }

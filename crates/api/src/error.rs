@@ -1,6 +1,10 @@
 //! Why a function ends early: what, where, and what would be right.
 
 use miette::Diagnostic;
+use std::path::Path;
+use stylet_diagnose::set::dataset::DatasetError;
+use stylet_plan::PlanError;
+use stylet_sweep::shard::ShardError;
 
 /// Why a function ended early. The sentence is the one that the command prints.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -26,6 +30,12 @@ pub enum Error {
     /// Recordings and scenario do not belong together.
     #[error(transparent)]
     Diagnose(#[from] stylet_diagnose::DiagnoseError),
+    /// A data set cannot be used.
+    #[error(transparent)]
+    Dataset(Box<DatasetError>),
+    /// What was asked for cannot be done with what was given; the sentence says why and what would.
+    #[error("{0}")]
+    Request(String),
     /// A trial of a sweep gives no row.
     #[error(transparent)]
     Trial(#[from] stylet_sweep::TrialError),
@@ -71,7 +81,37 @@ impl From<stylet_scenario::Problem> for Error {
     }
 }
 
+impl From<DatasetError> for Error {
+    fn from(error: DatasetError) -> Self {
+        match error {
+            DatasetError::Input(error) => Self::Input(error),
+            DatasetError::Recording(error) => Self::Recording(error),
+            other => Self::Dataset(Box::new(other)),
+        }
+    }
+}
+
+impl From<ShardError> for Error {
+    fn from(error: ShardError) -> Self {
+        Self::Request(error.to_string())
+    }
+}
+
 impl Error {
+    /// Why there is no plan, with the file that says what is wrong.
+    pub(crate) fn of_plan(file: &Path, why: PlanError) -> Self {
+        match why {
+            PlanError::Diagnose(why) => Self::Diagnose(why),
+            PlanError::Simulate(why) => Self::Simulate { file: file.display().to_string(), why },
+            other => Self::Request(format!("{}: {other}", file.display())),
+        }
+    }
+
+    /// A file or folder that cannot be written.
+    pub(crate) fn output(path: &Path, why: std::io::Error) -> Self {
+        Self::Output { path: path.display().to_string(), why }
+    }
+
     /// A mistake of ours, from what was said about it.
     pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())

@@ -7,26 +7,42 @@
 //! | [`diagnose`] | [`Scenario`] and recordings | [`Diagnosed`]: what the scenario gets wrong, and the scenario that does not |
 //! | [`forecast`] | [`Scenario`] and recordings that took no part | [`Foretold`]: errors beside the noise, coverage of the band |
 //! | [`sweep`](fn@sweep) | [`Sweep`] | [`Swept`]: one row per insertion, summary |
+//! | [`repeats`](fn@repeats::repeats), [`specimens`](fn@specimens::specimens) | a data set | laws, what varies from run to run, numbers over the specimens |
+//! | [`plan`](fn@plan::plan), [`identifiability`](plan::identifiability) | [`Inputs`] | the next insertion; what an experiment can show |
+//! | [`compare`] | scenarios, or the referee's cases | one row per algorithm |
+//! | [`benchmark`] | the referee's cases | the diagnosis and the planning examined |
 //!
 //! Every result has the files that the command writes, byte for byte, as an [`Output`] that is written at once or not at
 //! all. The command line, the package `stylet` and the Python package are thin layers over this crate.
 #![forbid(unsafe_code)]
 
+pub mod benchmark;
+pub mod compare;
 mod diagnose;
+pub mod effects;
 mod enhance;
 mod error;
 pub mod folder;
 pub mod hash;
+pub mod heard;
+mod inputs;
+pub mod need;
 pub mod output;
 pub mod picture;
+pub mod plan;
 mod predict;
+pub mod prediction;
+pub mod repeats;
 mod run;
+pub mod specimens;
 pub mod sweep;
+pub mod sweep_folder;
 
-pub use diagnose::{Diagnosed, diagnose, forecast, name_of};
+pub use diagnose::{Diagnosed, diagnose, forecast};
 pub use enhance::{Enhanced, enhance, listen};
 pub use error::Error;
 pub use folder::Claim;
+pub use inputs::{INPUTS, Inputs, name_of, read_all, read_options};
 pub use output::Output;
 pub use picture::Ran;
 pub use predict::predict;

@@ -2,7 +2,18 @@
 
 use crate::error::Error;
 use crate::folder::Claim;
+use serde::Serialize;
 use std::path::Path;
+
+/// A value as the text of a JSON file.
+///
+/// # Errors
+/// [`Error::Internal`] when the value cannot be written.
+pub fn json(value: &impl Serialize) -> Result<Vec<u8>, Error> {
+    let mut json = serde_json::to_vec_pretty(value).map_err(Error::internal)?;
+    json.push(b'\n');
+    Ok(json)
+}
 
 /// Files of one output folder, waiting to be written together.
 #[derive(Debug, Default)]
@@ -14,6 +25,15 @@ impl Output {
     /// Adds a file.
     pub fn add(&mut self, name: &'static str, content: impl Into<Vec<u8>>) {
         self.files.push((name, content.into()));
+    }
+
+    /// Adds a value as a JSON file.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the value cannot be written.
+    pub fn add_json(&mut self, name: &'static str, value: &impl Serialize) -> Result<(), Error> {
+        self.add(name, json(value)?);
+        Ok(())
     }
 
     /// Names and contents.

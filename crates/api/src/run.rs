@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::hash;
-use crate::output::Output;
+use crate::output::{Output, json};
 use crate::picture::{self, Ran};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -128,9 +128,7 @@ impl Run {
                 .filter_map(|r| r.score.as_ref().map(|s| (r.name.as_str(), s)))
                 .collect(),
         };
-        let mut json = serde_json::to_vec_pretty(&score).map_err(Error::internal)?;
-        json.push(b'\n');
-        Ok(json)
+        json(&score)
     }
 
     /// `scenario.ron`: every default written out.

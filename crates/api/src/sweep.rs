@@ -2,8 +2,9 @@
 
 use crate::error::Error;
 use crate::output::Output;
+use stylet_pages::sweep::page;
 pub use stylet_sweep::Overrides;
-use stylet_sweep::{Columns, Row, Summary, Sweep, csv, page, rows, summarise};
+use stylet_sweep::{Columns, Row, Summary, Sweep, csv, rows, summarise};
 
 /// What a sweep gives.
 pub struct Swept {
@@ -64,13 +65,11 @@ pub fn inputs(sweep: &Sweep) -> Result<Output, Error> {
 /// [`Error::Internal`] when a value cannot be written.
 pub fn results(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Result<(Output, Summary), Error> {
     let summary = summarise(sweep, columns, rows, HERE);
-    let mut json = serde_json::to_vec_pretty(&summary).map_err(Error::internal)?;
-    json.push(b'\n');
     let mut output = inputs(sweep)?;
     output.add("trials.csv", csv(columns, rows));
     #[cfg(feature = "parquet")]
     output.add("trials.parquet", stylet_sweep::parquet(columns, rows).map_err(Error::internal)?);
-    output.add("summary.json", json);
+    output.add_json("summary.json", &summary)?;
     output.add("report.html", page(sweep, columns, rows, &summary).to_html());
     Ok((output, summary))
 }

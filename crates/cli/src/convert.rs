@@ -5,7 +5,8 @@ use crate::exit::Failure;
 use crate::terminal::{say, tell};
 use std::path::Path;
 use stylet_api::folder::write_file;
-use stylet_record::{ReadOptions, Recording, read_csv, write_csv};
+use stylet_api::read_options;
+use stylet_record::{Recording, read_csv, write_csv};
 
 /// The command.
 ///
@@ -13,11 +14,8 @@ use stylet_record::{ReadOptions, Recording, read_csv, write_csv};
 /// [`Failure`] with the exit code that fits.
 pub fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let write = writer(&args.to)?;
-    let columns = match &args.columns {
-        Some(path) => Some(stylet_scenario::load(path)?),
-        None => None,
-    };
-    let (recording, notes) = read_csv(&args.from, &ReadOptions { columns, repair: args.repair })?;
+    let options = read_options(args.columns.as_deref(), args.repair)?;
+    let (recording, notes) = read_csv(&args.from, &options)?;
     write_file(&args.to, &write(&recording, &args.to)?)?;
     if !args.quiet {
         for note in notes {

@@ -15,29 +15,10 @@ pub const INTERNAL: u8 = 3;
 /// Why a command ended early.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum Failure {
-    /// A scenario or configuration is wrong.
+    /// What was asked for could not be done.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Input(Box<stylet_scenario::InputError>),
-    /// A recording is wrong.
-    #[error(transparent)]
-    Recording(#[from] stylet_record::RecordError),
-    /// The scenario asks for what cannot be simulated.
-    #[error("{file}: {why}")]
-    Simulate {
-        /// Scenario file.
-        file: String,
-        /// Reason and remedy.
-        why: stylet_testbed::SimulateError,
-    },
-    /// The output cannot be written.
-    #[error("{path}: cannot be written: {why}; nothing was changed there")]
-    Output {
-        /// File or folder.
-        path: String,
-        /// What the system says.
-        why: std::io::Error,
-    },
+    Work(Box<stylet_api::Error>),
     /// Standard output cannot be written.
     #[error(
         "standard output cannot be written: {0}; files in the output folder are complete, only what would be printed is lost: make room \
@@ -55,69 +36,40 @@ pub enum Failure {
         /// All bounds.
         of: usize,
     },
-    /// Recordings and scenario do not belong together.
-    #[error(transparent)]
-    Diagnose(#[from] stylet_diagnose::DiagnoseError),
-    /// A data set cannot be used.
-    #[error(transparent)]
-    Dataset(stylet_diagnose::set::dataset::DatasetError),
-    /// An argument names what there is not.
-    #[error("{0}")]
-    Argument(String),
-    /// A mistake of ours.
-    #[error("internal error: {0}; please report it")]
-    Internal(String),
 }
 
-impl From<stylet_scenario::InputError> for Failure {
-    fn from(error: stylet_scenario::InputError) -> Self {
-        Self::Input(Box::new(error))
-    }
-}
-
-impl From<stylet_api::Error> for Failure {
-    fn from(error: stylet_api::Error) -> Self {
-        use stylet_api::Error;
-        match error {
-            Error::Input(error) => Self::Input(error),
-            Error::Problem(_) | Error::Trial(_) | Error::Busy { .. } | Error::NotOneSet { .. } => {
-                Self::Check(error.to_string())
+/// Errors of [`stylet_api`], and of the crates below it, for each of which it has a place.
+macro_rules! from {
+    ($($error:ty),*) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::Work(Box::new(error.into()))
             }
-            Error::Recording(error) => Self::Recording(error),
-            Error::Simulate { file, why } => Self::Simulate { file, why },
-            Error::Diagnose(error) => Self::Diagnose(error),
-            Error::Output { path, why } => Self::Output { path, why },
-            Error::Internal(what) => Self::Internal(what),
-        }
-    }
+        })*
+    };
 }
 
-impl From<stylet_diagnose::set::dataset::DatasetError> for Failure {
-    fn from(error: stylet_diagnose::set::dataset::DatasetError) -> Self {
-        match error {
-            stylet_diagnose::set::dataset::DatasetError::Input(error) => Self::Input(error),
-            stylet_diagnose::set::dataset::DatasetError::Recording(error) => Self::Recording(error),
-            other => Self::Dataset(other),
-        }
-    }
-}
+from!(
+    stylet_api::Error,
+    stylet_scenario::InputError,
+    stylet_record::RecordError,
+    stylet_diagnose::set::dataset::DatasetError,
+    stylet_sweep::TrialError
+);
 
 impl Failure {
+    /// A mistake of ours, from what was said about it.
+    pub fn internal(error: impl std::fmt::Display) -> Self {
+        stylet_api::Error::Internal(error.to_string()).into()
+    }
+
     /// The exit code that goes with it.
     #[must_use]
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Failure::Input(_)
-            | Failure::Recording(_)
-            | Failure::Simulate { .. }
-            | Failure::Output { .. }
-            | Failure::Say(_)
-            | Failure::Check(_)
-            | Failure::Diagnose(_)
-            | Failure::Dataset(_)
-            | Failure::Argument(_) => INPUT_WRONG,
+            Failure::Work(why) if matches!(**why, stylet_api::Error::Internal(_)) => INTERNAL,
+            Failure::Work(_) | Failure::Say(_) | Failure::Check(_) => INPUT_WRONG,
             Failure::Gate { .. } => CHECK_FAILED,
-            Failure::Internal(_) => INTERNAL,
         })
     }
 }

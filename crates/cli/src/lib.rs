@@ -4,27 +4,20 @@
 mod args;
 mod benchmark;
 mod compare;
-mod compare_page;
-mod compare_world;
 mod convert;
 mod diagnose;
-mod diagnose_report;
 mod effects;
 mod enhance;
 pub mod exit;
 mod limits;
 mod listen;
 mod plan;
-mod plan_report;
 mod predict;
-mod predict_page;
 mod progress;
+mod repeats;
 mod reproduce;
+mod results;
 mod run;
-mod set_online;
-mod set_report;
-mod sets;
-mod specimens;
 mod sweep;
 mod terminal;
 
@@ -32,7 +25,6 @@ use args::{Cli, Command};
 use clap::Parser;
 use exit::Failure;
 use std::process::ExitCode;
-use stylet_api::{hash, output, picture};
 
 /// Runs the command line and returns the exit code (see [`exit`]).
 #[must_use]
@@ -56,7 +48,7 @@ pub fn main() -> ExitCode {
         Command::Listen(args) => listen::listen(args),
         Command::Reproduce(args) => reproduce::reproduce(args),
     })
-    .unwrap_or_else(|_| Err(Failure::Internal("the command stopped unexpectedly".to_owned())));
+    .unwrap_or_else(|_| Err(Failure::internal("the command stopped unexpectedly")));
     match outcome {
         Ok(()) => ExitCode::from(exit::DONE),
         Err(failure) => {

@@ -53,7 +53,7 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         // A reader that panicked has said so itself.
         let _ = reader.join();
     }
-    let json = serde_json::to_string(&session.counts()).map_err(|e| Failure::Internal(e.to_string()))?;
+    let json = serde_json::to_string(&session.counts()).map_err(Failure::internal)?;
     crate::terminal::tell(&format!("{json}\n"));
     Ok(())
 }

@@ -2,143 +2,22 @@
 
 use crate::args::{IdentifiabilityArgs, PlanArgs};
 use crate::exit::Failure;
-use crate::{limits, plan_report};
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use crate::results::default_folder;
+use crate::terminal::teller;
 use std::fmt::Write as _;
-use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
-use stylet_api::{Diagnosed, Evidence};
+use stylet_api::{Inputs, need};
+use stylet_pages::words;
+use stylet_plan::Plan;
 use stylet_plan::identifiability::Identifiability;
-use stylet_plan::{Ground, Limits, Plan, PlanError};
-use stylet_record::{ReadOptions, read_csv_with_holes};
 use stylet_report::significant;
-use stylet_scenario::{Motion, Scenario};
-
-/// What a diagnosis was made of: `inputs.json` of its folder. Paths as they were given.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Inputs {
-    /// Scenario.
-    pub scenario: PathBuf,
-    /// Recordings.
-    pub data: Vec<PathBuf>,
-    /// Column map.
-    pub columns: Option<PathBuf>,
-    /// Whether rows with backward time stamps were dropped.
-    pub repair: bool,
-}
-
-/// The file in which a diagnosis names its inputs.
-pub const INPUTS: &str = "inputs.json";
-
-impl Inputs {
-    /// The inputs with absolute paths, so that the folder can be used from anywhere.
-    pub fn absolute(&self) -> Self {
-        let full = |p: &PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
-        Self {
-            scenario: full(&self.scenario),
-            data: self.data.iter().map(full).collect(),
-            columns: self.columns.as_ref().map(full),
-            repair: self.repair,
-        }
-    }
-
-    /// As a file.
-    ///
-    /// # Errors
-    /// When a path is no text.
-    pub fn json(&self) -> Result<Vec<u8>, Failure> {
-        let mut json = serde_json::to_vec_pretty(self).map_err(|e| Failure::Internal(e.to_string()))?;
-        json.push(b'\n');
-        Ok(json)
-    }
-
-    /// What the diagnosis in a folder was made of.
-    ///
-    /// # Errors
-    /// When the folder does not say.
-    pub fn of_folder(folder: &Path) -> Result<Self, Failure> {
-        let path = folder.join(INPUTS);
-        let text = std::fs::read_to_string(&path).map_err(|_| {
-            Failure::Check(format!(
-                "{}: holds no {INPUTS}; name the folder that `stylet diagnose` wrote, or a scenario file",
-                folder.display()
-            ))
-        })?;
-        serde_json::from_str(&text)
-            .map_err(|e| Failure::Check(format!("{}: {e}; make the diagnosis anew", path.display())))
-    }
-
-    fn evidence(&self) -> Result<Vec<Evidence>, Failure> {
-        let columns = match &self.columns {
-            Some(path) => Some(stylet_scenario::load(path)?),
-            None => None,
-        };
-        let options = ReadOptions { columns, repair: self.repair };
-        read_all(&self.data, &options)
-    }
-}
-
-/// Reads recordings, several at once.
-///
-/// # Errors
-/// [`Failure`] with file and line.
-pub fn read_all(data: &[PathBuf], options: &ReadOptions) -> Result<Vec<Evidence>, Failure> {
-    let read: Vec<_> = data.par_iter().map(|path| read_csv_with_holes(path, options)).collect();
-    let named = data.iter().zip(read).map(|(path, read)| {
-        let (recording, notes) = read?;
-        Ok(Evidence { name: stylet_api::name_of(path, data), recording, notes })
-    });
-    named.collect()
-}
-
-/// Where planning stands.
-struct Stand {
-    scenario: Scenario,
-    evidence: Vec<Evidence>,
-    diagnosed: Option<Diagnosed>,
-    ground: Ground,
-    begin: stylet_plan::draw::Begin,
-}
-
-fn failed(at: &Path, why: PlanError) -> Failure {
-    match why {
-        PlanError::Diagnose(e) => Failure::Diagnose(e),
-        PlanError::Simulate(why) => Failure::Simulate { file: at.display().to_string(), why },
-        other => Failure::Check(format!("{}: {other}", at.display())),
-    }
-}
-
-fn stand(inputs: &Inputs, made: Option<&Motion>, talk: &dyn Fn(&str)) -> Result<Stand, Failure> {
-    let scenario = Scenario::load(&inputs.scenario)?;
-    let evidence = inputs.evidence()?;
-    let at = &inputs.scenario;
-    if evidence.is_empty() {
-        let (ground, begin) = stylet_plan::from_scenario(&scenario, made).map_err(|e| failed(at, e))?;
-        return Ok(Stand { scenario, evidence, diagnosed: None, ground, begin });
-    }
-    let diagnosed = stylet_api::diagnose(&scenario, &evidence, |what| talk(what))?;
-    let (ground, begin) =
-        stylet_plan::from_diagnosis(&scenario, &diagnosed.examined).map_err(|e| failed(at, e))?;
-    Ok(Stand { scenario, evidence, diagnosed: Some(diagnosed), ground, begin })
-}
-
-fn talker(quiet: bool) -> impl Fn(&str) {
-    let talk = !quiet && std::io::stderr().is_terminal();
-    move |what| {
-        if talk {
-            crate::terminal::tell(&format!("  {what} ...\n"));
-        }
-    }
-}
+use stylet_scenario::Motion;
 
 /// `stylet plan`.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
-    let bounds: Limits = stylet_scenario::load(&args.limits)?;
-    bounds.check().map_err(|e| failed(&args.limits, e))?;
+    let limits = stylet_api::plan::limits(&args.limits)?;
     let inputs = if args.from.is_dir() {
         Inputs::of_folder(&args.from)?
     } else {
@@ -149,58 +28,20 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
             repair: args.repair,
         }
     };
-    args.resources.allow(&inputs.scenario, &limits::of_diagnose(&inputs.data), args.quiet)?;
-    let tell = talker(args.quiet);
-    let stand = stand(&inputs, None, &tell)?;
-    tell("looking for the motion that tells most");
-    let (mut plan, found) =
-        stylet_plan::plan(&stand.ground, &bounds, &stand.begin).map_err(|e| failed(&args.limits, e))?;
-    if !args.quick {
-        plan = stylet_plan::check(&found, &bounds, &stand.scenario, &stand.ground, &stand.evidence, &tell)
-            .map_err(|e| failed(&inputs.scenario, e))?;
+    args.resources.allow(&inputs.scenario, &need::of_diagnose(&inputs.data), args.quiet)?;
+    let tell = teller(args.quiet, " ...");
+    let made = stylet_api::plan::plan(&inputs, (&args.limits, &limits), !args.quick, &tell)?;
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.from, "-plan").join("plan.ron"));
+    made.write(&out)?;
+    if args.quiet {
+        return Ok(());
     }
-    let out = args.out.clone().unwrap_or_else(|| {
-        let stem = args.from.file_stem().unwrap_or(args.from.as_os_str()).to_string_lossy().into_owned();
-        PathBuf::from("stylet-out").join(format!("{stem}-plan")).join("plan.ron")
-    });
-    write(&out, &stand, &plan)?;
-    if !args.quiet {
-        crate::terminal::say(&format!(
-            "{}\nMotion: {}\nReport: {}\n",
-            summary(&plan),
-            out.display(),
-            out.with_extension("html").display()
-        ))?;
-    }
-    Ok(())
-}
-
-fn write(out: &Path, stand: &Stand, plan: &Plan) -> Result<(), Failure> {
-    let problem = |why| Failure::Output { path: out.display().to_string(), why };
-    if let Some(folder) = out.parent().filter(|p| !p.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).map_err(problem)?;
-    }
-    let internal = |e: &dyn std::fmt::Display| Failure::Internal(e.to_string());
-    let pretty = ron_pretty(&plan.motion).map_err(|e| internal(&e))?;
-    let motion = format!(
-        "// The next insertion, planned by stylet {}: a motion for `stylet run SCENARIO.ron --motion {}`.\n{pretty}\n",
-        env!("CARGO_PKG_VERSION"),
-        out.file_name().unwrap_or(out.as_os_str()).to_string_lossy()
-    );
-    let mut json = serde_json::to_vec_pretty(plan).map_err(|e| internal(&e))?;
-    json.push(b'\n');
-    let verdict = stand.diagnosed.as_ref().map(|d| crate::diagnose::sentence(&d.diagnosis));
-    let page = plan_report::page(&stand.scenario, verdict, &stand.ground, plan);
-    stylet_api::folder::write_file(&out.with_extension("json"), &json)?;
-    stylet_api::folder::write_file(&out.with_extension("html"), page.to_html().as_bytes())?;
-    stylet_api::folder::write_file(out, motion.as_bytes())?;
-    Ok(())
-}
-
-/// A motion as RON, in the dialect of scenarios.
-fn ron_pretty(motion: &Motion) -> Result<String, Failure> {
-    let scenario = stylet_scenario::motion_to_ron(motion);
-    scenario.map_err(|e| Failure::Internal(e.to_string()))
+    crate::terminal::say(&format!(
+        "{}\nMotion: {}\nReport: {}\n",
+        summary(&made.plan),
+        out.display(),
+        out.with_extension("html").display()
+    ))
 }
 
 fn summary(plan: &Plan) -> String {
@@ -292,57 +133,11 @@ pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
         columns: args.columns.clone(),
         repair: args.repair,
     };
-    args.resources.allow(&inputs.scenario, &limits::of_diagnose(&inputs.data), args.results.quiet)?;
-    let scenario = Scenario::load(&args.scenario)?;
-    let mut scenario = scenario;
-    if let Some(path) = &args.motion {
-        scenario.motion = load_motion(path)?;
-        scenario.check().map_err(|p| Failure::Check(format!("{}: {p}", path.display())))?;
-    }
-    let evidence = inputs.evidence()?;
-    if evidence.is_empty() && scenario.motion.plan().is_none() {
-        return Err(Failure::Argument(
-            "the scenario's motion is `Recorded`: give recordings with --data, or a motion with --motion"
-                .to_owned(),
-        ));
-    }
-    let tell = talker(args.results.quiet);
-    let ground = if evidence.is_empty() {
-        stylet_plan::from_scenario(&scenario, None).map_err(|e| failed(&args.scenario, e))?.0
-    } else {
-        let found = stylet_api::diagnose(&scenario, &evidence, |what| tell(what))?;
-        stylet_plan::start::of_recordings(&scenario, &found.examined)
-            .map_err(|e| failed(&args.scenario, e))?
-    };
-    let shown = stylet_plan::identifiability(&ground);
-    let mut json = serde_json::to_vec_pretty(&shown).map_err(|e| Failure::Internal(e.to_string()))?;
-    json.push(b'\n');
-    let mut output = stylet_api::Output::default();
-    output.add("report.html", plan_report::identifiability_page(&scenario, &shown).to_html());
-    output.add("identifiability.json", json);
-    output.add("matrix.svg", plan_report::matrix(&scenario, &shown));
-    let folder = args.results.out.clone().unwrap_or_else(|| {
-        let stem =
-            args.scenario.file_stem().unwrap_or(args.scenario.as_os_str()).to_string_lossy().into_owned();
-        PathBuf::from("stylet-out").join(format!("{stem}-identifiability"))
-    });
-    output.write(&folder)?;
-    if !args.results.quiet {
-        crate::terminal::say(&format!(
-            "{}\nReport: {}\n",
-            words(&shown),
-            folder.join("report.html").display()
-        ))?;
-    }
-    Ok(())
-}
-
-/// A motion from a file of its own.
-///
-/// # Errors
-/// What is wrong with the file, and where.
-pub fn load_motion(path: &Path) -> Result<Motion, Failure> {
-    Ok(stylet_scenario::load(path)?)
+    args.resources.allow(&inputs.scenario, &need::of_diagnose(&inputs.data), args.results.quiet)?;
+    let tell = teller(args.results.quiet, " ...");
+    let found = stylet_api::plan::identifiability(&inputs, args.motion.as_deref(), &tell)?;
+    let folder = args.results.folder(&args.scenario, "-identifiability");
+    args.results.conclude(&folder, &found.output()?, || words(&found.shown))
 }
 
 fn words(shown: &Identifiability) -> String {
@@ -350,7 +145,7 @@ fn words(shown: &Identifiability) -> String {
     let _ = writeln!(out, "{:<26} {:>10}  {:<44} as well", "effect", "nats", "seen from");
     for e in &shown.effects {
         let from = match &e.smallest {
-            Some(numbers) => plan_report::numbers(&e.effect, numbers),
+            Some(numbers) => words::numbers(&e.effect, numbers),
             None => "at no plausible size".to_owned(),
         };
         let line =

@@ -2,14 +2,11 @@
 
 use crate::args::{Again, PredictArgs};
 use crate::exit::Failure;
-use crate::output::Output;
-use crate::plan::{Inputs, read_all};
-use crate::terminal::say;
-use crate::{limits, predict_page};
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-use stylet_api::{Diagnosis, Prediction, Refit};
-use stylet_record::ReadOptions;
+use stylet_api::prediction::{Origin, output};
+use stylet_api::{Prediction, Refit, need, read_all, read_options};
+use stylet_pages::prediction::sentence;
+use stylet_pages::words::shown;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -19,15 +16,9 @@ use stylet_scenario::Scenario;
 /// [`Failure`] with the exit code that fits.
 pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
     let model = Scenario::load(&args.model)?;
-    args.limits.allow(&args.model, &limits::of_predict(&args.data), args.results.quiet)?;
-    let beside = args.model.parent().unwrap_or(Path::new("."));
-    let diagnosis = diagnosis(&beside.join("diagnosis.json"))?;
-    let believed = believed(args, beside)?;
-    let columns = match &args.columns {
-        Some(path) => Some(stylet_scenario::load(path)?),
-        None => None,
-    };
-    let evidence = read_all(&args.data, &ReadOptions { columns, repair: args.repair })?;
+    args.limits.allow(&args.model, &need::of_predict(&args.data), args.results.quiet)?;
+    let Origin { diagnosis, believed } = Origin::beside(&args.model, args.believed.as_deref())?;
+    let evidence = read_all(&args.data, &read_options(args.columns.as_deref(), args.repair)?)?;
     let refit: Vec<Refit> = args
         .refit
         .iter()
@@ -37,57 +28,8 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
         })
         .collect();
     let found = stylet_api::forecast(&model, diagnosis.as_ref(), believed.as_ref(), &refit, &evidence)?;
-    let mut output = Output::default();
-    output.add("report.html", predict_page::page(&model, args, &found).to_html());
-    let mut json =
-        serde_json::to_vec_pretty(&found.prediction).map_err(|e| Failure::Internal(e.to_string()))?;
-    json.push(b'\n');
-    output.add("predict.json", json);
-    let folder = args.results.out.clone().unwrap_or_else(|| {
-        let stem = args.model.file_stem().unwrap_or(args.model.as_os_str()).to_string_lossy().into_owned();
-        PathBuf::from("stylet-out").join(format!("{stem}-prediction"))
-    });
-    output.write(&folder)?;
-    if !args.results.quiet {
-        say(&format!("{}\nReport: {}\n", summary(&found.prediction), folder.join("report.html").display()))?;
-    }
-    Ok(())
-}
-
-/// The diagnosis that a model came from, if it lies beside it.
-fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Failure> {
-    let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
-    serde_json::from_str(&text)
-        .map(Some)
-        .map_err(|e| Failure::Check(format!("{}: {e}; make the diagnosis anew", path.display())))
-}
-
-/// What was believed before: as said, or as the folder of the diagnosis says. A file that is gone since is nobody's error.
-fn believed(args: &PredictArgs, beside: &Path) -> Result<Option<Scenario>, Failure> {
-    if let Some(path) = &args.believed {
-        return Ok(Some(Scenario::load(path)?));
-    }
-    let Ok(inputs) = Inputs::of_folder(beside) else { return Ok(None) };
-    Ok(Scenario::load(&inputs.scenario).ok())
-}
-
-/// How good a prediction is, in a sentence.
-pub fn sentence(p: &Prediction) -> String {
-    let ratio = p.rmse_n / p.floor_n.max(1e-300);
-    let within = format!(
-        "{} N rms are left, {} times the noise; the 90 % band holds {:.0} %",
-        significant(p.rmse_n, 3),
-        significant(ratio, 2),
-        100.0 * p.band_coverage
-    );
-    let how = if ratio < 1.2 && p.band_coverage >= 0.8 {
-        "The model predicts these recordings to within the noise"
-    } else if p.band_coverage >= 0.8 {
-        "The model predicts these recordings as well as its own scatter allows"
-    } else {
-        "The model misses something of these recordings"
-    };
-    format!("{how}: {within}.")
+    let folder = args.results.folder(&args.model, "-prediction");
+    args.results.conclude(&folder, &output(&model, &args.model, &found)?, || summary(&found.prediction))
 }
 
 fn summary(p: &Prediction) -> String {
@@ -98,7 +40,7 @@ fn summary(p: &Prediction) -> String {
         "recording", "left, N", "believed", "in the band", "peak off, N"
     );
     for r in &p.recordings {
-        let before = r.believed_rmse_n.map_or("-".to_owned(), |x| significant(x, 3));
+        let before = shown(r.believed_rmse_n, 1.0, 3);
         let _ = writeln!(
             out,
             "  {:<24} {:>10} {:>10} {:>10.0} % {:>12}",

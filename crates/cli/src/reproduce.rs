@@ -2,25 +2,25 @@
 
 use crate::args::ReproduceArgs;
 use crate::exit::Failure;
-use crate::output::Output;
 use crate::progress::Progress;
 use crate::terminal;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Instant;
+use stylet_api::Output;
 
 /// The command.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
-    let folder = args.results.out.clone().unwrap_or_else(|| PathBuf::from("stylet-out/reproduce"));
+    let folder = args.results.folder(Path::new("reproduce"), "");
     let begun = Instant::now();
     let plan = stylet_reproduce::plan(args.first_seed, args.seeds);
     let progress = Progress::new(plan.recordings_in_all(), "recordings", args.results.quiet);
     let made = stylet_reproduce::reproduce(&plan, &|| progress.advance(1));
     progress.finish();
-    let made = made.map_err(|e| Failure::Internal(e.to_string()))?;
+    let made = made.map_err(Failure::internal)?;
     let mut output = Output::default();
     let mut text = String::new();
     for claim in &made.claims {

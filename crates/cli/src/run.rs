@@ -2,9 +2,8 @@
 
 use crate::args::RunArgs;
 use crate::exit::Failure;
-use crate::limits;
-use crate::terminal;
-use std::path::{Path, PathBuf};
+use crate::terminal::scorecard;
+use stylet_api::need;
 use stylet_core::config::Model;
 use stylet_scenario::Scenario;
 
@@ -19,29 +18,15 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         scenario.seed = seed;
     }
     if let Some(path) = &args.motion {
-        scenario.motion = crate::plan::load_motion(path)?;
-        scenario.check().map_err(|p| Failure::Check(format!("{}: {p}", path.display())))?;
+        stylet_api::plan::move_as(&mut scenario, path)?;
     }
     if args.compare {
         scenario.compare = vec![Model::MultiLayer, Model::KelvinVoigt];
     }
-    if let Some(need) = limits::of_run(&scenario) {
+    if let Some(need) = need::of_run(&scenario) {
         args.limits.allow(&args.scenario, &need, args.results.quiet)?;
     }
     let run = stylet_api::simulate_from(&scenario, &file)?;
-    let folder = args.results.out.clone().unwrap_or_else(|| default_folder(&args.scenario));
-    run.output(&file)?.write(&folder)?;
-    if !args.results.quiet {
-        terminal::say(&format!(
-            "{}\nReport: {}\n",
-            terminal::scorecard(&run),
-            folder.join("report.html").display()
-        ))?;
-    }
-    Ok(())
-}
-
-/// Where results go when nothing is said: `stylet-out/` and the input's name.
-pub fn default_folder(input: &Path) -> PathBuf {
-    Path::new("stylet-out").join(input.file_stem().unwrap_or(input.as_os_str()))
+    let folder = args.results.folder(&args.scenario, "");
+    args.results.conclude(&folder, &run.output(&file)?, || scorecard(&run))
 }

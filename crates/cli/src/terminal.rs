@@ -1,10 +1,11 @@
 //! The scorecard on the terminal.
 
 use crate::exit::Failure;
-use crate::picture::name_of;
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
+use stylet_api::picture::name_of;
 use stylet_api::{Run, settings_note, virtual_note};
+use stylet_pages::words::{or_dash, shown};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{Compared, Score, Trace};
@@ -26,8 +27,14 @@ pub fn tell(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
-fn or_dash(value: Option<String>) -> String {
-    value.unwrap_or_else(|| "-".to_owned())
+/// Tells on standard error what is being done, with `after` behind it, when somebody looks at a terminal.
+pub fn teller(quiet: bool, after: &'static str) -> impl Fn(&str) {
+    let talk = !quiet && std::io::stderr().is_terminal();
+    move |what| {
+        if talk {
+            tell(&format!("  {what}{after}\n"));
+        }
+    }
 }
 
 /// The scorecard of a simulated run, ready to print.
@@ -99,9 +106,9 @@ fn layers(out: &mut String, score: &Score) {
             out,
             "    {name:<12} {:>8} {:>8} {:>8} {:>8}",
             significant(c.truth, 4),
-            or_dash(c.estimated.map(|x| significant(x, 4))),
+            shown(c.estimated, 1.0, 4),
             or_dash(c.relative_error.map(percent)),
-            or_dash(offline.map(|x| significant(x, 4))),
+            shown(offline, 1.0, 4),
         );
     };
     for l in &score.layers {
@@ -128,9 +135,5 @@ fn summary(out: &mut String, score: &Score) {
         share(score.enhancement.in_tissue_relative),
         share(score.enhancement.after_exit_relative),
     );
-    let _ = writeln!(
-        out,
-        "  reconstruction  {} N rms",
-        or_dash(score.reconstruction_rms_n.map(|x| significant(x, 3)))
-    );
+    let _ = writeln!(out, "  reconstruction  {} N rms", shown(score.reconstruction_rms_n, 1.0, 3));
 }

@@ -145,6 +145,20 @@ pub struct Level {
     pub style: LineStyle,
 }
 
+impl Level {
+    /// A grey line at zero, without a name.
+    #[must_use]
+    pub fn zero() -> Self {
+        Self { y: 0.0, label: String::new(), colour: Colour::Grey, style: LineStyle::Solid }
+    }
+
+    /// A dotted grey line.
+    #[must_use]
+    pub fn dotted(y: f64, label: impl Into<String>) -> Self {
+        Self { y, label: label.into(), colour: Colour::Grey, style: LineStyle::Dotted }
+    }
+}
+
 /// One row of coloured spans: the states of a state machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lane {

@@ -125,6 +125,22 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
 }
 
+impl Table {
+    /// A table without an upper row of headings.
+    #[must_use]
+    pub fn new(title: impl Into<String>, headers: &[&str], rows: Vec<Vec<Cell>>) -> Self {
+        let headers = headers.iter().map(|h| (*h).to_owned()).collect();
+        Self { title: title.into(), groups: Vec::new(), headers, rows }
+    }
+
+    /// The same with an upper row of headings: text and number of columns of each.
+    #[must_use]
+    pub fn grouped(mut self, groups: &[(&str, usize)]) -> Self {
+        self.groups = groups.iter().map(|(text, columns)| ((*text).to_owned(), *columns)).collect();
+        self
+    }
+}
+
 /// Words.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Text {
@@ -211,7 +227,43 @@ impl Section {
     /// Adds a paragraph.
     #[must_use]
     pub fn text(self, paragraph: impl Into<String>) -> Self {
-        self.block(Block::Text(Text { paragraphs: vec![paragraph.into()], status: Status::Plain }))
+        self.texts(vec![paragraph.into()])
+    }
+
+    /// Adds paragraphs.
+    #[must_use]
+    pub fn texts(self, paragraphs: Vec<String>) -> Self {
+        self.block(Block::Text(Text { paragraphs, status: Status::Plain }))
+    }
+
+    /// Adds paragraphs set apart as a warning.
+    #[must_use]
+    pub fn warnings(self, paragraphs: Vec<String>) -> Self {
+        self.block(Block::Text(Text { paragraphs, status: Status::Warn }))
+    }
+
+    /// Adds a row of tiles without a heading of its own.
+    #[must_use]
+    pub fn tiles(self, tiles: Vec<Tile>) -> Self {
+        self.block(Block::Scorecard(Scorecard { title: String::new(), tiles }))
+    }
+
+    /// Adds a still picture (SVG).
+    #[must_use]
+    pub fn picture(self, description: impl Into<String>, markup: String) -> Self {
+        self.block(Block::Svg(SvgImage { description: description.into(), markup }))
+    }
+
+    /// Adds text to be copied.
+    #[must_use]
+    pub fn code(self, title: impl Into<String>, text: impl Into<String>) -> Self {
+        self.block(Block::Code(Code { title: title.into(), text: text.into(), folded: false }))
+    }
+
+    /// Adds text to be copied that is folded until opened.
+    #[must_use]
+    pub fn folded(self, title: impl Into<String>, text: impl Into<String>) -> Self {
+        self.block(Block::Code(Code { title: title.into(), text: text.into(), folded: true }))
     }
 }
 

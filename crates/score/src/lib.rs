@@ -3,12 +3,14 @@
 
 mod detection;
 mod offline;
+mod online;
 mod score;
 mod scorer;
 mod trace;
 
 pub use detection::{EARLIEST_S, LATEST_S, RuptureScore, match_ruptures};
 pub use offline::{LayerSample, OfflineEstimate, offline};
+pub use online::{Measured, Online};
 pub use score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
 pub use scorer::{Heard, Moment, Scorer};
 pub use stylet_record::LayerTruth;

@@ -5,12 +5,13 @@
 //! The same inputs give the same bytes for any number of threads and any split into shards.
 #![forbid(unsafe_code)]
 
+mod along;
+pub mod compare;
 mod design;
 mod distribution;
 mod draw;
 mod field;
 pub mod gate;
-mod page;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod row;
@@ -21,11 +22,11 @@ mod summary;
 mod sweep;
 pub mod trial;
 
+pub use along::{BINS, Bin, MapRow, bins, map_rows};
 pub use design::{Design, SOBOL_DIMENSIONS, Sampling, trial_seed};
 pub use distribution::Distribution;
 pub use draw::{DrawError, Drawer, Drawn};
 pub use field::Field;
-pub use page::{MapRow, map_rows, map_svg, page};
 #[cfg(feature = "parquet")]
 pub use parquet::parquet;
 pub use row::{Columns, Row, csv};

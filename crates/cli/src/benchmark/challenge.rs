@@ -9,7 +9,7 @@ use stylet_examine::{challenge, table};
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
-    let plan = super::examine::plan(&args.cases)?;
+    let plan = args.cases.asked().plan()?;
     let written = challenge::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
     crate::terminal::say(&format!(
         "{written} cases in {}\nThe key, for the judge alone: {}\n",

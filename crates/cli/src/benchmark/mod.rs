@@ -1,10 +1,8 @@
 //! `stylet benchmark`: examinations at scale.
 
 mod challenge;
-mod engine;
 mod examine;
 mod own;
-mod page;
 mod plan;
 
 use crate::args::{BenchmarkArgs, BenchmarkWhat};

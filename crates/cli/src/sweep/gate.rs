@@ -8,6 +8,7 @@ use crate::terminal::say;
 use std::fmt::Write as _;
 use std::path::Path;
 use stylet_api::folder::write_file;
+use stylet_api::output::json;
 use stylet_sweep::gate::{Baseline, Judged, baseline, changes, describe, junit, load};
 
 /// The command.
@@ -62,12 +63,6 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let failed = judged.iter().filter(|j| !j.passed).count();
     // A verdict outweighs that nobody could be told of it.
     if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { said }
-}
-
-fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Failure> {
-    let mut json = serde_json::to_vec_pretty(value).map_err(|e| Failure::Internal(e.to_string()))?;
-    json.push(b'\n');
-    Ok(json)
 }
 
 fn read(path: &Path) -> Result<Option<Baseline>, Failure> {

@@ -5,7 +5,8 @@ use super::with_threads;
 use crate::exit::Failure;
 use crate::progress::Progress;
 use std::fmt::Write as _;
-use stylet_sweep::{Columns, MapRow, Overrides, Sweep, map_rows, map_svg, rows};
+use stylet_pages::sweep::map_svg;
+use stylet_sweep::{Columns, MapRow, Overrides, Sweep, map_rows, rows};
 
 /// The command.
 pub fn map(args: &MapArgs) -> Result<(), Failure> {

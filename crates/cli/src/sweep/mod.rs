@@ -3,7 +3,6 @@
 pub mod args;
 mod gate;
 mod map;
-
 mod replay;
 mod shards;
 
@@ -11,31 +10,15 @@ pub use gate::gate;
 pub use replay::replay;
 
 use crate::exit::Failure;
-use crate::limits;
 use crate::progress::Progress;
-use crate::run::default_folder;
 use args::{SweepArgs, SweepCommand};
-use std::path::{Path, PathBuf};
-use stylet_api::Claim;
-use stylet_api::sweep::results;
+use std::fmt::Write as _;
+use std::path::Path;
+use stylet_api::sweep_folder::{SHARD_TRIALS, all_shards, begin, conclude};
+use stylet_api::{Claim, need};
+use stylet_pages::words::shown;
 use stylet_report::{percent, significant};
-use stylet_sweep::shard::{self, ShardError, ShardNumber};
-use stylet_sweep::{Columns, Row, Summary, Sweep, rows};
-
-/// Trials of a shard when `stylet sweep` splits the work itself: what a kill can cost at most.
-const SHARD_TRIALS: u64 = 1024;
-
-impl From<ShardError> for Failure {
-    fn from(error: ShardError) -> Self {
-        Failure::Check(error.to_string())
-    }
-}
-
-impl From<stylet_sweep::TrialError> for Failure {
-    fn from(error: stylet_sweep::TrialError) -> Self {
-        Failure::Check(error.to_string())
-    }
-}
+use stylet_sweep::{Columns, Row, Summary, Sweep};
 
 /// The command.
 ///
@@ -54,7 +37,7 @@ pub fn sweep(args: &SweepArgs) -> Result<(), Failure> {
 /// Runs `work` with a number of threads; 0 is one per core.
 fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(|pool| pool.install(work)).map_err(|e| Failure::Internal(e.to_string()))
+    pool.map(|pool| pool.install(work)).map_err(Failure::internal)
 }
 
 fn whole(args: &SweepArgs) -> Result<(), Failure> {
@@ -65,87 +48,33 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     };
     let sweep = Sweep::load(file, args.draws.into())?;
     let columns = Columns::new(&sweep);
-    let need = limits::of_sweep(&sweep, &columns, args.threads.unwrap_or(0));
-    args.limits.allow(file, &need, args.results.quiet)?;
-    let out = args.results.out.clone().unwrap_or_else(|| default_folder(file));
+    let threads = args.threads.unwrap_or(0);
+    args.limits.allow(file, &need::of_sweep(&sweep, &columns, threads), args.results.quiet)?;
+    let out = args.results.folder(file, "");
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     // Nobody else writes there until the set is whole: the shards, the tables and `sweep.ron` are of one draw.
     let claim = Claim::new(&out)?;
     begin(&sweep, &columns, &out, of, args.resume)?;
     let progress = Progress::new(sweep.trials(), "trials", args.results.quiet);
-    let rows =
-        with_threads(args.threads.unwrap_or(0), || all_shards(&sweep, &columns, &out, of, &progress))??;
+    let (there, done) = (|n| progress.skip(n), |n| progress.advance(n));
+    let rows = with_threads(threads, || all_shards(&sweep, &columns, &out, of, &there, &done))??;
     progress.finish();
-    conclude(&sweep, &columns, &rows, (&claim, &out), args.results.quiet)
-}
-
-/// Refuses to mix with what is unfinished in the folder.
-fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool) -> Result<(), Failure> {
-    let unfinished = shard::split_of(out);
-    if let (Ok(split), false) = (&unfinished, resume) {
-        let what = format!(
-            "{}: holds an unfinished sweep in {split} shards; go on with --resume, or remove {}",
-            out.display(),
-            out.join(shard::FOLDER).display()
-        );
-        return Err(Failure::Check(what));
-    }
-    if let (Ok(split), true) = (&unfinished, resume)
-        && *split != of
-    {
-        // A shard of another split is foreign, whatever it holds.
-        shard::read(sweep, columns, ShardNumber { shard: 1, of: *split }, out)?;
-        let what = format!(
-            "{}: is split into {split} shards, not {of}; finish it with: stylet sweep merge",
-            out.display()
-        );
-        return Err(Failure::Check(what));
-    }
-    Ok(())
-}
-
-fn all_shards(
-    sweep: &Sweep,
-    columns: &Columns,
-    out: &Path,
-    of: u64,
-    progress: &Progress,
-) -> Result<Vec<Row>, Failure> {
-    let mut all = Vec::with_capacity(sweep.trials() as usize);
-    for shard in 1..=of {
-        let number = ShardNumber { shard, of };
-        if number.path(out).exists() {
-            let rows = shard::read(sweep, columns, number, out)?;
-            progress.skip(rows.len() as u64);
-            all.extend(rows);
-            continue;
-        }
-        let rows = rows(sweep, columns, number.range(sweep.trials()), &|n| progress.advance(n))?;
-        shard::write(sweep, columns, number, &rows, out)?;
-        all.extend(rows);
-    }
-    Ok(all)
+    written(&sweep, &columns, &rows, (&claim, &out), args.results.quiet)
 }
 
 /// Writes the results, removes the shards, prints the summary.
-fn conclude(
+fn written(
     sweep: &Sweep,
     columns: &Columns,
     rows: &[Row],
     (claim, out): (&Claim, &Path),
     quiet: bool,
 ) -> Result<(), Failure> {
-    let (output, summary) = results(sweep, columns, rows)?;
-    output.write_to(claim)?;
-    let _ = std::fs::remove_dir_all(out.join(shard::FOLDER));
-    if !quiet {
-        crate::terminal::say(&terminal(&summary, out))?;
-    }
-    Ok(())
+    let summary = conclude(sweep, columns, rows, (claim, out))?;
+    if quiet { Ok(()) } else { crate::terminal::say(&terminal(&summary, out)) }
 }
 
 fn terminal(s: &Summary, out: &Path) -> String {
-    use std::fmt::Write;
     let mut text = format!("{}: {} trials of {}\n", s.sweep, s.trials, s.scenario);
     let mut rate = |name: &str, i: &stylet_stats::Interval| {
         let _ = writeln!(
@@ -173,13 +102,12 @@ fn terminal(s: &Summary, out: &Path) -> String {
     if let Some(outcome) = s.explained.first() {
         let _ = writeln!(text, "  {} explained by (first-order index, rank correlation)", outcome.outcome);
         for e in outcome.by.iter().take(5) {
-            let or_dash = |x: Option<f64>| x.map_or("-".to_owned(), |x| significant(x, 2));
             let _ = writeln!(
                 text,
                 "    {:<44} {:>6}  {:>6}",
                 e.quantity,
-                or_dash(e.first_order),
-                or_dash(e.rank_correlation)
+                shown(e.first_order, 1.0, 2),
+                shown(e.rank_correlation, 1.0, 2)
             );
         }
     }
@@ -189,9 +117,4 @@ fn terminal(s: &Summary, out: &Path) -> String {
     }
     let _ = writeln!(text, "\nReport: {}", out.join("report.html").display());
     text
-}
-
-/// Where the results of a command on shards go.
-fn folder(out: Option<&PathBuf>, sweep: &Path) -> PathBuf {
-    out.cloned().unwrap_or_else(|| default_folder(sweep))
 }

@@ -1,17 +1,15 @@
 //! `stylet sweep plan | run-shard | merge`: a sweep spread over machines.
 
 use super::args::{MergeArgs, PlanArgs, RunShardArgs, Which};
-use super::{conclude, folder, with_threads};
+use super::{with_threads, written};
 use crate::exit::Failure;
+use crate::results::default_folder;
 use std::fmt::Write as _;
-use std::time::Instant;
 use stylet_api::Claim;
+use stylet_api::sweep_folder::{merged, one_shard, trial_s};
 use stylet_report::significant;
-use stylet_sweep::shard::{self, ShardNumber};
-use stylet_sweep::{Columns, Sweep, rows};
-
-/// Trials that the plan runs to see how long one takes.
-const PROBE: u64 = 32;
+use stylet_sweep::shard::ShardNumber;
+use stylet_sweep::{Columns, Sweep};
 
 fn load(which: &Which) -> Result<(Sweep, Columns), Failure> {
     let sweep = Sweep::load(&which.sweep, which.draws.into())?;
@@ -22,10 +20,7 @@ fn load(which: &Which) -> Result<(Sweep, Columns), Failure> {
 /// `stylet sweep plan`.
 pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
     let (sweep, columns) = load(&args.which)?;
-    let probe = PROBE.min(sweep.trials());
-    let start = Instant::now();
-    with_threads(1, || rows(&sweep, &columns, 0..probe, &|_| {}))??;
-    let per_trial = start.elapsed().as_secs_f64() / probe as f64;
+    let per_trial = with_threads(1, || trial_s(&sweep, &columns))??;
     let mut text = format!(
         "{}: {} trials in {} shards, identity {}\n",
         sweep.name,
@@ -50,27 +45,16 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
 /// `stylet sweep run-shard`.
 pub fn run_shard(args: &RunShardArgs) -> Result<(), Failure> {
     let (sweep, columns) = load(&args.which)?;
-    let out = folder(args.out.as_ref(), &args.which.sweep);
-    let _claim = Claim::shared(&out)?;
-    let number = args.shard;
-    if args.resume && shard::read(&sweep, &columns, number, &out).is_ok() {
-        return Ok(());
-    }
-    let range = number.range(sweep.trials());
-    let rows = with_threads(args.threads.unwrap_or(0), || rows(&sweep, &columns, range, &|_| {}))??;
-    shard::write(&sweep, &columns, number, &rows, &out)?;
-    Ok(())
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.which.sweep, ""));
+    let work = || one_shard(&sweep, &columns, args.shard, &out, args.resume);
+    Ok(with_threads(args.threads.unwrap_or(0), work)??)
 }
 
 /// `stylet sweep merge`.
 pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     let (sweep, columns) = load(&args.which)?;
-    let out = folder(args.results.out.as_ref(), &args.which.sweep);
+    let out = args.results.folder(&args.which.sweep, "");
     let claim = Claim::new(&out)?;
-    let of = shard::split_of(&out)?;
-    let mut all = Vec::new();
-    for shard in 1..=of {
-        all.extend(shard::read(&sweep, &columns, ShardNumber { shard, of }, &out)?);
-    }
-    conclude(&sweep, &columns, &all, (&claim, &out), args.results.quiet)
+    let rows = merged(&sweep, &columns, &out)?;
+    written(&sweep, &columns, &rows, (&claim, &out), args.results.quiet)
 }

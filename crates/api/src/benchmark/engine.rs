@@ -9,15 +9,24 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// Why there is no answer.
 pub fn answer(question: &Question) -> Result<Answer, String> {
-    let scenario = Scenario::parse(&question.name, &question.believed_ron).map_err(|e| e.to_string())?;
-    let evidence: Vec<Evidence> = question
-        .recordings
-        .iter()
-        .map(|r| Evidence { name: r.name.clone(), recording: r.recording.clone(), notes: Vec::new() })
-        .collect();
+    let (scenario, evidence) = given(question)?;
     let examined = stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {})
         .map_err(|e| e.to_string())?;
     // By way of the file, so that what is judged is what a user gets.
     let json = serde_json::to_string(&examined.diagnosis).map_err(|e| e.to_string())?;
     Answer::from_json(&json).map_err(|e| e.to_string())
+}
+
+/// What a question gives: what is believed, and the recordings.
+///
+/// # Errors
+/// What is wrong with the belief.
+pub fn given(question: &Question) -> Result<(Scenario, Vec<Evidence>), String> {
+    let scenario = Scenario::parse(&question.name, &question.believed_ron).map_err(|e| e.to_string())?;
+    let evidence = question
+        .recordings
+        .iter()
+        .map(|r| Evidence { name: r.name.clone(), recording: r.recording.clone(), notes: Vec::new() })
+        .collect();
+    Ok((scenario, evidence))
 }

@@ -1,24 +1,23 @@
 //! The page of a prediction.
 
-use crate::args::PredictArgs;
-use crate::predict::sentence;
-use stylet_api::Foretold;
-use stylet_diagnose::predict::{Predicted, Shown};
+use crate::words::{or_dash, shown};
+use stylet_diagnose::predict::{Foretold, Predicted, Prediction, Shown};
 use stylet_report::{
-    Block, Cell, Chart, Colour, Level, LineStyle, MarkerSet, Page, Scorecard, Section, Series, Side, Status,
-    Table, Text, Tile, significant,
+    Cell, Chart, Colour, Level, LineStyle, MarkerSet, Page, Section, Series, Side, Status, Table, Tile,
+    significant,
 };
 use stylet_scenario::Scenario;
 
 /// Recordings that are drawn.
 const DRAWN: usize = 12;
 
-/// The page.
-pub fn page(model: &Scenario, args: &PredictArgs, found: &Foretold) -> Page {
+/// The page of what `model`, which was read from `file`, predicts.
+#[must_use]
+pub fn page(model: &Scenario, file: &str, found: &Foretold) -> Page {
     let p = &found.prediction;
     let mut page = Page::new(format!("Prediction: {}", model.name))
         .subtitle(sentence(p))
-        .fact("model", args.model.display().to_string())
+        .fact("model", file)
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(overview(found));
     let mut section = Section::new("Predicted and measured");
@@ -30,6 +29,26 @@ pub fn page(model: &Scenario, args: &PredictArgs, found: &Foretold) -> Page {
     }
     page = page.section(section);
     page
+}
+
+/// How good a prediction is, in a sentence.
+#[must_use]
+pub fn sentence(p: &Prediction) -> String {
+    let ratio = p.rmse_n / p.floor_n.max(1e-300);
+    let within = format!(
+        "{} N rms are left, {} times the noise; the 90 % band holds {:.0} %",
+        significant(p.rmse_n, 3),
+        significant(ratio, 2),
+        100.0 * p.band_coverage
+    );
+    let how = if ratio < 1.2 && p.band_coverage >= 0.8 {
+        "The model predicts these recordings to within the noise"
+    } else if p.band_coverage >= 0.8 {
+        "The model predicts these recordings as well as its own scatter allows"
+    } else {
+        "The model misses something of these recordings"
+    };
+    format!("{how}: {within}.")
 }
 
 fn overview(found: &Foretold) -> Section {
@@ -59,7 +78,6 @@ fn overview(found: &Foretold) -> Section {
         .recordings
         .iter()
         .map(|r| {
-            let or_dash = |x: Option<String>| Cell::number(x.unwrap_or_else(|| "-".to_owned()));
             vec![
                 Cell::text(r.name.clone()),
                 Cell::number(significant(r.rmse_n, 3)).status(Status::at_most(
@@ -67,37 +85,31 @@ fn overview(found: &Foretold) -> Section {
                     1.2 * p.floor_n,
                     2.0 * p.floor_n,
                 )),
-                or_dash(r.believed_rmse_n.map(|x| significant(x, 3))),
+                Cell::number(shown(r.believed_rmse_n, 1.0, 3)),
                 Cell::number(format!("{:.0} %", 100.0 * r.band_coverage)),
                 Cell::number(significant(r.peak_error_n, 2)),
-                or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m))),
-                or_dash(r.friction_factor.map(|x| significant(x, 3))),
+                Cell::number(or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m)))),
+                Cell::number(shown(r.friction_factor, 1.0, 3)),
             ]
         })
         .collect();
-    let mut section = Section::new("How good it is")
-        .block(Block::Scorecard(Scorecard { title: String::new(), tiles }))
-        .table(Table {
-            title: "Each recording".to_owned(),
-            groups: Vec::new(),
-            headers: [
-                "",
-                "left, N",
-                "left by what was believed, N",
-                "in the band",
-                "largest force: measured less predicted, N",
-                "surface",
-                "friction",
-            ]
-            .map(str::to_owned)
-            .to_vec(),
-            rows,
-        });
+    let mut section = Section::new("How good it is").tiles(tiles).table(Table::new(
+        "Each recording",
+        &[
+            "",
+            "left, N",
+            "left by what was believed, N",
+            "in the band",
+            "largest force: measured less predicted, N",
+            "surface",
+            "friction",
+        ],
+        rows,
+    ));
     if !p.held_out {
         let said = "Surface or friction were fitted to the recording that they predict: what is left is less than for the next one. \
                     Two or more recordings are each predicted by what the others say.";
-        section =
-            section.block(Block::Text(Text { paragraphs: vec![said.to_owned()], status: Status::Warn }));
+        section = section.warnings(vec![said.to_owned()]);
     }
     section
 }
@@ -132,16 +144,10 @@ fn force(r: &Predicted, s: &Shown) -> Chart {
 
 fn residual(r: &Predicted, s: &Shown, floor_n: f64) -> Chart {
     let left: Vec<f64> = s.measured_n.iter().zip(&s.predicted_n).map(|(y, f)| y - f).collect();
-    let level = |y: f64, label: &str| Level {
-        y,
-        label: label.to_owned(),
-        colour: Colour::Grey,
-        style: LineStyle::Dotted,
-    };
     Chart::new(format!("{}: what is left", r.name), "Time (s)", "Left (N)")
         .group(r.name.clone())
         .height(200)
         .with_series(Series::line("left", Colour::Blue, s.time_s.clone(), left).width(1.0))
-        .with_level(level(2.0 * floor_n, "twice the noise"))
-        .with_level(level(-2.0 * floor_n, ""))
+        .with_level(Level::dotted(2.0 * floor_n, "twice the noise"))
+        .with_level(Level::dotted(-2.0 * floor_n, ""))
 }

@@ -1,21 +1,10 @@
-//! `report.html`: the summary as a page, and the robustness map as a picture.
+//! The page of a sweep: the summary, and the robustness map as a picture.
 
-use crate::row::{Columns, Row};
-use crate::summary::{Outcome, Summary, failed, value};
-use crate::sweep::Sweep;
+use crate::words::shown;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
-use stylet_report::{
-    Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile,
-    significant,
-};
-use stylet_stats::{Interval, wilson};
-
-/// Bins of a drawn quantity in pictures.
-const BINS: usize = 10;
-
-fn percent(x: f64) -> String {
-    stylet_report::percent(x)
-}
+use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, percent, significant};
+use stylet_stats::Interval;
+use stylet_sweep::{BINS, Bin, Columns, MapRow, Outcome, Row, Summary, Sweep, bins, value};
 
 fn between(i: &Interval) -> String {
     format!("95 % interval {} to {}", percent(i.low), percent(i.high))
@@ -34,19 +23,15 @@ pub fn page(sweep: &Sweep, columns: &Columns, rows: &[Row], summary: &Summary) -
         page =
             page.fact("redrawn", format!("{} trials, their first draw being out of range", summary.redrawn));
     }
-    page.section(Section::new("Rates").block(Block::Scorecard(tiles(summary))))
+    page.section(Section::new("Rates").tiles(tiles(summary)))
         .section(worst(summary))
         .section(explained(&summary.explained))
         .section(against(sweep, columns, rows))
         .section(Section::new("Scores").table(scores(summary)))
-        .section(Section::new("How it was drawn").block(Block::Code(Code {
-            title: "sweep".to_owned(),
-            text: sweep.to_ron(),
-            folded: true,
-        })))
+        .section(Section::new("How it was drawn").folded("sweep", sweep.to_ron()))
 }
 
-fn tiles(s: &Summary) -> Scorecard {
+fn tiles(s: &Summary) -> Vec<Tile> {
     let rate = |label: &str, i: &Interval| {
         Tile::new(label, percent(i.value), between(i)).status(Status::at_most(i.value, 0.01, 0.05))
     };
@@ -69,7 +54,7 @@ fn tiles(s: &Summary) -> Scorecard {
             ));
         }
     }
-    Scorecard { title: String::new(), tiles }
+    tiles
 }
 
 fn worst(s: &Summary) -> Section {
@@ -121,48 +106,42 @@ fn explained(outcomes: &[Outcome]) -> Section {
         let chart = BarChart { label: "first-order Sobol index".to_owned(), bars: bars.collect() };
         let title = outcome.outcome.clone();
         let options = FigureOptions { title: title.clone(), ..FigureOptions::default() };
-        section = section
-            .block(Block::Svg(SvgImage { description: title.clone(), markup: bar_chart(&chart, &options) }))
-            .table(table(outcome));
+        section = section.picture(title.clone(), bar_chart(&chart, &options)).table(table(outcome));
     }
     section
 }
 
 fn table(outcome: &Outcome) -> Table {
-    let or_dash = |x: Option<f64>| x.map_or("-".to_owned(), |x| significant(x, 3));
-    Table {
-        title: outcome.outcome.clone(),
-        headers: ["quantity", "first-order index", "rank correlation", "p-value"].map(str::to_owned).to_vec(),
-        rows: outcome
+    let number = |x: Option<f64>| shown(x, 1.0, 3);
+    Table::new(
+        outcome.outcome.clone(),
+        &["quantity", "first-order index", "rank correlation", "p-value"],
+        outcome
             .by
             .iter()
             .map(|e| {
                 vec![
                     Cell::text(e.quantity.clone()),
-                    Cell::number(or_dash(e.first_order)),
-                    Cell::number(or_dash(e.rank_correlation)),
+                    Cell::number(number(e.first_order)),
+                    Cell::number(number(e.rank_correlation)),
                     Cell::number(match e.p_value {
                         Some(p) if p < 1e-15 => "< 1e-15".to_owned(),
-                        p => or_dash(p),
+                        p => number(p),
                     }),
                 ]
             })
             .collect(),
-        ..Table::default()
-    }
+    )
 }
 
 fn scores(s: &Summary) -> Table {
     let cell = |x: f64| Cell::number(significant(x, 3));
     let range =
         |i: &Interval| Cell::number(format!("{} to {}", significant(i.low, 3), significant(i.high, 3)));
-    Table {
-        title: "Medians and 95th percentiles with their 95 % intervals between order statistics".to_owned(),
-        headers: ["score", "trials", "median", "interval", "p95", "interval", "worst", "in trial"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows: s
-            .scores
+    Table::new(
+        "Medians and 95th percentiles with their 95 % intervals between order statistics",
+        &["score", "trials", "median", "interval", "p95", "interval", "worst", "in trial"],
+        s.scores
             .iter()
             .map(|x| {
                 vec![
@@ -177,34 +156,7 @@ fn scores(s: &Summary) -> Table {
                 ]
             })
             .collect(),
-        ..Table::default()
-    }
-}
-
-/// One bin of a drawn quantity.
-struct Bin {
-    middle: f64,
-    failed: Interval,
-}
-
-/// Rows in groups of equal size along a drawn quantity; those of an effect that is off are left out.
-fn bins(sweep: &Sweep, columns: &Columns, rows: &[Row], quantity: usize) -> Vec<Bin> {
-    let switch = sweep
-        .fields
-        .get(quantity)
-        .and_then(|f| f.effect())
-        .and_then(|e| e.checked_sub(sweep.own_effects))
-        .map(|e| sweep.fields.len() + e);
-    let mut kept: Vec<&Row> =
-        rows.iter().filter(|r| switch.is_none_or(|s| r.values.get(s).is_some_and(|on| *on > 0.0))).collect();
-    kept.sort_by(|a, b| a.values[quantity].total_cmp(&b.values[quantity]).then(a.trial.cmp(&b.trial)));
-    let size = kept.len().div_ceil(BINS).max(1);
-    kept.chunks(size)
-        .map(|chunk| {
-            let hits = chunk.iter().filter(|r| failed(columns, r)).count();
-            Bin { middle: chunk[chunk.len() / 2].values[quantity], failed: wilson(hits, chunk.len()) }
-        })
-        .collect()
+    )
 }
 
 /// The share of failed insertions against every quantity that explains something.
@@ -241,52 +193,6 @@ fn against(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Section {
         section = section.chart(chart);
     }
     section
-}
-
-/// A row of the robustness map.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MapRow {
-    /// Sweep and quantity with its range.
-    pub name: String,
-    /// Share of failed insertions per tenth of the draws, in %.
-    pub failed_percent: Vec<f64>,
-}
-
-/// Rows of the robustness map that a sweep gives: one per drawn quantity.
-#[must_use]
-pub fn map_rows(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Vec<MapRow> {
-    (0..sweep.fields.len())
-        .filter_map(|quantity| {
-            let bins = bins(sweep, columns, rows, quantity);
-            let (first, last) = (bins.first()?, bins.last()?);
-            if first.middle == last.middle {
-                return None; // a constant
-            }
-            let path = name(sweep, quantity);
-            Some(MapRow {
-                name: format!("{path}  {} … {}", significant(first.middle, 2), significant(last.middle, 2)),
-                failed_percent: bins.iter().map(|b| (100.0 * b.failed.value).round()).collect(),
-            })
-        })
-        .collect()
-}
-
-/// A quantity as people read it: an effect's by the effect's name.
-fn name(sweep: &Sweep, quantity: usize) -> String {
-    use stylet_tissue::Effect;
-    let Some(field) = sweep.fields.get(quantity) else { return String::new() };
-    match field.effect().and_then(|e| sweep.template.effects.get(e)) {
-        Some(effect) => {
-            let last = field.path().rsplit('.').next().unwrap_or_default();
-            format!("{} {last}", effect.id())
-        }
-        None => {
-            let path = field.path();
-            let short =
-                ["tissue.", "enhance.", "motion.", "sensor."].iter().find_map(|p| path.strip_prefix(p));
-            short.unwrap_or(path).to_owned()
-        }
-    }
 }
 
 /// The robustness map as SVG.

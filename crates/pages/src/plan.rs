@@ -1,42 +1,16 @@
-//! The pages of a plan and of what an experiment can show.
+//! The page of a plan.
 
-use std::collections::BTreeMap;
+use crate::words::spaced;
 use std::fmt::Write as _;
-use stylet_plan::identifiability::Identifiability;
 use stylet_plan::{Ground, Plan};
-use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
-use stylet_report::{
-    Block, Cell, Chart, Code, Colour, Page, Scorecard, Section, Series, Status, SvgImage, Table, Tile,
-    significant,
-};
+use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, significant};
 use stylet_scenario::{Motion, Scenario, Segment};
 
 /// Candidates whose forces are drawn.
 const DRAWN: usize = 7;
 
-fn spaced(id: &str) -> String {
-    id.replace('_', " ")
-}
-
-/// An effect's numbers with their units.
-pub fn numbers(effect: &str, values: &BTreeMap<String, f64>) -> String {
-    let unit = |path: &str| {
-        stylet_tissue::info(effect)
-            .and_then(|i| i.parameters.iter().find(|p| p.path == path))
-            .map_or("", |p| p.unit)
-    };
-    let one = |(path, x): (&String, &f64)| {
-        format!("{path} = {} {}", significant(*x, 2), unit(path)).trim_end().to_owned()
-    };
-    let strength = |path: &str| {
-        stylet_tissue::info(effect)
-            .and_then(|i| i.parameters.iter().find(|p| p.path == path))
-            .is_some_and(|p| p.strength)
-    };
-    values.iter().filter(|(p, _)| strength(p)).map(one).collect::<Vec<_>>().join(", ")
-}
-
 /// The page of a plan.
+#[must_use]
 pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &Ground, plan: &Plan) -> Page {
     let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     let mut tiles = vec![
@@ -84,7 +58,7 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &Ground, plan:
         }))
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .fact("motions looked at", plan.looked_at.to_string())
-        .section(Section::new("Plan").block(Block::Scorecard(Scorecard { title: String::new(), tiles })));
+        .section(Section::new("Plan").tiles(tiles));
     page = page.section(motion(plan, ground)).section(pairs(plan));
     if !plan.simulated.is_empty() {
         let rows = plan
@@ -94,17 +68,12 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &Ground, plan:
                 vec![Cell::text(spaced(&t.candidate)), Cell::number(format!("{} of {}", t.decided, t.of))]
             })
             .collect();
-        page = page.section(
-            Section::new("Simulated and diagnosed").table(Table {
-                title:
-                    "The chosen motion simulated under each candidate and diagnosed with what is at hand; \
-                        these insertions had no part in the choice"
-                        .to_owned(),
-                headers: ["what was simulated", "named, and alone"].map(str::to_owned).to_vec(),
-                rows,
-                ..Table::default()
-            }),
-        );
+        page = page.section(Section::new("Simulated and diagnosed").table(Table::new(
+            "The chosen motion simulated under each candidate and diagnosed with what is at hand; these insertions had no part in \
+             the choice",
+            &["what was simulated", "named, and alone"],
+            rows,
+        )));
     }
     page.section(intervals(plan)).section(alternatives(plan))
 }
@@ -178,7 +147,7 @@ fn motion(plan: &Plan, ground: &Ground) -> Section {
             };
         }
     }
-    section.block(Block::Code(Code { title: "segments".to_owned(), text, folded: false }))
+    section.code("segments", text)
 }
 
 fn pairs(plan: &Plan) -> Section {
@@ -208,17 +177,10 @@ fn pairs(plan: &Plan) -> Section {
         section =
             section.text("Nothing is left to tell apart: the motion was chosen for the sharpest intervals.");
     }
-    section.table(Table {
-        title: "Hardest first, at most 60".to_owned(),
-        groups: vec![
-            (String::new(), 2),
-            ("nats".to_owned(), 2),
-            ("right of the two".to_owned(), 2),
-            (String::new(), 1),
-        ],
-        headers: ["one", "other", "now", "then", "now", "then", ""].map(str::to_owned).to_vec(),
-        rows,
-    })
+    section.table(
+        Table::new("Hardest first, at most 60", &["one", "other", "now", "then", "now", "then", ""], rows)
+            .grouped(&[("", 2), ("nats", 2), ("right of the two", 2), ("", 1)]),
+    )
 }
 
 fn intervals(plan: &Plan) -> Section {
@@ -233,12 +195,11 @@ fn intervals(plan: &Plan) -> Section {
             ]
         })
         .collect();
-    Section::new("Intervals").table(Table {
-        title: "Half widths of 95 % intervals: of K, b and F relative, of places in m".to_owned(),
-        headers: ["number", "now", "then"].map(str::to_owned).to_vec(),
+    Section::new("Intervals").table(Table::new(
+        "Half widths of 95 % intervals: of K, b and F relative, of places in m",
+        &["number", "now", "then"],
         rows,
-        ..Table::default()
-    })
+    ))
 }
 
 fn alternatives(plan: &Plan) -> Section {
@@ -261,103 +222,9 @@ fn alternatives(plan: &Plan) -> Section {
             ]
         })
         .collect();
-    Section::new("Next best").table(Table {
-        title: "Other motions; their segments stand in plan.json".to_owned(),
-        headers: [
-            "segments",
-            "seconds",
-            "largest N",
-            "worst pair, nats",
-            "decided, by gaps",
-            "right, simulated",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
+    Section::new("Next best").table(Table::new(
+        "Other motions; their segments stand in plan.json",
+        &["segments", "seconds", "largest N", "worst pair, nats", "decided, by gaps", "right, simulated"],
         rows,
-        ..Table::default()
-    })
-}
-
-/// The matrix of what an experiment can tell apart.
-pub fn matrix(scenario: &Scenario, shown: &Identifiability) -> String {
-    let visible: Vec<usize> = (0..shown.effects.len()).filter(|k| shown.effects[*k].visible).collect();
-    let names: Vec<String> = visible.iter().map(|k| spaced(&shown.effects[*k].effect)).collect();
-    let map = HeatMap {
-        row_label: String::new(),
-        column_label: "absolute correlation in per cent, the base law's numbers taken out".to_owned(),
-        rows: names.clone(),
-        columns: names,
-        values: visible
-            .iter()
-            .map(|i| {
-                visible
-                    .iter()
-                    .map(|j| if i == j { f64::NAN } else { shown.correlation[*i][*j].abs() })
-                    .collect()
-            })
-            .collect(),
-        shares: true,
-    };
-    let options = FigureOptions {
-        title: "What this experiment can tell apart".to_owned(),
-        subtitle: format!("{}; effects that it shows at their typical size", scenario.name),
-        width_px: 1200.0,
-        ..FigureOptions::default()
-    };
-    heat_map(&map, &options)
-}
-
-/// The page of what an experiment can show.
-pub fn identifiability_page(scenario: &Scenario, shown: &Identifiability) -> Page {
-    let rows = shown
-        .effects
-        .iter()
-        .map(|e| {
-            let status = if e.visible { Status::Good } else { Status::Warn };
-            vec![
-                Cell::text(spaced(&e.effect)),
-                Cell::text(numbers(&e.effect, &e.typical)),
-                Cell::number(significant(e.nats, 3)).status(status),
-                Cell::text(
-                    e.smallest
-                        .as_ref()
-                        .map_or_else(|| "no plausible size".to_owned(), |s| numbers(&e.effect, s)),
-                ),
-                Cell::text(e.like.iter().map(|l| spaced(l)).collect::<Vec<_>>().join(", ")),
-                Cell::text(e.nearest.as_ref().map_or_else(String::new, |(n, nats)| {
-                    format!("{} ({} nats)", spaced(n), significant(*nats, 2))
-                })),
-            ]
-        })
-        .collect();
-    let table = Table {
-        title: "Effect by effect".to_owned(),
-        headers: ["effect", "typical size", "nats at it", "seen from", "explained as well by", "nearest"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows,
-        ..Table::default()
-    };
-    let mut summary = Section::new("What it shows").text(format!(
-        "Every effect at its typical size beside the base law, everything that is fitted taken out, at a noise of {} N in blocks of 20 ms. \
-         Ten nats are seen; effects within three nats of one another form a class.",
-        significant(shown.noise_n, 2)
-    ));
-    if !shown.invisible.is_empty() {
-        let names: Vec<String> = shown.invisible.iter().map(|n| spaced(n)).collect();
-        summary = summary.text(format!("Invisible: {}.", names.join(", ")));
-    }
-    for c in &shown.classes {
-        let names: Vec<String> = c.iter().map(|n| spaced(n)).collect();
-        summary = summary.text(format!("Cannot be told apart: {}.", names.join(", ")));
-    }
-    let figure = SvgImage {
-        description: "Absolute correlation of effects after projecting out the base law".to_owned(),
-        markup: matrix(scenario, shown),
-    };
-    Page::new(format!("What can be identified: {}", scenario.name))
-        .subtitle("Which effects this experiment shows, from which size on, and which it cannot tell apart.")
-        .fact("stylet", env!("CARGO_PKG_VERSION"))
-        .section(summary.table(table))
-        .section(Section::new("Which resemble one another").block(Block::Svg(figure)))
+    ))
 }

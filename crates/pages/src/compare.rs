@@ -1,13 +1,15 @@
 //! The page of `stylet compare`.
 
-use crate::compare::{Row, shown};
+use crate::words::shown;
 use stylet_report::{Cell, Page, Section, Status, Table};
+use stylet_sweep::compare::Row;
 
 fn percent(x: f64) -> String {
     shown(Some(x), 100.0, 2)
 }
 
-/// Tables: detection, estimates, calibration.
+/// The page, over `seeds` insertions a row. Tables: detection, estimates, calibration.
+#[must_use]
 pub fn page(rows: &[Row], seeds: u64) -> Page {
     let head = |r: &Row| vec![Cell::text(r.scenario.clone()), Cell::text(r.algorithm.clone())];
     let list = |v: &[Option<f64>]| v.iter().map(|x| shown(*x, 100.0, 2)).collect::<Vec<_>>().join(" / ");
@@ -60,38 +62,62 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
         }
         cells
     });
-    let headers = |all: &[&str]| all.iter().map(|h| (*h).to_owned()).collect();
+    let ruptures = Table::new(
+        "Ruptures missed and false alarms",
+        &[
+            "scenario",
+            "algorithm",
+            "missed / false",
+            "95 % interval, % of ruptures",
+            "delay median / p95, ms",
+        ],
+        detection.collect(),
+    );
+    let errors = Table::new(
+        "Errors in %",
+        &[
+            "scenario",
+            "algorithm",
+            "stiffness, layer by layer",
+            "its 95 % intervals",
+            "friction, layer by layer",
+            "enhanced force",
+            "its 95 % interval",
+            "with noise",
+        ],
+        estimates.collect(),
+    );
+    let covered = Table::new(
+        "Covered, %",
+        &["scenario", "algorithm", "stiffness", "friction", "cumulative friction", "tip force"],
+        calibrated.collect(),
+    );
     Page::new("Algorithms compared")
         .subtitle(format!("{seeds} noise seeds per scenario and algorithm; the same insertions for each"))
         .fact("version", env!("CARGO_PKG_VERSION"))
         .section(
             Section::new("Ruptures")
-                .text("A rupture is found by the first detection from 50 ms before to 1 s after it; the interval is that of missed and false together, Wilson's (a count's where there are more than ruptures).")
-                .table(Table {
-                    title: "Ruptures missed and false alarms".to_owned(),
-                    groups: Vec::new(),
-                    headers: headers(&["scenario", "algorithm", "missed / false", "95 % interval, % of ruptures", "delay median / p95, ms"]),
-                    rows: detection.collect(),
-                }),
+                .text(
+                    "A rupture is found by the first detection from 50 ms before to 1 s after it; the interval is that of \
+                     missed and false together, Wilson's (a count's where there are more than ruptures).",
+                )
+                .table(ruptures),
         )
         .section(
             Section::new("Estimates")
-                .text("Medians over the seeds, with their intervals between order statistics. Enhanced force: RMS of estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; beside it the same with the sensor's noise.")
-                .table(Table {
-                    title: "Errors in %".to_owned(),
-                    groups: Vec::new(),
-                    headers: headers(&["scenario", "algorithm", "stiffness, layer by layer", "its 95 % intervals", "friction, layer by layer", "enhanced force", "its 95 % interval", "with noise"]),
-                    rows: estimates.collect(),
-                }),
+                .text(
+                    "Medians over the seeds, with their intervals between order statistics. Enhanced force: RMS of \
+                     estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; \
+                     beside it the same with the sensor's noise.",
+                )
+                .table(errors),
         )
         .section(
             Section::new("Calibration")
-                .text("How often the truth lay in a 95 % interval, in %: over layers and seeds, the tip's force over samples. An algorithm that gives no intervals is not listed.")
-                .table(Table {
-                    title: "Covered, %".to_owned(),
-                    groups: Vec::new(),
-                    headers: headers(&["scenario", "algorithm", "stiffness", "friction", "cumulative friction", "tip force"]),
-                    rows: calibrated.collect(),
-                }),
+                .text(
+                    "How often the truth lay in a 95 % interval, in %: over layers and seeds, the tip's force over samples. \
+                     An algorithm that gives no intervals is not listed.",
+                )
+                .table(covered),
         )
 }

@@ -4,12 +4,13 @@ use std::collections::BTreeSet;
 use stylet_examine::table::Cell as Row;
 use stylet_examine::{Grade, Hide, Plan, Wrong};
 use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
-use stylet_report::{Block, Cell, Page, Section, Status, SvgImage, Table};
+use stylet_report::{Cell, Page, Section, Status, Table};
 
 /// Columns of a map: nothing wrong, then the grades.
 const COLUMNS: [&str; 4] = ["none", "small", "medium", "large"];
 
 /// Shares right, one map per kind of case: rows what is wrong, columns how much of it.
+#[must_use]
 pub fn maps(plan: &Plan, cells: &[Row]) -> Vec<(Hide, String)> {
     let kinds: BTreeSet<Hide> = cells.iter().map(|c| c.id.hide).collect();
     kinds.into_iter().map(|hide| (hide, map(plan, cells, hide))).collect()
@@ -61,16 +62,17 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     heat_map(&map, &options)
 }
 
-/// The page.
+/// The page of an examination; `text` is its table in words.
+#[must_use]
 pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
     let mut worlds = Section::new("In which world it fails");
     for (hide, markup) in maps(plan, cells) {
         let description = format!("Share of right answers, {}: {}", hide, hide.says());
-        worlds = worlds.block(Block::Svg(SvgImage { description, markup }));
+        worlds = worlds.picture(description, markup);
     }
-    let mut table = Table {
-        title: "Rates with 95 % Wilson intervals".to_owned(),
-        headers: [
+    let mut table = Table::new(
+        "Rates with 95 % Wilson intervals",
+        &[
             "wrong",
             "how much",
             "hidden",
@@ -80,11 +82,9 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
             "unknown",
             "median s",
             "p90 s",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-        ..Table::default()
-    };
+        ],
+        Vec::new(),
+    );
     for c in cells {
         let good = Status::at_most(1.0 - c.right.share(), 0.05, 0.2);
         table.rows.push(vec![
@@ -99,12 +99,11 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
             Cell::number(format!("{:.2}", c.p90_s)),
         ]);
     }
-    let details = stylet_report::Code { title: "table.txt".to_owned(), text: text.to_owned(), folded: true };
     Page::new("The diagnosis examined")
         .subtitle("by cases of an independent generator; which answers are right was written down before")
         .fact("world", format!("{}: {}", plan.world, plan.world.says()))
         .fact("strength", plan.size.says())
         .fact("seed", plan.seed.to_string())
         .section(worlds)
-        .section(Section::new("The table").table(table).block(Block::Code(details)))
+        .section(Section::new("The table").table(table).folded("table.txt", text))
 }

@@ -1,0 +1,128 @@
+//! The diagnosis examined in the referee's worlds.
+
+use super::{engine, pool, word};
+use crate::error::Error;
+use crate::folder::Claim;
+use crate::output::Output;
+use std::path::{Path, PathBuf};
+use stylet_examine::{CaseId, Grade, Hide, Plan, Size, World, Wrong, table};
+use stylet_pages::benchmark::{maps, page};
+
+/// Which cases are asked for, in words; `all` stands for all words of a list.
+#[derive(Clone, Debug)]
+pub struct Asked<'a> {
+    /// World of the referee.
+    pub world: &'a str,
+    /// What the believed simulation or the sensor has wrong.
+    pub wrong: &'a [String],
+    /// How much of it.
+    pub grade: &'a [String],
+    /// What is hidden.
+    pub hide: &'a [String],
+    /// How strong it is.
+    pub size: &'a str,
+    /// Cases per cell.
+    pub cases: u64,
+    /// Seed of all draws.
+    pub seed: u64,
+}
+
+/// The words of a list, or all of them.
+fn words<T: Copy>(
+    what: &str,
+    given: &[String],
+    all: &[T],
+    parse: fn(&str) -> Option<T>,
+    says: fn(T) -> &'static str,
+) -> Result<Vec<T>, Error> {
+    if given.iter().any(|g| g == "all") {
+        return Ok(all.to_vec());
+    }
+    given.iter().map(|g| word(what, g.trim(), all, parse, says)).collect()
+}
+
+impl Asked<'_> {
+    /// The plan of the cases.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a word that there is not, with those that there are.
+    pub fn plan(&self) -> Result<Plan, Error> {
+        let one = |given: &str| vec![given.to_owned()];
+        let world = words("--world", &one(self.world), World::ALL, World::parse, World::word)?;
+        let size = words("--size", &one(self.size), Size::ALL, Size::parse, Size::word)?;
+        let (Some(&world), Some(&size)) = (world.first(), size.first()) else {
+            return Err(Error::internal("a list of words is empty"));
+        };
+        Ok(Plan {
+            world,
+            wrong: words("--wrong", self.wrong, Wrong::ALL, Wrong::parse, Wrong::word)?,
+            grades: words("--grade", self.grade, Grade::ALL, Grade::parse, Grade::word)?,
+            hide: words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::word)?,
+            size,
+            cases: self.cases,
+            seed: self.seed,
+        })
+    }
+}
+
+/// An examination in its folder, which it alone writes to.
+pub struct Examination {
+    /// The cases.
+    pub cases: Vec<CaseId>,
+    plan: Plan,
+    journal: PathBuf,
+    claim: Claim,
+}
+
+impl Examination {
+    /// Claims the folder. With `look` the cases are those alone that its journal holds.
+    ///
+    /// # Errors
+    /// [`Error::Output`], [`Error::Busy`].
+    pub fn new(plan: Plan, folder: &Path, look: bool) -> Result<Self, Error> {
+        let claim = Claim::new(folder)?;
+        let journal = folder.join("cases.jsonl");
+        let mut cases = plan.cases();
+        if look {
+            let there = stylet_examine::run::read(&journal).map_err(|why| Error::output(folder, why))?;
+            cases.retain(|id| there.contains_key(id));
+        }
+        Ok(Self { cases, plan, journal, claim })
+    }
+
+    /// Asks the engine, judges its answers, writes table, page and maps, and gives the table in words. `tell` is told how many of how
+    /// many cases are done. 0 threads are one per core.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a mistake of the referee, [`Error::Output`].
+    pub fn run(&self, threads: usize, tell: &(dyn Fn(usize, usize) + Sync)) -> Result<String, Error> {
+        let Self { cases, plan, journal, claim } = self;
+        let outcomes = pool(threads)?
+            .install(|| stylet_examine::run(cases, Some(journal), &engine::answer, tell))
+            .map_err(Error::internal)?;
+        let text = table::text(&outcomes);
+        let cells = table::cells(&outcomes);
+        let mut output = Output::default();
+        output.add("table.txt", text.clone());
+        output.add_json("table.json", &cells)?;
+        output.add("report.html", page(plan, &cells, &text).to_html());
+        for (hide, svg) in maps(plan, &cells) {
+            output.add(map_name(hide), svg);
+        }
+        output.write_to(claim)?;
+        Ok(text)
+    }
+}
+
+/// The file of a map.
+fn map_name(hide: Hide) -> &'static str {
+    match hide {
+        Hide::Clean => "map_clean.svg",
+        Hide::One => "map_one.svg",
+        Hide::Two => "map_two.svg",
+        Hide::Three => "map_three.svg",
+        Hide::Outside => "map_outside.svg",
+        Hide::Beside => "map_beside.svg",
+        Hide::Instrument => "map_instrument.svg",
+    }
+}

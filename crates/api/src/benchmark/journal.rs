@@ -1,0 +1,44 @@
+//! Cases that are done, one JSON line each, so that a run that was stopped goes on.
+
+use crate::error::Error;
+use crate::folder::write_file;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::Path;
+use std::sync::Mutex;
+
+/// A journal, open for more.
+pub struct Journal<T> {
+    /// What it held.
+    pub done: Vec<T>,
+    file: Mutex<File>,
+}
+
+impl<T: Serialize + DeserializeOwned> Journal<T> {
+    /// Opens a journal, or begins it. A line that was cut off when the run was stopped goes, and its case is run again.
+    ///
+    /// # Errors
+    /// [`Error::Output`], which names the journal's folder, when it cannot be written.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let mut done: Vec<T> = Vec::new();
+        if let Ok(file) = File::open(path) {
+            let lines = BufReader::new(file).lines().map_while(Result::ok);
+            done.extend(lines.filter_map(|l| serde_json::from_str(&l).ok()));
+        }
+        let kept: String =
+            done.iter().filter_map(|d| serde_json::to_string(d).ok()).map(|l| l + "\n").collect();
+        write_file(path, kept.as_bytes())?;
+        let folder = path.parent().unwrap_or(path);
+        let file = OpenOptions::new().append(true).open(path).map_err(|why| Error::output(folder, why))?;
+        Ok(Self { done, file: Mutex::new(file) })
+    }
+
+    /// Notes a case. What cannot be written is run again another time.
+    pub fn note(&self, case: &T) {
+        if let (Ok(mut file), Ok(line)) = (self.file.lock(), serde_json::to_string(case)) {
+            let _ = writeln!(file, "{line}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The same insertions, heard by several algorithms: replayed scenarios, and the referee's cases. The only place where those cases and the
+//! online core meet; neither knows of the other.
+
+use crate::benchmark::word;
+use crate::error::Error;
+use crate::output::Output;
+use rayon::prelude::*;
+use stylet_core::EnhanceConfig;
+use stylet_core::config::Algorithm;
+use stylet_examine::{Case, CaseId, Grade, Hide, Plan, Size, World, Wrong};
+use stylet_record::TrueRupture;
+use stylet_scenario::Scenario;
+use stylet_score::{Trace, match_ruptures};
+use stylet_sweep::compare::{Row, Scored, name, row};
+
+/// The row of a scenario, which was read from `file`, over so many noise seeds; `done` is told of each insertion.
+///
+/// # Errors
+/// [`Error::Simulate`] when it cannot be replayed.
+pub fn replayed(
+    scenario: &Scenario,
+    file: &str,
+    algorithm: Algorithm,
+    seeds: u64,
+    done: &(dyn Fn(u64) + Sync),
+) -> Result<Row, Error> {
+    row(scenario, algorithm, seeds, done).map_err(|why| Error::Simulate { file: file.to_owned(), why })
+}
+
+/// All files that `stylet compare` writes, of rows over `seeds` insertions.
+///
+/// # Errors
+/// [`Error::Internal`] when a value cannot be written.
+pub fn output(rows: &[Row], seeds: u64) -> Result<Output, Error> {
+    let mut output = Output::default();
+    output.add_json("compare.json", &rows)?;
+    output.add("report.html", stylet_pages::compare::page(rows, seeds).to_html());
+    Ok(output)
+}
+
+/// Cases of one kind: a row per algorithm.
+pub struct Kind {
+    name: String,
+    cases: Vec<CaseId>,
+}
+
+/// Kinds of so many cases of a world in which nothing that is believed is wrong, one per word of what departs from the base law.
+///
+/// # Errors
+/// [`Error::Request`] for a word that there is not, with those that there are.
+pub fn kinds(world: &str, hide: &[String], cases: u64) -> Result<Vec<Kind>, Error> {
+    let world = word("--world", world, World::ALL, World::parse, World::word)?;
+    hide.iter()
+        .map(|given| {
+            let hide = word("--hide", given, Hide::ALL, Hide::parse, Hide::word)?;
+            let plan = Plan {
+                world,
+                wrong: vec![Wrong::Nothing],
+                grades: vec![Grade::Large],
+                hide: vec![hide],
+                size: Size::Strong,
+                cases,
+                seed: 1,
+            };
+            Ok(Kind { name: format!("{world} world, {hide}"), cases: plan.cases() })
+        })
+        .collect()
+}
+
+impl Kind {
+    /// Draws each case once and lets every algorithm hear it; `done` is told of the insertions that were heard.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a case cannot be drawn, which is a mistake of the referee.
+    pub fn listen(&self, algorithms: &[Algorithm], done: &(dyn Fn(u64) + Sync)) -> Result<Vec<Row>, Error> {
+        // In the order of the cases, whatever the threads: the same bytes.
+        let heard: Vec<Vec<Scored>> = self
+            .cases
+            .par_iter()
+            .map(|id| {
+                let case =
+                    stylet_examine::case(id).map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
+                let scored = algorithms.iter().map(|a| listen(&case, *a)).collect();
+                done(algorithms.len() as u64);
+                Ok(scored)
+            })
+            .collect::<Result<_, Error>>()?;
+        let row = |(k, algorithm): (usize, &Algorithm)| {
+            let mut all = Scored::default();
+            for one in heard.iter().filter_map(|of| of.get(k)) {
+                all.missed += one.missed;
+                all.false_alarms += one.false_alarms;
+                all.ruptures += one.ruptures;
+                all.delays_s.extend(&one.delays_s);
+            }
+            Row::new(&self.name, name(*algorithm), self.cases.len() as u64, &all)
+        };
+        Ok(algorithms.iter().enumerate().map(row).collect())
+    }
+}
+
+/// What an algorithm makes of all recordings of a case.
+fn listen(case: &Case, algorithm: Algorithm) -> Scored {
+    let config = EnhanceConfig { algorithm, ..EnhanceConfig::default() };
+    let surface_m = case.setup.believed.surface_m;
+    let mut all = Scored::default();
+    for (named, there) in case.question.recordings.iter().zip(&case.there) {
+        let recording = &named.recording;
+        let trace = Trace::record(recording, &recording.force_n, &config, surface_m, |_, _| {});
+        let last_s = recording.time_s.last().copied().unwrap_or(0.0);
+        let truth: Vec<TrueRupture> = there
+            .ruptures_s
+            .iter()
+            .filter(|t| **t < last_s)
+            .enumerate()
+            .map(|(i, &time_s)| TrueRupture { layer: i + 1, time_s, position_m: 0.0, by_force: false })
+            .collect();
+        let (ruptures, is_false) = match_ruptures(&truth, &trace.detections);
+        all.ruptures += ruptures.len();
+        all.missed += ruptures.iter().filter(|r| r.detected_s.is_none()).count();
+        all.false_alarms += is_false.iter().filter(|f| **f).count();
+        all.delays_s.extend(ruptures.iter().filter_map(|r| r.delay_s));
+    }
+    all
+}

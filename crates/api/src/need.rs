@@ -1,0 +1,126 @@
+//! What a command will need, reckoned before it begins.
+
+use std::path::{Path, PathBuf};
+use stylet_report::significant;
+use stylet_scenario::{Robot, Scenario};
+use stylet_sweep::{Columns, Sweep};
+
+/// Bytes that `run` holds per sample: columns, truth, traces of one model, the page. Measured with 1.6e5 samples: 970.
+const RUN_BYTES: f64 = 1000.0;
+/// Bytes that `enhance` holds per sample of one model. Measured with 1e5 samples: 770.
+const ENHANCE_BYTES: f64 = 800.0;
+/// Bytes per sample for each further model. Measured: 290.
+const MODEL_BYTES: f64 = 300.0;
+/// Bytes that `diagnose` holds per sample that it reads.
+const DIAGNOSE_BYTES: f64 = 300.0;
+/// Times that a sweep's rows lie in memory at the end: rows, table, page. Measured with 2e4 trials: 4.2.
+const ROWS: f64 = 5.0;
+/// Seconds per sample of `run` and `enhance`; an optimised build is faster.
+const SAMPLE_S: f64 = 6e-6;
+/// Seconds per physics step of the slide and of the arm.
+const SLIDE_S: f64 = 4e-6;
+const ARM_S: f64 = 25e-6;
+/// Seconds per sample of a sweep's trial.
+const TRIAL_SAMPLE_S: f64 = 1.5e-7;
+/// Seconds per sample that a diagnosis compares; the search makes more or less of it.
+const DIAGNOSE_S: f64 = 2e-4;
+/// A prediction takes this share of a diagnosis' time.
+const PREDICT_SHARE: f64 = 0.1;
+
+/// What some work needs.
+#[derive(Clone, Debug)]
+pub struct Need {
+    /// What makes it much, for people: `3.5e8 samples (3500 s at 1e5 Hz)`.
+    pub what: String,
+    /// Memory in bytes.
+    pub bytes: f64,
+    /// Time in s.
+    pub seconds: f64,
+    /// What would make it less.
+    pub remedy: &'static str,
+}
+
+/// What `stylet run` needs; nothing for a motion that is recorded, which it refuses by itself.
+#[must_use]
+pub fn of_run(scenario: &Scenario) -> Option<Need> {
+    let seconds = scenario.motion.plan()?.duration_s();
+    let samples = seconds * scenario.sample_hz;
+    let (steps, each_s) = match &scenario.robot {
+        Robot::Replay => (samples, 0.0),
+        Robot::Arm(_) => (seconds * scenario.physics_hz, ARM_S),
+        _ => (seconds * scenario.physics_hz, SLIDE_S),
+    };
+    let models = scenario.compare.len().max(1) as f64;
+    Some(Need {
+        what: format!(
+            "{} samples and {} physics steps in {} s",
+            significant(samples, 3),
+            significant(steps, 3),
+            significant(seconds, 4)
+        ),
+        bytes: samples * (RUN_BYTES + (models - 1.0) * MODEL_BYTES),
+        seconds: samples * SAMPLE_S * models + steps * each_s,
+        remedy: "shorten the motion, lower sample_hz or physics_hz",
+    })
+}
+
+/// What `stylet sweep` needs; 0 threads are one per core.
+#[must_use]
+pub fn of_sweep(sweep: &Sweep, columns: &Columns, threads: usize) -> Need {
+    let trials = sweep.trials() as f64;
+    let seconds = sweep.template.motion.plan().map_or(0.0, |plan| plan.duration_s());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = if threads == 0 { cores } else { threads.min(cores) };
+    Need {
+        what: format!("{} trials", significant(trials, 3)),
+        bytes: trials * (columns.width() + 3) as f64 * 8.0 * ROWS,
+        seconds: trials * seconds * sweep.template.sample_hz * TRIAL_SAMPLE_S / threads as f64,
+        remedy: "run fewer (--trials)",
+    }
+}
+
+/// What `stylet enhance` needs for a recording with so many models.
+#[must_use]
+pub fn of_enhance(data: &Path, models: usize) -> Option<Need> {
+    let samples = samples(data)?;
+    Some(Need {
+        what: format!("about {} samples", significant(samples, 2)),
+        bytes: samples * (ENHANCE_BYTES + (models as f64 - 1.0) * MODEL_BYTES),
+        seconds: samples * SAMPLE_S * models as f64,
+        remedy: "cut the recording to the insertion",
+    })
+}
+
+/// What `stylet diagnose` needs for these recordings.
+#[must_use]
+pub fn of_diagnose(data: &[PathBuf]) -> Need {
+    let each: Vec<f64> = data.iter().filter_map(|path| samples(path)).collect();
+    let all: f64 = each.iter().sum();
+    // Beyond that they are thinned.
+    let used: f64 = each.iter().map(|n| n.min(stylet_record::thin::MOST_SAMPLES as f64)).sum();
+    Need {
+        what: format!("about {} samples in {} recording(s)", significant(all, 2), data.len()),
+        bytes: all * DIAGNOSE_BYTES,
+        seconds: used * DIAGNOSE_S,
+        remedy: "cut the recordings to the insertion",
+    }
+}
+
+/// What `stylet predict` needs for these recordings.
+#[must_use]
+pub fn of_predict(data: &[PathBuf]) -> Need {
+    let need = of_diagnose(data);
+    Need { seconds: need.seconds * PREDICT_SHARE, ..need }
+}
+
+/// Samples of a CSV file, by its size and the length of its first lines. Nothing for what is no plain file.
+fn samples(path: &Path) -> Option<f64> {
+    use std::io::Read as _;
+    const HEAD: u64 = 1 << 16;
+    let file = std::fs::File::open(path).ok()?;
+    let size = file.metadata().ok().filter(std::fs::Metadata::is_file)?.len();
+    let mut head = Vec::new();
+    file.take(HEAD).read_to_end(&mut head).ok()?;
+    let lines = head.iter().filter(|b| **b == b'\n').count().max(1);
+    Some(size as f64 * lines as f64 / head.len().max(1) as f64)
+}

@@ -1,0 +1,38 @@
+//! Where results go, and the last words of a command that makes a folder.
+
+use crate::args::Results;
+use crate::exit::Failure;
+use crate::terminal::say;
+use std::path::{Path, PathBuf};
+use stylet_api::Output;
+
+impl Results {
+    /// The folder for the results: the one that is named, else `stylet-out/` and the input's name with `more` behind it.
+    pub fn folder(&self, input: &Path, more: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| default_folder(input, more))
+    }
+
+    /// Writes the files; says, unless asked to be quiet, what they hold and where the report is.
+    ///
+    /// # Errors
+    /// [`Failure`] when they cannot be written, or nothing can be said.
+    pub fn conclude(
+        &self,
+        folder: &Path,
+        output: &Output,
+        said: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        output.write(folder)?;
+        if self.quiet {
+            return Ok(());
+        }
+        say(&format!("{}\nReport: {}\n", said(), folder.join("report.html").display()))
+    }
+}
+
+/// Where results go when nothing is said: `stylet-out/` and the input's name.
+pub fn default_folder(input: &Path, more: &str) -> PathBuf {
+    let mut name = input.file_stem().unwrap_or(input.as_os_str()).to_os_string();
+    name.push(more);
+    Path::new("stylet-out").join(name)
+}

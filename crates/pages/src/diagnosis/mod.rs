@@ -1,0 +1,111 @@
+//! The page of a diagnosis: what was measured, what the base law cannot say, why, and what it gains.
+
+mod causes;
+mod evidence;
+mod residual;
+mod words;
+
+pub use words::{differ, sentence};
+
+use crate::words::remarks;
+use causes::{causes, moved, traces, unseen};
+use evidence::evidence;
+use residual::{differs, gain, remains, residual};
+use std::fmt::Write as _;
+use stylet_diagnose::Examined;
+use stylet_diagnose::curves::curves;
+use stylet_diagnose::outcome::{Diagnosis, Verdict};
+use stylet_report::{Page, Section, Status, Tile, significant};
+use stylet_scenario::Scenario;
+
+/// The page of a diagnosis of `scenario`, which was read from `file`; `command` repeats it.
+#[must_use]
+pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Examined) -> Page {
+    let d = &examined.diagnosis;
+    let all = curves(examined);
+    let samples: usize = all.iter().map(|c| c.time_s.len()).sum();
+    Page::new(format!("Diagnosis: {}", scenario.name))
+        .subtitle(sentence(d))
+        .fact("scenario", file)
+        .fact("recordings", d.gain.recordings.join(", "))
+        .fact("samples", samples.to_string())
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(verdict(d))
+        .section(differs(scenario, d, &all))
+        .section(causes(d))
+        .section(moved(scenario, d))
+        .section(traces(d))
+        .section(unseen(d))
+        .section(remains(d, &all))
+        .section(gain(d, &all))
+        .section(residual(d, examined, &all))
+        .section(evidence(d))
+        .section(quality(d))
+        .section(repeat(command, examined))
+}
+
+fn number(x: f64) -> String {
+    significant(x, 4)
+}
+
+fn verdict(d: &Diagnosis) -> Section {
+    let word = match d.verdict {
+        Verdict::None => "none",
+        Verdict::Named => "named",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Unknown => "unknown",
+    };
+    let mut tiles = vec![Tile::new("Verdict", word, sentence(d))];
+    for c in &d.causes {
+        let parameters = c
+            .parameters
+            .iter()
+            .map(|(p, e)| format!("{p} = {}", number(e.value)))
+            .collect::<Vec<_>>()
+            .join(", ");
+        let mut detail = format!("{parameters}; confidence {}", significant(c.confidence, 2));
+        if !c.equivalent.is_empty() {
+            let _ = write!(detail, "; as good: {}", c.equivalent.join(", "));
+        }
+        tiles.push(Tile::new("Cause", c.effect.replace('_', " "), detail));
+    }
+    let g = &d.gain;
+    let what = if g.held_out { "left-out recordings" } else { "the fitted recording" };
+    tiles.push(Tile::new(
+        "Residual",
+        format!("{} → {} N", significant(g.rmse_before_n, 3), significant(g.rmse_after_n, 3)),
+        format!("root mean square on {what}; the noise is {} N", significant(g.floor_n, 3)),
+    ));
+    let status = if d.leftover.p_value < 1e-3 { Status::Warn } else { Status::Good };
+    tiles.push(
+        Tile::new(
+            "Left over",
+            if d.leftover.p_value < 1e-3 { "structure" } else { "noise" },
+            format!(
+                "p = {} that the residual is the same in several recordings by chance",
+                significant(d.leftover.p_value, 2)
+            ),
+        )
+        .status(status),
+    );
+    let mut section = Section::new("Verdict").tiles(tiles);
+    for a in &d.advice {
+        section = section.warnings(vec![a.clone()]);
+    }
+    section
+}
+
+fn quality(d: &Diagnosis) -> Section {
+    let section = Section::new("Data quality");
+    if d.data_quality.is_empty() {
+        return section
+            .text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
+    }
+    section.table(remarks("", &d.data_quality))
+}
+
+fn repeat(command: String, examined: &Examined) -> Section {
+    Section::new("Repeat")
+        .code("command", command)
+        .folded("extended.ron", examined.extended.to_ron().unwrap_or_default())
+}

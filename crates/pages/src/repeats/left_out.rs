@@ -1,0 +1,124 @@
+//! Each run predicted by laws fitted to the others, and what that leaves.
+
+use crate::words::three;
+use stylet_diagnose::curves::binned;
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::study::{Study, speeds};
+use stylet_report::{Cell, Chart, Colour, Level, LineStyle, Section, Series, Table, significant};
+
+pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
+    let r = &study.repeats;
+    let rows = r
+        .speeds
+        .iter()
+        .map(|s| {
+            vec![
+                Cell::text(format!("{:.2} mm/s", 1e3 * s.speed_mps)),
+                Cell::number(s.runs.to_string()),
+                Cell::number(three(s.floor_n)),
+                Cell::number(three(Some(s.base_n))),
+                Cell::number(three(Some(s.extended_n))),
+                Cell::number(format!("{:.1} %", 100.0 * s.covered)),
+                Cell::number(three(s.base_speed_left_out_n)),
+                Cell::number(three(s.speed_left_out_n)),
+            ]
+        })
+        .chain(std::iter::once(vec![
+            Cell::text("mean"),
+            Cell::number(r.runs.len().to_string()),
+            Cell::number(three(r.mean.floor_n)),
+            Cell::number(three(Some(r.mean.base_n))),
+            Cell::number(three(Some(r.mean.extended_n))),
+            Cell::number(format!("{:.1} %", 100.0 * r.mean.covered)),
+            Cell::number(three(r.mean.base_speed_left_out_n)),
+            Cell::number(three(r.mean.speed_left_out_n)),
+        ]))
+        .collect();
+    let mut section = Section::new("Before and after").table(
+        Table::new(
+            "Each run predicted by laws fitted to the others, root mean square (N)",
+            &[
+                "",
+                "runs",
+                "mean of the others",
+                "base law",
+                "extended law",
+                "in the 90 % band",
+                "base law",
+                "extended law",
+            ],
+            rows,
+        )
+        .grouped(&[("", 2), ("one run left out", 4), ("a whole speed left out", 2)]),
+    );
+    if let Some(parts) = &r.parts {
+        let mut paragraphs: Vec<String> = parts
+            .alone
+            .iter()
+            .map(|(name, floor, error)| {
+                format!("{name}: {error:.3} N on runs left out, mean of the others {} N.", three(*floor))
+            })
+            .collect();
+        paragraphs.push(format!(
+            "Both laws put together, on the whole: {:.3} N (mean over the speeds).",
+            parts.mean_n
+        ));
+        section = section.texts(paragraphs);
+    }
+    // The middle run of each speed: neither the best nor the worst.
+    let groups = speeds(runs);
+    for (v, members) in groups {
+        let mut order = members.clone();
+        order.sort_by(|a, b| r.runs[*a].extended_n.total_cmp(&r.runs[*b].extended_n));
+        let i = order[order.len() / 2];
+        let (run, p) = (runs[i], &&study.out[i].prediction);
+        let t = &run.recording.time_s;
+        let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, t.clone(), y.to_vec());
+        section = section.chart(
+            Chart::new(format!("{} ({:.2} mm/s)", run.name, 1e3 * v), "Time (s)", "Force (N)")
+                .caption(format!(
+                    "Measured, and predicted by laws fitted to the other runs: base law {:.3} N, extended law {:.3} N rms; thin lines hold 90 %.",
+                    r.runs[i].base_n, r.runs[i].extended_n
+                ))
+                .height(320)
+                .with_series(line("measured", Colour::Grey, &run.recording.force_n).width(3.0))
+                .with_series(line("base law", Colour::Vermillion, &study.base_out[i].prediction.mean).width(1.1))
+                .with_series(line("extended law", Colour::Blue, &p.mean).width(1.5))
+                .with_series(line("5 %", Colour::SkyBlue, &p.low).width(0.8).styled(LineStyle::Dashed))
+                .with_series(line("95 %", Colour::SkyBlue, &p.high).width(0.8).styled(LineStyle::Dashed)),
+        );
+    }
+    section
+}
+
+pub(super) fn residual(runs: &[&Insertion], study: &Study) -> Section {
+    let mut section = Section::new("What remains").text(format!(
+        "Measured less predicted force of runs left out, averaged in 60 pieces of depth. The residual that all fitted runs have in common depends on {} \
+         (p = {}).",
+        if study.diagnosis.leftover.depends_on.is_empty() { "nothing".to_owned() } else { study.diagnosis.leftover.depends_on.join(", ") },
+        significant(study.diagnosis.leftover.p_value, 2)
+    ));
+    for (title, back) in [("Residual on the way in", false), ("Residual on the way back", true)] {
+        let mut chart = Chart::new(title, "Depth (mm)", "Residual (N)").height(280).with_level(Level::zero());
+        for (name, colour, predictions) in
+            [("base law", Colour::Vermillion, &study.base_out), ("extended law", Colour::Blue, &study.out)]
+        {
+            let (mut x, mut y) = (Vec::new(), Vec::new());
+            for (run, p) in runs.iter().zip(predictions).map(|(run, out)| (run, &out.prediction)) {
+                let r = &run.recording;
+                for i in 0..r.len() {
+                    let here = if back { i >= run.phases.back } else { i <= run.phases.deepest };
+                    if here {
+                        x.push(1e3 * r.position_m[i]);
+                        y.push(r.force_n[i] - p.mean.get(i).copied().unwrap_or(f64::NAN));
+                    }
+                }
+            }
+            let used = vec![true; x.len()];
+            let (bx, by) = binned(&x, &y, &used, 60);
+            chart = chart.with_series(Series::line(name, colour, bx, by));
+        }
+        section = section.chart(chart);
+    }
+    section
+}

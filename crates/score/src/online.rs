@@ -1,0 +1,92 @@
+//! The online core on a measured insertion, where nobody knows the truth: its detections against the drops of the raw force, and what
+//! is left of the force on the way back, all of which is friction.
+
+use crate::detection::{EARLIEST_S, LATEST_S};
+use crate::trace::Trace;
+use serde::Serialize;
+use stylet_record::Recording;
+use stylet_stats::rms;
+
+/// What the core found of one run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Online {
+    /// Run.
+    pub run: String,
+    /// Drops in the raw force.
+    pub drops: usize,
+    /// Drops that the core found.
+    pub found: usize,
+    /// Detections without a drop, on the way in.
+    pub false_in: usize,
+    /// In the hold.
+    pub false_hold: usize,
+    /// On the way back.
+    pub false_back: usize,
+    /// Force on the way back, in the tissue (N rms): all of it is friction, for nothing pushes the tip.
+    pub back_raw_n: f64,
+    /// What the core leaves of it with its own friction estimate (N rms).
+    pub back_before_n: f64,
+    /// What is left with the friction of a law fitted to the other runs, punctures taken where the core found them.
+    pub back_after_n: f64,
+}
+
+/// What is known of a measured run without the core.
+pub struct Measured<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What was recorded.
+    pub recording: &'a Recording,
+    /// Samples at which the raw force drops.
+    pub drops: &'a [usize],
+    /// Sample at which the tip is deepest.
+    pub deepest: usize,
+    /// Sample at which the way back begins.
+    pub back: usize,
+    /// Position of the surface in m.
+    pub contact_m: f64,
+}
+
+impl Online {
+    /// Judges what the core made of a run. `friction` says the friction (N, one value per sample) of a law fitted to other runs, from
+    /// the instants (s) at which layers count as punctured.
+    #[must_use]
+    pub fn of(run: &Measured, trace: &Trace, friction: impl FnOnce(&[f64]) -> Option<Vec<f64>>) -> Self {
+        let r = run.recording;
+        let mut taken = vec![false; trace.detections.len()];
+        let mut found = 0;
+        for drop in run.drops {
+            let at = r.time_s[*drop];
+            let hit = trace
+                .detections
+                .iter()
+                .enumerate()
+                .position(|(k, d)| !taken[k] && d.time_s >= at + EARLIEST_S && d.time_s <= at + LATEST_S);
+            if let Some(k) = hit {
+                taken[k] = true;
+                found += 1;
+            }
+        }
+        let time = |i: usize| r.time_s.get(i).copied().unwrap_or(f64::INFINITY);
+        let (deepest, back) = (time(run.deepest), time(run.back));
+        let count = |from: f64, to: f64| {
+            let lost = trace.detections.iter().zip(&taken).filter(|(_, taken)| !**taken);
+            lost.filter(|(d, _)| d.time_s >= from && d.time_s < to).count()
+        };
+        // Causally: a layer counts as punctured from the sample at which the core says so.
+        let instants: Vec<f64> = trace.detections.iter().map(|d| d.time_s).collect();
+        let friction = friction(&instants);
+        let inside: Vec<usize> = (run.back..r.len()).filter(|i| r.position_m[*i] > run.contact_m).collect();
+        let of = |what: &dyn Fn(usize) -> f64| rms(&inside.iter().map(|i| what(*i)).collect::<Vec<_>>());
+        Self {
+            run: run.name.to_owned(),
+            drops: run.drops.len(),
+            found,
+            false_in: count(f64::NEG_INFINITY, deepest),
+            false_hold: count(deepest, back),
+            false_back: count(back, f64::INFINITY),
+            back_raw_n: of(&|i| r.force_n[i]),
+            back_before_n: of(&|i| trace.enhanced_n[i]),
+            back_after_n: friction.map_or(f64::NAN, |friction| of(&|i| r.force_n[i] - friction[i])),
+        }
+    }
+}

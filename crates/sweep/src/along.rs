@@ -1,0 +1,86 @@
+//! Failures along a drawn quantity: the rows of the robustness map.
+
+use crate::row::{Columns, Row};
+use crate::summary::failed;
+use crate::sweep::Sweep;
+use stylet_report::significant;
+use stylet_stats::{Interval, wilson};
+
+/// Bins of a drawn quantity.
+pub const BINS: usize = 10;
+
+/// One bin of a drawn quantity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bin {
+    /// The quantity in the middle row.
+    pub middle: f64,
+    /// The share of failed insertions, with its 95 % interval.
+    pub failed: Interval,
+}
+
+/// Rows in groups of equal size along a drawn quantity; those of an effect that is off are left out.
+#[must_use]
+pub fn bins(sweep: &Sweep, columns: &Columns, rows: &[Row], quantity: usize) -> Vec<Bin> {
+    let switch = sweep
+        .fields
+        .get(quantity)
+        .and_then(|f| f.effect())
+        .and_then(|e| e.checked_sub(sweep.own_effects))
+        .map(|e| sweep.fields.len() + e);
+    let mut kept: Vec<&Row> =
+        rows.iter().filter(|r| switch.is_none_or(|s| r.values.get(s).is_some_and(|on| *on > 0.0))).collect();
+    kept.sort_by(|a, b| a.values[quantity].total_cmp(&b.values[quantity]).then(a.trial.cmp(&b.trial)));
+    let size = kept.len().div_ceil(BINS).max(1);
+    kept.chunks(size)
+        .map(|chunk| {
+            let hits = chunk.iter().filter(|r| failed(columns, r)).count();
+            Bin { middle: chunk[chunk.len() / 2].values[quantity], failed: wilson(hits, chunk.len()) }
+        })
+        .collect()
+}
+
+/// A row of the robustness map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapRow {
+    /// Sweep and quantity with its range.
+    pub name: String,
+    /// Share of failed insertions per tenth of the draws, in %.
+    pub failed_percent: Vec<f64>,
+}
+
+/// Rows of the robustness map that a sweep gives: one per drawn quantity.
+#[must_use]
+pub fn map_rows(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Vec<MapRow> {
+    (0..sweep.fields.len())
+        .filter_map(|quantity| {
+            let bins = bins(sweep, columns, rows, quantity);
+            let (first, last) = (bins.first()?, bins.last()?);
+            if first.middle == last.middle {
+                return None; // a constant
+            }
+            let path = name(sweep, quantity);
+            Some(MapRow {
+                name: format!("{path}  {} … {}", significant(first.middle, 2), significant(last.middle, 2)),
+                failed_percent: bins.iter().map(|b| (100.0 * b.failed.value).round()).collect(),
+            })
+        })
+        .collect()
+}
+
+/// A quantity as people read it: an effect's by the effect's name.
+fn name(sweep: &Sweep, quantity: usize) -> String {
+    use stylet_tissue::Effect;
+    let Some(field) = sweep.fields.get(quantity) else { return String::new() };
+    match field.effect().and_then(|e| sweep.template.effects.get(e)) {
+        Some(effect) => {
+            let last = field.path().rsplit('.').next().unwrap_or_default();
+            format!("{} {last}", effect.id())
+        }
+        None => {
+            let path = field.path();
+            let short =
+                ["tissue.", "enhance.", "motion.", "sensor."].iter().find_map(|p| path.strip_prefix(p));
+            short.unwrap_or(path).to_owned()
+        }
+    }
+}
