@@ -39,15 +39,20 @@ impl Diagnosed {
         ))
     }
 
+    /// The report: `believed` was read from `file`, `command` repeats it.
+    #[must_use]
+    pub fn html(&self, believed: &Scenario, file: &str, command: String) -> String {
+        stylet_pages::diagnosis::page(believed, file, command, &self.examined).to_html()
+    }
+
     /// All files that `stylet diagnose` writes for single recordings; `believed` was read from the inputs' scenario.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
     pub fn output(&self, believed: &Scenario, inputs: &Inputs) -> Result<Output, Error> {
         let file = inputs.scenario.display().to_string();
-        let page = stylet_pages::diagnosis::page(believed, &file, inputs.command(), &self.examined);
         let mut output = Output::default();
-        output.add("report.html", page.to_html());
+        output.add("report.html", self.html(believed, &file, inputs.command()));
         output.add("diagnosis.json", self.json()?);
         output.add_json(INPUTS, &inputs.absolute())?;
         output.add("extended.ron", self.extended_ron(&file)?);

@@ -31,6 +31,7 @@ struct Parts {
     json: Vec<u8>,
     extended: Scenario,
     ron: String,
+    html: String,
 }
 
 /// Compares what a scenario believes with what was measured.
@@ -46,6 +47,30 @@ pub fn diagnose(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Diagnosis> {
     let scenario = parse(kind, source)?;
+    let evidence = evidence(&measured, columns, repair)?;
+    let believed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
+    let named = believed.clone();
+    let found = beside(py, progress, move |told| {
+        let mut done = 0;
+        let found: Result<Diagnosed, stylet::Error> = stylet::diagnose(&scenario, &evidence, |what| {
+            done += 1;
+            told.tell_or_leave(what, done);
+        });
+        found.and_then(|found| {
+            let (json, ron) = (found.json()?, found.extended_ron(&named)?);
+            let html = found.html(&scenario, &named, "stylet.diagnose".to_owned());
+            Ok(Parts { json, ron, html, extended: found.extended })
+        })
+    })?;
+    Ok(Diagnosis { found: found.map_err(failure)?, believed })
+}
+
+/// Recordings as the engine takes them.
+pub fn evidence(
+    measured: &[Measured<'_>],
+    columns: Option<PathBuf>,
+    repair: bool,
+) -> PyResult<Vec<Evidence>> {
     let columns = columns.map(|c| stylet::scenario::load(&c)).transpose().map_err(failure)?;
     let options = ReadOptions { columns, repair };
     let files: Vec<PathBuf> = measured
@@ -56,7 +81,7 @@ pub fn diagnose(
         })
         .collect();
     let mut evidence = Vec::with_capacity(measured.len());
-    for one in &measured {
+    for one in measured {
         evidence.push(match one {
             Measured::File(path) => {
                 let (recording, notes) = read_csv_with_holes(path, &options).map_err(failure)?;
@@ -69,20 +94,7 @@ pub fn diagnose(
             },
         });
     }
-    let believed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
-    let named = believed.clone();
-    let found = beside(py, progress, move |told| {
-        let mut done = 0;
-        let found: Result<Diagnosed, stylet::Error> = stylet::diagnose(&scenario, &evidence, |what| {
-            done += 1;
-            told.tell_or_leave(what, done);
-        });
-        found.and_then(|found| {
-            let (json, ron) = (found.json()?, found.extended_ron(&named)?);
-            Ok(Parts { json, ron, extended: found.extended })
-        })
-    })?;
-    Ok(Diagnosis { found: found.map_err(failure)?, believed })
+    Ok(evidence)
 }
 
 #[pymethods]
@@ -95,6 +107,11 @@ impl Diagnosis {
     /// `extended.ron` as the command writes it.
     fn extended_ron(&self) -> &str {
         &self.found.ron
+    }
+
+    /// The report.
+    fn html(&self) -> &str {
+        &self.found.html
     }
 
     /// The scenario that was believed.

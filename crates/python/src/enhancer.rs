@@ -1,6 +1,6 @@
 //! The online core, sample by sample or over arrays.
 
-use crate::arrays::{Column, recording};
+use crate::arrays::{Column, put, recording};
 use crate::failure;
 use crate::run::put_trace;
 use numpy::PyArray1;
@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 use stylet::core::{Enhancer as Core, Output as CoreOutput, Sample};
+use stylet::heard::{Heard, Source, hear};
 use stylet::{EnhanceFile, record::differentiate};
 
 /// A configuration from a file (`"path"`), RON text (`"ron"`) or the defaults (empty text).
@@ -30,11 +31,6 @@ fn parse(kind: &str, source: &str) -> PyResult<EnhanceFile> {
 pub fn check_config(kind: &str, source: &str) -> PyResult<()> {
     parse(kind, source).map(drop)
 }
-
-/// A rupture: time in s, position it was traced back to in m, what declared it.
-type Rupture = (f64, f64, String);
-/// A layer: number, thickness in m, stiffness in N/m, friction in the model's unit.
-type Layer = (usize, f64, f64, f64);
 
 /// What one step gave.
 #[pyclass(frozen)]
@@ -212,27 +208,67 @@ impl Enhancer {
         let storage = vec![Sample::default(); self.storage];
         self.core = Core::new(self.config.enhance.clone(), self.config.surface_m, storage);
     }
+}
 
-    /// A whole recording by a fresh core: all outputs, ruptures, layers.
-    #[pyo3(signature = (time_s, position_m, force_n, velocity_mps=None))]
-    fn record<'py>(
-        &self,
-        py: Python<'py>,
-        time_s: Column<'py>,
-        position_m: Column<'py>,
-        force_n: Column<'py>,
-        velocity_mps: Option<Column<'py>>,
-    ) -> PyResult<(Bound<'py, PyDict>, Vec<Rupture>, Vec<Layer>)> {
-        let recording = recording(&time_s, &position_m, &force_n, velocity_mps.as_ref())?;
-        let config = &self.config;
-        let enhanced = py.detach(|| stylet::enhance(&recording, config));
-        let dict = PyDict::new(py);
-        put_trace(py, &dict, &enhanced.trace)?;
-        dict.set_item("velocity_mps", PyArray1::from_slice(py, &recording.velocity_mps))?;
-        let ruptures = enhanced.trace.detections.iter();
-        let ruptures = ruptures.map(|d| (d.time_s, d.located_m, d.cause.name().to_owned())).collect();
-        let layers = enhanced.trace.estimates.iter();
-        let layers = layers.map(|e| (e.layer, e.thickness_m, e.stiffness_n_per_m, e.friction)).collect();
-        Ok((dict, ruptures, layers))
+/// What the core made of a recording.
+#[pyclass(frozen)]
+pub struct Enhanced {
+    heard: Heard,
+    json: Vec<u8>,
+    html: String,
+}
+
+/// Runs the core over a whole recording.
+#[pyfunction]
+#[pyo3(signature = (kind, source, time_s, position_m, force_n, velocity_mps=None))]
+pub fn enhance(
+    py: Python<'_>,
+    kind: &str,
+    source: &str,
+    time_s: Column<'_>,
+    position_m: Column<'_>,
+    force_n: Column<'_>,
+    velocity_mps: Option<Column<'_>>,
+) -> PyResult<Enhanced> {
+    let config = parse(kind, source)?;
+    let recording = recording(&time_s, &position_m, &force_n, velocity_mps.as_ref())?;
+    let model = config.enhance.model;
+    py.detach(|| {
+        let heard = hear(recording, Vec::new(), config, &[model])?;
+        let named =
+            Source { data: Path::new("recording"), config: None, command: "stylet.enhance".to_owned() };
+        let (json, html) = (heard.json("recording")?, heard.report(&named)?.to_html());
+        Ok(Enhanced { heard, json, html })
+    })
+    .map_err(|e: stylet::Error| failure(e))
+}
+
+#[pymethods]
+impl Enhanced {
+    /// `enhance.json` as the command writes it.
+    fn json(&self) -> &[u8] {
+        &self.json
+    }
+
+    /// The report.
+    fn html(&self) -> &str {
+        &self.html
+    }
+
+    /// Recording and outputs, one value per sample.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (dict, recording) = (PyDict::new(py), &self.heard.recording);
+        let measured: [(&str, &[f64]); 4] = [
+            ("time_s", &recording.time_s),
+            ("position_m", &recording.position_m),
+            ("velocity_mps", &recording.velocity_mps),
+            ("force_n", &recording.force_n),
+        ];
+        put(py, &dict, &measured)?;
+        if let Some(ran) = self.heard.ran.first() {
+            put(py, &dict, &[("low_n", &ran.trace.low_n), ("high_n", &ran.trace.high_n)])?;
+            put_trace(py, &dict, &ran.trace)?;
+        }
+        Ok(dict)
     }
 }

@@ -5,6 +5,7 @@
 mod arrays;
 mod diagnosis;
 mod enhancer;
+mod plan;
 mod run;
 mod sweep;
 mod work;
@@ -32,7 +33,9 @@ mod _stylet {
     #[pymodule_export]
     use super::diagnosis::{Diagnosis, diagnose};
     #[pymodule_export]
-    use super::enhancer::{Enhancer, Output, check_config};
+    use super::enhancer::{Enhanced, Enhancer, Output, check_config, enhance};
+    #[pymodule_export]
+    use super::plan::{Plan, plan};
     #[pymodule_export]
     use super::run::{Run, check_scenario, load_scenario, read_csv, simulate};
     #[pymodule_export]

@@ -19,6 +19,30 @@ def test_a_run_plots_and_shows_itself(two_gels):
     assert "<iframe" in run._repr_html_() and "<html" in run.html().lower()
 
 
+def test_what_was_enhanced_has_intervals_and_a_report(two_gels):
+    frame = stylet.simulate(two_gels).to_pandas()
+    heard = stylet.enhance(frame[["time_s", "position_m", "force_n", "velocity_mps"]])
+    low, high = heard.layers[0]["stiffness_interval"]
+    assert low < heard.layers[0]["stiffness_n_per_m"] < high and low < 50.0 < high
+    assert (heard.to_pandas()["low_n"] <= heard.to_pandas()["high_n"]).all()
+    assert "<iframe" in heard._repr_html_() and "<html" in heard.html().lower()
+    assert heard.plot().get_ylabel() == "force (N)"
+
+
+def test_a_plan_tells_candidates_apart_and_is_a_motion(two_gels):
+    limits = {"depth_m": 0.02, "speed_mps": 0.008, "acceleration_mps2": 0.1, "duration_s": 30.0, "force_n": 6.0}
+    planned = stylet.plan(two_gels, limits=limits, simulated=False, progress=False)
+    assert 0.0 < planned.probability_decided <= 1.0 and planned.result["depth_m"] <= 0.02 + 1e-9
+    assert (planned.pairs["nats_after"] >= planned.pairs["nats_before"] - 1e-6).all()
+    begins, ends = two_gels.index("    motion:"), two_gels.index("    robot:")
+    again = two_gels[:begins] + f"    motion: {planned.motion_ron()},\n" + two_gels[ends:]
+    assert stylet.simulate(again).score["false"] == 0
+    assert "<html" in planned.html().lower() and "Plan(" in repr(planned)
+    assert planned.plot().get_xlabel().startswith("expected gap")
+    with pytest.raises(stylet.StyletError, match="speed_mps"):
+        stylet.plan(two_gels, limits=limits | {"speed_mps": -1.0}, simulated=False, progress=False)
+
+
 def test_a_dict_is_a_scenario():
     scenario = {
         "name": "one gel",

@@ -5,7 +5,7 @@ mod files;
 use crate::enhance::listen;
 use crate::error::Error;
 use crate::hash;
-use crate::output::Output;
+use crate::output::{Output, json};
 use crate::picture::{self, Ran};
 use crate::run::settings_note;
 use files::{EnhanceResult, events, found_by, with_state};
@@ -57,15 +57,14 @@ pub fn hear(
 }
 
 impl Heard {
-    /// All files that `stylet enhance` writes.
+    /// `enhance.json` for a recording called `name`.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
-    pub fn output(&self, source: &Source) -> Result<Output, Error> {
-        let Self { recording, notes, ran, hash, config, csv } = self;
-        let file = source.data.display().to_string();
-        let result = EnhanceResult {
-            recording: file.clone(),
+    pub fn json(&self, name: &str) -> Result<Vec<u8>, Error> {
+        let Self { recording, notes, ran, hash, .. } = self;
+        json(&EnhanceResult {
+            recording: name.to_owned(),
             samples: recording.len(),
             duration_s: recording.duration_s(),
             sample_hz: recording.sample_hz(),
@@ -73,10 +72,19 @@ impl Heard {
             version: env!("CARGO_PKG_VERSION"),
             found: ran.iter().map(found_by).collect(),
             data_quality: notes,
-        };
+        })
+    }
+
+    /// The report.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the configuration cannot be written.
+    pub fn report(&self, source: &Source) -> Result<RunReport, Error> {
+        let Self { recording, notes, ran, hash, config, .. } = self;
         let body = ron_options().to_string_pretty(config, Default::default()).map_err(Error::internal)?;
-        let report = RunReport {
-            title: source.data.file_name().map_or(file, |n| n.to_string_lossy().into_owned()),
+        let name = source.data.file_name().unwrap_or(source.data.as_os_str());
+        Ok(RunReport {
+            title: name.to_string_lossy().into_owned(),
             source: "measured recording; there is no ground truth to score against".to_owned(),
             provenance: Provenance {
                 scenario_file: source.config.map_or("defaults".to_owned(), |c| c.display().to_string()),
@@ -92,11 +100,19 @@ impl Heard {
                 vec![ForceTrace { sensor: "force_torque".to_owned(), force_n: recording.force_n.clone() }],
                 ran,
             )
-        };
-        let events = ran.first().map(|r| events(&r.trace)).unwrap_or_default();
+        })
+    }
+
+    /// All files that `stylet enhance` writes.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a value cannot be written.
+    pub fn output(&self, source: &Source) -> Result<Output, Error> {
+        let report = self.report(source)?;
+        let events = self.ran.first().map(|r| events(&r.trace)).unwrap_or_default();
         let mut output = Output::default();
-        output.add("enhanced.csv", csv.clone());
-        output.add_json("enhance.json", &result)?;
+        output.add("enhanced.csv", self.csv.clone());
+        output.add("enhance.json", self.json(&source.data.display().to_string())?);
         output.add_json("events.json", &events)?;
         output.add("figure.svg", report.to_svg(&FigureOptions::default()));
         output.add("report.html", report.to_html());

@@ -10,6 +10,7 @@ SI units everywhere; names carry their unit. Research software, not a medical de
 from ._core import Enhanced, Enhancer, enhance
 from ._data import read_csv
 from ._diagnosis import Diagnosis, diagnose
+from ._plan import Plan, plan
 from ._run import Run, Scenario, simulate
 from ._stylet import Output, StyletError, __version__
 from ._sweep import Sweep, sweep
@@ -29,6 +30,7 @@ __all__ = [
     "Enhanced",
     "Enhancer",
     "Output",
+    "Plan",
     "Run",
     "STATES",
     "Scenario",
@@ -37,6 +39,7 @@ __all__ = [
     "__version__",
     "diagnose",
     "enhance",
+    "plan",
     "read_csv",
     "simulate",
     "sweep",

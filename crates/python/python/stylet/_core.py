@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 from . import _data, _stylet
@@ -40,13 +42,20 @@ class Enhancer:
 class Enhanced:
     """What the core made of a recording."""
 
-    def __init__(self, time_s, force_n, found):
-        columns, ruptures, layers = found
-        self._columns = {"time_s": time_s, "force_n": force_n, **columns}
-        self.ruptures = [dict(zip(("time_s", "located_m", "cause"), r)) for r in ruptures]
+    def __init__(self, inner):
+        self._inner = inner
+        self._columns = inner.columns()
+        self.result: dict = json.loads(inner.json())
+        """`enhance.json` as a dict."""
+        found = self.result["found"][0]
+        self.ruptures: list[dict] = found["ruptures"]
         """Declared ruptures: instant, position that the drop was traced back to, what declared it."""
-        self.layers = [dict(zip(("layer", "thickness_m", "stiffness_n_per_m", "friction"), e)) for e in layers]
-        """Estimates of the traversed layers."""
+        self.layers: list[dict] = found["layers"]
+        """Estimates of the traversed layers, each number with its 95 % interval."""
+
+    def html(self) -> str:
+        """The report, a page of its own."""
+        return self._inner.html()
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Recording and outputs, one value per sample."""
@@ -60,12 +69,16 @@ class Enhanced:
         ax = _data.axes(ax)[0]
         c = self._columns
         ax.plot(c["time_s"], c["force_n"], color="0.6", lw=1, label="measured")
+        ax.fill_between(c["time_s"], c["low_n"], c["high_n"], color="#0072b2", alpha=0.2, lw=0, label="95 %")
         ax.plot(c["time_s"], c["enhanced_n"], color="#0072b2", lw=1.4, label="enhanced")
         for k, rupture in enumerate(self.ruptures):
             ax.axvline(rupture["time_s"], color="#d55e00", lw=1, label=None if k else "rupture found")
         ax.set(xlabel="time (s)", ylabel="force (N)")
         ax.legend(frameon=False, fontsize="small")
         return ax
+
+    def _repr_html_(self) -> str:
+        return _data.embedded(self.html())
 
     def __repr__(self) -> str:
         return f"Enhanced({len(self._columns['time_s'])} samples, {len(self.ruptures)} ruptures)"
@@ -78,5 +91,4 @@ def enhance(data, config=None) -> Enhanced:
         data = _data.read_csv(data)
         data.pop("velocity_mps")
     time_s, position_m, force_n, velocity_mps = _data.columns(data)
-    core = _stylet.Enhancer(*_config(config))
-    return Enhanced(time_s, force_n, core.record(time_s, position_m, force_n, velocity_mps))
+    return Enhanced(_stylet.enhance(*_config(config), time_s, position_m, force_n, velocity_mps))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import os
 from pathlib import Path
@@ -102,24 +101,16 @@ class Diagnosis:
             f"{gain['rmse_after_n']:.3g} N, noise {gain['floor_n']:.3g} N)"
         )
 
+    def html(self) -> str:
+        """The report, a page of its own."""
+        return self._inner.html()
+
     def _repr_html_(self) -> str:
-        rows = "".join(
-            "<tr>"
-            + "".join(f"<td>{html.escape(f'{v:.4g}' if isinstance(v, float) else str(v))}</td>" for v in row.values())
-            + "</tr>"
-            for row in self._rows()
-        )
-        head = "".join(f"<th>{h}</th>" for h in ("effect", "parameter", "value", "low", "high", "confidence"))
-        return f"<p>{html.escape(repr(self))}</p><table><tr>{head}</tr>{rows}</table>"
+        return _data.embedded(self.html())
 
 
-def diagnose(believed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
-    """Compares what a scenario believes with measured recordings.
-
-    `believed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
-    `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on recordings left out.
-    `columns`: path of a column map for the files. `progress`: True, False, or a callable `(text, count)`; by default shown
-    where tqdm is there. Ctrl-C ends it. The same bytes as `stylet diagnose`."""
+def recordings(measured, names=None) -> tuple[list, list]:
+    """Recordings as the library takes them, and as they are kept for pictures."""
     if isinstance(measured, (str, os.PathLike, dict)) or hasattr(measured, "columns"):
         measured = [measured]
     given: list = []
@@ -134,6 +125,17 @@ def diagnose(believed, measured, *, columns=None, repair: bool = False, names=No
             given.append((name, time_s, position_m, force_n, velocity_mps))
             data = {"time_s": time_s, "position_m": position_m, "force_n": force_n}
             kept.append((name, data if velocity_mps is None else data | {"velocity_mps": velocity_mps}))
+    return given, kept
+
+
+def diagnose(believed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
+    """Compares what a scenario believes with measured recordings.
+
+    `believed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
+    `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on recordings left out.
+    `columns`: path of a column map for the files. `progress`: True, False, or a callable `(text, count)`; by default shown
+    where tqdm is there. Ctrl-C ends it. The same bytes as `stylet diagnose`."""
+    given, kept = recordings(measured, names)
     if not given:
         raise _stylet.StyletError("no recordings: give at least one")
     kind, text = _data.source(believed)

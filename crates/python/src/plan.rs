@@ -1,0 +1,77 @@
+//! Which insertion to make next.
+
+use crate::diagnosis::{Measured, evidence};
+use crate::failure;
+use crate::run::parse;
+use crate::work::beside;
+use pyo3::prelude::*;
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+use stylet::Limits;
+
+/// A planned insertion.
+#[pyclass(frozen)]
+pub struct Plan {
+    json: Vec<u8>,
+    motion: String,
+    html: String,
+}
+
+/// The limits of a motion: from a file, RON text or JSON.
+fn limits(kind: &str, source: &str) -> PyResult<Limits> {
+    let limits: Limits = match kind {
+        "path" => stylet::scenario::load(Path::new(source)).map_err(failure)?,
+        "json" => serde_json::from_str(source).map_err(|e| failure(format!("limits: {e}")))?,
+        _ => stylet::scenario::parse("limits", source).map_err(failure)?,
+    };
+    limits.check().map_err(|e| failure(format!("limits: {e}")))?;
+    Ok(limits)
+}
+
+/// Plans the next insertion: before any measurement, or after those given.
+#[pyfunction]
+#[pyo3(signature = (scenario, measured, within, columns=None, repair=false, simulated=true, progress=None))]
+pub fn plan(
+    py: Python<'_>,
+    scenario: (String, String),
+    measured: Vec<Measured<'_>>,
+    within: (String, String),
+    columns: Option<PathBuf>,
+    repair: bool,
+    simulated: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Plan> {
+    let believed = parse(&scenario.0, &scenario.1)?;
+    let limits = limits(&within.0, &within.1)?;
+    let evidence = evidence(&measured, columns, repair)?;
+    let name = if scenario.0 == "path" { scenario.1 } else { "scenario".to_owned() };
+    let planned = beside(py, progress, move |told| {
+        let done = Cell::new(0);
+        let tell = |what: &str| {
+            done.set(done.get() + 1);
+            told.tell_or_leave(what, done.get());
+        };
+        let at = [Path::new(&name), Path::new("limits")];
+        let planned = stylet::plan_after(believed, &evidence, &limits, simulated, at, &tell)?;
+        Ok(Plan { json: planned.json()?, motion: planned.motion_ron()?, html: planned.html() })
+    })?;
+    planned.map_err(|e: stylet::Error| failure(e))
+}
+
+#[pymethods]
+impl Plan {
+    /// `plan.json` as the command writes it.
+    fn json(&self) -> &[u8] {
+        &self.json
+    }
+
+    /// The motion as RON.
+    fn motion_ron(&self) -> &str {
+        &self.motion
+    }
+
+    /// The report.
+    fn html(&self) -> &str {
+        &self.html
+    }
+}
