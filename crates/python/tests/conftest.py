@@ -37,10 +37,8 @@ def scenarios():
 
 @pytest.fixture(scope="session")
 def command():
-    """The `stylet` command that `cargo test` built beside this module."""
-    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    for profile in ("debug", "release"):
-        found = target / profile / "stylet"
-        if found.exists():
-            return lambda *args, cwd: subprocess.run([found, *map(str, args)], cwd=cwd, check=True, capture_output=True)
-    pytest.skip("SKIPPED: the command is not built (cargo build)")
+    """The `stylet` command that `test.sh` built beside this module."""
+    found = os.environ.get("STYLET_COMMAND")
+    if not found or not Path(found).exists():
+        pytest.skip("SKIPPED: STYLET_COMMAND names no command; crates/python/test.sh builds it")
+    return lambda *args, cwd: subprocess.run([found, *map(str, args)], cwd=cwd, check=True, capture_output=True)
