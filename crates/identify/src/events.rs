@@ -73,7 +73,7 @@ fn survived(u: f64) -> f64 {
         // Q(u) ~ phi(u)/u.
         return 0.5 * u * u + libm::log(u) + 0.918_938_533_204_672_7;
     }
-    -libm::log(0.5 * libm::erfc(u * core::f64::consts::FRAC_1_SQRT_2))
+    -libm::log(stylet_stats::normal::sf(u))
 }
 
 fn ln_phi(u: f64) -> f64 {
