@@ -51,7 +51,7 @@ def frame(columns: dict):
     try:
         import pandas
     except ImportError as error:
-        raise ImportError("pandas is needed for this: pip install 'stylet-needle[pandas]'") from error
+        raise ImportError("pandas is needed for this: pip install pandas") from error
     return pandas.DataFrame(columns)
 
 
@@ -60,7 +60,7 @@ def axes(ax, rows: int = 1):
     try:
         import matplotlib.pyplot as plt
     except ImportError as error:
-        raise ImportError("matplotlib is needed for this: pip install 'stylet-needle[plot]'") from error
+        raise ImportError("matplotlib is needed for this: pip install matplotlib") from error
     if ax is not None:
         return np.atleast_1d(ax)
     return np.atleast_1d(plt.subplots(rows, sharex=True, figsize=(8, 2.6 * rows), layout="constrained")[1])
