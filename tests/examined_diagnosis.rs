@@ -41,6 +41,26 @@ fn in_a_world_that_it_did_not_make_clean_data_are_not_accused_and_strong_effects
     assert!(outcomes.iter().any(|o| o.strength_sd > 5.0));
 }
 
+/// Its steps at stops and faces were given to layers as their ruptures, and the faces moved: the base law stood where nothing finds
+/// back, and the answer was unknown, or a scale of the position and a membrane beside it.
+#[test]
+fn a_cutting_force_whose_steps_look_like_ruptures_is_found_from_what_is_believed() {
+    let of = |(wrong, index): (Wrong, u64)| CaseId {
+        world: World::Plain,
+        wrong,
+        grade: Grade::Large,
+        hide: Hide::One,
+        size: Size::Strong,
+        seed: 128,
+        index,
+    };
+    let cases: Vec<CaseId> =
+        [(Wrong::Nothing, 35), (Wrong::ScatterPuncture, 29), (Wrong::Thickness, 1)].map(of).to_vec();
+    let outcomes = run(&cases, None, &answer, &|_, _| {}).expect("a run");
+    let table = table::text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.right), "{table}");
+}
+
 /// In these worlds it was taken for scatter between insertions once.
 #[test]
 fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once() {

@@ -6,7 +6,7 @@ use stylet_identify::assign::assign;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::drops::{Drop, drops};
 use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
-use stylet_identify::model::{Belief, Model};
+use stylet_identify::model::{Belief, Choice, Model};
 use stylet_identify::noise::{From, Noise};
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
@@ -60,10 +60,26 @@ pub(crate) fn roughness(blocks: &[Blocks]) -> f64 {
 /// Fits the base law; returns it with the noise by which it is judged. `None` when it cannot be replayed.
 #[must_use]
 pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
+    from_belief(prepared, &[])
+}
+
+/// The law with effects, begun anew from what is believed: drops are given to layers by the law that makes them. Where an effect makes
+/// drops of its own, or steps at faces, the base law alone has taken them for ruptures and moved its faces, and nothing that begins there
+/// finds back.
+#[must_use]
+pub fn anew(prepared: &Prepared, effects: &[Choice], data: &Data) -> Option<Fit> {
+    let (found, _) = from_belief(prepared, effects)?;
+    let mut model = found.model;
+    retime(&mut model, data, &prepared.drop_times());
+    fit(&model, data, Effort::FULL)
+}
+
+fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
     let mut data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
-    let mut model = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
+    let start = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
+    let mut model = effects.iter().fold(start, |m, choice| m.with(choice.clone()));
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model);

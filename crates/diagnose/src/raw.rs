@@ -125,6 +125,8 @@ fn limit(recordings: &[&Recording], step: Option<f64>) -> Option<f64> {
 
 /// Half width in samples of the window in which the scatter around a sample is judged: noise may grow with the force.
 const AROUND: usize = 60;
+/// Samples that tell a scatter.
+const ENOUGH: usize = 20;
 /// Spikes have one size: the relative spread of their sizes. Tails of a distribution have many.
 const ONE_SIZE: f64 = 0.35;
 /// ... and hardly any outlying sample is smaller: at most this share of their number between a third and two thirds.
@@ -146,11 +148,19 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
             around.sort_unstable_by(f64::total_cmp);
             f[i] - 0.5 * (around[1] + around[2])
         };
+        // What stands at a limit does not scatter; beside it everything stands out.
+        let clear: Vec<bool> = exclude[r].windows(5).map(|w| w.iter().all(|x| !x)).collect();
         let sizes: Vec<f64> = (2..f.len() - 2).map(|i| away(i).abs()).collect();
+        let scatter = |lo: usize, hi: usize| {
+            let mut of: Vec<f64> = (lo..hi).filter(|k| clear[*k]).map(|k| sizes[k]).collect();
+            (of.len() >= ENOUGH || hi - lo == sizes.len())
+                .then(|| (median(&mut of) * stylet_stats::MAD_TO_SD).max(step).max(1e-12))
+        };
+        let overall = scatter(0, sizes.len());
         let local: Vec<f64> = (0..sizes.len().div_ceil(AROUND))
             .map(|k| {
                 let (lo, hi) = ((k * AROUND).saturating_sub(AROUND), ((k + 2) * AROUND).min(sizes.len()));
-                (median(&mut sizes[lo..hi].to_vec()) * stylet_stats::MAD_TO_SD).max(step).max(1e-12)
+                scatter(lo, hi).or(overall).unwrap_or(f64::NAN)
             })
             .collect();
         for i in 2..f.len() - 2 {
@@ -161,7 +171,7 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
             let v = &recording.velocity_mps;
             let moves = (v[i + 1] - v[i - 1]).abs()
                 > 1e-4 + 3.0 * (v[i + 2] - v[i + 1]).abs().max((v[i - 1] - v[i - 2]).abs());
-            if moves || exclude[r][i] {
+            if moves || !clear[i - 2] {
                 continue;
             }
             // Only here would one have been seen; what is missing from a recording has none.
@@ -200,6 +210,26 @@ mod tests {
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
     use stylet_record::Recording;
+
+    #[test]
+    fn noise_between_samples_that_stand_at_the_sensors_limit_is_no_spike() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let t: Vec<f64> = (0..8000).map(|k| f64::from(k) / 200.0).collect();
+        // Noise of 0.015 N; then a force so far beyond the limit that only now and then a sample shows below it.
+        let mut noisy = |k: i32| {
+            let normal = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+            match k {
+                0..4000 => 1.0 + 0.015 * normal,
+                _ if k % 23 == 0 => 1.99,
+                _ => 2.0,
+            }
+        };
+        let f: Vec<f64> = (0..8000).map(&mut noisy).collect();
+        let r = Recording::new(t.clone(), vec![0.0; t.len()], f).expect("a recording");
+        let raw = look(&[&r], &[Vec::new()]);
+        assert_eq!(raw.limit_n, Some(2.0));
+        assert_eq!(raw.spikes, None);
+    }
 
     /// Half of the samples are missing: the rate is that of the samples that are there. The size is as sure as the spikes agree.
     #[test]

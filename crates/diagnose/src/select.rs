@@ -1,6 +1,6 @@
 //! Effects enter by what they gain, and leave when the others can do without them.
 
-use crate::base::Prepared;
+use crate::base::{Prepared, anew};
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
@@ -26,6 +26,11 @@ const BEHIND: f64 = 0.5;
 const RESTARTS: usize = 4;
 /// Blocks of the search are averaged by so many to rank starts.
 const COARSER: usize = 3;
+
+/// What leaves so many times the noise of its calm stretches is no fit.
+const MISFIT: f64 = 1.2;
+/// Stages of a search in which effects are begun anew from what is believed.
+const BEGINNINGS: usize = 2;
 
 /// One step of the search.
 #[derive(Clone, Debug)]
@@ -54,13 +59,22 @@ pub struct Search {
     pub stages: Vec<Stage>,
     /// How often the best may still be begun anew from a rival's numbers.
     restarts: usize,
+    /// In how many stages effects may still be begun anew from what is believed.
+    beginnings: usize,
 }
 
 impl Search {
     /// From the base law on.
     #[must_use]
     pub fn run(prepared: &Prepared, base: Fit, data: Data, progress: &mut impl FnMut(&str)) -> Self {
-        let mut search = Self { best: base.clone(), base, data, stages: Vec::new(), restarts: RESTARTS };
+        let mut search = Self {
+            best: base.clone(),
+            base,
+            data,
+            stages: Vec::new(),
+            restarts: RESTARTS,
+            beginnings: BEGINNINGS,
+        };
         loop {
             let stands = search.best.model.effects.len();
             progress(&format!("looking for {} effect", if stands == 0 { "an" } else { "another" }));
@@ -136,6 +150,12 @@ impl Search {
         full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
         let mut names: Vec<&str> = Vec::new();
         full.retain(|f| first_of(&mut names, f));
+        if let Some(more) = self.anew(&full, &ranked, prepared) {
+            full.extend(more);
+            full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
+            let mut names: Vec<&str> = Vec::new();
+            full.retain(|f| first_of(&mut names, f));
+        }
         if self.started_too_far(&full) {
             return self.grow(prepared);
         }
@@ -166,6 +186,23 @@ impl Search {
         let any = stage.taken.is_some();
         self.stages.push(stage);
         any
+    }
+
+    /// Every effect that promises something, begun anew from what is believed, when even the leader leaves far more than noise: the fits
+    /// so far may stand on what the law without the effect took for ruptures.
+    fn anew(&mut self, full: &[Fit], ranked: &[Vec<Start>], prepared: &Prepared) -> Option<Vec<Fit>> {
+        let leader = full.first()?;
+        let noise_n = self.data.judged_by(&leader.residuals.e, From::Calm).noise.sd_n();
+        if self.beginnings == 0 || leader.rms_n(&self.data) < MISFIT * noise_n {
+            return None;
+        }
+        self.beginnings -= 1;
+        let begin = |starts: &Vec<Start>| {
+            let mut effects = self.best.model.effects.clone();
+            effects.push(starts.first()?.choice.clone());
+            anew(prepared, &effects, &self.data)
+        };
+        Some(ranked.par_iter().filter_map(begin).collect())
     }
 
     /// Whether the leader owes its gain to a better start: the best so far, begun from the leader's numbers, is then better

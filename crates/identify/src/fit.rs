@@ -23,6 +23,19 @@ impl Fit {
     pub fn nats(&self) -> f64 {
         self.residuals.nats
     }
+
+    /// Root mean square in N of what is left at the blocks that are compared.
+    #[must_use]
+    pub fn rms_n(&self, data: &Data) -> f64 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for (b, e) in data.blocks.iter().zip(&self.residuals.e) {
+            for k in (0..b.len()).filter(|k| b.used[*k]) {
+                sum += e[k] * e[k];
+                n += 1.0;
+            }
+        }
+        (sum / f64::max(n, 1.0)).sqrt()
+    }
 }
 
 /// A change of all residuals with a number.

@@ -54,7 +54,7 @@ impl Fitted {
     /// Root mean square in N of what the fit leaves with the ruptures where they were seen.
     #[must_use]
     pub fn rms_n(&self) -> f64 {
-        rms(&self.fit, &self.data)
+        self.fit.rms_n(&self.data)
     }
 
     /// The same recordings with another law, fitted from where it stands.
@@ -63,17 +63,6 @@ impl Fitted {
         let (fit, data) = settle(model, self.data.clone(), &self.drops, &[6])?;
         Some(Self { fit, data, drops: self.drops.clone(), starts: self.starts })
     }
-}
-
-fn rms(fit: &Fit, data: &Data) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for (b, e) in data.blocks.iter().zip(&fit.residuals.e) {
-        for k in (0..b.len()).filter(|k| b.used[*k]) {
-            sum += e[k] * e[k];
-            n += 1.0;
-        }
-    }
-    (sum / f64::max(n, 1.0)).sqrt()
 }
 
 /// The recordings in blocks, without the samples that the raw force excludes.
@@ -202,7 +191,7 @@ fn spreads(model: &mut Model, data: &Data, at: &Fit) {
 fn from_all(models: &[Model], data: &Data, drops: &[Vec<f64>], rounds: &[usize]) -> Vec<(f64, Model)> {
     let one = |model: &Model| {
         let (fit, data) = settle(model, data.clone(), drops, rounds)?;
-        Some((rms(&fit, &data), fit.model))
+        Some((fit.rms_n(&data), fit.model))
     };
     let mut found: Vec<(f64, Model)> = models.par_iter().filter_map(one).collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
