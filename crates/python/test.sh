@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tests the Python package: type stubs, pytest, notebooks, in an environment of its own (cached in target/python). Uses the
 # profile and the target folder of `cargo test`, so that little is compiled twice; `--release` for speeds worth reading; what
-# STYLET_BUILD holds goes to cargo (`.ci/run` asks for the features that are built already). Ends with 77 where there is no Python
+# STYLET_BUILD holds goes to cargo, and STYLET_COMMAND names a command that is built already (`.ci/run` has both). Ends with 77 where there is no Python
 # to test with or its packages cannot be had.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -31,8 +31,10 @@ read -ra build <<<"${STYLET_BUILD:-}"
 [ "${1:-}" = --release ] && { profile=release; build+=(--release); shift; }
 # Built beside the command, which the tests compare it with, so that both share every dependency; maturin would choose other features
 # for them.
-cargo build "${build[@]}" -p stylet
-export STYLET_COMMAND="$target/$profile/stylet"
+if [ -z "${STYLET_COMMAND:-}" ]; then
+    cargo build "${build[@]}" -p stylet
+    export STYLET_COMMAND="$target/$profile/stylet"
+fi
 PYO3_PYTHON="$venv/bin/python" cargo build "${build[@]}" -p stylet -p stylet-python --lib --features stylet-python/extension-module
 rm -rf "$target/python-module"
 mkdir -p "$target/python-module"

@@ -28,22 +28,22 @@ fn limits(kind: &str, source: &str) -> PyResult<Limits> {
     Ok(limits)
 }
 
-/// Plans the next insertion: before any measurement, or after those given.
+/// Plans the next insertion: before any measurement, or after those given. `read`: the column map of files, and whether rows whose time goes
+/// back are dropped.
 #[pyfunction]
-#[pyo3(signature = (scenario, measured, within, columns=None, repair=false, simulated=true, progress=None))]
+#[pyo3(signature = (scenario, measured, within, read, simulated=true, progress=None))]
 pub fn plan(
     py: Python<'_>,
     scenario: (String, String),
     measured: Vec<Measured<'_>>,
     within: (String, String),
-    columns: Option<PathBuf>,
-    repair: bool,
+    read: (Option<PathBuf>, bool),
     simulated: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Plan> {
     let believed = parse(&scenario.0, &scenario.1)?;
     let limits = limits(&within.0, &within.1)?;
-    let evidence = evidence(&measured, columns, repair)?;
+    let evidence = evidence(&measured, read.0, read.1)?;
     let name = if scenario.0 == "path" { scenario.1 } else { "scenario".to_owned() };
     let planned = beside(py, progress, move |told| {
         let done = Cell::new(0);

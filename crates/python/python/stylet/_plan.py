@@ -73,7 +73,7 @@ def plan(believed, measured=(), *, limits, columns=None, repair: bool = False, s
     told = _data.Progress(True if progress is None else progress)
     try:
         inner = _stylet.plan(
-            _data.source(believed), given, _data.source(limits), columns and os.fspath(columns), repair, simulated, told
+            _data.source(believed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, told
         )
     finally:
         told.close()

@@ -116,8 +116,7 @@ def plan(
     scenario: tuple[str, str],
     measured: Sequence[_Measured],
     within: tuple[str, str],
-    columns: PathLike[str] | str | None = None,
-    repair: bool = False,
+    read: tuple[PathLike[str] | str | None, bool],
     simulated: bool = True,
     progress: _Progress = None,
 ) -> Plan: ...
