@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mean = seconds.iter().sum::<f64>() / cases as f64;
     println!(
         "processor time per case: mean {mean:.3} s, p90 {:.2} s",
-        stylet_examine::stats::quantile(&seconds, 0.9)
+        stylet_stats::quantile_of(seconds.iter().copied(), 0.9)
     );
     Ok(())
 }
