@@ -18,7 +18,7 @@ fn the_referee_depends_on_none_of_the_engines() {
             "metadata",
             "--format-version",
             "1",
-            "--offline",
+            "--locked",
             "--filter-platform",
             host,
             "--manifest-path",
