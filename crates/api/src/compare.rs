@@ -61,6 +61,7 @@ pub fn kinds(world: &str, hide: &[String], cases: u64) -> Result<Vec<Kind>, Erro
                 size: Size::Strong,
                 cases,
                 seed: 1,
+                only: Vec::new(),
             };
             Ok(Kind { name: format!("{world} world, {hide}"), cases: plan.cases() })
         })

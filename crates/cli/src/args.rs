@@ -469,6 +469,9 @@ pub struct CaseArgs {
     /// Seed of the drawing.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
+    /// Of these cases those alone that hide one of these effects (names of `stylet effects`) or shapes outside the library.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub effect: Vec<String>,
 }
 
 /// Arguments of `stylet benchmark diagnose`.
@@ -478,6 +481,7 @@ pub struct CaseArgs {
   stylet benchmark diagnose --wrong thickness,encoder --grade large --cases 60 --seed 7
   stylet benchmark diagnose --wrong all --cases 60 --out out/baseline
   stylet benchmark diagnose --hide outside --cases 48
+  stylet benchmark diagnose --wrong all --grade large --effect time_delay --cases 60
   stylet benchmark diagnose --world rich --hide one --cases 60
   stylet benchmark diagnose --world own --cases 1000
 

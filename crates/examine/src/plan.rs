@@ -1,5 +1,6 @@
 //! Which cases an examination consists of.
 
+use crate::world::hide::meant;
 use crate::world::id::{CaseId, Grade, Hide, Size, World, Wrong};
 
 /// An examination: rows of what is wrong, each in some grades, with a number of cases per cell.
@@ -20,6 +21,8 @@ pub struct Plan {
     pub cases: u64,
     /// Seed.
     pub seed: u64,
+    /// Of these cases those alone whose number asks for one of these effects or shapes; empty: all.
+    pub only: Vec<&'static str>,
 }
 
 impl Default for Plan {
@@ -32,6 +35,7 @@ impl Default for Plan {
             size: Size::Strong,
             cases: 60,
             seed: 1,
+            only: Vec::new(),
         }
     }
 }
@@ -49,7 +53,7 @@ impl Plan {
                     let Some(&hide) = self.hide.get(k as usize % self.hide.len().max(1)) else { continue };
                     let index = counts[hide as usize];
                     counts[hide as usize] += 1;
-                    out.push(CaseId {
+                    let id = CaseId {
                         world: self.world,
                         wrong,
                         grade,
@@ -57,10 +61,33 @@ impl Plan {
                         size: self.size,
                         seed: self.seed,
                         index,
-                    });
+                    };
+                    if self.asks_for(&id) {
+                        out.push(id);
+                    }
                 }
             }
         }
         out
+    }
+
+    fn asks_for(&self, id: &CaseId) -> bool {
+        self.only.is_empty() || meant(id).is_some_and(|what| self.only.contains(&what))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Plan;
+    use crate::world::hide::meant;
+    use crate::world::id::{Hide, Wrong};
+
+    #[test]
+    fn cases_of_one_effect_are_those_of_all_that_hide_it() {
+        let all = Plan { wrong: vec![Wrong::Nothing, Wrong::Thickness], seed: 5, ..Plan::default() };
+        let some = Plan { only: vec!["time_delay"], ..all.clone() };
+        let wanted: Vec<_> = all.cases().into_iter().filter(|id| meant(id) == Some("time_delay")).collect();
+        assert!(wanted.len() > 4 && wanted.iter().all(|id| id.hide == Hide::One), "{wanted:?}");
+        assert_eq!(some.cases(), wanted);
     }
 }

@@ -194,17 +194,32 @@ impl Blocks {
                 self.f[lo..hi].iter().sum::<f64>().abs() / (hi - lo) as f64
             })
             .collect();
-        // A force that jumps with the speed jumps between two samples: its mean is known to a step of one sample.
         self.doubt_n = vec![0.0; n];
         let motion = Arc::clone(&self.motion);
-        for jump in &motion.jumps {
-            let k = self.at(jump.between_s);
-            if k > 0 && k + 1 < n {
-                let step = (self.f[k + 1] - self.f[k - 1]).abs() / self.samples as f64 * UNIFORM_SD;
-                self.doubt_n[k] = self.doubt_n[k].max(step);
-            }
-        }
+        motion.jumps.iter().for_each(|j| self.doubt_jump(j.between_s));
         self.pieces = Arc::new(self.pieces_shown(Shown::Sampled));
+    }
+
+    /// A force that jumps with the speed jumps between two samples: its mean is known to a step of one sample.
+    fn doubt_jump(&mut self, at_s: f64) {
+        let k = self.at(at_s);
+        if k > 0 && k + 1 < self.len() {
+            let step = (self.f[k + 1] - self.f[k - 1]).abs() / self.samples as f64 * UNIFORM_SD;
+            self.doubt_n[k] = self.doubt_n[k].max(step);
+        }
+    }
+
+    /// The same for a force that is late by so many s: where its jumps show, sampling leaves as much open. Near the edge of a block
+    /// both sides of it may hold the jump.
+    #[must_use]
+    pub fn seen_late(&self, late_s: f64) -> Self {
+        let mut b = self.clone();
+        for jump in &self.motion.jumps {
+            let at_s = jump.at_s + late_s;
+            b.doubt_jump(at_s - 0.5 * self.step_s);
+            b.doubt_jump(at_s + 0.5 * self.step_s);
+        }
+        b
     }
 
     /// Pieces of smooth motion as a force sees them that is late by so many s and, if it is `smeared` or late, shows the

@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::folder::Claim;
 use crate::output::Output;
 use std::path::{Path, PathBuf};
+use stylet_examine::world::hide::{thing, things};
 use stylet_examine::{CaseId, Grade, Hide, Plan, Size, World, Wrong, table};
 use stylet_pages::benchmark::{maps, page};
 
@@ -25,6 +26,8 @@ pub struct Asked<'a> {
     pub cases: u64,
     /// Seed of all draws.
     pub seed: u64,
+    /// Of these cases those alone that hide one of these; empty: all.
+    pub effect: &'a [String],
 }
 
 /// The words of a list, or all of them.
@@ -61,6 +64,7 @@ impl Asked<'_> {
             size,
             cases: self.cases,
             seed: self.seed,
+            only: words("--effect", self.effect, &things(), thing, |t| t)?,
         })
     }
 }

@@ -18,6 +18,7 @@ impl CaseArgs {
             size: &self.size,
             cases: self.cases,
             seed: self.seed,
+            effect: &self.effect,
         }
     }
 }

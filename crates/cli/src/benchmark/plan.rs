@@ -19,6 +19,7 @@ pub fn plan(args: &BenchmarkPlanArgs) -> Result<(), Failure> {
         size: "strong",
         cases: 1,
         seed: args.seed,
+        effect: &[],
     }
     .plan()?;
     let folder = args.out.clone().unwrap_or_else(|| {

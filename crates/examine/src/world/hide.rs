@@ -141,6 +141,31 @@ fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut Setup, target_n: f64) {
     setup.rich = all;
 }
 
+/// All that a case's number can ask for: the library's effects and the shapes outside it.
+#[must_use]
+pub fn things() -> Vec<&'static str> {
+    IDS.iter().chain(&SHAPES).copied().collect()
+}
+
+/// One of [`things`] by its name.
+#[must_use]
+pub fn thing(name: &str) -> Option<&'static str> {
+    things().into_iter().find(|t| *t == name)
+}
+
+/// What a case's number asks it to hide first: an effect, a shape outside the library, or nothing. Where the stack cannot have
+/// an effect, the next of the list is hidden instead.
+#[must_use]
+pub fn meant(id: &CaseId) -> Option<&'static str> {
+    match id.hide {
+        Hide::Clean => None,
+        Hide::Outside => Some(SHAPES[in_turn(id, SHAPES.len())]),
+        Hide::Instrument => Some(INSTRUMENT[in_turn(id, INSTRUMENT.len())]),
+        _ if id.world == World::Rich => None,
+        _ => Some(IDS[in_turn(id, IDS.len())]),
+    }
+}
+
 /// Which of `n` things the case hides. In every row each comes once in `n` cases, in an order that the seed shuffles anew for
 /// every round; rows begin at different places of it (a cyclic Latin square with its rows shuffled), so that the same number of
 /// another row is another thing and a few cases of all rows hold everything about equally often. The grade does not
@@ -241,10 +266,12 @@ mod tests {
                 Some(shape) => (Hide::Outside, shape, SHAPES.len()),
             };
             let (wrong, index) = first(what, n).expect("one of the cases");
-            let setup = set_up(&id(wrong, hide, index));
+            let id = id(wrong, hide, index);
+            let setup = set_up(&id);
             let hidden = setup.effects.first().map(Effect::id).or(setup.shape.as_ref().map(Shape::name));
             let wanted = if hide == Hide::One { IDS[what] } else { SHAPES[what] };
             assert_eq!(hidden, Some(wanted), "{wrong} {index}");
+            assert_eq!(meant(&id), hidden, "{wrong} {index}");
         });
     }
 }
