@@ -251,13 +251,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let unknown = share > UNEXPLAINED && (sure || at_sight);
     let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included, however slow.
-    let late_s = search.best.model.compile(0).map_or(0.0, |c| c.delay_s);
-    let seen = if late_s > 0.0 {
-        search.data.on(search.data.blocks.iter().map(|b| b.seen_late(late_s)).collect())
-    } else {
-        search.data.clone()
-    };
-    let whole = seen.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
+    let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
     let settled = fit(&crate::geometry::unsure(&search.best.model), &whole, Effort { turns: 3, enough: 0.1 })
         .unwrap_or_else(|| search.best.clone());
     let spread = Spread::new(&settled, &whole, &mut ChaCha8Rng::seed_from_u64(SEED));

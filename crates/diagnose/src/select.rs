@@ -5,6 +5,7 @@ use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
+use stylet_identify::late::placed;
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::From;
@@ -256,7 +257,14 @@ impl Search {
     /// Makes a fit the best, with the noise that it leaves.
     pub fn settle(&mut self, f: Fit) {
         self.data = self.data.judged_by(&f.residuals.e, From::Calm);
-        self.best = fit_sharp(&f.model, &self.data, Effort::FULL).unwrap_or(f);
+        let best = fit_sharp(&f.model, &self.data, Effort::FULL).unwrap_or(f);
+        let (best, data) = placed(best, self.data.clone());
+        if best.model.placed_s.is_some() {
+            self.data = data.judged_by(&best.residuals.e, From::Calm);
+            self.best = fit(&best.model, &self.data, Effort::FULL).unwrap_or(best);
+        } else {
+            self.best = best;
+        }
     }
 
     /// Drops effects that the others can do without.

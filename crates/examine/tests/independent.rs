@@ -14,15 +14,7 @@ fn the_referee_depends_on_none_of_the_engines() {
     let told = String::from_utf8_lossy(&rustc.stdout).into_owned();
     let host = told.lines().find_map(|l| l.strip_prefix("host: ")).expect("a host");
     let output = Command::new(cargo)
-        .args([
-            "metadata",
-            "--format-version",
-            "1",
-            "--locked",
-            "--filter-platform",
-            host,
-            "--manifest-path",
-        ])
+        .args(["metadata", "--format-version", "1", "--locked", "--filter-platform", host, "--manifest-path"])
         .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))
         .output()
         .expect("cargo metadata");

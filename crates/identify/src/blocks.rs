@@ -209,24 +209,42 @@ impl Blocks {
         }
     }
 
-    /// The same for a force that is late by so many s: where its jumps show, sampling leaves as much open. Near the edge of a block
-    /// both sides of it may hold the jump.
+    /// The same for a force that is late by so many s: its jumps are between other samples, and where noisy positions leave open
+    /// between which, the mean of their block is uncertain.
     #[must_use]
     pub fn seen_late(&self, late_s: f64) -> Self {
         let mut b = self.clone();
+        b.doubt_n = vec![0.0; self.len()];
         for jump in &self.motion.jumps {
+            b.doubt_jump(jump.between_s);
             let at_s = jump.at_s + late_s;
-            b.doubt_jump(at_s - 0.5 * self.step_s);
-            b.doubt_jump(at_s + 0.5 * self.step_s);
+            let reach = jump.doubt_s.max(AT_A_JUMP * self.step_s);
+            let of = |t: f64| self.raw_t.partition_point(|sample| *sample < t);
+            if of(at_s - reach) < of(at_s + reach) {
+                b.doubt_jump(at_s - reach);
+                b.doubt_jump(at_s + reach);
+            }
         }
         b
     }
 
+    /// The middle between the samples around an instant.
+    fn between(&self, at_s: f64) -> f64 {
+        let k = self.raw_t.partition_point(|t| *t <= at_s);
+        match (k.checked_sub(1).and_then(|k| self.raw_t.get(k)), self.raw_t.get(k)) {
+            (Some(before), Some(after)) if after - before <= GAP * self.step_s => 0.5 * (before + after),
+            _ => at_s,
+        }
+    }
+
     /// Pieces of smooth motion as a force sees them that is late by so many s and, if it is `smeared` or late, shows the
-    /// instants at which the speed jumps.
+    /// instants at which the speed jumps; if it is not smeared and its jumps are `placed` where they are when it is late by so many s, the
+    /// middles between the samples around them.
     #[must_use]
-    pub fn pieces_seen(&self, smeared: bool, late_s: f64) -> Arc<Vec<Piece>> {
-        if late_s > 0.0 {
+    pub fn pieces_seen(&self, smeared: bool, late_s: f64, placed: Option<f64>) -> Arc<Vec<Piece>> {
+        if let Some(placed_s) = placed.filter(|_| late_s > 0.0 && !smeared) {
+            Arc::new(self.pieces_shown(Shown::SampledLate { late_s, placed_s }))
+        } else if late_s > 0.0 {
             Arc::new(self.pieces_shown(Shown::Late(late_s)))
         } else if smeared {
             Arc::clone(self.smeared.get_or_init(|| Arc::new(self.pieces_shown(Shown::Late(0.0)))))
@@ -236,7 +254,8 @@ impl Blocks {
     }
 
     fn pieces_shown(&self, shown: Shown) -> Vec<Piece> {
-        self.motion.pieces(self.from_s.iter().copied().zip(self.to_s.iter().copied()), shown)
+        let spans = self.from_s.iter().copied().zip(self.to_s.iter().copied());
+        self.motion.pieces(spans, shown, |t| self.between(t))
     }
 
     /// Residuals (N) of the recorded forces for those of the blocks: what a block leaves, and what a sample differs from

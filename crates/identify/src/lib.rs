@@ -14,6 +14,7 @@
 //! | [`noise`] | autoregressive noise per range of the force, whitening |
 //! | [`discrepancy`](mod@discrepancy) | what an unfinished law leaves, as noise |
 //! | [`objective`], [`fit`], [`retime`] | the likelihood, its optimum, instants moved |
+//! | [`late`] | a delay to a fraction of a sampling step |
 //! | [`phases`] | advance, hold and way back; sudden falls and releases in the raw force |
 //! | [`drops`], [`assign`] | drops of the force, and which layer each belongs to |
 //! | [`look`] | what every effect would gain, to first order |
@@ -29,6 +30,7 @@ pub mod drops;
 pub mod events;
 pub mod fit;
 pub mod forward;
+pub mod late;
 pub mod linear;
 pub mod look;
 pub mod model;

@@ -219,6 +219,9 @@ pub struct Model {
     pub days: Vec<Day>,
     /// Spreads between recordings and days stay as they are in a fit: somebody else tells them.
     pub steady: bool,
+    /// The delay in s at which the jumps of a late force are put between samples; none: they show at their instants. The likelihood has
+    /// steps in it, so that a search begins without.
+    pub placed_s: Option<f64>,
 }
 
 /// A model ready to be replayed over one recording.
@@ -235,6 +238,8 @@ pub struct Compiled {
     pub delay_s: f64,
     /// A jump of the speed is smeared before it is sampled.
     pub smears: bool,
+    /// As in [`Model::placed_s`].
+    pub placed_s: Option<f64>,
     /// Positions (m) at which a force at the tip may jump: faces, and where something of an effect's own breaks.
     pub breaks_m: Vec<f64>,
     /// Own puncture force of every layer in N, infinite when only its far face ruptures it.
@@ -259,6 +264,7 @@ impl Model {
             day_of: Vec::new(),
             days: Vec::new(),
             steady: false,
+            placed_s: None,
             belief,
         }
     }
@@ -350,6 +356,7 @@ impl Model {
             to_true: chain.true_position(1.0),
             delay_s: chain.delay_s(),
             smears: chain.smears() || law.bends(),
+            placed_s: self.placed_s,
             measures: !chain.is_plain(),
             breaks_m: {
                 let mut places: Vec<f64> =

@@ -46,6 +46,13 @@ pub enum Shown {
     Sampled,
     /// A force that is late by so many s, or smeared, shows the instants.
     Late(f64),
+    /// A force that follows the speed at once, and is late, is sampled before or after a jump.
+    SampledLate {
+        /// By so many s.
+        late_s: f64,
+        /// The jumps show between the samples around where they are if it is late by so many s.
+        placed_s: f64,
+    },
 }
 
 /// A jump of the speed.
@@ -57,6 +64,10 @@ pub struct Jump {
     pub between_s: f64,
     /// How uncertain the instant is, in s.
     pub doubt_s: f64,
+    /// Where it is in m.
+    pub z_m: f64,
+    /// Velocity in m/s before and after it.
+    pub v_mps: [f64; 2],
 }
 
 /// Velocity noise in m/s from which on positions are smoothed over as long as they allow.
@@ -103,7 +114,7 @@ impl Motion {
                         m.sampled.push(between_s, kink.z + side * (between_s - at_s), side);
                     }
                     let doubt_s = kink.sd_m / (kink.v[1] - kink.v[0]).abs().max(1e-6);
-                    m.jumps.push(Jump { at_s, between_s, doubt_s });
+                    m.jumps.push(Jump { at_s, between_s, doubt_s, z_m: kink.z, v_mps: kink.v });
                 }
             }
             m.exact.push(t[i], z[i], v[i]);
@@ -146,36 +157,57 @@ impl Motion {
         (k.z[i] + share * (k.z[i + 1] - k.z[i]), k.v[i] + share * (k.v[i + 1] - k.v[i]))
     }
 
-    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece.
+    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece. `between` is the
+    /// middle between the samples around an instant of the recording.
     #[must_use]
-    pub fn pieces(&self, spans: impl Iterator<Item = (f64, f64)>, shown: Shown) -> Vec<Piece> {
+    pub fn pieces(
+        &self,
+        spans: impl Iterator<Item = (f64, f64)>,
+        shown: Shown,
+        between: impl Fn(f64) -> f64,
+    ) -> Vec<Piece> {
         let (knots, late_s) = match shown {
             Shown::Sampled => (&self.sampled, 0.0),
-            Shown::Late(late_s) => (&self.exact, late_s),
+            Shown::Late(late_s) | Shown::SampledLate { late_s, .. } => (&self.exact, late_s),
         };
-        let at_of = |j: &Jump| if shown == Shown::Sampled { j.between_s } else { j.at_s + late_s };
+        let seen = |at_s: f64, between_s: f64| match shown {
+            Shown::Sampled => between_s,
+            Shown::Late(late_s) => at_s + late_s,
+            Shown::SampledLate { placed_s, .. } => between(at_s + placed_s),
+        };
+        let jumps: Vec<f64> = self.jumps.iter().map(|j| seen(j.at_s, j.between_s)).collect();
+        let turns: Vec<f64> = self.turns.iter().map(|t| seen(t.0, t.1)).collect();
         let mut out = Vec::new();
         let mut near = 0;
-        let turn_at = |(at_s, between_s): &(f64, f64)| {
-            if shown == Shown::Sampled { *between_s } else { at_s + late_s }
-        };
         let (mut jump, mut turn) = (0, 0);
         for (block, (from, to)) in spans.enumerate() {
             let mut at = from;
             let whole = to - from;
             loop {
-                while self.jumps.get(jump).is_some_and(|j| at_of(j) <= at + 1e-6 * whole) {
+                while jumps.get(jump).is_some_and(|j| *j <= at + 1e-6 * whole) {
                     jump += 1;
                 }
-                while self.turns.get(turn).is_some_and(|t| turn_at(t) <= at + 1e-6 * whole) {
+                while turns.get(turn).is_some_and(|t| *t <= at + 1e-6 * whole) {
                     turn += 1;
                 }
-                let cut = |next: Option<f64>| next.filter(|j| *j < to - 1e-6 * whole).unwrap_or(to);
-                let end = cut(self.jumps.get(jump).map(at_of)).min(cut(self.turns.get(turn).map(turn_at)));
+                let cut = |next: Option<&f64>| next.copied().filter(|j| *j < to - 1e-6 * whole).unwrap_or(to);
+                let end = cut(jumps.get(jump)).min(cut(turns.get(turn)));
+                // A jump that shows between samples: until there, and from there on, the motion is that of its own side.
+                let (before, next) = match shown {
+                    Shown::SampledLate { .. } => {
+                        (jump.checked_sub(1).and_then(|k| self.jumps.get(k)), self.jumps.get(jump))
+                    }
+                    _ => (None, None),
+                };
+                let mut sums = |at_s: f64| match (before, next) {
+                    (Some(j), _) if at_s < j.at_s => knots.sums_beside(j, 1, at_s, &mut near),
+                    (_, Some(j)) if at_s > j.at_s => knots.sums_beside(j, 0, at_s, &mut near),
+                    _ => knots.sums(at_s, &mut near),
+                };
                 // Slope of the velocity from means over both halves.
-                let (z0, v0) = knots.sums(at - late_s, &mut near);
-                let (_, vm) = knots.sums(0.5 * (at + end) - late_s, &mut near);
-                let (z1, v1) = knots.sums(end - late_s, &mut near);
+                let (z0, v0) = sums(at - late_s);
+                let (_, vm) = sums(0.5 * (at + end) - late_s);
+                let (z1, v1) = sums(end - late_s);
                 let dt = (end - at).max(1e-12);
                 let a = ((v1 - vm) - (vm - v0)) / (0.25 * dt * dt);
                 out.push(Piece {
@@ -222,6 +254,13 @@ impl Knots {
     /// The last knot at or before `at_s`; the first one when there is none.
     fn before(&self, at_s: f64) -> usize {
         self.t.partition_point(|t| *t <= at_s).saturating_sub(1)
+    }
+
+    /// [`sums`](Self::sums) as if the speed of one side of a jump lasted beyond it.
+    fn sums_beside(&self, jump: &Jump, side: usize, at_s: f64, near: &mut usize) -> (f64, f64) {
+        let (z, v) = self.sums(jump.at_s, near);
+        let (dt, speed) = (at_s - jump.at_s, jump.v_mps[side]);
+        (z + dt * (jump.z_m + 0.5 * dt * speed), v + dt * speed)
     }
 
     /// Integrals of position and velocity up to an instant, searched from knot `near` on.

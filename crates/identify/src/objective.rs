@@ -98,7 +98,7 @@ pub struct Residuals {
 /// The pieces of smooth motion that a model sees.
 #[must_use]
 pub fn pieces(model: &Compiled, blocks: &Blocks) -> Arc<Vec<Piece>> {
-    blocks.pieces_seen(model.smears, model.delay_s)
+    blocks.pieces_seen(model.smears, model.delay_s, model.placed_s)
 }
 
 /// Replays one recording.

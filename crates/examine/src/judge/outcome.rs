@@ -131,6 +131,9 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
             if path == "layer" {
                 continue;
             }
+            // A force that the sensor sends late as well is late by both.
+            let late = matches!(effect, Effect::TimeDelay { .. });
+            let truth = truth + if late { case.setup.amounts.late_s() } else { 0.0 };
             let turn = if path.ends_with("_rad") {
                 let whole = core::f64::consts::TAU;
                 libm::round((truth - e.value) / whole) * whole

@@ -65,6 +65,12 @@ pub struct Amounts {
 }
 
 impl Amounts {
+    /// By how much the force is late in s.
+    #[must_use]
+    pub fn late_s(&self) -> f64 {
+        self.late_samples / self.rate_hz
+    }
+
     /// The ordinary world: nothing is wrong, but nobody knows K, b, F to better than 5 %.
     #[must_use]
     pub fn neutral() -> Self {

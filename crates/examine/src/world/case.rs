@@ -144,7 +144,7 @@ pub(crate) fn measured(
     let mut noise_rng = ChaCha8Rng::seed_from_u64(rng.random());
     let mut encoder_rng = ChaCha8Rng::seed_from_u64(rng.random());
     let tissue = draw::met(&mut met_rng, &setup.truth, amounts);
-    let mut instrument = Instrument::new(&setup.effects, amounts.late_samples * interval_s);
+    let mut instrument = Instrument::new(&setup.effects, amounts.late_s());
     if let Some(range) = amounts.bits_range_n {
         instrument = instrument.rounding(2.0 * range / 4096.0);
     }

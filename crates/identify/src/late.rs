@@ -1,0 +1,62 @@
+//! A delay to a fraction of a sampling step.
+//!
+//! Where the speed jumps, so does the friction. A sample lies before such a jump or after it: a delay moves samples across one by one, and
+//! the likelihood has a step for each. Derivatives do not see steps. A delay found with the jumps at their instants, which no sampled force shows,
+//! is therefore looked for once more on a grid; what the smooth parts of the force say is fitted with the jumps between the samples where they
+//! are by then.
+
+use crate::fit::{Effort, Fit, fit};
+use crate::model::{Choice, Model};
+use crate::objective::{Data, residuals};
+use rayon::prelude::*;
+use stylet_tissue::Effect;
+
+/// Spacings of the grids, as shares of a sampling step.
+const SPACINGS: [f64; 2] = [0.1, 0.03];
+/// Grid points to either side.
+const REACH: i32 = 12;
+
+/// The effect that makes the force late, if it is in the search and has the delay as its only number.
+fn late_effect(model: &Model) -> Option<usize> {
+    let late = |c: &Choice| c.effect().is_some_and(|e| e.delay_s() > 0.0);
+    model.effects.iter().position(|c| c.info.parameters.len() == 1 && late(c))
+}
+
+/// By how much a model's force is late, in s.
+#[must_use]
+pub fn late_s(model: &Model) -> f64 {
+    model.compile(0).map_or(0.0, |c| c.delay_s)
+}
+
+/// A fit whose force is late, with its jumps between the samples that show them, and the data with what that leaves open; as it was when its
+/// force is not late, or is no better so.
+#[must_use]
+pub fn placed(found: Fit, data: Data) -> (Fit, Data) {
+    let step_s = data.blocks.iter().map(|b| b.step_s).fold(f64::INFINITY, f64::min);
+    let Some(effect) = late_effect(&found.model) else { return (found, data) };
+    let seen = data.on(data.blocks.par_iter().map(|b| b.seen_late(late_s(&found.model))).collect());
+    let Some(was) = residuals(&found.model, &seen) else { return (found, data) };
+    let mut best: Option<Fit> = None;
+    // Fine steps about what the coarse ones led to.
+    for spacing_s in SPACINGS.map(|share| share * step_s) {
+        let about = best.as_ref().unwrap_or(&found).model.clone();
+        let from_s = late_s(&about);
+        let at = |k: i32| {
+            let to_s = from_s + spacing_s * f64::from(k);
+            let mut model = Model { placed_s: Some(to_s), ..about.clone() };
+            model.effects[effect] = Choice::new(model.effects[effect].info, &[to_s]);
+            let nats = if to_s > 0.0 { residuals(&model, &seen)?.nats } else { return None };
+            Some((nats, model))
+        };
+        let tried: Vec<(f64, Model)> = (-REACH..=REACH).into_par_iter().filter_map(at).collect();
+        let likeliest = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some(next) = likeliest.and_then(|(_, model)| fit(&model, &seen, Effort::FULL)) else { continue };
+        if best.as_ref().is_none_or(|b| next.nats() < b.nats()) {
+            best = Some(next);
+        }
+    }
+    match best.filter(|b| b.nats() < was.nats) {
+        Some(better) => (better, seen),
+        None => (found, data),
+    }
+}

@@ -1,0 +1,78 @@
+//! A force that comes late is late by a fraction of a sampling step: the jumps of the friction say it only by the samples that they lie
+//! between.
+
+use std::sync::Arc;
+use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_identify::fit::{Effort, fit};
+use stylet_identify::late::{late_s, placed};
+use stylet_identify::model::{Belief, Choice, Model, NEVER};
+use stylet_identify::noise::Noise;
+use stylet_identify::objective::Data;
+use stylet_record::Recording;
+use stylet_tissue::{Layer, Tissue, info};
+
+/// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
+const LAYER: (f64, f64) = (60.0, 12_000.0);
+/// Time between samples in s.
+const STEP_S: f64 = 0.005;
+
+/// Position (m) and velocity (m/s) of a base that goes to and fro at changing speeds.
+fn base(t: f64) -> (f64, f64) {
+    const SPEEDS: [f64; 8] = [0.003, 0.006, -0.002, 0.005, 0.0, 0.004, -0.004, 0.003];
+    const LASTS_S: f64 = 1.7317;
+    let mut z = -0.002;
+    for (k, v) in SPEEDS.iter().enumerate() {
+        let since = t - k as f64 * LASTS_S;
+        if since < LASTS_S || k + 1 == SPEEDS.len() {
+            return (z + v * since, *v);
+        }
+        z += v * LASTS_S;
+    }
+    (z, 0.0)
+}
+
+fn force(t: f64) -> f64 {
+    let (z, v) = base(t);
+    let (k, b) = LAYER;
+    if z > 0.0 { k * z + b * z * v } else { 0.0 }
+}
+
+#[test]
+fn a_delay_is_found_to_a_fraction_of_a_sampling_step() {
+    let layer = Layer {
+        thickness_m: 0.08,
+        stiffness_n_per_m: LAYER.0,
+        friction_ns_per_m2: LAYER.1,
+        puncture_n: None,
+        name: String::new(),
+    };
+    let belief = Arc::new(Belief {
+        tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
+        given: Vec::new(),
+        tolerance: vec![0.3],
+        thickness_tolerance: vec![0.1],
+        surface_tolerance_m: 0.002,
+    });
+    let (mut worst, mut worst_at_instants) = (0.0_f64, 0.0_f64);
+    for truth in [0.0117, 0.0234, 0.0301, 0.0468] {
+        let t: Vec<f64> = (0..2700).map(|k| f64::from(k) * STEP_S).collect();
+        let z: Vec<f64> = t.iter().map(|t| base(*t).0).collect();
+        // A little that no law explains, the same for every delay.
+        let f: Vec<f64> =
+            t.iter().enumerate().map(|(k, t)| force(t - truth) + 2e-3 * (k as f64 * 2.4).sin()).collect();
+        let recording = Recording::new(t, z, f).expect("a recording");
+        let blocks = Blocks::new(&recording, &vec![false; recording.time_s.len()], BLOCK_S);
+        let data = Data::new(Arc::new(vec![blocks]), Noise::white(1e-3), 0.0);
+        let info = info("time_delay").expect("an effect");
+        let mut model = Model::base(Arc::clone(&belief), 1).with(Choice::new(info, &[0.02]));
+        model.instants = vec![vec![NEVER]];
+        let found = fit(&model, &data, Effort::FULL).expect("a fit");
+        worst_at_instants = worst_at_instants.max((late_s(&found.model) - truth).abs());
+        let (found, _) = placed(found, data);
+        assert!(found.model.placed_s.is_some(), "{truth}");
+        worst = worst.max((late_s(&found.model) - truth).abs());
+    }
+    assert!(worst < 0.02 * STEP_S, "{worst} s");
+    // What would be left without.
+    assert!(worst_at_instants > 0.1 * STEP_S, "{worst_at_instants} s");
+}
