@@ -68,7 +68,8 @@ pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
 /// finds back.
 #[must_use]
 pub fn anew(prepared: &Prepared, effects: &[Choice], data: &Data) -> Option<Fit> {
-    let (found, _) = from_belief(prepared, effects)?;
+    let (found, own) = from_belief(prepared, effects)?;
+    data.worked(own.work());
     let mut model = found.model;
     retime(&mut model, data, &prepared.drop_times());
     fit(&model, data, Effort::FULL)

@@ -7,6 +7,7 @@ use crate::model::{Compiled, Model, NEVER, Number};
 use crate::motion::Piece;
 use crate::noise::{From, Laid, Noise, rho};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Recordings in blocks and the noise by which they are judged.
@@ -20,13 +21,14 @@ pub struct Data {
     pub floor_n: f64,
     /// How each recording is whitened.
     laid: Arc<OnceLock<Vec<Laid>>>,
+    work: Arc<AtomicU64>,
 }
 
 impl Data {
     /// Recordings judged by a noise that is nowhere less than `floor_n`.
     #[must_use]
     pub fn new(blocks: Arc<Vec<Blocks>>, noise: Noise, floor_n: f64) -> Self {
-        Self { blocks, noise: Arc::new(noise), floor_n, laid: Arc::default() }
+        Self { blocks, noise: Arc::new(noise), floor_n, laid: Arc::default(), work: Arc::default() }
     }
 
     /// Normalised innovations of residuals `e` (N) of recording `r`; blocks that are not compared give zero.
@@ -48,7 +50,18 @@ impl Data {
     /// The same recordings judged by another noise.
     #[must_use]
     pub fn with_noise(&self, noise: Noise) -> Self {
-        Self::new(Arc::clone(&self.blocks), noise, self.floor_n)
+        Self { noise: Arc::new(noise), laid: Arc::default(), ..self.clone() }
+    }
+
+    /// Blocks replayed so far for these recordings, under whatever noise: what a diagnosis costs, the same on every machine.
+    #[must_use]
+    pub fn work(&self) -> u64 {
+        self.work.load(Ordering::Relaxed)
+    }
+
+    /// So many more blocks were replayed.
+    pub fn worked(&self, blocks: u64) {
+        self.work.fetch_add(blocks, Ordering::Relaxed);
     }
 
     /// The same recordings judged by the noise that residuals tell.
@@ -108,6 +121,7 @@ pub fn replay(model: &Model, data: &Data, r: usize) -> Option<Replayed> {
     let mut out = Replayed::default();
     let blocks = &data.blocks[r];
     imposed(&compiled, blocks, &pieces(&compiled, blocks), &model.instants[r], &mut out);
+    data.worked(blocks.len() as u64);
     out.f.iter().all(|f| f.is_finite()).then_some(out)
 }
 
@@ -126,6 +140,7 @@ impl Trail {
         let blocks = &data.blocks[r];
         let seen = pieces(&compiled, blocks);
         let track = Track::new(&compiled, blocks, &seen, &model.instants[r]);
+        data.worked(blocks.len() as u64);
         Some(Self { compiled, seen, track })
     }
 
@@ -133,6 +148,8 @@ impl Trail {
     #[must_use]
     pub fn replay(&self, model: &Model, data: &Data, r: usize) -> Option<Replayed> {
         let compiled = model.compile(r)?;
+        // On average from the middle on.
+        data.worked(data.blocks[r].len() as u64 / 2);
         let out =
             self.track.neighbour(&self.compiled, &compiled, &data.blocks[r], &self.seen, &model.instants[r]);
         out.f.iter().all(|f| f.is_finite()).then_some(out)
@@ -148,6 +165,7 @@ impl Trail {
     #[must_use]
     pub fn nats_at(&self, model: &Model, data: &Data, r: usize, instants: &[f64]) -> f64 {
         let b = &data.blocks[r];
+        data.worked(b.len() as u64 / 2);
         let now = self.track.neighbour(&self.compiled, &self.compiled, b, &self.seen, instants);
         let e: Vec<f64> = b.f.iter().zip(&now.f).map(|(y, f)| y - f).collect();
         let w = data.whiten(r, &e);

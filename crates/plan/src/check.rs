@@ -17,8 +17,9 @@ const RACED: usize = 4;
 /// Candidates under which the chosen motion is tried, and how often each.
 const TRIED: usize = 6;
 const ROUNDS: u64 = 2;
-/// Samples that are diagnosed in all: some 40 s of two cores. Longer recordings mean fewer simulated insertions.
-const SAMPLES: f64 = 1.2e6;
+/// Blocks that are replayed in all ([`Data::work`](stylet_identify::objective::Data::work)): some 40 s of two cores. Where diagnoses cost
+/// more, fewer motions are raced and fewer insertions judge.
+const WORK: u64 = 1_200_000_000;
 /// What the expected gaps count for, in simulated insertions.
 const GAPS_WEIGH: f64 = 6.0;
 /// Seeds of the insertions that choose, and of those that judge.
@@ -52,24 +53,21 @@ pub fn check(
     let mut order: Vec<usize> = (0..ground.candidates.len()).collect();
     order.sort_by(|a, b| ground.candidates[*b].weight.total_cmp(&ground.candidates[*a].weight));
     order.truncate(TRIED);
-    // What the chosen motion's own insertions leave goes into the choice.
-    let affordable = (SAMPLES / samples(found, ground, old)).max(1.0) as usize;
-    let rounds = ((affordable / 2 / order.len().max(1)) as u64).clamp(1, ROUNDS);
-    let left = affordable.saturating_sub(rounds as usize * order.len());
     let raced = &order[..order.len().min(RACED)];
-    let racing = (left / raced.len().max(1)).min(found.best.len());
     let mut outcomes: Vec<Vec<bool>> = Vec::new();
-    if racing > 1 {
-        for (k, motion) in found.best.iter().take(racing).enumerate() {
-            progress(&format!(
-                "motion {} of {racing}: simulating and diagnosing {} candidates",
-                k + 1,
-                raced.len()
-            ));
-            let jobs: Vec<(usize, u64)> = raced.iter().map(|c| (*c, CHOOSE)).collect();
-            outcomes.push(bench.try_all(&motion.motion, &jobs)?);
+    let mut spent = 0;
+    for (k, motion) in found.best.iter().enumerate() {
+        // As dear as those before, and the chosen motion's own insertions have to be affordable, too.
+        let each = spent / (k * raced.len()).max(1) as u64;
+        if k > 0 && spent + each * (raced.len() + order.len()) as u64 > WORK {
+            break;
         }
+        let of = found.best.len();
+        progress(&format!("motion {} of {of}: simulating and diagnosing {} candidates", k + 1, raced.len()));
+        let jobs: Vec<(usize, u64)> = raced.iter().map(|c| (*c, CHOOSE)).collect();
+        outcomes.push(bench.try_all(&motion.motion, &jobs, &mut spent)?);
     }
+    let each = spent / (outcomes.len() * raced.len()).max(1) as u64;
     // Weighed by how likely each candidate is; the first of equals.
     let worth = |of: &[bool]| -> f64 {
         raced.iter().zip(of).filter(|(_, right)| **right).map(|(c, _)| ground.candidates[*c].weight).sum()
@@ -91,13 +89,26 @@ pub fn check(
     }
     let mut tried: Vec<Tried> =
         order.iter().map(|c| Tried { candidate: ground.name(*c).to_owned(), of: 0, decided: 0 }).collect();
-    for round in 0..rounds {
-        progress(&format!("the chosen motion, {} of {rounds}: {} candidates", round + 1, order.len()));
+    let mut judged = false;
+    if let [only] = outcomes.as_slice() {
+        // Nothing was chosen by them.
+        judged = spent + each * order.len() as u64 > WORK;
+        for (tried, right) in tried.iter_mut().zip(only) {
+            tried.of += 1;
+            tried.decided += usize::from(*right);
+        }
+    }
+    for round in 0..ROUNDS {
+        if judged && spent + each * order.len() as u64 > WORK {
+            break;
+        }
+        progress(&format!("the chosen motion, {} of {ROUNDS}: {} candidates", round + 1, order.len()));
         let jobs: Vec<(usize, u64)> = order.iter().map(|c| (*c, JUDGE + round)).collect();
-        for (tried, right) in tried.iter_mut().zip(bench.try_all(&plan.motion, &jobs)?) {
+        for (tried, right) in tried.iter_mut().zip(bench.try_all(&plan.motion, &jobs, &mut spent)?) {
             tried.of += 1;
             tried.decided += usize::from(right);
         }
+        judged = true;
     }
     let weights: Vec<f64> = order.iter().map(|c| ground.candidates[*c].weight).collect();
     let sum: f64 = weights.iter().sum();
@@ -113,28 +124,29 @@ pub fn check(
     Ok(plan)
 }
 
-/// Samples of one diagnosis: the recordings at hand and the longest of the motions.
-fn samples(found: &Searched, ground: &Ground, old: &[Evidence]) -> f64 {
-    let longest =
-        found.best.iter().filter_map(|f| f.motion.plan()).map(|p| p.duration_s()).fold(0.0, f64::max);
-    let known: usize = old.iter().map(|e| e.recording.len()).sum();
-    known as f64 + longest * ground.sample_hz * if old.is_empty() { 2.0 } else { 1.0 }
-}
-
 impl Bench<'_> {
-    /// Whether the diagnosis is right after one insertion, per candidate and seed.
-    fn try_all(&self, motion: &Motion, jobs: &[(usize, u64)]) -> Result<Vec<bool>, PlanError> {
-        jobs.par_iter().map(|(candidate, seed)| self.once(motion, *candidate, *seed)).collect()
+    /// Whether the diagnosis is right after one insertion, per candidate and seed; what it costs goes to `spent`.
+    fn try_all(
+        &self,
+        motion: &Motion,
+        jobs: &[(usize, u64)],
+        spent: &mut u64,
+    ) -> Result<Vec<bool>, PlanError> {
+        let one = |(candidate, seed): &(usize, u64)| self.once(motion, *candidate, *seed);
+        let said: Vec<(bool, u64)> = jobs.par_iter().map(one).collect::<Result<_, PlanError>>()?;
+        *spent += said.iter().map(|s| s.1).sum::<u64>();
+        Ok(said.into_iter().map(|s| s.0).collect())
     }
 
-    fn once(&self, motion: &Motion, candidate: usize, seed: u64) -> Result<bool, PlanError> {
+    /// Whether the diagnosis is right, and what it cost.
+    fn once(&self, motion: &Motion, candidate: usize, seed: u64) -> Result<(bool, u64), PlanError> {
         let mut evidence = self.old.to_vec();
         if evidence.is_empty() && self.believed.motion.plan().is_some() {
             evidence.push(self.simulated(candidate, &self.believed.motion, seed + 7)?);
         }
         evidence.push(self.simulated(candidate, motion, seed)?);
-        let said = diagnose(self.believed, &evidence, &Options { brief: true }, |_| {})?.diagnosis;
-        Ok(right(&said, self.ground, candidate))
+        let examined = diagnose(self.believed, &evidence, &Options { brief: true }, |_| {})?;
+        Ok((right(&examined.diagnosis, self.ground, candidate), examined.search.data.work()))
     }
 
     fn simulated(&self, candidate: usize, motion: &Motion, seed: u64) -> Result<Evidence, PlanError> {
