@@ -87,6 +87,28 @@ fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once(
     assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.right), "{table}");
 }
 
+/// Two time constants where two are there (seed 128, number 6, 0.33 and 6.5 s), one where there is one (37, 7.4 s); both numbers were looked at.
+#[test]
+fn a_second_time_constant_of_relaxation_is_found_where_there_is_one() {
+    for (index, terms) in [(6, 2), (37, 1)] {
+        let plan = Plan { hide: vec![Hide::One], cases: index + 1, seed: 128, ..Plan::default() };
+        let id = plan.cases().into_iter().next_back().expect("a case");
+        let case = stylet_examine::case(&id).expect("a case");
+        let truth = case.setup.effects[0].parameters();
+        assert!(truth[0].0.starts_with("terms.0.") && truth.len() == 2 * terms, "{truth:?}");
+        let (believed, evidence) = asked(&case.question).expect("a scenario");
+        let found = stylet_diagnose::diagnose(&believed, &evidence, &Options { brief: true }, |_| {})
+            .expect("a diagnosis")
+            .diagnosis;
+        let [cause] = found.causes.as_slice() else { panic!("{:?}", found.causes) };
+        assert_eq!((cause.effect.as_str(), cause.parameters.len()), ("stress_relaxation", 2 * terms));
+        for (path, value) in truth {
+            let said = cause.parameters[&path];
+            assert!((said.value / value - 1.0).abs() < 0.1, "{path}: {said:?} for {value}");
+        }
+    }
+}
+
 #[test]
 fn the_model_of_a_diagnosis_predicts_a_recording_that_took_no_part_to_about_its_noise() {
     let plan = Plan { hide: vec![Hide::One], cases: 2, seed: 1, ..Plan::default() };

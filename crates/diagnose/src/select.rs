@@ -4,14 +4,14 @@ use crate::base::{Prepared, anew};
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
-use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
+use stylet_identify::fit::{Effort, Fit, Tangent, fit, fit_sharp};
 use stylet_identify::late::placed;
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::From;
 use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
-use stylet_tissue::{Place, Proposal};
+use stylet_tissue::{FitScale, Place, Proposal};
 
 /// Most effects at once.
 pub const MOST: usize = 5;
@@ -182,6 +182,7 @@ impl Search {
             }
             stage.taken = Some((name(&f), judged));
             self.settle(f);
+            self.enlarge(&times);
             break;
         }
         let any = stage.taken.is_some();
@@ -254,6 +255,34 @@ impl Search {
         }
     }
 
+    /// Gives effects that have a larger form (a second time constant of relaxation) that form, where it is worth its numbers.
+    fn enlarge(&mut self, times: &[Vec<f64>]) {
+        for k in 0..self.best.model.effects.len() {
+            let Some(larger) = self.best.model.effects[k].info.larger else { continue };
+            let Proposal::Columns(starts) = larger.proposal else { continue };
+            let coarse = self.coarse();
+            let begun = |group: &&[&[f64]]| {
+                let mut model = self.best.model.clone();
+                model.effects[k] = Choice::new(larger, group.first()?);
+                fit(&model, &coarse, Effort::SHORT)
+            };
+            let tried: Vec<Fit> = starts.par_iter().filter_map(begun).collect();
+            let likeliest = tried.into_iter().min_by(|a, b| a.nats().total_cmp(&b.nats()));
+            let whole = likeliest.and_then(|f| {
+                let mut model = f.model;
+                retime(&mut model, &self.data, times);
+                fit(&model, &self.data, Effort::FULL)
+            });
+            if let Some(f) = whole
+                && !at_a_bound(&f, k)
+                && every_strength_is_told(&f, k, &self.data)
+                && gain(&self.best, &f, &self.data) > extra(&self.best, &f, &self.data)
+            {
+                self.settle(f);
+            }
+        }
+    }
+
     /// Makes a fit the best, with the noise that it leaves.
     pub fn settle(&mut self, f: Fit) {
         self.data = self.data.judged_by(&f.residuals.e, From::Calm);
@@ -320,6 +349,23 @@ fn simpler_first(mut full: Vec<Fit>, data: &Data) -> Vec<Fit> {
 pub fn extra(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
     let more = larger.model.effect_numbers().saturating_sub(smaller.model.effect_numbers());
     cost(more, data.compared()) + LEAST
+}
+
+/// So many standard deviations from neutral a strength is told.
+const TOLD: f64 = 5.0;
+
+/// Whether each strength of an effect is told by itself: two terms that stand for one share its strength as they like.
+fn every_strength_is_told(f: &Fit, which: usize, data: &Data) -> bool {
+    let tangent = Tangent::new(&f.model, data, &f.residuals);
+    let variances = tangent.factor().inverse_diagonal();
+    tangent.shared.iter().zip(variances).all(|(n, variance)| match n.role {
+        Role::Effect { effect, parameter } if effect == which => {
+            let p = &f.model.effects[which].info.parameters[parameter];
+            let off = f.model.effects[which].values[parameter] - p.neutral;
+            !p.strength || p.fit_scale() != FitScale::Linear || off.abs() > TOLD * variance.sqrt()
+        }
+        _ => true,
+    })
 }
 
 /// Whether a number of an effect stands where it may not go further.

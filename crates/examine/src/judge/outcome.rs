@@ -1,12 +1,13 @@
 //! What came of one case.
 
-use super::answer::{Answer, Verdict};
+use super::answer::{Answer, Estimate, Verdict};
 use super::answers::{Expected, Worth, expected, judge};
 use crate::reality::effect::Effect;
 use crate::world::case::Case;
 use crate::world::id::{CaseId, DRAWING, first_drawing};
 use crate::world::ingredients;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// One number of an answer beside the truth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,6 +119,20 @@ impl Outcome {
     }
 }
 
+/// Numbers of two terms, the faster one first: which is called the first is a matter of words.
+fn in_order(numbers: &BTreeMap<String, Estimate>) -> BTreeMap<String, Estimate> {
+    let time = |term: &str| numbers.get(&format!("{term}.time_constant_s")).map(|e| e.value);
+    let (first, second) = ("terms.0", "terms.1");
+    if !matches!((time(first), time(second)), (Some(a), Some(b)) if a > b) {
+        return numbers.clone();
+    }
+    let swapped = |path: &String| match path.strip_prefix(first) {
+        Some(rest) => format!("{second}{rest}"),
+        None => path.strip_prefix(second).map_or_else(|| path.clone(), |rest| format!("{first}{rest}")),
+    };
+    numbers.iter().map(|(path, e)| (swapped(path), *e)).collect()
+}
+
 fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
     let mut out = Vec::new();
     if !ingredients::names(&case.setup.rich).is_empty() {
@@ -126,8 +141,9 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
     }
     for effect in &case.setup.effects {
         let Some(cause) = answer.causes.iter().find(|c| c.effect == effect.id()) else { continue };
+        let told = in_order(&cause.parameters);
         for (path, truth) in effect.parameters() {
-            let Some(e) = cause.parameters.get(&path) else { continue };
+            let Some(e) = told.get(&path) else { continue };
             if path == "layer" {
                 continue;
             }
@@ -176,4 +192,36 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<Number> {
 fn number(name: String, truth: f64, value: f64, low: Option<f64>, high: Option<f64>) -> Number {
     let held = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
     Number { name, truth, value, low, high, held }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Estimate, in_order};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn of_two_terms_the_faster_one_is_the_first() {
+        let told = |numbers: &[(&str, f64)]| -> BTreeMap<String, Estimate> {
+            let of = |(path, value): &(&str, f64)| {
+                ((*path).to_owned(), Estimate { value: *value, ..Estimate::default() })
+            };
+            numbers.iter().map(of).collect()
+        };
+        let slow_first = told(&[
+            ("terms.0.fraction", 0.5),
+            ("terms.0.time_constant_s", 6.0),
+            ("terms.1.fraction", 0.2),
+            ("terms.1.time_constant_s", 0.3),
+        ]);
+        let fast_first = told(&[
+            ("terms.0.fraction", 0.2),
+            ("terms.0.time_constant_s", 0.3),
+            ("terms.1.fraction", 0.5),
+            ("terms.1.time_constant_s", 6.0),
+        ]);
+        assert_eq!(in_order(&slow_first), fast_first);
+        assert_eq!(in_order(&fast_first), fast_first);
+        let one = told(&[("terms.0.fraction", 0.2), ("terms.0.time_constant_s", 3.0)]);
+        assert_eq!(in_order(&one), one);
+    }
 }

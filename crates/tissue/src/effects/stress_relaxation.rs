@@ -61,6 +61,10 @@ static TWO_TERMS: EffectInfo = EffectInfo {
         ParameterInfo { path: "terms.1.fraction", ..FRACTION },
         ParameterInfo { path: "terms.1.time_constant_s", ..TIME }.search(3.0, 0.2, 120.0),
     ],
+    proposal: Proposal::Columns(&[
+        &[&[0.2, 0.1, 0.2, 1.0]], &[&[0.2, 0.3, 0.2, 3.0]], &[&[0.2, 0.3, 0.2, 8.0]], &[&[0.2, 1.0, 0.2, 8.0]],
+        &[&[0.2, 1.0, 0.2, 25.0]],
+    ]),
     ..ONE
 };
 
