@@ -87,7 +87,7 @@ mod tests {
         let all = Plan { wrong: vec![Wrong::Nothing, Wrong::Thickness], seed: 5, ..Plan::default() };
         let some = Plan { only: vec!["time_delay"], ..all.clone() };
         let wanted: Vec<_> = all.cases().into_iter().filter(|id| meant(id) == Some("time_delay")).collect();
-        assert!(wanted.len() > 4 && wanted.iter().all(|id| id.hide == Hide::One), "{wanted:?}");
+        assert!(wanted.len() >= 2 && wanted.iter().all(|id| id.hide == Hide::One), "{wanted:?}");
         assert_eq!(some.cases(), wanted);
     }
 }
