@@ -27,19 +27,12 @@ pub(crate) fn spaced(id: &str) -> String {
 /// An effect's numbers with their units.
 #[must_use]
 pub fn numbers(effect: &str, values: &BTreeMap<String, f64>) -> String {
-    let unit = |path: &str| {
-        stylet_tissue::info(effect)
-            .and_then(|i| i.parameters.iter().find(|p| p.path == path))
-            .map_or("", |p| p.unit)
-    };
+    let known = |path: &str| stylet_tissue::info(effect).and_then(|i| i.parameter(path));
+    let unit = |path: &str| known(path).map_or("", |p| p.unit);
     let one = |(path, x): (&String, &f64)| {
         format!("{path} = {} {}", significant(*x, 2), unit(path)).trim_end().to_owned()
     };
-    let strength = |path: &str| {
-        stylet_tissue::info(effect)
-            .and_then(|i| i.parameters.iter().find(|p| p.path == path))
-            .is_some_and(|p| p.strength)
-    };
+    let strength = |path: &str| known(path).is_some_and(|p| p.strength);
     values.iter().filter(|(p, _)| strength(p)).map(one).collect::<Vec<_>>().join(", ")
 }
 

@@ -48,7 +48,7 @@ fn path(at: &str, path: &str) -> String {
 }
 
 fn unit(effect: &AnyEffect, parameter: &str) -> String {
-    let unit = effect.info().parameters.iter().find(|p| p.path == parameter).map_or("", |p| p.unit);
+    let unit = effect.info().parameter(parameter).map_or("", |p| p.unit);
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 

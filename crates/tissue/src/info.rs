@@ -27,6 +27,15 @@ pub struct EffectInfo {
     pub nested_in: &'static [&'static str],
 }
 
+impl EffectInfo {
+    /// What is known about the parameter of this path, further terms of the larger variant included.
+    #[must_use]
+    pub fn parameter(&self, path: &str) -> Option<&'static ParameterInfo> {
+        let larger = self.larger.map_or(&[][..], |l| l.parameters);
+        self.parameters.iter().chain(larger).find(|p| p.path == path)
+    }
+}
+
 /// Where a search for an effect in measured data begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

@@ -49,6 +49,15 @@ fn the_library_holds_every_row_of_the_specification_once_in_the_order_of_the_cha
 }
 
 #[test]
+fn parameters_of_further_terms_are_known_by_their_path() {
+    let relaxation = info("stress_relaxation").expect("an effect");
+    for path in ["terms.0.time_constant_s", "terms.1.time_constant_s"] {
+        assert_eq!(relaxation.parameter(path).map(|p| p.unit), Some("s"), "{path}");
+    }
+    assert!(relaxation.parameter("terms.2.fraction").is_none());
+}
+
+#[test]
 fn every_parameter_has_a_typical_value_inside_its_search_range_inside_its_allowed_range() {
     for effect in typical_effects() {
         let info = effect.info();

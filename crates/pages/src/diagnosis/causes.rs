@@ -21,9 +21,7 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
         if let Some(info) = info {
             let _ = write!(text, "\n{}:\n    {}\n", c.effect, info.equation);
         }
-        let unit = |path: &str| {
-            info.and_then(|i| i.parameters.iter().find(|p| p.path == path)).map_or("", |p| p.unit)
-        };
+        let unit = |path: &str| info.and_then(|i| i.parameter(path)).map_or("", |p| p.unit);
         for (k, (path, e)) in c.parameters.iter().enumerate() {
             let first = |text: String| Cell::text(if k == 0 { text } else { String::new() });
             rows.push(vec![
