@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo build --quiet --release
-stylet="$PWD/${CARGO_TARGET_DIR:-target}/release/stylet"
+stylet="$(cd "${CARGO_TARGET_DIR:-target}" && pwd)/release/stylet"
 there=$(mktemp -d)
 trap 'rm -rf "$there"' EXIT
 "$stylet" benchmark export --wrong nothing --grade large --hide one --cases 6 --seed "${1:-128}" --out "$there/cases" >/dev/null 2>&1

@@ -287,13 +287,13 @@ impl Search {
     pub fn settle(&mut self, f: Fit) {
         self.data = self.data.judged_by(&f.residuals.e, From::Calm);
         let best = fit_sharp(&f.model, &self.data, Effort::FULL).unwrap_or(f);
-        let (best, data) = placed(best, self.data.clone());
-        if best.model.placed_s.is_some() {
-            self.data = data.judged_by(&best.residuals.e, From::Calm);
-            self.best = fit(&best.model, &self.data, Effort::FULL).unwrap_or(best);
-        } else {
-            self.best = best;
-        }
+        self.best = match placed(&best, &self.data) {
+            Some((late, data)) => {
+                self.data = data.judged_by(&late.residuals.e, From::Calm);
+                fit(&late.model, &self.data, Effort::FULL).unwrap_or(late)
+            }
+            None => best,
+        };
     }
 
     /// Drops effects that the others can do without.

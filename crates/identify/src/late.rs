@@ -28,18 +28,18 @@ pub fn late_s(model: &Model) -> f64 {
     model.compile(0).map_or(0.0, |c| c.delay_s)
 }
 
-/// A fit whose force is late, with its jumps between the samples that show them, and the data with what that leaves open; as it was when its
+/// A fit whose force is late, with its jumps between the samples that show them, and the data with what that leaves open; `None` when its
 /// force is not late, or is no better so.
 #[must_use]
-pub fn placed(found: Fit, data: Data) -> (Fit, Data) {
+pub fn placed(found: &Fit, data: &Data) -> Option<(Fit, Data)> {
     let step_s = data.blocks.iter().map(|b| b.step_s).fold(f64::INFINITY, f64::min);
-    let Some(effect) = late_effect(&found.model) else { return (found, data) };
+    let effect = late_effect(&found.model)?;
     let seen = data.on(data.blocks.par_iter().map(|b| b.seen_late(late_s(&found.model))).collect());
-    let Some(was) = residuals(&found.model, &seen) else { return (found, data) };
+    let was = residuals(&found.model, &seen)?;
     let mut best: Option<Fit> = None;
     // Fine steps about what the coarse ones led to.
     for spacing_s in SPACINGS.map(|share| share * step_s) {
-        let about = best.as_ref().unwrap_or(&found).model.clone();
+        let about = best.as_ref().unwrap_or(found).model.clone();
         let from_s = late_s(&about);
         let at = |k: i32| {
             let to_s = from_s + spacing_s * f64::from(k);
@@ -55,8 +55,5 @@ pub fn placed(found: Fit, data: Data) -> (Fit, Data) {
             best = Some(next);
         }
     }
-    match best.filter(|b| b.nats() < was.nats) {
-        Some(better) => (better, seen),
-        None => (found, data),
-    }
+    best.filter(|b| b.nats() < was.nats).map(|better| (better, seen))
 }

@@ -1,13 +1,16 @@
 //! A needle that gives is replayed in blocks of 20 ms as if it had been followed at every instant: through stops and starts, whose
 //! effect fades within a few blocks, and through ripples, which its tip follows late.
 
+mod common;
+
+use common::one_layer;
 use std::sync::Arc;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
-use stylet_identify::model::{Belief, Choice, Model, NEVER};
+use stylet_identify::model::{Choice, Model, NEVER};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::{Data, replay};
 use stylet_record::Recording;
-use stylet_tissue::{Layer, Tissue, info};
+use stylet_tissue::info;
 
 /// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
 const LAYER: (f64, f64) = (60.0, 9000.0);
@@ -43,20 +46,7 @@ fn followed(needle: f64, end_s: f64) -> Vec<f64> {
 
 #[test]
 fn a_needle_that_gives_is_replayed_in_blocks_as_if_followed_at_every_instant() {
-    let layer = Layer {
-        thickness_m: 0.06,
-        stiffness_n_per_m: LAYER.0,
-        friction_ns_per_m2: LAYER.1,
-        puncture_n: None,
-        name: String::new(),
-    };
-    let belief = Arc::new(Belief {
-        tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
-        given: Vec::new(),
-        tolerance: vec![0.3],
-        thickness_tolerance: vec![0.1],
-        surface_tolerance_m: 0.002,
-    });
+    let belief = one_layer(0.06, LAYER);
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();
     let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("a recording");

@@ -1,15 +1,18 @@
 //! A force that comes late is late by a fraction of a sampling step: the jumps of the friction say it only by the samples that they lie
 //! between.
 
+mod common;
+
+use common::one_layer;
 use std::sync::Arc;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
 use stylet_identify::fit::{Effort, fit};
 use stylet_identify::late::{late_s, placed};
-use stylet_identify::model::{Belief, Choice, Model, NEVER};
+use stylet_identify::model::{Choice, Model, NEVER};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::Data;
 use stylet_record::Recording;
-use stylet_tissue::{Layer, Tissue, info};
+use stylet_tissue::info;
 
 /// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
 const LAYER: (f64, f64) = (60.0, 12_000.0);
@@ -39,20 +42,7 @@ fn force(t: f64) -> f64 {
 
 #[test]
 fn a_delay_is_found_to_a_fraction_of_a_sampling_step() {
-    let layer = Layer {
-        thickness_m: 0.08,
-        stiffness_n_per_m: LAYER.0,
-        friction_ns_per_m2: LAYER.1,
-        puncture_n: None,
-        name: String::new(),
-    };
-    let belief = Arc::new(Belief {
-        tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
-        given: Vec::new(),
-        tolerance: vec![0.3],
-        thickness_tolerance: vec![0.1],
-        surface_tolerance_m: 0.002,
-    });
+    let belief = one_layer(0.08, LAYER);
     let (mut worst, mut worst_at_instants) = (0.0_f64, 0.0_f64);
     for truth in [0.0117, 0.0234, 0.0301, 0.0468] {
         let t: Vec<f64> = (0..2700).map(|k| f64::from(k) * STEP_S).collect();
@@ -68,8 +58,7 @@ fn a_delay_is_found_to_a_fraction_of_a_sampling_step() {
         model.instants = vec![vec![NEVER]];
         let found = fit(&model, &data, Effort::FULL).expect("a fit");
         worst_at_instants = worst_at_instants.max((late_s(&found.model) - truth).abs());
-        let (found, _) = placed(found, data);
-        assert!(found.model.placed_s.is_some(), "{truth}");
+        let (found, _) = placed(&found, &data).expect("a late force is better so");
         worst = worst.max((late_s(&found.model) - truth).abs());
     }
     assert!(worst < 0.02 * STEP_S, "{worst} s");

@@ -56,7 +56,7 @@ impl Asked<'_> {
         let (Some(&world), Some(&size)) = (world.first(), size.first()) else {
             return Err(Error::internal("a list of words is empty"));
         };
-        Ok(Plan {
+        let plan = Plan {
             world,
             wrong: words("--wrong", self.wrong, Wrong::ALL, Wrong::parse, Wrong::word)?,
             grades: words("--grade", self.grade, Grade::ALL, Grade::parse, Grade::word)?,
@@ -65,7 +65,15 @@ impl Asked<'_> {
             cases: self.cases,
             seed: self.seed,
             only: words("--effect", self.effect, &things(), thing, |t| t)?,
-        })
+        };
+        if !plan.only.is_empty() && plan.cases().is_empty() {
+            return Err(Error::Request(format!(
+                "--effect {}: none of these cases hides it; effects are hidden by `--hide one` in the plain world, other shapes by `--hide \
+                 outside`, and every one of 27 effects (16 shapes) once in so many cases of a row",
+                plan.only.join(",")
+            )));
+        }
+        Ok(plan)
     }
 }
 

@@ -11,6 +11,12 @@ use std::path::PathBuf;
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
     let (seed, cases) = (args.cases.seed, args.cases.cases);
+    if !args.cases.effect.is_empty() {
+        return Err(stylet_api::Error::Request(
+            "--effect: the world `own` draws its effects by itself".into(),
+        )
+        .into());
+    }
     let folder = args
         .out
         .clone()
