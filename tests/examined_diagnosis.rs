@@ -87,6 +87,23 @@ fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once(
     assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.right), "{table}");
 }
 
+/// Two lines close together and of one size: one of them was named, and an autoregression took the other for the noise's colour.
+#[test]
+fn beats_are_not_called_a_tone() {
+    let id = CaseId {
+        world: World::Plain,
+        wrong: Wrong::Nothing,
+        grade: Grade::Large,
+        hide: Hide::Outside,
+        size: Size::Strong,
+        seed: 142,
+        index: 6,
+    };
+    let outcomes = run(&[id], None, &answer, &|_, _| {}).expect("a run");
+    let table = table::text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.right), "{table}");
+}
+
 /// Two time constants where two are there (seed 128, number 6, 0.33 and 6.5 s), one where there is one (37, 7.4 s); both numbers were looked at.
 #[test]
 fn a_second_time_constant_of_relaxation_is_found_where_there_is_one() {

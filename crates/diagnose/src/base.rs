@@ -75,12 +75,24 @@ pub fn anew(prepared: &Prepared, effects: &[Choice], data: &Data) -> Option<Fit>
     fit(&model, data, Effort::FULL)
 }
 
-fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
+/// The same in short, on blocks averaged further (`coarse`): enough to tell whether an effect is worth beginning anew.
+#[must_use]
+pub fn sketched(prepared: &Prepared, effects: &[Choice], coarse: &Data) -> Option<Fit> {
+    let less = Prepared { blocks: Arc::clone(&coarse.blocks), ..prepared.clone() };
+    let (found, own) = given(&less, effects)?;
+    coarse.worked(own.work());
+    let mut model = found.model;
+    retime(&mut model, coarse, &prepared.drop_times());
+    fit(&model, coarse, Effort { turns: 5, enough: 0.3 })
+}
+
+/// Drops given to layers and numbers fitted, in turn, seen from afar.
+fn given(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
-    let mut data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
+    let data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
     let start = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
-    let mut model = effects.iter().fold(start, |m, choice| m.with(choice.clone()));
+    let model = effects.iter().fold(start, |m, choice| m.with(choice.clone()));
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model);
@@ -94,12 +106,14 @@ fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
         if let Some(new) = fit(&next, &data, Effort { turns: 4, enough: 0.3 })
             && best.as_ref().is_none_or(|b| new.nats() < b.nats())
         {
-            model = new.model.clone();
             best = Some(new);
         }
     }
-    let _ = model;
-    let mut best = best?;
+    Some((best?, data))
+}
+
+fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
+    let (mut best, mut data) = given(prepared, effects)?;
     let times = prepared.drop_times();
     for round in 0..3 {
         data = data.judged_by(&best.residuals.e, From::Calm);

@@ -20,9 +20,10 @@ use stylet_identify::blocks::{BLOCK_S, Blocks};
 use stylet_identify::fit::{Effort, fit};
 use stylet_identify::model::{Belief, Role};
 use stylet_identify::noise::From as NoiseFrom;
+use stylet_identify::objective::Data;
 use stylet_record::{QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
-use stylet_tissue::AnyEffect;
+use stylet_tissue::{AnyEffect, EffectInfo, Proposal};
 
 /// One recording with its name.
 #[derive(Clone, Debug)]
@@ -118,8 +119,12 @@ pub fn diagnose(
     if unknown {
         let borne = crate::held_out::borne(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&borne);
-        let kept: Vec<&str> =
-            effects.filter(|(_, b)| b.gain > BORNE && b.spread < SAME).map(|(e, _)| e.info.id).collect();
+        // Of a force with several lines one tone is no cause.
+        let tone = |i: &EffectInfo| matches!(i.proposal, Proposal::Line | Proposal::Breath);
+        let kept: Vec<&str> = effects
+            .filter(|(e, b)| b.gain > BORNE && b.spread < SAME && !(judged.lined && tone(e.info)))
+            .map(|(e, _)| e.info.id)
+            .collect();
         causes.retain(|c| kept.contains(&c.effect.as_str()));
     }
     let verdict = if unknown {
@@ -215,15 +220,17 @@ struct Judged {
     base_parameters: Vec<BaseParameter>,
     leftover: LeftoverReport,
     unknown: bool,
+    /// What is left has lines in its spectrum.
+    lined: bool,
 }
 
 /// Mean square of a residual beyond the noise, outlying samples cut, in units of the noise.
-fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
+fn excess(data: &Data, e: &[Vec<f64>]) -> f64 {
     // Outlying blocks are nobody's cause, nor are those at a jump of the speed that noisy positions leave open.
     const LIMIT: f64 = 6.0;
     const AT_JUMP: usize = 4;
     let (mut sum, mut n) = (0.0, 0.0);
-    for (b, e) in search.data.blocks.iter().zip(e) {
+    for (b, e) in data.blocks.iter().zip(e) {
         let mut near = vec![false; b.len()];
         for jump in &b.motion.jumps {
             let (lo, hi) = (b.at(jump.at_s - jump.doubt_s), b.at(jump.at_s + jump.doubt_s));
@@ -231,7 +238,7 @@ fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
             near[lo.min(hi)..hi].fill(true);
         }
         for k in (0..b.len()).filter(|k| b.used[*k] && !near[*k]) {
-            let noise = &search.data.noise;
+            let noise = &data.noise;
             let sd = noise.bins[noise.bin(b.size_n[k]).min(noise.bins.len() - 1)].sd_n;
             sum += (e[k] / sd).powi(2).min(LIMIT * LIMIT);
             n += 1.0;
@@ -240,15 +247,29 @@ fn excess(search: &Search, e: &[Vec<f64>]) -> f64 {
     sum / f64::max(n, 1.0) - 1.0
 }
 
+/// Chance that white noise of so many blocks has one line as strong as `excess` times all others together (Fisher 1929).
+fn line_p(excess: f64, blocks: usize) -> f64 {
+    let bins = 0.5 * blocks as f64;
+    (bins * (1.0 + excess).powf(1.0 - bins)).clamp(f64::MIN_POSITIVE, 1.0)
+}
+
 fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let told = leftover::test(&search.best, &search.data);
+    // A line of the spectrum is no noise, though an autoregression would take it for its own colour.
+    let lines = crate::lines::lines(&search.best, &search.data);
+    let quiet = if lines.is_empty() {
+        search.data.clone()
+    } else {
+        search.data.judged_by(&crate::lines::without(&search.best, &search.data, &lines), NoiseFrom::Calm)
+    };
     let (before, after) =
-        (excess(search, &search.base.residuals.e), excess(search, &search.best.residuals.e));
+        (excess(&quiet, &search.base.residuals.e), excess(&quiet, &search.best.residuals.e));
+    let lined = !lines.is_empty() && after > EXCESS;
     let share = (after.max(0.0) / before.max(1e-9)).min(1.0);
     let alone = search.data.recordings() < 2;
     let sure = if alone { after > EXCESS_ALONE } else { after > EXCESS && told.sure.p_value < LEFTOVER_P };
     let at_sight = after > EXCESS_SLOW && told.at_sight.p_value < LEFTOVER_P;
-    let unknown = share > UNEXPLAINED && (sure || at_sight);
+    let unknown = share > UNEXPLAINED && (sure || at_sight || lined);
     let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included, however slow.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
@@ -268,7 +289,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
         let needed = stage.map_or(0.0, |s| s.needed);
         let weights: f64 = rivals.iter().map(|r| libm::exp(-r.behind.max(-3.0))).sum();
         let without = fit(&search.best.model.without(k), &search.data, Effort { turns: 3, enough: 1.0 });
-        let back = without.map_or(0.0, |f| excess(search, &f.residuals.e) - after);
+        let back = without.map_or(0.0, |f| excess(&quiet, &f.residuals.e) - after);
         causes.push(Cause {
             effect: choice.info.id.to_owned(),
             equivalent: rivals.iter().filter(|r| r.behind < CLASS_NATS).map(|r| r.name.to_owned()).collect(),
@@ -280,13 +301,20 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     }
     let base_parameters = base_parameters(search, &spread);
     causes.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
+    let mut depends_on: Vec<String> = left.depends_on.iter().map(|d| d.0.clone()).collect();
+    if lined {
+        depends_on.insert(0, "frequency".to_owned());
+    }
     let leftover = LeftoverReport {
-        p_value: left.p_value,
-        depends_on: left.depends_on.iter().map(|d| d.0.clone()).collect(),
+        p_value: if lined { left.p_value.min(line_p(after, search.data.compared())) } else { left.p_value },
+        depends_on,
         nats: left.nats,
         share,
     };
-    Judged { causes, base_parameters, leftover, unknown }
+    if lined {
+        search.data = quiet;
+    }
+    Judged { causes, base_parameters, leftover, unknown, lined }
 }
 
 /// Moves causes that are too small to `traces`.

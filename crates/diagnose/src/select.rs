@@ -1,6 +1,6 @@
 //! Effects enter by what they gain, and leave when the others can do without them.
 
-use crate::base::{Prepared, anew};
+use crate::base::{Prepared, anew, sketched};
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, starts};
 use rayon::prelude::*;
@@ -30,6 +30,8 @@ const COARSER: usize = 3;
 
 /// What leaves so many times the noise of its calm stretches is no fit.
 const MISFIT: f64 = 1.2;
+/// Effects that are begun anew to the end.
+const ANEW: usize = 3;
 /// Stages of a search in which effects are begun anew from what is believed.
 const BEGINNINGS: usize = 2;
 
@@ -199,12 +201,27 @@ impl Search {
             return None;
         }
         self.beginnings -= 1;
-        let begin = |starts: &Vec<Start>| {
+        let with = |starts: &Vec<Start>| {
             let mut effects = self.best.model.effects.clone();
             effects.push(starts.first()?.choice.clone());
-            anew(prepared, &effects, &self.data)
+            Some(effects)
         };
-        Some(ranked.par_iter().filter_map(begin).collect())
+        // In short for all, and beside the law without; to the end for those that come near the best of them.
+        let coarse = self.coarse();
+        let coarse = coarse.judged_by(&residuals(&leader.model, &coarse)?.e, From::Calm);
+        let stood = sketched(prepared, &self.best.model.effects, &coarse)?.nats();
+        let mut sketches: Vec<(f64, Vec<Choice>)> = ranked
+            .par_iter()
+            .filter_map(|s| {
+                let effects = with(s)?;
+                Some((sketched(prepared, &effects, &coarse)?.nats(), effects))
+            })
+            .collect();
+        sketches.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let most = stood - sketches.first()?.0;
+        sketches.retain(|s| stood - s.0 > BEHIND * most);
+        sketches.truncate(ANEW);
+        Some(sketches.par_iter().filter_map(|s| anew(prepared, &s.1, &self.data)).collect())
     }
 
     /// Whether the leader owes its gain to a better start: the best so far, begun from the leader's numbers, is then better
@@ -230,10 +247,6 @@ impl Search {
     /// Frequencies (Hz) of strong lines of the residual's spectrum. They are no noise: an autoregression would take them for
     /// its own colour.
     fn see_lines(&mut self) -> Vec<f64> {
-        let line = |id: &str| stylet_tissue::info(id).is_some_and(|i| matches!(i.proposal, Proposal::Line));
-        if self.best.model.effects.iter().any(|e| line(e.info.id)) {
-            return Vec::new();
-        }
         let found = crate::lines::lines(&self.best, &self.data);
         if !found.is_empty() {
             let less = crate::lines::without(&self.best, &self.data, &found);
