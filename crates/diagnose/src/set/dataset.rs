@@ -126,10 +126,16 @@ impl Dataset {
     /// # Errors
     /// [`InputError`] with file, line and column.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        let file = path.display().to_string();
-        let text = read_text(path)?;
-        let out: Self = parse(&file, &text)?;
-        out.check().map_err(|problem| problem.in_file(&file, &text))?;
+        Self::parse(&path.display().to_string(), &read_text(path)?)
+    }
+
+    /// Parses and checks a description; `file` is named in errors.
+    ///
+    /// # Errors
+    /// [`InputError`] with line and column.
+    pub fn parse(file: &str, text: &str) -> Result<Self, InputError> {
+        let out: Self = parse(file, text)?;
+        out.check().map_err(|problem| problem.in_file(file, text))?;
         Ok(out)
     }
 
