@@ -197,7 +197,7 @@ fn data_sets_limits_and_motions_are_read_or_refused_with_their_place() {
 
 #[test]
 fn what_stylet_wrote_itself_is_read_again_or_refused() {
-    let scratch = Scratch::new("mutated");
+    let scratch = Scratch::in_memory("mutated");
     let scenario = Scenario::parse("gel.ron", GEL).expect("a scenario");
     let run = stylet::simulate(&scenario).expect("it can be simulated");
     let evidence =
@@ -240,7 +240,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     set.write(&folder).expect("a set");
     let manifest = folder.join("manifest.json");
     let whole = [std::fs::read(&manifest).expect("it is there")];
-    feed("manifest", (2_000, What::Slow), &whole, |bytes| {
+    feed("manifest", (2_000, What::Text), &whole, |bytes| {
         std::fs::write(&manifest, bytes).is_ok() && stylet::folder::verify(&folder, &["a.csv"]).is_ok()
     });
     let csv = scratch.path().join("holes.csv");
@@ -251,7 +251,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
         let all: Vec<&str> = rows.iter().chain(&more).copied().collect();
         all.chunks(3).map(|row| row.join(delimiter) + "\n").collect::<String>().into_bytes()
     };
-    feed("holes", (2_000, What::Slow), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
+    feed("holes", (2_000, What::Text), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
         let options = ReadOptions { columns: None, repair: false };
         std::fs::write(&csv, bytes).is_ok()
             && read_csv_with_holes(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
@@ -267,7 +267,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     let bits = |rows: &[stylet_sweep::Row]| -> Vec<u64> {
         rows.iter().flat_map(|r| r.values.iter().map(|x| x.to_bits()).chain([r.trial, r.seed])).collect()
     };
-    feed("shard", (2_000, What::Slow), &whole, |bytes| {
+    feed("shard", (2_000, What::Text), &whole, |bytes| {
         let written = std::fs::write(&place, bytes).is_ok();
         let found = shard::read(&sweep, &columns, number, scratch.path());
         assert!(found.as_ref().is_ok_and(|found| bits(found) == bits(&rows)) || found.is_err(), "other rows");
@@ -290,7 +290,7 @@ fn short_recordings_are_diagnosed_or_refused() {
     let mut csv = Vec::new();
     stylet_record::write_csv(&run.simulation.recording, None, &[], &mut csv).expect("it can be written");
     let options = ReadOptions { columns: None, repair: true };
-    let (found, of) = feed("diagnose", (150, What::Slow), &[csv], |bytes| {
+    let (found, of) = feed("diagnose", (1_000, What::Slow), &[csv], |bytes| {
         let Ok((recording, notes)) = read_csv_bytes(bytes, Path::new("a.csv"), &options) else {
             return false;
         };

@@ -106,7 +106,7 @@ fn amount(of: u64, what: What) -> (u64, u64) {
 pub enum What {
     /// A parser of text.
     Text,
-    /// One that finds its text in a file, or computes with what was read: not as many.
+    /// What computes with what was read: not as many.
     Slow,
 }
 
