@@ -186,6 +186,10 @@ fn repeats_are_repaired_as_asked_and_tell_who_is_not_like_the_others() {
     let said = flat(&stylet(&command));
     assert!(said.contains("run4.csv: it is not like the others: its force is 3.0"), "{said}");
     assert_eq!(said.matches("it is not like the others").count(), 1, "{said}");
+    assert!(
+        said.contains("run4.csv is not like the other recordings") && !said.contains("agrees with"),
+        "{said}"
+    );
 }
 
 #[test]

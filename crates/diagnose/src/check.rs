@@ -80,7 +80,7 @@ pub(crate) fn unlike(times: &[Option<f64>]) -> Vec<Option<QualityNote>> {
         let own = times[i]?;
         let others: Vec<f64> =
             times.iter().enumerate().filter(|(j, _)| *j != i).filter_map(|(_, t)| *t).collect();
-        let typical = (others.len() + 1 >= FEWEST).then(|| stylet_stats::median_of(others.into_iter()))?;
+        let typical = (others.len() + 1 >= FEWEST).then(|| stylet_stats::median_of(others))?;
         if own < UNLIKE * typical && own * UNLIKE > typical {
             return None;
         }

@@ -1,6 +1,7 @@
 //! A diagnosis in sentences.
 
 use stylet_diagnose::outcome::{Cause, Diagnosis, Verdict};
+use stylet_record::QualityKind;
 use stylet_report::significant;
 
 /// The verdict in a sentence.
@@ -8,9 +9,17 @@ use stylet_report::significant;
 pub fn sentence(d: &Diagnosis) -> String {
     let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
     match d.verdict {
-        Verdict::None => {
-            "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned()
-        }
+        Verdict::None => match strangers(d).as_slice() {
+            [] => "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned(),
+            names => format!(
+                "No effect is needed beyond the base law, but {} not like the other recordings: see the note.",
+                if names.len() == 1 {
+                    format!("{} is", names[0])
+                } else {
+                    format!("{} are", names.join(", "))
+                }
+            ),
+        },
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &Cause| {
@@ -33,6 +42,12 @@ pub fn sentence(d: &Diagnosis) -> String {
             format!("The data hold structure that no effect of the library explains{on}.")
         }
     }
+}
+
+/// The recordings that are not like the others.
+fn strangers(d: &Diagnosis) -> Vec<&str> {
+    let all = d.data_quality.iter().filter(|q| q.note.kind == QualityKind::NotLikeTheOthers);
+    all.map(|q| q.recording.as_str()).collect()
 }
 
 /// What differs from insertion to insertion so much that a simulation of the next one will miss it.
