@@ -256,6 +256,18 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
         std::fs::write(&csv, bytes).is_ok()
             && read_csv_with_holes(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
     });
+    let set = r#"Dataset(name: "two", recordings: ["two.csv"], split_by: ["specimen"],
+        tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]))"#;
+    let set = stylet_diagnose::set::dataset::Dataset::parse("a.ron", set).expect("a data set");
+    let mut two = "specimen,time_s,position_m,force_n\n".to_owned();
+    for i in 0..120 {
+        let t = 0.01 * f64::from(i % 60);
+        two += &format!("{},{t:.3},{:.5},{:.4}\n", i / 60, 0.003 * t, 0.5 * t * t);
+    }
+    let csv = scratch.path().join("two.csv");
+    feed("specimens", (2_000, What::Text), &[two.into_bytes()], |bytes| {
+        std::fs::write(&csv, bytes).is_ok() && set.runs(std::slice::from_ref(&csv), 1).is_ok()
+    });
     let file = "Sweep(scenario: \"gel.ron\", trials: 3, vary: [(path: \"sensor.noise_n\", with: Uniform(0.01, 0.02))])";
     scratch.file("gel.ron", GEL);
     let sweep = Sweep::load(&scratch.file("sweep.ron", file), Overrides::default()).expect("a sweep");

@@ -4,22 +4,25 @@ use stylet_diagnose::outcome::{Cause, Diagnosis, Verdict};
 use stylet_record::QualityKind;
 use stylet_report::significant;
 
-/// The verdict in a sentence.
+/// The verdict in a sentence, and which recordings should be looked at before it is believed.
 #[must_use]
 pub fn sentence(d: &Diagnosis) -> String {
+    let strangers = strangers(d);
+    let mut said = verdict(d, strangers.is_empty());
+    if !strangers.is_empty() {
+        let are = if strangers.len() == 1 { "is" } else { "are" };
+        said += &format!(" But {} {are} not like the other recordings: see the note.", strangers.join(", "));
+    }
+    said
+}
+
+fn verdict(d: &Diagnosis, agrees: bool) -> String {
     let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
     match d.verdict {
-        Verdict::None => match strangers(d).as_slice() {
-            [] => "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned(),
-            names => format!(
-                "No effect is needed beyond the base law, but {} not like the other recordings: see the note.",
-                if names.len() == 1 {
-                    format!("{} is", names[0])
-                } else {
-                    format!("{} are", names.join(", "))
-                }
-            ),
-        },
+        Verdict::None if agrees => {
+            "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned()
+        }
+        Verdict::None => "No effect is needed beyond the base law.".to_owned(),
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &Cause| {
