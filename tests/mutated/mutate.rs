@@ -136,7 +136,7 @@ pub fn feed(
     for (k, whole) in corpus.iter().enumerate() {
         assert!(parser(whole), "{name}: {k} of the corpus itself is accepted");
     }
-    let (mut accepted, mut longest, all) = (0_u64, Duration::ZERO, Instant::now());
+    let (mut accepted, mut longest, all) = (0_u64, (Duration::ZERO, 0), Instant::now());
     for k in 0..count {
         let mut dice = Dice(seed.wrapping_mul(0x2545_F491_4F6C_DD1D).wrapping_add(k));
         let from = &corpus[dice.below(corpus.len())];
@@ -144,7 +144,7 @@ pub fn feed(
         let begun = Instant::now();
         let outcome = catch_unwind(AssertUnwindSafe(|| parser(&input)));
         let took = begun.elapsed();
-        longest = longest.max(took);
+        longest = longest.max((took, k));
         if outcome.is_err() || took > PATIENCE {
             let folder = root().join("target/mutated");
             let _ = std::fs::create_dir_all(&folder);
@@ -156,8 +156,9 @@ pub fn feed(
     }
     let rate = count as f64 / all.elapsed().as_secs_f64();
     println!(
-        "{name}: {count} inputs, {accepted} accepted, {rate:.0}/s, the slowest {:.1} ms",
-        1e3 * longest.as_secs_f64()
+        "{name}: {count} inputs, {accepted} accepted, {rate:.0}/s, the slowest {:.1} ms (mutation {})",
+        1e3 * longest.0.as_secs_f64(),
+        longest.1
     );
     (accepted, count)
 }
