@@ -217,6 +217,25 @@ fn a_recording_whose_position_zero_lies_elsewhere_is_told() {
 }
 
 #[test]
+fn repeats_without_a_way_back_are_told_without_numbers_that_are_none() {
+    let scratch = Scratch::new("alike-in");
+    let files: Vec<String> = (1..=3)
+        .map(|seed| {
+            let way_in = csv(simulated(&scratch, seed).into_iter().take(780));
+            text(&scratch.file(&format!("in{seed}.csv"), way_in))
+        })
+        .collect();
+    let believed = text(&scratch.path().join("believed.ron"));
+    let out = text(&scratch.path().join("out"));
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let output =
+        stylet(&[&["diagnose", &believed, "--repeats", "--out", &out, "--data"], &files[..]].concat());
+    let said = flat(&output);
+    assert!(output.status.success() && said.contains("online core"), "{said}");
+    assert!(!said.contains("NaN"), "{said}");
+}
+
+#[test]
 fn repeats_do_not_forget_in_silence_what_the_scenario_believes() {
     let scratch = Scratch::new("alike-effects");
     let run = text(&scratch.file("run.csv", csv(simulated(&scratch, 1))));

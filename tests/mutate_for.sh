@@ -18,4 +18,4 @@ until [ "$rounds" -gt 0 ] && [ "$SECONDS" -ge "$seconds" ]; do
     seed=$((seed + 1))
 done
 echo "mutated inputs, $rounds rounds, no panic and none over 5 s:"
-grep -oE '[a-z.-]+: [0-9]+ inputs' "$found" | awk '{ sum[$1] += $2; all += $2 } END { for (name in sum) print "  " name, sum[name]; print "  all:", all }' | sort
+grep -oE '[a-z][a-z.-]*: [0-9]+ inputs' "$found" | awk '{ sum[$1] += $2; all += $2 } END { for (name in sum) print "  " name, sum[name]; print "  all:", all }' | sort
