@@ -181,6 +181,58 @@ fn repeats_are_repaired_as_asked_and_tell_who_is_not_like_the_others() {
     }
     let json = fs::read_to_string(Path::new(&folder).join("diagnosis.json")).expect("results");
     assert!(json.contains("\"repaired_rows\"") && json.contains("\"not_like_the_others\""));
+    // As recordings that need not be repeats, too.
+    let command = [&["diagnose", &believed, "--repair", "--out", &folder, "--data"], &files[..]].concat();
+    let said = flat(&stylet(&command));
+    assert!(said.contains("run4.csv: it is not like the others: its force is 3.0"), "{said}");
+    assert_eq!(said.matches("it is not like the others").count(), 1, "{said}");
+    assert!(
+        said.contains("run4.csv is not like the other recordings") && !said.contains("agrees with"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_recording_whose_position_zero_lies_elsewhere_is_told() {
+    let scratch = Scratch::new("alike-offset");
+    let rows = simulated(&scratch, 1);
+    let out = text(&scratch.path().join("out"));
+    let believed = text(&scratch.path().join("believed.ron"));
+    let cases: [(f64, &[&str]); 4] = [
+        (1.5, &["begins behind the tissue", "offset: -1.49", "surface_m"]),
+        (0.1, &["begins behind the tissue", "offset: -0.09", "surface_m"]),
+        (0.03, &["begins behind the tissue", "offset: -0.02", "surface_m"]),
+        (-0.03, &["never reaches the tissue", "offset", "surface_m"]),
+    ];
+    for (offset_m, words) in cases {
+        let data = csv(rows.iter().map(|[t, z, f]| [*t, z + offset_m, *f]));
+        let data = text(&scratch.file("offset.csv", data));
+        let output = stylet(&["diagnose", &believed, "--data", &data, "--out", &out]);
+        let said = flat(&output);
+        assert_eq!(output.status.code(), Some(2), "{offset_m}: {said}");
+        for word in words.iter().chain(&["offset.csv"]) {
+            assert!(said.contains(word), "{offset_m}: does not say {word}: {said}");
+        }
+    }
+}
+
+#[test]
+fn repeats_without_a_way_back_are_told_without_numbers_that_are_none() {
+    let scratch = Scratch::new("alike-in");
+    let files: Vec<String> = (1..=3)
+        .map(|seed| {
+            let way_in = csv(simulated(&scratch, seed).into_iter().take(780));
+            text(&scratch.file(&format!("in{seed}.csv"), way_in))
+        })
+        .collect();
+    let believed = text(&scratch.path().join("believed.ron"));
+    let out = text(&scratch.path().join("out"));
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let output =
+        stylet(&[&["diagnose", &believed, "--repeats", "--out", &out, "--data"], &files[..]].concat());
+    let said = flat(&output);
+    assert!(output.status.success() && said.contains("online core"), "{said}");
+    assert!(!said.contains("NaN"), "{said}");
 }
 
 #[test]

@@ -1,141 +1,24 @@
-//! Promise: no input makes a parser panic or run away, and whatever a parser lets through is what it promises. A hundred thousand
-//! mutations of a small corpus per run of the tests; `tests/mutate_for.sh SECONDS` goes on with other seeds and keeps what it finds.
+//! Promise: no input makes a parser panic or run away, and whatever a parser lets through is what it promises. A few hundred thousand
+//! mutations of a small corpus per run of the tests; `tests/mutate_for.sh SECONDS` goes on with other seeds and keeps what it finds,
+//! `STYLET_MUTATIONS_EACH=10000000` gives every parser of text as many.
 
+#[path = "mutated/mutate.rs"]
+mod mutate;
 mod support;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use mutate::{Dice, What, feed, hold};
 use std::path::Path;
-use std::time::{Duration, Instant};
-use stylet_record::{ColumnMap, ReadOptions, assess, read_csv_bytes};
-use stylet_scenario::{EnhanceFile, Scenario, parse};
-use stylet_sweep::gate::GatesFile;
-use stylet_sweep::{Sweep, SweepFile};
-use support::root;
-
-/// SplitMix64: the same mutations everywhere.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        x ^ (x >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.roll() % n.max(1) as u64) as usize
-    }
-
-    fn of<'a, T: ?Sized>(&mut self, all: &[&'a T]) -> &'a T {
-        all[self.below(all.len())]
-    }
-}
-
-/// What breaks parsers: numbers at the ends of their range, brackets, quotation marks, separators, other scripts.
-const PIECES: [&[u8]; 32] = [
-    b"NaN",
-    b"-inf",
-    b"1e400",
-    b"1e300",
-    b"-1",
-    b"0",
-    b"1e-320",
-    b"18446744073709551616",
-    b"-0.0",
-    b"(",
-    b")",
-    b"[",
-    b"]",
-    b"\"",
-    b"r#\"",
-    b"/*",
-    b"//",
-    b"#!",
-    b",",
-    b";",
-    b"\t",
-    b"|",
-    b"\n",
-    b"\r",
-    b"\0",
-    b":",
-    b"\xff",
-    b"\xef\xbb\xbf",
-    "é😀".as_bytes(),
-    b"Some(",
-    b"()",
-    b"                                                                ",
-];
-
-/// One to six changes: bytes flipped, cut out, repeated, exchanged, pieces put in.
-fn mutated(seed: &[u8], dice: &mut Dice) -> Vec<u8> {
-    let mut out = seed.to_vec();
-    for _ in 0..=dice.below(6) {
-        let at = dice.below(out.len() + 1);
-        let to = (at + dice.below(24)).min(out.len());
-        match dice.below(8) {
-            0 if at < out.len() => out[at] ^= 1 << dice.below(8),
-            1 => drop(out.drain(at..to)),
-            2 => {
-                let again = out[at..to].to_vec();
-                out.splice(at..at, again);
-            }
-            3 => out.truncate(at),
-            4 => {
-                let there = dice.below(out.len() + 1);
-                let piece = out[at..to].to_vec();
-                out.splice(there..there, piece);
-            }
-            // A whole number goes, another comes.
-            5 => {
-                let number = |b: &u8| b.is_ascii_digit() || *b == b'.' || *b == b'-';
-                let from = out[at..].iter().position(number).map_or(at, |k| at + k);
-                let end = out[from..].iter().position(|b| !number(b)).map_or(out.len(), |k| from + k);
-                out.splice(from..end, dice.of(&PIECES[..9]).iter().copied());
-            }
-            _ => drop(out.splice(at..at, dice.of(&PIECES).iter().copied())),
-        }
-    }
-    out
-}
-
-/// How many mutations of each corpus, and from which seed.
-fn amount(of: u64) -> (u64, u64) {
-    let set = |name: &str| std::env::var(name).ok().and_then(|x| x.parse::<u64>().ok());
-    (of * set("STYLET_MUTATIONS").unwrap_or(100) / 100, set("STYLET_MUTATION_SEED").unwrap_or(1))
-}
-
-/// Longest that one input may take.
-const PATIENCE: Duration = Duration::from_secs(5);
-
-/// Feeds mutations of the corpus to `parser`; what makes it panic or linger is kept in `target/mutated` and named.
-fn hold(name: &str, of: u64, corpus: &[Vec<u8>], parser: impl Fn(&[u8]) -> bool) {
-    let (count, seed) = amount(of);
-    assert!(corpus.iter().all(|whole| parser(whole)), "{name}: the corpus itself is accepted");
-    let mut accepted = 0_u64;
-    for k in 0..count {
-        let mut dice = Dice(seed.wrapping_mul(0x2545_F491_4F6C_DD1D).wrapping_add(k));
-        let from = &corpus[dice.below(corpus.len())];
-        let input = mutated(from, &mut dice);
-        let begun = Instant::now();
-        let outcome = catch_unwind(AssertUnwindSafe(|| parser(&input)));
-        let took = begun.elapsed();
-        if outcome.is_err() || took > PATIENCE {
-            let folder = root().join("target/mutated");
-            let _ = std::fs::create_dir_all(&folder);
-            let file = folder.join(format!("{name}-{seed}-{k}"));
-            let _ = std::fs::write(&file, &input);
-            panic!("{name}: mutation {k} of seed {seed} panics or takes {took:?}: {}", file.display());
-        }
-        accepted += u64::from(outcome.unwrap_or(false));
-    }
-    // Mutations that all fail in the first line would test nothing.
-    assert!(
-        accepted * 200 > count && accepted < count,
-        "{name}: {accepted} of {count} mutations are accepted"
-    );
-}
+use std::str::from_utf8;
+use stylet::{Diagnosis, Evidence, Inputs, Limits};
+use stylet_examine::challenge::Key;
+use stylet_examine::{Answer, Outcome, Plan};
+use stylet_record::{ColumnMap, ReadOptions, Recording, Truth, assess, read_csv_bytes, read_csv_with_holes};
+use stylet_scenario::{EnhanceFile, Motion, Scenario, motion_to_ron, parse};
+use stylet_sweep::gate::{Baseline, GatesFile};
+use stylet_sweep::shard::{self, ShardNumber};
+use stylet_sweep::{Columns, Overrides, Sweep, SweepFile};
+use stylet_tissue::{AnyEffect, Law, LawState, library};
+use support::{Scratch, root};
 
 fn shipped(folder: &str, most: u64) -> Vec<Vec<u8>> {
     let files = std::fs::read_dir(root().join(folder)).expect("shipped files").flatten().map(|e| e.path());
@@ -243,4 +126,191 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_their_pl
         let text = String::from_utf8_lossy(bytes);
         stylet_live::parse(1, &text).is_ok_and(|given| given.is_some())
     });
+}
+
+/// A scenario per effect of the library, with typical numbers: what a diagnosis writes as `extended.ron`.
+fn extended() -> Vec<Vec<u8>> {
+    let base = Scenario::load(&root().join("scenarios/three_layer_latex_constant.ron")).expect("a scenario");
+    library()
+        .map(|entry| {
+            let typical: Vec<f64> = entry.parameters.iter().map(|p| p.start).collect();
+            let effects = AnyEffect::from_parameters(entry.id, &typical).into_iter().collect();
+            Scenario { effects, ..base.clone() }.to_ron().expect("it can be written").into_bytes()
+        })
+        .collect()
+}
+
+fn read_again(text: &str) -> Option<Scenario> {
+    told(Scenario::parse("extended.ron", text))
+}
+
+#[test]
+fn extended_models_are_read_or_refused_and_their_law_steps_whatever_comes() {
+    let corpus = extended();
+    hold("extended", 6_000, &corpus, |bytes| from_utf8(bytes).ok().and_then(read_again).is_some());
+    let (laws, _) = feed("law", (4_000, What::Slow), &corpus, |bytes| {
+        let Some(scenario) = from_utf8(bytes).ok().and_then(read_again) else { return false };
+        let Ok(law) = Law::new(&scenario.tissue, &scenario.effects) else { return false };
+        let mut dice = Dice(bytes.iter().fold(7, |sum, b| sum * 31 % 1_000_003 + u64::from(*b)));
+        let (mut state, mut t, mut z) = (LawState::default(), 0.0, -0.005);
+        for _ in 0..200 {
+            let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300, 1e-320, -1.0, 0.0];
+            let mut drawn = |usual: f64| if dice.below(40) == 0 { odd[dice.below(odd.len())] } else { usual };
+            let (time_s, place_m, v) = (drawn(t), drawn(z), drawn(0.01));
+            let felt = law.step(&mut state, time_s, place_m, v, |_| {});
+            let told = time_s.is_finite() && place_m.is_finite() && v.is_finite();
+            assert!(told || felt.total_n.is_nan(), "what is not a number gives none");
+            (t, z) = (t + 0.005, z + 0.002 * (dice.below(1000) as f64 / 1000.0 - 0.2));
+        }
+        true
+    });
+    assert!(laws > 0);
+}
+
+#[test]
+fn data_sets_limits_and_motions_are_read_or_refused_with_their_place() {
+    hold("data-set", 6_000, &shipped("scenarios/measured", 9000), |bytes| {
+        from_utf8(bytes).is_ok_and(|text| {
+            told(stylet_diagnose::set::dataset::Dataset::parse("a.ron", text))
+                .is_some_and(|set| (1..=7).contains(&set.tissue.layers.len()))
+        })
+    });
+    let limits =
+        b"Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)"
+            .to_vec();
+    hold("limits", 6_000, &[limits], |bytes| {
+        from_utf8(bytes)
+            .is_ok_and(|text| told(parse::<Limits>("a.ron", text)).is_some_and(|l| l.check().is_ok()))
+    });
+    let scenarios = shipped("scenarios/compare", 4000).into_iter().chain(shipped("scenarios", 4000));
+    let scenarios: Vec<Scenario> = scenarios.filter_map(|s| read_again(from_utf8(&s).ok()?)).collect();
+    let motions: Vec<Vec<u8>> =
+        scenarios.iter().filter_map(|s| motion_to_ron(&s.motion).ok()).map(String::into_bytes).collect();
+    let base = scenarios[0].clone();
+    hold("motion", 6_000, &motions, |bytes| {
+        let Ok(text) = from_utf8(bytes) else { return false };
+        let Some(motion) = told(parse::<Motion>("a.ron", text)) else { return false };
+        let moved = Scenario { motion, ..base.clone() };
+        moved.check().is_ok() && moved.motion.plan().is_none_or(|plan| plan.duration_s().is_finite())
+    });
+}
+
+#[test]
+fn what_stylet_wrote_itself_is_read_again_or_refused() {
+    let scratch = Scratch::in_memory("mutated");
+    let scenario = Scenario::parse("gel.ron", GEL).expect("a scenario");
+    let run = stylet::simulate(&scenario).expect("it can be simulated");
+    let evidence =
+        [Evidence { name: "a".to_owned(), recording: run.simulation.recording.clone(), notes: Vec::new() }];
+    let diagnosis =
+        stylet::diagnose(&scenario, &evidence, |_| {}).and_then(|d| d.json()).expect("a diagnosis");
+    let whole = [diagnosis];
+    hold("diagnosis", 6_000, &whole, |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        serde_json::from_str::<Diagnosis>(&text).is_ok() | Answer::from_json(&text).is_ok()
+    });
+    let inputs =
+        br#"{"scenario":"/a/gel.ron","data":["/a/1.csv","/a/2.csv"],"columns":null,"repair":false}"#.to_vec();
+    hold("inputs", 6_000, &[inputs], |bytes| serde_json::from_slice::<Inputs>(bytes).is_ok());
+    let baseline = std::fs::read(root().join("scenarios/gates/ci.baseline.json")).expect("it is shipped");
+    hold("baseline", 6_000, &[baseline], |bytes| serde_json::from_slice::<Baseline>(bytes).is_ok());
+    let cases = Plan { cases: 2, ..Plan::default() }.cases();
+    let outcomes = stylet_examine::run(&cases, None, &|_| Ok(Answer::none()), &|_, _| {}).expect("two cases");
+    let lines: Vec<Vec<u8>> = outcomes.iter().filter_map(|o| serde_json::to_vec(o).ok()).collect();
+    hold("journal", 6_000, &lines, |bytes| serde_json::from_slice::<Outcome>(bytes).is_ok());
+    let key = Key { drawing: 1, cases: cases.iter().map(|id| (id.name(), *id)).collect() };
+    let key = serde_json::to_vec_pretty(&key).expect("a key");
+    hold("key", 6_000, &[key], |bytes| serde_json::from_slice::<Key>(bytes).is_ok());
+    let mut few = run.simulation.recording.clone();
+    few.time_s.truncate(4);
+    few.position_m.truncate(4);
+    few.force_n.truncate(4);
+    few.velocity_mps.truncate(4);
+    hold("recording.json", 6_000, &[serde_json::to_vec(&few).expect("a recording")], |bytes| {
+        serde_json::from_slice::<Recording>(bytes).is_ok_and(|r| r.check().is_ok())
+    });
+    let truth = serde_json::to_vec(&Truth::default()).expect("a truth");
+    feed("truth.json", (6_000, What::Text), &[truth], |bytes| {
+        serde_json::from_slice::<Truth>(bytes).is_ok_and(|t| t.check(0).is_ok())
+    });
+    // From here on through files.
+    let folder = scratch.path().join("set");
+    let mut set = stylet::Output::default();
+    set.add("a.csv", "1");
+    set.write(&folder).expect("a set");
+    let manifest = folder.join("manifest.json");
+    let whole = [std::fs::read(&manifest).expect("it is there")];
+    feed("manifest", (2_000, What::Text), &whole, |bytes| {
+        std::fs::write(&manifest, bytes).is_ok() && stylet::folder::verify(&folder, &["a.csv"]).is_ok()
+    });
+    let csv = scratch.path().join("holes.csv");
+    let rows = |delimiter: &str| {
+        let rows =
+            ["time_s", "position_m", "force_n", "0", "0", "NaN", "0.1", "1e-3", "inf", "0.2", "2e-3", "1"];
+        let more = ["0.3", "3e-3", "nan", "0.4", "4e-3", "2", "0.5", "5e-3", "3"];
+        let all: Vec<&str> = rows.iter().chain(&more).copied().collect();
+        all.chunks(3).map(|row| row.join(delimiter) + "\n").collect::<String>().into_bytes()
+    };
+    feed("holes", (2_000, What::Text), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
+        let options = ReadOptions { columns: None, repair: false };
+        std::fs::write(&csv, bytes).is_ok()
+            && read_csv_with_holes(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
+    });
+    let set = r#"Dataset(name: "two", recordings: ["two.csv"], split_by: ["specimen"],
+        tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]))"#;
+    let set = stylet_diagnose::set::dataset::Dataset::parse("a.ron", set).expect("a data set");
+    let mut two = "specimen,time_s,position_m,force_n\n".to_owned();
+    for i in 0..120 {
+        let t = 0.01 * f64::from(i % 60);
+        two += &format!("{},{t:.3},{:.5},{:.4}\n", i / 60, 0.003 * t, 0.5 * t * t);
+    }
+    let csv = scratch.path().join("two.csv");
+    feed("specimens", (2_000, What::Text), &[two.into_bytes()], |bytes| {
+        std::fs::write(&csv, bytes).is_ok() && set.runs(std::slice::from_ref(&csv), 1).is_ok()
+    });
+    let file = "Sweep(scenario: \"gel.ron\", trials: 3, vary: [(path: \"sensor.noise_n\", with: Uniform(0.01, 0.02))])";
+    scratch.file("gel.ron", GEL);
+    let sweep = Sweep::load(&scratch.file("sweep.ron", file), Overrides::default()).expect("a sweep");
+    let (columns, number) = (Columns::new(&sweep), ShardNumber { shard: 1, of: 1 });
+    let rows = stylet_sweep::rows(&sweep, &columns, 0..3, &|_| {}).expect("three trials");
+    shard::write(&sweep, &columns, number, &rows, scratch.path()).expect("a shard");
+    let place = number.path(scratch.path());
+    let whole = [std::fs::read(&place).expect("it is there")];
+    let bits = |rows: &[stylet_sweep::Row]| -> Vec<u64> {
+        rows.iter().flat_map(|r| r.values.iter().map(|x| x.to_bits()).chain([r.trial, r.seed])).collect()
+    };
+    feed("shard", (2_000, What::Text), &whole, |bytes| {
+        let written = std::fs::write(&place, bytes).is_ok();
+        let found = shard::read(&sweep, &columns, number, scratch.path());
+        assert!(found.as_ref().is_ok_and(|found| bits(found) == bits(&rows)) || found.is_err(), "other rows");
+        written && found.is_ok()
+    });
+}
+
+const GEL: &str = r#"Scenario(
+    name: "one gel",
+    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
+    motion: Constant(start_m: -0.004, velocity_mps: 0.008, duration_s: 0.8),
+    sample_hz: 100.0,
+    robot: Replay,
+)"#;
+
+#[test]
+fn short_recordings_are_diagnosed_or_refused() {
+    let scenario = Scenario::parse("gel.ron", GEL).expect("a scenario");
+    let run = stylet::simulate(&scenario).expect("it can be simulated");
+    let mut csv = Vec::new();
+    stylet_record::write_csv(&run.simulation.recording, None, &[], &mut csv).expect("it can be written");
+    let options = ReadOptions { columns: None, repair: true };
+    let (found, of) = feed("diagnose", (1_000, What::Slow), &[csv], |bytes| {
+        let Ok((recording, notes)) = read_csv_bytes(bytes, Path::new("a.csv"), &options) else {
+            return false;
+        };
+        let evidence = [Evidence { name: "a.csv".to_owned(), recording, notes }];
+        match stylet::diagnose(&scenario, &evidence, |_| {}) {
+            Ok(found) => found.json().is_ok() && found.extended_ron("gel.ron").is_ok(),
+            Err(why) => !why.to_string().is_empty() && !matches!(why, stylet::Error::Internal(_)),
+        }
+    });
+    assert!(found * 50 > of, "{found} of {of} are read");
 }

@@ -59,7 +59,12 @@ fn a_reader_that_goes_away_changes_no_exit_code_and_a_full_disk_is_told_in_a_sen
     let (holds, fails) = (gate("holds.ron", 9.0), gate("fails.ron", -1.0));
     let (gel, sweep, holds, fails) = (text(&gel), text(&sweep), text(&holds), text(&fails));
     let (out, svg) = (text(&scratch.path().join("out")), text(&scratch.path().join("map.svg")));
-    let commands: [(&[&str], i32); 8] = [
+    let swept = text(&scratch.path().join("swept"));
+    let (csv, replayed) = (format!("{out}/recording.csv"), text(&scratch.path().join("trial")));
+    for made in [["run", &gel, "--out", &out, "--quiet"], ["sweep", &sweep, "--out", &swept, "--quiet"]] {
+        assert!(stylet(&made).status.success(), "{made:?}");
+    }
+    let commands: [(&[&str], i32); 11] = [
         (&["effects"], 0),
         (&["run", &gel, "--out", &out], 0),
         (&["sweep", &sweep, "--out", &out], 0),
@@ -68,6 +73,9 @@ fn a_reader_that_goes_away_changes_no_exit_code_and_a_full_disk_is_told_in_a_sen
         (&["gate", &holds], 0),
         (&["gate", &fails], 1),
         (&["compare", &gel, "--seeds", "2", "--out", &out], 0),
+        (&["enhance", &csv, "--out", &replayed], 0),
+        (&["diagnose", &gel, "--data", &csv, "--out", &replayed], 0),
+        (&["replay", &swept, "3", "--out", &replayed], 0),
     ];
     for (command, code) in commands {
         let (found, said) = ended(command, gone());
@@ -80,6 +88,16 @@ fn a_reader_that_goes_away_changes_no_exit_code_and_a_full_disk_is_told_in_a_sen
         assert_eq!(found, Some(if code == 1 { 1 } else { 2 }), "{command:?} onto a full disk: {said}");
         assert!(code == 1 || said.contains("standard output cannot be written"), "{command:?}: {said}");
     }
+}
+
+#[test]
+fn an_impossible_number_of_shards_is_refused() {
+    let scratch = Scratch::new("shards");
+    let out = text(&scratch.path().join("out"));
+    let sweep = text(&root().join("scenarios/sweeps/noise.ron"));
+    let output = stylet(&["sweep", "run-shard", "1/18446744073709551615", &sweep, "--out", &out]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("at most 999999"), "{}", said(&output));
 }
 
 #[test]

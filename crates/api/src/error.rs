@@ -47,6 +47,17 @@ pub enum Error {
         /// What the system says.
         why: std::io::Error,
     },
+    /// The output is written aside, and cannot be brought to its places or given up.
+    #[error(
+        "{path}: cannot be written: {why}; the new results are whole in its folder .stylet-set, and the next stylet command that uses \
+         {path} puts them in their places: mend the disk and give it again"
+    )]
+    Begun {
+        /// Folder.
+        path: String,
+        /// What the system says.
+        why: std::io::Error,
+    },
     /// Another process writes there.
     #[error(
         "{path}: another stylet is writing to this folder; wait until it has ended, or give this one a folder of its own with --out"

@@ -2,7 +2,8 @@
 //!
 //! A set is written into a folder of its own inside the output folder, synced, and announced by one rename; then its files are
 //! moved to their places, the manifest last. Whoever is killed before that rename leaves the old set, whoever is killed after it the
-//! new one: the next command that looks at the folder ends what was begun ([`settle`]).
+//! new one: the next command that looks at the folder ends what was begun ([`settle`]). Whoever is told that something cannot be
+//! written puts the old set back.
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
@@ -44,10 +45,13 @@ impl Claim {
     /// [`Error::Output`] when it cannot be made, [`Error::Busy`] when another process works there.
     pub fn new(folder: &Path) -> Result<Self, Error> {
         let claim = Self::take(folder, File::try_lock)?;
-        let tidy = fs::remove_dir_all(folder.join(NEW))
-            .or_else(absent)
-            .and_then(|()| settle_with(folder, &mut || false));
-        tidy.map_err(|why| failed(folder, why))?;
+        let begun = || {
+            if folder.join(WHOLE).exists() {
+                move_in(folder, &mut || false)?;
+            }
+            tidy(folder, &mut || false)
+        };
+        begun().map_err(|why| failed(folder, why))?;
         Ok(claim)
     }
 
@@ -82,13 +86,16 @@ impl Claim {
     /// Writes a set of files. Files of the same names are replaced, others are left alone.
     ///
     /// # Errors
-    /// [`Error::Output`]; the folder then holds what it held before.
+    /// [`Error::Output`]; the folder then holds what it held before. [`Error::Begun`] where the disk does not even let what it held be
+    /// put back.
     pub fn write(&self, files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
-        let written = self.write_until(files, &mut || false);
-        if written.is_err() {
-            let _ = fs::remove_dir_all(self.folder.join(NEW));
+        let Err(why) = self.write_until(files, &mut || false) else { return Ok(()) };
+        let names = files.iter().map(|(name, _)| *name).chain([MANIFEST]);
+        if self.folder.join(WHOLE).exists() && take_back(&self.folder, names).is_err() {
+            return Err(Error::Begun { path: self.folder.display().to_string(), why });
         }
-        written.map_err(|why| failed(&self.folder, why))
+        let _ = tidy(&self.folder, &mut || false);
+        Err(failed(&self.folder, why))
     }
 
     /// `killed` is asked before every change of the disk; tests end the work there as a kill would.
@@ -116,12 +123,14 @@ impl Claim {
         text.push(b'\n');
         go_on(killed)?;
         synced(&new.join(MANIFEST), &text)?;
-        sync_names(&new);
+        sync_names(&new)?;
         go_on(killed)?;
         // From here on it is the new set.
         fs::rename(&new, folder.join(WHOLE))?;
-        sync_names(folder);
-        settle_with(folder, killed)
+        sync_names(folder)?;
+        move_in(folder, killed)?;
+        // The new set is in its places. What cannot be tidied now is tidied by the next command, or stops it.
+        tidy(folder, killed).or_else(|why| if is_kill(&why) { Err(why) } else { Ok(()) })
     }
 }
 
@@ -145,13 +154,28 @@ pub fn settle(folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
+/// The same for the folder that a file lies in, before the file is read.
+///
+/// # Errors
+/// As [`settle`].
+pub fn settle_beside(file: &Path) -> Result<(), Error> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    settle(folder.unwrap_or(Path::new(".")))
+}
+
 /// Whether the files are those that the folder's manifest tells of; a folder without manifest is not judged.
 ///
 /// # Errors
-/// [`Error::NotOneSet`] naming the first file that is not.
+/// [`Error::NotOneSet`] naming the first file that is not, or a manifest that cannot be read.
 pub fn verify(folder: &Path, names: &[&str]) -> Result<(), Error> {
-    let Ok(text) = fs::read(folder.join(MANIFEST)) else { return Ok(()) };
-    let manifest: Manifest = serde_json::from_slice(&text).unwrap_or_default();
+    let path = folder.join(MANIFEST);
+    let text = match fs::read(&path) {
+        Err(why) if why.kind() == io::ErrorKind::NotFound => return Ok(()),
+        text => text.ok(),
+    };
+    let Some(manifest) = text.and_then(|text| serde_json::from_slice::<Manifest>(&text).ok()) else {
+        return Err(Error::NotOneSet { path: path.display().to_string() });
+    };
     for name in names {
         let path = folder.join(name);
         let found = fs::read(&path).map(|content| sum(&content)).ok();
@@ -172,7 +196,7 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
     let part = PathBuf::from(part);
     let written = synced(&part, content).and_then(|()| fs::rename(&part, path));
     if let Some(folder) = path.parent() {
-        sync_names(folder);
+        let _ = sync_names(folder);
     }
     written.map_err(|why| {
         let _ = fs::remove_file(&part);
@@ -185,29 +209,26 @@ fn failed(path: &Path, why: io::Error) -> Error {
 }
 
 /// A set that is whole goes to its places; what it replaces waits aside until all are there.
-fn settle_with(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+fn move_in(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
     let (whole, old) = (folder.join(WHOLE), folder.join(OLD));
-    if whole.exists() {
-        let names = names_in(&whole)?;
-        go_on(killed)?;
-        fs::create_dir(&old)
-            .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
-        let moved = move_in(folder, &whole, &old, &names, killed);
-        match moved {
-            Ok(()) => {}
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => return Err(e),
-            Err(e) => {
-                move_back(folder, &whole, &old)?;
-                fs::remove_dir_all(&whole)?;
-                return Err(e);
-            }
-        }
-        sync_names(folder);
-        go_on(killed)?;
-        fs::remove_dir_all(&whole)?;
-    }
+    let names = names_in(&whole)?;
     go_on(killed)?;
-    fs::remove_dir_all(&old).or_else(absent)
+    fs::create_dir(&old)
+        .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
+    // The old manifest goes first: it does not speak of a folder in between.
+    for name in names.iter().rev() {
+        let place = folder.join(name);
+        // What was put aside before a kill is the older one.
+        if place.exists() && !old.join(name).exists() {
+            go_on(killed)?;
+            fs::rename(&place, old.join(name))?;
+        }
+    }
+    for name in &names {
+        go_on(killed)?;
+        fs::rename(whole.join(name), folder.join(name))?;
+    }
+    sync_names(folder)
 }
 
 /// The files of a set, its manifest last.
@@ -220,43 +241,37 @@ fn names_in(whole: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-fn move_in(
-    folder: &Path,
-    whole: &Path,
-    old: &Path,
-    names: &[String],
-    killed: &mut dyn FnMut() -> bool,
-) -> io::Result<()> {
-    // The old manifest goes first: it does not speak of a folder in between.
-    for name in names.iter().rev() {
-        let place = folder.join(name);
-        // What was put aside before a kill is the older one.
-        if place.exists() && !old.join(name).exists() {
-            go_on(killed)?;
-            fs::rename(&place, old.join(name))?;
+/// As it was before [`move_in`] began, with a set of these names. Until the last rename a kill leaves the new set.
+fn take_back<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Result<()> {
+    let (whole, old) = (folder.join(WHOLE), folder.join(OLD));
+    for name in names {
+        let (place, new, aside) = (folder.join(name), whole.join(name), old.join(name));
+        if !new.exists() && place.exists() {
+            fs::rename(&place, &new)?;
+        }
+        if aside.exists() {
+            fs::rename(&aside, &place)?;
         }
     }
-    for name in names {
+    fs::rename(&whole, folder.join(NEW))
+}
+
+/// What is left of a set that was written or given up: nothing of it is needed any more.
+fn tidy(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+    for left in [NEW, WHOLE, OLD] {
         go_on(killed)?;
-        fs::rename(whole.join(name), folder.join(name))?;
+        fs::remove_dir_all(folder.join(left)).or_else(absent)?;
     }
     Ok(())
 }
 
-/// As it was before [`move_in`].
-fn move_back(folder: &Path, whole: &Path, old: &Path) -> io::Result<()> {
-    for name in names_in(old)? {
-        let place = folder.join(&name);
-        if place.exists() {
-            fs::rename(&place, whole.join(&name))?;
-        }
-        fs::rename(old.join(&name), &place)?;
-    }
-    fs::remove_dir_all(old).or_else(absent)
-}
-
 fn go_on(killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
     if killed() { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
+}
+
+/// Whether an error is that of [`go_on`] rather than the system's.
+fn is_kill(why: &io::Error) -> bool {
+    why.kind() == io::ErrorKind::Interrupted && why.raw_os_error().is_none()
 }
 
 fn absent(why: io::Error) -> io::Result<()> {
@@ -269,9 +284,18 @@ fn synced(path: &Path, content: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Names survive a power cut too, where the system can sync a folder.
-fn sync_names(folder: &Path) {
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+/// Names survive a power cut too, where the system can sync a folder; not all can.
+fn sync_names(folder: &Path) -> io::Result<()> {
+    let synced = File::open(folder).and_then(|folder| folder.sync_all());
+    synced.or_else(|why| if is_of_the_disk(&why) { Err(why) } else { Ok(()) })
+}
+
+/// Whether the disk is full or broken, rather than asked for what it cannot do.
+fn is_of_the_disk(why: &io::Error) -> bool {
+    /// `EIO` on every Unix.
+    const INPUT_OUTPUT: i32 = 5;
+    let full = matches!(why.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+    full || (cfg!(unix) && why.raw_os_error() == Some(INPUT_OUTPUT))
 }
 
 fn sum(content: &[u8]) -> String {
@@ -362,24 +386,32 @@ mod tests {
     }
 
     #[test]
-    fn a_move_that_fails_half_way_gives_everything_back() -> Result<(), Error> {
+    fn a_move_that_fails_anywhere_gives_everything_back() -> Result<(), Error> {
         let scratch = Scratch::new("back");
-        Claim::new(&scratch.0)?.write(&set("old"))?;
-        let claim = Claim::new(&scratch.0)?;
-        let mut killed = claim.write_until(&set("new"), &mut {
-            let folder = scratch.0.clone();
-            move || folder.join(WHOLE).exists()
-        });
-        assert!(killed.is_err() && scratch.0.join(WHOLE).exists());
-        // The second file of the set vanishes: its rename fails after the first one's.
-        fs::remove_file(scratch.0.join(WHOLE).join(NAMES[1])).map_err(|e| failed(&scratch.0, e))?;
-        let names: Vec<String> = NAMES.iter().map(|n| (*n).to_owned()).chain([MANIFEST.to_owned()]).collect();
-        let (whole, old) = (scratch.0.join(WHOLE), scratch.0.join(OLD));
-        fs::create_dir(&old).map_err(|e| failed(&old, e))?;
-        killed = move_in(&scratch.0, &whole, &old, &names, &mut || false);
-        assert!(killed.is_err(), "the rename of a file that is not there");
-        move_back(&scratch.0, &whole, &old).map_err(|e| failed(&old, e))?;
-        assert_eq!(held(&scratch.0).as_deref(), Some("old"));
+        let mut taken_back = 0;
+        for at in 0..40 {
+            let folder = scratch.0.join(format!("{at}"));
+            Claim::new(&folder)?.write(&set("old"))?;
+            let mut left = at;
+            let new = [set("new"), vec![("only-new.svg", b"new".to_vec())]].concat();
+            let claim = Claim::new(&folder)?;
+            let _ = claim.write_until(&new, &mut || {
+                left -= 1;
+                left < 0
+            });
+            // What is announced and not yet in its places.
+            if !folder.join(WHOLE).join(MANIFEST).exists() {
+                continue;
+            }
+            taken_back += 1;
+            let names = new.iter().map(|(name, _)| *name).chain([MANIFEST]);
+            take_back(&folder, names)
+                .and_then(|()| tidy(&folder, &mut || false))
+                .map_err(|e| failed(&folder, e))?;
+            assert_eq!((held(&folder).as_deref(), leftovers(&folder)), (Some("old"), vec![]), "at {at}");
+            assert!(!folder.join("only-new.svg").exists(), "at {at}: a file of the set that was given up");
+        }
+        assert!(taken_back > 8, "{taken_back}");
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! What a diagnosis is made of: scenario, recordings, column map.
 
 use crate::error::Error;
+use crate::folder::settle;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -40,8 +41,9 @@ impl Inputs {
     /// What the diagnosis in a folder was made of.
     ///
     /// # Errors
-    /// [`Error::Request`] when the folder does not say.
+    /// [`Error::Request`] when the folder does not say; as [`settle`] when a killed command had begun something there.
     pub fn of_folder(folder: &Path) -> Result<Self, Error> {
+        settle(folder)?;
         let path = folder.join(INPUTS);
         let text = std::fs::read_to_string(&path).map_err(|_| {
             Error::Request(format!(

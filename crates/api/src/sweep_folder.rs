@@ -137,11 +137,11 @@ pub fn trial_s(sweep: &Sweep, columns: &Columns) -> Result<f64, Error> {
 /// [`Error::Request`] when it is no such folder or has no such trial, [`Error::NotOneSet`] when its files were changed.
 pub fn trial_of(folder: &Path, trial: u64) -> Result<Scenario, Error> {
     let file = folder.join("sweep.ron");
+    folder::settle(folder)?;
     if !file.exists() {
         let what = format!("{}: is not the folder of a sweep (it holds no sweep.ron)", folder.display());
         return Err(Error::Request(what));
     }
-    folder::settle(folder)?;
     folder::verify(folder, &["scenario.ron", "sweep.ron", "trials.csv"])?;
     let sweep = Sweep::load(&file, Overrides::default())?;
     if trial >= sweep.trials() {

@@ -4,6 +4,7 @@ use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
 use crate::terminal::teller;
 use std::fmt::Write as _;
+use stylet_api::folder::settle_beside;
 use stylet_api::{Inputs, need};
 use stylet_diagnose::Diagnosis;
 use stylet_pages::diagnosis::{differ, sentence};
@@ -27,6 +28,8 @@ impl DiagnoseArgs {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
+    // It may be what an earlier diagnosis extended.
+    settle_beside(&args.scenario)?;
     if args.repeats || stylet_diagnose::set::dataset::is_dataset(&args.scenario)? {
         return crate::repeats::diagnose(args);
     }

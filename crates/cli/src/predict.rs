@@ -3,6 +3,7 @@
 use crate::args::{Again, PredictArgs};
 use crate::exit::Failure;
 use std::fmt::Write as _;
+use stylet_api::folder::settle_beside;
 use stylet_api::prediction::{Origin, output};
 use stylet_api::{Prediction, Refit, need, read_all, read_options};
 use stylet_pages::prediction::sentence;
@@ -15,6 +16,7 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
+    settle_beside(&args.model)?;
     let model = Scenario::load(&args.model)?;
     args.limits.allow(&args.model, &need::of_predict(&args.data), args.results.quiet)?;
     let Origin { diagnosis, believed } = Origin::beside(&args.model, args.believed.as_deref())?;

@@ -3,6 +3,7 @@
 use crate::args::RunArgs;
 use crate::exit::Failure;
 use crate::terminal::scorecard;
+use stylet_api::folder::settle_beside;
 use stylet_api::need;
 use stylet_core::config::Model;
 use stylet_scenario::Scenario;
@@ -13,6 +14,7 @@ use stylet_scenario::Scenario;
 /// [`Failure`] with the exit code that fits.
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let file = args.scenario.display().to_string();
+    settle_beside(&args.scenario)?;
     let mut scenario = Scenario::load(&args.scenario)?;
     if let Some(seed) = args.seed {
         scenario.seed = seed;

@@ -11,8 +11,15 @@ const LEAST_SAMPLES: usize = stylet_record::LEAST_SAMPLES;
 /// Most layers: so many were seen to be told apart, with clean data and no cause named.
 const MOST_LAYERS: usize = 40;
 
-/// Checks reach, units and signs.
-pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), DiagnoseError> {
+/// Among so many recordings one can be unlike the others ...
+const FEWEST: usize = 3;
+/// ... when its force is more than so many times theirs, or less than one of so many parts of it, each against what the law expects of its
+/// motion.
+const UNLIKE: f64 = 2.0;
+
+/// Checks reach, units and signs; says how many times what the scenario expects each recording's force is (none where they do not go
+/// together).
+pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<Vec<Option<f64>>, DiagnoseError> {
     if evidence.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
@@ -21,6 +28,7 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Di
         return Err(DiagnoseError::TooManyLayers { layers, most: MOST_LAYERS });
     }
     let (surface_m, end_m) = (scenario.tissue.surface_m, scenario.tissue.end_m());
+    let mut times = Vec::with_capacity(evidence.len());
     for e in evidence {
         let r = &e.recording;
         let usable = (0..r.len())
@@ -39,6 +47,10 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Di
         let depth_m = end_m - surface_m;
         // The smallest depth of any use: a hundredth of the first layer.
         let first_m = scenario.tissue.layers.first().map_or(depth_m, |l| l.thickness_m);
+        if lowest_m >= end_m && deepest_m - lowest_m <= 20.0 * depth_m {
+            let offset_m = surface_m - lowest_m;
+            return Err(DiagnoseError::BeginsBehind { name: name(), lowest_m, end_m, offset_m });
+        }
         if deepest_m - surface_m > 20.0 * depth_m {
             let scale = if deepest_m > 2e4 * depth_m { 1e-6 } else { 1e-3 };
             let unit = if scale == 1e-3 { "millimetres" } else { "micrometres" };
@@ -57,15 +69,41 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Di
             };
             return Err(DiagnoseError::NeverReaches { name: name(), deepest_m, surface_m, remedy });
         }
-        force(scenario, e, &usable)?;
+        times.push(force(scenario, e, &usable)?);
     }
-    Ok(())
+    Ok(times)
 }
 
-/// Compares the size and sign of the measured force with the believed law's.
-fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<(), DiagnoseError> {
+/// Per recording a note when its force is not of the others' size, by what [`check`] says of all.
+pub(crate) fn unlike(times: &[Option<f64>]) -> Vec<Option<QualityNote>> {
+    let note = |i: usize| {
+        let own = times[i]?;
+        let others: Vec<f64> =
+            times.iter().enumerate().filter(|(j, _)| *j != i).filter_map(|(_, t)| *t).collect();
+        let typical = (others.len() + 1 >= FEWEST).then(|| stylet_stats::median_of(others))?;
+        if own < UNLIKE * typical && own * UNLIKE > typical {
+            return None;
+        }
+        let message = format!(
+            "it is not like the others: its force is {own:.2} times what the scenario expects of its motion, that of the others {typical:.2} \
+             times; is it filed under the right tissue, needle and units? leave it out or put it right"
+        );
+        let numbers = [("own_times", own), ("others_times", typical)].map(|(name, x)| (name.to_owned(), x));
+        Some(QualityNote {
+            kind: QualityKind::NotLikeTheOthers,
+            message,
+            numbers: numbers.into_iter().collect(),
+            lines: Vec::new(),
+            grave: false,
+        })
+    };
+    (0..times.len()).map(note).collect()
+}
+
+/// Compares the size and sign of the measured force with the believed law's; how many times it is, where the two go together.
+fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<Option<f64>, DiagnoseError> {
     let r = &e.recording;
-    let Ok(law) = Law::new(&scenario.tissue, &scenario.effects) else { return Ok(()) };
+    let Ok(law) = Law::new(&scenario.tissue, &scenario.effects) else { return Ok(None) };
     let mut believed = Vec::with_capacity(usable.len());
     replay(
         &law,
@@ -104,7 +142,7 @@ fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<(), Diag
             1e3,
         );
     }
-    Ok(())
+    Ok((correlation > 0.5).then_some(ratio))
 }
 
 /// The recording without samples that are not finite.

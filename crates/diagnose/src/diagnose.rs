@@ -87,8 +87,11 @@ pub fn diagnose(
     options: &Options,
     mut progress: impl FnMut(&str),
 ) -> Result<Examined, DiagnoseError> {
-    crate::check::check(scenario, evidence)?;
-    let Ready { recordings, notes, raw } = ready(evidence);
+    let times = crate::check::check(scenario, evidence)?;
+    let Ready { recordings, mut notes, raw } = ready(evidence);
+    for (notes, unlike) in notes.iter_mut().zip(crate::check::unlike(&times)) {
+        notes.extend(unlike);
+    }
     progress("fitting the base law");
     let blocks: Vec<Blocks> =
         recordings.par_iter().zip(&raw.exclude).map(|(r, x)| Blocks::new(r, x, BLOCK_S)).collect();

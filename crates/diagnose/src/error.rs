@@ -41,6 +41,22 @@ pub enum DiagnoseError {
         /// What to do.
         remedy: &'static str,
     },
+    /// The needle is behind the tissue from the beginning.
+    #[error(
+        "{name}: the needle begins behind the tissue: its smallest position is {lowest_m:.6} m, the tissue ends at {end_m:.6} m; does \
+         position zero mean the same in both? a column map shifts it with position: (name: \"position_m\", offset: {offset_m:.3}), which \
+         begins at the surface, or give the scenario the surface_m that the recording has"
+    )]
+    BeginsBehind {
+        /// Recording.
+        name: String,
+        /// Smallest position.
+        lowest_m: f64,
+        /// End of the tissue.
+        end_m: f64,
+        /// Offset that puts the first position to the surface.
+        offset_m: f64,
+    },
     /// Position in another unit.
     #[error(
         "{name}: positions reach {deepest:.4} where the tissue ends at {end_m:.4} m: this looks like {unit}; give a column map \

@@ -26,7 +26,7 @@ pub fn read_csv_with_holes(
     };
     let Ok(text) = String::from_utf8(bytes) else { return Err(error) };
     let hole = |line: &&str| {
-        line.split([',', ';', '\t']).any(|x| {
+        line.split([',', ';', '\t', '|']).any(|x| {
             let x = x.trim().trim_matches('"');
             x.parse::<f64>().is_ok_and(|x| !x.is_finite())
         })

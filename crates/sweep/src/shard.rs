@@ -94,6 +94,9 @@ pub struct ShardNumber {
     pub of: u64,
 }
 
+/// Most shards of a sweep: their names have six digits.
+const MOST_SHARDS: u64 = 999_999;
+
 impl std::str::FromStr for ShardNumber {
     type Err = String;
 
@@ -102,6 +105,9 @@ impl std::str::FromStr for ShardNumber {
         let (shard, of) = text.split_once('/').ok_or_else(wrong)?;
         let (shard, of) =
             (shard.trim().parse().map_err(|_| wrong())?, of.trim().parse().map_err(|_| wrong())?);
+        if of > MOST_SHARDS {
+            return Err(format!("`{text}` is one of too many shards; a sweep has at most {MOST_SHARDS}"));
+        }
         if shard == 0 || shard > of { Err(wrong()) } else { Ok(Self { shard, of }) }
     }
 }

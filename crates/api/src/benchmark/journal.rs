@@ -5,7 +5,7 @@ use crate::folder::write_file;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -20,12 +20,18 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// Opens a journal, or begins it. A line that was cut off when the run was stopped goes, and its case is run again.
     ///
     /// # Errors
-    /// [`Error::Output`], which names the journal's folder, when it cannot be written.
+    /// [`Error::Output`] when it cannot be read (what it holds is then left alone) or written.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let mut done: Vec<T> = Vec::new();
-        if let Ok(file) = File::open(path) {
-            let lines = BufReader::new(file).lines().map_while(Result::ok);
-            done.extend(lines.filter_map(|l| serde_json::from_str(&l).ok()));
+        match File::open(path) {
+            Ok(file) => {
+                for line in BufReader::new(file).split(b'\n') {
+                    let line = line.map_err(|why| Error::output(path, why))?;
+                    done.extend(serde_json::from_slice::<T>(&line).ok());
+                }
+            }
+            Err(why) if why.kind() == ErrorKind::NotFound => {}
+            Err(why) => return Err(Error::output(path, why)),
         }
         let kept: String =
             done.iter().filter_map(|d| serde_json::to_string(d).ok()).map(|l| l + "\n").collect();

@@ -15,6 +15,7 @@
 
 use crate::set::first::Insertion;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stylet_record::{
     ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, read_csv_bytes,
@@ -126,10 +127,16 @@ impl Dataset {
     /// # Errors
     /// [`InputError`] with file, line and column.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        let file = path.display().to_string();
-        let text = read_text(path)?;
-        let out: Self = parse(&file, &text)?;
-        out.check().map_err(|problem| problem.in_file(&file, &text))?;
+        Self::parse(&path.display().to_string(), &read_text(path)?)
+    }
+
+    /// Parses and checks a description; `file` is named in errors.
+    ///
+    /// # Errors
+    /// [`InputError`] with line and column.
+    pub fn parse(file: &str, text: &str) -> Result<Self, InputError> {
+        let out: Self = parse(file, text)?;
+        out.check().map_err(|problem| problem.in_file(file, text))?;
         Ok(out)
     }
 
@@ -226,13 +233,13 @@ impl Dataset {
             places.push(place);
         }
         let mut groups: Vec<(String, String)> = Vec::new();
+        let mut known: BTreeMap<String, usize> = BTreeMap::new();
         for line in lines {
             let cells: Vec<&str> = line.split(',').collect();
             let key =
                 places.iter().map(|p| cells.get(*p).map_or("", |c| c.trim())).collect::<Vec<_>>().join(" ");
-            let known = groups.iter().rposition(|(k, _)| *k == key);
-            let place = known.unwrap_or_else(|| {
-                groups.push((key, format!("{header}\n")));
+            let place = *known.entry(key).or_insert_with_key(|key| {
+                groups.push((key.clone(), format!("{header}\n")));
                 groups.len() - 1
             });
             groups[place].1.push_str(line);

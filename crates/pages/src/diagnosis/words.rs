@@ -1,16 +1,28 @@
 //! A diagnosis in sentences.
 
 use stylet_diagnose::outcome::{Cause, Diagnosis, Verdict};
+use stylet_record::QualityKind;
 use stylet_report::significant;
 
-/// The verdict in a sentence.
+/// The verdict in a sentence, and which recordings should be looked at before it is believed.
 #[must_use]
 pub fn sentence(d: &Diagnosis) -> String {
+    let strangers = strangers(d);
+    let mut said = verdict(d, strangers.is_empty());
+    if !strangers.is_empty() {
+        let are = if strangers.len() == 1 { "is" } else { "are" };
+        said += &format!(" But {} {are} not like the other recordings: see the note.", strangers.join(", "));
+    }
+    said
+}
+
+fn verdict(d: &Diagnosis, agrees: bool) -> String {
     let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
     match d.verdict {
-        Verdict::None => {
+        Verdict::None if agrees => {
             "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned()
         }
+        Verdict::None => "No effect is needed beyond the base law.".to_owned(),
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &Cause| {
@@ -33,6 +45,12 @@ pub fn sentence(d: &Diagnosis) -> String {
             format!("The data hold structure that no effect of the library explains{on}.")
         }
     }
+}
+
+/// The recordings that are not like the others.
+fn strangers(d: &Diagnosis) -> Vec<&str> {
+    let all = d.data_quality.iter().filter(|q| q.note.kind == QualityKind::NotLikeTheOthers);
+    all.map(|q| q.recording.as_str()).collect()
 }
 
 /// What differs from insertion to insertion so much that a simulation of the next one will miss it.

@@ -22,13 +22,16 @@ pub fn summary(all: &[Online]) -> String {
         out,
         "  online core: {found} of {drops} drops found; false: {inside} on the way in, {hold} in the hold, {back} on the way back"
     );
-    let _ = writeln!(
-        out,
-        "  force on the way back, all of it friction (N rms): {:.3} measured, {:.3} left by the core, {:.3} with the extended law's friction",
-        mean(all, |o| o.back_raw_n),
-        mean(all, |o| o.back_before_n),
-        mean(all, |o| o.back_after_n)
-    );
+    let measured_n = mean(all, |o| o.back_raw_n);
+    // Not every insertion is recorded on its way back.
+    if measured_n.is_finite() {
+        let _ = writeln!(
+            out,
+            "  force on the way back, all of it friction (N rms): {measured_n:.3} measured, {:.3} left by the core, {:.3} with the extended law's friction",
+            mean(all, |o| o.back_before_n),
+            mean(all, |o| o.back_after_n)
+        );
+    }
     out
 }
 

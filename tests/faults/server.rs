@@ -1,0 +1,94 @@
+//! A command that is ready to write its results, and meets a fault wherever it is told to. See `shim.c`.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::process::ExitStatusExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+
+/// The library that brings the faults, compiled into `folder`; `None`, and said so, where there is no `cc`.
+pub fn shim(folder: &Path) -> Option<PathBuf> {
+    let library = folder.join("shim.so");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/shim.c");
+    let made = Command::new("cc")
+        .args(["-O1", "-shared", "-fPIC", "-o"])
+        .args([&library, &source])
+        .arg("-ldl")
+        .status();
+    match made {
+        Ok(status) => {
+            assert!(status.success(), "tests/faults/shim.c compiles");
+            Some(library)
+        }
+        Err(why) => {
+            let _ = writeln!(std::io::stderr(), "SKIPPED faults of a disk: cc does not run: {why}");
+            None
+        }
+    }
+}
+
+/// How a child ended.
+pub struct Ended {
+    pub status: ExitStatus,
+    /// Calls that change the disk.
+    pub calls: u64,
+    /// What the fault hit; empty when there was none.
+    pub hit: String,
+    /// Standard error in one line.
+    pub said: String,
+}
+
+pub struct Server {
+    child: Child,
+    orders: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+    said: PathBuf,
+}
+
+impl Server {
+    /// Starts the command; it stops before the first change of the disk at or below `out`.
+    pub fn new(shim: &Path, out: &Path, arguments: &[String]) -> Self {
+        let said = out.with_extension("said");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+            .args(arguments)
+            .env("NO_COLOR", "1")
+            .env("RAYON_NUM_THREADS", "1")
+            .env("LD_PRELOAD", shim)
+            .env("STYLET_FAULT_BELOW", out)
+            .env("STYLET_FAULT_SAID", &said)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let orders = child.stdin.take();
+        let answers = BufReader::new(child.stdout.take().expect("a pipe"));
+        Self { child, orders, answers, said }
+    }
+
+    /// Lets the command go on, with a fault of a `mode` at its call `at`.
+    pub fn strike(&mut self, mode: char, at: u64) -> Ended {
+        let orders = self.orders.as_mut().expect("a pipe");
+        writeln!(orders, "{mode} {at}").and_then(|()| orders.flush()).expect("it waits for orders");
+        let mut line = String::new();
+        self.answers.read_line(&mut line).expect("an answer");
+        let mut words = line.trim_end().splitn(3, ' ');
+        let status = words.next().and_then(|w| w.parse().ok()).expect("a status");
+        let calls = words.next().and_then(|w| w.parse().ok()).expect("a number of calls");
+        let said = std::fs::read(&self.said).unwrap_or_default();
+        let said = String::from_utf8_lossy(&said).replace('│', " ");
+        Ended {
+            status: ExitStatus::from_raw(status),
+            calls,
+            hit: words.next().unwrap_or_default().to_owned(),
+            said: said.split_whitespace().collect::<Vec<_>>().join(" "),
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // No more orders: it ends.
+        drop(self.orders.take());
+        let _ = self.child.wait();
+        let _ = std::fs::remove_file(&self.said);
+    }
+}
