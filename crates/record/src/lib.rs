@@ -25,10 +25,12 @@
 //! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
 //! | [`foreign`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
 //! | `quality` | [`QualityNote`]s: dead, reversed, in air, mixed-up units, stuck, gaps, jitter, saturation, spikes, quantisation, unlike its repeats |
+//! | [`scratch`] | columns of numbers on disk |
 //! | [`thin`](mod@thin) | recordings of hours, thinned |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 
+mod along;
 pub mod columns;
 pub mod differentiate;
 pub mod error;
@@ -39,6 +41,7 @@ mod quality;
 pub mod read;
 pub mod recording;
 mod repair;
+pub mod scratch;
 pub mod thin;
 pub mod truth;
 pub mod write;
