@@ -11,6 +11,10 @@ const RUN_BYTES: f64 = 1000.0;
 const ENHANCE_BYTES: f64 = 800.0;
 /// Bytes per sample for each further model. Measured: 290.
 const MODEL_BYTES: f64 = 300.0;
+/// Samples of a CSV file above which `enhance` keeps them on disk. Below, the page draws every sample that it can.
+const LONG_SAMPLES: f64 = 1e6;
+/// Bytes that it holds then, however long the recording is. Measured with 1e7 samples: see `tests/enhance_long.sh`.
+const LONG_BYTES: f64 = 1e8;
 /// Bytes that `diagnose` holds per sample that it reads.
 const DIAGNOSE_BYTES: f64 = 300.0;
 /// Times that a sweep's rows lie in memory at the end: rows, table, page. Measured with 2e4 trials: 4.2.
@@ -89,6 +93,13 @@ pub fn of_enhance(data: &Path, models: usize) -> Option<Need> {
         seconds: samples * SAMPLE_S * models as f64,
         remedy: "cut the recording to the insertion",
     })
+}
+
+/// What `stylet enhance` needs for a recording that is long enough to be kept on disk.
+#[must_use]
+pub fn of_long_enhance(data: &Path, models: usize) -> Option<Need> {
+    let need = of_enhance(data, models)?;
+    (samples(data)? > LONG_SAMPLES).then_some(Need { bytes: LONG_BYTES, ..need })
 }
 
 /// What `stylet diagnose` needs for these recordings.

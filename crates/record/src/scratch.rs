@@ -7,6 +7,8 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// How the names of files begin that only live while they are written.
+pub const NAME: &str = ".stylet-scratch-";
 /// Rows that are read and written together.
 pub const BLOCK: usize = 1 << 14;
 /// Numbers that are sorted in memory.
@@ -25,7 +27,7 @@ impl Hidden {
     fn new(folder: &Path) -> io::Result<Self> {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let path = folder.join(format!(".stylet-scratch-{}-{number}", std::process::id()));
+        let path = folder.join(format!("{NAME}{}-{number}", std::process::id()));
         let file = File::options().read(true).write(true).create_new(true).open(&path)?;
         if cfg!(unix) {
             fs::remove_file(&path)?;
@@ -129,24 +131,32 @@ impl Table {
         self.rows
     }
 
-    /// Hands over these columns of all rows, block by block.
+    /// Hands over the rows, one by one.
     ///
     /// # Errors
     /// What the system or `each` says.
-    pub fn blocks<const N: usize>(
+    pub fn each_row<E: From<io::Error>>(
         &self,
-        which: [usize; N],
-        mut each: impl FnMut([&[f64]; N]) -> io::Result<()>,
-    ) -> io::Result<()> {
-        let mut held: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
-        let mut bytes = Vec::new();
-        for block in 0..self.rows.div_ceil(BLOCK) {
-            for (held, column) in held.iter_mut().zip(which) {
+        mut each: impl FnMut(&[f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut held = vec![Vec::new(); self.columns];
+        let (mut bytes, mut row) = (Vec::new(), vec![0.0; self.columns]);
+        for block in 0..self.count_blocks() {
+            for (column, held) in held.iter_mut().enumerate() {
                 self.block(block, column, held, &mut bytes)?;
             }
-            each(std::array::from_fn(|at| held[at].as_slice()))?;
+            for at in 0..held.first().map_or(0, Vec::len) {
+                row.iter_mut().zip(&held).for_each(|(x, held)| *x = held[at]);
+                each(&row)?;
+            }
         }
         Ok(())
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn columns(&self) -> usize {
+        self.columns
     }
 
     /// Number of blocks.
@@ -195,7 +205,13 @@ pub(crate) struct Sorting {
 impl Sorting {
     pub(crate) fn new(folder: &Path) -> io::Result<Self> {
         let stretches = Hidden::new(folder)?;
-        Ok(Self { folder: folder.to_owned(), stretches, lengths: Vec::new(), now: Vec::new(), bytes: Vec::new() })
+        Ok(Self {
+            folder: folder.to_owned(),
+            stretches,
+            lengths: Vec::new(),
+            now: Vec::new(),
+            bytes: Vec::new(),
+        })
     }
 
     pub(crate) fn push(&mut self, x: f64) -> io::Result<()> {
@@ -318,12 +334,14 @@ mod tests {
         }
         let table = table.finish()?;
         let (mut first, mut second) = (Vec::new(), Vec::new());
-        table.blocks([1, 0], |[b, a]| {
-            second.extend_from_slice(b);
-            first.extend_from_slice(a);
-            Ok(())
+        table.each_row(|row| {
+            first.push(row[0]);
+            second.push(row[1]);
+            io::Result::Ok(())
         })?;
-        assert!(first.iter().copied().eq(scatter(rows)) && second.iter().copied().eq(scatter(rows).map(|x| -x)));
+        assert!(
+            first.iter().copied().eq(scatter(rows)) && second.iter().copied().eq(scatter(rows).map(|x| -x))
+        );
         for row in [0, BLOCK - 1, BLOCK, rows - 1] {
             assert_eq!(Some(table.at(0, row)?), scatter(rows).nth(row));
         }
@@ -336,9 +354,9 @@ mod tests {
             let mut sorting = Sorting::new(&folder())?;
             scatter(count).try_for_each(|x| sorting.push(x))?;
             let mut sorted = Vec::new();
-            sorting.finish()?.blocks([0], |[x]| {
-                sorted.extend_from_slice(x);
-                Ok(())
+            sorting.finish()?.each_row(|row| {
+                sorted.push(row[0]);
+                io::Result::Ok(())
             })?;
             let mut expected: Vec<f64> = scatter(count).collect();
             expected.sort_unstable_by(f64::total_cmp);

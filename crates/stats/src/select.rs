@@ -152,8 +152,7 @@ impl Sought {
                 range.ranks.push((rank, here));
             } else {
                 let few = *count <= AT_HAND as u64 / 2;
-                let within =
-                    if few { Within::Few(Vec::new()) } else { Within::Many(Histogram::default()) };
+                let within = if few { Within::Few(Vec::new()) } else { Within::Many(Histogram::default()) };
                 self.open.push(Range { first, known, ranks: vec![(rank, here)], within });
             }
             return;
@@ -176,7 +175,12 @@ mod tests {
         let Ok(found) = found;
         for (q, found) in qs.iter().zip(found) {
             let expected = quantile_of(values.iter().copied(), *q);
-            assert_eq!(found.to_bits(), expected.to_bits(), "{} values at {q}: {found} {expected}", values.len());
+            assert_eq!(
+                found.to_bits(),
+                expected.to_bits(),
+                "{} values at {q}: {found} {expected}",
+                values.len()
+            );
         }
     }
 

@@ -18,7 +18,7 @@ use stylet_api::sweep_folder::{SHARD_TRIALS, all_shards, begin, conclude};
 use stylet_api::{Claim, need};
 use stylet_pages::words::shown;
 use stylet_report::{percent, significant};
-use stylet_sweep::{Columns, Row, Summary, Sweep};
+use stylet_sweep::{Columns, Summary, Sweep, TrialsOnDisk};
 
 /// The command.
 ///
@@ -66,7 +66,7 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
 fn written(
     sweep: &Sweep,
     columns: &Columns,
-    rows: &[Row],
+    rows: &TrialsOnDisk,
     (claim, out): (&Claim, &Path),
     quiet: bool,
 ) -> Result<(), Failure> {

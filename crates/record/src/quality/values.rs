@@ -335,7 +335,13 @@ mod tests {
     fn a_noisy_insertion_with_a_rupture_raises_no_doubt() -> Result<(), RecordError> {
         assert_eq!(of_kind(QualityKind::Saturation, force_n())?, []);
         assert_eq!(of_kind(QualityKind::Spikes, force_n())?, []);
-        assert_eq!(of_kind(QualityKind::Quantisation, force_n())?.iter().filter(|n| n.message.starts_with("force_n")).count(), 0);
+        assert_eq!(
+            of_kind(QualityKind::Quantisation, force_n())?
+                .iter()
+                .filter(|n| n.message.starts_with("force_n"))
+                .count(),
+            0
+        );
         Ok(())
     }
 
