@@ -449,8 +449,10 @@ impl Rows {
 
 fn number(place: &Place<'_>, offset: usize, source: &Source, field: &[u8]) -> Result<f64, RecordError> {
     // The whole file was checked to be UTF-8; a delimiter cannot split a character.
-    let text = std::str::from_utf8(field).unwrap_or_default().trim();
-    let Ok(raw) = text.parse::<f64>() else {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    // Spaces are rare.
+    let Ok(raw) = text.parse::<f64>().or_else(|_| text.trim().parse()) else {
+        let text = text.trim();
         return Err(RecordError::NotANumber {
             path: place.path(),
             line: place.line(offset)?,
@@ -467,7 +469,7 @@ fn number(place: &Place<'_>, offset: usize, source: &Source, field: &[u8]) -> Re
         path: place.path(),
         line: place.line(offset)?,
         column: source.column.name.clone(),
-        text: text.to_owned(),
+        text: text.trim().to_owned(),
     })
 }
 

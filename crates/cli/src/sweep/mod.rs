@@ -49,7 +49,7 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     let sweep = Sweep::load(file, args.draws.into())?;
     let columns = Columns::new(&sweep);
     let threads = args.threads.unwrap_or(0);
-    args.limits.allow(file, &need::of_sweep(&sweep, &columns, threads), args.results.quiet)?;
+    args.limits.allow(file, &need::of_sweep(&sweep, threads), args.results.quiet)?;
     let out = args.results.folder(file, "");
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     // Nobody else writes there until the set is whole: the shards, the tables and `sweep.ron` are of one draw.
