@@ -112,8 +112,8 @@ impl Heard {
     /// [`Error::Internal`] when the configuration cannot be written.
     pub fn report(&self, source: &Source) -> Result<RunReport, Error> {
         let Self { recording, extent, notes, ran, hash, config, .. } = self;
-        let shortened =
-            (extent.samples > recording.len()).then(|| picture::note(extent.samples, recording.len()));
+        let shortened = (extent.samples > recording.len())
+            .then(|| picture::note(extent.samples, recording.len(), ran.len()));
         let body = ron_options().to_string_pretty(config, Default::default()).map_err(Error::internal)?;
         let name = source.data.file_name().unwrap_or(source.data.as_os_str());
         let mut page = RunReport {

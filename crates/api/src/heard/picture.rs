@@ -33,13 +33,10 @@ pub(super) struct Picture {
 impl Picture {
     /// For a recording of so many samples heard by so many models.
     pub fn new(samples: usize, models: usize) -> Self {
-        let curves = curves(&Sample { time_s: 0.0, position_m: 0.0, velocity_mps: 0.0, force_n: 0.0 }, &[])
-            .len()
-            + models * of_model(&Output::default()).len();
-        let stretches = if samples <= SHOWN { samples } else { SHOWN / (2 * curves + 1) };
+        let (curves, stretches) = (curves_of(models), stretches(samples, models));
         Self {
             samples,
-            stretches: stretches.max(1),
+            stretches,
             stretch: 0,
             end: 0,
             extremes: vec![[None, None]; curves],
@@ -59,7 +56,7 @@ impl Picture {
         if self.stretches == self.samples {
             return;
         }
-        for (value, [low, high]) in curves(sample, outs).into_iter().zip(&mut self.extremes) {
+        for (value, [low, high]) in curves(sample, outs).zip(&mut self.extremes) {
             if low.as_ref().is_none_or(|(least, _)| value < *least) {
                 *low = Some((value, moment()));
             }
@@ -85,22 +82,30 @@ impl Picture {
 }
 
 /// The curves whose extremes must be seen.
-fn curves(sample: &Sample, outs: &[Output]) -> Vec<f64> {
-    let mut curves = vec![sample.force_n, sample.position_m];
-    curves.extend(outs.iter().flat_map(of_model));
-    curves
+fn curves(sample: &Sample, outs: &[Output]) -> impl Iterator<Item = f64> {
+    [sample.force_n, sample.position_m].into_iter().chain(outs.iter().flat_map(of_model))
 }
 
 fn of_model(out: &Output) -> [f64; 3] {
     [out.enhanced_n, out.reconstructed_n, out.cusum_n2]
 }
 
+/// Curves whose extremes are kept: force, position, and those of each model.
+fn curves_of(models: usize) -> usize {
+    2 + models * of_model(&Output::default()).len()
+}
+
+/// Stretches of which the first sample and those with the extremes are shown; as many as samples when all are.
+fn stretches(samples: usize, models: usize) -> usize {
+    if samples <= SHOWN { samples.max(1) } else { SHOWN / (2 * curves_of(models) + 1) }
+}
+
 /// That it is a selection.
-pub(super) fn note(samples: usize, shown: usize) -> String {
+pub(super) fn note(samples: usize, shown: usize, models: usize) -> String {
     format!(
-        "{samples} samples are more than a page can draw: it shows {shown} of them, among them the extremes of the curves in every {} \
-         samples; enhanced.csv has all. States between them are not shown.",
-        significant((samples as f64 / shown as f64).ceil(), 2)
+        "{samples} samples are more than a page can draw: it shows {shown} of them, among them the extremes of force, position, enhanced and \
+         reconstructed force and CUSUM in every {} samples; enhanced.csv has all. States between them are not shown.",
+        significant((samples as f64 / stretches(samples, models) as f64).ceil(), 2)
     )
 }
 
