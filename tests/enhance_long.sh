@@ -18,4 +18,4 @@ awk -v n="$samples" -F': ' '
     /Elapsed/ { k = split($2, part, ":"); for (i = 1; i <= k; i++) s = s * 60 + part[i] }
     /User time|System time/ { cpu += $2 }
     END { printf ", %.0f s (%.0f s on the processor): %.2f million samples/s\n", s, cpu, n / s / 1e6 }' \
-    <(sort -t: -k1,1 "$there/time" | sed 's/Elapsed (wall clock) time (h:mm:ss or m:ss)/Elapsed/')
+    <(sed 's/Elapsed (wall clock) time (h:mm:ss or m:ss)/Elapsed/' "$there/time")
