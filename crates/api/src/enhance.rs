@@ -18,12 +18,19 @@ pub fn enhance(recording: &Recording, config: &EnhanceFile) -> Enhanced {
 /// The same with another model.
 #[must_use]
 pub fn listen(recording: &Recording, config: &EnhanceFile, model: Model) -> Enhanced {
+    let ran = combination(config, model);
+    let trace = Trace::record(recording, &recording.force_n, &ran.config, config.surface_m, |_, _| {});
+    Ran { trace, ..ran }
+}
+
+/// A model before it has heard anything.
+pub(crate) fn combination(config: &EnhanceFile, model: Model) -> Ran {
     let mut enhance = config.enhance.clone();
     enhance.model = model;
     Ran {
         name: format!("{}/{}/force_torque", algorithm_name(enhance.in_force()), model_name(model)),
         sensor: "force_torque",
-        trace: Trace::record(recording, &recording.force_n, &enhance, config.surface_m, |_, _| {}),
+        trace: Trace::default(),
         config: enhance,
         score: None,
     }

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The file that says which files make the set; written last.
 pub const MANIFEST: &str = "manifest.json";
@@ -35,7 +36,48 @@ pub struct Claim {
     folder: PathBuf,
     /// Folders that were made for it; those that are still empty at the end go again.
     made: Vec<PathBuf>,
+    /// Whether a file of a set was begun that is not announced.
+    begun: AtomicBool,
     _lock: Option<File>,
+}
+
+/// A file of a set that is written piece by piece, where the set is being written.
+#[derive(Debug)]
+pub struct Part {
+    name: &'static str,
+    place: PathBuf,
+    file: File,
+    hash: Sha256,
+}
+
+impl io::Write for Part {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.file.write(bytes)?;
+        self.hash.update(&bytes[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Part {
+    /// The file is whole.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn finish(self) -> Result<Written, Error> {
+        self.file.sync_all().map_err(|why| failed(&self.place, why))?;
+        Ok(Written { name: self.name, sha256: hex(&self.hash.finalize()) })
+    }
+}
+
+/// A file of a set that lies where the set is being written.
+#[derive(Debug)]
+pub struct Written {
+    name: &'static str,
+    sha256: String,
 }
 
 impl Claim {
@@ -49,6 +91,7 @@ impl Claim {
             if folder.join(WHOLE).exists() {
                 move_in(folder, &mut || false)?;
             }
+            remove_scratch(folder)?;
             tidy(folder, &mut || false)
         };
         begun().map_err(|why| failed(folder, why))?;
@@ -69,7 +112,8 @@ impl Claim {
             .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
             .map(Path::to_path_buf)
             .collect();
-        let mut claim = Self { folder: folder.to_path_buf(), made, _lock: None };
+        let mut claim =
+            Self { folder: folder.to_path_buf(), made, begun: AtomicBool::new(false), _lock: None };
         fs::create_dir_all(folder).map_err(|why| failed(folder, why))?;
         // Where a folder cannot be locked (not on every system, not on every network disk) nothing keeps others away.
         if let Ok(file) = File::open(folder) {
@@ -83,14 +127,46 @@ impl Claim {
         Ok(claim)
     }
 
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Begins a file of a set whose other files come later, by [`Claim::write_with`]. Without those it goes with the claim.
+    ///
+    /// # Errors
+    /// [`Error::Output`]; the folder then holds what it held before.
+    pub fn begin(&self, name: &'static str) -> Result<Part, Error> {
+        let new = self.folder.join(NEW);
+        let made = fs::create_dir(&new).or_else(|why| match why.kind() {
+            io::ErrorKind::AlreadyExists if self.begun.load(Ordering::Relaxed) => Ok(()),
+            _ => Err(why),
+        });
+        made.map_err(|why| failed(&self.folder, why))?;
+        self.begun.store(true, Ordering::Relaxed);
+        let place = new.join(name);
+        let file = File::create(&place).map_err(|why| failed(&place, why))?;
+        Ok(Part { name, place, file, hash: Sha256::new() })
+    }
+
     /// Writes a set of files. Files of the same names are replaced, others are left alone.
     ///
     /// # Errors
     /// [`Error::Output`]; the folder then holds what it held before. [`Error::Begun`] where the disk does not even let what it held be
     /// put back.
     pub fn write(&self, files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
-        let Err(why) = self.write_until(files, &mut || false) else { return Ok(()) };
-        let names = files.iter().map(|(name, _)| *name).chain([MANIFEST]);
+        self.write_with(&[], files)
+    }
+
+    /// The same with files that were written piece by piece.
+    ///
+    /// # Errors
+    /// As [`Claim::write`].
+    pub fn write_with(&self, parts: &[Written], files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
+        let Err(why) = self.write_until(parts, files, &mut || false) else { return Ok(()) };
+        let names = files.iter().map(|(name, _)| *name);
+        let names = names.chain(parts.iter().map(|part| part.name)).chain([MANIFEST]);
         if self.folder.join(WHOLE).exists() && take_back(&self.folder, names).is_err() {
             return Err(Error::Begun { path: self.folder.display().to_string(), why });
         }
@@ -101,23 +177,30 @@ impl Claim {
     /// `killed` is asked before every change of the disk; tests end the work there as a kill would.
     fn write_until(
         &self,
+        parts: &[Written],
         files: &[(&'static str, Vec<u8>)],
         killed: &mut dyn FnMut() -> bool,
     ) -> io::Result<()> {
         let folder = &self.folder;
         // A file cannot take the place of a folder of the same name.
-        let names = files.iter().map(|(name, _)| *name).chain([MANIFEST]);
+        let names = files.iter().map(|(name, _)| *name);
+        let names = names.chain(parts.iter().map(|part| part.name)).chain([MANIFEST]);
         if let Some(place) = names.map(|name| folder.join(name)).find(|place| place.is_dir()) {
             return Err(io::Error::other(format!("{} is a folder", place.display())));
         }
         let new = folder.join(NEW);
-        go_on(killed)?;
-        fs::create_dir(&new)?;
+        if parts.is_empty() {
+            go_on(killed)?;
+            fs::create_dir(&new)?;
+        }
         let mut manifest = Manifest { stylet: env!("CARGO_PKG_VERSION").to_owned(), ..Manifest::default() };
         for (name, content) in files {
             go_on(killed)?;
             synced(&new.join(name), content)?;
             manifest.sha256.insert((*name).to_owned(), sum(content));
+        }
+        for part in parts {
+            manifest.sha256.insert(part.name.to_owned(), part.sha256.clone());
         }
         let mut text = serde_json::to_vec_pretty(&manifest).map_err(io::Error::other)?;
         text.push(b'\n');
@@ -136,6 +219,9 @@ impl Claim {
 
 impl Drop for Claim {
     fn drop(&mut self) {
+        if self.begun.load(Ordering::Relaxed) {
+            let _ = fs::remove_dir_all(self.folder.join(NEW));
+        }
         for folder in &self.made {
             // Only empty folders go.
             let _ = fs::remove_dir(folder);
@@ -178,7 +264,7 @@ pub fn verify(folder: &Path, names: &[&str]) -> Result<(), Error> {
     };
     for name in names {
         let path = folder.join(name);
-        let found = fs::read(&path).map(|content| sum(&content)).ok();
+        let found = sum_of_file(&path).ok();
         if manifest.sha256.get(*name) != found.as_ref() {
             return Err(Error::NotOneSet { path: path.display().to_string() });
         }
@@ -298,8 +384,29 @@ fn is_of_the_disk(why: &io::Error) -> bool {
     full || (cfg!(unix) && why.raw_os_error() == Some(INPUT_OUTPUT))
 }
 
+/// Where a system keeps the names of scratch files, a kill leaves them behind.
+fn remove_scratch(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(stylet_record::scratch::NAME) {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
 fn sum(content: &[u8]) -> String {
-    Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&Sha256::digest(content))
+}
+
+fn sum_of_file(path: &Path) -> io::Result<String> {
+    let mut hash = Sha256::new();
+    io::copy(&mut File::open(path)?, &mut hash)?;
+    Ok(hex(&hash.finalize()))
+}
+
+fn hex(hash: &[u8]) -> String {
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -355,7 +462,19 @@ mod tests {
             fs::write(folder.join("notes.txt"), "mine").map_err(|e| failed(&folder, e))?;
             let claim = Claim::new(&folder)?;
             let mut left = at;
-            let done = claim.write_until(&set("new"), &mut || {
+            // Every other time the first file comes piece by piece.
+            let (parts, files) = if at % 2 == 0 {
+                let (name, content) = &set("new")[0];
+                let mut part = claim.begin(name)?;
+                content
+                    .chunks(3)
+                    .try_for_each(|piece| part.write_all(piece))
+                    .map_err(|e| failed(&folder, e))?;
+                (vec![part.finish()?], set("new").split_off(1))
+            } else {
+                (Vec::new(), set("new"))
+            };
+            let done = claim.write_until(&parts, &files, &mut || {
                 left -= 1;
                 left < 0
             });
@@ -395,7 +514,7 @@ mod tests {
             let mut left = at;
             let new = [set("new"), vec![("only-new.svg", b"new".to_vec())]].concat();
             let claim = Claim::new(&folder)?;
-            let _ = claim.write_until(&new, &mut || {
+            let _ = claim.write_until(&[], &new, &mut || {
                 left -= 1;
                 left < 0
             });
@@ -428,6 +547,18 @@ mod tests {
         assert!(Claim::new(&scratch.0).is_err(), "shards are being written");
         drop((one, two));
         assert!(!scratch.0.exists(), "a folder that was made and stayed empty goes again");
+        Ok(())
+    }
+
+    #[test]
+    fn a_file_that_was_begun_and_not_ended_goes_with_the_claim() -> Result<(), Error> {
+        let scratch = Scratch::new("begun");
+        Claim::new(&scratch.0)?.write(&set("old"))?;
+        let claim = Claim::new(&scratch.0)?;
+        claim.begin(NAMES[0])?.write_all(b"half").map_err(|e| failed(&scratch.0, e))?;
+        assert_eq!(leftovers(&scratch.0), [NEW]);
+        drop(claim);
+        assert_eq!((held(&scratch.0).as_deref(), leftovers(&scratch.0)), (Some("old"), vec![]));
         Ok(())
     }
 

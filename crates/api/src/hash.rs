@@ -1,13 +1,14 @@
 //! A hash of results: same inputs, same bytes.
 
 use sha2::{Digest, Sha256};
-use stylet_score::Trace;
+use stylet_core::Output;
+use stylet_score::{Trace, coefficients};
 
 /// First 16 bytes of the SHA-256 over the recording's bytes and every output of the core, in hex.
 #[must_use]
 pub fn of_results(recording_csv: &[u8], traces: &[&Trace]) -> String {
-    let mut hash = Sha256::new();
-    hash.update(recording_csv);
+    let mut hash = ResultHash::default();
+    hash.text(recording_csv);
     for trace in traces {
         for column in [
             &trace.enhanced_n,
@@ -18,10 +19,45 @@ pub fn of_results(recording_csv: &[u8], traces: &[&Trace]) -> String {
             &trace.cusum_n2,
             &trace.derivative_n_per_s,
         ] {
-            for value in column {
-                hash.update(value.to_le_bytes());
-            }
+            hash.column(column);
         }
     }
-    hash.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+    hash.finish()
+}
+
+/// Number of columns of [`hashed`].
+pub(crate) const COLUMNS: usize = 7;
+
+/// What of a sample's output is hashed, in the order of the columns of [`of_results`].
+pub(crate) fn hashed(out: &Output) -> [f64; COLUMNS] {
+    let [stiffness, friction] = coefficients(out);
+    [
+        out.enhanced_n,
+        out.reconstructed_n,
+        stiffness,
+        friction,
+        out.cumulative_friction_ns_per_m,
+        out.cusum_n2,
+        out.derivative_n_per_s,
+    ]
+}
+
+/// [`of_results`] piece by piece: the recording's text, then one column after the other.
+#[derive(Clone, Default)]
+pub(crate) struct ResultHash(Sha256);
+
+impl ResultHash {
+    pub fn text(&mut self, piece: &[u8]) {
+        self.0.update(piece);
+    }
+
+    pub fn column(&mut self, piece: &[f64]) {
+        for value in piece {
+            self.0.update(value.to_le_bytes());
+        }
+    }
+
+    pub fn finish(self) -> String {
+        self.0.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+    }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use stylet_report::significant;
 use stylet_scenario::{Robot, Scenario};
-use stylet_sweep::{Columns, Sweep};
+use stylet_sweep::Sweep;
 
 /// Bytes that `run` holds per sample: columns, truth, traces of one model, the page. Measured with 1.6e5 samples: 970.
 const RUN_BYTES: f64 = 1000.0;
@@ -11,10 +11,16 @@ const RUN_BYTES: f64 = 1000.0;
 const ENHANCE_BYTES: f64 = 800.0;
 /// Bytes per sample for each further model. Measured: 290.
 const MODEL_BYTES: f64 = 300.0;
+/// Samples of a CSV file above which `enhance` keeps them on disk. Below, the page draws every sample that it can.
+const LONG_SAMPLES: f64 = 1e6;
+/// Bytes that it holds then, however long the recording is. `tests/enhance_long.sh` measures it.
+const LONG_BYTES: f64 = 1e8;
 /// Bytes that `diagnose` holds per sample that it reads.
 const DIAGNOSE_BYTES: f64 = 300.0;
-/// Times that a sweep's rows lie in memory at the end: rows, table, page. Measured with 2e4 trials: 4.2.
-const ROWS: f64 = 5.0;
+/// Bytes that a sweep holds however many trials it has: a shard and a block of rows (`tests/sweep_large.sh`).
+const SWEEP_BYTES: f64 = 5e7;
+/// Bytes per trial at the end, when a few values of every trial are ranked at a time. Measured from 1e5 to 1e6 trials: 70.
+const TRIAL_BYTES: f64 = 100.0;
 /// Seconds per sample of `run` and `enhance`; an optimised build is faster.
 const SAMPLE_S: f64 = 6e-6;
 /// Seconds per physics step of the slide and of the arm.
@@ -66,14 +72,14 @@ pub fn of_run(scenario: &Scenario) -> Option<Need> {
 
 /// What `stylet sweep` needs; 0 threads are one per core.
 #[must_use]
-pub fn of_sweep(sweep: &Sweep, columns: &Columns, threads: usize) -> Need {
+pub fn of_sweep(sweep: &Sweep, threads: usize) -> Need {
     let trials = sweep.trials() as f64;
     let seconds = sweep.template.motion.plan().map_or(0.0, |plan| plan.duration_s());
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if threads == 0 { cores } else { threads.min(cores) };
     Need {
         what: format!("{} trials", significant(trials, 3)),
-        bytes: trials * (columns.width() + 3) as f64 * 8.0 * ROWS,
+        bytes: SWEEP_BYTES + trials * TRIAL_BYTES,
         seconds: trials * seconds * sweep.template.sample_hz * TRIAL_SAMPLE_S / threads as f64,
         remedy: "run fewer (--trials)",
     }
@@ -89,6 +95,13 @@ pub fn of_enhance(data: &Path, models: usize) -> Option<Need> {
         seconds: samples * SAMPLE_S * models as f64,
         remedy: "cut the recording to the insertion",
     })
+}
+
+/// What `stylet enhance` needs for a recording that is long enough to be kept on disk.
+#[must_use]
+pub fn of_long_enhance(data: &Path, models: usize) -> Option<Need> {
+    let need = of_enhance(data, models)?;
+    (samples(data)? > LONG_SAMPLES).then_some(Need { bytes: LONG_BYTES, ..need })
 }
 
 /// What `stylet diagnose` needs for these recordings.

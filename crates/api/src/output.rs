@@ -1,7 +1,7 @@
 //! Files of one output folder, waiting to be written as one set.
 
 use crate::error::Error;
-use crate::folder::Claim;
+use crate::folder::{Claim, Written};
 use serde::Serialize;
 use std::path::Path;
 
@@ -19,6 +19,8 @@ pub fn json(value: &impl Serialize) -> Result<Vec<u8>, Error> {
 #[derive(Debug, Default)]
 pub struct Output {
     files: Vec<(&'static str, Vec<u8>)>,
+    /// Files that lie in the claimed folder already.
+    parts: Vec<Written>,
 }
 
 impl Output {
@@ -36,7 +38,12 @@ impl Output {
         Ok(())
     }
 
-    /// Names and contents.
+    /// Adds a file that was written piece by piece; the set then belongs into the folder of the claim that began it.
+    pub fn add_part(&mut self, part: Written) {
+        self.parts.push(part);
+    }
+
+    /// Names and contents of the files in memory.
     pub fn files(&self) -> impl Iterator<Item = (&'static str, &[u8])> {
         self.files.iter().map(|(name, content)| (*name, content.as_slice()))
     }
@@ -55,6 +62,6 @@ impl Output {
     /// # Errors
     /// [`Error::Output`]; the folder is then as it was before.
     pub fn write_to(&self, claim: &Claim) -> Result<(), Error> {
-        claim.write(&self.files)
+        claim.write_with(&self.parts, &self.files)
     }
 }

@@ -1,10 +1,12 @@
 //! Many drawn insertions: rows, summary, the files of a sweep's folder.
 
 use crate::error::Error;
+use crate::folder::Claim;
 use crate::output::Output;
+use std::io;
 use stylet_pages::sweep::page;
 pub use stylet_sweep::Overrides;
-use stylet_sweep::{Columns, Row, Summary, Sweep, csv, rows, summarise};
+use stylet_sweep::{Columns, Row, Summary, Sweep, TrialsOnDisk, csv, rows, summarise};
 
 /// What a sweep gives.
 pub struct Swept {
@@ -20,7 +22,8 @@ impl Swept {
     /// The report as one HTML page.
     #[must_use]
     pub fn html(&self, sweep: &Sweep) -> String {
-        page(sweep, &self.columns, &self.rows, &self.summary).to_html()
+        let Ok(page) = page(sweep, &self.columns, &self.rows[..], &self.summary);
+        page.to_html()
     }
 }
 
@@ -41,7 +44,7 @@ pub fn sweep(sweep: &Sweep, mut progress: impl FnMut(u64) -> bool) -> Result<Opt
             return Ok(None);
         }
     }
-    let summary = summarise(sweep, &columns, &all, HERE);
+    let Ok(summary) = summarise(sweep, &columns, &all[..], HERE);
     Ok(Some(Swept { columns, rows: all, summary }))
 }
 
@@ -59,17 +62,30 @@ pub fn inputs(sweep: &Sweep) -> Result<Output, Error> {
     Ok(output)
 }
 
-/// Table, summary and report.
+/// Table, summary and report. The table is written into the claimed folder at once, as part of a set that is announced when the output is
+/// written there.
 ///
 /// # Errors
-/// [`Error::Internal`] when a value cannot be written.
-pub fn results(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Result<(Output, Summary), Error> {
-    let summary = summarise(sweep, columns, rows, HERE);
+/// [`Error::Output`] when the folder does not take the table or give the rows, [`Error::Internal`] when a value cannot be written.
+pub fn results(
+    sweep: &Sweep,
+    columns: &Columns,
+    rows: &TrialsOnDisk,
+    claim: &Claim,
+) -> Result<(Output, Summary), Error> {
+    let out_of = |why: io::Error| Error::output(claim.folder(), why);
+    let summary = summarise(sweep, columns, rows, HERE).map_err(out_of)?;
     let mut output = inputs(sweep)?;
-    output.add("trials.csv", csv(columns, rows));
+    let mut table = claim.begin("trials.csv")?;
+    csv(columns, rows, &mut table).map_err(out_of)?;
+    output.add_part(table.finish()?);
     #[cfg(feature = "parquet")]
-    output.add("trials.parquet", stylet_sweep::parquet(columns, rows).map_err(Error::internal)?);
+    {
+        let mut table = claim.begin("trials.parquet")?;
+        stylet_sweep::parquet(columns, rows, &mut table).map_err(Error::internal)?;
+        output.add_part(table.finish()?);
+    }
     output.add_json("summary.json", &summary)?;
-    output.add("report.html", page(sweep, columns, rows, &summary).to_html());
+    output.add("report.html", page(sweep, columns, rows, &summary).map_err(out_of)?.to_html());
     Ok((output, summary))
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Instant;
 use stylet_scenario::Scenario;
 use stylet_sweep::shard::{self, ShardNumber};
-use stylet_sweep::{Columns, Drawer, Overrides, Row, Summary, Sweep, rows};
+use stylet_sweep::{Columns, Drawer, Overrides, Row, Summary, Sweep, TrialsOnDisk, TrialsWriter, rows};
 
 /// Trials of a shard when a whole sweep splits the work itself: what a kill can cost at most.
 pub const SHARD_TRIALS: u64 = 1024;
@@ -44,7 +44,7 @@ pub fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool
 }
 
 /// The rows of all shards: those that are in the folder (`there` is told of their trials), and new ones, which are written there (`done` is
-/// told of them).
+/// told of them). They lie on disk, in the folder.
 ///
 /// # Errors
 /// [`Error::Trial`] for a trial that gives no row, [`Error::Request`] for a shard that is foreign or cannot be written.
@@ -55,21 +55,42 @@ pub fn all_shards(
     of: u64,
     there: &(dyn Fn(u64) + Sync),
     done: &(dyn Fn(u64) + Sync),
-) -> Result<Vec<Row>, Error> {
-    let mut all = Vec::with_capacity(sweep.trials() as usize);
+) -> Result<TrialsOnDisk, Error> {
+    let mut all = Gathered::new(columns, out)?;
     for shard in 1..=of {
         let number = ShardNumber { shard, of };
         if number.path(out).exists() {
             let rows = shard::read(sweep, columns, number, out)?;
             there(rows.len() as u64);
-            all.extend(rows);
+            all.take(&rows)?;
             continue;
         }
         let rows = rows(sweep, columns, number.range(sweep.trials()), done)?;
         shard::write(sweep, columns, number, &rows, out)?;
-        all.extend(rows);
+        all.take(&rows)?;
     }
-    Ok(all)
+    all.finish()
+}
+
+/// Rows of one shard after the other.
+struct Gathered<'a> {
+    out: &'a Path,
+    rows: TrialsWriter,
+}
+
+impl<'a> Gathered<'a> {
+    fn new(columns: &Columns, out: &'a Path) -> Result<Self, Error> {
+        let rows = TrialsWriter::new(out, columns).map_err(|why| Error::output(out, why))?;
+        Ok(Self { out, rows })
+    }
+
+    fn take(&mut self, rows: &[Row]) -> Result<(), Error> {
+        rows.iter().try_for_each(|row| self.rows.push(row)).map_err(|why| Error::output(self.out, why))
+    }
+
+    fn finish(self) -> Result<TrialsOnDisk, Error> {
+        self.rows.finish().map_err(|why| Error::output(self.out, why))
+    }
 }
 
 /// Runs one shard and writes it; with `resume` a whole shard of this sweep stays as it is.
@@ -95,13 +116,13 @@ pub fn one_shard(
 ///
 /// # Errors
 /// [`Error::Request`] when one is missing or foreign.
-pub fn merged(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<Vec<Row>, Error> {
+pub fn merged(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<TrialsOnDisk, Error> {
     let of = shard::split_of(out)?;
-    let mut all = Vec::new();
+    let mut all = Gathered::new(columns, out)?;
     for shard in 1..=of {
-        all.extend(shard::read(sweep, columns, ShardNumber { shard, of }, out)?);
+        all.take(&shard::read(sweep, columns, ShardNumber { shard, of }, out)?)?;
     }
-    Ok(all)
+    all.finish()
 }
 
 /// Writes the results into the claimed folder `out` and removes the shards.
@@ -111,10 +132,10 @@ pub fn merged(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<Vec<Row>, 
 pub fn conclude(
     sweep: &Sweep,
     columns: &Columns,
-    rows: &[Row],
+    rows: &TrialsOnDisk,
     (claim, out): (&Claim, &Path),
 ) -> Result<Summary, Error> {
-    let (output, summary) = results(sweep, columns, rows)?;
+    let (output, summary) = results(sweep, columns, rows, claim)?;
     output.write_to(claim)?;
     let _ = std::fs::remove_dir_all(out.join(shard::FOLDER));
     Ok(summary)

@@ -3,12 +3,15 @@
 use crate::args::EnhanceArgs;
 use crate::exit::Failure;
 use std::fmt::Write as _;
-use stylet_api::heard::{Heard, Source, hear};
-use stylet_api::{need, read_options};
+use stylet_api::heard::{Heard, Source, hear, hear_long};
+use stylet_api::{Claim, need, read_options};
 use stylet_core::config::Model;
-use stylet_record::read_csv;
+use stylet_record::{read_csv, read_long_csv};
 use stylet_report::{plus_minus, significant};
 use stylet_scenario::EnhanceFile;
+
+/// Ruptures and layers of a long recording that are said.
+const LISTED: usize = 100;
 
 /// The command.
 ///
@@ -17,18 +20,28 @@ use stylet_scenario::EnhanceFile;
 pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let config = args.config.as_deref().map(EnhanceFile::load).transpose()?.unwrap_or_default();
     let options = read_options(args.columns.as_deref(), args.repair)?;
-    if let Some(need) = need::of_enhance(&args.data, if args.compare { 2 } else { 1 }) {
-        args.limits.allow(&args.data, &need, args.results.quiet)?;
-    }
-    let (recording, notes) = read_csv(&args.data, &options)?;
     let models = match args.compare {
         true => vec![Model::MultiLayer, Model::KelvinVoigt],
         false => vec![config.enhance.model],
     };
-    let heard = hear(recording, notes, config, &models)?;
     let source = Source { data: &args.data, config: args.config.as_deref(), command: command(args) };
     let folder = args.results.folder(&args.data, "");
-    args.results.conclude(&folder, &heard.output(&source)?, || summary(args, &heard))
+    if let Some(need) = need::of_long_enhance(&args.data, models.len()) {
+        args.limits.allow(&args.data, &need, args.results.quiet)?;
+        let claim = Claim::new(&folder)?;
+        if let Some((recording, notes)) = read_long_csv(&args.data, &options, &folder)? {
+            let heard = hear_long(&recording, notes, config, &models, &claim)?;
+            let said = summary(args, &heard);
+            return args.results.conclude_in(&claim, &heard.output(&source)?, || said);
+        }
+    }
+    if let Some(need) = need::of_enhance(&args.data, models.len()) {
+        args.limits.allow(&args.data, &need, args.results.quiet)?;
+    }
+    let (recording, notes) = read_csv(&args.data, &options)?;
+    let heard = hear(recording, notes, config, &models)?;
+    let said = summary(args, &heard);
+    args.results.conclude(&folder, &heard.output(&source)?, || said)
 }
 
 fn command(args: &EnhanceArgs) -> String {
@@ -47,15 +60,16 @@ fn command(args: &EnhanceArgs) -> String {
 }
 
 fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
-    let Heard { recording, notes, ran, hash, .. } = heard;
+    let Heard { extent, notes, ran, hash, .. } = heard;
+    let listed = if heard.is_long() { LISTED } else { usize::MAX };
     let mut out = String::new();
     let _ = writeln!(
         out,
         "{}\n{} samples over {} s, {} Hz, hash {hash}",
         args.data.display(),
-        recording.len(),
-        significant(recording.duration_s(), 4),
-        significant(recording.sample_hz(), 3),
+        extent.samples,
+        significant(extent.duration_s, 4),
+        significant(extent.sample_hz, 3),
     );
     for note in notes {
         let _ = writeln!(out, "  note: {}", note.message);
@@ -79,7 +93,7 @@ fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
             }
         }
         let _ = writeln!(out, "  {} rupture(s)", r.trace.detections.len());
-        for d in &r.trace.detections {
+        for d in r.trace.detections.iter().take(listed) {
             let _ = writeln!(
                 out,
                 "    at {:.3} s, {:.2} mm (traced back to {:.2} mm), by {}",
@@ -89,7 +103,7 @@ fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
                 d.cause.name()
             );
         }
-        for e in &r.trace.estimates {
+        for e in r.trace.estimates.iter().take(listed) {
             let shown =
                 |value: f64, sd: f64| plus_minus(value, (sd > 0.0).then_some(stylet_stats::Z95 * sd), 3);
             let _ = writeln!(
@@ -101,6 +115,9 @@ fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
                 shown(e.friction, e.friction_sd),
                 shown(e.drop_n, e.drop_sd_n),
             );
+        }
+        if r.trace.detections.len().max(r.trace.estimates.len()) > listed {
+            let _ = writeln!(out, "  the first {listed} of each; events.json and enhance.json have all");
         }
         if r.trace.estimates.iter().any(|e| e.stiffness_sd > 0.0) {
             let _ = writeln!(out, "  (± 95 %)");

@@ -4,7 +4,7 @@ use crate::args::Results;
 use crate::exit::Failure;
 use crate::terminal::say;
 use std::path::{Path, PathBuf};
-use stylet_api::Output;
+use stylet_api::{Claim, Output};
 
 impl Results {
     /// The folder for the results: the one that is named, else `stylet-out/` and the input's name with `more` behind it.
@@ -23,6 +23,24 @@ impl Results {
         said: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         output.write(folder)?;
+        self.report(folder, said)
+    }
+
+    /// The same into a folder that is claimed already.
+    ///
+    /// # Errors
+    /// [`Failure`] when they cannot be written, or nothing can be said.
+    pub fn conclude_in(
+        &self,
+        claim: &Claim,
+        output: &Output,
+        said: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        output.write_to(claim)?;
+        self.report(claim.folder(), said)
+    }
+
+    fn report(&self, folder: &Path, said: impl FnOnce() -> String) -> Result<(), Failure> {
         if self.quiet {
             return Ok(());
         }

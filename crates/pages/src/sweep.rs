@@ -4,15 +4,22 @@ use crate::words::shown;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
 use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, percent, significant};
 use stylet_stats::Interval;
-use stylet_sweep::{BINS, Bin, Columns, MapRow, Outcome, Row, Summary, Sweep, bins, value};
+use stylet_sweep::{BINS, Bin, Columns, MapRow, Outcome, Summary, Sweep, Trials, bins, value};
 
 fn between(i: &Interval) -> String {
     format!("95 % interval {} to {}", percent(i.low), percent(i.high))
 }
 
 /// The page of a sweep.
-#[must_use]
-pub fn page(sweep: &Sweep, columns: &Columns, rows: &[Row], summary: &Summary) -> Page {
+///
+/// # Errors
+/// When the rows cannot be read.
+pub fn page<T: Trials + ?Sized>(
+    sweep: &Sweep,
+    columns: &Columns,
+    rows: &T,
+    summary: &Summary,
+) -> Result<Page, T::Error> {
     let mut page = Page::new(format!("Sweep: {}", summary.sweep))
         .subtitle(format!("{} trials of {}", summary.trials, summary.scenario))
         .fact("seed", summary.seed.to_string())
@@ -23,12 +30,14 @@ pub fn page(sweep: &Sweep, columns: &Columns, rows: &[Row], summary: &Summary) -
         page =
             page.fact("redrawn", format!("{} trials, their first draw being out of range", summary.redrawn));
     }
-    page.section(Section::new("Rates").tiles(tiles(summary)))
+    let page = page
+        .section(Section::new("Rates").tiles(tiles(summary)))
         .section(worst(summary))
         .section(explained(&summary.explained))
-        .section(against(sweep, columns, rows))
+        .section(against(sweep, columns, rows)?)
         .section(Section::new("Scores").table(scores(summary)))
-        .section(Section::new("How it was drawn").folded("sweep", sweep.to_ron()))
+        .section(Section::new("How it was drawn").folded("sweep", sweep.to_ron()));
+    Ok(page)
 }
 
 fn tiles(s: &Summary) -> Vec<Tile> {
@@ -160,10 +169,10 @@ fn scores(s: &Summary) -> Table {
 }
 
 /// The share of failed insertions against every quantity that explains something.
-fn against(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Section {
+fn against<T: Trials + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -> Result<Section, T::Error> {
     let mut section = Section::new("Failures and errors along the drawn quantities");
     for (index, quantity) in columns.drawn.iter().take(sweep.fields.len()).enumerate().take(12) {
-        let bins = bins(sweep, columns, rows, index);
+        let bins = bins(sweep, columns, rows, index)?;
         if bins.len() < 2 {
             continue;
         }
@@ -180,10 +189,12 @@ fn against(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Section {
         chart.y_range = Some((0.0, 100.0));
         section = section.chart(chart);
     }
-    let shown: Vec<&Row> = rows.iter().take(2000).collect();
     if let Some(first) = columns.drawn.first() {
-        let mut pairs: Vec<(f64, f64)> =
-            shown.iter().map(|r| (r.values[0], value(columns, r, "enhancement.rms_relative"))).collect();
+        let mut pairs: Vec<(f64, f64)> = Vec::new();
+        for place in 0..rows.count().min(2000) {
+            let row = rows.row(place)?;
+            pairs.push((row.values[0], value(columns, &row, "enhancement.rms_relative")));
+        }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let (x, y) = pairs.into_iter().unzip();
         let mut chart = Chart::new("Enhancement error", first.clone(), "relative error")
@@ -192,7 +203,7 @@ fn against(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Section {
         chart.scale = stylet_report::Scale::Log;
         section = section.chart(chart);
     }
-    section
+    Ok(section)
 }
 
 /// The robustness map as SVG.

@@ -21,6 +21,8 @@
 //! window's middle: it is off by up to `h/2` times the acceleration. Changes of speed are smeared over `+-h`. A window with fewer
 //! than three samples is widened to the neighbours on both sides, so that beside a gap the mean slope across it enters.
 
+use std::collections::VecDeque;
+
 /// Half-width of the window when nobody chooses one (s).
 ///
 /// Insertions are slow (a sinusoid of 0.0167 Hz, constant speeds, ripples of about 1 Hz), so that 5.8 Hz of bandwidth lose
@@ -36,40 +38,112 @@ const RIM: f64 = 1e-6;
 /// `time_s` must strictly increase and be as long as `position_m` (the shorter length counts). Fewer than two samples
 /// give zeros. Takes time proportional to the number of samples, whatever the width.
 pub fn differentiate(time_s: &[f64], position_m: &[f64], half_width_s: f64) -> Vec<f64> {
-    let count = time_s.len().min(position_m.len());
-    let (time_s, position_m) = (&time_s[..count], &position_m[..count]);
-    if count < 2 {
-        return vec![0.0; count];
+    let mut velocity_mps = Vec::with_capacity(time_s.len().min(position_m.len()));
+    let mut slopes = Slopes::new(half_width_s);
+    for (time_s, position_m) in time_s.iter().zip(position_m) {
+        slopes.take(*time_s, *position_m, |v| velocity_mps.push(v));
     }
-    let reach_s = half_width_s * (1.0 + RIM);
-    let (mut first, mut end) = (0, 0);
-    let mut sums = Sums::anchored_at(time_s[0], position_m[0]);
-    let mut steps_since_anchor = 0;
-    let mut velocity_mps = Vec::with_capacity(count);
-    for centre in 0..count {
-        let now_s = time_s[centre];
-        while end < count && (end <= centre || time_s[end] - now_s <= reach_s) {
-            sums.add(time_s[end], position_m[end]);
-            end += 1;
+    slopes.end(|v| velocity_mps.push(v));
+    velocity_mps
+}
+
+/// [`differentiate`] for samples that come one by one; remembers one window. The slope at a sample is told as soon as a sample
+/// behind its window has come.
+#[derive(Debug, Clone)]
+pub(crate) struct Slopes {
+    reach_s: f64,
+    /// Samples from the window's first, or the one before its centre, to the newest.
+    at_hand: VecDeque<(f64, f64)>,
+    /// Number of the first sample at hand.
+    from: usize,
+    /// The window, and the sample whose slope comes next.
+    first: usize,
+    end: usize,
+    centre: usize,
+    sums: Sums,
+    steps_since_anchor: usize,
+}
+
+impl Slopes {
+    pub(crate) fn new(half_width_s: f64) -> Self {
+        Self {
+            reach_s: half_width_s * (1.0 + RIM),
+            at_hand: VecDeque::new(),
+            from: 0,
+            first: 0,
+            end: 0,
+            centre: 0,
+            sums: Sums::anchored_at(0.0, 0.0),
+            steps_since_anchor: 0,
         }
-        while first < centre && now_s - time_s[first] > reach_s {
-            sums.remove(time_s[first], position_m[first]);
-            first += 1;
+    }
+
+    /// Takes the next sample; `tell` gets the slopes that are certain now.
+    #[inline]
+    pub(crate) fn take(&mut self, time_s: f64, position_m: f64, mut tell: impl FnMut(f64)) {
+        if self.end == 0 {
+            self.sums = Sums::anchored_at(time_s, position_m);
+        }
+        self.at_hand.push_back((time_s, position_m));
+        while self.end > self.centre && time_s - self.at(self.centre).0 > self.reach_s {
+            tell(self.slope());
+        }
+        self.sums.add(time_s, position_m);
+        self.end += 1;
+    }
+
+    /// No more samples: the slopes that are left.
+    pub(crate) fn end(mut self, mut tell: impl FnMut(f64)) {
+        if self.end == 1 {
+            return tell(0.0);
+        }
+        while self.centre < self.end {
+            tell(self.slope());
+        }
+    }
+
+    fn at(&self, sample: usize) -> (f64, f64) {
+        self.at_hand[sample - self.from]
+    }
+
+    /// The slope at the centre, whose window is complete; moves on.
+    #[inline]
+    fn slope(&mut self) -> f64 {
+        let now_s = self.at(self.centre).0;
+        while self.first < self.centre && now_s - self.at(self.first).0 > self.reach_s {
+            let (time_s, position_m) = self.at(self.first);
+            self.sums.remove(time_s, position_m);
+            self.first += 1;
         }
         // Running sums lose digits as the window leaves their anchor behind: start afresh every half window.
-        steps_since_anchor += 1;
-        if 2 * steps_since_anchor >= end - first {
-            sums = Sums::over(time_s, position_m, first, end, centre);
-            steps_since_anchor = 0;
+        self.steps_since_anchor += 1;
+        if 2 * self.steps_since_anchor >= self.end - self.first {
+            self.sums = self.sums_over(self.first, self.end);
+            self.steps_since_anchor = 0;
         }
-        let slope = if end - first >= 3 {
-            sums.slope()
+        let slope = if self.end - self.first >= 3 {
+            self.sums.slope()
         } else {
-            Sums::over(time_s, position_m, centre.saturating_sub(1), (centre + 2).min(count), centre).slope()
+            let newest = self.from + self.at_hand.len();
+            self.sums_over(self.centre.saturating_sub(1), (self.centre + 2).min(newest)).slope()
         };
-        velocity_mps.push(slope);
+        self.centre += 1;
+        // The sample before the next centre stays, for windows that are widened.
+        while self.from < self.first.min(self.centre - 1) {
+            self.at_hand.pop_front();
+            self.from += 1;
+        }
+        slope
     }
-    velocity_mps
+
+    fn sums_over(&self, first: usize, end: usize) -> Sums {
+        let (anchor_s, anchor_m) = self.at(self.centre);
+        let mut sums = Sums::anchored_at(anchor_s, anchor_m);
+        for (time_s, position_m) in self.at_hand.range(first - self.from..end - self.from) {
+            sums.add(*time_s, *position_m);
+        }
+        sums
+    }
 }
 
 /// Moments of the samples in a window, relative to an anchor inside or near it.
@@ -87,14 +161,6 @@ struct Sums {
 impl Sums {
     fn anchored_at(anchor_s: f64, anchor_m: f64) -> Self {
         Self { anchor_s, anchor_m, n: 0.0, t: 0.0, tt: 0.0, z: 0.0, tz: 0.0 }
-    }
-
-    fn over(time_s: &[f64], position_m: &[f64], first: usize, end: usize, centre: usize) -> Self {
-        let mut sums = Self::anchored_at(time_s[centre], position_m[centre]);
-        for index in first..end {
-            sums.add(time_s[index], position_m[index]);
-        }
-        sums
     }
 
     fn add(&mut self, time_s: f64, position_m: f64) {
@@ -207,7 +273,9 @@ mod tests {
         for centre in 0..time_s.len() {
             let first = time_s.partition_point(|&t| time_s[centre] - t > 0.05 * (1.0 + RIM));
             let end = time_s.partition_point(|&t| t - time_s[centre] <= 0.05 * (1.0 + RIM));
-            let direct = Sums::over(&time_s, &position_m, first, end, centre).slope();
+            let mut direct = Sums::anchored_at(time_s[centre], position_m[centre]);
+            (first..end).for_each(|k| direct.add(time_s[k], position_m[k]));
+            let direct = direct.slope();
             assert!((fast[centre] - direct).abs() < 1e-11, "{centre}: {} {direct}", fast[centre]);
         }
     }

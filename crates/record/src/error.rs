@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Why a recording cannot be read, built or written.
 ///
 /// Each message names the file, the line (1-based, as an editor counts) and the column where these exist, and ends with
-/// the remedy. All variants but [`RecordError::Write`] mean that the input is wrong.
+/// the remedy. All variants but [`RecordError::Write`] and [`RecordError::Scratch`] mean that the input is wrong.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the message is the documentation of its fields
@@ -156,6 +156,22 @@ pub enum RecordError {
     /// An extra column's name cannot stand in a header.
     #[error("the extra column \"{name}\" cannot be written: {why}; choose another name")]
     BadColumnName { name: String, why: &'static str },
+
+    /// The disk does not take what a long log is worked on with.
+    #[error(
+        "{}: a log this long is worked on beside its results, and the disk there says: {source}; make room for about 150 bytes per \
+         sample, or name a folder on another disk with --out",
+        path.display()
+    )]
+    Scratch { path: PathBuf, source: io::Error },
+
+    /// Time stamps out of order over more rows than can be sorted out at once.
+    #[error(
+        "{}: from line {line} on the time stamps of over {rows} rows are out of order together; cut the log there (a clock that was \
+         set?) and enhance the parts",
+        path.display()
+    )]
+    DisorderTooLong { path: PathBuf, line: u64, rows: usize },
 
     /// The destination refuses the text.
     #[error("the recording cannot be written ({0}); check that the destination exists and has room")]

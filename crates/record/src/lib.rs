@@ -23,22 +23,27 @@
 //! | [`truth`] | [`Truth`]: what a simulation knows and a sensor does not |
 //! | [`columns`] | [`ColumnMap`]: names, units and signs of somebody else's log |
 //! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
+//! | [`long`] | recordings of any length, on disk |
 //! | [`foreign`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
 //! | `quality` | [`QualityNote`]s: dead, reversed, in air, mixed-up units, stuck, gaps, jitter, saturation, spikes, quantisation, unlike its repeats |
+//! | [`scratch`] | columns of numbers on disk |
 //! | [`thin`](mod@thin) | recordings of hours, thinned |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 
+mod along;
 pub mod columns;
 pub mod differentiate;
 pub mod error;
 pub mod foreign;
 pub mod holes;
 mod layout;
+pub mod long;
 mod quality;
 pub mod read;
 pub mod recording;
 mod repair;
+pub mod scratch;
 pub mod thin;
 pub mod truth;
 pub mod write;
@@ -47,9 +52,10 @@ pub use columns::{Column, ColumnMap};
 pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 pub use error::RecordError;
 pub use holes::read_csv_with_holes;
+pub use long::{LongRecording, read_long_csv};
 pub use quality::{LEAST_SAMPLES, QualityKind, QualityNote, assess, unlike_the_others, usable};
 pub use read::{ReadOptions, read_csv, read_csv_bytes};
 pub use recording::{JOINTS, Recording, Sample};
 pub use thin::thin;
 pub use truth::{LayerTruth, TrueRupture, Truth};
-pub use write::write_csv;
+pub use write::{RowWriter, write_csv};

@@ -5,6 +5,7 @@
 //! named; [`usable`] turns it into an error that says what to do. The thresholds stand in [`QualityKind`].
 
 mod likeness;
+mod runs;
 mod sense;
 mod timing;
 mod units;
@@ -17,6 +18,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::along::{Along, Quantity};
 use crate::error::RecordError;
 use crate::recording::Recording;
 
@@ -105,35 +107,57 @@ impl QualityNote {
 ///
 /// Expects what [`Recording::check`] promises; takes `O(n log n)`.
 pub fn assess(recording: &Recording) -> Vec<QualityNote> {
+    let Ok(notes) = look_over(recording);
+    notes
+}
+
+/// What several checks ask for.
+struct Facts {
+    force_n: (f64, f64),
+    position_m: (f64, f64),
+    median_interval_s: f64,
+}
+
+/// [`assess`] wherever the samples are.
+///
+/// # Errors
+/// When the samples cannot be gone through.
+pub(crate) fn look_over<A: Along>(recording: &A) -> Result<Vec<QualityNote>, A::Error> {
     let mut notes: Vec<QualityNote> = sense::too_short(recording.len()).into_iter().collect();
     if recording.len() < 2 {
-        return notes;
+        return Ok(notes);
     }
-    if let Some(note) = sense::unmeasurable(recording) {
+    if let Some(note) = sense::unmeasurable(recording)? {
         // Nothing else can be computed from it.
         notes.push(note);
-        return notes;
+        return Ok(notes);
     }
-    notes.extend(units::unit_mix_ups(recording));
-    let dead = sense::dead(recording);
+    let facts = Facts {
+        force_n: recording.extremes(Quantity::Force)?,
+        position_m: recording.extremes(Quantity::Position)?,
+        median_interval_s: recording.median_interval_s()?,
+    };
+    notes.extend(units::unit_mix_ups(recording, &facts)?);
+    let dead = sense::dead(recording.len(), &facts);
     if dead.is_none() && notes.is_empty() {
-        notes.extend(sense::reversed(recording));
-        notes.extend(sense::in_air(recording));
+        notes.extend(sense::reversed(recording)?);
+        notes.extend(sense::in_air(recording, &facts)?);
     }
     notes.extend(dead);
-    notes.extend(sense::still(recording));
-    notes.extend(sense::stuck(recording));
-    notes.extend(timing::gaps(recording));
-    notes.extend(timing::jitter(recording));
-    notes.extend(values::saturation(recording));
-    for (what, unit, values) in
-        [("force_n", "N", &recording.force_n), ("position_m", "m", &recording.position_m)]
-    {
-        notes.extend(values::spikes(what, unit, values, &recording.time_s));
-        notes.extend(values::quantisation(what, unit, values));
+    notes.extend(sense::still(&facts));
+    notes.extend(timing::gaps(recording, &facts)?);
+    notes.extend(timing::jitter(recording, &facts)?);
+    notes.extend(values::saturation(recording, &facts)?);
+    for (what, unit, which) in [("force_n", "N", Quantity::Force), ("position_m", "m", Quantity::Position)] {
+        notes.extend(values::spikes(recording, what, unit, which)?);
+        let sorted = recording.keep_sorted(|keep| recording.values(which, keep))?;
+        notes.extend(values::quantisation(&sorted, what, unit)?);
+        if which == Quantity::Force {
+            notes.extend(sense::stuck(recording, &sorted, &facts)?);
+        }
     }
     notes.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| a.message.cmp(&b.message)));
-    notes
+    Ok(notes)
 }
 
 /// Whether conclusions may be drawn from recordings.

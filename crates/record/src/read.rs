@@ -1,7 +1,7 @@
 //! CSV in: numbers or a message that says what, where and what would be right.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::columns::{Column, ColumnMap};
@@ -68,25 +68,23 @@ pub fn read_csv_bytes(
         return read_csv_bytes(&text, path, options);
     }
     check_text(bytes, path)?;
-    let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
-    let Some(header) = bytes[start..].iter().position(|byte| !byte.is_ascii_whitespace()) else {
-        return Err(RecordError::EmptyFile { path: path.to_owned() });
-    };
-    // Tabs and spaces before the first name belong to the header line.
-    let header = start + header;
-    let header =
-        bytes[..header].iter().rposition(|byte| matches!(byte, b'\n' | b'\r')).map_or(start, |end| end + 1);
-    let place = Place { bytes, path, header };
-    let layout = read_layout(&bytes[header..], path, place.line(header), options.columns.as_ref())?;
-    let mut rows = Rows::read(&place, &layout, options.repair)?;
-    let dropped_lines = rows.repair(&place);
+    let header = header_start(bytes).ok_or_else(|| RecordError::EmptyFile { path: path.to_owned() })?;
+    let place = Place { text: Text::Bytes(bytes), path, header };
+    let layout = read_layout(&bytes[header..], path, place.line(header)?, options.columns.as_ref())?;
+    let mut rows = Rows { columns: vec![Vec::new(); layout.sources.len()], offsets: Vec::new() };
+    read_rows(&place, &layout, !options.repair, |offset, row| {
+        rows.columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
+        rows.offsets.push(offset);
+        Ok(())
+    })?;
+    let dropped_lines = rows.repair(&place)?;
     let offsets = rows.offsets.clone();
     let mut recording = rows.into_recording(&place, &layout)?;
     if !recording.velocity_measured {
         recording.velocity_mps =
             differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
         if let Some(row) = recording.velocity_mps.iter().position(|v| !v.is_finite()) {
-            let line = place.line(offsets.get(row).copied().unwrap_or(header));
+            let line = place.line(offsets.get(row).copied().unwrap_or(header))?;
             return Err(RecordError::NoSlope { path: path.to_owned(), line });
         }
     }
@@ -97,35 +95,130 @@ pub fn read_csv_bytes(
     Ok((recording, notes))
 }
 
+/// Where the header line begins: the first line that is not blank, behind a byte order mark.
+pub(crate) fn header_start(bytes: &[u8]) -> Option<usize> {
+    let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+    let header = start + bytes[start..].iter().position(|byte| !byte.is_ascii_whitespace())?;
+    // Tabs and spaces before the first name belong to the header line.
+    let line = bytes[..header].iter().rposition(|byte| matches!(byte, b'\n' | b'\r'));
+    Some(line.map_or(start, |end| end + 1))
+}
+
+/// A text that is read more than once.
+pub(crate) enum Text<'a> {
+    Bytes(&'a [u8]),
+    File(&'a File),
+}
+
+impl Text<'_> {
+    /// The text from a byte on.
+    pub(crate) fn from(&self, byte: usize) -> io::Result<Box<dyn Read + '_>> {
+        match self {
+            Self::Bytes(bytes) => Ok(Box::new(bytes.get(byte..).unwrap_or_default())),
+            Self::File(file) => {
+                let mut file: &File = file;
+                file.seek(SeekFrom::Start(byte as u64))?;
+                Ok(Box::new(file))
+            }
+        }
+    }
+}
+
 /// A file and where its header begins; turns byte offsets into line numbers when somebody asks.
-struct Place<'a> {
-    bytes: &'a [u8],
-    path: &'a Path,
-    header: usize,
+pub(crate) struct Place<'a> {
+    pub(crate) text: Text<'a>,
+    pub(crate) path: &'a Path,
+    pub(crate) header: usize,
 }
 
 impl Place<'_> {
     /// Line (1-based) of the row that begins at or, after blank lines, behind the byte.
-    fn line(&self, byte: usize) -> u64 {
-        let byte = byte + self.bytes[byte..].iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).count();
-        1 + line_ends(self.bytes, 0, byte)
+    pub(crate) fn line(&self, byte: usize) -> Result<u64, RecordError> {
+        Ok(self.lines(std::iter::once(byte))?.first().copied().unwrap_or(1))
+    }
+
+    /// Line of a byte, be it a line end.
+    fn line_of(&self, byte: usize) -> Result<u64, RecordError> {
+        let unreadable = |source| self.unreadable(source);
+        let mut before = self.text.from(0).map_err(unreadable)?.take(byte as u64 + 1);
+        let (mut line, mut left, mut after_return) = (1, byte, false);
+        let mut piece = vec![0; AT_ONCE];
+        loop {
+            let count = before.read(&mut piece).map_err(unreadable)?;
+            for &byte in &piece[..count] {
+                line += u64::from(after_return && byte != b'\n');
+                if left == 0 {
+                    return Ok(line);
+                }
+                left -= 1;
+                line += u64::from(byte == b'\n');
+                after_return = byte == b'\r';
+            }
+            if count == 0 {
+                return Ok(line);
+            }
+        }
     }
 
     /// The same for ascending offsets, in one pass.
-    fn lines(&self, offsets: impl Iterator<Item = usize>) -> Vec<u64> {
-        let (mut line, mut from) = (1, 0);
-        let next = |byte: usize| {
-            let byte =
-                byte + self.bytes[byte..].iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).count();
-            line += line_ends(self.bytes, from, byte);
-            from = byte;
-            line
+    pub(crate) fn lines(&self, offsets: impl Iterator<Item = usize>) -> Result<Vec<u64>, RecordError> {
+        let from = self.text.from(0).map_err(|source| self.unreadable(source))?;
+        let mut text = Bytes { from, held: Vec::new(), at: 0 };
+        let (mut line, mut passed, mut lines) = (1, 0, Vec::new());
+        let mut failed = None;
+        let mut next = |text: &mut Bytes<'_>| {
+            text.next().unwrap_or_else(|why| {
+                failed.get_or_insert(why);
+                None
+            })
         };
-        offsets.map(next).collect()
+        let mut now = next(&mut text);
+        for offset in offsets {
+            while let Some(byte) = now
+                && (passed < offset || matches!(byte, b'\n' | b'\r'))
+            {
+                let following = next(&mut text);
+                // Line ends: LF, CRLF, or a CR alone.
+                line += u64::from(byte == b'\n' || (byte == b'\r' && following != Some(b'\n')));
+                passed += 1;
+                now = following;
+            }
+            lines.push(line);
+        }
+        match failed {
+            Some(why) => Err(self.unreadable(why)),
+            None => Ok(lines),
+        }
     }
 
-    fn path(&self) -> PathBuf {
+    pub(crate) fn path(&self) -> PathBuf {
         self.path.to_owned()
+    }
+
+    pub(crate) fn unreadable(&self, source: io::Error) -> RecordError {
+        RecordError::Unreadable { path: self.path(), source }
+    }
+}
+
+/// Bytes, one by one.
+struct Bytes<'a> {
+    from: Box<dyn Read + 'a>,
+    held: Vec<u8>,
+    at: usize,
+}
+
+impl Bytes<'_> {
+    #[inline]
+    fn next(&mut self) -> io::Result<Option<u8>> {
+        if self.at == self.held.len() {
+            self.held.resize(AT_ONCE, 0);
+            let count = self.from.read(&mut self.held)?;
+            self.held.truncate(count);
+            self.at = 0;
+        }
+        let byte = self.held.get(self.at).copied();
+        self.at += usize::from(byte.is_some());
+        Ok(byte)
     }
 }
 
@@ -137,22 +230,173 @@ fn line_ends(bytes: &[u8], from: usize, to: usize) -> u64 {
 }
 
 fn check_text(bytes: &[u8], path: &Path) -> Result<(), RecordError> {
-    let bad = |byte: usize, what| {
-        Err(RecordError::NotText { path: path.to_owned(), byte, line: 1 + line_ends(bytes, 0, byte), what })
-    };
-    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
-        return bad(0, "a UTF-16 byte order mark");
+    let mut check = TextCheck::default();
+    let checked = check.take(bytes).and_then(|()| check.end());
+    checked.map_err(|NotText { byte, what }| RecordError::NotText {
+        path: path.to_owned(),
+        byte,
+        line: 1 + line_ends(bytes, 0, byte),
+        what,
+    })
+}
+
+/// What makes a file no text in UTF-8, and where.
+#[derive(Debug)]
+pub(crate) struct NotText {
+    byte: usize,
+    what: &'static str,
+}
+
+impl NotText {
+    pub(crate) fn of(self, place: &Place<'_>) -> RecordError {
+        match place.line_of(self.byte) {
+            Ok(line) => RecordError::NotText { path: place.path(), byte: self.byte, line, what: self.what },
+            Err(error) => error,
+        }
     }
-    if bytes.starts_with(b"PK\x03\x04") {
-        return bad(0, "the head of a ZIP archive (a spreadsheet?)");
+}
+
+/// Whether bytes that come piece by piece are text.
+#[derive(Debug, Default)]
+pub(crate) struct TextCheck {
+    /// Bytes that are known to be text.
+    passed: usize,
+    /// The beginning of a character whose end is to come.
+    open: Vec<u8>,
+    begun: bool,
+}
+
+impl TextCheck {
+    pub(crate) fn take(&mut self, piece: &[u8]) -> Result<(), NotText> {
+        if !std::mem::replace(&mut self.begun, true) {
+            let head = |what| Err(NotText { byte: 0, what });
+            if piece.starts_with(b"\xFF\xFE") || piece.starts_with(b"\xFE\xFF") {
+                return head("a UTF-16 byte order mark");
+            }
+            if piece.starts_with(b"PK\x03\x04") {
+                return head("the head of a ZIP archive (a spreadsheet?)");
+            }
+        }
+        let joined;
+        let bytes = if self.open.is_empty() {
+            piece
+        } else {
+            self.open.extend_from_slice(piece);
+            joined = std::mem::take(&mut self.open);
+            &joined
+        };
+        // Zero bytes are valid UTF-8; whichever trouble comes first is named.
+        let zero = if bytes.contains(&0) { bytes.iter().position(|byte| *byte == 0) } else { None };
+        match std::str::from_utf8(&bytes[..zero.unwrap_or(bytes.len())]) {
+            Err(error) if zero.is_some() || error.error_len().is_some() => {
+                Err(NotText { byte: self.passed + error.valid_up_to(), what: "an invalid UTF-8 sequence" })
+            }
+            Err(error) => {
+                self.passed += error.valid_up_to();
+                self.open = bytes[error.valid_up_to()..].to_vec();
+                Ok(())
+            }
+            Ok(_) => match zero {
+                Some(zero) => Err(NotText { byte: self.passed + zero, what: "a zero byte" }),
+                None => {
+                    self.passed += bytes.len();
+                    Ok(())
+                }
+            },
+        }
     }
-    // Zero bytes are valid UTF-8; whichever trouble comes first is named.
-    let zero = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
-    match std::str::from_utf8(&bytes[..zero]) {
-        Err(error) => bad(error.valid_up_to(), "an invalid UTF-8 sequence"),
-        Ok(_) if zero < bytes.len() => bad(zero, "a zero byte"),
-        Ok(_) => Ok(()),
+
+    pub(crate) fn end(&self) -> Result<(), NotText> {
+        match self.open.is_empty() {
+            true => Ok(()),
+            false => Err(NotText { byte: self.passed, what: "an invalid UTF-8 sequence" }),
+        }
     }
+}
+
+/// Bytes that are taken from a file at once.
+const AT_ONCE: usize = 1 << 16;
+
+/// Hands over the rows of a file: where each begins, and its numbers in the order of the layout's sources (time first). With
+/// `in_order` time stamps that do not increase are errors.
+pub(crate) fn read_rows(
+    place: &Place<'_>,
+    layout: &Layout,
+    in_order: bool,
+    mut each: impl FnMut(usize, &[f64]) -> Result<(), RecordError>,
+) -> Result<(), RecordError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(layout.delimiter)
+        .buffer_capacity(AT_ONCE)
+        .from_reader(place.text.from(place.header).map_err(|source| place.unreadable(source))?);
+    let mut row = csv::ByteRecord::new();
+    let mut numbers = vec![0.0; layout.sources.len()];
+    let (mut rows, mut previous_s, mut previous_offset) = (0_u64, f64::NEG_INFINITY, 0);
+    let mut header_passed = false;
+    loop {
+        let offset =
+            place.header + usize::try_from(reader.position().byte()).unwrap_or(usize::MAX - place.header);
+        let more = reader.read_byte_record(&mut row);
+        let more = match more {
+            Ok(more) => more,
+            Err(error) => {
+                return Err(RecordError::BadTable {
+                    path: place.path(),
+                    line: place.line(offset)?,
+                    message: error.to_string(),
+                });
+            }
+        };
+        if !more {
+            break;
+        }
+        if !header_passed {
+            header_passed = true;
+            continue;
+        }
+        if row.iter().all(|field| field.trim_ascii().is_empty()) {
+            continue;
+        }
+        if row.len() != layout.width {
+            return Err(RecordError::RaggedRow {
+                path: place.path(),
+                line: place.line(offset)?,
+                found: row.len(),
+                expected: layout.width,
+                remedy: remedy_for_row(&row, layout),
+            });
+        }
+        for (value, source) in numbers.iter_mut().zip(&layout.sources) {
+            *value = number(place, offset, source, row.get(source.index).unwrap_or_default())?;
+        }
+        let time_s = numbers.first().copied().unwrap_or(f64::NAN);
+        if in_order && rows > 0 && time_s <= previous_s {
+            let column = &layout.sources[0].column;
+            return Err(out_of_order(place, column, (offset, time_s), (previous_offset, previous_s)));
+        }
+        (previous_s, previous_offset) = (time_s, offset);
+        rows += 1;
+        each(offset, &numbers)?;
+    }
+    if rows == 0 {
+        return Err(RecordError::HeaderOnly { path: place.path(), line: place.line(place.header)? });
+    }
+    Ok(())
+}
+
+/// Fewer than two samples are no recording.
+pub(crate) fn enough(
+    place: &Place<'_>,
+    samples: usize,
+    last_offset: Option<usize>,
+) -> Result<(), RecordError> {
+    if samples >= 2 {
+        return Ok(());
+    }
+    let line = place.line(last_offset.unwrap_or(place.header))?;
+    Err(RecordError::TooFewSamples { path: place.path(), line, samples })
 }
 
 /// The numbers of a file, one column per source of the layout (time first), and where each row begins.
@@ -162,80 +406,24 @@ struct Rows {
 }
 
 impl Rows {
-    /// Reads all rows; unless they may be repaired, time stamps that do not increase are errors.
-    fn read(place: &Place<'_>, layout: &Layout, repair: bool) -> Result<Self, RecordError> {
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .delimiter(layout.delimiter)
-            .from_reader(&place.bytes[place.header..]);
-        let mut row = csv::ByteRecord::new();
-        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); layout.sources.len()];
-        let mut offsets: Vec<usize> = Vec::new();
-        let mut header_passed = false;
-        loop {
-            let offset =
-                place.header + usize::try_from(reader.position().byte()).unwrap_or(usize::MAX - place.header);
-            let more = reader.read_byte_record(&mut row).map_err(|error| RecordError::BadTable {
-                path: place.path(),
-                line: place.line(offset),
-                message: error.to_string(),
-            })?;
-            if !more {
-                break;
-            }
-            if !header_passed {
-                header_passed = true;
-                continue;
-            }
-            if row.iter().all(|field| field.trim_ascii().is_empty()) {
-                continue;
-            }
-            if row.len() != layout.width {
-                return Err(RecordError::RaggedRow {
-                    path: place.path(),
-                    line: place.line(offset),
-                    found: row.len(),
-                    expected: layout.width,
-                    remedy: remedy_for_row(&row, layout),
-                });
-            }
-            for (column, source) in columns.iter_mut().zip(&layout.sources) {
-                column.push(number(place, offset, source, row.get(source.index).unwrap_or_default())?);
-            }
-            if !repair {
-                let previous_offset = offsets.last().copied().unwrap_or_default();
-                check_time(place, &layout.sources[0].column, &columns[0], offset, previous_offset)?;
-            }
-            offsets.push(offset);
-        }
-        if offsets.is_empty() {
-            return Err(RecordError::HeaderOnly { path: place.path(), line: place.line(place.header) });
-        }
-        Ok(Self { columns, offsets })
-    }
-
     /// Drops the rows whose time stamps do not increase; returns their lines.
-    fn repair(&mut self, place: &Place<'_>) -> Vec<u64> {
+    fn repair(&mut self, place: &Place<'_>) -> Result<Vec<u64>, RecordError> {
         let Some(keep) = rows_to_keep(&self.columns[0]) else {
-            return Vec::new();
+            return Ok(Vec::new());
         };
         let dropped: Vec<bool> = keep.iter().map(|keep| !keep).collect();
-        let lines = place.lines(kept(&self.offsets, &dropped).into_iter());
+        let lines = place.lines(kept(&self.offsets, &dropped).into_iter())?;
         for column in &mut self.columns {
             *column = kept(column, &keep);
         }
         self.offsets = kept(&self.offsets, &keep);
-        lines
+        Ok(lines)
     }
 
     /// The columns under their names; the velocity stays empty when the file has none.
     fn into_recording(self, place: &Place<'_>, layout: &Layout) -> Result<Recording, RecordError> {
         let samples = self.offsets.len();
-        if samples < 2 {
-            let line = place.line(self.offsets.last().copied().unwrap_or(place.header));
-            return Err(RecordError::TooFewSamples { path: place.path(), line, samples });
-        }
+        enough(place, samples, self.offsets.last().copied())?;
         let mut recording = Recording::default();
         for (source, values) in layout.sources.iter().zip(self.columns) {
             match source.role {
@@ -261,11 +449,13 @@ impl Rows {
 
 fn number(place: &Place<'_>, offset: usize, source: &Source, field: &[u8]) -> Result<f64, RecordError> {
     // The whole file was checked to be UTF-8; a delimiter cannot split a character.
-    let text = std::str::from_utf8(field).unwrap_or_default().trim();
-    let Ok(raw) = text.parse::<f64>() else {
+    let text = std::str::from_utf8(field).unwrap_or_default();
+    // Spaces are rare.
+    let Ok(raw) = text.parse::<f64>().or_else(|_| text.trim().parse()) else {
+        let text = text.trim();
         return Err(RecordError::NotANumber {
             path: place.path(),
-            line: place.line(offset),
+            line: place.line(offset)?,
             column: source.column.name.clone(),
             text: text.to_owned(),
             remedy: remedy(text),
@@ -277,9 +467,9 @@ fn number(place: &Place<'_>, offset: usize, source: &Source, field: &[u8]) -> Re
     }
     Err(RecordError::NotFinite {
         path: place.path(),
-        line: place.line(offset),
+        line: place.line(offset)?,
         column: source.column.name.clone(),
-        text: text.to_owned(),
+        text: text.trim().to_owned(),
     })
 }
 
@@ -307,24 +497,20 @@ fn remedy(text: &str) -> &'static str {
     }
 }
 
-/// Checks that the newest time stamp is later than the one before.
-fn check_time(
+/// A time stamp that is not later than the one before, each with where its row begins.
+fn out_of_order(
     place: &Place<'_>,
     column: &Column,
-    time_s: &[f64],
-    offset: usize,
-    previous_offset: usize,
-) -> Result<(), RecordError> {
-    let [.., previous_s, time_s] = *time_s else {
-        return Ok(());
-    };
-    if time_s > previous_s {
-        return Ok(());
-    }
+    (offset, time_s): (usize, f64),
+    (previous_offset, previous_s): (usize, f64),
+) -> RecordError {
     let (path, column) = (place.path(), column.name.clone());
-    let (line, previous_line) = (place.line(offset), place.line(previous_offset));
+    let (previous_line, line) = match place.lines([previous_offset, offset].into_iter()) {
+        Ok(lines) => (lines.first().copied().unwrap_or(1), lines.last().copied().unwrap_or(1)),
+        Err(error) => return error,
+    };
     if time_s == previous_s {
-        return Err(RecordError::RepeatedTime { path, line, column, time_s, previous_line });
+        return RecordError::RepeatedTime { path, line, column, time_s, previous_line };
     }
-    Err(RecordError::BackwardTime { path, line, column, time_s, previous_s, previous_line })
+    RecordError::BackwardTime { path, line, column, time_s, previous_s, previous_line }
 }

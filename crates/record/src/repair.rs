@@ -34,6 +34,66 @@ pub(crate) fn rows_to_keep(time_s: &[f64]) -> Option<Vec<bool>> {
     Some(keep.collect())
 }
 
+/// Which of many rows to drop, in ascending order: those that [`rows_to_keep`] would not keep. `pass` hands over all time stamps, block
+/// by block, whenever it is asked. Memory holds one block and the longest stretch of disorder, from a row that is later than one behind
+/// it to where all rows are later than all before.
+///
+/// # Errors
+/// What `pass` says. `Err` within: the row at which a disorder of over `most` rows begins.
+pub(crate) fn rows_to_drop<E>(
+    pass: impl Fn(&mut dyn FnMut(&[f64])) -> Result<(), E>,
+    most: usize,
+) -> Result<Result<Vec<usize>, usize>, E> {
+    // The earliest time of each block, then of each block and all behind it.
+    let (mut earliest, mut last, mut in_order) = (Vec::new(), f64::NEG_INFINITY, true);
+    pass(&mut |block| {
+        for &time in block {
+            in_order &= time > last;
+            last = time;
+        }
+        earliest.push(block.iter().copied().fold(f64::INFINITY, f64::min));
+    })?;
+    if in_order {
+        return Ok(Ok(Vec::new()));
+    }
+    for at in (1..earliest.len()).rev() {
+        earliest[at - 1] = earliest[at].min(earliest[at - 1]);
+    }
+    let (mut dropped, mut disorder, mut begins) = (Vec::new(), Vec::new(), 0);
+    let (mut row, mut block_number, mut latest, mut too_long) = (0, 0, f64::NEG_INFINITY, None);
+    let mut end_of_disorder = |disorder: &mut Vec<f64>, begins: usize| {
+        let keep = rows_to_keep(disorder).into_iter().flatten();
+        dropped.extend(keep.enumerate().filter(|(_, keep)| !keep).map(|(at, _)| begins + at));
+        disorder.clear();
+    };
+    let mut still_to_come = Vec::new();
+    pass(&mut |block| {
+        block_number += 1;
+        // The earliest time from each row on.
+        let mut least = earliest.get(block_number).copied().unwrap_or(f64::INFINITY);
+        still_to_come.clear();
+        still_to_come.extend(block.iter().rev().map(|time| {
+            least = least.min(*time);
+            least
+        }));
+        for (&time, &least) in block.iter().zip(still_to_come.iter().rev()) {
+            if latest < least {
+                end_of_disorder(&mut disorder, begins);
+                begins = row;
+            }
+            latest = latest.max(time);
+            row += 1;
+            if disorder.len() < most {
+                disorder.push(time);
+            } else {
+                too_long.get_or_insert(begins);
+            }
+        }
+    })?;
+    end_of_disorder(&mut disorder, begins);
+    Ok(too_long.map_or(Ok(dropped), Err))
+}
+
 /// The values of the rows that are kept.
 pub(crate) fn kept<T: Copy>(values: &[T], keep: &[bool]) -> Vec<T> {
     values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
@@ -81,6 +141,28 @@ mod tests {
                 .map(u32::count_ones)
                 .max();
             prop_assert_eq!(Some(result.len() as u32), best);
+        }
+
+        #[test]
+        fn block_by_block_the_same_rows_are_dropped(
+            steps in prop::collection::vec(-3_i8..6, 1..60),
+            block in 1_usize..20,
+        ) {
+            let time_s: Vec<f64> = steps
+                .iter()
+                .scan(0.0, |time, step| {
+                    *time += f64::from(*step);
+                    Some(*time)
+                })
+                .collect();
+            let pass = |take: &mut dyn FnMut(&[f64])| -> Result<(), std::convert::Infallible> {
+                time_s.chunks(block).for_each(take);
+                Ok(())
+            };
+            let Ok(dropped) = rows_to_drop(pass, 1000);
+            let keep = rows_to_keep(&time_s).unwrap_or(vec![true; time_s.len()]);
+            let expected: Vec<usize> = (0..keep.len()).filter(|row| !keep[*row]).collect();
+            prop_assert_eq!(dropped, Ok(expected));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! CSV out: what [`crate::read_csv`] reads back bit for bit.
 
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 
 use crate::error::RecordError;
 use crate::layout::joint_torque_name;
@@ -67,7 +67,54 @@ pub fn write_csv(
     Ok(())
 }
 
-fn names(recording: &Recording, truth: Option<&Truth>) -> Vec<String> {
+/// A table that is written row by row: numbers of a recording, numbers beside them, and a word.
+#[derive(Debug)]
+pub struct RowWriter<W: Write> {
+    output: BufWriter<W>,
+}
+
+impl<W: Write> RowWriter<W> {
+    /// Begins a table with the names of its columns.
+    ///
+    /// # Errors
+    /// What the destination says.
+    pub fn new(names: &[String], output: W) -> io::Result<Self> {
+        let mut output = BufWriter::with_capacity(1 << 16, output);
+        writeln!(output, "{}", names.join(","))?;
+        Ok(Self { output })
+    }
+
+    /// Writes a row: numbers as [`write_csv`] writes them, those beside them empty where they are not numbers, and the word.
+    ///
+    /// # Errors
+    /// What the destination says.
+    #[inline]
+    pub fn row(&mut self, measured: &[f64], beside: &[f64], word: &str) -> io::Result<()> {
+        for value in measured {
+            write!(self.output, "{value:?},")?;
+        }
+        for value in beside {
+            if value.is_nan() {
+                self.output.write_all(b",")?;
+            } else {
+                write!(self.output, "{value:?},")?;
+            }
+        }
+        self.output.write_all(word.as_bytes())?;
+        self.output.write_all(b"\n")
+    }
+
+    /// Ends the table.
+    ///
+    /// # Errors
+    /// What the destination says.
+    pub fn finish(self) -> io::Result<W> {
+        self.output.into_inner().map_err(io::IntoInnerError::into_error)
+    }
+}
+
+/// Names of a recording's columns and of those of the truth, in the order in which they are written.
+pub fn names(recording: &Recording, truth: Option<&Truth>) -> Vec<String> {
     let mut names = vec!["time_s".to_owned(), "position_m".to_owned(), "force_n".to_owned()];
     if recording.velocity_measured {
         names.push("velocity_mps".to_owned());

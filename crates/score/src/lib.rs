@@ -14,4 +14,4 @@ pub use online::{Measured, Online};
 pub use score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
 pub use scorer::{Heard, Moment, Scorer};
 pub use stylet_record::LayerTruth;
-pub use trace::{STORAGE_SAMPLES, Trace, algorithm_name, model_name, score_run};
+pub use trace::{STORAGE_SAMPLES, Trace, algorithm_name, coefficients, model_name, score_run};

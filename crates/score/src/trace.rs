@@ -74,31 +74,43 @@ impl Trace {
                 force_n,
             });
             each(index, &out);
-            let touched = out.theta != [0.0, 0.0];
-            trace.enhanced_n.push(out.enhanced_n);
-            let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
-            trace.low_n.push(low);
-            trace.high_n.push(high);
-            trace.reconstructed_n.push(out.reconstructed_n);
-            trace.error_n.push(out.error_n);
-            trace.stiffness_n_per_m.push(if touched { out.theta[0] } else { f64::NAN });
-            trace.friction.push(if touched { out.theta[1] } else { f64::NAN });
-            trace.cumulative_friction_ns_per_m.push(out.cumulative_friction_ns_per_m);
-            trace.cusum_n2.push(out.cusum_n2);
-            trace.derivative_n_per_s.push(out.derivative_n_per_s);
-            trace.state.push(out.state);
-            trace.detections.extend(out.detection);
-            if let Some(estimate) = out.estimate {
-                // A later word on a layer replaces an earlier one.
-                trace.estimates.retain(|e| e.layer != estimate.layer);
-                trace.estimates.push(estimate);
-            }
-            trace.contact_m = out.contact_m;
-            trace.unused += usize::from(!out.used);
+            trace.push(&out);
+            trace.note(&out);
         }
         trace.contact_s =
             trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
         trace
+    }
+
+    /// Adds what the core says of a sample to the columns.
+    pub fn push(&mut self, out: &stylet_core::Output) {
+        let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
+        let [stiffness, friction] = coefficients(out);
+        self.enhanced_n.push(out.enhanced_n);
+        self.low_n.push(low);
+        self.high_n.push(high);
+        self.reconstructed_n.push(out.reconstructed_n);
+        self.error_n.push(out.error_n);
+        self.stiffness_n_per_m.push(stiffness);
+        self.friction.push(friction);
+        self.cumulative_friction_ns_per_m.push(out.cumulative_friction_ns_per_m);
+        self.cusum_n2.push(out.cusum_n2);
+        self.derivative_n_per_s.push(out.derivative_n_per_s);
+        self.state.push(out.state);
+    }
+
+    /// Remembers what happened at a sample: ruptures, estimates, contact.
+    pub fn note(&mut self, out: &stylet_core::Output) {
+        self.detections.extend(out.detection);
+        if let Some(estimate) = out.estimate {
+            // A later word on a layer replaces an earlier one; it is among the last.
+            if let Some(earlier) = self.estimates.iter().rposition(|e| e.layer == estimate.layer) {
+                self.estimates.remove(earlier);
+            }
+            self.estimates.push(estimate);
+        }
+        self.contact_m = out.contact_m;
+        self.unused += usize::from(!out.used);
     }
 
     /// Offline estimate of the layer between `start_m` and `end_m`, whose samples are those before
@@ -132,6 +144,12 @@ impl Trace {
         // Without a measured drop nothing can split what the data do not separate.
         found.filter(|f| f.separable || estimate.is_some())
     }
+}
+
+/// Stiffness in N/m and friction in the model's unit; not numbers before contact.
+#[must_use]
+pub fn coefficients(out: &stylet_core::Output) -> [f64; 2] {
+    if out.theta == [0.0, 0.0] { [f64::NAN; 2] } else { out.theta }
 }
 
 /// Runs the core over a simulated recording and scores it against the truth.

@@ -8,6 +8,7 @@
 //! | [`robust`] | Huber and Student losses, weights, M-estimate of location |
 //! | [`ar`] | autoregressive noise: fit, order, exact whitening, likelihood |
 //! | [`moments`] | sums in order, compensated; running mean and variance |
+//! | [`select`] | quantiles of more numbers than memory holds |
 //! | [`rank`] | ranks and Spearman's correlation |
 //!
 //! Everything is `f64`, deterministic (`libm`, sums in the order given: the same bits on every machine and for any
@@ -23,6 +24,7 @@ pub mod normal;
 pub mod order;
 pub mod rank;
 pub mod robust;
+pub mod select;
 pub mod student;
 pub mod tails;
 
@@ -36,6 +38,7 @@ pub use order::{
 };
 pub use rank::spearman;
 pub use robust::Loss;
+pub use select::quantiles_along;
 
 /// Half width of the two-sided 95 % interval of a normal distribution, in standard deviations.
 pub const Z95: f64 = 1.959_963_984_540_054;

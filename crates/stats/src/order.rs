@@ -90,7 +90,7 @@ pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
 }
 
 /// Index below the quantile and the share of the way to the next; `None` where there is no quantile.
-fn position(count: usize, q: f64) -> Option<(usize, f64)> {
+pub(crate) fn position(count: usize, q: f64) -> Option<(usize, f64)> {
     let last = count.checked_sub(1)?;
     if !(0.0..=1.0).contains(&q) {
         return None;
@@ -101,7 +101,7 @@ fn position(count: usize, q: f64) -> Option<(usize, f64)> {
 }
 
 /// Between two values, also where their difference would overflow or one is infinite.
-fn between(low: f64, high: f64, share: f64) -> f64 {
+pub(crate) fn between(low: f64, high: f64, share: f64) -> f64 {
     if low == high { low } else { low + share * (high - low) }
 }
 

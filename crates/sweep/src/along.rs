@@ -1,8 +1,9 @@
 //! Failures along a drawn quantity: the rows of the robustness map.
 
 use crate::row::{Columns, Row};
-use crate::summary::failed;
+use crate::summary::score;
 use crate::sweep::Sweep;
+use crate::trials::Trials;
 use stylet_report::significant;
 use stylet_stats::{Interval, wilson};
 
@@ -19,24 +20,33 @@ pub struct Bin {
 }
 
 /// Rows in groups of equal size along a drawn quantity; those of an effect that is off are left out.
-#[must_use]
-pub fn bins(sweep: &Sweep, columns: &Columns, rows: &[Row], quantity: usize) -> Vec<Bin> {
+///
+/// # Errors
+/// When the rows cannot be read.
+pub fn bins<T: Trials + ?Sized>(
+    sweep: &Sweep,
+    columns: &Columns,
+    rows: &T,
+    quantity: usize,
+) -> Result<Vec<Bin>, T::Error> {
     let switch = sweep
         .fields
         .get(quantity)
         .and_then(|f| f.effect())
         .and_then(|e| e.checked_sub(sweep.own_effects))
         .map(|e| sweep.fields.len() + e);
-    let mut kept: Vec<&Row> =
-        rows.iter().filter(|r| switch.is_none_or(|s| r.values.get(s).is_some_and(|on| *on > 0.0))).collect();
-    kept.sort_by(|a, b| a.values[quantity].total_cmp(&b.values[quantity]).then(a.trial.cmp(&b.trial)));
+    let on = switch.map(|switch| rows.column(switch)).transpose()?;
+    let mut kept: Vec<usize> =
+        (0..rows.count()).filter(|place| on.as_ref().is_none_or(|on| on[*place] > 0.0)).collect();
+    let along = rows.column(quantity)?;
+    kept.sort_by(|&a, &b| along[a].total_cmp(&along[b]).then(a.cmp(&b)));
+    let (missed, alarms) = (score(columns, rows, "missed")?, score(columns, rows, "false")?);
     let size = kept.len().div_ceil(BINS).max(1);
-    kept.chunks(size)
-        .map(|chunk| {
-            let hits = chunk.iter().filter(|r| failed(columns, r)).count();
-            Bin { middle: chunk[chunk.len() / 2].values[quantity], failed: wilson(hits, chunk.len()) }
-        })
-        .collect()
+    let bin = |chunk: &[usize]| {
+        let hits = chunk.iter().filter(|&&place| missed[place] > 0.0 || alarms[place] > 0.0).count();
+        Bin { middle: along[chunk[chunk.len() / 2]], failed: wilson(hits, chunk.len()) }
+    };
+    Ok(kept.chunks(size).map(bin).collect())
 }
 
 /// A row of the robustness map.
@@ -53,7 +63,7 @@ pub struct MapRow {
 pub fn map_rows(sweep: &Sweep, columns: &Columns, rows: &[Row]) -> Vec<MapRow> {
     (0..sweep.fields.len())
         .filter_map(|quantity| {
-            let bins = bins(sweep, columns, rows, quantity);
+            let Ok(bins) = bins(sweep, columns, rows, quantity);
             let (first, last) = (bins.first()?, bins.last()?);
             if first.middle == last.middle {
                 return None; // a constant

@@ -21,6 +21,7 @@ pub mod shard;
 mod summary;
 mod sweep;
 pub mod trial;
+mod trials;
 
 pub use along::{BINS, Bin, MapRow, bins, map_rows};
 pub use design::{Design, SOBOL_DIMENSIONS, Sampling, trial_seed};
@@ -33,3 +34,4 @@ pub use row::{Columns, Row, csv};
 pub use run::{TrialError, rows, rows_with};
 pub use summary::{Explained, Outcome, ScoreSummary, Summary, WorstTrial, failed, summarise, value};
 pub use sweep::{Overrides, RandomEffect, Sweep, SweepFile, Vary};
+pub use trials::{Trials, TrialsOnDisk, TrialsWriter};

@@ -1,6 +1,7 @@
 //! `trials.parquet`: the same table as `trials.csv`, one column per name, nulls for what does not exist.
 
-use crate::row::{Columns, Row};
+use crate::row::Columns;
+use crate::trials::Trials;
 use parquet::basic::Repetition;
 use parquet::basic::Type as Physical;
 use parquet::column::writer::ColumnWriter;
@@ -9,13 +10,18 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
+use std::io::Write;
 use std::sync::Arc;
 
-/// The table as the bytes of a Parquet file, the same for the same rows.
+/// Writes the table as a Parquet file, the same bytes for the same rows.
 ///
 /// # Errors
-/// What the Parquet library says; no table of a sweep makes it say anything.
-pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
+/// What the destination or the rows say; no table of a sweep makes the Parquet library say anything.
+pub fn parquet<T: Trials + ?Sized>(
+    columns: &Columns,
+    rows: &T,
+    output: impl Write + Send,
+) -> Result<(), ParquetError> {
     let mut fields = Vec::new();
     for (index, name) in columns.names().enumerate() {
         let (physical, repetition) = if index < 3 {
@@ -29,19 +35,20 @@ pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError>
     }
     let schema = Arc::new(Type::group_type_builder("trials").with_fields(fields).build()?);
     let properties = Arc::new(WriterProperties::builder().set_created_by("stylet".to_owned()).build());
-    let mut bytes = Vec::new();
-    let mut writer = SerializedFileWriter::new(&mut bytes, schema, properties)?;
+    let read = |why: T::Error| ParquetError::from(T::told(why));
+    let mut writer = SerializedFileWriter::new(output, schema, properties)?;
     let mut group = writer.next_row_group()?;
     let mut index = 0;
     while let Some(mut column) = group.next_column()? {
         if index < 3 {
             // Seeds keep their 64 bits: those beyond the signed range come out negative.
-            let whole: Vec<i64> = rows.iter().map(|r| [r.trial, r.seed, r.redrawn][index] as i64).collect();
+            let mut whole: Vec<i64> = Vec::with_capacity(rows.count());
+            rows.each(|r| whole.push([r.trial, r.seed, r.redrawn][index] as i64)).map_err(read)?;
             column.typed::<Int64Type>().write_batch(&whole, None, None)?;
         } else if let ColumnWriter::DoubleColumnWriter(typed) = column.untyped() {
-            let all = || rows.iter().map(|r| r.values.get(index - 3).copied().unwrap_or(f64::NAN));
-            let there: Vec<i16> = all().map(|x| i16::from(!x.is_nan())).collect();
-            let values: Vec<f64> = all().filter(|x| !x.is_nan()).collect();
+            let mut values = rows.column(index - 3).map_err(read)?;
+            let there: Vec<i16> = values.iter().map(|x| i16::from(!x.is_nan())).collect();
+            values.retain(|x| !x.is_nan());
             typed.write_batch(&values, Some(&there), None)?;
         }
         column.close()?;
@@ -49,7 +56,7 @@ pub fn parquet(columns: &Columns, rows: &[Row]) -> Result<Vec<u8>, ParquetError>
     }
     group.close()?;
     writer.close()?;
-    Ok(bytes)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -68,8 +75,13 @@ mod tests {
             Sweep::load(&file, Overrides { trials: Some(12), seed: None }).expect("the shipped sweep");
         let columns = Columns::new(&sweep);
         let rows = rows_with(&sweep, &columns, 0..12, 1, &|_| {}).expect("it runs");
-        let bytes = parquet(&columns, &rows).expect("it is written");
-        assert_eq!(bytes, parquet(&columns, &rows).expect("it is written"), "the same bytes");
+        let written = || {
+            let mut bytes = Vec::new();
+            parquet(&columns, &rows[..], &mut bytes).expect("it is written");
+            bytes
+        };
+        let bytes = written();
+        assert_eq!(bytes, written(), "the same bytes");
 
         let place = std::env::temp_dir().join(format!("stylet-{}.parquet", std::process::id()));
         std::fs::write(&place, &bytes).expect("a scratch file");

@@ -2,11 +2,13 @@
 
 use crate::draw::Drawn;
 use crate::sweep::Sweep;
+use crate::trials::Trials;
+use std::io::{self, BufWriter, Write};
 use stylet_score::{Compared, Score};
 use stylet_tissue::Effect;
 
 /// The row of one trial.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
     /// Number of the trial, from 0.
     pub trial: u64,
@@ -129,21 +131,30 @@ impl Columns {
 
 /// `trials.csv`: a header, then one line per trial; a value that does not exist is empty. Numbers are
 /// the shortest that read back as the same bits.
-#[must_use]
-pub fn csv(columns: &Columns, rows: &[Row]) -> Vec<u8> {
-    use std::fmt::Write;
-    let mut text = columns.names().collect::<Vec<_>>().join(",");
-    text.push('\n');
-    for row in rows {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{},{},{}", row.trial, row.seed, row.redrawn);
-        for value in &row.values {
-            text.push(',');
-            if !value.is_nan() {
-                let _ = write!(text, "{value}");
-            }
+///
+/// # Errors
+/// What the destination or the rows say.
+pub fn csv<T: Trials + ?Sized>(columns: &Columns, rows: &T, output: impl Write) -> io::Result<()> {
+    let mut output = BufWriter::new(output);
+    writeln!(output, "{}", columns.names().collect::<Vec<_>>().join(","))?;
+    let mut written = Ok(());
+    let read = rows.each(|row| {
+        if written.is_ok() {
+            written = write_row(row, &mut output);
         }
-        text.push('\n');
+    });
+    read.map_err(T::told)?;
+    written?;
+    output.flush()
+}
+
+fn write_row(row: &Row, output: &mut impl Write) -> io::Result<()> {
+    write!(output, "{},{},{}", row.trial, row.seed, row.redrawn)?;
+    for value in &row.values {
+        match value.is_nan() {
+            true => output.write_all(b",")?,
+            false => write!(output, ",{value}")?,
+        }
     }
-    text.into_bytes()
+    output.write_all(b"\n")
 }

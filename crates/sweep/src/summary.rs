@@ -4,6 +4,7 @@
 use crate::row::{Columns, Row};
 use crate::sensitivity::first_order;
 use crate::sweep::Sweep;
+use crate::trials::Trials;
 use serde::{Deserialize, Serialize};
 use stylet_stats::{Interval, quantile_interval, sorted, spearman, wilson};
 
@@ -124,77 +125,103 @@ fn is_signed(score: &str) -> bool {
     score.starts_with("contact_m") || score.contains("delay")
 }
 
-/// Sums up a sweep. `replay` is the folder that the replay commands name.
-#[must_use]
-pub fn summarise(sweep: &Sweep, columns: &Columns, rows: &[Row], replay: &str) -> Summary {
-    let sum = |score: &str| rows.iter().map(|r| value(columns, r, score)).sum::<f64>();
-    let count = |test: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| test(r)).count();
-    let trials = rows.len();
+/// A score of all rows; not numbers when they have none.
+pub(crate) fn score<T: Trials + ?Sized>(
+    columns: &Columns,
+    rows: &T,
+    score: &str,
+) -> Result<Vec<f64>, T::Error> {
+    columns.score(score).map_or_else(|| Ok(vec![f64::NAN; rows.count()]), |value| rows.column(value))
+}
+
+/// Sums up a sweep. `replay` is the folder that the replay commands name. Holds a few values of every row at a time, not the rows.
+///
+/// # Errors
+/// When the rows cannot be read.
+pub fn summarise<T: Trials + ?Sized>(
+    sweep: &Sweep,
+    columns: &Columns,
+    rows: &T,
+    replay: &str,
+) -> Result<Summary, T::Error> {
+    let sum = |name: &str| Ok::<f64, T::Error>(score(columns, rows, name)?.iter().sum::<f64>());
+    let trials = rows.count();
     let counted = ["ruptures", "missed", "false", "hits_are_chance"];
-    let scores = columns.scores.iter().filter(|s| !counted.contains(&s.as_str()));
-    let size = |score: &str, x: f64| if is_signed(score) { x.abs() } else { x };
-    let scores = scores
-        .filter_map(|score| {
-            let all = sorted(rows.iter().map(|r| size(score, value(columns, r, score))));
-            let worst = rows
-                .iter()
-                .map(|r| (size(score, value(columns, r, score)), r.trial))
-                .filter(|(x, _)| !x.is_nan())
-                .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
-            Some(ScoreSummary {
-                score: score.clone(),
-                trials: all.len(),
-                median: quantile_interval(&all, 0.5)?,
-                p95: quantile_interval(&all, 0.95)?,
-                worst: worst.0,
-                worst_trial: worst.1,
-            })
-        })
-        .collect();
-    Summary {
+    let mut scores = Vec::new();
+    for name in columns.scores.iter().filter(|s| !counted.contains(&s.as_str())) {
+        scores.extend(summary_of(name, score(columns, rows, name)?));
+    }
+    let (mut redrawn, mut failures) = (0, 0);
+    rows.each(|row| {
+        redrawn += usize::from(row.redrawn > 0);
+        failures += usize::from(failed(columns, row));
+    })?;
+    let with_false = score(columns, rows, "false")?.iter().filter(|count| **count > 0.0).count();
+    Ok(Summary {
         sweep: sweep.name.clone(),
         scenario: sweep.template.name.clone(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         identity: sweep.identity(),
-        trials: rows.len(),
+        trials,
         seed: sweep.file.seed,
         sampling: format!("{:?}", sweep.file.sampling),
-        redrawn: rows.iter().filter(|r| r.redrawn > 0).count(),
-        ruptures: sum("ruptures") as u64,
-        missed: wilson(sum("missed") as usize, sum("ruptures") as usize),
-        false_alarms: sum("false") as u64,
-        trials_with_false: wilson(count(&|r| value(columns, r, "false") > 0.0), trials),
-        failed: wilson(count(&|r| failed(columns, r)), trials),
+        redrawn,
+        ruptures: sum("ruptures")? as u64,
+        missed: wilson(sum("missed")? as usize, sum("ruptures")? as usize),
+        false_alarms: sum("false")? as u64,
+        trials_with_false: wilson(with_false, trials),
+        failed: wilson(failures, trials),
         scores,
         drawn: columns.drawn.clone(),
-        worst: worst(columns, rows, replay),
-        explained: explained(columns, rows),
-    }
+        worst: worst(columns, rows, replay)?,
+        explained: explained(columns, rows)?,
+    })
 }
 
-fn worst(columns: &Columns, rows: &[Row], replay: &str) -> Vec<WorstTrial> {
-    let rank = |r: &Row| {
-        let errors = value(columns, r, "missed") + value(columns, r, "false");
-        let off = value(columns, r, "enhancement.rms_relative");
-        (errors, if off.is_nan() { f64::INFINITY } else { off })
-    };
-    let mut order: Vec<&Row> = rows.iter().collect();
-    order.sort_by(|a, b| {
-        let (x, y) = (rank(a), rank(b));
-        y.0.total_cmp(&x.0).then(y.1.total_cmp(&x.1)).then(a.trial.cmp(&b.trial))
-    });
-    order
-        .into_iter()
-        .take(WORST)
-        .map(|r| WorstTrial {
+/// A score over all trials; nothing when no trial has it.
+fn summary_of(name: &str, mut values: Vec<f64>) -> Option<ScoreSummary> {
+    if is_signed(name) {
+        values.iter_mut().for_each(|x| *x = x.abs());
+    }
+    // Trials are numbered as they come.
+    let worst = values
+        .iter()
+        .zip(0_u64..)
+        .filter(|(x, _)| !x.is_nan())
+        .max_by(|a, b| a.0.total_cmp(b.0).then(b.1.cmp(&a.1)))
+        .map(|(x, trial)| (*x, trial))?;
+    let all = sorted(values);
+    Some(ScoreSummary {
+        score: name.to_owned(),
+        trials: all.len(),
+        median: quantile_interval(&all, 0.5)?,
+        p95: quantile_interval(&all, 0.95)?,
+        worst: worst.0,
+        worst_trial: worst.1,
+    })
+}
+
+fn worst<T: Trials + ?Sized>(columns: &Columns, rows: &T, replay: &str) -> Result<Vec<WorstTrial>, T::Error> {
+    let mut errors = score(columns, rows, "missed")?;
+    errors.iter_mut().zip(score(columns, rows, "false")?).for_each(|(errors, more)| *errors += more);
+    let off: Vec<f64> = score(columns, rows, "enhancement.rms_relative")?;
+    let off = |place: usize| if off[place].is_nan() { f64::INFINITY } else { off[place] };
+    let mut order: Vec<usize> = (0..rows.count()).collect();
+    order.sort_by(|&a, &b| errors[b].total_cmp(&errors[a]).then(off(b).total_cmp(&off(a))).then(a.cmp(&b)));
+    order.truncate(WORST);
+    let mut worst = Vec::with_capacity(order.len());
+    for place in order {
+        let r = rows.row(place)?;
+        worst.push(WorstTrial {
             trial: r.trial,
-            missed: value(columns, r, "missed") as u64,
-            false_alarms: value(columns, r, "false") as u64,
-            enhancement: Some(value(columns, r, "enhancement.rms_relative")).filter(|x| !x.is_nan()),
+            missed: value(columns, &r, "missed") as u64,
+            false_alarms: value(columns, &r, "false") as u64,
+            enhancement: Some(value(columns, &r, "enhancement.rms_relative")).filter(|x| !x.is_nan()),
             drawn: r.values[..columns.drawn.len()].to_vec(),
             replay: format!("stylet replay {replay} {}", r.trial),
-        })
-        .collect()
+        });
+    }
+    Ok(worst)
 }
 
 /// Outcomes of a trial that the drawn quantities are held against.
@@ -205,39 +232,36 @@ const OUTCOMES: [(&str, &[&str]); 4] = [
     ("enhancement error", &["enhancement.rms_relative"]),
 ];
 
-fn explained(columns: &Columns, rows: &[Row]) -> Vec<Outcome> {
-    OUTCOMES
-        .iter()
-        .map(|(outcome, scores)| {
-            let (mut kept, mut y) = (Vec::new(), Vec::new());
-            for row in rows {
-                let sum: f64 = scores.iter().map(|s| value(columns, row, s)).sum();
-                if !sum.is_nan() {
-                    kept.push(row);
-                    y.push(sum);
-                }
-            }
-            let mut by: Vec<Explained> = columns
-                .drawn
-                .iter()
-                .enumerate()
-                .map(|(i, quantity)| {
-                    let x: Vec<f64> = kept.iter().map(|r| r.values[i]).collect();
-                    let rank = spearman(&x, &y);
-                    Explained {
-                        quantity: quantity.clone(),
-                        rank_correlation: rank.map(|r| r.0),
-                        p_value: rank.map(|r| r.1),
-                        first_order: first_order(&x, &y),
-                    }
-                })
-                .collect();
-            by.sort_by(|a, b| {
-                let key = |e: &Explained| e.first_order.unwrap_or(-1.0);
-                key(b).total_cmp(&key(a)).then(a.quantity.cmp(&b.quantity))
+fn explained<T: Trials + ?Sized>(columns: &Columns, rows: &T) -> Result<Vec<Outcome>, T::Error> {
+    let mut found = Vec::new();
+    for (outcome, scores) in OUTCOMES {
+        // Minus zero is what adds nothing.
+        let mut y = vec![-0.0; rows.count()];
+        for name in scores {
+            y.iter_mut().zip(score(columns, rows, name)?).for_each(|(sum, x)| *sum += x);
+        }
+        let there: Vec<bool> = y.iter().map(|y| !y.is_nan()).collect();
+        y.retain(|y| !y.is_nan());
+        let mut by = Vec::with_capacity(columns.drawn.len());
+        for (i, quantity) in columns.drawn.iter().enumerate() {
+            let mut x = rows.column(i)?;
+            let mut kept = there.iter();
+            x.retain(|_| kept.next().is_some_and(|there| *there));
+            let rank = spearman(&x, &y);
+            by.push(Explained {
+                quantity: quantity.clone(),
+                rank_correlation: rank.map(|r| r.0),
+                p_value: rank.map(|r| r.1),
+                first_order: first_order(&x, &y),
             });
-            Outcome { outcome: (*outcome).to_owned(), by }
-        })
-        .filter(|o| o.by.iter().any(|e| e.first_order.is_some() || e.rank_correlation.is_some()))
-        .collect()
+        }
+        by.sort_by(|a, b| {
+            let key = |e: &Explained| e.first_order.unwrap_or(-1.0);
+            key(b).total_cmp(&key(a)).then(a.quantity.cmp(&b.quantity))
+        });
+        if by.iter().any(|e| e.first_order.is_some() || e.rank_correlation.is_some()) {
+            found.push(Outcome { outcome: outcome.to_owned(), by });
+        }
+    }
+    Ok(found)
 }

@@ -2,6 +2,7 @@
 
 use crate::picture::Ran;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use stylet_core::LayerEstimate;
 use stylet_core::config::Model;
 use stylet_record::QualityNote;
@@ -141,11 +142,12 @@ struct DropSize {
 /// The ruptures that the core found.
 pub(super) fn events(trace: &Trace) -> Vec<Event> {
     let told = |x: f64| (x != 0.0).then_some(x);
+    let estimates: BTreeMap<usize, &LayerEstimate> = trace.estimates.iter().map(|e| (e.layer, e)).collect();
     trace
         .detections
         .iter()
         .map(|d| {
-            let estimate = trace.estimates.iter().find(|e| e.layer == d.layer);
+            let estimate = estimates.get(&d.layer).copied();
             // What the samples around the drop say; without that, what the layer's estimate says.
             let (value, sd) = match (told(d.drop_sd_n), estimate) {
                 (Some(sd), _) => (Some(d.drop_n), Some(sd)),
@@ -161,18 +163,4 @@ pub(super) fn events(trace: &Trace) -> Vec<Event> {
             }
         })
         .collect()
-}
-
-/// The table with the state's name as its last column.
-pub(super) fn with_state(csv: &[u8], state: &[stylet_core::State]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(csv.len() + 24 * state.len());
-    let mut state = state.iter();
-    for (i, line) in csv.split(|b| *b == b'\n').filter(|line| !line.is_empty()).enumerate() {
-        out.extend_from_slice(line.strip_suffix(b"\r").unwrap_or(line));
-        out.push(b',');
-        let name = if i == 0 { "state" } else { state.next().map_or("", |s| s.name()) };
-        out.extend_from_slice(name.as_bytes());
-        out.push(b'\n');
-    }
-    out
 }

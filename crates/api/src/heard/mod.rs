@@ -1,33 +1,59 @@
 //! A measured recording, heard by the online core: what it found, as files.
 
 mod files;
+mod long;
+mod picture;
+mod table;
+
+pub use long::hear_long;
 
 use crate::enhance::listen;
 use crate::error::Error;
+use crate::folder::Written;
 use crate::hash;
 use crate::output::{Output, json};
-use crate::picture::{self, Ran};
+use crate::picture::{Ran, report};
 use crate::run::settings_note;
-use files::{EnhanceResult, events, found_by, with_state};
+use files::{EnhanceResult, events, found_by};
 use std::path::Path;
 use stylet_core::config::Model;
-use stylet_record::{QualityNote, Recording, write_csv};
+use stylet_record::{QualityNote, Recording};
 use stylet_report::run::{ForceTrace, Provenance, RunReport};
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::{EnhanceFile, ron_options};
 
 /// A measured recording and what the core made of it.
 pub struct Heard {
-    /// What was recorded.
+    /// What was recorded; of a long recording the samples that the report shows.
     pub recording: Recording,
+    /// How much was recorded.
+    pub extent: Extent,
     /// What is remarkable about it.
     pub notes: Vec<QualityNote>,
-    /// What the core made of it, per model.
+    /// What the core made of it, per model: all ruptures and layers, and one value per sample of `recording`.
     pub ran: Vec<Ran>,
     /// Hash over all results: the same recording and configuration give the same.
     pub hash: String,
     config: EnhanceFile,
-    csv: Vec<u8>,
+    table: Table,
+}
+
+/// How much was recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Number of samples.
+    pub samples: usize,
+    /// From the first to the last (s).
+    pub duration_s: f64,
+    /// Inverse of the median interval (Hz).
+    pub sample_hz: f64,
+}
+
+/// `enhanced.csv`.
+enum Table {
+    Here(Vec<u8>),
+    /// In the folder where the set is being written.
+    There(Written),
 }
 
 /// Where a recording and a configuration came from.
@@ -51,9 +77,14 @@ pub fn hear(
     models: &[Model],
 ) -> Result<Heard, Error> {
     let ran: Vec<Ran> = models.iter().map(|&model| listen(&recording, &config, model)).collect();
-    let csv = table(&recording, &ran)?;
+    let csv = table::of(&recording, &ran)?;
     let hash = hash::of_results(&csv, &ran.iter().map(|r| &r.trace).collect::<Vec<_>>());
-    Ok(Heard { recording, notes, ran, hash, config, csv })
+    let extent = Extent {
+        samples: recording.len(),
+        duration_s: recording.duration_s(),
+        sample_hz: recording.sample_hz(),
+    };
+    Ok(Heard { recording, extent, notes, ran, hash, config, table: Table::Here(csv) })
 }
 
 impl Heard {
@@ -62,12 +93,12 @@ impl Heard {
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
     pub fn json(&self, name: &str) -> Result<Vec<u8>, Error> {
-        let Self { recording, notes, ran, hash, .. } = self;
+        let Self { extent, notes, ran, hash, .. } = self;
         json(&EnhanceResult {
             recording: name.to_owned(),
-            samples: recording.len(),
-            duration_s: recording.duration_s(),
-            sample_hz: recording.sample_hz(),
+            samples: extent.samples,
+            duration_s: extent.duration_s,
+            sample_hz: extent.sample_hz,
             hash,
             version: env!("CARGO_PKG_VERSION"),
             found: ran.iter().map(found_by).collect(),
@@ -80,10 +111,12 @@ impl Heard {
     /// # Errors
     /// [`Error::Internal`] when the configuration cannot be written.
     pub fn report(&self, source: &Source) -> Result<RunReport, Error> {
-        let Self { recording, notes, ran, hash, config, .. } = self;
+        let Self { recording, extent, notes, ran, hash, config, .. } = self;
+        let shortened = (extent.samples > recording.len())
+            .then(|| picture::note(extent.samples, recording.len(), ran.len()));
         let body = ron_options().to_string_pretty(config, Default::default()).map_err(Error::internal)?;
         let name = source.data.file_name().unwrap_or(source.data.as_os_str());
-        Ok(RunReport {
+        let mut page = RunReport {
             title: name.to_string_lossy().into_owned(),
             source: "measured recording; there is no ground truth to score against".to_owned(),
             provenance: Provenance {
@@ -94,43 +127,46 @@ impl Heard {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 hash: hash.clone(),
             },
-            notes: notes.iter().map(|n| n.message.clone()).chain(settings_note(ran)).collect(),
-            ..picture::report(
+            notes: notes
+                .iter()
+                .map(|n| n.message.clone())
+                .chain(settings_note(ran))
+                .chain(shortened)
+                .collect(),
+            ..report(
                 recording,
                 vec![ForceTrace { sensor: "force_torque".to_owned(), force_n: recording.force_n.clone() }],
                 ran,
             )
-        })
+        };
+        if self.is_long() {
+            picture::shorten(&mut page);
+        }
+        Ok(page)
     }
 
-    /// All files that `stylet enhance` writes.
+    /// Whether the recording was too long to be kept, so that the report shows a selection.
+    #[must_use]
+    pub fn is_long(&self) -> bool {
+        matches!(self.table, Table::There(_))
+    }
+
+    /// All files that `stylet enhance` writes; those of a long recording belong into the folder that was claimed for it.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
-    pub fn output(&self, source: &Source) -> Result<Output, Error> {
+    pub fn output(self, source: &Source) -> Result<Output, Error> {
         let report = self.report(source)?;
         let events = self.ran.first().map(|r| events(&r.trace)).unwrap_or_default();
         let mut output = Output::default();
-        output.add("enhanced.csv", self.csv.clone());
         output.add("enhance.json", self.json(&source.data.display().to_string())?);
         output.add_json("events.json", &events)?;
         output.add("figure.svg", report.to_svg(&FigureOptions::default()));
         output.add("report.html", report.to_html());
+        match self.table {
+            Table::Here(csv) => output.add("enhanced.csv", csv),
+            Table::There(part) => output.add_part(part),
+        }
         Ok(output)
     }
-}
-
-/// `enhanced.csv`: the recording beside what the first model made of it.
-fn table(recording: &Recording, ran: &[Ran]) -> Result<Vec<u8>, Error> {
-    let Some(first) = ran.first() else { return Ok(Vec::new()) };
-    let extra: [(&str, &[f64]); 5] = [
-        ("enhanced_n", &first.trace.enhanced_n),
-        ("low_n", &first.trace.low_n),
-        ("high_n", &first.trace.high_n),
-        ("reconstructed_n", &first.trace.reconstructed_n),
-        ("estimated_cumulative_friction_ns_per_m", &first.trace.cumulative_friction_ns_per_m),
-    ];
-    let mut csv = Vec::new();
-    write_csv(recording, None, &extra, &mut csv)?;
-    Ok(with_state(&csv, &first.trace.state))
 }

@@ -18,7 +18,7 @@ use stylet_api::sweep_folder::{SHARD_TRIALS, all_shards, begin, conclude};
 use stylet_api::{Claim, need};
 use stylet_pages::words::shown;
 use stylet_report::{percent, significant};
-use stylet_sweep::{Columns, Row, Summary, Sweep};
+use stylet_sweep::{Columns, Summary, Sweep, TrialsOnDisk};
 
 /// The command.
 ///
@@ -49,7 +49,7 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
     let sweep = Sweep::load(file, args.draws.into())?;
     let columns = Columns::new(&sweep);
     let threads = args.threads.unwrap_or(0);
-    args.limits.allow(file, &need::of_sweep(&sweep, &columns, threads), args.results.quiet)?;
+    args.limits.allow(file, &need::of_sweep(&sweep, threads), args.results.quiet)?;
     let out = args.results.folder(file, "");
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     // Nobody else writes there until the set is whole: the shards, the tables and `sweep.ron` are of one draw.
@@ -66,7 +66,7 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
 fn written(
     sweep: &Sweep,
     columns: &Columns,
-    rows: &[Row],
+    rows: &TrialsOnDisk,
     (claim, out): (&Claim, &Path),
     quiet: bool,
 ) -> Result<(), Failure> {

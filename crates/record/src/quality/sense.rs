@@ -1,9 +1,10 @@
 //! Recordings from which no cause may be named: a dead or reversed sensor, a needle that stays in the air or does not move,
 //! too few samples.
 
-use super::{QualityKind, QualityNote};
-use crate::recording::Recording;
-use stylet_stats::{extremes, median_of, quantile_of};
+use super::runs::runs;
+use super::{Facts, QualityKind, QualityNote};
+use crate::along::{Along, Kept, Quantity};
+use stylet_stats::quantiles_along;
 
 /// Fewest samples from which anything about a tissue can be told.
 pub const LEAST_SAMPLES: usize = 50;
@@ -18,13 +19,12 @@ pub(super) fn too_short(samples: usize) -> Option<QualityNote> {
 /// A force that varies by less than this share of itself (or than this many newtons) comes from no sensor that works.
 const NOTHING: f64 = 1e-9;
 
-pub(super) fn dead(recording: &Recording) -> Option<QualityNote> {
-    let (low, high) = extremes(&recording.force_n);
+pub(super) fn dead(samples: usize, facts: &Facts) -> Option<QualityNote> {
+    let (low, high) = facts.force_n;
     (high - low <= NOTHING * high.abs().max(low.abs()).max(1.0)).then(|| {
         let message = format!(
-            "the force stands at {high} N in all {} samples, without any noise: the sensor was off or not connected, or this is \
-             another column; check the cable and the column map, and record again",
-            recording.len()
+            "the force stands at {high} N in all {samples} samples, without any noise: the sensor was off or not connected, or this is \
+             another column; check the cable and the column map, and record again"
         );
         QualityNote::forbidding(QualityKind::Dead, message, [("value", high)])
     })
@@ -33,8 +33,8 @@ pub(super) fn dead(recording: &Recording) -> Option<QualityNote> {
 /// A needle that travels less than this (m) was not inserted.
 const STILL_M: f64 = 1e-6;
 
-pub(super) fn still(recording: &Recording) -> Option<QualityNote> {
-    let (low, high) = extremes(&recording.position_m);
+pub(super) fn still(facts: &Facts) -> Option<QualityNote> {
+    let (low, high) = facts.position_m;
     (high - low < STILL_M).then(|| {
         let message = format!(
             "the position stands at {high} m: the needle does not move, or this is another column; check the encoder and the column map"
@@ -47,25 +47,34 @@ pub(super) fn still(recording: &Recording) -> Option<QualityNote> {
 const UNMEASURABLE: f64 = 1e12;
 
 /// Values like 1e300, which finite arithmetic does not survive.
-pub(super) fn unmeasurable(recording: &Recording) -> Option<QualityNote> {
+pub(super) fn unmeasurable<A: Along>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
     let columns = [
-        ("force_n", &recording.force_n),
-        ("position_m", &recording.position_m),
-        ("velocity_mps", &recording.velocity_mps),
+        ("force_n", Quantity::Force),
+        ("position_m", Quantity::Position),
+        ("velocity_mps", Quantity::Velocity),
     ];
-    let first = |values: &[f64]| values.iter().position(|x| x.abs() > UNMEASURABLE);
-    let (name, at, value) =
-        columns.iter().find_map(|(name, values)| first(values).map(|at| (*name, at, values[at])))?;
+    for (name, which) in columns {
+        let (mut sample, mut first) = (0, None);
+        recording.values(which, |x| {
+            if x.abs() > UNMEASURABLE && first.is_none() {
+                first = Some((sample, x));
+            }
+            sample += 1;
+        })?;
+        if let Some((at, value)) = first {
+            return Ok(Some(beyond_measure(name, value, at, recording.at(Quantity::Time, at)?)));
+        }
+    }
+    Ok(None)
+}
+
+fn beyond_measure(name: &str, value: f64, at: usize, time_s: f64) -> QualityNote {
     let message = format!(
         "{name} is {value:e} in sample {} (t = {} s): no sensor gives that; remove the row or correct the value",
         at + 1,
-        recording.time_s[at]
+        time_s
     );
-    Some(QualityNote::forbidding(
-        QualityKind::UnitMixUp,
-        message,
-        [("value", value), ("limit", UNMEASURABLE)],
-    ))
+    QualityNote::forbidding(QualityKind::UnitMixUp, message, [("value", value), ("limit", UNMEASURABLE)])
 }
 
 /// Longest run of equal forces that passes while the needle moves.
@@ -76,38 +85,38 @@ const MOVED: f64 = 0.01;
 const DISTINCT: f64 = 0.2;
 
 /// A force that freezes at a value that is not its extreme (there it is saturation), and not zero (nothing touches the needle).
-pub(super) fn stuck(recording: &Recording) -> Option<QualityNote> {
-    let force_n = &recording.force_n;
-    let mut distinct = force_n.clone();
-    distinct.sort_unstable_by(f64::total_cmp);
-    distinct.dedup();
-    if (distinct.len() as f64) < DISTINCT * force_n.len() as f64 {
-        return None;
+pub(super) fn stuck<A: Along>(
+    recording: &A,
+    sorted: &A::Kept,
+    facts: &Facts,
+) -> Result<Option<QualityNote>, A::Error> {
+    let (mut distinct, mut last) = (0_usize, None);
+    sorted.each(|x| distinct += usize::from(last.replace(x) != Some(x)))?;
+    if (distinct as f64) < DISTINCT * recording.len() as f64 {
+        return Ok(None);
     }
-    let (least, most) = extremes(force_n);
-    let (low_m, high_m) = extremes(&recording.position_m);
-    let (mut runs, mut longest, mut at_s, mut value, mut start) = (0_u32, 0, 0.0, 0.0, 0);
-    for run in force_n.chunk_by(|a, b| a == b) {
-        let end = start + run.len();
-        if run.len() > LONGEST_RUN && run[0] != least && run[0] != most && run[0] != 0.0 {
-            let (from_m, to_m) = extremes(&recording.position_m[start..end]);
-            if to_m - from_m > MOVED * (high_m - low_m) {
-                runs += 1;
-                if run.len() > longest {
-                    (longest, at_s, value) = (run.len(), recording.time_s[start], run[0]);
-                }
+    let (least, most) = facts.force_n;
+    let travel_m = facts.position_m.1 - facts.position_m.0;
+    let (mut stretches, mut longest, mut at_s, mut value) = (0_u32, 0, 0.0, 0.0);
+    runs(recording, |run| {
+        let inside = run.force_n != least && run.force_n != most && run.force_n != 0.0;
+        let moved_m = run.between_m.1 - run.between_m.0;
+        if run.samples > LONGEST_RUN && inside && moved_m > MOVED * travel_m {
+            stretches += 1;
+            if run.samples > longest {
+                (longest, at_s, value) = (run.samples, run.start_s, run.force_n);
             }
         }
-        start = end;
-    }
-    (runs > 0).then(|| {
+    })?;
+    Ok((stretches > 0).then(|| {
         let message = format!(
-            "the force stands still at {value:.4} N for {longest} samples from t = {at_s:.4} s while the needle moves ({runs} such \
+            "the force stands still at {value:.4} N for {longest} samples from t = {at_s:.4} s while the needle moves ({stretches} such \
              stretch(es)): the logger probably repeated its last value; cut the stretch out or record again"
         );
-        let numbers = [("runs", f64::from(runs)), ("longest", longest as f64), ("at_s", at_s), ("value", value)];
+        let numbers =
+            [("runs", f64::from(stretches)), ("longest", longest as f64), ("at_s", at_s), ("value", value)];
         QualityNote::new(QualityKind::Stuck, message, numbers)
-    })
+    }))
 }
 
 /// How far above its noise a force must go the wrong way.
@@ -120,49 +129,81 @@ const CORRELATED: f64 = -0.3;
 const BEGIN: f64 = 0.02;
 
 /// A force that grows in the negative direction while the needle goes in.
-pub(super) fn reversed(recording: &Recording) -> Option<QualityNote> {
-    let force_n = &recording.force_n;
-    let first = ((BEGIN * force_n.len() as f64) as usize).clamp(5, force_n.len());
-    let rest_n = median_of(force_n[..first].iter().copied());
-    let in_m = |pair: &[f64]| pair[1] > pair[0];
-    let way_in: Vec<usize> =
-        (1..recording.len()).filter(|&i| in_m(&recording.position_m[i - 1..=i])).collect();
-    if way_in.len() < LEAST_SAMPLES {
-        return None;
+pub(super) fn reversed<A: Along>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
+    let samples = recording.len();
+    let first = ((BEGIN * samples as f64) as usize).clamp(5, samples.max(5));
+    let rest_n = median(|take| {
+        let mut left = first;
+        recording.values(Quantity::Force, |force_n| {
+            if left > 0 {
+                left -= 1;
+                take(force_n);
+            }
+        })
+    })?;
+    let mut count = 0_usize;
+    way_in(recording, |_, _| count += 1)?;
+    if count < LEAST_SAMPLES {
+        return Ok(None);
     }
-    let of = |share: f64| quantile_of(way_in.iter().map(|&i| force_n[i] - rest_n), share);
-    let (right_n, wrong_n) = (of(0.98).max(0.0), -of(0.02));
-    let middle_n = median_of(way_in.iter().map(|&i| force_n[i]));
-    let least_n = ABOVE_NOISE * noise_n(force_n);
+    let of = quantiles_along(&[0.98, 0.02], |take| way_in(recording, |_, force_n| take(force_n - rest_n)))?;
+    let (right_n, wrong_n) = match of[..] {
+        [most, least] => (most.max(0.0), -least),
+        _ => return Ok(None),
+    };
+    let middle_n = median(|take| way_in(recording, |_, force_n| take(force_n)))?;
+    let least_n = ABOVE_NOISE * noise_n(recording)?;
     let other_way = wrong_n > least_n && wrong_n > BEYOND * right_n && middle_n < 0.0;
-    (other_way && correlation(recording, &way_in) < CORRELATED).then(|| {
-        let message = format!(
-            "the force runs the other way: it falls by {wrong_n:.4} N while the needle goes in, and should be positive when it resists \
-             the insertion; give a column map with force: (name: \"force_n\", scale: -1)"
-        );
-        QualityNote::forbidding(QualityKind::Reversed, message, [("wrong_n", wrong_n), ("right_n", right_n)])
+    if !(other_way && correlation(recording, count as f64)? < CORRELATED) {
+        return Ok(None);
+    }
+    let message = format!(
+        "the force runs the other way: it falls by {wrong_n:.4} N while the needle goes in, and should be positive when it resists \
+         the insertion; give a column map with force: (name: \"force_n\", scale: -1)"
+    );
+    let numbers = [("wrong_n", wrong_n), ("right_n", right_n)];
+    Ok(Some(QualityNote::forbidding(QualityKind::Reversed, message, numbers)))
+}
+
+/// Position and force of the samples at which the needle has gone further in.
+fn way_in<A: Along>(recording: &A, mut each: impl FnMut(f64, f64)) -> Result<(), A::Error> {
+    let mut before_m = f64::NAN;
+    recording.blocks([Quantity::Position, Quantity::Force], |[position_m, force_n]| {
+        for (&position_m, &force_n) in position_m.iter().zip(force_n) {
+            if position_m > before_m {
+                each(position_m, force_n);
+            }
+            before_m = position_m;
+        }
     })
 }
 
-/// Standard deviation of the noise from the differences of neighbours: motion and ruptures hardly show in their median.
-fn noise_n(force_n: &[f64]) -> f64 {
-    median_of(force_n.windows(2).map(|pair| (pair[1] - pair[0]).abs())) * stylet_stats::MAD_TO_SD
-        / core::f64::consts::SQRT_2
+fn median<E>(pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>) -> Result<f64, E> {
+    Ok(quantiles_along(&[0.5], pass)?.first().copied().unwrap_or(f64::NAN))
 }
 
-fn correlation(recording: &Recording, at: &[usize]) -> f64 {
-    let n = at.len() as f64;
-    let mean = |x: &[f64]| at.iter().map(|&i| x[i]).sum::<f64>() / n;
-    let (z, f) = (&recording.position_m, &recording.force_n);
-    let (mean_z, mean_f) = (mean(z), mean(f));
+/// Standard deviation of the noise from the differences of neighbours: motion and ruptures hardly show in their median.
+fn noise_n<A: Along>(recording: &A) -> Result<f64, A::Error> {
+    let step_n = median(|take| recording.pairs(Quantity::Force, |before, now| take((now - before).abs())))?;
+    Ok(step_n * stylet_stats::MAD_TO_SD / core::f64::consts::SQRT_2)
+}
+
+/// Correlation of position and force on the way in, which has so many samples.
+fn correlation<A: Along>(recording: &A, n: f64) -> Result<f64, A::Error> {
+    let (mut sum_z, mut sum_f) = (0.0, 0.0);
+    way_in(recording, |z, f| {
+        sum_z += z;
+        sum_f += f;
+    })?;
+    let (mean_z, mean_f) = (sum_z / n, sum_f / n);
     let (mut zz, mut ff, mut zf) = (0.0, 0.0, 0.0);
-    for &i in at {
-        let (dz, df) = (z[i] - mean_z, f[i] - mean_f);
+    way_in(recording, |z, f| {
+        let (dz, df) = (z - mean_z, f - mean_f);
         zz += dz * dz;
         ff += df * df;
         zf += dz * df;
-    }
-    zf / (zz * ff).sqrt().max(f64::MIN_POSITIVE)
+    })?;
+    Ok(zf / (zz * ff).sqrt().max(f64::MIN_POSITIVE))
 }
 
 /// Shortest stretch (s) whose mean is looked at: slower noise is no contact.
@@ -174,36 +215,90 @@ const STRETCHES: usize = 24;
 const LIKE_NOISE: f64 = 1.0;
 
 /// A force that is noise at every time scale: the needle touches nothing.
-pub(super) fn in_air(recording: &Recording) -> Option<QualityNote> {
-    let step_s = recording.median_interval_s();
-    let least = ((STRETCH_S / step_s).ceil().max(1.0) as usize).max(1);
-    let mut means: Vec<f64> = recording.force_n.chunks_exact(least).map(stylet_stats::mean).collect();
-    if means.len() < STRETCHES || recording.duration_s() < STRETCH_S * STRETCHES as f64 {
-        return None;
+pub(super) fn in_air<A: Along>(recording: &A, facts: &Facts) -> Result<Option<QualityNote>, A::Error> {
+    let least = ((STRETCH_S / facts.median_interval_s).ceil().max(1.0) as usize).max(1);
+    let mut stretches = recording.len() / least;
+    if stretches < STRETCHES || recording.duration_s()? < STRETCH_S * STRETCHES as f64 {
+        return Ok(None);
     }
-    while means.len() >= STRETCHES {
-        if neumann(&means) < LIKE_NOISE {
-            return None;
-        }
-        means = means.chunks_exact(2).map(stylet_stats::mean).collect();
+    // Stretches, pairs of stretches, pairs of pairs ...
+    let mut levels = Vec::new();
+    while stretches >= STRETCHES {
+        levels.push(Neumann::default());
+        stretches /= 2;
     }
-    let (low, high) = (
-        quantile_of(recording.force_n.iter().copied(), 0.05),
-        quantile_of(recording.force_n.iter().copied(), 0.95),
-    );
+    stretch_means(recording, least, levels.len(), |level, mean| levels[level].first(mean))?;
+    stretch_means(recording, least, levels.len(), |level, mean| levels[level].second(mean))?;
+    if levels.iter().any(|level| level.ratio() < LIKE_NOISE) {
+        return Ok(None);
+    }
+    let of = quantiles_along(&[0.05, 0.95], |take| recording.values(Quantity::Force, take))?;
+    let [low, high] = of[..] else { return Ok(None) };
     let message = format!(
         "the force stays within {low:.4} N and {high:.4} N and is nothing but noise, as in air: the needle touches nothing, or the \
          sensor does not feel it; check that this is an insertion and that the force comes from its sensor"
     );
-    Some(QualityNote::forbidding(QualityKind::InAir, message, [("low_n", low), ("high_n", high)]))
+    let numbers = [("low_n", low), ("high_n", high)];
+    Ok(Some(QualityNote::forbidding(QualityKind::InAir, message, numbers)))
 }
 
-/// Von Neumann's ratio.
-fn neumann(x: &[f64]) -> f64 {
-    let middle = stylet_stats::mean(x);
-    let steps: f64 = x.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
-    let all: f64 = x.iter().map(|x| (x - middle).powi(2)).sum();
-    if all > 0.0 { steps / all * x.len() as f64 / (x.len() - 1) as f64 } else { 2.0 }
+/// Hands over the mean force of every stretch of `least` samples (level 0), of every two of them (level 1), and so on.
+fn stretch_means<A: Along>(
+    recording: &A,
+    least: usize,
+    levels: usize,
+    mut each: impl FnMut(usize, f64),
+) -> Result<(), A::Error> {
+    let (mut count, mut sum) = (0, 0.0);
+    // The first of two means, while the second is to come.
+    let mut halves: Vec<Option<f64>> = vec![None; levels];
+    recording.values(Quantity::Force, |force_n| {
+        sum += force_n;
+        count += 1;
+        if count == least {
+            let mut mean = sum / least as f64;
+            (count, sum) = (0, 0.0);
+            for (level, half) in halves.iter_mut().enumerate() {
+                each(level, mean);
+                match half.take() {
+                    Some(first) => mean = (first + mean) / 2.0,
+                    None => {
+                        *half = Some(mean);
+                        break;
+                    }
+                }
+            }
+        }
+    })
+}
+
+/// Von Neumann's ratio of numbers that come twice.
+#[derive(Clone, Debug, Default)]
+struct Neumann {
+    count: usize,
+    sum: f64,
+    before: Option<f64>,
+    steps: f64,
+    all: f64,
+}
+
+impl Neumann {
+    fn first(&mut self, x: f64) {
+        self.count += 1;
+        self.sum += x;
+    }
+
+    fn second(&mut self, x: f64) {
+        if let Some(before) = self.before.replace(x) {
+            self.steps += (x - before).powi(2);
+        }
+        self.all += (x - self.sum / self.count as f64).powi(2);
+    }
+
+    fn ratio(&self) -> f64 {
+        let n = self.count as f64;
+        if self.all > 0.0 { self.steps / self.all * n / (n - 1.0) } else { 2.0 }
+    }
 }
 
 #[cfg(test)]
@@ -211,6 +306,7 @@ mod tests {
     use super::super::assess;
     use super::*;
     use crate::error::RecordError;
+    use crate::recording::Recording;
 
     /// Numbers spread as noise, the same every time.
     fn noise(n: usize, seed: u64) -> Vec<f64> {

@@ -1,9 +1,10 @@
 //! Quantities that look as if they came in another unit.
 
-use super::{QualityKind, QualityNote};
-use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
-use crate::recording::Recording;
-use stylet_stats::{extremes, quantile_of};
+use super::{Facts, QualityKind, QualityNote};
+use crate::along::{Along, Quantity};
+use crate::differentiate::{DEFAULT_HALF_WIDTH_S, Slopes};
+use std::collections::VecDeque;
+use stylet_stats::quantiles_along;
 
 /// No needle travels so far (m).
 const FARTHEST_M: f64 = 2.0;
@@ -18,7 +19,11 @@ const GRAVE_FACTOR: f64 = 20.0;
 /// Single bad samples shall not look like a unit.
 const PERCENTILE: f64 = 0.99;
 
-pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
+pub(super) fn unit_mix_ups<A: Along>(recording: &A, facts: &Facts) -> Result<Vec<QualityNote>, A::Error> {
+    let typical = |which| -> Result<f64, A::Error> {
+        let most = quantiles_along(&[PERCENTILE], |take| recording.values(which, |x| take(x.abs())))?;
+        Ok(most.first().copied().unwrap_or(f64::NAN))
+    };
     let mut notes = Vec::new();
     let mut beyond = |value: f64, limit: f64, grave: bool, message: String| {
         if value > limit {
@@ -27,7 +32,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
             notes.push(QualityNote { grave, ..note });
         }
     };
-    let (low, high) = extremes(&recording.position_m);
+    let (low, high) = facts.position_m;
     let travel_m = high - low;
     beyond(
         travel_m,
@@ -37,7 +42,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
             "the position ranges over {travel_m:.4} m: it looks like millimetres; give a column map with position scale 1e-3"
         ),
     );
-    let speed_mps = quantile_of(recording.velocity_mps.iter().map(|v| v.abs()), PERCENTILE);
+    let speed_mps = typical(Quantity::Velocity)?;
     beyond(
         speed_mps,
         FASTEST_MPS,
@@ -47,7 +52,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
          (or the time is too short by its unit)"
         ),
     );
-    let force_n = quantile_of(recording.force_n.iter().map(|f| f.abs()), PERCENTILE);
+    let force_n = typical(Quantity::Force)?;
     beyond(
         force_n,
         STRONGEST_N,
@@ -56,7 +61,7 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
             "the force reaches {force_n:.1} N: it looks like millinewtons; give a column map with force scale 1e-3"
         ),
     );
-    let interval_s = recording.median_interval_s();
+    let interval_s = facts.median_interval_s;
     beyond(
         interval_s,
         SLOWEST_S,
@@ -66,36 +71,51 @@ pub(super) fn unit_mix_ups(recording: &Recording) -> Vec<QualityNote> {
          (scale 1e-6)"
         ),
     );
-    notes.extend(velocity_against_position(recording));
-    notes
+    notes.extend(velocity_against_position(recording)?);
+    Ok(notes)
 }
 
 /// A measured velocity should be the slope of the position: the factor between them (least squares) is near one.
-fn velocity_against_position(recording: &Recording) -> Option<QualityNote> {
-    if !recording.velocity_measured {
-        return None;
+fn velocity_against_position<A: Along>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
+    if !recording.velocity_measured() {
+        return Ok(None);
     }
-    let slope = differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
     let (mut together, mut alone) = (0.0, 0.0);
-    for (slope, velocity) in slope.iter().zip(&recording.velocity_mps) {
-        together += slope * velocity;
-        alone += slope * slope;
-    }
+    // Measured velocities that wait for the slope of their sample.
+    let mut waiting = VecDeque::new();
+    let mut compare = |slope: f64, velocity: Option<f64>| {
+        if let Some(velocity) = velocity {
+            together += slope * velocity;
+            alone += slope * slope;
+        }
+    };
+    let mut slopes = Slopes::new(DEFAULT_HALF_WIDTH_S);
+    recording.blocks(
+        [Quantity::Time, Quantity::Position, Quantity::Velocity],
+        |[time_s, position_m, velocity_mps]| {
+            for ((time_s, position_m), velocity_mps) in time_s.iter().zip(position_m).zip(velocity_mps) {
+                waiting.push_back(*velocity_mps);
+                slopes.take(*time_s, *position_m, |slope| compare(slope, waiting.pop_front()));
+            }
+        },
+    )?;
+    slopes.end(|slope| compare(slope, waiting.pop_front()));
     let factor = together / alone;
-    (alone > 0.0 && !(0.5..=2.0).contains(&factor)).then(|| {
+    Ok((alone > 0.0 && !(0.5..=2.0).contains(&factor)).then(|| {
         let message = format!(
             "the measured velocity is {factor:.4} times the slope of the position: check the units and signs of both, or leave the velocity out of the \
              column map"
         );
         let note = QualityNote::new(QualityKind::UnitMixUp, message, [("value", factor), ("limit", 2.0)]);
         QualityNote { grave: !(1.0 / GRAVE_FACTOR..=GRAVE_FACTOR).contains(&factor), ..note }
-    })
+    }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::RecordError;
+    use crate::recording::Recording;
 
     /// Three seconds at 100 Hz and 5 mm/s, with units wrong by the given factors.
     fn insertion(time: f64, position: f64, force: f64) -> Result<Recording, RecordError> {
@@ -106,7 +126,8 @@ mod tests {
     }
 
     fn remarks(recording: &Recording) -> String {
-        unit_mix_ups(recording).into_iter().map(|note| note.message + "\n").collect()
+        let notes = super::super::assess(recording).into_iter();
+        notes.filter(|note| note.kind == QualityKind::UnitMixUp).map(|note| note.message + "\n").collect()
     }
 
     #[test]

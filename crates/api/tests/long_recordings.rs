@@ -1,0 +1,123 @@
+//! Promise: a recording that is heard from disk gives the files of one that is heard in memory, byte for byte; only the report of one that
+//! is longer than a page can draw shows a selection, and says so.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use stylet_api::heard::{Heard, Source, hear, hear_long};
+use stylet_api::{Claim, EnhanceFile, Error, ReadOptions};
+use stylet_core::config::{Algorithm, EnhanceConfig, Model};
+use stylet_record::{read_csv, read_long_csv};
+
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("stylet-api-long-{}-{name}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a scratch folder");
+        Self(folder)
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Insertions of 10 s at 1 kHz through layers of 15 mm that rupture, one after the other.
+fn log(samples: usize, velocity: bool) -> String {
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut text = String::from("time_s,position_m,force_n,force_virtual_n");
+    text.push_str(if velocity { ",velocity_mps\n" } else { "\n" });
+    for k in 0..samples {
+        let phase = (k % 10_000) as f64 * 1e-3;
+        let (z, v) = if phase < 6.0 { (0.01 * phase, 0.01) } else { (0.06 - 0.015 * (phase - 6.0), -0.015) };
+        let inside = (z - 0.015_f64).max(0.0);
+        let force = if v > 0.0 { 60.0 * (inside % 0.015) } else { 0.0 } + 2000.0 * inside * v;
+        let force = force + 0.02 * (uniform() + uniform() + uniform());
+        write!(text, "{:.3},{z:.6},{force:.6},{k}", k as f64 * 1e-3).expect("a string");
+        if velocity {
+            write!(text, ",{v}").expect("a string");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn of(config: EnhanceConfig) -> EnhanceFile {
+    EnhanceFile { enhance: config, ..EnhanceFile::default() }
+}
+
+/// Both ways; gives what was heard from disk, after its files were held against the other's.
+fn alike(name: &str, text: &str, config: &EnhanceFile, models: &[Model], same: &[&str]) -> Result<(), Error> {
+    let scratch = Scratch::new(name);
+    let path = scratch.0.join("log.csv");
+    fs::write(&path, text).expect("a scratch file");
+    let source = |path| Source { data: path, config: None, command: "stylet enhance log.csv".to_owned() };
+    let (here, there) = (scratch.0.join("here"), scratch.0.join("there"));
+
+    let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
+    let heard = hear(recording, notes, config.clone(), models)?;
+    let found = said(&heard);
+    assert!(found.contains("rupture"), "{name}: there was something to be found: {found}");
+    heard.output(&source(&path))?.write(&here)?;
+
+    let claim = Claim::new(&there)?;
+    let (recording, notes) = read_long_csv(&path, &ReadOptions::default(), &there)?.expect("a plain file");
+    let heard = hear_long(&recording, notes, config.clone(), models, &claim)?;
+    assert_eq!(said(&heard), found, "{name}");
+    heard.output(&source(&path))?.write_to(&claim)?;
+    drop((recording, claim));
+
+    for file in same {
+        let read = |folder: &Path| fs::read(folder.join(file)).expect("a result");
+        assert!(read(&here) == read(&there), "{name}: {file} differs");
+    }
+    let names = |folder: &Path| {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).expect("results").flatten().map(|e| e.file_name()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&here), names(&there), "{name}: nothing else is left");
+    let page = fs::read_to_string(there.join("report.html")).expect("a report");
+    assert_eq!(page.contains("more than a page can draw"), !same.contains(&"report.html"), "{name}");
+    Ok(())
+}
+
+fn said(heard: &Heard) -> String {
+    let mut said = format!("{:?} {}", heard.extent, heard.hash);
+    for ran in &heard.ran {
+        let trace = &ran.trace;
+        let _ = write!(said, "\n{} contact {:?} {:?}", ran.name, trace.contact_m, trace.contact_s);
+        trace.detections.iter().for_each(|d| said += &format!("\nrupture {d:?}"));
+        trace.estimates.iter().for_each(|e| said += &format!("\nlayer {e:?}"));
+    }
+    said
+}
+
+const BOTH: [Model; 2] = [Model::MultiLayer, Model::KelvinVoigt];
+const TABLES: [&str; 3] = ["enhanced.csv", "enhance.json", "events.json"];
+const ALL: [&str; 6] =
+    ["enhanced.csv", "enhance.json", "events.json", "report.html", "figure.svg", "manifest.json"];
+
+#[test]
+fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memory() -> Result<(), Error> {
+    let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
+    alike("short", &log(20_000, true), &EnhanceFile::default(), &[Model::MultiLayer], &ALL)?;
+    alike("positions", &log(19_000, false), &EnhanceFile::default(), &[Model::MultiLayer], &ALL)?;
+    alike("compared", &log(17_000, true), &of(paper), &BOTH, &ALL)
+}
+
+#[test]
+fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> Result<(), Error> {
+    let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
+    alike("long", &log(60_000, true), &EnhanceFile::default(), &[Model::MultiLayer], &TABLES)?;
+    alike("long, compared", &log(50_000, false), &of(paper), &BOTH, &TABLES)
+}
