@@ -64,6 +64,8 @@ pub struct Search {
     restarts: usize,
     /// In how many stages effects may still be begun anew from what is believed.
     beginnings: usize,
+    /// Frequencies (Hz) of the lines of the residual's spectrum.
+    lines: Vec<f64>,
 }
 
 impl Search {
@@ -77,6 +79,7 @@ impl Search {
             stages: Vec::new(),
             restarts: RESTARTS,
             beginnings: BEGINNINGS,
+            lines: Vec::new(),
         };
         loop {
             let stands = search.best.model.effects.len();
@@ -98,7 +101,7 @@ impl Search {
 
     /// Takes one more effect; false when none is worth it.
     fn grow(&mut self, prepared: &Prepared) -> bool {
-        let lines = self.see_lines();
+        self.see_lines();
         let look = Look::new(&self.best, &self.data);
         let times = prepared.drop_times();
         let blocks = self.data.compared();
@@ -108,7 +111,7 @@ impl Search {
             // What only ruptures show looks like their scatter at first, and that shrinks when it is fitted.
             s[0].choice.info.place == Place::Puncture || s[0].nats > PROMISE * (cost(numbers, blocks) + LEAST)
         };
-        let mut ranked = starts(&look, prepared, &lines);
+        let mut ranked = starts(&look, prepared, &self.lines);
         ranked.retain(|s| promises(s));
         let by_ruptures = |s: &&Vec<Start>| s[0].choice.info.place == Place::Puncture;
         let tried: Vec<&Start> = ranked
@@ -246,7 +249,7 @@ impl Search {
 
     /// Frequencies (Hz) of strong lines of the residual's spectrum. They are no noise: an autoregression would take them for
     /// its own colour.
-    fn see_lines(&mut self) -> Vec<f64> {
+    fn see_lines(&mut self) {
         let found = crate::lines::lines(&self.best, &self.data);
         if !found.is_empty() {
             let less = crate::lines::without(&self.best, &self.data, &found);
@@ -256,16 +259,16 @@ impl Search {
                 self.data = data;
             }
         }
-        found
+        self.lines = found;
     }
 
     /// The data averaged further, with the noise of the best, to rank starts.
     fn coarse(&self) -> Data {
         let coarse = self.data.on(self.data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
-        match residuals(&self.best.model, &coarse) {
-            Some(left) => coarse.judged_by(&left.e, From::Calm),
-            None => coarse,
-        }
+        let model = self.best.model.clone();
+        let Some(residuals) = residuals(&model, &coarse) else { return coarse };
+        let seen = Fit { model, residuals };
+        coarse.judged_by(&crate::lines::without(&seen, &coarse, &self.lines), From::Calm)
     }
 
     /// Gives effects that have a larger form (a second time constant of relaxation) that form, where it is worth its numbers.
