@@ -104,6 +104,31 @@ fn beats_are_not_called_a_tone() {
     assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.right), "{table}");
 }
 
+/// A wander of the zero made faces look shifted, and the shift was never weighed under the noise that it left; a tone beside it, or in a
+/// single recording, was taken for the noise's colour where starts are ranked.
+#[test]
+fn a_wandering_zero_is_no_shifted_face_and_hides_no_tone() {
+    let of = |(wrong, hide, seed, index): (Wrong, Hide, u64, u64)| CaseId {
+        world: World::Plain,
+        wrong,
+        grade: Grade::Large,
+        hide,
+        size: Size::Strong,
+        seed,
+        index,
+    };
+    let cases = [
+        (Wrong::Wander, Hide::Clean, 141, 0),
+        (Wrong::Wander, Hide::Clean, 141, 5),
+        (Wrong::Wander, Hide::One, 128, 29),
+        (Wrong::Recordings, Hide::One, 128, 18),
+    ];
+    let outcomes = run(&cases.map(of), None, &answer, &|_, _| {}).expect("a run");
+    let table = table::text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.worth.right), "{table}");
+    assert_eq!(outcomes.iter().filter(|o| o.hidden == ["periodic_interference"]).count(), 2);
+}
+
 /// Two time constants where two are there (seed 128, number 6, 0.33 and 6.5 s), one where there is one (37, 7.4 s); both numbers were looked at.
 #[test]
 fn a_second_time_constant_of_relaxation_is_found_where_there_is_one() {

@@ -6,7 +6,7 @@
 //! the saved numbers are paid for.
 
 use crate::base::Prepared;
-use crate::judge::{LEAST, cost};
+use crate::judge::{LEAST, cost, gain};
 use crate::select::Search;
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit, fit_below};
@@ -73,16 +73,28 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
             fit_below(&model, &search.data, Effort::FULL, wanted)
         })
         .collect();
-    let cheapest =
-        fits.into_iter().min_by(|a, b| priced(a, &search.data).total_cmp(&priced(b, &search.data)));
-    match cheapest {
-        Some(f) if priced(&f, &search.data) < stands => {
-            let new = f.model.effects.len() > best.model.effects.len();
-            search.best = f;
-            new
-        }
-        _ => false,
+    let cheapest = |fits: &[&Fit]| {
+        let cheaper = |a: &&&Fit, b: &&&Fit| priced(a, &search.data).total_cmp(&priced(b, &search.data));
+        fits.iter().min_by(cheaper).map(|f| (*f).clone())
+    };
+    let (with, without): (Vec<&Fit>, Vec<&Fit>) =
+        fits.iter().partition(|f| f.model.effects.len() > best.model.effects.len());
+    let plain = cheapest(&without).filter(|f| priced(f, &search.data) < stands);
+    let rival = plain.as_ref().unwrap_or(best);
+    let told = cheapest(&with).filter(|f| {
+        priced(f, &search.data) < priced(rival, &search.data)
+            && without.iter().copied().chain([best]).all(|r| is_worth(f, r, &search.data))
+    });
+    let new = told.is_some();
+    if let Some(f) = told.or(plain) {
+        search.best = f;
     }
+    new
+}
+
+/// Whether a fit with an effect for the geometry is worth its price when all that it leaves is noise, however slow.
+fn is_worth(f: &Fit, rival: &Fit, data: &Data) -> bool {
+    gain(rival, f, data) > price(&f.model, data) - price(&rival.model, data)
 }
 
 /// A model with its geometry as unsure as it is believed to be: numbers whose intervals suppose faces that nobody measured are too
