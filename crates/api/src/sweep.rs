@@ -82,7 +82,7 @@ pub fn results(
     #[cfg(feature = "parquet")]
     {
         let mut table = claim.begin("trials.parquet")?;
-        stylet_sweep::parquet(columns, rows, &mut table).map_err(Error::internal)?;
+        stylet_sweep::parquet(columns, rows, &mut table).map_err(out_of)?;
         output.add_part(table.finish()?);
     }
     output.add_json("summary.json", &summary)?;

@@ -10,14 +10,24 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
-use std::io::Write;
+use std::io::{self, Write};
 use std::sync::Arc;
 
 /// Writes the table as a Parquet file, the same bytes for the same rows.
 ///
 /// # Errors
 /// What the destination or the rows say; no table of a sweep makes the Parquet library say anything.
-pub fn parquet<T: Trials + ?Sized>(
+pub fn parquet<T: Trials + ?Sized>(columns: &Columns, rows: &T, output: impl Write + Send) -> io::Result<()> {
+    written(columns, rows, output).map_err(|why| match why {
+        ParquetError::External(why) => match why.downcast::<io::Error>() {
+            Ok(why) => *why,
+            Err(why) => io::Error::other(why),
+        },
+        why => io::Error::other(why),
+    })
+}
+
+fn written<T: Trials + ?Sized>(
     columns: &Columns,
     rows: &T,
     output: impl Write + Send,
