@@ -32,10 +32,11 @@ const TERMINATED: i32 = 15;
 
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Every file of a folder but those of what lies in folders of it.
+/// Every file of a folder but those of what lies in folders of it, and scratch, of which [`left_over`] tells.
 fn held(folder: &Path) -> Files {
     let files = fs::read_dir(folder).into_iter().flatten().flatten().filter(|e| e.path().is_file());
     files
+        .filter(|e| !e.file_name().to_string_lossy().starts_with('.'))
         .map(|e| (e.file_name().to_string_lossy().into_owned(), fs::read(e.path()).expect("a file")))
         .collect()
 }
