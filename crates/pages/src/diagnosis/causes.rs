@@ -3,7 +3,7 @@
 use super::number;
 use crate::words::BASE_LAW;
 use std::fmt::Write as _;
-use stylet_diagnose::outcome::{BaseParameter, Diagnosis};
+use stylet_diagnose::outcome::{BaseParameter, Diagnosis, Verdict};
 use stylet_report::{Cell, Section, Status, Table, significant};
 use stylet_scenario::Scenario;
 
@@ -11,8 +11,11 @@ use stylet_scenario::Scenario;
 pub(super) fn causes(d: &Diagnosis) -> Section {
     let section = Section::new("Causes");
     if d.causes.is_empty() {
-        return section
-            .text("None: the base law, re-fitted, is as good as any extension of it that was tried.");
+        return section.text(if d.verdict == Verdict::Unknown {
+            "None that could be named: what is left is more than an effect of the library explains."
+        } else {
+            "None: the base law, re-fitted, is as good as any extension of it that was tried."
+        });
     }
     let mut text = String::from(BASE_LAW);
     let mut rows = Vec::new();
