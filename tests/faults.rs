@@ -16,14 +16,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Scratch, said, stylet};
-
-const GEL: &str = r#"Scenario(
-    name: "one gel",
-    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
-    motion: Constant(start_m: -0.004, velocity_mps: 0.008, duration_s: 2.0),
-    robot: Replay,
-)"#;
+use support::{ONE_GEL, Scratch, said, stylet, text};
 
 const SWEEP: &str = r#"Sweep(scenario: "gel.ron", trials: 2060, vary: [(path: "sensor.noise_n", with: Uniform(0.01, 0.02))])"#;
 
@@ -60,10 +53,6 @@ fn restore(folder: &Path, files: &Files) {
     }
 }
 
-fn text(path: &Path) -> String {
-    path.to_str().expect("a path").to_owned()
-}
-
 /// A command as a test sees it: what it is called, how it makes an older set, and how the new one.
 struct Case {
     name: &'static str,
@@ -78,8 +67,8 @@ fn case(name: &'static str, common: &[&str], old: &[&str], new: &[&str]) -> Case
 
 /// The commands over one another's results, in a folder with their inputs.
 fn cases(scratch: &Scratch) -> Vec<Case> {
-    let gel = text(&scratch.file("gel.ron", GEL));
-    let stiff = text(&scratch.file("stiff.ron", GEL.replace("60.0", "75.0")));
+    let gel = text(&scratch.file("gel.ron", ONE_GEL));
+    let stiff = text(&scratch.file("stiff.ron", ONE_GEL.replace("60.0", "75.0")));
     let sweep = text(&scratch.file("sweep.ron", SWEEP));
     let data = |seed: &str| {
         let out = scratch.path().join(format!("data-{seed}"));

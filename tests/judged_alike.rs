@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
-use support::{Scratch, said, stylet};
+use support::{Scratch, said, stylet, text};
 
 const BELIEVED: &str = r#"Scenario(
     name: "one gel",
@@ -15,10 +15,6 @@ const BELIEVED: &str = r#"Scenario(
     motion: Program(start_m: -0.004, segments: [Move(velocity_mps: 0.004, duration_s: 4.0), Move(velocity_mps: -0.004, duration_s: 3.0)]),
     robot: Replay,
 )"#;
-
-fn text(path: &Path) -> String {
-    path.to_str().expect("a path").to_owned()
-}
 
 fn flat(output: &Output) -> String {
     let all = format!("{}\n{}", said(output), String::from_utf8_lossy(&output.stdout));

@@ -8,11 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Scratch, root, said, scenario, stylet};
-
-fn text(path: &Path) -> String {
-    path.to_str().expect("a path").to_owned()
-}
+use support::{Scratch, root, said, scenario, stylet, text};
 
 /// Every file of a folder, hidden ones too.
 fn held(folder: &Path) -> BTreeMap<String, Vec<u8>> {

@@ -4,20 +4,8 @@
 mod support;
 
 use std::fs::File;
-use std::path::Path;
 use std::process::{Command, Stdio};
-use support::{Scratch, root, said, scenario, stylet};
-
-const ONE_GEL: &str = r#"Scenario(
-    name: "one gel",
-    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
-    motion: Constant(start_m: -0.004, velocity_mps: 0.008, duration_s: 2.0),
-    robot: Replay,
-)"#;
-
-fn text(path: &Path) -> String {
-    path.to_str().expect("a path").to_owned()
-}
+use support::{ONE_GEL, Scratch, root, said, scenario, stylet, text};
 
 /// Exit code and standard error of a command whose standard output is `out`.
 fn ended(arguments: &[&str], out: Stdio) -> (Option<i32>, String) {

@@ -6,7 +6,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use support::{Scratch, root, said, stylet};
+use support::{Scratch, root, said, stylet, text};
 
 const GOOD: &str = r#"Sweep(
     scenario: "SCENARIO",
@@ -22,10 +22,6 @@ fn good() -> String {
         "SCENARIO",
         root().join("scenarios/three_layer_latex_constant.ron").to_str().expect("a path"),
     )
-}
-
-fn text(path: &Path) -> String {
-    path.to_str().expect("a path").to_owned()
 }
 
 #[test]

@@ -8,16 +8,12 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Scratch, root, said, stylet};
+use support::{Scratch, root, said, stylet, text};
 
 const FILES: [&str; 5] = ["trials.csv", "summary.json", "report.html", "sweep.ron", "scenario.ron"];
 
 fn noise() -> PathBuf {
     root().join("scenarios/sweeps/noise.ron")
-}
-
-fn text(path: &Path) -> String {
-    path.to_str().expect("a path").to_owned()
 }
 
 fn files(folder: &Path) -> Vec<Vec<u8>> {

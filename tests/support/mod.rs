@@ -6,6 +6,19 @@ pub mod measured;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+/// The shortest insertion: two seconds into one layer.
+pub const ONE_GEL: &str = r#"Scenario(
+    name: "one gel",
+    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
+    motion: Constant(start_m: -0.004, velocity_mps: 0.008, duration_s: 2.0),
+    robot: Replay,
+)"#;
+
+/// A path as an argument.
+pub fn text(path: &Path) -> String {
+    path.to_str().expect("a path").to_owned()
+}
+
 /// A folder of its own for a test, removed at the end.
 pub struct Scratch(PathBuf);
 

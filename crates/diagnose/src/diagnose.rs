@@ -258,12 +258,11 @@ fn line_p(excess: f64, blocks: usize) -> f64 {
 
 fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let told = leftover::test(&search.best, &search.data);
-    // A line of the spectrum is no noise, though an autoregression would take it for its own colour.
     let lines = crate::lines::lines(&search.best, &search.data);
     let quiet = if lines.is_empty() {
         search.data.clone()
     } else {
-        search.data.judged_by(&crate::lines::without(&search.best, &search.data, &lines), NoiseFrom::Calm)
+        crate::lines::judged_beside(&search.best, &search.data, &lines)
     };
     let (before, after) =
         (excess(&quiet, &search.base.residuals.e), excess(&quiet, &search.best.residuals.e));

@@ -5,6 +5,7 @@ use rustfft::num_complex::Complex;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Fit;
 use stylet_identify::linear::Symmetric;
+use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
 use stylet_stats::order::median;
 
@@ -102,6 +103,13 @@ pub fn without(fit: &Fit, data: &Data, lines: &[f64]) -> Vec<Vec<f64>> {
         }
     }
     e
+}
+
+/// The data judged by the noise that a fit leaves beside the lines at these frequencies (Hz): a line is no noise, though an
+/// autoregression would take it for its own colour.
+#[must_use]
+pub fn judged_beside(fit: &Fit, data: &Data, lines: &[f64]) -> Data {
+    data.judged_by(&without(fit, data, lines), From::Calm)
 }
 
 /// Frequencies (Hz) at which the residual of a fit has lines, strongest first.

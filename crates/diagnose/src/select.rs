@@ -247,13 +247,11 @@ impl Search {
         true
     }
 
-    /// Frequencies (Hz) of strong lines of the residual's spectrum. They are no noise: an autoregression would take them for
-    /// its own colour.
+    /// Looks for strong lines of the residual's spectrum, and judges beside them from here on.
     fn see_lines(&mut self) {
         let found = crate::lines::lines(&self.best, &self.data);
         if !found.is_empty() {
-            let less = crate::lines::without(&self.best, &self.data, &found);
-            let data = self.data.judged_by(&less, From::Calm);
+            let data = crate::lines::judged_beside(&self.best, &self.data, &found);
             if let Some(left) = residuals(&self.best.model, &data) {
                 self.best.residuals = left;
                 self.data = data;
@@ -268,7 +266,7 @@ impl Search {
         let model = self.best.model.clone();
         let Some(residuals) = residuals(&model, &coarse) else { return coarse };
         let seen = Fit { model, residuals };
-        coarse.judged_by(&crate::lines::without(&seen, &coarse, &self.lines), From::Calm)
+        crate::lines::judged_beside(&seen, &coarse, &self.lines)
     }
 
     /// Gives effects that have a larger form (a second time constant of relaxation) that form, where it is worth its numbers.
