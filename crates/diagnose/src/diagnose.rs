@@ -113,7 +113,11 @@ pub fn diagnose(
         (before, after)
     };
     let noise_n = floor(&search.data);
-    let small = if options.brief { Vec::new() } else { small::small(&search, &after, &judged.causes) };
+    let small = if options.brief {
+        Vec::new()
+    } else {
+        small::small(&search, &after, &judged.causes, &judged.against_none)
+    };
     let traces = take_traces(&mut judged, small);
     let mut from_raw = raw_causes(&raw, noise_n);
     let coarse = raw.step_n.is_some_and(|s| s > 0.5 * noise_n);
@@ -220,6 +224,8 @@ pub fn belief(s: &Scenario) -> Belief {
 /// What follows from the search alone.
 struct Judged {
     causes: Vec<Cause>,
+    /// Nats that speak against an effect's having no strength.
+    against_none: Vec<(String, f64)>,
     base_parameters: Vec<BaseParameter>,
     leftover: LeftoverReport,
     unknown: bool,
@@ -278,7 +284,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let settled = fit(&crate::geometry::unsure(&search.best.model), &whole, Effort { turns: 3, enough: 0.1 })
         .unwrap_or_else(|| search.best.clone());
     let spread = Spread::new(&settled, &whole, &mut ChaCha8Rng::seed_from_u64(SEED));
-    let mut causes = Vec::new();
+    let (mut causes, mut against_none) = (Vec::new(), Vec::new());
     for (k, choice) in settled.model.effects.iter().enumerate() {
         let none = Vec::new();
         let rivals = classes.get(k).unwrap_or(&none);
@@ -286,6 +292,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
         for (p, info) in choice.info.parameters.iter().enumerate() {
             parameters.insert(info.path.to_owned(), spread.parameter(k, p));
         }
+        against_none.extend(spread.against_none(k).map(|nats| (choice.info.id.to_owned(), nats)));
         let stage = search.stages.iter().rev().find(|s| s.taken.is_some_and(|t| t.0 == choice.info.id));
         let gain_nats = stage.and_then(|s| s.taken).map_or(0.0, |t| t.1);
         let needed = stage.map_or(0.0, |s| s.needed);
@@ -316,7 +323,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     if lined {
         search.data = quiet;
     }
-    Judged { causes, base_parameters, leftover, unknown, lined }
+    Judged { causes, against_none, base_parameters, leftover, unknown, lined }
 }
 
 /// Moves causes that are too small to `traces`.

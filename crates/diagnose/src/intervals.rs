@@ -17,7 +17,7 @@ use stylet_identify::fit::{Fit, Tangent};
 use stylet_identify::linear::{Factor, Symmetric};
 use stylet_identify::model::{Number, Role};
 use stylet_identify::objective::Data;
-use stylet_stats::student;
+use stylet_stats::{normal, student};
 use stylet_tissue::FitScale;
 
 /// Probability below the upper end of a 95 % interval.
@@ -100,6 +100,12 @@ impl<'a> Spread<'a> {
 
     /// Half the width of the 95 % interval of a combination of the numbers.
     fn half_width(&self, gradient: &[f64]) -> f64 {
+        let (sd, freedom) = self.deviation(gradient);
+        sd * student::quantile(UPPER, freedom)
+    }
+
+    /// Standard deviation of a combination of the numbers, and the degrees of freedom by which it is told.
+    fn deviation(&self, gradient: &[f64]) -> (f64, f64) {
         let variance = |f: &Factor| f.half(gradient).iter().map(|y| y * y).sum::<f64>();
         let all = variance(&self.factor);
         let mut lost = 0.0;
@@ -116,7 +122,43 @@ impl<'a> Spread<'a> {
         }
         let freedom = if lost > 0.0 { all * all / lost } else { f64::INFINITY };
         let all = if told { all / mean.min(1.0) } else { all };
-        all.sqrt() * student::quantile(UPPER, freedom.clamp(1.0, MANY))
+        (all.sqrt(), freedom.clamp(1.0, MANY))
+    }
+
+    /// Nats that speak against an effect's having none of its strengths: half the square of the normal deviate that is as rare as
+    /// Student's is, the largest over the strengths. `None` where no strength can be none in the scale of the fit.
+    #[must_use]
+    pub fn against_none(&self, effect: usize) -> Option<f64> {
+        let choice = &self.fit.model.effects[effect];
+        let strengths = choice.info.parameters.iter().zip(&choice.values).enumerate();
+        let nats = strengths.filter(|(_, (p, _))| p.strength).filter_map(|(k, (p, value))| {
+            let off = match p.fit_scale() {
+                FitScale::Linear => value - p.neutral,
+                // So many deviations of the reciprocal, to first order.
+                FitScale::Reciprocal => *value,
+                FitScale::Log => return None,
+            };
+            let (sd, freedom) = self.deviation(&self.gradient(effect, k));
+            let rare = normal::quantile(student::sf((off / sd).abs(), freedom));
+            Some(0.5 * rare * rare)
+        });
+        nats.reduce(f64::max)
+    }
+
+    /// How a parameter of an effect changes with each number of the fit.
+    fn gradient(&self, effect: usize, parameter: usize) -> Vec<f64> {
+        let value = self.fit.model.effects[effect].values[parameter];
+        let mut gradient = vec![0.0; self.tangent.matrix.size];
+        for (i, n) in self.tangent.shared.iter().enumerate() {
+            if !matches!(n.role, Role::Effect { effect: e, .. } if e == effect) {
+                continue;
+            }
+            let mut moved = self.fit.model.clone();
+            moved.set(n.role, 0, moved.get(n.role, 0) + n.step);
+            let change = (moved.effects[effect].values[parameter] - value) / n.step;
+            gradient[i] = if change.is_finite() { change } else { 0.0 };
+        }
+        gradient
     }
 
     /// Value and half width of the 95 % interval of a shared number, in the scale of the fit; `None` when it is not free.
@@ -149,21 +191,7 @@ impl<'a> Spread<'a> {
         if p.whole {
             return Estimate { value, low: value, high: value };
         }
-        // How the value changes with each of the effect's numbers in the fit.
-        let mut gradient = vec![0.0; self.tangent.matrix.size];
-        for (i, n) in self.tangent.shared.iter().enumerate() {
-            let Role::Effect { effect: e, parameter: k } = n.role else { continue };
-            if e != effect {
-                continue;
-            }
-            let mut moved = self.fit.model.clone();
-            let x = moved.get(n.role, 0);
-            moved.set(n.role, 0, x + n.step);
-            let change = (moved.effects[effect].values[parameter] - value) / n.step;
-            gradient[i] = if change.is_finite() { change } else { 0.0 };
-            let _ = k;
-        }
-        let half = self.half_width(&gradient);
+        let half = self.half_width(&self.gradient(effect, parameter));
         let (low, high) = match p.fit_scale() {
             FitScale::Log => (value * libm::exp(-half / value), value * libm::exp(half / value)),
             FitScale::Reciprocal => {

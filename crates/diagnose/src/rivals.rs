@@ -41,7 +41,7 @@ pub fn rivals(search: &mut Search) -> Vec<Vec<Rival>> {
                     && gain(&search.best, f, &search.data) > extra(&search.best, f, &search.data))
         };
         if let Some((f, _)) = ahead.filter(|r| swaps < 3 && worth(&r.0)) {
-            search.settle(f.clone());
+            search.swap(k, f.clone());
             swaps += 1;
             (k, out) = (0, Vec::new());
             continue;

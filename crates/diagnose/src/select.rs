@@ -310,6 +310,17 @@ impl Search {
         };
     }
 
+    /// Makes a fit the best in which a rival stands for effect `k`; the stage that took the effect took the rival then.
+    pub fn swap(&mut self, k: usize, f: Fit) {
+        let (Some(old), Some(new)) = (self.best.model.effects.get(k), f.model.effects.get(k)) else { return };
+        let (old, new, more) = (old.info.id, new.info.id, self.best.nats() - f.nats());
+        let stage = self.stages.iter_mut().rev().find_map(|s| s.taken.as_mut().filter(|t| t.0 == old));
+        if let Some(taken) = stage {
+            *taken = (new, taken.1 + more);
+        }
+        self.settle(f);
+    }
+
     /// Drops effects that the others can do without.
     fn prune(&mut self) {
         loop {

@@ -5,8 +5,7 @@ use crate::outcome::Cause;
 use crate::select::Search;
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, fit};
-use stylet_stats::Z95;
-use stylet_tissue::{EffectInfo, FitScale, ParameterInfo, Place, Proposal};
+use stylet_tissue::{EffectInfo, Place, Proposal};
 
 /// A trace.
 #[derive(Clone, Debug)]
@@ -30,9 +29,14 @@ const ASKED: f64 = 0.3;
 /// and noise, and a simulation integrates.
 const LAW_ERROR: f64 = 0.07;
 
-/// Causes that are traces.
+/// Causes that are traces; `against_none` are the nats that speak against an effect's having no strength.
 #[must_use]
-pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<Small> {
+pub fn small(
+    search: &Search,
+    after: &[Option<Left>],
+    causes: &[Cause],
+    against_none: &[(String, f64)],
+) -> Vec<Small> {
     let noise_n = crate::held_out::floor(&search.data);
     let free = search.best.model.free;
     let with_n = if free.own_surface || free.own_friction {
@@ -48,7 +52,7 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
         if let Some(reason) = unresolved(search, k) {
             return why(reason);
         }
-        if unsure(c, effects[k].info, search) {
+        if unsure(c, against_none, search) {
             return why("too uncertain to be told from none after a search through every effect".to_owned());
         }
         let without = fit(&search.best.model.without(k), &search.data, Effort { turns: 4, enough: 0.5 })?;
@@ -75,22 +79,11 @@ pub fn small(search: &Search, after: &[Option<Left>], causes: &[Cause]) -> Vec<S
     causes.par_iter().filter_map(one).collect()
 }
 
-/// Whether every strength of a cause is less sure than what the search asked for: by the calibrated interval, in which slow noise counts in
-/// full and the geometry is unsure, `z^2/2` nats speak against none.
-fn unsure(cause: &Cause, info: &EffectInfo, search: &Search) -> bool {
-    let stage = search.stages.iter().find(|s| s.taken.is_some_and(|t| t.0 == info.id));
-    let Some(needed) = stage.map(|s| s.needed) else { return false };
-    let against = |p: &ParameterInfo| {
-        let e = cause.parameters.get(p.path)?;
-        let (off, half) = match p.fit_scale() {
-            FitScale::Linear => (e.value - p.neutral, (e.high - e.value).max(e.value - e.low)),
-            FitScale::Reciprocal => (1.0 / e.value, 1.0 / e.low - 1.0 / e.value),
-            FitScale::Log => return None,
-        };
-        Some(0.5 * (Z95 * off / half).powi(2))
-    };
-    let nats: Vec<f64> = info.parameters.iter().filter(|p| p.strength).filter_map(against).collect();
-    !nats.is_empty() && nats.iter().all(|n| *n < needed)
+/// Whether every strength of a cause is less sure than what the search asked for, slow noise counted in full and the geometry unsure.
+fn unsure(cause: &Cause, against_none: &[(String, f64)], search: &Search) -> bool {
+    let stage = search.stages.iter().find(|s| s.taken.is_some_and(|t| t.0 == cause.effect));
+    let against = against_none.iter().find(|a| a.0 == cause.effect);
+    stage.zip(against).is_some_and(|(stage, (_, nats))| *nats < stage.needed)
 }
 
 /// Whether an effect shows in every sample, and not only where something gives way.
