@@ -277,7 +277,8 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let alone = search.data.recordings() < 2;
     let sure = if alone { after > EXCESS_ALONE } else { after > EXCESS && told.sure.p_value < LEFTOVER_P };
     let at_sight = after > EXCESS_SLOW && told.at_sight.p_value < LEFTOVER_P;
-    let unknown = share > UNEXPLAINED && (sure || at_sight || lined);
+    let stretch = crate::stretch::chance(&quiet, &search.best.residuals.e);
+    let unknown = share > UNEXPLAINED && (sure || at_sight || lined || stretch.is_some());
     let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included, however slow.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
@@ -313,9 +314,12 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let mut depends_on: Vec<String> = left.depends_on.iter().map(|d| d.0.clone()).collect();
     if lined {
         depends_on.insert(0, "frequency".to_owned());
+    } else if unknown && depends_on.is_empty() {
+        depends_on.push("time".to_owned());
     }
+    let line = if lined { line_p(after, search.data.compared()) } else { 1.0 };
     let leftover = LeftoverReport {
-        p_value: if lined { left.p_value.min(line_p(after, search.data.compared())) } else { left.p_value },
+        p_value: left.p_value.min(line).min(stretch.filter(|_| unknown).unwrap_or(1.0)),
         depends_on,
         nats: left.nats,
         share,

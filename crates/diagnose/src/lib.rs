@@ -44,6 +44,7 @@ pub mod rivals;
 pub mod select;
 pub mod set;
 pub mod small;
+mod stretch;
 mod told_again;
 pub mod varied;
 mod visible;

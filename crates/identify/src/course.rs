@@ -62,14 +62,20 @@ impl Course {
         self.waves.is_empty() && self.poly[1..].iter().all(|c| *c == 0.0)
     }
 
+    /// Whether all its waves are larger than so many m.
+    fn waves_beyond(&self, amplitude_m: f64) -> bool {
+        self.waves.iter().all(|[_, x, y]| libm::hypot(*x, *y) > amplitude_m)
+    }
+
     /// Angular frequencies in 1/s.
     pub fn frequencies(&self) -> impl Iterator<Item = f64> + '_ {
         self.waves.iter().map(|w| w[0])
     }
 
     /// The best form of cells at `t` (s, middle of each, `cell_s` apart) with mean positions `z` (m). Angular frequencies in
-    /// `hints` (1/s) are all that a long stretch is tried with, when there are any.
-    pub fn of(t: &[f64], z: &[f64], cell_s: f64, hints: &[f64]) -> Option<Self> {
+    /// `hints` (1/s) are all that a long stretch is tried with, when there are any. A wave smaller than `rounded_m` may be what rounding
+    /// makes of a line: steps at an even speed beat with the sampling. It is none, and a line is white that leaves nothing else.
+    pub fn of(t: &[f64], z: &[f64], cell_s: f64, hints: &[f64], rounded_m: f64) -> Option<Self> {
         let n = t.len();
         if n < FEWEST {
             return None;
@@ -86,12 +92,17 @@ impl Course {
         if !best.white || union {
             let narrow = 0.3 / (2.0 * frame.half);
             for w in hints {
-                best = better(best, frame.refined(&[], w / TAU, narrow));
+                best =
+                    better(best, frame.refined(&[], w / TAU, narrow).filter(|c| c.waves_beyond(rounded_m)));
             }
             let wanted = if union { 2.0 * frame.half < SHORT_S } else { !best.white };
             if wanted && let Some(one) = frame.wave(&[]) {
-                let two = if one.white { None } else { frame.wave(&[one.waves[0][0]]) };
-                best = better(better(best, Some(one)), two);
+                if one.waves_beyond(rounded_m) {
+                    let two = if one.white { None } else { frame.wave(&[one.waves[0][0]]) };
+                    best = better(better(best, Some(one)), two.filter(|c| c.waves_beyond(rounded_m)));
+                } else if one.white && best.waves.is_empty() {
+                    best.white = true;
+                }
             }
         }
         Some(best)

@@ -52,8 +52,8 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
         let v = stylet_record::differentiate(t, z, 0.1);
         return Settled { z: z.to_vec(), v, kinks: Vec::new(), sd_mps: f64::INFINITY };
     }
-    let noise_m =
-        (position_noise(t, z) / (q as f64).sqrt()).max(rounding(z) / 12.0_f64.sqrt() / (q as f64).sqrt());
+    let step_m = rounding(z);
+    let noise_m = position_noise(t, z).max(step_m / 12.0_f64.sqrt()) / (q as f64).sqrt();
     let dt = step * q as f64;
     // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
     let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (SIDE as f64).powf(1.5));
@@ -62,7 +62,8 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     edges.extend([0, cells]);
     edges.sort_unstable();
     edges.dedup();
-    let cells = Cells { t: &tc, z: &zc, dt, noise_m };
+    let rounded_m = step_m / core::f64::consts::PI;
+    let cells = Cells { t: &tc, z: &zc, dt, noise_m, rounded_m };
     let first = edges.windows(2).map(|e| Stretch::new(&cells, (e[0], e[1]), &[])).collect();
     let stretches = moved(&cells, joined(&cells, split(&cells, joined(&cells, first))));
     let kinks: Vec<Kink> = stretches.windows(2).map(|p| meet(&p[0], &p[1], &found, &cells, t)).collect();
@@ -79,13 +80,15 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     Settled { z, v, kinks, sd_mps: median(&mut sds).max(1e-9) }
 }
 
-/// Means of samples: middle (s), position (m), length (s), standard deviation of the noise (m).
+/// Means of samples: middle (s), position (m), length (s), standard deviation of the noise (m), amplitude of the first harmonic of what
+/// rounding does at an even speed (m).
 #[derive(Clone, Copy)]
 struct Cells<'a> {
     t: &'a [f64],
     z: &'a [f64],
     dt: f64,
     noise_m: f64,
+    rounded_m: f64,
 }
 
 /// What happens between two jumps of the speed.
@@ -104,10 +107,11 @@ struct Stretch {
 
 impl Stretch {
     fn new(cells: &Cells, (from, to): (usize, usize), hints: &[f64]) -> Self {
-        let Cells { t: tc, z: zc, dt, noise_m } = *cells;
+        let Cells { t: tc, z: zc, dt, noise_m, rounded_m } = *cells;
         // A cell beside a jump has both speeds.
         let (lo, hi) = (if from > 0 { from + 1 } else { 0 }, if to < tc.len() { to - 1 } else { to });
-        let course = if hi > lo + FEWEST { Course::of(&tc[lo..hi], &zc[lo..hi], dt, hints) } else { None };
+        let course =
+            if hi > lo + FEWEST { Course::of(&tc[lo..hi], &zc[lo..hi], dt, hints, rounded_m) } else { None };
         let course = course.filter(|c| c.white && c.sd_m < NO_NOISE * noise_m);
         if let Some(course) = course {
             let cells = (hi - lo) as f64;
@@ -227,19 +231,33 @@ fn moved(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
     stretches
 }
 
-/// The instant near their border at which two forms agree about the position.
+/// The instant near their border at which two forms agree about the position; of several (a ripple comes back to a line) the one under
+/// which the cells around are followed best, the one form before it and the other after.
 fn meeting(left: &Stretch, right: &Stretch, cells: &Cells) -> Option<f64> {
     let (Some(a), Some(b)) = (&left.course, &right.course) else { return None };
     let near = cells.t[right.from] - 0.5 * cells.dt;
     let reach = REACH as f64 * cells.dt;
-    let mut at = near;
-    for _ in 0..12 {
-        let slope = a.at(at).1 - b.at(at).1;
-        if slope.abs() > 1e-7 {
-            at = (at - (a.at(at).0 - b.at(at).0) / slope).clamp(near - reach, near + reach);
+    let apart = |t: f64| a.at(t).0 - b.at(t).0;
+    let newton = |from: f64| {
+        let mut at = from;
+        for _ in 0..12 {
+            let slope = a.at(at).1 - b.at(at).1;
+            if slope.abs() > 1e-7 {
+                at = (at - apart(at) / slope).clamp(near - reach, near + reach);
+            }
         }
-    }
-    Some(at)
+        at
+    };
+    let grid = || (0..=2 * REACH).map(|k| near - reach + k as f64 * cells.dt);
+    let crosses = |(s, t): (f64, f64)| apart(s) * apart(t) < 0.0;
+    let crossings = grid().zip(grid().skip(1)).filter(|p| crosses(*p)).map(|(s, t)| newton(0.5 * (s + t)));
+    let (lo, hi) = (right.from.saturating_sub(REACH).max(left.from), (right.from + REACH).min(right.to));
+    let misfit = |at: f64| {
+        let off = |k: usize| cells.z[k] - if cells.t[k] < at { a } else { b }.at(cells.t[k]).0;
+        (lo..hi).map(|k| off(k).powi(2)).sum::<f64>()
+    };
+    let told = crossings.chain([newton(near)]).map(|at| (misfit(at), at));
+    told.min_by(|x, y| x.0.total_cmp(&y.0)).map(|t| t.1)
 }
 
 /// The jump of the speed between two stretches.
@@ -357,6 +375,17 @@ mod tests {
         assert_eq!(kinks, 2);
     }
 
+    /// 4.85 mm/s are 97 steps of 50 um in a second: at 200 Hz they beat at 3 Hz.
+    #[test]
+    fn steps_that_beat_with_the_sampling_are_no_ripple() {
+        for speed_mps in [0.00485, 0.0049, 0.0051, 0.00255, 0.0073] {
+            let line = |t: f64| if t < 2.0 { (0.0, 0.0) } else { (speed_mps * (t - 2.0), speed_mps) };
+            let (off, kinks) = error(line, |_| 0.0, 5e-5);
+            assert!(off < 1e-5, "{speed_mps}: {off}");
+            assert_eq!(kinks, 1, "{speed_mps}");
+        }
+    }
+
     #[test]
     fn a_fast_ripple_is_no_chain_of_jumps() {
         let w = core::f64::consts::TAU * 1.4;
@@ -377,6 +406,37 @@ mod tests {
         let (off, kinks) = error(bent, |k| 2e-5 * rough(k), 0.0);
         assert!(off < 1e-5, "{off}");
         assert_eq!(kinks, 1);
+    }
+
+    /// A ripple that begins at a line comes back to it: the two meet more than once.
+    #[test]
+    fn a_line_goes_over_into_a_strong_ripple_where_it_does_and_not_where_they_would_meet_too() {
+        let w = core::f64::consts::TAU * 1.22;
+        let ripple =
+            move |s: f64| (0.0069 * s + 0.0055 / w * (1.0 - (w * s).cos()), 0.0069 + 0.0055 * (w * s).sin());
+        let told = move |begin: f64| {
+            move |t: f64| {
+                let s = t - begin;
+                let at = 0.0039 * begin;
+                if s < 0.0 {
+                    (0.0039 * t, 0.0039)
+                } else if s < 3.86 {
+                    (at + ripple(s).0, ripple(s).1)
+                } else {
+                    (at + ripple(3.86).0 + 0.0056 * (s - 3.86), 0.0056)
+                }
+            }
+        };
+        let t: Vec<f64> = (0..1800).map(|k| f64::from(k) / 200.0).collect();
+        for k in 0..12 {
+            let begin = 4.0 + 0.0137 * f64::from(k);
+            let z: Vec<f64> = t.iter().map(|t| (told(begin)(*t).0 / 5e-5).round() * 5e-5).collect();
+            let found = settle(&t, &z);
+            let calm = |t: f64| t < begin + 3.5 && (t - begin).abs() > 0.03;
+            let off = |(t, v): (&f64, &f64)| if calm(*t) { (v - told(begin)(*t).1).abs() } else { 0.0 };
+            let most = t.iter().zip(&found.v).map(off).fold(0.0, f64::max);
+            assert!(most < 5e-4, "begin {begin}: {most}");
+        }
     }
 
     #[test]

@@ -1,0 +1,110 @@
+//! A stretch of a recording in which far more is left than anywhere else.
+//!
+//! Where only one motion in many asks for what a law lacks (a hold, a way back), what is left is not the same in several recordings, and
+//! its mean square is small. But slow noise is as large in one second as in another.
+
+use stylet_identify::blocks::Blocks;
+use stylet_identify::objective::Data;
+use stylet_stats::order::median;
+
+/// Length in s of the windows whose means are compared.
+const WINDOW_S: f64 = 1.0;
+/// So many windows one after the other are a stretch: what a misplaced rupture leaves is shorter.
+const WINDOWS: usize = 2;
+/// Their means are so many times the typical one: normal ones are never, however slow.
+const TIMES: f64 = 10.0;
+/// And so many times the noise of a block: what is less is not seen by eye.
+const LEAST: f64 = 3.0;
+
+/// The chance of such a stretch in residuals `e` (N), where there is one: windows of a second, one after the other and of one sign, whose
+/// means are ten times the typical one of all windows and three times the noise of a block. The chance is that of one normal mean so large
+/// among as many as there are windows.
+#[must_use]
+pub fn chance(data: &Data, e: &[Vec<f64>]) -> Option<f64> {
+    let noise = &data.noise;
+    let of = |(b, e): (&Blocks, &Vec<f64>)| -> Vec<f64> {
+        let per = ((WINDOW_S / (b.step_s * b.samples as f64)).round() as usize).max(1);
+        let mean = |from: usize| {
+            let (mut sum, mut n) = (0.0, 0_usize);
+            for k in (from..(from + per).min(b.len())).filter(|k| b.used[*k] && e[*k].is_finite()) {
+                sum += e[k] / noise.bins[noise.bin(b.size_n[k]).min(noise.bins.len() - 1)].sd_n;
+                n += 1;
+            }
+            // A gap is no calm.
+            if 2 * n >= per { sum / n as f64 } else { f64::NAN }
+        };
+        (0..b.len()).step_by(per).map(mean).collect()
+    };
+    let means: Vec<Vec<f64>> = data.blocks.iter().zip(e).map(of).collect();
+    let mut sizes: Vec<f64> = means.iter().flatten().filter(|m| m.is_finite()).map(|m| m.abs()).collect();
+    let count = sizes.len() as f64;
+    let typical = (median(&mut sizes) * stylet_stats::MAD_TO_SD).max(LEAST / TIMES);
+    // The least of the means of a stretch, as many times the typical one.
+    let least = |w: &[f64]| {
+        let (low, high) =
+            w.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, m| (r.0.min(*m), r.1.max(*m)));
+        if w.iter().all(|m| m.is_finite()) { low.max(-high) / typical } else { 0.0 }
+    };
+    let most = means.iter().flat_map(|m| m.windows(WINDOWS)).map(least).fold(0.0, f64::max);
+    (most > TIMES).then(|| (2.0 * count * stylet_stats::normal::sf(most)).clamp(f64::MIN_POSITIVE, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::chance;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
+    use stylet_record::Recording;
+
+    /// Four recordings of 40 s.
+    fn recordings() -> Data {
+        let t: Vec<f64> = (0..8000).map(|k| f64::from(k) / 200.0).collect();
+        let z: Vec<f64> = t.iter().map(|t| 1e-3 * t).collect();
+        let f = vec![0.0; t.len()];
+        let r = Recording::new(t, z, f).expect("a recording");
+        let b = Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S);
+        Data::new(Arc::new(vec![b; 4]), Noise::white(1.0), 0.0)
+    }
+
+    /// Noise, and a wander of so many times its size that lasts for seconds.
+    fn noise(data: &Data, wander: f64, seed: u64) -> Vec<Vec<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = move || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let mut one = |n: usize| {
+            let (mut slow, keep) = (normal(), 0.995_f64);
+            (0..n)
+                .map(|_| {
+                    slow = keep * slow + (1.0 - keep * keep).sqrt() * normal();
+                    wander * slow + normal()
+                })
+                .collect()
+        };
+        data.blocks.iter().map(|b| one(b.len())).collect()
+    }
+
+    #[test]
+    fn some_seconds_of_one_recording_far_off_are_structure() {
+        let data = recordings();
+        for wander in [0.0, 1.0] {
+            let mut e = noise(&data, wander, 7);
+            e[2][900..1110].iter_mut().for_each(|x| *x -= 16.0);
+            assert!(chance(&data, &e).is_some_and(|p| p < 1e-12), "{wander}");
+        }
+    }
+
+    #[test]
+    fn a_slow_wander_is_none_nor_is_a_rupture_a_tenth_of_a_second_late() {
+        let data = recordings();
+        for seed in 0..60 {
+            let wander = f64::from(seed as u32 % 6);
+            let mut e = noise(&data, wander, 100 + seed);
+            assert!(chance(&data, &e).is_none(), "seed {seed}");
+            e[1][500..505].iter_mut().for_each(|x| *x += 100.0);
+            assert!(chance(&data, &e).is_none(), "seed {seed}, with a late rupture");
+        }
+    }
+}
