@@ -85,9 +85,9 @@ fn summary(d: &Diagnosis) -> String {
     if d.leftover.p_value < 1e-3 {
         let _ = writeln!(
             out,
-            "  what remains still depends on {} (p = {:.1e})",
+            "  what remains still depends on {} ({})",
             d.leftover.depends_on.join(", "),
-            d.leftover.p_value
+            stylet_report::chance(d.leftover.p_value)
         );
     }
     if !d.invisible.is_empty() {

@@ -31,7 +31,7 @@ pub mod svg;
 mod text;
 
 pub use chart::{Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span};
-pub use number::{percent, plus_minus, significant};
+pub use number::{chance, percent, plus_minus, significant};
 pub use page::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text, Tile};
 pub use palette::Colour;
 pub use run::RunReport;

@@ -20,6 +20,12 @@ pub fn plus_minus(value: f64, doubt: Option<f64>, digits: usize) -> String {
     doubt.map_or_else(|| value.clone(), |d| format!("{value} ± {}", significant(d, 2)))
 }
 
+/// A p-value: `p = 0.012`. Below 1e-12 nobody knows the tails of noise: `p < 1e-12`.
+#[must_use]
+pub fn chance(p: f64) -> String {
+    if p < 1e-12 { "p < 1e-12".to_owned() } else { format!("p = {}", significant(p, 2)) }
+}
+
 /// A ratio as percentage with two significant digits (three from 10 % on): `0.0361` gives `3.6 %`.
 #[must_use]
 pub fn percent(ratio: f64) -> String {

@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 use stylet_diagnose::Examined;
 use stylet_diagnose::curves::curves;
 use stylet_diagnose::outcome::{Diagnosis, Verdict};
-use stylet_report::{Page, Section, Status, Tile, significant};
+use stylet_report::{Page, Section, Status, Tile, chance, significant};
 use stylet_scenario::Scenario;
 
 /// The page of a diagnosis of `scenario`, which was read from `file`; `command` repeats it.
@@ -81,10 +81,7 @@ fn verdict(d: &Diagnosis) -> Section {
         Tile::new(
             "Left over",
             if d.leftover.p_value < 1e-3 { "structure" } else { "noise" },
-            format!(
-                "p = {} that the residual is the same in several recordings by chance",
-                significant(d.leftover.p_value, 2)
-            ),
+            format!("{} that noise alone leaves as much", chance(d.leftover.p_value)),
         )
         .status(status),
     );

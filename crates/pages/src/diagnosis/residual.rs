@@ -6,7 +6,7 @@ use stylet_diagnose::curves::{Curves, binned, by_layer_and_phase, correlations, 
 use stylet_diagnose::lines::spectrum;
 use stylet_diagnose::outcome::Diagnosis;
 use stylet_report::{
-    Cell, Chart, Colour, Level, LineStyle, MarkerSet, Scale, Section, Series, Side, Status, Table,
+    Cell, Chart, Colour, Level, LineStyle, MarkerSet, Scale, Section, Series, Side, Status, Table, chance,
     significant,
 };
 use stylet_scenario::Scenario;
@@ -226,15 +226,19 @@ fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
 pub(super) fn remains(d: &Diagnosis, all: &[Curves]) -> Section {
     let text = if d.leftover.p_value < 1e-3 {
         format!(
-            "The residual of the extended model is still predictable: it depends on {} (p = {}; {} nats).",
+            "The residual of the extended model is still predictable: it depends on {} ({}{}).",
             d.leftover.depends_on.join(", "),
-            significant(d.leftover.p_value, 2),
-            significant(d.leftover.nats, 3)
+            chance(d.leftover.p_value),
+            if d.leftover.nats > 0.0 {
+                format!("; {} nats", significant(d.leftover.nats, 3))
+            } else {
+                String::new()
+            }
         )
     } else {
         format!(
-            "Nothing that is the same in several recordings remains (p = {}). The noise: {} N, autoregressive coefficients {} and {} per sample, {}.",
-            significant(d.leftover.p_value, 2),
+            "Nothing that is the same in several recordings remains ({}). The noise: {} N, autoregressive coefficients {} and {} per sample, {}.",
+            chance(d.leftover.p_value),
             significant(d.noise.sd_n, 3),
             significant(d.noise.ar[0], 3),
             significant(d.noise.ar[1], 3),

@@ -4,7 +4,7 @@ use crate::words::three;
 use stylet_diagnose::curves::binned;
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::study::{Study, speeds};
-use stylet_report::{Cell, Chart, Colour, Level, LineStyle, Section, Series, Table, significant};
+use stylet_report::{Cell, Chart, Colour, Level, LineStyle, Section, Series, Table, chance};
 
 pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
     let r = &study.repeats;
@@ -94,9 +94,9 @@ pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
 pub(super) fn residual(runs: &[&Insertion], study: &Study) -> Section {
     let mut section = Section::new("What remains").text(format!(
         "Measured less predicted force of runs left out, averaged in 60 pieces of depth. The residual that all fitted runs have in common depends on {} \
-         (p = {}).",
+         ({}).",
         if study.diagnosis.leftover.depends_on.is_empty() { "nothing".to_owned() } else { study.diagnosis.leftover.depends_on.join(", ") },
-        significant(study.diagnosis.leftover.p_value, 2)
+        chance(study.diagnosis.leftover.p_value)
     ));
     for (title, back) in [("Residual on the way in", false), ("Residual on the way back", true)] {
         let mut chart = Chart::new(title, "Depth (mm)", "Residual (N)").height(280).with_level(Level::zero());
