@@ -297,7 +297,7 @@ mod tests {
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::{Effort, Tangent, fit};
-    use stylet_identify::model::{Belief, Model, Role};
+    use stylet_identify::model::{Belief, Choice, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, Trail, replay};
     use stylet_record::Recording;
@@ -373,6 +373,33 @@ mod tests {
         let (_, half) = Spread::known(&told, &data).of(Role::Friction(0)).expect("free");
         assert!((half / wanted(&own) - 1.0).abs() < 0.1, "{half} for {}", wanted(&own));
     }
+    /// Where the noise is known a strength is told as a normal deviate tells it; where it is told by what the fit leaves, as Student's does,
+    /// which is less.
+    #[test]
+    fn a_strength_is_told_from_none_by_the_degrees_of_freedom_that_its_interval_has() {
+        let (mut model, data) = insertions(&[0.0, 0.0], |_, _| ());
+        let mut drifting: Vec<Blocks> = data.blocks.to_vec();
+        for b in &mut drifting {
+            b.f.iter_mut().zip(&b.from_s).for_each(|(f, t)| *f += 0.005 * t);
+        }
+        let mut noise = Noise::white(0.004);
+        noise.bins[0].a[0] = 0.9;
+        let data = Data::new(Arc::new(drifting), noise, 0.0);
+        model.free.thickness = false;
+        let drift = stylet_tissue::info("force_drift").expect("in the library");
+        let told = fit(&model.with(Choice::new(drift, &[0.005])), &data, Effort::FULL).expect("a fit");
+        let nats = |s: &Spread, dof: f64| {
+            let e = s.parameter(0, 0);
+            0.5 * (e.value / (e.high - e.low) * 2.0 * student::quantile(0.975, dof)).powi(2)
+        };
+        let known = Spread::known(&told, &data);
+        let by_normal = known.against_none(0).expect("a strength");
+        assert!(by_normal > 8.0 && (by_normal / nats(&known, 1e4) - 1.0).abs() < 0.01, "{by_normal}");
+        let own = Spread::new(&told, &data, &mut ChaCha8Rng::seed_from_u64(3));
+        let by_student = own.against_none(0).expect("a strength");
+        assert!(by_student < 0.97 * nats(&own, 1e4), "{by_student} of {}", nats(&own, 1e4));
+    }
+
     /// Under a slow noise the place at which a force bends is far less sure than a derivative says, which sees a jump there; under a white
     /// one both agree.
     #[test]
