@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # How much of a crate its own tests hold fast: mutates it line by line and counts the mutants that they notice.
-#     tests/mutants.sh CRATE [SHARD] [-- OPTION...]      e.g.  tests/mutants.sh stats;  tests/mutants.sh tissue 2/5;  tests/mutants.sh core 0/7 -- --file '*/rls.rs'
+#     tests/mutants.sh CRATE [SHARD] [-- OPTION...]      e.g.  tests/mutants.sh stats;  tests/mutants.sh tissue 2/5;  tests/mutants.sh core 0/7 -- --file rls.rs
 # CRATE is a folder of crates/ or a package; SHARD k/n takes every n-th mutant from the k-th on (n odd: operators come in pairs); what follows
 # `--` goes to `cargo mutants`. Prints tried, killed (a timeout is noticed, too), survived, unviable (do not compile), the share killed
 # with its Wilson 95 % interval, and the survivors. Nothing is left out: a mutant that changes no behaviour counts as a survivor.
