@@ -258,6 +258,26 @@ fn a_needle_that_starts_inside_the_tissue_and_a_repeated_time_stamp_are_in_balan
     }
 }
 
+#[test]
+fn the_balance_holds_with_every_effect_of_the_tissue() {
+    let motion = ripple_hold_retract(-0.002, 0.005, 0.004, 0.4, 100.0);
+    let ks = 900.0;
+    let per_layer = per_layer().map(|info| {
+        let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
+        AnyEffect::from_parameters(info.id, &start).expect("its own parameters")
+    });
+    let bends = |e: &AnyEffect| e.id() == "needle_compliance";
+    // What moves the tissue or shakes it moves the base with it.
+    let moves = |e: &AnyEffect| e.place() == Place::Kinematics || e.place() >= Place::Tool;
+    for effect in typical_effects().into_iter().chain(per_layer).filter(|e| !moves(e) && !bends(e)) {
+        let (f, tips, _) = bend(&three_gels(), &[effect.clone(), spring(ks)], &motion);
+        for (k, (&(_, z, _), (force, tip))) in motion.iter().zip(f.iter().zip(&tips)).enumerate() {
+            let off = (tip - z + force.total_n / ks).abs();
+            assert!(off < 1e-10, "{effect:?}, sample {k}: {off}");
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

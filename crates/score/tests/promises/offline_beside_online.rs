@@ -127,8 +127,9 @@ fn only_the_way_forward_inside_a_layer_before_its_rupture_is_asked() {
             recording.force_n[i] = 7.0;
         }
     }
-    // Behind the rupture the tip springs back into the layer for ten samples.
+    // From the instant of the rupture on the tip springs back into the layer for ten samples.
     let at = recording.time_s.partition_point(|t| *t < ruptures[0].time_s);
+    run.truth.ruptures[0].time_s = recording.time_s[at];
     for i in at..at + 10 {
         recording.position_m[i] = 0.018;
         recording.force_n[i] = 9.0;
