@@ -444,6 +444,30 @@ mod tests {
     }
 
     #[test]
+    fn a_layer_that_gives_way_leaves_the_tip_where_it_is_with_the_speed_of_that_instant() {
+        let rupture =
+            Rupture { layer: 2, time_s: 0.004, position_m: 0.0152, released_n: 0.4, by_force: true };
+        let (mut law, state) = law(&[]);
+        let gone = |law: &Law, state: LawState| {
+            let mut at = LawState { ruptured: 2, dv_mps: 0.001, ..state };
+            law.let_go(&mut at, &rupture, 0.017, 0.009, 0.4);
+            assert_eq!((at.z_m, at.time_s), (0.0152, 0.004));
+            (at.v_mps, at.dv_mps)
+        };
+        // Friction of 50 + 7000 x 5.2 mm Ns/m takes over what the needle presses with, 1.8 mm behind its base.
+        let (v, dv) = gone(&law, state);
+        near(v, 0.0018 * NEEDLE_N_PER_M / (50.0 + 36.4), 1e-9);
+        assert_eq!(dv, 0.0);
+        // Without any the tip goes on at the speed it had, 4 mm/s on the way to 9.
+        for slab in &mut law.slabs {
+            slab.friction_ns_per_m2 = 0.0;
+        }
+        let (v, dv) = gone(&law, state);
+        near(v, 0.006, 1e-15);
+        assert_eq!(dv, 0.001);
+    }
+
+    #[test]
     fn a_balance_is_exact_or_stuck_where_dry_friction_jumps() {
         for (v_before, base_m, sticks) in
             [(0.004, 0.0165, false), (-0.004, 0.0145, false), (0.0, 0.015_45, true)]
