@@ -407,6 +407,23 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_heard_twice_teaches_what_it_teaches_once() {
+        let e = coloured(11, 90, &[0.9, -0.4, 0.2], 1.0);
+        let (once, thrice) = (Ar::burg(&[&e], 4), Ar::burg(&[&e, &e, &e], 4));
+        assert_eq!((once.order(), thrice.order()), (4, 4));
+        for (a, b) in once.reflection().iter().zip(thrice.reflection()) {
+            assert!((a - b).abs() < 1e-13, "{once:?} {thrice:?}");
+        }
+        // Nor does it matter which of two recordings comes first.
+        let (short, long) = (&e[..30], &e[30..]);
+        let (ab, ba) = (Ar::burg(&[short, long], 4), Ar::burg(&[long, short], 4));
+        assert!(
+            ab.reflection().iter().zip(ba.reflection()).all(|(a, b)| (a - b).abs() < 1e-13),
+            "{ab:?} {ba:?}"
+        );
+    }
+
+    #[test]
     fn a_model_stays_stationary_and_within_its_largest_order() {
         assert_eq!(Ar::from_reflection(&[0.1; 40], 1.0).order(), MAX_ORDER);
         let clipped = Ar::from_reflection(&[2.0, -2.0, f64::NAN], 1.0);
