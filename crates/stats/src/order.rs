@@ -46,7 +46,7 @@ pub fn quantile_of_sorted(sorted: &[f64], q: f64) -> f64 {
     if share == 0.0 {
         return sorted[below];
     }
-    between(sorted[below], sorted[(below + 1).min(sorted.len() - 1)], share)
+    between(sorted[below], sorted[below + 1], share)
 }
 
 /// The `q` quantile of values in ascending order with its distribution-free 95 % interval between order statistics: the
