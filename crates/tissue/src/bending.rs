@@ -37,8 +37,8 @@ struct Balance {
     v: f64,
     /// The force there, when it could be told without the effects' remembering anything.
     force: Option<TissueForce>,
-    /// Force in N when the tip sticks: the spring's, somewhere in the jump of the law's.
-    stuck_n: Option<f64>,
+    /// Force in N when the tip sticks, the spring's, and the law's on the two sides of the jump in which it lies.
+    stuck: Option<(f64, [TissueForce; 2])>,
 }
 
 /// What is sought: the tip's velocity, or its position when no time has passed.
@@ -64,6 +64,19 @@ fn theta(dt_s: f64, tau_s: f64) -> f64 {
     } else {
         -1.0 / libm::expm1(-ratio) - 1.0 / ratio
     }
+}
+
+/// The force of a tip that sticks: `total_n`, with what is missing of it given to friction and tip as they share the jump of the law's
+/// force between its two sides.
+fn stick(force: &mut TissueForce, total_n: f64, [low, high]: [TissueForce; 2]) {
+    let missing = total_n - force.total_n;
+    let jump = high.total_n - low.total_n;
+    let share = if jump == 0.0 { 0.0 } else { missing / jump };
+    let at_tip = share * (high.tip_extra_n - low.tip_extra_n);
+    force.tip_extra_n += at_tip;
+    force.friction_n += missing - at_tip;
+    force.tip_n += share * (high.tip_n - low.tip_n);
+    force.total_n = total_n;
 }
 
 impl Step {
@@ -116,8 +129,8 @@ impl Law {
             // The tip's speed changes as the base's does: its travel is the mean of both speeds.
             let lead_m = (0.5 - theta) * state.base_mps2 * dt * dt;
             let step = Step { dt, theta, base_m, from_m: state.z_m, v_before: state.v_mps, lead_m };
-            let Balance { z, v, force, stuck_n } = if let_go && dt <= 0.0 && viscous > 0.0 {
-                Balance { z: state.z_m, v: state.v_mps, force: None, stuck_n: None }
+            let Balance { z, v, force, stuck } = if let_go && dt <= 0.0 && viscous > 0.0 {
+                Balance { z: state.z_m, v: state.v_mps, force: None, stuck: None }
             } else {
                 self.balance(state, step)
             };
@@ -142,11 +155,8 @@ impl Law {
             let moment = state.moment(time_s, z, v);
             state.remember(&moment, elastic);
             let mut force = force.unwrap_or_else(|| self.sum_up(&moment, elastic, &mut state.memory));
-            if let Some(total_n) = stuck_n {
-                let missing = total_n - force.total_n;
-                force.friction_n += missing;
-                force.tip_n += missing;
-                force.total_n = total_n;
+            if let Some((total_n, sides)) = stuck {
+                stick(&mut force, total_n, sides);
             }
             return force;
         }
@@ -246,10 +256,11 @@ impl Law {
         let memory = self.remembers.then_some(state.memory);
         let mut u = if step.dt > 0.0 { step.v_before + state.dv_mps } else { step.base_m };
         let (mut low, mut high) = (None, None); // the bracket: surplus negative, positive
+        let mut sides = [TissueForce::default(); 2]; // and the forces there
         let mut before: Option<(f64, f64)> = None;
         let mut best = (u, f64::INFINITY, None);
         let smallest = if step.dt > 0.0 { 2e-9 * SGN_DEAD_BAND_MPS } else { TOLERANCE_M };
-        let mut stuck = false;
+        let mut sticks = false;
         for turn in 0..MAX_TRIALS {
             let force = self.trial(state, &step, u);
             if let Some(memory) = &memory {
@@ -263,10 +274,11 @@ impl Law {
                 break;
             }
             *if surplus < 0.0 { &mut low } else { &mut high } = Some(u);
+            sides[usize::from(surplus >= 0.0)] = force;
             if let (Some(low), Some(high)) = (low, high)
                 && f64::abs(high - low) <= smallest
             {
-                stuck = true;
+                sticks = true;
                 best = (if low.abs() < high.abs() { low } else { high }, 0.0, None);
                 break;
             }
@@ -295,7 +307,7 @@ impl Law {
         }
         let (z, v) = step.tip(best.0);
         let force = best.2.filter(|_| memory.is_none());
-        Balance { z, v, force, stuck_n: stuck.then_some((step.base_m - z) * self.needle_n_per_m) }
+        Balance { z, v, force, stuck: sticks.then_some(((step.base_m - z) * self.needle_n_per_m, sides)) }
     }
 }
 
@@ -468,6 +480,33 @@ mod tests {
     }
 
     #[test]
+    fn what_holds_a_tip_is_shared_as_the_jump_of_the_force_is() {
+        let side = |friction_n, tip_extra_n, tip_n| TissueForce {
+            total_n: friction_n + tip_extra_n,
+            friction_n,
+            tip_extra_n,
+            tip_n,
+            ..TissueForce::default()
+        };
+        // From -0.3 N of friction and 0.1 N at the tip to 0.9 and 0.5 N: 1.6 N in all, of which the tip feels 1 N.
+        let sides = [side(-0.3, 0.1, 0.0), side(0.9, 0.5, 1.0)];
+        for (from, total_n) in [(sides[0], 0.2), (sides[1], 0.2), (side(0.1, 0.3, 0.4), 0.2)] {
+            let mut force = from;
+            stick(&mut force, total_n, sides);
+            let share = (total_n - from.total_n) / 1.6;
+            near(force.friction_n, from.friction_n + share * 1.2, 1e-15);
+            near(force.tip_extra_n, from.tip_extra_n + share * 0.4, 1e-15);
+            near(force.tip_n, from.tip_n + share, 1e-15);
+            assert_eq!(force.total_n, total_n);
+        }
+        // A rest that no jump explains is rounding; friction takes it.
+        let mut force = sides[0];
+        stick(&mut force, -0.15, [sides[0]; 2]);
+        near(force.friction_n, -0.25, 1e-15);
+        assert_eq!((force.tip_extra_n, force.tip_n, force.total_n), (0.1, 0.0, -0.15));
+    }
+
+    #[test]
     fn a_balance_is_exact_or_stuck_where_dry_friction_jumps() {
         for (v_before, base_m, sticks) in
             [(0.004, 0.0165, false), (-0.004, 0.0145, false), (0.0, 0.015_45, true)]
@@ -476,11 +515,11 @@ mod tests {
             let mut at = LawState { v_mps: v_before, ..state };
             let step = Step { dt: 0.005, theta: 0.6, base_m, from_m: 0.015, v_before, lead_m: 0.0 };
             let balance = law.balance(&mut at, step);
-            assert_eq!(balance.stuck_n.is_some(), sticks, "{base_m}");
+            assert_eq!(balance.stuck.is_some(), sticks, "{base_m}");
             assert_eq!(step.tip(balance.v), (balance.z, balance.v));
             let spring = (base_m - balance.z) * NEEDLE_N_PER_M;
-            match balance.stuck_n {
-                Some(stuck) => {
+            match balance.stuck {
+                Some((stuck, _)) => {
                     near(stuck, spring, 0.0);
                     assert!(balance.v.abs() <= SLIDING_MPS, "{}", balance.v);
                 }

@@ -259,6 +259,43 @@ fn a_needle_that_starts_inside_the_tissue_and_a_repeated_time_stamp_are_in_balan
 }
 
 #[test]
+fn what_a_tip_that_sticks_feels_is_free_of_the_friction_of_the_layers_passed() {
+    // 40 mm in, held, and slowly back: the shaft rubs in 20 mm that are passed and in 20 mm of the layer that the tip is in.
+    let (c, ks) = (20.0, 1000.0);
+    let stack = tissue(&[layer(0.02, 0.0, 0.0, None), layer(1.0, 0.0, 0.0, None)]);
+    let mut motion = constant(0.005, 200.0, 8.0);
+    let (last_s, last_m, _) = motion[motion.len() - 1];
+    motion.extend((1..=60).map(|k| (last_s + 0.005 * f64::from(k), last_m - 1e-5 * f64::from(k), -0.002)));
+    let dry: AnyEffect = CoulombFriction { c_n_per_m: c }.into();
+    let (f, tips, _) = bend(&stack, &[dry.clone(), spring(ks)], &motion);
+    assert!(tips.windows(2).skip(1600).all(|w| (w[1] - w[0]).abs() < 1e-7), "it sticks");
+    for (force, tip) in f.iter().zip(&tips).skip(1000) {
+        near(force.tip_n, force.friction_n * (tip - 0.02) / tip, 1e-9);
+        near(force.friction_n, force.total_n, 1e-12);
+    }
+    // In the air behind its only layer a tip feels nothing, stuck or not.
+    let (f, ..) = bend(&tissue(&[layer(0.02, 0.0, 0.0, None)]), &[dry, spring(ks)], &motion);
+    assert!(f[1620].friction_n.abs() > 0.1);
+    f.iter().skip(1000).for_each(|force| near(force.tip_n, 0.0, 1e-12));
+}
+
+#[test]
+fn a_tip_that_sticks_under_a_cutting_force_bears_it_at_the_tip() {
+    // Cutting stops when the tip does: on the way back the spring lets go of what the tip bears, between 0.5 N and nothing.
+    let mut motion = constant(0.005, 200.0, 8.0);
+    let (last_s, last_m, _) = motion[motion.len() - 1];
+    motion.extend((1..=40).map(|k| (last_s + 0.005 * f64::from(k), last_m - 1e-5 * f64::from(k), -0.002)));
+    let cutting = CuttingForce { force_n: 0.5 }.into();
+    let (f, ..) = bend(&block(0.0, 0.0), &[cutting, spring(1000.0)], &motion);
+    for (k, force) in f.iter().enumerate().skip(1600) {
+        assert!(force.total_n > 0.05 && force.total_n < 0.5, "{k}: {force:?}");
+        near(force.tip_extra_n, force.total_n, 1e-12);
+        near(force.tip_n, force.total_n, 1e-12);
+        near(force.friction_n, 0.0, 1e-12);
+    }
+}
+
+#[test]
 fn the_balance_holds_with_every_effect_of_the_tissue() {
     let motion = ripple_hold_retract(-0.002, 0.005, 0.004, 0.4, 100.0);
     let ks = 900.0;
