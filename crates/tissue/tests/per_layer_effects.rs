@@ -113,3 +113,61 @@ fn a_creeping_branch_fades_in_the_hold_with_its_time_constant_and_is_the_same_at
     let slow = forces(&skin(), &branches, &coarse);
     assert!(worst(&every[130..], &slow[130..]) < 1e-3, "{}", worst(&every[130..], &slow[130..]));
 }
+
+#[test]
+fn a_tougher_layer_and_a_rougher_shaft_change_the_effects_that_hold_their_numbers() {
+    let waits = |force_n| AnyEffect::from(DelayedPuncture { layer: 2, force_n, exponent: 3.0 });
+    let mut tough = waits(2.0);
+    tough.toughened(1, 1.5);
+    assert_eq!(tough, waits(2.0), "another layer");
+    tough.toughened(2, 1.5);
+    assert_eq!(tough, waits(3.0));
+    let clings = |push_n, pull_n| AnyEffect::from(ShaftSlip { push_n, pull_n, ..ShaftSlip::default() });
+    let mut rough = clings(2.0, 1.0);
+    rough.rubbed(1.5);
+    assert_eq!(rough, clings(3.0, 1.5));
+    // Others take what the layers hold.
+    let mut other = holds(0.5, 0.004, 2.0);
+    other.rubbed(1.5);
+    other.toughened(1, 1.5);
+    assert_eq!(other, holds(0.5, 0.004, 2.0));
+}
+
+#[test]
+fn relaxing_shares_cannot_be_more_than_the_whole_and_the_error_says_what_is_left() {
+    let relaxes = |fractions| AnyEffect::from(ShaftSlip { push_n: 1.0, fractions, ..ShaftSlip::default() });
+    assert!(relaxes([0.75, 0.25]).check().is_ok());
+    let error = relaxes([0.75, 0.5]).check().expect_err("more than the whole");
+    assert_eq!((error.path, error.value, error.allowed), ("fractions.1", 0.5, (0.0, 0.25)));
+    // In coordinates the second share is one of what the first leaves, so that any two are allowed.
+    assert_eq!(relaxes([0.75, 0.125]).coordinates()[8..10], [0.75, 0.5]);
+    assert_eq!(relaxes([1.0, 0.0]).coordinates()[8..10], [1.0, 0.0]);
+    let whole = AnyEffect::from_coordinates("shaft_slip", &relaxes([0.75, 0.25]).coordinates());
+    assert_eq!(whole, Some(relaxes([0.75, 0.25])));
+    let term = |fraction| PronyTerm { fraction, time_constant_s: 1.0 };
+    let prony = |first, second| AnyEffect::from(StressRelaxation { terms: vec![term(first), term(second)] });
+    assert!(prony(0.75, 0.25).check().is_ok());
+    assert_eq!(prony(0.75, 0.5).check().expect_err("more than the whole").allowed, (0.0, 0.25));
+}
+
+#[test]
+fn damage_grows_with_the_mean_power_of_the_force_whatever_the_step() {
+    // Damage 1 breaks the layer: of a ramp to 2 F_1 in T with exponent n, T 2^n/(n + 1) at its end.
+    let layer = tissue(&[layer(0.5, 100.0, 0.0, None)]);
+    for exponent in [1.0, 2.5, 8.0] {
+        let seconds = (exponent + 1.0) / 2.0_f64.powf(exponent);
+        for steps in [3, 400] {
+            let effect = AnyEffect::from(DelayedPuncture { layer: 1, force_n: 0.5, exponent });
+            let law = Law::new(&layer, &[effect]).expect("one effect");
+            let (mut state, mut broke) = (LawState::default(), None);
+            for k in 0..=steps + 1 {
+                // 1 N, which is 2 F_1, at 10 mm.
+                let share = 1.000_001 * f64::from(k) / f64::from(steps);
+                law.step(&mut state, seconds * share, 0.01 * share, 0.01 / seconds, |r| {
+                    broke = broke.or(Some((k, r.time_s)))
+                });
+            }
+            assert_eq!(broke.map(|b| b.0), Some(steps), "{exponent} {steps}");
+        }
+    }
+}
