@@ -171,3 +171,43 @@ fn damage_grows_with_the_mean_power_of_the_force_whatever_the_step() {
         }
     }
 }
+
+#[test]
+fn a_puncture_passes_the_share_that_is_kept_into_the_branch_s_hold() {
+    // 0.8 N are released at 8 mm, the shaft stands still there: what is kept of them holds, and creeps away with its time constant.
+    let motion: Vec<Sample> = (0..=1600)
+        .map(|k| f64::from(k) * 0.005)
+        .map(|t| if t <= 4.001 { (t, 0.002_000_1 * t, 0.002_000_1) } else { (t, 0.008_002, 0.0) })
+        .collect();
+    for (share, kept) in [(0.5, 0.5), (1.0, 0.25), (0.8, 1.0)] {
+        let delta_m = 0.05;
+        let creeps =
+            ViscoelasticPresliding { layer: 1, share, delta_m, time_constant_s: 2.0, kept, release_m: 0.0 };
+        let f = run(&skin(), &[creeps.into()], &motion).0;
+        // Two steps of creep take 5 ms/2 s each, a little travel adds less.
+        near(f[801].friction_n, share * kept * 0.8, 0.005);
+        near(f[1201].friction_n / f[801].friction_n, (-1.0f64).exp(), 1e-9);
+    }
+}
+
+#[test]
+fn a_hold_follows_travel_to_first_order_however_small() {
+    // Steps of a nanometre, a micrometre and a tenth of a millimetre: the hold's limit follows by 1 - exp(-travel/delta).
+    for steps in [10, 10_000, 1_000_000] {
+        let way = 0.001;
+        let effect = holds(1.0, 0.004, 1e6);
+        let law = Law::new(&skin(), &[effect]).expect("one effect");
+        let mut state = LawState::default();
+        let mut at = |t: f64, z: f64, v: f64| law.step(&mut state, t, z, v, |_| {});
+        // Slid in at 2 mm/s until it holds 1 N; then on at 1 mm/s, at which it slides at 0.5 N.
+        for k in 0..=2000 {
+            at(0.01 * f64::from(k), 2e-5 * f64::from(k), 0.002);
+        }
+        let mut force = 0.0;
+        for k in 1..=steps {
+            let share = f64::from(k) / f64::from(steps);
+            force = at(20.0 + share, 0.04 + way * share, 0.001).friction_n;
+        }
+        near(force, 0.5 + 0.5 * (-way / 0.004).exp(), 1e-6);
+    }
+}
