@@ -187,11 +187,15 @@ fn one_long_step_finds_every_rupture_where_short_ones_do() {
         let deepest = positions[positions.len() - 1];
         let rest = (1..=90).map(|k| deepest + 0.001 * f64::from(k));
         let motion: Vec<_> = positions.iter().copied().chain(rest).map(|z| (z / v, z, v)).collect();
-        let (_, ruptures) = insert(&tissue, &motion);
-        assert_eq!(ruptures.iter().map(|r| r.by_force).collect::<Vec<_>>(), [false, true, true]);
-        for (r, (z, released_n)) in ruptures.iter().zip(expected) {
-            assert!((r.position_m - z).abs() < 1e-12 && (r.time_s - z / v).abs() < 1e-9, "{r:?} at {z}");
-            assert!((r.released_n - released_n).abs() < 1e-12, "{r:?} {released_n}");
+        // The same with an effect that has no say in it.
+        for effects in [vec![], vec![stylet_tissue::CoulombFriction { c_n_per_m: 1.0 }.into()] as Vec<_>] {
+            let (law, mut ruptures) = (Law::new(&tissue, &effects).expect("few effects"), Vec::new());
+            replay(&law, motion.iter().copied(), |r| ruptures.push(r), |_| {});
+            assert_eq!(ruptures.iter().map(|r| r.by_force).collect::<Vec<_>>(), [false, true, true]);
+            for (r, (z, released_n)) in ruptures.iter().zip(expected) {
+                assert!((r.position_m - z).abs() < 1e-12 && (r.time_s - z / v).abs() < 1e-9, "{r:?} at {z}");
+                assert!((r.released_n - released_n).abs() < 1e-12, "{r:?} {released_n}");
+            }
         }
     }
 }
