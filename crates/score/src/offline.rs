@@ -106,7 +106,44 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_without_samples_has_no_estimate() {
+    fn a_layer_without_two_samples_inside_it_has_no_estimate() {
         assert!(offline(std::iter::empty(), 1.0).is_none());
+        let at = |depth_m| LayerSample { depth_m, velocity_mps: 0.002, force_n: 1.0 };
+        assert!(offline([at(-0.01), at(0.0), at(0.01)].into_iter(), 1.0).is_none());
+        assert!(offline([at(0.01), at(0.02)].into_iter(), 1.0).is_some());
+        // Nor one whose numbers are none.
+        let wild = LayerSample { velocity_mps: f64::INFINITY, ..at(0.01) };
+        assert!(offline([at(0.01), at(0.02), wild].into_iter(), 1.0).is_none());
+    }
+
+    #[test]
+    fn what_lies_before_the_layer_does_not_count() {
+        let inside = samples(|z| 0.002 + 0.1 * z);
+        let before = inside.iter().map(|s| LayerSample { depth_m: -s.depth_m, force_n: 7.0, ..*s });
+        let found = offline(before.chain(inside.clone()), 1000.0).expect("enough samples");
+        assert!((found.stiffness_n_per_m - 40.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn a_velocity_that_hardly_changes_is_not_trusted_to_separate() {
+        // Columns with a ratio r = ratio x v of about one: the smaller eigenvalue of the normal matrix is a quarter of the relative
+        // variance of r times the larger, so that the bar of 1e-4 lies at velocities that differ by two hundredths.
+        for (spread, separable) in [(0.03, true), (0.015, false)] {
+            let mut sign = 1.0;
+            let alternating: Vec<LayerSample> = samples(|_| 0.002)
+                .into_iter()
+                .map(|s| {
+                    sign = -sign;
+                    let velocity_mps = 0.002 * (1.0 + sign * spread);
+                    LayerSample { velocity_mps, force_n: s.depth_m * (40.0 + 9000.0 * velocity_mps), ..s }
+                })
+                .collect();
+            // The same whatever the size of the matrix: a layer a thousand times as deep.
+            for scale in [1.0, 1000.0] {
+                let data = alternating.iter().map(|s| LayerSample { depth_m: s.depth_m * scale, ..*s });
+                let found = offline(data, 1.0 / 0.002).expect("enough samples");
+                assert_eq!(found.separable, separable, "{spread} {scale}: {found:?}");
+            }
+        }
     }
 }

@@ -358,4 +358,98 @@ mod tests {
         let tone: Vec<f64> = (0..1000).map(|i| libm::sin(0.1 * f64::from(i))).collect();
         assert!(Ar::fit(&[&tone], 8, Criterion::Aic).innovations_sd().is_finite());
     }
+
+    #[test]
+    fn the_prediction_is_what_whitening_takes_off() {
+        let ar = Ar::from_reflection(&[0.8, -0.5, 0.3], 2.0);
+        let e = [1.0, -0.5, 2.0, 0.25, -3.0, 1.5];
+        let mut w = [0.0; 6];
+        ar.whiten(&e, &mut w);
+        for t in 0..6 {
+            let (mean, sd) = ar.predict(&e[..t]);
+            assert!(((e[t] - mean) / sd - w[t]).abs() < 1e-14, "{t}");
+        }
+        // Of the first sample nothing is known; of order three at the latest no more than three samples matter.
+        assert_eq!(ar.predict(&[]), (0.0, 2.0));
+        assert_eq!(ar.predict(&[9.0, 1.0, 2.0, 3.0]), ar.predict(&[1.0, 2.0, 3.0]));
+        // One sample before: correlation 0.8, and what it leaves open of the variance 4.
+        let (mean, sd) = ar.predict(&[1.5]);
+        assert!((mean - 1.2).abs() < 1e-15 && (sd - 2.0 * 0.6).abs() < 1e-15);
+        assert_eq!(
+            (Ar::white(3.0).predict(&[1.0]), Ar::first_order(0.5, 1.0).coefficients()),
+            ((0.0, 3.0), &[0.5][..])
+        );
+    }
+
+    #[test]
+    fn the_order_chosen_has_the_lowest_price() {
+        for seed in 0..20 {
+            let e = coloured(seed, 120, &[0.5, -0.2, 0.15], 1.0);
+            let halves = [&e[..50], &e[50..]];
+            for (criterion, price) in [(Criterion::Aic, 2.0), (Criterion::Bic, 120f64.ln())] {
+                let cost = |p: usize| 240.0 * Ar::burg(&halves, p).innovations_sd().ln() + price * p as f64;
+                let best = (0..=6).min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
+                assert_eq!(Some(Ar::fit(&halves, 6, criterion).order()), best, "{seed} {criterion:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn burg_s_first_coefficient_is_that_by_hand() {
+        // 2 sum f b / sum (f^2 + b^2) over neighbours inside the stretches: 2 (2 + 2 + 12 - 2)/(5 + 5 + 25 + 5).
+        let ar = Ar::burg(&[&[1.0, 2.0, 1.0], &[3.0, 4.0], &[-1.0, 2.0]], 1);
+        assert!((ar.coefficients()[0] - 0.7).abs() < 1e-15);
+        assert!((ar.sd() - (36.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert!((ar.innovations_sd() - ar.sd() * (1.0 - 0.49_f64).sqrt()).abs() < 1e-15);
+        // Of a stretch of three one coefficient can be told, of two none, whatever is asked.
+        assert_eq!(Ar::burg(&[&[1.0, 2.0, 1.0]], 9).order(), 1);
+        assert_eq!(Ar::burg(&[&normals(3, 200)], 40).order(), MAX_ORDER);
+    }
+
+    #[test]
+    fn a_recording_heard_twice_teaches_what_it_teaches_once() {
+        let e = coloured(11, 90, &[0.9, -0.4, 0.2], 1.0);
+        let (once, thrice) = (Ar::burg(&[&e], 4), Ar::burg(&[&e, &e, &e], 4));
+        assert_eq!((once.order(), thrice.order()), (4, 4));
+        for (a, b) in once.reflection().iter().zip(thrice.reflection()) {
+            assert!((a - b).abs() < 1e-13, "{once:?} {thrice:?}");
+        }
+        // Nor does it matter which of two recordings comes first.
+        let (short, long) = (&e[..30], &e[30..]);
+        let (ab, ba) = (Ar::burg(&[short, long], 4), Ar::burg(&[long, short], 4));
+        assert!(
+            ab.reflection().iter().zip(ba.reflection()).all(|(a, b)| (a - b).abs() < 1e-13),
+            "{ab:?} {ba:?}"
+        );
+    }
+
+    #[test]
+    fn a_model_stays_stationary_and_within_its_largest_order() {
+        assert_eq!(Ar::from_reflection(&[0.1; 40], 1.0).order(), MAX_ORDER);
+        let clipped = Ar::from_reflection(&[2.0, -2.0, f64::NAN], 1.0);
+        assert!(clipped.reflection().iter().all(|k| k.abs() < 1.0) && clipped.innovations_sd() > 0.0);
+        assert_eq!(clipped.reflection()[2], 0.0);
+        for (lags, order) in [(&[][..], 0), (&[-1.0, 0.5], 0), (&[0.0, 0.0], 0), (&[1.0, 0.5], 1)] {
+            assert_eq!(Ar::from_autocovariance(lags).order(), order, "{lags:?}");
+        }
+        assert_eq!(Ar::from_autocovariance(&[0.1; 50]).order(), MAX_ORDER);
+        assert_eq!(Ar::from_reflection(&[0.5], 1.0).with_sd(3.0), Ar::from_reflection(&[0.5], 3.0));
+    }
+
+    #[test]
+    fn the_likelihood_of_short_stretches_is_that_of_the_normal_distribution() {
+        let ar = Ar::from_reflection(&[0.6, -0.3], 2.0);
+        let mut lags = [0.0; 3];
+        ar.autocovariance(&mut lags);
+        assert!((lags[0] - 4.0).abs() < 1e-15 && (lags[1] - 2.4).abs() < 1e-15);
+        // One sample: variance 4. Two: a bivariate normal with correlation 0.6.
+        let one = -0.5 * (1.5 * 1.5 / 4.0 + (TAU * 4.0).ln());
+        assert!((ar.ln_likelihood(&[1.5], &mut [0.0]) - one).abs() < 1e-14);
+        let (x, y, r) = (1.5_f64, -1.0_f64, 0.6_f64);
+        let rest: f64 = 1.0 - r * r;
+        let two = -0.5 * (x * x - 2.0 * r * x * y + y * y) / (4.0 * rest) - (TAU * 4.0 * rest.sqrt()).ln();
+        assert!((ar.ln_likelihood(&[x, y], &mut [0.0; 2]) - two).abs() < 1e-14);
+        assert!((ar.ln_sd_sum(2) - (2.0_f64 * 2.0 * 0.8).ln()).abs() < 1e-14);
+        assert_eq!(ar.ln_likelihood(&[], &mut []), 0.0);
+    }
 }

@@ -29,4 +29,11 @@ mod tests {
         }
         assert!(interpolate(&[], &[], 1.0).is_nan());
     }
+
+    #[test]
+    fn at_a_step_the_left_value_counts() {
+        assert_eq!(interpolate(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0], 1.0), 1.0);
+        assert_eq!(interpolate(&[-2.0, 6.0], &[10.0, -6.0], 1.5), 3.0);
+        assert_eq!(interpolate(&[3.0], &[7.0], 3.0), 7.0);
+    }
 }

@@ -75,4 +75,32 @@ mod tests {
         assert_eq!(mean_interval(&[1.0]).expect("a value").high, f64::INFINITY);
         assert_eq!(mean_interval(&[]), None);
     }
+
+    #[test]
+    fn a_score_interval_ends_where_the_test_of_its_end_would_just_reject() {
+        // Wilson's interval by its definition: at an end p the estimate is z standard errors sqrt(p (1 - p)/n) away.
+        for (hits, of, confidence) in [(3.0, 10.0, 0.95), (0.5, 4.0, 0.8), (70.0, 71.5, 0.99)] {
+            let i = wilson_at(hits, of, confidence);
+            let z = normal::quantile(0.5 + confidence / 2.0);
+            assert_eq!(i.value, hits / of);
+            for end in [i.low, i.high] {
+                let errors = (i.value - end).abs() / (end * (1.0 - end) / of).sqrt();
+                assert!((errors / z - 1.0).abs() < 1e-10, "{hits} of {of}: {end}");
+            }
+            assert!(i.low < i.value && i.value < i.high);
+        }
+        assert!(wilson(0, 0).value.is_nan());
+        assert_eq!((wilson_at(0.0, 3.0, 0.5).low, wilson_at(3.0, 3.0, 0.5).high), (0.0, 1.0));
+    }
+
+    #[test]
+    fn three_values_have_an_interval_of_4_303_standard_errors() {
+        // Mean 6, variance 13; Student's quantile of two degrees of freedom in closed form.
+        let i = mean_interval(&[2.0, 7.0, 9.0]).expect("values");
+        let t = 0.95 * (2.0 / (1.0 - 0.95 * 0.95_f64)).sqrt();
+        let half = t * (13.0_f64 / 3.0).sqrt();
+        assert!((i.low - (6.0 - half)).abs() < 1e-12 && (i.high - (6.0 + half)).abs() < 1e-12, "{i:?}");
+        let one = mean_interval(&[4.0]).expect("a value");
+        assert_eq!((one.value, one.low, one.high), (4.0, f64::NEG_INFINITY, f64::INFINITY));
+    }
 }

@@ -165,4 +165,30 @@ mod tests {
         let sine: Vec<f64> = (0..360).map(|i| 3.0 * libm::sin(f64::from(i).to_radians())).collect();
         assert!((rms(&sine) - 3.0 / 2f64.sqrt()).abs() < 1e-12);
     }
+
+    #[test]
+    fn moments_of_few_numbers_are_those_by_hand_or_none() {
+        let three: Moments = [2.0, 7.0, 9.0].into_iter().collect();
+        assert_eq!((three.mean(), three.variance(), three.sd()), (6.0, 13.0, 13f64.sqrt()));
+        assert_eq!((mean(&[2.0, 7.0, 9.0]), variance(&[2.0, 7.0, 9.0])), (6.0, 13.0));
+        assert_eq!((variance(&[2.0, 4.0]), sd(&[2.0, 4.0])), (2.0, 2f64.sqrt()));
+        let two: Moments = [2.0, 4.0].into_iter().collect();
+        assert_eq!((two.count(), two.variance()), (2, 2.0));
+        let one: Moments = [5.0].into_iter().collect();
+        assert!(one.variance().is_nan() && one.sd().is_nan() && variance(&[5.0]).is_nan());
+        assert_eq!((one.mean(), one.min(), one.max()), (5.0, 5.0, 5.0));
+        assert!(mean(&[]).is_nan() && rms(&[]).is_nan() && Moments::default().min().is_nan());
+        assert_eq!(rms(&[3.0, -3.0]), 3.0);
+    }
+
+    #[test]
+    fn a_compensated_sum_is_exact_whichever_of_two_terms_is_the_larger() {
+        let (large, small) = (2f64.powi(53), 1.0);
+        for terms in
+            [[large, small, small, -large], [small, large, small, -large], [small, small, -large, large]]
+        {
+            assert_eq!(terms.into_iter().collect::<Sum>().value(), 2.0, "{terms:?}");
+            assert_eq!(terms.map(|x| -x).into_iter().collect::<Sum>().value(), -2.0, "{terms:?}");
+        }
+    }
 }

@@ -84,4 +84,24 @@ mod tests {
         assert!(quantile(-0.1).is_nan() && quantile(1.1).is_nan() && quantile(f64::NAN).is_nan());
         assert!((quantile(0.975) - crate::Z95).abs() < 1e-15);
     }
+
+    #[test]
+    fn tails_mirror_each_other_and_a_density_is_its_distribution_s_slope() {
+        for x in [-6.0, -1.3, 0.0, 0.4, 2.7] {
+            assert_eq!(cdf(x), sf(-x));
+            let slope = (cdf(x + 1e-5) - cdf(x - 1e-5)) / 2e-5;
+            assert!((slope - libm::exp(ln_pdf(x))).abs() < 1e-9, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_quantile_leads_back_to_its_probability() {
+        for p in [1e-200, 1e-9, 0.0242, 0.0243, 0.2, 0.4999, 0.5] {
+            assert!((cdf(quantile(p)) / p - 1.0).abs() < 1e-12, "{p}");
+        }
+        // The upper half mirrors the lower one, on either side of where the approximation changes.
+        for p in [1e-6, 0.0242, 0.0243, 0.2, 0.4999] {
+            assert!((quantile(1.0 - p) + quantile(p)).abs() < 1e-10, "{p}");
+        }
+    }
 }

@@ -46,7 +46,7 @@ pub fn quantile_of_sorted(sorted: &[f64], q: f64) -> f64 {
     if share == 0.0 {
         return sorted[below];
     }
-    between(sorted[below], sorted[(below + 1).min(sorted.len() - 1)], share)
+    between(sorted[below], sorted[below + 1], share)
 }
 
 /// The `q` quantile of values in ascending order with its distribution-free 95 % interval between order statistics: the
@@ -138,5 +138,39 @@ mod tests {
         clean.iter_mut().step_by(3).for_each(|x| *x = 1e9);
         assert!(mad_scale(&mut clean) < 2.0);
         assert!((MAD_TO_SD * crate::normal::quantile(0.75) - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_interval_of_a_quantile_lies_between_order_statistics() {
+        // Values that say their number, from 1. Conover 1999, section 3.2: of 100 values the 40th and the 61st hold the median.
+        let values: Vec<f64> = (1..=100).map(f64::from).collect();
+        let median = quantile_interval(&values, 0.5).expect("values");
+        assert_eq!((median.value, median.low, median.high), (50.5, 40.0, 61.0));
+        // 64 x 0.2 = 12.8 below, give or take 1.96 x 3.2 = 6.27: from the 6th to the 21st.
+        let fifth = quantile_interval(&values[..64], 0.2).expect("values");
+        assert_eq!((fifth.low, fifth.high), (6.0, 21.0));
+        // Too few values for an end: the extremes.
+        let few = quantile_interval(&values[..5], 0.9).expect("values");
+        assert_eq!((few.low, few.high), (3.0, 5.0));
+        let fewer = quantile_interval(&values[..3], 0.1).expect("values");
+        assert_eq!((fewer.low, fewer.high), (1.0, 3.0));
+        assert_eq!(quantile_interval(&[], 0.5), None);
+    }
+
+    #[test]
+    fn extremes_and_order_leave_out_what_is_no_number() {
+        assert_eq!(extremes(&[2.0, f64::NAN, -3.0, 7.5]), (-3.0, 7.5));
+        let nothing = extremes(&[f64::NAN]);
+        assert!(nothing.0.is_nan() && nothing.1.is_nan());
+        assert_eq!(sorted([2.0, f64::NAN, -3.0, 7.5]), [-3.0, 2.0, 7.5]);
+    }
+
+    #[test]
+    fn a_quantile_between_infinite_or_equal_values_is_a_number() {
+        assert_eq!(quantile(&mut [f64::INFINITY, f64::INFINITY], 0.3), f64::INFINITY);
+        assert_eq!(quantile_of_sorted(&[1.0, f64::INFINITY], 0.0), 1.0);
+        assert_eq!(quantile_of_sorted(&[1.0, 3.0], 0.25), 1.5);
+        assert_eq!(quantile_of_sorted(&[1.0, 3.0], 1.0), 3.0);
+        assert!(quantile_of_sorted(&[], 0.5).is_nan() && quantile_of_sorted(&[1.0], -0.1).is_nan());
     }
 }

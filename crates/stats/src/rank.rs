@@ -51,4 +51,30 @@ mod tests {
         let (rho, p) = spearman(&[1.0, 2.0, 3.0, 4.0, 5.0], &[2.0, 4.0, 8.0, 16.0, 32.0]).expect("it varies");
         assert!(rho == 1.0 && p < 1e-3, "{rho} {p}");
     }
+
+    #[test]
+    fn the_p_value_is_about_the_share_of_all_orders_that_correlate_as_much() {
+        let x = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+        // Of all 40320 orders, counted; the approximation, by another program.
+        for (y, rho, counted, approximate) in [
+            ([2.0, 1.0, 5.0, 3.0, 4.0, 8.0, 6.0, 7.0], 5.0 / 6.0, 0.0154, 0.009215677301205006),
+            ([3.0, 5.0, 1.0, 4.0, 8.0, 2.0, 7.0, 6.0], 19.0 / 42.0, 0.267, 0.28951115772861946),
+            ([8.0, 6.0, 7.0, 3.0, 5.0, 4.0, 1.0, 2.0], -37.0 / 42.0, 0.00724, 0.0027249042173982285),
+        ] {
+            let (found, p) = spearman(&x, &y).expect("it varies");
+            assert!((found - rho).abs() < 1e-14, "{found}");
+            assert!((p / approximate - 1.0).abs() < 1e-11 && (p - counted).abs() < 0.03, "{p}");
+        }
+    }
+
+    #[test]
+    fn four_pairs_are_enough_and_the_longer_column_is_cut() {
+        assert_eq!(spearman(&[1.0, 2.0, 3.0], &[1.0, 3.0, 2.0]), None);
+        let (rho, _) = spearman(&[1.0, 2.0, 3.0, 4.0, -9.0], &[1.0, 2.0, 4.0, 3.0]).expect("it varies");
+        assert!((rho - 0.8).abs() < 1e-15, "{rho}");
+        assert_eq!(spearman(&[1.0, 2.0, 3.0, 4.0], &[5.0; 4]), None);
+        // Ever so sure is not certain.
+        let (_, p) = spearman(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.0, 3.0, 4.0]).expect("it varies");
+        assert!(p > 0.0, "{p}");
+    }
 }

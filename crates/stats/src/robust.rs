@@ -151,4 +151,40 @@ mod tests {
         assert!(location(&values, 1.0, Loss::Squares).0 > 1e4);
         assert!(location(&[], 1.0, Loss::HUBER).0.is_nan());
     }
+
+    #[test]
+    fn a_loss_is_zero_at_zero_and_continuous_where_huber_s_line_begins() {
+        for loss in ALL {
+            assert_eq!((loss.value(0.0), loss.influence(0.0)), (0.0, 0.0));
+            for r in [0.3, 2.0, 9.0] {
+                assert!((loss.weight(r) * r - loss.influence(r)).abs() < 1e-15);
+                assert_eq!((loss.value(r), loss.weight(r)), (loss.value(-r), loss.weight(-r)));
+            }
+        }
+        let k = 1.345;
+        assert!((Loss::HUBER.value(k + 1e-9) - Loss::HUBER.value(k - 1e-9)).abs() < 1e-8);
+        assert_eq!((Loss::HUBER.curvature(k), Loss::HUBER.curvature(k + 1e-9)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn a_location_is_where_the_influences_cancel_and_moves_with_the_values() {
+        let values = [-3.0, 0.1, 0.4, 0.5, 0.9, 1.1, 2.0, 14.0];
+        for loss in [Loss::HUBER, Loss::Student { dof: 4.0 }] {
+            for scale in [0.5, 2.0] {
+                let (at, weights) = location(&values, scale, loss);
+                let pull: f64 = values.iter().map(|x| loss.influence((x - at) / scale)).sum();
+                assert!(pull.abs() < 1e-8, "{loss:?} {scale}: {pull}");
+                let sum: f64 = values.iter().map(|x| loss.weight((x - at) / scale)).sum();
+                assert!((sum - weights).abs() < 1e-6, "{loss:?} {scale}: {sum} {weights}");
+                let moved = values.map(|x| 10.0 - 3.0 * x);
+                let (there, _) = location(&moved, 3.0 * scale, loss);
+                assert!((there - (10.0 - 3.0 * at)).abs() < 1e-8, "{loss:?} {scale}: {at} {there}");
+            }
+        }
+        // Without a scale it is the median, and every value counts.
+        for scale in [0.0, -1.0, f64::NAN] {
+            assert_eq!(location(&values, scale, Loss::HUBER), (0.7, 8.0));
+        }
+        assert_eq!(location(&[1.0, 2.0, 6.0], 1.0, Loss::Squares), (3.0, 3.0));
+    }
 }

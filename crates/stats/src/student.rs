@@ -75,4 +75,32 @@ mod tests {
             assert!((cdf(x, 1.0) - exact).abs() < 1e-14, "{x}: {}", cdf(x, 1.0));
         }
     }
+
+    #[test]
+    fn outside_its_range_there_is_nothing_and_at_the_ends_certainty() {
+        for dof in [0.0, -1.0, f64::NAN] {
+            assert!(sf(1.0, dof).is_nan() && quantile(0.3, dof).is_nan(), "{dof}");
+        }
+        assert!(sf(f64::NAN, 3.0).is_nan() && quantile(-0.1, 3.0).is_nan() && quantile(1.1, 3.0).is_nan());
+        assert_eq!((sf(f64::INFINITY, 3.0), sf(f64::NEG_INFINITY, 3.0), sf(0.0, 3.0)), (0.0, 1.0, 0.5));
+        assert_eq!((quantile(0.0, 3.0), quantile(1.0, 3.0)), (f64::NEG_INFINITY, f64::INFINITY));
+        assert_eq!((quantile(0.5, 3.0), quantile(0.5, f64::INFINITY)), (0.0, 0.0));
+        assert_eq!(ln_pdf(0.7, f64::INFINITY), normal::ln_pdf(0.7));
+        assert_eq!(sf(0.7, f64::INFINITY), normal::sf(0.7));
+    }
+
+    #[test]
+    fn two_degrees_of_freedom_have_a_closed_form() {
+        for p in [1e-9, 0.01, 0.2, 0.499_999, 0.500_001, 0.7, 0.9999] {
+            let a: f64 = 2.0 * p - 1.0;
+            let exact = a * (2.0 / (1.0 - a * a)).sqrt();
+            // The tail that is asked for loses digits in `2 p - 1`, not in the quantile.
+            assert!((quantile(p, 2.0) / exact - 1.0).abs() < 1e-7, "{p}: {} {exact}", quantile(p, 2.0));
+        }
+        for x in [-7.0, -0.4, 0.0, 1.0, 30.0_f64] {
+            let exact = 0.5 - x / (2.0 * (2.0 + x * x).sqrt());
+            assert!((sf(x, 2.0) - exact).abs() < 1e-14, "{x}");
+            assert!((ln_pdf(x, 2.0) + 1.5 * (2.0 + x * x).ln()).abs() < 1e-13, "{x}");
+        }
+    }
 }

@@ -202,4 +202,106 @@ mod tests {
             assert!((chi_square_sf(x, 2.0) / libm::exp(-x / 2.0) - 1.0).abs() < 1e-13, "{x}");
         }
     }
+
+    // The references below were made with mpmath at 40 digits.
+
+    #[test]
+    fn the_incomplete_gamma_function_is_exact_on_both_sides_of_the_switch_from_series_to_fraction() {
+        for (a, x, p, q) in [
+            (0.25, 0.001, 0.19615169838272653, 0.8038483016172735),
+            (0.25, 5.0, 0.9995079748755537, 0.00049202512444634),
+            (1.5, 2.49, 0.8267324857697974, 0.17326751423020254),
+            (1.5, 2.51, 0.8296615096194444, 0.17033849038055557),
+            (3.0, 0.1, 0.00015465307026467167, 0.9998453469297354),
+            (3.0, 9.0, 0.9937678048936227, 0.006232195106377317),
+            (12.0, 12.9, 0.6366094288351127, 0.3633905711648873),
+            (12.0, 13.1, 0.656904608707293, 0.34309539129270705),
+            (60.0, 20.0, 4.233284694712903e-13, 0.9999999999995767),
+            (60.0, 140.0, 0.9999999999999918, 8.169795379525076e-15),
+        ] {
+            let (lower, upper) = regularised_gamma(a, x);
+            // Each to some bits of one, the smaller one to some bits of itself.
+            assert!((lower - p).abs() < 2e-13 && (upper - q).abs() < 2e-13, "{a} {x}: {lower} {upper}");
+            let smaller = if p < q { lower / p } else { upper / q };
+            assert!((smaller - 1.0).abs() < 2e-13, "{a} {x}: {lower} {upper}");
+        }
+    }
+
+    #[test]
+    fn the_incomplete_beta_function_is_exact() {
+        for (a, b, x, wanted) in [
+            (0.3, 0.7, 0.01, 0.21576857250318626),
+            (0.3, 0.7, 0.99, 0.9853118721013316),
+            (2.0, 5.0, 0.25, 0.466064453125),
+            (2.0, 5.0, 0.4, 0.76672),
+            (7.5, 1.5, 0.6, 0.04812149934817907),
+            (30.0, 4.0, 0.5, 7.005874067544937e-07),
+            (30.0, 4.0, 0.95, 0.91919050658563),
+            (25.0, 40.0, 0.3, 0.07643481617057919),
+            (120.0, 0.5, 0.99, 0.12078864909692316),
+        ] {
+            let found = regularised_beta(a, b, x);
+            assert!((found / wanted - 1.0).abs() < 2e-13, "{a} {b} {x}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_logarithm_of_the_beta_function_keeps_its_digits_between_large_and_small() {
+        for (a, b, wanted) in [
+            (0.5, 0.5, 1.1447298858494002),
+            (3.0, 4.5, -4.387480485356345),
+            (19.9, 0.1, 1.9559170457709223),
+            (20.0, 0.5, -0.919251844406604),
+            (20.0, 20.0, -27.95199188624447),
+            (0.25, 37.0, 0.38783247856317876),
+            (150.0, 2.5, -12.254350153923419),
+            (1e6, 0.5, -6.335390211057437),
+            (1e9, 3.0, -61.47665033327929),
+        ] {
+            let found = ln_beta(a, b);
+            assert!((found - wanted).abs() < 4e-15 * wanted.abs().max(1.0), "{a} {b}: {found} {wanted}");
+            assert_eq!(found, ln_beta(b, a));
+        }
+    }
+
+    #[test]
+    fn gamma_and_beta_have_ends_and_nothing_beyond_them() {
+        assert_eq!(regularised_gamma(2.0, 0.0), (0.0, 1.0));
+        assert_eq!(regularised_gamma(2.0, f64::INFINITY), (1.0, 0.0));
+        for (a, x) in [(0.0, 1.0), (0.0, 0.0), (-1.0, 1.0), (1.0, -0.1), (f64::NAN, 1.0), (1.0, f64::NAN)] {
+            let (lower, upper) = regularised_gamma(a, x);
+            assert!(lower.is_nan() && upper.is_nan(), "{a} {x}");
+        }
+        assert_eq!((regularised_beta(2.0, 3.0, 0.0), regularised_beta(2.0, 3.0, 1.0)), (0.0, 1.0));
+        for (a, b, x) in [(0.0, 1.0, 0.5), (1.0, 0.0, 0.5), (1.0, 1.0, -0.1), (1.0, 1.0, 1.1)] {
+            assert!(regularised_beta(a, b, x).is_nan(), "{a} {b} {x}");
+        }
+        assert_eq!((chi_square_sf(0.0, 3.0), f_sf(-1.0, 2.0, 9.0)), (1.0, 1.0));
+        assert_eq!((chi_square_quantile(0.0, 2.0), chi_square_quantile(1.0, 0.1)), (0.0, f64::INFINITY));
+        for (p, dof) in [(0.5, 0.0), (0.5, -1.0), (-0.1, 2.0), (1.1, 2.0), (f64::NAN, 2.0)] {
+            assert!(chi_square_quantile(p, dof).is_nan(), "{p} {dof}");
+        }
+    }
+
+    #[test]
+    fn a_chi_square_quantile_leads_back_to_its_probability() {
+        for dof in [0.2, 1.0, 5.0, 60.0, 1000.0] {
+            for p in [1e-12, 0.003, 0.3, 0.4999, 0.5, 0.8, 0.999] {
+                let (low, high) = regularised_gamma(dof / 2.0, chi_square_quantile(p, dof) / 2.0);
+                let off = if p < 0.5 { low / p } else { high / (1.0 - p) };
+                assert!((off - 1.0).abs() < 1e-12, "{p} {dof}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_inversion_is_exact_to_the_last_bit_wherever_it_begins() {
+        for guess in [1e-9, 0.7, 1.0, 1.5, 1e9] {
+            let root = invert(|x| x * x > 2.0, guess);
+            assert!((root - 2f64.sqrt()).abs() <= f64::EPSILON, "{guess}: {root}");
+        }
+        // What is true or false everywhere turns at one of the ends.
+        assert!(invert(|_| true, 1.0) <= f64::MIN_POSITIVE);
+        assert!(invert(|_| false, 1.0) >= f64::MAX / 4.0);
+    }
 }

@@ -37,8 +37,8 @@ struct Balance {
     v: f64,
     /// The force there, when it could be told without the effects' remembering anything.
     force: Option<TissueForce>,
-    /// Force in N when the tip sticks: the spring's, somewhere in the jump of the law's.
-    stuck_n: Option<f64>,
+    /// Force in N when the tip sticks, the spring's, and the law's on the two sides of the jump in which it lies.
+    stuck: Option<(f64, [TissueForce; 2])>,
 }
 
 /// What is sought: the tip's velocity, or its position when no time has passed.
@@ -64,6 +64,19 @@ fn theta(dt_s: f64, tau_s: f64) -> f64 {
     } else {
         -1.0 / libm::expm1(-ratio) - 1.0 / ratio
     }
+}
+
+/// The force of a tip that sticks: `total_n`, with what is missing of it given to friction and tip as they share the jump of the law's
+/// force between its two sides.
+fn stick(force: &mut TissueForce, total_n: f64, [low, high]: [TissueForce; 2]) {
+    let missing = total_n - force.total_n;
+    let jump = high.total_n - low.total_n;
+    let share = if jump == 0.0 { 0.0 } else { missing / jump };
+    let at_tip = share * (high.tip_extra_n - low.tip_extra_n);
+    force.tip_extra_n += at_tip;
+    force.friction_n += missing - at_tip;
+    force.tip_n += share * (high.tip_n - low.tip_n);
+    force.total_n = total_n;
 }
 
 impl Step {
@@ -116,8 +129,8 @@ impl Law {
             // The tip's speed changes as the base's does: its travel is the mean of both speeds.
             let lead_m = (0.5 - theta) * state.base_mps2 * dt * dt;
             let step = Step { dt, theta, base_m, from_m: state.z_m, v_before: state.v_mps, lead_m };
-            let Balance { z, v, force, stuck_n } = if let_go && dt <= 0.0 && viscous > 0.0 {
-                Balance { z: state.z_m, v: state.v_mps, force: None, stuck_n: None }
+            let Balance { z, v, force, stuck } = if let_go && dt <= 0.0 && viscous > 0.0 {
+                Balance { z: state.z_m, v: state.v_mps, force: None, stuck: None }
             } else {
                 self.balance(state, step)
             };
@@ -142,11 +155,8 @@ impl Law {
             let moment = state.moment(time_s, z, v);
             state.remember(&moment, elastic);
             let mut force = force.unwrap_or_else(|| self.sum_up(&moment, elastic, &mut state.memory));
-            if let Some(total_n) = stuck_n {
-                let missing = total_n - force.total_n;
-                force.friction_n += missing;
-                force.tip_n += missing;
-                force.total_n = total_n;
+            if let Some((total_n, sides)) = stuck {
+                stick(&mut force, total_n, sides);
             }
             return force;
         }
@@ -246,10 +256,11 @@ impl Law {
         let memory = self.remembers.then_some(state.memory);
         let mut u = if step.dt > 0.0 { step.v_before + state.dv_mps } else { step.base_m };
         let (mut low, mut high) = (None, None); // the bracket: surplus negative, positive
+        let mut sides = [TissueForce::default(); 2]; // and the forces there
         let mut before: Option<(f64, f64)> = None;
         let mut best = (u, f64::INFINITY, None);
         let smallest = if step.dt > 0.0 { 2e-9 * SGN_DEAD_BAND_MPS } else { TOLERANCE_M };
-        let mut stuck = false;
+        let mut sticks = false;
         for turn in 0..MAX_TRIALS {
             let force = self.trial(state, &step, u);
             if let Some(memory) = &memory {
@@ -263,10 +274,11 @@ impl Law {
                 break;
             }
             *if surplus < 0.0 { &mut low } else { &mut high } = Some(u);
+            sides[usize::from(surplus >= 0.0)] = force;
             if let (Some(low), Some(high)) = (low, high)
                 && f64::abs(high - low) <= smallest
             {
-                stuck = true;
+                sticks = true;
                 best = (if low.abs() < high.abs() { low } else { high }, 0.0, None);
                 break;
             }
@@ -295,6 +307,224 @@ impl Law {
         }
         let (z, v) = step.tip(best.0);
         let force = best.2.filter(|_| memory.is_none());
-        Balance { z, v, force, stuck_n: stuck.then_some((step.base_m - z) * self.needle_n_per_m) }
+        Balance { z, v, force, stuck: sticks.then_some(((step.base_m - z) * self.needle_n_per_m, sides)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{CoulombFriction, NeedleCompliance, PowerLawFriction};
+    use crate::layer::{Layer, Tissue};
+    use crate::{AnyEffect, LawState};
+    use alloc::string::String;
+    use alloc::vec::Vec;
+
+    const NEEDLE_N_PER_M: f64 = 800.0;
+
+    /// Two layers of 10 and 20 mm under a needle that gives, the first ruptured, with the tip at 15 mm.
+    fn law(effects: &[AnyEffect]) -> (Law, LawState) {
+        let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2| Layer {
+            name: String::new(),
+            thickness_m,
+            stiffness_n_per_m,
+            friction_ns_per_m2,
+            puncture_n: None,
+        };
+        let tissue = Tissue {
+            surface_m: 0.0,
+            layers: alloc::vec![layer(0.01, 40.0, 5000.0), layer(0.02, 90.0, 7000.0)],
+        };
+        let mut all: Vec<AnyEffect> = effects.to_vec();
+        all.push(NeedleCompliance { stiffness_n_per_m: NEEDLE_N_PER_M }.into());
+        let state = LawState { ruptured: 1, started: true, z_m: 0.015, v_mps: 0.004, ..LawState::default() };
+        (Law::new(&tissue, &all).expect("few effects"), state)
+    }
+
+    #[track_caller]
+    fn near(found: f64, wanted: f64, within: f64) {
+        assert!((found - wanted).abs() <= within, "{found} instead of {wanted}");
+    }
+
+    #[test]
+    fn a_step_is_exact_for_a_speed_that_dies_away() {
+        // v = exp(-t/tau) travels tau (1 - exp(-dt/tau)), which (1 - theta) v(0) + theta v(dt) has to be per unit of time.
+        for ratio in [1e-6, 9e-4, 1.1e-3, 0.02, 0.5, 3.0, 40.0, 699.0] {
+            let (end, travel) = (libm::exp(-ratio), -libm::expm1(-ratio) / ratio);
+            let weight = theta(0.005 * ratio, 0.005);
+            near(1.0 - weight + weight * end, travel, 1e-12);
+            assert!((0.5..=1.0).contains(&weight), "{ratio}: {weight}");
+        }
+        // Short steps are the trapezoidal rule to second order; without friction it is backward Euler, in a step of no time, too.
+        near(theta(6e-4, 1.0), 0.5 + 5e-5, 1e-11);
+        assert_eq!([theta(701.0, 1.0), theta(0.1, 0.0), theta(0.0, 0.0)], [1.0; 3]);
+    }
+
+    #[test]
+    fn a_tip_travels_with_the_weighted_mean_of_its_speeds_and_in_no_time_goes_where_it_is_put() {
+        let step = Step { dt: 0.1, theta: 0.7, base_m: 9.0, from_m: 2.0, v_before: 3.0, lead_m: 0.25 };
+        let (z, v) = step.tip(5.0);
+        assert_eq!(v, 5.0);
+        near(z, 2.0 + 0.25 + 0.1 * (0.3 * 3.0 + 0.7 * 5.0), 1e-15);
+        assert_eq!(Step { dt: 0.0, ..step }.tip(5.0), (5.0, 3.0));
+    }
+
+    #[test]
+    fn a_search_looks_at_both_sides_of_an_edge_of_the_dead_band_before_it_crosses_it() {
+        let step = Step { dt: 0.1, theta: 0.7, base_m: 0.0, from_m: 0.0, v_before: 0.0, lead_m: 0.0 };
+        let edge = SGN_DEAD_BAND_MPS;
+        for side in [1.0, -1.0] {
+            // From outside to the inside or to the other side: just outside first, then the edge, which is inside.
+            for target in [0.0, -side * 0.01] {
+                assert_eq!(step.up_to_the_jump(side * 0.01, target), side * SLIDING_MPS);
+                assert_eq!(step.up_to_the_jump(side * SLIDING_MPS, target), side * edge);
+            }
+            // From inside to the outside the other way round.
+            assert_eq!(step.up_to_the_jump(0.3 * edge, side * 0.01), side * edge);
+            assert_eq!(step.up_to_the_jump(side * edge, side * 0.01), side * SLIDING_MPS);
+            assert!(sgn(side * edge) == 0.0 && sgn(side * SLIDING_MPS) == side);
+            // On one side there is nothing to look at, and without time no speed.
+            assert_eq!(step.up_to_the_jump(side * 0.01, side * 0.02), side * 0.02);
+            assert_eq!(Step { dt: 0.0, ..step }.up_to_the_jump(side * 0.01, -side), -side);
+        }
+    }
+
+    #[test]
+    fn the_tip_feels_the_friction_of_all_it_is_in_and_the_spring_of_the_active_layer() {
+        let (law, mut state) = law(&[]);
+        let resistance = |state: &LawState| law.resistance(state);
+        assert_eq!(resistance(&state), (5000.0 * 0.01 + 7000.0 * 0.005, 90.0));
+        // On the active layer's front face its spring is not felt yet, behind the last rupture never.
+        state.z_m = 0.01;
+        assert_eq!(resistance(&state), (50.0, 0.0));
+        state = LawState { ruptured: 2, z_m: 0.02, ..state };
+        assert_eq!(resistance(&state), (120.0, 0.0));
+    }
+
+    #[test]
+    fn the_slope_is_the_surplus_s_derivative_where_the_force_rises() {
+        let (law, mut state) = law(&[]);
+        let base = Step { dt: 0.005, theta: 0.6, base_m: 0.017, from_m: 0.015, v_before: 0.004, lead_m: 0.0 };
+        let mut surplus = |step: &Step, u: f64| {
+            let memory = state.memory;
+            let force = law.trial(&mut state, step, u);
+            state.memory = memory;
+            step.tip(u).0 + force.total_n / NEEDLE_N_PER_M - step.base_m
+        };
+        // Advancing and gently retracting; in no time where the tip is anywhere in the stack or behind it.
+        let in_time = [0.012, 0.0001, -0.002].map(|v| (base, v));
+        let at_once = [0.004, 0.012, 0.029, 0.031].map(|z| (Step { dt: 0.0, ..base }, z));
+        for (step, u) in in_time.into_iter().chain(at_once) {
+            let h = 1e-7;
+            let derivative = (surplus(&step, u + h) - surplus(&step, u - h)) / (2.0 * h);
+            near(
+                law.slope(&LawState { ruptured: 1, ..LawState::default() }, &step, u),
+                derivative,
+                1e-7 * derivative,
+            );
+        }
+    }
+
+    #[test]
+    fn where_the_force_falls_with_depth_the_slope_is_that_of_friction_alone() {
+        let (law, state) = law(&[]);
+        let step = Step { dt: 0.005, theta: 0.6, base_m: 0.017, from_m: 0.015, v_before: 0.0, lead_m: 0.0 };
+        // Out of the tissue at 20 mm/s friction on the growing length outweighs the spring of 90 N/m.
+        let u = -0.02;
+        let friction = 5000.0 * 0.01 + 7000.0 * (step.tip(u).0 - 0.01);
+        near(law.slope(&state, &step, u), 0.6 * 0.005 + friction / NEEDLE_N_PER_M, 1e-12);
+    }
+
+    #[test]
+    fn a_tip_slips_at_the_speed_at_which_friction_is_what_the_needle_presses_with() {
+        // 2 mm behind its base the tip is pressed with 1.6 N; 85 Ns/m rub, and the spring still holds 0.45 N.
+        for (v_before, exponent, exact) in
+            [(0.004, 1.0, true), (0.004, 1.5, true), (0.0, 3.0, true), (0.3, 1.7, true), (0.004, 0.6, false)]
+        {
+            let (law, state) = law(&[PowerLawFriction { exponent }.into()]);
+            let mut at = LawState { v_mps: v_before, ..state };
+            let viscous = law.resistance(&state).0;
+            let v = law.slip_speed(&mut at, 0.017, viscous);
+            let left = 0.002 * NEEDLE_N_PER_M - 90.0 * 0.005 - 1e-3 * libm::pow(v / 1e-3, exponent) * viscous;
+            if exact {
+                near(left, 0.0, 1e-7);
+            } else {
+                // Friction that grows less than its speed: the plain speed stays.
+                assert!(left > 0.1, "{left}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_layer_that_gives_way_leaves_the_tip_where_it_is_with_the_speed_of_that_instant() {
+        let rupture =
+            Rupture { layer: 2, time_s: 0.004, position_m: 0.0152, released_n: 0.4, by_force: true };
+        let (mut law, state) = law(&[]);
+        let gone = |law: &Law, state: LawState| {
+            let mut at = LawState { ruptured: 2, dv_mps: 0.001, ..state };
+            law.let_go(&mut at, &rupture, 0.017, 0.009, 0.4);
+            assert_eq!((at.z_m, at.time_s), (0.0152, 0.004));
+            (at.v_mps, at.dv_mps)
+        };
+        // Friction of 50 + 7000 x 5.2 mm Ns/m takes over what the needle presses with, 1.8 mm behind its base.
+        let (v, dv) = gone(&law, state);
+        near(v, 0.0018 * NEEDLE_N_PER_M / (50.0 + 36.4), 1e-9);
+        assert_eq!(dv, 0.0);
+        // Without any the tip goes on at the speed it had, 4 mm/s on the way to 9.
+        for slab in &mut law.slabs {
+            slab.friction_ns_per_m2 = 0.0;
+        }
+        let (v, dv) = gone(&law, state);
+        near(v, 0.006, 1e-15);
+        assert_eq!(dv, 0.001);
+    }
+
+    #[test]
+    fn what_holds_a_tip_is_shared_as_the_jump_of_the_force_is() {
+        let side = |friction_n, tip_extra_n, tip_n| TissueForce {
+            total_n: friction_n + tip_extra_n,
+            friction_n,
+            tip_extra_n,
+            tip_n,
+            ..TissueForce::default()
+        };
+        // From -0.3 N of friction and 0.1 N at the tip to 0.9 and 0.5 N: 1.6 N in all, of which the tip feels 1 N.
+        let sides = [side(-0.3, 0.1, 0.0), side(0.9, 0.5, 1.0)];
+        for (from, total_n) in [(sides[0], 0.2), (sides[1], 0.2), (side(0.1, 0.3, 0.4), 0.2)] {
+            let mut force = from;
+            stick(&mut force, total_n, sides);
+            let share = (total_n - from.total_n) / 1.6;
+            near(force.friction_n, from.friction_n + share * 1.2, 1e-15);
+            near(force.tip_extra_n, from.tip_extra_n + share * 0.4, 1e-15);
+            near(force.tip_n, from.tip_n + share, 1e-15);
+            assert_eq!(force.total_n, total_n);
+        }
+        // A rest that no jump explains is rounding; friction takes it.
+        let mut force = sides[0];
+        stick(&mut force, -0.15, [sides[0]; 2]);
+        near(force.friction_n, -0.25, 1e-15);
+        assert_eq!((force.tip_extra_n, force.tip_n, force.total_n), (0.1, 0.0, -0.15));
+    }
+
+    #[test]
+    fn a_balance_is_exact_or_stuck_where_dry_friction_jumps() {
+        for (v_before, base_m, sticks) in
+            [(0.004, 0.0165, false), (-0.004, 0.0145, false), (0.0, 0.015_45, true)]
+        {
+            let (law, state) = law(&[CoulombFriction { c_n_per_m: 20.0 }.into()]);
+            let mut at = LawState { v_mps: v_before, ..state };
+            let step = Step { dt: 0.005, theta: 0.6, base_m, from_m: 0.015, v_before, lead_m: 0.0 };
+            let balance = law.balance(&mut at, step);
+            assert_eq!(balance.stuck.is_some(), sticks, "{base_m}");
+            assert_eq!(step.tip(balance.v), (balance.z, balance.v));
+            let spring = (base_m - balance.z) * NEEDLE_N_PER_M;
+            match balance.stuck {
+                Some((stuck, _)) => {
+                    near(stuck, spring, 0.0);
+                    assert!(balance.v.abs() <= SLIDING_MPS, "{}", balance.v);
+                }
+                None => near(law.trial(&mut at, &step, balance.v).total_n, spring, 1e-10),
+            }
+        }
     }
 }

@@ -255,3 +255,86 @@ pub(crate) fn lag_weights(dt_s: f64, time_constant_s: f64) -> (f64, f64) {
 pub(crate) fn same_step(a_s: f64, b_s: f64) -> bool {
     (a_s - b_s).abs() <= 1e-10 * a_s
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An effect that answers no hook.
+    struct Nothing;
+
+    impl Effect for Nothing {
+        fn info(&self) -> &'static EffectInfo {
+            crate::info("cutting_force").expect("in the library")
+        }
+        fn is_neutral(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_hook_that_an_effect_does_not_answer_passes_the_value_through() {
+        let (none, mut memory) = (Nothing, [0.25; 8]);
+        let moment = Moment { time_s: 1.0, dt_s: 0.1, z_m: 0.02, dz_m: 0.001, v_mps: 0.01, ruptured: 1 };
+        assert_eq!((none.id(), none.place(), none.remembers()), ("cutting_force", Place::Tip, false));
+        assert_eq!(none.relative(1.0, 0.02, 0.03), (0.02, 0.03));
+        assert_eq!(none.elastic(50.0, 0.02, 0.7), 0.7);
+        assert_eq!(none.relax(0.1, 0.7, &mut memory), 0.7);
+        assert_eq!(none.puncture(0.7, 0.01), 0.7);
+        assert_eq!(none.endure(1, 0.1, 0.3, 0.7, &mut memory), 0.7);
+        assert_eq!(none.press(1, 0.1, 0.7, &mut memory), 0.7);
+        assert_eq!((none.friction_velocity(0.03), none.friction_factor(0.03)), (0.03, 1.0));
+        assert_eq!(none.sense(1.0, 0.1, 0.7, &mut memory), 0.7);
+        assert_eq!(none.sense_mean(1.0, 0.1, 20.0, 0.7, &mut memory), 0.7);
+        assert_eq!((none.position_factor(), none.delay_s(), none.break_depth_m()), (1.0, 0.0, None));
+        // What would add to the force adds nothing, nothing breaks, and nothing is remembered.
+        assert_eq!((none.withheld(0.7), none.tool_force(0.01, 2.0)), (0.0, 0.0));
+        assert_eq!(none.shaft_force(&moment, 0.02, &mut memory), 0.0);
+        assert_eq!(none.grip(&moment, &[], 0.01, &mut memory), 0.0);
+        assert_eq!(none.tip_force(&moment, &[], &mut memory), 0.0);
+        assert!(!none.breaks(0.02, &[], &mut memory));
+        assert_eq!(memory, [0.25; 8]);
+    }
+
+    #[test]
+    fn a_sign_is_zero_within_the_dead_band_and_on_its_edges() {
+        let edge = SGN_DEAD_BAND_MPS;
+        assert_eq!(
+            [-1.0, -1.1 * edge, -edge, 0.0, edge, 1.1 * edge, 1.0].map(sgn),
+            [-1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+        );
+    }
+
+    #[test]
+    fn the_weights_of_a_lag_solve_its_equation_over_a_step() {
+        // tau y' = x0 + (x1 - x0) t/dt - y from y0, by very short steps of Heun's method.
+        for (dt, tau) in [(0.1, 0.3), (0.7, 0.2)] {
+            let (y0, x0, x1) = (0.4, 1.5, -2.0);
+            let (mut y, n) = (y0, 200_000);
+            let h = dt / f64::from(n);
+            for k in 0..n {
+                let x = |k: i32| x0 + (x1 - x0) * f64::from(k) / f64::from(n);
+                let first = (x(k) - y) / tau;
+                let second = (x(k + 1) - (y + h * first)) / tau;
+                y += 0.5 * h * (first + second);
+            }
+            let (keep, ramp) = lag_weights(dt, tau);
+            assert!((keep * y0 + (1.0 - keep) * x0 + ramp * (x1 - x0) - y).abs() < 1e-9, "{dt} {tau}");
+        }
+        // In no time nothing changes, not even without a lag; without a lag the input comes through.
+        assert_eq!(
+            [lag_weights(0.0, 0.3), lag_weights(0.0, 0.0), lag_weights(0.1, 0.0)],
+            [(1.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
+        );
+        assert_eq!(lag_weights(-0.1, 0.3), (1.0, 0.0));
+    }
+
+    #[test]
+    fn steps_are_the_same_but_for_the_rounding_of_time_stamps() {
+        assert!(
+            same_step(0.005, 0.005) && same_step(1000.005 - 1000.0, 0.005 + 1e-13) && same_step(0.0, 0.0)
+        );
+        assert!(!same_step(0.005, 0.005_001) && !same_step(0.005, 0.0) && !same_step(0.005, 0.004_999));
+        assert!(!same_step(0.005, 0.005 + 1e-11) && !same_step(5.0, 5.0 + 1e-8));
+    }
+}

@@ -114,3 +114,86 @@ impl Slab {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// From 10 to 30 mm, plain.
+    const PLAIN: Slab = Slab {
+        front_m: 0.01,
+        thickness_m: 0.02,
+        stiffness_n_per_m: 50.0,
+        friction_ns_per_m2: 9000.0,
+        puncture_n: f64::INFINITY,
+        reach_m: 0.0,
+        kappa_per_m: 0.0,
+        gripped: 0.0,
+        curve_n_per_m2: 0.0,
+        ground_m_per_n: 0.0,
+        release_m: 0.0,
+    };
+
+    #[test]
+    fn a_layer_is_plain_until_an_effect_gives_it_something_of_its_own() {
+        assert!(PLAIN.is_plain() && !PLAIN.is_curved());
+        let stiffening = Slab { kappa_per_m: 3.0, ..PLAIN };
+        let curved = Slab { curve_n_per_m2: 3.0, ..PLAIN };
+        assert!(stiffening.is_curved() && curved.is_curved());
+        for slab in [
+            stiffening,
+            curved,
+            Slab { reach_m: 0.001, ..PLAIN },
+            Slab { ground_m_per_n: 0.001, ..PLAIN },
+            Slab { release_m: 0.001, ..PLAIN },
+        ] {
+            assert!(!slab.is_plain(), "{slab:?}");
+        }
+    }
+
+    #[test]
+    fn a_layer_gives_way_as_far_behind_its_far_face_as_it_can_be_pushed() {
+        let slab = Slab { reach_m: 0.005, ..PLAIN };
+        assert!((slab.far_m() - 0.03).abs() < 1e-17 && (slab.gives_way_m() - 0.035).abs() < 1e-17);
+    }
+
+    #[test]
+    fn the_length_inside_a_layer_ends_at_its_faces() {
+        for (z, inside) in [(-1.0, 0.0), (0.01, 0.0), (0.012, 0.002), (0.03, 0.02), (0.5, 0.02)] {
+            assert!((PLAIN.inside_m(z) - inside).abs() < 1e-17, "{z}");
+        }
+    }
+
+    #[test]
+    fn a_shaft_rubs_on_the_way_back_until_the_layer_lets_go() {
+        let slab = Slab { release_m: 0.004, ..PLAIN };
+        // Just inside, on the way in, at rest, out; on the place where it lets go it still rubs.
+        for (z, v, rubs) in [
+            (0.013, 0.002, 0.003),
+            (0.013, 0.0, 0.003),
+            (0.013, -0.002, 0.0),
+            (0.010 + 0.004, -0.002, 0.004),
+            (0.025, -0.002, 0.015),
+        ] {
+            assert!((slab.rubs_m(z, v) - rubs).abs() < 1e-17, "{z} {v}: {}", slab.rubs_m(z, v));
+        }
+    }
+
+    #[test]
+    fn a_layer_on_ground_that_gives_is_indented_by_what_the_ground_leaves() {
+        let plain = Slab { ground_m_per_n: 0.0, ..PLAIN };
+        assert_eq!(plain.indented_m(0.007), 0.007);
+        for (kappa_per_m, curve_n_per_m2) in [(0.0, 0.0), (20.0, 0.0), (0.0, 3000.0), (-15.0, 2500.0)] {
+            for ground_m_per_n in [0.001, 0.02, 0.2] {
+                let slab = Slab { kappa_per_m, curve_n_per_m2, ground_m_per_n, ..PLAIN };
+                for x in [0.0, 0.003, 0.015] {
+                    // The layer's own force, K x' (1 + kappa x') + b x'^2, pushes the ground by the rest of the way.
+                    let own = slab.indented_m(x);
+                    let force = 50.0 * own * (1.0 + kappa_per_m * own) + curve_n_per_m2 * own * own;
+                    assert!((own + ground_m_per_n * force - x).abs() < 1e-15, "{slab:?} {x}: {own}");
+                    assert!((0.0..=x).contains(&own));
+                }
+            }
+        }
+    }
+}

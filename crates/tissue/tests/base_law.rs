@@ -172,3 +172,156 @@ fn imposed_ruptures_at_the_law_s_own_instants_give_the_same_bits() {
         assert_eq!((free.ruptured(), strained), (3, 3));
     }
 }
+
+#[test]
+fn one_long_step_finds_every_rupture_where_short_ones_do() {
+    // The third layer is punctured, too; the springs hold 40 x 28.2 mm, 2.2 N and 1 N when they let go.
+    let mut tissue = Tissue::three_gels();
+    tissue.layers[2].puncture_n = Some(1.0);
+    let expected = [(0.0282, 40.0 * 0.0282), (0.0282 + 2.2 / 60.0, 2.2), (0.0659 + 1.0 / 80.0, 1.0)];
+    let v = 0.01;
+    let steps: [&[f64]; 4] =
+        [&[-0.01, 0.12], &[0.0, 0.01, 0.03, 0.1, 0.11], &[-0.003, 0.0282, 0.0659], &[0.02]];
+    for positions in steps {
+        // Then in steps of 1 mm to the end.
+        let deepest = positions[positions.len() - 1];
+        let rest = (1..=90).map(|k| deepest + 0.001 * f64::from(k));
+        let motion: Vec<_> = positions.iter().copied().chain(rest).map(|z| (z / v, z, v)).collect();
+        // The same with an effect that has no say in it.
+        for effects in [vec![], vec![stylet_tissue::CoulombFriction { c_n_per_m: 1.0 }.into()] as Vec<_>] {
+            let (law, mut ruptures) = (Law::new(&tissue, &effects).expect("few effects"), Vec::new());
+            replay(&law, motion.iter().copied(), |r| ruptures.push(r), |_| {});
+            assert_eq!(ruptures.iter().map(|r| r.by_force).collect::<Vec<_>>(), [false, true, true]);
+            for (r, (z, released_n)) in ruptures.iter().zip(expected) {
+                assert!((r.position_m - z).abs() < 1e-12 && (r.time_s - z / v).abs() < 1e-9, "{r:?} at {z}");
+                assert!((r.released_n - released_n).abs() < 1e-12, "{r:?} {released_n}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_time_stamp_that_repeats_or_runs_back_is_a_step_of_no_length() {
+    let tissue = Tissue::three_gels();
+    for effects in [vec![], vec![stylet_tissue::CoulombFriction { c_n_per_m: 1.0 }.into()] as Vec<_>] {
+        let law = Law::new(&tissue, &effects).expect("few effects");
+        for again_s in [3.0, 1.0] {
+            let (mut state, mut ruptures) = (LawState::default(), Vec::new());
+            law.step(&mut state, 3.0, 0.01, 0.0, |r| ruptures.push(r));
+            let force = law.step(&mut state, again_s, 0.03, 0.0, |r| ruptures.push(r));
+            assert_eq!((ruptures.len(), ruptures[0].time_s, state.ruptured()), (1, 3.0, 1));
+            assert!(
+                (ruptures[0].position_m - 0.0282).abs() < 1e-15
+                    && (force.elastic_n - 60.0 * 0.0018).abs() < 1e-12
+            );
+            // The clock goes on from the latest stamp.
+            law.step(&mut state, 5.0, 0.0282 + 0.0377 + 0.0018, 0.0, |r| ruptures.push(r));
+            let way = (2.2 / 60.0 - 0.0018) / 0.0377;
+            assert!((ruptures[1].time_s - (3.0 + 2.0 * way)).abs() < 1e-12, "{ruptures:?}");
+        }
+    }
+}
+
+#[test]
+fn many_samples_at_once_are_the_samples_one_by_one() {
+    let mut samples: Vec<[f64; 3]> =
+        constant(-0.005, 0.0023, 50.0, 2500).into_iter().map(|(t, z, v)| [t, z, v]).collect();
+    samples[700][1] = f64::NAN;
+    samples[1400][2] = f64::INFINITY;
+    for effects in [vec![], vec![stylet_tissue::CoulombFriction { c_n_per_m: 1.0 }.into()] as Vec<_>] {
+        let law = Law::new(&Tissue::three_gels(), &effects).expect("few effects");
+        let (mut one, mut all) = (LawState::default(), LawState::default());
+        let (mut expected, mut found) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+        for [t, z, v] in &samples {
+            let force = law.step(&mut one, *t, *z, *v, |r| expected.1.push(r));
+            expected.0.push(format!("{force:?}"));
+        }
+        law.run(&mut all, samples.iter().copied(), |r| found.1.push(r), |f| found.0.push(format!("{f:?}")));
+        assert_eq!(found, expected);
+        assert_eq!((one, found.1.len()), (all, 3));
+        assert!(found.0[700].contains("total_n: NaN") && found.0[1400].contains("total_n: NaN"));
+        assert_eq!((all.tip_m(), all.tip_velocity_mps()), (samples[2499][1], 0.0023));
+    }
+}
+
+#[test]
+fn a_law_knows_whether_the_tip_is_where_the_base_is() {
+    use stylet_tissue::{
+        AnyEffect, CoulombFriction, CuttingForce, IncompleteRelease, NeedleCompliance, Respiration,
+    };
+    let of = |effect: AnyEffect| Law::new(&Tissue::three_gels(), &[effect]).expect("an effect");
+    let base = Law::base(&Tissue::three_gels());
+    assert!(base.keeps_place() && !base.bends());
+    assert!(of(CoulombFriction { c_n_per_m: 1.0 }.into()).keeps_place());
+    let needle = of(NeedleCompliance { stiffness_n_per_m: 500.0 }.into());
+    assert!(!needle.keeps_place() && needle.bends());
+    for moves in [
+        Respiration { amplitude_m: 1e-3, frequency_hz: 0.3, phase_rad: 0.0 }.into(),
+        CuttingForce { force_n: 0.1 }.into(),
+        IncompleteRelease { fraction: 0.2 }.into(),
+    ] {
+        let law = of(moves);
+        assert!(!law.keeps_place() && !law.bends(), "{law:?}");
+    }
+    assert_eq!(base.slabs().len(), 3);
+}
+
+#[test]
+fn the_velocity_that_friction_feels_is_that_of_all_friction_effects() {
+    use stylet_tissue::{AsymmetricFriction, PowerLawFriction};
+    let effects = [PowerLawFriction { exponent: 0.5 }.into(), AsymmetricFriction { eps: 0.2 }.into()];
+    for chosen in [&effects[..0], &effects[..1], &effects[1..], &effects[..]] {
+        let law = Law::new(&Tissue::three_gels(), chosen).expect("few effects");
+        for v in [0.004, -0.004, 0.0] {
+            // Against the law itself: the tip at 20 mm in 9000 Ns/m2.
+            let force = law.step(&mut LawState::default(), 0.0, 0.02, v, |_| {});
+            let friction = force.total_n - 40.0 * 0.02;
+            assert!((law.viscous_velocity(v) * 9000.0 * 0.02 - friction).abs() < 1e-12, "{chosen:?} {v}");
+        }
+    }
+}
+
+#[test]
+fn dry_friction_goes_with_the_length_in_the_layers_passed() {
+    let tissue =
+        Tissue { surface_m: 0.0, layers: vec![layer(0.03, 0.0, 2000.0, None), layer(0.1, 0.0, 0.0, None)] };
+    let law =
+        Law::new(&tissue, &[stylet_tissue::CoulombFriction { c_n_per_m: 10.0 }.into()]).expect("an effect");
+    let (mut state, v) = (LawState::default(), 0.005);
+    law.step(&mut state, 0.0, 0.0, v, |_| {});
+    let inside = law.step(&mut state, 5.0, 0.025, v, |_| {});
+    assert!((inside.total_n - (v * 2000.0 * 0.025 + 0.25)).abs() < 1e-12 && inside.tip_n == inside.total_n);
+    // 50 mm in: 0.5 N of dry friction, 0.3 N of them and all viscous friction in the layer passed.
+    let passed = law.step(&mut state, 10.0, 0.05, v, |_| {});
+    assert!(
+        (passed.total_n - (v * 60.0 + 0.5)).abs() < 1e-12 && (passed.tip_n - 0.2).abs() < 1e-12,
+        "{passed:?}"
+    );
+    // In the air nothing rubs.
+    assert_eq!(law.step(&mut LawState::default(), 0.0, -0.01, v, |_| {}).tip_n, 0.0);
+}
+
+#[test]
+fn ruptures_may_be_imposed_before_the_law_would_bring_them() {
+    let law = Law::base(&Tissue::three_gels());
+    let (mut state, mut strains) = (LawState::default(), Vec::new());
+    law.step_imposed(&mut state, 0.0, 0.01, 0.0, 0, |s| strains.push(s));
+    let force = law.step_imposed(&mut state, 1.0, 0.02, 0.0, 1, |s| strains.push(s));
+    // The first layer gives way at 20 mm although neither force nor face asks for it; the second is not reached yet.
+    assert_eq!((force.total_n, force.active_layer, state.ruptured()), (0.0, 2, 1));
+    let seen: Vec<_> = strains.iter().map(|s| (s.layer, s.elastic_n, s.tip_m, s.breaks())).collect();
+    assert_eq!(seen, [(1, 0.4, 0.01, false), (1, 0.8, 0.02, false), (2, 0.0, 0.02, false)]);
+    assert_eq!((strains[1].puncture_n, strains[1].far_m), (f64::INFINITY, 0.0282));
+    // And it may hold longer than the law would: its strain says so.
+    let later = law.step_imposed(&mut state, 2.0, 0.09, 0.0, 1, |s| strains.push(s));
+    assert!((later.elastic_n - 60.0 * (0.09 - 0.0282)).abs() < 1e-12 && strains[3].breaks());
+}
+
+#[test]
+fn faces_are_where_the_layers_before_them_end() {
+    let tissue = Tissue { surface_m: -0.004, ..Tissue::three_gels() };
+    for (index, front) in [-0.004, 0.0242, 0.0619, 0.0941].into_iter().enumerate() {
+        assert!((tissue.front_m(index) - front).abs() < 1e-15, "{index}");
+    }
+    assert_eq!(tissue.end_m(), tissue.front_m(3));
+}

@@ -227,3 +227,77 @@ fn a_sample_that_is_not_a_number_has_no_force_and_leaves_no_trace() {
     }
     assert_eq!(state.ruptured(), 2, "the motion went through layers");
 }
+
+#[test]
+fn coordinates_lead_back_to_the_effect() {
+    for info in library().chain(per_layer()) {
+        let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
+        let effect = AnyEffect::from_parameters(info.id, &start).expect("its own parameters");
+        let coordinates = effect.coordinates();
+        let back = AnyEffect::from_coordinates(info.id, &coordinates).expect("its own coordinates");
+        for (a, b) in effect.parameters().iter().zip(back.parameters()) {
+            near(b, *a, 1e-15 * a.abs());
+        }
+        assert_eq!(coordinates.len(), start.len());
+        // Two effects know better ones than their parameters.
+        if !["shaft_slip", "hidden_membrane"].contains(&info.id) {
+            assert_eq!(coordinates, start, "{}", info.id);
+        }
+        assert_eq!(AnyEffect::from_coordinates(info.id, &[0.1; 99]), None);
+    }
+    assert_eq!(AnyEffect::from_coordinates("magic", &[1.0]), None);
+}
+
+#[test]
+fn a_parameter_enters_a_fit_as_it_is_sought() {
+    let scale = |id: &str, path: &str| info(id).and_then(|i| i.parameter(path)).expect("known").fit_scale();
+    assert_eq!(scale("coulomb_friction", "c_n_per_m"), FitScale::Linear);
+    // A strength stays linear although its search goes in the logarithm: it may shrink to nothing.
+    assert_eq!(scale("low_pass_lag", "time_constant_s"), FitScale::Linear);
+    assert_eq!(scale("stress_relaxation", "terms.0.time_constant_s"), FitScale::Log);
+    assert_eq!(scale("respiration", "phase_rad"), FitScale::Linear);
+    // What is rigid when neutral.
+    assert_eq!(scale("needle_compliance", "stiffness_n_per_m"), FitScale::Reciprocal);
+}
+
+#[test]
+fn the_description_of_a_parameter_is_the_one_of_its_file() {
+    let lag = info("low_pass_lag").and_then(|i| i.parameter("time_constant_s")).expect("known");
+    assert!(lag.strength && !lag.whole && lag.low == 0.0 && lag.neutral == 0.0, "{lag:?}");
+    let phase = info("respiration").and_then(|i| i.parameter("phase_rad")).expect("known");
+    assert!(!phase.strength, "{phase:?}");
+    let layer = info("boundary_shift").and_then(|i| i.parameter("layer")).expect("known");
+    assert!(layer.whole && !layer.strength && !layer.log, "{layer:?}");
+    let exponent = info("power_law_friction").and_then(|i| i.parameter("exponent")).expect("known");
+    assert_eq!((exponent.low, exponent.high, exponent.neutral), (-0.9, 3.0, 1.0));
+    assert_eq!((exponent.start, exponent.search), (0.7, (0.1, 2.0)));
+    // Where a layer lets go is another depth in every insertion; a law's number is not.
+    let let_go = info("let_go").and_then(|i| i.parameters.iter().find(|p| p.differs > 0.0));
+    assert_eq!((let_go.map(|p| p.differs), exponent.differs), (Some(5e-4), 0.0));
+    assert_eq!(per_layer().count(), 7);
+}
+
+#[test]
+fn a_bound_without_an_upper_end_is_told_as_one() {
+    let with =
+        |high| ParameterError { effect: "magic", path: "x", value: -1.0, allowed: (0.0, high) }.to_string();
+    assert_eq!(with(f64::INFINITY), "magic: x is -1; it must be at least 0");
+    assert_eq!(with(2.0), "magic: x is -1; it must lie between 0 and 2");
+}
+
+#[test]
+fn sixteen_effects_act_at_once_and_no_more() {
+    let one: AnyEffect = CoulombFriction { c_n_per_m: 1.0 }.into();
+    let many = |n: usize| Law::new(&three_gels(), &vec![one.clone(); n]);
+    let law = many(MAX_EFFECTS).expect("as many as can");
+    near(
+        law.step(&mut LawState::default(), 0.0, 0.01, 1e-4, |_| {}).friction_n,
+        16.0 * 0.01 + 9000.0 * 0.01 * 1e-4,
+        1e-12,
+    );
+    assert_eq!(many(MAX_EFFECTS + 1).err(), Some(TooManyEffects { asked: 17 }));
+    // Effects of the sensor and a needle that gives do not count.
+    let mut more = vec![one.clone(); MAX_EFFECTS];
+    more.extend([ForceBias { force_n: 1.0 }.into(), NeedleCompliance { stiffness_n_per_m: 500.0 }.into()]);
+    assert!(Law::new(&three_gels(), &more).is_ok());
+}

@@ -145,3 +145,79 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_mean_over_spans_is_that_of_many_readings() {
+    let effects: Vec<AnyEffect> = vec![
+        ToolInertia { mass_kg: 0.3 }.into(),
+        DriveFriction { force_n: 0.2 }.into(),
+        ForceGain { eps: 0.1 }.into(),
+        LowPassLag { time_constant_s: 0.03 }.into(),
+        ForceBias { force_n: -0.4 }.into(),
+        ForceDrift { rate_n_per_s: 0.05 }.into(),
+        PeriodicInterference { amplitude_n: 0.3, frequency_hz: 7.0, phase_rad: 0.5 }.into(),
+    ];
+    let chain = Measurement::new(&effects);
+    let (mut fine, mut coarse) = (chain.start(1e5), chain.start(50.0));
+    // Spans of 20 ms in which the force stays what it is; many readings in each.
+    let (span_s, readings) = (0.02, 4000);
+    for k in 0..30 {
+        let (tissue_n, acceleration_mps2) = (if k < 10 { 1.0 } else { 3.0 }, if k < 20 { 0.5 } else { -1.0 });
+        let mut sum = 0.0;
+        for i in 0..readings {
+            let time_s = span_s * (f64::from(k) + (f64::from(i) + 0.5) / f64::from(readings));
+            sum += chain.step(
+                &mut fine,
+                &Reading { time_s, velocity_mps: 0.01, acceleration_mps2, tissue_n, noise_n: 0.0 },
+            );
+        }
+        let cell = Cell {
+            time_s: span_s * (f64::from(k) + 0.5),
+            span_s,
+            samples: f64::from(readings),
+            velocity_mps: 0.01,
+            acceleration_mps2,
+            tissue_n,
+        };
+        near(chain.mean(&mut coarse, &cell), sum / f64::from(readings), 5e-4);
+    }
+}
+
+#[test]
+fn a_chain_says_how_late_it_is_and_whether_it_smears_a_jump() {
+    let two = Measurement::new(&[TimeDelay { delay_s: 0.02 }.into(), TimeDelay { delay_s: 0.0137 }.into()]);
+    near(two.delay_s(), 0.0337, 1e-17);
+    assert!(!two.smears() && !two.is_plain());
+    let lag = Measurement::new(&[LowPassLag { time_constant_s: 0.1 }.into(), ForceGain { eps: 0.1 }.into()]);
+    assert!(lag.smears() && lag.delay_s() == 0.0);
+    assert!(!Measurement::new(&[ForceGain { eps: 0.1 }.into()]).smears());
+    for effect in [
+        AnyEffect::from(ToolInertia { mass_kg: 0.3 }),
+        ForceGain { eps: 0.1 }.into(),
+        TimeDelay { delay_s: 0.01 }.into(),
+        ForceBias { force_n: 0.1 }.into(),
+        Saturation { limit_n: 5.0 }.into(),
+    ] {
+        assert!(!Measurement::new(&[effect]).is_plain());
+    }
+    assert!(
+        Measurement::new(&[CoulombFriction { c_n_per_m: 5.0 }.into()]).is_plain(),
+        "that acts in the tissue"
+    );
+}
+
+#[test]
+fn a_delay_remembers_as_much_as_its_sampling_asks_for_and_a_repeated_time_is_no_time() {
+    // 0.1 s at 100 Hz, exactly at a sample and between two; jumps are sharp to one sample.
+    for (delay_s, at) in [(0.1, 60), (0.105, 61)] {
+        let times = regular(100.0, 1.0);
+        let force = |t: f64| if t < 0.5 { 0.0 } else { 1.0 };
+        let late = record(&[TimeDelay { delay_s }.into()], &times, force);
+        assert_eq!(late.iter().filter(|f| **f == 1.0).count(), times.len() - at, "{delay_s}");
+        near(late[60], if delay_s > 0.1 { 0.5 } else { 1.0 }, 1e-9);
+    }
+    let lag = Measurement::new(&[LowPassLag { time_constant_s: 0.1 }.into()]);
+    let mut state = lag.start(100.0);
+    let mut at = |time_s, tissue_n| lag.step(&mut state, &Reading { time_s, tissue_n, ..Reading::default() });
+    assert_eq!([at(5.0, 1.0), at(5.0, 9.0), at(4.0, 9.0)], [1.0; 3]);
+}

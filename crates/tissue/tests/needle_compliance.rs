@@ -112,6 +112,63 @@ fn after_a_rupture_between_samples_the_force_is_the_same_at_every_sampling_rate(
 }
 
 #[test]
+fn a_rupture_with_friction_that_stays_is_exact_at_every_sampling_rate() {
+    // The shaft rubs with D = 20 Ns/m in a layer that the tip has left; the next one holds nothing but a spring that gives way at 1 N.
+    let (ks, d, k, v) = (500.0, 20.0, 100.0, 0.003);
+    let tissue = tissue(&[layer(0.01, 0.0, d / 0.01, None), layer(0.05, k, 0.0, Some(1.0))]);
+    for rate in [37.0, 200.0, 1000.0] {
+        let motion = constant(v, rate, 9.0);
+        let (f, tips, ruptures) = bend(&tissue, &[spring(ks)], &motion);
+        // Long after its front face the spring grows at the pace of springs in series: k x + d v_tip = k_s (z - z_tip).
+        let rupture = ruptures[1];
+        near(rupture.position_m, 0.02, 1e-9);
+        let pressed = 1.0 + d * v * ks / (ks + k);
+        near(rupture.time_s, (0.02 + pressed / ks) / v, 1e-8);
+        // Then the needle's lag behind the base relaxes from there to d v/k_s.
+        let tau = d / ks;
+        for (&(t, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
+            if t > rupture.time_s && z < 0.055 {
+                let lag = v * tau + (pressed / ks - v * tau) * (-(t - rupture.time_s) / tau).exp();
+                near(z - tip, lag, 1e-8);
+                near(force.total_n, ks * lag, 1e-5);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_base_that_accelerates_as_it_says_is_followed_exactly_however_long_the_steps() {
+    // D z_tip' = k_s (z - z_tip) with z = a t^2/2 from rest: z_tip = a (t^2/2 - tau t + tau^2 (1 - exp(-t/tau))).
+    let (ks, d, a) = (500.0, 20.0, 0.02);
+    let tau = d / ks;
+    for step_s in [0.01, 0.05, 0.3] {
+        let law = Law::new(&tissue(&[layer(0.01, 0.0, d / 0.01, None)]), &[spring(ks)]).expect("few effects");
+        let mut state = LawState::default();
+        for k in 0..10 {
+            state.set_base_acceleration(a);
+            let t = step_s * f64::from(k);
+            law.step(&mut state, t, 0.03 + 0.5 * a * t * t, a * t, |_| {});
+            let tip = a * (0.5 * t * t - tau * t + tau * tau * (1.0 - (-t / tau).exp()));
+            near(state.tip_m() - 0.03, tip, 1e-12);
+            near(state.tip_velocity_mps(), a * (t - tau * (1.0 - (-t / tau).exp())), 1e-11);
+        }
+    }
+}
+
+#[test]
+fn in_the_layer_that_it_is_in_all_the_friction_is_the_tip_s_stuck_or_sliding() {
+    let motion = ripple_hold_retract(0.005, 0.002, 0.004, 0.4, 200.0);
+    let effects = [CoulombFriction { c_n_per_m: 20.0 }.into(), spring(1000.0)];
+    let (f, tips, _) = bend(&block(30.0, 2000.0), &effects, &motion);
+    for force in &f {
+        near(force.tip_n, force.total_n, 1e-12);
+        near(force.elastic_n + force.friction_n, force.total_n, 1e-12);
+    }
+    let stuck = tips.windows(2).filter(|w| (w[1] - w[0]).abs() < 1e-7).count();
+    assert!(stuck > 100, "{stuck}");
+}
+
+#[test]
 fn at_a_rupture_the_tip_jumps_although_the_base_does_not() {
     let (k, ks) = (100.0, 400.0);
     let tissue = tissue(&[layer(0.05, k, 0.0, Some(1.0)), layer(0.05, 50.0, 0.0, None)]);
@@ -198,6 +255,63 @@ fn a_needle_that_starts_inside_the_tissue_and_a_repeated_time_stamp_are_in_balan
     for (&(_, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
         near(*tip, z / 2.0, 1e-12);
         near(force.total_n, 50.0 * z, 1e-10);
+    }
+}
+
+#[test]
+fn what_a_tip_that_sticks_feels_is_free_of_the_friction_of_the_layers_passed() {
+    // 40 mm in, held, and slowly back: the shaft rubs in 20 mm that are passed and in 20 mm of the layer that the tip is in.
+    let (c, ks) = (20.0, 1000.0);
+    let stack = tissue(&[layer(0.02, 0.0, 0.0, None), layer(1.0, 0.0, 0.0, None)]);
+    let mut motion = constant(0.005, 200.0, 8.0);
+    let (last_s, last_m, _) = motion[motion.len() - 1];
+    motion.extend((1..=60).map(|k| (last_s + 0.005 * f64::from(k), last_m - 1e-5 * f64::from(k), -0.002)));
+    let dry: AnyEffect = CoulombFriction { c_n_per_m: c }.into();
+    let (f, tips, _) = bend(&stack, &[dry.clone(), spring(ks)], &motion);
+    assert!(tips.windows(2).skip(1600).all(|w| (w[1] - w[0]).abs() < 1e-7), "it sticks");
+    for (force, tip) in f.iter().zip(&tips).skip(1000) {
+        near(force.tip_n, force.friction_n * (tip - 0.02) / tip, 1e-9);
+        near(force.friction_n, force.total_n, 1e-12);
+    }
+    // In the air behind its only layer a tip feels nothing, stuck or not.
+    let (f, ..) = bend(&tissue(&[layer(0.02, 0.0, 0.0, None)]), &[dry, spring(ks)], &motion);
+    assert!(f[1620].friction_n.abs() > 0.1);
+    f.iter().skip(1000).for_each(|force| near(force.tip_n, 0.0, 1e-12));
+}
+
+#[test]
+fn a_tip_that_sticks_under_a_cutting_force_bears_it_at_the_tip() {
+    // Cutting stops when the tip does: on the way back the spring lets go of what the tip bears, between 0.5 N and nothing.
+    let mut motion = constant(0.005, 200.0, 8.0);
+    let (last_s, last_m, _) = motion[motion.len() - 1];
+    motion.extend((1..=40).map(|k| (last_s + 0.005 * f64::from(k), last_m - 1e-5 * f64::from(k), -0.002)));
+    let cutting = CuttingForce { force_n: 0.5 }.into();
+    let (f, ..) = bend(&block(0.0, 0.0), &[cutting, spring(1000.0)], &motion);
+    for (k, force) in f.iter().enumerate().skip(1600) {
+        assert!(force.total_n > 0.05 && force.total_n < 0.5, "{k}: {force:?}");
+        near(force.tip_extra_n, force.total_n, 1e-12);
+        near(force.tip_n, force.total_n, 1e-12);
+        near(force.friction_n, 0.0, 1e-12);
+    }
+}
+
+#[test]
+fn the_balance_holds_with_every_effect_of_the_tissue() {
+    let motion = ripple_hold_retract(-0.002, 0.005, 0.004, 0.4, 100.0);
+    let ks = 900.0;
+    let per_layer = per_layer().map(|info| {
+        let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
+        AnyEffect::from_parameters(info.id, &start).expect("its own parameters")
+    });
+    let bends = |e: &AnyEffect| e.id() == "needle_compliance";
+    // What moves the tissue or shakes it moves the base with it.
+    let moves = |e: &AnyEffect| e.place() == Place::Kinematics || e.place() >= Place::Tool;
+    for effect in typical_effects().into_iter().chain(per_layer).filter(|e| !moves(e) && !bends(e)) {
+        let (f, tips, _) = bend(&three_gels(), &[effect.clone(), spring(ks)], &motion);
+        for (k, (&(_, z, _), (force, tip))) in motion.iter().zip(f.iter().zip(&tips)).enumerate() {
+            let off = (tip - z + force.total_n / ks).abs();
+            assert!(off < 1e-10, "{effect:?}, sample {k}: {off}");
+        }
     }
 }
 

@@ -113,3 +113,101 @@ fn a_creeping_branch_fades_in_the_hold_with_its_time_constant_and_is_the_same_at
     let slow = forces(&skin(), &branches, &coarse);
     assert!(worst(&every[130..], &slow[130..]) < 1e-3, "{}", worst(&every[130..], &slow[130..]));
 }
+
+#[test]
+fn a_tougher_layer_and_a_rougher_shaft_change_the_effects_that_hold_their_numbers() {
+    let waits = |force_n| AnyEffect::from(DelayedPuncture { layer: 2, force_n, exponent: 3.0 });
+    let mut tough = waits(2.0);
+    tough.toughened(1, 1.5);
+    assert_eq!(tough, waits(2.0), "another layer");
+    tough.toughened(2, 1.5);
+    assert_eq!(tough, waits(3.0));
+    let clings = |push_n, pull_n| AnyEffect::from(ShaftSlip { push_n, pull_n, ..ShaftSlip::default() });
+    let mut rough = clings(2.0, 1.0);
+    rough.rubbed(1.5);
+    assert_eq!(rough, clings(3.0, 1.5));
+    // Others take what the layers hold.
+    let mut other = holds(0.5, 0.004, 2.0);
+    other.rubbed(1.5);
+    other.toughened(1, 1.5);
+    assert_eq!(other, holds(0.5, 0.004, 2.0));
+}
+
+#[test]
+fn relaxing_shares_cannot_be_more_than_the_whole_and_the_error_says_what_is_left() {
+    let relaxes = |fractions| AnyEffect::from(ShaftSlip { push_n: 1.0, fractions, ..ShaftSlip::default() });
+    assert!(relaxes([0.75, 0.25]).check().is_ok());
+    let error = relaxes([0.75, 0.5]).check().expect_err("more than the whole");
+    assert_eq!((error.path, error.value, error.allowed), ("fractions.1", 0.5, (0.0, 0.25)));
+    // In coordinates the second share is one of what the first leaves, so that any two are allowed.
+    assert_eq!(relaxes([0.75, 0.125]).coordinates()[8..10], [0.75, 0.5]);
+    assert_eq!(relaxes([1.0, 0.0]).coordinates()[8..10], [1.0, 0.0]);
+    let whole = AnyEffect::from_coordinates("shaft_slip", &relaxes([0.75, 0.25]).coordinates());
+    assert_eq!(whole, Some(relaxes([0.75, 0.25])));
+    let term = |fraction| PronyTerm { fraction, time_constant_s: 1.0 };
+    let prony = |first, second| AnyEffect::from(StressRelaxation { terms: vec![term(first), term(second)] });
+    assert!(prony(0.75, 0.25).check().is_ok());
+    assert_eq!(prony(0.75, 0.5).check().expect_err("more than the whole").allowed, (0.0, 0.25));
+}
+
+#[test]
+fn damage_grows_with_the_mean_power_of_the_force_whatever_the_step() {
+    // Damage 1 breaks the layer: of a ramp to 2 F_1 in T with exponent n, T 2^n/(n + 1) at its end.
+    let layer = tissue(&[layer(0.5, 100.0, 0.0, None)]);
+    for exponent in [1.0, 2.5, 8.0] {
+        let seconds = (exponent + 1.0) / 2.0_f64.powf(exponent);
+        for steps in [3, 400] {
+            let effect = AnyEffect::from(DelayedPuncture { layer: 1, force_n: 0.5, exponent });
+            let law = Law::new(&layer, &[effect]).expect("one effect");
+            let (mut state, mut broke) = (LawState::default(), None);
+            for k in 0..=steps + 1 {
+                // 1 N, which is 2 F_1, at 10 mm.
+                let share = 1.000_001 * f64::from(k) / f64::from(steps);
+                law.step(&mut state, seconds * share, 0.01 * share, 0.01 / seconds, |r| {
+                    broke = broke.or(Some((k, r.time_s)))
+                });
+            }
+            assert_eq!(broke.map(|b| b.0), Some(steps), "{exponent} {steps}");
+        }
+    }
+}
+
+#[test]
+fn a_puncture_passes_the_share_that_is_kept_into_the_branch_s_hold() {
+    // 0.8 N are released at 8 mm, the shaft stands still there: what is kept of them holds, and creeps away with its time constant.
+    let motion: Vec<Sample> = (0..=1600)
+        .map(|k| f64::from(k) * 0.005)
+        .map(|t| if t <= 4.001 { (t, 0.002_000_1 * t, 0.002_000_1) } else { (t, 0.008_002, 0.0) })
+        .collect();
+    for (share, kept) in [(0.5, 0.5), (1.0, 0.25), (0.8, 1.0)] {
+        let delta_m = 0.05;
+        let creeps =
+            ViscoelasticPresliding { layer: 1, share, delta_m, time_constant_s: 2.0, kept, release_m: 0.0 };
+        let f = run(&skin(), &[creeps.into()], &motion).0;
+        // Two steps of creep take 5 ms/2 s each, a little travel adds less.
+        near(f[801].friction_n, share * kept * 0.8, 0.005);
+        near(f[1201].friction_n / f[801].friction_n, (-1.0f64).exp(), 1e-9);
+    }
+}
+
+#[test]
+fn a_hold_follows_travel_to_first_order_however_small() {
+    // Steps of a nanometre, a micrometre and a tenth of a millimetre: the hold's limit follows by 1 - exp(-travel/delta).
+    for steps in [10, 10_000, 1_000_000] {
+        let way = 0.001;
+        let effect = holds(1.0, 0.004, 1e6);
+        let law = Law::new(&skin(), &[effect]).expect("one effect");
+        let mut state = LawState::default();
+        let mut at = |t: f64, z: f64, v: f64| law.step(&mut state, t, z, v, |_| {});
+        // Slid in at 2 mm/s until it holds 1 N; then on at 1 mm/s, at which it slides at 0.5 N.
+        for k in 0..=2000 {
+            at(0.01 * f64::from(k), 2e-5 * f64::from(k), 0.002);
+        }
+        let mut force = 0.0;
+        for k in 1..=steps {
+            let share = f64::from(k) / f64::from(steps);
+            force = at(20.0 + share, 0.04 + way * share, 0.001).friction_n;
+        }
+        near(force, 0.5 + 0.5 * (-way / 0.004).exp(), 1e-6);
+    }
+}

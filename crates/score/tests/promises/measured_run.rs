@@ -1,0 +1,85 @@
+//! A measured run without a truth: the core's detections against the drops of the raw force, and what it leaves of the way back.
+
+use crate::support::detection;
+use stylet_record::Recording;
+use stylet_score::{Measured, Online, Trace};
+
+/// One sample per 0.5 s: in until 10 s, held until 12 s, back to the surface at 10 mm and out of it.
+fn run() -> Recording {
+    let time_s: Vec<f64> = (0..=40).map(|i| 0.5 * f64::from(i)).collect();
+    let position_m = time_s.iter().map(|t| 0.004 * t.min(10.0) - 0.005 * (t - 12.0).max(0.0)).collect();
+    let force_n = time_s.iter().map(|t| if *t < 12.0 { 2.0 } else { -3.0 }).collect();
+    Recording::new(time_s, position_m, force_n).expect("a recording")
+}
+
+fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Online, Vec<f64>) {
+    let recording = run();
+    let trace = Trace {
+        detections: detections_s.iter().enumerate().map(|(i, t)| detection(i + 1, *t)).collect(),
+        enhanced_n: recording.time_s.iter().map(|t| if *t < 12.0 { 5.0 } else { 0.5 }).collect(),
+        ..Trace::default()
+    };
+    let drops: Vec<usize> = drops_s.iter().map(|t| (2.0 * t) as usize).collect();
+    let measured = Measured {
+        name: "gel 3",
+        recording: &recording,
+        drops: &drops,
+        deepest: 20,
+        back: 24,
+        contact_m: 0.010,
+    };
+    let mut asked = Vec::new();
+    let online = Online::of(&measured, &trace, |instants| {
+        asked = instants.to_vec();
+        friction.map(|f| vec![f; recording.len()])
+    });
+    (online, asked)
+}
+
+#[test]
+fn a_drop_is_found_from_fifty_milliseconds_before_to_one_second_after_it() {
+    for (late_s, found) in [(-0.06, 0), (-0.04, 1), (0.3, 1), (0.9, 1), (1.1, 0)] {
+        let (online, _) = judged(&[6.0], &[6.0 + late_s], None);
+        assert_eq!((online.drops, online.found, online.false_in), (1, found, 1 - found), "{late_s}");
+    }
+}
+
+#[test]
+fn two_drops_cannot_share_a_detection_and_a_second_detection_is_false() {
+    let (online, _) = judged(&[6.0, 6.5], &[6.6], None);
+    assert_eq!((online.drops, online.found, online.false_in), (2, 1, 0));
+    let (online, _) = judged(&[6.0, 6.5], &[6.1, 6.2, 6.6], None);
+    assert_eq!((online.found, online.false_in), (2, 1));
+}
+
+#[test]
+fn false_detections_are_counted_where_they_happen() {
+    // The deepest sample is the first of the hold, and the turn the first of the way back.
+    let (online, asked) = judged(&[3.0], &[1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0], None);
+    assert_eq!((online.found, online.false_in, online.false_hold, online.false_back), (1, 2, 3, 4));
+    // Layers count as punctured from where the core says so, rightly or not.
+    assert_eq!(asked, [1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0]);
+}
+
+#[test]
+fn what_is_left_of_the_way_back_is_measured_inside_the_tissue() {
+    let (online, _) = judged(&[], &[], Some(-2.75));
+    assert_eq!(online.run, "gel 3");
+    assert_eq!((online.back_raw_n, online.back_before_n, online.back_after_n), (3.0, 0.5, 0.25));
+    assert!(judged(&[], &[], None).0.back_after_n.is_nan());
+}
+
+#[test]
+fn the_way_back_ends_where_the_tip_is_at_the_surface() {
+    let mut recording = run();
+    // On the surface itself (18 s) and outside nothing is friction of the tissue.
+    assert_eq!(recording.time_s[36], 18.0);
+    recording.position_m[36] = 0.010;
+    for i in 36..recording.len() {
+        recording.force_n[i] = 100.0;
+    }
+    let trace = Trace { enhanced_n: recording.force_n.clone(), ..Trace::default() };
+    let measured =
+        Measured { name: "", recording: &recording, drops: &[], deepest: 20, back: 24, contact_m: 0.010 };
+    assert_eq!(Online::of(&measured, &trace, |_| None).back_raw_n, 3.0);
+}
