@@ -21,9 +21,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Okamura, Simone, O'Leary 2004, table I",
     signature: "Viscous friction has another size in retraction than in advance, in proportion to speed and length.",
     place: Place::Friction,
-    parameters: &[
-        ParameterInfo::strength("eps", "", "asymmetry between advance and retraction").allowed(-1.0, 1.0).search(0.2, -0.9, 0.9),
-    ],
+    parameters: &[ParameterInfo::strength("eps", "", "asymmetry between advance and retraction")
+        .allowed(-1.0, 1.0)
+        .search(0.2, -0.9, 0.9)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.01]]]),
     nested_in: &[],

@@ -20,9 +20,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Okamura, Simone, O'Leary 2004 (Karnopp model, per unit length)",
     signature: "A plateau that does not depend on speed, with a step at reversal, in proportion to the length inside.",
     place: Place::Friction,
-    parameters: &[
-        ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside").allowed(0.0, 1e4).search(3.0, 0.05, 100.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside")
+        .allowed(0.0, 1e4)
+        .search(3.0, 0.05, 100.0)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.0]]]),
     nested_in: &["stribeck_friction", "presliding_friction"],

@@ -22,9 +22,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Okamura, Simone, O'Leary 2004 (0.94 N in liver)",
     signature: "An offset during advance only: zero in hold and retraction, gone behind the last layer.",
     place: Place::Tip,
-    parameters: &[
-        ParameterInfo::strength("force_n", "N", "cutting force").allowed(0.0, 100.0).search(0.3, 0.01, 3.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("force_n", "N", "cutting force")
+        .allowed(0.0, 100.0)
+        .search(0.3, 0.01, 3.0)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.1]]]),
     nested_in: &[],

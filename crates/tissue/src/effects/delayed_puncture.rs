@@ -108,6 +108,10 @@ impl Effect for DelayedPuncture {
             };
             memory[0] += dt_s * mean * libm::exp((n * libm::log(most)).min(600.0));
         }
-        if memory[0] > 0.0 { elastic_n.max(0.0) / libm::pow(memory[0], 1.0 / self.exponent) } else { f64::INFINITY }
+        if memory[0] > 0.0 {
+            elastic_n.max(0.0) / libm::pow(memory[0], 1.0 / self.exponent)
+        } else {
+            f64::INFINITY
+        }
     }
 }

@@ -20,9 +20,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Joint friction of the KUKA LWR, 0.24-0.68 N m",
     signature: "A step at every reversal, also in air, of the same size at all depths.",
     place: Place::Tool,
-    parameters: &[
-        ParameterInfo::strength("force_n", "N", "dry friction of the drive").allowed(0.0, 100.0).search(0.2, 0.01, 3.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("force_n", "N", "dry friction of the drive")
+        .allowed(0.0, 100.0)
+        .search(0.2, 0.01, 3.0)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.1]]]),
     nested_in: &[],

@@ -19,9 +19,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Taring: 15 mN in the measured recordings",
     signature: "A constant in air before contact.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("force_n", "N", "offset").allowed(-100.0, 100.0).search(0.05, -2.0, 2.0),
-    ],
+    parameters: &[ParameterInfo::strength("force_n", "N", "offset")
+        .allowed(-100.0, 100.0)
+        .search(0.05, -2.0, 2.0)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.1]]]),
     nested_in: &[],

@@ -20,9 +20,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Thermal drift of strain gauges",
     signature: "Slow in time, and the force in air does not return to zero at the end.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("rate_n_per_s", "N/s", "drift").allowed(-10.0, 10.0).search(0.005, -0.1, 0.1),
-    ],
+    parameters: &[ParameterInfo::strength("rate_n_per_s", "N/s", "drift")
+        .allowed(-10.0, 10.0)
+        .search(0.005, -0.1, 0.1)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[1e-3]]]),
     nested_in: &[],

@@ -20,9 +20,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Calibration of force sensors",
     signature: "All forces scaled, known loads too; invisible in the shape of an insertion.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("eps", "", "relative error of the force").allowed(-0.99, 10.0).search(0.05, -0.5, 0.5),
-    ],
+    parameters: &[ParameterInfo::strength("eps", "", "relative error of the force")
+        .allowed(-0.99, 10.0)
+        .search(0.05, -0.5, 0.5)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.01]]]),
     nested_in: &[],

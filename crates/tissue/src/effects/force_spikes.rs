@@ -24,8 +24,14 @@ static INFO: EffectInfo = EffectInfo {
     signature: "Single samples far from both neighbours, at any depth and in air.",
     place: Place::Sensor,
     parameters: &[
-        ParameterInfo::strength("rate_hz", "Hz", "mean number per second").allowed(0.0, 1000.0).search(0.2, 0.01, 20.0).log(),
-        ParameterInfo::strength("size_n", "N", "size of a spike").allowed(-1000.0, 1000.0).search(1.0, 0.1, 20.0).log(),
+        ParameterInfo::strength("rate_hz", "Hz", "mean number per second")
+            .allowed(0.0, 1000.0)
+            .search(0.2, 0.01, 20.0)
+            .log(),
+        ParameterInfo::strength("size_n", "N", "size of a spike")
+            .allowed(-1000.0, 1000.0)
+            .search(1.0, 0.1, 20.0)
+            .log(),
     ],
     larger: None,
     proposal: Proposal::Raw,

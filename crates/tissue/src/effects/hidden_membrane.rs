@@ -31,9 +31,18 @@ static INFO: EffectInfo = EffectInfo {
     signature: "A peak and a drop at a depth where no boundary is, once.",
     place: Place::Tip,
     parameters: &[
-        ParameterInfo::shape("depth_m", "m", "depth below the surface").allowed(0.0, 1.0).neutral(0.02).search(0.02, 0.001, 0.2),
-        ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness").allowed(0.0, 1e6).search(100.0, 5.0, 5000.0).log(),
-        ParameterInfo::strength("puncture_n", "N", "force at which it breaks").allowed(0.0, 100.0).search(0.5, 0.02, 5.0).log(),
+        ParameterInfo::shape("depth_m", "m", "depth below the surface")
+            .allowed(0.0, 1.0)
+            .neutral(0.02)
+            .search(0.02, 0.001, 0.2),
+        ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness")
+            .allowed(0.0, 1e6)
+            .search(100.0, 5.0, 5000.0)
+            .log(),
+        ParameterInfo::strength("puncture_n", "N", "force at which it breaks")
+            .allowed(0.0, 100.0)
+            .search(0.5, 0.02, 5.0)
+            .log(),
     ],
     larger: None,
     proposal: Proposal::Break,

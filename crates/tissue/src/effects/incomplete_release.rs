@@ -22,9 +22,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Okamura, Simone, O'Leary 2004 (liver: drop 0.66 N of 2.30 N)",
     signature: "The force does not fall to the friction line after a puncture, and the rest goes at reversal.",
     place: Place::Release,
-    parameters: &[
-        ParameterInfo::strength("fraction", "", "share of the elastic force that stays").allowed(0.0, 1.0).search(0.3, 0.01, 0.99),
-    ],
+    parameters: &[ParameterInfo::strength("fraction", "", "share of the elastic force that stays")
+        .allowed(0.0, 1.0)
+        .search(0.3, 0.01, 0.99)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.05]]]),
     nested_in: &[],

@@ -23,9 +23,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "The laboratory's filter: 0.01 at 200 Hz is 0.5 s",
     signature: "A drop becomes a first-order step, constant in time, not in depth.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("time_constant_s", "s", "time constant").allowed(0.0, 100.0).search(0.05, 0.002, 2.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("time_constant_s", "s", "time constant")
+        .allowed(0.0, 100.0)
+        .search(0.05, 0.002, 2.0)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.004]], &[&[0.02]], &[&[0.08]], &[&[0.3]]]),
     nested_in: &[],

@@ -1,12 +1,48 @@
 //! The effects library: one file per effect.
 //!
-//! [`AnyEffect`] is the closed list that scenarios can name; adding an effect is one file and one
-//! line in the list below, which stands in the order of the chain.
+//! [`AnyEffect`] is the closed list that scenarios can name; adding an effect is one file and
+//! two lines here: its module, and its place in the list below, which is the order of the chain.
 
 use crate::effect::{Effect, Memory, Moment};
 use crate::info::{EffectInfo, ParameterError};
 use crate::slab::Slab;
 use alloc::vec::Vec;
+
+// Outside the macro, where rustfmt and cargo-mutants see them.
+mod asymmetric_friction;
+mod boundary_shift;
+mod coulomb_friction;
+mod cutting_force;
+mod deep_indentation;
+mod delayed_puncture;
+mod drive_friction;
+mod force_bias;
+mod force_drift;
+mod force_gain;
+mod force_spikes;
+mod hidden_membrane;
+mod incomplete_release;
+mod layer_coupling;
+mod layer_stiffening;
+mod let_go;
+mod low_pass_lag;
+mod needle_compliance;
+mod nonlinear_elasticity;
+mod periodic_interference;
+mod position_scale;
+mod power_law_friction;
+mod presliding_friction;
+mod quantisation;
+mod rate_dependent_puncture;
+mod respiration;
+mod saturation;
+mod shaft_slip;
+mod soft_boundary;
+mod stress_relaxation;
+mod stribeck_friction;
+mod time_delay;
+mod tool_inertia;
+mod viscoelastic_presliding;
 
 /// What an effect's parameters are as a list of numbers.
 trait Described: Effect + Default {
@@ -41,7 +77,7 @@ trait Described: Effect + Default {
 /// Declares the effect modules and the enum that scenarios write in camel case.
 macro_rules! effects {
     ($($module:ident :: $name:ident),* $(,)?) => {
-        $(mod $module; pub use $module::*;)*
+        $(pub use $module::*;)*
 
         /// Any effect of the library, as a scenario's `effects` list writes it.
         #[derive(Clone, Debug, PartialEq)]

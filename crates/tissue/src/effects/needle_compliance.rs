@@ -29,9 +29,11 @@ static INFO: EffectInfo = EffectInfo {
     source: "Series spring of needle and holder",
     signature: "Apparent stiffness k k_s/(k + k_s); the tip lags in proportion to the force and jumps at a rupture although the base does not.",
     place: Place::Kinematics,
-    parameters: &[
-        ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness of needle and holder").allowed(1.0, f64::INFINITY).neutral(f64::INFINITY).search(1000.0, 50.0, 1e5).log(),
-    ],
+    parameters: &[ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness of needle and holder")
+        .allowed(1.0, f64::INFINITY)
+        .neutral(f64::INFINITY)
+        .search(1000.0, 50.0, 1e5)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[8000.0]], &[&[1500.0]], &[&[300.0]]]),
     nested_in: &[],

@@ -20,9 +20,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Okamura, Simone, O'Leary 2004",
     signature: "The loading slope grows with depth before each rupture, the same at all speeds.",
     place: Place::Elastic,
-    parameters: &[
-        ParameterInfo::strength("kappa_per_m", "1/m", "stiffening with indentation").allowed(-100.0, 1000.0).search(10.0, -5.0, 100.0),
-    ],
+    parameters: &[ParameterInfo::strength("kappa_per_m", "1/m", "stiffening with indentation")
+        .allowed(-100.0, 1000.0)
+        .search(10.0, -5.0, 100.0)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.0]]]),
     nested_in: &[],

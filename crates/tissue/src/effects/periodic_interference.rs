@@ -25,9 +25,20 @@ static INFO: EffectInfo = EffectInfo {
     signature: "A narrow line in time, the same in air, in holds and at every depth.",
     place: Place::Sensor,
     parameters: &[
-        ParameterInfo::strength("amplitude_n", "N", "amplitude").allowed(0.0, 100.0).search(0.05, 0.002, 2.0).log(),
-        ParameterInfo::shape("frequency_hz", "Hz", "frequency").allowed(0.0, 1e5).neutral(5.0).search(5.0, 0.05, 100.0).log(),
-        ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(0.0, -core::f64::consts::PI, core::f64::consts::PI),
+        ParameterInfo::strength("amplitude_n", "N", "amplitude")
+            .allowed(0.0, 100.0)
+            .search(0.05, 0.002, 2.0)
+            .log(),
+        ParameterInfo::shape("frequency_hz", "Hz", "frequency")
+            .allowed(0.0, 1e5)
+            .neutral(5.0)
+            .search(5.0, 0.05, 100.0)
+            .log(),
+        ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(
+            0.0,
+            -core::f64::consts::PI,
+            core::f64::consts::PI,
+        ),
     ],
     larger: None,
     proposal: Proposal::Line,

@@ -20,9 +20,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "Following errors of 0.6-2.9 % in the measured recordings",
     signature: "All boundaries come at depths that are off in proportion to depth.",
     place: Place::Position,
-    parameters: &[
-        ParameterInfo::strength("eps", "", "relative error of the recorded position").allowed(-0.5, 1.0).search(0.02, -0.2, 0.2),
-    ],
+    parameters: &[ParameterInfo::strength("eps", "", "relative error of the recorded position")
+        .allowed(-0.5, 1.0)
+        .search(0.02, -0.2, 0.2)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.01]]]),
     nested_in: &[],

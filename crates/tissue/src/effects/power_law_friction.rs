@@ -29,9 +29,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Rate dependence of phantoms and liver: van Gerwen et al. 2012",
     signature: "Friction against speed is a curve, not a line; no offset between speeds near 1 mm/s.",
     place: Place::Friction,
-    parameters: &[
-        ParameterInfo::strength("exponent", "", "exponent of speed in the friction").allowed(-0.9, 3.0).neutral(1.0).search(0.7, 0.1, 2.0),
-    ],
+    parameters: &[ParameterInfo::strength("exponent", "", "exponent of speed in the friction")
+        .allowed(-0.9, 3.0)
+        .neutral(1.0)
+        .search(0.7, 0.1, 2.0)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.02]]]),
     nested_in: &[],

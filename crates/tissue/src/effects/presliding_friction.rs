@@ -36,8 +36,15 @@ static INFO: EffectInfo = EffectInfo {
     signature: "After each reversal the force follows travel over a finite distance, whatever the speed, and it stays in holds.",
     place: Place::Friction,
     parameters: &[
-        ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside once sliding").allowed(0.0, 1e4).search(3.0, 0.05, 100.0).log(),
-        ParameterInfo::shape("delta_m", "m", "travel over which the friction builds up").allowed(1e-7, 0.1).neutral(5e-4).search(5e-4, 1e-5, 2e-2).log(),
+        ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside once sliding")
+            .allowed(0.0, 1e4)
+            .search(3.0, 0.05, 100.0)
+            .log(),
+        ParameterInfo::shape("delta_m", "m", "travel over which the friction builds up")
+            .allowed(1e-7, 0.1)
+            .neutral(5e-4)
+            .search(5e-4, 1e-5, 2e-2)
+            .log(),
     ],
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.0, 6e-5]], &[&[1.0, 2.5e-4]], &[&[1.0, 1e-3]], &[&[1.0, 4e-3]]]),

@@ -20,9 +20,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Sensor resolutions: 1/320 N (Nano17) to 1/16 N (Mini45)",
     signature: "Stairs: few distinct values, equal smallest differences.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("step_n", "N", "step").allowed(0.0, 100.0).search(0.05, 0.0005, 1.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("step_n", "N", "step")
+        .allowed(0.0, 100.0)
+        .search(0.05, 0.0005, 1.0)
+        .log()],
     larger: None,
     proposal: Proposal::Raw,
     nested_in: &[],

@@ -21,9 +21,9 @@ static INFO: EffectInfo = EffectInfo {
     source: "van Gerwen, Dankelman, van den Dobbelsteen 2012",
     signature: "The peak before a puncture changes with speed while the loading curve does not.",
     place: Place::Puncture,
-    parameters: &[
-        ParameterInfo::strength("alpha", "", "change of the puncture force per factor e in speed").allowed(-2.0, 2.0).search(0.1, -0.5, 0.5),
-    ],
+    parameters: &[ParameterInfo::strength("alpha", "", "change of the puncture force per factor e in speed")
+        .allowed(-2.0, 2.0)
+        .search(0.1, -0.5, 0.5)],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.02]]]),
     nested_in: &[],

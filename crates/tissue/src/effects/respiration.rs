@@ -26,9 +26,20 @@ static INFO: EffectInfo = EffectInfo {
     signature: "Periodic in time, also while the needle is held.",
     place: Place::Kinematics,
     parameters: &[
-        ParameterInfo::strength("amplitude_m", "m", "amplitude of the tissue's motion").allowed(0.0, 0.1).search(0.002, 1e-4, 0.02).log(),
-        ParameterInfo::shape("frequency_hz", "Hz", "frequency of the breath").allowed(0.0, 20.0).neutral(0.25).search(0.25, 0.05, 2.0).log(),
-        ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(0.0, -core::f64::consts::PI, core::f64::consts::PI),
+        ParameterInfo::strength("amplitude_m", "m", "amplitude of the tissue's motion")
+            .allowed(0.0, 0.1)
+            .search(0.002, 1e-4, 0.02)
+            .log(),
+        ParameterInfo::shape("frequency_hz", "Hz", "frequency of the breath")
+            .allowed(0.0, 20.0)
+            .neutral(0.25)
+            .search(0.25, 0.05, 2.0)
+            .log(),
+        ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(
+            0.0,
+            -core::f64::consts::PI,
+            core::f64::consts::PI,
+        ),
     ],
     larger: None,
     proposal: Proposal::Breath,

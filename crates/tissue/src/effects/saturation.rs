@@ -26,9 +26,11 @@ static INFO: EffectInfo = EffectInfo {
     source: "Sensor ranges",
     signature: "A flat top: many equal maxima.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("limit_n", "N", "range of the sensor").allowed(0.0, f64::INFINITY).neutral(f64::INFINITY).search(4.0, 0.2, 50.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("limit_n", "N", "range of the sensor")
+        .allowed(0.0, f64::INFINITY)
+        .neutral(f64::INFINITY)
+        .search(4.0, 0.2, 50.0)
+        .log()],
     larger: None,
     proposal: Proposal::Raw,
     nested_in: &[],

@@ -94,10 +94,9 @@ const LAYER: ParameterInfo = ParameterInfo::shape("layer", "", "layer, 1-based")
     .neutral(1.0)
     .search(1.0, 1.0, 10.0)
     .whole();
-const FRACTION: ParameterInfo =
-    ParameterInfo::shape("fractions.0", "", "share of the force that relaxes").allowed(0.0, 1.0).search(
-        0.2, 0.0, 0.9,
-    );
+const FRACTION: ParameterInfo = ParameterInfo::shape("fractions.0", "", "share of the force that relaxes")
+    .allowed(0.0, 1.0)
+    .search(0.2, 0.0, 0.9);
 /// Place of the second relaxing share among the parameters.
 const SECOND: usize = 9;
 const TIME: ParameterInfo = ParameterInfo::shape("time_constants_s.0", "s", "its time constant")
@@ -163,7 +162,8 @@ impl Described for ShaftSlip {
         ]
     }
     fn from_values(values: &[f64]) -> Option<Self> {
-        let [layer, push_n, pull_n, kept, exponent, wear_per_m, rate, curve_n_per_m2, g1, g2, t1, t2] = *values
+        let [layer, push_n, pull_n, kept, exponent, wear_per_m, rate, curve_n_per_m2, g1, g2, t1, t2] =
+            *values
         else {
             return None;
         };

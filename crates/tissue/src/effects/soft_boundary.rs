@@ -25,9 +25,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Tilted or blunt interfaces: NeedleInsertionDataAnalysis tables",
     signature: "Force drops are smeared over a travel, the same at all speeds.",
     place: Place::Release,
-    parameters: &[
-        ParameterInfo::strength("width_m", "m", "travel over which a rupture releases its force").allowed(0.0, 0.1).search(0.003, 1e-4, 0.02).log(),
-    ],
+    parameters: &[ParameterInfo::strength("width_m", "m", "travel over which a rupture releases its force")
+        .allowed(0.0, 0.1)
+        .search(0.003, 1e-4, 0.02)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[3e-4]], &[&[1e-3]], &[&[3e-3]], &[&[8e-3]]]),
     nested_in: &[],

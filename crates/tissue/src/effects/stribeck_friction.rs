@@ -1,6 +1,6 @@
 use super::Described;
 use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, ParameterError, Proposal};
+use crate::info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 
 /// Dry friction that is larger at low speed:
 /// `f_B += sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)^2))`, `c_s >= c`.
@@ -33,9 +33,23 @@ static INFO: EffectInfo = EffectInfo {
     signature: "Force higher at lower speed, and a break-away peak after each stop.",
     place: Place::Friction,
     parameters: &[
-        ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside at high speed").allowed(0.0, 1e4).search(3.0, 0.05, 100.0).log(),
-        ParameterInfo::strength("c_static_n_per_m", "N/m", "dry friction per metre of needle inside at low speed").allowed(0.0, 1e4).search(6.0, 0.05, 200.0).log(),
-        ParameterInfo::shape("v_stribeck_mps", "m/s", "speed at which static friction fades").allowed(1e-6, 1.0).neutral(2e-3).search(2e-3, 1e-4, 2e-2).log(),
+        ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside at high speed")
+            .allowed(0.0, 1e4)
+            .search(3.0, 0.05, 100.0)
+            .log(),
+        ParameterInfo::strength(
+            "c_static_n_per_m",
+            "N/m",
+            "dry friction per metre of needle inside at low speed",
+        )
+        .allowed(0.0, 1e4)
+        .search(6.0, 0.05, 200.0)
+        .log(),
+        ParameterInfo::shape("v_stribeck_mps", "m/s", "speed at which static friction fades")
+            .allowed(1e-6, 1.0)
+            .neutral(2e-3)
+            .search(2e-3, 1e-4, 2e-2)
+            .log(),
     ],
     larger: None,
     proposal: Proposal::Columns(&[

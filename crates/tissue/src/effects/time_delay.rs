@@ -21,9 +21,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Latency and misaligned clocks",
     signature: "Starts, stops and drops come late by the same time at every depth and speed.",
     place: Place::Sensor,
-    parameters: &[
-        ParameterInfo::strength("delay_s", "s", "delay of the force").allowed(0.0, 10.0).search(0.03, 0.001, 0.5).log(),
-    ],
+    parameters: &[ParameterInfo::strength("delay_s", "s", "delay of the force")
+        .allowed(0.0, 10.0)
+        .search(0.03, 0.001, 0.5)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.003]], &[&[0.012]], &[&[0.05]], &[&[0.15]]]),
     nested_in: &[],

@@ -20,9 +20,10 @@ static INFO: EffectInfo = EffectInfo {
     source: "Needle 0.068 kg, sensor 0.236 kg: the laboratory's software",
     signature: "Spikes at start and stop, also in air, in proportion to the acceleration.",
     place: Place::Tool,
-    parameters: &[
-        ParameterInfo::strength("mass_kg", "kg", "mass beyond the sensor").allowed(0.0, 100.0).search(0.1, 0.005, 5.0).log(),
-    ],
+    parameters: &[ParameterInfo::strength("mass_kg", "kg", "mass beyond the sensor")
+        .allowed(0.0, 100.0)
+        .search(0.1, 0.005, 5.0)
+        .log()],
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.1]]]),
     nested_in: &[],

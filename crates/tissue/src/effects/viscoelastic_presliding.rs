@@ -81,18 +81,26 @@ static INFO: EffectInfo = EffectInfo {
             .neutral(5e-3)
             .search(5e-3, 2e-4, 0.05)
             .log(),
-        ParameterInfo::shape("kept", "", "share of the elastic force at the puncture that passes into friction")
-            .allowed(0.0, 1.0)
-            .neutral(1.0)
-            .search(1.0, 0.0, 1.0),
+        ParameterInfo::shape(
+            "kept",
+            "",
+            "share of the elastic force at the puncture that passes into friction",
+        )
+        .allowed(0.0, 1.0)
+        .neutral(1.0)
+        .search(1.0, 0.0, 1.0),
         ParameterInfo::shape("time_constant_s", "s", "time constant of the creep")
             .allowed(1e-3, 1e6)
             .neutral(1e6)
             .search(3.0, 0.1, 60.0)
             .log(),
-        ParameterInfo::shape("release_m", "m", "where the layer lets go on the way back, beyond its front face")
-            .allowed(-0.1, 0.1)
-            .search(0.0, -0.01, 0.01),
+        ParameterInfo::shape(
+            "release_m",
+            "m",
+            "where the layer lets go on the way back, beyond its front face",
+        )
+        .allowed(-0.1, 0.1)
+        .search(0.0, -0.01, 0.01),
     ],
     larger: None,
     proposal: Proposal::PerLayer,
