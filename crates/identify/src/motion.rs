@@ -315,3 +315,37 @@ fn roughness(x: &[f64]) -> f64 {
     let mut d: Vec<f64> = x.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
     stylet_stats::order::median(&mut d) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Motion;
+    use stylet_record::Recording;
+
+    /// At 1.1 mm/s an encoder of 50 um stands still in eight samples of nine, at 0.2 mm/s in forty-nine of fifty.
+    #[test]
+    fn a_needle_slower_than_a_step_per_sample_goes_evenly() {
+        for speed_mps in [0.0011, 0.0002, 0.006] {
+            let t: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.005).collect();
+            let true_m = |t: f64| if t < 25.0 { speed_mps * t } else { speed_mps * (50.0 - t) };
+            let z: Vec<f64> = t.iter().map(|t| (true_m(*t) / 5e-5).round() * 5e-5).collect();
+            let force = vec![0.0; t.len()];
+            let m = Motion::of(&Recording::new(t, z, force).expect("a recording"));
+            for k in 1..240 {
+                let (at, told) = (0.1 * f64::from(k), m.at(0.1 * f64::from(k)).1);
+                assert!((told - speed_mps).abs() < 1e-5, "{speed_mps} m/s: {told} at {at} s");
+            }
+        }
+    }
+
+    /// A needle that goes evenly, rests and goes back has equal differences, too; its positions are exact.
+    #[test]
+    fn even_motion_with_rests_is_not_rounded() {
+        let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * 0.005).collect();
+        let z: Vec<f64> =
+            t.iter().map(|t| 0.003 * if *t < 8.0 { *t } else { 8.0 - (*t - 12.0).max(0.0) }).collect();
+        let force = vec![0.0; t.len()];
+        let m = Motion::of(&Recording::new(t, z, force).expect("a recording"));
+        assert!(m.noise_m < 1e-9, "{}", m.noise_m);
+        assert_eq!(m.jumps.len(), 2);
+    }
+}

@@ -6,7 +6,7 @@
 //! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
 
 use crate::course::{Course, FEWEST};
-use crate::velocity::{Break, Kink, breaks, parabola, position_noise};
+use crate::velocity::{Break, Kink, breaks, parabola, position_noise, rounding};
 use stylet_stats::order::median;
 
 /// Length of a cell in s.
@@ -53,7 +53,7 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
         return Settled { z: z.to_vec(), v, kinks: Vec::new(), sd_mps: f64::INFINITY };
     }
     let step_m = rounding(z);
-    let noise_m = position_noise(t, z).max(step_m / 12.0_f64.sqrt()) / (q as f64).sqrt();
+    let noise_m = position_noise(t, z) / (q as f64).sqrt();
     let dt = step * q as f64;
     // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
     let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (SIDE as f64).powf(1.5));
@@ -280,18 +280,6 @@ fn meet(left: &Stretch, right: &Stretch, found: &[Break], cells: &Cells, t: &[f6
             kink(at, 0.5 * (one.0 + two.0), [one.1, two.1], cells.noise_m)
         }
     }
-}
-
-/// The step of rounded positions, zero when they take (nearly) as many values as there are samples.
-fn rounding(z: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = z.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    let still = steps.iter().filter(|s| **s == 0.0).count();
-    if 5 * still < steps.len() {
-        return 0.0;
-    }
-    steps.retain(|s| *s > 1e-12);
-    steps.sort_unstable_by(f64::total_cmp);
-    steps.get(steps.len() / 10).copied().unwrap_or(0.0)
 }
 
 /// Position, velocity and its standard deviation at cell `i` from the widest window that agrees with all narrower ones.

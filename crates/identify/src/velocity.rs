@@ -106,7 +106,32 @@ pub(crate) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
         .collect();
     // Rounded positions of a needle at rest do not differ at all.
     d.retain(|d| *d > 0.0);
-    median(&mut d) * stylet_stats::MAD_TO_SD
+    (median(&mut d) * stylet_stats::MAD_TO_SD).max(rounding(z) / 12.0_f64.sqrt())
+}
+
+/// A smaller step in m is none of an encoder: numbers in memory are no further apart.
+const LEAST_STEP_M: f64 = 1e-9;
+/// Positions are rounded when their differences are whole numbers of steps, to this share ...
+const WHOLE: f64 = 0.02;
+/// ... and change at least in this share of the samples: a needle that goes evenly, and rests, has steps, too.
+const UNEVEN: f64 = 0.005;
+
+/// The step in m to which positions are rounded, zero where they are not.
+///
+/// A needle that needs several samples for a step rests in most of them, and moves by a whole step in the others: no difference tells
+/// the noise then.
+pub(crate) fn rounding(z: &[f64]) -> f64 {
+    let moves = || z.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite());
+    let mut sizes: Vec<f64> = moves().map(f64::abs).filter(|d| *d > LEAST_STEP_M).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    let Some(&step) = sizes.get(sizes.len() / 100) else { return 0.0 };
+    let count = |d: f64| libm::round(d / step);
+    let broken = moves().filter(|d| (d / step - count(*d)).abs() > WHOLE).count();
+    if 100 * broken > z.len() {
+        return 0.0;
+    }
+    let uneven = moves().zip(moves().skip(1)).filter(|(a, b)| count(*a) != count(*b)).count();
+    if uneven as f64 > UNEVEN * z.len() as f64 { step } else { 0.0 }
 }
 
 /// A break of the slope: the sample after it, the instant with position and slope before, the slope after.
