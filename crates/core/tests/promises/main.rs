@@ -10,4 +10,5 @@ mod state_machine;
 mod stylet_finds;
 mod stylet_gaps;
 mod stylet_holds;
+mod stylet_without_a_law;
 mod support;
