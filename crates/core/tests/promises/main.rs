@@ -7,6 +7,7 @@ mod not_a_rupture;
 mod paper_stays_bit_for_bit;
 mod robustness;
 mod state_machine;
+mod stylet_falls;
 mod stylet_finds;
 mod stylet_gaps;
 mod stylet_holds;
