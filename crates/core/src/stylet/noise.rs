@@ -288,6 +288,24 @@ mod tests {
     }
 
     #[test]
+    fn in_the_tissue_the_colour_is_followed_to_what_leaves_the_innovations_white() {
+        for (from, to) in [(0.0, 0.6), (0.8, 0.3)] {
+            let mut noise = in_air(&forces(8, 2000, 0.0, from, 0.01));
+            let (mut last_n, mut mean, mut count) = (0.0, 0.0, 0.0);
+            for (k, n) in forces(9, 40_000, 0.0, to, 0.01).into_iter().enumerate() {
+                noise.in_tissue(n - noise.rho * last_n, 1.0);
+                last_n = n;
+                if k >= 20_000 {
+                    mean += noise.rho;
+                    count += 1.0;
+                }
+            }
+            assert!((mean / count - to).abs() < 0.03, "{} for {to}", mean / count);
+            assert!((noise.variance.sqrt() / 0.01 - 1.0).abs() < 0.05, "{noise:?}");
+        }
+    }
+
+    #[test]
     fn correlation_fades_with_the_interval() {
         let mut noise = in_air(&forces(6, 20_000, 0.0, 0.8, 0.01));
         noise.clock(0.005);

@@ -11,5 +11,6 @@ mod stylet_falls;
 mod stylet_finds;
 mod stylet_gaps;
 mod stylet_holds;
+mod stylet_origins;
 mod stylet_without_a_law;
 mod support;
