@@ -315,6 +315,26 @@ mod tests {
     }
 
     #[test]
+    fn friction_on_the_way_back_is_known_to_what_the_tip_has_seemed_to_feel_of_late() {
+        for size_n in [0.05, 0.2] {
+            let (mut last_n, mut early_n) = (0.0, f64::NAN);
+            let mut sign = 1.0;
+            let off = |_| {
+                sign = -sign;
+                sign * size_n
+            };
+            tip_n(off, |x, _, sd| {
+                if x > 0.0001 && early_n.is_nan() {
+                    early_n = sd;
+                }
+                last_n = sd;
+            });
+            assert!((last_n / size_n - 1.0).abs() < 0.1, "{last_n} N for {size_n} N");
+            assert!(early_n < 0.5 * size_n, "over millimetres: {early_n} N");
+        }
+    }
+
+    #[test]
     fn a_tip_that_is_caught_on_the_way_back_keeps_most_of_its_pull_over_a_millimetre() {
         let (mut at_once, mut after) = (0.0, 0.0);
         let off = |x: f64| if x > 0.0099 { -0.5 } else { 0.0 };
