@@ -98,9 +98,8 @@ fn behind_the_first_rupture_dry_friction_is_taken_away_to_within_the_next_layers
     assert!(inside as f64 > 0.5 * count, "{inside} of {count} in the band");
 }
 
-#[test]
-fn on_the_way_back_the_tip_feels_nothing() {
-    // Back at 2 mm/s from 50 mm: the force of the turn goes over to a pull within a few millimetres.
+/// To 50 mm, and back at 2 mm/s: the force of the turn goes over to a pull within some millimetres; and the sample at which it turns.
+fn to_and_fro() -> (Vec<Sample>, usize) {
     let (mut samples, _) = rough(0.0);
     let turn = samples.iter().position(|s| s.position_m > 0.05).expect("it goes that deep");
     samples.truncate(turn);
@@ -116,6 +115,29 @@ fn on_the_way_back_the_tip_feels_nothing() {
             force_n: force_n + 0.004 * (f64::from(k * 7919 % 1009) / 504.0 - 1.0),
         });
     }
+    (samples, turn)
+}
+
+/// A pull that lets go at once pulls no tip: it was the shaft's.
+#[test]
+fn a_sudden_release_on_the_way_back_is_friction() {
+    let (mut samples, turn) = to_and_fro();
+    let plain = enhance(&with_smallest(0.08), &samples);
+    let at = turn + 2000;
+    for sample in &mut samples[at..] {
+        sample.force_n += 0.8;
+    }
+    let outputs = enhance(&with_smallest(0.08), &samples);
+    assert!(outputs[turn..].iter().all(|o| o.detection.is_none()));
+    for k in at + 30..at + 400 {
+        let off = outputs[k].enhanced_n - plain[k].enhanced_n;
+        assert!(off.abs() < 0.1, "{off} N {} samples after a release of 0.8 N", k - at);
+    }
+}
+
+#[test]
+fn on_the_way_back_the_tip_feels_nothing() {
+    let (samples, turn) = to_and_fro();
     let outputs = enhance(&with_smallest(0.08), &samples);
     assert!(outputs[turn..].iter().all(|o| o.detection.is_none()));
     let worst = |range: core::ops::Range<usize>| {
