@@ -103,7 +103,7 @@ mod tests {
     const SPEED_MPS: f64 = 0.002;
     const DRY_MPS: f64 = 0.01;
 
-    /// The drive of friction after each of these travels at constant speed, 50 samples each; a travel of none is a hold.
+    /// The drive of friction after each of these travels at constant speed, 49 samples each; a travel of none is a hold.
     fn drives(law: FrictionLaw, travels_m: &[f64]) -> alloc::vec::Vec<f64> {
         let mut config = EnhanceConfig::default();
         config.stylet.law = law;
@@ -113,10 +113,10 @@ mod tests {
         travels_m
             .iter()
             .map(|travel_m| {
-                for _ in 0..50 {
+                for _ in 0..49 {
                     let sample = Sample {
                         time_s: last.time_s + 0.005,
-                        position_m: last.position_m + travel_m / 50.0,
+                        position_m: last.position_m + travel_m / 49.0,
                         velocity_mps: if *travel_m == 0.0 { 0.0 } else { SPEED_MPS.copysign(*travel_m) },
                         force_n: 0.0,
                     };
