@@ -69,3 +69,53 @@ impl Compensation {
             .sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layer(start_m: f64, thickness_m: f64, added_friction_ns_per_m: f64) -> LayerEstimate {
+        LayerEstimate { start_m, thickness_m, added_friction_ns_per_m, ..LayerEstimate::default() }
+    }
+
+    #[test]
+    fn friction_is_spread_evenly_over_each_layer_and_all_of_it_acts_beyond_them() {
+        let mut behind = Compensation::default();
+        assert_eq!(behind.around_shaft_ns_per_m(0.05), 0.0);
+        behind.add(layer(0.0, 0.02, 100.0));
+        behind.add(layer(0.02, 0.01, 300.0));
+        assert_eq!(behind.cumulative_ns_per_m(), 400.0);
+        for (z, expected) in
+            [(-0.01, 0.0), (0.005, 25.0), (0.02, 100.0), (0.0275, 325.0), (0.03, 400.0), (0.1, 400.0)]
+        {
+            assert!((behind.around_shaft_ns_per_m(z) - expected).abs() < 1e-9, "at {z} m");
+        }
+    }
+
+    #[test]
+    fn layers_beyond_those_that_are_kept_apart_merge_into_the_last() {
+        let mut behind = Compensation::default();
+        for i in 0..MAX_LAYERS + 4 {
+            behind.add(layer(0.01 * i as f64, 0.01, 10.0));
+        }
+        let whole = 10.0 * (MAX_LAYERS + 4) as f64;
+        assert_eq!(behind.cumulative_ns_per_m(), whole);
+        let end_m = 0.01 * (MAX_LAYERS + 4) as f64;
+        assert!((behind.around_shaft_ns_per_m(end_m) - whole).abs() < 1e-9);
+        // The last five are one, 50 mm long with 50 N s/m.
+        let merged_m = 0.01 * (MAX_LAYERS - 1) as f64;
+        let found = behind.around_shaft_ns_per_m(merged_m + 0.02);
+        assert!((found - (10.0 * (MAX_LAYERS - 1) as f64 + 20.0)).abs() < 1e-9, "{found}");
+    }
+
+    #[test]
+    fn friction_that_pushes_is_none_and_a_layer_without_thickness_adds_only_beyond_it() {
+        let mut behind = Compensation::default();
+        behind.add(layer(0.0, 0.01, -5.0));
+        assert_eq!(behind.cumulative_ns_per_m(), 0.0);
+        let mut behind = Compensation::default();
+        behind.add(layer(0.01, 0.0, 7.0));
+        assert_eq!(behind.around_shaft_ns_per_m(0.005), 0.0);
+        assert_eq!(behind.around_shaft_ns_per_m(0.01), 7.0);
+    }
+}

@@ -126,3 +126,97 @@ impl ContactSearch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT_S: f64 = 0.005;
+    const SPEED_MPS: f64 = 0.0023;
+
+    /// A force of 40 N/m from the surface at zero on, with bias and noise, from 5 mm before: what is found, sample by sample.
+    fn search(
+        config: &ContactConfig,
+        bias_n: f64,
+        noise_n: f64,
+        drift_n_per_s: f64,
+    ) -> alloc::vec::Vec<Found> {
+        let mut search = ContactSearch::new(config);
+        (0..1000_u64)
+            .map(|k| {
+                let time_s = DT_S * k as f64;
+                let position_m = -0.005 + SPEED_MPS * time_s;
+                let noise = noise_n * ((k * 7919 % 1009) as f64 / 504.0 - 1.0);
+                let drift_n = drift_n_per_s * time_s.min(0.005 / SPEED_MPS);
+                let force_n = bias_n + drift_n + noise + 40.0 * position_m.max(0.0);
+                search.update(
+                    config,
+                    DT_S,
+                    Sample { time_s, position_m, velocity_mps: SPEED_MPS, force_n },
+                    k,
+                )
+            })
+            .collect()
+    }
+
+    /// Sample at which it is declared and settled, and where.
+    fn found(all: &[Found]) -> (usize, usize, f64) {
+        let declared = all.iter().position(|f| *f != Found::Nothing).expect("a contact");
+        let settled = all.iter().position(|f| matches!(f, Found::Settled { .. })).expect("settled");
+        let Found::Settled { surface_m, .. } = all[settled] else { unreachable!() };
+        (declared, settled, surface_m)
+    }
+
+    #[test]
+    fn the_surface_is_where_the_loading_line_comes_from_whatever_bias_and_noise_are() {
+        let config = ContactConfig::default();
+        for (bias_n, noise_n) in [(0.0, 0.0), (0.0, 0.02), (-1.5, 0.02), (3.0, 0.005)] {
+            let (declared, settled, surface_m) = found(&search(&config, bias_n, noise_n, 0.0));
+            assert!(surface_m.abs() < 1e-4 + 5e-3 * noise_n, "{surface_m} m at {bias_n} N, {noise_n} N");
+            // Never in the air, and settled a millimetre after.
+            assert!(DT_S * declared as f64 * SPEED_MPS > 0.005, "declared at {declared}");
+            let travel_m = (settled - declared) as f64 * DT_S * SPEED_MPS;
+            assert!((0.001..0.001 + 2.0 * DT_S * SPEED_MPS).contains(&travel_m), "{travel_m} m");
+        }
+    }
+
+    #[test]
+    fn a_slow_drift_in_air_is_followed_and_is_no_contact() {
+        // 10 mN/s: twice the noise within the two seconds of the way in air.
+        let (declared, _, surface_m) = found(&search(&ContactConfig::default(), 0.0, 0.01, 0.01));
+        assert!(DT_S * declared as f64 * SPEED_MPS > 0.005 && surface_m.abs() < 1e-3, "{surface_m} m");
+    }
+
+    #[test]
+    fn without_extrapolation_the_surface_is_where_contact_was_declared_and_settles_there() {
+        let config = ContactConfig { extrapolate_over_m: 0.0, ..ContactConfig::default() };
+        let all = search(&config, 0.0, 0.02, 0.0);
+        let (declared, settled, surface_m) = found(&all);
+        assert_eq!(surface_m, -0.005 + SPEED_MPS * (DT_S * declared as f64));
+        assert_eq!(settled, declared + 1);
+    }
+
+    #[test]
+    fn the_more_standard_deviations_and_samples_are_asked_for_the_later_contact_is_declared() {
+        let declared = |noise_sds: f64, samples: usize| {
+            found(&search(&ContactConfig { noise_sds, samples, ..ContactConfig::default() }, 0.0, 0.02, 0.0))
+                .0
+        };
+        let usual = declared(5.0, 5);
+        assert_eq!(declared(5.0, 25), usual + 20);
+        // Five more of the noise's standard deviations, 0.02/sqrt(3) N, at 40 N/m are 1.44 mm: 125 samples.
+        assert!((115..=135).contains(&(declared(10.0, 5) - usual)), "{} {usual}", declared(10.0, 5));
+    }
+
+    #[test]
+    fn contact_is_not_declared_while_bias_and_noise_are_learned() {
+        // The needle is said to begin at the surface: what loads it in the first second is taken for bias.
+        let config = ContactConfig { learn_s: 1.0, ..ContactConfig::default() };
+        let mut search = ContactSearch::new(&config);
+        for k in 0..190_u64 {
+            let force_n = if k < 20 { 0.0 } else { 0.5 };
+            let found = search.update(&config, DT_S, Sample { force_n, ..Sample::default() }, k);
+            assert_eq!(found, Found::Nothing, "sample {k}");
+        }
+    }
+}

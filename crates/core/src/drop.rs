@@ -130,3 +130,139 @@ impl Drop {
         (drop_n, share)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    const SPEED_MPS: f64 = 0.0023;
+
+    /// Samples at `hz` from 3 mm before a rupture at zero to 3 mm behind it, and the number of the first behind it.
+    fn rupture(hz: f64, force_n: impl Fn(f64) -> f64) -> (History<Vec<Sample>>, u64) {
+        let step_m = SPEED_MPS / hz;
+        let before = (0.003 / step_m) as u64;
+        let mut history = History::new(alloc::vec![Sample::default(); 2 * before as usize + 2]);
+        for number in 0..=2 * before {
+            let position_m = (number as f64 - before as f64) * step_m;
+            history.push(Sample {
+                time_s: number as f64 / hz,
+                position_m,
+                velocity_mps: SPEED_MPS,
+                force_n: force_n(position_m),
+            });
+        }
+        (history, before + 1)
+    }
+
+    /// Curved on either side: `1 + 3e5 z²` N falls to `0.2 - 6e5 z²` N.
+    fn curved(z: f64) -> f64 {
+        if z <= 0.0 { 1.0 + 3e5 * z * z } else { 0.2 - 6e5 * z * z }
+    }
+
+    #[test]
+    fn the_drop_is_what_straight_lines_over_a_millimetre_leave_between_them_at_every_sampling_rate() {
+        // The straight line nearest to z² over a travel h from zero on is h z - h²/6 there: -h²/6 at zero.
+        for hz in [100.0, 200.0, 1000.0, 5000.0, 20_000.0] {
+            let (history, after) = rupture(hz, curved);
+            let config = DropConfig::default();
+            let (drop_n, share) = Drop::begin(&history, 0, after).share(&config, 0.0);
+            let (top_n, bottom_n) = (1.0 - 3e5 * 1e-6 / 6.0, 0.2 + 6e5 * 1e-6 / 6.0);
+            assert!((drop_n - (top_n - bottom_n)).abs() < 0.008, "{hz} Hz: {drop_n} N");
+            assert!((share - (top_n - bottom_n) / top_n).abs() < 0.01, "{hz} Hz: {share}");
+        }
+    }
+
+    #[test]
+    fn the_drop_knows_nothing_from_before_the_layer() {
+        for hz in [200.0, 5000.0] {
+            let (history, after) = rupture(hz, curved);
+            let first = after - (0.0005 / (SPEED_MPS / hz)) as u64;
+            let (drop_n, _) = Drop::begin(&history, first, after).share(&DropConfig::default(), 0.0);
+            let expected = 1.0 - 3e5 * 0.25e-6 / 6.0 - (0.2 + 6e5 * 1e-6 / 6.0);
+            assert!((drop_n - expected).abs() < 0.006, "{hz} Hz: {drop_n} N");
+        }
+    }
+
+    #[test]
+    fn by_extremes_the_drop_is_the_maximum_of_the_last_millimetre_less_the_minimum_after() {
+        let (history, after) = rupture(1000.0, curved);
+        let config = DropConfig { estimator: DropEstimator::Extremes, ..DropConfig::default() };
+        let (drop_n, _) = Drop::begin(&history, 0, after).share(&config, 0.0);
+        let expected = (1.0 + 3e5 * 1e-6) - (0.2 - 6e5 * 9e-6);
+        assert!((drop_n - expected).abs() < 0.02, "{drop_n} N for {expected} N");
+    }
+
+    #[test]
+    fn samples_that_come_after_the_declaration_count_as_if_they_had_been_there() {
+        let (history, after) = rupture(200.0, curved);
+        let mut short = History::new(alloc::vec![Sample::default(); 1000]);
+        for number in 0..after {
+            short.push(*history.get(number).expect("held"));
+        }
+        let mut drop = Drop::begin(&short, 0, after);
+        for number in after..history.next() {
+            drop.add(history.get(number).expect("held"));
+        }
+        let at_once = Drop::begin(&history, 0, after);
+        for estimator in [DropEstimator::Lines, DropEstimator::Extremes] {
+            let config = DropConfig { estimator, ..DropConfig::default() };
+            assert_eq!(drop.share(&config, 10.0), at_once.share(&config, 10.0));
+        }
+    }
+
+    #[test]
+    fn the_elastic_share_is_that_of_the_force_without_the_friction_behind_and_keeps_its_limits() {
+        let (history, after) = rupture(200.0, |z| if z <= 0.0 { 1.0 } else { 0.5 });
+        let drop = Drop::begin(&history, 0, after);
+        let config = DropConfig { share_limits: [0.1, 0.9], ..DropConfig::default() };
+        // 0.5 N of the 0.8 N that D = 0.2 N/v leaves; of less than itself; of nothing; of less than nothing.
+        for (friction_n, expected) in [(0.2, 0.625), (0.45, 0.9), (1.0, 0.9), (1.5, 0.9)] {
+            let (drop_n, share) = drop.share(&config, friction_n / SPEED_MPS);
+            assert!((drop_n - 0.5).abs() < 1e-9 && (share - expected).abs() < 1e-9, "{drop_n} N, {share}");
+        }
+        let (history, after) = rupture(200.0, |z| if z <= 0.0 { 1.0 } else { 1.3 });
+        let (drop_n, share) = Drop::begin(&history, 0, after).share(&config, 0.0);
+        assert!((drop_n + 0.3).abs() < 1e-9, "a rise of 0.3 N is said as such: {drop_n}");
+        assert_eq!(share, 0.1, "a rise has the least share");
+    }
+
+    fn forces(forces_n: impl IntoIterator<Item = f64>) -> History<Vec<Sample>> {
+        let mut history = History::new(alloc::vec![Sample::default(); 3000]);
+        for (number, force_n) in forces_n.into_iter().enumerate() {
+            history.push(Sample { time_s: 0.005 * number as f64, force_n, ..Sample::default() });
+        }
+        history
+    }
+
+    /// Loading with some noise, and a fall by 0.5 N from sample `at` on.
+    fn falling(count: usize, at: usize) -> impl Iterator<Item = f64> {
+        (0..count).map(move |k| {
+            let noise_n = 0.02 * ((k * 7919 % 101) as f64 / 50.0 - 1.0);
+            1.0 + 1e-4 * k as f64 + noise_n - if k >= at { 0.5 } else { 0.0 }
+        })
+    }
+
+    #[test]
+    fn a_rupture_is_traced_back_to_the_first_sample_after_its_drop() {
+        for at in [3, 4, 50, 120, 195, 198, 199] {
+            assert_eq!(locate(&forces(falling(200, at)), 0), at as u64);
+        }
+    }
+
+    #[test]
+    fn a_rupture_among_more_samples_than_a_tick_may_look_at_is_traced_back_to_within_its_steps() {
+        for (count, at) in [(600, 401), (2000, 1501), (2500, 77)] {
+            let found = locate(&forces(falling(count, at)), 0) as usize;
+            assert!((at..=at + count / 256).contains(&found), "{at} of {count}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_drop_before_the_layer_and_a_low_sample_at_the_end_are_not_the_drop() {
+        let early = falling(200, 120).enumerate().map(|(k, f)| if k >= 40 { f - 2.0 } else { f });
+        assert_eq!(locate(&forces(early), 60), 120);
+        let late = falling(200, 120).enumerate().map(|(k, f)| if k == 199 { f - 0.7 } else { f });
+        assert_eq!(locate(&forces(late), 0), 120);
+    }
+}

@@ -60,3 +60,44 @@ impl ForceDerivative {
         self.value_n_per_s
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_low_pass_follows_a_step_by_its_time_constant_at_every_interval() {
+        // Fed at 5, 1 and 20 ms in turn, after any time t what is missing is exp(-t/tau).
+        let mut coefficients = Coefficients::new([0.05, 0.4]);
+        let (mut time_s, mut values) = (0.0_f64, [0.0_f64; 2]);
+        for k in 0..300 {
+            let dt_s = [0.005, 0.001, 0.02][k / 7 % 3];
+            time_s += dt_s;
+            let shares = *coefficients.at(dt_s);
+            for ((value, share), tau_s) in values.iter_mut().zip(shares).zip([0.05, 0.4]) {
+                *value += share * (1.0 - *value);
+                assert!((1.0 - *value - (-time_s / tau_s).exp()).abs() < 1e-9, "after {time_s} s");
+            }
+        }
+    }
+
+    #[test]
+    fn the_derivative_of_a_ramp_is_its_slope_and_of_a_constant_none() {
+        for bias_n in [0.0, 5.0] {
+            let mut derivative = ForceDerivative::default();
+            derivative.begin(bias_n);
+            for _ in 0..100 {
+                assert_eq!(derivative.update(0.005, [0.01, 0.1], bias_n), 0.0);
+            }
+            let mut force_n = bias_n;
+            for _ in 0..4000 {
+                force_n += 0.3 * 0.005;
+                derivative.update(0.005, [0.01, 0.1], force_n);
+            }
+            assert!((derivative.value_n_per_s() - 0.3).abs() < 1e-9, "{derivative:?}");
+        }
+        // The first sample after a step: both shares of it over the interval.
+        let mut derivative = ForceDerivative::default();
+        assert!((derivative.update(0.005, [0.01, 0.1], 2.0) - 0.1 * 0.01 * 2.0 / 0.005).abs() < 1e-12);
+    }
+}

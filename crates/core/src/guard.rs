@@ -114,3 +114,101 @@ impl MotionGuard {
         self.acceleration_mps2 < -config.slowing_per_s * self.velocity_mps.abs()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STANDSTILL_MPS: f64 = 5e-5;
+    const DT_S: f64 = 0.005;
+
+    /// Whether detection rests after each of the samples, from rest at zero with a speed that is there at once.
+    fn quiet(count: usize, mut v: impl FnMut(usize) -> f64) -> alloc::vec::Vec<bool> {
+        let (config, mut guard, mut z) = (GuardConfig::default(), MotionGuard::default(), 0.0);
+        let share = |tau_s: f64| 1.0 - (-DT_S / tau_s).exp();
+        let shares = [share(config.acceleration_time_constant_s), share(SCATTER_S)];
+        (0..count)
+            .map(|k| {
+                let velocity_mps = v(k);
+                z += velocity_mps * DT_S;
+                let sample = Sample { velocity_mps, position_m: z, ..Sample::default() };
+                if k == 0 {
+                    guard.begin(&config, STANDSTILL_MPS, sample);
+                } else {
+                    guard.update(&config, STANDSTILL_MPS, DT_S, shares, sample);
+                }
+                guard.is_quiet()
+            })
+            .collect()
+    }
+
+    /// Numbers of the first and last sample at rest, and how many there were.
+    fn rests(quiet: &[bool]) -> Option<(usize, usize, usize)> {
+        let at = |i: Option<usize>| i.map(|i| i + 1);
+        let first = at(quiet.iter().position(|q| !q))?;
+        let last = at(quiet.iter().rposition(|q| !q))?;
+        Some((first - 1, last - 1, quiet.iter().filter(|q| !**q).count()))
+    }
+
+    #[test]
+    fn an_even_advance_never_rests_and_a_hold_rests_as_long_as_it_lasts_and_a_quarter_of_a_second() {
+        assert_eq!(rests(&quiet(2000, |_| 0.0023)), None);
+        let (first, last, count) =
+            rests(&quiet(2000, |k| if (500..900).contains(&k) { 0.0 } else { 0.0023 })).expect("a hold");
+        // 0.25 s are 50 samples; the filter of 10 ms is two samples late.
+        assert!((500..=504).contains(&first) && (945..=965).contains(&last), "{first} to {last}");
+        assert_eq!(count, last + 1 - first);
+    }
+
+    #[test]
+    fn a_sudden_change_of_speed_rests_and_a_gentle_one_does_not() {
+        let (first, last, _) =
+            rests(&quiet(2000, |k| if k < 700 { 0.0023 } else { 0.0046 })).expect("a sudden change");
+        // Over the filters' 10 ms the change is 0.2 m/s² and fades within some of them.
+        assert!((700..=701).contains(&first) && (748..=770).contains(&last), "{first} to {last}");
+        // 0.02 m/s² are less than the 0.05 that are sudden.
+        let gentle = |k: usize| 0.0023 + 0.02 * DT_S * (k as f64 - 700.0).clamp(0.0, 100.0);
+        assert_eq!(rests(&quiet(2000, gentle)), None);
+        // And 0.09 are more.
+        let strong = |k: usize| 0.0023 + 0.09 * DT_S * (k as f64 - 700.0).clamp(0.0, 20.0);
+        assert!(rests(&quiet(2000, strong)).is_some());
+    }
+
+    #[test]
+    fn noise_on_the_speed_is_no_sudden_change_once_its_scatter_is_known() {
+        let noisy = |k: usize| 0.0023 + 2e-4 * ((k * 7919 % 1009) as f64 / 504.0 - 1.0);
+        let found = quiet(4000, noisy);
+        assert!(found[2000..].iter().all(|q| *q));
+        // A jump that stands out of that scatter is one.
+        let found = quiet(4000, |k| noisy(k) + if k >= 3000 { 0.004 } else { 0.0 });
+        let (first, ..) = rests(&found[2000..]).expect("a sudden change");
+        assert!((1000..=1001).contains(&first), "{first}");
+    }
+
+    #[test]
+    fn going_over_old_ground_rests_until_the_tip_is_a_tenth_of_a_millimetre_from_its_deepest_point() {
+        let (config, mut guard) = (GuardConfig::default(), MotionGuard::default());
+        let sample = |position_m: f64| Sample { position_m, ..Sample::default() };
+        guard.begin(&config, STANDSTILL_MPS, sample(0.01));
+        guard.begin(&config, STANDSTILL_MPS, sample(0.008));
+        assert!(guard.is_old_ground(&config, 0.0098) && !guard.is_old_ground(&config, 0.00995));
+    }
+
+    #[test]
+    fn slowing_down_is_by_a_tenth_of_the_speed_a_second() {
+        // A speed that falls exponentially with a time constant of 20 s slows down by 5 % a second, one of 5 s by 20 %.
+        for (tau_s, slowing) in [(20.0, false), (5.0, true)] {
+            let (config, mut guard) = (GuardConfig::default(), MotionGuard::default());
+            for k in 0..400 {
+                let v = 0.01 * (-DT_S * f64::from(k) / tau_s).exp();
+                let sample = Sample { velocity_mps: v, position_m: 1e-5 * f64::from(k), ..Sample::default() };
+                if k == 0 {
+                    guard.begin(&config, STANDSTILL_MPS, sample);
+                } else {
+                    guard.update(&config, STANDSTILL_MPS, DT_S, [0.4, 0.0025], sample);
+                }
+            }
+            assert_eq!(guard.is_slowing(&config), slowing, "{tau_s} s");
+        }
+    }
+}

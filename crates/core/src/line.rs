@@ -53,3 +53,36 @@ impl Line {
         Some(mean_x + (y - self.sy / self.count) / slope)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_is_the_one_from_which_no_other_is_nearer() {
+        // Far from the origin, with known residuals: their sum and their moment vanish.
+        let points = [(100.01, 3.0), (100.02, 3.5), (100.03, 3.1), (100.05, 4.2), (100.08, 4.0)];
+        let mut line = Line::default();
+        points.iter().for_each(|(x, y)| line.add(*x, *y));
+        let rest = |x: f64, y: f64| y - line.at(x).expect("points");
+        let sum: f64 = points.iter().map(|(x, y)| rest(*x, *y)).sum();
+        let moment: f64 = points.iter().map(|(x, y)| (x - 100.0) * rest(*x, *y)).sum();
+        assert!(sum.abs() < 1e-9 && moment.abs() < 1e-9, "{sum} {moment}");
+        let rise = line.at(101.0).expect("points") - line.at(100.0).expect("points");
+        assert!((line.slope() - rise).abs() < 1e-9);
+        for y in [-2.0, 3.3, 10.0] {
+            let x = line.reaches(y).expect("a slope");
+            assert!((line.at(x).expect("points") - y).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn without_points_or_spread_nothing_is_made_up() {
+        let mut line = Line::default();
+        assert_eq!((line.at(1.0), line.reaches(1.0), line.slope()), (None, None, 0.0));
+        line.add(2.0, 5.0);
+        assert_eq!((line.at(7.0), line.reaches(1.0), line.slope()), (Some(5.0), None, 0.0));
+        line.add(2.0, 7.0);
+        assert_eq!((line.at(7.0), line.reaches(1.0), line.slope()), (Some(6.0), None, 0.0));
+    }
+}

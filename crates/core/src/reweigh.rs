@@ -144,3 +144,145 @@ impl Rerun {
         (self.rls, self.clock, self.last_s) = (rls, clock, last_s);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    fn with_model(model: Model) -> EnhanceConfig {
+        EnhanceConfig { model, ..EnhanceConfig::paper() }
+    }
+
+    #[test]
+    fn the_prior_makes_elastic_and_viscous_force_stand_as_the_drop_says() {
+        // Standard deviations of K d and of the friction's force at the rupture, whose squares stand as kappa to 1 - kappa.
+        let (share, v, d) = (0.8, 0.0023, 0.03);
+        for model in [Model::MultiLayer, Model::KelvinVoigt] {
+            let config = with_model(model);
+            let prior = reweighted_prior(&config, share, v, d);
+            let elastic_n2 = config.prior_stiffness * d * d;
+            let friction_n2 = match model {
+                Model::MultiLayer => prior * (d * v) * (d * v),
+                // Kelvin-Voigt's friction does not grow with depth: it is weighed at half of the travel.
+                Model::KelvinVoigt => 4.0 * prior * v * v,
+            };
+            assert!((friction_n2 / elastic_n2 - 0.25).abs() < 1e-9, "{model:?}");
+            // At rest nothing is said of friction.
+            assert_eq!(reweighted_prior(&config, share, 0.0, d), config.prior_friction);
+        }
+    }
+
+    #[test]
+    fn a_sample_weighs_by_the_time_that_it_stands_for() {
+        for (dt_s, expected) in [(0.005, 1.0), (0.001, 5.0), (0.02, 0.25), (0.0, 1.0)] {
+            assert!((relative_noise(dt_s) - expected).abs() < 1e-12);
+        }
+    }
+
+    /// Samples after which the covariance is back at its prior.
+    fn resets(reset: Reset, dt_s: f64, count: usize) -> Vec<usize> {
+        let (mut clock, mut rls) = (ResetClock::default(), Rls::new([1e6, 1e6]));
+        (1..=count)
+            .filter(|k| {
+                clock.tick(&reset, dt_s, [1e6, 1e6], &mut rls);
+                let fresh = rls.trace() == 2e6;
+                rls.update([0.01, 1e-4 * *k as f64], 0.0, 1.0);
+                *k > 1 && fresh
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_covariance_is_reset_at_the_frequency_on_average_and_evenly() {
+        for (hz, dt_s) in [(40.0, 0.005), (40.0, 0.01), (6.66, 0.005), (30.0, 0.001)] {
+            let found = resets(Reset::Frequency { hz }, dt_s, 6000);
+            let expected = 6000.0 * dt_s * hz;
+            assert!((found.len() as f64 - expected).abs() <= 1.0, "{} for {expected}", found.len());
+            let between = 1.0 / (hz * dt_s);
+            for pair in found.windows(2) {
+                let gap = (pair[1] - pair[0]) as f64;
+                assert!((gap - between).abs() < 1.0, "{gap} samples for {between}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_covariance_is_reset_where_its_trace_has_fallen_below_the_threshold_and_not_elsewhere() {
+        assert_eq!(resets(Reset::Ruptures, 0.005, 1000), [0_usize; 0]);
+        assert_eq!(resets(Reset::Trace { below: 0.0 }, 0.005, 1000), [0_usize; 0]);
+        let often = resets(Reset::Trace { below: 1.999e6 }, 0.005, 1000);
+        assert_eq!(often.len(), 999, "the first sample takes more than that");
+    }
+
+    /// A layer of 40 N/m and 9000 N s/m² at two speeds, from sample 10 on; air before.
+    fn layer(count: u64, hold: usize) -> History<Vec<Sample>> {
+        let mut history = History::new(alloc::vec![Sample::default(); hold]);
+        let mut z = -0.0001;
+        for number in 0..count {
+            let v = if number / 200 % 2 == 0 { 0.002 } else { 0.004 };
+            z += 0.005 * v;
+            let force_n = if z > 0.0 { 40.0 * z + 9000.0 * z * v } else { 0.0 };
+            let time_s = 0.005 * number as f64;
+            history.push(Sample { time_s, position_m: z, velocity_mps: v, force_n });
+        }
+        history
+    }
+
+    #[test]
+    fn running_the_layer_again_takes_the_ticks_that_it_may_and_gives_the_law_back() {
+        let mut config = with_model(Model::MultiLayer);
+        config.drop.replay_per_tick = 64;
+        config.reset = Reset::Ruptures;
+        let history = layer(1000, 2000);
+        let mut rerun = Rerun::new([1e6, 1e12], 0.0, 0, 1000);
+        let mut ticks = 1;
+        let found = loop {
+            match rerun.work(&config, &history, &Compensation::default(), [0.0; 2]) {
+                Some(found) => break found,
+                None => ticks += 1,
+            }
+        };
+        assert_eq!(ticks, 16, "1000 samples by 64");
+        assert!((found[0] / 40.0 - 1.0).abs() < 0.02 && (found[1] / 9000.0 - 1.0).abs() < 0.02, "{found:?}");
+    }
+
+    #[test]
+    fn of_samples_that_are_gone_the_rest_is_run_and_without_any_the_online_estimate_stays() {
+        let mut config = with_model(Model::MultiLayer);
+        config.reset = Reset::Ruptures;
+        let online = [1.0, 2.0];
+        let through = |history: &History<Vec<Sample>>, first, end| {
+            let mut rerun = Rerun::new([1e6, 1e12], 0.0, first, end);
+            (0..100).find_map(|_| rerun.work(&config, history, &Compensation::default(), online))
+        };
+        let found = through(&layer(1000, 600), 0, 1000).expect("an end");
+        assert!((found[0] / 40.0 - 1.0).abs() < 0.05, "{found:?}");
+        assert_eq!(through(&layer(1000, 100), 0, 800), Some(online));
+        assert_eq!(through(&layer(1000, 0), 0, 1000), Some(online));
+    }
+
+    #[test]
+    fn the_friction_of_the_layers_before_is_no_part_of_the_layer_that_is_run_again() {
+        let mut config = with_model(Model::MultiLayer);
+        config.reset = Reset::Ruptures;
+        let mut before = Compensation::default();
+        before.add(crate::sample::LayerEstimate {
+            start_m: -0.02,
+            thickness_m: 0.02,
+            added_friction_ns_per_m: 200.0,
+            ..crate::sample::LayerEstimate::default()
+        });
+        let (plain, mut history) = (layer(1000, 2000), History::new(alloc::vec![Sample::default(); 2000]));
+        for number in 0..1000 {
+            let s = *plain.get(number).expect("held");
+            history.push(Sample { force_n: s.force_n + 200.0 * s.velocity_mps, ..s });
+        }
+        let run = |history: &History<Vec<Sample>>, compensation: &Compensation| {
+            let mut rerun = Rerun::new([1e6, 1e12], 0.0, 0, 1000);
+            (0..100).find_map(|_| rerun.work(&config, history, compensation, [0.0; 2])).expect("an end")
+        };
+        let (with, without) = (run(&history, &before), run(&plain, &Compensation::default()));
+        assert!((with[0] - without[0]).abs() < 1e-3 && (with[1] / without[1] - 1.0).abs() < 1e-4, "{with:?}");
+    }
+}

@@ -79,3 +79,66 @@ pub(crate) struct Heard {
     /// Log-likelihood above the threshold, in nats.
     pub(crate) evidence: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Mean number of samples of unit noise with this shift until the alarm.
+    fn mean_samples(per_hour: f64, step_s: f64, shift: f64) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let (mut samples, runs) = (0, 1000);
+        for _ in 0..runs {
+            let mut alarm = Alarm::new(per_hour, step_s);
+            loop {
+                let w: f64 = StandardNormal.sample(&mut rng);
+                samples += 1;
+                if alarm.take(w + shift).alarm {
+                    break;
+                }
+            }
+        }
+        f64::from(samples) / f64::from(runs)
+    }
+
+    #[test]
+    fn false_alarms_come_as_often_as_they_are_accepted_at_every_sampling_rate() {
+        // The three sums share the rate, and alarm together now and then: somewhat fewer.
+        for (per_hour, step_s) in [(720.0, 0.005), (3600.0, 0.001), (72.0, 0.05)] {
+            let ratio = mean_samples(per_hour, step_s, 0.0) * step_s * per_hour / 3600.0;
+            assert!((0.8..1.6).contains(&ratio), "{ratio} of the accepted time at {step_s} s");
+        }
+    }
+
+    #[test]
+    fn a_fall_is_heard_about_as_soon_as_the_sum_made_for_it_can() {
+        // Siegmund: the sum for a shift mu takes (a - 1)/(mu²/2) samples, a = log(samples mu²/2) being threshold and overshoot.
+        for mu in [1.0, 2.0, 4.0] {
+            let reached = (3.0 * 720_000.0 * mu * mu / 2.0_f64).ln();
+            let expected = (reached - 1.0) / (mu * mu / 2.0);
+            let found = mean_samples(1.0, 0.005, -mu);
+            assert!((0.75..1.3).contains(&(found / expected)), "{found} samples for {expected} at {mu}");
+        }
+    }
+
+    #[test]
+    fn what_is_heard_is_told_from_what_was_summed_up_before() {
+        let mut alarm = Alarm::new(0.05, 0.005);
+        let heard = alarm.take(0.3);
+        assert!(heard.quiet && !heard.alarm && heard.evidence == 0.0);
+        // A fall by one: the sums for one and two have something, all of it new.
+        let heard = alarm.take(-1.5);
+        assert!(!heard.quiet && !heard.alarm);
+        // Less than what is there does not outweigh it; much more does.
+        assert!(!alarm.take(-1.0).outweighs);
+        let heard = alarm.take(-30.0);
+        assert!(heard.outweighs && heard.alarm && heard.evidence > 50.0, "{heard:?}");
+        assert!(alarm.level() > 1.0);
+        alarm.rest();
+        assert_eq!(alarm.level(), 0.0);
+        assert!(alarm.take(0.0).quiet);
+    }
+}

@@ -183,3 +183,147 @@ pub(crate) const WIDEST: f64 = 1e8;
 const ROUNDING: f64 = 1e-6;
 /// Least variance kept, in units of the noise variance and the unknown's own unit squared.
 const TINY: f64 = 1e-15;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Matrix = [[f64; 3]; 3];
+
+    /// `map diag(1, 4, 0.25) map'` about the mean `map [1, -2, 0.5]`: unknowns that hang together.
+    const MAP: Matrix = [[1.0, 0.5, -1.0], [0.3, 1.0, 2.0], [-0.7, 0.2, 1.5]];
+    const DIAGONAL: [f64; 3] = [1.0, 4.0, 0.25];
+    const MEAN: [f64; 3] = [1.0, -2.0, 0.5];
+
+    fn belief() -> Gaussian<3> {
+        Gaussian::new(MEAN, DIAGONAL).mapped(&MAP)
+    }
+
+    fn full(g: &Gaussian<3>) -> Matrix {
+        core::array::from_fn(|i| core::array::from_fn(|j| g.cov(i, j)))
+    }
+
+    fn assert_near(found: &Matrix, expected: &Matrix) {
+        for (f, e) in found.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((f - e).abs() < 1e-9, "{found:?} for {expected:?}");
+        }
+    }
+
+    /// By Cramer's rule.
+    fn inverse(m: &Matrix) -> Matrix {
+        let cofactor = |i: usize, j: usize| {
+            let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+            m[a][c] * m[b][d] - m[a][d] * m[b][c]
+        };
+        let determinant: f64 = (0..3).map(|j| m[0][j] * cofactor(0, j)).sum();
+        core::array::from_fn(|i| core::array::from_fn(|j| cofactor(j, i) / determinant))
+    }
+
+    #[test]
+    fn a_linear_map_carries_mean_and_covariance_along() {
+        let g = belief();
+        let expected: Matrix = core::array::from_fn(|i| {
+            core::array::from_fn(|j| (0..3).map(|k| MAP[i][k] * DIAGONAL[k] * MAP[j][k]).sum())
+        });
+        assert_near(&full(&g), &expected);
+        for i in 0..3 {
+            let mean: f64 = (0..3).map(|k| MAP[i][k] * MEAN[k]).sum();
+            assert!((g.x[i] - mean).abs() < 1e-12);
+        }
+        // And once more, now that the unknowns hang together.
+        let twice = g.mapped(&MAP);
+        let expected: Matrix = core::array::from_fn(|i| {
+            core::array::from_fn(|j| {
+                (0..9).map(|n| MAP[i][n / 3] * expected[n / 3][n % 3] * MAP[j][n % 3]).sum()
+            })
+        });
+        assert_near(&full(&twice), &expected);
+    }
+
+    /// In the information form `P⁻¹` grows by `h h'/r`, and `P⁻¹ x` by `h y/r`.
+    #[test]
+    fn a_measurement_adds_its_information() {
+        let (h, y, r) = ([2.0, 0.0, -0.5], 1.7, 0.3);
+        let before = belief();
+        let innovation = before.innovation([0, 2], [h[0], h[2]], y, r);
+        let spread: f64 = (0..9).map(|n| h[n / 3] * before.cov(n / 3, n % 3) * h[n % 3]).sum();
+        assert!((innovation.s - (spread + r)).abs() < 1e-12);
+        let mut after = before;
+        after.take(&innovation);
+        let information = inverse(&full(&before));
+        let grown: Matrix =
+            core::array::from_fn(|i| core::array::from_fn(|j| information[i][j] + h[i] * h[j] / r));
+        assert_near(&full(&after), &inverse(&grown));
+        for i in 0..3 {
+            let was: f64 = (0..3).map(|j| information[i][j] * before.x[j]).sum();
+            let is: f64 = (0..3).map(|j| grown[i][j] * after.x[j]).sum();
+            assert!((is - (was + h[i] * y / r)).abs() < 1e-9, "{i}");
+        }
+    }
+
+    #[test]
+    fn a_shear_is_the_linear_map_that_adds_a_share_of_one_unknown_to_another() {
+        for (i, j) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
+            let mut sheared = belief();
+            sheared.shear(i, j, 0.8);
+            let mut map: Matrix =
+                core::array::from_fn(|a| core::array::from_fn(|b| f64::from(u8::from(a == b))));
+            map[i][j] = 0.8;
+            let expected = belief().mapped(&map);
+            assert_near(&full(&sheared), &full(&expected));
+            assert!(sheared.x.iter().zip(expected.x).all(|(a, b)| (a - b).abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn what_is_known_anew_of_one_unknown_leaves_the_others_as_they_were() {
+        let mut g = belief();
+        g.renew(1, 7.0, 9.0);
+        let expected = full(&belief());
+        let (x, was) = (g.x, belief().x);
+        assert_eq!((x[0], x[1], x[2]), (was[0], 7.0, was[2]));
+        for i in 0..3 {
+            for j in 0..3 {
+                let is = match (i == 1, j == 1) {
+                    (true, true) => 9.0,
+                    (false, false) => expected[i][j],
+                    _ => 0.0,
+                };
+                assert_eq!(g.cov(i, j), is);
+            }
+        }
+    }
+
+    #[test]
+    fn a_covariance_that_none_can_be_is_not_sound() {
+        assert!(belief().is_sound() && belief().is_usable());
+        // Correlations above one; those of which any two could be but not all three; a variance below zero; what is no number.
+        let mut g = Gaussian::new([0.0; 3], [1.0, 4.0, 9.0]);
+        g.p[1][0] = 1.9;
+        assert!(g.is_sound(), "a correlation of 0.95");
+        g.p[1][0] = -2.1;
+        assert!(!g.is_sound(), "a correlation of -1.05");
+        let mut g = Gaussian::new([0.0; 3], [1.0; 3]);
+        (g.p[1][0], g.p[2][0], g.p[2][1]) = (0.9, 0.9, 0.9);
+        assert!(g.is_sound());
+        g.p[2][1] = -0.9;
+        assert!(!g.is_sound());
+        let mut g = belief();
+        g.p[2][2] = -1.0;
+        assert!(!g.is_sound());
+        for spoil in [f64::NAN, f64::INFINITY] {
+            let mut g = belief();
+            g.x[1] = spoil;
+            assert!(!g.is_sound() && !g.is_usable());
+            let mut g = belief();
+            g.p[1][1] = spoil;
+            assert!(!g.is_sound() && !g.is_usable());
+        }
+    }
+
+    #[test]
+    fn bounds_hold_for_what_is_no_number_too() {
+        assert_eq!([at_least(1.0, 2.0), at_least(1.0, 0.5), at_least(1.0, f64::NAN)], [2.0, 1.0, 1.0]);
+        assert_eq!([at_most(1.0, 2.0), at_most(1.0, 0.5), at_most(1.0, f64::NAN)], [1.0, 0.5, 1.0]);
+    }
+}

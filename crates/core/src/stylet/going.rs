@@ -88,3 +88,124 @@ impl Going {
         (if self.apart > 0 { stepped } else { said }, true)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    const DT_S: f64 = 0.005;
+
+    /// With the first sample, which has none before it.
+    fn begun(velocity_mps: f64) -> (Going, Sample) {
+        let (mut going, first) = (Going::default(), Sample { velocity_mps, ..Sample::default() });
+        assert_eq!(going.speed(&first, &first, 0.0, 0.0), (velocity_mps, false));
+        (going, first)
+    }
+
+    /// What is told of each sample of a motion whose log may differ from it.
+    fn told(
+        motion_mps: impl Fn(usize) -> f64,
+        said_mps: impl Fn(usize) -> f64,
+        count: usize,
+    ) -> Vec<(f64, bool)> {
+        let (mut going, mut last) = begun(said_mps(0));
+        let mut found = Vec::new();
+        for k in 1..count {
+            let v = 0.5 * (motion_mps(k - 1) + motion_mps(k));
+            let sample = Sample {
+                time_s: DT_S * k as f64,
+                position_m: last.position_m + v * DT_S,
+                velocity_mps: said_mps(k),
+                force_n: 0.0,
+            };
+            found.push(going.speed(&last, &sample, 0.002, DT_S / (DT_S + LEARNED_S)));
+            last = sample;
+        }
+        found
+    }
+
+    #[test]
+    fn a_velocity_that_agrees_with_the_positions_is_taken_as_it_is_said() {
+        let v = |k: usize| 0.002 + 0.001 * (0.05 * k as f64).sin();
+        for (k, (found, apart)) in told(v, v, 1000).into_iter().enumerate() {
+            assert_eq!((found, apart), (v(k + 1), false));
+        }
+    }
+
+    #[test]
+    fn where_the_log_is_late_the_positions_are_right_until_both_agree_again() {
+        // A step from 2 to 4 mm/s at sample 500, logged with a first-order lag of 10 samples.
+        let v = |k: usize| if k < 500 { 0.002 } else { 0.004 };
+        let said =
+            |k: usize| if k < 500 { 0.002 } else { 0.004 - 0.002 * (-(k as f64 - 500.0) / 10.0).exp() };
+        let found = told(v, said, 800);
+        for (k, (mps, apart)) in found.iter().enumerate() {
+            let sample = k + 1;
+            if sample < 500 {
+                assert_eq!((*mps, *apart), (0.002, false));
+            } else if (502..520).contains(&sample) {
+                assert!(*apart && (mps - 0.004).abs() < 1e-9, "{mps} m/s at sample {sample}");
+            } else if sample > 600 {
+                assert!(!apart && (mps - 0.004).abs() < 1e-6, "{mps} m/s at sample {sample}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_jump_within_a_step_is_told_and_the_log_believed() {
+        // From 2 to 4 mm/s somewhere between two samples: the mean speed lies between those at the ends.
+        let v = |k: usize| if k < 500 { 0.002 } else { 0.004 };
+        let ((mut going, mut last), mut apart) = (begun(0.002), Vec::new());
+        for k in 1..600 {
+            let mean = if k == 500 { 0.0022 } else { v(k) };
+            let sample = Sample {
+                time_s: DT_S * k as f64,
+                position_m: last.position_m + mean * DT_S,
+                velocity_mps: v(k),
+                force_n: 0.0,
+            };
+            let (mps, sudden) = going.speed(&last, &sample, 0.002, 0.0025);
+            assert_eq!(mps, v(k), "at sample {k}");
+            if sudden {
+                apart.push(k);
+            }
+            last = sample;
+        }
+        assert_eq!(apart, [500]);
+    }
+
+    #[test]
+    fn the_encoders_noise_becomes_usual() {
+        // 5 um of noise on positions make 1.4 mm/s of mean speeds; the log says the 2 mm/s that it is.
+        let ((mut going, mut last), mut late) = (begun(0.002), 0);
+        for k in 1..4000_usize {
+            let noise_m = 5e-6 * ((k * 7919 % 1009) as f64 / 504.0 - 1.0);
+            let sample = Sample {
+                time_s: DT_S * k as f64,
+                position_m: 0.002 * DT_S * k as f64 + noise_m,
+                velocity_mps: 0.002,
+                force_n: 0.0,
+            };
+            let (mps, apart) = going.speed(&last, &sample, 0.002, DT_S / (DT_S + LEARNED_S));
+            if k >= 2000 {
+                late += usize::from(apart);
+                assert!(apart || mps == 0.002);
+            }
+            last = sample;
+        }
+        assert!(late < 20, "{late} of 2000 samples after ten seconds");
+    }
+
+    #[test]
+    fn a_needle_that_has_not_moved_stands_until_it_has() {
+        // The log begins to rise at sample 90, the needle moves from 100 on.
+        let v = |k: usize| if k < 100 { 0.0 } else { 0.002 };
+        let said = |k: usize| (0.0001 * (k as f64 - 90.0)).clamp(0.0, 0.002);
+        let found = told(v, said, 200);
+        assert!(found[..98].iter().all(|f| *f == (0.0, false)), "{:?}", &found[85..99]);
+        assert!(found[99].1, "when it sets off, nobody knows when: {:?}", found[99]);
+        let (mps, apart) = found[150];
+        assert!(!apart && mps == 0.002);
+    }
+}

@@ -323,3 +323,159 @@ impl Layers {
         all * share
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DRIVES: [f64; 3] = [0.002, 0.003, 0.0015];
+
+    /// Noise of 1 mN with a zero that is known to be none.
+    fn noise() -> Noise {
+        let mut noise = Noise::new(1e-3);
+        (0..2000).for_each(|_| noise.in_air(0.0));
+        noise
+    }
+
+    /// Stiffness, friction per metre, end.
+    type Layer = (f64, f64, f64);
+    const FIRST: Layer = (60.0, 9000.0, 0.02);
+    const SECOND: Layer = (120.0, 5000.0, 0.045);
+    const FIRST_BEHIND: f64 = 9000.0 * 0.02;
+    const BOTH_BEHIND: f64 = FIRST_BEHIND + 5000.0 * 0.025;
+
+    /// Over a layer from `start_m` to its end by 50 um, at speeds that change, with the friction `behind` of those before.
+    fn travel(layers: &mut Layers, start_m: f64, (k, b, end_m): Layer, behind: f64) {
+        let steps = ((end_m - start_m) / 5e-5) as usize;
+        for n in 1..steps {
+            let (x, u) = (5e-5 * n as f64, DRIVES[n / 40 % 3]);
+            layers.take(start_m + x, u, k * x + b * x * u + behind * u, 0.0);
+        }
+    }
+
+    /// At the end of the second layer, before it gives way.
+    fn two() -> (Layers, Behind, Noise) {
+        let (noise, mut behind) = (noise(), Behind::default());
+        let mut layers = Layers::contact(0.0, 0.0, 0.0, 2000.0, 0.002, &noise);
+        travel(&mut layers, 0.0, FIRST, 0.0);
+        layers.rupture(FIRST.2, 0.0, 0.002, &noise, &mut behind);
+        travel(&mut layers, FIRST.2, SECOND, FIRST_BEHIND);
+        (layers, behind, noise)
+    }
+
+    fn near(found: f64, expected: f64, share: f64) {
+        assert!((found - expected).abs() <= share * expected.abs(), "{found} for {expected}");
+    }
+
+    #[test]
+    fn stiffness_and_friction_of_this_layer_and_the_one_before_come_back_from_the_law() {
+        let (layers, _, noise) = two();
+        near(layers.belief.x[K], SECOND.0, 0.01);
+        near(layers.belief.x[F], SECOND.1, 0.01);
+        near(layers.belief.x[KP], FIRST.0, 0.01);
+        near(layers.belief.x[FP], FIRST.1, 0.01);
+        near(layers.behind(0.04, &noise).0, FIRST_BEHIND, 0.01);
+        near(layers.when_it_gave_way(&noise).0, FIRST_BEHIND, 0.01);
+        near(layers.previous_m, FIRST.2, 1e-9);
+        near(layers.slope(0.002), SECOND.0 + SECOND.1 * 0.002, 0.01);
+        near(layers.friction(0.03), FIRST_BEHIND + SECOND.1 * 0.01, 0.01);
+        near(layers.growth(0.002), FIRST.1 * 0.002, 0.01);
+        for (z, u) in [(0.025, 0.001), (0.04, 0.004)] {
+            let x = z - FIRST.2;
+            let force_n = SECOND.0 * x + SECOND.1 * x * u + FIRST_BEHIND * u;
+            near(layers.says(z, u), force_n, 0.005);
+        }
+    }
+
+    #[test]
+    fn a_tip_that_was_inside_when_contact_was_noticed_has_its_layer_begin_before() {
+        // 0.5 mm: 30 mN and some friction act already, known to 20 mN.
+        let (noise, mut behind, inside_m) = (noise(), Behind::default(), 5e-4);
+        let force_n = FIRST.0 * inside_m + FIRST.1 * inside_m * DRIVES[0];
+        let mut layers = Layers::contact(0.0, force_n, 0.02, 2000.0, DRIVES[0], &noise);
+        for n in 1..400 {
+            let (z, u) = (5e-5 * f64::from(n), DRIVES[n as usize / 40 % 3]);
+            let x = z + inside_m;
+            layers.take(z, u, FIRST.0 * x + FIRST.1 * x * u, 0.0);
+        }
+        layers.rupture(0.02, 0.0, 0.002, &noise, &mut behind);
+        near(layers.previous_m, 0.0205, 0.005);
+        near(layers.behind(0.02, &noise).0, FIRST.1 * 0.0205, 0.01);
+        near(layers.belief.x[KP], FIRST.0, 0.01);
+        near(behind[0][0], -inside_m, 0.2);
+        assert_eq!(behind[0][1], 0.02);
+    }
+
+    #[test]
+    fn on_the_way_back_each_layer_leaves_the_shaft_as_the_tip_leaves_it() {
+        let (mut layers, mut behind, noise) = two();
+        layers.rupture(SECOND.2, 0.0, 0.002, &noise, &mut behind);
+        for (z, expected) in [
+            (0.06, BOTH_BEHIND),
+            (0.045, BOTH_BEHIND),
+            (0.035, FIRST_BEHIND + 5000.0 * 0.015),
+            (0.02, FIRST_BEHIND),
+            (0.005, 9000.0 * 0.005),
+        ] {
+            near(layers.around_shaft(&behind, z, 0.06, &noise), expected, 0.02);
+        }
+        assert_eq!(layers.around_shaft(&behind, -0.01, 0.06, &noise), 0.0);
+    }
+
+    #[test]
+    fn what_is_not_known_of_the_place_of_a_rupture_is_not_known_of_the_friction_behind() {
+        // Friction grows by b a metre: 0.4 mm more or less are 3.6 N s/m.
+        let sd = |place_m: f64| {
+            let (noise, mut behind) = (noise(), Behind::default());
+            let mut layers = Layers::contact(0.0, 0.0, 0.0, 2000.0, 0.002, &noise);
+            travel(&mut layers, 0.0, FIRST, 0.0);
+            layers.rupture(FIRST.2, place_m, 0.002, &noise, &mut behind);
+            layers.behind(FIRST.2, &noise).1.sqrt()
+        };
+        let (sharp, blurred) = (sd(0.0), sd(4e-4));
+        near((blurred * blurred - sharp * sharp).sqrt(), FIRST.1 * 4e-4, 0.01);
+    }
+
+    #[test]
+    fn in_a_gap_friction_grows_on_and_the_layer_before_reaches_to_its_end() {
+        let (mut layers, mut behind, noise) = two();
+        layers.rupture(SECOND.2, 0.0, 0.002, &noise, &mut behind);
+        // The shaft enters the second layer for 8 mm more, the tip feels nothing.
+        layers.free = true;
+        let gap = (0.0, SECOND.1, SECOND.2 + 0.008);
+        travel(&mut layers, SECOND.2, gap, BOTH_BEHIND);
+        near(layers.behind(SECOND.2 + 0.004, &noise).0, BOTH_BEHIND + SECOND.1 * 0.004, 0.01);
+        layers.bend(SECOND.2 + 0.008, 1e-4, true, 0.002, &noise, &mut behind);
+        assert!(!layers.free);
+        near(layers.gap_m, 0.008, 1e-9);
+        near(layers.behind(0.06, &noise).0, BOTH_BEHIND + SECOND.1 * 0.008, 0.01);
+        near(layers.when_it_gave_way(&noise).0, BOTH_BEHIND, 0.01);
+        // What it gave way at is known as well as the sum of what is known now and of what the gap has added.
+        let g = &layers.belief;
+        let h = [(A, 1.0), (FP, -0.008)];
+        let spread: f64 = h.iter().flat_map(|a| h.iter().map(|b| a.1 * g.cov(a.0, b.0) * b.1)).sum::<f64>()
+            * noise.variance;
+        let place = g.x[FP] * 1e-4;
+        near(layers.when_it_gave_way(&noise).1, spread + place * place, 1e-6);
+        near(behind[1][1], SECOND.2 + 0.008, 1e-9);
+        let back = layers.around_shaft(&behind, SECOND.2 + 0.004, 0.06, &noise);
+        near(back, BOTH_BEHIND + SECOND.1 * 0.004, 0.01);
+    }
+
+    #[test]
+    fn coloured_noise_weighs_as_if_it_were_whitened() {
+        // Samples alternating about the law by what AR(1) noise makes of one impulse: f_k - rho f_(k-1) is the law's again.
+        let (noise, rho) = (noise(), 0.8);
+        let mut layers = Layers::contact(0.0, 0.0, 0.0, 2000.0, 0.002, &noise);
+        let mut colour_n = 0.05;
+        for n in 1..400 {
+            let (x, u) = (5e-5 * f64::from(n), DRIVES[n as usize / 40 % 3]);
+            let (e, _) = layers.take(x, u, FIRST.0 * x + FIRST.1 * x * u + colour_n, rho);
+            if n > 200 {
+                assert!(e.abs() < 2e-3, "{e} N at {x} m");
+            }
+            colour_n *= rho;
+        }
+        near(layers.slope(0.002), FIRST.0 + FIRST.1 * 0.002, 0.05);
+    }
+}

@@ -153,3 +153,132 @@ impl Local {
         self.state.x[L]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STIFFNESS: f64 = 40.0;
+    const FRICTION: f64 = 9000.0;
+    const BEHIND: f64 = 150.0;
+
+    /// `K x + b x v + D v`, and a relaxation by 0.2 N/s.
+    fn law_n(t: f64, x: f64, v: f64) -> f64 {
+        STIFFNESS * x + FRICTION * x * v + BEHIND * v - 0.2 * t
+    }
+
+    /// What is to be known of that law at a depth and a speed, with some doubt that hangs together.
+    fn knowing(x: f64, v: f64) -> Local {
+        let mut local = Local::new(0.0);
+        let mean = [law_n(0.0, x, v), -0.2, STIFFNESS + FRICTION * v, BEHIND + FRICTION * x, FRICTION];
+        let map = core::array::from_fn(|i| {
+            core::array::from_fn(|j| if i == j { 1.0 } else { 0.1 * (i as f64 - 0.5 * j as f64) })
+        });
+        local.state = Gaussian::new([0.0; 5], [1.0, 4.0, 0.25, 2.0, 0.5]).mapped(&map);
+        local.state.x = mean;
+        local
+    }
+
+    fn noise(rho: f64) -> Noise {
+        let mut noise = Noise::new(1e-2);
+        (noise.rho, noise.count, noise.step_s) = (rho, 1e6, 0.005);
+        noise
+    }
+
+    fn step(dt_s: f64, dz_m: f64, dv_mps: f64, rho: f64) -> Step {
+        Step { dt_s, dz_m, dv_mps, rho, sudden: false, speed_mps: 0.002 }
+    }
+
+    #[test]
+    fn the_prediction_is_exact_where_the_law_of_layers_holds() {
+        for (dz, dv) in [(1e-5, 0.0), (0.0, 1e-4), (1e-5, 1e-5), (2e-5, -1e-4), (-1e-5, 1e-4)] {
+            let (mut local, mut x, mut v) = (knowing(0.01, 0.002), 0.01, 0.002);
+            for k in 1..=20 {
+                local.advance(&step(0.005, dz, dv, 0.0), &noise(0.0));
+                (x, v) = (x + dz, v + dv);
+                // What a step leaves out is b dz dv, of the second order.
+                let off = local.level_n() - law_n(0.005 * f64::from(k), x, v);
+                assert!(off.abs() <= 1.001 * f64::from(k) * FRICTION * (dz * dv).abs() + 1e-9, "{off} N");
+            }
+            assert!((local.state.x[S] - (STIFFNESS + FRICTION * v)).abs() < 1e-9);
+            assert!((local.state.x[B] - (BEHIND + FRICTION * x)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn coloured_noise_is_whitened_by_the_sample_before() {
+        for rho in [0.0, 0.4, 0.9] {
+            let noise = noise(rho);
+            let (mut local, x, v) = (knowing(0.01, 0.002), 0.01, 0.002);
+            // Known exactly, so that the innovation is what the noise has new, and its variance that of it.
+            for (row, p) in local.state.p.iter_mut().enumerate() {
+                p[..=row].fill(0.0);
+            }
+            let colour_n = 0.03;
+            local.last_n = law_n(0.0, x, v) + colour_n;
+            local.fresh = false;
+            let step = step(0.005, 1e-5, 2e-5, rho);
+            local.advance(&step, &noise);
+            let new_n = 0.007;
+            let expected = local.level_n() + rho * colour_n + new_n;
+            let innovation = local.innovation(expected, &step, &noise);
+            // But for b dz dv, of the second order.
+            let left_out = 2.01 * rho * FRICTION * step.dz_m * step.dv_mps + 1e-12;
+            assert!((innovation.e - new_n).abs() < left_out, "rho {rho}: {}", innovation.e);
+            // What the slopes may have changed by within a step is next to nothing.
+            assert!((innovation.s - 1.0).abs() < 0.05, "rho {rho}: {}", innovation.s);
+            // Without a sample before it, all of the noise is new.
+            local.pass();
+            let alone = local.innovation(expected, &step, &noise);
+            assert!((alone.e - (rho * colour_n + new_n)).abs() < 1e-12);
+            assert!((alone.s * (1.0 - rho * rho) - 1.0).abs() < 0.05, "rho {rho}: {}", alone.s);
+        }
+    }
+
+    #[test]
+    fn the_rate_of_the_force_is_the_sum_of_its_parts_and_as_uncertain_as_they_are_together() {
+        let local = knowing(0.01, 0.002);
+        let (v, a, known) = (0.7, -0.4, 30.0);
+        let (rate, variance) = local.rate(v, a, known);
+        let x = &local.state.x;
+        assert!((rate - (x[R] + v * x[S] + a * (x[B] - known))).abs() < 1e-9);
+        // h' P h, the known friction being no unknown.
+        let h = [0.0, 1.0, v, a, 0.0];
+        let expected: f64 = (0..25).map(|n| h[n / 5] * local.state.cov(n / 5, n % 5) * h[n % 5]).sum();
+        assert!((variance - expected).abs() < 1e-9 * expected, "{variance} {expected}");
+    }
+
+    #[test]
+    fn slopes_begin_anew_on_the_scale_of_a_force_per_memory_and_friction_is_kept_as_far_as_it_is_known() {
+        let (noise, speed, force_n) = (noise(0.6), 0.002, 0.5);
+        let sd_n = |local: &Local, i: usize, by: f64| (local.state.p[i][i] * noise.variance).sqrt() * by;
+        for all in [false, true] {
+            let mut local = knowing(0.01, 0.002);
+            let was = (local.state.x[B], local.state.p[B][B]);
+            local.renew(1.7, force_n, &noise, speed, all);
+            assert_eq!(local.level_n(), 1.7);
+            // The level is known as well as one sample knows it.
+            assert!((sd_n(&local, L, 1.0) / (noise.variance / (1.0 - 0.36)).sqrt() - 1.0).abs() < 1e-9);
+            // Over the memory's travel, or at the usual speed in the time that it takes, the whole force.
+            assert!((sd_n(&local, S, MEMORY_M) / force_n - 1.0).abs() < 1e-9);
+            assert!((sd_n(&local, R, MEMORY_M / speed) / force_n - 1.0).abs() < 1e-9);
+            assert!((sd_n(&local, C, MEMORY_M * speed) / force_n - 1.0).abs() < 1e-9);
+            assert_eq!([local.state.x[R], local.state.x[S], local.state.x[C]], [0.0; 3]);
+            if all {
+                assert!((sd_n(&local, B, speed) / force_n - 1.0).abs() < 1e-9);
+                assert_eq!(local.state.x[B], 0.0);
+            } else {
+                assert_eq!(
+                    (local.state.x[B], local.state.p[B][B]),
+                    was,
+                    "friction is better known than that"
+                );
+            }
+        }
+        // What is known worse than to the whole force is no better known than before, and no worse than to the force.
+        let mut local = knowing(0.01, 0.002);
+        local.state.p[B][B] = 1e14;
+        local.renew(1.7, force_n, &noise, speed, false);
+        assert!((sd_n(&local, B, speed) / force_n - 1.0).abs() < 1e-9);
+    }
+}

@@ -95,3 +95,71 @@ impl Stylet {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEED_MPS: f64 = 0.002;
+    const DRY_MPS: f64 = 0.01;
+
+    /// The drive of friction after each of these travels at constant speed, 49 samples each; a travel of none is a hold.
+    fn drives(law: FrictionLaw, travels_m: &[f64]) -> alloc::vec::Vec<f64> {
+        let mut config = EnhanceConfig::default();
+        config.stylet.law = law;
+        let mut stylet = Stylet::new(&config, 0.0);
+        stylet.in_tissue = true;
+        let mut last = Sample::default();
+        travels_m
+            .iter()
+            .map(|travel_m| {
+                for _ in 0..49 {
+                    let sample = Sample {
+                        time_s: last.time_s + 0.005,
+                        position_m: last.position_m + travel_m / 49.0,
+                        velocity_mps: if *travel_m == 0.0 { 0.0 } else { SPEED_MPS.copysign(*travel_m) },
+                        force_n: 0.0,
+                    };
+                    let step = stylet.motion(&config, &last, &sample, false);
+                    stylet.drive_friction(&config, &step, &sample);
+                    last = sample;
+                }
+                stylet.drive
+            })
+            .collect()
+    }
+
+    fn assert_near(found: &[f64], expected: &[f64]) {
+        let near = found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-9);
+        assert!(near && found.len() == expected.len(), "{found:?} for {expected:?}");
+    }
+
+    #[test]
+    fn viscous_friction_is_driven_by_the_speed_and_dry_friction_by_its_direction_too() {
+        let travels = [0.004, 0.0, -0.001, 0.002];
+        for law in [FrictionLaw::Auto, FrictionLaw::Viscous] {
+            assert_near(&drives(law, &travels), &[SPEED_MPS, 0.0, -SPEED_MPS, SPEED_MPS]);
+        }
+        let law = FrictionLaw::CoulombViscous { dry_mps: DRY_MPS };
+        let both = SPEED_MPS + DRY_MPS;
+        assert_near(&drives(law, &travels), &[both, 0.0, -both, both]);
+    }
+
+    #[test]
+    fn presliding_friction_builds_up_over_its_travel_and_stays_in_a_hold() {
+        // xi' = (v/travel)(1 - xi sgn v): towards the direction of motion by exp(-x/travel).
+        let travel_m = 0.001;
+        let law = FrictionLaw::Presliding { dry_mps: DRY_MPS, travel_m };
+        let faded = |x: f64| (-x / travel_m).exp();
+        let first = 1.0 - faded(0.0005);
+        let second = 1.0 - faded(0.003);
+        let back = -1.0 + (second + 1.0) * faded(0.0007);
+        let expected = [
+            SPEED_MPS + DRY_MPS * first,
+            SPEED_MPS + DRY_MPS * second,
+            DRY_MPS * second,
+            -SPEED_MPS + DRY_MPS * back,
+        ];
+        assert_near(&drives(law, &[0.0005, 0.0025, 0.0, -0.0007]), &expected);
+    }
+}

@@ -190,3 +190,157 @@ impl Noise {
         self.slow
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// `bias + n_k` with `n_k = rho n_(k-1) + sigma w`.
+    fn forces(seed: u64, count: usize, bias_n: f64, rho: f64, sigma_n: f64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut n = 0.0;
+        (0..count + 1000)
+            .map(|_| {
+                let w: f64 = StandardNormal.sample(&mut rng);
+                n = rho * n + sigma_n * w;
+                bias_n + n
+            })
+            .skip(1000)
+            .collect()
+    }
+
+    fn in_air(forces_n: &[f64]) -> Noise {
+        let mut noise = Noise::new(1e-4);
+        forces_n.iter().for_each(|f| noise.in_air(*f));
+        noise
+    }
+
+    #[test]
+    fn bias_and_colour_and_strength_of_the_noise_are_learned_in_the_air() {
+        for (rho, sigma_n) in [(0.0, 0.02), (0.5, 0.02), (0.9, 0.005)] {
+            let noise = in_air(&forces(1, 20_000, 0.7, rho, sigma_n));
+            assert!((noise.rho - rho).abs() < 0.03, "{noise:?}");
+            assert!((noise.variance.sqrt() / sigma_n - 1.0).abs() < 0.03, "{noise:?}");
+            let marginal = sigma_n * sigma_n / (1.0 - rho * rho);
+            assert!((noise.marginal() / marginal - 1.0).abs() < 0.15, "{noise:?}");
+            assert!((noise.slow() * (1.0 - rho) * (1.0 - rho) - 1.0).abs() < 0.4, "{noise:?}");
+            // The mean of slow noise is known as well as its spread divided by the samples that count.
+            let sd = noise.bias_variance().sqrt();
+            assert!((noise.bias_n() - 0.7).abs() < 4.0 * sd, "{noise:?}");
+            let known = sigma_n / (1.0 - rho) / noise.in_air_count().sqrt();
+            assert!((sd / known - 1.0).abs() < 0.25, "{sd} {known}");
+        }
+    }
+
+    #[test]
+    fn white_noise_has_no_colour_and_few_samples_are_not_biased() {
+        // 80 samples, of which 40 count: over many runs the mean square is that of the noise.
+        let (mut sum, mut coloured) = (0.0, 0);
+        for seed in 0..400 {
+            let noise = in_air(&forces(seed, 40, -0.3, 0.0, 0.01));
+            assert_eq!(noise.in_air_count(), 40.0);
+            sum += noise.variance / 1e-4;
+            coloured += usize::from(noise.rho_over(0.005) != 0.0);
+        }
+        assert!((sum / 400.0 - 1.0).abs() < 0.06, "{}", sum / 400.0);
+        assert!(coloured < 40, "{coloured} of 400 have a colour at two standard errors");
+    }
+
+    #[test]
+    fn a_load_counts_as_noise_only_when_twice_as_many_samples_have_followed() {
+        let mut forces_n = forces(2, 400, 0.0, 0.0, 0.01);
+        let before = in_air(&forces_n);
+        let counted = before.in_air_count();
+        assert!((100.0..=200.0).contains(&counted), "{counted}");
+        forces_n.extend(forces(3, 100, 0.2, 0.0, 0.01));
+        let after = in_air(&forces_n);
+        assert!(after.bias_n().abs() < 0.005, "a quarter more samples with a load leave the bias: {after:?}");
+        assert!(after.variance.sqrt() < 0.013, "and the strength: {after:?}");
+    }
+
+    #[test]
+    fn noise_is_never_weaker_than_the_least() {
+        let mut noise = in_air(&[0.25; 500]);
+        assert_eq!((noise.variance.sqrt(), noise.bias_n()), (1e-4, 0.25));
+        for _ in 0..5000 {
+            noise.in_tissue(0.0, 1.0);
+        }
+        assert!((noise.variance.sqrt() - 1e-4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn in_the_tissue_the_noise_is_followed() {
+        let mut noise = in_air(&forces(4, 2000, 0.0, 0.0, 0.01));
+        // Innovations of twice the strength whose variance is 1.5 times that of the noise.
+        for e in forces(5, 12_000, 0.0, 0.0, 0.02 * 1.5_f64.sqrt()) {
+            noise.in_tissue(e, 1.5);
+        }
+        assert!((noise.variance.sqrt() / 0.02 - 1.0).abs() < 0.05, "{noise:?}");
+        assert!(noise.rho < 0.08, "{noise:?}");
+        // One event says little.
+        let before = noise.variance;
+        noise.in_tissue(5.0, 1.0);
+        assert!(noise.variance < 1.01 * before, "{before} to {}", noise.variance);
+    }
+
+    #[test]
+    fn in_the_tissue_the_colour_is_followed_to_what_leaves_the_innovations_white() {
+        for (from, to) in [(0.0, 0.6), (0.8, 0.3)] {
+            let mut noise = in_air(&forces(8, 2000, 0.0, from, 0.01));
+            let (mut last_n, mut mean, mut count) = (0.0, 0.0, 0.0);
+            for (k, n) in forces(9, 40_000, 0.0, to, 0.01).into_iter().enumerate() {
+                noise.in_tissue(n - noise.rho * last_n, 1.0);
+                last_n = n;
+                if k >= 20_000 {
+                    mean += noise.rho;
+                    count += 1.0;
+                }
+            }
+            assert!((mean / count - to).abs() < 0.03, "{} for {to}", mean / count);
+            assert!((noise.variance.sqrt() / 0.01 - 1.0).abs() < 0.05, "{noise:?}");
+        }
+    }
+
+    #[test]
+    fn correlation_fades_with_the_interval() {
+        let mut noise = in_air(&forces(6, 20_000, 0.0, 0.8, 0.01));
+        noise.clock(0.005);
+        let rho = noise.rho;
+        assert!((noise.rho_over(0.005) - rho).abs() < 1e-12);
+        // To first order in the rate (1 - rho)/rho per step.
+        for steps in [0.5, 2.0, 10.0] {
+            let expected = 1.0 / (1.0 + steps * (1.0 - rho) / rho);
+            assert!((noise.rho_over(steps * 0.005) - expected).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_usual_step_follows_the_clock_and_a_gap_hardly_moves_it() {
+        let mut noise = Noise::new(1e-4);
+        noise.clock(0.005);
+        assert_eq!(noise.step_s, 0.005);
+        noise.clock(10.0);
+        assert!((noise.step_s - 0.0051).abs() < 1e-12, "as if twice as long: {}", noise.step_s);
+        noise.clock(1e-9);
+        assert!((noise.step_s - (0.0051 - 0.02 * 0.00255)).abs() < 1e-12, "as if half: {}", noise.step_s);
+        for _ in 0..1000 {
+            noise.clock(0.002);
+        }
+        assert!((noise.step_s - 0.002).abs() < 1e-6, "{}", noise.step_s);
+    }
+
+    #[test]
+    fn intervals_are_wider_the_slower_the_noise_and_the_fewer_the_samples() {
+        for (rho, count) in [(0.0, 20_000), (0.5, 20_000), (0.9, 1000)] {
+            let noise = in_air(&forces(7, count, 0.0, rho, 0.01));
+            // Half of the relative variance of the level, 4 (1 + rho)/((1 - rho) n).
+            let expected = 2.0 * (1.0 + noise.rho) / ((1.0 - noise.rho) * noise.in_air_count());
+            assert!((noise.doubt() - 1.0 - expected).abs() < 1e-12);
+        }
+        assert_eq!(Noise::new(1e-4).doubt(), 1.05, "no samples count as forty");
+    }
+}

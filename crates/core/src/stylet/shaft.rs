@@ -164,3 +164,213 @@ impl Back {
         (friction, libm::sqrt(self.scatter_n2))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Advancing with a force that needs no smoothing.
+    fn felt(position_m: f64, force_n: f64) -> Felt {
+        Felt {
+            share: 1.0,
+            position_m,
+            force_n,
+            advancing: true,
+            retracting: false,
+            peak_n: 4.0,
+            jumped: false,
+            noise_n2: 1e-4,
+            track: true,
+        }
+    }
+
+    fn hold(position_m: f64, force_n: f64) -> Felt {
+        Felt { advancing: false, ..felt(position_m, force_n) }
+    }
+
+    fn back(position_m: f64, force_n: f64) -> Felt {
+        Felt { advancing: false, retracting: true, ..felt(position_m, force_n) }
+    }
+
+    /// After a rupture at 20 mm that has left 1 N, and the travel in which all of the force is friction.
+    fn ruptured() -> Shaft {
+        let mut shaft = Shaft::default();
+        shaft.rupture(0.02, 1.0);
+        shaft.take(&felt(0.0205, 1.2));
+        shaft
+    }
+
+    #[test]
+    fn no_friction_is_known_before_the_first_rupture() {
+        let mut shaft = Shaft::default();
+        for k in 0..10 {
+            assert_eq!(shaft.take(&felt(0.001 * f64::from(k), f64::from(k))), (0.0, 0.0));
+        }
+    }
+
+    #[test]
+    fn all_of_the_force_is_friction_over_the_first_millimetre_after_a_rupture_and_no_rise_after() {
+        let mut shaft = Shaft::default();
+        shaft.rupture(0.02, 1.0);
+        for (position_m, force_n, friction_n) in [
+            (0.0201, 1.0, 1.0),
+            (0.0205, 1.3, 1.3),
+            (0.0208, 1.1, 1.1),
+            (0.0209, 1.2, 1.2),
+            (0.0215, 1.7, 1.2),
+            (0.0230, 3.0, 1.2),
+            // What the force falls by, friction falls by.
+            (0.0235, 2.9, 1.1),
+            (0.0240, 3.5, 1.1),
+            // Friction is not below zero, nor more than the whole force.
+            (0.0245, 2.0, 0.0),
+            (0.0250, 2.5, 0.0),
+        ] {
+            let (found_n, sd_n) = shaft.take(&felt(position_m, force_n));
+            assert!((found_n - friction_n).abs() < 1e-12, "{found_n} N at {position_m} m");
+            assert!((sd_n - 0.25 * friction_n).abs() < 1e-12, "known to a quarter: {sd_n} N");
+        }
+    }
+
+    #[test]
+    fn in_a_hold_friction_keeps_its_share_of_the_force() {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.023, 3.0));
+        for force_n in [2.7, 2.4, 2.1, 1.5, 1.8] {
+            let (friction_n, _) = shaft.take(&hold(0.023, force_n));
+            assert!((friction_n / force_n - 0.4).abs() < 1e-12, "{friction_n} of {force_n} N");
+        }
+    }
+
+    #[test]
+    fn the_smoothed_force_takes_the_share_of_a_sample_that_it_is_told() {
+        let mut shaft = Shaft::default();
+        shaft.rupture(0.02, 1.0);
+        let mut expected_n = 1.0;
+        for force_n in [2.0, 2.0, 0.0, 5.0] {
+            expected_n += 0.25 * (force_n - expected_n);
+            let (friction_n, _) = shaft.take(&Felt { share: 0.25, ..felt(0.0201, force_n) });
+            assert!((friction_n - expected_n).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_way_back_goes_from_the_force_of_the_hold_over_zero_at_two_and_a_half_millimetres_to_a_pull() {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.03, 3.0));
+        let mut at = |x: f64, force_n: f64| shaft.take(&Felt { track: false, ..back(0.03 - x, force_n) });
+        let (begin_n, sd_n) = at(0.0, 3.0);
+        assert!((begin_n - 3.0).abs() < 1e-12 && (sd_n - 1.0).abs() < 1e-12, "{begin_n} {sd_n}");
+        let (middle_n, _) = at(0.00125, 0.0);
+        // Half way to zero the exponential has gone by the root of what it goes by in all: -1 + 4/2.
+        assert!((middle_n - 1.0).abs() < 1e-9, "{middle_n}");
+        assert!(at(0.0025, 0.0).0.abs() < 1e-9);
+        // A quarter of the largest force pulls in the end, whatever the sensor says.
+        assert!((at(0.03, 2.0).0 + 1.0).abs() < 1e-3);
+        // What was travelled back is not travelled back again.
+        assert!((at(0.02, 2.0).0 + 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_needle_that_goes_in_again_has_the_way_back_behind_it_where_it_turned() {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.03, 3.0));
+        for k in 0..100 {
+            shaft.take(&back(0.03 - 1e-4 * f64::from(k), -1.0));
+        }
+        let (below_n, _) = shaft.take(&felt(0.025, -1.0));
+        assert!((below_n + 1.0).abs() < 0.1, "still as on the way back: {below_n} N");
+        let (behind_n, _) = shaft.take(&felt(0.0301, 2.0));
+        assert!((0.0..=2.0).contains(&behind_n), "friction again between none and the force: {behind_n} N");
+        let (later_n, _) = shaft.take(&felt(0.0311, 3.0));
+        assert!((later_n - behind_n).abs() < 1e-12, "a rise is the tip's: {later_n} N");
+    }
+
+    /// The force of the way back as it is taught, from a hold of 3 N to a pull of 1 N.
+    fn taught_n(x: f64) -> f64 {
+        -1.0 + 4.0 * (-x / 0.0025 * 4.0_f64.ln()).exp()
+    }
+
+    /// Enhanced force over a way back by 50 um steps in which the force is off what is taught by `off_n(x)`.
+    fn tip_n(mut off_n: impl FnMut(f64) -> f64, mut hear: impl FnMut(f64, f64, f64)) {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.03, 3.0));
+        for k in 0..400 {
+            let x = 5e-5 * f64::from(k);
+            let force_n = taught_n(x) + off_n(x);
+            let (friction_n, sd_n) = shaft.take(&back(0.03 - x, force_n));
+            hear(x, force_n - friction_n, sd_n);
+        }
+    }
+
+    #[test]
+    fn on_the_way_back_what_is_taught_is_friction_and_what_stays_becomes_it() {
+        tip_n(|_| 0.0, |x, tip, sd| assert!(tip.abs() < 1e-9 && sd < 1e-9, "{tip} {sd} at {x}"));
+        // A pull that is 0.5 N stronger all along is friction in the end; a line is so, too.
+        for off in [|_| -0.5, |x: f64| -30.0 * x] as [fn(f64) -> f64; 2] {
+            let mut last = 1.0;
+            tip_n(off, |_, tip, _| last = tip);
+            assert!(last.abs() < 0.1, "{last} N left");
+        }
+    }
+
+    #[test]
+    fn friction_on_the_way_back_is_known_to_what_the_tip_has_seemed_to_feel_of_late() {
+        for size_n in [0.05, 0.2] {
+            let (mut last_n, mut early_n) = (0.0, f64::NAN);
+            let mut sign = 1.0;
+            let off = |_| {
+                sign = -sign;
+                sign * size_n
+            };
+            tip_n(off, |x, _, sd| {
+                if x > 0.0001 && early_n.is_nan() {
+                    early_n = sd;
+                }
+                last_n = sd;
+            });
+            assert!((last_n / size_n - 1.0).abs() < 0.1, "{last_n} N for {size_n} N");
+            assert!(early_n < 0.5 * size_n, "over millimetres: {early_n} N");
+        }
+    }
+
+    #[test]
+    fn a_tip_that_is_caught_on_the_way_back_keeps_most_of_its_pull_over_a_millimetre() {
+        let (mut at_once, mut after) = (0.0, 0.0);
+        let off = |x: f64| if x > 0.0099 { -0.5 } else { 0.0 };
+        tip_n(off, |x, tip, _| {
+            if (x - 0.01).abs() < 1e-5 {
+                at_once = tip;
+            } else if (x - 0.011).abs() < 1e-5 {
+                after = tip;
+            }
+        });
+        assert!((-0.5..-0.45).contains(&at_once), "{at_once}");
+        // exp(-1/2) of it, and the slope has learned an eighth.
+        assert!((-0.5 * 0.61..-0.5 * 0.5).contains(&after), "{after}");
+    }
+
+    #[test]
+    fn on_the_way_back_no_tip_pushes_and_a_sudden_release_is_the_shafts() {
+        // An excess push is given in to over one millimetre, half of the way of a pull.
+        let mut push = 1.0;
+        tip_n(
+            |x| if x > 0.0099 { 0.5 } else { 0.0 },
+            |x, tip, _| {
+                if (x - 0.011).abs() < 1e-5 {
+                    push = tip;
+                }
+            },
+        );
+        assert!((0.0..0.5 * 0.37).contains(&push), "{push}");
+        // The jump of a release is friction at once.
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.03, 3.0));
+        shaft.take(&back(0.03, 3.0));
+        let x = 0.01;
+        shaft.take(&back(0.03 - x, taught_n(x)));
+        let force_n = taught_n(x) + 0.6;
+        let (friction_n, _) = shaft.take(&Felt { jumped: true, ..back(0.03 - x, force_n) });
+        assert!((friction_n - force_n).abs() < 1e-9, "{friction_n} of {force_n}");
+    }
+}

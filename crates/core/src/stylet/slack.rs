@@ -160,3 +160,83 @@ impl Layers {
         -0.5 * (libm::log(determinant) + square / noise.variance)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise() -> Noise {
+        let mut noise = Noise::new(1e-3);
+        (0..2000).for_each(|_| noise.in_air(0.0));
+        noise
+    }
+
+    const SPEEDS: [f64; 3] = [0.002, 0.003, 0.0015];
+
+    /// A layer of 60 N/m and 9000 N s/m² that gives way at 20 mm; then 4 mm in which the force grows by `stiffness` and `friction`.
+    fn behind_a_rupture(stiffness: f64, friction: f64) -> (Layers, Noise) {
+        let (noise, mut behind) = (noise(), Behind::default());
+        let mut layers = Layers::contact(0.0, 0.0, 0.0, 2000.0, 0.002, &noise);
+        for n in 1..400_usize {
+            let (x, u) = (5e-5 * n as f64, SPEEDS[n / 40 % 3]);
+            layers.take(x, u, 60.0 * x + 9000.0 * x * u, 0.0);
+        }
+        layers.rupture(0.02, 0.0, 0.002, &noise, &mut behind);
+        for n in 1..80_usize {
+            let (x, u) = (5e-5 * n as f64, SPEEDS[n / 20 % 3]);
+            layers.take(0.02 + x, u, stiffness * x + (180.0 + friction * x) * u, 0.0);
+        }
+        (layers, noise)
+    }
+
+    /// Density of a normal vector of two by its definition, from the belief about `(K, b - bp)` or `(K, b)`.
+    fn log_density(layers: &Layers, follows: bool, noise: &Noise) -> f64 {
+        let g = &layers.belief;
+        let map = [[(K, 1.0), (K, 0.0)], [(F, 1.0), (FP, if follows { -1.0 } else { 0.0 })]];
+        let mean = map.map(|row| row.iter().map(|(i, w)| w * g.x[*i]).sum::<f64>());
+        let cov = |a: usize, b: usize| -> f64 {
+            map[a].iter().flat_map(|x| map[b].iter().map(move |y| x.1 * g.cov(x.0, y.0) * y.1)).sum::<f64>()
+                * noise.variance
+        };
+        let (c00, c01, c11) = (cov(0, 0), cov(0, 1), cov(1, 1));
+        let determinant = c00 * c11 - c01 * c01;
+        let distance2 =
+            (c11 * mean[0] * mean[0] - 2.0 * c01 * mean[0] * mean[1] + c00 * mean[1] * mean[1]) / determinant;
+        -0.5 * (determinant.ln() + distance2)
+    }
+
+    #[test]
+    fn the_evidence_for_a_free_tip_is_a_ratio_of_densities() {
+        for (stiffness, friction) in [(0.0, 9000.0), (0.0, 0.0), (30.0, 4000.0)] {
+            let (layers, noise) = behind_a_rupture(stiffness, friction);
+            let (other, _) = behind_a_rupture(10.0, 8000.0);
+            for follows in [true, false] {
+                // Up to a constant, which a difference does not show.
+                let found =
+                    layers.log_density_of_free(follows, &noise) - other.log_density_of_free(follows, &noise);
+                let expected = log_density(&layers, follows, &noise) - log_density(&other, follows, &noise);
+                assert!((found - expected).abs() < 1e-6 * expected.abs().max(1.0), "{found} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_tip_is_free_where_nothing_is_felt_and_friction_grows_on_or_stays() {
+        let (mut gap, noise) = behind_a_rupture(0.0, 9000.0);
+        assert!(gap.consider_free(ODDS, &noise) && gap.free && !gap.settled);
+        assert!(gap.belief.x[K].abs() < 1e-3, "{}", gap.belief.x[K]);
+        assert!((gap.belief.x[F] / 9000.0 - 1.0).abs() < 0.02, "{}", gap.belief.x[F]);
+        let (mut end, noise) = behind_a_rupture(0.0, 0.0);
+        assert!(end.consider_free(ODDS, &noise) && end.free);
+        assert!(end.belief.x[F].abs() < 10.0, "{}", end.belief.x[F]);
+    }
+
+    #[test]
+    fn a_layer_that_has_begun_is_no_gap_and_is_not_looked_at_again() {
+        for (stiffness, friction) in [(60.0, 9000.0), (0.0, 20_000.0), (30.0, 0.0)] {
+            let (mut layers, noise) = behind_a_rupture(stiffness, friction);
+            assert!(!layers.consider_free(ODDS, &noise) && !layers.free, "{stiffness} N/m");
+            assert!(layers.settled, "{stiffness} N/m");
+        }
+    }
+}

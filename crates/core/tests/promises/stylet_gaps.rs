@@ -102,6 +102,34 @@ fn stiffness_friction_and_drops_are_right_within_their_intervals() {
 }
 
 #[test]
+fn the_friction_behind_a_layer_that_gave_way_is_right_within_its_interval() {
+    let tissue = Tissue::three_gels();
+    let (mut inside, mut of, mut worst) = (0, 0, 0.0_f64);
+    for seed in 0..20 {
+        let data = early(0.02, seed, |_| 0.0023, 50.0);
+        let outputs = enhance(&stylet(), &data.samples);
+        let mut layers: Vec<LayerEstimate> = Vec::new();
+        for e in outputs.iter().filter_map(|o| o.estimate) {
+            layers.retain(|x| x.layer != e.layer);
+            layers.push(e);
+        }
+        // Behind the rupture the shaft has all layers before around it, and this one as far as the tip came.
+        let (mut before, mut face_m) = (0.0, 0.0);
+        for ((e, layer), rupture) in layers.iter().zip(&tissue.layers).zip(&data.ruptures) {
+            let truth = before + layer.friction_ns_per_m2 * (rupture.position_m - face_m);
+            before += layer.friction_ns_per_m2 * layer.thickness_m;
+            face_m += layer.thickness_m;
+            let off = e.cumulative_ns_per_m - truth;
+            worst = worst.max(off.abs() / truth);
+            inside += usize::from(off.abs() <= 1.96 * e.cumulative_sd);
+            of += 1;
+            assert!(e.cumulative_sd < 0.03 * truth, "seed {seed}: {e:?} for {truth} N s/m");
+        }
+    }
+    assert!(of == 60 && inside >= 54 && worst < 0.03, "{inside} of {of} in their intervals, off by {worst}");
+}
+
+#[test]
 fn a_needle_that_has_not_moved_yet_stands_whatever_a_smoothed_velocity_says() {
     // Smoothed in both directions of time: the velocity rises before the needle has moved.
     // Stops every other second, so that log and positions are usually apart.

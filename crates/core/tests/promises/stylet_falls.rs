@@ -1,0 +1,138 @@
+//! What `algorithm: Stylet` promises of a fall of the force: one that takes up to 0.1 s is one rupture, placed where it began and told with its
+//! size; one that takes longer is none; three odd samples are a spike.
+
+use crate::support::{Insertion, enhance, insertion};
+use stylet_core::config::Algorithm;
+use stylet_core::{Detection, EnhanceConfig, Output, Sample};
+use stylet_tissue::Tissue;
+
+fn stylet() -> EnhanceConfig {
+    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
+}
+
+fn gels() -> Tissue {
+    let mut tissue = Tissue::three_gels();
+    for layer in &mut tissue.layers {
+        layer.puncture_n = None;
+    }
+    tissue
+}
+
+/// The paper's three layers without latex whose drops last `drop_s`: what is released is let go evenly.
+fn soft(seed: u64, drop_s: f64) -> Insertion {
+    let mut data = insertion(&gels(), -0.005, 50.0, 200.0, 0.02, seed, |_| 0.0023);
+    for rupture in &data.ruptures {
+        for (sample, truth) in data.samples.iter_mut().zip(&mut data.truth) {
+            let since_s = sample.time_s - rupture.time_s;
+            if (0.0..drop_s).contains(&since_s) {
+                let left_n = rupture.released_n * (1.0 - since_s / drop_s);
+                sample.force_n += left_n;
+                truth.total_n += left_n;
+                truth.tip_n += left_n;
+            }
+        }
+    }
+    data
+}
+
+fn found(outputs: &[Output]) -> Vec<Detection> {
+    outputs.iter().filter_map(|o| o.detection).collect()
+}
+
+#[test]
+fn a_drop_is_placed_within_a_step_of_where_it_was_and_told_with_its_size() {
+    for seed in 0..10 {
+        let data = soft(seed, 0.0);
+        let found = found(&enhance(&stylet(), &data.samples));
+        assert_eq!(found.len(), 3, "seed {seed}");
+        for (d, rupture) in found.iter().zip(&data.ruptures) {
+            assert!((d.located_m - rupture.position_m).abs() <= 0.0023 * 0.005, "{d:?} for {rupture:?}");
+            assert!((d.drop_n - rupture.released_n).abs() < 4.0 * 0.02, "{d:?} for {rupture:?}");
+            assert!((0.01..=0.03).contains(&d.drop_sd_n), "one sample's noise at most: {d:?}");
+            assert!(d.confidence > 0.99 && d.confidence <= 1.0, "{d:?}");
+        }
+    }
+}
+
+#[test]
+fn a_drop_that_takes_up_to_a_tenth_of_a_second_is_one_rupture() {
+    for seed in 0..10 {
+        for drop_s in [0.02, 0.05, 0.08] {
+            let data = soft(seed, drop_s);
+            let outputs = enhance(&stylet(), &data.samples);
+            let found = found(&outputs);
+            assert_eq!(found.len(), 3, "seed {seed}, {drop_s} s: {found:?}");
+            for (d, rupture) in found.iter().zip(&data.ruptures) {
+                let delay_s = d.time_s - rupture.time_s;
+                assert!((0.0..=drop_s).contains(&delay_s), "seed {seed}, {drop_s} s: {delay_s} s late");
+            }
+            // Half a second after the drop, the predictor's memory, its slope is forgotten and friction is gone.
+            for rupture in &data.ruptures {
+                let at = (200.0 * (rupture.time_s + drop_s + 0.5)) as usize;
+                let noise_n = data.samples[at].force_n - data.truth[at].total_n;
+                let off_n = outputs[at].enhanced_n - noise_n - data.truth[at].tip_n;
+                assert!(off_n.abs() < 0.1, "seed {seed}, {drop_s} s: {off_n} N");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rise_by_the_same_force_is_no_rupture_and_up_to_three_odd_samples_change_nothing() {
+    let data = soft(1, 0.0);
+    let plain = enhance(&stylet(), &data.samples);
+    for length in 1..=3 {
+        let mut samples = data.samples.clone();
+        for k in (1000..9000).step_by(500) {
+            for sample in &mut samples[k..k + length] {
+                sample.force_n += 5.0;
+            }
+        }
+        let outputs = enhance(&stylet(), &samples);
+        assert_eq!(found(&outputs).len(), 3, "{length} samples");
+        // A tenth of a second after the last one what is said of friction is what it was.
+        let (now, before) = (&outputs[8700], &plain[8700]);
+        let off = now.cumulative_friction_ns_per_m - before.cumulative_friction_ns_per_m;
+        assert!(off.abs() < 0.01 * before.cumulative_friction_ns_per_m, "{length} samples: {off} N s/m");
+    }
+}
+
+#[test]
+fn the_weaker_a_drop_the_less_sure_it_is() {
+    // Layers of some N/m, so that drops are some standard deviations of the noise.
+    let mut confidences = Vec::new();
+    for stiffness in [2.0, 5.0, 40.0] {
+        let mut tissue = gels();
+        for layer in &mut tissue.layers {
+            layer.stiffness_n_per_m = stiffness;
+        }
+        let (mut sum, mut count) = (0.0, 0);
+        for seed in 0..10 {
+            let data = insertion(&tissue, -0.005, 50.0, 200.0, 0.02, seed, |_| 0.0023);
+            let found = found(&enhance(&stylet(), &data.samples));
+            assert_eq!(found.len(), 3, "{stiffness} N/m, seed {seed}");
+            for (d, rupture) in found.iter().zip(&data.ruptures) {
+                assert!((0.0..0.2).contains(&(d.time_s - rupture.time_s)), "{stiffness} N/m: {d:?}");
+                assert!((0.5..=1.0).contains(&d.confidence), "{d:?}");
+                sum += d.confidence;
+                count += 1;
+            }
+        }
+        confidences.push(sum / f64::from(count));
+    }
+    assert!(confidences.is_sorted() && confidences[2] > 0.999 && confidences[0] < 0.999, "{confidences:?}");
+}
+
+/// A sample that is odd and stays so long that it is no spike is taken as it is.
+#[test]
+fn a_force_that_jumps_up_and_stays_is_followed_without_a_rupture() {
+    let data = insertion(&gels(), -0.005, 14.0, 200.0, 0.02, 1, |_| 0.0023);
+    let mut samples: Vec<Sample> = data.samples.clone();
+    for sample in &mut samples[1800..] {
+        sample.force_n += 2.0;
+    }
+    let outputs = enhance(&stylet(), &samples);
+    assert!(found(&outputs).is_empty());
+    let last = outputs.last().expect("some");
+    assert!(last.error_n.abs() < 0.1, "it predicts again: {last:?}");
+}
