@@ -134,6 +134,8 @@ pub fn diagnose(
             .collect();
         causes.retain(|c| kept.contains(&c.effect.as_str()));
     }
+    // Where none of its effects is a cause, the base law is what is left.
+    let after = if explains(&search, &causes) { after } else { before.clone() };
     let verdict = if unknown {
         Verdict::Unknown
     } else if causes.iter().any(|c| !c.equivalent.is_empty()) {
@@ -452,11 +454,16 @@ pub(crate) fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
     causes
 }
 
+/// Whether an effect of the best model is a cause.
+fn explains(search: &Search, causes: &[Cause]) -> bool {
+    search.best.model.effects.iter().any(|e| causes.iter().any(|c| c.effect == e.info.id))
+}
+
 /// The scenario as the diagnosis leaves it.
 fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
     let mut out = scenario.clone();
-    let source =
-        if d.verdict == Verdict::Unknown && d.causes.is_empty() { &search.base } else { &search.best };
+    let none = search.best.model.effects.is_empty() && d.verdict != Verdict::Unknown;
+    let source = if none || explains(search, &d.causes) { &search.best } else { &search.base };
     out.tissue = source.model.tissue.clone();
     let named = |id: &str| d.causes.iter().any(|c| c.effect == id);
     out.effects.extend(source.model.effects.iter().filter(|e| named(e.info.id)).filter_map(|e| e.effect()));
