@@ -123,8 +123,11 @@ const UNEVEN: f64 = 0.005;
 pub(crate) fn rounding(z: &[f64]) -> f64 {
     let moves = || z.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite());
     let mut sizes: Vec<f64> = moves().map(f64::abs).filter(|d| *d > LEAST_STEP_M).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let Some(&step) = sizes.get(sizes.len() / 100) else { return 0.0 };
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let small = sizes.len() / 100;
+    let step = *sizes.select_nth_unstable_by(small, f64::total_cmp).1;
     let count = |d: f64| libm::round(d / step);
     let broken = moves().filter(|d| (d / step - count(*d)).abs() > WHOLE).count();
     if 100 * broken > z.len() {

@@ -1,22 +1,8 @@
 //! What `algorithm: Stylet` promises of a fall of the force: one that takes up to 0.1 s is one rupture, placed where it began and told with its
 //! size; one that takes longer is none; three odd samples are a spike.
 
-use crate::support::{Insertion, enhance, insertion};
-use stylet_core::config::Algorithm;
-use stylet_core::{Detection, EnhanceConfig, Output, Sample};
-use stylet_tissue::Tissue;
-
-fn stylet() -> EnhanceConfig {
-    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
-}
-
-fn gels() -> Tissue {
-    let mut tissue = Tissue::three_gels();
-    for layer in &mut tissue.layers {
-        layer.puncture_n = None;
-    }
-    tissue
-}
+use crate::support::{Insertion, enhance, gels, insertion, stylet};
+use stylet_core::{Detection, Output, Sample};
 
 /// The paper's three layers without latex whose drops last `drop_s`: what is released is let go evenly.
 fn soft(seed: u64, drop_s: f64) -> Insertion {

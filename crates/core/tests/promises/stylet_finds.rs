@@ -1,23 +1,9 @@
 //! What `algorithm: Stylet` promises on simulated insertions: every rupture within a few samples and nothing else, with loud noise, rippled speed
 //! and holds; stiffness, friction and their intervals; friction taken away soon after a drop.
 
-use crate::support::{Insertion, constant, enhance, insertion, sinusoid};
-use stylet_core::config::Algorithm;
-use stylet_core::{EnhanceConfig, LayerEstimate, Output, Sample};
-use stylet_tissue::{Rupture, Tissue};
-
-fn stylet() -> EnhanceConfig {
-    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
-}
-
-/// The paper's three layers without latex.
-fn gels() -> Tissue {
-    let mut tissue = Tissue::three_gels();
-    for layer in &mut tissue.layers {
-        layer.puncture_n = None;
-    }
-    tissue
-}
+use crate::support::{Insertion, constant, enhance, gels, insertion, last_estimates, sinusoid, stylet};
+use stylet_core::{Output, Sample};
+use stylet_tissue::Rupture;
 
 /// Asserts that exactly the true ruptures are found, each at most `latest_s` late.
 fn assert_found(name: &str, ruptures: &[Rupture], outputs: &[Output], latest_s: f64) {
@@ -31,16 +17,6 @@ fn assert_found(name: &str, ruptures: &[Rupture], outputs: &[Output], latest_s: 
             rupture.layer
         );
     }
-}
-
-/// The last word on each layer.
-fn estimates(outputs: &[Output]) -> Vec<LayerEstimate> {
-    let mut all: Vec<LayerEstimate> = Vec::new();
-    for e in outputs.iter().filter_map(|o| o.estimate) {
-        all.retain(|x| x.layer != e.layer);
-        all.push(e);
-    }
-    all
 }
 
 #[test]
@@ -102,7 +78,7 @@ fn stiffness_and_friction_are_right_within_their_intervals() {
     let (mut inside, mut of) = (0, 0);
     for seed in 0..20 {
         let data = insertion(&tissue, -0.005, 50.0, 200.0, 0.1, seed, |_| 0.0023);
-        let found = estimates(&enhance(&stylet(), &data.samples));
+        let found = last_estimates(&enhance(&stylet(), &data.samples));
         assert_eq!(found.len(), 3, "seed {seed}");
         for (e, layer) in found.iter().zip(&tissue.layers) {
             let k = (e.stiffness_n_per_m - layer.stiffness_n_per_m, e.stiffness_sd, layer.stiffness_n_per_m);
@@ -137,7 +113,7 @@ fn a_fall_that_is_no_drop_estimates_no_layer() {
     for s in &mut data.samples[1800..2000] {
         s.force_n += 1.0;
     }
-    let found = estimates(&enhance(&stylet(), &data.samples));
+    let found = last_estimates(&enhance(&stylet(), &data.samples));
     assert!(found.iter().all(|e| e.drop_n > 1.96 * e.drop_sd_n && e.drop_n > 0.0), "{found:?}");
 }
 

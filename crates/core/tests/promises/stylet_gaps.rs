@@ -1,14 +1,9 @@
 //! What `algorithm: Stylet` promises where a layer gives way before its far face: behind the drop the tip is free until the next face, and the
 //! core knows.
 
-use crate::support::{Insertion, enhance, insertion};
-use stylet_core::config::Algorithm;
-use stylet_core::{EnhanceConfig, LayerEstimate, Output};
+use crate::support::{Insertion, enhance, insertion, last_estimates, stylet};
+use stylet_core::Output;
 use stylet_tissue::Tissue;
-
-fn stylet() -> EnhanceConfig {
-    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
-}
 
 const DROPS_N: [f64; 3] = [0.9, 1.7, 2.1];
 
@@ -70,11 +65,7 @@ fn stiffness_friction_and_drops_are_right_within_their_intervals() {
     for seed in 0..20 {
         let data = early(0.02, seed, |_| 0.0023, 50.0);
         let outputs = enhance(&stylet(), &data.samples);
-        let mut layers: Vec<LayerEstimate> = Vec::new();
-        for e in outputs.iter().filter_map(|o| o.estimate) {
-            layers.retain(|x| x.layer != e.layer);
-            layers.push(e);
-        }
+        let layers = last_estimates(&outputs);
         assert_eq!(layers.len(), 3, "seed {seed}");
         for (e, layer) in layers.iter().zip(&tissue.layers) {
             for (off, sd, truth) in [
@@ -108,11 +99,7 @@ fn the_friction_behind_a_layer_that_gave_way_is_right_within_its_interval() {
     for seed in 0..20 {
         let data = early(0.02, seed, |_| 0.0023, 50.0);
         let outputs = enhance(&stylet(), &data.samples);
-        let mut layers: Vec<LayerEstimate> = Vec::new();
-        for e in outputs.iter().filter_map(|o| o.estimate) {
-            layers.retain(|x| x.layer != e.layer);
-            layers.push(e);
-        }
+        let layers = last_estimates(&outputs);
         // Behind the rupture the shaft has all layers before around it, and this one as far as the tip came.
         let (mut before, mut face_m) = (0.0, 0.0);
         for ((e, layer), rupture) in layers.iter().zip(&tissue.layers).zip(&data.ruptures) {

@@ -1,14 +1,14 @@
 //! `algorithm: Stylet` stays finite, its covariances positive definite and its work bounded, whatever a robot or a logger does to it; and
 //! it allocates nothing.
 
-use crate::support::constant;
+use crate::support::{constant, stylet};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 
 fn core() -> Enhancer<[Sample; 0]> {
-    let config = EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() };
+    let config = stylet();
     Enhancer::new(config, 0.0, [])
 }
 

@@ -1,8 +1,7 @@
 //! `algorithm: Stylet` does not mind where the sensor's zero, the clock's and the position's lie: the air tells.
 
-use crate::support::{enhance, insertion};
-use stylet_core::config::Algorithm;
-use stylet_core::{EnhanceConfig, Sample};
+use crate::support::{enhance, insertion, stylet};
+use stylet_core::Sample;
 use stylet_tissue::Tissue;
 
 /// Insertions to and fro: by the law of layers, with gaps, and with dry friction, a curved force and texture that follow no law.
@@ -41,7 +40,7 @@ fn insertions() -> Vec<(&'static str, Vec<Sample>)> {
 
 #[test]
 fn another_zero_of_sensor_clock_and_position_shifts_what_is_said_and_changes_nothing_else() {
-    let config = EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() };
+    let config = stylet();
     // By powers of two, so that rounding is next to none.
     for (force_n, time_s, position_m) in
         [(2.0, 0.0, 0.0), (-4.0, 0.0, 0.0), (0.0, 64.0, 0.0), (0.0, 0.0, 0.5)]

@@ -1,8 +1,7 @@
 //! What `algorithm: Stylet` promises where the law of layers does not hold, as in measured insertions: friction that hardly depends on
 //! speed, a force that is curved with travel, texture.
 
-use crate::support::enhance;
-use stylet_core::config::Algorithm;
+use crate::support::{enhance, stylet};
 use stylet_core::{EnhanceConfig, Output, Sample};
 
 const LAYER_M: f64 = 0.02;
@@ -41,7 +40,7 @@ fn rough(texture_n: f64) -> (Vec<Sample>, Vec<f64>) {
 }
 
 fn with_smallest(smallest_drop: f64) -> EnhanceConfig {
-    let mut config = EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() };
+    let mut config = stylet();
     config.stylet.smallest_drop = smallest_drop;
     config
 }

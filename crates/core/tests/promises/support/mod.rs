@@ -4,7 +4,8 @@
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use stylet_core::{EnhanceConfig, Enhancer, Output, Sample};
+use stylet_core::config::Algorithm;
+use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample};
 use stylet_tissue::{Law, LawState, Rupture, Tissue, TissueForce};
 
 /// Samples of an insertion, with the true force and ruptures.
@@ -69,4 +70,28 @@ pub fn enhance(config: &EnhanceConfig, samples: &[Sample]) -> Vec<Output> {
 /// Times of the detections.
 pub fn detections(outputs: &[Output]) -> Vec<f64> {
     outputs.iter().filter_map(|o| o.detection).map(|d| d.time_s).collect()
+}
+
+/// This project's algorithm as it comes.
+pub fn stylet() -> EnhanceConfig {
+    EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
+}
+
+/// The paper's three layers without latex.
+pub fn gels() -> Tissue {
+    let mut tissue = Tissue::three_gels();
+    for layer in &mut tissue.layers {
+        layer.puncture_n = None;
+    }
+    tissue
+}
+
+/// The last word on each layer.
+pub fn last_estimates(outputs: &[Output]) -> Vec<LayerEstimate> {
+    let mut all: Vec<LayerEstimate> = Vec::new();
+    for e in outputs.iter().filter_map(|o| o.estimate) {
+        all.retain(|x| x.layer != e.layer);
+        all.push(e);
+    }
+    all
 }
