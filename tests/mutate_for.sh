@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Mutated inputs for a given time (seconds, default 600), with a new seed every round. What makes a parser panic or linger is kept in
 # target/mutated and the round's seed is printed: put it into the corpus of tests/mutated_inputs.rs when it is mended.
-# STYLET_MUTATIONS_EACH=10000000 gives every parser of text so many in a round (some hours). Ends with the inputs per parser.
+# STYLET_MUTATIONS_EACH=10000000 gives every parser of text so many in a round (some hours), with
+# STYLET_MUTATED="gates shard" those alone. Ends with the inputs per parser.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:-600}

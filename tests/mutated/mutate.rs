@@ -93,11 +93,13 @@ fn mutated(seed: &[u8], dice: &mut Dice) -> Vec<u8> {
 }
 
 /// How many mutations of a corpus, and from which seed: `of`, or so many percent of them as `STYLET_MUTATIONS` says, or for what parses
-/// text as many as `STYLET_MUTATIONS_EACH` says.
-fn amount(of: u64, what: What) -> (u64, u64) {
+/// text as many as `STYLET_MUTATIONS_EACH` says; where `STYLET_MUTATED` names parsers (`"gates shard"`), those alone so many.
+fn amount(name: &str, of: u64, what: What) -> (u64, u64) {
     let set = |name: &str| std::env::var(name).ok().and_then(|x| x.parse::<u64>().ok());
     let share = of * set("STYLET_MUTATIONS").unwrap_or(100) / 100;
-    let each = set("STYLET_MUTATIONS_EACH").filter(|_| what == What::Text);
+    let asked =
+        std::env::var("STYLET_MUTATED").map_or(true, |names| names.split_whitespace().any(|n| n == name));
+    let each = set("STYLET_MUTATIONS_EACH").filter(|_| what == What::Text && asked);
     (each.unwrap_or(share), set("STYLET_MUTATION_SEED").unwrap_or(1))
 }
 
@@ -132,7 +134,7 @@ pub fn feed(
     corpus: &[Vec<u8>],
     parser: impl Fn(&[u8]) -> bool,
 ) -> (u64, u64) {
-    let (count, seed) = amount(of, what);
+    let (count, seed) = amount(name, of, what);
     for (k, whole) in corpus.iter().enumerate() {
         assert!(parser(whole), "{name}: {k} of the corpus itself is accepted");
     }
