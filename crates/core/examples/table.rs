@@ -239,6 +239,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
     let mut errors: Vec<Vec<f64>> = vec![vec![]; row.tissue.layers.len()];
     let mut enh = vec![];
     let mut cover = [[0.0; 2]; 4];
+    let mut zs = [[(); 3]; 3].map(|r| r.map(|()| Vec::<f64>::new()));
     let mut verbose = if std::env::var_os("VERBOSE").is_some() { 5 } else { 0 };
     for seed in 0..seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
@@ -312,6 +313,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                         errors[i].push(100.0 * (e.stiffness_n_per_m / l.stiffness_n_per_m - 1.0).abs());
                         let mut c = |k: usize, x: f64, sd: f64| {
                             cover[k][1] += 1.0;
+                            if i < 3 { zs[i][k].push(x / sd); }
                             if x.abs() <= 1.96 * sd {
                                 cover[k][0] += 1.0;
                             }
@@ -332,6 +334,20 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                 }
             }
         }
+    }
+    for (i, layer) in zs.iter().enumerate() {
+        for (k, z) in layer.iter().enumerate() {
+            let n = z.len() as f64;
+            let m = z.iter().sum::<f64>() / n;
+            let s = (z.iter().map(|z| (z - m).powi(2)).sum::<f64>() / n).sqrt();
+            let cov = z.iter().filter(|z| z.abs() <= 1.96).count() as f64 / n;
+            let mut q = z.clone();
+            q.sort_by(f64::total_cmp);
+            let at = |p: f64| q.get(((n - 1.0) * p) as usize).copied().unwrap_or(0.0);
+            println!("      q {:.1?}", [0.0, 0.01, 0.025, 0.05, 0.16, 0.5, 0.84, 0.95, 0.975, 0.99, 1.0].map(at));
+            print!("   {}{} mean {m:+.2} sd {s:.2} cover {:.1}", i + 1, ["K", "b", "D"][k], 100.0 * cov);
+        }
+        println!();
     }
     let ks: Vec<String> = errors.iter_mut().map(|e| format!("{:.2}", median(e, 0.5))).collect();
     let cv: Vec<String> = cover.iter().map(|c| format!("{:.1}", 100.0 * c[0] / c[1])).collect();

@@ -136,7 +136,7 @@ impl Stylet {
         self.layers.rupture(at_m, place_m, drive, &self.noise, &mut self.behind);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
-        self.layers.take(sample.position_m, self.drive, sample.force_n, 0.0);
+        self.layers.take(sample.position_m, self.drive, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.alarm.rest();

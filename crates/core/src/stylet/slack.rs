@@ -18,7 +18,7 @@ use super::layers::{Behind, F, FP, K, Layers};
 use super::noise::Noise;
 
 /// Odds at which the tip is taken to be free.
-const ODDS: f64 = 20.0;
+const ODDS: f64 = 100.0;
 /// Shift that the sum is made for which tells where a bend began, in standard deviations of an innovation.
 const SLOW_SHIFT: f64 = 0.5;
 /// No more is said of odds than this, in nats.
