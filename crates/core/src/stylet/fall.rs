@@ -1,6 +1,6 @@
 //! A fall of the force: whether it is a rupture, and what a rupture does.
 
-use super::gaussian::at_most;
+use super::gaussian::{at_least, at_most};
 use super::local::{MEMORY_M, Step};
 use super::motion::SPEED_S;
 use super::{LONGEST_DROP_S, Stylet, WORK_RUPTURE};
@@ -12,6 +12,9 @@ const MOST_AVERAGED: f64 = 16.0;
 
 /// Standard deviations that a fall below the law has to have: whatever else set off the alarm, noise makes it so low once in 30 000 looks.
 const SURE_SDS: f64 = 4.0;
+
+/// A place is not known better than to a micrometre, in m².
+const TINY_M2: f64 = 1e-12;
 
 /// A fall of the force that may become a rupture.
 #[derive(Clone, Copy, Debug)]
@@ -136,6 +139,8 @@ impl Stylet {
         self.layers.rupture(at_m, place_m, drive, &self.noise, &mut self.behind);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
+        self.lasting = None;
+        (self.intact, self.fell_m, self.located_m) = (self.before, sample.position_m, at_m);
         self.layers.take(sample.position_m, self.drive, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
@@ -175,9 +180,39 @@ impl Stylet {
         let (rate, variance) = self.local.rate(step.speed_mps, accel_mps2, friction);
         let sd = libm::sqrt(variance * self.noise.variance);
         let falling = rate < -3.0 * sd;
-        if self.since_s > LONGEST_DROP_S && rate > -2.0 * sd {
-            self.fallen = None;
+        if self.since_s > LONGEST_DROP_S {
+            if falling {
+                self.trace_back(step, sample, rate, sd);
+            } else if rate > -2.0 * sd {
+                self.fallen = None;
+                self.fall_anew();
+            }
         }
         falling
+    }
+
+    /// A drop that lasts began where the straight line of the force that falls meets what the law says: the best known of what its samples say.
+    fn trace_back(&mut self, step: &Step, sample: &Sample, rate_n_per_s: f64, sd_n_per_s: f64) {
+        let steep = self.intact.slope(self.drive) - rate_n_per_s / step.speed_mps;
+        let back_m = (self.intact.says(sample.position_m, self.drive) - self.local.level_n()) / steep;
+        // Level and slope are wrong together: what makes the one too high makes the line less steep.
+        let (level, both) = self.local.level_doubt(step.speed_mps);
+        let (by_m, noise_n2) = (back_m / step.speed_mps, self.noise.variance);
+        let line_n2 = level * noise_n2 + by_m * (by_m * sd_n_per_s * sd_n_per_s - 2.0 * both * noise_n2);
+        let variance = at_least(TINY_M2, line_n2 / (steep * steep));
+        if steep > 0.0 && self.lasting.is_none_or(|(_, best)| variance < best) {
+            self.lasting = Some((sample.position_m - back_m, variance));
+        }
+    }
+
+    /// What was taken for a sudden drop began before: the belief of before moves on from there.
+    fn fall_anew(&mut self) {
+        let Some((began_m, variance)) = self.lasting.take() else { return };
+        let span_m = self.fell_m - self.located_m;
+        let began_m = began_m.clamp(self.located_m - span_m.max(MEMORY_M), self.fell_m);
+        self.work += WORK_RUPTURE;
+        self.layers = self.intact;
+        let drive = self.steady.max(1e-6);
+        self.layers.rupture(began_m, libm::sqrt(variance).min(span_m), drive, &self.noise, &mut self.behind);
     }
 }

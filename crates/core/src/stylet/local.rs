@@ -148,6 +148,12 @@ impl Local {
         (rate, alone + a * (2.0 * (g.cov(R, B) + v * g.cov(S, B)) + a * g.p[B][B]))
     }
 
+    /// Variance of the level in units of the noise's, and its covariance with [`Local::rate`] at an even speed.
+    pub(crate) fn level_doubt(&self, speed_mps: f64) -> (f64, f64) {
+        let g = &self.state;
+        (g.p[L][L], g.cov(L, R) + speed_mps * g.cov(L, S))
+    }
+
     /// Predicted force in N.
     pub(crate) fn level_n(&self) -> f64 {
         self.state.x[L]

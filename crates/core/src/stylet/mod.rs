@@ -78,6 +78,12 @@ pub(crate) struct Stylet {
     fallen: Option<Layers>,
     since_s: f64,
     falling: bool,
+    /// The estimator as it was before the last rupture, where that was noticed and where it was located in m; and where a drop that lasts began,
+    /// with the variance of that in m².
+    intact: Layers,
+    fell_m: f64,
+    located_m: f64,
+    lasting: Option<(f64, f64)>,
     fall: Option<Fall>,
     /// Size of the last fall that was looked at, and its standard deviation, in N.
     drop: (f64, f64),
@@ -134,6 +140,10 @@ impl Stylet {
             fallen: None,
             since_s: 0.0,
             falling: false,
+            intact: layers,
+            fell_m: surface_m,
+            located_m: surface_m,
+            lasting: None,
             fall: None,
             drop: (0.0, 0.0),
             last_level_n: 0.0,
