@@ -38,6 +38,14 @@ fn weak() -> Tissue {
     }
     t
 }
+/// Each gives way 6 to 9 mm before its far face.
+fn gaps() -> Tissue {
+    let mut t = gels();
+    for (l, n) in t.layers.iter_mut().zip([0.9, 1.7, 2.1]) {
+        l.puncture_n = Some(n);
+    }
+    t
+}
 fn constant(_t: f64) -> f64 {
     0.0023
 }
@@ -212,6 +220,36 @@ fn main() {
             dur: 50.0,
             v: constant,
         },
+        Row {
+            name: "gaps .02",
+            tissue: gaps(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "gaps .1",
+            tissue: gaps(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.1,
+            rho: 0.0,
+            dur: 50.0,
+            v: constant,
+        },
+        Row {
+            name: "gaps sinus",
+            tissue: gaps(),
+            effects: vec![],
+            fs: 200.0,
+            noise: 0.02,
+            rho: 0.0,
+            dur: 15.0,
+            v: sinus,
+        },
     ];
     println!(
         "{:16} {:>10} {:>12} {:>14} {:>8} cover K b D band",
@@ -296,6 +334,8 @@ fn run(row: &Row, seeds: u64, rate: f64) {
         for (i, (tr, zr)) in ruptures.iter().enumerate() {
             total += 1;
             let l = &row.tissue.layers[i];
+            let inside = l.friction_ns_per_m2 * (zr - row.tissue.front_m(i));
+            let dsum_now = dsum + inside;
             dsum += l.friction_ns_per_m2 * l.thickness_m;
             let hit = (0..det.len()).find(|&j| !used[j] && det[j] >= tr - 0.05 && det[j] <= tr + 1.0);
             match hit {
@@ -320,7 +360,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                         };
                         c(0, e.stiffness_n_per_m - l.stiffness_n_per_m, e.stiffness_sd);
                         c(1, e.friction - l.friction_ns_per_m2, e.friction_sd);
-                        c(2, e.cumulative_ns_per_m - dsum, e.cumulative_sd);
+                        c(2, e.cumulative_ns_per_m - dsum_now, e.cumulative_sd);
                     }
                 }
             }

@@ -18,7 +18,7 @@ use super::layers::{Behind, F, FP, K, Layers};
 use super::noise::Noise;
 
 /// Odds at which the tip is taken to be free.
-const ODDS: f64 = 100.0;
+const ODDS: f64 = 20.0;
 /// Shift that the sum is made for which tells where a bend began, in standard deviations of an innovation.
 const SLOW_SHIFT: f64 = 0.5;
 /// No more is said of odds than this, in nats.
@@ -127,7 +127,7 @@ impl Layers {
         // A layer has begun, and it is not looked at again, when it is that much more probable than a free tip.
         self.settled = follows.max(ends) < -SETTLED * libm::log(odds);
         // As probable as that against both others together: that a layer has begun, and the other way to be free.
-        let others = libm::log(odds * (1.0 + libm::exp(follows.min(ends).min(MOST_NATS))));
+        let others = libm::log(odds * (1.0 + odds * libm::exp(follows.min(ends).min(MOST_NATS))));
         if follows.max(ends) < others || !(follows + ends).is_finite() {
             return false;
         }
