@@ -13,6 +13,9 @@ const MOST_AVERAGED: f64 = 16.0;
 /// Standard deviations that a fall below the law has to have: whatever else set off the alarm, noise makes it so low once in 30 000 looks.
 const SURE_SDS: f64 = 4.0;
 
+/// Where it does not hold: a drop below its own interval is none.
+const LIKELY_SDS: f64 = 2.0;
+
 /// A place is not known better than to a micrometre, in m².
 const TINY_M2: f64 = 1e-12;
 
@@ -94,15 +97,15 @@ impl Stylet {
         let effective = (fall.count.min(MOST_AVERAGED) / libm::sqrt(self.noise.slow())).max(1.0);
         let sd_n = libm::sqrt(self.noise.marginal() / effective);
         let fallen_n = fall.from_n - fall.mean_n;
-        if self.rough > 0.0 {
-            let least_n = self.least_n.max(2.0 * sd_n);
-            return Some(Size { fall_n: fallen_n, sd_n, least_n });
-        }
-        // Where the law of layers holds it knows what the force would be; and the force has to have fallen, too. A free tip has nothing to
-        // lose, but where friction stops to grow the force is below what the predictor's memory makes of the growth.
-        let fall_n = at_most(fall.missing_n, fallen_n);
+        // A free tip has nothing to lose, but where friction stops to grow the force is below what the predictor's memory makes of the growth.
         let growth_n = if self.layers.free { self.layers.growth(self.steady) * MEMORY_M } else { 0.0 };
-        let least_n = SURE_SDS * sd_n + growth_n;
+        let sure_sds = SURE_SDS + self.rough * (LIKELY_SDS - SURE_SDS);
+        let sure_n = sure_sds * sd_n + (1.0 - self.rough) * growth_n;
+        if self.rough > 0.0 {
+            return Some(Size { fall_n: fallen_n, sd_n, least_n: at_least(self.least_n, sure_n) });
+        }
+        // Where the law of layers holds it knows what the force would be; and the force has to have fallen, too.
+        let (fall_n, least_n) = (at_most(fall.missing_n, fallen_n), sure_n);
         Some(Size { fall_n, sd_n, least_n })
     }
 

@@ -114,7 +114,7 @@ impl Stylet {
             let standard = e / libm::sqrt(s * self.noise.variance);
             let z2 = at_most(400.0, standard * standard);
             if self.fallen.is_none() {
-                self.work += self.slack.follow(
+                let (work, bent) = self.slack.follow(
                     &mut self.layers,
                     (before, self.last.position_m),
                     (sample.position_m, standard, at_least(1e-6, self.steady)),
@@ -122,6 +122,12 @@ impl Stylet {
                     &self.noise,
                     &mut self.behind,
                 );
+                self.work += work;
+                if bent {
+                    // What the predictor has missed since was the bend.
+                    self.alarm.rest();
+                    (self.fall, self.was_quiet) = (None, true);
+                }
             }
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {
                 let share = at_least(share, at_most(0.5, step.dt_s * (0.25 / local::MEMORY_S)));

@@ -81,7 +81,7 @@ impl Slack {
     }
 
     /// After a sample at `position_m` that the estimator took with the standardised innovation `z` (`before`, while the tip is free, is the estimator
-    /// without it, `last_m` the position of the sample before). Returns the work done.
+    /// without it, `last_m` the position of the sample before). Returns the work done, and whether the force has bent.
     #[inline(always)]
     pub(super) fn follow(
         &mut self,
@@ -91,30 +91,30 @@ impl Slack {
         count: u32,
         noise: &Noise,
         behind: &mut Behind,
-    ) -> u32 {
+    ) -> (u32, bool) {
         if layers.passed == 0 {
-            return 0;
+            return (0, false);
         }
         let Some(before) = &before else {
             if layers.settled || !count.is_multiple_of(EVERY) {
-                return 0;
+                return (0, false);
             }
             if layers.consider_free(ODDS, noise) {
                 self.rest();
             }
-            return WORK_LOOK;
+            return (WORK_LOOK, false);
         };
         let bent_up = self.up.take(-z, before, last_m);
         let bent_down = self.down.take(z, before, last_m);
         if !bent_up && !bent_down {
-            return WORK_SUMS;
+            return (WORK_SUMS, false);
         }
         let side = if bent_up { &self.up } else { &self.down };
         let (span_m, at_m) = ((position_m - side.before_m).max(0.0), side.before_m);
         *layers = side.before;
         layers.bend(at_m, span_m / libm::sqrt(12.0), bent_up, drive, noise, behind);
         self.rest();
-        WORK_SUMS + WORK_BEND
+        (WORK_SUMS + WORK_BEND, true)
     }
 }
 
