@@ -277,6 +277,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
     let mut errors: Vec<Vec<f64>> = vec![vec![]; row.tissue.layers.len()];
     let mut enh = vec![];
     let mut cover = [[0.0; 2]; 4];
+    let mut hist = [[0.0f64; 3]; 60];
     let mut zs = [[(); 3]; 3].map(|r| r.map(|()| Vec::<f64>::new()));
     let mut verbose = if std::env::var_os("VERBOSE").is_some() { 5 } else { 0 };
     for seed in 0..seeds {
@@ -322,6 +323,10 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                     if f.tip_n >= lo && f.tip_n <= hi {
                         cover[3][0] += 1.0;
                     }
+                    let bin = ((z * 1e3 / 2.0) as usize).min(59);
+                    hist[bin][1] += 1.0;
+                    if f.tip_n < lo { hist[bin][0] += 1.0; }
+                    if f.tip_n > hi { hist[bin][2] += 1.0; }
                 }
             }
             let w: f64 = StandardNormal.sample(&mut rng);
@@ -389,6 +394,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
         }
         println!();
     }
+    for (k, [lo, n, hi]) in hist.iter().enumerate() { if *n > 0.0 { println!("H {} {:.3} {:.3} n {}", 2 * k, lo / n, hi / n, n); } }
     let ks: Vec<String> = errors.iter_mut().map(|e| format!("{:.2}", median(e, 0.5))).collect();
     let cv: Vec<String> = cover.iter().map(|c| format!("{:.1}", 100.0 * c[0] / c[1])).collect();
     let hours = seeds as f64 * row.dur / 3600.0;

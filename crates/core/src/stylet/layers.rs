@@ -284,6 +284,16 @@ impl Layers {
             let x = at_least(0.0, position_m - self.start_m);
             behind += g.x[F] * x;
             variance += x * (2.0 * g.cov(F, A) + x * g.p[F][F]);
+        } else if self.start_sd_m > 0.0 {
+            // A layer that begins `delta` later than it is taken to leaves `f0 - K delta` of the zero and `D - b delta` of the friction behind.
+            let (k, sd_k) = (g.x[K], libm::sqrt(g.p[K][K] * noise.variance));
+            if k > 2.0 * sd_k {
+                let later_m = (noise.bias_n() - g.x[ZERO]) / k;
+                let bound_m = 2.0 * self.start_sd_m;
+                let by = g.x[F] / k;
+                behind += g.x[F] * later_m.clamp(-bound_m, bound_m);
+                variance += by * (by * g.p[ZERO][ZERO] - 2.0 * g.cov(ZERO, A));
+            }
         }
         (behind, variance * noise.variance)
     }
