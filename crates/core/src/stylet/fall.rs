@@ -19,6 +19,10 @@ const LIKELY_SDS: f64 = 2.0;
 /// A place is not known better than to a micrometre, in m².
 const TINY_M2: f64 = 1e-12;
 
+fn square(x: f64) -> f64 {
+    x * x
+}
+
 /// A fall of the force that may become a rupture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fall {
@@ -142,7 +146,7 @@ impl Stylet {
         self.layers.rupture(at_m, place_m, drive, &self.noise, &mut self.behind);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
-        self.lasting = None;
+        (self.lasting, self.fell_by) = (None, f64::NEG_INFINITY);
         (self.intact, self.fell_m, self.located_m) = (self.before, sample.position_m, at_m);
         self.layers.take(sample.position_m, self.drive, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
@@ -183,10 +187,17 @@ impl Stylet {
         let (rate, variance) = self.local.rate(step.speed_mps, accel_mps2, friction);
         let sd = libm::sqrt(variance * self.noise.variance);
         let falling = rate < -3.0 * sd;
+        if falling {
+            self.fell_by = rate;
+        } else if self.falling {
+            // The slope of a fall that may be over is not that of what follows.
+            let force = (sample.force_n - self.noise.bias_n()).abs().max(sd * step.dt_s);
+            self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
+        }
         if self.since_s > LONGEST_DROP_S {
             if falling {
                 self.trace_back(step, sample, rate, sd);
-            } else if rate > -2.0 * sd {
+            } else if rate > -2.0 * sd && rate - 2.0 * sd > self.fell_by {
                 self.fallen = None;
                 self.fall_anew();
             }
@@ -203,9 +214,15 @@ impl Stylet {
         let (by_m, noise_n2) = (back_m / step.speed_mps, self.noise.variance);
         let line_n2 = level * noise_n2 + by_m * (by_m * sd_n_per_s * sd_n_per_s - 2.0 * both * noise_n2);
         let variance = at_least(TINY_M2, line_n2 / (steep * steep));
-        if steep > 0.0 && self.lasting.is_none_or(|(_, best)| variance < best) {
-            self.lasting = Some((sample.position_m - back_m, variance));
-        }
+        let began_m = sample.position_m - back_m;
+        self.lasting = match self.lasting {
+            None if steep > 0.0 => Some((began_m, variance)),
+            // A line that does not lead to where it led before is not that of the fall any more.
+            Some((best_m, best)) if steep > 0.0 && variance < best && square(began_m - best_m) < 4.0 * best => {
+                Some((began_m, variance))
+            }
+            kept => kept,
+        };
     }
 
     /// What was taken for a sudden drop began before: the belief of before moves on from there.
