@@ -146,7 +146,7 @@ impl Stylet {
         self.layers.rupture(at_m, place_m, drive, &self.noise, &mut self.behind);
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
-        (self.lasting, self.fell_by) = (None, f64::NEG_INFINITY);
+        (self.lasting, self.fell_s) = (None, f64::INFINITY);
         (self.intact, self.fell_m, self.located_m) = (self.before, sample.position_m, at_m);
         self.layers.take(sample.position_m, self.drive, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
@@ -187,9 +187,8 @@ impl Stylet {
         let (rate, variance) = self.local.rate(step.speed_mps, accel_mps2, friction);
         let sd = libm::sqrt(variance * self.noise.variance);
         let falling = rate < -3.0 * sd;
-        if falling {
-            self.fell_by = rate;
-        } else if self.falling {
+        self.fell_s = if falling { 0.0 } else { self.fell_s + step.dt_s };
+        if self.falling && !falling {
             // The slope of a fall that may be over is not that of what follows.
             let force = (sample.force_n - self.noise.bias_n()).abs().max(sd * step.dt_s);
             self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
@@ -197,7 +196,7 @@ impl Stylet {
         if self.since_s > LONGEST_DROP_S {
             if falling {
                 self.trace_back(step, sample, rate, sd);
-            } else if rate > -2.0 * sd && rate - 2.0 * sd > self.fell_by {
+            } else if rate > -2.0 * sd && self.fell_s > LONGEST_DROP_S {
                 self.fallen = None;
                 self.fall_anew();
             }
@@ -218,7 +217,7 @@ impl Stylet {
         self.lasting = match self.lasting {
             None if steep > 0.0 => Some((began_m, variance)),
             // A line that does not lead to where it led before is not that of the fall any more.
-            Some((best_m, best)) if steep > 0.0 && variance < best && square(began_m - best_m) < 4.0 * best => {
+            Some((best_m, best)) if steep > 0.0 && variance < best && square(began_m - best_m) < 16.0 * best => {
                 Some((began_m, variance))
             }
             kept => kept,

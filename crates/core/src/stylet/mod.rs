@@ -84,8 +84,8 @@ pub(crate) struct Stylet {
     fell_m: f64,
     located_m: f64,
     lasting: Option<(f64, f64)>,
-    /// Change of the force with time while it was last seen to fall, in N/s.
-    fell_by: f64,
+    /// Time since it was last seen to fall, in s.
+    fell_s: f64,
     fall: Option<Fall>,
     /// Size of the last fall that was looked at, and its standard deviation, in N.
     drop: (f64, f64),
@@ -146,7 +146,7 @@ impl Stylet {
             fell_m: surface_m,
             located_m: surface_m,
             lasting: None,
-            fell_by: f64::NEG_INFINITY,
+            fell_s: f64::INFINITY,
             fall: None,
             drop: (0.0, 0.0),
             last_level_n: 0.0,
