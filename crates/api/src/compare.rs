@@ -44,11 +44,12 @@ pub struct Kind {
     cases: Vec<CaseId>,
 }
 
-/// Kinds of so many cases of a world in which nothing that is believed is wrong, one per word of what departs from the base law.
+/// Kinds of so many cases of a world, drawn with a seed, in which nothing that is believed is wrong; one per word of what departs from the base
+/// law.
 ///
 /// # Errors
 /// [`Error::Request`] for a word that there is not, with those that there are.
-pub fn kinds(world: &str, hide: &[String], cases: u64) -> Result<Vec<Kind>, Error> {
+pub fn kinds(world: &str, hide: &[String], cases: u64, seed: u64) -> Result<Vec<Kind>, Error> {
     let world = word("--world", world, World::ALL, World::parse, World::word)?;
     hide.iter()
         .map(|given| {
@@ -60,7 +61,7 @@ pub fn kinds(world: &str, hide: &[String], cases: u64) -> Result<Vec<Kind>, Erro
                 hide: vec![hide],
                 size: Size::Strong,
                 cases,
-                seed: 1,
+                seed,
                 only: Vec::new(),
             };
             Ok(Kind { name: format!("{world} world, {hide}"), cases: plan.cases() })

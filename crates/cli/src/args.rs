@@ -68,6 +68,9 @@ pub struct CompareArgs {
     /// Also the insertions of this world of the referee: plain or rich.
     #[arg(long, value_name = "WORLD")]
     pub world: Option<String>,
+    /// With --world: seed that its cases are drawn with.
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    pub seed: u64,
     /// With --world: what departs from the base law there; a row for each.
     #[arg(long, value_delimiter = ',', value_name = "WORDS", default_value = "clean,one,two,three")]
     pub hide: Vec<String>,

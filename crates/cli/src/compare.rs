@@ -28,7 +28,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let algorithms: Vec<Algorithm> = args.algorithms.iter().map(|which| (*which).into()).collect();
     let scenarios = args.scenarios.iter().map(|path| Scenario::load(path)).collect::<Result<Vec<_>, _>>()?;
     let worlds = match &args.world {
-        Some(world) => kinds(world, &args.hide, args.seeds)?,
+        Some(world) => kinds(world, &args.hide, args.seeds, args.seed)?,
         None => Vec::new(),
     };
     let progress = Progress::new(

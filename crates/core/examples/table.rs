@@ -325,8 +325,12 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                     }
                     let bin = ((z * 1e3 / 2.0) as usize).min(59);
                     hist[bin][1] += 1.0;
-                    if f.tip_n < lo { hist[bin][0] += 1.0; }
-                    if f.tip_n > hi { hist[bin][2] += 1.0; }
+                    if f.tip_n < lo {
+                        hist[bin][0] += 1.0;
+                    }
+                    if f.tip_n > hi {
+                        hist[bin][2] += 1.0;
+                    }
                 }
             }
             let w: f64 = StandardNormal.sample(&mut rng);
@@ -358,7 +362,9 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                         errors[i].push(100.0 * (e.stiffness_n_per_m / l.stiffness_n_per_m - 1.0).abs());
                         let mut c = |k: usize, x: f64, sd: f64| {
                             cover[k][1] += 1.0;
-                            if i < 3 { zs[i][k].push(x / sd); }
+                            if i < 3 {
+                                zs[i][k].push(x / sd);
+                            }
                             if x.abs() <= 1.96 * sd {
                                 cover[k][0] += 1.0;
                             }
@@ -389,12 +395,19 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             let mut q = z.clone();
             q.sort_by(f64::total_cmp);
             let at = |p: f64| q.get(((n - 1.0) * p) as usize).copied().unwrap_or(0.0);
-            println!("      q {:.1?}", [0.0, 0.01, 0.025, 0.05, 0.16, 0.5, 0.84, 0.95, 0.975, 0.99, 1.0].map(at));
+            println!(
+                "      q {:.1?}",
+                [0.0, 0.01, 0.025, 0.05, 0.16, 0.5, 0.84, 0.95, 0.975, 0.99, 1.0].map(at)
+            );
             print!("   {}{} mean {m:+.2} sd {s:.2} cover {:.1}", i + 1, ["K", "b", "D"][k], 100.0 * cov);
         }
         println!();
     }
-    for (k, [lo, n, hi]) in hist.iter().enumerate() { if *n > 0.0 { println!("H {} {:.3} {:.3} n {}", 2 * k, lo / n, hi / n, n); } }
+    for (k, [lo, n, hi]) in hist.iter().enumerate() {
+        if *n > 0.0 {
+            println!("H {} {:.3} {:.3} n {}", 2 * k, lo / n, hi / n, n);
+        }
+    }
     let ks: Vec<String> = errors.iter_mut().map(|e| format!("{:.2}", median(e, 0.5))).collect();
     let cv: Vec<String> = cover.iter().map(|c| format!("{:.1}", 100.0 * c[0] / c[1])).collect();
     let hours = seeds as f64 * row.dur / 3600.0;

@@ -217,7 +217,9 @@ impl Stylet {
         self.lasting = match self.lasting {
             None if steep > 0.0 => Some((began_m, variance)),
             // A line that does not lead to where it led before is not that of the fall any more.
-            Some((best_m, best)) if steep > 0.0 && variance < best && square(began_m - best_m) < 16.0 * best => {
+            Some((best_m, best))
+                if steep > 0.0 && variance < best && square(began_m - best_m) < 16.0 * best =>
+            {
                 Some((began_m, variance))
             }
             kept => kept,
