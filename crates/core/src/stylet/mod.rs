@@ -202,3 +202,43 @@ impl Stylet {
         &self.out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::gaussian::Gaussian;
+    use super::*;
+
+    /// In the first layer, 10 mm deep at 2 mm/s, at 200 Hz, with a noise of 20 mN about 0.07 N: the last sample was at 9.9 mm. The
+    /// predictor expects 1.5 N and knows them to 1.73 times the noise, so that an innovation's standard deviation is 40 mN. So does the law of
+    /// layers, `0.6 + 25 u + 60 x + 9000 x u + 0.07`, which knows all but the zero exactly, and that to 14 mN.
+    pub(super) fn inside() -> Stylet {
+        let mut stylet = Stylet::new(&EnhanceConfig::default(), 0.0);
+        stylet.noise = Noise::known(0.0, 4e-4, 0.07, 400.0);
+        stylet.local = Local::new(1.5);
+        stylet.local.state = Gaussian::new([1.5, 0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0, 0.0]);
+        stylet.layers = Layers::contact(0.0, 0.0, 0.0, 100.0, 0.002, &stylet.noise);
+        stylet.layers.belief =
+            Gaussian::new([0.6, 60.0, 9000.0, 25.0, 0.0, 0.07], [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]);
+        (stylet.before, stylet.before_m) = (stylet.layers, 0.0097);
+        (stylet.in_tissue, stylet.started, stylet.last) = (true, true, sample(0.0099, 1.5));
+        (stylet.first_m, stylet.deepest_m) = (0.001, 0.0099);
+        (stylet.drive, stylet.steady, stylet.speed_mps) = (0.002, 0.002, 0.002);
+        (stylet.peak_n, stylet.misfit, stylet.rough) = (1.2, 1.0, 0.0);
+        (stylet.since, stylet.since_s) = (100, 0.5);
+        stylet
+    }
+
+    /// At this place, with this force, at 2 mm/s.
+    pub(super) fn sample(position_m: f64, force_n: f64) -> Sample {
+        Sample { time_s: 500.0 * position_m, position_m, velocity_mps: 0.002, force_n }
+    }
+
+    /// From 9.9 to 10 mm.
+    pub(super) fn step() -> Step {
+        Step { dt_s: 0.005, dz_m: 1e-4, dv_mps: 0.0, rho: 0.0, sudden: false, speed_mps: 0.002 }
+    }
+
+    pub(super) fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-10 * expected.abs(), "{found} for {expected}");
+    }
+}
