@@ -241,4 +241,107 @@ mod tests {
     pub(super) fn near(found: f64, expected: f64) {
         assert!((found - expected).abs() <= 1e-10 * expected.abs(), "{found} for {expected}");
     }
+
+    #[test]
+    fn a_sample_of_the_same_instant_or_that_no_robot_makes_is_not_used() {
+        let config = EnhanceConfig::default();
+        let used = |stylet: &Stylet, sample: Sample| {
+            let mut stylet = *stylet;
+            let used = stylet.step(&config, 0.0, sample).used;
+            assert_eq!(stylet.last == sample, used);
+            used
+        };
+        // A fiftieth of the usual step, no less than a microsecond, no more than a tenth of a millisecond.
+        for (step_s, instant_s) in [(0.005, 1e-4), (0.001, 2e-5), (1e-5, 1e-6), (0.1, 1e-4)] {
+            let mut stylet = inside();
+            stylet.noise.step_s = step_s;
+            for (share, later) in [(0.99, false), (1.01, true), (-1.01, false)] {
+                let time_s = stylet.last.time_s + share * instant_s;
+                // At the place and speed that the mean of the two speeds leads to.
+                let position_m = stylet.last.position_m + 0.002 * (share * instant_s);
+                let sample = Sample { time_s, position_m, ..stylet.last };
+                assert_eq!(used(&stylet, sample), later, "{share} of {instant_s} s");
+            }
+        }
+        let fresh = Stylet::new(&config, 0.0);
+        let of =
+            |position_m: f64, velocity_mps: f64| Sample { position_m, velocity_mps, ..Sample::default() };
+        assert!(used(&fresh, of(-0.01, 0.002)), "the first needs none before it");
+        for (position_m, v, robot) in [
+            (0.0, 1.99, true),
+            (0.0, 2.0, false),
+            (0.0, -1.99, true),
+            (0.0, -2.01, false),
+            (-9.9, 0.0, true),
+            (-10.1, 0.0, false),
+            (-10.0, 0.0, false),
+            (10.1, 0.0, false),
+            (9.9, 0.0, true),
+        ] {
+            assert_eq!(used(&fresh, of(position_m, v)), robot, "{position_m} m, {v} m/s");
+        }
+        assert!(!used(&fresh, Sample { force_n: f64::NAN, ..of(-0.01, 0.002) }));
+        assert!(!used(&fresh, Sample { time_s: f64::INFINITY, ..of(-0.01, 0.002) }));
+    }
+
+    #[test]
+    fn what_was_said_of_a_sample_is_not_said_of_the_next() {
+        let config = EnhanceConfig::default();
+        let mut stylet = inside();
+        stylet.out.estimate = Some(crate::sample::LayerEstimate::default());
+        stylet.rupture(&step(), &sample(0.0099, 0.5), 1.3);
+        assert!(stylet.out.detection.is_some());
+        let out = stylet.step(&config, 0.0, Sample { force_n: f64::NAN, ..stylet.last });
+        assert!(out.detection.is_none() && out.estimate.is_none() && !out.used);
+        assert_eq!(stylet.work(), 60, "no more than the frame");
+    }
+
+    #[test]
+    fn every_sample_costs_its_frame_and_moves_as_its_positions_do() {
+        let config = EnhanceConfig::default();
+        let mut stylet = inside();
+        // It is said to creep, but has not moved.
+        let still = Sample { time_s: 4.955, velocity_mps: 9e-6, ..stylet.last };
+        stylet.step(&config, 0.0, still);
+        assert_eq!((stylet.last.velocity_mps, stylet.last.position_m), (0.0, 0.0099));
+        assert_eq!(stylet.work(), 60 + 158 + 136);
+        assert!(stylet.out.used && stylet.started);
+        // And is looked at in the air.
+        let mut air = Stylet::new(&config, 0.0);
+        air.step(&config, 0.0, sample(-0.01, 0.3));
+        assert_eq!((air.work(), air.low_passed_n, air.is_sound()), (60, 0.3, true));
+    }
+
+    #[test]
+    fn what_is_no_number_or_no_variance_is_not_sound() {
+        assert!(inside().is_sound());
+        let spoils: [fn(&mut Stylet, f64); 8] = [
+            |s, x| s.noise.variance = x,
+            |s, x| s.noise.rho = x,
+            |s, x| s.peak_n = x,
+            |s, x| s.misfit = x,
+            |s, x| s.texture = x,
+            |s, x| s.out.enhanced_n = x,
+            |s, x| s.local.state.x[2] = x,
+            |s, x| s.layers.belief.x[2] = x,
+        ];
+        for (n, spoil) in spoils.iter().enumerate() {
+            for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                let mut stylet = inside();
+                spoil(&mut stylet, x);
+                assert!(!stylet.is_sound(), "{n} with {x}");
+            }
+        }
+        for variance in [0.0, -1.0] {
+            let mut stylet = inside();
+            stylet.noise.variance = variance;
+            assert!(!stylet.is_sound());
+        }
+        let mut stylet = inside();
+        stylet.local.state.p[1][1] = -1.0;
+        assert!(!stylet.is_sound());
+        let mut stylet = inside();
+        stylet.layers.belief.p[1][1] = -1.0;
+        assert!(!stylet.is_sound());
+    }
 }
