@@ -152,13 +152,15 @@ impl Stylet {
     }
 
     pub(crate) fn is_sound(&self) -> bool {
-        let numbers = self.noise.variance
-            + self.noise.rho
-            + self.peak_n
-            + self.misfit
-            + self.texture
-            + self.out.enhanced_n;
-        numbers.is_finite()
+        let numbers = [
+            self.noise.variance,
+            self.noise.rho,
+            self.peak_n,
+            self.misfit,
+            self.texture,
+            self.out.enhanced_n,
+        ];
+        numbers.iter().sum::<f64>().is_finite()
             && self.noise.variance > 0.0
             && self.local.state.is_sound()
             && self.layers.belief.is_sound()
