@@ -666,11 +666,8 @@ mod tests {
     ) -> ([f64; N], Matrix) {
         let (mut x, mut p) = carried(map, &g.x, &full(g));
         (x[K], x[F]) = (0.5 * before, 0.5 * before / 0.3);
-        for i in 0..N {
-            for j in [K, F] {
-                (p[i][j], p[j][i]) = (0.0, 0.0);
-            }
-        }
+        (p[K], p[F]) = ([0.0; N], [0.0; N]);
+        p.iter_mut().for_each(|row| (row[K], row[F]) = (0.0, 0.0));
         let wide = (3.0 * before).min((1e8 * noise.variance).sqrt() / MEMORY_M);
         p[K][K] = wide * wide / noise.variance;
         p[F][F] = wide * wide / (0.3 * 0.3) / noise.variance;

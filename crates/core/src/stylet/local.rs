@@ -353,9 +353,9 @@ mod tests {
         assert_eq!((local.level_n(), local.last_n, local.fresh), (1.7, 1.7, true));
         assert_eq!(local.state.x[1..], x[1..]);
         near(local.state.p[0][0], 1.0 / 0.64, 1.0);
-        for i in 1..5 {
+        for (i, row) in p.iter().enumerate().skip(1) {
             assert_eq!(local.state.cov(0, i), 0.0);
-            (1..5).for_each(|j| assert_eq!(local.state.cov(i, j), p[i][j]));
+            (1..5).for_each(|j| assert_eq!(local.state.cov(i, j), row[j]));
         }
         // Noise of 1 uN: slopes on the scale of 10 mN a millimetre, whatever the force.
         let noise = Noise::known(0.0, 1e-12, 0.0, 1e6);

@@ -484,4 +484,10 @@ mod tests {
         near(Noise::known(0.6, 0.04, 0.0, 160.0).doubt(), 1.05);
         near(Noise::known(0.6, 0.04, 0.0, 10.0).doubt(), 1.2);
     }
+
+    #[test]
+    fn of_a_force_that_does_not_change_no_colour_is_known() {
+        let noise = in_air(&[0.25; 40]);
+        assert_eq!((noise.rho, noise.rho_over(0.005), noise.slow()), (0.0, 0.0, 1.0));
+    }
 }

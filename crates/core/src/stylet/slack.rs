@@ -378,4 +378,17 @@ mod tests {
             assert_eq!((slack.up.slow, slack.down.slow), (0.0, 0.0));
         }
     }
+
+    #[test]
+    fn what_hangs_together_wholly_still_has_a_density() {
+        let (mut layers, noise) = behind_a_rupture(0.0, 9000.0);
+        layers.belief = crate::stylet::gaussian::Gaussian::new([0.0; 6], [1.0, 4.0, 9.0, 1.0, 1.0, 1.0]);
+        layers.belief.p[F][K] = 6.0;
+        // A trillionth of what it would be of unknowns on their own.
+        near(layers.log_density_of_free(false, &noise), -0.5 * 36e-12_f64.ln());
+        layers.belief.p[F][K] = -3.0;
+        (layers.belief.x[K], layers.belief.x[F]) = (0.7, 1.1);
+        let square = (0.49 * 9.0 + 2.0 * 0.7 * 1.1 * 3.0 + 1.21 * 4.0) / 27.0;
+        near(layers.log_density_of_free(false, &noise), -0.5 * (27.0_f64.ln() + square / noise.variance));
+    }
 }
