@@ -219,4 +219,135 @@ mod tests {
             assert_eq!(found, Found::Nothing, "sample {k}");
         }
     }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} for {expected}");
+    }
+
+    /// Noise of 0.1 N about 0.3 N is known from twenty samples of a second; the low-passed force is this.
+    fn known(force_n: f64) -> (ContactConfig, ContactSearch) {
+        let config = ContactConfig::default();
+        let mut search = ContactSearch::new(&config);
+        (search.count, search.mean_n, search.m2) = (20.0, 0.3, 0.19);
+        (search.elapsed_s, search.force_n) = (1.0, force_n);
+        (config, search)
+    }
+
+    fn at(position_m: f64, force_n: f64) -> Sample {
+        Sample { position_m, force_n, ..Sample::default() }
+    }
+
+    #[test]
+    fn bias_and_noise_are_those_of_all_samples_at_first_and_then_forgotten_slowly() {
+        let config = ContactConfig::default();
+        let mut search = ContactSearch::new(&config);
+        assert_eq!(search.noise_n(&config), f64::INFINITY);
+        let forces_n = [0.7, 0.4, 0.9, 0.1, 0.6];
+        search.learn(0.1, true, forces_n[0]);
+        assert_eq!(search.noise_n(&config), f64::INFINITY);
+        forces_n[1..].iter().for_each(|f| search.learn(0.1, true, *f));
+        near(search.mean_n, 0.54);
+        let squares: f64 = forces_n.iter().map(|f| (f - 0.54) * (f - 0.54)).sum();
+        near(search.noise_n(&config), (squares / 4.0).sqrt());
+        let (config, mut search) = known(0.3);
+        near(search.noise_n(&config), 0.1);
+        search.learn(0.1, false, 0.5);
+        near(search.mean_n, 0.32);
+        // The variance of 0.01 moves by a tenth towards 0.04.
+        near(search.noise_n(&config), 0.013_f64.sqrt());
+        assert_eq!(search.count, 20.0);
+        search.m2 = 0.0;
+        assert_eq!(search.noise_n(&config), 1e-4);
+    }
+
+    #[test]
+    fn the_force_is_low_passed_from_the_first_sample_on() {
+        let (config, mut search) = known(0.3);
+        search.update(&config, 0.005, at(0.001, 0.4), 7);
+        near(search.force_n, 0.3 + 0.1 * (1.0 - (-0.1_f64).exp()));
+        near(search.elapsed_s, 1.005);
+        let mut fresh = ContactSearch::new(&config);
+        fresh.update(&config, 0.0, at(0.0, 5.0), 0);
+        assert_eq!((fresh.force_n, fresh.mean_n), (5.0, 5.0));
+    }
+
+    #[test]
+    fn a_loading_line_begins_at_two_standard_deviations_and_contact_is_counted_from_five() {
+        // Lift over the bias, whether it belongs to the line, and whether it counts.
+        for (lift_n, line, above) in
+            [(0.19, 0.0, 0), (0.21, 1.0, 0), (0.49, 1.0, 0), (0.51, 1.0, 1), (-0.6, 0.0, 0)]
+        {
+            let force_n = 0.3 + lift_n;
+            let (config, mut search) = known(force_n);
+            assert_eq!(search.update(&config, 0.005, at(0.001, force_n), 7), Found::Nothing);
+            assert_eq!((search.line.count, search.above), (line, above), "{lift_n} N");
+            assert_eq!(search.first, if line > 0.0 { 7 } else { 0 });
+            // What belongs to the line is no noise.
+            assert_eq!(search.mean_n == 0.3, line > 0.0);
+            // The line goes on, or is given up.
+            search.force_n = force_n;
+            search.update(&config, 0.005, at(0.001, force_n), 8);
+            assert!(search.line.count == 2.0 * line && search.above == 2 * above);
+            search.force_n = 0.3;
+            search.update(&config, 0.005, at(0.001, 0.3), 9);
+            assert_eq!((search.line.count, search.above), (0.0, 0));
+        }
+        // As long as bias and noise are being learned all is noise: for a quarter of a second and ten samples.
+        for (elapsed_s, count, learning) in
+            [(0.24, 20.0, true), (0.246, 20.0, false), (1.0, 9.0, true), (1.0, 10.0, false)]
+        {
+            let (config, mut search) = known(0.9);
+            (search.elapsed_s, search.count) = (elapsed_s, count);
+            search.m2 = 0.01 * (count - 1.0);
+            search.update(&config, 0.005, at(0.001, 0.9), 7);
+            assert_eq!(
+                (search.above == 0, search.count > count),
+                (learning, learning),
+                "{elapsed_s} {count}"
+            );
+        }
+    }
+
+    #[test]
+    fn contact_is_declared_after_its_samples_and_settled_after_its_travel() {
+        for (samples, needed) in [(3, 3), (1, 1), (0, 1)] {
+            let (mut config, mut search) = known(0.9);
+            config.samples = samples;
+            for k in 1..needed {
+                assert_eq!(search.update(&config, 0.005, at(0.001, 0.9), k), Found::Nothing);
+            }
+            let found = search.update(&config, 0.005, at(0.0012, 0.9), needed);
+            assert!(matches!(found, Found::Provisional { first: 1, .. }), "{found:?}");
+            assert_eq!(search.declared_m, Some(0.0012));
+            for (position_m, settled) in
+                [(0.0015, false), (0.002, false), (0.0003, false), (0.0023, true), (0.0001, true)]
+            {
+                let mut search = search;
+                let found = search.update(&config, 0.005, at(position_m, 1.3), 9);
+                assert_eq!(matches!(found, Found::Settled { first: 1, .. }), settled, "{position_m} m");
+                assert_eq!(search.mean_n, 0.3, "nothing more is learned of the air");
+            }
+        }
+    }
+
+    #[test]
+    fn the_surface_is_where_the_line_meets_the_bias_within_five_millimetres_before_the_declaration() {
+        // Slope, and where the line is 0.3 N; the surface, with contact declared at 10 mm.
+        for (slope, zero_m, surface_m) in [
+            (40.0, 0.0083, 0.0083),
+            (40.0, 0.001, 0.005),
+            (40.0, 0.012, 0.01),
+            (-40.0, 0.0083, 0.01),
+            (0.0, 0.0, 0.01),
+        ] {
+            let (mut config, mut search) = known(0.3);
+            assert_eq!(search.surface_m(&config, 0.01), 0.01, "no line");
+            for x in [0.0097, 0.0101, 0.0109] {
+                search.line.add(x, 0.3 + slope * (x - zero_m));
+            }
+            assert!((search.surface_m(&config, 0.01) - surface_m).abs() < 1e-12);
+            config.extrapolate_over_m = 0.0;
+            assert_eq!(search.surface_m(&config, 0.01), 0.01);
+        }
+    }
 }

@@ -265,4 +265,99 @@ mod tests {
         let late = falling(200, 120).enumerate().map(|(k, f)| if k == 199 { f - 0.7 } else { f });
         assert_eq!(locate(&forces(late), 0), 120);
     }
+
+    /// Place of the largest fall among those looked at: the mean of three samples before to that of up to three after, which counts by the root
+    /// of how many these are.
+    fn steepest(forces_n: &[f64], first: usize, stride: usize) -> usize {
+        let mean = |at: &dyn Fn(usize) -> usize, count: usize| {
+            (0..count).map(|k| forces_n[at(k)]).sum::<f64>() / count as f64
+        };
+        let places = (first + 3 * stride..forces_n.len()).step_by(stride);
+        let fall = |place: usize| {
+            let count = ((forces_n.len() - 1 - place) / stride + 1).min(3);
+            let after_n = mean(&|k| place + k * stride, count);
+            (after_n - mean(&|k| place - (k + 1) * stride, 3)) * (count as f64 / 3.0).sqrt()
+        };
+        places.min_by(|a, b| fall(*a).total_cmp(&fall(*b))).unwrap_or(forces_n.len() - 1)
+    }
+
+    #[test]
+    fn a_rupture_is_where_three_samples_before_and_after_differ_most() {
+        // Walks of noise, from where the sum was last zero, whose steepest place may be anywhere.
+        for seed in 1..60_usize {
+            for (count, first, stride) in [
+                (20, 0, 1),
+                (20, 9, 1),
+                (7, 3, 1),
+                (4, 0, 1),
+                (3, 0, 1),
+                (300, 5, 1),
+                (600, 10, 2),
+                (900, 30, 3),
+            ] {
+                let forces_n: Vec<f64> = (0..count)
+                    .map(|k| 1.0 + ((k * k * 31 + k * seed * 7919 + seed * seed) % 1009) as f64 / 1009.0)
+                    .collect();
+                let expected = steepest(&forces_n, first, stride);
+                assert_eq!(locate(&forces(forces_n), first as u64), expected as u64, "{count} from {first}");
+            }
+        }
+        // What is no longer held is not looked at.
+        let mut short = History::new(alloc::vec![Sample::default(); 40]);
+        let forces_n: Vec<f64> = falling(100, 50).collect();
+        for force_n in &forces_n {
+            short.push(Sample { force_n: *force_n, ..Sample::default() });
+        }
+        assert_eq!(locate(&short, 0), 60 + steepest(&forces_n[60..], 0, 1) as u64);
+    }
+
+    #[test]
+    fn the_lines_are_through_the_samples_of_a_millimetre_on_either_side_thinned_out_evenly() {
+        for hz in [100.0, 200.0, 1000.0, 20_000.0] {
+            let (history, after) = rupture(hz, curved);
+            let step_m = SPEED_MPS / hz;
+            // No more than 256 are looked at.
+            let stride = (0.001 / step_m / 256.0) as u64 + 1;
+            for first in [0, after - 40.min(after / 2)] {
+                let drop = Drop::begin(&history, first, after);
+                let mut numbers: Vec<u64> = alloc::vec![after - 1];
+                while let Some(number) = numbers.last().and_then(|n| n.checked_sub(stride)) {
+                    numbers.push(number);
+                }
+                let (mut before, mut highest_n) = (Line::default(), f64::NEG_INFINITY);
+                let edge = history.get(after - 1).expect("held").position_m;
+                for number in numbers.into_iter().take(256).filter(|n| *n >= first) {
+                    let s = history.get(number).expect("held");
+                    if s.position_m >= edge - 0.001 {
+                        before.add(s.position_m, s.force_n);
+                        highest_n = highest_n.max(s.force_n);
+                    }
+                }
+                assert_eq!((drop.before, drop.highest_n), (before, highest_n), "{hz} Hz");
+                let (mut behind, mut lowest_n) = (Line::default(), f64::INFINITY);
+                for s in (after..history.next()).filter_map(|n| history.get(n)) {
+                    lowest_n = lowest_n.min(s.force_n);
+                    if s.position_m <= edge + 0.001 {
+                        behind.add(s.position_m, s.force_n);
+                    }
+                }
+                assert_eq!((drop.after, drop.lowest_n), (behind, lowest_n), "{hz} Hz");
+                assert_eq!((drop.rupture_m, drop.velocity_mps), (edge, SPEED_MPS));
+            }
+        }
+    }
+
+    #[test]
+    fn a_drop_at_the_first_sample_and_of_a_needle_that_stands_has_what_there_is() {
+        let history = forces([1.0, 0.7, 0.4]);
+        let none = Drop::begin(&history, 0, 0);
+        assert_eq!((none.before.count, none.after.count), (0.0, 0.0));
+        let one = Drop::begin(&history, 0, 1);
+        assert_eq!((one.before.count, one.after.count), (1.0, 2.0));
+        assert_eq!((one.highest_n, one.lowest_n), (1.0, 0.4));
+        let (drop_n, share) = one.share(&DropConfig::default(), 0.0);
+        assert!((drop_n - 0.45).abs() < 1e-12 && (share - 0.45).abs() < 1e-12, "{drop_n} N, {share}");
+        assert_eq!(Drop::begin(&history, 0, 2).before.count, 2.0);
+        assert_eq!(Drop::begin(&history, 1, 2).before.count, 1.0);
+    }
 }

@@ -133,3 +133,78 @@ impl Front {
         was_on && !self.derivative_on
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    /// What is seen of these forces at 200 Hz, from an even advance that has long gone on.
+    fn seen(config: &EnhanceConfig, forces_n: &[f64]) -> Vec<(bool, bool, bool, bool)> {
+        let mut front = Front::new(config);
+        let mut told = Seen::default();
+        forces_n
+            .iter()
+            .enumerate()
+            .map(|(k, force_n)| {
+                let time_s = 0.005 * k as f64;
+                let sample =
+                    Sample { time_s, position_m: 0.002 * time_s, velocity_mps: 0.002, force_n: *force_n };
+                front.look(config, sample, &mut told);
+                (told.used(), told.quiet(), told.derivative_on(), told.edge())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_derivative_switches_on_above_one_threshold_and_off_below_the_other() {
+        let mut config = EnhanceConfig::paper();
+        // A rise by 0.5 N/s for two seconds, then a fall.
+        let forces_n: Vec<f64> = (0..800)
+            .map(|k| 0.0025 * f64::from(k).min(400.0) - 0.01 * (f64::from(k) - 400.0).max(0.0))
+            .collect();
+        let rise = seen(&config, &forces_n);
+        let on = rise.iter().position(|s| s.2).expect("a rise");
+        let off = on + rise[on..].iter().position(|s| !s.2).expect("a fall");
+        assert!(rise.iter().all(|s| s.0 && s.1), "all of it can be used, and the motion is even");
+        assert!((10..200).contains(&on) && (401..500).contains(&off), "{on} {off}");
+        // The edge is one sample, and only a trailing one; where it is asked for.
+        let edges = |seen: &[(bool, bool, bool, bool)]| {
+            seen.iter().enumerate().filter(|(_, s)| s.3).map(|(k, _)| k).collect::<Vec<_>>()
+        };
+        assert_eq!(edges(&rise), [off]);
+        config.derivative.trailing_edge = false;
+        let without = seen(&config, &forces_n);
+        assert_eq!((edges(&without), without[on].2), (Vec::new(), true));
+        // The drop's switch is that of the force turned over.
+        config.derivative.sense = DerivativeSense::Drop;
+        let over: Vec<f64> = forces_n.iter().map(|f| -f).collect();
+        assert_eq!(seen(&config, &over), without);
+        config.derivative.enabled = false;
+        assert!(seen(&config, &over).iter().all(|s| !s.2 && !s.3));
+    }
+
+    #[test]
+    fn samples_that_cannot_be_used_leave_nothing_behind() {
+        let config = EnhanceConfig::paper();
+        let look = |front: &mut Front, time_s: f64, force_n: f64| {
+            let mut seen = Seen::default();
+            let sample = Sample { time_s, position_m: 0.01, velocity_mps: 0.002, force_n };
+            front.look(&config, sample, &mut seen);
+            (seen.used(), seen.dt_s)
+        };
+        let mut front = Front::new(&config);
+        for (time_s, force_n) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (0.3, f64::NAN), (0.3, 1e6)] {
+            assert_eq!(look(&mut front, time_s, force_n), (false, 0.0));
+        }
+        assert_eq!(look(&mut front, 0.3, 1.0), (true, 0.0), "the first has none before it");
+        for (time_s, force_n) in
+            [(0.3, 1.0), (0.2, 1.0), (0.4, f64::NAN), (f64::INFINITY, 1.0), (f64::NAN, 1.0)]
+        {
+            assert_eq!(look(&mut front, time_s, force_n), (false, 0.0), "{time_s} s, {force_n} N");
+        }
+        let (used, dt_s) = look(&mut front, 0.45, 1.0);
+        assert!(used && (dt_s - 0.15).abs() < 1e-12);
+        assert_eq!(front.derivative_n_per_s(), 0.0, "a force that stays");
+    }
+}

@@ -211,4 +211,125 @@ mod tests {
             assert_eq!(guard.is_slowing(&config), slowing, "{tau_s} s");
         }
     }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} for {expected}");
+    }
+
+    /// In motion at 2 mm/s, with an acceleration whose scatter is this in m/s².
+    fn moving(scatter_mps2: f64) -> MotionGuard {
+        MotionGuard {
+            raw_mps: 0.002,
+            velocity_mps: 0.0021,
+            acceleration_mps2: 0.03,
+            scatter_mps2_squared: scatter_mps2 * scatter_mps2,
+            deepest_m: 0.01,
+            ..MotionGuard::default()
+        }
+    }
+
+    #[test]
+    fn speed_and_acceleration_are_low_passed_and_sudden_is_what_stands_out_of_scatter_and_limit() {
+        let config = GuardConfig::default();
+        // Scatter, speed, and whether it is sudden: above six times the scatter, and above 0.05 m/s².
+        for (scatter, v, sudden) in [
+            (0.02, 0.0023, false),
+            (0.0, 0.0023, false),
+            (0.0, 0.00241, true),
+            (0.0, 0.00239, false),
+            (0.0, -0.0005, true),
+            (0.02, 0.0032, false),
+            (0.02, 0.0033, true),
+            (0.007, 0.00241, true),
+            (0.009, 0.00241, false),
+        ] {
+            let mut guard = moving(scatter);
+            // (v - 2 mm/s)/5 ms has two fifths of the acceleration.
+            let acceleration = 0.6 * 0.03 + 0.4 * (v - 0.002) / 0.005;
+            let limit = f64::max(36.0 * scatter * scatter, 0.0025);
+            let size = acceleration * acceleration;
+            assert_eq!(guard.filter(&config, 0.005, 0.4, 0.1, v), sudden, "{scatter} m/s², {v} m/s");
+            near(guard.velocity_mps, 0.6 * 0.0021 + 0.4 * v);
+            near(guard.acceleration_mps2, acceleration);
+            near(guard.scatter_mps2_squared, 0.9 * scatter * scatter + 0.1 * size.min(limit));
+            assert!(!guard.even);
+        }
+    }
+
+    #[test]
+    fn a_motion_is_even_once_all_filters_have_come_to_rest_and_goes_on_so_until_the_speed_changes() {
+        let config = GuardConfig::default();
+        let sample = |velocity_mps: f64| Sample { velocity_mps, position_m: 0.01, ..Sample::default() };
+        let even = MotionGuard {
+            raw_mps: 0.002,
+            velocity_mps: 0.002,
+            acceleration_mps2: 0.0,
+            scatter_mps2_squared: 0.0,
+            ..MotionGuard::default()
+        };
+        for (guard, v, expected) in [
+            (even, 0.002, true),
+            (MotionGuard { velocity_mps: 0.0021, ..even }, 0.002, false),
+            (MotionGuard { acceleration_mps2: 1e-9, ..even }, 0.002, false),
+            (MotionGuard { scatter_mps2_squared: 1e-9, ..even }, 0.002, false),
+            (even, 0.0021, false),
+        ] {
+            let mut filtered = guard;
+            filtered.filter(&config, DT_S, 0.4, 0.1, v);
+            assert_eq!(filtered.even, expected);
+        }
+        // What is even is not filtered again; what has changed is.
+        let mut guard = MotionGuard { acceleration_mps2: 0.01, even: true, ..even };
+        guard.update(&config, STANDSTILL_MPS, DT_S, [0.4, 0.1], sample(0.002));
+        assert_eq!(guard.acceleration_mps2, 0.01);
+        guard.update(&config, STANDSTILL_MPS, DT_S, [0.4, 0.1], sample(0.0021));
+        near(guard.acceleration_mps2, 0.006 + 0.4 * 0.02);
+        assert_eq!(guard.raw_mps, 0.0021);
+        guard.even = false;
+        guard.update(&config, STANDSTILL_MPS, DT_S, [0.4, 0.1], sample(0.0021));
+        near(guard.acceleration_mps2, 0.6 * 0.014);
+    }
+
+    #[test]
+    fn detection_rests_for_its_time_after_what_may_not_be_a_rupture() {
+        let config = GuardConfig::default();
+        for (sudden, v, position_m, rests) in [
+            (false, 0.002, 0.011, false),
+            (true, 0.002, 0.011, true),
+            (false, 4e-5, 0.011, true),
+            (false, 5e-5, 0.011, false),
+            (false, -0.002, 0.011, true),
+            (false, 0.002, 0.00989, true),
+            (false, 0.002, 0.00991, false),
+        ] {
+            let mut guard = MotionGuard { velocity_mps: v, deepest_m: 0.01, ..MotionGuard::default() };
+            let sample = Sample { position_m, velocity_mps: 0.003, ..Sample::default() };
+            guard.settle(&config, STANDSTILL_MPS, sudden, sample);
+            assert_eq!(guard.is_quiet(), !rests, "{sudden} {v} m/s {position_m} m");
+            assert_eq!((guard.raw_mps, guard.deepest_m), (0.003, position_m.max(0.01)));
+            assert_eq!(guard.rest_s, if rests { 0.25 } else { 0.0 });
+        }
+        let mut guard = MotionGuard { rest_s: 0.011, even: true, ..moving(0.0) };
+        let sample = Sample { position_m: 0.01, velocity_mps: 0.002, ..Sample::default() };
+        for quiet in [false, false, true] {
+            guard.update(&config, STANDSTILL_MPS, DT_S, [0.4, 0.1], sample);
+            assert_eq!(guard.is_quiet(), quiet);
+        }
+    }
+
+    #[test]
+    fn a_needle_slows_down_where_its_speed_falls_by_more_than_a_tenth_a_second() {
+        let config = GuardConfig::default();
+        for (v, a, slowing) in [
+            (0.002, -1.9e-4, false),
+            (0.002, -2.1e-4, true),
+            (-0.002, -1.9e-4, false),
+            (-0.002, -2.1e-4, true),
+            (0.002, 2.1e-4, false),
+            (0.0, 0.0, false),
+        ] {
+            let guard = MotionGuard { velocity_mps: v, acceleration_mps2: a, ..MotionGuard::default() };
+            assert_eq!(guard.is_slowing(&config), slowing, "{v} m/s, {a} m/s²");
+        }
+    }
 }

@@ -85,4 +85,33 @@ mod tests {
         line.add(2.0, 7.0);
         assert_eq!((line.at(7.0), line.reaches(1.0), line.slope()), (Some(6.0), None, 0.0));
     }
+
+    #[test]
+    fn slope_and_place_are_those_of_the_normal_equations() {
+        // About the means 0.275 and 1.15: 0.0975 over 0.06375.
+        let mut line = Line::default();
+        for (x, y) in [(0.125, 1.0), (0.25, 0.9), (0.25, 1.2), (0.475, 1.5)] {
+            line.add(x, y);
+        }
+        let slope = 0.0975 / 0.063_75;
+        let near =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        near(line.slope(), slope);
+        near(line.at(0.7).expect("points"), 1.15 + slope * 0.425);
+        near(line.reaches(2.4).expect("a slope"), 0.275 + 1.25 / slope);
+        assert_eq!(line.count, 4.0);
+        // The same line wherever it lies.
+        let mut far = Line::default();
+        for (x, y) in [(0.125, 1.0), (0.25, 0.9), (0.25, 1.2), (0.475, 1.5)] {
+            far.add(x - 3.0, y);
+        }
+        near(far.slope(), slope);
+        near(far.at(-2.3).expect("points"), 1.15 + slope * 0.425);
+        near(far.reaches(2.4).expect("a slope"), -2.725 + 1.25 / slope);
+        // Two points are a line.
+        let mut two = Line::default();
+        two.add(1.0, 3.0);
+        two.add(1.5, 2.0);
+        near(two.slope(), -2.0);
+    }
 }

@@ -31,8 +31,7 @@ impl Rls {
     #[must_use]
     #[inline]
     pub fn is_finite(&self) -> bool {
-        (self.theta[0] + self.theta[1] + self.covariance[0] + self.covariance[1] + self.covariance[2])
-            .is_finite()
+        self.theta.iter().chain(&self.covariance).sum::<f64>().is_finite()
     }
 
     /// Trace of the covariance.
@@ -74,5 +73,89 @@ impl Rls {
             }
         }
         error
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} for {expected}");
+    }
+
+    /// What hangs together already.
+    fn known() -> Rls {
+        Rls { theta: [3.0, -5.0], covariance: [0.7, 0.2, 0.4] }
+    }
+
+    #[test]
+    fn an_update_is_that_of_the_supplement() {
+        let mut rls = known();
+        let (phi, y) = ([1.5, 0.6], 11.0);
+        near(rls.predict(phi), 1.5);
+        near(rls.trace(), 1.1);
+        // P phi; lambda r + phi' P phi.
+        let (p_phi, denominator) = ([1.17, 0.54], 0.9 * 1.3 + 1.5 * 1.17 + 0.6 * 0.54);
+        near(rls.update_with_noise(phi, y, 0.9, 1.3), 9.5);
+        near(rls.theta[0], 3.0 + 1.17 * 9.5 / denominator);
+        near(rls.theta[1], -5.0 + 0.54 * 9.5 / denominator);
+        for (found, (was, i, j)) in rls.covariance.into_iter().zip([(0.7, 0, 0), (0.2, 0, 1), (0.4, 1, 1)]) {
+            near(found, (was - p_phi[i] * p_phi[j] / denominator) / 0.9);
+        }
+        // An ordinary measurement has noise of one.
+        let (mut ordinary, mut one) = (known(), known());
+        assert_eq!(ordinary.update(phi, y, 0.8), one.update_with_noise(phi, y, 0.8, 1.0));
+        assert_eq!(ordinary, one);
+    }
+
+    #[test]
+    fn one_by_one_the_samples_give_the_batch_solution_and_its_covariance() {
+        // Normal equations with the prior, each sample by its noise and forgotten by what has come since.
+        for forgetting in [1.0, 0.9] {
+            let mut rls = Rls::new([4.0, 25.0]);
+            let mut information = [1.0 / 4.0, 0.0, 1.0 / 25.0];
+            let mut right = [0.0; 2];
+            for k in 0..9 {
+                let k = f64::from(k);
+                let (phi, noise) = ([1.0 + 0.3 * k, (0.7 * k).cos()], 0.5 + 0.1 * k);
+                let y = 2.0 * phi[0] - 3.0 * phi[1] + 0.1 * (1.9 * k).sin();
+                rls.update_with_noise(phi, y, forgetting, noise);
+                let products = [phi[0] * phi[0], phi[0] * phi[1], phi[1] * phi[1]];
+                for (sum, product) in information.iter_mut().zip(products) {
+                    *sum = forgetting * *sum + product / noise;
+                }
+                for (sum, phi) in right.iter_mut().zip(phi) {
+                    *sum = forgetting * *sum + phi * y / noise;
+                }
+            }
+            let [a, b, c] = information;
+            let determinant = a * c - b * b;
+            for (found, expected) in rls.covariance.into_iter().zip([c, -b, a]) {
+                assert!((found - expected / determinant).abs() < 1e-10, "{found}");
+            }
+            assert!((rls.theta[0] - (c * right[0] - b * right[1]) / determinant).abs() < 1e-10);
+            assert!((rls.theta[1] - (a * right[1] - b * right[0]) / determinant).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn a_reset_forgets_how_well_the_parameters_are_known_and_not_what_they_are() {
+        let mut rls = known();
+        rls.reset_covariance([6.0, 8.0]);
+        assert_eq!(rls, Rls { theta: [3.0, -5.0], covariance: [6.0, 0.0, 8.0] });
+        assert_eq!(Rls::new([6.0, 8.0]), Rls { theta: [0.0; 2], covariance: [6.0, 0.0, 8.0] });
+    }
+
+    #[test]
+    fn what_has_overflowed_is_told() {
+        assert!(known().is_finite());
+        for spoil in [f64::NAN, f64::INFINITY] {
+            for i in 0..5 {
+                let mut rls = known();
+                *(if i < 2 { &mut rls.theta[i] } else { &mut rls.covariance[i - 2] }) = spoil;
+                assert!(!rls.is_finite(), "{i}");
+            }
+        }
     }
 }

@@ -6,6 +6,8 @@
 //! for the overshoot (Siegmund 1985, Sequential Analysis, eq. 2.57), `(exp(h + 1.166 mu) - h - 1.166 mu - 1) 2/mu²` samples.
 //! It is solved for `h` from the rate that the configuration states, which the three share.
 
+use super::gaussian::at_least;
+
 /// Drops that the sums are made for, in standard deviations of an innovation.
 const SHIFTS: [f64; 3] = [1.0, 2.0, 4.0];
 /// Mean overshoot of a random walk of unit normal steps.
@@ -42,18 +44,14 @@ impl Alarm {
             if gain <= *sum {
                 heard.outweighs = false;
             }
-            let next = *sum + gain;
-            *sum = if next > 0.0 { next } else { 0.0 };
+            *sum = at_least(0.0, *sum + gain);
             if *sum > 0.0 {
                 heard.quiet = false;
             }
             if *sum > *threshold {
                 heard.alarm = true;
             }
-            let evidence = *sum - *threshold;
-            if evidence > heard.evidence {
-                heard.evidence = evidence;
-            }
+            heard.evidence = at_least(heard.evidence, *sum - *threshold);
         }
         heard
     }
@@ -140,5 +138,56 @@ mod tests {
         alarm.rest();
         assert_eq!(alarm.level(), 0.0);
         assert!(alarm.take(0.0).quiet);
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} for {expected}");
+    }
+
+    #[test]
+    fn thresholds_are_siegmunds_for_a_third_of_the_rate_and_at_least_one() {
+        // 720 an hour at 200 Hz are one in a thousand samples, in three thousand for each of the sums.
+        let alarm = Alarm::new(720.0, 0.005);
+        for (threshold, mu) in alarm.thresholds.into_iter().zip([1.0, 2.0, 4.0_f64]) {
+            near(threshold, (1500.0 * mu * mu).ln() - 1.166 * mu);
+        }
+        assert_eq!(Alarm::new(1e9, 0.005).thresholds, [1.0; 3]);
+        // Nobody samples faster than a megahertz, nor waits longer than for one alarm in 10^9 hours.
+        assert_eq!(Alarm::new(720.0, 1e-9).thresholds, Alarm::new(720.0, 1e-6).thresholds);
+        assert_eq!(Alarm::new(0.0, 0.005).thresholds, Alarm::new(1e-9, 0.005).thresholds);
+    }
+
+    #[test]
+    fn the_sums_are_of_log_likelihood_ratios_and_evidence_is_what_is_above_the_threshold() {
+        let mut alarm = Alarm::new(720.0, 0.005);
+        let h = alarm.thresholds;
+        // For a fall by z the sum for mu grows by mu (z - mu/2).
+        let heard = alarm.take(-1.7);
+        assert_eq!((heard.quiet, heard.outweighs, heard.alarm, heard.evidence), (false, false, false, 0.0));
+        near(alarm.sums[0], 1.2);
+        near(alarm.sums[1], 1.4);
+        assert_eq!(alarm.sums[2], 0.0);
+        near(alarm.level(), f64::max(1.2 / h[0], 1.4 / h[1]));
+        let heard = alarm.take(-2.6);
+        near(alarm.sums[0], 3.3);
+        near(alarm.sums[1], 4.6);
+        near(alarm.sums[2], 2.4);
+        assert!(heard.outweighs && !heard.alarm);
+        let heard = alarm.take(-4.0);
+        for (sum, expected) in alarm.sums.into_iter().zip([6.8, 10.6, 10.4]) {
+            near(sum, expected);
+        }
+        assert!(heard.alarm && heard.outweighs);
+        near(heard.evidence, f64::max(f64::max(6.8 - h[0], 10.6 - h[1]), 10.4 - h[2]));
+        // What is as expected takes from each what it stands for.
+        let heard = alarm.take(0.5);
+        for (sum, expected) in alarm.sums.into_iter().zip([5.8, 7.6, 0.4]) {
+            near(sum, expected);
+        }
+        assert!(!heard.outweighs && heard.alarm && !heard.quiet);
+        for _ in 0..7 {
+            alarm.take(0.5);
+        }
+        assert!(alarm.take(0.5).quiet && alarm.level() == 0.0);
     }
 }

@@ -78,3 +78,151 @@ impl Stylet {
         self.out.contact_m = Some(start_m);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::noise::Noise;
+    use super::super::tests::{inside, near, sample, step};
+    use super::*;
+    use crate::stylet::layers::{A, K};
+
+    /// In the air, with a low-passed force of this and a noise that is known.
+    fn air(noise: Noise, low_passed_n: f64) -> Stylet {
+        let mut stylet = Stylet::new(&EnhanceConfig::default(), 0.004);
+        (stylet.noise, stylet.low_passed_n) = (noise, low_passed_n);
+        (stylet.started, stylet.steady) = (true, 0.002);
+        stylet
+    }
+
+    fn look(stylet: &mut Stylet, config: &EnhanceConfig, sample: &Sample) {
+        stylet.look_for_contact(config, 0.004, &step(), sample);
+    }
+
+    #[test]
+    fn the_force_that_is_looked_at_is_low_passed_from_the_first_sample_on() {
+        let config = EnhanceConfig::default();
+        let mut stylet = air(Noise::known(0.0, 4e-4, 0.07, 400.0), 0.03);
+        look(&mut stylet, &config, &sample(0.001, 0.14));
+        // 5 ms of 50 ms and that.
+        near(stylet.low_passed_n, 0.04);
+        assert_eq!((stylet.deepest_m, stylet.above), (0.001, 0));
+        look(&mut stylet, &config, &sample(0.0005, 0.04));
+        near(stylet.low_passed_n, 0.04);
+        assert_eq!(stylet.deepest_m, 0.001);
+        stylet.started = false;
+        look(&mut stylet, &config, &sample(0.001, 0.14));
+        near(stylet.low_passed_n, 0.14);
+        assert!(!stylet.in_tissue);
+    }
+
+    /// Standard deviation of the low-passed force about the bias.
+    fn sd_n(noise: &Noise) -> f64 {
+        let spread = noise.variance * noise.slow() * 0.005 / 0.1;
+        (spread.min(noise.marginal()) + noise.bias_variance().min(noise.marginal())).sqrt()
+    }
+
+    #[test]
+    fn contact_is_five_samples_in_a_row_that_stand_out_by_five_standard_deviations() {
+        let config = EnhanceConfig::default();
+        // White noise, and two that are so slow that low-pass or bias are known no better than one sample.
+        for noise in [
+            Noise::known(0.0, 4e-4, 0.07, 400.0),
+            Noise::known(0.98, 4e-4, 0.07, 4000.0),
+            Noise::known(0.9, 4e-4, 0.07, 8.0),
+        ] {
+            let sd = sd_n(&noise);
+            for (sds, counts) in [(5.001, true), (4.999, false)] {
+                let force_n = 0.07 + sds * sd;
+                let mut stylet = air(noise, force_n);
+                for above in 1..=4_u32 {
+                    look(&mut stylet, &config, &sample(0.006, force_n));
+                    assert_eq!(stylet.above, if counts { above } else { 0 }, "{sds}");
+                }
+                assert!(!stylet.in_tissue);
+                look(&mut stylet, &config, &sample(0.0061, force_n));
+                assert_eq!(stylet.in_tissue, counts);
+                if counts {
+                    // Half of what it has risen by is elastic; it is known to itself and three standard deviations.
+                    let l = &stylet.layers;
+                    assert_eq!(
+                        (l.start_m, stylet.first_m, stylet.out.contact_m),
+                        (0.0061, 0.0061, Some(0.0061))
+                    );
+                    near(l.belief.x[A], 0.5 * sds * sd);
+                    near((l.belief.p[A][A] * stylet.noise.variance).sqrt(), (sds + 3.0) * sd);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_force_that_is_gone_or_a_needle_that_goes_back_is_no_contact() {
+        let config = EnhanceConfig::default();
+        let noise = Noise::known(0.0, 4e-4, 0.07, 400.0);
+        for (force_n, v, above) in [
+            (0.6, 0.002, 4),
+            (0.0701, 0.002, 4),
+            (0.07, 0.002, 0),
+            (0.6, -4e-5, 4),
+            (0.6, -5e-5, 0),
+            (0.6, -6e-5, 0),
+        ] {
+            let mut stylet = air(noise, 0.5);
+            stylet.above = 3;
+            look(&mut stylet, &config, &Sample { velocity_mps: v, ..sample(0.006, force_n) });
+            assert_eq!(stylet.above, above, "{force_n} N at {v} m/s");
+        }
+        // Before bias and noise are known there is none, either.
+        let mut stylet = air(Noise::known(0.0, 4e-4, 0.07, 0.0), 0.5);
+        stylet.above = 4;
+        look(&mut stylet, &config, &sample(0.006, 0.6));
+        assert!(!stylet.in_tissue && stylet.above == 4);
+    }
+
+    #[test]
+    fn a_surface_that_is_known_is_where_contact_is_and_nowhere_else() {
+        let config = EnhanceConfig { contact: Contact::Known, ..EnhanceConfig::default() };
+        let mut stylet = air(Noise::known(0.0, 4e-4, 0.07, 400.0), 0.5);
+        for _ in 0..9 {
+            look(&mut stylet, &config, &sample(0.0039, 0.6));
+        }
+        assert!(!stylet.in_tissue && stylet.above == 0);
+        for position_m in [0.004, 0.0043] {
+            let mut touched = stylet;
+            look(&mut touched, &config, &sample(position_m, 0.6));
+            assert!(touched.in_tissue);
+            assert_eq!((touched.layers.start_m, touched.first_m), (0.004, position_m));
+            assert_eq!((touched.layers.belief.x[A], touched.out.contact_m), (0.0, Some(0.004)));
+            assert!(touched.layers.belief.p[A][A] < 1e-12);
+        }
+        // And a surface that is not known is found behind it and before it.
+        let config = EnhanceConfig::default();
+        let mut stylet = air(Noise::known(0.0, 4e-4, 0.07, 400.0), 0.03);
+        look(&mut stylet, &config, &sample(0.006, 0.03));
+        assert!(!stylet.in_tissue);
+    }
+
+    #[test]
+    fn at_contact_tissue_may_be_as_stiff_as_any_and_the_alarm_is_that_of_the_sampling_rate() {
+        let mut stylet = air(Noise::known(0.0, 4e-4, 0.07, 400.0), 0.5);
+        stylet.noise.step_s = 0.001;
+        stylet.touch(&EnhanceConfig::default(), &step(), &sample(0.006, 0.6), 0.0055, 0.2, 0.3);
+        near(stylet.layers.belief.x[K], 1000.0);
+        near((stylet.layers.belief.p[K][K] * 4e-4).sqrt(), 2000.0);
+        assert_eq!((stylet.local.level_n(), stylet.before.start_m, stylet.before_m), (0.6, 0.0055, 0.006));
+        // Two newtons over a millimetre, or at 2 mm/s in half a second; friction of up to them.
+        let p = &stylet.local.state.p;
+        near((p[2][2] * 4e-4).sqrt(), 2000.0);
+        near((p[1][1] * 4e-4).sqrt(), 4.0);
+        near((p[3][3] * 4e-4).sqrt(), 1000.0);
+        let mut alarm = Alarm::new(0.05, 0.001);
+        alarm.take(-3.0);
+        stylet.alarm.take(-3.0);
+        assert_eq!(stylet.alarm.level(), alarm.level());
+        // A needle that stands has friction of its own to be found.
+        let mut stylet = inside();
+        stylet.steady = 0.0;
+        stylet.touch(&EnhanceConfig::default(), &step(), &sample(0.006, 0.6), 0.0055, 0.2, 0.3);
+        near(stylet.layers.belief.x[2], 1000.0 / 1e-6);
+    }
+}

@@ -237,3 +237,339 @@ impl Stylet {
         self.layers.rupture(began_m, libm::sqrt(variance).min(span_m), drive, &self.noise, &mut self.behind);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::layers::{A, F, FP, KP, Layers};
+    use super::super::local::Local;
+    use super::super::noise::Noise;
+    use super::super::shaft::Felt;
+    use super::super::tests::{inside, near, sample, step};
+    use super::*;
+    use alloc::vec::Vec;
+
+    /// A fall that has gone on for `count` samples, from 1.9 N to 1.6 N, where the law says 1.85 N.
+    fn fallen(count: f64) -> Stylet {
+        let mut stylet = inside();
+        stylet.fall = Some(Fall { from_n: 1.9, mean_n: 1.6, missing_n: 0.25, since_s: 0.005 * count, count });
+        stylet
+    }
+
+    #[test]
+    fn a_fall_is_from_the_level_before_to_the_mean_since_as_if_the_speed_had_stayed() {
+        let mut stylet = inside();
+        stylet.last_level_n = 1.48;
+        // Friction of 25 + 9000 x N s/m, while the speed falls by 0.4 and 0.2 mm/s.
+        let friction = 25.0 + 9000.0 * 0.01;
+        stylet.fall(&Step { dv_mps: -4e-4, ..step() }, &sample(0.01, 1.3), false);
+        let fall = stylet.fall.expect("a fall");
+        near(fall.from_n, 1.48 - friction * 4e-4);
+        near(fall.mean_n, 1.3);
+        near(fall.missing_n, 1.5 - 1.3);
+        assert_eq!((fall.since_s, fall.count), (0.005, 1.0));
+        stylet.drive = 0.0018;
+        stylet.fall(&Step { dv_mps: -2e-4, ..step() }, &sample(0.01, 1.2), false);
+        let fall = stylet.fall.expect("a fall");
+        near(fall.from_n, 1.48 - friction * 6e-4);
+        near(fall.mean_n, 0.5 * (1.3 - friction * 2e-4 + 1.2));
+        near(fall.missing_n, 0.5 * (0.2 + 0.277));
+        assert_eq!((fall.since_s, fall.count), (0.01, 2.0));
+        // Where the law does not hold, nobody knows what the speed makes of the force.
+        let mut stylet = inside();
+        (stylet.last_level_n, stylet.rough) = (1.48, 0.3);
+        stylet.fall(&Step { dv_mps: -4e-4, ..step() }, &sample(0.01, 1.3), false);
+        near(stylet.fall.expect("a fall").from_n, 1.48);
+    }
+
+    #[test]
+    fn what_outweighs_all_before_begins_the_fall_anew_at_what_was_expected() {
+        let mut stylet = fallen(7.0);
+        stylet.last_level_n = 9.0;
+        stylet.fall(&step(), &sample(0.01, 1.1), true);
+        let fall = stylet.fall.expect("a fall");
+        assert_eq!((fall.from_n, fall.mean_n, fall.count), (1.5, 1.1, 1.0));
+        assert_eq!(stylet.last_level_n, 1.5);
+    }
+
+    #[test]
+    fn the_level_of_a_fall_is_the_mean_of_as_many_samples_as_a_quarter_of_the_least_drop_takes() {
+        // Noise of 20 mN, to a quarter of 50 mN: 2.56 samples; of 5 mN: sixteen and no more; of 1 N: one.
+        for (least_n, most) in [(0.0, 16.0), (0.05, 2.56), (0.005, 16.0), (1.0, 1.0)] {
+            let mut stylet = inside();
+            (stylet.least_n, stylet.last_level_n) = (least_n, 5.0);
+            let (mut mean_n, mut missing_n) = (0.0, 0.0);
+            for k in 1..=19_u32 {
+                let force_n = 1.0 + 0.1 * f64::from(k * 7 % 5);
+                stylet.fall(&step(), &sample(0.01, force_n), false);
+                let share = 1.0 / f64::from(k).min(most);
+                mean_n += share * (force_n - mean_n);
+                missing_n += share * (1.5 - force_n - missing_n);
+                let fall = stylet.fall.expect("a fall");
+                near(fall.mean_n, mean_n);
+                assert!((fall.missing_n - missing_n).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_fall_that_is_too_small_after_a_tenth_of_a_second_is_none() {
+        // Roughness, least drop, duration, force after it, and whether the fall goes on. Least is four standard deviations of the level's
+        // 20 mN, or half of that where the law does not hold.
+        for (rough, least_n, dt_s, force_n, goes_on) in [
+            (0.0, 0.0, 0.101, 1.45, false),
+            (0.0, 0.0, 0.101, 1.3, true),
+            (0.0, 0.0, 0.1, 1.45, true),
+            (0.0, 0.0, 0.09, 1.45, true),
+            (0.4, 0.0, 0.101, 1.48, true),
+            (0.4, 0.25, 0.101, 1.45, false),
+            (0.4, 0.25, 0.101, 1.0, true),
+            (0.4, 0.25, 0.101, 1.25, true),
+            (0.4, 0.25, 0.1, 1.45, true),
+        ] {
+            let mut stylet = inside();
+            (stylet.rough, stylet.least_n, stylet.last_level_n) = (rough, least_n, 1.5);
+            stylet.alarm.take(-1.0);
+            stylet.was_quiet = false;
+            stylet.fall(&Step { dt_s, ..step() }, &sample(0.01, force_n), false);
+            let found = (stylet.fall.is_some(), stylet.alarm.level() > 0.0, stylet.was_quiet);
+            assert_eq!(found, (goes_on, goes_on, !goes_on), "{rough} {least_n} N {dt_s} s {force_n} N");
+        }
+    }
+
+    #[test]
+    fn a_fall_is_as_large_as_both_law_and_level_say_and_has_to_be_four_standard_deviations() {
+        let size = |stylet: &Stylet| {
+            let size = stylet.size().expect("a fall");
+            [size.fall_n, size.sd_n, size.least_n]
+        };
+        let assert = |found: [f64; 3], expected: [f64; 3]| {
+            found.into_iter().zip(expected).for_each(|(f, e)| near(f, e));
+        };
+        // Of ten samples of 20 mN.
+        let sd_n = 0.02 / 10.0_f64.sqrt();
+        assert(size(&fallen(10.0)), [0.25, sd_n, 4.0 * sd_n]);
+        let mut stylet = fallen(10.0);
+        stylet.fall = stylet.fall.map(|fall| Fall { from_n: 1.7, ..fall });
+        assert(size(&stylet), [0.1, sd_n, 4.0 * sd_n]);
+        // Of no more than sixteen; of less than one where the noise is slow.
+        assert(size(&fallen(40.0)), [0.25, 0.005, 0.02]);
+        let mut stylet = fallen(10.0);
+        stylet.noise = Noise::known(0.5, 3e-4, 0.0, 400.0);
+        let sd_n = 0.02 / 5.0_f64.sqrt();
+        assert(size(&stylet), [0.25, sd_n, 4.0 * sd_n]);
+        stylet.fall = stylet.fall.map(|fall| Fall { count: 1.0, ..fall });
+        assert(size(&stylet), [0.25, 0.02, 0.08]);
+        // A free tip: and what friction of 7000 N s/m² grows by over a millimetre, 14 mN.
+        let mut stylet = fallen(16.0);
+        stylet.layers.belief.x[FP] = 7000.0;
+        assert(size(&stylet), [0.25, 0.005, 0.02]);
+        stylet.layers.free = true;
+        assert(size(&stylet), [0.25, 0.005, 0.034]);
+        // Where the law does not hold it is not asked: two standard deviations, and the least drop.
+        let mut stylet = fallen(16.0);
+        (stylet.rough, stylet.least_n) = (0.1, 0.004);
+        assert(size(&stylet), [0.3, 0.005, 0.01]);
+        stylet.least_n = 0.2;
+        assert(size(&stylet), [0.3, 0.005, 0.2]);
+        stylet.fall = None;
+        assert!(stylet.size().is_none());
+    }
+
+    #[test]
+    fn a_drop_is_a_fall_of_the_least_size_and_none_in_the_blind_travel_of_a_law_that_is_not_seen_to_hold() {
+        let config = EnhanceConfig::default();
+        // Roughness, least drop, deepest point behind contact at 1 mm.
+        for (rough, least_n, deepest_m, drop) in [
+            (0.0, 0.0, 0.0099, true),
+            (0.0, 0.0, 0.0029, true),
+            (0.3, 0.0, 0.0099, true),
+            (0.3, 0.0, 0.0029, false),
+            (0.3, 0.31, 0.0099, false),
+            (0.3, 0.29, 0.0099, true),
+        ] {
+            let mut stylet = fallen(16.0);
+            (stylet.rough, stylet.least_n, stylet.deepest_m) = (rough, least_n, deepest_m);
+            assert_eq!(stylet.is_a_drop(&config), drop, "{rough} {least_n} N {deepest_m} m");
+            if deepest_m > 0.003 {
+                near(stylet.drop.0, if rough > 0.0 { 0.3 } else { 0.25 });
+                near(stylet.drop.1, 0.005);
+            }
+        }
+        // Two millimetres of blind travel are over at two.
+        let mut stylet = fallen(16.0);
+        (stylet.rough, stylet.first_m, stylet.deepest_m) = (0.3, 0.0, config.guard.blind_travel_m);
+        assert!(stylet.is_a_drop(&config));
+        stylet.fall = None;
+        assert!(!stylet.is_a_drop(&config));
+    }
+
+    /// The predictor as it begins anew at a force, with slopes on the scale of `scale_n`.
+    fn begun_anew(local: &Local, force_n: f64, scale_n: f64, noise: &Noise) -> Local {
+        let mut expected = *local;
+        expected.renew(force_n, scale_n, noise, 0.002, false);
+        expected
+    }
+
+    fn assert_same(found: &Layers, expected: &Layers) {
+        assert_eq!((found.belief.x, found.belief.p), (expected.belief.x, expected.belief.p));
+        assert_eq!((found.start_m, found.passed), (expected.start_m, expected.passed));
+    }
+
+    /// Friction along the shaft without a law, at a force that stays.
+    fn shaft_friction_n(stylet: &Stylet) -> f64 {
+        let felt = Felt {
+            share: 0.0,
+            position_m: 0.01,
+            force_n: 0.0,
+            advancing: true,
+            retracting: false,
+            peak_n: 1.0,
+            jumped: false,
+            noise_n2: 4e-4,
+            track: true,
+        };
+        let mut shaft = stylet.shaft;
+        shaft.take(&felt).0
+    }
+
+    #[test]
+    fn while_a_drop_goes_on_all_begins_anew_where_it_has_come_to() {
+        for (force_n, sd, scale_n) in [(0.5, 0.03, 0.43), (-0.2, 0.03, 0.27), (0.08, 0.03, 0.03)] {
+            let mut stylet = fallen(3.0);
+            stylet.alarm.take(-3.0);
+            stylet.was_quiet = false;
+            let mut other = stylet.layers;
+            other.belief.x[F] = 7000.0;
+            stylet.fallen = Some(other);
+            let expected = begun_anew(&stylet.local, force_n, scale_n, &stylet.noise);
+            stylet.go_on_falling(&step(), &sample(0.01, force_n), sd);
+            assert_eq!(stylet.local.level_n(), force_n);
+            for i in 1..5 {
+                near(stylet.local.state.p[i][i], expected.state.p[i][i]);
+            }
+            assert!(stylet.alarm.level() == 0.0 && stylet.was_quiet && stylet.fall.is_none());
+            assert_same(&stylet.layers, &other);
+            assert_same(&stylet.before, &other);
+            assert_eq!(stylet.before_m, 0.01);
+            // All of the force without the sensor's zero is friction now.
+            near(shaft_friction_n(&stylet), (force_n - 0.07).max(0.0));
+        }
+    }
+
+    #[test]
+    fn a_rupture_is_half_a_step_behind_where_the_sums_left_zero_and_known_by_how_long_they_took() {
+        // Where the sums left zero, the last step, and the place and its standard deviation.
+        let even = 1e-4 / 12.0_f64.sqrt();
+        for (before_m, dz_m, at_m, place_m) in [
+            (0.0099, 1e-4, 0.00995, even),
+            (0.00986, 1e-4, 0.00991, even),
+            (0.00984, 1e-4, 0.00989, 1e-4),
+            (0.0096, 1e-4, 0.00965, 2e-4),
+            (0.00998, 1e-4, 0.00999, 2e-5 / 12.0_f64.sqrt()),
+            // The needle stood, or is above where it was.
+            (0.0096, -1e-5, 0.0096, 2e-4),
+            (0.0101, 1e-4, 0.0101, 0.0),
+        ] {
+            let mut stylet = fallen(3.0);
+            stylet.before_m = before_m;
+            stylet.work = 5;
+            stylet.before.belief.x[F] = 8000.0;
+            let (mut expected, mut behind) = (stylet.before, stylet.behind);
+            expected.rupture(at_m, place_m, 0.002, &stylet.noise, &mut behind);
+            stylet.rupture(&Step { dz_m, ..step() }, &sample(0.01, 0.5), 1.3);
+            let fallen = stylet.fallen.expect("a drop that may go on");
+            near(fallen.start_m, at_m);
+            for i in 0..6 {
+                near(fallen.belief.x[i], expected.belief.x[i]);
+                let off = (fallen.belief.p[i][i] - expected.belief.p[i][i]).abs();
+                assert!(off <= 1e-9 * expected.belief.p[i][i], "{before_m}: {off} of {i}");
+            }
+            // The sample itself is the first of the new layer.
+            let mut taken = fallen;
+            taken.take(0.01, 0.002, 0.5, 0.0);
+            assert_same(&stylet.layers, &taken);
+            assert_same(&stylet.before, &taken);
+            let found = stylet.out.detection.expect("a rupture");
+            near(found.located_m, at_m);
+            near(found.confidence, 1.0 / (1.0 + 0.5 * (-1.3_f64).exp()));
+            assert_eq!((found.layer, found.time_s, found.position_m), (1, 5.0, 0.01));
+            assert_eq!(stylet.work, 5 + 2 * 216 + 2 * 126 + 2 * 84);
+        }
+    }
+
+    #[test]
+    fn after_a_rupture_all_is_counted_and_expected_anew() {
+        // Scale of what may come: the force that is left, or what is gone.
+        for (force_n, scale_n) in [(0.5, 1.0), (1.2, 1.13), (-0.9, 2.4)] {
+            let mut stylet = fallen(3.0);
+            stylet.alarm.take(-3.0);
+            stylet.was_quiet = false;
+            stylet.drop = (0.31, 0.02);
+            let expected = begun_anew(&stylet.local, force_n, scale_n, &stylet.noise);
+            stylet.rupture(&step(), &sample(0.01, force_n), 0.0);
+            assert_eq!(stylet.local.level_n(), force_n);
+            for i in 1..5 {
+                near(stylet.local.state.p[i][i], expected.state.p[i][i]);
+            }
+            assert!(stylet.alarm.level() == 0.0 && stylet.was_quiet && stylet.fall.is_none());
+            assert_eq!((stylet.since, stylet.since_s, stylet.report_at), (0, 0.0, 16));
+            assert_eq!((stylet.before_m, stylet.out.ruptures), (0.01, 1));
+            let found = stylet.out.detection.expect("a rupture");
+            assert_eq!((found.drop_n, found.drop_sd_n), (0.31, 0.02));
+            near(found.confidence, 2.0 / 3.0);
+            // What the first rupture says of the first contact is the last word on it.
+            let contact_m = stylet.layers.start_m - stylet.layers.previous_m;
+            assert_eq!(stylet.out.contact_m, Some(contact_m));
+            stylet.rupture(&step(), &sample(0.02, force_n), 0.0);
+            assert_eq!((stylet.out.contact_m, stylet.out.ruptures), (Some(contact_m), 2));
+            near(shaft_friction_n(&stylet), (force_n - 0.07).max(0.0));
+        }
+    }
+
+    #[test]
+    fn the_ruptured_layer_has_its_last_word_when_the_next_one_gives_way() {
+        for (report_at, reported) in [(u32::MAX, false), (16, true)] {
+            let mut stylet = fallen(3.0);
+            (stylet.layers.passed, stylet.layers.previous_m, stylet.out.ruptures) = (1, 0.02, 1);
+            stylet.layers.belief.x[KP] = 50.0;
+            stylet.report_at = report_at;
+            stylet.rupture(&step(), &sample(0.01, 0.5), 1.3);
+            assert_eq!(stylet.out.estimate.is_some(), reported);
+        }
+    }
+
+    #[test]
+    fn a_drop_goes_on_while_the_force_falls_by_three_standard_deviations_and_is_over_at_two() {
+        // Rate in standard deviations of itself; time since the rupture; whether it falls, and whether that is settled.
+        let cases: Vec<(f64, f64, bool, bool)> = [0.1001, 0.0999]
+            .into_iter()
+            .flat_map(|since_s| {
+                let late = since_s > 0.1;
+                [
+                    (-3.1, true, false),
+                    (-2.9, false, false),
+                    (-2.1, false, false),
+                    (-1.9, false, late),
+                    (3.0, false, late),
+                ]
+                .map(|(sds, falls, over)| (sds, since_s, falls, over))
+            })
+            .collect();
+        for (sds, since_s, falls, over) in cases {
+            let mut stylet = inside();
+            // In the second layer, with 150 N s/m behind; the predictor thinks it knows 170, and a rate of its own.
+            (stylet.layers.passed, stylet.layers.belief.x[A]) = (1, 150.0);
+            (stylet.fallen, stylet.since_s) = (Some(stylet.layers), since_s);
+            let sd = (25.0 + 0.0025_f64.powi(2) * 9e6 + 0.0045_f64.powi(2) * 4e6).sqrt() * 0.02;
+            stylet.local.state.p[1][1] = 25.0;
+            stylet.local.state.p[2][2] = 9e6;
+            stylet.local.state.p[3][3] = 4e6;
+            // 0.9 mm/s faster than its low-passed self over 0.2 s: 4.5 mm/s².
+            let moved = Sample { velocity_mps: 0.0034, ..sample(0.01, 1.0) };
+            (stylet.local.state.x[2], stylet.local.state.x[3]) = (30.0, 170.0);
+            stylet.local.state.x[1] = sds * sd - 30.0 * 0.0025 - 20.0 * 0.0045;
+            let found = stylet.settle(&Step { speed_mps: 0.0025, ..step() }, &moved);
+            assert_eq!((found, stylet.fallen.is_none()), (falls, over), "{sds} after {since_s} s");
+        }
+    }
+}

@@ -172,3 +172,366 @@ impl Stylet {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{inside, near, sample, step};
+    use super::*;
+    use crate::stylet::alarm::Alarm;
+    use crate::stylet::gaussian::Gaussian;
+
+    /// After one more sample of this force, at 10 mm.
+    fn after(mut stylet: Stylet, force_n: f64) -> Stylet {
+        stylet.feel(&EnhanceConfig::default(), &step(), &sample(0.01, force_n));
+        stylet
+    }
+
+    fn assert_same<const N: usize>(found: &Gaussian<N>, expected: &Gaussian<N>) {
+        assert_eq!((found.x, found.p), (expected.x, expected.p));
+    }
+
+    /// The beliefs as they are when such a sample is taken; the misfit is that of the law.
+    fn taken(stylet: &Stylet, force_n: f64) -> (Local, Layers, Noise, f64) {
+        let (mut local, mut layers, mut noise) = (stylet.local, stylet.layers, stylet.noise);
+        local.advance(&step(), &noise);
+        let innovation = local.innovation(force_n, &step(), &noise);
+        noise.in_tissue(innovation.e, innovation.s);
+        local.take(&innovation, force_n);
+        let (e, s) = layers.take(0.01, stylet.drive, force_n, 0.0);
+        (local, layers, noise, e * e / (s * noise.variance))
+    }
+
+    #[test]
+    fn an_ordinary_sample_teaches_predictor_law_and_noise_and_costs_their_sums_of_products() {
+        let mut stylet = inside();
+        (stylet.work, stylet.texture) = (7, 3.0);
+        let (local, layers, noise, square) = taken(&stylet, 1.48);
+        let found = after(stylet, 1.48);
+        near(found.out.error_n, -0.02);
+        assert_same(&found.local.state, &local.state);
+        assert_same(&found.layers.belief, &layers.belief);
+        assert_eq!((found.noise.variance, found.noise.rho), (noise.variance, noise.rho));
+        // Five shears and an update of five unknowns; an update of six.
+        assert_eq!(found.work, 7 + 158 + 136);
+        assert_eq!((found.since, found.deepest_m), (101, 0.01));
+        near(found.since_s, 0.505);
+        near(found.releasing_s, -0.005);
+        // A travel of 0.1 mm has a twenty-first of the memory; the innovation is half a standard deviation.
+        near(found.texture, 3.0 + (0.25 - 3.0) / 21.0);
+        near(found.misfit, 1.0 + (square - 1.0) / 21.0);
+        assert_eq!((found.rough, found.dry, found.least_n), (0.0, false, 0.0));
+        near(found.peak_n, local.level_n() - 0.07);
+        near(found.last_level_n, 1.5);
+        assert!(found.peak_n > 1.2 && found.out.detection.is_none());
+    }
+
+    #[test]
+    fn an_innovation_counts_for_texture_up_to_six_standard_deviations() {
+        let mut stylet = inside();
+        (stylet.texture, stylet.alarm) = (3.0, Alarm::new(1e-9, 0.005));
+        stylet.alarm.rest();
+        // Seven and five standard deviations of 40 mN, in one sample: not enough for this alarm.
+        near(after(stylet, 1.22).texture, 3.0 + 33.0 / 21.0);
+        near(after(stylet, 1.3).texture, 3.0 + 22.0 / 21.0);
+    }
+
+    #[test]
+    fn texture_makes_the_force_as_much_rougher_as_the_law_fails() {
+        for (rough, texture, heard) in [(0.0, 5.0, -2.5), (0.4, 5.0, -2.5 / 2.6_f64.sqrt()), (0.4, 0.3, -2.5)]
+        {
+            let mut stylet = inside();
+            (stylet.rough, stylet.texture) = (rough, texture);
+            let mut alarm = stylet.alarm;
+            alarm.take(heard);
+            near(after(stylet, 1.4).alarm.level(), alarm.level());
+        }
+    }
+
+    #[test]
+    fn the_misfit_of_the_law_is_that_of_its_last_travel_and_in_a_hold_of_its_last_seconds() {
+        let config = EnhanceConfig::default();
+        let square = |stylet: &Stylet, force_n: f64| taken(stylet, force_n).3;
+        // Duration of the step, travel, speed, and share.
+        for (dt_s, dz_m, v, share) in [
+            (0.005, 1e-4, 0.002, 1.0 / 21.0),
+            (0.005, 0.0, 0.0, 0.0025),
+            (0.2, 1e-4, 0.002, 0.1),
+            (2.0, 1e-4, 0.002, 0.5),
+            (0.005, -1e-4, 5e-5, 1.0 / 21.0),
+        ] {
+            let mut stylet = inside();
+            stylet.misfit = 0.3;
+            let square = square(&stylet, 1.53);
+            let moved = Sample { velocity_mps: v, ..sample(0.01, 1.53) };
+            stylet.feel(&config, &Step { dt_s, dz_m, ..step() }, &moved);
+            near(stylet.misfit, 0.3 + share * (square - 0.3));
+        }
+        // What the law has not been able to know says nothing of it, but in a hold; a square counts up to four hundred.
+        for (zero, v, force_n, counted) in [
+            (1.5, 0.002, 1.53, None),
+            (1.5, 0.0, 1.53, Some(0.03 * 0.03 / 2.5 / 4e-4)),
+            (1.5, 5e-5, 1.53, Some(0.03 * 0.03 / 2.5 / 4e-4)),
+            (0.9, 0.002, 1.53, Some(0.03 * 0.03 / 1.9 / 4e-4)),
+            (0.5, 0.002, 9.5, Some(400.0)),
+        ] {
+            let mut stylet = inside();
+            stylet.layers.belief.p[5][5] = zero;
+            stylet.misfit = 0.3;
+            // What the predictor knows is no matter.
+            stylet.local.state.x[0] = force_n;
+            let moved = Sample { velocity_mps: v, ..sample(0.01, force_n) };
+            // The noise stays as it is where nothing was off: its count alone.
+            stylet.noise.count = 1e300;
+            stylet.feel(&config, &step(), &moved);
+            let expected = counted.map_or(0.3, |square| 0.3 + (square - 0.3) / 21.0);
+            assert!((stylet.misfit / expected - 1.0).abs() < 1e-9, "{} for {expected}", stylet.misfit);
+        }
+    }
+
+    #[test]
+    fn the_worse_the_law_fits_the_rougher_the_force_is_taken_and_the_larger_a_drop_has_to_be() {
+        for (misfit, rough) in [(1.2, 0.0), (1.5, 0.0), (1.7, 0.4), (1.9, 0.8), (2.5, 1.0)] {
+            let mut stylet = inside();
+            // Even after the sample, whose share is a twenty-first.
+            let square = taken(&stylet, 1.48).3;
+            stylet.misfit = (misfit - square / 21.0) * 21.0 / 20.0;
+            stylet.peak_n = 3.0;
+            let found = after(stylet, 1.48);
+            near(found.misfit, misfit);
+            assert!((found.rough - rough).abs() < 1e-9, "{} for {rough}", found.rough);
+            assert!((found.least_n - rough * 0.08 * 3.0).abs() < 1e-9, "{} N", found.least_n);
+        }
+        // A law that is off by three variances is not trusted again, but for the first two millimetres behind contact.
+        for (misfit, first_m, dry) in
+            [(3.3, 0.001, true), (2.9, 0.001, false), (3.3, 0.0081, false), (3.3, 0.0079, true)]
+        {
+            let mut stylet = inside();
+            (stylet.misfit, stylet.first_m) = (misfit, first_m);
+            assert_eq!(after(stylet, 1.48).dry, dry, "{misfit} from {first_m} m");
+        }
+    }
+
+    #[test]
+    fn a_spike_of_up_to_three_samples_is_passed_over_and_a_jump_that_stays_begins_anew() {
+        // Of six standard deviations, up; or down to where no rupture leads, six of the noise below the sensor's zero.
+        for force_n in [1.78, -0.06] {
+            let mut stylet = inside();
+            stylet.last_level_n = 0.3;
+            let (texture, was) = (stylet.texture, stylet.layers.belief);
+            for spikes in 1..=3 {
+                let count = stylet.noise.count;
+                stylet = after(stylet, force_n);
+                assert_eq!((stylet.spikes, stylet.noise.count, stylet.texture), (spikes, count, texture));
+                assert_eq!((stylet.local.level_n(), stylet.work), (1.5, 158 * u32::from(spikes)));
+                assert_same(&stylet.layers.belief, &was);
+            }
+            let found = after(stylet, force_n);
+            assert_eq!((found.spikes, found.local.level_n(), found.texture), (0, force_n, texture));
+            // Slopes as if all of the force without the zero came or went over a millimetre.
+            let scale_n = (force_n - 0.07_f64).abs().max(0.04);
+            let sd = (found.local.state.p[2][2] * found.noise.variance).sqrt();
+            assert!((sd / (scale_n / 1e-3) - 1.0).abs() < 1e-4, "{sd} N/m for {force_n} N");
+            assert!(found.fall.is_none() && found.out.detection.is_none() && found.alarm.level() == 0.0);
+            // An ordinary sample in between ends it.
+            assert_eq!(after(stylet, 1.5).spikes, 0);
+        }
+        // Neither is one what is less than that.
+        for force_n in [1.73, -0.04] {
+            assert_eq!(after(inside(), force_n).spikes, 0, "{force_n} N");
+        }
+        // A force that jumps to where there is none is known to the innovation's standard deviation.
+        let mut stylet = inside();
+        (stylet.local.state.x[0], stylet.spikes) = (-0.2, 3);
+        let found = after(stylet, 0.08);
+        let sd = (found.local.state.p[2][2] * found.noise.variance).sqrt();
+        assert!((sd / 40.0 - 1.0).abs() < 1e-4, "{sd} N/m");
+    }
+
+    /// One more sample of this force on the way back or above old ground.
+    fn after_back(mut stylet: Stylet, position_m: f64, velocity_mps: f64, force_n: f64) -> Stylet {
+        let moved = Sample { velocity_mps, ..sample(position_m, force_n) };
+        stylet.feel(&EnhanceConfig::default(), &step(), &moved);
+        stylet
+    }
+
+    #[test]
+    fn on_the_way_back_and_on_old_ground_nothing_ruptures_and_a_release_is_told_at_once() {
+        for (position_m, v, forward) in [
+            (0.01, 0.002, true),
+            (0.01, -4e-5, true),
+            (0.01, -6e-5, false),
+            (0.01, -0.002, false),
+            (0.0099 - 9e-5, 0.002, true),
+            (0.0099 - 1.1e-4, 0.002, false),
+        ] {
+            let mut stylet = inside();
+            stylet.alarm.take(-3.0);
+            stylet.fall = None;
+            stylet.was_quiet = false;
+            // An ordinary sample: what was summed up is forgotten on the way back, and the law of layers says nothing there.
+            let was = stylet.layers.belief;
+            let found = after_back(stylet, position_m, v, 1.45);
+            assert_eq!(found.alarm.level() > 0.0, forward, "{position_m} m, {v} m/s");
+            assert_eq!(found.was_quiet, !forward);
+            assert_eq!(found.fall.is_some(), forward);
+            assert_eq!(found.layers.belief.x != was.x, forward);
+            assert_eq!(found.work, 158 + if forward { 136 } else { 0 });
+            // A jump upwards.
+            let found = after_back(stylet, position_m, v, 1.8);
+            assert_eq!(found.spikes == 1, forward);
+            near(found.releasing_s, if forward { -0.005 } else { 0.1 });
+            assert_eq!(found.local.level_n() == 1.8, !forward);
+            // Downwards there is no release, and no rupture on the way back.
+            let found = after_back(stylet, position_m, v, 0.5);
+            near(found.releasing_s, -0.005);
+            assert_eq!(found.out.detection.is_some(), forward);
+            // Nor a spike downwards: what is below zero is a pull.
+            let found = after_back(stylet, position_m, v, -0.5);
+            assert_eq!(found.spikes == 1, forward);
+        }
+        // Above the place where the layer begins the law says nothing, though the needle advances.
+        let mut stylet = inside();
+        stylet.layers.start_m = 0.0105;
+        assert_eq!(after(stylet, 1.48).work, 158);
+        stylet.layers.start_m = 0.01;
+        assert_eq!(after(stylet, 1.48).work, 158 + 136);
+    }
+
+    #[test]
+    fn the_law_as_it_was_before_a_fall_is_kept_from_where_the_sums_left_zero() {
+        // Whether the sums were zero, the force, and whether this sample alone outweighs what they were.
+        for (quiet, force_n, kept) in
+            [(true, 1.4, true), (false, 1.46, false), (false, 0.9, true), (true, 1.56, false)]
+        {
+            let mut stylet = inside();
+            if !quiet {
+                stylet.alarm.take(-3.0);
+                stylet.was_quiet = false;
+                // A drop has to be larger than this.
+                (stylet.rough, stylet.least_n) = (0.5, 5.0);
+            }
+            stylet.before.belief.x[1] = 61.0;
+            let found = after(stylet, force_n);
+            assert_eq!(found.before_m, if kept { 0.0099 } else { 0.0097 }, "{force_n} N");
+            assert_eq!(found.before.belief.x[1], if kept { 60.0 } else { 61.0 });
+            assert_eq!(found.was_quiet, quiet && force_n > 1.5);
+            assert_eq!(found.fall.is_some(), force_n < 1.5);
+        }
+    }
+
+    #[test]
+    fn an_alarm_is_a_rupture_unless_it_is_too_small_or_the_same_drop_goes_on() {
+        let rupture = after(inside(), 0.9);
+        assert_eq!((rupture.out.ruptures, rupture.layers.passed), (1, 1));
+        assert!(rupture.out.detection.is_some_and(|d| d.confidence > 0.99));
+        // At once after a rupture the drop goes on; at a tenth of a second, too, and not after.
+        for (since_s, ruptures, goes_on) in
+            [(0.02, 1, true), (0.094, 1, true), (0.096, 1, false), (0.02, 0, false)]
+        {
+            let mut stylet = inside();
+            (stylet.out.ruptures, stylet.since_s) = (ruptures, since_s);
+            let found = after(stylet, 0.9);
+            assert_eq!(found.out.detection.is_none(), goes_on, "{since_s} s after {ruptures}");
+            assert_eq!(found.local.level_n(), 0.9);
+        }
+        // A fall that is too small to be one is taken for what it is: an innovation.
+        let mut stylet = inside();
+        (stylet.rough, stylet.least_n) = (0.5, 0.7);
+        let found = after(stylet, 0.9);
+        assert!(found.out.detection.is_none() && found.fall.is_some());
+        assert_eq!(found.work, 158 + 136);
+    }
+
+    #[test]
+    fn while_a_drop_goes_on_the_law_waits_as_it_was_after_the_rupture() {
+        for (rate, waits) in [(-9e9, true), (0.0, false)] {
+            let mut stylet = inside();
+            (stylet.layers.passed, stylet.since_s) = (1, 0.02);
+            let mut fallen = stylet.layers;
+            fallen.belief.x[1] = 71.0;
+            (stylet.fallen, stylet.local.state.x[1]) = (Some(fallen), rate);
+            // As predicted, whatever that is.
+            let found = after(stylet, 1.5 + 0.005 * rate);
+            assert_eq!(found.falling, waits);
+            assert_eq!(found.layers.belief.x[1] == 71.0, waits);
+        }
+        // Without a rupture there is nothing that goes on.
+        assert!(!after(inside(), 1.4).falling);
+    }
+
+    #[test]
+    fn the_evidence_for_a_free_tip_is_weighed_once_a_drop_is_over() {
+        for (drop_goes_on, looked) in [(false, 60), (true, 0)] {
+            let mut stylet = inside();
+            (stylet.layers.passed, stylet.since, stylet.since_s) = (1, 103, 0.02);
+            stylet.fallen = drop_goes_on.then_some(stylet.layers);
+            stylet.layers.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07], [1.0; 6]);
+            assert_eq!(after(stylet, 1.48).work, 158 + 136 + looked);
+        }
+    }
+
+    #[test]
+    fn a_sudden_change_of_speed_is_no_fall_and_teaches_nothing_of_the_slopes() {
+        let mut stylet = inside();
+        stylet.alarm.take(-3.0);
+        stylet.was_quiet = false;
+        stylet.fall(&step(), &sample(0.01, 1.3), false);
+        let (was, count) = (stylet.layers.belief, stylet.noise.count);
+        let texture = stylet.texture;
+        stylet.feel(&EnhanceConfig::default(), &Step { sudden: true, ..step() }, &sample(0.01, 0.4));
+        assert_eq!((stylet.local.level_n(), stylet.deepest_m, stylet.work), (0.4, 0.01, 158));
+        assert_eq!((stylet.noise.count, stylet.texture), (count, texture));
+        assert_same(&stylet.layers.belief, &was);
+        assert!(stylet.alarm.level() == 0.0 && stylet.was_quiet && stylet.fall.is_none());
+        assert!(stylet.out.detection.is_none());
+    }
+
+    #[test]
+    fn the_layer_before_is_reported_again_after_twice_as_many_samples() {
+        for (since, said, next) in [(14, false, 16), (15, true, 32), (16, true, 32)] {
+            let mut stylet = inside();
+            (stylet.layers.passed, stylet.layers.previous_m, stylet.out.ruptures) = (1, 0.02, 1);
+            stylet.layers.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07], [1.0; 6]);
+            (stylet.since, stylet.report_at) = (since, 16);
+            let found = after(stylet, 1.48);
+            assert_eq!((found.out.estimate.is_some(), found.report_at), (said, next));
+        }
+    }
+
+    #[test]
+    fn beliefs_that_are_no_numbers_begin_anew_and_nothing_else_does() {
+        let mended = |spoil: fn(&mut Stylet)| {
+            let mut stylet = inside();
+            stylet.fallen = Some(stylet.layers);
+            spoil(&mut stylet);
+            stylet.mend(&step(), &sample(0.01, 0.4));
+            stylet
+        };
+        let sound = mended(|_| ());
+        assert_eq!((sound.work, sound.noise.variance), (0, 4e-4));
+        assert!(sound.fallen.is_some());
+        assert_same(&sound.local.state, &inside().local.state);
+        assert_same(&sound.layers.belief, &inside().layers.belief);
+        for (variance, kept) in
+            [(f64::NAN, 1e-6), (f64::INFINITY, 1e-6), (1e12, 1e-6), (9e11, 9e11), (1e-13, 1e-13)]
+        {
+            let mut stylet = inside();
+            stylet.noise.variance = variance;
+            stylet.mend(&step(), &sample(0.01, 0.4));
+            near(stylet.noise.variance, kept);
+        }
+        // The predictor: from the force, whose slopes are on the scale of it without the zero.
+        let found = mended(|s| s.local.state.x[2] = f64::NAN);
+        assert_eq!((found.local.level_n(), found.work), (0.4, 2 * 216 + 2 * 126 + 2 * 84));
+        near((found.local.state.p[2][2] * 4e-4).sqrt(), 0.33 / 1e-3);
+        near((found.local.state.p[3][3] * 4e-4).sqrt(), 0.33 / 0.002);
+        // The law: from here, with all that tissue may be.
+        let found = mended(|s| s.layers.belief.x[2] = f64::NAN);
+        assert_eq!(
+            (found.layers.start_m, found.layers.passed, found.work),
+            (0.01, 0, 2 * 216 + 2 * 126 + 2 * 84)
+        );
+        assert!(found.fallen.is_none() && found.layers.belief.is_sound());
+        assert_same(&found.before.belief, &found.layers.belief);
+    }
+}

@@ -156,11 +156,7 @@ impl<const N: usize> Gaussian<N> {
     /// [`Gaussian::take`] sees to it.
     #[inline(always)]
     pub(crate) fn is_usable(&self) -> bool {
-        let mut sum = 0.0;
-        for i in 0..N {
-            sum += self.p[i][i] + self.x[i];
-        }
-        sum.is_finite()
+        (0..N).map(|i| self.p[i][i] + self.x[i]).sum::<f64>().is_finite()
     }
 }
 
@@ -325,5 +321,37 @@ mod tests {
     fn bounds_hold_for_what_is_no_number_too() {
         assert_eq!([at_least(1.0, 2.0), at_least(1.0, 0.5), at_least(1.0, f64::NAN)], [2.0, 1.0, 1.0]);
         assert_eq!([at_most(1.0, 2.0), at_most(1.0, 0.5), at_most(1.0, f64::NAN)], [1.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn no_innovation_is_surer_than_its_noise_and_no_variance_falls_below_the_least() {
+        // What rounding has made of a covariance that is none.
+        let mut g = Gaussian::new([1.0, 2.0, 3.0], [1.0; 3]);
+        g.p[1][0] = -3.0;
+        let found = g.innovation([0, 1], [0.7, 0.9], 5.0, 0.3);
+        assert_eq!(found.s, 0.3);
+        assert!((found.e - (5.0 - 0.7 - 1.8)).abs() < 1e-12);
+        let mut g = Gaussian::new([1.0, 2.0, 3.0], [0.0, 4.0, 9.0]);
+        assert_eq!(g.p[0][0], 1e-15);
+        let known = g.innovation([1], [1.0], 5.0, 1e-30);
+        g.take(&known);
+        assert_eq!((g.p[1][1], g.x[1]), (1e-15, 5.0));
+        g.renew(2, 7.0, -1.0);
+        assert_eq!((g.p[2][2], g.x[2]), (1e-15, 7.0));
+    }
+
+    #[test]
+    fn large_numbers_are_numbers_and_a_variance_of_none_is_not_sound() {
+        let large = Gaussian::new([1e200; 3], [1e200; 3]);
+        assert!(large.is_usable() && large.is_sound());
+        let mut g = belief();
+        (g.p[1][0], g.p[1][1], g.p[2][1]) = (0.0, 0.0, 0.0);
+        assert!(!g.is_sound());
+        // A correlation of one up to rounding is one.
+        let mut g = Gaussian::new([0.0; 3], [4.0, 9.0, 1.0]);
+        g.p[1][0] = 6.0 * (1.0 + 4e-7);
+        assert!(g.is_sound());
+        g.p[1][0] = 6.0 * (1.0 + 6e-7);
+        assert!(!g.is_sound());
     }
 }

@@ -208,4 +208,94 @@ mod tests {
         let (mps, apart) = found[150];
         assert!(!apart && mps == 0.002);
     }
+
+    /// Said before and now, in m/s, the mean speed of the positions over 5 ms, and what is usual.
+    fn next(going: &mut Going, (before, said): (f64, f64), stepped: f64) -> (f64, bool) {
+        let last = Sample { velocity_mps: before, ..Sample::default() };
+        let sample =
+            Sample { time_s: DT_S, position_m: stepped * DT_S, velocity_mps: said, ..Sample::default() };
+        going.speed(&last, &sample, 0.002, 0.25)
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{found} for {expected}");
+    }
+
+    #[test]
+    fn log_and_positions_agree_within_four_times_their_usual_difference() {
+        // Nothing is usual: half a percent of 2 mm/s is, and four times that is 40 um/s. Or 60 um/s are usual: 240.
+        for (usual, limit) in [(0.0, 4e-5), (6e-5, 2.4e-4), (1e-6, 4e-5)] {
+            for (share, agree) in [(0.99, true), (-0.99, true), (1.01, false), (-1.01, false)] {
+                let mut going = Going { usual: usual * usual, said_mps: 0.002, ..Going::default() };
+                let off = share * limit;
+                // The mean of what is said before and now.
+                let (mps, apart) = next(&mut going, (0.002, 0.0022), 0.0021 + off);
+                assert_eq!(apart, !agree, "{share} of {limit} m/s");
+                assert_eq!(mps, 0.0022, "a jump within the step explains it");
+                let square = (off * off).min(limit * limit);
+                near(going.usual, 0.75 * usual * usual + 0.25 * square);
+                assert_eq!(going.said_mps, 0.0022);
+            }
+        }
+        // What agrees to the last digit makes the usual less, unless nothing is said.
+        let at_once = |before: f64, said: f64| {
+            let mut going = Going { usual: 4e-10, said_mps: before, ..Going::default() };
+            let last = Sample { velocity_mps: before, ..Sample::default() };
+            let stepped_m = 0.5 * (said + before) * DT_S;
+            let sample =
+                Sample { time_s: DT_S, position_m: stepped_m, velocity_mps: said, ..Sample::default() };
+            assert_eq!(going.speed(&last, &sample, 0.002, 0.25), (said, false));
+            going.usual
+        };
+        near(at_once(0.002, 0.003), 3e-10);
+        assert_eq!(at_once(0.002, 0.0), 4e-10);
+    }
+
+    #[test]
+    fn positions_are_right_until_two_samples_agree_twice_as_closely() {
+        // Within 40 um/s of what lies between those said before and now; within 20 once apart.
+        let said = (0.002, 0.0022);
+        let mut going = Going { said_mps: 0.002, ..Going::default() };
+        let mut tell = |off_mps: f64, expected_mps: f64| {
+            (going.usual, going.said_mps) = (0.0, 0.002);
+            let (mps, apart) = next(&mut going, said, 0.0022 + off_mps);
+            assert!(apart);
+            near(mps, expected_mps);
+            going.apart
+        };
+        assert_eq!(tell(3.9e-5, 0.0022), 0);
+        assert_eq!(tell(4.1e-5, 0.0022 + 4.1e-5), 2);
+        assert_eq!(tell(2.1e-5, 0.0022 + 2.1e-5), 2);
+        assert_eq!(tell(1.9e-5, 0.0022 + 1.9e-5), 1);
+        assert_eq!(tell(2.1e-5, 0.0022 + 2.1e-5), 2);
+        assert_eq!(tell(1.9e-5, 0.0022 + 1.9e-5), 1);
+        assert_eq!(tell(-1e-4, 0.0022), 0);
+        // Below the smaller of the two as above the larger.
+        assert_eq!(tell(-0.0002 - 3.9e-5, 0.0022), 0);
+        assert_eq!(tell(-0.0002 - 4.1e-5, 0.002 - 4.1e-5), 2);
+    }
+
+    #[test]
+    fn a_needle_stands_where_it_has_not_moved_and_is_not_said_to() {
+        for (said, stands) in [(9e-6, true), (-9e-6, true), (1e-5, true), (1.1e-5, false), (-1.1e-5, false)] {
+            let mut going = Going { said_mps: 1e-5, ..Going::default() };
+            let (mps, apart) = next(&mut going, (1e-5, said), 0.0);
+            assert_eq!(
+                (mps, apart, going.standing),
+                (if stands { 0.0 } else { said }, false, stands),
+                "{said}"
+            );
+            assert_eq!(going.said_mps, said);
+        }
+        // Once it stands it does so until it moves, and then sets off whatever is said.
+        let mut going = Going { standing: true, ..Going::default() };
+        assert_eq!(next(&mut going, (0.0, 0.002), 0.0), (0.0, false));
+        assert_eq!(next(&mut going, (0.002, 0.002), 1e-6), (0.002, true));
+        assert!(!going.standing && going.usual == 0.0);
+        // Two samples at one instant tell no speed.
+        let mut going = Going { apart: 2, said_mps: 0.002, ..Going::default() };
+        let last = Sample { velocity_mps: 0.002, ..Sample::default() };
+        let jumped = Sample { position_m: 1e-5, ..last };
+        assert_eq!(going.speed(&last, &jumped, 0.002, 0.25), (0.002, false));
+    }
 }

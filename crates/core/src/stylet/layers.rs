@@ -488,4 +488,350 @@ mod tests {
         }
         near(layers.slope(0.002), FIRST.0 + FIRST.1 * 0.002, 0.05);
     }
+
+    use crate::stylet::gaussian::Gaussian;
+
+    type Matrix = [[f64; N]; N];
+
+    /// A layer from 31 mm on, behind `passed` others, and what is known of it: unknowns that hang together, in units of the noise.
+    fn knowing(passed: usize) -> (Layers, Noise) {
+        let noise = Noise::known(0.0, 1.6e-3, 0.07, 400.0);
+        let mut layers = Layers::contact(0.013, 0.7, 0.3, 1700.0, 0.0023, &noise);
+        let map = core::array::from_fn(|i| {
+            core::array::from_fn(|j| if i == j { 1.0 } else { 0.1 * (i as f64 - 0.7 * j as f64) })
+        });
+        layers.belief = Gaussian::new([0.0; N], [1.3, 4.0, 0.25, 2.0, 0.5, 0.7]).mapped(&map);
+        layers.belief.x = [130.0, 57.0, 8300.0, 44.0, 7100.0, 0.06];
+        (layers.start_m, layers.previous_m, layers.passed) = (0.031, 0.018, passed);
+        (layers.gap_m, layers.gap_sd_m, layers.previous_sd_m) = (0.0037, 3e-4, 5e-4);
+        (layers.scale, layers.settled) = (90.0, true);
+        (layers, noise)
+    }
+
+    fn full(g: &Gaussian<N>) -> Matrix {
+        core::array::from_fn(|i| core::array::from_fn(|j| g.cov(i, j)))
+    }
+
+    /// `h' P h`.
+    fn spread(p: &Matrix, h: &[f64; N]) -> f64 {
+        (0..N * N).map(|n| h[n / N] * p[n / N][n % N] * h[n % N]).sum()
+    }
+
+    fn assert_belief(found: &Gaussian<N>, x: &[f64; N], p: &Matrix) {
+        for i in 0..N {
+            near(found.x[i], x[i], 1e-9);
+            for j in 0..N {
+                let scale = (p[i][i] * p[j][j]).sqrt();
+                let off = (found.cov(i, j) - p[i][j]).abs();
+                assert!(off <= 1e-9 * scale, "{i} {j}: {} for {}", found.cov(i, j), p[i][j]);
+            }
+        }
+    }
+
+    /// `map x` and `map P map'`.
+    fn carried(map: &Matrix, x: &[f64; N], p: &Matrix) -> ([f64; N], Matrix) {
+        let mean = map.map(|row| (0..N).map(|k| row[k] * x[k]).sum());
+        let of =
+            |i: usize, j: usize| (0..N * N).map(|n| map[i][n / N] * p[n / N][n % N] * map[j][n % N]).sum();
+        (mean, core::array::from_fn(|i| core::array::from_fn(|j| of(i, j))))
+    }
+
+    #[test]
+    fn at_contact_the_force_is_half_elastic_and_slopes_are_as_uncertain_as_they_may_be_large() {
+        let noise = Noise::known(0.0, 1.6e-3, 0.07, 400.0);
+        let layers = Layers::contact(0.013, 0.7, 0.3, 1700.0, 0.0023, &noise);
+        let g = &layers.belief;
+        assert_eq!(g.x, [0.35, 850.0, 0.5 * (1700.0 / 0.0023), 0.35 / 0.0023, 0.0, 0.07]);
+        let sds = [0.3, 1700.0, 1700.0 / 0.0023, 0.3 / 0.0023, 0.04, 0.002];
+        for (i, sd) in sds.into_iter().enumerate() {
+            near((g.p[i][i] * noise.variance).sqrt(), sd, 1e-12);
+        }
+        assert_eq!((layers.start_m, layers.drive0, layers.scale), (0.013, 0.0023, 1700.0));
+        // Not wider than what can be told apart from a noise of 1 uN: 10 mN, and that much over the memory of 1 mm.
+        let noise = Noise::known(0.0, 1e-12, 0.0, 400.0);
+        let layers = Layers::contact(0.0, 0.7, 0.3, 1700.0, 0.0023, &noise);
+        for (i, sd) in [(A, 0.01), (K, 10.0), (F, 10.0 / 0.0023), (KP, 0.01 / 0.0023)] {
+            near((layers.belief.p[i][i] * noise.variance).sqrt(), sd, 1e-12);
+        }
+        near(layers.belief.x[K], 5.0, 1e-12);
+    }
+
+    #[test]
+    fn a_sample_teaches_what_the_law_of_its_place_leaves_of_it_whitened_by_the_one_before() {
+        for (passed, rho) in [(0, 0.0), (0, 0.6), (2, 0.0), (2, 0.6)] {
+            let (mut layers, _) = knowing(passed);
+            let h = |z: f64, u: f64| {
+                let x = z - 0.031;
+                if passed == 0 { [1.0, x, x * u, u, 0.0, 1.0] } else { [u, x, x * u, 0.0, 0.0, 1.0] }
+            };
+            let samples = [(0.0347, 0.7, 3.1), (0.0391, 1.9, 2.7), (0.0402, 0.3, 9.9)];
+            let mut before: Option<(f64, f64, f64)> = None;
+            for (n, (z, u, force_n)) in samples.into_iter().enumerate() {
+                let (mut h_now, mut y, mut r) = (h(z, u), force_n, 1.0);
+                let says: f64 = (0..N).map(|i| h_now[i] * layers.belief.x[i]).sum();
+                near(layers.says(z, u), says, 1e-12);
+                if rho > 0.0 && n == 1 {
+                    let (z, u, force_n) = before.expect("a sample before");
+                    let h_before = h(z, u);
+                    (0..N).for_each(|i| h_now[i] -= rho * h_before[i]);
+                    y -= rho * force_n;
+                } else {
+                    // The noise of a sample alone.
+                    r = 1.0 / (1.0 - rho * rho);
+                }
+                let (g, p) = (layers.belief, full(&layers.belief));
+                let e = y - (0..N).map(|i| h_now[i] * g.x[i]).sum::<f64>();
+                let s = r + spread(&p, &h_now);
+                let gain: [f64; N] =
+                    core::array::from_fn(|i| (0..N).map(|j| p[i][j] * h_now[j]).sum::<f64>() / s);
+                let (found_e, found_s) = layers.take(z, u, force_n, rho);
+                near(found_e, e, 1e-9);
+                near(found_s, s, 1e-9);
+                let x = core::array::from_fn(|i| g.x[i] + gain[i] * e);
+                let left =
+                    core::array::from_fn(|i| core::array::from_fn(|j| p[i][j] - gain[i] * gain[j] * s));
+                assert_belief(&layers.belief, &x, &left);
+                before = Some((z, u, force_n));
+                if n == 1 {
+                    // What is passed over whitens nothing.
+                    layers.pass();
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn slope_and_friction_are_what_the_belief_makes_of_drive_and_place() {
+        let (layers, noise) = knowing(2);
+        near(layers.slope(0.3), 57.0 + 0.3 * 8300.0, 1e-12);
+        near(layers.friction(0.0345), 130.0 + 8300.0 * 0.0035, 1e-12);
+        near(layers.growth(0.3), 7100.0 * 0.3, 1e-12);
+        near(knowing(0).0.friction(0.0345), 44.0 + 8300.0 * 0.0035, 1e-12);
+        let p = full(&layers.belief);
+        near(layers.previous_variance(&noise)[0], p[KP][KP] * 1.6e-3, 1e-12);
+        near(layers.previous_variance(&noise)[1], p[FP][FP] * 1.6e-3, 1e-12);
+        let (mut falling, _) = knowing(2);
+        falling.belief.x[FP] = -7100.0;
+        near(falling.growth(0.3), 7100.0 * 0.3, 1e-12);
+    }
+
+    #[test]
+    fn friction_behind_is_that_of_the_layers_passed_and_grows_with_travel_where_the_tip_is_free() {
+        let (mut layers, noise) = knowing(2);
+        let p = full(&layers.belief);
+        let (found, variance) = layers.behind(0.0345, &noise);
+        near(found, 130.0, 1e-12);
+        near(variance, p[A][A] * 1.6e-3, 1e-12);
+        layers.free = true;
+        let (found, variance) = layers.behind(0.0345, &noise);
+        near(found, 130.0 + 8300.0 * 0.0035, 1e-12);
+        near(variance, spread(&p, &[1.0, 0.0, 0.0035, 0.0, 0.0, 0.0]) * 1.6e-3, 1e-12);
+        // Before where it begins there is none of it; and none at all in the first layer.
+        near(layers.behind(0.02, &noise).0, 130.0, 1e-12);
+        assert_eq!(knowing(0).0.behind(0.0345, &noise), (0.0, 0.0));
+        // When the layer before gave way there was as much less as the gap of 3.7 mm has added.
+        let (gave_way, variance) = layers.when_it_gave_way(&noise);
+        near(gave_way, 130.0 - 0.0037 * 7100.0, 1e-12);
+        let place = 7100.0 * 3e-4;
+        near(variance, spread(&p, &[1.0, 0.0, 0.0, 0.0, -0.0037, 0.0]) * 1.6e-3 + place * place, 1e-9);
+    }
+
+    #[test]
+    fn each_layer_has_its_share_of_the_friction_on_the_way_back() {
+        let (mut layers, noise) = knowing(2);
+        let mut behind = Behind::default();
+        behind[0] = [0.001, 0.021, 9000.0];
+        behind[1] = [0.021, 0.031, 1.0];
+        behind[2] = [0.031, 0.041, 5000.0];
+        // 180 N s/m, and 71 N s/m of the one before as it is known now: of what is known of the sum.
+        for (z, inside) in
+            [(0.05, 251.0), (0.031, 251.0), (0.027, 180.0 + 42.6), (0.011, 90.0), (0.0005, 0.0)]
+        {
+            near(layers.around_shaft(&behind, z, 0.04, &noise), 130.0 * inside / 251.0, 1e-9);
+        }
+        // A free tip has gone on in friction to its deepest point.
+        layers.free = true;
+        near(layers.around_shaft(&behind, 0.011, 0.0345, &noise), (130.0 + 29.05) * 90.0 / 251.0, 1e-9);
+        // No layer pulls; without friction of its own each is as good as another.
+        layers.free = false;
+        layers.belief.x[FP] = -3.0;
+        near(layers.around_shaft(&behind, 0.027, 0.04, &noise), 130.0, 1e-12);
+        near(layers.around_shaft(&behind, 0.011, 0.04, &noise), 65.0, 1e-9);
+        behind[0][2] = 0.0;
+        near(layers.around_shaft(&behind, 0.011, 0.04, &noise), 130.0, 1e-12);
+        layers.belief.x[A] = -4.0;
+        assert_eq!(layers.around_shaft(&behind, 0.011, 0.04, &noise), 0.0);
+        // Those beyond the last one kept are part of the sum alone.
+        let (layers, _) = knowing(MAX_LAYERS + 1);
+        let behind: Behind = core::array::from_fn(|i| [0.001 * i as f64, 0.001 * (i as f64 + 1.0), 40.0]);
+        near(layers.around_shaft(&behind, 0.004, 0.04, &noise), 130.0 * 4.0 / MAX_LAYERS as f64, 1e-9);
+    }
+
+    /// What is known just after a rupture at 43.1 mm, to 0.6 mm, of a layer whose slope had the size `before` and whose friction `b`.
+    fn after_a_rupture(
+        map: &Matrix,
+        (g, noise): (&Gaussian<N>, &Noise),
+        before: f64,
+        b: f64,
+    ) -> ([f64; N], Matrix) {
+        let (mut x, mut p) = carried(map, &g.x, &full(g));
+        (x[K], x[F]) = (0.5 * before, 0.5 * before / 0.3);
+        (p[K], p[F]) = ([0.0; N], [0.0; N]);
+        p.iter_mut().for_each(|row| (row[K], row[F]) = (0.0, 0.0));
+        let wide = (3.0 * before).min((1e8 * noise.variance).sqrt() / MEMORY_M);
+        p[K][K] = wide * wide / noise.variance;
+        p[F][F] = wide * wide / (0.3 * 0.3) / noise.variance;
+        p[A][A] += (b * 6e-4).powi(2) / noise.variance;
+        p[ZERO][ZERO] += (before * 6e-4).powi(2) / noise.variance;
+        (x, p)
+    }
+
+    #[test]
+    fn at_a_rupture_the_friction_of_the_layer_is_behind_and_the_next_may_be_three_times_as_stiff() {
+        // K, b, and what is believed of the slope and of the friction: no more of it than the slope allows.
+        for (k, b, before, believed) in [
+            (57.0, 83.0, 81.9, 83.0),
+            (-30.0, 70.0, 9.0, 30.0),
+            (57.0, -240.0, 15.0, -50.0),
+            (-24.2, 80.0, 1.0, 1.0 / 0.3),
+        ] {
+            let (mut layers, noise) = knowing(2);
+            (layers.belief.x[K], layers.belief.x[F]) = (k, b);
+            let (g, mut behind) = (layers.belief, Behind::default());
+            behind[1] = [0.013, 0.031, 5.0];
+            let mut map = Matrix::default();
+            (map[A][A], map[A][F]) = (1.0, 0.0121);
+            (map[KP][K], map[FP][F], map[ZERO][ZERO]) = (1.0, 1.0, 1.0);
+            let (x, p) = after_a_rupture(&map, (&g, &noise), before, believed);
+            layers.rupture(0.0431, 6e-4, 0.3, &noise, &mut behind);
+            assert_belief(&layers.belief, &x, &p);
+            assert_eq!(behind[1], [0.013, 0.031, 7100.0], "as it is known when the next one gives way");
+            near(behind[2][0], 0.031, 1e-12);
+            assert_eq!((behind[2][1], behind[2][2], behind[3]), (0.0431, 0.0, [0.0; 3]));
+            near(layers.previous_m, 0.0121, 1e-9);
+            near(layers.scale, before, 1e-9);
+            assert_eq!((layers.passed, layers.start_m, layers.settled), (3, 0.0431, false));
+            assert_eq!((layers.gap_m, layers.gap_sd_m, layers.previous_sd_m), (0.0, 0.0, 0.0));
+            let densities = [true, false].map(|follows| layers.log_density_of_free(follows, &noise));
+            assert_eq!(layers.free_before, densities);
+        }
+    }
+
+    #[test]
+    fn a_layer_that_began_behind_a_gap_takes_its_doubt_about_its_begin_with_it() {
+        let (mut layers, noise) = knowing(2);
+        (layers.start_sd_m, layers.free) = (8e-4, true);
+        layers.belief.x[F] = 83.0;
+        let (g, mut behind) = (layers.belief, Behind::default());
+        behind[1] = [0.013, 0.031, 5.0];
+        let mut map = Matrix::default();
+        (map[A][A], map[A][F], map[KP][K], map[FP][F]) = (1.0, 1e-6, 1.0, 1.0);
+        // A free tip's slope says nothing of layers: the scale stays. What looked like an error of the zero is gone.
+        let (mut x, mut p) = after_a_rupture(&map, (&g, &noise), 90.0, 83.0);
+        x[ZERO] = 0.07;
+        p[ZERO][ZERO] += 1.0 / 400.0;
+        // Nor does a layer end before it has begun.
+        layers.rupture(0.03, 6e-4, 0.3, &noise, &mut behind);
+        assert_belief(&layers.belief, &x, &p);
+        assert_eq!((layers.previous_sd_m, layers.start_sd_m, layers.free), (8e-4, 0.0, false));
+        near(layers.previous_m, 1e-6, 1e-9);
+    }
+
+    #[test]
+    fn no_layer_is_expected_to_be_stiffer_than_what_can_be_told_from_the_noise() {
+        let (mut layers, _) = knowing(2);
+        let noise = Noise::known(0.0, 1e-12, 0.07, 400.0);
+        layers.rupture(0.0431, 0.0, 0.3, &noise, &mut Behind::default());
+        near(layers.scale, 10.0, 1e-9);
+        near((layers.belief.p[K][K] * noise.variance).sqrt(), 10.0, 1e-9);
+        near((layers.belief.p[F][F] * noise.variance).sqrt(), 10.0 / 0.3, 1e-9);
+    }
+
+    #[test]
+    fn the_first_layer_began_as_far_before_contact_as_force_over_slope_says() {
+        // Force and slope at contact with the drive that there was, in N and N/m; and how far the tip was inside, in m.
+        for (p_n, q, k, b, inside_m) in [
+            (0.13, 0.9, 57.0, 83.0, Some((0.13 + 0.9 * 0.0023) / (57.0 + 83.0 * 0.0023))),
+            // No more than the tip has travelled since.
+            (1.9, 0.9, 57.0, 83.0, Some(0.0121)),
+            (-0.13, 0.9, 57.0, 83.0, None),
+            (-0.0023 * 0.9, 0.9, 57.0, 83.0, None),
+            (0.13, 0.9, -57.0, 83.0, None),
+            (-0.13, 0.9, -57.0, 83.0, None),
+            (0.13, 0.9, -0.0023 * 83.0, 83.0, None),
+        ] {
+            let (mut layers, noise) = knowing(0);
+            let x = &mut layers.belief.x;
+            (x[A], x[KP], x[K], x[F]) = (p_n, q, k, b);
+            let (mut g, mut behind) = (layers.belief, Behind::default());
+            let delta = inside_m.unwrap_or(0.0);
+            if inside_m.is_some() {
+                // Then p = K delta, as well as the force was known.
+                let r = spread(&full(&g), &[1.0, 0.0, 0.0, 0.0023, 0.0, 0.0]);
+                let p_is_k_delta = g.innovation([A, K], [1.0, -delta], 0.0, r);
+                g.take(&p_is_k_delta);
+            }
+            let mut map = Matrix::default();
+            (map[A][KP], map[A][F], map[KP][K], map[FP][F], map[ZERO][ZERO]) = (1.0, 0.0121, 1.0, 1.0, 1.0);
+            let before = (g.x[K] + g.x[F] * 0.3).abs().max(1.0);
+            let (x, p) =
+                after_a_rupture(&map, (&g, &noise), before, g.x[F].clamp(-before / 0.3, before / 0.3));
+            layers.rupture(0.0431, 6e-4, 0.3, &noise, &mut behind);
+            assert_belief(&layers.belief, &x, &p);
+            near(layers.previous_m, 0.0121 + delta, 1e-9);
+            near(behind[0][0], 0.031 - delta, 1e-9);
+            assert_eq!((behind[0][1], layers.passed), (0.0431, 1));
+        }
+        // A force that is known all but exactly makes no constraint that is.
+        let (mut layers, noise) = knowing(0);
+        layers.belief = Gaussian::new([0.13, 57.0, 83.0, 0.9, 0.0, 0.0], [1e-9, 1e-9, 0.1, 1e-9, 0.1, 0.1]);
+        let inside_m = (0.13 + 0.9 * 0.0023) / (57.0 + 83.0 * 0.0023);
+        layers.rupture(0.0431, 6e-4, 0.3, &noise, &mut Behind::default());
+        let kept =
+            57.0 + 1e-9 * inside_m * (0.13 - 57.0 * inside_m) / (1e-6 + 1e-9 + 1e-9 * inside_m * inside_m);
+        assert!((layers.belief.x[KP] - kept).abs() < 1e-13, "{} for {kept}", layers.belief.x[KP]);
+    }
+
+    #[test]
+    fn where_the_force_bends_upwards_a_layer_begins_and_where_downwards_friction_stops_to_grow() {
+        for (up, b, grows) in
+            [(true, 83.0, true), (false, 83.0, true), (true, 30.0, false), (false, 30.0, false)]
+        {
+            let (mut layers, noise) = knowing(2);
+            (layers.free, layers.gap_sd_m) = (true, 3e-4);
+            (layers.belief.x[F], layers.belief.x[FP]) = (b, 61.0);
+            let (g, mut behind) = (layers.belief, Behind::default());
+            behind[1] = [0.013, 0.031, 61.0];
+            let mut map: Matrix =
+                core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j))));
+            map[A][F] = 0.0121;
+            layers.bend(0.0431, 6e-4, up, 0.3, &noise, &mut behind);
+            let (x, p) = if up {
+                after_a_rupture(&map, (&g, &noise), 90.0, b)
+            } else {
+                let (mut x, mut p) = carried(&map, &g.x, &full(&g));
+                x[F] = 0.0;
+                (0..N).for_each(|i| (p[i][F], p[F][i]) = (0.0, 0.0));
+                p[F][F] = b * b / noise.variance;
+                p[A][A] += (b * 6e-4).powi(2) / noise.variance;
+                (x, p)
+            };
+            assert_belief(&layers.belief, &x, &p);
+            assert_eq!((layers.free, layers.start_m), (!up, 0.0431));
+            assert_eq!(layers.start_sd_m, if up { 6e-4 } else { 0.0 });
+            // As far as more than half of its friction per metre went on, the layer before went on.
+            let gap = layers.gap_m - 0.0037;
+            if grows {
+                near(gap, 0.0121, 1e-9);
+                assert_eq!((behind[1], layers.gap_sd_m), ([0.013, 0.0431, 61.0], 6e-4));
+            } else {
+                assert_eq!((gap, behind[1], layers.gap_sd_m), (0.0, [0.013, 0.031, 61.0], 3e-4));
+            }
+        }
+        // What bends before the place where it began has not gone on.
+        let (mut layers, noise) = knowing(2);
+        let before = layers.belief.x[A];
+        layers.bend(0.03, 6e-4, false, 0.3, &noise, &mut Behind::default());
+        assert_eq!((layers.gap_m, layers.belief.x[A]), (0.0037, before));
+    }
 }

@@ -186,9 +186,7 @@ mod tests {
     }
 
     fn noise(rho: f64) -> Noise {
-        let mut noise = Noise::new(1e-2);
-        (noise.rho, noise.count, noise.step_s) = (rho, 1e6, 0.005);
-        noise
+        Noise::known(rho, 1e-4, 0.0, 1e6)
     }
 
     fn step(dt_s: f64, dz_m: f64, dv_mps: f64, rho: f64) -> Step {
@@ -286,5 +284,93 @@ mod tests {
         local.state.p[B][B] = 1e14;
         local.renew(1.7, force_n, &noise, speed, false);
         assert!((sd_n(&local, B, speed) / force_n - 1.0).abs() < 1e-9);
+    }
+
+    fn full(local: &Local) -> [[f64; 5]; 5] {
+        core::array::from_fn(|i| core::array::from_fn(|j| local.state.cov(i, j)))
+    }
+
+    fn near(found: f64, expected: f64, scale: f64) {
+        assert!((found - expected).abs() <= 1e-12 * scale, "{found} for {expected}");
+    }
+
+    #[test]
+    fn a_step_is_a_linear_map_and_slopes_wander_as_their_memories_say() {
+        let noise = noise(0.6);
+        for (dz, dv) in [(0.3, 0.7), (0.3, 0.0), (0.0, 0.7), (0.0, 0.0)] {
+            let (mut local, dt) = (knowing(0.01, 0.002), 0.2);
+            local.state.x = [1.3, -0.7, 2.9, 5.3, -3.1];
+            let (x, p) = (local.state.x, full(&local));
+            local.advance(&step(dt, dz, dv, 0.6), &noise);
+            let map = [
+                [1.0, dt, dz, dv, 0.0],
+                [0.0, 1.0, 0.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 0.0, dv],
+                [0.0, 0.0, 0.0, 1.0, dz],
+                [0.0, 0.0, 0.0, 0.0, 1.0],
+            ];
+            // Slow noise of correlation 0.6 weighs 1/0.16; half a second and a millimetre are the memories.
+            let wander = [0.0, (dt / 0.25).powi(2) / 0.16, (dz / 1e-6).powi(2) / 0.16, 0.0, 0.0];
+            for i in 0..5 {
+                near(local.state.x[i], (0..5).map(|k| map[i][k] * x[k]).sum(), 10.0);
+                for j in 0..5 {
+                    let mut expected: f64 =
+                        (0..25).map(|n| map[i][n / 5] * p[n / 5][n % 5] * map[j][n % 5]).sum();
+                    if i == j {
+                        expected += wander[i];
+                    }
+                    near(local.state.cov(i, j), expected, expected.abs().max(1.0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_innovation_is_what_is_new_of_a_force_against_the_sample_before() {
+        let (mut local, noise) = (knowing(0.01, 0.002), noise(0.6));
+        local.state.x = [1.3, -0.7, 2.9, 5.3, -3.1];
+        (local.last_n, local.fresh) = (1.1, false);
+        let (x, p) = (local.state.x, full(&local));
+        for (rho, h) in [(0.5, [0.5, 0.1, 0.15, 0.35, 0.0]), (0.0, [1.0, 0.0, 0.0, 0.0, 0.0])] {
+            let found = local.innovation(2.3, &step(0.2, 0.3, 0.7, rho), &noise);
+            near(found.e, 2.3 - rho * 1.1 - (0..5).map(|i| h[i] * x[i]).sum::<f64>(), 1.0);
+            near(found.s, 1.0 + (0..25).map(|n| h[n / 5] * p[n / 5][n % 5] * h[n % 5]).sum::<f64>(), 10.0);
+            let mut taken = local;
+            taken.take(&found, 2.3);
+            let mut expected = local.state;
+            expected.take(&found);
+            assert_eq!((taken.state.x, taken.state.p), (expected.x, expected.p));
+            assert_eq!((taken.last_n, taken.fresh), (2.3, false));
+            // Where there is none before it, all of the noise is in it, whatever the step.
+            taken = local;
+            taken.pass();
+            let alone = taken.innovation(2.3, &step(0.2, 0.3, 0.7, rho), &noise);
+            near(alone.e, 1.0, 1.0);
+            near(alone.s, p[0][0] + 1.0 / 0.64, 10.0);
+        }
+    }
+
+    #[test]
+    fn a_level_that_begins_anew_leaves_the_slopes_and_no_scale_is_wider_than_the_noise_can_tell() {
+        let mut local = knowing(0.01, 0.002);
+        let (x, p) = (local.state.x, full(&local));
+        local.fresh = false;
+        local.level(1.7, &noise(0.6));
+        assert_eq!((local.level_n(), local.last_n, local.fresh), (1.7, 1.7, true));
+        assert_eq!(local.state.x[1..], x[1..]);
+        near(local.state.p[0][0], 1.0 / 0.64, 1.0);
+        for (i, row) in p.iter().enumerate().skip(1) {
+            assert_eq!(local.state.cov(0, i), 0.0);
+            (1..5).for_each(|j| assert_eq!(local.state.cov(i, j), row[j]));
+        }
+        // Noise of 1 uN: slopes on the scale of 10 mN a millimetre, whatever the force.
+        let noise = Noise::known(0.0, 1e-12, 0.0, 1e6);
+        local.renew(1.7, 0.5, &noise, 0.002, true);
+        near((local.state.p[S][S] * 1e-12).sqrt(), 10.0, 10.0);
+        assert_eq!((local.last_n, local.fresh), (1.7, true));
+        // In the air nothing changes with anything.
+        let air = Local::new(0.3);
+        assert_eq!((air.state.x, air.last_n, air.fresh), ([0.3, 0.0, 0.0, 0.0, 0.0], 0.3, true));
+        assert_eq!(core::array::from_fn(|i| air.state.p[i][i]), [1.0, 1e-12, 1e-12, 1e-12, 1e-12]);
     }
 }

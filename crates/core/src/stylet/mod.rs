@@ -165,13 +165,15 @@ impl Stylet {
     }
 
     pub(crate) fn is_sound(&self) -> bool {
-        let numbers = self.noise.variance
-            + self.noise.rho
-            + self.peak_n
-            + self.misfit
-            + self.texture
-            + self.out.enhanced_n;
-        numbers.is_finite()
+        let numbers = [
+            self.noise.variance,
+            self.noise.rho,
+            self.peak_n,
+            self.misfit,
+            self.texture,
+            self.out.enhanced_n,
+        ];
+        numbers.iter().sum::<f64>().is_finite()
             && self.noise.variance > 0.0
             && self.local.state.is_sound()
             && self.layers.belief.is_sound()
@@ -213,5 +215,148 @@ impl Stylet {
         self.started = true;
         self.speak(config, &sample);
         &self.out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::gaussian::Gaussian;
+    use super::*;
+
+    /// In the first layer, 10 mm deep at 2 mm/s, at 200 Hz, with a noise of 20 mN about 0.07 N: the last sample was at 9.9 mm. The
+    /// predictor expects 1.5 N and knows them to 1.73 times the noise, so that an innovation's standard deviation is 40 mN. So does the law of
+    /// layers, `0.6 + 25 u + 60 x + 9000 x u + 0.07`, which knows all but the zero exactly, and that to 14 mN.
+    pub(super) fn inside() -> Stylet {
+        let mut stylet = Stylet::new(&EnhanceConfig::default(), 0.0);
+        stylet.noise = Noise::known(0.0, 4e-4, 0.07, 400.0);
+        stylet.local = Local::new(1.5);
+        stylet.local.state = Gaussian::new([1.5, 0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0, 0.0]);
+        stylet.layers = Layers::contact(0.0, 0.0, 0.0, 100.0, 0.002, &stylet.noise);
+        stylet.layers.belief =
+            Gaussian::new([0.6, 60.0, 9000.0, 25.0, 0.0, 0.07], [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]);
+        (stylet.before, stylet.before_m) = (stylet.layers, 0.0097);
+        (stylet.in_tissue, stylet.started, stylet.last) = (true, true, sample(0.0099, 1.5));
+        (stylet.first_m, stylet.deepest_m) = (0.001, 0.0099);
+        (stylet.drive, stylet.steady, stylet.speed_mps) = (0.002, 0.002, 0.002);
+        (stylet.peak_n, stylet.misfit, stylet.rough) = (1.2, 1.0, 0.0);
+        (stylet.since, stylet.since_s) = (100, 0.5);
+        stylet
+    }
+
+    /// At this place, with this force, at 2 mm/s.
+    pub(super) fn sample(position_m: f64, force_n: f64) -> Sample {
+        Sample { time_s: 500.0 * position_m, position_m, velocity_mps: 0.002, force_n }
+    }
+
+    /// From 9.9 to 10 mm.
+    pub(super) fn step() -> Step {
+        Step { dt_s: 0.005, dz_m: 1e-4, dv_mps: 0.0, rho: 0.0, sudden: false, speed_mps: 0.002 }
+    }
+
+    pub(super) fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-10 * expected.abs(), "{found} for {expected}");
+    }
+
+    #[test]
+    fn a_sample_of_the_same_instant_or_that_no_robot_makes_is_not_used() {
+        let config = EnhanceConfig::default();
+        let used = |stylet: &Stylet, sample: Sample| {
+            let mut stylet = *stylet;
+            let used = stylet.step(&config, 0.0, sample).used;
+            assert_eq!(stylet.last == sample, used);
+            used
+        };
+        // A fiftieth of the usual step, no less than a microsecond, no more than a tenth of a millisecond.
+        for (step_s, instant_s) in [(0.005, 1e-4), (0.001, 2e-5), (1e-5, 1e-6), (0.1, 1e-4)] {
+            let mut stylet = inside();
+            stylet.noise.step_s = step_s;
+            for (share, later) in [(0.99, false), (1.01, true), (-1.01, false)] {
+                let time_s = stylet.last.time_s + share * instant_s;
+                // At the place and speed that the mean of the two speeds leads to.
+                let position_m = stylet.last.position_m + 0.002 * (share * instant_s);
+                let sample = Sample { time_s, position_m, ..stylet.last };
+                assert_eq!(used(&stylet, sample), later, "{share} of {instant_s} s");
+            }
+        }
+        let fresh = Stylet::new(&config, 0.0);
+        let of =
+            |position_m: f64, velocity_mps: f64| Sample { position_m, velocity_mps, ..Sample::default() };
+        assert!(used(&fresh, of(-0.01, 0.002)), "the first needs none before it");
+        for (position_m, v, robot) in [
+            (0.0, 1.99, true),
+            (0.0, 2.0, false),
+            (0.0, -1.99, true),
+            (0.0, -2.01, false),
+            (-9.9, 0.0, true),
+            (-10.1, 0.0, false),
+            (-10.0, 0.0, false),
+            (10.1, 0.0, false),
+            (9.9, 0.0, true),
+        ] {
+            assert_eq!(used(&fresh, of(position_m, v)), robot, "{position_m} m, {v} m/s");
+        }
+        assert!(!used(&fresh, Sample { force_n: f64::NAN, ..of(-0.01, 0.002) }));
+        assert!(!used(&fresh, Sample { time_s: f64::INFINITY, ..of(-0.01, 0.002) }));
+    }
+
+    #[test]
+    fn what_was_said_of_a_sample_is_not_said_of_the_next() {
+        let config = EnhanceConfig::default();
+        let mut stylet = inside();
+        stylet.out.estimate = Some(crate::sample::LayerEstimate::default());
+        stylet.rupture(&step(), &sample(0.0099, 0.5), 1.3);
+        assert!(stylet.out.detection.is_some());
+        let out = stylet.step(&config, 0.0, Sample { force_n: f64::NAN, ..stylet.last });
+        assert!(out.detection.is_none() && out.estimate.is_none() && !out.used);
+        assert_eq!(stylet.work(), 60, "no more than the frame");
+    }
+
+    #[test]
+    fn every_sample_costs_its_frame_and_moves_as_its_positions_do() {
+        let config = EnhanceConfig::default();
+        let mut stylet = inside();
+        // It is said to creep, but has not moved.
+        let still = Sample { time_s: 4.955, velocity_mps: 9e-6, ..stylet.last };
+        stylet.step(&config, 0.0, still);
+        assert_eq!((stylet.last.velocity_mps, stylet.last.position_m), (0.0, 0.0099));
+        assert_eq!(stylet.work(), 60 + 158 + 136);
+        assert!(stylet.out.used && stylet.started);
+        // And is looked at in the air.
+        let mut air = Stylet::new(&config, 0.0);
+        air.step(&config, 0.0, sample(-0.01, 0.3));
+        assert_eq!((air.work(), air.low_passed_n, air.is_sound()), (60, 0.3, true));
+    }
+
+    #[test]
+    fn what_is_no_number_or_no_variance_is_not_sound() {
+        assert!(inside().is_sound());
+        let spoils: [fn(&mut Stylet, f64); 8] = [
+            |s, x| s.noise.variance = x,
+            |s, x| s.noise.rho = x,
+            |s, x| s.peak_n = x,
+            |s, x| s.misfit = x,
+            |s, x| s.texture = x,
+            |s, x| s.out.enhanced_n = x,
+            |s, x| s.local.state.x[2] = x,
+            |s, x| s.layers.belief.x[2] = x,
+        ];
+        for (n, spoil) in spoils.iter().enumerate() {
+            for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                let mut stylet = inside();
+                spoil(&mut stylet, x);
+                assert!(!stylet.is_sound(), "{n} with {x}");
+            }
+        }
+        for variance in [0.0, -1.0] {
+            let mut stylet = inside();
+            stylet.noise.variance = variance;
+            assert!(!stylet.is_sound());
+        }
+        let mut stylet = inside();
+        stylet.local.state.p[1][1] = -1.0;
+        assert!(!stylet.is_sound());
+        let mut stylet = inside();
+        stylet.layers.belief.p[1][1] = -1.0;
+        assert!(!stylet.is_sound());
     }
 }

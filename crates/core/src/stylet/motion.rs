@@ -162,4 +162,124 @@ mod tests {
         ];
         assert_near(&drives(law, &[0.0005, 0.0025, 0.0, -0.0007]), &expected);
     }
+
+    use crate::stylet::tests::{inside, near, sample};
+
+    #[test]
+    fn a_needle_that_is_said_to_have_set_off_has_if_the_force_shows_half_of_its_friction() {
+        // 115 N s/m at 10 mm: 0.23 N at 2 mm/s.
+        for (said, jump_n, sets_off) in [
+            (0.002, 0.12, true),
+            (0.002, 0.11, false),
+            (0.002, -0.12, false),
+            (-0.002, -0.12, true),
+            (-0.002, 0.12, false),
+            (-0.002, -0.11, false),
+            (1.1e-5, 0.12, true),
+            (9e-6, 0.12, false),
+        ] {
+            let (last, moved) = (sample(0.01, 1.3), sample(0.01, 1.3 + jump_n));
+            let moved = Sample { velocity_mps: said, ..moved };
+            let found = inside().set_off(&last, &moved, 0.0, false);
+            assert_eq!(found, if sets_off { (said, true) } else { (0.0, false) }, "{said} m/s, {jump_n} N");
+            // What moves anyway, or is in the air, is let be.
+            assert_eq!(inside().set_off(&last, &moved, 0.001, false), (0.001, false));
+            let mut air = inside();
+            air.in_tissue = false;
+            assert_eq!(air.set_off(&last, &moved, 0.0, true), (0.0, true));
+        }
+    }
+
+    #[test]
+    fn a_step_is_what_lies_between_two_samples_and_the_speed_is_smoothed_while_the_needle_moves() {
+        let config = EnhanceConfig::default();
+        let mut stylet = inside();
+        let last = sample(0.01, 1.3);
+        let at = |dt_s: f64, velocity_mps: f64| Sample {
+            time_s: last.time_s + dt_s,
+            position_m: 0.0103,
+            velocity_mps,
+            force_n: 1.4,
+        };
+        let step = stylet.motion(&config, &last, &at(0.01, 0.0032), true);
+        near(step.dt_s, 0.01);
+        near(step.dz_m, 3e-4);
+        near(step.dv_mps, 0.0012);
+        assert!(step.sudden && step.rho == 0.0);
+        // Over 0.2 s; the shaft's force over 50 ms, what is usual over two seconds.
+        near(step.speed_mps, 0.002 + 0.0012 * 0.01 / 0.21);
+        assert_eq!(step.speed_mps, stylet.speed_mps);
+        for (share, tau_s) in stylet.shares[1..].iter().zip([0.2, 0.05, 2.0]) {
+            near(*share, 0.01 / (0.01 + tau_s));
+        }
+        near(stylet.noise.step_s, 0.0051);
+        // Backwards is as fast; at a standstill the usual speed stays.
+        let step = stylet.motion(&config, &last, &at(0.01, -0.0032), false);
+        assert!(!step.sudden && step.speed_mps > 0.002);
+        let before = stylet.speed_mps;
+        stylet.motion(&config, &last, &at(0.01, 4e-5), false);
+        assert_eq!(stylet.speed_mps, before);
+        stylet.motion(&config, &last, &at(0.01, 6e-5), false);
+        assert!(stylet.speed_mps < before);
+        // The first speed is the usual one, and there is always one.
+        stylet.speed_mps = 0.0;
+        let step = stylet.motion(&config, &last, &at(0.01, 4e-5), false);
+        assert_eq!((stylet.speed_mps, step.speed_mps), (0.0, config.drop.standstill_mps));
+        stylet.motion(&config, &last, &at(0.01, -0.0032), false);
+        assert_eq!(stylet.speed_mps, 0.0032);
+        // Time stamps that are rounded make no other step; nor is there one between two samples of one instant.
+        let (shares, step_s) = (stylet.shares, stylet.noise.step_s);
+        stylet.motion(&config, &last, &at(0.01 + 5e-10, 0.002), false);
+        assert_eq!(stylet.shares, shares);
+        stylet.motion(&config, &last, &at(0.01 + 3e-9, 0.002), false);
+        assert_ne!(stylet.shares, shares);
+        let (shares, was_s) = (stylet.shares, stylet.noise.step_s);
+        assert!(was_s > step_s);
+        let step = stylet.motion(&config, &last, &at(0.0, 0.002), false);
+        assert_eq!((step.dt_s, stylet.shares, stylet.noise.step_s), (0.0, shares, was_s));
+    }
+
+    #[test]
+    fn noise_fades_over_a_step_as_over_the_usual_one() {
+        let mut stylet = inside();
+        stylet.noise = crate::stylet::noise::Noise::known(0.6, 4e-4, 0.0, 400.0);
+        let last = sample(0.01, 1.3);
+        let next = Sample { time_s: last.time_s + 0.01, ..last };
+        let step = stylet.motion(&EnhanceConfig::default(), &last, &next, false);
+        near(step.rho, stylet.noise.rho_over(0.01));
+        assert!(step.rho > 0.4 && step.rho < 0.5);
+    }
+
+    #[test]
+    fn dry_friction_has_the_sign_of_a_motion_that_is_none_below_ten_micrometres_a_second() {
+        let step =
+            |dz_m: f64| Step { dt_s: 0.005, dz_m, dv_mps: 0.0, rho: 0.0, sudden: false, speed_mps: 0.0025 };
+        let moving = |velocity_mps: f64| Sample { velocity_mps, ..Sample::default() };
+        let mut config = EnhanceConfig::default();
+        config.stylet.law = FrictionLaw::CoulombViscous { dry_mps: DRY_MPS };
+        for (v, xi) in [(1.1e-5, 1.0), (1e-5, 0.0), (9e-6, 0.0), (-9e-6, 0.0), (-1e-5, 0.0), (-1.1e-5, -1.0)]
+        {
+            let mut stylet = inside();
+            stylet.drive_friction(&config, &step(1e-5), &moving(v));
+            near(stylet.drive, v + DRY_MPS * xi);
+            near(stylet.steady, 0.0125);
+        }
+        // Presliding: only travel inside builds it up, in the direction of motion.
+        config.stylet.law = FrictionLaw::Presliding { dry_mps: DRY_MPS, travel_m: 2e-5 };
+        let faded = (-0.5_f64).exp();
+        for (v, dz_m, in_tissue, xi) in [
+            (0.002, 1e-5, true, 1.0 - 0.7 * faded),
+            (-0.002, -1e-5, true, -1.0 + 1.3 * faded),
+            (0.002, -1e-5, true, 1.0 - 0.7 * faded),
+            (0.002, 0.0, true, 0.3),
+            (9e-6, 1e-5, true, 0.3),
+            (0.002, 1e-5, false, 0.3),
+        ] {
+            let mut stylet = inside();
+            (stylet.xi, stylet.in_tissue) = (0.3, in_tissue);
+            stylet.drive_friction(&config, &step(dz_m), &moving(v));
+            near(stylet.xi, xi);
+            near(stylet.drive, v + DRY_MPS * xi);
+        }
+    }
 }

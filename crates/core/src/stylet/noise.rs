@@ -343,4 +343,151 @@ mod tests {
         }
         assert_eq!(Noise::new(1e-4).doubt(), 1.05, "no samples count as forty");
     }
+
+    impl Noise {
+        /// Known to be so from as many samples in the air, at 200 Hz: for the tests of what is built on it.
+        pub(crate) fn known(rho: f64, variance: f64, bias_n: f64, count: f64) -> Self {
+            let mut noise = Self::new(1e-9);
+            (noise.rho, noise.variance, noise.bias_n, noise.count) = (rho, variance, bias_n, count);
+            (noise.sums[3], noise.step_s) = (count, 0.005);
+            noise.follow();
+            noise
+        }
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-11 * expected.abs(), "{found} for {expected}");
+    }
+
+    /// Colour, variance of what is new, and mean by the moments of a batch about its first value.
+    fn by_moments(forces_n: &[f64], least: f64) -> (f64, f64, f64) {
+        let n = forces_n.len() as f64;
+        let f: Vec<f64> = forces_n.iter().map(|x| x - forces_n[0]).collect();
+        let mean = f.iter().sum::<f64>() / n;
+        let variance = f.iter().map(|x| x * x).sum::<f64>() / n - mean * mean;
+        let covariance = f.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n - mean * mean;
+        let raw = covariance / variance;
+        let rho = (raw + (1.0 + 4.0 * raw.max(0.0)) / n).clamp(0.0, 0.98);
+        let rho = if rho * rho * n < 4.0 { 0.0 } else { rho };
+        let unbiased = variance * n / (n - (1.0 + rho) / (1.0 - rho)).max(0.5 * n);
+        (rho, (unbiased * (1.0 - rho * rho)).max(least), forces_n[0] + mean)
+    }
+
+    #[test]
+    fn what_counts_in_the_air_are_the_first_forty_samples_and_then_a_half_to_a_quarter_of_all() {
+        let mut noise = Noise::new(1e-4);
+        let forces_n = forces(11, 700, 0.7, 0.5, 0.02);
+        let mut counts = Vec::new();
+        for (k, f) in forces_n.iter().enumerate() {
+            let before = (noise.bias_n(), noise.variance, noise.rho);
+            noise.in_air(*f);
+            let count = noise.in_air_count();
+            if counts.last().is_none_or(|(_, c)| *c != count) {
+                counts.push((k + 1, count));
+            } else if counts.len() > 2 || k < 39 {
+                let changed = (noise.bias_n(), noise.variance, noise.rho) != before;
+                assert!(!changed, "at {k} nothing new counts");
+            }
+        }
+        assert_eq!(counts, [(1, 0.0), (40, 40.0), (160, 80.0), (320, 160.0), (640, 320.0)]);
+    }
+
+    #[test]
+    fn the_noise_in_the_air_is_that_of_the_moments_of_the_samples_that_count() {
+        for (seed, rho, sigma_n) in [(1, 0.0, 0.02), (2, 0.5, 0.02), (3, 0.9, 0.005), (4, 0.995, 0.003)] {
+            let forces_n = forces(seed, 1279, 0.7, rho, sigma_n);
+            for (count, counted) in [(40, 40), (159, 40), (160, 80), (320, 160), (1279, 320)] {
+                let noise = in_air(&forces_n[..count]);
+                let (rho, variance, mean) = by_moments(&forces_n[..counted], 1e-8);
+                assert!((noise.rho - rho).abs() < 1e-9, "{} for {rho}", noise.rho);
+                assert!((noise.variance / variance - 1.0).abs() < 1e-7, "{} for {variance}", noise.variance);
+                near(noise.bias_n(), mean);
+                near(noise.count, counted as f64);
+                near(noise.bias_variance(), noise.variance * noise.slow() / counted as f64);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_known_of_the_bias_but_the_least_noise_before_the_first_samples_have_counted() {
+        let mut noise = Noise::new(0.03);
+        near(noise.bias_variance(), 9e-4);
+        assert_eq!((noise.bias_n(), noise.in_air_count(), noise.slow()), (0.0, 0.0, 1.0));
+        near(noise.marginal(), 9e-4);
+        (0..39).for_each(|_| noise.in_air(5.0));
+        assert_eq!((noise.bias_n(), noise.in_air_count()), (0.0, 0.0));
+        noise.in_air(5.0);
+        assert_eq!((noise.bias_n(), noise.in_air_count()), (5.0, 40.0));
+    }
+
+    #[test]
+    fn forces_that_go_up_and_down_from_sample_to_sample_have_no_colour() {
+        let forces_n: Vec<f64> = (0..40).map(|k| if k % 2 == 0 { 0.1 } else { -0.1 }).collect();
+        let noise = in_air(&forces_n);
+        assert_eq!(noise.rho, 0.0);
+        // Of forty samples with one mean.
+        near(noise.variance, 0.01 * 40.0 / 39.0);
+    }
+
+    #[test]
+    fn an_innovation_moves_strength_and_colour_by_its_share_of_the_memory() {
+        // Variance 0.04 N², colour 0.3, from 99 samples; an innovation of 0.5 N, 1.25 times as wide as the noise: its square is five.
+        let mut noise = Noise::known(0.3, 0.04, 0.0, 99.0);
+        noise.last_z = -0.7;
+        noise.in_tissue(0.5, 1.25);
+        near(noise.count, 100.0);
+        near(noise.variance, 0.04 * 1.04);
+        near(noise.rho, 0.3 - 0.01 * 5.0_f64.sqrt() * 0.7 * 0.91);
+        near(noise.last_z, 5.0_f64.sqrt());
+        near(noise.slow(), 1.0 / (1.0 - noise.rho).powi(2));
+        near(noise.marginal(), noise.variance / (1.0 - noise.rho * noise.rho));
+        noise.in_tissue(-0.1, 1.0);
+        near(noise.last_z, -0.1 / 0.0416_f64.sqrt());
+        // At most sixteen counts of a square, but not while the noise itself is young.
+        for (count, counted) in [(49.0, 100.0), (50.0, 16.0), (400.0, 16.0)] {
+            let mut noise = Noise::known(0.0, 0.04, 0.0, count);
+            noise.in_tissue(-2.0, 1.0);
+            near(noise.variance, 0.04 * (1.0 + (counted - 1.0) / (count + 1.0)));
+            near(noise.last_z, -f64::sqrt(counted));
+        }
+        // The memory is two thousand samples long, and colour neither negative nor above its limit.
+        let mut noise = Noise::known(0.0, 0.04, 0.0, 2000.0);
+        noise.last_z = 1.5;
+        noise.in_tissue(-0.3, 1.0);
+        near(noise.count, 2000.0);
+        near(noise.variance, 0.04 * (1.0 + 1.25 / 2000.0));
+        assert_eq!(noise.rho, 0.0);
+        let mut noise = Noise::known(0.9799, 0.04, 0.0, 60.0);
+        noise.last_z = 4.0;
+        noise.in_tissue(0.8, 1.0);
+        assert_eq!(noise.rho, 0.98);
+    }
+
+    #[test]
+    fn colour_that_may_be_chance_is_none() {
+        // Two standard errors of none, 2/sqrt(n), are 0.2 for a hundred samples.
+        let none = Noise::known(0.19, 0.04, 0.0, 100.0);
+        assert_eq!((none.rho_over(0.005), none.slow(), none.marginal()), (0.0, 1.0, 0.04));
+        for (rho, count) in [(0.21, 100.0), (0.5, 16.0)] {
+            let some = Noise::known(rho, 0.04, 0.0, count);
+            near(some.rho_over(0.005), rho);
+            near(some.rho_over(0.015), rho / (rho + 3.0 * (1.0 - rho)));
+            near(some.slow(), 1.0 / ((1.0 - rho) * (1.0 - rho)));
+            near(some.marginal(), 0.04 / (1.0 - rho * rho));
+            near(some.bias_variance(), 0.04 * some.slow() / count);
+        }
+    }
+
+    #[test]
+    fn doubt_about_slow_noise_is_by_its_colour_and_the_samples_in_the_air() {
+        // 2 (1 + 0.6)/(0.4 n).
+        near(Noise::known(0.6, 0.04, 0.0, 160.0).doubt(), 1.05);
+        near(Noise::known(0.6, 0.04, 0.0, 10.0).doubt(), 1.2);
+    }
+
+    #[test]
+    fn of_a_force_that_does_not_change_no_colour_is_known() {
+        let noise = in_air(&[0.25; 40]);
+        assert_eq!((noise.rho, noise.rho_over(0.005), noise.slow()), (0.0, 0.0, 1.0));
+    }
 }

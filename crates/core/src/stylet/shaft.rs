@@ -373,4 +373,112 @@ mod tests {
         let (friction_n, _) = shaft.take(&Felt { jumped: true, ..back(0.03 - x, force_n) });
         assert!((friction_n - force_n).abs() < 1e-9, "{friction_n} of {force_n}");
     }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-11 * expected.abs().max(1e-3), "{found} for {expected}");
+    }
+
+    #[test]
+    fn the_pull_of_the_way_back_is_by_the_largest_force_or_the_noise_and_begins_at_the_force_of_the_hold() {
+        // Largest force, noise, force of the hold; pull and first force that follow.
+        for (peak_n, noise_n, hold_n, pull_n, force_n) in [
+            (4.0, 0.01, 3.0, 1.0, 3.0),
+            (4.0, 0.01, 0.02, 1.0, 0.05),
+            (4.0, 0.01, -0.5, 1.0, 0.05),
+            (0.02, 0.01, 0.3, 0.01, 0.3),
+            (0.0, 0.0, 0.0, 1e-9, 5e-11),
+        ] {
+            let mut shaft = Shaft::default();
+            shaft.rupture(0.02, hold_n);
+            let at =
+                |x: f64| Felt { peak_n, noise_n2: noise_n * noise_n, track: false, ..back(0.03 - x, hold_n) };
+            let (begin_n, sd_n) = shaft.take(&at(0.0));
+            near(begin_n, force_n);
+            near(sd_n, 0.25 * peak_n);
+            // Zero after 2.5 mm.
+            let faded = (-0.0007 / 0.0025 * (1.0 + force_n / pull_n).ln()).exp();
+            near(shaft.take(&at(0.0007)).0, -pull_n + (force_n + pull_n) * faded);
+            assert!(shaft.take(&at(0.0025)).0.abs() <= 1e-9 * pull_n);
+        }
+    }
+
+    #[test]
+    fn the_tracker_gives_in_to_a_pull_over_two_millimetres_to_a_push_over_one_and_to_a_release_at_once() {
+        let mut shaft = Shaft::default();
+        shaft.rupture(0.02, 3.0);
+        // How far off what is taught and tracked the force is; the travel before it; whether it jumped.
+        let mut off_n = 0.0;
+        let (mut slope, mut scatter_n2, mut x) = (0.0, 0.0, 0.0);
+        for (rest_n, travel_m, jumped, released_n) in [
+            (0.1, 0.0, false, 0.0),
+            (-0.2, 3e-4, false, 0.0),
+            (0.3, 5e-4, false, 0.0),
+            (0.5, 2e-4, true, 0.2),
+            (0.1, 1e-4, true, 0.0),
+            (-0.2, 1e-4, true, 0.0),
+            (0.15, 1e-4, true, 0.15),
+            (-0.3, 1e-4, true, 0.0),
+            (0.2, 1e-4, false, 0.0),
+            // Going in again is no travel back; what the tip has felt is bounded by the largest force.
+            (0.4, -2e-4, false, 0.0),
+            (-5.0, 4e-4, false, 0.0),
+            (7.0, 3e-4, false, 0.0),
+        ] {
+            let travel = f64::max(travel_m, 0.0);
+            x += travel;
+            off_n += slope * travel;
+            let force_n = taught_n(x) + off_n + rest_n;
+            let place = if travel_m < 0.0 { 0.03 - x - travel_m } else { 0.03 - x };
+            let (friction_n, sd_n) = shaft.take(&Felt { jumped, ..back(place, force_n) });
+            off_n += released_n;
+            let rest_n: f64 = rest_n - released_n;
+            near(friction_n, taught_n(x) + off_n);
+            let reach_m = if rest_n < 0.0 { 2e-3 } else { 1e-3 };
+            off_n += (1.0 - (-travel / reach_m).exp()) * rest_n;
+            slope += travel * rest_n / (2e-3 * 8e-3);
+            let bounded = rest_n.clamp(-4.0, 4.0);
+            scatter_n2 += travel / (travel + 2e-3) * (bounded * bounded - scatter_n2);
+            near(sd_n, scatter_n2.sqrt());
+        }
+    }
+
+    #[test]
+    fn friction_turns_with_the_needle_and_begins_anew_at_a_rupture() {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.023, 3.0));
+        near(shaft.take(&hold(0.023, 2.5)).0, 1.0);
+        // Above where it turned it is still on the way back, there it is on the way in again, with no more friction than force.
+        shaft.take(&back(0.023, 2.0));
+        shaft.take(&back(0.0225, 1.0));
+        assert!(shaft.back.is_some());
+        shaft.take(&felt(0.0229, 0.7));
+        assert!(shaft.back.is_some());
+        shaft.take(&hold(0.024, 0.7));
+        assert!(shaft.back.is_some(), "only an advance goes in again");
+        near(shaft.take(&felt(0.023, 0.7)).0, 0.7);
+        assert!(shaft.back.is_none());
+        near(shaft.take(&felt(0.0232, 3.0)).0, 0.7);
+        shaft.take(&back(0.0225, -1.0));
+        shaft.rupture(0.0225, -0.5);
+        assert!(shaft.back.is_none());
+        near(shaft.take(&felt(0.0226, 1.5)).0, 1.5);
+        shaft.rupture(0.0225, 0.8);
+        near(shaft.take(&felt(0.0226 + MEMORY_M, 0.9)).0, 0.8);
+    }
+
+    #[test]
+    fn in_a_hold_friction_grows_with_the_force_at_most_twofold_a_sample_and_not_from_none() {
+        let level = |from_n: f64, to_n: f64| {
+            let mut shaft = Shaft::default();
+            shaft.rupture(0.02, 0.4);
+            shaft.take(&felt(0.0202, 0.4));
+            shaft.take(&felt(0.0215, from_n));
+            shaft.take(&hold(0.0215, to_n)).0
+        };
+        near(level(0.8, 1.2), 0.6);
+        near(level(0.8, 4.0), 0.8);
+        near(level(0.8, 0.2), 0.1);
+        near(level(0.8, -0.2), 0.0);
+        near(level(-0.2, 0.5), 0.0);
+    }
 }

@@ -239,4 +239,156 @@ mod tests {
             assert!(layers.settled, "{stiffness} N/m");
         }
     }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{found} for {expected}");
+    }
+
+    /// Behind a rupture, with the tip free or a layer begun as surely as these log-densities over those at the rupture say.
+    fn with_evidence(follows: f64, ends: f64) -> (Layers, Noise) {
+        let (mut layers, noise) = behind_a_rupture(0.0, 9000.0);
+        let now = [true, false].map(|follows| layers.log_density_of_free(follows, &noise));
+        layers.free_before = [now[0] - follows, now[1] - ends];
+        (layers, noise)
+    }
+
+    #[test]
+    fn a_tip_is_free_at_twenty_to_one_against_a_layer_and_the_other_way_to_be_free() {
+        let log = |x: f64| x.ln();
+        for (follows, ends, free, settled) in [
+            (log(20.2), -30.0, true, false),
+            (log(19.8), -30.0, false, false),
+            (-30.0, log(20.2), true, false),
+            (-30.0, log(19.8), false, false),
+            // Against one and three, twenty times as probable is eighty.
+            (log(81.0), log(3.0), true, false),
+            (log(79.0), log(3.0), false, false),
+            (log(3.0), log(81.0), true, false),
+            // Twenty to the fourth to one that it is not, both ways.
+            (-4.01 * log(20.0), -30.0, false, true),
+            (-30.0, -4.01 * log(20.0), false, true),
+            (-3.99 * log(20.0), -30.0, false, false),
+            (-30.0, -3.99 * log(20.0), false, false),
+            // No more is made of odds than numbers can hold.
+            (900.0, 800.0, true, false),
+            (f64::INFINITY, 0.0, false, false),
+            (f64::NEG_INFINITY, 10.0, false, false),
+        ] {
+            let (mut layers, noise) = with_evidence(follows, ends);
+            let was = layers.belief;
+            assert_eq!(layers.consider_free(ODDS, &noise), free, "{follows} {ends}");
+            assert_eq!((layers.free, layers.settled), (free, settled), "{follows} {ends}");
+            // What is believed then: no stiffness, and the friction of the layer before or none.
+            let mut expected = was;
+            let variance = |g: &crate::stylet::gaussian::Gaussian<6>, i: usize| 1e-9 * g.p[i][i];
+            if free {
+                let none = expected.innovation([K], [1.0], 0.0, variance(&expected, K));
+                expected.take(&none);
+                let h = if follows > ends { -1.0 } else { 0.0 };
+                let friction = expected.innovation([F, FP], [1.0, h], 0.0, variance(&expected, F));
+                expected.take(&friction);
+            }
+            for i in 0..6 {
+                let scale = was.p[i][i].sqrt();
+                assert!((layers.belief.x[i] - expected.x[i]).abs() <= 1e-12 * expected.x[i].abs().max(scale));
+                assert!((layers.belief.p[i][i] - expected.p[i][i]).abs() <= 1e-9 * expected.p[i][i], "{i}");
+            }
+        }
+    }
+
+    #[test]
+    fn where_a_bend_begins_is_told_by_a_sum_for_half_a_standard_deviation() {
+        let (layers, _) = behind_a_rupture(0.0, 9000.0);
+        let mut other = layers;
+        other.start_m = 0.077;
+        let Slack { mut up, .. } = Slack::new(0.05, 0.005, &layers);
+        // It leaves zero where an innovation is lower than a quarter.
+        assert!(!up.take(-0.2, &other, 0.03) && up.slow == 0.0 && up.before_m == 0.02);
+        assert!(!up.take(-0.7, &other, 0.031));
+        near(up.slow, 0.5 * (0.7 - 0.25));
+        assert_eq!((up.before_m, up.before.start_m), (0.031, 0.077));
+        up.take(-1.3, &layers, 0.032);
+        near(up.slow, 0.5 * (0.7 + 1.3 - 0.5));
+        assert_eq!((up.before_m, up.before.start_m), (0.031, 0.077));
+        up.take(3.0, &layers, 0.033);
+        assert_eq!(up.slow, 0.0);
+        up.take(-0.7, &layers, 0.034);
+        assert_eq!(up.before_m, 0.034);
+        assert!(up.take(-9.0, &layers, 0.035));
+        up.rest();
+        assert_eq!((up.slow, up.alarm.level()), (0.0, 0.0));
+    }
+
+    #[test]
+    fn evidence_is_looked_at_every_eighth_sample_until_it_is_settled_or_the_tip_is_free() {
+        let (noise, mut behind) = (noise(), Behind::default());
+        let mut follow = |layers: &mut Layers, slack: &mut Slack, count: u32| {
+            slack.follow(layers, (None, 0.024), (0.02405, 0.0, 0.002), count, &noise, &mut behind)
+        };
+        let (mut layers, _) = behind_a_rupture(60.0, 9000.0);
+        let mut slack = Slack::new(0.05, 0.005, &layers);
+        assert_eq!([7, 9, 12].map(|count| follow(&mut layers, &mut slack, count)), [0; 3]);
+        assert!(!layers.settled);
+        assert_eq!(follow(&mut layers, &mut slack, 16), 60);
+        assert!(layers.settled && !layers.free);
+        assert_eq!(follow(&mut layers, &mut slack, 24), 0);
+        // Nothing is behind the first layer but air.
+        (layers.settled, layers.passed) = (false, 0);
+        assert_eq!(follow(&mut layers, &mut slack, 16), 0);
+        let (mut layers, _) = behind_a_rupture(0.0, 9000.0);
+        for side in [&mut slack.up, &mut slack.down] {
+            side.take(-3.0, &layers, 0.0);
+        }
+        assert_eq!(follow(&mut layers, &mut slack, 8), 60);
+        assert!(layers.free && slack.up.slow == 0.0 && slack.down.slow == 0.0, "the sums begin then");
+    }
+
+    #[test]
+    fn a_free_tip_is_ended_by_a_force_above_and_its_friction_by_one_below() {
+        for up in [true, false] {
+            let (mut layers, noise) = behind_a_rupture(0.0, 9000.0);
+            let mut behind = Behind::default();
+            assert!(layers.consider_free(ODDS, &noise));
+            let before = layers;
+            let mut slack = Slack::new(0.05, 0.005, &layers);
+            let mut follow = |layers: &mut Layers, last_m: f64, z: f64| {
+                slack.follow(
+                    layers,
+                    (Some(before), last_m),
+                    (last_m + 1e-4, z, 0.0021),
+                    3,
+                    &noise,
+                    &mut behind,
+                )
+            };
+            // A sample that says nothing, then two that do; the sums leave zero before the first of them.
+            let sign = if up { 1.0 } else { -1.0 };
+            assert_eq!(follow(&mut layers, 0.024, 0.0), 42);
+            assert_eq!(follow(&mut layers, 0.0241, 2.0 * sign), 42);
+            layers.belief.x[K] = 77.0;
+            assert_eq!(follow(&mut layers, 0.0242, 9.0 * sign), 42 + 2 * 216 + 2 * 126);
+            let (mut expected, mut expected_behind) = (before, Behind::default());
+            let place_m = (0.0243 - 0.0241) / 12.0_f64.sqrt();
+            expected.bend(0.0241, place_m, up, 0.0021, &noise, &mut expected_behind);
+            assert_eq!((layers.free, layers.start_m), (!up, 0.0241));
+            for i in 0..6 {
+                near(layers.belief.x[i], expected.belief.x[i]);
+                near(layers.belief.p[i][i], expected.belief.p[i][i]);
+            }
+            assert_eq!((slack.up.slow, slack.down.slow), (0.0, 0.0));
+        }
+    }
+
+    #[test]
+    fn what_hangs_together_wholly_still_has_a_density() {
+        let (mut layers, noise) = behind_a_rupture(0.0, 9000.0);
+        layers.belief = crate::stylet::gaussian::Gaussian::new([0.0; 6], [1.0, 4.0, 9.0, 1.0, 1.0, 1.0]);
+        layers.belief.p[F][K] = 6.0;
+        // A trillionth of what it would be of unknowns on their own.
+        near(layers.log_density_of_free(false, &noise), -0.5 * 36e-12_f64.ln());
+        layers.belief.p[F][K] = -3.0;
+        (layers.belief.x[K], layers.belief.x[F]) = (0.7, 1.1);
+        let square = (0.49 * 9.0 + 2.0 * 0.7 * 1.1 * 3.0 + 1.21 * 4.0) / 27.0;
+        near(layers.log_density_of_free(false, &noise), -0.5 * (27.0_f64.ln() + square / noise.variance));
+    }
 }

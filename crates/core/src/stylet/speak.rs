@@ -111,3 +111,223 @@ impl Stylet {
         &self.out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::layers::A;
+    use super::super::shaft::Shaft;
+    use super::super::tests::{inside, near, sample};
+    use super::*;
+    use crate::stylet::gaussian::Gaussian;
+
+    /// In the second layer, behind one of 50 N/m and 8000 N s/m² over 20 mm and a gap of 3 mm: 200 N s/m are behind, to 0.6.
+    fn second() -> Stylet {
+        let mut stylet = inside();
+        let l = &mut stylet.layers;
+        l.belief = Gaussian::new([200.0, 60.0, 9000.0, 50.0, 8000.0, 0.07], [900.0, 4.0, 5.0, 6.0, 7.0, 0.5]);
+        (l.passed, l.previous_m, l.previous_sd_m, l.gap_m, l.start_m) = (1, 0.02, 5e-4, 0.003, 0.005);
+        stylet.behind[0] = [-0.015, 0.008, 8000.0];
+        stylet.out.ruptures = 1;
+        stylet.drive = 0.0021;
+        stylet
+    }
+
+    fn said(mut stylet: Stylet, sample: &Sample) -> Stylet {
+        stylet.speak(&EnhanceConfig::default(), sample);
+        stylet
+    }
+
+    fn at(velocity_mps: f64) -> Sample {
+        Sample { velocity_mps, ..sample(0.0099, 1.3) }
+    }
+
+    #[test]
+    fn a_layer_is_reported_with_what_is_known_of_it_and_of_the_friction_behind() {
+        let mut stylet = second();
+        stylet.report(&sample(0.01, 1.3));
+        let found = stylet.out.estimate.expect("an estimate");
+        // The noise's level was learned from four hundred samples.
+        let doubt = 1.005_f64;
+        assert_eq!((found.layer, found.thickness_m, found.time_s), (1, 0.02, 5.0));
+        near(found.start_m, -0.015);
+        assert_eq!((found.stiffness_n_per_m, found.friction), (50.0, 8000.0));
+        near(found.drop_n, 1.0);
+        near(found.elastic_share, 50.0 / 66.0);
+        near(found.added_friction_ns_per_m, 184.0);
+        near(found.stiffness_sd, (6.0 * 4e-4 * doubt).sqrt());
+        near(found.friction_sd, (7.0 * 4e-4 * doubt).sqrt());
+        // Stiffness over the travel, and the travel that the begin is uncertain by.
+        near(found.drop_sd_n, (4e-4 * 6.0 * 4e-4 * doubt + (50.0 * 5e-4_f64).powi(2)).sqrt());
+        near(found.cumulative_ns_per_m, 176.0);
+        near(found.cumulative_sd, ((900.0 + 9e-6 * 7.0) * 4e-4 * doubt).sqrt());
+    }
+
+    #[test]
+    fn a_layer_whose_drop_may_be_none_is_not_reported() {
+        // 1.96 standard deviations of a drop of 1 N as a share of it.
+        for (share, said) in [(0.99, true), (1.01, false)] {
+            let mut stylet = second();
+            let sd = share / 1.96;
+            let stiffness = (sd * sd - 6.25e-4) / 4e-4;
+            stylet.layers.belief.p[KP][KP] = stiffness / (4e-4 * 1.005);
+            stylet.report(&sample(0.01, 1.3));
+            assert_eq!(stylet.out.estimate.is_some(), said, "{share}");
+        }
+        for k in [-50.0, 0.0] {
+            let mut stylet = second();
+            stylet.layers.belief.x[KP] = k;
+            stylet.report(&sample(0.01, 1.3));
+            assert!(stylet.out.estimate.is_none());
+        }
+    }
+
+    #[test]
+    fn what_the_tip_feels_is_the_force_without_the_friction_behind_as_well_as_that_is_known() {
+        let found = said(second(), &at(0.002));
+        near(found.out.enhanced_n, 1.3 - 0.42);
+        near(found.out.cumulative_friction_ns_per_m, 200.0);
+        // Friction to 0.6 N s/m, and the noise itself.
+        near(found.behind_variance, 0.36);
+        let half = 1.96 * (4e-4 + 0.36 * 0.0021_f64.powi(2)).sqrt();
+        let [low, high] = found.out.band_n.expect("a band");
+        near(high - 0.88, half);
+        near(0.88 - low, half);
+        assert_eq!((found.out.state, found.work), (State::NoRupture, 0));
+        // No friction pulls on the way in.
+        let mut stylet = second();
+        stylet.layers.belief.x[A] = -20.0;
+        assert_eq!(said(stylet, &at(0.002)).out.enhanced_n, 1.3);
+    }
+
+    #[test]
+    fn as_long_as_a_drop_goes_on_friction_is_no_more_than_just_after_the_rupture() {
+        for (fallen, falling, friction) in [(150.0, true, 150.0), (150.0, false, 200.0), (250.0, true, 200.0)]
+        {
+            let mut stylet = second();
+            let mut then = stylet.layers;
+            then.belief.x[A] = fallen;
+            (stylet.fallen, stylet.falling) = (Some(then), falling);
+            near(said(stylet, &at(0.002)).out.cumulative_friction_ns_per_m, friction);
+        }
+    }
+
+    #[test]
+    fn on_the_way_back_friction_is_that_of_the_layers_around_the_shaft() {
+        // The layer before began at -15 mm and reaches to 8 mm.
+        for (v, z, friction, work) in [
+            (-0.002, 0.0034, 200.0 * 0.0184 / 0.023, 80),
+            (-6e-5, 0.0034, 200.0 * 0.0184 / 0.023, 80),
+            (-4e-5, 0.0034, 200.0, 0),
+            (-5e-5, 0.0034, 200.0, 0),
+            (0.002, 0.0034, 200.0, 0),
+        ] {
+            let found = said(second(), &Sample { velocity_mps: v, ..sample(z, -0.3) });
+            near(found.out.cumulative_friction_ns_per_m, friction);
+            assert_eq!(found.work, work, "{v} m/s");
+        }
+        let mut stylet = second();
+        stylet.in_tissue = false;
+        assert_eq!(said(stylet, &at(-0.002)).work, 0, "there is none around it in the air");
+    }
+
+    #[test]
+    fn the_state_is_a_rupture_then_a_free_tip_that_the_law_tells_then_none() {
+        let state = |free: bool, dry: bool, ruptured: bool| {
+            let mut stylet = second();
+            (stylet.layers.free, stylet.dry) = (free, dry);
+            if ruptured {
+                let step = super::super::tests::step();
+                stylet.rupture(&step, &sample(0.01, 0.5), 1.3);
+                stylet.layers.free = free;
+            }
+            said(stylet, &at(0.002)).out.state
+        };
+        assert_eq!(state(false, false, true), State::DetectedRupture);
+        assert_eq!(state(true, false, true), State::DetectedRupture);
+        assert_eq!(state(true, false, false), State::FreeTip);
+        assert_eq!(state(true, true, false), State::NoRupture);
+        assert_eq!(state(false, false, false), State::NoRupture);
+    }
+
+    #[test]
+    fn where_the_law_has_failed_friction_is_what_the_shaft_is_told_to_feel() {
+        let config = |law| {
+            let mut config = EnhanceConfig::default();
+            config.stylet.law = law;
+            config
+        };
+        // Speed, time that is left of a release, and what that means.
+        for (v, releasing_s, advancing, retracting, jumped) in [
+            (0.002, -0.1, true, false, false),
+            (6e-5, 0.0, true, false, false),
+            (5e-5, 0.0, false, false, false),
+            (-4e-5, 0.0, false, false, false),
+            (-0.002, 0.0, false, true, false),
+            (-0.002, 0.01, false, true, true),
+        ] {
+            let mut stylet = second();
+            stylet.dry = true;
+            (stylet.releasing_s, stylet.shares[2]) = (releasing_s, 0.4);
+            stylet.shaft.rupture(0.005, 1.1);
+            for position_m in [0.0055, 0.0099] {
+                stylet.shaft.take(&Felt { jumped: false, ..felt(position_m, 1.5, true, false) });
+            }
+            if retracting {
+                stylet.shaft.take(&felt(0.0099, 0.2, false, true));
+            }
+            let mut shaft: Shaft = stylet.shaft;
+            let (dry_n, sd) = shaft.take(&Felt { jumped, ..felt(0.0099, 1.23, advancing, retracting) });
+            stylet.speak(&config(FrictionLaw::Auto), &at(v));
+            near(stylet.out.enhanced_n, 1.3 - dry_n);
+            let [low, high] = stylet.out.band_n.expect("a band");
+            near(0.5 * (high - low), 1.96 * (4e-4 + sd * sd).sqrt());
+            // A law that was asked for stays.
+            stylet.speak(&config(FrictionLaw::Viscous), &at(v));
+            near(stylet.out.enhanced_n, 1.3 - 0.0021 * stylet.out.cumulative_friction_ns_per_m);
+            // In the air there is no shaft to feel anything.
+            let before = stylet.shaft;
+            stylet.in_tissue = false;
+            stylet.speak(&config(FrictionLaw::Auto), &at(0.002));
+            assert_eq!(alloc::format!("{before:?}"), alloc::format!("{:?}", stylet.shaft));
+        }
+        // As long as it holds the law is what says it.
+        let mut stylet = second();
+        stylet.shaft.rupture(0.005, 1.1);
+        near(said(stylet, &at(0.002)).out.enhanced_n, 0.88);
+    }
+
+    fn felt(position_m: f64, force_n: f64, advancing: bool, retracting: bool) -> Felt {
+        Felt {
+            share: 0.4,
+            position_m,
+            force_n,
+            advancing,
+            retracting,
+            peak_n: 1.2,
+            jumped: true,
+            noise_n2: 4e-4,
+            track: true,
+        }
+    }
+
+    #[test]
+    fn the_whole_output_tells_prediction_sums_and_what_is_known() {
+        let mut stylet = second();
+        (stylet.out.used, stylet.out.error_n, stylet.behind_variance) = (true, 0.2, 0.36);
+        stylet.alarm.take(-3.0);
+        let out = *stylet.complete(&sample(0.01, 1.3));
+        near(out.reconstructed_n, 1.1);
+        assert_eq!((out.theta, out.cusum_n2), ([60.0, 9000.0], stylet.alarm.level()));
+        near(out.sd[0], 0.04);
+        near(out.sd[1], (5.0 * 4e-4_f64).sqrt());
+        near(out.sd[2], 0.6);
+        // What was not used says what the one before said; in the air nothing is expected.
+        stylet.out.used = false;
+        (stylet.layers.belief.x[K], stylet.out.error_n) = (1.0, 0.5);
+        assert_eq!(stylet.complete(&sample(0.01, 1.3)).theta, [60.0, 9000.0]);
+        let mut air = second();
+        (air.out.used, air.in_tissue, air.out.error_n) = (true, false, 0.2);
+        let out = air.complete(&sample(0.01, 1.3));
+        assert_eq!((out.reconstructed_n, out.theta, out.sd), (0.0, [0.0; 2], [0.0; 3]));
+    }
+}
