@@ -186,3 +186,205 @@ fn smallest(nats: impl Fn(f64) -> f64, grid: &[f64]) -> f64 {
     }
     best.1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Event, judge, ln_phi, rows_like, scatter_of, scatter_prior, smallest, spreads, survived};
+    use crate::model::Scatter;
+    use stylet_stats::normal;
+
+    fn scatter(force: f64, place_m: f64) -> Scatter {
+        Scatter { force, place_m, ..Scatter::default() }
+    }
+
+    /// A layer that has given way, its force by 3 % beyond the threshold, its place 0.4 mm before the far face.
+    const BOTH: Event = Event {
+        force: 0.03,
+        place_m: -4e-4,
+        force_rate: 0.7,
+        place_rate: 0.005,
+        elastic_n: 1.3,
+        ruptured: true,
+        step_s: 0.005,
+    };
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-12), "{told} for {wanted}");
+    }
+
+    #[test]
+    fn spreads_hold_the_scatter_the_sampling_and_what_rounding_leaves() {
+        let (force, place) = spreads(&BOTH, &scatter(0.02, 3e-5));
+        near(force, (0.02_f64 * 0.02 + 0.0035 * 0.0035 / 12.0 + 1e-8).sqrt());
+        near(place, (3e-5_f64 * 3e-5 + 2.5e-5 * 2.5e-5 / 12.0 + 2.25e-12).sqrt());
+        let (force, place) = spreads(&Event::UNSEEN, &scatter(0.0, 0.0));
+        near(force, 1e-4);
+        near(place, 1.5e-6);
+    }
+
+    #[test]
+    fn what_survives_is_the_upper_tail_of_the_normal_distribution() {
+        for u in [-8.0, -7.5, -3.1, -0.2, 0.0, 0.7, 2.4, 8.3, 19.7, 25.0] {
+            near(survived(u), -libm::log(normal::sf(u)));
+        }
+        assert_eq!(survived(-8.1), 0.0);
+        // Beyond, by the first term of its asymptotic series, of which the second is smaller by the square of the deviate.
+        for u in [25.1, 27.3, 31.0] {
+            near(survived(u), 0.5 * u * u + libm::log(u * core::f64::consts::TAU.sqrt()));
+            assert!((survived(u) + libm::log(normal::sf(u))).abs() < 1.1 / (u * u), "{u}");
+        }
+        near(ln_phi(1.7), normal::ln_pdf(1.7));
+        near(ln_phi(0.0), -0.5 * libm::log(core::f64::consts::TAU));
+    }
+
+    /// The probabilities of all instants, and of none, add up to one.
+    #[test]
+    fn two_competing_risks_are_a_distribution_of_the_instant() {
+        let s = scatter(0.06, 4e-4);
+        // The tip reaches the far face 0.06 s after the force has reached its threshold.
+        let (place_rate, force_rate) = (0.005, 0.8);
+        let at = |t: f64, ruptured: bool| Event {
+            force: force_rate * t,
+            place_m: place_rate * (t - 0.06),
+            force_rate,
+            place_rate,
+            elastic_n: 1.0,
+            ruptured,
+            step_s: 0.005,
+        };
+        let dt = 1e-4;
+        for end in [-0.05, 0.02, 0.09, 0.6] {
+            let steps = ((end + 0.8) / dt) as usize;
+            let density =
+                |k: usize| libm::exp(-judge(&at(-0.8 + (k as f64 + 0.5) * dt, true), &s).nats) / 0.005;
+            let until: f64 = (0..steps).map(density).sum::<f64>() * dt;
+            let later = libm::exp(-judge(&at(-0.8 + steps as f64 * dt, false), &s).nats);
+            assert!((until + later - 1.0).abs() < 1e-6, "{until} and {later} until {end}");
+        }
+        // Without a puncture force by the far face alone.
+        let alone = |t: f64, ruptured: bool| Event { force: f64::NEG_INFINITY, ..at(t, ruptured) };
+        let steps = 8600;
+        let density =
+            |k: usize| libm::exp(-judge(&alone(-0.8 + (k as f64 + 0.5) * dt, true), &s).nats) / 0.005;
+        let until: f64 = (0..steps).map(density).sum::<f64>() * dt;
+        let later = libm::exp(-judge(&alone(-0.8 + steps as f64 * dt, false), &s).nats);
+        assert!((until + later - 1.0).abs() < 1e-6 && later > 0.3, "{until} and {later}");
+    }
+
+    #[test]
+    fn rows_are_deviates_under_the_shares_of_both_risks() {
+        let s = scatter(0.02, 3e-4);
+        let told = judge(&BOTH, &s);
+        let (s_f, s_z) = spreads(&BOTH, &s);
+        let (u_f, u_z) = (0.03 / s_f, -4e-4 / s_z);
+        let force = normal::ln_pdf(u_f) + libm::log(0.7 * 0.005 / s_f) + libm::log(normal::sf(u_z));
+        let place = normal::ln_pdf(u_z) + libm::log(0.005 * 0.005 / s_z) + libm::log(normal::sf(u_f));
+        let (force, place) = (libm::exp(force), libm::exp(place));
+        near(told.nats, -libm::log(force + place));
+        let shares = [force / (force + place), place / (force + place)].map(f64::sqrt);
+        near(told.shares[0], shares[0]);
+        near(told.shares[1], shares[1]);
+        let tail = |u: f64| (-2.0 * libm::log(normal::sf(u))).sqrt();
+        for (row, wanted) in told.rows.into_iter().zip([
+            shares[0] * u_f,
+            shares[1] * u_z,
+            shares[0] * tail(u_z),
+            shares[1] * tail(u_f),
+        ]) {
+            near(row, wanted);
+        }
+        assert_eq!(rows_like(&BOTH, &s, &BOTH), told.rows);
+        // A layer that holds: neither by force nor by place, yet.
+        let holds = Event { ruptured: false, ..BOTH };
+        let told = judge(&holds, &s);
+        near(told.nats, -libm::log(normal::sf(u_f)) - libm::log(normal::sf(u_z)));
+        assert_eq!(told.rows[..2], [0.0, 0.0]);
+        near(told.rows[2], tail(u_z));
+        near(told.rows[3], tail(u_f));
+        assert_eq!(rows_like(&holds, &s, &holds), told.rows);
+        // Without a puncture force only the place tells.
+        let plain = Event { force: f64::NEG_INFINITY, ..BOTH };
+        let told = judge(&plain, &s);
+        assert_eq!((told.shares, told.rows[0], told.rows[2], told.rows[3]), ([0.0, 1.0], 0.0, 0.0, 0.0));
+        near(told.rows[1], u_z);
+        near(told.nats, -normal::ln_pdf(u_z) - libm::log(0.005 * 0.005 / s_z));
+        assert_eq!(rows_like(&plain, &s, &plain), told.rows);
+        let plain = Event { ruptured: false, ..plain };
+        near(judge(&plain, &s).nats, -libm::log(normal::sf(u_z)));
+        assert_eq!(judge(&plain, &s).rows[3], 0.0);
+        assert_eq!(rows_like(&plain, &s, &plain), judge(&plain, &s).rows);
+    }
+
+    /// For a derivative the shares and the spreads stay as they were, and only the deviates move.
+    #[test]
+    fn rows_like_those_of_another_event_have_its_shares_and_spreads() {
+        let s = scatter(0.02, 3e-4);
+        let (s_f, s_z) = spreads(&BOTH, &s);
+        let shares = judge(&BOTH, &s).shares;
+        let moved = Event { force: 0.05, place_m: -2e-4, force_rate: 3.0, place_rate: 0.1, ..BOTH };
+        let told = rows_like(&moved, &s, &BOTH);
+        near(told[0], shares[0] * 0.05 / s_f);
+        near(told[1], shares[1] * -2e-4 / s_z);
+        near(told[2], shares[0] * (2.0 * survived(-2e-4 / s_z)).sqrt());
+        near(told[3], shares[1] * (2.0 * survived(0.05 / s_f)).sqrt());
+        let far = Event { place_m: f64::NEG_INFINITY, ..moved };
+        near(rows_like(&far, &s, &BOTH)[1], shares[1] * -1e3 / s_z);
+        near(
+            judge(&far, &s).nats,
+            -ln_phi(0.05 / spreads(&far, &s).0) - libm::log(3.0 * 0.005 / spreads(&far, &s).0),
+        );
+    }
+
+    /// An instant told by a needle that hardly moves, or goes back, says no more than one told at the slowest speed.
+    #[test]
+    fn the_slowest_needle_tells_as_if_it_went_at_a_fiftieth_of_a_millimetre_per_second() {
+        let s = scatter(0.02, 3e-4);
+        let rates = |force_rate: f64, place_rate: f64| {
+            judge(&Event { force_rate, place_rate, step_s: 0.0, ..BOTH }, &s).nats
+        };
+        near(rates(0.0, 0.0), rates(2e-3, 2e-5));
+        assert!(rates(2.1e-3, 2e-5) < rates(2e-3, 2e-5) && rates(2e-3, 2.1e-5) < rates(2e-3, 2e-5));
+        // A sampling step of nothing counts as a microsecond.
+        near(
+            rates(2e-3, 2e-5),
+            judge(&Event { force_rate: 2e-3, place_rate: 2e-5, step_s: 1e-6, ..BOTH }, &s).nats,
+        );
+    }
+
+    #[test]
+    fn a_scatter_is_asked_for_by_half_a_nat_per_factor_e() {
+        near(scatter_prior(&scatter(5e-4, 0.0)), 0.25 * libm::log(2.0));
+        near(scatter_prior(&scatter(0.0, 1.5e-5)), 0.25 * libm::log(10.0));
+        let e = |x: f64| scatter_prior(&scatter(x * 1.0, 0.0));
+        assert!((e(core::f64::consts::E) - e(1.0) - 0.5).abs() < 1e-6);
+    }
+
+    /// Ruptures told by deviates of a known size: the scatter found is that of the grid which is nearest.
+    #[test]
+    fn a_scatter_is_found_as_the_ruptures_have_it() {
+        let deviates = [-1.6, -1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0, 1.6];
+        for sd in [0.004, 0.02, 0.09] {
+            let of = |u: f64| Event { force: u * sd * 1.1, place_m: -0.01, force_rate: 0.2, ..BOTH };
+            let events = deviates.map(of);
+            let told = scatter_of(&events, &scatter(0.3, 1e-3));
+            assert_eq!((told.force, told.place_m), (sd, 0.0), "{sd}");
+        }
+        for sd in [4e-5, 3.2e-4] {
+            let of =
+                |u: f64| Event { force: f64::NEG_INFINITY, place_m: u * sd * 1.1, place_rate: 0.001, ..BOTH };
+            let events = deviates.map(of);
+            let told = scatter_of(&events, &scatter(0.3, 1e-3));
+            assert_eq!((told.force, told.place_m), (0.0, sd), "{sd}");
+        }
+        // Without any, as it was.
+        assert_eq!(scatter_of(&[], &scatter(0.3, 1e-3)), scatter(0.3, 1e-3));
+    }
+
+    #[test]
+    fn of_values_alike_the_first_is_taken() {
+        let grid = [0.0, 1.0, 2.0, 3.0, 4.0];
+        assert_eq!(smallest(|x| (x - 2.2).powi(2), &grid), 2.0);
+        assert_eq!(smallest(|x| if x < 1.5 { 1.0 } else { 1.0 - 5e-10 }, &grid), 0.0);
+        assert_eq!(smallest(|x| if x < 1.5 { 1.0 } else { 1.0 - 2e-9 }, &grid), 2.0);
+    }
+}

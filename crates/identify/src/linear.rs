@@ -194,7 +194,130 @@ mod tests {
 
     #[test]
     fn a_scalar_product_has_every_element_once() {
-        let a: Vec<f64> = (0..11).map(f64::from).collect();
-        assert_eq!(dot(&a, &a), 385.0);
+        for n in 0..12 {
+            let a: Vec<f64> = (0..n).map(|k| f64::from(k) + 2.5).collect();
+            let b: Vec<f64> = (0..n).map(|k| 7.0 - 1.5 * f64::from(k)).collect();
+            let naive: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
+            assert_eq!(dot(&a, &b), naive, "{n}");
+        }
+    }
+
+    /// Gauss and Jordan, with the largest pivot.
+    fn inverse(a: &Symmetric) -> Vec<Vec<f64>> {
+        let n = a.size;
+        let unit = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
+        let row = |i: usize| (0..n).map(|j| a.at(i, j)).chain((0..n).map(|j| unit(i, j))).collect();
+        let mut rows: Vec<Vec<f64>> = (0..n).map(row).collect();
+        for k in 0..n {
+            let best = (k..n).max_by(|i, j| rows[*i][k].abs().total_cmp(&rows[*j][k].abs())).expect("rows");
+            rows.swap(k, best);
+            let pivot = rows[k][k];
+            rows[k].iter_mut().for_each(|x| *x /= pivot);
+            let own = rows[k].clone();
+            for i in (0..n).filter(|i| *i != k) {
+                let share = rows[i][k];
+                rows[i].iter_mut().zip(&own).for_each(|(x, y)| *x -= share * y);
+            }
+        }
+        rows.into_iter().map(|r| r[n..].to_vec()).collect()
+    }
+
+    /// A sum of outer products, five rows.
+    fn larger() -> Symmetric {
+        let mut a = Symmetric::zeros(5);
+        for k in 0..9 {
+            let row: Vec<f64> =
+                (0..5).map(|i| libm::sin(1.3 * f64::from(k) + 2.1 * f64::from(i) + 0.4)).collect();
+            for i in 0..5 {
+                for j in 0..=i {
+                    a.add(i, j, row[i] * row[j]);
+                }
+            }
+        }
+        for i in 0..5 {
+            a.add(i, i, 0.3 + 0.1 * i as f64);
+        }
+        a
+    }
+
+    #[test]
+    fn a_factor_gives_what_the_inverse_gives() {
+        let a = larger();
+        let (factor, inverse) = (a.factor(), inverse(&a));
+        let b = [1.7, -2.3, 0.9, 3.1, -0.6];
+        let near = |told: f64, wanted: f64| {
+            assert!((told - wanted).abs() < 1e-10 * wanted.abs().max(1.0), "{told} for {wanted}")
+        };
+        for i in 0..5 {
+            near(factor.solve(&b)[i], (0..5).map(|j| inverse[i][j] * b[j]).sum());
+            near(factor.inverse_diagonal()[i], inverse[i][i]);
+        }
+        let square: f64 =
+            (0..5).flat_map(|i| (0..5).map(move |j| (i, j))).map(|(i, j)| b[i] * inverse[i][j] * b[j]).sum();
+        near(factor.half(&b).iter().map(|y| y * y).sum(), square);
+        assert_eq!(factor.size(), 5);
+        // `back` of unit vectors: columns whose outer products add up to the inverse.
+        let columns: Vec<Vec<f64>> =
+            (0..5).map(|k| factor.back(&[0, 1, 2, 3, 4].map(|i| f64::from(u8::from(i == k))))).collect();
+        for i in 0..5 {
+            for j in 0..5 {
+                near(columns.iter().map(|c| c[i] * c[j]).sum(), inverse[i][j]);
+            }
+        }
+    }
+
+    #[test]
+    fn rows_named_make_a_matrix_of_their_own() {
+        let (a, part) = (larger(), larger().part(&[3, 1, 4]));
+        assert_eq!(part.size, 3);
+        for (i, x) in [3, 1, 4].into_iter().enumerate() {
+            for (j, y) in [3, 1, 4].into_iter().enumerate() {
+                assert_eq!(part.at(i, j), a.at(x, y));
+            }
+        }
+        let (factor, own) = (part.factor().solve(&[0.3, 0.7, -1.1]), inverse(&part));
+        assert!((factor[1] - (own[1][0] * 0.3 + own[1][1] * 0.7 - own[1][2] * 1.1)).abs() < 1e-10);
+    }
+
+    /// What the others say of one another does not depend on a direction in the middle that the matrix does not hold.
+    #[test]
+    fn directions_in_the_middle_that_are_not_held_change_nothing_for_the_others() {
+        let held = larger();
+        let wide = |middle: f64| {
+            let mut a = Symmetric::zeros(6);
+            let place = |i: usize| i + usize::from(i >= 2);
+            for i in 0..5 {
+                for j in 0..=i {
+                    a.add(place(i), place(j), held.at(i, j));
+                }
+            }
+            a.add(2, 2, middle);
+            a
+        };
+        let b = [1.7, -2.3, 99.0, 0.9, 3.1, -0.6];
+        let alone = held.factor().solve(&[1.7, -2.3, 0.9, 3.1, -0.6]);
+        for middle in [0.0, -3.0, f64::NAN] {
+            let factor = wide(middle).factor();
+            let x = factor.solve(&b);
+            assert_eq!([x[0], x[1], x[3], x[4], x[5]], alone[..], "{middle}");
+            assert_eq!(x[2], 0.0);
+            assert_eq!(factor.half(&b)[2], 0.0);
+            assert_eq!(factor.inverse_diagonal()[2], f64::INFINITY);
+            assert_eq!(factor.log_determinant(), held.factor().log_determinant());
+        }
+    }
+
+    /// Of two columns that differ by a share of `1e-6` the second has a pivot of `1e-12`, by one of `1e-7` of `1e-14`.
+    #[test]
+    fn a_direction_is_held_from_a_share_of_1e_13_on() {
+        let twin = |off: f64| {
+            let mut a = Symmetric::zeros(2);
+            a.add(0, 0, 4.0);
+            a.add(1, 0, 4.0);
+            a.add(1, 1, 4.0 * (1.0 + off));
+            a.factor().inverse_diagonal()[1]
+        };
+        assert!(twin(4e-13).is_finite() && twin(1.5e-13).is_finite());
+        assert!(twin(5e-14).is_infinite() && twin(0.0).is_infinite());
     }
 }

@@ -200,7 +200,7 @@ impl Noise {
         }
         let sd_n = (median(&mut all) * stylet_stats::MAD_TO_SD).max(floor_n);
         if rows.len() < 40 {
-            return Bin::white(if sd_n.is_finite() { sd_n } else { 1.0 });
+            return Bin::white(sd_n);
         }
         let n = rows.len() as f64;
         let mut best: Option<(f64, Bin)> = None;
@@ -510,9 +510,443 @@ fn calm(b: &Blocks, e: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{From, Noise};
-    use crate::blocks::{BLOCK_S, Blocks};
+    use super::*;
+    use crate::blocks::BLOCK_S;
     use stylet_record::Recording;
+    use stylet_stats::Ar;
+
+    /// Blocks of a needle at rest; of none is anything known but its time.
+    fn still(blocks: usize) -> Blocks {
+        let t: Vec<f64> = (0..4 * blocks).map(|k| k as f64 / 200.0).collect();
+        let zero = vec![0.0; t.len()];
+        let r = Recording::new(t, zero.clone(), zero).expect("a recording");
+        let b = Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S);
+        assert_eq!(b.len(), blocks);
+        b
+    }
+
+    /// Normal numbers: twelve even ones of a linear congruence (Knuth's MMIX) each.
+    fn normal(seed: u64, n: usize) -> Vec<f64> {
+        let mut state = seed;
+        let mut even = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..n).map(|_| (0..12).map(|_| even()).sum::<f64>() - 6.0).collect()
+    }
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
+    }
+
+    #[test]
+    fn a_loss_is_a_square_near_zero_and_a_line_beyond() {
+        near(rho(1.3), 0.845);
+        near(rho(-2.4), 2.88);
+        near(rho(4.0), 6.875);
+        near(rho(-7.5), 15.625);
+        near(weight(-2.4), 1.0);
+        near(weight(2.5), 1.0);
+        near(weight(-4.0), 0.625);
+        // The weight is the slope of the loss over the deviate.
+        for w in [-6.3, -1.1, 0.4, 2.2, 3.7] {
+            let slope = (rho(w + 1e-6) - rho(w - 1e-6)) / 2e-6;
+            assert!((weight(w) * w - slope).abs() < 1e-6, "{w}");
+        }
+    }
+
+    /// Bins whose first blocks after a break are foretold as those of an autoregressive process of a known covariance are.
+    fn of_process(ar: &Ar) -> (Bin, Vec<f64>) {
+        let mut c = vec![0.0; 12];
+        ar.autocovariance(&mut c);
+        let mut bin = Bin::white(c[0].sqrt());
+        for run in 0..=ORDER {
+            let mut h = Symmetric::zeros(run);
+            for i in 0..run {
+                for j in 0..=i {
+                    h.add(i, j, c[i - j]);
+                }
+            }
+            let a = h.factor().solve(&c[1..=run]);
+            let left = c[0] - a.iter().zip(&c[1..]).map(|(a, c)| a * c).sum::<f64>();
+            let mut padded = [0.0; ORDER];
+            padded[..run].copy_from_slice(&a);
+            if run == ORDER {
+                (bin.a, bin.innovation_n) = (padded, left.sqrt());
+            } else {
+                bin.first[run] = First { a: padded, slow: [0.0; SLOW.len()], sd_n: left.sqrt() };
+            }
+        }
+        (bin, c)
+    }
+
+    /// The logarithm of the density of a normal vector with this covariance, by a naive factor.
+    fn ln_density(e: &[f64], covariance: impl Fn(usize, usize) -> f64) -> f64 {
+        let n = e.len();
+        let mut l = vec![vec![0.0; n]; n];
+        let (mut y, mut sum) = (vec![0.0; n], -0.5 * n as f64 * libm::log(core::f64::consts::TAU));
+        for i in 0..n {
+            for j in 0..=i {
+                let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+                let left = covariance(i, j) - known;
+                l[i][j] = if i == j { left.sqrt() } else { left / l[j][j] };
+            }
+            let known: f64 = (0..i).map(|k| l[i][k] * y[k]).sum();
+            y[i] = (e[i] - known) / l[i][i];
+            sum -= 0.5 * y[i] * y[i] + libm::log(l[i][i]);
+        }
+        sum
+    }
+
+    #[test]
+    fn whitened_noise_has_the_likelihood_of_the_dense_covariance() {
+        let ar = Ar::from_reflection(&[0.6, -0.35, 0.2, 0.1], 0.03);
+        let (bin, c) = of_process(&ar);
+        let mut b = still(12);
+        // A block that is not compared ends the memory.
+        b.used[7] = false;
+        b.restart[8] = true;
+        let noise = Noise { edges_n: Vec::new(), bins: vec![bin], lasting: false };
+        let e: Vec<f64> = normal(5, 12).into_iter().map(|x| 0.03 * x).collect();
+        let w = noise.whiten(&noise.laid(&b), &e);
+        let told: f64 = -w.iter().map(|w| 0.5 * w * w).sum::<f64>()
+            - noise.ln_sizes(std::slice::from_ref(&b))
+            - 0.5 * 11.0 * libm::log(core::f64::consts::TAU);
+        let toeplitz = |i: usize, j: usize| c[i.abs_diff(j)];
+        near(told, ln_density(&e[..7], toeplitz) + ln_density(&e[8..], toeplitz));
+        assert_eq!(w[7], 0.0);
+        // What sampling leaves open of a block is added to its own size alone.
+        b.doubt_n[4] = 0.05;
+        let doubted = noise.whiten(&noise.laid(&b), &e);
+        near(doubted[4], w[4] * bin.innovation_n / (bin.innovation_n * bin.innovation_n + 0.0025).sqrt());
+        assert_eq!([doubted[3], doubted[5]], [w[3], w[5]]);
+    }
+
+    /// Two ranges with a slow wander of their own, breaks, and blocks that are not compared.
+    fn wandering(lasting: bool) -> (Noise, Blocks) {
+        let mut b = still(900);
+        for k in 0..900 {
+            b.size_n[k] = if k % 7 < 3 { 0.4 } else { 1.1 };
+            b.used[k] = k % 53 != 0;
+            b.restart[k] = k % 53 == 1 || k == 300;
+        }
+        let bin = |x: f64| {
+            let mut bin = Bin::white(0.02 * x);
+            bin.a = [0.3 * x, 0.1, -0.05 * x, 0.02];
+            bin.slow = [0.2, 0.1 * x, 0.15];
+            bin.innovation_n = 0.015 * x;
+            for (k, first) in bin.first.iter_mut().enumerate() {
+                first.a[..k].copy_from_slice(&[0.31 * x, 0.11, 0.05][..k]);
+                first.slow = [0.25, 0.11, 0.05 * x];
+                first.sd_n = 0.03 - 0.002 * k as f64;
+            }
+            bin
+        };
+        (Noise { edges_n: vec![0.9], bins: vec![bin(1.0), bin(1.3)], lasting }, b)
+    }
+
+    /// One block by the definition: those before it since the break, and the means of stretches before those.
+    fn innovation_of(noise: &Noise, b: &Blocks, e: &[f64], k: usize) -> f64 {
+        let since = (0..=k).rev().find(|j| b.restart[*j]).unwrap_or(0);
+        let bin = &noise.bins[usize::from(b.size_n[k] >= 0.9)];
+        let run = k - since;
+        let (a, slow, sd) = match bin.first.get(run) {
+            Some(f) => (f.a, f.slow, f.sd_n),
+            None => (bin.a, bin.slow, bin.innovation_n),
+        };
+        let mut w = e[k];
+        for i in 1..=run.min(4) {
+            w -= a[i - 1] * e[k - i];
+        }
+        let begin = if noise.lasting { 0 } else { since };
+        for (slow, (from, to)) in slow.iter().zip([(4, 24), (24, 124), (124, 624)]) {
+            let counts = |j: &usize| *j >= begin && (!noise.lasting || b.used[*j]);
+            let stretch = (k.saturating_sub(to)..k.saturating_sub(from)).filter(counts);
+            w -= slow * stretch.map(|j| e[j]).sum::<f64>() / (to - from) as f64;
+        }
+        w / sd
+    }
+
+    #[test]
+    fn a_slow_wander_is_foretold_from_the_means_of_stretches_before() {
+        for lasting in [false, true] {
+            let (noise, b) = wandering(lasting);
+            let e = normal(7, b.len());
+            let laid = noise.laid(&b);
+            let w = noise.whiten(&laid, &e);
+            for k in 0..b.len() {
+                near(w[k], if b.used[k] { innovation_of(&noise, &b, &e, k) } else { 0.0 });
+            }
+            let sizes = |k: usize| {
+                let since = (0..=k).rev().find(|j| b.restart[*j]).unwrap_or(0);
+                let bin = &noise.bins[usize::from(b.size_n[k] >= 0.9)];
+                libm::log(bin.first.get(k - since).map_or(bin.innovation_n, |f| f.sd_n))
+            };
+            near(
+                noise.ln_sizes(&[b.clone(), b.clone()]),
+                2.0 * (0..b.len()).filter(|k| b.used[*k]).map(sizes).sum::<f64>(),
+            );
+            // Coloured again it is what it was, where it is compared; what is not is nothing.
+            let bare: Vec<f64> =
+                e.iter().zip(&b.used).map(|(e, used)| if *used { *e } else { 0.0 }).collect();
+            let again = noise.colour(&laid, &noise.whiten(&laid, &bare));
+            for (told, wanted) in again.iter().zip(&bare) {
+                assert!((told - wanted).abs() < 1e-9, "{told} for {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_size_of_the_force_lies_in_the_range_that_begins_there() {
+        let mut noise = Noise::white(0.3);
+        assert_eq!((noise.bin(0.0), noise.bin(9.0)), (0, 0));
+        near(noise.sd_n(), 0.3);
+        noise.edges_n = vec![0.5, 1.5];
+        noise.bins = vec![Bin::white(0.3), Bin::white(0.5), Bin::white(1.1)];
+        assert_eq!([0.49, 0.5, 1.49, 1.5, 7.0].map(|s| noise.bin(s)), [0, 1, 1, 2, 2]);
+        near(noise.sd_n(), ((0.09 + 0.25 + 1.21) / 3.0_f64).sqrt());
+        let bin = &noise.bins[1];
+        assert_eq!((bin.size_n(0), bin.size_n(3), bin.size_n(4), bin.a), (0.5, 0.5, 0.5, [0.0; ORDER]));
+        assert!(!bin.wanders());
+        assert!(Bin { slow: [0.0, 0.0, 0.1], ..*bin }.wanders());
+        let mut first = *bin;
+        first.first[2].slow[1] = 0.2;
+        assert!(first.wanders());
+    }
+
+    /// Ranges have the same number of blocks, of which a size needs 220; no more than five ranges.
+    #[test]
+    fn ranges_hold_as_many_blocks_each_as_a_size_needs() {
+        for (blocks, ranges) in [(219, 1), (439, 1), (440, 2), (659, 2), (660, 3), (1100, 5), (1500, 5)] {
+            let mut b = still(blocks + 1);
+            b.used[0] = false;
+            b.size_n = (0..=blocks).map(|k| (k * 7919 % (blocks + 1)) as f64).collect();
+            b.size_n[0] = 1e6;
+            let e: Vec<f64> = normal(3, blocks + 1);
+            let noise = Noise::estimate(&[b.clone()], &[e], From::Whole, 0.0);
+            assert_eq!(noise.bins.len(), ranges, "{blocks}");
+            let mut sizes: Vec<f64> = b.size_n[1..].to_vec();
+            sizes.sort_unstable_by(f64::total_cmp);
+            for (k, edge) in noise.edges_n.iter().enumerate() {
+                near(*edge, quantile_of_sorted(&sizes, (k + 1) as f64 / ranges as f64));
+            }
+        }
+    }
+
+    /// Noise that grows with the force and remembers is found as it was drawn.
+    #[test]
+    fn noise_is_estimated_as_it_was_drawn() {
+        let n = 16_000;
+        let mut b = still(n);
+        let draw = normal(9, n);
+        let mut e = vec![0.0; n];
+        for k in 0..n {
+            // Stretches of one size each.
+            let range = k / 800 % 2;
+            b.size_n[k] = [0.3, 1.7][range];
+            let a = [[0.5, -0.2], [0.3, 0.25]][range];
+            let before = |i: usize| if k >= i { e[k - i] } else { 0.0 };
+            e[k] = a[0] * before(1) + a[1] * before(2) + [0.01, 0.04][range] * draw[k];
+        }
+        for from in [From::Whole, From::Lasting, From::Drawn] {
+            let mut noise = Noise { edges_n: vec![1.0], bins: Vec::new(), lasting: from.lasts() };
+            for range in 0..2 {
+                noise.bins.push(noise.fit(
+                    std::slice::from_ref(&b),
+                    std::slice::from_ref(&e),
+                    range,
+                    from,
+                    1e-6,
+                ));
+            }
+            for (bin, (a, sd)) in noise.bins.iter().zip([([0.5, -0.2], 0.01), ([0.3, 0.25], 0.04)]) {
+                let whole: Vec<f64> = bin.a.iter().chain(&bin.slow).copied().collect();
+                assert!(
+                    (whole[0] - a[0]).abs() < 0.04 && (whole[1] - a[1]).abs() < 0.04,
+                    "{from:?}: {whole:?}"
+                );
+                assert!((bin.innovation_n / sd - 1.0).abs() < 0.03, "{from:?}: {}", bin.innovation_n);
+                // The process has a larger size than its innovations: c0 = s^2 (1 - a2) / ((1 + a2) ((1 - a2)^2 - a1^2)).
+                let ratio = (1.0 - a[1]) / ((1.0 + a[1]) * ((1.0 - a[1]).powi(2) - a[0] * a[0]));
+                assert!((bin.sd_n / (sd * ratio.sqrt()) - 1.0).abs() < 0.05, "{from:?}: {}", bin.sd_n);
+            }
+        }
+    }
+
+    #[test]
+    fn fewer_than_forty_blocks_tell_a_size_and_no_more() {
+        let told = |blocks: usize| {
+            let b = still(blocks);
+            let e: Vec<f64> = (0..blocks).map(|k| libm::sin(0.3 * k as f64)).collect();
+            let noise = Noise::estimate(&[b], std::slice::from_ref(&e), From::Whole, 0.0);
+            let mut sizes: Vec<f64> = e.iter().map(|e| e.abs()).collect();
+            (noise.bins[0], median(&mut sizes) * stylet_stats::MAD_TO_SD)
+        };
+        // The first four have not four before them.
+        let (few, sd) = told(43);
+        assert_eq!(few, Bin::white(sd));
+        let (many, sd) = told(44);
+        near(many.sd_n, sd);
+        assert!(many.a != [0.0; ORDER] && many.innovation_n < 0.25 * sd, "{many:?}");
+        let none = Noise::estimate(&[still(10)], &[vec![f64::NAN; 10]], From::Whole, 0.0);
+        assert_eq!(none.bins[0], Bin::white(1e-6));
+        let floor = Noise::estimate(&[still(60)], &[vec![0.0; 60]], From::Whole, 0.02);
+        assert_eq!((floor.bins[0].sd_n, floor.bins[0].innovation_n), (0.02, 0.02));
+        let least = Noise::estimate(&[still(60)], &[vec![0.0; 60]], From::Whole, 0.0);
+        assert_eq!(least.bins[0].sd_n, 1e-6);
+    }
+
+    #[test]
+    fn running_sums_and_means_of_stretches_are_naive_ones() {
+        let mut e = normal(2, 700);
+        e[13] = f64::NAN;
+        let of = sums(&e, |k| k % 5 != 2);
+        let kept = |k: usize| if k % 5 != 2 && k != 13 { e[k] } else { 0.0 };
+        assert_eq!(of.len(), 701);
+        for k in [0, 1, 2, 3, 14, 650, 700] {
+            near(of[k], (0..k).map(kept).sum());
+        }
+        for (k, reach) in [(690, 690), (690, 130), (690, 60), (690, 17), (690, 3), (3, 3), (200, 200)] {
+            let means = slow_means(&of, k, reach);
+            for (mean, (from, to)) in means.into_iter().zip([(4, 24), (24, 124), (124, 624)]) {
+                let sum: f64 = (k - reach.min(to)..k - reach.min(from)).map(kept).sum();
+                near(mean, sum / (to - from) as f64);
+            }
+        }
+        let e = normal(2, 700);
+        let of = sums(&e, |_| true);
+        let told = row(&e, &of, 650, 650);
+        assert_eq!(told[..5], [e[650], e[649], e[648], e[647], e[646]]);
+        assert_eq!(told[5..], slow_means(&of, 650, 650));
+        let a = [0.3, -0.2, 0.7, 0.11, 0.5, -0.4, 0.9];
+        let wanted = told[0] - a.iter().zip(&told[1..]).map(|(a, x)| a * x).sum::<f64>();
+        near(innovation(&told, &a), wanted);
+    }
+
+    /// By plain least squares what is left is orthogonal to every column.
+    #[test]
+    fn what_plain_least_squares_do_not_foretell_is_orthogonal_to_what_does() {
+        let numbers = normal(21, 60 * ROW);
+        let rows: Vec<[f64; ROW]> =
+            numbers.chunks_exact(ROW).map(|c| core::array::from_fn(|i| c[i])).collect();
+        let columns = [0, 2, 5];
+        let (a, s) = foretold(&rows, &columns, (1.0, 1e-6), 1);
+        for x in 0..ROW - 1 {
+            let along: f64 = rows.iter().map(|r| r[x + 1] * innovation(r, &a)).sum();
+            assert_eq!(columns.contains(&x), along.abs() < 1e-9, "{x}: {along}");
+            assert_eq!(columns.contains(&x), a[x] != 0.0);
+        }
+        near(s, (rows.iter().map(|r| innovation(r, &a).powi(2)).sum::<f64>() / 60.0).sqrt());
+        assert_eq!(foretold(&rows, &columns, (1.0, 5.0), 1).1, 5.0);
+        // Robust ones are not led astray by a few that are far off.
+        let mut led = rows.clone();
+        led[10][0] = 30.0;
+        let (robust, s) = foretold(&led, &columns, (1.0, 1e-6), 4);
+        assert!((0..ROW - 1).all(|x| (robust[x] - a[x]).abs() < 0.4), "{robust:?} {a:?}");
+        assert!(s > 0.9 && s < 2.2, "{s}");
+    }
+
+    #[test]
+    fn a_scale_is_the_size_of_normal_noise_and_known_for_residuals_all_alike() {
+        let rows = |x: &[f64]| -> Vec<[f64; ROW]> {
+            x.iter().map(|x| core::array::from_fn(|i| if i == 0 { *x } else { 0.0 })).collect()
+        };
+        let none = [0.0; ROW - 1];
+        // Every weight is one: the root of their square over its expectation under Huber's loss.
+        let alike: Vec<f64> = (0..50).map(|k| if k % 3 == 0 { 0.7 } else { -0.7 }).collect();
+        near(scale(&rows(&alike), &none), 0.7 / libm::erf(2.5 / core::f64::consts::SQRT_2).sqrt());
+        near(plain_scale(&rows(&alike), &none), 0.7);
+        let drawn: Vec<f64> = normal(4, 20_000).into_iter().map(|x| 0.03 * x).collect();
+        assert!((scale(&rows(&drawn), &none) / 0.03 - 1.0).abs() < 0.02);
+        // One in fifty twelve times as large: the size under which the squares that Huber's weights leave are as many as expected.
+        let tails: Vec<f64> =
+            drawn.iter().enumerate().map(|(k, x)| if k % 50 == 0 { 12.0 * x } else { *x }).collect();
+        let told = scale(&rows(&tails), &none);
+        let counted = |x: &f64| (x / told).abs() * (x / told).abs().min(2.5);
+        let share = tails.iter().map(counted).sum::<f64>() / 20_000.0;
+        assert!((share - libm::erf(2.5 / core::f64::consts::SQRT_2)).abs() < 1e-3, "{share}");
+        assert!(told / 0.03 > 1.1 && told / 0.03 < 1.4, "{told}");
+    }
+
+    /// The roots of the characteristic polynomial all lie inside the unit circle.
+    #[test]
+    fn a_process_is_stationary_when_its_roots_are_inside_the_unit_circle() {
+        // Coefficients of `(1 - p z)(1 - q z)(1 - r z)`.
+        let product = |p: f64, q: f64, r: f64| [p + q + r, -(p * q + p * r + q * r), p * q * r];
+        for (p, q, r, wanted) in [
+            (0.5, 0.3, -0.4, true),
+            (0.95, 0.9, 0.85, true),
+            (0.95, -0.97, 0.3, true),
+            (1.05, 0.4, 0.2, false),
+            (0.5, -1.02, 0.1, false),
+            (0.2, 1.2, 0.9, false),
+            (0.2, 1.2, 0.7, false),
+        ] {
+            assert_eq!(stationary(&product(p, q, r)), wanted, "{p} {q} {r}");
+        }
+        // The triangle of two coefficients.
+        for (a, b, wanted) in [
+            (0.5, 0.45, true),
+            (0.5, 0.55, false),
+            (-1.4, -0.6, true),
+            (-1.7, -0.6, false),
+            (0.2, -0.998, true),
+            (0.2, -0.9995, false),
+            (1.5, -0.6, true),
+        ] {
+            assert_eq!(stationary(&[a, b]), wanted, "{a} {b}");
+        }
+        assert!(stationary(&[]) && stationary(&[0.998]) && !stationary(&[0.999]) && !stationary(&[-1.0]));
+    }
+
+    /// What is smooth over a second is no noise, and a window that is rougher than its neighbours is left out.
+    #[test]
+    fn calm_residuals_are_without_their_smooth_course_and_without_rough_windows() {
+        let mut b = still(1020);
+        b.used[130] = false;
+        let draw = normal(6, 1020);
+        let bent = |k: usize| {
+            let s = k as f64 / 50.0;
+            0.3 + 0.5 * s - 0.7 * (s - 3.0) * (s - 3.0)
+        };
+        let rough = |k: usize| if k / 50 == 7 { 1.9 } else { 1.0 };
+        let e: Vec<f64> = (0..1020).map(|k| bent(k) + 0.01 * rough(k) * draw[k]).collect();
+        let told = calm(&b, &e);
+        // Three numbers by naive normal equations (Cramer) in every second.
+        for window in 0..20 {
+            let (from, to) = (50 * window, 50 * window + 50);
+            let inside: Vec<usize> = (from..to).filter(|k| b.used[*k]).collect();
+            let x = |k: usize| (k - from) as f64;
+            let sum = |f: &dyn Fn(usize) -> f64| inside.iter().map(|k| f(*k)).sum::<f64>();
+            let s: Vec<f64> = (0..5).map(|p| sum(&|k| x(k).powi(p))).collect();
+            let g: Vec<f64> = (0..3).map(|p| sum(&|k| x(k).powi(p) * (e[k] - bent(k)))).collect();
+            let det = |m: [[f64; 3]; 3]| {
+                m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
+                    - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+                    + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+            };
+            let m = [[s[0], s[1], s[2]], [s[1], s[2], s[3]], [s[2], s[3], s[4]]];
+            let c: Vec<f64> = (0..3)
+                .map(|p| {
+                    let mut with = m;
+                    (0..3).for_each(|i| with[i][p] = g[i]);
+                    det(with) / det(m)
+                })
+                .collect();
+            for k in from..to {
+                let left = e[k] - bent(k) - c[0] - c[1] * x(k) - c[2] * x(k) * x(k);
+                if window == 7 {
+                    assert!(told[k].is_nan(), "{k}");
+                } else {
+                    let wanted = left * (50.0 / 47.0_f64).sqrt();
+                    assert!((told[k] - wanted).abs() < 1e-8, "{k}: {} for {wanted}", told[k]);
+                }
+            }
+        }
+        // Less than half a second is left at the end.
+        assert!(told[1000..].iter().all(|x| x.is_nan()));
+        assert!(calm(&still(1025), &vec![0.1; 1025])[1000..].iter().all(|x| x.abs() < 1e-12));
+    }
 
     /// A wander that lasts some seconds goes on after a break: what is left of the first blocks there is small, and those of one
     /// break know nothing of one another. As if they began anew they would count as many times what they tell.

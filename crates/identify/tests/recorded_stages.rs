@@ -1,0 +1,864 @@
+//! No stage of the identification changes unnoticed.
+//!
+//! Seven small synthetic insertions, each of its own character, go through velocity, motion, phases, blocks, drops, assignment, fit, noise,
+//! trials of effects and intervals. What each stage says is compared with `recorded_stages.txt`: a name, and one number or several, ten
+//! digits of them. The search for a model has many branches that no formula tells; where one is known, the other tests of this crate hold it.
+//! Whoever changes a stage on purpose records anew (`STYLET_RECORD=1 cargo test -p stylet-identify --test recorded_stages`) and explains
+//! the difference. Where the truth is known, what is said is near it, whatever is recorded.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+use stylet_identify::assign::assign;
+use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_identify::discrepancy::discrepancy;
+use stylet_identify::drops::drops;
+use stylet_identify::events::{judge, scatter_of, spreads};
+use stylet_identify::fit::{Column, Effort, Fit, Tangent, fit, fit_below, fit_sharp};
+use stylet_identify::late::{late_s, placed};
+use stylet_identify::look::{Look, scaled};
+use stylet_identify::model::{Belief, Choice, Day, Model, NEVER, Role};
+use stylet_identify::motion::{Motion, Piece};
+use stylet_identify::noise::{From, Noise};
+use stylet_identify::objective::{Data, Trail, event_nats, prior_nats, replay, residuals};
+use stylet_identify::phases;
+use stylet_identify::retime::retime;
+use stylet_identify::settle::settle;
+use stylet_identify::velocity::{Kink, velocity};
+use stylet_record::Recording;
+use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissue, info, library};
+
+// ---- What is written down ----
+
+/// What the stages say of one insertion, or of several: names and numbers in their order.
+#[derive(Default)]
+struct Said(Vec<(String, Vec<f64>)>);
+
+impl Said {
+    fn numbers(&mut self, name: &str, numbers: &[f64]) {
+        self.0.push((name.to_owned(), numbers.to_vec()));
+    }
+
+    fn number(&mut self, name: &str, number: f64) {
+        self.numbers(name, &[number]);
+    }
+
+    fn count(&mut self, name: &str, count: usize) {
+        self.number(name, count as f64);
+    }
+
+    /// A column by its mean, its root mean square, that of its differences, and its mean under weights that no two elements share.
+    fn column(&mut self, name: &str, x: &[f64]) {
+        let n = x.len().max(1) as f64;
+        let mean = |f: &dyn Fn(usize) -> f64| (0..x.len()).map(f).sum::<f64>() / n;
+        let size = mean(&|k| x[k] * x[k]).sqrt();
+        let steps = x.windows(2).map(|p| (p[1] - p[0]).powi(2)).sum::<f64>() / n;
+        let weighted = mean(&|k| x[k] * libm::sin(1.0 + 0.37 * k as f64 + 2.0 * k as f64 / n));
+        self.numbers(name, &[mean(&|k| x[k]), size, steps.sqrt(), weighted]);
+    }
+
+    fn flags(&mut self, name: &str, x: &[bool]) {
+        self.column(name, &x.iter().map(|x| f64::from(u8::from(*x))).collect::<Vec<f64>>());
+    }
+
+    fn kinks(&mut self, name: &str, kinks: &[Kink]) {
+        self.count(&format!("{name} jumps"), kinks.len());
+        for (i, k) in kinks.iter().enumerate().take(6) {
+            self.numbers(&format!("{name} jump {i}"), &[k.sample as f64, k.t, k.z, k.v[0], k.v[1], k.sd_m]);
+        }
+    }
+
+    fn pieces(&mut self, name: &str, p: &[Piece]) {
+        let column = |f: fn(&Piece) -> f64| -> Vec<f64> { p.iter().map(f).collect() };
+        self.count(&format!("{name} pieces"), p.len());
+        self.column(&format!("{name} pieces block"), &column(|p| f64::from(p.block)));
+        self.column(&format!("{name} pieces length_s"), &column(|p| p.to_s - p.from_s));
+        self.column(&format!("{name} pieces place_m"), &column(|p| p.z_m));
+        self.column(&format!("{name} pieces velocity_mps"), &column(|p| p.v_mps));
+        self.column(&format!("{name} pieces acceleration_mps2"), &column(|p| p.a_mps2));
+    }
+
+    fn blocks(&mut self, name: &str, b: &Blocks) {
+        self.count(&format!("{name} blocks"), b.len());
+        self.numbers(&format!("{name} span_s"), &[b.span_s().0, b.span_s().1]);
+        let lengths: Vec<f64> = b.from_s.iter().zip(&b.to_s).map(|(a, b)| b - a).collect();
+        self.column(&format!("{name} lengths_s"), &lengths);
+        self.column(&format!("{name} force_n"), &b.f);
+        self.flags(&format!("{name} compared"), &b.used);
+        self.flags(&format!("{name} restart"), &b.restart);
+        self.column(&format!("{name} size_n"), &b.size_n);
+        self.column(&format!("{name} doubt_n"), &b.doubt_n);
+        self.pieces(name, &b.pieces);
+    }
+
+    fn noise(&mut self, name: &str, noise: &Noise) {
+        self.numbers(&format!("{name} edges_n"), &noise.edges_n);
+        self.number(&format!("{name} sd_n"), noise.sd_n());
+        for (k, bin) in noise.bins.iter().enumerate() {
+            let of = |what: &str| format!("{name} range {k} {what}");
+            self.numbers(&of("coefficients"), &bin.a);
+            self.numbers(&of("slow"), &bin.slow);
+            self.numbers(&of("sizes_n"), &[bin.innovation_n, bin.sd_n]);
+            if noise.lasting {
+                let first: Vec<f64> = bin.first.iter().flat_map(|f| f.a.into_iter().chain(f.slow)).collect();
+                self.numbers(&of("first"), &first);
+                self.numbers(&of("first_n"), &bin.first.map(|f| f.sd_n));
+            }
+        }
+    }
+
+    fn instants(&mut self, name: &str, instants: &[f64]) {
+        let told: Vec<f64> = instants.iter().map(|t| if *t < NEVER { *t } else { -1.0 }).collect();
+        self.numbers(name, &told);
+    }
+
+    /// Estimates: shared numbers, each recording's own, scatter, instants; and what they leave.
+    fn fit(&mut self, name: &str, f: &Fit, data: &Data) {
+        let m = &f.model;
+        let nats = [f.nats(), event_nats(m, &f.residuals), prior_nats(m)];
+        self.numbers(
+            &format!("{name} nats, of ruptures, of priors; rms_n"),
+            &[&nats[..], &[f.rms_n(data)]].concat(),
+        );
+        let (shared, own) = (m.shared(), m.own_numbers());
+        self.numbers(
+            &format!("{name} shared"),
+            &shared.iter().map(|n| m.get(n.role, 0)).collect::<Vec<f64>>(),
+        );
+        for r in 0..data.recordings() {
+            let told: Vec<f64> = own.iter().map(|n| m.get(n.role, r)).collect();
+            self.instants(&format!("{name} own of {r}"), &told);
+        }
+        let s = &m.scatter;
+        let scatter = [s.force, s.place_m, s.surface_m, s.friction, s.differing[0], s.differing[1]];
+        self.numbers(&format!("{name} scatter"), &scatter);
+    }
+
+    fn of_column(&mut self, name: &str, c: &Column) {
+        for (r, (w, rows)) in c.w.iter().zip(&c.rows).enumerate().take(2) {
+            self.column(&format!("{name} of {r} force"), w);
+            self.column(&format!("{name} of {r} ruptures"), rows);
+        }
+    }
+}
+
+/// Numbers are compared to this share of themselves, or to [`NOTHING`] of the largest in their line.
+const ALIKE: f64 = 1e-7;
+const NOTHING: f64 = 1e-10;
+
+fn file() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/recorded_stages.txt")
+}
+
+fn written(all: &[(&str, Said)]) -> String {
+    let mut text = String::new();
+    for (insertion, said) in all {
+        for (name, numbers) in &said.0 {
+            let _ = write!(text, "{insertion}: {name} =");
+            for x in numbers {
+                let _ = if *x == 0.0 || x.fract() == 0.0 && x.abs() < 1e6 {
+                    write!(text, " {x}")
+                } else {
+                    write!(text, " {x:.9e}")
+                };
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+fn parsed(text: &str) -> BTreeMap<&str, Vec<f64>> {
+    let line = |l: &'_ str| -> Option<(usize, Vec<f64>)> {
+        let at = l.find(" =")?;
+        Some((at, l[at + 2..].split_whitespace().map(|x| x.parse().expect("a number")).collect()))
+    };
+    text.lines().filter_map(|l| line(l).map(|(at, x)| (&l[..at], x))).collect()
+}
+
+/// Whether two lines of numbers are the same.
+fn alike(a: &[f64], b: &[f64]) -> bool {
+    let size = a.iter().filter(|x| x.is_finite()).fold(1e-15_f64, |m, x| m.max(x.abs()));
+    let same = |(a, b): (&f64, &f64)| {
+        a == b || a.is_nan() && b.is_nan() || (a - b).abs() <= ALIKE * a.abs() + NOTHING * size
+    };
+    a.len() == b.len() && a.iter().zip(b).all(same)
+}
+
+// ---- Insertions ----
+
+/// A leg of a motion: how long in s, speed in m/s, amplitude of a ripple of the speed in m/s and its frequency in Hz.
+type Leg = (f64, f64, f64, f64);
+
+/// Position (m) and velocity (m/s) of a motion that begins 3 mm above where the surface is believed to be.
+fn moved(legs: &[Leg], t: f64) -> (f64, f64) {
+    let (mut z, mut from) = (-0.003, 0.0);
+    for (k, (lasts, speed, ripple, hz)) in legs.iter().enumerate() {
+        let w = core::f64::consts::TAU * hz.max(1e-9);
+        let along = |s: f64| speed * s + ripple / w * (1.0 - libm::cos(w * s));
+        let s = t - from;
+        if s < *lasts || k + 1 == legs.len() {
+            return (z + along(s), speed + ripple * libm::sin(w * s));
+        }
+        z += along(*lasts);
+        from += lasts;
+    }
+    (z, 0.0)
+}
+
+/// Normal numbers, the same on every machine: twelve even ones of a linear congruence (Knuth's MMIX).
+struct Normal(u64);
+
+impl Normal {
+    fn draw(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+}
+
+/// An insertion as it really is, and how it is recorded.
+struct Insertion {
+    legs: Vec<Leg>,
+    tissue: Tissue,
+    effects: Vec<AnyEffect>,
+    rate_hz: f64,
+    /// Noise of the force in N, and its growth with the force.
+    noise: (f64, f64),
+    /// Memory of the noise from one sample to the next.
+    memory: f64,
+    /// Step in m to which positions are rounded.
+    step_m: f64,
+    /// Nothing is recorded from here to there, in s.
+    gap_s: (f64, f64),
+    seed: u64,
+}
+
+impl Insertion {
+    /// The recording and the instants (s) of the true ruptures.
+    fn recorded(&self) -> (Recording, Vec<f64>) {
+        let law = Law::new(&self.tissue, &self.effects).expect("few effects");
+        let chain = Measurement::new(&self.effects);
+        let (mut state, mut sensor) = (LawState::default(), chain.start(self.rate_hz));
+        let (mut t, mut z, mut f, mut ruptures) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut normal = Normal(self.seed);
+        let mut slow = 0.0;
+        let lasts_s: f64 = self.legs.iter().map(|l| l.0).sum();
+        for k in 0..=(lasts_s * self.rate_hz) as usize {
+            let at = k as f64 / self.rate_hz;
+            let (true_m, velocity_mps) = moved(&self.legs, at);
+            let tissue_n =
+                law.step(&mut state, at, true_m, velocity_mps, |r| ruptures.push(r.time_s)).total_n;
+            slow = self.memory * slow + (1.0 - self.memory * self.memory).sqrt() * normal.draw();
+            let noise_n = slow * (self.noise.0 + self.noise.1 * tissue_n.abs());
+            let reading = Reading { time_s: at, velocity_mps, tissue_n, noise_n, ..Reading::default() };
+            let force_n = chain.step(&mut sensor, &reading);
+            if at > self.gap_s.0 && at < self.gap_s.1 {
+                continue;
+            }
+            t.push(at);
+            let told = chain.position(true_m);
+            z.push(if self.step_m > 0.0 { libm::round(told / self.step_m) * self.step_m } else { told });
+            f.push(force_n);
+        }
+        (Recording::new(t, z, f).expect("a recording"), ruptures)
+    }
+}
+
+/// Layers: thickness (m), stiffness (N/m), friction (Ns/m²), puncture force (N).
+fn tissue(surface_m: f64, layers: &[(f64, f64, f64, Option<f64>)]) -> Tissue {
+    let layer = |&(thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n)| Layer {
+        thickness_m,
+        stiffness_n_per_m,
+        friction_ns_per_m2,
+        puncture_n,
+        name: String::new(),
+    };
+    Tissue { surface_m, layers: layers.iter().map(layer).collect() }
+}
+
+/// What is believed of all of them.
+fn belief() -> Belief {
+    Belief {
+        tissue: tissue(
+            0.002,
+            &[
+                (0.012, 110.0, 5200.0, Some(0.8)),
+                (0.015, 190.0, 9400.0, Some(1.7)),
+                (0.03, 70.0, 6100.0, None),
+            ],
+        ),
+        given: Vec::new(),
+        tolerance: vec![0.3, 0.25, 0.35],
+        thickness_tolerance: vec![0.1, 0.12, 0.08],
+        surface_tolerance_m: 0.001,
+    }
+}
+
+/// What is true of most of them.
+fn truth() -> Tissue {
+    tissue(
+        0.0024,
+        &[
+            (0.0115, 118.0, 5600.0, Some(0.74)),
+            (0.0157, 171.0, 8900.0, Some(1.83)),
+            (0.03, 77.0, 6500.0, None),
+        ],
+    )
+}
+
+fn effect(id: &str, values: &[f64]) -> AnyEffect {
+    AnyEffect::from_parameters(id, values).expect("in the library")
+}
+
+fn choice(id: &str, values: &[f64]) -> Choice {
+    Choice::new(info(id).expect("in the library"), values)
+}
+
+/// In at an even speed and out again.
+fn even() -> Insertion {
+    Insertion {
+        legs: vec![(8.2131, 0.005, 0.0, 0.0), (5.4, -0.0065, 0.0, 0.0)],
+        tissue: truth(),
+        effects: vec![effect("coulomb_friction", &[9.0])],
+        rate_hz: 200.0,
+        noise: (0.012, 0.0),
+        memory: 0.0,
+        step_m: 0.0,
+        gap_s: (0.0, 0.0),
+        seed: 11,
+    }
+}
+
+/// In with a ripple of the speed, which a coarse encoder tells.
+fn rippled() -> Insertion {
+    Insertion {
+        legs: vec![(1.5137, 0.0, 0.0, 0.0), (7.1071, 0.005, 0.002, 0.7), (3.3, -0.006, 0.0, 0.0)],
+        effects: Vec::new(),
+        step_m: 5e-5,
+        seed: 12,
+        ..even()
+    }
+}
+
+/// In, held in the middle and at the end, and out; a stretch was not recorded.
+fn held() -> Insertion {
+    Insertion {
+        legs: vec![
+            (3.6123, 0.004, 0.001, 0.4),
+            (1.7071, 0.0, 0.0, 0.0),
+            (5.1234, 0.0045, 0.0, 0.0),
+            (1.8, 0.0, 0.0, 0.0),
+            (4.0, -0.008, 0.0, 0.0),
+        ],
+        effects: vec![effect("stress_relaxation", &[0.3, 0.9])],
+        noise: (0.008, 0.0),
+        memory: 0.6,
+        gap_s: (2.1, 2.35),
+        seed: 13,
+        ..even()
+    }
+}
+
+/// Sampled at 50 Hz by a sensor that is late.
+fn slow() -> Insertion {
+    Insertion {
+        legs: vec![
+            (2.7317, 0.006, 0.0, 0.0),
+            (1.9317, 0.003, 0.0, 0.0),
+            (2.2317, 0.007, 0.0, 0.0),
+            (1.2, 0.0, 0.0, 0.0),
+            (2.5317, 0.004, 0.0, 0.0),
+            (5.3, -0.006, 0.0, 0.0),
+        ],
+        effects: vec![effect("time_delay", &[0.0437])],
+        rate_hz: 50.0,
+        noise: (0.006, 0.0),
+        seed: 14,
+        ..even()
+    }
+}
+
+/// Drops that hardly show, under a noise with memory, and something that breaks on the way.
+fn small() -> Insertion {
+    Insertion {
+        legs: vec![(9.7131, 0.0041, 0.0008, 0.31), (4.0, -0.0075, 0.0, 0.0)],
+        tissue: tissue(
+            0.0017,
+            &[
+                (0.0126, 104.0, 4700.0, Some(0.21)),
+                (0.0143, 205.0, 9900.0, Some(0.34)),
+                (0.03, 64.0, 5500.0, None),
+            ],
+        ),
+        effects: vec![effect("hidden_membrane", &[0.019, 120.0, 0.16])],
+        noise: (0.011, 0.0),
+        memory: 0.5,
+        seed: 15,
+        ..even()
+    }
+}
+
+/// The surface is deeper than believed, and the noise grows with the force.
+fn shifted() -> Insertion {
+    let mut there = truth();
+    there.surface_m = 0.0037;
+    Insertion {
+        legs: vec![(6.4131, 0.0065, 0.0015, 0.9), (1.6, 0.0, 0.0, 0.0), (6.2, -0.006, 0.001, 0.5)],
+        tissue: there,
+        effects: vec![effect("respiration", &[6e-4, 0.31, 0.7])],
+        noise: (0.004, 0.02),
+        seed: 16,
+        ..even()
+    }
+}
+
+/// One of several whose surface and friction differ.
+fn repeated(k: usize) -> Insertion {
+    let mut there = truth();
+    there.surface_m += [3e-4, -5e-4, 7e-4][k];
+    for l in &mut there.layers {
+        l.friction_ns_per_m2 *= [1.11, 0.93, 0.98][k];
+    }
+    Insertion {
+        legs: vec![
+            (7.3131 + 0.1 * k as f64, 0.005, 0.001, 0.6),
+            (0.9, 0.0, 0.0, 0.0),
+            (5.0, -0.006, 0.0, 0.0),
+        ],
+        tissue: there,
+        effects: vec![effect("let_go", &[2.0, 3.1e-3 + 4e-4 * k as f64])],
+        noise: (0.01, 0.0),
+        memory: 0.3,
+        seed: 17 + k as u64,
+        ..even()
+    }
+}
+
+// ---- Stages ----
+
+/// What the motion and the raw force say by themselves.
+fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
+    let (t, z) = (&r.time_s, &r.position_m);
+    let told = velocity(t, z);
+    said.column("velocity mps", &told.v);
+    said.number("velocity noise_mps", told.noise_mps);
+    said.kinks("velocity", &told.kinks);
+    let calm = settle(t, z);
+    said.column("settled place_m", &calm.z);
+    said.column("settled mps", &calm.v);
+    said.number("settled sd_mps", calm.sd_mps);
+    said.kinks("settled", &calm.kinks);
+    let motion = Motion::of(r);
+    said.numbers("motion noise", &[motion.velocity_sd_mps, motion.noise_m * 100.0]);
+    for (i, j) in motion.jumps.iter().enumerate().take(6) {
+        said.numbers(&format!("motion jump {i} instants_s"), &[j.at_s, j.between_s, j.doubt_s]);
+        said.number(&format!("motion jump {i} place_m"), j.z_m);
+        said.numbers(&format!("motion jump {i} mps"), &j.v_mps);
+    }
+    let end = t[t.len() - 1];
+    let between: Vec<(f64, f64)> = (0..400).map(|k| motion.at(end * (f64::from(k) - 3.0) / 390.0)).collect();
+    said.column("motion place_m", &between.iter().map(|m| m.0).collect::<Vec<f64>>());
+    said.column("motion mps", &between.iter().map(|m| m.1).collect::<Vec<f64>>());
+    let p = phases::phases(r);
+    said.numbers("phases", &[p.start as f64, p.deepest as f64, p.back as f64]);
+    said.number("phases noise_n", phases::noise_n(&r.force_n));
+    said.number("phases contact_m", phases::contact_m(r, &p));
+    let falls = phases::drops(r, &p);
+    said.numbers("phases drops", &falls.iter().map(|d| d.at as f64).collect::<Vec<f64>>());
+    said.numbers("phases drops_n", &falls.iter().map(|d| d.size_n).collect::<Vec<f64>>());
+    let of = phases::ruptures(&falls, layers);
+    said.numbers("phases ruptures", &of.iter().map(|d| d.map_or(-1.0, |d| d as f64)).collect::<Vec<f64>>());
+    for few in 1..=layers {
+        let released = phases::releases(r, &p, few);
+        said.numbers(
+            &format!("phases {few} releases"),
+            &released.iter().flat_map(|r| [r.position_m, 0.1 * r.size_n]).collect::<Vec<f64>>(),
+        );
+    }
+}
+
+/// Blocks as they are, late, coarser.
+fn block_stages(said: &mut Said, b: &Blocks) {
+    said.blocks("blocks", b);
+    said.blocks("coarse", &b.coarser(3));
+    for (name, smeared, late_s, placed_s) in [
+        ("smeared", true, 0.0, None),
+        ("late", false, 0.0137, None),
+        ("late and smeared", true, 0.0137, Some(0.02)),
+        ("placed", false, 0.0437, Some(0.0391)),
+    ] {
+        said.pieces(name, &b.pieces_seen(smeared, late_s, placed_s));
+    }
+    said.column("late doubt_n", &b.seen_late(0.0437).doubt_n);
+    let e: Vec<f64> = (0..b.len()).map(|k| 0.05 * libm::sin(0.3 * k as f64)).collect();
+    said.column("raw residual_n", &b.raw_residual(&e));
+    said.number("within_n", b.within_n());
+    let found = drops(b);
+    said.numbers("drops at_s", &found.iter().map(|d| d.time_s).collect::<Vec<f64>>());
+    said.numbers("drops place_m", &found.iter().map(|d| d.position_m).collect::<Vec<f64>>());
+    said.numbers("drops size_n", &found.iter().map(|d| d.size_n).collect::<Vec<f64>>());
+    said.numbers("drops score", &found.iter().map(|d| d.score).collect::<Vec<f64>>());
+}
+
+/// Standard deviation in N of blocks about their neighbours.
+fn roughness(blocks: &[Blocks]) -> f64 {
+    let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+    let mut all: Vec<f64> = blocks.iter().flat_map(|b| b.f.windows(4).map(third)).collect();
+    (stylet_stats::order::median(&mut all) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()).max(1e-6)
+}
+
+/// The base law fitted as a diagnosis does: drops given to layers, numbers and instants in turn.
+fn base_stages(said: &mut Said, belief: &Arc<Belief>, blocks: &Arc<Vec<Blocks>>) -> (Fit, Data) {
+    let found: Vec<_> = blocks.iter().map(drops).collect();
+    let times: Vec<Vec<f64>> = found.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect();
+    let rough_n = roughness(blocks);
+    let largest = blocks.iter().flat_map(|b| &b.size_n).fold(1e-9_f64, |m, f| m.max(*f));
+    let mut data = Data::new(Arc::clone(blocks), Noise::white(rough_n.max(0.03 * largest)), 1e-4);
+    let model = Model::base(Arc::clone(belief), blocks.len());
+    let mut best: Option<Fit> = None;
+    for trust in [1.0, 0.5] {
+        let from = best.as_ref().map_or(&model, |b| &b.model).clone();
+        let told = blocks.iter().zip(&found).map(|(b, d)| assign(&from, b, d, trust, rough_n));
+        let instants: Vec<Vec<f64>> = told.collect();
+        for (r, i) in instants.iter().enumerate() {
+            said.instants(&format!("assigned with {trust} of {r} instants_s"), i);
+        }
+        let next = Model { instants, ..from };
+        let new = fit(&next, &data, Effort { turns: 4, enough: 0.3 }).expect("a fit");
+        said.fit(&format!("first fit with {trust}"), &new, &data);
+        if best.as_ref().is_none_or(|b| new.nats() < b.nats()) {
+            best = Some(new);
+        }
+    }
+    let mut best = best.expect("a fit");
+    for round in 0..2 {
+        data = data.judged_by(&best.residuals.e, From::Calm);
+        said.noise(&format!("calm noise {round}"), &data.noise);
+        let mut model = best.model.clone();
+        let moved = retime(&mut model, &data, &times);
+        said.flags(&format!("round {round} moved"), &[moved]);
+        for (r, i) in model.instants.iter().enumerate() {
+            said.instants(&format!("round {round} of {r} instants_s"), i);
+        }
+        best = fit(&model, &data, Effort { turns: 5, enough: 0.3 }).expect("a fit");
+        said.fit(&format!("round {round}"), &best, &data);
+    }
+    data = data.judged_by(&best.residuals.e, From::Calm);
+    best = fit_sharp(&best.model, &data, Effort::FULL).expect("a fit");
+    said.fit("base", &best, &data);
+    (best, data)
+}
+
+/// Noise of every kind that residuals tell, and what it makes of them.
+fn noise_stages(said: &mut Said, found: &Fit, data: &Data) {
+    let e = &found.residuals.e;
+    for from in [From::Whole, From::Lasting, From::Drawn, From::Calm] {
+        let name = format!("noise {from:?}");
+        let own = data.judged_by(e, from);
+        said.noise(&name, &own.noise);
+        said.number(&format!("{name} ln sizes"), own.noise.ln_sizes(&data.blocks));
+        let w = own.whiten(0, &e[0]);
+        said.column(&format!("{name} innovations"), &w);
+        said.column(&format!("{name} coloured_n"), &own.colour(0, &w));
+        let nats = residuals(&found.model, &own).expect("a replay").nats;
+        said.number(&format!("{name} nats"), nats);
+    }
+    said.number("discrepancy_n", discrepancy(&data.blocks, e, 1e-4).sd_n());
+    said.count("compared", data.compared());
+}
+
+/// The linear picture: columns, standard deviations, evidence; and what effects would gain.
+fn picture_stages(said: &mut Said, found: &Fit, data: &Data) {
+    let tangent = Tangent::new(&found.model, data, &found.residuals);
+    let factor = tangent.factor();
+    said.column("slope", &tangent.slope);
+    let sds: Vec<f64> = factor.inverse_diagonal().iter().map(|v| v.sqrt()).collect();
+    said.numbers("sds", &sds);
+    said.number("ln determinant", factor.log_determinant());
+    let numbers = tangent.shared.iter().chain(&tangent.own);
+    for (n, c) in numbers.zip(&tangent.columns) {
+        said.of_column(&format!("column {:?}", n.role), c);
+    }
+    let step = |n: &stylet_identify::model::Number| match n.role {
+        Role::Surface | Role::Thickness(_) => Some(2e-4),
+        _ => None,
+    };
+    let wide = Tangent::new(&found.model, data, &found.residuals);
+    let wide = wide.widened(&found.model, data, &found.residuals, &step);
+    said.column("wide slope", &wide.slope);
+    said.number("wide ln determinant", wide.factor().log_determinant());
+    let look = Look::new(found, data);
+    for effect in library() {
+        let values: Vec<f64> = effect
+            .parameters
+            .iter()
+            .map(|p| if p.whole { 1.0 } else { 0.7 * p.search.0 + 0.3 * p.search.1 })
+            .collect();
+        let one = Choice::new(effect, &values);
+        let Some(c) = one.effect().and_then(|_| look.column(&one)) else { continue };
+        let gain = look.gain(std::slice::from_ref(&c));
+        let name = format!("look {}", effect.id);
+        said.numbers(&name, &[gain.nats, gain.visible, gain.left, gain.coefficients[0]]);
+        if effect.parameters.len() < 4 {
+            said.numbers(&format!("{name} scaled"), &scaled(effect, &[&values], &gain.coefficients));
+        }
+    }
+    let (one, two) = (choice("coulomb_friction", &[2.0]), choice("stress_relaxation", &[0.2, 1.1]));
+    let force: Vec<Vec<f64>> =
+        data.blocks.iter().map(|b| b.from_s.iter().map(|t| 0.01 * t).collect()).collect();
+    let columns =
+        [look.column(&one), look.column(&two), Some(look.of_force(&force))].map(|c| c.expect("a column"));
+    let gain = look.gain(&columns);
+    said.numbers("look three", &[&[gain.nats, gain.visible, gain.left][..], &gain.coefficients].concat());
+    let mut other = found.model.clone();
+    other.tissue.layers[0].friction_ns_per_m2 *= 1.03;
+    said.of_column("look change", &look.change(&other).expect("a column"));
+    for (l, e) in found.residuals.events.iter().flatten().enumerate().take(4) {
+        let s = found.model.scatter;
+        let (a, b) = spreads(e, &s);
+        said.numbers(&format!("rupture {l} force"), &[e.force, a, e.force_rate, e.elastic_n]);
+        said.numbers(&format!("rupture {l} place_m"), &[e.place_m, b, e.place_rate]);
+        said.numbers(&format!("rupture {l} judged"), &judge(e, &s).rows);
+        said.number(&format!("rupture {l} nats"), judge(e, &s).nats);
+    }
+    let all: Vec<_> = found.residuals.events.iter().flatten().copied().collect();
+    let s = scatter_of(&all, &found.model.scatter);
+    said.numbers("scatter told", &[s.force, s.place_m]);
+}
+
+/// Every effect of the library replayed beside the law, with the law's own ruptures.
+fn library_stages(said: &mut Said, found: &Fit, data: &Data) {
+    for effect in library() {
+        let values: Vec<f64> = effect
+            .parameters
+            .iter()
+            .map(|p| if p.whole { 1.0 } else { 0.6 * p.search.0 + 0.4 * p.search.1 })
+            .collect();
+        let model = found.model.with(Choice::new(effect, &values));
+        let Some(trail) = Trail::new(&model, data, 0) else { continue };
+        let instants = trail.own_instants();
+        let there = Model { instants: vec![instants.clone()], ..model.clone() };
+        let Some(out) = replay(&there, data, 0) else { continue };
+        said.instants(&format!("replay {} instants_s", effect.id), &instants);
+        said.column(&format!("replay {} force_n", effect.id), &out.f);
+        let told = |e: &stylet_identify::events::Event| {
+            [e.force, e.force_rate, e.elastic_n, e.place_m, e.place_rate, f64::from(u8::from(e.ruptured))]
+        };
+        let told: Vec<f64> = out.events.iter().flat_map(told).collect();
+        said.numbers(&format!("replay {} ruptures", effect.id), &told);
+        let nats = trail.nats_at(&model, data, 0, &instants);
+        said.number(&format!("replay {} nats", effect.id), if nats < NEVER { nats } else { -1.0 });
+    }
+}
+
+/// A trial of an effect: retimed, fitted, judged by what it leaves.
+fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &Data, with: Choice) -> Fit {
+    let mut model = found.model.with(with);
+    let times: Vec<Vec<f64>> =
+        data.blocks.iter().map(|b| drops(b).iter().map(|d| d.time_s).collect()).collect();
+    let short = fit(&model, data, Effort::SHORT).expect("a fit");
+    said.number(&format!("{name} in short nats"), short.nats());
+    let hopeless = fit_below(&model, data, Effort::FULL, 0.5 * short.nats()).expect("a fit");
+    said.number(&format!("{name} given up nats"), hopeless.nats());
+    model = short.model;
+    retime(&mut model, data, &times);
+    let whole = fit(&model, data, Effort::FULL).expect("a fit");
+    let own = data.judged_by(&whole.residuals.e, From::Whole);
+    let best = fit_sharp(&whole.model, &own, Effort::FULL).expect("a fit");
+    said.fit(name, &best, &own);
+    let tangent = Tangent::new(&best.model, &own, &best.residuals);
+    let sds = tangent.factor().inverse_diagonal();
+    said.numbers(
+        &format!("{name} sds"),
+        &sds[..tangent.shared.len()].iter().map(|v| v.sqrt()).collect::<Vec<f64>>(),
+    );
+    said.number(&format!("{name} ln determinant"), tangent.factor().log_determinant());
+    best
+}
+
+/// All that is said of a single insertion, but for trials of effects.
+fn one(said: &mut Said, of: &Insertion) -> (Fit, Data, Vec<f64>) {
+    let (recording, ruptures) = of.recorded();
+    let belief = Arc::new(belief());
+    raw_stages(said, &recording, 3);
+    let exclude: Vec<bool> = recording.time_s.iter().map(|t| (*t - 1.3).abs() < 0.031).collect();
+    let blocks = Blocks::new(&recording, &exclude, BLOCK_S);
+    block_stages(said, &blocks);
+    let (found, data) = base_stages(said, &belief, &Arc::new(vec![blocks]));
+    noise_stages(said, &found, &data);
+    (found, data, ruptures)
+}
+
+/// The instants found are the true ones to within so many s.
+fn near(found: &Fit, ruptures: &[f64], within_s: f64) {
+    let told = &found.model.instants[0];
+    for (t, truth) in told.iter().zip(ruptures) {
+        assert!((t - truth).abs() < within_s, "{told:?} for {ruptures:?}");
+    }
+}
+
+/// The numbers of the first two layers are the true ones.
+fn lies_at(found: &Fit, truth: &Tissue) {
+    let told = &found.model.tissue;
+    assert!((told.surface_m - truth.surface_m).abs() < 1e-4, "{}", told.surface_m);
+    for (l, t) in told.layers.iter().zip(&truth.layers).take(2) {
+        close("stiffness", l.stiffness_n_per_m, t.stiffness_n_per_m, 0.02);
+        close("friction", l.friction_ns_per_m2, t.friction_ns_per_m2, 0.02);
+        close("puncture force", l.puncture_n.unwrap_or(0.0), t.puncture_n.unwrap_or(1.0), 0.02);
+        assert!((l.thickness_m - t.thickness_m).abs() < 1e-4, "{}", l.thickness_m);
+    }
+}
+
+fn close(name: &str, told: f64, truth: f64, within: f64) {
+    assert!((told / truth - 1.0).abs() < within, "{name}: {told} for {truth}");
+}
+
+fn even_stages() -> Said {
+    let mut said = Said::default();
+    let (found, data, ruptures) = one(&mut said, &even());
+    near(&found, &ruptures, 0.03);
+    library_stages(&mut said, &found, &data);
+    let best = trial_stages(&mut said, "dry friction", &found, &data, choice("coulomb_friction", &[3.0]));
+    near(&best, &ruptures, 0.03);
+    lies_at(&best, &truth());
+    close("dry friction", best.model.effects[0].values[0], 9.0, 0.03);
+    said
+}
+
+fn rippled_stages() -> Said {
+    let mut said = Said::default();
+    let (found, data, ruptures) = one(&mut said, &rippled());
+    near(&found, &ruptures, 0.03);
+    lies_at(&found, &truth());
+    let bent = trial_stages(&mut said, "bent", &found, &data, choice("needle_compliance", &[4000.0]));
+    assert!(bent.model.effects[0].values[0] > 1e5, "a rigid needle gives: {:?}", bent.model.effects);
+    library_stages(&mut said, &found, &data);
+    said
+}
+
+fn held_stages() -> Said {
+    let mut said = Said::default();
+    let (found, data, ruptures) = one(&mut said, &held());
+    near(&found, &ruptures, 0.03);
+    picture_stages(&mut said, &found, &data);
+    library_stages(&mut said, &found, &data);
+    let best = trial_stages(&mut said, "relaxing", &found, &data, choice("stress_relaxation", &[0.2, 1.5]));
+    near(&best, &ruptures, 0.03);
+    lies_at(&best, &truth());
+    close("relaxing share", best.model.effects[0].values[0], 0.3, 0.03);
+    close("time of relaxation", best.model.effects[0].values[1], 0.9, 0.1);
+    said
+}
+
+fn slow_stages() -> Said {
+    let mut said = Said::default();
+    let (found, data, _) = one(&mut said, &slow());
+    let best = trial_stages(&mut said, "late", &found, &data, choice("time_delay", &[0.03]));
+    let (to_the_step, seen) = placed(&best, &data).expect("a late force is better so");
+    said.fit("placed", &to_the_step, &seen);
+    close("delay", late_s(&to_the_step.model), 0.0437, 0.05);
+    lies_at(&to_the_step, &truth());
+    trial_stages(&mut said, "smeared", &found, &data, choice("low_pass_lag", &[0.03]));
+    said
+}
+
+fn small_stages() -> Said {
+    let mut said = Said::default();
+    let (found, data, _) = one(&mut said, &small());
+    picture_stages(&mut said, &found, &data);
+    let with = choice("hidden_membrane", &[0.018, 100.0, 0.2]);
+    let best = trial_stages(&mut said, "membrane", &found, &data, with);
+    let values = &best.model.effects[0].values;
+    assert!((best.model.tissue.surface_m + values[0] - 0.0207).abs() < 2e-3, "{values:?}");
+    close("the membrane's stiffness", values[1], 120.0, 0.1);
+    said
+}
+
+fn shifted_stages() -> Said {
+    let mut said = Said::default();
+    let (found, data, ruptures) = one(&mut said, &shifted());
+    near(&found, &ruptures, 0.03);
+    let breath = trial_stages(&mut said, "breath", &found, &data, choice("respiration", &[5e-4, 0.3, 0.5]));
+    lies_at(&breath, &Tissue { surface_m: 0.0037, ..truth() });
+    close("amplitude", breath.model.effects[0].values[0], 6e-4, 0.02);
+    close("frequency", breath.model.effects[0].values[1], 0.31, 0.005);
+    trial_stages(&mut said, "by speed", &found, &data, choice("rate_dependent_puncture", &[0.1]));
+    said
+}
+
+/// Three insertions, two on one day.
+fn several_stages() -> Said {
+    let mut said = Said::default();
+    let belief = Arc::new(belief());
+    let blocks: Vec<Blocks> = (0..3)
+        .map(|k| {
+            let (r, _) = repeated(k).recorded();
+            Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)
+        })
+        .collect();
+    let (found, data) = base_stages(&mut said, &belief, &Arc::new(blocks));
+    noise_stages(&mut said, &found, &data);
+    let mut own = found.model.clone();
+    (own.free.own_surface, own.free.own_friction) = (true, true);
+    let own = fit(&own, &data, Effort::FULL).expect("a fit");
+    said.fit("own", &own, &data);
+    for (k, wanted) in [0.11, -0.07, -0.02].iter().enumerate() {
+        let mean = own.model.own.iter().map(|o| o.friction).sum::<f64>() / 3.0;
+        let told = own.model.own[k].friction - mean;
+        assert!((told - (wanted - 0.0067)).abs() < 0.03, "friction of {k}: {told}");
+    }
+    picture_stages(&mut said, &own, &data);
+    let mut lets_go = own.model.with(choice("let_go", &[2.0, 3e-3]));
+    lets_go.free.own_effects = true;
+    let lets_go = fit(&lets_go, &data, Effort::FULL).expect("a fit");
+    said.fit("lets go", &lets_go, &data);
+    let tangent = Tangent::new(&lets_go.model, &data, &lets_go.residuals);
+    said.number("lets go ln determinant", tangent.factor().log_determinant());
+    said.column("lets go slope", &tangent.slope);
+    let mut days = found.model.clone();
+    (days.days, days.day_of) = (vec![Day::default(); 2], vec![0, 1, 0]);
+    (days.free.day_surface, days.free.day_friction) = (true, true);
+    days.steady = true;
+    let days = fit(&days, &data, Effort::FULL).expect("a fit");
+    said.fit("days", &days, &data);
+    let two = data.only(&[2, 0]);
+    let fewer = fit(&days.model.only(&[2, 0]), &two, Effort::SHORT).expect("a fit");
+    said.fit("two of them", &fewer, &two);
+    said
+}
+
+#[test]
+fn every_stage_says_what_was_recorded_of_it() {
+    type Stages = fn() -> Said;
+    let insertions: [(&str, Stages); 7] = [
+        ("even", even_stages),
+        ("rippled", rippled_stages),
+        ("held", held_stages),
+        ("slow", slow_stages),
+        ("small", small_stages),
+        ("shifted", shifted_stages),
+        ("several", several_stages),
+    ];
+    let running = insertions.map(|(name, of)| (name, std::thread::spawn(of)));
+    let all = running.map(|(name, said)| (name, said.join().expect("stages that run to their end")));
+    let now = written(&all);
+    if std::env::var_os("STYLET_RECORD").is_some() {
+        std::fs::write(file(), now).expect("a place to write");
+        return;
+    }
+    let then = std::fs::read_to_string(file()).expect("recorded stages");
+    let (then, now) = (parsed(&then), parsed(&now));
+    let differs = |name: &&str| match (then.get(*name), now.get(*name)) {
+        (Some(a), Some(b)) => !alike(a, b),
+        _ => true,
+    };
+    let names: std::collections::BTreeSet<&str> = then.keys().chain(now.keys()).copied().collect();
+    let off: Vec<&str> = names.into_iter().filter(differs).collect();
+    let first = off.first().map(|n| (n, then.get(*n), now.get(*n)));
+    assert!(off.is_empty(), "{} of {} differ; the first: {first:?}", off.len(), now.len());
+}
