@@ -365,9 +365,11 @@ mod tests {
         assert(size(&stylet), [0.25, 0.005, 0.02]);
         stylet.layers.free = true;
         assert(size(&stylet), [0.25, 0.005, 0.034]);
-        // Where the law does not hold it is not asked: two standard deviations, and the least drop.
+        // Where the law does not hold it is not asked: two standard deviations, and the least drop; in between as much of either.
+        (stylet.rough, stylet.least_n) = (0.5, 0.004);
+        assert(size(&stylet), [0.3, 0.005, 0.022]);
         let mut stylet = fallen(16.0);
-        (stylet.rough, stylet.least_n) = (0.1, 0.004);
+        (stylet.rough, stylet.least_n) = (1.0, 0.004);
         assert(size(&stylet), [0.3, 0.005, 0.01]);
         stylet.least_n = 0.2;
         assert(size(&stylet), [0.3, 0.005, 0.2]);

@@ -253,17 +253,17 @@ mod tests {
     }
 
     #[test]
-    fn a_tip_is_free_at_twenty_to_one_against_a_layer_and_the_other_way_to_be_free() {
+    fn a_tip_is_free_at_twenty_to_one_against_a_layer_and_four_hundred_against_the_other_way_to_be_free() {
         let log = |x: f64| x.ln();
         for (follows, ends, free, settled) in [
             (log(20.2), -30.0, true, false),
             (log(19.8), -30.0, false, false),
             (-30.0, log(20.2), true, false),
             (-30.0, log(19.8), false, false),
-            // Against one and three, twenty times as probable is eighty.
-            (log(81.0), log(3.0), true, false),
-            (log(79.0), log(3.0), false, false),
-            (log(3.0), log(81.0), true, false),
+            // Twenty times as probable as a layer and four hundred times as the other way at three to one: 1220.
+            (log(1230.0), log(3.0), true, false),
+            (log(1210.0), log(3.0), false, false),
+            (log(3.0), log(1230.0), true, false),
             // Twenty to the fourth to one that it is not, both ways.
             (-4.01 * log(20.0), -30.0, false, true),
             (-30.0, -4.01 * log(20.0), false, true),
@@ -327,19 +327,19 @@ mod tests {
         };
         let (mut layers, _) = behind_a_rupture(60.0, 9000.0);
         let mut slack = Slack::new(0.05, 0.005, &layers);
-        assert_eq!([7, 9, 12].map(|count| follow(&mut layers, &mut slack, count)), [0; 3]);
+        assert_eq!([7, 9, 12].map(|count| follow(&mut layers, &mut slack, count)), [(0, false); 3]);
         assert!(!layers.settled);
-        assert_eq!(follow(&mut layers, &mut slack, 16), 60);
+        assert_eq!(follow(&mut layers, &mut slack, 16), (60, false));
         assert!(layers.settled && !layers.free);
-        assert_eq!(follow(&mut layers, &mut slack, 24), 0);
+        assert_eq!(follow(&mut layers, &mut slack, 24), (0, false));
         // Nothing is behind the first layer but air.
         (layers.settled, layers.passed) = (false, 0);
-        assert_eq!(follow(&mut layers, &mut slack, 16), 0);
+        assert_eq!(follow(&mut layers, &mut slack, 16), (0, false));
         let (mut layers, _) = behind_a_rupture(0.0, 9000.0);
         for side in [&mut slack.up, &mut slack.down] {
             side.take(-3.0, &layers, 0.0);
         }
-        assert_eq!(follow(&mut layers, &mut slack, 8), 60);
+        assert_eq!(follow(&mut layers, &mut slack, 8), (60, false));
         assert!(layers.free && slack.up.slow == 0.0 && slack.down.slow == 0.0, "the sums begin then");
     }
 
@@ -363,10 +363,10 @@ mod tests {
             };
             // A sample that says nothing, then two that do; the sums leave zero before the first of them.
             let sign = if up { 1.0 } else { -1.0 };
-            assert_eq!(follow(&mut layers, 0.024, 0.0), 42);
-            assert_eq!(follow(&mut layers, 0.0241, 2.0 * sign), 42);
+            assert_eq!(follow(&mut layers, 0.024, 0.0), (42, false));
+            assert_eq!(follow(&mut layers, 0.0241, 2.0 * sign), (42, false));
             layers.belief.x[K] = 77.0;
-            assert_eq!(follow(&mut layers, 0.0242, 9.0 * sign), 42 + 2 * 216 + 2 * 126);
+            assert_eq!(follow(&mut layers, 0.0242, 9.0 * sign), (42 + 2 * 216 + 2 * 126, true));
             let (mut expected, mut expected_behind) = (before, Behind::default());
             let place_m = (0.0243 - 0.0241) / 12.0_f64.sqrt();
             expected.bend(0.0241, place_m, up, 0.0021, &noise, &mut expected_behind);

@@ -11,6 +11,7 @@ mod stylet_falls;
 mod stylet_finds;
 mod stylet_gaps;
 mod stylet_holds;
+mod stylet_intervals;
 mod stylet_origins;
 mod stylet_without_a_law;
 mod support;
