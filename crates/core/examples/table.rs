@@ -277,8 +277,6 @@ fn run(row: &Row, seeds: u64, rate: f64) {
     let mut errors: Vec<Vec<f64>> = vec![vec![]; row.tissue.layers.len()];
     let mut enh = vec![];
     let mut cover = [[0.0; 2]; 4];
-    let mut hist = [[0.0f64; 3]; 60];
-    let mut zs = [[(); 3]; 3].map(|r| r.map(|()| Vec::<f64>::new()));
     let mut verbose = if std::env::var_os("VERBOSE").is_some() { 5 } else { 0 };
     for seed in 0..seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
@@ -323,14 +321,6 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                     if f.tip_n >= lo && f.tip_n <= hi {
                         cover[3][0] += 1.0;
                     }
-                    let bin = ((z * 1e3 / 2.0) as usize).min(59);
-                    hist[bin][1] += 1.0;
-                    if f.tip_n < lo {
-                        hist[bin][0] += 1.0;
-                    }
-                    if f.tip_n > hi {
-                        hist[bin][2] += 1.0;
-                    }
                 }
             }
             let w: f64 = StandardNormal.sample(&mut rng);
@@ -343,8 +333,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
         for (i, (tr, zr)) in ruptures.iter().enumerate() {
             total += 1;
             let l = &row.tissue.layers[i];
-            let inside = l.friction_ns_per_m2 * (zr - row.tissue.front_m(i));
-            let dsum_now = dsum + inside;
+            let behind = dsum + l.friction_ns_per_m2 * (zr - row.tissue.front_m(i));
             dsum += l.friction_ns_per_m2 * l.thickness_m;
             let hit = (0..det.len()).find(|&j| !used[j] && det[j] >= tr - 0.05 && det[j] <= tr + 1.0);
             match hit {
@@ -362,16 +351,13 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                         errors[i].push(100.0 * (e.stiffness_n_per_m / l.stiffness_n_per_m - 1.0).abs());
                         let mut c = |k: usize, x: f64, sd: f64| {
                             cover[k][1] += 1.0;
-                            if i < 3 {
-                                zs[i][k].push(x / sd);
-                            }
                             if x.abs() <= 1.96 * sd {
                                 cover[k][0] += 1.0;
                             }
                         };
                         c(0, e.stiffness_n_per_m - l.stiffness_n_per_m, e.stiffness_sd);
                         c(1, e.friction - l.friction_ns_per_m2, e.friction_sd);
-                        c(2, e.cumulative_ns_per_m - dsum_now, e.cumulative_sd);
+                        c(2, e.cumulative_ns_per_m - behind, e.cumulative_sd);
                     }
                 }
             }
@@ -384,28 +370,6 @@ fn run(row: &Row, seeds: u64, rate: f64) {
                     println!("   false seed {seed} t {:.3}", det[j]);
                 }
             }
-        }
-    }
-    for (i, layer) in zs.iter().enumerate() {
-        for (k, z) in layer.iter().enumerate() {
-            let n = z.len() as f64;
-            let m = z.iter().sum::<f64>() / n;
-            let s = (z.iter().map(|z| (z - m).powi(2)).sum::<f64>() / n).sqrt();
-            let cov = z.iter().filter(|z| z.abs() <= 1.96).count() as f64 / n;
-            let mut q = z.clone();
-            q.sort_by(f64::total_cmp);
-            let at = |p: f64| q.get(((n - 1.0) * p) as usize).copied().unwrap_or(0.0);
-            println!(
-                "      q {:.1?}",
-                [0.0, 0.01, 0.025, 0.05, 0.16, 0.5, 0.84, 0.95, 0.975, 0.99, 1.0].map(at)
-            );
-            print!("   {}{} mean {m:+.2} sd {s:.2} cover {:.1}", i + 1, ["K", "b", "D"][k], 100.0 * cov);
-        }
-        println!();
-    }
-    for (k, [lo, n, hi]) in hist.iter().enumerate() {
-        if *n > 0.0 {
-            println!("H {} {:.3} {:.3} n {}", 2 * k, lo / n, hi / n, n);
         }
     }
     let ks: Vec<String> = errors.iter_mut().map(|e| format!("{:.2}", median(e, 0.5))).collect();
