@@ -2,7 +2,7 @@
 # How much of a crate its own tests hold fast: mutates it line by line and counts the mutants that they notice.
 #     tests/mutants.sh CRATE [SHARD] [-- OPTION...]      e.g.  tests/mutants.sh stats;  tests/mutants.sh tissue 2/5;  tests/mutants.sh core 0/7 -- --file rls.rs
 # CRATE is a folder of crates/ or a package; SHARD k/n takes every n-th mutant from the k-th on (n odd: operators come in pairs); what follows
-# `--` goes to `cargo mutants`. Prints tried, killed (a timeout is noticed, too), survived, unviable (do not compile), the share killed
+# `--` goes to `cargo mutants` (all features are on unless it names some). Prints tried, killed (a timeout is noticed, too), survived, unviable (do not compile), the share killed
 # with its Wilson 95 % interval, and the survivors. Nothing is left out: a mutant that changes no behaviour counts as a survivor.
 # Everything is written to target/mutants. Needs cargo-mutants (cargo install --locked cargo-mutants); seconds per mutant, minutes to hours in all.
 set -euo pipefail
@@ -20,6 +20,12 @@ if [ $# -gt 0 ] && [ "$1" != -- ]; then
     shift
 fi
 [ "${1:-}" != -- ] || shift
+# Every feature, so that no module stands aside; other ones may be asked for. As an extension, Python's crate links no tests.
+features=(--all-features)
+[ "$package" != stylet-python ] || features=()
+for option in "$@"; do
+    case $option in --all-features | --features | --features=* | --no-default-features) features=() ;; esac
+done
 cargo mutants --version >/dev/null 2>&1 || { echo "needs cargo-mutants: cargo install --locked cargo-mutants" >&2; exit 1; }
 
 # Built a thousand times and run once each: neither line numbers nor more optimisation than the tests' own work needs.
@@ -31,7 +37,7 @@ export CARGO_TARGET_DIR=$there/target
 rm -rf "$there/mutants.out" "$there/mutants.out.old"
 started=$SECONDS
 # 0: all noticed; 2: some survived; 3: some timed out. Anything else did not run.
-cargo mutants --package "$package" --test-package "$package" --jobs 1 --minimum-test-timeout 60 --timeout-multiplier 5 \
+cargo mutants --package "$package" --test-package "$package" "${features[@]}" --jobs 1 --minimum-test-timeout 60 --timeout-multiplier 5 \
     --no-shuffle --colors never --output "$there" "${shard[@]}" "$@" >"$there/log" 2>&1 ||
     case $? in 2 | 3) ;; *) tail -n 20 "$there/log" >&2; exit 1 ;; esac
 took=$((SECONDS - started))

@@ -402,3 +402,223 @@ pub fn summary(cases: &[Result]) -> String {
 fn gain() -> &'static str {
     stylet_tissue::ForceGain { eps: 0.0 }.info().id
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Result, aim, examine, gain, strength, summary, wilson};
+    use crate::hidden::{Drawn, Kind, Motions, Outside, Size, Sketch};
+    use crate::outcome::Verdict;
+    use stylet_tissue::{AnyEffect, CoulombFriction, ForceGain, ForceSpikes, PeriodicInterference};
+
+    #[test]
+    fn a_rate_is_told_in_per_cent_with_its_interval() {
+        assert_eq!(wilson(0, 0), "-");
+        // Wilson's interval of 7 of 9, by hand.
+        let (n, p, z) = (9.0, 7.0 / 9.0, 1.959_963_984_540_054_f64);
+        let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+        let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
+        let wanted =
+            format!("7/9 = 77.8 % ({:.1} to {:.1})", 100.0 * (middle - half), 100.0 * (middle + half));
+        assert_eq!(wilson(7, 9), wanted);
+    }
+
+    fn one(kind: Kind, hidden: &[&str], named: &[&[&str]], right: bool, strength: f64) -> Result {
+        let owned = |all: &[&str]| all.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+        Result {
+            index: 0,
+            kind,
+            hidden: owned(hidden),
+            values: Vec::new(),
+            strength,
+            size: Size::of(strength),
+            ar: 0.0,
+            verdict: if named.is_empty() { Verdict::None } else { Verdict::Named },
+            named: named.iter().map(|n| owned(n)).collect(),
+            confidence: named.iter().map(|_| 0.97).collect(),
+            invisible: Vec::new(),
+            right,
+            truth_nats: None,
+            errors: Vec::new(),
+            gain: None,
+            rms_n: [0.02; 3],
+            leftover: (1.0, 0.0),
+            explained: 0.0,
+            seconds: 1.0,
+            samples: 10,
+        }
+    }
+
+    /// Each line of the summary counts what it says.
+    #[test]
+    fn the_summary_counts_cases_by_what_was_hidden_and_said() {
+        let mut all = vec![
+            one(Kind::Clean, &[], &[], true, 0.0),
+            one(Kind::Clean, &[], &[], true, 0.0),
+            one(Kind::Clean, &[], &[&["time_delay"]], false, 0.0),
+            one(Kind::Single, &["force_drift"], &[&["force_drift"]], true, 9.0),
+            one(Kind::Single, &["force_drift"], &[&["force_bias", "force_drift"]], true, 7.0),
+            one(Kind::Single, &["force_drift"], &[&["time_delay"], &["force_bias"]], false, 6.0),
+            one(Kind::Single, &["force_drift"], &[], false, 1.0),
+            one(Kind::Single, &["force_bias"], &[&["force_bias"]], true, 2.0),
+            one(Kind::Single, &["force_bias"], &[], false, 0.3),
+            one(Kind::Single, &["force_bias"], &[], false, 0.2),
+            one(Kind::Single, &["force_bias"], &[&["force_bias"]], true, 0.1),
+            one(Kind::Single, &["force_gain"], &[], true, 0.4),
+            one(Kind::Single, &["force_gain"], &[], true, 6.4),
+            one(Kind::Two, &["force_bias", "time_delay"], &[&["force_bias"]], false, 9.0),
+            one(Kind::Outside, &["chirp"], &[], true, 8.0),
+            one(Kind::Outside, &["chirp"], &[&["force_drift"]], false, 7.0),
+            one(Kind::Outside, &["chirp"], &[&["force_drift"]], false, 0.3),
+        ];
+        all[14].verdict = Verdict::Unknown;
+        all[1].rms_n = [0.02, 0.0203, 0.02];
+        all[2].rms_n = [0.02, 0.0201, 0.02];
+        // What is too small to be told from the truth's own likelihood does not count as a miss.
+        all[8].truth_nats = Some(19.0);
+        all[9].truth_nats = Some(21.0);
+        all[3].errors =
+            vec![("force_drift.rate".to_owned(), 0.01, true), ("force_drift.x".to_owned(), 0.04, false)];
+        all[4].errors = vec![("force_drift.rate".to_owned(), 0.02, true)];
+        all[5].errors = vec![("force_drift.rate".to_owned(), 9.0, false)];
+        all[7].errors = vec![("force_bias.f".to_owned(), 0.3, true)];
+        (all[3].gain, all[4].gain, all[5].gain) = (Some(0.9), Some(0.7), Some(0.1));
+        all[5].confidence = vec![0.6, 0.97];
+        all[4].confidence = vec![0.8];
+        all[7].confidence = vec![0.4];
+        all[0].seconds = 5.0;
+        let text = summary(&all);
+        let has = |wanted: &str| {
+            let squeezed = |t: &str| t.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(text.lines().any(|l| squeezed(l).starts_with(&squeezed(wanted))), "{wanted}\n{text}");
+        };
+        has("17 cases");
+        has("clean, called clean 2/3 = 66.7 %");
+        has("one effect, Strong: named, or in its class 2/3");
+        has("one effect, Medium: named, or in its class 1/2");
+        has("one effect, Faint: named, or in its class 0/1");
+        has("force_gain: listed as invisible 2/2");
+        has("two effects, both named 0/1");
+        has("outside the library, Strong: wrongly named 1/2");
+        has("outside the library, Strong: unknown 1/2");
+        has("outside the library, Medium: unknown -");
+        has("outside the library, Faint: wrongly named 1/1");
+        has("outside the library, Faint: unknown 0/1");
+        // The median of 1, 2, 4 per cent.
+        has("parameter error, strong: median 2.000 %, p90 3.600 %");
+        has("95 % intervals, Strong: hold the truth in 2/3");
+        has("95 % intervals, Medium: hold the truth in 1/1");
+        has("95 % intervals, Faint: hold the truth in -");
+        has("force_drift.rate held 2/2, worst error 2.00 %");
+        has("force_drift.x held 0/1, worst error 4.00 %");
+        has("force_bias.f held 1/1, worst error 30.00 %");
+        has("held-out gain over the possible one, strong: p10 0.7200, median 0.8000");
+        has("clean data, worse than the base by more than 1 %: 1/3");
+        has("seconds per case (cases run side by side): median 1.00, p90 1.00");
+        has("said 0.00 to 0.50: the first named is it in 1/1");
+        has("said 0.50 to 0.80: the first named is it in 0/1");
+        has("said 0.80 to 0.95: the first named is it in 0/1");
+        has("said 0.95 to 1.00: the first named is it in 2/2");
+        // By strength 9, 7, 6 (missed), 1 (missed): four fifths hold down to 7. Of 2, 0.3, 0.2, 0.1: down to 2.
+        has("force_drift strong 2/3 medium 0/1 faint 0/0 below 0/0 80 % from 7.00 sd");
+        has("force_bias strong 0/0 medium 1/1 faint 0/2 below 1/1 80 % from 2.00 sd");
+        has("(clean) -> none 2");
+        has("(clean) -> time_delay 1");
+        has("force_drift -> force_bias|force_drift 1");
+        has("force_drift -> time_delay + force_bias 1");
+        has("chirp -> unknown 1");
+        has("chirp -> force_drift 2");
+        has("force_gain -> none 2");
+        assert!(
+            !text.contains("force_bias, time_delay")
+                && !text.contains("force_bias                         -> force_bias   2\n")
+        );
+        assert_eq!(gain(), "force_gain");
+    }
+
+    fn drawn(effects: Vec<AnyEffect>) -> Drawn {
+        Drawn {
+            seed: 21,
+            effects,
+            outside: None,
+            noise_n: 0.02,
+            ar: [0.0; 2],
+            off: 0.1,
+            motions: Motions::One,
+            scatter: 0.0,
+            velocity_noise_mps: 0.0,
+        }
+    }
+
+    fn tone(amplitude_n: f64) -> AnyEffect {
+        PeriodicInterference { amplitude_n, frequency_hz: 5.0, phase_rad: 0.3 }.into()
+    }
+
+    #[test]
+    fn strengths_are_what_the_refitted_base_law_leaves_over_the_noise() {
+        let nothing = strength(&drawn(Vec::new())).expect("a fit");
+        assert!(nothing < 0.05, "{nothing}");
+        // Spikes leave what they are by themselves: so many a second of so much.
+        let spikes = ForceSpikes { rate_hz: 0.5, size_n: 0.8 };
+        let told = strength(&drawn(vec![spikes.into()])).expect("a fit");
+        let wanted = (0.5 / 200.0 * 0.8 * 0.8_f64).sqrt() / 0.02;
+        assert!((told / wanted - 1.0).abs() < 0.02, "{told} for {wanted}");
+        // A tone that no number of the base law follows, its mean over blocks of 20 ms.
+        let of = |a: f64| strength(&drawn(vec![tone(a)])).expect("a fit");
+        let (little, much) = (of(0.05), of(0.1));
+        let seen = (0.1 * std::f64::consts::PI).sin() / (0.1 * std::f64::consts::PI);
+        let wanted = 0.05 / 2.0_f64.sqrt() * seen / 0.02;
+        assert!((little / wanted - 1.0).abs() < 0.02, "{little} for {wanted}");
+        assert!((much / little - 2.0).abs() < 0.02, "{little} {much}");
+    }
+
+    #[test]
+    fn strengths_are_drawn_to_the_target_and_what_the_base_law_swallows_is_left() {
+        let sketch = |effects: Vec<AnyEffect>, target: f64| Sketch {
+            kind: Kind::Single,
+            target,
+            drawn: drawn(effects),
+        };
+        for target in [3.0, 8.0] {
+            let made = aim(&sketch(vec![tone(0.01)], target));
+            let told = strength(&made).expect("a fit");
+            assert!((0.8..1.25).contains(&(target / told)), "{told} for {target}");
+        }
+        let same = aim(&sketch(vec![ForceGain { eps: 0.02 }.into()], 8.0));
+        assert_eq!(same.effects[0].parameters(), [0.02]);
+        assert!(aim(&sketch(Vec::new(), 8.0)).effects.is_empty());
+        // Two share the square of the strength.
+        let two = aim(&sketch(vec![tone(0.01), ForceGain { eps: 0.02 }.into()], 8.0));
+        let alone = Drawn { effects: vec![two.effects[0].clone()], ..two };
+        let told = strength(&alone).expect("a fit") * 2.0_f64.sqrt();
+        assert!((0.8..1.25).contains(&(8.0 / told)), "{told}");
+    }
+
+    #[test]
+    fn a_case_examined_says_what_was_hidden_named_and_right() {
+        let case = drawn(vec![CoulombFriction { c_n_per_m: 9.0 }.into()]);
+        let r = examine(7, Kind::Single, &case).expect("a diagnosis");
+        assert_eq!(
+            (r.index, r.hidden.as_slice(), r.values.as_slice()),
+            (7, &["coulomb_friction".to_owned()][..], &[vec![9.0]][..])
+        );
+        assert_eq!(r.named, [["coulomb_friction"]]);
+        assert!(r.right && r.verdict == Verdict::Named && r.size == Size::of(r.strength) && r.strength > 5.0);
+        let (name, error, _) = &r.errors[0];
+        assert_eq!(name, "coulomb_friction.c_n_per_m");
+        assert!(*error < 0.1, "{error}");
+        assert!(r.gain.is_some_and(|g| (0.9..1.1).contains(&g)), "{:?}", r.gain);
+        assert!(r.rms_n[1] < 0.03 && r.rms_n[2] < 0.03 && r.rms_n[0] > 2.0 * r.rms_n[1], "{:?}", r.rms_n);
+        assert!(r.explained > 50.0 && r.seconds > 0.0 && r.samples > 1000);
+        let clean = examine(1, Kind::Clean, &drawn(Vec::new())).expect("a diagnosis");
+        assert!(clean.right && clean.gain.is_none() && clean.errors.is_empty() && clean.hidden.is_empty());
+        let wrong = examine(1, Kind::Outside, &drawn(Vec::new())).expect("a diagnosis");
+        assert!(!wrong.right);
+        let missed = examine(1, Kind::Clean, &case).expect("a diagnosis");
+        assert!(!missed.right);
+        let scaled =
+            examine(1, Kind::Single, &drawn(vec![ForceGain { eps: 0.03 }.into()])).expect("a diagnosis");
+        assert!(scaled.right && scaled.verdict == Verdict::None, "{:?}", scaled.verdict);
+        let outside = Drawn { outside: Some(Outside::new(3, [0.2; 4], 0.01)), ..drawn(Vec::new()) };
+        assert_eq!(examine(1, Kind::Outside, &outside).expect("a diagnosis").hidden, ["chirp"]);
+    }
+}

@@ -178,3 +178,228 @@ pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
         [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
     Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new(), grave: false })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{check, finite, holes, unlike};
+    use crate::diagnose::Evidence;
+    use crate::error::DiagnoseError;
+    use stylet_record::Recording;
+    use stylet_scenario::Scenario;
+    use stylet_tissue::{Law, LawState, Layer, Tissue};
+
+    const SURFACE_M: f64 = 0.01;
+
+    /// Two layers of 20 and 30 mm that begin at 10 mm.
+    fn scenario() -> Scenario {
+        let layer = |d: f64, k: f64| Layer {
+            name: String::new(),
+            thickness_m: d,
+            stiffness_n_per_m: k,
+            friction_ns_per_m2: 5000.0,
+            puncture_n: None,
+        };
+        let mut s: Scenario = stylet_scenario::parse(
+            "a scenario",
+            r#"(name: "a", tissue: (surface_m: 0.0, layers: []), motion: Recorded)"#,
+        )
+        .expect("a scenario");
+        s.tissue = Tissue { surface_m: SURFACE_M, layers: vec![layer(0.02, 100.0), layer(0.03, 150.0)] };
+        s
+    }
+
+    /// From one position to another and half the way back, with the force that the law expects.
+    fn moved(from_m: f64, to_m: f64) -> Evidence {
+        let t: Vec<f64> = (0..600).map(|k| 0.01 * f64::from(k)).collect();
+        let z: Vec<f64> = t
+            .iter()
+            .map(|t| {
+                if *t < 4.0 {
+                    from_m + (to_m - from_m) * t / 4.0
+                } else {
+                    to_m + (from_m - to_m) * 0.25 * (t - 4.0)
+                }
+            })
+            .collect();
+        let s = scenario();
+        let law = Law::new(&s.tissue, &[]).expect("a law");
+        let (mut state, r) =
+            (LawState::default(), Recording::new(t, z, vec![0.0; 600]).expect("clean columns"));
+        let f = (0..600)
+            .map(|i| law.step(&mut state, r.time_s[i], r.position_m[i], r.velocity_mps[i], |_| {}).total_n)
+            .collect();
+        Evidence { name: "a.csv".to_owned(), recording: Recording { force_n: f, ..r }, notes: Vec::new() }
+    }
+
+    fn judged(e: &Evidence) -> Result<Vec<Option<f64>>, DiagnoseError> {
+        check(&scenario(), std::slice::from_ref(e))
+    }
+
+    fn said(e: &Evidence) -> String {
+        judged(e).map_or_else(|e| e.to_string(), |t| format!("{t:?}"))
+    }
+
+    #[test]
+    fn a_recording_of_the_law_itself_is_once_what_is_expected() {
+        let times = judged(&moved(0.0, 0.04)).expect("it belongs together");
+        assert!((times[0].expect("a number") - 1.0).abs() < 1e-6, "{times:?}");
+        let mut e = moved(0.0, 0.04);
+        e.recording.force_n.iter_mut().for_each(|f| *f = 2.6 * *f + 0.4);
+        assert!((judged(&e).expect("a gain")[0].expect("a number") - 2.6).abs() < 1e-6);
+        // A force that has nothing to do with the motion says nothing.
+        e.recording.force_n = (0..600).map(|k| if k % 2 == 0 { 0.1 } else { -0.1 }).collect();
+        assert_eq!(judged(&e).expect("no unit is wrong"), vec![None]);
+    }
+
+    #[test]
+    fn units_and_signs_of_the_force_are_told_from_both_sides() {
+        let scaled = |by: f64| {
+            let mut e = moved(0.0, 0.04);
+            e.recording.force_n.iter_mut().for_each(|f| *f *= by);
+            said(&e)
+        };
+        assert!(scaled(99.0).starts_with('['), "{}", scaled(99.0));
+        let text = scaled(101.0);
+        assert!(text.contains("is 101 times") && text.contains("scale: 0.001"), "{text}");
+        assert!(scaled(0.0101).starts_with('['), "{}", scaled(0.0101));
+        let text = scaled(0.0099);
+        assert!(text.contains("9.9e-3 of what") && text.contains("scale: 1000"), "{text}");
+        assert!(scaled(-1.0).contains("the force runs the other way") && scaled(-1.0).contains("scale: -1"));
+        // Only a force that goes with the law's is judged: with noise eight times its size nothing does.
+        let mut e = moved(0.0, 0.04);
+        let size = stylet_stats::sd(&e.recording.force_n);
+        for (k, f) in e.recording.force_n.iter_mut().enumerate() {
+            *f = 200.0 * (*f + 8.0 * size * if k % 2 == 0 { 1.0 } else { -1.0 });
+        }
+        assert_eq!(said(&e), "[None]");
+        e.recording.force_n.iter_mut().for_each(|f| *f *= -1e-5);
+        assert_eq!(said(&e), "[None]");
+    }
+
+    #[test]
+    fn a_needle_has_to_reach_a_hundredth_of_the_first_layer() {
+        assert!(said(&moved(0.0, SURFACE_M + 2.1e-4)).starts_with('['));
+        let text = said(&moved(0.0, SURFACE_M + 1.9e-4));
+        assert!(
+            text.contains("never reaches") && text.contains("0.010190 m") && text.contains("offset"),
+            "{text}"
+        );
+        // Less than a thousandth of the tissue's way in all.
+        let text = said(&moved(0.0, 9e-5));
+        assert!(text.contains("kilometres"), "{text}");
+        assert!(!said(&moved(0.0, 1.1e-4)).contains("kilometres"));
+        // The way out is the larger one, and goes beyond the surface's mirror image by a tenth of the depth of 50 mm.
+        for (start, lowest, other) in [(0.0, -0.0151, true), (0.0, -0.0149, false), (-0.014, -0.0151, false)]
+        {
+            let mut e = moved(0.0, 1e-3);
+            let z: Vec<f64> = (0..600).map(|k| start + (lowest - start) * f64::from(k) / 599.0).collect();
+            e.recording.position_m = z;
+            // Forward by as much as the lowest position is below the start.
+            if start < 0.0 {
+                e.recording.position_m[300] = 0.005;
+            }
+            let text = said(&e);
+            assert_eq!(text.contains("the position runs the other way"), other, "{start} {lowest}: {text}");
+        }
+    }
+
+    #[test]
+    fn positions_of_another_unit_or_behind_the_tissue_are_told_from_both_sides() {
+        // Twenty depths of 50 mm beyond the surface.
+        let text = said(&moved(0.0, 1.0 + SURFACE_M - 1e-3));
+        assert!(!text.contains("looks like"), "{text}");
+        let text = said(&moved(0.0, 1.0 + SURFACE_M + 1e-3));
+        assert!(text.contains("millimetres") && text.contains("scale: 0.001"), "{text}");
+        assert!(said(&moved(0.0, 999.0)).contains("millimetres"));
+        let text = said(&moved(0.0, 1001.0));
+        assert!(text.contains("micrometres") && text.contains("scale: 0.000001"), "{text}");
+        // The tissue ends at 60 mm.
+        assert!(!said(&moved(0.0599, 0.07)).contains("behind"));
+        let text = said(&moved(0.0601, 0.07));
+        assert!(text.contains("begins behind the tissue") && text.contains("offset: -0.050"), "{text}");
+        assert!(said(&moved(0.0601, 1.0600)).contains("behind"));
+        assert!(said(&moved(0.0601, 1.0610)).contains("millimetres"));
+    }
+
+    #[test]
+    fn forty_layers_are_told_apart_and_four_samples_are_too_few() {
+        let mut s = scenario();
+        let e = moved(0.0, 0.04);
+        let one = s.tissue.layers[0].clone();
+        s.tissue.layers = vec![one.clone(); 40];
+        assert!(check(&s, std::slice::from_ref(&e)).is_ok());
+        s.tissue.layers.push(one);
+        let text = check(&s, std::slice::from_ref(&e)).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(text.contains("41 layers") && text.contains("up to 40"), "{text}");
+        assert!(matches!(check(&scenario(), &[]), Err(DiagnoseError::NoRecording)));
+        let least = stylet_record::LEAST_SAMPLES;
+        for (usable, enough) in [(least, true), (least - 1, false)] {
+            let mut e = moved(0.0, 0.04);
+            // Usable ones lie deep in the tissue, where they say something.
+            for k in 0..600 {
+                if !(100..100 + usable).contains(&k) {
+                    let column = [
+                        &mut e.recording.time_s,
+                        &mut e.recording.position_m,
+                        &mut e.recording.velocity_mps,
+                        &mut e.recording.force_n,
+                    ];
+                    column.into_iter().nth(1 + k % 3).expect("four columns")[k] = f64::NAN;
+                }
+            }
+            let short =
+                matches!(judged(&e), Err(DiagnoseError::TooShort { samples, .. }) if samples == usable);
+            assert_eq!(short, !enough, "{usable}: {}", said(&e));
+        }
+    }
+
+    #[test]
+    fn one_recording_of_twice_or_half_the_others_force_is_unlike_them() {
+        let seen = |times: &[f64]| -> Vec<bool> {
+            unlike(&times.iter().map(|t| Some(*t)).collect::<Vec<_>>()).iter().map(Option::is_some).collect()
+        };
+        assert_eq!(seen(&[1.0, 1.2, 2.19]), [false, false, false]);
+        // The others' median is 1.1.
+        assert_eq!(seen(&[1.0, 1.2, 2.2]), [false, false, true]);
+        assert_eq!(seen(&[1.0, 1.2, 0.56]), [false, false, false]);
+        assert_eq!(seen(&[1.0, 1.2, 0.55]), [false, false, true]);
+        // Two say nothing of each other.
+        assert_eq!(seen(&[1.0, 9.0]), [false, false]);
+        // Nor does one that does not go with the law, nor is it told.
+        assert!(unlike(&[Some(1.0), None, Some(9.0)]).iter().all(Option::is_none));
+        let notes = unlike(&[Some(1.0), None, Some(1.2), Some(1.1), Some(4.4)]);
+        assert_eq!(notes.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, false, true]);
+        let note = notes[4].as_ref().expect("a note");
+        assert!(
+            note.message.contains("is 4.40 times") && note.message.contains("others 1.10 times"),
+            "{}",
+            note.message
+        );
+        assert_eq!((note.numbers["own_times"], note.numbers["others_times"]), (4.4, 1.1));
+    }
+
+    #[test]
+    fn samples_that_are_no_numbers_are_cut_out_and_told() {
+        let mut r = moved(0.0, 0.04).recording;
+        assert_eq!(finite(&r), r);
+        assert!(holes(&r).is_none());
+        r.time_s[7] = f64::NAN;
+        r.position_m[11] = f64::INFINITY;
+        r.velocity_mps[13] = f64::NAN;
+        r.force_n[17] = f64::NEG_INFINITY;
+        let cut = finite(&r);
+        assert_eq!(cut.len(), 596);
+        assert_eq!(
+            (cut.time_s[7], cut.force_n[7], cut.position_m[9]),
+            (r.time_s[8], r.force_n[8], r.position_m[10])
+        );
+        assert_eq!((cut.velocity_mps[11], cut.velocity_measured), (r.velocity_mps[14], r.velocity_measured));
+        let note = holes(&r).expect("a note");
+        assert!(
+            note.message.contains("4 sample(s)") && note.message.contains("number 8:"),
+            "{}",
+            note.message
+        );
+        assert_eq!((note.numbers["count"], note.numbers["first"], note.grave), (4.0, 7.0, false));
+    }
+}

@@ -154,3 +154,131 @@ pub fn correlations(
     })
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Curves, binned, by_layer_and_phase, correlations};
+    use stylet_tissue::Slab;
+
+    /// What was done, by its name.
+    type Named<'a> = (&'a str, Box<dyn Fn(usize) -> f64 + 'a>);
+
+    fn curve(layer: usize, z: f64, v: f64, n: usize, e: f64) -> Curves {
+        Curves {
+            time_s: (0..n).map(|k| 0.1 * k as f64).collect(),
+            position_m: vec![z; n],
+            velocity_mps: vec![v; n],
+            force_n: vec![1.0; n],
+            base_n: (0..n).map(|k| if k % 2 == 0 { e } else { -e }).collect(),
+            used: vec![true; n],
+            layer: vec![layer; n],
+            ..Curves::default()
+        }
+    }
+
+    #[test]
+    fn what_is_left_is_told_by_layer_and_phase_from_twenty_samples_on() {
+        let mut all = vec![
+            curve(1, 0.01, 0.002, 20, 0.3),
+            curve(1, 0.01, 0.0, 19, 0.5),
+            curve(1, -0.01, -0.002, 30, 0.7),
+            curve(2, 0.02, -2e-5, 25, 1.1),
+            curve(3, 0.03, 5e-6, 40, 1.3),
+            curve(9, 0.09, 2e-5, 22, 1.9),
+            curve(2, -0.02, 0.003, 21, 0.2),
+        ];
+        // Samples that are not compared do not count.
+        all[0].base_n.push(99.0);
+        all[0].used.push(false);
+        let rows = by_layer_and_phase(&all, |c| &c.base_n, 2);
+        assert_eq!(rows.len(), 4);
+        let wanted = [
+            [f64::NAN, f64::NAN, 0.7],
+            [0.3, f64::NAN, f64::NAN],
+            [0.2, f64::NAN, 1.1],
+            [1.9, 1.3, f64::NAN],
+        ];
+        for (row, wanted) in rows.iter().zip(wanted) {
+            for (x, w) in row.iter().zip(wanted) {
+                assert!((x - w).abs() < 1e-12 || (x.is_nan() && w.is_nan()), "{rows:?}");
+            }
+        }
+        // Different samples together: the root of their mean square.
+        let two = [curve(1, 0.01, 0.002, 10, 0.3), curve(1, 0.01, 0.002, 30, 0.5)];
+        let told = by_layer_and_phase(&two, |c| &c.base_n, 1)[1][0];
+        assert!((told - ((10.0 * 0.09 + 30.0 * 0.25) / 40.0_f64).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bins_have_their_middles_and_means_from_five_samples_on() {
+        // From 2 to 6 in four bins of one: five samples in the first, four in the second, six in the third, the last has the end.
+        let mut x = vec![2.0, 2.1, 2.3, 2.5, 2.9];
+        x.extend([3.0, 3.2, 3.5, 3.9]);
+        x.extend([4.0, 4.1, 4.2, 4.3, 4.4, 4.9]);
+        x.extend([5.0, 5.5, 5.9, 5.95, 5.99, 6.0]);
+        let e: Vec<f64> = (0..x.len()).map(|k| 0.7 * k as f64 - 3.0).collect();
+        let mut used = vec![true; x.len()];
+        used[10] = false;
+        let (at, mean) = binned(&x, &e, &used, 4);
+        assert_eq!(at, [2.5, 4.5, 5.5]);
+        let of = |k: &[usize]| k.iter().map(|k| e[*k]).sum::<f64>() / k.len() as f64;
+        for (m, w) in
+            mean.iter().zip([of(&[0, 1, 2, 3, 4]), of(&[9, 11, 12, 13, 14]), of(&[15, 16, 17, 18, 19, 20])])
+        {
+            assert!((m - w).abs() < 1e-12, "{mean:?}");
+        }
+        assert_eq!(binned(&[1.0; 9], &[1.0; 9], &[true; 9], 4), (vec![], vec![]));
+        assert_eq!(binned(&[], &[], &[], 4), (vec![], vec![]));
+    }
+
+    #[test]
+    fn correlations_are_pearsons_with_time_depth_speed_direction_friction_and_force() {
+        let n = 40;
+        let mut c = curve(1, 0.0, 0.0, n, 0.0);
+        for k in 0..n {
+            let x = k as f64;
+            c.position_m[k] = 0.01 * (0.21 * x).sin() + 0.012;
+            c.velocity_mps[k] = 0.004 * (0.37 * x + 0.4).cos();
+            c.force_n[k] = 1.0 + (0.11 * x * x).sin();
+            c.base_n[k] = 0.3 * (0.19 * x).sin() + 0.5 * (0.61 * x).cos() + 0.01 * x;
+        }
+        c.used[7] = false;
+        let slab = |front_m, thickness_m| Slab {
+            front_m,
+            thickness_m,
+            stiffness_n_per_m: 1.0,
+            friction_ns_per_m2: 1.0,
+            puncture_n: 1.0,
+            reach_m: 0.0,
+            kappa_per_m: 0.0,
+            gripped: 0.0,
+            curve_n_per_m2: 0.0,
+            ground_m_per_n: 0.0,
+            release_m: 0.0,
+        };
+        let slabs = [slab(0.005, 0.007), slab(0.012, 0.038)];
+        let told = correlations(&[c.clone()], |c| &c.base_n, &slabs);
+        let kept: Vec<usize> = (0..n).filter(|k| *k != 7).collect();
+        let inside = |k: usize| (c.position_m[k].clamp(0.005, 0.05) - 0.005).max(0.0);
+        let sign = |k: usize| c.velocity_mps[k].signum();
+        let of: [Named; 7] = [
+            ("time", Box::new(|k| c.time_s[k])),
+            ("depth", Box::new(|k| c.position_m[k])),
+            ("velocity", Box::new(|k| c.velocity_mps[k])),
+            ("direction", Box::new(sign)),
+            ("length inside x velocity", Box::new(|k| inside(k) * c.velocity_mps[k])),
+            ("length inside x direction", Box::new(|k| inside(k) * sign(k))),
+            ("force", Box::new(|k| c.force_n[k])),
+        ];
+        for ((name, r), (wanted, x)) in told.iter().zip(&of) {
+            assert_eq!(name, wanted);
+            let (x, e): (Vec<f64>, Vec<f64>) = kept.iter().map(|k| (x(*k), c.base_n[*k])).unzip();
+            let (mx, me) = (stylet_stats::mean(&x), stylet_stats::mean(&e));
+            let sum = x.iter().zip(&e).map(|(x, e)| (x - mx) * (e - me)).sum::<f64>() / (x.len() - 1) as f64;
+            let wanted = sum / (stylet_stats::sd(&x) * stylet_stats::sd(&e));
+            assert!((r - wanted).abs() < 1e-9, "{name}: {r} for {wanted}");
+        }
+        let none = correlations(&[], |c| &c.base_n, &slabs);
+        assert!(none.iter().all(|c| c.1 == 0.0));
+    }
+}

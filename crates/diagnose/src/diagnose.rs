@@ -475,3 +475,97 @@ fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{excess, line_p, raw_causes};
+    use crate::raw::{Raw, Spikes};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
+    use stylet_record::Recording;
+
+    /// Fisher 1929: `m (1 + x)^(1 - m)` for a line `x` times all others among `m` half the blocks.
+    #[test]
+    fn the_chance_of_a_line_is_fishers() {
+        let wanted = 25.0 * 1.4_f64.powi(-24);
+        assert!((line_p(0.4, 50) / wanted - 1.0).abs() < 1e-12, "{} for {wanted}", line_p(0.4, 50));
+        assert_eq!(line_p(0.001, 50), 1.0);
+        assert_eq!(line_p(9.0, 9000), f64::MIN_POSITIVE);
+    }
+
+    /// Two recordings at a steady speed and one that stops, every block a residual of so many noises.
+    #[test]
+    fn what_is_left_beyond_the_noise_is_its_mean_square_less_one() {
+        let data = |stops: bool| {
+            let t: Vec<f64> = (0..1000).map(|k| f64::from(k) / 100.0).collect();
+            let z = t.iter().map(|t| if stops { (2e-3 * t).min(0.01) } else { 2e-3 * t }).collect();
+            let r = Recording::new(t, z, vec![0.0; 1000]).expect("a recording");
+            Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S)]), Noise::white(0.5), 0.0)
+        };
+        let still = data(false);
+        let n = still.blocks[0].len();
+        let e: Vec<f64> = (0..n).map(|k| 0.5 * (0.7 + (k % 5) as f64 * 0.3)).collect();
+        let used: Vec<usize> = (0..n).filter(|k| still.blocks[0].used[*k]).collect();
+        let square =
+            used.iter().map(|k| (0.7 + (k % 5) as f64 * 0.3_f64).powi(2)).sum::<f64>() / used.len() as f64;
+        assert!((excess(&still, std::slice::from_ref(&e)) - (square - 1.0)).abs() < 1e-9);
+        // Outlying blocks count as six noises.
+        let mut far = e.clone();
+        far[100] = 99.0;
+        let more = (36.0 - (2.0 * e[100]).powi(2)) / used.len() as f64;
+        assert!((excess(&still, &[far]) - (square - 1.0 + more)).abs() < 1e-9);
+        // Four blocks to either side of a jump of the speed are nobody's; those beyond count.
+        let stopped = data(true);
+        let b = &stopped.blocks[0];
+        let jump = b.motion.jumps.first().expect("it stops");
+        let (lo, hi) = (b.at(jump.at_s - jump.doubt_s), b.at(jump.at_s + jump.doubt_s));
+        let with = |k: usize| {
+            let mut e = vec![0.5; n];
+            e[k] = 2.0;
+            excess(&stopped, &[e])
+        };
+        for k in [lo - 4, lo, hi, hi + 4] {
+            assert!(with(k).abs() < 1e-12, "{k}: {}", with(k));
+        }
+        for k in [lo - 5, hi + 5] {
+            assert!(with(k) > 0.01, "{k}: {}", with(k));
+        }
+        assert_eq!(excess(&still, &[]), -1.0);
+    }
+
+    #[test]
+    fn causes_of_the_raw_numbers_have_intervals_and_steps_have_to_matter() {
+        let z = stylet_stats::Z95;
+        let spikes = Spikes { count: 9, size_n: 0.1, size_sd_n: 0.9, seen_s: 45.0 };
+        let raw = Raw { limit_n: Some(2.5), step_n: Some(0.031), spikes: Some(spikes), ..Raw::default() };
+        let causes = raw_causes(&raw, 0.1);
+        assert_eq!(
+            causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>(),
+            ["saturation", "quantisation", "force_spikes"]
+        );
+        let limit = causes[0].parameters["limit_n"];
+        assert!(
+            (limit.low - 2.5 * (1.0 - z * 1e-6)).abs() < 1e-12
+                && (limit.high - 2.5 * (1.0 + z * 1e-6)).abs() < 1e-12
+        );
+        let step = causes[1].parameters["step_n"];
+        assert!(
+            (step.low - 0.031 * (1.0 - z * 1e-4)).abs() < 1e-12
+                && (step.high - 0.031 * (1.0 + z * 1e-4)).abs() < 1e-12
+        );
+        let (rate, size) = (causes[2].parameters["rate_hz"], causes[2].parameters["size_n"]);
+        assert_eq!(
+            (rate.value, rate.low, rate.high),
+            (0.2, spikes.rate_interval_hz().0, spikes.rate_interval_hz().1)
+        );
+        // No size is less than nothing.
+        assert!(
+            spikes.size_interval_n().0 < 0.0 && size.low == 0.0 && size.high == spikes.size_interval_n().1
+        );
+        // Steps of less than three tenths of the noise are nobody's matter.
+        assert_eq!(raw_causes(&Raw { step_n: Some(0.029), ..Raw::default() }, 0.1).len(), 0);
+        assert_eq!(raw_causes(&raw, 0.2).len(), 2);
+    }
+}

@@ -146,3 +146,183 @@ pub fn lines(fit: &Fit, data: &Data) -> Vec<f64> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LEAST_HZ, judged_beside, lines, power, spectrum, without};
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::Fit;
+    use stylet_identify::model::{Belief, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, residuals};
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue};
+
+    const HZ: f64 = 100.0;
+
+    /// Recordings in air: the law has no force there, so that the force is what is left.
+    fn in_air(forces: &[&dyn Fn(f64) -> f64], seconds: f64, keep: impl Fn(usize) -> bool) -> (Fit, Data) {
+        let blocks: Vec<Blocks> = forces
+            .iter()
+            .map(|f| {
+                let kept: Vec<usize> = (0..(seconds * HZ) as usize).filter(|k| keep(*k)).collect();
+                let t: Vec<f64> = kept.iter().map(|k| 7.0 + *k as f64 / HZ).collect();
+                let z = t.iter().map(|t| -0.1 + 1e-4 * t).collect();
+                let f = t.iter().map(|t| f(*t)).collect();
+                Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+            })
+            .collect();
+        let layer = Layer {
+            name: String::new(),
+            thickness_m: 0.02,
+            stiffness_n_per_m: 100.0,
+            friction_ns_per_m2: 1000.0,
+            puncture_n: None,
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.01,
+        };
+        let model = Model::base(Arc::new(belief), blocks.len());
+        let data = Data::new(Arc::new(blocks), Noise::white(0.02), 0.0);
+        let residuals = residuals(&model, &data).expect("a replay");
+        (Fit { model, residuals }, data)
+    }
+
+    fn wave(a: f64, hz: f64, phase: f64) -> impl Fn(f64) -> f64 {
+        move |t| a * (std::f64::consts::TAU * hz * t + phase).sin()
+    }
+
+    fn noise(t: f64) -> f64 {
+        nth(0, t)
+    }
+
+    /// Noise of one of several recordings.
+    fn nth(r: u64, t: f64) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64((t * 1e4).round() as u64 + 10_000_000 * r);
+        0.02 * (rng.random::<f64>() - 0.5)
+    }
+
+    /// Four recordings with noise of their own and the same beside it; their lines.
+    fn of_four(f: &dyn Fn(f64) -> f64) -> Vec<f64> {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|r| move |t: f64| nth(r, t) + f(t));
+        let (fit, data) = in_air(&[&a, &b, &c, &d], 20.0, |_| true);
+        lines(&fit, &data)
+    }
+
+    /// Parseval: the one-sided density over all frequencies is the mean square, for a tone and for noise, also where the mean is over
+    /// recordings of different power.
+    #[test]
+    fn the_power_of_a_residual_adds_up_to_its_mean_square() {
+        let (tone, hiss, quiet) = (wave(0.3, 11.3, 0.4), |t: f64| 20.0 * noise(t), |_: f64| 0.0);
+        let square = |f: &dyn Fn(f64) -> f64| {
+            (0..2000).map(|k| f(7.0 + f64::from(k) / HZ).powi(2)).sum::<f64>() / 2000.0
+        };
+        let total = |forces: &[&dyn Fn(f64) -> f64], padding: usize| {
+            let (fit, data) = in_air(forces, 20.0, |_| true);
+            let (bin_hz, p) = power(&fit, &data, padding);
+            assert_eq!(p.len(), 1024 * padding);
+            assert!((bin_hz * (2048 * padding) as f64 / HZ - 1.0).abs() < 1e-9);
+            p.iter().sum::<f64>() * bin_hz
+        };
+        for padding in [1, 4] {
+            assert!((total(&[&tone], padding) / square(&tone) - 1.0).abs() < 0.01);
+            assert!((total(&[&hiss], padding) / square(&hiss) - 1.0).abs() < 0.15);
+            assert!((total(&[&tone, &quiet], padding) / square(&tone) - 0.5).abs() < 0.01);
+        }
+        // A tone of which every fifth sample is missing has less, and a recording of another rate does not count.
+        let (fit, data) = in_air(&[&tone], 20.0, |k| k % 5 != 0);
+        let (bin_hz, p) = power(&fit, &data, 1);
+        let peak = (0..p.len()).max_by(|a, b| p[*a].total_cmp(&p[*b])).expect("a peak");
+        assert!((peak as f64 * bin_hz - 11.3).abs() < bin_hz, "{}", peak as f64 * bin_hz);
+    }
+
+    #[test]
+    fn outlying_samples_are_cut_at_six_times_the_median() {
+        let spike = |t: f64| if (t - 12.0).abs() < 0.004 { 900.0 } else { wave(0.3, 11.3, 0.4)(t) };
+        let (fit, data) = in_air(&[&spike], 20.0, |_| true);
+        let (bin_hz, p) = power(&fit, &data, 1);
+        let total = p.iter().sum::<f64>() * bin_hz;
+        // One of 2000 samples of at most 6 * 0.22 adds little to a mean square of 0.045.
+        assert!(total > 0.044 && total < 0.05, "{total}");
+    }
+
+    #[test]
+    fn the_spectrum_that_is_drawn_is_the_root_of_means_over_bins() {
+        let tone = wave(0.3, 11.3, 0.4);
+        let (fit, data) = in_air(&[&tone], 20.0, |_| true);
+        let (bin_hz, p) = power(&fit, &data, 1);
+        let (hz, amplitude) = spectrum(&fit, &data);
+        // 1024 bins, two by two.
+        assert_eq!(hz.len(), 512);
+        for k in [0, 1, 57, 115, 116, 511] {
+            assert!((hz[k] - (2.0 * k as f64 + 1.0) * bin_hz).abs() < 1e-9, "{k}: {}", hz[k]);
+            assert!((amplitude[k] - (0.5 * (p[2 * k] + p[2 * k + 1])).sqrt()).abs() < 1e-12);
+        }
+        // A short one is drawn bin by bin.
+        let (fit, data) = in_air(&[&tone], 4.0, |_| true);
+        assert_eq!(spectrum(&fit, &data).0.len(), 256);
+    }
+
+    #[test]
+    fn lines_stand_where_the_tones_are_strongest_first() {
+        let found = of_four(&|t| wave(0.02, 7.77, 0.3)(t) + wave(0.05, 23.41, 1.0)(t));
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((found[0] - 23.41).abs() < 0.003 && (found[1] - 7.77).abs() < 0.003, "{found:?}");
+        // Three at most.
+        let found = of_four(&|t| {
+            [3.1, 9.2, 17.3, 31.7, 44.0].map(|hz| wave(0.05 + 1e-3 * hz, hz, 0.2)(t)).iter().sum()
+        });
+        assert_eq!(found.iter().map(|hz| (10.0 * hz).round() / 10.0).collect::<Vec<_>>(), [44.0, 31.7, 17.3]);
+        // Within eight bins before padding (0.39 Hz) a weaker one is the strong one's flank.
+        for (apart, count) in [(0.36, 1), (0.44, 2)] {
+            let found = of_four(&move |t| wave(0.05, 20.0, 0.2)(t) + wave(0.03, 20.0 + apart, 0.2)(t));
+            assert_eq!(found.len(), count, "{apart}: {found:?}");
+        }
+        // Noise has none, nor has what is slower than the slowest line, nor a recording of a few samples.
+        assert!(of_four(&|_| 0.0).is_empty());
+        let found = of_four(&wave(0.05, 0.5 * LEAST_HZ, 0.2));
+        assert!(found.is_empty(), "{found:?}");
+        let tone = |t: f64| noise(t) + wave(0.2, 20.0, 0.2)(t);
+        for (samples, any) in [(63, false), (64, true)] {
+            let (fit, data) = in_air(&[&tone], 5.0, move |k| k < samples);
+            assert_eq!(!lines(&fit, &data).is_empty(), any, "{samples}");
+        }
+    }
+
+    #[test]
+    fn a_residual_without_its_lines_has_their_best_sinusoids_taken_away_recording_by_recording() {
+        let (one, two) = (wave(0.3, 5.1, 0.4), |t: f64| wave(0.7, 5.1, 2.0)(t) + wave(0.2, 12.6, 0.1)(t));
+        let (fit, data) = in_air(&[&one, &two], 20.0, |_| true);
+        let left = without(&fit, &data, &[5.1, 12.6]);
+        let most = |e: &[f64]| e.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        // Blocks of two samples see a tone as it is.
+        assert!(most(&left[0]) < 2e-3 && most(&left[1]) < 2e-3, "{} {}", most(&left[0]), most(&left[1]));
+        let left = without(&fit, &data, &[5.1]);
+        assert!((most(&left[1]) - 0.19).abs() < 0.02, "{}", most(&left[1]));
+        assert_eq!(without(&fit, &data, &[]), fit.residuals.e);
+        // What is left stands at right angles to the line, over the blocks compared.
+        let mut blocks = data.blocks.to_vec();
+        blocks[1].used[100..300].fill(false);
+        let some = data.on(blocks);
+        let left = without(&fit, &some, &[7.3]);
+        let b = &some.blocks[1];
+        for phase in [0.0, 0.5 * std::f64::consts::PI] {
+            let dot: f64 = (0..b.len())
+                .filter(|k| b.used[*k])
+                .map(|k| {
+                    left[1][k] * (std::f64::consts::TAU * 7.3 * 0.5 * (b.from_s[k] + b.to_s[k]) + phase).sin()
+                })
+                .sum();
+            assert!(dot.abs() < 1e-8, "{dot}");
+        }
+        let judged = judged_beside(&fit, &data, &[5.1, 12.6]);
+        assert!(judged.noise.sd_n() < 2e-3, "{}", judged.noise.sd_n());
+    }
+}

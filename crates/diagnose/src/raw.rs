@@ -206,10 +206,11 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
 
 #[cfg(test)]
 mod tests {
-    use super::look;
+    use super::{Spikes, limit, look, step};
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use stylet_record::Recording;
+    use std::collections::BTreeMap;
+    use stylet_record::{QualityKind, QualityNote, Recording};
 
     #[test]
     fn noise_between_samples_that_stand_at_the_sensors_limit_is_no_spike() {
@@ -254,5 +255,223 @@ mod tests {
         assert!((low - 0.8223).abs() < 1e-3 && (high - 1.2161).abs() < 1e-3, "{low} {high}");
         let (low, high) = spikes.size_interval_n();
         assert!(low < 3.0 && high > 3.0 && high - low > 0.05 && high - low < 0.13, "{low} {high}");
+    }
+
+    fn recording(f: Vec<f64>) -> Recording {
+        let t: Vec<f64> = (0..f.len()).map(|k| 0.01 * k as f64).collect();
+        Recording::new(t, vec![0.0; f.len()], f).expect("clean columns")
+    }
+
+    fn quantised(step: f64) -> QualityNote {
+        QualityNote {
+            kind: QualityKind::Quantisation,
+            message: "force_n moves in steps".to_owned(),
+            numbers: BTreeMap::from([("smallest_step".to_owned(), step)]),
+            lines: Vec::new(),
+            grave: false,
+        }
+    }
+
+    /// Samples that alternate about nothing by `d` stand out of their neighbours by `d`, each: the scatter is 1.4826 `d`.
+    fn alternating(n: usize, d: f64) -> Vec<f64> {
+        (0..n).map(|k| if k % 2 == 0 { d } else { -d }).collect()
+    }
+
+    const D: f64 = 0.01;
+    /// What a spike has to stand out by: six and a half of these scatters.
+    const LEAST: f64 = 6.5 * stylet_stats::MAD_TO_SD * D;
+
+    #[test]
+    fn a_spike_stands_out_by_six_and_a_half_times_the_scatter_around_it() {
+        for (size, seen) in [(0.99 * LEAST, false), (1.01 * LEAST, true)] {
+            for sign in [1.0, -1.0] {
+                let mut f = alternating(1000, D);
+                for k in [200, 430, 777] {
+                    f[k] = sign * size;
+                }
+                let raw = look(&[&recording(f)], &[Vec::new()]);
+                assert_eq!(raw.spikes.is_some(), seen, "{size}");
+                let marked: Vec<usize> = (0..1000).filter(|k| raw.exclude[0][*k]).collect();
+                assert_eq!(marked, if seen { vec![200, 430, 777] } else { vec![] });
+                if let Some(s) = raw.spikes {
+                    assert_eq!(s.count, 3);
+                    assert!((s.size_n - size).abs() < 1e-12 && s.size_sd_n < 1e-12, "{s:?}");
+                    // Two samples at either end could not show one.
+                    assert!((s.seen_s - 9.96).abs() < 1e-9, "{s:?}");
+                }
+            }
+        }
+        // One alone is none, nor are there any in a few samples.
+        let mut f = alternating(1000, D);
+        f[200] = 2.0 * LEAST;
+        assert_eq!(look(&[&recording(f)], &[Vec::new()]).spikes, None);
+        for (n, seen) in [(11, false), (12, true)] {
+            let mut f = alternating(n, 0.0);
+            (f[3], f[8]) = (1.0, 1.0);
+            assert_eq!(look(&[&recording(f)], &[Vec::new()]).spikes.is_some(), seen, "{n}");
+        }
+    }
+
+    /// The noise may grow with the force: in the loud half a sample is none that is one in the quiet half.
+    #[test]
+    fn the_scatter_is_that_of_the_neighbourhood() {
+        let mut f = alternating(600, D);
+        f.extend(alternating(600, 3.0 * D));
+        for (places, count) in [([100, 300, 450], 3), ([750, 900, 1100], 0), ([100, 300, 900], 2)] {
+            let mut f = f.clone();
+            for k in places {
+                f[k] = 1.5 * LEAST;
+            }
+            let raw = look(&[&recording(f)], &[Vec::new()]);
+            assert_eq!(raw.spikes.map_or(0, |s| s.count), count, "{places:?}");
+        }
+        // A force on a grid scatters by a step at least.
+        let mut f = alternating(1000, D);
+        for k in [200, 430, 777] {
+            f[k] = 1.5 * LEAST;
+        }
+        let notes = [vec![quantised(0.03)]];
+        assert_eq!(look(&[&recording(f.clone())], &notes).spikes, None);
+        let notes = [vec![quantised(0.02)]];
+        assert!(look(&[&recording(f)], &notes).spikes.is_some());
+    }
+
+    #[test]
+    fn steps_and_ramps_and_what_moves_are_no_spikes() {
+        let spiky = |change: &dyn Fn(&mut [f64], usize)| {
+            let mut f = alternating(1000, D);
+            for k in [200, 430, 776] {
+                change(&mut f, k);
+            }
+            look(&[&recording(f)], &[Vec::new()]).spikes.map(|s| s.count)
+        };
+        let size = 3.0 * LEAST;
+        assert_eq!(spiky(&|f, k| f[k] = size), Some(3));
+        // A neighbour that is nearly as high: it does not stand out of both by seven tenths of the least.
+        assert_eq!(spiky(&|f, k| (f[k], f[k + 1]) = (size, size - 0.6 * LEAST)), None);
+        // A level that changes there by more than half of it.
+        assert_eq!(spiky(&|f, k| f[k..].iter_mut().for_each(|f| *f += size)), None);
+        // Spikes of every size are the tail of a distribution.
+        let several = |sizes: [f64; 6]| {
+            let mut f = alternating(1400, D);
+            for (k, s) in sizes.iter().enumerate() {
+                f[100 + 200 * k] = s * LEAST;
+            }
+            look(&[&recording(f)], &[Vec::new()]).spikes.map(|s| s.count)
+        };
+        assert_eq!(several([3.0, 3.1, 2.9, 3.2, 3.0, 2.8]), Some(6));
+        assert_eq!(several([1.1, 2.0, 3.0, 4.5, 6.0, 9.0]), None);
+        // At most 35 % of their number may lie between a third and two thirds: one beside three, not two, found or nearly found.
+        assert_eq!(several([3.0, 3.1, 2.9, 1.5, 0.0, 0.0]), Some(4));
+        assert_eq!(several([3.0, 3.1, 2.9, 1.5, 1.4, 0.0]), None);
+        assert_eq!(several([1.8, 1.8, 1.8, 0.9, 0.0, 0.0]), Some(3));
+        assert_eq!(several([1.8, 1.8, 1.8, 0.9, 0.9, 0.0]), None);
+        // Where the speed jumps nothing is said, and these samples could not have shown one.
+        let mut r = recording(alternating(1000, D));
+        for k in [200, 430, 776] {
+            r.force_n[k] = size;
+        }
+        r.velocity_mps[431..].iter_mut().for_each(|v| *v = 5e-4);
+        let raw = look(&[&r], &[Vec::new()]);
+        let s = raw.spikes.expect("two are left");
+        assert_eq!(s.count, 2);
+        assert!((s.seen_s - 9.94).abs() < 1e-9, "{s:?}");
+        // A speed that changes steadily, and one that changes by less than a tenth of a mm/s, does not matter.
+        let mut slow = r.clone();
+        slow.velocity_mps = (0..1000).map(|k| 2e-4 * k as f64).collect();
+        assert_eq!(look(&[&slow], &[Vec::new()]).spikes.map(|s| s.count), Some(3));
+        slow.velocity_mps = (0..1000).map(|k| if k > 430 { 9e-5 } else { 0.0 }).collect();
+        assert_eq!(look(&[&slow], &[Vec::new()]).spikes.map(|s| s.count), Some(3));
+        slow.velocity_mps = (0..1000).map(|k| if k > 430 { 1.1e-4 } else { 0.0 }).collect();
+        assert_eq!(look(&[&slow], &[Vec::new()]).spikes.map(|s| s.count), Some(2));
+    }
+
+    #[test]
+    fn a_limit_holds_six_samples_or_three_times_what_a_grid_holds_near_it() {
+        let ramp = |at_limit: usize| {
+            let mut f: Vec<f64> = (0..300).map(|k| 0.0101 * f64::from(k)).collect();
+            f.iter_mut().rev().take(at_limit).for_each(|f| *f = -3.5);
+            recording(f)
+        };
+        assert_eq!(limit(&[&ramp(5)], None), None);
+        assert_eq!(limit(&[&ramp(6)], None), Some(3.5));
+        assert_eq!(limit(&[&recording(vec![0.0; 50])], None), None);
+        // On a grid of 0.1 N up to 3.5 N, four samples share the level below and two the one below that.
+        let grid = |at: usize, below: usize, further: usize| {
+            let mut f: Vec<f64> = (0..300).map(|k| 0.1 * f64::from(k % 10)).collect();
+            f[..at].fill(3.5);
+            f[at..at + below].fill(3.4);
+            f[at + below..at + below + further].fill(3.3);
+            limit(&[&recording(f)], Some(0.1))
+        };
+        assert_eq!(grid(12, 4, 2), None);
+        assert_eq!(grid(13, 4, 2), Some(3.5));
+        assert_eq!(grid(13, 2, 5), None);
+        assert_eq!(grid(16, 2, 5), Some(3.5));
+        // Two at least are expected.
+        assert_eq!((grid(6, 0, 0), grid(7, 1, 0)), (None, Some(3.5)));
+        // With fewer than twenty levels a limit holds twelve times as many.
+        let coarse = |at: usize, step: f64| {
+            let mut f: Vec<f64> = (0..300).map(|k| step * f64::from(k % 5)).collect();
+            f[..at].fill(3.8);
+            limit(&[&recording(f)], Some(step))
+        };
+        assert_eq!((coarse(24, 0.2), coarse(25, 0.2)), (None, Some(3.8)));
+        assert_eq!(coarse(24, 0.19), Some(3.8));
+    }
+
+    #[test]
+    fn the_step_is_that_of_all_levels_at_once() {
+        let f: Vec<f64> = (0..500).map(|k| 0.0503 * f64::from((k * 37) % 61 - 20)).collect();
+        let r = recording(f);
+        // Told roughly, found finely.
+        let fine = step(&[&r], &[vec![quantised(0.05)]]).expect("a step");
+        assert!((fine - 0.0503).abs() < 1e-9, "{fine}");
+        // What is told and found differ by more than two per cent: what is told stands.
+        let two = recording((0..60).map(|k| if k % 3 == 0 { -0.0503 } else { 0.0503 }).collect());
+        assert_eq!(step(&[&two], &[vec![quantised(0.049)]]), Some(0.049));
+        assert!((step(&[&two], &[vec![quantised(0.0495)]]).expect("a step") - 0.0503).abs() < 1e-9);
+        assert_eq!(step(&[&two], &[vec![quantised(0.052)]]), Some(0.052));
+        // Half of the recordings have to be on a grid; other remarks, and steps of nothing, do not count.
+        assert!(step(&[&r, &r], &[vec![quantised(0.05)], Vec::new()]).is_some());
+        assert_eq!(step(&[&r, &r, &r], &[vec![quantised(0.05)], Vec::new(), Vec::new()]), None);
+        assert_eq!(step(&[&r], &[vec![quantised(0.0)]]), None);
+        let of_position = QualityNote { message: "position_m moves in steps".to_owned(), ..quantised(0.05) };
+        let gaps = QualityNote { kind: QualityKind::Gaps, ..quantised(0.05) };
+        assert_eq!(step(&[&r], &[vec![of_position, gaps]]), None);
+        // Without any force the rough one is all there is.
+        assert_eq!(step(&[&recording(vec![0.0; 20])], &[vec![quantised(0.05)]]), Some(0.05));
+        let raw = look(&[&r], &[vec![quantised(0.05)]]);
+        assert!((raw.step_n.expect("a step") - 0.0503).abs() < 1e-9);
+    }
+
+    #[test]
+    fn samples_at_the_limit_are_marked_whatever_their_sign() {
+        let mut f: Vec<f64> = (0..300).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        f[100..107].fill(1.25);
+        f[200..203].fill(-1.25);
+        f[150] = 1.25 * (1.0 - 1e-6);
+        let raw = look(&[&recording(f)], &[Vec::new()]);
+        assert_eq!(raw.limit_n, Some(1.25));
+        let marked: Vec<usize> = (0..300).filter(|k| raw.exclude[0][*k]).collect();
+        assert_eq!(marked, (100..107).chain(200..203).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn intervals_of_spikes_are_those_of_a_poisson_number_and_of_a_mean() {
+        let s = Spikes { count: 9, size_n: 1.7, size_sd_n: 0.3, seen_s: 45.0 };
+        assert!((s.rate_hz() - 0.2).abs() < 1e-15);
+        let (z, (low, high)) = (stylet_stats::Z95, s.rate_interval_hz());
+        // The rates from which nine are as far as 1.96 standard deviations: (n - m)^2 = z^2 m.
+        for m in [45.0 * low, 45.0 * high] {
+            assert!(((9.0 - m).powi(2) / m - z * z).abs() < 1e-9, "{m}");
+        }
+        assert!(low < 0.2 && high > 0.2);
+        let (low, high) = s.size_interval_n();
+        let half = stylet_stats::student::quantile(0.975, 8.0) * 0.3 / 3.0;
+        assert!((low - 1.7 + half).abs() < 1e-12 && (high - 1.7 - half).abs() < 1e-12);
+        let one = Spikes { count: 1, ..s };
+        let half = stylet_stats::student::quantile(0.975, 1.0) * 0.3;
+        assert!((one.size_interval_n().1 - 1.7 - half).abs() < 1e-9);
     }
 }

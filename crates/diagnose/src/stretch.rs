@@ -107,4 +107,71 @@ mod tests {
             assert!(chance(&data, &e).is_none(), "seed {seed}, with a late rupture");
         }
     }
+
+    /// Eight windows of one second, 50 blocks each: alternating means of so many noises, and a stretch of two that stand out.
+    fn windows(means: &[f64]) -> (Data, Vec<Vec<f64>>) {
+        let t: Vec<f64> = (0..100 * means.len()).map(|k| k as f64 / 100.0).collect();
+        let z: Vec<f64> = t.iter().map(|t| 1e-3 * t).collect();
+        let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("a recording");
+        let data = Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S)]), Noise::white(0.5), 0.0);
+        assert_eq!(data.blocks[0].len(), 50 * means.len());
+        let e = (0..data.blocks[0].len())
+            .map(|k| 0.5 * (means[k / 50] + if k % 2 == 0 { 3.0 } else { -3.0 }))
+            .collect();
+        (data, vec![e])
+    }
+
+    /// The lesser of two neighbouring means of one sign, over 1.4826 times the median of all, is the deviate; twice its tail times the number
+    /// of windows is the chance.
+    #[test]
+    fn the_chance_is_that_of_one_normal_mean_so_large_among_so_many() {
+        let said = |means: &[f64]| {
+            let (data, e) = windows(means);
+            chance(&data, &e)
+        };
+        let calm = [0.4, -0.5, 0.6, -0.5, 0.4, -0.6, 0.5];
+        let with = |a: f64, b: f64| [&calm[..3], &[a, b], &calm[3..]].concat();
+        let typical = 0.5 * stylet_stats::MAD_TO_SD;
+        for (a, b, least) in [(-9.0, -12.0, 9.0), (8.5, 8.0, 8.0)] {
+            let p = said(&with(a, b)).expect("a stretch");
+            let wanted = 2.0 * 9.0 * stylet_stats::normal::sf(least / typical);
+            assert!((p / wanted - 1.0).abs() < 1e-6, "{p:e} for {wanted:e}");
+        }
+        // Ten times the typical one from both sides.
+        assert!(said(&with(9.0, 10.1 * typical)).is_some());
+        assert_eq!(said(&with(9.0, 9.9 * typical)), None);
+        // Of two signs, or one window alone, it is none.
+        assert_eq!(said(&with(9.0, -9.0)), None);
+        assert_eq!(said(&with(90.0, 0.5)), None);
+        // Calm is never calmer than three tenths of the noise: three times the noise is the least.
+        let small: Vec<f64> = with(3.1, 3.1).iter().map(|m| if *m > 3.0 { *m } else { 0.01 * m }).collect();
+        assert!(said(&small).is_some());
+        let less: Vec<f64> = small.iter().map(|m| if *m > 3.0 { 2.9 } else { *m }).collect();
+        assert_eq!(said(&less), None);
+        // No chance is none at all.
+        assert_eq!(said(&with(900.0, 900.0)), Some(f64::MIN_POSITIVE));
+    }
+
+    #[test]
+    fn a_gap_is_no_calm_and_no_stretch() {
+        let means = [0.4, -0.5, 0.6, 9.0, 9.0, -0.5, 0.4, -0.6, 0.5];
+        let (data, e) = windows(&means);
+        let without = |from: usize, to: usize| {
+            let mut blocks = data.blocks.to_vec();
+            blocks[0].used[from..to].fill(false);
+            chance(&data.on(blocks), &e)
+        };
+        // Half of a window's blocks are enough.
+        assert!(without(200, 225).is_some());
+        assert_eq!(without(200, 226), None);
+        // Nine windows, two of them lost: a median of seven.
+        let kept: Vec<f64> = [0.4, 0.5, 0.6, 9.0, 9.0, 0.6, 0.5].to_vec();
+        let typical = stylet_stats::median_of(kept) * stylet_stats::MAD_TO_SD;
+        let p = without(250, 350).expect("a stretch");
+        let wanted = 2.0 * 7.0 * stylet_stats::normal::sf(9.0 / typical);
+        assert!((p / wanted - 1.0).abs() < 1e-6, "{p:e} for {wanted:e}");
+        let mut holed = e.clone();
+        holed[0][200..230].fill(f64::NAN);
+        assert_eq!(chance(&data, &holed), None);
+    }
 }

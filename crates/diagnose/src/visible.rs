@@ -75,3 +75,36 @@ pub fn advice(causes: &[Cause], invisible: &[String]) -> Vec<String> {
     }
     advice
 }
+
+#[cfg(test)]
+mod tests {
+    use super::advice;
+    use crate::outcome::Cause;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn advice_follows_from_what_cannot_be_told_apart_or_seen() {
+        let cause = |effect: &str, equivalent: &[&str]| Cause {
+            effect: effect.to_owned(),
+            equivalent: equivalent.iter().map(|e| (*e).to_owned()).collect(),
+            confidence: 1.0,
+            parameters: BTreeMap::new(),
+            gain_nats: 0.0,
+            share: 0.0,
+        };
+        assert!(
+            advice(&[cause("force_bias", &[])], &["hidden_membrane".to_owned(), "no such effect".to_owned()])
+                .is_empty()
+        );
+        let one =
+            advice(&[cause("force_bias", &[]), cause("time_delay", &["low_pass_lag", "tool_inertia"])], &[]);
+        assert!(
+            one.len() == 1 && one[0].starts_with("time_delay and low_pass_lag, tool_inertia explain"),
+            "{one:?}"
+        );
+        let friction = advice(&[], &["coulomb_friction".to_owned()]);
+        assert!(friction.len() == 1 && friction[0].starts_with("Laws of friction"), "{friction:?}");
+        let sensor = advice(&[], &["hidden_membrane".to_owned(), "force_gain".to_owned()]);
+        assert!(sensor.len() == 1 && sensor[0].starts_with("A wrong gain"), "{sensor:?}");
+    }
+}

@@ -2,6 +2,7 @@
 //! runs, and predicts runs that took no part as well as their fellows do; where the base law is the truth it names nothing.
 
 mod drawn;
+mod recorded;
 
 use drawn::{Drawn, drawn, plain};
 use stylet_diagnose::Verdict;
@@ -44,7 +45,50 @@ fn where_the_base_law_is_the_truth_nothing_is_named() {
     let s = look(&runs);
     let named: Vec<&str> = s.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
     println!("{named:?} {:?}", s.repeats.mean);
+    recorded(&s);
     assert_eq!(s.diagnosis.verdict, Verdict::None, "{named:?}");
     let m = &s.repeats.mean;
     assert!(m.extended_n <= 1.1 * m.floor_n.expect("four of each speed"), "{m:?}");
+}
+
+/// All that was said and fitted, compared with `recorded_answers.txt` (see the test of that name).
+fn recorded(s: &Study) {
+    let mut told = recorded::Told::default();
+    told.value("diagnosis", &serde_json::to_value(&s.diagnosis).expect("JSON"));
+    told.value("repeats", &serde_json::to_value(&s.repeats).expect("JSON"));
+    told.value("extended", &serde_json::to_value(&s.extended).expect("JSON"));
+    for (name, law) in
+        [("base", Some(&s.laws.base)), ("library", s.laws.library.as_ref()), ("slip", s.laws.slip.as_ref())]
+    {
+        let Some(law) = law else { continue };
+        told.numbers(&format!("{name}.left out"), &law.errors_n);
+        let model = &law.fitted.fit.model;
+        for (k, e) in model.effects.iter().enumerate() {
+            told.numbers(&format!("{name}.{k}.{}", e.info.id), &e.values);
+        }
+        let layer = &model.tissue.layers[0];
+        told.numbers(
+            &format!("{name}.numbers"),
+            &[
+                model.tissue.surface_m,
+                layer.stiffness_n_per_m,
+                layer.friction_ns_per_m2,
+                layer.puncture_n.unwrap_or(0.0),
+            ],
+        );
+        told.numbers(&format!("{name}.instants"), &model.instants.concat());
+        let s = &model.scatter;
+        told.numbers(
+            &format!("{name}.scatter"),
+            &[s.force, s.place_m, s.surface_m, s.friction, s.day_surface_m, s.day_friction],
+        );
+    }
+    for (k, out) in s.out.iter().enumerate() {
+        let p = &out.prediction;
+        for (n, x) in [("mean", &p.mean), ("low", &p.low), ("high", &p.high)] {
+            told.column(&format!("out.{k}.{n}"), x);
+        }
+        told.numbers(&format!("out.{k}.parts"), &out.score.parts.map(|p| p.0));
+    }
+    told.hold("recorded_answers.txt", "a set of repeats");
 }

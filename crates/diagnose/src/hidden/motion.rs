@@ -117,3 +117,53 @@ fn program(between: &mut dyn FnMut(f64, f64) -> f64, start: f64, depth: f64) -> 
     pieces.push([between(0.3, 0.8) * depth / v, -v, 0.0, 0.0]);
     Path::Pieces(start, pieces)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Path;
+
+    #[test]
+    fn a_sinusoid_begins_at_rest_and_turns_after_half_a_period() {
+        let path = Path::Sinusoid(-0.003, 0.02, 0.25, 9.0);
+        assert_eq!(path.duration(), 9.0);
+        let w = 0.5 * std::f64::consts::PI;
+        for t in [0.0, 0.7, 2.0, 5.3] {
+            let [z, v, a] = path.at(t);
+            assert!((z - (-0.003 + 0.02 * (1.0 - (w * t).cos()))).abs() < 1e-15);
+            assert!((v - 0.02 * w * (w * t).sin()).abs() < 1e-15);
+            assert!((a - 0.02 * w * w * (w * t).cos()).abs() < 1e-15);
+        }
+        assert!((path.at(2.0)[0] - 0.037).abs() < 1e-12);
+    }
+
+    /// Pieces follow one another without a jump of the position; each has a mean speed and a ripple that begins at nothing; the last one
+    /// goes on.
+    #[test]
+    fn pieces_follow_one_another() {
+        let pieces = vec![[2.0, 0.004, 0.003, 0.7], [1.5, 0.0, 0.0, 0.0], [3.0, -0.002, 0.001, 1.3]];
+        let path = Path::Pieces(0.01, pieces.clone());
+        assert_eq!(path.duration(), 6.5);
+        let way = |p: &[f64; 4], t: f64| {
+            let w = std::f64::consts::TAU * p[3].max(1e-9);
+            p[1] * t + p[2] / w * (1.0 - (w * t).cos())
+        };
+        let first = 0.01 + way(&pieces[0], 2.0);
+        for (t, piece, since, begins) in [
+            (0.0, 0, 0.0, 0.01),
+            (1.3, 0, 1.3, 0.01),
+            (2.0, 1, 0.0, first),
+            (3.1, 1, 1.1, first),
+            (3.5, 2, 0.0, first),
+            (5.9, 2, 2.4, first),
+            (8.0, 2, 4.5, first),
+        ] {
+            let p = &pieces[piece];
+            let w = std::f64::consts::TAU * p[3];
+            let [z, v, a] = path.at(t);
+            assert!((z - begins - way(p, since)).abs() < 1e-12, "{t}: {z}");
+            assert!((v - p[1] - p[2] * (w * since).sin()).abs() < 1e-12, "{t}: {v}");
+            assert!((a - p[2] * w * (w * since).cos()).abs() < 1e-9, "{t}: {a}");
+        }
+        assert_eq!(Path::Pieces(0.3, Vec::new()).at(1.0), [0.3, 0.0, 0.0]);
+    }
+}

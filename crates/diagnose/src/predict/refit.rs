@@ -73,3 +73,22 @@ pub fn lent(own: &[Own], r: usize) -> Own {
         ..Own::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::lent;
+    use stylet_identify::model::Own;
+
+    #[test]
+    fn a_recording_is_lent_the_mean_of_the_others_and_its_own_when_it_is_alone() {
+        let own = |surface_m: f64, friction: f64| Own { surface_m, friction, differing: [3.0; 8] };
+        let all = [own(1e-3, 0.2), own(4e-3, -0.5), own(-3e-4, 0.7)];
+        let l = lent(&all, 1);
+        assert!((l.surface_m - 3.5e-4).abs() < 1e-15 && (l.friction - 0.45).abs() < 1e-15);
+        assert_eq!(l.differing, [0.0; 8]);
+        let l = lent(&all[..2], 0);
+        assert_eq!((l.surface_m, l.friction), (4e-3, -0.5));
+        let l = lent(&all[..1], 0);
+        assert_eq!((l.surface_m, l.friction), (1e-3, 0.2));
+    }
+}

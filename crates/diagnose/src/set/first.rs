@@ -345,3 +345,289 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     }
     model
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Guess, Insertion, first, frame, groups, plain, pressed};
+    use stylet_identify::model::{Bound, NEVER};
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue};
+
+    /// In at a speed, a rest of 1 s, back to the beginning; two layers give way at 10 and 22 mm and let go at 18.5 and 7 mm.
+    fn run(name: &str, speed_mps: f64, stroke_m: f64) -> Insertion {
+        let travel = stroke_m / speed_mps;
+        let (mut t, mut z, mut f) = (Vec::new(), Vec::new(), Vec::new());
+        let mut k = 0;
+        loop {
+            let at = 0.01 * f64::from(k);
+            let place = match at {
+                x if x < travel => speed_mps * x,
+                x if x < travel + 1.0 => stroke_m,
+                x => stroke_m - speed_mps * (x - travel - 1.0),
+            };
+            if place < 0.0 {
+                break;
+            }
+            let inward = at < travel + 1.0;
+            // A spring that begins at 4 mm, falls to a third at 10 mm, and another one beyond 13 mm that falls at 22 mm.
+            let load = match (inward, place) {
+                (true, z) if z < 0.004 => 0.0,
+                (true, z) if z < 0.010 => 500.0 * (z - 0.004),
+                (true, z) if z < 0.022 => 1.0 + 200.0 * (z - 0.010),
+                (true, z) => 1.2 + 50.0 * (z - 0.022),
+                (false, z) if z > 0.0185 => -2.0,
+                (false, z) if z > 0.007 => -1.0,
+                (false, _) => 0.0,
+            };
+            t.push(at);
+            z.push(place);
+            f.push(load + 1e-3 * (f64::from((k * 37) % 11) / 11.0 - 0.5));
+            k += 1;
+        }
+        Insertion::new(name.to_owned(), Recording::new(t, z, f).expect("clean columns"), 2)
+    }
+
+    fn believed() -> Tissue {
+        let layer = |d: f64| Layer {
+            name: String::new(),
+            thickness_m: d,
+            stiffness_n_per_m: 300.0,
+            friction_ns_per_m2: 100.0,
+            puncture_n: Some(4.0),
+        };
+        Tissue { surface_m: 0.001, layers: vec![layer(0.009), layer(0.03)] }
+    }
+
+    #[test]
+    fn an_insertion_is_read_off_its_force() {
+        let r = run("a", 0.005, 0.026);
+        assert!((r.speed_mps - 0.005).abs() < 2e-4, "{}", r.speed_mps);
+        assert!((r.stroke_m - 0.026).abs() < 1e-9);
+        assert!((r.contact_m - 0.004).abs() < 6e-4, "{}", r.contact_m);
+        // The instant between the last sample before and the first behind the drop.
+        assert!((r.ruptures_s[0] - 1.995).abs() < 0.011, "{:?}", r.ruptures_s);
+        assert!((r.ruptures_s[1] - 4.395).abs() < 0.011, "{:?}", r.ruptures_s);
+        assert!((r.ruptures_s[0] * 200.0).fract().abs() < 1e-6, "{}", r.ruptures_s[0]);
+        // The load a little before: 500 N/m times 6 mm, four samples of 0.05 mm earlier.
+        let loads: Vec<f64> = r.loads_n.iter().flatten().copied().collect();
+        assert!((loads[0] - 2.9).abs() < 0.06 && (loads[1] - 3.36).abs() < 0.06, "{loads:?}");
+        let releases: Vec<f64> = r.releases_m.iter().flatten().copied().collect();
+        assert_eq!(releases.len(), 2);
+        assert!((releases[0] - 0.007).abs() < 6e-4 && (releases[1] - 0.0185).abs() < 6e-4, "{releases:?}");
+        // Of three layers nobody knows whose the second release is.
+        let three = Insertion::new("b".to_owned(), r.recording.clone(), 3);
+        assert!(three.releases_m[0].is_some() && three.releases_m[1..].iter().all(Option::is_none));
+        assert_eq!(three.ruptures_s[..2], r.ruptures_s[..]);
+        assert!(r.noise_n() < 2e-3 && r.noise_n() > 1e-5, "{}", r.noise_n());
+        // Two ruptures, and where the force turns with the way.
+        assert_eq!(r.drops().len(), 3);
+    }
+
+    #[test]
+    fn insertions_of_one_speed_and_stroke_are_a_group_slowest_first() {
+        let mut all: Vec<Insertion> = (0..6).map(|_| run("a", 0.005, 0.026)).collect();
+        for (r, (speed, stroke)) in all.iter_mut().zip([
+            (0.005, 0.0300),
+            (0.001, 0.0200),
+            (0.00549, 0.0309),
+            (0.00551, 0.0300),
+            (0.0010, 0.0209),
+            (0.0010, 0.0211),
+        ]) {
+            (r.speed_mps, r.stroke_m) = (speed, stroke);
+        }
+        let refs: Vec<&Insertion> = all.iter().collect();
+        // The stroke of the last differs by 1.1 mm from its group's first.
+        assert_eq!(groups(&refs), vec![vec![1, 4], vec![5], vec![0, 2], vec![3]]);
+    }
+
+    #[test]
+    fn faces_loads_and_indentations_are_what_the_runs_have_in_the_middle() {
+        let all = [run("a", 0.005, 0.026), run("b", 0.005, 0.026), run("c", 0.004, 0.026)];
+        let refs: Vec<&Insertion> = all.iter().collect();
+        let f = frame(&believed(), &refs, 2e-4);
+        let contact = stylet_stats::median_of(all.iter().map(|r| r.contact_m));
+        assert_eq!(f.fronts_m[0], contact + 2e-4);
+        assert_eq!(f.tissue.surface_m, f.fronts_m[0]);
+        let lets_go = stylet_stats::median_of(all.iter().filter_map(|r| r.releases_m[1]));
+        assert!((f.fronts_m[1] - (lets_go - 5e-4)).abs() < 1e-12);
+        assert!((f.tissue.layers[0].thickness_m - (f.fronts_m[1] - f.fronts_m[0])).abs() < 1e-12);
+        assert!((f.tissue.layers[1].thickness_m - 0.03).abs() < 1e-12);
+        let load = |l: usize| stylet_stats::median_of(all.iter().filter_map(|r| r.loads_n[l]));
+        // A deeper layer shares its force with friction of the one before.
+        assert!((f.loads_n[0] - load(0)).abs() < 1e-12 && (f.loads_n[1] - 0.6 * load(1)).abs() < 1e-12);
+        assert!((f.indented_m[0] - (0.010 - f.fronts_m[0])).abs() < 2e-4, "{:?}", f.indented_m);
+        assert!((f.indented_m[1] - (0.022 - f.fronts_m[1])).abs() < 2e-4, "{:?}", f.indented_m);
+
+        // Nothing lets go: the believed thickness tells the face; nothing gives way: the deepest point and the largest force.
+        let mut blank = all.to_vec();
+        for r in &mut blank {
+            (r.releases_m, r.ruptures_s, r.loads_n) = (vec![None; 2], vec![NEVER; 2], vec![None; 2]);
+        }
+        let refs: Vec<&Insertion> = blank.iter().collect();
+        let f = frame(&believed(), &refs, 0.0);
+        assert!((f.fronts_m[1] - (contact + 0.009)).abs() < 1e-12);
+        let largest = blank.iter().flat_map(|r| &r.recording.force_n).fold(0.0_f64, |m, x| m.max(x.abs()));
+        assert!((f.loads_n[0] - largest).abs() < 1e-12 && (f.loads_n[1] - 0.6 * largest).abs() < 1e-12);
+        assert!((f.indented_m[0] - (0.026 - contact)).abs() < 1e-9);
+        // A face lies a millimetre behind the one before and a millimetre before the deepest point at least.
+        let mut thin = believed();
+        thin.layers[0].thickness_m = 2e-4;
+        assert!((frame(&thin, &refs, 0.0).fronts_m[1] - (contact + 1e-3)).abs() < 1e-12);
+        thin.layers[0].thickness_m = 0.08;
+        let f = frame(&thin, &refs, 0.0);
+        assert!(
+            (f.fronts_m[1] - 0.025).abs() < 1e-9 && (f.indented_m[1] - 2e-3).abs() < 1e-9,
+            "{:?}",
+            f.fronts_m
+        );
+        // The last layer reaches 20 mm beyond the deepest point at least.
+        thin.layers[1].thickness_m = 1e-3;
+        let f = frame(&thin, &refs, 0.0);
+        assert!((f.tissue.layers[1].thickness_m - 0.021).abs() < 1e-9, "{:?}", f.tissue);
+        // A load of less than a twentieth of the largest force is none.
+        blank[0].loads_n = vec![Some(0.01), None];
+        let refs: Vec<&Insertion> = blank.iter().collect();
+        assert!((frame(&believed(), &refs, 0.0).loads_n[0] - 0.05 * largest).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_believed_before_a_fit_is_a_spring_friction_and_a_threshold_where_most_give_way() {
+        let mut all =
+            [run("a", 0.005, 0.026), run("b", 0.005, 0.026), run("c", 0.005, 0.026), run("d", 0.005, 0.026)];
+        all[0].ruptures_s[1] = NEVER;
+        all[1].ruptures_s[1] = NEVER;
+        let refs: Vec<&Insertion> = all.iter().collect();
+        let f = frame(&believed(), &refs, 0.0);
+        let b = plain(&believed(), &refs);
+        for l in 0..2 {
+            let layer = &b.tissue.layers[l];
+            assert!((layer.stiffness_n_per_m - f.loads_n[l] / f.indented_m[l]).abs() < 1e-9);
+            let friction = 0.3 * f.loads_n[l] / (refs[0].speed_mps * f.indented_m[l]);
+            assert!((layer.friction_ns_per_m2 / friction - 1.0).abs() < 1e-9);
+            assert_eq!(layer.puncture_n, Some(f.loads_n[l]));
+        }
+        assert_eq!(
+            (b.tolerance, b.thickness_tolerance, b.surface_tolerance_m),
+            (vec![4.0; 2], vec![0.2, 0.0], 1.5e-3)
+        );
+        // Less than half of them: no threshold.
+        all[2].ruptures_s[1] = NEVER;
+        let refs: Vec<&Insertion> = all.iter().collect();
+        assert_eq!(plain(&believed(), &refs).tissue.layers[1].puncture_n, None);
+        let p = pressed(&believed(), &all[3]);
+        let f = frame(&believed(), &[&all[3]], 0.0);
+        for l in 0..2 {
+            let layer = &p.tissue.layers[l];
+            assert!((layer.stiffness_n_per_m - f.loads_n[l] / f.indented_m[l]).abs() < 1e-9);
+            assert_eq!((layer.friction_ns_per_m2, layer.puncture_n), (0.0, None));
+        }
+        assert_eq!(p.surface_tolerance_m, 2e-3);
+    }
+
+    fn guess() -> Guess {
+        Guess {
+            straight: 0.4,
+            hold: 0.55,
+            pull: 0.7,
+            kept: 0.8,
+            exponent: 9.0,
+            wear_per_m: [11.0, 23.0],
+            rate: -0.2,
+            fractions: [0.1, 0.2],
+            times_s: [0.5, 7.0],
+            waits: 13.0,
+            surface_m: 3e-4,
+            gives_way_m: Some(2e-3),
+        }
+    }
+
+    #[test]
+    fn a_start_has_a_slipping_shaft_a_waiting_puncture_and_a_release_in_every_layer() {
+        let all = [run("a", 0.005, 0.026), run("b", 0.003, 0.026), run("c", 0.005, 0.026)];
+        let refs: Vec<&Insertion> = all.iter().collect();
+        let g = guess();
+        let f = frame(&believed(), &refs, g.surface_m);
+        let m = first(&believed(), &refs, &g);
+        assert_eq!(
+            m.effects.iter().map(|e| e.info.id).collect::<Vec<_>>(),
+            ["shaft_slip", "delayed_puncture", "let_go"].repeat(2)
+        );
+        let of = |e: usize, path: &str| {
+            let k = m.effects[e].info.parameters.iter().position(|p| p.path == path).expect("a parameter");
+            m.effects[e].values[k]
+        };
+        for l in 0..2 {
+            let (load, x) = (f.loads_n[l], f.indented_m[l]);
+            let near =
+                |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * (1.0 + b.abs()), "layer {l}: {a} for {b}");
+            near(m.tissue.layers[l].stiffness_n_per_m, 0.4 * load / x);
+            near(of(3 * l, "push_n"), 0.55 * load);
+            near(of(3 * l, "pull_n"), 0.7 * 0.55 * load);
+            near(of(3 * l, "curve_n_per_m2"), 0.6 * load / (x * x));
+            near(of(3 * l, "wear_per_m"), [11.0, 23.0][l]);
+            near(of(3 * l, "rate"), -0.2);
+            near(of(3 * l + 1, "force_n"), load);
+            near(of(3 * l + 1, "exponent"), 13.0);
+            let z = stylet_stats::median_of(all.iter().filter_map(|r| r.releases_m[l]));
+            near(of(3 * l + 2, "depth_m"), z - f.fronts_m[l]);
+            assert_eq!(
+                (of(3 * l, "layer"), of(3 * l + 1, "layer"), of(3 * l + 2, "layer")),
+                (l as f64 + 1.0, l as f64 + 1.0, l as f64 + 1.0)
+            );
+        }
+        // What the shaft's material decides is common to the layers; with two speeds nothing else is bound.
+        let mut wanted = vec![Bound { effect: 4, parameter: 2, like: Some(1) }];
+        wanted.extend([3, 4, 6, 8, 9, 10, 11].map(|parameter| Bound { effect: 3, parameter, like: Some(0) }));
+        assert_eq!(m.bound, wanted);
+        // Days are groups: the slow run was the first one.
+        assert_eq!(
+            (m.day_of.as_slice(), m.days.len(), m.free.day_surface, m.free.day_friction),
+            (&[1, 0, 1][..], 2, true, true)
+        );
+        assert!(m.steady && m.free.own_surface && m.free.own_friction && m.free.own_effects);
+        // The second layer gives way 2 mm behind its front, not where the force drops.
+        for (r, run) in all.iter().enumerate() {
+            assert_eq!(m.instants[r][0], run.ruptures_s[0]);
+            let k = run
+                .recording
+                .position_m
+                .iter()
+                .position(|z| *z > f.fronts_m[1] + 2e-3)
+                .expect("it gets there");
+            assert_eq!(m.instants[r][1], run.recording.time_s[k]);
+        }
+        // Each release of its own is known.
+        for (k, (e, p)) in m.differing().enumerate() {
+            for (r, run) in all.iter().enumerate() {
+                if let Some(z) = run.releases_m.get(k).copied().flatten() {
+                    let range = m.effects[e].info.parameters[p];
+                    let own =
+                        (z - f.fronts_m[k.min(1)]).clamp(range.low, range.high) - m.effects[e].values[p];
+                    assert!((m.own[r].differing[k] - own).abs() < 1e-12, "{k} {r}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_speed_tells_neither_a_rate_nor_how_long_a_puncture_waits() {
+        let all = [run("a", 0.005, 0.026), run("b", 0.0052, 0.026)];
+        let refs: Vec<&Insertion> = all.iter().collect();
+        let m = first(&believed(), &refs, &Guess { gives_way_m: None, ..guess() });
+        assert_eq!(
+            m.bound[..2],
+            [Bound { effect: 0, parameter: 6, like: None }, Bound { effect: 1, parameter: 2, like: None }]
+        );
+        assert_eq!(m.effects[0].values[6], 0.0);
+        assert!(!m.free.day_surface && !m.free.day_friction && m.days.len() == 1);
+        // Without a guess layers give way where the force drops.
+        assert_eq!(m.instants, all.iter().map(|r| r.ruptures_s.clone()).collect::<Vec<_>>());
+        // A layer that would give way before the one above waits for two samples behind it.
+        let m = first(&believed(), &refs, &Guess { gives_way_m: Some(-8e-3), ..guess() });
+        for (r, run) in all.iter().enumerate() {
+            let wanted = run.ruptures_s[0] + 2.0 * run.recording.median_interval_s();
+            assert!(m.instants[r][1] >= wanted - 1e-12, "{:?}", m.instants[r]);
+        }
+    }
+}

@@ -358,3 +358,148 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{candidates, effects, held, less, several};
+    use crate::set::Insertion;
+    use std::sync::Arc;
+    use stylet_identify::model::{Belief, Bound, Choice, Model};
+    use stylet_record::Recording;
+    use stylet_tissue::{
+        AnyEffect, CoulombFriction, DelayedPuncture, Effect, Layer, LetGo, ShaftSlip, Tissue,
+    };
+
+    fn model(all: &[AnyEffect]) -> Model {
+        let layer = Layer {
+            name: String::new(),
+            thickness_m: 0.02,
+            stiffness_n_per_m: 100.0,
+            friction_ns_per_m2: 1000.0,
+            puncture_n: None,
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: vec![layer.clone(), layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3; 2],
+            thickness_tolerance: vec![0.1; 2],
+            surface_tolerance_m: 0.01,
+        };
+        let mut m = Model::base(Arc::new(belief), 1);
+        m.effects = all.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        m
+    }
+
+    fn slips(layer: usize) -> AnyEffect {
+        ShaftSlip {
+            layer,
+            push_n: 1.0,
+            curve_n_per_m2: 3e3,
+            fractions: [0.1, 0.2],
+            time_constants_s: [0.5, 7.0],
+            wear_per_m: 4.0,
+            rate: -0.1,
+            ..ShaftSlip::default()
+        }
+        .into()
+    }
+
+    fn waits(layer: usize, force_n: f64) -> AnyEffect {
+        DelayedPuncture { layer, force_n, exponent: 9.0 }.into()
+    }
+
+    fn lets_go(layer: usize) -> AnyEffect {
+        LetGo { layer, depth_m: 1e-3 }.into()
+    }
+
+    #[test]
+    fn a_law_may_do_without_each_effect_and_each_part_of_a_slipping_shaft() {
+        let m = model(&[slips(1), waits(1, 1.5), lets_go(1), slips(2), waits(2, 2.5), lets_go(2)]);
+        let all = candidates(&m);
+        let names: Vec<&str> = all.iter().map(|c| c.1.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "delayed_puncture",
+                "let_go",
+                "shaft_slip: curved spring",
+                "shaft_slip: relaxation",
+                "shaft_slip: wear",
+                "shaft_slip: rate of the hold"
+            ]
+        );
+        assert_eq!(all.iter().map(|c| c.0).collect::<Vec<_>>()[1..3], ["let_go", "shaft_slip"]);
+        let count = |m: &Model| m.effects.len();
+        assert_eq!(all.iter().map(|c| count(&c.2)).collect::<Vec<_>>(), [4, 4, 6, 6, 6, 6]);
+        let value = |m: &Model, e: usize, path: &str| {
+            let k = m.effects[e].info.parameters.iter().position(|p| p.path == path).expect("a parameter");
+            m.effects[e].values[k]
+        };
+        for e in [0, 3] {
+            assert_eq!(value(&all[2].2, e, "curve_n_per_m2"), 0.0);
+            assert_eq!(
+                (value(&all[3].2, e, "fractions.1"), value(&all[3].2, e, "time_constants_s.1")),
+                (0.0, 10.0)
+            );
+            assert_eq!(
+                (value(&all[3].2, e, "time_constants_s.0"), value(&all[3].2, e, "curve_n_per_m2")),
+                (1.0, 3e3)
+            );
+            assert_eq!((value(&all[4].2, e, "wear_per_m"), value(&all[5].2, e, "rate")), (0.0, 0.0));
+        }
+        // Without a slipping shaft only whole effects go.
+        assert_eq!(candidates(&model(&[CoulombFriction { c_n_per_m: 3.0 }.into()])).len(), 1);
+        assert!(candidates(&model(&[])).is_empty());
+    }
+
+    #[test]
+    fn numbers_that_are_held_do_nothing_and_are_fitted_no_more() {
+        let m = model(&[waits(1, 1.5), slips(1), slips(2)]);
+        let wear =
+            m.effects[1].info.parameters.iter().position(|p| p.path == "wear_per_m").expect("a parameter");
+        let out = held(&m, &[("wear_per_m", 0.0)]).expect("it wore");
+        let bound = |e| Bound { effect: e, parameter: wear, like: None };
+        assert_eq!(out.bound, [bound(1), bound(2)]);
+        // One that is bound already is not bound again; where nothing changes there is nothing to try.
+        let mut half = m.clone();
+        half.bound = vec![Bound { effect: 2, parameter: wear, like: Some(1) }];
+        assert_eq!(held(&half, &[("wear_per_m", 0.0)]).expect("it wore").bound, [half.bound[0], bound(1)]);
+        assert!(held(&out, &[("wear_per_m", 0.0)]).is_none());
+        assert!(held(&m, &[("no such number", 0.0)]).is_none());
+    }
+
+    #[test]
+    fn layers_that_waited_give_way_at_a_force_when_they_wait_no_more() {
+        let mut m = model(&[waits(2, 2.5), slips(1), waits(1, 1.5)]);
+        m.own[0].differing[0] = 3e-4;
+        m.scatter.differing[1] = 2e-4;
+        let out = less(&m, "delayed_puncture");
+        assert_eq!(out.effects.len(), 1);
+        for t in [&out.tissue, &out.belief.tissue] {
+            assert_eq!([t.layers[0].puncture_n, t.layers[1].puncture_n], [Some(1.5), Some(2.5)]);
+        }
+        assert_eq!((out.own[0].differing, out.scatter.differing), ([0.0; 8], [0.0; 8]));
+        let same = less(&m, "shaft_slip");
+        assert_eq!((same.effects.len(), same.tissue.layers[0].puncture_n), (2, None));
+    }
+
+    #[test]
+    fn a_laws_effects_are_named_once_and_only_where_they_do_something() {
+        let nothing: AnyEffect = CoulombFriction { c_n_per_m: 0.0 }.into();
+        assert_eq!(
+            effects(&model(&[slips(1), waits(1, 1.5), slips(2), nothing])),
+            ["shaft_slip", "delayed_puncture"]
+        );
+    }
+
+    #[test]
+    fn one_speed_is_not_several() {
+        let run = |speed: f64| {
+            let t: Vec<f64> = (0..200).map(|k| 0.05 * f64::from(k)).collect();
+            let z = t.iter().map(|t| (speed * t).min(0.01)).collect();
+            Insertion::new(String::new(), Recording::new(t, z, vec![0.0; 200]).expect("clean columns"), 1)
+        };
+        let (a, b, c) = (run(0.002), run(0.002), run(0.004));
+        assert!(!several(&[&a, &b]) && several(&[&a, &c]));
+    }
+}

@@ -149,3 +149,102 @@ pub fn floor(runs: &[&Insertion]) -> Vec<Option<(Score, usize)>> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{floor, score};
+    use crate::set::Insertion;
+    use crate::set::population::Prediction;
+    use stylet_identify::model::NEVER;
+    use stylet_record::Recording;
+
+    /// In by 20 mm in 5 s, a rest of 2 s, and back; the force is the position times 100 and so much more.
+    fn run(name: &str, start_s: f64, more_n: f64) -> Insertion {
+        let t: Vec<f64> = (0..600).map(|k| 0.02 * f64::from(k)).collect();
+        let z = t.iter().map(|t| {
+            let t = t - start_s;
+            if t < 0.0 {
+                0.0
+            } else if t < 5.0 {
+                0.004 * t
+            } else if t < 7.0 {
+                0.02
+            } else {
+                (0.02 - 0.008 * (t - 7.0)).max(0.0)
+            }
+        });
+        let z: Vec<f64> = z.collect();
+        let f = z.iter().map(|z| 100.0 * z + more_n).collect();
+        Insertion::new(name.to_owned(), Recording::new(t, z, f).expect("clean columns"), 1)
+    }
+
+    #[test]
+    fn a_prediction_is_scored_over_all_samples_and_by_part() {
+        let mut r = run("a", 1.0, 0.0);
+        r.ruptures_s = vec![3.0, NEVER];
+        let n = r.recording.len();
+        let t = r.recording.time_s.clone();
+        let mean: Vec<f64> = (0..n).map(|k| r.recording.force_n[k] - 0.1 - 0.001 * k as f64).collect();
+        // Inside in every third sample, at the edges, too.
+        let low: Vec<f64> = (0..n).map(|k| r.recording.force_n[k] - [0.0, 0.3, -0.1][k % 3]).collect();
+        let high: Vec<f64> = (0..n).map(|k| r.recording.force_n[k] + [0.0, -0.1, 0.3][k % 3]).collect();
+        let s = score(&r, &Prediction { mean: mean.clone(), low, high });
+        let square = |k: usize| (0.1 + 0.001 * k as f64).powi(2);
+        let all: f64 = (0..n).map(square).sum();
+        assert!((s.rmse_n - (all / n as f64).sqrt()).abs() < 1e-12);
+        assert!((s.covered - 200.0 / 600.0).abs() < 1e-12, "{}", s.covered);
+        let (deepest, back) = (t[r.phases.deepest], t[r.phases.back]);
+        let mut parts = [(0.0, 0.0); 5];
+        for k in 0..n {
+            let at = t[k];
+            let p = match at {
+                x if (x - 3.0).abs() < 0.5 => 1,
+                x if x >= back => 4,
+                x if x > deepest => 3,
+                x if x >= 3.0 => 2,
+                _ => 0,
+            };
+            parts[p].0 += square(k);
+            parts[p].1 += 1.0;
+        }
+        for (s, w) in s.parts.iter().zip(parts) {
+            assert!((s.0 - w.0).abs() < 1e-9 && s.1 == w.1, "{s:?} {w:?}");
+        }
+        assert!(parts.iter().all(|p| p.1 > 10.0));
+        // Half of a prediction scores half of the samples over all of them; none is no number.
+        let half = score(&r, &Prediction { mean: mean[..300].to_vec(), ..Prediction::default() });
+        let some: f64 = (0..300).map(square).sum();
+        assert!((half.rmse_n - (some / 600.0).sqrt()).abs() < 1e-12 && half.covered == 0.0);
+        assert!(score(&r, &Prediction::default()).rmse_n.is_nan());
+    }
+
+    #[test]
+    fn what_a_sensor_cannot_show_is_not_asked_of_a_prediction() {
+        let mut r = run("a", 1.0, 0.0);
+        r.recording.force_n.iter_mut().for_each(|f| *f = f.clamp(-1.5, 1.5));
+        r.limit_n = Some(1.5);
+        let mean: Vec<f64> = run("a", 1.0, 0.0).recording.force_n;
+        let (low, high) = (mean.iter().map(|f| f - 0.01).collect(), mean.iter().map(|f| f + 0.01).collect());
+        let p = Prediction { mean, low, high };
+        let s = score(&r, &p);
+        assert!(s.rmse_n < 1e-12 && s.covered == 1.0, "{s:?}");
+        r.limit_n = None;
+        assert!(score(&r, &p).rmse_n > 0.1 && score(&r, &p).covered < 0.9);
+    }
+
+    /// The others of a group are aligned where their motion begins.
+    #[test]
+    fn the_floor_is_the_mean_of_the_others_of_one_speed() {
+        let mut all = [run("a", 1.0, 0.3), run("b", 1.5, 0.5), run("c", 0.5, 1.0), run("d", 1.0, 9.0)];
+        all[3].speed_mps *= 3.0;
+        let refs: Vec<&Insertion> = all.iter().collect();
+        let told = floor(&refs);
+        for (k, wanted) in [(0, 0.45), (1, 0.15), (2, 0.6)] {
+            let (s, others) = told[k].as_ref().expect("others");
+            assert_eq!(*others, 2);
+            // Beyond the ends the others stay where they were.
+            assert!((s.rmse_n - wanted).abs() < 0.02, "{k}: {}", s.rmse_n);
+        }
+        assert!(told[3].is_none(), "nobody is like it");
+    }
+}

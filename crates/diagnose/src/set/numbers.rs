@@ -122,3 +122,217 @@ pub fn base_parameters(told: &[Told], believed: &Tissue) -> Vec<BaseParameter> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{base_parameters, estimates, values};
+    use crate::set::fitted::Fitted;
+    use crate::set::left_out::Out;
+    use crate::set::population::Population;
+    use std::sync::Arc;
+    use stylet_identify::fit::Fit;
+    use stylet_identify::model::{Belief, Bound, Choice, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, Residuals};
+    use stylet_stats::student;
+    use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, Layer, LetGo, Tissue};
+
+    fn tissue() -> Tissue {
+        let layer = |d: f64, k: f64, f: Option<f64>| Layer {
+            name: String::new(),
+            thickness_m: d,
+            stiffness_n_per_m: k,
+            friction_ns_per_m2: 4000.0,
+            puncture_n: f,
+        };
+        Tissue { surface_m: 0.002, layers: vec![layer(0.02, 150.0, Some(1.1)), layer(0.03, 220.0, None)] }
+    }
+
+    fn model() -> Model {
+        let belief = Belief {
+            tissue: tissue(),
+            given: Vec::new(),
+            tolerance: vec![0.5; 2],
+            thickness_tolerance: vec![0.1; 2],
+            surface_tolerance_m: 0.01,
+        };
+        Model::base(Arc::new(belief), 1)
+    }
+
+    fn fitted(model: Model) -> Fitted {
+        let residuals = Residuals { e: Vec::new(), w: Vec::new(), events: Vec::new(), nats: 0.0 };
+        let data = Data::new(Arc::new(Vec::new()), Noise::white(1.0), 0.0);
+        Fitted { fit: Fit { model, residuals }, data, drops: Vec::new(), starts: (1, 1) }
+    }
+
+    /// Quenouille and Tukey: `(n - 1)/n` times the sum of squares about the mean, Student's with one less than there are.
+    #[test]
+    fn intervals_are_those_of_the_jackknife_over_runs() {
+        let left = [148.0, 155.0, 151.0, 158.0];
+        let out: Vec<Out> = left
+            .iter()
+            .map(|k| {
+                let mut law = model();
+                law.tissue.layers[0].stiffness_n_per_m = *k;
+                law.tissue.layers[0].thickness_m = 0.02 + (k - 153.0) * 1e-5;
+                Out {
+                    population: Some(Population { law, residual_n: [0.0; 4], recordings: 3 }),
+                    ..Out::default()
+                }
+            })
+            .chain([Out::default()])
+            .collect();
+        let told = estimates(&fitted(model()), &out);
+        let of = |owner: &str, path: &str| {
+            told.iter().find(|t| t.owner == owner && t.path == path).expect("a number")
+        };
+        let k = of("layer.1", "stiffness_n_per_m");
+        let sum: f64 = left.iter().map(|x| (x - 153.0_f64).powi(2)).sum();
+        let reach = student::quantile(0.975, 3.0) * (sum * 3.0 / 4.0).sqrt();
+        assert!((k.value - 150.0).abs() < 1e-12);
+        assert!(
+            (k.high - 150.0 - reach).abs() < 1e-9 && (150.0 - k.low - reach).abs() < 1e-9,
+            "{k:?} for {reach}"
+        );
+        // The face behind moves with the thickness.
+        let front = of("layer.2", "front_m");
+        assert!((front.value - 0.022).abs() < 1e-12 && (front.high - 0.022 - reach * 1e-5).abs() < 1e-12);
+        let same = of("layer.2", "stiffness_n_per_m");
+        assert_eq!((same.low, same.high), (220.0, 220.0));
+        assert_eq!((k.estimate().low, k.estimate().value, k.estimate().high), (k.low, k.value, k.high));
+        // One run left out tells nothing: the interval is as wide as the number.
+        let one = estimates(&fitted(model()), &out[..1]);
+        let k = one.iter().find(|t| t.path == "stiffness_n_per_m").expect("a number");
+        assert_eq!((k.low, k.high), (0.0, 300.0));
+    }
+
+    #[test]
+    fn numbers_are_told_in_the_order_of_the_law_with_their_owners() {
+        let mut m = model();
+        let effects: [AnyEffect; 3] = [
+            LetGo { layer: 1, depth_m: 1e-3 }.into(),
+            DelayedPuncture { layer: 1, force_n: 2.0, exponent: 9.0 }.into(),
+            LetGo { layer: 2, depth_m: 2e-3 }.into(),
+        ];
+        m.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        let all = values(&m);
+        let names: Vec<String> = all.iter().map(|(o, p, _, _)| format!("{o} {p}")).collect();
+        assert_eq!(
+            names,
+            [
+                "layer.0 surface_m",
+                "layer.1 front_m",
+                "layer.1 stiffness_n_per_m",
+                "layer.1 friction_ns_per_m2",
+                "layer.1 puncture_n",
+                "layer.2 front_m",
+                "layer.2 stiffness_n_per_m",
+                "layer.2 friction_ns_per_m2",
+                "let_go 0.layer",
+                "let_go 0.depth_m",
+                "delayed_puncture layer",
+                "delayed_puncture force_n",
+                "delayed_puncture exponent",
+                "let_go 1.layer",
+                "let_go 1.depth_m",
+            ]
+        );
+        let numbers: Vec<f64> = all.iter().map(|v| v.2).collect();
+        assert_eq!(numbers[..8], [0.002, 0.002, 150.0, 4000.0, 1.1, 0.022, 220.0, 4000.0]);
+        assert_eq!(numbers[8..], [1.0, 1e-3, 1.0, 2.0, 9.0, 2.0, 2e-3]);
+        assert!(all.iter().all(|v| !v.3), "{all:?}");
+    }
+
+    #[test]
+    fn a_number_stands_at_its_bound_within_a_thousandth_of_the_range() {
+        let m = model();
+        for (path, at) in [
+            ("surface_m", 0),
+            ("stiffness_n_per_m", 2),
+            ("friction_ns_per_m2", 3),
+            ("puncture_n", 4),
+            ("front_m", 5),
+        ] {
+            let role = match path {
+                "surface_m" => stylet_identify::model::Role::Surface,
+                "stiffness_n_per_m" => stylet_identify::model::Role::Stiffness(0),
+                "friction_ns_per_m2" => stylet_identify::model::Role::Friction(0),
+                "puncture_n" => stylet_identify::model::Role::Puncture(0),
+                _ => stylet_identify::model::Role::Thickness(0),
+            };
+            let n = m.shared().into_iter().find(|n| n.role == role).expect("free");
+            let near = 1e-3 * (n.high - n.low).min(1.0);
+            for (x, reached) in [
+                (n.low + 0.9 * near, true),
+                (n.low + 1.1 * near, false),
+                (n.high - 0.9 * near, true),
+                (n.high - 1.1 * near, false),
+            ] {
+                let mut moved = m.clone();
+                moved.set(role, 0, x);
+                let all = values(&moved);
+                assert_eq!(all[at].3, reached, "{path} at {x} of {} to {}", n.low, n.high);
+                // The first front is no thickness.
+                assert!(!all[1].3);
+            }
+        }
+        // A number that goes with another one's stands where that one stands.
+        let mut m = model();
+        let waits =
+            |force_n: f64, layer| -> AnyEffect { DelayedPuncture { layer, force_n, exponent: 9.0 }.into() };
+        m.effects =
+            [waits(2.0, 1), waits(2.0, 2)].iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        m.bound = vec![Bound { effect: 1, parameter: 2, like: Some(0) }];
+        let high = m.effects[0].info.parameters[2].high;
+        assert!(high.is_finite());
+        m.effects[0].values[2] = high;
+        let at = |m: &Model, path: &str| values(m).into_iter().find(|v| v.1 == path).map(|v| v.3);
+        assert_eq!(
+            (at(&m, "0.exponent"), at(&m, "1.exponent"), at(&m, "1.force_n")),
+            (Some(true), Some(true), Some(false))
+        );
+        assert_eq!(at(&m, "0.layer"), Some(false), "which layer is no number of a fit");
+    }
+
+    #[test]
+    fn base_parameters_stand_beside_what_was_believed() {
+        let mut law = model();
+        law.tissue.surface_m = 0.003;
+        law.tissue.layers[0].stiffness_n_per_m = 190.0;
+        let out: Vec<Out> = [-1.0, 1.0]
+            .iter()
+            .map(|x| {
+                let mut other = law.clone();
+                other.tissue.layers[0].stiffness_n_per_m += 2.5 * x;
+                other.tissue.layers[1].stiffness_n_per_m += 2.5 * x;
+                Out {
+                    population: Some(Population { law: other, residual_n: [0.0; 4], recordings: 3 }),
+                    ..Out::default()
+                }
+            })
+            .collect();
+        let mut m = law.clone();
+        m.effects = vec![Choice::new(LetGo { layer: 1, depth_m: 1e-3 }.info(), &[1.0, 1e-3])];
+        let base = base_parameters(&estimates(&fitted(m), &out), &tissue());
+        let told: Vec<(usize, &str, f64, bool)> =
+            base.iter().map(|b| (b.layer, b.name.as_str(), b.assumed, b.changed)).collect();
+        assert_eq!(
+            told,
+            [
+                (0, "surface_m", 0.002, true),
+                (1, "front_m", 0.002, true),
+                (1, "stiffness_n_per_m", 150.0, true),
+                (1, "friction_ns_per_m2", 4000.0, false),
+                (1, "puncture_n", 1.1, false),
+                (2, "front_m", 0.022, true),
+                (2, "stiffness_n_per_m", 220.0, false),
+                (2, "friction_ns_per_m2", 4000.0, false),
+            ]
+        );
+        let k = &base[2];
+        // Two that differ by 5: half of that is the error, Student's with one degree of freedom.
+        let reach = student::quantile(0.975, 1.0) * 2.5;
+        assert!((k.value - 190.0).abs() < 1e-12 && (k.high - 190.0 - reach).abs() < 1e-9, "{k:?}");
+        assert!(reach > 30.0 && reach < 40.0);
+    }
+}

@@ -242,3 +242,235 @@ pub fn friction(population: &Population, recording: &Recording, instants: &[f64]
     }
     Some(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{DRAWS, PRIMES, Part, Population, drawn, friction, halton, part, predict, single};
+    use crate::set::Insertion;
+    use std::sync::Arc;
+    use stylet_identify::model::{Belief, Choice, Day, Model, NEVER};
+    use stylet_record::Recording;
+    use stylet_stats::normal::quantile;
+    use stylet_tissue::{DelayedPuncture, Effect, Law, LawState, Layer, LetGo, ShaftSlip, Tissue};
+
+    #[test]
+    fn halton_points_are_digits_mirrored_at_the_point() {
+        // 6 is 110 in base two, 11 is 102 in base three, 23 is 43 in base five.
+        assert_eq!(halton(6, 2), 0.375);
+        assert!((halton(11, 3) - (2.0 / 3.0 + 1.0 / 27.0)).abs() < 1e-15);
+        assert!((halton(23, 5) - (3.0 / 5.0 + 4.0 / 25.0)).abs() < 1e-15);
+        assert_eq!(halton(0, 7), 0.0);
+    }
+
+    fn tissue() -> Tissue {
+        let layer = |k: f64, f: f64| Layer {
+            name: String::new(),
+            thickness_m: 0.02,
+            stiffness_n_per_m: k,
+            friction_ns_per_m2: 4000.0,
+            puncture_n: Some(f),
+        };
+        Tissue { surface_m: 0.002, layers: vec![layer(150.0, 1.1), layer(220.0, 1.9)] }
+    }
+
+    fn population() -> Population {
+        let belief = Belief {
+            tissue: tissue(),
+            given: Vec::new(),
+            tolerance: vec![0.3; 2],
+            thickness_tolerance: vec![0.1; 2],
+            surface_tolerance_m: 0.01,
+        };
+        let mut law = Model::base(Arc::new(belief), 0);
+        (law.scatter.surface_m, law.scatter.friction, law.scatter.force) = (3e-4, 0.07, 0.05);
+        (law.scatter.day_surface_m, law.scatter.day_friction) = (7e-4, 0.11);
+        (law.free.own_surface, law.free.own_friction, law.free.day_surface, law.free.day_friction) =
+            (true, true, true, true);
+        law.days = vec![Day { surface_m: 1e-3, friction: 0.2 }];
+        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5 }
+    }
+
+    /// In by 30 mm in 6 s, a rest of 2 s, and back.
+    fn run() -> Insertion {
+        let t: Vec<f64> = (0..700).map(|k| 0.02 * f64::from(k)).collect();
+        let z = t.iter().map(|t| {
+            if *t < 6.0 {
+                0.005 * t
+            } else if *t < 8.0 {
+                0.03
+            } else {
+                0.03 - 0.005 * (t - 8.0)
+            }
+        });
+        let z: Vec<f64> = z.collect();
+        let f = z.iter().map(|z| 100.0 * z).collect();
+        Insertion::new("one".to_owned(), Recording::new(t, z, f).expect("clean columns"), 2)
+    }
+
+    /// Every number that varies has a dimension of the Halton sequence of its own, in the order surface, friction, each layer's force, the
+    /// numbers of effects, the day; wider by what a mean of so many leaves open.
+    #[test]
+    fn a_drawn_insertion_has_its_numbers_by_the_points_of_a_sequence() {
+        let mut p = population();
+        let wide = (1.0_f64 + 1.0 / 5.0).sqrt();
+        let n = |k: usize, dimension: usize| quantile(halton(k, PRIMES[dimension])) * wide;
+        for k in [1, 7, 50] {
+            let m = p.draw(k, None);
+            let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{k}: {a} for {b}");
+            near(m.own[0].surface_m, 3e-4 * n(k, 0));
+            near(m.own[0].friction, 0.07 * n(k, 1));
+            near(m.tissue.layers[0].puncture_n.unwrap_or(0.0), 1.1 * (1.0 + 0.05 * n(k, 2)));
+            near(m.tissue.layers[1].puncture_n.unwrap_or(0.0), 1.9 * (1.0 + 0.05 * n(k, 3)));
+            near(m.days[1].surface_m, 7e-4 * n(k, 4));
+            near(m.days[1].friction, 0.11 * n(k, 5));
+            assert_eq!((m.day_of.as_slice(), m.instants.as_slice()), (&[1][..], &[vec![NEVER; 2]][..]));
+            assert_eq!(p.draw(k, Some(0)).day_of, [0]);
+            assert_eq!(p.draw(k, Some(0)).days.len(), 1);
+        }
+        // A mean of two or one is as open as one of two.
+        p.recordings = 1;
+        let open = p.draw(7, None).own[0].surface_m / (3e-4 * quantile(halton(7, 2)));
+        assert!((open - 1.5_f64.sqrt()).abs() < 1e-12, "{open}");
+        p.recordings = 5;
+        p.law.free = stylet_identify::model::Free::default();
+        let m = p.draw(7, None);
+        assert_eq!(
+            (m.own[0].surface_m, m.own[0].friction, m.days[1].surface_m, m.days[1].friction),
+            (0.0, 0.0, 0.0, 0.0)
+        );
+        // Forces never fall below a fifth.
+        p.law.scatter.force = 9.0;
+        let k = (1..200).find(|k| halton(*k, PRIMES[2]) < 0.2).expect("a low point");
+        assert!((p.draw(k, None).tissue.layers[0].puncture_n.unwrap_or(0.0) - 0.22).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_effects_say_of_a_layers_strength_is_drawn_with_it() {
+        let mut p = population();
+        let effects: [stylet_tissue::AnyEffect; 3] = [
+            ShaftSlip { layer: 1, push_n: 1.0, ..ShaftSlip::default() }.into(),
+            DelayedPuncture { layer: 2, force_n: 2.0, exponent: 9.0 }.into(),
+            LetGo { layer: 1, depth_m: 1e-3 }.into(),
+        ];
+        p.law.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        p.law.free.own_effects = true;
+        p.law.scatter.differing[0] = 4e-4;
+        let m = p.draw(9, Some(0));
+        let wide = (1.0_f64 + 1.0 / 5.0).sqrt();
+        let n = |dimension: usize| quantile(halton(9, PRIMES[dimension])) * wide;
+        let force = m.effects[1].values[1];
+        assert!((force - 2.0 * (1.0 + 0.05 * n(3))).abs() < 1e-12, "{force}");
+        let differing = p.law.differing().count();
+        assert!(differing > 0);
+        for k in 0..differing {
+            assert!((m.own[0].differing[k] - p.law.differing_sd(k) * n(4 + k)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_drawn_force_is_that_of_the_law_moved_as_the_run_was() {
+        let p = population();
+        let run = run();
+        let m = p.draw(3, Some(0));
+        let mut there = m.tissue.clone();
+        there.surface_m += m.own[0].surface_m + 1e-3;
+        for layer in &mut there.layers {
+            layer.friction_ns_per_m2 *= (m.own[0].friction + 0.2).exp();
+        }
+        let law = Law::new(&there, &[]).expect("a law");
+        let mut state = LawState::default();
+        let r = &run.recording;
+        let told = drawn(&p, &run, 3, Some(0)).expect("a force");
+        for i in 0..r.len() {
+            let f = law.step(&mut state, r.time_s[i], r.position_m[i], r.velocity_mps[i], |_| {}).total_n;
+            assert!((told[i] - f).abs() < 1e-9, "{i}: {} for {f}", told[i]);
+        }
+    }
+
+    #[test]
+    fn parts_of_an_insertion_follow_one_another() {
+        let run = run();
+        let t = &run.recording.time_s;
+        let (deepest, back) = (t[run.phases.deepest], t[run.phases.back]);
+        for (at, first, wanted) in [
+            (2.0, 3.0, Part::Loading),
+            (3.0, 3.0, Part::Cutting),
+            (deepest, 3.0, Part::Cutting),
+            (deepest, NEVER, Part::Loading),
+            (deepest + 1e-6, 3.0, Part::Hold),
+            (back - 1e-6, 3.0, Part::Hold),
+            (back, 3.0, Part::Back),
+            (99.0, NEVER, Part::Back),
+        ] {
+            assert_eq!(part(&run, at, first), wanted, "{at}");
+        }
+    }
+
+    #[test]
+    fn single_samples_scatter_about_a_line_through_eight() {
+        // Alternating noise of 0.02 about a ramp: about the line of eight its mean square is 0.02^2 (1 - 64/1344 ... ) by hand below.
+        let t: Vec<f64> = (0..83).map(|k| 0.1 * f64::from(k)).collect();
+        let f: Vec<f64> = t
+            .iter()
+            .enumerate()
+            .map(|(k, t)| 1.0 + 0.3 * t + if k % 2 == 0 { 0.02 } else { -0.02 })
+            .collect();
+        let r = Recording::new(t, vec![0.0; 83], f).expect("clean columns");
+        // sum (k - 3.5)(-1)^k = -4 over sum (k - 3.5)^2 = 42: the line takes 16/42 of 8.
+        let wanted = 0.02 * ((8.0 - 16.0 / 42.0) / 8.0_f64 * 8.0 / 6.0).sqrt();
+        assert!((single(&r) / wanted - 1.0).abs() < 1e-9, "{} for {wanted}", single(&r));
+    }
+
+    /// With the noise alone the band is that of nine of ten of five pieces each, wider than what is left by `sqrt((n + 1)/(n - 1))`.
+    #[test]
+    fn the_band_holds_nine_of_ten_of_what_was_drawn_and_of_what_is_left() {
+        let mut p = population();
+        let run = run();
+        let first = |k: usize| super::force(&p, &run, k, Some(0)).expect("a force");
+        let forces: Vec<(Vec<f64>, f64)> = (1..=12).map(first).collect();
+        let told = predict(&p, &run, Some(0), 12);
+        let beyond = (6.0_f64 / 4.0).sqrt();
+        assert!((p.beyond() - beyond).abs() < 1e-15);
+        for i in [5, 120, 250, 340, 600] {
+            let mean = forces.iter().map(|f| f.0[i]).sum::<f64>() / 12.0;
+            assert!((told.mean[i] - mean).abs() < 1e-12);
+            let mut all = Vec::new();
+            for (f, at) in &forces {
+                let left = p.residual_n[part(&run, run.recording.time_s[i], *at) as usize];
+                for share in [0.1, 0.3, 0.5, 0.7, 0.9] {
+                    all.push(f[i] + beyond * left * quantile(share));
+                }
+            }
+            all.sort_by(f64::total_cmp);
+            assert!((told.low[i] - all[3]).abs() < 1e-9 && (told.high[i] - all[56]).abs() < 1e-9, "{i}");
+        }
+        p.recordings = 2;
+        assert!((p.beyond() - 3.0_f64.sqrt()).abs() < 1e-15);
+        assert!(predict(&p, &run, Some(0), 0).mean.is_empty());
+        assert_eq!(DRAWS, 64);
+    }
+
+    #[test]
+    fn friction_is_that_of_the_mean_law_with_layers_that_rupture_when_told() {
+        let p = population();
+        let run = run();
+        let r = &run.recording;
+        let law = Law::new(&tissue(), &[]).expect("a law");
+        for instants in [vec![], vec![2.5], vec![2.5, 5.0], vec![5.0, 2.5]] {
+            let told = friction(&p, r, &instants).expect("friction");
+            let mut state = LawState::default();
+            for i in 0..r.len() {
+                let t = r.time_s[i];
+                // In order: a second one before the first does not count.
+                let count = match instants.as_slice() {
+                    [a, ..] if t < *a => 0,
+                    [_, b] if t >= *b => 2,
+                    [_, ..] => 1,
+                    _ => 0,
+                };
+                let f = law.step_imposed(&mut state, t, r.position_m[i], r.velocity_mps[i], count, |_| {});
+                assert!((told[i] - f.friction_n).abs() < 1e-12, "{instants:?} {i}");
+            }
+        }
+    }
+}

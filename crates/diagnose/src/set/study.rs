@@ -283,3 +283,194 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
     let mean = |g: &[usize]| g.iter().map(|i| runs[*i].speed_mps).sum::<f64>() / g.len().max(1) as f64;
     groups(runs).into_iter().map(|g| (mean(&g), g)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{advice, bought, cause, confidence, dropped, evidence, speeds};
+    use crate::set::Insertion;
+    use crate::set::fitted::Fitted;
+    use crate::set::laws::{Kind, Law, Laws, Part};
+    use crate::set::numbers::Told;
+    use std::sync::Arc;
+    use stylet_identify::fit::Fit;
+    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, Residuals};
+    use stylet_record::Recording;
+    use stylet_tissue::{CoulombFriction, Effect, Layer, Tissue};
+
+    fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {
+        let layer = Layer {
+            name: String::new(),
+            thickness_m: 0.02,
+            stiffness_n_per_m: 100.0,
+            friction_ns_per_m2: 1000.0,
+            puncture_n: None,
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.01,
+        };
+        let mut model = Model::base(Arc::new(belief), 0);
+        if with {
+            model.effects = vec![Choice::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
+        }
+        let residuals = Residuals { e: Vec::new(), w: Vec::new(), events: Vec::new(), nats };
+        let data = Data::new(Arc::new(Vec::new()), Noise::white(1.0), 0.0);
+        let fitted = Fitted { fit: Fit { model, residuals }, data, drops: Vec::new(), starts: (8, 3) };
+        Law { kind, fitted, errors_n: errors_n.to_vec() }
+    }
+
+    #[test]
+    fn confidence_is_the_chance_that_the_mean_of_what_is_worse_lies_above_nothing() {
+        let (without, with) = ([0.5, 0.7, 0.4, 0.9], [0.45, 0.5, 0.42, 0.6]);
+        let d: [f64; 4] = std::array::from_fn(|k| without[k] - with[k]);
+        let mean = d.iter().sum::<f64>() / 4.0;
+        let sd = (d.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3.0).sqrt();
+        let wanted = stylet_stats::normal::cdf(mean / (sd / 2.0));
+        assert!((confidence(&without, &with) - wanted).abs() < 1e-12);
+        // A recording that cannot be predicted without it does not count; where none can be, nothing else is left.
+        let more: Vec<f64> = without.iter().copied().chain([f64::INFINITY]).collect();
+        assert!((confidence(&more, &[&with[..], &[0.5]].concat()) - wanted).abs() < 1e-12);
+        assert_eq!(confidence(&[f64::INFINITY; 3], &with[..3]), 1.0);
+        assert_eq!((confidence(&[], &[]), confidence(&[0.5], &[0.4])), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_causes_share_is_what_comes_back_without_it_of_all_that_was_explained() {
+        let base = law(Kind::Base, &[0.5, 0.7], -20.0, false);
+        let best = law(Kind::Library, &[0.2, 0.1], -150.0, true);
+        let told = |at_bound| Told {
+            owner: "coulomb_friction".to_owned(),
+            path: "c_n_per_m".to_owned(),
+            value: 3.0,
+            low: 2.0,
+            high: 4.5,
+            at_bound,
+        };
+        let other = Told { owner: "let_go".to_owned(), at_bound: true, ..told(false) };
+        let c = cause("coulomb_friction", &[told(false), other.clone()], 0.97, &[0.3, 0.4], &best, &base);
+        // Mean squares 0.37, 0.025 and 0.125.
+        assert!((c.share - (0.125 - 0.025) / (0.37 - 0.025)).abs() < 1e-12, "{}", c.share);
+        let nats = base.fitted.fit.nats() - best.fitted.fit.nats();
+        assert!((c.gain_nats - nats).abs() < 1e-9 && (nats - 130.0).abs() < 20.0, "{}", c.gain_nats);
+        assert_eq!((c.confidence, c.parameters.len(), c.parameters["c_n_per_m"].high), (0.97, 1, 4.5));
+        // At a bound nothing is surer than nine of ten.
+        let c = cause("coulomb_friction", &[told(true)], 0.97, &[0.3, 0.4], &best, &base);
+        assert_eq!(c.confidence, 0.9);
+        assert_eq!(cause("coulomb_friction", &[told(true)], 0.6, &[0.3, 0.4], &best, &base).confidence, 0.6);
+        // More than all is all, less than nothing nothing; where nobody knows it is all.
+        assert_eq!(cause("x", &[], 1.0, &[3.0, 4.0], &best, &base).share, 1.0);
+        assert_eq!(cause("x", &[], 1.0, &[0.01, 0.01], &best, &base).share, 0.0);
+        assert_eq!(cause("x", &[], 1.0, &[f64::NAN, 0.01], &best, &base).share, 1.0);
+        assert_eq!(cause("x", &[], 1.0, &[0.3], &base, &best).gain_nats, 0.0);
+    }
+
+    fn laws() -> Laws {
+        let part = |name: &str, without_n: &[f64], kept| Part {
+            effect: "shaft_slip",
+            name: name.to_owned(),
+            without_n: without_n.to_vec(),
+            kept,
+        };
+        Laws {
+            base: law(Kind::Base, &[0.5, 0.7], -20.0, false),
+            library: Some(law(Kind::Library, &[0.3, 0.1], -90.0, true)),
+            slip: Some(law(Kind::Slip, &[0.25, 0.35], -70.0, true)),
+            best: law(Kind::Library, &[0.3, 0.1], -90.0, true),
+            parts: vec![
+                part("wear", &[0.4, 0.6], true),
+                part("rate", &[0.21, 0.2], false),
+                part("lost", &[f64::INFINITY], true),
+            ],
+        }
+    }
+
+    #[test]
+    fn what_each_law_buys_is_told_with_what_was_kept() {
+        let all = bought(&laws());
+        let told: Vec<(&str, f64, Option<f64>, bool)> = all
+            .iter()
+            .map(|b| {
+                (
+                    b.step.as_str(),
+                    (b.left_out_n * 1e9).round() / 1e9,
+                    b.without_n.map(|x| (x * 1e9).round() / 1e9),
+                    b.kept,
+                )
+            })
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("base law with what the library adds", 0.2, None, true),
+                ("a shaft that slips", 0.3, None, false),
+                ("wear", 0.2, Some(0.5), true),
+                ("rate", 0.2, Some(0.205), false),
+                ("lost", 0.2, None, true),
+            ]
+        );
+        let traces = dropped(&laws());
+        assert_eq!(traces.len(), 1);
+        assert_eq!(
+            (traces[0].effect.as_str(), traces[0].why.as_str()),
+            ("shaft_slip", "rate: recordings left out are predicted to 0.205 N without it, 0.200 N with it")
+        );
+        let e = evidence(&laws());
+        assert_eq!(e.taken.as_deref(), Some("coulomb_friction"));
+        let l = laws();
+        let gained = |law: &Law| l.base.fitted.fit.nats() - law.fitted.fit.nats();
+        assert_eq!(
+            (e.rivals[0].effect.as_str(), e.rivals[1].effect.as_str()),
+            ("shaft_slip", "coulomb_friction")
+        );
+        assert!((e.rivals[0].gain_nats - gained(l.slip.as_ref().expect("it"))).abs() < 1e-9);
+        assert!((e.rivals[1].gain_nats - gained(&l.best)).abs() < 1e-9 && e.rivals[1].gain_nats > 50.0);
+        let plain = Laws { best: l.base.clone(), ..laws() };
+        assert_eq!(evidence(&plain).taken, None);
+    }
+
+    #[test]
+    fn numbers_at_a_bound_and_starts_that_disagree_are_told() {
+        let told = |at_bound| Told {
+            owner: "layer.1".to_owned(),
+            path: "stiffness_n_per_m".to_owned(),
+            value: 3.0,
+            low: 2.0,
+            high: 4.5,
+            at_bound,
+        };
+        let (slip, library) = (law(Kind::Slip, &[0.1], 0.0, true), law(Kind::Library, &[0.1], 0.0, true));
+        assert!(advice(&library, &[told(false)]).is_empty());
+        let one = advice(&library, &[told(true), told(false)]);
+        assert!(
+            one.len() == 1
+                && one[0].ends_with("so that their values say little: stiffness_n_per_m of layer.1."),
+            "{one:?}"
+        );
+        let one = advice(&slip, &[told(false)]);
+        assert!(one.len() == 1 && one[0].contains("Only 3 of 8 starts"), "{one:?}");
+        // Half of them is enough.
+        let mut agree = slip;
+        agree.fitted.starts = (8, 4);
+        assert!(advice(&agree, &[]).is_empty());
+    }
+
+    #[test]
+    fn speeds_are_the_means_of_their_groups() {
+        let run = |speed: f64| {
+            let t: Vec<f64> = (0..400).map(|k| 0.05 * f64::from(k)).collect();
+            let z = t.iter().map(|t| (speed * t).min(0.01)).collect();
+            Insertion::new(String::new(), Recording::new(t, z, vec![0.0; 400]).expect("clean columns"), 1)
+        };
+        let mut all = [run(0.004), run(0.002), run(0.002)];
+        (all[1].speed_mps, all[2].speed_mps) = (0.00205, 0.002);
+        let refs: Vec<&Insertion> = all.iter().collect();
+        let told = speeds(&refs);
+        assert_eq!(told.iter().map(|s| s.1.clone()).collect::<Vec<_>>(), [vec![1, 2], vec![0]]);
+        assert!((told[0].0 - 0.002025).abs() < 1e-12 && told[1].0 == all[0].speed_mps);
+    }
+}

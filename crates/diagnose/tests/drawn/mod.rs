@@ -60,27 +60,27 @@ fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> 
         DelayedPuncture { layer: 1, force_n: 3.0 * (1.0 + tough), exponent: 12.0 }.into(),
         LetGo { layer: 1, depth_m: 1e-3 + 2e-4 * normal() }.into(),
     ];
-    recorded(name, speed_mps, &tissue, &effects, rng)
+    recorded(name, (0.025, speed_mps, 5.0), &tissue, &effects, rng)
 }
 
-/// An insertion with this law, recorded at 100 Hz with noise.
+/// An insertion with this law, so deep, at a speed and with a rest of so many s, recorded at 100 Hz with noise.
 fn recorded(
     name: String,
-    speed_mps: f64,
+    (stroke_m, speed_mps, rest_s): (f64, f64, f64),
     tissue: &Tissue,
     effects: &[AnyEffect],
     rng: &mut impl Rng,
 ) -> Insertion {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let law = Law::new(tissue, effects).expect("three effects");
-    let travel_s = 0.025 / speed_mps;
+    let travel_s = stroke_m / speed_mps;
     let (mut state, mut columns) = (LawState::default(), [vec![], vec![], vec![]]);
-    for k in 0..((2.0 * travel_s + 5.5) * 100.0) as usize {
+    for k in 0..((2.0 * travel_s + rest_s + 0.5) * 100.0) as usize {
         let t = k as f64 * 0.01;
         let (z, v) = match t {
             t if t < travel_s => (speed_mps * t, speed_mps),
-            t if t < travel_s + 5.0 => (0.025, 0.0),
-            t if t < 2.0 * travel_s + 5.0 => (0.025 - speed_mps * (t - travel_s - 5.0), -speed_mps),
+            t if t < travel_s + rest_s => (stroke_m, 0.0),
+            t if t < 2.0 * travel_s + rest_s => (stroke_m - speed_mps * (t - travel_s - rest_s), -speed_mps),
             _ => (0.0, 0.0),
         };
         let f = law.step(&mut state, t, z, v, |_| {}).total_n + NOISE_N * normal();
@@ -106,7 +106,7 @@ pub fn drawn(d: &Drawn) -> Vec<Insertion> {
 pub fn plain(seed: u64) -> Vec<Insertion> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut out = Vec::new();
-    for speed_mps in [1e-3, 3e-3] {
+    for speed_mps in [2.5e-3, 6e-3] {
         for k in 0..4 {
             let (surface, tough): (f64, f64) =
                 (StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng));
@@ -114,8 +114,8 @@ pub fn plain(seed: u64) -> Vec<Insertion> {
             tissue.surface_m += 1e-4 * surface;
             tissue.layers[0].stiffness_n_per_m = 250.0;
             tissue.layers[0].friction_ns_per_m2 = 2e4;
-            tissue.layers[0].puncture_n = Some(3.0 * (1.0 + 0.03 * tough));
-            out.push(recorded(format!("{speed_mps} {k}"), speed_mps, &tissue, &[], &mut rng));
+            tissue.layers[0].puncture_n = Some(2.0 * (1.0 + 0.03 * tough));
+            out.push(recorded(format!("{speed_mps} {k}"), (0.016, speed_mps, 2.0), &tissue, &[], &mut rng));
         }
     }
     out

@@ -174,3 +174,154 @@ fn tone(t: &[f64], e: &[f64]) -> Option<(f64, f64)> {
     }
     Some(best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Air, Line, before_contact, between, common, in_air_m, line, regress, tone};
+    use crate::set::first::Insertion;
+    use stylet_record::Recording;
+
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-9 * (1.0 + b.abs())
+    }
+
+    #[test]
+    fn a_line_of_least_squares_is_the_one_of_the_text_books() {
+        // Slope sum(dt df)/sum(dt^2) of four points, by hand: means 2.5 and 3.75, sums 8.25 and 5.
+        let (t, f) = ([1.0, 2.0, 3.0, 4.0], [1.5, 3.0, 4.0, 6.5]);
+        let l = line(&t, &f);
+        let (slope, level) = (8.0 / 5.0, 3.75);
+        assert!(near(l.rate_n_per_s, slope), "{l:?}");
+        assert!(near(l.first_n, level - 1.5 * slope), "{l:?}");
+        let rest: f64 = t.iter().zip(&f).map(|(t, f)| (f - level - slope * (t - 2.5)).powi(2)).sum();
+        assert!(near(l.sd_n, (rest / 4.0).sqrt()), "{l:?}");
+        // The instants begin anywhere: what counts is the first one.
+        let later = line(&t.map(|t| t + 7.0), &f);
+        assert!(near(later.first_n, l.first_n) && near(later.rate_n_per_s, slope));
+        // Where time stands still there is no slope, and the level is the mean.
+        assert_eq!(line(&[3.0, 3.0], &[1.0, 4.0]).first_n, 2.5);
+    }
+
+    #[test]
+    fn a_regression_gives_the_coefficients_that_made_the_force_and_what_no_column_explains() {
+        let rows: Vec<[f64; 3]> =
+            (0..9).map(f64::from).map(|k| [1.0, 0.3 * k - 1.1, (1.7 * k).sin()]).collect();
+        let y: Vec<f64> = rows.iter().map(|r| 0.7 * r[0] - 1.3 * r[1] + 2.9 * r[2]).collect();
+        let (x, rest) = regress(&rows, &y);
+        for (x, wanted) in x.iter().zip([0.7, -1.3, 2.9]) {
+            assert!((x - wanted).abs() < 1e-8, "{x} is not {wanted}");
+        }
+        assert!(rest.iter().all(|e| e.abs() < 1e-8));
+        // What is left stands at right angles to every column.
+        let bent: Vec<f64> = y.iter().enumerate().map(|(k, y)| y + ((k * k) as f64 * 0.37).cos()).collect();
+        let (_, rest) = regress(&rows, &bent);
+        for column in 0..3 {
+            let dot: f64 = rest.iter().zip(&rows).map(|(e, r)| e * r[column]).sum();
+            assert!(dot.abs() < 1e-8, "{dot}");
+        }
+        assert!(rest.iter().map(|e| e * e).sum::<f64>() > 0.1);
+    }
+
+    fn recording(n: usize, dt: f64, z: impl Fn(f64) -> f64, f: impl Fn(usize, f64) -> f64) -> Recording {
+        let t: Vec<f64> = (0..n).map(|k| 0.5 + dt * k as f64).collect();
+        let z = t.iter().map(|t| z(*t)).collect();
+        let f = t.iter().enumerate().map(|(k, t)| f(k, *t)).collect();
+        Recording::new(t, z, f).expect("clean columns")
+    }
+
+    /// Offset, drift, drive and noise at once; the noise alternates, so that neighbours are opposed.
+    #[test]
+    fn air_tells_offset_drift_drive_and_the_colour_of_its_noise_apart() {
+        let noise = |k: usize| if k.is_multiple_of(2) { 0.003 } else { -0.003 };
+        let there_and_back = |t: f64| if t < 2.5 { 0.004 * t } else { 0.02 - 0.004 * t };
+        let force = |k: usize, t: f64| 0.4 + 0.02 * (t - 0.5) + if t < 2.5 { 0.05 } else { -0.05 } + noise(k);
+        let air = Air::of(&recording(400, 0.01, there_and_back, force));
+        assert!((air.line.first_n - 0.4).abs() < 2e-3, "{air:?}");
+        assert!((air.line.rate_n_per_s - 0.02).abs() < 1e-3, "{air:?}");
+        assert!((air.line.sd_n - 0.003).abs() < 1.2e-3, "{air:?}");
+        assert!(air.ar1 < -0.5, "{air:?}");
+        assert!((air.drive_n.expect("it moves both ways") - 0.05).abs() < 2e-3, "{air:?}");
+        // At rest, or in one direction only, nothing tells a drive.
+        assert_eq!(Air::of(&recording(400, 0.01, |_| 0.0, force)).drive_n, None);
+        assert_eq!(Air::of(&recording(400, 0.01, |t| 0.004 * t, force)).drive_n, None);
+        let slow = noise(0);
+        let alike = Air::of(&recording(400, 0.01, |_| 0.0, |k, _| if k < 200 { slow } else { -slow }));
+        assert!(alike.ar1 > 0.5 && alike.line.sd_n < slow, "{alike:?}");
+    }
+
+    #[test]
+    fn the_strongest_tone_has_its_amplitude_and_its_frequency() {
+        // 4 s at 50 Hz: the grid's step is an eighth of a hertz.
+        let t: Vec<f64> = (0..201).map(|k| 0.7 + 0.02 * f64::from(k)).collect();
+        let wave = |hz: f64, a: f64, phase: f64| {
+            t.iter()
+                .map(move |t| a * (std::f64::consts::TAU * hz * (t - 0.7) + phase).sin())
+                .collect::<Vec<f64>>()
+        };
+        for (hz, a, phase) in [(3.25, 0.4, 0.3), (11.5, 0.07, 1.9), (24.0, 1.3, 0.2), (0.5, 0.6, 0.0)] {
+            let (amplitude, frequency) = tone(&t, &wave(hz, a, phase)).expect("a tone");
+            assert!((frequency - hz).abs() < 1e-9, "{hz}: {frequency}");
+            assert!((amplitude / a - 1.0).abs() < 0.03, "{hz}: {amplitude} for {a}");
+        }
+        let both: Vec<f64> =
+            wave(3.25, 0.4, 0.3).iter().zip(wave(11.5, 0.5, 1.0)).map(|(a, b)| a + b).collect();
+        assert!((tone(&t, &both).expect("a tone").1 - 11.5).abs() < 1e-9);
+        // Half the sampling rate and beyond show nothing, and too few samples tell nothing.
+        assert_eq!(tone(&t[..19], &wave(3.25, 0.4, 0.3)[..19]), None);
+        assert!(tone(&t[..20], &wave(3.25, 0.4, 0.3)[..20]).is_some());
+        assert_eq!(tone(&[1.0; 30], &[0.5; 30]), None);
+        assert!(tone(&t, &wave(7.0, 1.0, 0.0)).expect("a tone").1 < 25.0);
+    }
+
+    #[test]
+    fn numbers_on_which_insertions_agree_are_common_and_others_nothing() {
+        assert_eq!(common(&[0.31, 0.29, 0.3, 0.33, 0.1]), 0.3);
+        assert_eq!(common(&[-0.31, -0.29, -0.3]), -0.3);
+        // Half of its size is the most by which the middle one may lie apart.
+        assert_eq!(common(&[0.1, 0.2, 0.29]), 0.2);
+        assert_eq!(common(&[0.05, 0.2, 0.4]), 0.0);
+        assert_eq!(common(&[-0.2, 0.1, 0.3]), 0.0);
+    }
+
+    /// An insertion from 10 mm before a surface at 0: half of the way counts as air.
+    fn insertion(bias: f64, rate: f64, late: f64) -> Insertion {
+        let z = |t: f64| {
+            let t = t - 0.5;
+            if t < 10.0 { 0.003 * t - 0.01 } else { 0.02 - 0.006 * (t - 10.0) }
+        };
+        let jitter = |k: usize| 1e-3 * (((k * 7919) % 101) as f64 / 101.0 - 0.5);
+        let f = move |k: usize, t: f64| {
+            let back = if t > 15.5 { late } else { 0.0 };
+            bias + rate * (t - 0.5) + back + 300.0 * z(t).max(0.0) + jitter(k)
+        };
+        Insertion::new("one".to_owned(), recording(900, 0.02, z, f), 1)
+    }
+
+    #[test]
+    fn the_way_there_shows_the_line_of_the_air() {
+        let run = insertion(0.3, 0.02, 0.0);
+        assert!(near(in_air_m(&run.recording, 0.0), -0.005));
+        assert!(near(in_air_m(&run.recording, 0.004), -0.003));
+        let lines: Vec<Line> = before_contact(&[&run, &run], 0.0);
+        assert_eq!(lines.len(), 2);
+        assert!((lines[0].first_n - 0.3).abs() < 1e-3, "{:?}", lines[0]);
+        assert!((lines[0].rate_n_per_s - 0.02).abs() < 1e-3, "{:?}", lines[0]);
+        // With a surface believed too deep the tissue is in it, and that is not straight; one above the needle leaves no air.
+        assert!(before_contact(&[&run], 0.02).is_empty());
+        assert!(before_contact(&[&run], -0.0101).is_empty());
+        // Two tenths of a millimetre take four samples: too few.
+        assert!(before_contact(&[&run], -0.0095).is_empty());
+    }
+
+    #[test]
+    fn the_air_before_and_after_an_insertion_tells_its_drift() {
+        // The needle is back in air from 5 mm before the surface on: 14.2 s; the later half of what follows counts.
+        let rate = between(&insertion(0.3, 0.02, 0.0), 0.0).expect("air on both sides");
+        assert!((rate - 0.02).abs() < 2e-4, "{rate}");
+        // Another level at the end counts by the time between the middles of both stretches.
+        let (t0, t1) = (0.5 + 0.5 * 1.66, 0.5 * (0.5 + 899.0 * 0.02 + 16.1));
+        let rate = between(&insertion(0.3, 0.0, 0.5), 0.0).expect("air on both sides");
+        assert!((rate * (t1 - t0) - 0.5).abs() < 0.01, "{}", rate * (t1 - t0));
+        assert_eq!(between(&insertion(0.3, 0.02, 0.0), 0.03), None);
+    }
+}

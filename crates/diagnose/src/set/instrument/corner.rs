@@ -213,3 +213,125 @@ impl<'a> Corner<'a> {
 
 /// Columns of the regression.
 const COLUMNS: usize = 4;
+
+#[cfg(test)]
+mod tests {
+    use super::{At, Corner, How, LEAST_S, Left, STEP_S, late, lowest, together};
+    use crate::set::Insertion;
+    use stylet_record::Recording;
+
+    #[test]
+    fn the_lowest_point_of_a_parabola_lies_where_the_parabola_has_it() {
+        for place in [2.0, 2.3, 3.49, 5.75] {
+            let curve: Vec<f64> = (0..9).map(|k| 4.0 + 1.7 * (f64::from(k) - place).powi(2)).collect();
+            let (at, height) = lowest(&curve);
+            assert!((at - place * STEP_S).abs() < 1e-12, "{place}: {at}");
+            let nearest = curve.iter().copied().fold(f64::INFINITY, f64::min);
+            assert_eq!(height, nearest);
+        }
+        // At an end there is nothing to go between; on a flat bottom the first is as good as any.
+        assert_eq!(lowest(&[1.0, 2.0, 5.0]), (0.0, 1.0));
+        assert_eq!(lowest(&[5.0, 2.0, 1.0]), (2.0 * STEP_S, 1.0));
+        assert_eq!(lowest(&[7.0, 7.0, 7.0]), (0.0, 7.0));
+    }
+
+    #[test]
+    fn corners_are_summed_at_the_length_that_suits_each_kind_best_and_one_may_be_left_out() {
+        let one = |name: &str, add: f64| Left {
+            name: name.to_owned(),
+            by: std::array::from_fn(|d| {
+                (0..3).map(|k| add + (d as f64 - 1.0).powi(2) + 10.0 * k as f64).collect()
+            }),
+        };
+        let back = vec![one("a", 1.0), one("b", 4.0)];
+        let stop = vec![one("b", 0.5)];
+        let all = together(&[back, stop], None);
+        // Length 1 adds nothing; two corners and one.
+        assert_eq!(all, [5.5, 35.5, 65.5]);
+        let back = vec![one("a", 1.0), one("b", 4.0)];
+        let stop = vec![one("b", 0.5)];
+        assert_eq!(together(&[back, stop], Some("b")), [1.0, 11.0, 21.0]);
+    }
+
+    /// In for 8 s, a rest, and back, at 50 Hz; the force is that of the position so many s ago, through a lag.
+    fn run(name: &str, rest_s: f64, delay_s: f64, lag_s: f64, seed: u64) -> Insertion {
+        let z = |t: f64| match t {
+            t if t < 8.0 => 0.0025 * t - 0.002,
+            t if t < 8.0 + rest_s => 0.018,
+            t => (0.018 - 0.0025 * (t - 8.0 - rest_s)).max(-0.002),
+        };
+        let (mut slow, mut noise) = (0.0, seed);
+        let (mut t, mut f) = (Vec::new(), Vec::new());
+        for k in 0..((17.0 + rest_s) * 50.0) as usize {
+            let at = 0.02 * k as f64;
+            noise = (noise * 1_103_515_245 + 12_345) % 2_147_483_648;
+            let there = z(at - delay_s);
+            let load = 180.0 * there.max(0.0);
+            // Friction turns where the way back begins.
+            let back = if at - delay_s > 8.0 + rest_s {
+                0.6 * libm::exp(-(0.018 - there) / 3e-4) - 0.6
+            } else {
+                0.0
+            };
+            let share = if lag_s > 0.0 && k > 0 { 1.0 - libm::exp(-0.02 / lag_s) } else { 1.0 };
+            slow += (load + back - slow) * share;
+            t.push(at);
+            f.push(slow + 0.002 * (noise as f64 / 2_147_483_648.0 - 0.5));
+        }
+        let z = t.iter().map(|t| z(*t)).collect();
+        Insertion::new(name.to_owned(), Recording::new(t, z, f).expect("clean columns"), 1)
+    }
+
+    fn said(rest_s: f64, delay_s: f64, lag_s: f64) -> Option<super::Late> {
+        let runs: Vec<Insertion> =
+            (0..4).map(|k| run(&format!("{k}"), rest_s, delay_s, lag_s, 17 + 5 * k)).collect();
+        late(&runs.iter().collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_late_and_a_slow_force_are_told_with_their_time() {
+        assert_eq!(said(4.0, 0.0, 0.0), None);
+        let l = said(4.0, 0.26, 0.0).expect("late");
+        assert_eq!(l.how, How::Delayed);
+        assert!((l.by_s - 0.26).abs() < 0.01 && l.low_s < l.by_s && l.by_s < l.high_s, "{l:?}");
+        let l = said(4.0, 0.0, 0.32).expect("slow");
+        assert_eq!(l.how, How::Slow);
+        assert!((l.by_s - 0.32).abs() < 0.02, "{l:?}");
+        assert!(l.high_s - l.low_s < 0.1 && (l.high_s + l.low_s - 2.0 * l.by_s).abs() < 1e-9, "{l:?}");
+        // What play makes, too.
+        assert_eq!(said(4.0, LEAST_S - 0.03, 0.0), None);
+    }
+
+    #[test]
+    fn a_corner_counts_only_when_it_stands_alone() {
+        let has = |run: &Insertion| [At::Back, At::Stop].map(|at| Corner::of(run, at).is_some());
+        assert_eq!(has(&run("a", 4.0, 0.0, 0.0, 3)), [true, true]);
+        // A rest shorter than the stretches around it: the corner of the way back has the stop in it, and the stop the way back.
+        assert_eq!(has(&run("a", 0.5, 0.0, 0.0, 3)), [false, false]);
+        assert_eq!(has(&run("a", 0.9, 0.0, 0.0, 3)), [false, true]);
+        assert_eq!(has(&run("a", 0.0, 0.0, 0.0, 3)), [true, false]);
+        // A rupture within or shortly before.
+        let mut torn = run("a", 4.0, 0.0, 0.0, 3);
+        for (at, wanted) in [
+            (6.1, [true, true]),
+            (6.3, [true, false]),
+            (8.7, [true, false]),
+            (9.0, [true, true]),
+            (10.1, [true, true]),
+            (10.3, [false, true]),
+            (12.7, [false, true]),
+            (12.9, [true, true]),
+        ] {
+            torn.ruptures_s = vec![at];
+            assert_eq!(has(&torn), wanted, "{at}");
+        }
+        let whole = run("a", 4.0, 0.0, 0.0, 3);
+        let corner = Corner::of(&whole, At::Back).expect("a corner");
+        assert!((corner.at_s - 12.02).abs() < 0.06, "{}", corner.at_s);
+        assert!((corner.turned_m - 0.018).abs() < 1e-9);
+        assert_eq!(corner.time_s.len(), corner.force_n.len());
+        assert!((corner.time_s[0] - (corner.at_s - 1.0)).abs() < 0.021);
+        assert!((corner.time_s[corner.time_s.len() - 1] - (corner.at_s + 0.8)).abs() < 0.021);
+        assert_eq!(corner.time_s[0], whole.recording.time_s[corner.first]);
+    }
+}

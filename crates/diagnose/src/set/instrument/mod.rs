@@ -260,3 +260,138 @@ pub fn timing(recording: &Recording) -> String {
         1e3 * DEFAULT_HALF_WIDTH_S
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Air, Checks, Instrument, Line, load, timing};
+    use crate::set::Insertion;
+    use stylet_record::Recording;
+
+    fn still(f: Vec<f64>) -> Recording {
+        let t = (0..f.len()).map(|k| 0.1 * k as f64).collect();
+        Recording::new(t, vec![0.0; f.len()], f).expect("clean columns")
+    }
+
+    #[test]
+    fn a_load_tells_the_gain_unless_the_sensor_is_at_its_end() {
+        let wobble = |k: usize| 1e-3 * ((k * 37) % 11) as f64;
+        let f: Vec<f64> = (0..50).map(|k| 5.5 + wobble(k)).collect();
+        let middle = stylet_stats::median(&mut f.clone());
+        let gain = load(&still(f.clone()), 5.0, 0.2, false).expect("a gain");
+        assert!((gain - ((middle - 0.2) / 5.0 - 1.0)).abs() < 1e-12, "{gain}");
+        // Where the zero drifts the first instant counts.
+        let drifting: Vec<f64> = (0..50).map(|k| 5.5 + 0.03 * k as f64).collect();
+        let gain = load(&still(drifting), 5.0, 0.2, true).expect("a gain");
+        assert!((gain - (5.3 / 5.0 - 1.0)).abs() < 1e-9, "{gain}");
+        // 15 of 50 samples at one end may be chance, 16 are not; from below as from above.
+        for sign in [1.0, -1.0] {
+            for (count, told) in [(15, true), (16, false)] {
+                let f = (0..50).map(|k| sign * if k < count { 6.0 } else { 5.5 + wobble(k) }).collect();
+                assert_eq!(load(&still(f), 5.0, 0.0, false).is_some(), told, "{count}");
+            }
+        }
+    }
+
+    #[test]
+    fn insertions_that_agree_tell_bias_and_drift_and_the_check_in_air_what_they_do_not() {
+        let line = |first_n: f64, rate_n_per_s: f64| Line { first_n, rate_n_per_s, sd_n: 0.013 };
+        let lines = [line(0.31, 0.010), line(0.3, 0.011), line(0.32, 0.0102)];
+        let air = Air { line: line(0.05, 0.02), ar1: 0.4, tone: Some((0.1, 7.0)), drive_n: Some(0.2) };
+        let mut only = Instrument::default();
+        only.of_sensor(None, Some(&lines), 20.0, 10.0);
+        assert_eq!((only.bias_n, only.noise_n, only.ar1), (Some(0.31), Some(0.013), None));
+        assert!((only.drift_n.expect("a drift") - 0.0102 * 20.0).abs() < 1e-12);
+        // Slopes that say little of the end say nothing: half of their interval over the insertion against 2 % of the force.
+        let mut unsure = Instrument::default();
+        unsure.of_sensor(None, Some(&lines), 20.0, 1.0);
+        assert_eq!(unsure.drift_n, None);
+        let mut both = Instrument::default();
+        both.of_sensor(Some(&air), Some(&lines), 20.0, 10.0);
+        assert_eq!((both.bias_n, both.drift_n), (Some(0.31), Some(0.4)));
+        assert_eq!((both.noise_n, both.ar1), (Some(0.013), Some(0.4)));
+        assert_eq!((both.line, both.drive_n), (Some((0.1, 7.0)), Some(0.2)));
+        // A bias of nothing beside the force leaves the check's.
+        let mut small = Instrument::default();
+        small.of_sensor(Some(&air), Some(&lines), 20.0, 20.0);
+        assert_eq!(small.bias_n, Some(0.05));
+        let mut none = Instrument::default();
+        none.of_sensor(Some(&air), None, 20.0, 10.0);
+        assert_eq!(none.bias_n, Some(0.05));
+    }
+
+    #[test]
+    fn what_makes_less_than_a_fiftieth_of_the_force_is_excluded_and_the_rest_shown() {
+        let mut seen = Instrument {
+            gain: Some(-0.03),
+            bias_n: Some(-0.19),
+            drift_n: Some(0.21),
+            line: Some((0.25, 7.5)),
+            drive_n: Some(-0.22),
+            ..Instrument::default()
+        };
+        seen.judge(10.0, 20.0, true, None);
+        let excluded: Vec<(&str, f64)> =
+            seen.excluded.iter().map(|e| (e.effect.as_str(), e.size_n)).collect();
+        assert_eq!(excluded, [("force_bias", 0.19)]);
+        let shown: Vec<&str> = seen.shown.iter().map(|e| e.effect.as_str()).collect();
+        assert_eq!(shown, ["force_gain", "force_drift", "periodic_interference", "drive_friction"]);
+        let of = |k: usize, path: &str| seen.shown[k].parameters[path];
+        assert!((seen.shown[0].size_n - 0.3).abs() < 1e-12 && of(0, "eps").value == -0.03);
+        assert!((of(1, "rate_n_per_s").value - 0.0105).abs() < 1e-12);
+        assert_eq!((of(2, "amplitude_n").value, of(2, "frequency_hz").low), (0.25, 7.5));
+        // The phase is nobody's.
+        assert_eq!(seen.shown[2].parameters.len(), 2);
+        assert!(seen.shown[0].evidence.contains("-3.00 %"), "{}", seen.shown[0].evidence);
+        assert!(seen.excluded[0].evidence.contains("-190.0 mN"), "{}", seen.excluded[0].evidence);
+        let cause = seen.shown[3].cause();
+        assert_eq!(
+            (cause.effect.as_str(), cause.confidence, cause.parameters["force_n"].value),
+            ("drive_friction", 0.99, -0.22)
+        );
+        // Without a check in air neither tones nor the drive are told.
+        seen.judge(10.0, 20.0, false, None);
+        assert_eq!(seen.shown.len(), 2);
+    }
+
+    #[test]
+    fn insertions_without_checks_are_looked_at_by_themselves() {
+        let run = |k: usize, ahead_m: f64| {
+            let t: Vec<f64> = (0..1000).map(|i| 0.02 * i as f64).collect();
+            let z: Vec<f64> = t
+                .iter()
+                .map(|t| if *t < 12.0 { 0.002 * t - ahead_m } else { 0.024 - ahead_m - 0.004 * (t - 12.0) })
+                .collect();
+            let noise = |i: usize| 1e-3 * (((i * 7919 + 31 * k) % 101) as f64 / 101.0 - 0.5);
+            let f = z.iter().enumerate().map(|(i, z)| 0.2 + 150.0 * z.max(0.0) + noise(i)).collect();
+            Insertion::new(format!("{k}"), Recording::new(t, z, f).expect("clean columns"), 1)
+        };
+        let runs: Vec<Insertion> = (0..3).map(|k| run(k, 0.008)).collect();
+        let refs: Vec<&Insertion> = runs.iter().collect();
+        let seen = Instrument::look(&Checks::default(), &refs, 0.0);
+        assert!((seen.bias_n.expect("a bias") - 0.2).abs() < 1e-3, "{seen:?}");
+        assert!(seen.drift_n.expect("no drift").abs() < 1e-3, "{seen:?}");
+        assert_eq!(seen.shown.iter().map(|s| s.effect.as_str()).collect::<Vec<_>>(), ["force_bias"]);
+        assert_eq!(seen.drifts_n_per_s.len(), 3);
+        // A load over a zero that the insertions tell.
+        let f = (0..40).map(|k| 0.2 + 5.5 + 1e-3 * ((k * 37) % 11) as f64).collect();
+        let weight = still(f);
+        let checks = Checks { load: Some((&weight, 5.0)), ..Checks::default() };
+        let seen = Instrument::look(&checks, &refs, 0.0);
+        assert!((seen.gain.expect("a gain") - 0.1).abs() < 2e-3, "{:?}", seen.gain);
+        // Half of the insertions with air are enough, fewer are not.
+        let bias = |which: &[&Insertion]| Instrument::look(&Checks::default(), which, 0.0).bias_n;
+        let (late, later) = (run(3, -0.001), run(4, -0.001));
+        assert!(bias(&[refs[0], &late]).is_some() && bias(&refs[..1]).is_some());
+        assert_eq!(bias(&[refs[0], &late, &later]), None);
+    }
+
+    #[test]
+    fn the_timing_of_a_run_is_told_as_it_is() {
+        let t = vec![0.0, 0.01, 0.02, 0.035, 0.05];
+        let z = vec![0.002, 0.003, 0.0075, 0.006, 0.005];
+        let text = timing(&Recording::new(t, z, vec![0.0; 5]).expect("clean columns"));
+        for part in ["5 samples", "80.0 Hz", "largest gap 15.0 ms", "ends at 5.5 mm"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+}

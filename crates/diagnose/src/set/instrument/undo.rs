@@ -124,3 +124,127 @@ fn quick(recording: &mut Recording, lag_s: f64) {
     };
     recording.force_n = (0..f.len()).map(|i| f[i] + lag_s * slope(i)).collect();
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{earlier, quick};
+    use crate::set::Insertion;
+    use crate::set::instrument::{Instrument, Shown};
+    use std::collections::BTreeMap;
+    use stylet_record::Recording;
+    use stylet_tissue::{
+        AnyEffect, DriveFriction, Effect, ForceBias, ForceDrift, ForceGain, LowPassLag, PeriodicInterference,
+        TimeDelay,
+    };
+
+    /// Forces that name their samples: 3 k + 1, at instants 0.1 s apart from 2 s on.
+    fn numbered(n: usize) -> Recording {
+        let t: Vec<f64> = (0..n).map(|k| 2.0 + 0.1 * k as f64).collect();
+        let z = (0..n).map(|k| 1e-3 * k as f64).collect();
+        Recording::new(t, z, (0..n).map(|k| 3.0 * k as f64 + 1.0).collect()).expect("clean columns")
+    }
+
+    #[test]
+    fn a_force_undelayed_stands_where_it_was_made_and_the_end_goes() {
+        let r = numbered(30);
+        for (delay_s, by) in [(0.3, 3), (0.34, 3), (0.36, 4), (0.04, 0), (0.06, 1)] {
+            let out = earlier(&r, delay_s);
+            // What would need samples after the last one goes.
+            let kept = 30 - (delay_s * 10.0 - 1e-9).ceil() as usize;
+            assert_eq!(out.len(), kept, "{delay_s}");
+            for i in 0..kept {
+                assert_eq!(out.force_n[i], r.force_n[i + by], "{delay_s}, sample {i}");
+                assert_eq!((out.time_s[i], out.position_m[i]), (r.time_s[i], r.position_m[i]));
+            }
+            assert_eq!(out.velocity_mps.len(), kept);
+        }
+        assert_eq!(earlier(&r, 0.0), r);
+        assert_eq!(earlier(&r, -0.3), r);
+        // A delay longer than the recording leaves two samples.
+        assert_eq!(earlier(&r, 9.0).len(), 2);
+    }
+
+    #[test]
+    fn a_lag_undone_adds_the_slope_times_its_time_constant() {
+        let mut r = numbered(30);
+        let before = r.force_n.clone();
+        quick(&mut r, 0.25);
+        // 3 N in a tenth of a second: 30 N/s, at the ends too.
+        for (f, b) in r.force_n.iter().zip(&before) {
+            assert!((f - b - 0.25 * 30.0).abs() < 1e-9, "{f} {b}");
+        }
+        // A bend counts over three samples to either side: the line of 0 0 0 0 1 2 3 has the slope 14/28 per sample.
+        let mut bent = numbered(30);
+        bent.force_n = (0..30).map(|k| f64::from((k - 15).max(0))).collect();
+        quick(&mut bent, 0.1);
+        assert!((bent.force_n[15] - 14.0 / 28.0).abs() < 1e-9, "{}", bent.force_n[15]);
+        assert!(bent.force_n[12].abs() < 1e-12 && (bent.force_n[18] - 4.0).abs() < 1e-9);
+        let kept = bent.force_n.clone();
+        quick(&mut bent, 0.0);
+        assert_eq!(bent.force_n, kept);
+    }
+
+    fn shows(all: Vec<AnyEffect>) -> Instrument {
+        let shown = all.into_iter().map(|e| Shown {
+            effect: e.id().to_owned(),
+            parameters: BTreeMap::new(),
+            size_n: 1.0,
+            evidence: String::new(),
+            itself: Some(e),
+        });
+        Instrument { shown: shown.collect(), ..Instrument::default() }
+    }
+
+    #[test]
+    fn drift_bias_and_gain_are_undone_in_the_order_in_which_the_sensor_made_them() {
+        let run = Insertion::new("one".to_owned(), numbered(40), 1);
+        let (bias, gain, rate) = (0.7, 0.25, 0.4);
+        let all: Vec<AnyEffect> = vec![
+            ForceBias { force_n: bias }.into(),
+            ForceGain { eps: gain }.into(),
+            ForceDrift { rate_n_per_s: rate }.into(),
+            PeriodicInterference { amplitude_n: 1.0, frequency_hz: 3.0, phase_rad: 0.0 }.into(),
+            DriveFriction { force_n: 0.5 }.into(),
+        ];
+        let mut seen = shows(all);
+        let ids: Vec<&str> = seen.effects().iter().map(Effect::id).collect();
+        assert_eq!(ids, ["force_bias", "force_gain", "force_drift"], "tones and the drive stay");
+        for (own, rate) in [(None, rate), (Some(-0.15), -0.15)] {
+            seen.drifts_n_per_s = vec![own];
+            let out = seen.undo(&[&run]);
+            for (k, f) in out.runs[0].recording.force_n.iter().enumerate() {
+                let wanted = (3.0 * k as f64 + 1.0 - rate * 0.1 * k as f64 - bias) / (1.0 + gain);
+                assert!((f - wanted).abs() < 1e-9, "{k}: {f} for {wanted}");
+            }
+        }
+        // An own drift counts only where a drift is shown at all.
+        let mut biased = shows(vec![ForceBias { force_n: bias }.into()]);
+        biased.drifts_n_per_s = vec![Some(9.0)];
+        let out = biased.undo(&[&run]);
+        assert!((out.runs[0].recording.force_n[20] - 61.0 + bias).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_delay_and_a_lag_are_undone_before_the_rest_and_a_limit_is_told_in_true_newtons() {
+        let mut r = numbered(60);
+        r.force_n.iter_mut().for_each(|f| *f = f.min(100.0));
+        let run = Insertion::new("one".to_owned(), r.clone(), 2);
+        let seen = shows(vec![
+            TimeDelay { delay_s: 0.2 }.into(),
+            LowPassLag { time_constant_s: 0.05 }.into(),
+            ForceBias { force_n: 1.0 }.into(),
+            ForceGain { eps: 0.1 }.into(),
+        ]);
+        let out = seen.undo(&[&run]);
+        assert_eq!(out.raw.limit_n, Some(100.0));
+        assert!((out.runs[0].limit_n.expect("a limit") - 90.0).abs() < 1e-9);
+        assert_eq!(out.runs[0].recording.len(), 58);
+        assert_eq!(out.runs[0].ruptures_s.len(), 2);
+        let wanted = (3.0 * 12.0 + 1.0 + 0.05 * 30.0 - 1.0) / 1.1;
+        assert!((out.runs[0].recording.force_n[10] - wanted).abs() < 1e-9);
+        // Without anything shown the insertion stays as it is, but for the limit.
+        let same = Instrument::default().undo(&[&run]);
+        assert_eq!(same.runs[0].recording, r);
+        assert_eq!(same.runs[0].limit_n, Some(100.0));
+    }
+}

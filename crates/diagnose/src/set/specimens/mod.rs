@@ -289,3 +289,195 @@ fn value(law: &Model, path: &str) -> Option<f64> {
         _ => of(path),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Over, look, numbers, relaxing, value, whole};
+    use crate::outcome::Verdict;
+    use crate::set::Insertion;
+    use crate::set::first::pressed;
+    use std::sync::Arc;
+    use stylet_identify::model::{Choice, Model};
+    use stylet_record::Recording;
+    use stylet_stats::student;
+    use stylet_tissue::{AnyEffect, Effect, Law, LawState, Layer, NonlinearElasticity, Tissue};
+
+    fn tissue(k: f64) -> Tissue {
+        let layer = Layer {
+            name: "gel".to_owned(),
+            thickness_m: 0.03,
+            stiffness_n_per_m: k,
+            friction_ns_per_m2: 0.0,
+            puncture_n: None,
+        };
+        Tissue { surface_m: 0.001, layers: vec![layer] }
+    }
+
+    /// A ramp of 5 mm in a second and a hold of so many s, at 50 Hz, with noise of 1 mN.
+    fn specimen(name: &str, k: f64, effects: &[AnyEffect], hold_s: f64, seed: usize) -> Insertion {
+        let t = tissue(k);
+        let law = Law::new(&t, effects).expect("a law");
+        let mut state = LawState::default();
+        let (mut times, mut z, mut f) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..((1.2 + hold_s) * 50.0) as usize {
+            let at = 0.02 * i as f64;
+            let (place, v) = if at < 0.2 {
+                (0.0, 0.0)
+            } else if at < 1.2 {
+                (0.005 * (at - 0.2), 0.005)
+            } else {
+                (0.005, 0.0)
+            };
+            let force = law.step(&mut state, at, place, v, |_| {}).total_n;
+            times.push(at);
+            z.push(place);
+            f.push(force + 2e-3 * (((i * 7919 + 31 * seed) % 101) as f64 / 101.0 - 0.5));
+        }
+        Insertion::new(name.to_owned(), Recording::new(times, z, f).expect("clean columns"), 1)
+    }
+
+    fn law(effects: &[AnyEffect]) -> Model {
+        let mut m = Model::base(Arc::new(pressed(&tissue(300.0), &specimen("a", 300.0, &[], 4.0, 1))), 1);
+        m.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        m
+    }
+
+    #[test]
+    fn a_specimen_is_a_ramp_and_a_hold_of_three_seconds() {
+        let good = specimen("a", 300.0, &[], 4.0, 1);
+        assert_eq!(whole(&good), Ok(()));
+        assert_eq!(whole(&specimen("a", 300.0, &[], 2.8, 1)).err().as_deref(), Some("held for 2.8 s only"));
+        assert!(whole(&specimen("a", 300.0, &[], 3.1, 1)).is_ok());
+        let mut short = good.clone();
+        for c in [&mut short.recording.time_s, &mut short.recording.position_m, &mut short.recording.force_n]
+        {
+            let all: Vec<f64> = c.iter().copied().step_by(6).collect();
+            *c = all;
+        }
+        assert_eq!(short.recording.len(), 44);
+        short.phases.deepest = 10;
+        assert_eq!(whole(&short).err().as_deref(), Some("44 samples are too few"));
+        for (count, fine) in [(50, true), (49, false)] {
+            let mut r = good.clone();
+            r.phases.deepest = 5;
+            let t: Vec<f64> = (0..count).map(|k| 0.1 * f64::from(k)).collect();
+            let n = t.len();
+            r.recording = Recording::new(t, vec![0.0; n], vec![0.0; n]).expect("clean columns");
+            r.phases.back = n;
+            assert_eq!(whole(&r).is_ok(), fine, "{count}");
+        }
+        let mut back = good;
+        back.phases.back -= 5;
+        assert_eq!(whole(&back).err().as_deref(), Some("the tool comes back"));
+    }
+
+    #[test]
+    fn terms_are_told_the_fast_one_first() {
+        let two = |a: (f64, f64), b: (f64, f64)| {
+            law(&[NonlinearElasticity { kappa_per_m: 30.0 }.into(), relaxing(&[a, b])])
+        };
+        for m in [two((0.2, 0.5), (0.3, 6.0)), two((0.3, 6.0), (0.2, 0.5))] {
+            let told = [
+                "terms.0.fraction",
+                "terms.0.time_constant_s",
+                "terms.1.fraction",
+                "terms.1.time_constant_s",
+                "kappa_per_m",
+            ]
+            .map(|p| value(&m, p));
+            assert_eq!(told, [Some(0.2), Some(0.5), Some(0.3), Some(6.0), Some(30.0)]);
+        }
+        let one = law(&[relaxing(&[(0.2, 0.5)])]);
+        assert_eq!((value(&one, "terms.0.fraction"), value(&one, "terms.1.fraction")), (Some(0.2), None));
+    }
+
+    #[test]
+    fn numbers_over_specimens_have_students_interval_time_constants_in_their_logarithm() {
+        let (fractions, times) = ([0.2, 0.26, 0.31, 0.24, 0.22], [0.5, 0.9, 0.7, 1.4, 0.8]);
+        let each: Vec<super::One> = (0..5)
+            .map(|k| super::One {
+                errors: Vec::new(),
+                laws: vec![law(&[]), law(&[relaxing(&[(fractions[k], times[k])])])],
+                straight: (0.0, 0.0),
+            })
+            .collect();
+        assert!(numbers(&each, 0).is_empty() && numbers(&[], 0).is_empty());
+        let told = numbers(&each, 1);
+        let of = |x: &[f64]| {
+            let mean = x.iter().sum::<f64>() / 5.0;
+            let sd = (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 4.0).sqrt();
+            (mean, student::quantile(0.975, 4.0) * sd / 5.0_f64.sqrt())
+        };
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} for {b}");
+        let Over { name, mean, low, high, nine_of_ten } = told[0].clone();
+        let (m, reach) = of(&fractions);
+        assert_eq!(name, "terms.0.fraction");
+        [(mean, m), (low, m - reach), (high, m + reach)].iter().for_each(|(a, b)| near(*a, *b));
+        // Between neighbours of 0.2, 0.22 .. 0.31: a fifth of the way at either end.
+        near(nine_of_ten.0, 0.2 + 0.2 * 0.02);
+        near(nine_of_ten.1, 0.31 - 0.2 * 0.05);
+        let logs: Vec<f64> = times.iter().map(|x: &f64| x.ln()).collect();
+        let (m, reach) = of(&logs);
+        let t = &told[1];
+        [(t.mean, m.exp()), (t.low, (m - reach).exp()), (t.high, (m + reach).exp())]
+            .iter()
+            .for_each(|(a, b)| near(*a, *b));
+        near(t.nine_of_ten.0, (0.5_f64.ln() + 0.2 * (0.7_f64 / 0.5).ln()).exp());
+    }
+
+    #[test]
+    fn what_specimens_relax_by_is_found_and_what_they_do_not_have_is_not() {
+        let relaxes = [relaxing(&[(0.3, 2.5)])];
+        let mut runs: Vec<Insertion> =
+            (0..4).map(|k| specimen(&format!("{k}"), 280.0 + 20.0 * k as f64, &relaxes, 4.0, k)).collect();
+        runs.push(specimen("short", 300.0, &relaxes, 1.0, 9));
+        let s = look(&tissue(300.0), &runs).expect("specimens");
+        assert_eq!(
+            (s.used, s.unused.as_slice(), s.punctured.len()),
+            (4, &[("short".to_owned(), "held for 1.0 s only".to_owned())][..], 0)
+        );
+        assert_eq!(
+            s.rungs.iter().map(|r| r.kept).collect::<Vec<_>>(),
+            [true, false, true, false],
+            "{:?}",
+            s.rungs
+        );
+        assert_eq!(s.kept().collect::<Vec<_>>(), ["stress_relaxation"]);
+        let of = |name: &str| s.numbers.iter().find(|n| n.name == name).expect("a number");
+        assert!((of("terms.0.fraction").mean - 0.3).abs() < 0.02, "{:?}", s.numbers);
+        assert!((of("terms.0.time_constant_s").mean / 2.5 - 1.0).abs() < 0.1, "{:?}", s.numbers);
+        assert!(s.rungs[2].left_out_n < 0.3 * s.rungs[0].left_out_n && s.rungs[2].better == 1.0);
+        assert!(s.rungs[0].better == 0.0 && s.rungs[2].fitted_n < 2e-3, "{:?}", s.rungs);
+        let d = s.diagnosis(&runs);
+        assert_eq!((d.verdict, d.causes.len(), d.causes[0].confidence), (Verdict::Named, 1, 1.0));
+        assert!(
+            d.causes[0].parameters.keys().all(|k| k.starts_with("terms."))
+                && !d.causes[0].parameters.is_empty()
+        );
+        assert_eq!(
+            (d.gain.rmse_before_n, d.gain.rmse_after_n),
+            (s.rungs[0].left_out_n, s.rungs[2].left_out_n)
+        );
+        assert_eq!(d.invisible, ["power_law_friction", "shaft_slip", "rate_dependent_puncture"]);
+        // A spring alone.
+        let plain: Vec<Insertion> =
+            (0..4).map(|k| specimen(&format!("{k}"), 280.0 + 20.0 * k as f64, &[], 4.0, k)).collect();
+        let s = look(&tissue(300.0), &plain).expect("specimens");
+        assert_eq!(s.kept().count(), 0, "{:?}", s.rungs);
+        assert_eq!(s.diagnosis(&plain).verdict, Verdict::None);
+        assert!(look(&tissue(300.0), &runs[4..]).is_none());
+        // A curved one that relaxes with two terms.
+        let both: [AnyEffect; 2] =
+            [NonlinearElasticity { kappa_per_m: 150.0 }.into(), relaxing(&[(0.25, 0.3), (0.3, 3.0)])];
+        let curved: Vec<Insertion> =
+            (0..4).map(|k| specimen(&format!("{k}"), 280.0 + 20.0 * k as f64, &both, 9.0, k)).collect();
+        let s = look(&tissue(300.0), &curved).expect("specimens");
+        assert_eq!(s.rungs.iter().map(|r| r.kept).collect::<Vec<_>>(), [true; 4], "{:?}", s.rungs);
+        let d = s.diagnosis(&curved);
+        assert_eq!(
+            d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>(),
+            ["nonlinear_elasticity", "stress_relaxation"]
+        );
+        assert_eq!(d.causes[0].parameters.keys().collect::<Vec<_>>(), ["kappa_per_m"]);
+    }
+}

@@ -1,0 +1,128 @@
+//! Answers kept in a text file, and their comparison with what comes out today.
+
+#![allow(dead_code, reason = "every test uses a part")]
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+/// Numbers agree to this share: more than another libm changes, less than any change of a rule.
+const SAME: f64 = 1e-5;
+/// And numbers below this one are nothing.
+const NOTHING: f64 = 1e-14;
+
+/// One writes at a time.
+static FILE: Mutex<()> = Mutex::new(());
+
+/// Lines of one case: a path and what stands there.
+#[derive(Default)]
+pub struct Told(Vec<String>);
+
+impl Told {
+    /// A number, to eight digits.
+    pub fn number(&mut self, path: &str, x: f64) {
+        self.0.push(format!("{path} {}", digits(x)));
+    }
+
+    /// Words.
+    pub fn words(&mut self, path: &str, text: &str) {
+        self.0.push(format!("{path} {}", text.split_whitespace().collect::<Vec<_>>().join(" ")));
+    }
+
+    /// Some numbers on one line.
+    pub fn numbers(&mut self, path: &str, all: &[f64]) {
+        let all: Vec<String> = all.iter().map(|x| digits(*x)).collect();
+        self.0.push(format!("{path} {}", all.join(" ")));
+    }
+
+    /// A long column: how many, mean, root mean square, a sum in which every place weighs something else, some places.
+    pub fn column(&mut self, path: &str, x: &[f64]) {
+        let n = x.len() as f64;
+        let sum = |w: &dyn Fn(f64) -> f64| {
+            x.iter().enumerate().filter(|(_, x)| x.is_finite()).map(|(i, x)| w(i as f64) * x).sum::<f64>()
+        };
+        let square = x.iter().filter(|x| x.is_finite()).map(|x| x * x).sum::<f64>();
+        let at = |share: f64| x.get((share * n) as usize).copied().unwrap_or(f64::NAN);
+        let told = [
+            n,
+            sum(&|_| 1.0) / n,
+            (square / n).sqrt(),
+            sum(&|i| (i / n).powi(2)) / n,
+            at(0.31),
+            at(0.64),
+            at(0.93),
+        ];
+        self.numbers(path, &told);
+    }
+
+    /// Whatever can be written as JSON, one line per leaf.
+    pub fn value(&mut self, path: &str, value: &Value) {
+        match value {
+            Value::Object(fields) => fields.iter().for_each(|(k, v)| self.value(&format!("{path}.{k}"), v)),
+            Value::Array(all) if all.iter().all(Value::is_number) && !all.is_empty() => {
+                self.numbers(path, &all.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
+            }
+            Value::Array(all) => {
+                all.iter().enumerate().for_each(|(k, v)| self.value(&format!("{path}.{k}"), v))
+            }
+            Value::Number(x) => self.number(path, x.as_f64().unwrap_or(f64::NAN)),
+            Value::String(text) => self.words(path, text),
+            other => self.words(path, &other.to_string()),
+        }
+    }
+
+    /// Compares with what is kept under this name, or keeps it when `STYLET_RECORD` is set.
+    pub fn hold(self, file: &str, name: &str) {
+        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests").join(file);
+        if std::env::var_os("STYLET_RECORD").is_some() {
+            let _one = FILE.lock().unwrap_or_else(|e| e.into_inner());
+            let mut kept = sections(&std::fs::read_to_string(&path).unwrap_or_default());
+            kept.insert(name.to_owned(), self.0);
+            let mut text = String::new();
+            for (name, lines) in kept {
+                let _ = writeln!(text, "[{name}]\n{}\n", lines.join("\n"));
+            }
+            std::fs::write(&path, text).expect("the file of answers");
+            return;
+        }
+        let kept = sections(&std::fs::read_to_string(&path).expect("the file of answers"));
+        let kept = kept.get(name).expect("recorded under this name");
+        let differ: Vec<String> = (0..kept.len().max(self.0.len()))
+            .map(|k| (kept.get(k).map_or("", String::as_str), self.0.get(k).map_or("", String::as_str)))
+            .filter(|(was, is)| !alike(was, is))
+            .map(|(was, is)| format!("  was {was}\n  is  {is}"))
+            .take(12)
+            .collect();
+        assert!(differ.is_empty(), "{name}: answers changed\n{}", differ.join("\n"));
+    }
+}
+
+fn digits(x: f64) -> String {
+    if x == 0.0 || x.abs() < NOTHING { "0".to_owned() } else { format!("{x:.7e}") }
+}
+
+fn sections(text: &str) -> BTreeMap<String, Vec<String>> {
+    let mut out: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut name = String::new();
+    for line in text.lines().filter(|l| !l.is_empty()) {
+        match line.strip_prefix('[').and_then(|l| l.strip_suffix(']')) {
+            Some(next) => name = next.to_owned(),
+            None => out.entry(name.clone()).or_default().push(line.to_owned()),
+        }
+    }
+    out
+}
+
+/// Whether two lines say the same, number by number and word by word.
+fn alike(was: &str, is: &str) -> bool {
+    let (was, is): (Vec<&str>, Vec<&str>) = (was.split(' ').collect(), is.split(' ').collect());
+    was.len() == is.len()
+        && was.iter().zip(&is).all(|(a, b)| match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(a), Ok(b)) if a.is_finite() && b.is_finite() => {
+                (a - b).abs() <= SAME * a.abs().max(b.abs()) + NOTHING
+            }
+            _ => a == b,
+        })
+}
