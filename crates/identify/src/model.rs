@@ -907,7 +907,7 @@ mod tests {
         assert_eq!(plain.stiffness, [90.0, 150.0, 0.0]);
         assert_eq!((plain.delay_s, plain.measures, plain.smears, plain.placed_s), (0.03, true, false, None));
         near(plain.to_true, 1.0 / 1.02);
-        assert_eq!(plain.breaks_m, []);
+        assert!(plain.breaks_m.is_empty());
         model.own[1] = Own { surface_m: 4e-4, friction: 0.2, ..Own::default() };
         (model.day_of, model.days) = (vec![0; 3], vec![Day { surface_m: -1e-4, friction: 0.1 }]);
         model.own[1].differing[0] = 5e-4;
