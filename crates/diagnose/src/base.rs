@@ -125,3 +125,64 @@ fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
     best = fit_sharp(&best.model, &data, Effort::FULL)?;
     Some((best, data))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Prepared, roughness};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::drops::Drop;
+    use stylet_identify::model::Belief;
+    use stylet_record::Recording;
+    use stylet_tissue::Tissue;
+
+    fn blocks(f: impl Fn(f64) -> f64) -> Blocks {
+        let t: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
+        let z = t.iter().map(|t| 1e-3 * t).collect();
+        let f = t.iter().map(|t| f(*t)).collect();
+        Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+    }
+
+    /// A third difference takes away parabolas; of noise of one sort it has twenty times the variance.
+    #[test]
+    fn blocks_are_as_rough_as_their_third_differences() {
+        let parabola = blocks(|t| 3.0 - 0.4 * t + 0.07 * t * t);
+        assert_eq!(roughness(&[parabola]), 1e-6);
+        // Alternating by 0.02: every third difference is eight times that.
+        let at = |t: f64| if (t / 0.02).round() as i64 % 2 == 0 { 0.02 } else { -0.02 };
+        let wanted = 8.0 * 0.02 * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt();
+        assert!((roughness(&[blocks(at)]) / wanted - 1.0).abs() < 1e-6);
+        // Differences are weighed 1, 3, 3, 1: a step every 20 blocks is not seen, one every second block is.
+        let ragged = blocks(|t| [0.0, 0.3, 0.1, -0.2, 0.05][(t / 0.02).round() as usize % 5]);
+        let x = [0.0, 0.3, 0.1, -0.2, 0.05_f64];
+        let mut all: Vec<f64> = (0..5)
+            .map(|k| (x[(k + 3) % 5] - 3.0 * x[(k + 2) % 5] + 3.0 * x[(k + 1) % 5] - x[k]).abs())
+            .collect();
+        all.sort_by(f64::total_cmp);
+        let wanted = all[2] * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt();
+        assert!((roughness(&[ragged]) / wanted - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn recordings_made_ready_tell_their_drops_and_their_largest_force() {
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: Vec::new() },
+            given: Vec::new(),
+            tolerance: Vec::new(),
+            thickness_tolerance: Vec::new(),
+            surface_tolerance_m: 0.01,
+        };
+        let saw = |t: f64| if t < 4.0 { 0.5 * t } else { 0.5 * t - 1.5 };
+        let (a, b) = (blocks(saw), blocks(|t| 0.6 * t));
+        let largest = b.size_n.iter().copied().fold(0.0, f64::max);
+        let p = Prepared::new(Arc::new(belief), vec![a, b], 0.01);
+        assert!((p.largest_n() - largest).abs() < 1e-12 && largest > 4.0);
+        assert_eq!((p.floor_n, p.drops[1].len()), (0.01, 0));
+        let times = p.drop_times();
+        assert_eq!(
+            times,
+            p.drops.iter().map(|d| d.iter().map(|d: &Drop| d.time_s).collect::<Vec<_>>()).collect::<Vec<_>>()
+        );
+        assert!(times[0].iter().any(|t| (t - 4.0).abs() < 0.05), "{times:?}");
+    }
+}

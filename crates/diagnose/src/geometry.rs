@@ -151,3 +151,126 @@ fn patterns(model: &Model) -> Vec<Choice> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{fixed, patterns, price, unsure};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::model::{Belief, Choice, Free, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
+    use stylet_record::Recording;
+    use stylet_tissue::{AnyEffect, BoundaryShift, CoulombFriction, Effect, Layer, PositionScale, Tissue};
+
+    /// Layers of 20, 30, 40 and so on mm, each off by so many tenths of a mm.
+    fn model(off: &[f64], effects: &[AnyEffect]) -> Model {
+        let layers: Vec<Layer> = (0..off.len())
+            .map(|l| Layer {
+                name: String::new(),
+                thickness_m: 0.02 + 0.01 * l as f64,
+                stiffness_n_per_m: 100.0,
+                friction_ns_per_m2: 1000.0,
+                puncture_n: None,
+            })
+            .collect();
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.003, layers },
+            given: Vec::new(),
+            tolerance: vec![0.3; off.len()],
+            thickness_tolerance: vec![0.1; off.len()],
+            surface_tolerance_m: 0.01,
+        };
+        let mut m = Model::base(Arc::new(belief), 1);
+        m.tissue.surface_m = 0.004;
+        m.tissue.layers.iter_mut().zip(off).for_each(|(l, o)| l.thickness_m += 1e-4 * o);
+        m.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        m
+    }
+
+    fn found(off: &[f64]) -> Vec<(&'static str, Vec<f64>)> {
+        let round = |x: &f64| (x * 1e9).round() / 1e9;
+        patterns(&model(off, &[])).iter().map(|c| (c.info.id, c.values.iter().map(round).collect())).collect()
+    }
+
+    #[test]
+    fn a_face_that_is_elsewhere_makes_one_layer_thicker_and_the_next_thinner() {
+        assert_eq!(found(&[10.0, -9.0, 0.5]), [("boundary_shift", vec![1.0, 1e-3])]);
+        assert_eq!(found(&[1.9, -10.0, 9.0]), [("boundary_shift", vec![2.0, -1e-3])]);
+        // To a fifth of its size, from both sides, for the next layer and for the others.
+        assert!(found(&[10.0, -8.1, 0.0]).len() == 1 && found(&[10.0, -7.9, 0.0]).is_empty());
+        assert!(found(&[10.0, -11.9, 0.0]).len() == 1 && found(&[10.0, -12.1, 0.0]).is_empty());
+        assert!(found(&[10.0, -10.0, 1.9]).len() == 1 && found(&[10.0, -10.0, 2.1]).is_empty());
+        assert!(found(&[10.0, -10.0, 0.0, -1.9]).len() == 1 && found(&[10.0, -10.0, 0.0, -2.1]).is_empty());
+        // Two hundredths of a millimetre are none.
+        assert!(found(&[0.21, -0.21, 0.0]).len() == 1 && found(&[0.19, -0.19, 0.0]).is_empty());
+        let taken = model(&[10.0, -9.0, 0.5], &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]);
+        assert!(patterns(&taken).is_empty());
+    }
+
+    #[test]
+    fn a_wrong_scale_makes_every_layer_but_the_last_thicker_in_proportion() {
+        // 20, 30 and 40 mm by 5, 4.2 and 99 per cent.
+        let all = found(&[10.0, 12.6, 396.0]);
+        assert_eq!(all.len(), 1);
+        assert_eq!((all[0].0, all[0].1.len()), ("position_scale", 1));
+        assert!((all[0].1[0] - 0.046).abs() < 1e-9, "{all:?}");
+        // Each within a fifth of the mean.
+        assert!(found(&[10.0, 10.2, 0.0]).len() == 1 && found(&[10.0, 9.9, 0.0]).is_empty());
+        assert!(found(&[-10.0, -15.0, 0.0]).len() == 1);
+        // A ten-thousandth is none, and one layer alone is in proportion to anything.
+        assert!(found(&[0.021, 0.0315, 0.0]).len() == 1 && found(&[0.019, 0.0285, 0.0]).is_empty());
+        assert!(found(&[10.0, 0.0]).is_empty() && found(&[10.0]).is_empty());
+        let taken = model(&[10.0, 15.0, 0.0], &[PositionScale { eps: 0.01 }.into()]);
+        assert!(patterns(&taken).is_empty());
+    }
+
+    #[test]
+    fn what_is_fixed_lies_where_it_is_believed() {
+        let m = model(&[10.0, -9.0, 0.5], &[]);
+        let free = |surface, thickness| Free { surface, thickness, own_friction: true, ..Free::default() };
+        let both = fixed(&m, free(false, false));
+        assert_eq!((both.tissue.surface_m, &both.tissue.layers), (0.003, &m.belief.tissue.layers));
+        assert!(both.free.own_friction && !both.free.surface);
+        let surface = fixed(&m, free(true, false));
+        assert_eq!((surface.tissue.surface_m, &surface.tissue.layers), (0.004, &m.belief.tissue.layers));
+        let thickness = fixed(&m, free(false, true));
+        assert_eq!((thickness.tissue.surface_m, &thickness.tissue.layers), (0.003, &m.tissue.layers));
+    }
+
+    /// Half the logarithm of the number of blocks for every number, four nats for every effect.
+    #[test]
+    fn a_free_geometry_costs_its_numbers() {
+        let t: Vec<f64> = (0..1000).map(|k| f64::from(k) / 100.0).collect();
+        let z = t.iter().map(|t| 2e-3 * t).collect();
+        let r = Recording::new(t, z, vec![0.0; 1000]).expect("a recording");
+        let data = Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S)]), Noise::white(0.5), 0.0);
+        let each = 0.5 * (data.compared() as f64).ln();
+        let friction: AnyEffect = CoulombFriction { c_n_per_m: 1.0 }.into();
+        for (surface, thickness, effects, wanted) in [
+            (true, true, vec![], 4.0 * each),
+            (false, true, vec![], 3.0 * each),
+            (true, false, vec![], each),
+            (false, false, vec![friction.clone()], each + 4.0),
+            (true, true, vec![friction, PositionScale { eps: 0.01 }.into()], 6.0 * each + 8.0),
+        ] {
+            let mut m = model(&[0.0, 0.0, 0.0], &effects);
+            (m.free.surface, m.free.thickness) = (surface, thickness);
+            assert!((price(&m, &data) - wanted).abs() < 1e-9, "{} for {wanted}", price(&m, &data));
+        }
+    }
+
+    #[test]
+    fn intervals_suppose_no_face_but_where_an_effect_stands_for_it() {
+        let with = |effects: &[AnyEffect]| {
+            let mut m = model(&[0.0; 3], effects);
+            m.free = Free::default();
+            let f = unsure(&m).free;
+            (f.surface, f.thickness)
+        };
+        assert_eq!(with(&[]), (true, true));
+        assert_eq!(with(&[CoulombFriction { c_n_per_m: 1.0 }.into()]), (true, true));
+        assert_eq!(with(&[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]), (false, false));
+        assert_eq!(with(&[PositionScale { eps: 0.01 }.into()]), (false, false));
+    }
+}

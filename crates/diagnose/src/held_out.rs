@@ -160,3 +160,39 @@ pub fn floor(data: &Data) -> f64 {
     let within = data.blocks.iter().map(|b| b.within_n().powi(2)).sum::<f64>() / n;
     (data.noise.sd_n().powi(2) + within).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Left, floor, rms};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
+    use stylet_record::Recording;
+
+    /// Four samples a block that alternate by so much.
+    fn blocks(within_n: f64) -> Blocks {
+        let t: Vec<f64> = (0..800).map(|k| f64::from(k) / 200.0).collect();
+        let z = t.iter().map(|t| 1e-3 * t).collect();
+        let f = (0..800).map(|k| if k % 2 == 0 { within_n } else { -within_n }).collect();
+        Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+    }
+
+    #[test]
+    fn errors_and_the_floor_have_what_samples_scatter_within_their_blocks() {
+        let (a, b) = (blocks(0.03), blocks(0.07));
+        let (wa, wb) = (a.within_n(), b.within_n());
+        assert!(wa > 0.02 && wb > 2.0 * wa, "{wa} {wb}");
+        let data = Data::new(Arc::new(vec![a, b]), Noise::white(0.02), 0.0);
+        let left = |square_n2: f64, blocks: usize| Some(Left { square_n2, blocks, ..Left::default() });
+        let told = rms(&[left(0.0025, 30), left(0.0016, 70)], &data);
+        let wanted = ((30.0 * (0.0025 + wa * wa) + 70.0 * (0.0016 + wb * wb)) / 100.0).sqrt();
+        assert!((told - wanted).abs() < 1e-12, "{told} for {wanted}");
+        // A recording that cannot be predicted does not count.
+        let told = rms(&[None, left(0.0016, 70)], &data);
+        assert!((told - (0.0016 + wb * wb).sqrt()).abs() < 1e-12);
+        assert_eq!(rms(&[None, None], &data), 0.0);
+        let wanted = (data.noise.sd_n().powi(2) + 0.5 * (wa * wa + wb * wb)).sqrt();
+        assert!((floor(&data) - wanted).abs() < 1e-12);
+    }
+}

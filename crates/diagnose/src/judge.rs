@@ -24,3 +24,15 @@ pub fn gain(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
 pub fn cost(numbers: usize, blocks: usize) -> f64 {
     0.5 * numbers as f64 * libm::log(blocks.max(2) as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::cost;
+
+    #[test]
+    fn a_number_costs_half_the_logarithm_of_the_number_of_blocks() {
+        assert!((cost(3, 700) - 1.5 * 700.0_f64.ln()).abs() < 1e-12);
+        assert!((cost(2, 1) - 2.0_f64.ln()).abs() < 1e-12);
+        assert_eq!(cost(0, 700), 0.0);
+    }
+}

@@ -68,6 +68,22 @@ pub struct Search {
     lines: Vec<f64>,
 }
 
+#[cfg(test)]
+impl Search {
+    /// A search that found nothing, for tests of what follows it.
+    pub(crate) fn of(fit: Fit, data: Data) -> Self {
+        Self {
+            base: fit.clone(),
+            best: fit,
+            data,
+            stages: Vec::new(),
+            restarts: 0,
+            beginnings: 0,
+            lines: Vec::new(),
+        }
+    }
+}
+
 impl Search {
     /// From the base law on.
     #[must_use]
@@ -404,4 +420,137 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
         }
         _ => false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Search, Stage, at_a_bound, extra, first_of, simpler_first};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::Fit;
+    use stylet_identify::model::{Belief, Choice, Model, Role};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, residuals};
+    use stylet_record::Recording;
+    use stylet_tissue::{
+        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, Layer, StribeckFriction, Tissue,
+    };
+
+    fn data() -> Data {
+        let t: Vec<f64> = (0..600).map(|k| f64::from(k) / 100.0).collect();
+        let z = t.iter().map(|t| if *t < 4.0 { 4e-3 * t } else { 0.016 - 4e-3 * (t - 4.0) }).collect();
+        let f = t
+            .iter()
+            .enumerate()
+            .map(|(k, t)| 0.3 * t + 0.01 * (((k * 7919) % 101) as f64 / 101.0 - 0.5))
+            .collect();
+        let r = Recording::new(t, z, f).expect("a recording");
+        Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S)]), Noise::white(0.02), 0.0)
+    }
+
+    fn fit(effects: &[AnyEffect]) -> Fit {
+        let layer = Layer {
+            name: String::new(),
+            thickness_m: 0.05,
+            stiffness_n_per_m: 60.0,
+            friction_ns_per_m2: 4000.0,
+            puncture_n: None,
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.01,
+        };
+        let mut model = Model::base(Arc::new(belief), 1);
+        model.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        let residuals = residuals(&model, &data()).expect("a replay");
+        Fit { model, residuals }
+    }
+
+    #[test]
+    fn a_number_stands_at_a_bound_within_a_millionth_of_its_range() {
+        let bias = |force_n: f64| -> AnyEffect { ForceBias { force_n }.into() };
+        let f = fit(&[bias(0.1), AsymmetricFriction { eps: 0.2 }.into()]);
+        assert!(!at_a_bound(&f, 0) && !at_a_bound(&f, 1));
+        let role = Role::Effect { effect: 1, parameter: 0 };
+        let n = f.model.shared().into_iter().find(|n| n.role == role).expect("free");
+        assert!((n.high - n.low).is_finite());
+        let near = 1e-6 * (n.high - n.low);
+        for (x, at) in [
+            (n.low + 0.9 * near, true),
+            (n.low + 1.1 * near, false),
+            (n.high - 0.9 * near, true),
+            (n.high - 1.1 * near, false),
+        ] {
+            let mut moved = f.clone();
+            moved.model.set(role, 0, x);
+            assert_eq!((at_a_bound(&moved, 0), at_a_bound(&moved, 1)), (false, at), "{x}");
+        }
+    }
+
+    #[test]
+    fn what_a_larger_model_has_to_gain_is_the_cost_of_its_numbers() {
+        let (none, one) = (fit(&[]), fit(&[ForceBias { force_n: 0.1 }.into()]));
+        let stribeck = StribeckFriction { c_n_per_m: 2.0, c_static_n_per_m: 5.0, v_stribeck_mps: 1e-3 };
+        let three = fit(&[stribeck.into()]);
+        let d = data();
+        let each = 0.5 * (d.compared() as f64).ln();
+        assert!((extra(&none, &one, &d) - each - 4.0).abs() < 1e-9);
+        assert!((extra(&one, &three, &d) - 2.0 * each - 4.0).abs() < 1e-9);
+        assert!((extra(&three, &one, &d) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn each_effect_is_taken_once() {
+        let mut names = Vec::new();
+        let (a, b) =
+            (fit(&[ForceBias { force_n: 0.1 }.into()]), fit(&[CoulombFriction { c_n_per_m: 2.0 }.into()]));
+        assert_eq!([&a, &b, &a, &b].map(|f| first_of(&mut names, f)), [true, true, false, false]);
+        assert_eq!(names, ["force_bias", "coulomb_friction", "force_bias", "coulomb_friction"]);
+    }
+
+    #[test]
+    fn a_special_case_goes_before_a_leader_whose_further_numbers_gain_nothing() {
+        let coulomb = fit(&[CoulombFriction { c_n_per_m: 2.0 }.into()]);
+        let stribeck = StribeckFriction { c_n_per_m: 2.0, c_static_n_per_m: 2.1, v_stribeck_mps: 1e-3 };
+        let stribeck = fit(&[stribeck.into()]);
+        let bias = fit(&[ForceBias { force_n: 0.1 }.into()]);
+        let order = |all: Vec<Fit>| -> Vec<&'static str> {
+            simpler_first(all, &data())
+                .iter()
+                .filter_map(|f| f.model.effects.last())
+                .map(|e| e.info.id)
+                .collect()
+        };
+        assert_eq!(
+            order(vec![stribeck.clone(), bias.clone(), coulomb.clone()]),
+            ["coulomb_friction", "stribeck_friction", "force_bias"]
+        );
+        assert_eq!(
+            order(vec![bias.clone(), stribeck.clone(), coulomb.clone()]),
+            ["force_bias", "stribeck_friction", "coulomb_friction"]
+        );
+        assert_eq!(order(vec![stribeck, bias]), ["stribeck_friction", "force_bias"]);
+        assert!(order(Vec::new()).is_empty());
+    }
+
+    #[test]
+    fn a_rival_that_takes_a_causes_place_has_its_stage_and_gains_what_it_is_ahead() {
+        let old = fit(&[CoulombFriction { c_n_per_m: 2.0 }.into()]);
+        let new = fit(&[ForceBias { force_n: 0.9 }.into()]);
+        let more = old.nats() - new.nats();
+        let mut search = Search::of(old, data());
+        let stage =
+            |taken| Stage { stood: Vec::new(), rivals: Vec::new(), taken, needed: 0.0, choices: Vec::new() };
+        search.stages =
+            vec![stage(Some(("coulomb_friction", 20.0))), stage(Some(("force_drift", 9.0))), stage(None)];
+        search.swap(0, new);
+        let (name, gained) = search.stages[0].taken.expect("taken");
+        assert_eq!(name, "force_bias");
+        assert!((gained - 20.0 - more).abs() < 1e-9, "{gained}");
+        assert_eq!(search.stages[1].taken, Some(("force_drift", 9.0)));
+        assert_eq!(search.best.model.effects[0].info.id, "force_bias");
+    }
 }

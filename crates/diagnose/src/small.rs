@@ -109,3 +109,109 @@ fn unresolved(search: &Search, k: usize) -> Option<String> {
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{at_every_sample, unresolved, unsure};
+    use crate::outcome::Cause;
+    use crate::select::{Search, Stage};
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::Fit;
+    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, Residuals};
+    use stylet_record::Recording;
+    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, LowPassLag, Respiration, Tissue};
+
+    fn search(effects: &[AnyEffect]) -> Search {
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: Vec::new() },
+            given: Vec::new(),
+            tolerance: Vec::new(),
+            thickness_tolerance: Vec::new(),
+            surface_tolerance_m: 0.01,
+        };
+        let mut model = Model::base(Arc::new(belief), 2);
+        model.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        // One at 100 Hz and one at 50 Hz, positions to 20 micrometres.
+        let blocks = [100.0, 50.0].map(|hz: f64| {
+            let t: Vec<f64> = (0..400).map(|k| f64::from(k) / hz).collect();
+            let z = t
+                .iter()
+                .enumerate()
+                .map(|(k, t)| 1e-3 * t + 2e-5 * (((k * 7919) % 101) as f64 / 101.0 - 0.5))
+                .collect();
+            Blocks::new(&Recording::new(t, z, vec![0.0; 400]).expect("a recording"), &[], BLOCK_S)
+        });
+        let data = Data::new(Arc::new(blocks.to_vec()), Noise::white(0.02), 0.0);
+        let residuals = Residuals { e: Vec::new(), w: Vec::new(), events: Vec::new(), nats: 0.0 };
+        Search::of(Fit { model, residuals }, data)
+    }
+
+    #[test]
+    fn what_lies_below_a_twentieth_of_a_step_or_a_tenth_of_the_encoders_noise_is_not_resolved() {
+        let lag = |time_constant_s: f64| unresolved(&search(&[LowPassLag { time_constant_s }.into()]), 0);
+        assert_eq!(lag(4.9e-4).as_deref(), Some("below a twentieth of the sampling step"));
+        assert_eq!(lag(5.1e-4), None);
+        let noise_m = search(&[]).data.blocks.iter().map(|b| b.motion.noise_m).fold(0.0, f64::max);
+        assert!(noise_m > 1e-6, "{noise_m}");
+        let breath = |amplitude_m: f64| {
+            let e = Respiration { amplitude_m, frequency_hz: 0.3, phase_rad: 0.0 };
+            unresolved(&search(&[CoulombFriction { c_n_per_m: 1.0 }.into(), e.into()]), 1)
+        };
+        assert_eq!(breath(0.09 * noise_m).as_deref(), Some("below a tenth of the encoder's noise"));
+        assert_eq!(breath(0.11 * noise_m), None);
+        // A length that is not a motion's is another matter.
+        assert_eq!(unresolved(&search(&[CoulombFriction { c_n_per_m: 1e-9 }.into()]), 0), None);
+    }
+
+    #[test]
+    fn a_cause_is_unsure_when_less_speaks_against_none_than_the_search_asked_for() {
+        let mut s = search(&[]);
+        s.stages = vec![Stage {
+            stood: Vec::new(),
+            rivals: Vec::new(),
+            taken: Some(("force_bias", 30.0)),
+            needed: 8.0,
+            choices: Vec::new(),
+        }];
+        let cause = |effect: &str| Cause {
+            effect: effect.to_owned(),
+            equivalent: Vec::new(),
+            confidence: 1.0,
+            parameters: BTreeMap::new(),
+            gain_nats: 0.0,
+            share: 0.0,
+        };
+        let told = |effect: &str, nats: f64| unsure(&cause(effect), &[("force_bias".to_owned(), nats)], &s);
+        assert!(told("force_bias", 7.9) && !told("force_bias", 8.0) && !told("force_drift", 1.0));
+        assert!(!unsure(&cause("force_bias"), &[], &s));
+    }
+
+    #[test]
+    fn effects_at_ruptures_faces_and_breaks_do_not_show_in_every_sample() {
+        let shows = |id: &str| at_every_sample(stylet_tissue::info(id).expect("in the library"));
+        for id in [
+            "coulomb_friction",
+            "force_drift",
+            "time_delay",
+            "respiration",
+            "position_scale",
+            "stress_relaxation",
+        ] {
+            assert!(shows(id), "{id}");
+        }
+        for id in [
+            "rate_dependent_puncture",
+            "incomplete_release",
+            "boundary_shift",
+            "hidden_membrane",
+            "force_spikes",
+            "saturation",
+        ] {
+            assert!(!shows(id), "{id}");
+        }
+    }
+}

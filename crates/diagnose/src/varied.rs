@@ -66,3 +66,60 @@ pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
     let settled = fit(&other.model, &data, Effort::FULL).unwrap_or(other);
     (settled, data)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{price, with};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::model::{Belief, Free, Model, Own};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
+    use stylet_record::Recording;
+    use stylet_tissue::Tissue;
+
+    #[test]
+    fn numbers_of_their_own_cost_one_less_than_there_are_recordings_and_four_nats_a_kind() {
+        let t: Vec<f64> = (0..400).map(|k| f64::from(k) / 100.0).collect();
+        let z = t.iter().map(|t| 1e-3 * t).collect();
+        let r = Recording::new(t, z, vec![0.0; 400]).expect("a recording");
+        let data = Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S); 4]), Noise::white(0.02), 0.0);
+        let each = 0.5 * (data.compared() as f64).ln();
+        for (own_surface, own_friction, wanted) in [
+            (false, false, 0.0),
+            (true, false, 3.0 * each + 4.0),
+            (false, true, 3.0 * each + 4.0),
+            (true, true, 6.0 * each + 8.0),
+        ] {
+            let free = Free { own_surface, own_friction, ..Free::default() };
+            assert!((price(free, &data) - wanted).abs() < 1e-9, "{} for {wanted}", price(free, &data));
+        }
+    }
+
+    #[test]
+    fn what_is_no_more_of_their_own_is_nothing() {
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: Vec::new() },
+            given: Vec::new(),
+            tolerance: Vec::new(),
+            thickness_tolerance: Vec::new(),
+            surface_tolerance_m: 0.01,
+        };
+        let mut m = Model::base(Arc::new(belief), 2);
+        m.free.thickness = true;
+        m.own[1] = Own { surface_m: 2e-3, friction: 0.3, differing: [0.7; 8] };
+        for (surface, friction) in [(false, false), (true, false), (false, true), (true, true)] {
+            let out = with(&m, surface, friction);
+            assert_eq!(
+                (out.free.own_surface, out.free.own_friction, out.free.thickness),
+                (surface, friction, true)
+            );
+            let wanted = Own {
+                surface_m: if surface { 2e-3 } else { 0.0 },
+                friction: if friction { 0.3 } else { 0.0 },
+                differing: [0.7; 8],
+            };
+            assert_eq!(out.own[1], wanted);
+        }
+    }
+}

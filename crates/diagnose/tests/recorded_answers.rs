@@ -23,10 +23,11 @@ use stylet_diagnose::{Evidence, Examined, Options, Verdict, diagnose};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_tissue::{
-    AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceSpikes, HiddenMembrane, Law, LawState, Layer,
-    LowPassLag, Measurement, NeedleCompliance, PeriodicInterference, PositionScale, PronyTerm, Quantisation,
-    RateDependentPuncture, Reading, Respiration, Saturation, StressRelaxation, StribeckFriction, TimeDelay,
-    Tissue,
+    AnyEffect, AsymmetricFriction, BoundaryShift, CoulombFriction, CuttingForce, Effect, ForceBias,
+    ForceDrift, ForceSpikes, HiddenMembrane, IncompleteRelease, Law, LawState, Layer, LowPassLag,
+    Measurement, NeedleCompliance, PeriodicInterference, PositionScale, PowerLawFriction, PronyTerm,
+    Quantisation, RateDependentPuncture, Reading, Respiration, Saturation, SoftBoundary, StressRelaxation,
+    StribeckFriction, TimeDelay, Tissue, ToolInertia,
 };
 
 const FILE: &str = "recorded_answers.txt";
@@ -165,6 +166,11 @@ impl Case {
             let (mut state, mut measuring) = (LawState::default(), chain.start(HZ * FINE as f64));
             let mut outside = self.outside.clone();
             let (keep, mut slow) = (libm::exp(-1.0 / (HZ * self.wander.1)), normal());
+            let spike_n = self.effects.iter().find_map(|e| match e {
+                AnyEffect::ForceSpikes(s) => Some(s.size_n),
+                _ => None,
+            });
+            let spike_n = spike_n.unwrap_or(0.0);
             let mut columns = [vec![], vec![], vec![]];
             for i in 0..(9.0 * HZ) as usize * FINE {
                 let t = i as f64 / (HZ * FINE as f64);
@@ -178,6 +184,13 @@ impl Case {
                 if sampled {
                     slow = keep * slow + (1.0 - keep * keep).sqrt() * normal();
                     noise_n = self.noise_n * normal() + self.wander.0 * slow;
+                    // Now and then a spike, in and out of either sign.
+                    let spike = if (i / FINE + 13 * k) % 97 == 40 {
+                        1.0 - 2.0 * ((i / FINE) % 2) as f64
+                    } else {
+                        0.0
+                    };
+                    noise_n += spike * spike_n;
                 }
                 let reading = Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
                 let f = chain.step(&mut measuring, &reading);
@@ -383,6 +396,110 @@ fn one_recording_alone() {
     let found = case.examined("one recording alone");
     assert_eq!(named(&found), ["stribeck_friction"]);
     holds(&found, "stribeck_friction", "c_n_per_m", 8.0);
+}
+
+/// Causes of every other kind, one by one and in pairs, some of them too small to matter: what is said, not what is drawn of it.
+fn others(which: &[(&str, Vec<AnyEffect>, f64, f64)]) {
+    for (name, effects, noise_n, scatter) in which {
+        let case = Case { noise_n: *noise_n, scatter: *scatter, ..Case::with(effects.iter().cloned()) };
+        let found =
+            diagnose(&case.believed, &case.evidence(), &Options::default(), |_| {}).expect("a diagnosis");
+        // What is hidden is named, but for traces.
+        let mut all = named(&found);
+        all.extend(found.diagnosis.traces.iter().map(|t| t.effect.as_str()));
+        let mut hidden: Vec<&str> = effects.iter().map(Effect::id).collect();
+        all.sort_unstable();
+        hidden.sort_unstable();
+        assert_eq!(all, hidden, "{name}");
+        let mut told = Told::default();
+        told.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
+        for (k, class) in found.classes.iter().enumerate() {
+            class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.behind));
+        }
+        told.hold(FILE, &format!("other: {name}"));
+    }
+}
+
+#[test]
+fn causes_of_other_kinds() {
+    let two =
+        [(0.2, 0.3), (0.25, 2.4)].map(|(fraction, time_constant_s)| PronyTerm { fraction, time_constant_s });
+    others(&[
+        ("compliance", vec![NeedleCompliance { stiffness_n_per_m: 700.0 }.into()], NOISE_N, 0.0),
+        ("cutting", vec![CuttingForce { force_n: 0.3 }.into()], NOISE_N, 0.0),
+        ("soft faces", vec![SoftBoundary { width_m: 0.003 }.into()], NOISE_N, 0.0),
+        ("two terms", vec![StressRelaxation { terms: two.to_vec() }.into()], NOISE_N, 0.0),
+        ("lag", vec![LowPassLag { time_constant_s: 0.05 }.into()], NOISE_N, 0.0),
+    ]);
+}
+
+#[test]
+fn causes_of_still_other_kinds() {
+    others(&[
+        (
+            "spikes",
+            vec![ForceSpikes { rate_hz: 1.0, size_n: 0.8 }.into(), ForceDrift { rate_n_per_s: 0.03 }.into()],
+            NOISE_N,
+            0.0,
+        ),
+        ("release", vec![IncompleteRelease { fraction: 0.4 }.into()], NOISE_N, 0.0),
+        ("exponent", vec![PowerLawFriction { exponent: 0.6 }.into()], NOISE_N, 0.06),
+        (
+            "asymmetric",
+            vec![AsymmetricFriction { eps: 0.3 }.into(), ForceBias { force_n: 0.15 }.into()],
+            NOISE_N,
+            0.0,
+        ),
+        ("inertia", vec![ToolInertia { mass_kg: 1.5 }.into()], NOISE_N, 0.0),
+    ]);
+}
+
+#[test]
+fn causes_too_small_to_matter() {
+    others(&[
+        ("a delay of a part of a sample", vec![TimeDelay { delay_s: 4e-4 }.into()], 5e-4, 0.0),
+        (
+            "a little bias",
+            vec![ForceBias { force_n: 8e-4 }.into(), CoulombFriction { c_n_per_m: 30.0 }.into()],
+            5e-3,
+            0.0,
+        ),
+        ("a little drift", vec![ForceDrift { rate_n_per_s: 4e-4 }.into()], NOISE_N, 0.0),
+        (
+            "a breath of micrometres",
+            vec![Respiration { amplitude_m: 3e-5, frequency_hz: 0.4, phase_rad: 0.3 }.into()],
+            1e-3,
+            0.0,
+        ),
+    ]);
+}
+
+#[test]
+fn causes_that_go_together() {
+    others(&[
+        (
+            "late and slow",
+            vec![TimeDelay { delay_s: 0.03 }.into(), LowPassLag { time_constant_s: 0.04 }.into()],
+            NOISE_N,
+            0.0,
+        ),
+        (
+            "three",
+            vec![
+                CoulombFriction { c_n_per_m: 10.0 }.into(),
+                ForceDrift { rate_n_per_s: 0.02 }.into(),
+                HiddenMembrane { depth_m: 0.017, stiffness_n_per_m: 250.0, puncture_n: 0.7 }.into(),
+            ],
+            NOISE_N,
+            0.0,
+        ),
+        (
+            "friction of two kinds",
+            vec![PowerLawFriction { exponent: 0.7 }.into(), AsymmetricFriction { eps: -0.2 }.into()],
+            NOISE_N,
+            0.04,
+        ),
+    ]);
 }
 
 /// Two days later, the surface moved and the needle more slippery: by the diagnosis, and by the numbers that the others lend.

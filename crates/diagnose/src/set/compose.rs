@@ -118,3 +118,81 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
     model.day_of = Vec::new();
     Some(model)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::together;
+    use std::sync::Arc;
+    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, Layer, LetGo, ShaftSlip, Tissue};
+
+    fn tissue(names: &[&str], surface_m: f64, thickness_m: f64, k: f64) -> Tissue {
+        let layer = |name: &&str| Layer {
+            name: (*name).to_owned(),
+            thickness_m,
+            stiffness_n_per_m: k,
+            friction_ns_per_m2: 1000.0,
+            puncture_n: None,
+        };
+        Tissue { surface_m, layers: names.iter().map(layer).collect() }
+    }
+
+    fn alone(surface_m: f64, k: f64, effects: &[AnyEffect]) -> Model {
+        let belief = Belief {
+            tissue: tissue(&["x"], surface_m, 0.05, k),
+            given: Vec::new(),
+            tolerance: vec![4.0],
+            thickness_tolerance: vec![0.0],
+            surface_tolerance_m: 2e-3,
+        };
+        let mut m = Model::base(Arc::new(belief), 1);
+        m.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        m.free.own_effects = true;
+        m
+    }
+
+    #[test]
+    fn layers_measured_alone_stand_where_they_were_found_with_their_effects() {
+        let whole = |c: f64| -> AnyEffect { CoulombFriction { c_n_per_m: c }.into() };
+        let slip =
+            |push_n: f64| -> AnyEffect { ShaftSlip { layer: 1, push_n, ..ShaftSlip::default() }.into() };
+        let lets_go = |depth_m: f64| -> AnyEffect { LetGo { layer: 1, depth_m }.into() };
+        let mut first = alone(0.004, 100.0, &[slip(1.1), lets_go(1e-3), whole(2.0)]);
+        let mut second = alone(0.0155, 250.0, &[slip(2.2), lets_go(2e-3), whole(7.0)]);
+        first.scatter.differing[0] = 3e-4;
+        second.scatter.differing[0] = 5e-4;
+        let believed = tissue(&["skin", "muscle"], 0.0, 0.03, 1.0);
+        let m = together(&believed, &[&first, &second], 7e-4).expect("a law");
+        assert!((m.tissue.surface_m - 0.0047).abs() < 1e-15);
+        let [a, b] = &m.tissue.layers[..] else { unreachable!("two layers") };
+        assert_eq!((a.name.as_str(), b.name.as_str(), b.thickness_m), ("skin", "muscle", 0.05));
+        // As thick as the next one's surface lies behind, a millimetre at least.
+        assert!((a.thickness_m - 0.0115).abs() < 1e-15, "{}", a.thickness_m);
+        assert_eq!((a.stiffness_n_per_m, b.stiffness_n_per_m), (100.0, 250.0));
+        let near = alone(0.0041, 250.0, &[]);
+        assert_eq!(
+            together(&believed, &[&first, &near], 0.0).expect("a law").tissue.layers[0].thickness_m,
+            1e-3
+        );
+        // What belongs to no layer is the first one's.
+        let ids: Vec<(&str, f64)> = m.effects.iter().map(|e| (e.info.id, e.values[0])).collect();
+        assert_eq!(
+            ids,
+            [
+                ("shaft_slip", 1.0),
+                ("let_go", 1.0),
+                ("coulomb_friction", 2.0),
+                ("shaft_slip", 2.0),
+                ("let_go", 2.0)
+            ]
+        );
+        assert_eq!(m.scatter.differing[..3], [3e-4, 5e-4, 0.0]);
+        assert_eq!(
+            (m.belief.tolerance.as_slice(), m.belief.thickness_tolerance.as_slice()),
+            (&[4.0, 4.0][..], &[0.0, 0.0][..])
+        );
+        assert!(m.days.is_empty() && m.day_of.is_empty() && m.bound.is_empty());
+        assert!(together(&believed, &[], 0.0).is_none());
+        assert!(together(&tissue(&["one"], 0.0, 0.03, 1.0), &[&first, &second], 0.0).is_none());
+    }
+}

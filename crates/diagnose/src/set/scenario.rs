@@ -49,3 +49,87 @@ pub fn extended(name: &str, model: &Model, runs: &[&Insertion], instrument: &Ins
         seed: 1,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::extended;
+    use crate::set::Insertion;
+    use crate::set::instrument::Instrument;
+    use std::sync::Arc;
+    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_record::Recording;
+    use stylet_scenario::{Motion, Segment, Sensor};
+    use stylet_tissue::{CoulombFriction, Effect, Layer, Tissue};
+
+    /// From 3 mm on in at a speed for 4 s, a rest, and back or not.
+    fn run(speed: f64, rest_s: f64, back: bool) -> Insertion {
+        let n = ((4.0 + rest_s + if back { 4.0 } else { 0.0 }) * 50.0) as usize;
+        let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
+        let z = t.iter().map(|t| {
+            0.003
+                + if *t < 4.0 {
+                    speed * t
+                } else if *t < 4.0 + rest_s {
+                    4.0 * speed
+                } else {
+                    4.0 * speed - speed * (t - 4.0 - rest_s)
+                }
+        });
+        let z = z.collect();
+        Insertion::new("a".to_owned(), Recording::new(t, z, vec![0.0; n]).expect("clean columns"), 1)
+    }
+
+    #[test]
+    fn the_mean_insertion_moves_as_the_middle_run_did() {
+        let layer = Layer {
+            name: String::new(),
+            thickness_m: 0.05,
+            stiffness_n_per_m: 100.0,
+            friction_ns_per_m2: 1000.0,
+            puncture_n: None,
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.01,
+        };
+        let mut model = Model::base(Arc::new(belief), 3);
+        model.effects = vec![Choice::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
+        let (a, b, c) = (run(0.002, 1.0, true), run(0.004, 2.0, true), run(0.009, 1.0, false));
+        let s = extended(
+            "gel",
+            &model,
+            &[&a, &b, &c],
+            &Instrument { noise_n: Some(0.03), ar1: Some(2.0), ..Instrument::default() },
+        );
+        let Motion::Program { start_m, segments } = &s.motion else { unreachable!("a program") };
+        let r = &b.recording;
+        let (deepest, back) = (b.phases.deepest, b.phases.back);
+        assert_eq!(*start_m, 0.003);
+        let way = r.position_m[deepest] - 0.003;
+        let wanted = [
+            Segment::Move { velocity_mps: b.speed_mps, duration_s: way / b.speed_mps },
+            Segment::Hold { duration_s: r.time_s[back] - r.time_s[deepest] },
+            Segment::Move { velocity_mps: -b.speed_mps, duration_s: way / b.speed_mps },
+        ];
+        assert_eq!(segments.as_slice(), wanted);
+        assert!((b.speed_mps - 0.004).abs() < 1e-6 && (way - 0.016).abs() < 2e-4);
+        assert_eq!(s.effects.len(), 1);
+        assert_eq!(s.name, "gel, as measured: the mean insertion");
+        let Sensor::ForceTorque(f) = &s.sensor else { unreachable!("a force sensor") };
+        assert_eq!((f.noise_n, f.ar1), (0.03, 0.99));
+        // A run that never comes back: it rests until its end, a tenth of a second at least.
+        let s = extended("gel", &model, &[&c], &Instrument { ar1: Some(-2.0), ..Instrument::default() });
+        let Motion::Program { segments, .. } = &s.motion else { unreachable!("a program") };
+        let end = c.recording.time_s[c.recording.len() - 1] - c.recording.time_s[c.phases.deepest];
+        assert_eq!(segments[1..], [Segment::Hold { duration_s: end }]);
+        let short = run(0.004, 0.0, false);
+        let s = extended("gel", &model, &[&short], &Instrument::default());
+        let Motion::Program { segments, .. } = &s.motion else { unreachable!("a program") };
+        assert_eq!(segments[1], Segment::Hold { duration_s: 0.1 });
+        let Sensor::ForceTorque(f) = &s.sensor else { unreachable!("a force sensor") };
+        assert_eq!((f.noise_n, f.ar1), (0.01, 0.0));
+    }
+}
