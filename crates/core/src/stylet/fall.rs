@@ -240,7 +240,7 @@ impl Stylet {
 
 #[cfg(test)]
 mod tests {
-    use super::super::layers::{A, F, FP, KP, Layers};
+    use super::super::layers::{A, Behind, F, FP, KP, Layers};
     use super::super::local::Local;
     use super::super::noise::Noise;
     use super::super::shaft::Felt;
@@ -253,6 +253,67 @@ mod tests {
         let mut stylet = inside();
         stylet.fall = Some(Fall { from_n: 1.9, mean_n: 1.6, missing_n: 0.25, since_s: 0.005 * count, count });
         stylet
+    }
+
+    /// 10 mm deep and .3 N below the law, which grows by 78 N/m.
+    fn low() -> Stylet {
+        let mut stylet = inside();
+        stylet.intact = stylet.layers;
+        stylet.local.state.x[0] = 1.2;
+        stylet.local.state.p[0][0] = 0.25;
+        (stylet.local.state.p[1][0], stylet.local.state.p[2][0]) = (0.05, 3.0);
+        stylet
+    }
+
+    #[test]
+    fn a_drop_that_lasts_is_traced_back_to_where_its_line_meets_the_law() {
+        let mut stylet = low();
+        // .9 N/s at 2 mm/s, known to .1 N/s.
+        stylet.trace_back(&step(), &sample(0.01, 1.2), -0.9, 0.1);
+        let (steep, noise_n2) = (78.0 + 450.0, 4e-4);
+        let back_s = 0.3 / steep / 0.002;
+        let line_n2 = 0.25 * noise_n2 + back_s * (back_s * 0.01 - 2.0 * (0.05 + 0.002 * 3.0) * noise_n2);
+        let (began_m, variance) = stylet.lasting.expect("a place");
+        near(began_m, 0.01 - 0.3 / steep);
+        near(variance, line_n2 / (steep * steep));
+        let kept = stylet.lasting;
+        // Known worse: it stays. Better, but four standard deviations and more from there: another line.
+        stylet.trace_back(&step(), &sample(0.01, 1.2), -0.85, 0.2);
+        assert_eq!(stylet.lasting, kept);
+        stylet.trace_back(&step(), &sample(0.01, 1.2), -0.5, 0.01);
+        assert_eq!(stylet.lasting, kept);
+        stylet.trace_back(&step(), &sample(0.01, 1.2), -0.88, 0.05);
+        near(stylet.lasting.expect("a better place").0, 0.01 - 0.3 / (78.0 + 440.0));
+        // A force that falls less than the law is no line to trace back.
+        let mut stylet = low();
+        stylet.trace_back(&step(), &sample(0.01, 1.2), 0.16, 0.1);
+        assert!(stylet.lasting.is_none());
+    }
+
+    #[test]
+    fn the_layer_behind_a_drop_that_lasted_begins_where_the_drop_did() {
+        for (traced_m, sd_m, began_m) in
+            [(0.0093, 4e-5, 0.0093), (0.0106, 4e-5, 0.0101), (0.0081, 4e-5, 0.0087)]
+        {
+            let mut stylet = low();
+            (stylet.located_m, stylet.fell_m) = (0.0097, 0.0101);
+            stylet.lasting = Some((traced_m, sd_m * sd_m));
+            let mut expected = stylet.intact;
+            expected.rupture(began_m, sd_m, 0.002, &stylet.noise, &mut Behind::default());
+            stylet.fall_anew();
+            assert!(stylet.lasting.is_none());
+            near(stylet.layers.start_m, began_m);
+            for k in 0..6 {
+                near(stylet.layers.belief.x[k], expected.belief.x[k]);
+                near(stylet.layers.belief.p[k][k], expected.belief.p[k][k]);
+            }
+            near(stylet.behind[0][1], began_m);
+        }
+        // One that did not last is left as it is.
+        let mut stylet = low();
+        let start_m = stylet.layers.start_m;
+        stylet.fall_anew();
+        assert_eq!((stylet.layers.start_m, stylet.layers.passed), (start_m, 0));
     }
 
     #[test]

@@ -473,6 +473,37 @@ mod tests {
     }
 
     #[test]
+    fn a_layer_that_begins_later_than_it_is_taken_to_tells_so_by_the_zero() {
+        let (mut layers, mut behind, noise) = two();
+        layers.rupture(SECOND.2, 0.0, 0.002, &noise, &mut behind);
+        layers.free = true;
+        travel(&mut layers, SECOND.2, (0.0, SECOND.1, SECOND.2 + 0.008), BOTH_BEHIND);
+        // Taken to begin a millimetre before the face.
+        let (face_m, k, b) = (SECOND.2 + 0.008, 100.0, 20_000.0);
+        layers.bend(face_m - 1e-3, 8e-4, true, 0.002, &noise, &mut behind);
+        let at_face = BOTH_BEHIND + SECOND.1 * 0.008;
+        for n in 1..400 {
+            let (x, u) = (5e-5 * n as f64, DRIVES[n / 40 % 3]);
+            layers.take(face_m + x, u, k * x + b * x * u + at_face * u, 0.0);
+        }
+        near(layers.behind(0.07, &noise).0, at_face, 2e-3);
+        // b times a millimetre, 20 N s/m, is what the estimator has in place of it.
+        near(layers.belief.x[A], at_face - b * 1e-3, 0.01);
+        let g = &layers.belief;
+        let by = g.x[F] / g.x[K];
+        let spread = g.p[A][A] + by * by * g.p[ZERO][ZERO] - 2.0 * by * g.cov(ZERO, A);
+        near(layers.behind(0.07, &noise).1, spread * noise.variance, 1e-9);
+        // No farther than twice what the begin is known to, and only where stiffness is known to half of itself.
+        let mut far = layers;
+        far.belief.x[ZERO] -= 1.0;
+        near(far.behind(0.07, &noise).0, far.belief.x[A] + far.belief.x[F] * 1.6e-3, 1e-9);
+        let mut vague = layers;
+        vague.belief.p[K][K] = 1.1 * 0.25 * vague.belief.x[K] * vague.belief.x[K] / noise.variance;
+        near(vague.behind(0.07, &noise).0, vague.belief.x[A], 1e-12);
+        near(vague.behind(0.07, &noise).1, vague.belief.p[A][A] * noise.variance, 1e-12);
+    }
+
+    #[test]
     fn coloured_noise_weighs_as_if_it_were_whitened() {
         // Samples alternating about the law by what AR(1) noise makes of one impulse: f_k - rho f_(k-1) is the law's again.
         let (noise, rho) = (noise(), 0.8);
