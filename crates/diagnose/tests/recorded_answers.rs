@@ -351,6 +351,20 @@ fn outside_the_library() {
     assert_eq!(found.diagnosis.verdict, Verdict::Unknown, "{:?}", named(&found));
 }
 
+/// A strong cause stands beside what nobody knows; where one recording is alone, what is unknown has to be far larger.
+#[test]
+fn outside_the_library_beside_a_cause_and_alone() {
+    let outside = |kind, size_n| Some(Outside::new(kind, [0.1, 0.3, 0.5, 0.7], size_n));
+    let friction: AnyEffect = CoulombFriction { c_n_per_m: 90.0 }.into();
+    let beside =
+        Case { outside: outside(0, 0.12), ..Case::with([friction]) }.examined("unknown beside a cause");
+    assert_eq!((beside.diagnosis.verdict, named(&beside)), (Verdict::Unknown, vec!["coulomb_friction"]));
+    let alone = Case { outside: outside(0, 0.3), count: 1, ..Case::default() }.examined("unknown, alone");
+    assert_eq!(alone.diagnosis.verdict, Verdict::Unknown, "{:?}", named(&alone));
+    let chirp = Case { outside: outside(3, 0.1), ..Case::default() }.examined("unknown: a chirp");
+    assert_eq!(chirp.diagnosis.verdict, Verdict::Unknown, "{:?}", named(&chirp));
+}
+
 #[test]
 fn a_membrane() {
     let effect = HiddenMembrane { depth_m: 0.018, stiffness_n_per_m: 300.0, puncture_n: 0.9 };
