@@ -230,11 +230,18 @@ impl Stylet {
     fn fall_anew(&mut self) {
         let Some((began_m, variance)) = self.lasting.take() else { return };
         let span_m = self.fell_m - self.located_m;
-        let began_m = began_m.clamp(self.located_m - span_m.max(MEMORY_M), self.fell_m);
+        let earliest_m = self.located_m - at_least(MEMORY_M, span_m);
+        let began_m = at_most(self.fell_m, at_least(earliest_m, began_m));
         self.work += WORK_RUPTURE;
         self.layers = self.intact;
         let drive = self.steady.max(1e-6);
-        self.layers.rupture(began_m, libm::sqrt(variance).min(span_m), drive, &self.noise, &mut self.behind);
+        self.layers.rupture(
+            began_m,
+            at_most(at_least(0.0, span_m), libm::sqrt(variance)),
+            drive,
+            &self.noise,
+            &mut self.behind,
+        );
     }
 }
 
