@@ -129,12 +129,10 @@ fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
 #[cfg(test)]
 mod tests {
     use super::{Prepared, roughness};
-    use std::sync::Arc;
+    use crate::made::believed;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::drops::Drop;
-    use stylet_identify::model::Belief;
     use stylet_record::Recording;
-    use stylet_tissue::Tissue;
 
     fn blocks(f: impl Fn(f64) -> f64) -> Blocks {
         let t: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
@@ -165,17 +163,11 @@ mod tests {
 
     #[test]
     fn recordings_made_ready_tell_their_drops_and_their_largest_force() {
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: Vec::new() },
-            given: Vec::new(),
-            tolerance: Vec::new(),
-            thickness_tolerance: Vec::new(),
-            surface_tolerance_m: 0.01,
-        };
+        let belief = believed(&[]);
         let saw = |t: f64| if t < 4.0 { 0.5 * t } else { 0.5 * t - 1.5 };
         let (a, b) = (blocks(saw), blocks(|t| 0.6 * t));
         let largest = b.size_n.iter().copied().fold(0.0, f64::max);
-        let p = Prepared::new(Arc::new(belief), vec![a, b], 0.01);
+        let p = Prepared::new(belief, vec![a, b], 0.01);
         assert!((p.largest_n() - largest).abs() < 1e-12 && largest > 4.0);
         assert_eq!((p.floor_n, p.drops[1].len()), (0.01, 0));
         let times = p.drop_times();

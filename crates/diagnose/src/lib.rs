@@ -36,6 +36,8 @@ pub mod intervals;
 pub mod judge;
 pub mod leftover;
 pub mod lines;
+#[cfg(test)]
+mod made;
 pub mod outcome;
 pub mod predict;
 pub mod propose;

@@ -150,16 +150,16 @@ pub fn lines(fit: &Fit, data: &Data) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::{LEAST_HZ, judged_beside, lines, power, spectrum, without};
+    use crate::made::believed;
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::Fit;
-    use stylet_identify::model::{Belief, Model};
+    use stylet_identify::model::Model;
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
-    use stylet_tissue::{Layer, Tissue};
 
     const HZ: f64 = 100.0;
 
@@ -175,21 +175,8 @@ mod tests {
                 Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
             })
             .collect();
-        let layer = Layer {
-            name: String::new(),
-            thickness_m: 0.02,
-            stiffness_n_per_m: 100.0,
-            friction_ns_per_m2: 1000.0,
-            puncture_n: None,
-        };
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
-            given: Vec::new(),
-            tolerance: vec![0.3],
-            thickness_tolerance: vec![0.1],
-            surface_tolerance_m: 0.01,
-        };
-        let model = Model::base(Arc::new(belief), blocks.len());
+        let belief = believed(&[[0.02, 100.0, 1000.0]]);
+        let model = Model::base(belief, blocks.len());
         let data = Data::new(Arc::new(blocks), Noise::white(0.02), 0.0);
         let residuals = residuals(&model, &data).expect("a replay");
         (Fit { model, residuals }, data)

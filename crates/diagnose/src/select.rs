@@ -425,15 +425,16 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Search, Stage, at_a_bound, extra, first_of, simpler_first};
+    use crate::made::believed;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::Fit;
-    use stylet_identify::model::{Belief, Choice, Model, Role};
+    use stylet_identify::model::{Choice, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
     use stylet_tissue::{
-        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, Layer, StribeckFriction, Tissue,
+        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, StribeckFriction,
     };
 
     fn data() -> Data {
@@ -449,21 +450,8 @@ mod tests {
     }
 
     fn fit(effects: &[AnyEffect]) -> Fit {
-        let layer = Layer {
-            name: String::new(),
-            thickness_m: 0.05,
-            stiffness_n_per_m: 60.0,
-            friction_ns_per_m2: 4000.0,
-            puncture_n: None,
-        };
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
-            given: Vec::new(),
-            tolerance: vec![0.3],
-            thickness_tolerance: vec![0.1],
-            surface_tolerance_m: 0.01,
-        };
-        let mut model = Model::base(Arc::new(belief), 1);
+        let belief = believed(&[[0.05, 60.0, 4000.0]]);
+        let mut model = Model::base(belief, 1);
         model.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
         let residuals = residuals(&model, &data()).expect("a replay");
         Fit { model, residuals }

@@ -113,27 +113,22 @@ fn unresolved(search: &Search, k: usize) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{at_every_sample, unresolved, unsure};
+    use crate::made::believed;
     use crate::outcome::Cause;
     use crate::select::{Search, Stage};
     use std::collections::BTreeMap;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::Fit;
-    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_identify::model::{Choice, Model};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, Residuals};
     use stylet_record::Recording;
-    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, LowPassLag, Respiration, Tissue};
+    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, LowPassLag, Respiration};
 
     fn search(effects: &[AnyEffect]) -> Search {
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: Vec::new() },
-            given: Vec::new(),
-            tolerance: Vec::new(),
-            thickness_tolerance: Vec::new(),
-            surface_tolerance_m: 0.01,
-        };
-        let mut model = Model::base(Arc::new(belief), 2);
+        let belief = believed(&[]);
+        let mut model = Model::base(belief, 2);
         model.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
         // One at 100 Hz and one at 50 Hz, positions to 20 micrometres.
         let blocks = [100.0, 50.0].map(|hz: f64| {

@@ -70,13 +70,13 @@ pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
 #[cfg(test)]
 mod tests {
     use super::{price, with};
+    use crate::made::believed;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
-    use stylet_identify::model::{Belief, Free, Model, Own};
+    use stylet_identify::model::{Free, Model, Own};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
-    use stylet_tissue::Tissue;
 
     #[test]
     fn numbers_of_their_own_cost_one_less_than_there_are_recordings_and_four_nats_a_kind() {
@@ -98,14 +98,8 @@ mod tests {
 
     #[test]
     fn what_is_no_more_of_their_own_is_nothing() {
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: Vec::new() },
-            given: Vec::new(),
-            tolerance: Vec::new(),
-            thickness_tolerance: Vec::new(),
-            surface_tolerance_m: 0.01,
-        };
-        let mut m = Model::base(Arc::new(belief), 2);
+        let belief = believed(&[]);
+        let mut m = Model::base(belief, 2);
         m.free.thickness = true;
         m.own[1] = Own { surface_m: 2e-3, friction: 0.3, differing: [0.7; 8] };
         for (surface, friction) in [(false, false), (true, false), (false, true), (true, true)] {

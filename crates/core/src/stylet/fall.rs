@@ -16,12 +16,11 @@ const SURE_SDS: f64 = 4.0;
 /// Where it does not hold: a drop below its own interval is none.
 const LIKELY_SDS: f64 = 2.0;
 
+/// Squared number of standard deviations within which two lines lead to the same place: 4.
+const SAME_LINE: f64 = 16.0;
+
 /// A place is not known better than to a micrometre, in m².
 const TINY_M2: f64 = 1e-12;
-
-fn square(x: f64) -> f64 {
-    x * x
-}
 
 /// A fall of the force that may become a rupture.
 #[derive(Clone, Copy, Debug)]
@@ -78,9 +77,7 @@ impl Stylet {
         let over = fall.since_s > LONGEST_DROP_S && (self.least_n > 0.0 || self.rough == 0.0);
         if over && self.size().is_none_or(|size| size.fall_n < size.least_n) {
             // Too slow, or too small: not a rupture.
-            self.fall = None;
-            self.alarm.rest();
-            self.was_quiet = true;
+            self.listen_anew();
         }
     }
 
@@ -113,12 +110,17 @@ impl Stylet {
         Some(Size { fall_n, sd_n, least_n })
     }
 
+    /// Nothing that was summed up so far counts.
+    #[inline(always)]
+    pub(super) fn listen_anew(&mut self) {
+        self.alarm.rest();
+        (self.fall, self.was_quiet) = (None, true);
+    }
+
     pub(super) fn go_on_falling(&mut self, step: &Step, sample: &Sample, sd: f64) {
         let force = (sample.force_n - self.noise.bias_n()).abs().max(sd);
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
-        self.alarm.rest();
-        self.was_quiet = true;
-        self.fall = None;
+        self.listen_anew();
         if let Some(fallen) = self.fallen {
             self.layers = fallen;
         }
@@ -147,13 +149,11 @@ impl Stylet {
         self.fallen = Some(self.layers);
         self.since_s = 0.0;
         (self.lasting, self.fell_s) = (None, f64::INFINITY);
-        (self.intact, self.fell_m, self.located_m) = (self.before, sample.position_m, at_m);
+        (self.intact, self.fell_m) = (self.before, sample.position_m);
         self.layers.take(sample.position_m, self.drive, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
-        self.alarm.rest();
-        self.was_quiet = true;
-        self.fall = None;
+        self.listen_anew();
         self.before = self.layers;
         self.before_m = sample.position_m;
         self.since = 0;
@@ -214,23 +214,22 @@ impl Stylet {
         let line_n2 = level * noise_n2 + by_m * (by_m * sd_n_per_s * sd_n_per_s - 2.0 * both * noise_n2);
         let variance = at_least(TINY_M2, line_n2 / (steep * steep));
         let began_m = sample.position_m - back_m;
-        self.lasting = match self.lasting {
-            None if steep > 0.0 => Some((began_m, variance)),
-            // A line that does not lead to where it led before is not that of the fall any more.
-            Some((best_m, best))
-                if steep > 0.0 && variance < best && square(began_m - best_m) < 16.0 * best =>
-            {
-                Some((began_m, variance))
-            }
-            kept => kept,
-        };
+        // A line that does not lead to where it led before is not that of the fall any more.
+        let same_line = self.lasting.is_none_or(|(best_m, best)| {
+            let off_m = began_m - best_m;
+            variance < best && off_m * off_m < SAME_LINE * best
+        });
+        if steep > 0.0 && same_line {
+            self.lasting = Some((began_m, variance));
+        }
     }
 
     /// What was taken for a sudden drop began before: the belief of before moves on from there.
     fn fall_anew(&mut self) {
         let Some((began_m, variance)) = self.lasting.take() else { return };
-        let span_m = self.fell_m - self.located_m;
-        let earliest_m = self.located_m - at_least(MEMORY_M, span_m);
+        let located_m = self.layers.start_m;
+        let span_m = self.fell_m - located_m;
+        let earliest_m = located_m - at_least(MEMORY_M, span_m);
         let began_m = at_most(self.fell_m, at_least(earliest_m, began_m));
         self.work += WORK_RUPTURE;
         self.layers = self.intact;
@@ -303,7 +302,7 @@ mod tests {
             [(0.0093, 4e-5, 0.0093), (0.0106, 4e-5, 0.0101), (0.0081, 4e-5, 0.0087)]
         {
             let mut stylet = low();
-            (stylet.located_m, stylet.fell_m) = (0.0097, 0.0101);
+            (stylet.layers.start_m, stylet.fell_m) = (0.0097, 0.0101);
             stylet.lasting = Some((traced_m, sd_m * sd_m));
             let mut expected = stylet.intact;
             expected.rupture(began_m, sd_m, 0.002, &stylet.noise, &mut Behind::default());

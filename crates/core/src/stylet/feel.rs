@@ -31,8 +31,7 @@ impl Stylet {
             // Friction has changed by any part of the force, at any instant of the step.
             self.local.level(force_n, &self.noise);
             self.layers.pass();
-            self.alarm.rest();
-            (self.fall, self.was_quiet) = (None, true);
+            self.listen_anew();
             self.deepest_m = at_least(self.deepest_m, sample.position_m);
             return;
         }
@@ -125,8 +124,7 @@ impl Stylet {
                 self.work += work;
                 if bent {
                     // What the predictor has missed since was the bend.
-                    self.alarm.rest();
-                    (self.fall, self.was_quiet) = (None, true);
+                    self.listen_anew();
                 }
             }
             if s < 2.0 || sample.velocity_mps.abs() <= standstill {

@@ -78,11 +78,10 @@ pub(crate) struct Stylet {
     fallen: Option<Layers>,
     since_s: f64,
     falling: bool,
-    /// The estimator as it was before the last rupture, where that was noticed and where it was located in m; and where a drop that lasts began,
-    /// with the variance of that in m².
+    /// The estimator as it was before the last rupture, and where that was noticed in m; where a drop that lasts began, with the variance of that
+    /// in m².
     intact: Layers,
     fell_m: f64,
-    located_m: f64,
     lasting: Option<(f64, f64)>,
     /// Time since it was last seen to fall, in s.
     fell_s: f64,
@@ -144,7 +143,6 @@ impl Stylet {
             falling: false,
             intact: layers,
             fell_m: surface_m,
-            located_m: surface_m,
             lasting: None,
             fell_s: f64::INFINITY,
             fall: None,

@@ -362,30 +362,15 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::{candidates, effects, held, less, several};
+    use crate::made::believed;
     use crate::set::Insertion;
-    use std::sync::Arc;
-    use stylet_identify::model::{Belief, Bound, Choice, Model};
+    use stylet_identify::model::{Bound, Choice, Model};
     use stylet_record::Recording;
-    use stylet_tissue::{
-        AnyEffect, CoulombFriction, DelayedPuncture, Effect, Layer, LetGo, ShaftSlip, Tissue,
-    };
+    use stylet_tissue::{AnyEffect, CoulombFriction, DelayedPuncture, Effect, LetGo, ShaftSlip};
 
     fn model(all: &[AnyEffect]) -> Model {
-        let layer = Layer {
-            name: String::new(),
-            thickness_m: 0.02,
-            stiffness_n_per_m: 100.0,
-            friction_ns_per_m2: 1000.0,
-            puncture_n: None,
-        };
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: vec![layer.clone(), layer] },
-            given: Vec::new(),
-            tolerance: vec![0.3; 2],
-            thickness_tolerance: vec![0.1; 2],
-            surface_tolerance_m: 0.01,
-        };
-        let mut m = Model::base(Arc::new(belief), 1);
+        let belief = believed(&[[0.02, 100.0, 1000.0]; 2]);
+        let mut m = Model::base(belief, 1);
         m.effects = all.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
         m
     }

@@ -53,13 +53,13 @@ pub fn extended(name: &str, model: &Model, runs: &[&Insertion], instrument: &Ins
 #[cfg(test)]
 mod tests {
     use super::extended;
+    use crate::made::believed;
     use crate::set::Insertion;
     use crate::set::instrument::Instrument;
-    use std::sync::Arc;
-    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_identify::model::{Choice, Model};
     use stylet_record::Recording;
     use stylet_scenario::{Motion, Segment, Sensor};
-    use stylet_tissue::{CoulombFriction, Effect, Layer, Tissue};
+    use stylet_tissue::{CoulombFriction, Effect};
 
     /// From 3 mm on in at a speed for 4 s, a rest, and back or not.
     fn run(speed: f64, rest_s: f64, back: bool) -> Insertion {
@@ -81,21 +81,8 @@ mod tests {
 
     #[test]
     fn the_mean_insertion_moves_as_the_middle_run_did() {
-        let layer = Layer {
-            name: String::new(),
-            thickness_m: 0.05,
-            stiffness_n_per_m: 100.0,
-            friction_ns_per_m2: 1000.0,
-            puncture_n: None,
-        };
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
-            given: Vec::new(),
-            tolerance: vec![0.3],
-            thickness_tolerance: vec![0.1],
-            surface_tolerance_m: 0.01,
-        };
-        let mut model = Model::base(Arc::new(belief), 3);
+        let belief = believed(&[[0.05, 100.0, 1000.0]]);
+        let mut model = Model::base(belief, 3);
         model.effects = vec![Choice::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
         let (a, b, c) = (run(0.002, 1.0, true), run(0.004, 2.0, true), run(0.009, 1.0, false));
         let s = extended(

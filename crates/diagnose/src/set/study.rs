@@ -287,34 +287,22 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 #[cfg(test)]
 mod tests {
     use super::{advice, bought, cause, confidence, dropped, evidence, speeds};
+    use crate::made::believed;
     use crate::set::Insertion;
     use crate::set::fitted::Fitted;
     use crate::set::laws::{Kind, Law, Laws, Part};
     use crate::set::numbers::Told;
     use std::sync::Arc;
     use stylet_identify::fit::Fit;
-    use stylet_identify::model::{Belief, Choice, Model};
+    use stylet_identify::model::{Choice, Model};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, Residuals};
     use stylet_record::Recording;
-    use stylet_tissue::{CoulombFriction, Effect, Layer, Tissue};
+    use stylet_tissue::{CoulombFriction, Effect};
 
     fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {
-        let layer = Layer {
-            name: String::new(),
-            thickness_m: 0.02,
-            stiffness_n_per_m: 100.0,
-            friction_ns_per_m2: 1000.0,
-            puncture_n: None,
-        };
-        let belief = Belief {
-            tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
-            given: Vec::new(),
-            tolerance: vec![0.3],
-            thickness_tolerance: vec![0.1],
-            surface_tolerance_m: 0.01,
-        };
-        let mut model = Model::base(Arc::new(belief), 0);
+        let belief = believed(&[[0.02, 100.0, 1000.0]]);
+        let mut model = Model::base(belief, 0);
         if with {
             model.effects = vec![Choice::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
         }
