@@ -1,24 +1,12 @@
 //! What `algorithm: Stylet` promises of a fall of the force: one that takes up to 0.1 s is one rupture, placed where it began and told with its
 //! size; one that takes longer is none; three odd samples are a spike.
 
-use crate::support::{Insertion, enhance, gels, insertion, stylet};
+use crate::support::{Insertion, enhance, gels, insertion, lasting, stylet};
 use stylet_core::{Detection, Output, Sample};
 
-/// The paper's three layers without latex whose drops last `drop_s`: what is released is let go evenly.
+/// The paper's three layers without latex whose drops last `drop_s`.
 fn soft(seed: u64, drop_s: f64) -> Insertion {
-    let mut data = insertion(&gels(), -0.005, 50.0, 200.0, 0.02, seed, |_| 0.0023);
-    for rupture in &data.ruptures {
-        for (sample, truth) in data.samples.iter_mut().zip(&mut data.truth) {
-            let since_s = sample.time_s - rupture.time_s;
-            if (0.0..drop_s).contains(&since_s) {
-                let left_n = rupture.released_n * (1.0 - since_s / drop_s);
-                sample.force_n += left_n;
-                truth.total_n += left_n;
-                truth.tip_n += left_n;
-            }
-        }
-    }
-    data
+    lasting(insertion(&gels(), -0.005, 50.0, 200.0, 0.02, seed, |_| 0.0023), drop_s)
 }
 
 fn found(outputs: &[Output]) -> Vec<Detection> {

@@ -1,22 +1,9 @@
 //! What `algorithm: Stylet` promises of its intervals where a drop lasts or the noise is slow: they hold what is true as often as they say.
 
-use crate::support::{Insertion, enhance, gels, insertion, last_estimates, stylet};
+use crate::support::{Insertion, enhance, gels, insertion, last_estimates, lasting, stylet};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-
-/// Adds what is released, let go evenly over `drop_s`.
-fn lasting(mut data: Insertion, drop_s: f64) -> Insertion {
-    for rupture in &data.ruptures {
-        for sample in &mut data.samples {
-            let since_s = sample.time_s - rupture.time_s;
-            if (0.0..drop_s).contains(&since_s) {
-                sample.force_n += rupture.released_n * (1.0 - since_s / drop_s);
-            }
-        }
-    }
-    data
-}
 
 /// Of how many numbers (stiffness, friction and the friction behind, of three layers) the interval holds the truth, and the worst error in
 /// standard deviations.

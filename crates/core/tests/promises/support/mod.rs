@@ -53,6 +53,22 @@ pub fn constant(noise_n: f64, seed: u64) -> Insertion {
     insertion(&Tissue::three_gels(), -0.005, 50.0, 200.0, noise_n, seed, |_| 0.0023)
 }
 
+/// What is released at a rupture is let go evenly over `drop_s`.
+pub fn lasting(mut data: Insertion, drop_s: f64) -> Insertion {
+    for rupture in &data.ruptures {
+        for (sample, truth) in data.samples.iter_mut().zip(&mut data.truth) {
+            let since_s = sample.time_s - rupture.time_s;
+            if (0.0..drop_s).contains(&since_s) {
+                let left_n = rupture.released_n * (1.0 - since_s / drop_s);
+                sample.force_n += left_n;
+                truth.total_n += left_n;
+                truth.tip_n += left_n;
+            }
+        }
+    }
+    data
+}
+
 /// The latex stack with the paper's sinusoid from rest.
 pub fn sinusoid(noise_n: f64, seed: u64) -> Insertion {
     let omega = std::f64::consts::TAU * 0.0167;
