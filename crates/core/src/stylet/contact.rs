@@ -1,15 +1,19 @@
 //! From the air into the tissue.
 
 use super::alarm::Alarm;
+use super::fall::SURE_SDS;
+use super::feel::UNPROVEN;
 use super::layers::Layers;
 use super::local::{self, Local, Step};
-use super::slack::Slack;
+use super::slack::{Slack, WORK_SUMS};
 use super::{STIFFEST, Stylet};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::Sample;
 
 /// Samples in a row above the threshold that are a contact.
 const CONTACT_SAMPLES: u32 = 5;
+/// Multiplications and additions of a slope with its variance, and of the sums.
+const WORK_DOUBT: u32 = 10 + WORK_SUMS;
 
 impl Stylet {
     /// In the air.
@@ -52,6 +56,28 @@ impl Stylet {
         }
         if self.above >= CONTACT_SAMPLES {
             self.touch(config, step, sample, sample.position_m, risen, risen + 3.0 * sd);
+        }
+    }
+
+    /// Whether it was contact: air is flat until the tissue begins. A sample that the first layer's law took with the standardised innovation `z`; `before` is
+    /// that law without it.
+    pub(super) fn doubt_contact(
+        &mut self,
+        config: &EnhanceConfig,
+        step: &Step,
+        sample: &Sample,
+        (z, before): (f64, &Layers),
+    ) {
+        self.work += WORK_DOUBT;
+        let (slope, sd) = self.layers.slope_and_sd(self.steady, &self.noise);
+        // It rises, and along a straight line.
+        self.layers.settled = slope > SURE_SDS * sd && self.slack.is_straight();
+        if !self.layers.settled && self.slack.bends_up(z, before, self.last.position_m) {
+            let (bias_n, marginal) = (self.noise.bias_n(), self.noise.marginal());
+            let risen = self.local.level_n() - bias_n;
+            let sd_n = risen.abs() + 3.0 * libm::sqrt(marginal);
+            self.touch(config, step, sample, sample.position_m, risen.max(0.0), sd_n);
+            self.misfit = UNPROVEN;
         }
     }
 
@@ -113,6 +139,45 @@ mod tests {
         look(&mut stylet, &config, &sample(0.001, 0.14));
         near(stylet.low_passed_n, 0.14);
         assert!(!stylet.in_tissue);
+    }
+
+    /// Just behind a contact, with a slope of 78 N/m at 2 mm/s that is known to `sd`.
+    fn touched(sd: f64) -> Stylet {
+        let mut stylet = inside();
+        (stylet.steady, stylet.layers.settled) = (0.002, false);
+        stylet.layers.belief.p[K][K] = sd * sd / stylet.noise.variance;
+        stylet
+    }
+
+    #[test]
+    fn a_contact_is_sure_once_the_force_rises_along_a_straight_line() {
+        let config = EnhanceConfig::default();
+        for (sd, bends, sure) in [(19.0, false, true), (20.0, false, false), (19.0, true, false)] {
+            let mut stylet = touched(sd);
+            let before = stylet.layers;
+            if bends {
+                stylet.slack.bends_up(1.0, &before, 0.0099);
+            }
+            stylet.work = 0;
+            stylet.doubt_contact(&config, &step(), &sample(0.01, 1.5), (0.0, &before));
+            assert_eq!((stylet.layers.settled, stylet.work), (sure, 52), "{sd} N/m");
+            assert_eq!(stylet.first_m, 0.001);
+        }
+    }
+
+    #[test]
+    fn where_a_flat_force_begins_to_rise_the_tissue_begins() {
+        let config = EnhanceConfig::default();
+        let mut stylet = touched(60.0);
+        let before = stylet.layers;
+        stylet.doubt_contact(&config, &step(), &sample(0.01, 1.5), (3.0, &before));
+        assert_eq!(stylet.first_m, 0.001, "once is not enough");
+        stylet.doubt_contact(&config, &step(), &sample(0.01, 1.5), (9.0, &before));
+        assert_eq!((stylet.first_m, stylet.layers.start_m, stylet.out.contact_m), (0.01, 0.01, Some(0.01)));
+        assert_eq!((stylet.misfit, stylet.layers.passed), (UNPROVEN, 0));
+        // What acts already: the predictor's level above the zero, 1.43 N, and as uncertain, half of it elastic.
+        near(stylet.layers.belief.x[A], 0.5 * 1.43);
+        near((stylet.layers.belief.p[A][A] * stylet.noise.variance).sqrt(), 1.43 + 0.06);
     }
 
     /// Standard deviation of the low-passed force about the bias.

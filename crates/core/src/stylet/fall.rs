@@ -11,7 +11,7 @@ use crate::sample::{Cause, Detection, Sample};
 const MOST_AVERAGED: f64 = 16.0;
 
 /// Standard deviations that a fall below the law has to have: whatever else set off the alarm, noise makes it so low once in 30 000 looks.
-const SURE_SDS: f64 = 4.0;
+pub(super) const SURE_SDS: f64 = 4.0;
 
 /// Where it does not hold: a drop below its own interval is none.
 const LIKELY_SDS: f64 = 2.0;
@@ -154,6 +154,7 @@ impl Stylet {
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.local.renew(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.listen_anew();
+        self.slack.rest();
         self.before = self.layers;
         self.before_m = sample.position_m;
         self.since = 0;

@@ -32,6 +32,7 @@ impl Stylet {
             self.local.level(force_n, &self.noise);
             self.layers.pass();
             self.listen_anew();
+            self.doubted = false;
             self.deepest_m = at_least(self.deepest_m, sample.position_m);
             return;
         }
@@ -84,6 +85,14 @@ impl Stylet {
         if heard.quiet {
             self.fall = None;
         }
+        let far = innovation.e * innovation.e > SPIKE_SDS * SPIKE_SDS * self.noise.marginal();
+        self.doubted = self.going.tells_late() && far && !self.doubted;
+        if self.doubted {
+            // Whether the speed has jumped within this step is told by the next.
+            self.local.pass();
+            self.layers.pass();
+            return;
+        }
         if heard.alarm && forward && !odd {
             let recent = self.out.ruptures > 0 && self.since_s <= LONGEST_DROP_S;
             if recent {
@@ -108,11 +117,15 @@ impl Stylet {
             }
         } else if forward && sample.position_m >= self.layers.start_m {
             self.work += WORK_LAYERS;
-            let before = self.layers.free.then_some(self.layers);
+            let before = self.layers.may_be_free().then_some(self.layers);
             let (e, s) = self.layers.take(sample.position_m, self.drive, force_n, step.rho);
             let standard = e / libm::sqrt(s * self.noise.variance);
             let z2 = at_most(400.0, standard * standard);
-            if self.fallen.is_none() {
+            if self.layers.passed == 0 {
+                if let Some(before) = &before {
+                    self.doubt_contact(config, step, sample, (standard, before));
+                }
+            } else if self.fallen.is_none() {
                 let (work, bent) = self.slack.follow(
                     &mut self.layers,
                     (before, self.last.position_m),
@@ -177,6 +190,7 @@ mod tests {
     use super::*;
     use crate::stylet::alarm::Alarm;
     use crate::stylet::gaussian::Gaussian;
+    use crate::stylet::going::Going;
 
     /// After one more sample of this force, at 10 mm.
     fn after(mut stylet: Stylet, force_n: f64) -> Stylet {
@@ -459,13 +473,55 @@ mod tests {
 
     #[test]
     fn the_evidence_for_a_free_tip_is_weighed_once_a_drop_is_over() {
-        for (drop_goes_on, looked) in [(false, 60), (true, 0)] {
+        // The sums of a bend, and the look.
+        for (drop_goes_on, looked) in [(false, 42 + 60), (true, 0)] {
             let mut stylet = inside();
             (stylet.layers.passed, stylet.since, stylet.since_s) = (1, 103, 0.02);
+            stylet.layers.settled = false;
             stylet.fallen = drop_goes_on.then_some(stylet.layers);
-            stylet.layers.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07], [1.0; 6]);
+            stylet.layers.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.5], [1.0; 6]);
             assert_eq!(after(stylet, 1.48).work, 158 + 136 + looked);
         }
+    }
+
+    /// A log that has been seen to be late.
+    fn late(mut stylet: Stylet) -> Stylet {
+        stylet.going = Going::known_late();
+        stylet
+    }
+
+    #[test]
+    fn where_the_log_is_late_a_sample_that_is_far_off_is_waited_for() {
+        // Seven standard deviations of the noise below the prediction, then once more.
+        for force_n in [1.36, 0.9, 1.74] {
+            let stylet = late(inside());
+            let found = after(stylet, force_n);
+            assert!(found.doubted && found.out.detection.is_none(), "{force_n} N");
+            assert_eq!((found.noise.count, found.texture), (stylet.noise.count, stylet.texture));
+            assert_eq!(found.local.level_n(), 1.5);
+            assert_same(&found.layers.belief, &stylet.layers.belief);
+            let again = after(found, force_n);
+            assert!(!again.doubted && again.local.level_n() != 1.5);
+            assert_eq!(again.out.detection.is_some(), force_n == 0.9);
+            // It is the speed that has jumped.
+            let mut sudden = found;
+            sudden.feel(
+                &EnhanceConfig::default(),
+                &Step { sudden: true, ..step() },
+                &sample(0.0101, force_n),
+            );
+            assert!(sudden.out.detection.is_none() && sudden.fall.is_none() && !sudden.doubted);
+        }
+        // What is not far off, and a log that is on time, are taken at once.
+        assert!(!after(late(inside()), 1.4).doubted);
+        assert!(after(inside(), 0.9).out.detection.is_some());
+    }
+
+    #[test]
+    fn a_rupture_that_was_waited_for_is_where_it_showed_first() {
+        let (once, twice) = (after(inside(), 0.9), after(after(late(inside()), 0.9), 0.9));
+        let [once, twice] = [once, twice].map(|s| s.out.detection.expect("a rupture"));
+        near(twice.located_m, once.located_m);
     }
 
     #[test]

@@ -3,6 +3,10 @@
 //! Velocities in logs are often smoothed or late: at a stop within one sample they go down over twenty, while friction, and with it the
 //! force, is gone at once. The mean speed `w` of a step, from the positions, does not lag; but it carries the encoder's noise,
 //! `sqrt(2) sigma/dt`. So what is said is taken as long as it agrees with `w` within four times their usual difference.
+//!
+//! The second difference of `w` is free of smooth motion, and of `sigma` it has the variance `20 sigma^2/dt^2`: a tenth of its mean square
+//! is what noise there is in `w`. The speed at a sample is `w` carried on by half a step, with `6.5 sigma^2/dt^2`. Where that is as exact as a good log,
+//! and the log has once been seen to smooth, the positions alone are believed; the speed has jumped where `w` changes otherwise than before.
 
 use super::gaussian::{at_least, at_most};
 use crate::sample::Sample;
@@ -17,18 +21,30 @@ pub(crate) const LEARNED_S: f64 = 2.0;
 /// What is said to be below this in m/s is rest (SPEC section 6).
 pub(crate) const DEAD_MPS: f64 = 1e-5;
 
+/// White noise of the positions has in the mean speeds this share of the variance that it has in their second differences (2 of 20), and in the speed that is
+/// carried on from them so many times as much (6.5 of 2).
+const NOISE_OF_BENDS: f64 = 0.1;
+const SPEED_PER_NOISE: f64 = 3.25;
+
 /// Samples in a row that have to agree.
 const AGREEING: u8 = 2;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Going {
-    /// Mean square of the usual difference in (m/s)².
+    /// Mean square of the usual difference, and what of it is the positions' own noise, in (m/s)².
     usual: f64,
+    noise: f64,
     said_mps: f64,
+    /// Mean speeds of the last three steps in m/s, the newest first, and whether they have jumped.
+    stepped_mps: [f64; 3],
+    jumped: bool,
     /// The needle stands: it has not moved, and was not said to.
     standing: bool,
     /// They disagree for at least this many samples more: where the positions' speed jumps it may cross a smoothed one.
     apart: u8,
+    /// The positions are exact; and the log has told later, or earlier, what they show at once.
+    exact: bool,
+    smooths: bool,
 }
 
 impl Going {
@@ -45,36 +61,62 @@ impl Going {
         let said = sample.velocity_mps;
         let dt_s = sample.time_s - last.time_s;
         let stepped_m = sample.position_m - last.position_m;
+        let before = core::mem::replace(&mut self.said_mps, said);
         if stepped_m == 0.0 && (self.standing || said.abs() <= DEAD_MPS) {
             // A velocity that was smoothed in both directions of time rises before the needle has moved.
-            (self.standing, self.said_mps) = (true, said);
+            self.smooths |= before.abs() > DEAD_MPS && said.abs() > DEAD_MPS;
+            (self.standing, self.stepped_mps, self.jumped) = (true, [0.0; 3], false);
             return (0.0, false);
         }
         let starts = core::mem::take(&mut self.standing);
-        let before = self.said_mps;
-        self.said_mps = said;
+        if dt_s <= 0.0 {
+            return (said, starts);
+        }
+        let stepped = stepped_m / dt_s;
+        self.stepped_mps = [stepped, self.stepped_mps[0], self.stepped_mps[1]];
         if starts {
             return (said, true);
         }
-        let off_m = stepped_m - 0.5 * (said + before) * dt_s;
-        let least = LEAST_SHARE * speed_mps;
-        let limit = DISAGREEMENT * at_least(least * least, self.usual);
-        let off2_m2 = off_m * off_m;
-        if off2_m2 > limit * (dt_s * dt_s) || self.apart > 0 {
-            let off2 = off2_m2 / (dt_s * dt_s);
-            self.usual += share * (at_most(limit, off2) - self.usual);
-            return if dt_s > 0.0 {
-                self.disagree(before, said, stepped_m / dt_s, limit)
-            } else {
-                (said, false)
-            };
+        let off = stepped - 0.5 * (said + before);
+        let least2 = LEAST_SHARE * speed_mps * (LEAST_SHARE * speed_mps);
+        let limit = DISAGREEMENT * at_least(least2, self.usual);
+        if off != 0.0 || said != 0.0 {
+            self.usual += share * (at_most(limit, off * off) - self.usual);
         }
-        if off_m != 0.0 {
-            self.usual += share * (off2_m2 / (dt_s * dt_s) - self.usual);
-        } else if said != 0.0 {
-            self.usual -= share * self.usual;
+        let (noise, positions_mps) =
+            self.by_positions(DISAGREEMENT * at_least(least2, self.noise / NOISE_OF_BENDS));
+        // Jumps are none of it.
+        let clip = at_least(least2, DISAGREEMENT * self.noise);
+        self.noise += share * (at_most(clip, noise) - self.noise);
+        self.exact = SPEED_PER_NOISE * self.noise <= least2;
+        if self.tells_late() {
+            return (positions_mps, self.jumped);
+        }
+        if off * off > limit || self.apart > 0 {
+            let told = self.disagree(before, said, stepped, limit);
+            self.smooths |= self.exact && SPEED_PER_NOISE * noise <= least2 && self.apart > 0;
+            return told;
         }
         (said, false)
+    }
+
+    /// The log is smoothed, and the positions are believed: what has happened within a step is told by the next.
+    #[inline(always)]
+    pub(super) fn tells_late(&self) -> bool {
+        self.exact && self.smooths
+    }
+
+    /// What this step says of the noise in (m/s)², and the speed that exact positions show; notes whether it has jumped: `limit` is the squared
+    /// change of speed within a step that has no meaning.
+    fn by_positions(&mut self, limit: f64) -> (f64, f64) {
+        let [now, last, before] = self.stepped_mps;
+        let (change, changed) = (now - last, last - before);
+        let bent2 = (change - changed) * (change - changed);
+        // A jump in the middle of a step changes two of them alike.
+        self.jumped = bent2 > limit || (self.jumped && change * change > limit);
+        // Behind it the speed goes on as it does now.
+        let smoothly = !self.jumped || change * change <= limit;
+        (NOISE_OF_BENDS * bent2, if smoothly { now + 0.5 * change } else { now })
     }
 
     /// Whether a jump within the step explains it, so that the mean speed lies between those at the ends; otherwise the positions are right.
@@ -95,6 +137,13 @@ mod tests {
     use alloc::vec::Vec;
 
     const DT_S: f64 = 0.005;
+
+    impl Going {
+        /// Whose log is known to be late.
+        pub(in super::super) fn known_late() -> Self {
+            Self { exact: true, smooths: true, ..Self::default() }
+        }
+    }
 
     /// With the first sample, which has none before it.
     fn begun(velocity_mps: f64) -> (Going, Sample) {
@@ -134,22 +183,61 @@ mod tests {
     }
 
     #[test]
-    fn where_the_log_is_late_the_positions_are_right_until_both_agree_again() {
-        // A step from 2 to 4 mm/s at sample 500, logged with a first-order lag of 10 samples.
-        let v = |k: usize| if k < 500 { 0.002 } else { 0.004 };
-        let said =
-            |k: usize| if k < 500 { 0.002 } else { 0.004 - 0.002 * (-(k as f64 - 500.0) / 10.0).exp() };
-        let found = told(v, said, 800);
+    fn where_the_log_is_late_the_positions_are_right_from_then_on() {
+        // A step from 2 to 4 mm/s at sample 500, logged with a first-order lag of 10 samples, and one back at 700.
+        let v = |k: usize| if (500..700).contains(&k) { 0.004 } else { 0.002 };
+        let lag = |k: usize, step: f64| 1.0 - (-(k as f64 - step).max(0.0) / 10.0).exp();
+        let said = |k: usize| 0.002 + 0.002 * (lag(k, 500.0) - lag(k, 700.0));
+        let found = told(v, said, 900);
         for (k, (mps, apart)) in found.iter().enumerate() {
             let sample = k + 1;
             if sample < 500 {
                 assert_eq!((*mps, *apart), (0.002, false));
-            } else if (502..520).contains(&sample) {
-                assert!(*apart && (mps - 0.004).abs() < 1e-9, "{mps} m/s at sample {sample}");
-            } else if sample > 600 {
-                assert!(!apart && (mps - 0.004).abs() < 1e-6, "{mps} m/s at sample {sample}");
+            } else if sample > 501 && sample != 700 {
+                assert!((mps - v(sample)).abs() < 1e-9, "{mps} m/s at sample {sample}");
             }
+            // The step of the jump, half of which it is, and the next two, which differ from it.
+            assert_eq!(*apart, (500..=502).contains(&sample) || (700..=702).contains(&sample), "{sample}");
         }
+    }
+
+    #[test]
+    fn exact_positions_know_a_speed_that_the_log_has_smoothed() {
+        // 1 Hz of ripple on 4 mm/s, logged as the mean of 21 samples, which takes off 4 % of it and smears a stop over 10 samples on both sides.
+        let v = |k: usize| {
+            if k < 1000 { 0.004 + 0.002 * (core::f64::consts::TAU * DT_S * k as f64).sin() } else { 0.0 }
+        };
+        let said = |k: usize| (0..21).map(|i| v((k + i).saturating_sub(10))).sum::<f64>() / 21.0;
+        let found = told(v, said, 1100);
+        for (k, (mps, apart)) in found.iter().enumerate().skip(200) {
+            let sample = k + 1;
+            assert!(sample == 1000 || (mps - v(sample)).abs() < 5e-6, "{mps} m/s at sample {sample}");
+            assert!(!apart || (1000..=1002).contains(&sample), "sample {sample}");
+        }
+    }
+
+    #[test]
+    fn a_log_is_late_where_exact_positions_show_it_and_not_for_a_jump_or_noise() {
+        let late = |v: &dyn Fn(usize) -> f64, said: &dyn Fn(usize) -> f64, noise_m: f64| {
+            let ((mut going, mut last), mut at_m) = (begun(said(0)), 0.0);
+            for k in 1..2000_usize {
+                at_m += 0.5 * (v(k - 1) + v(k)) * DT_S;
+                let position_m = at_m + noise_m * ((k * 7919 % 1009) as f64 / 504.0 - 1.0);
+                let sample =
+                    Sample { time_s: DT_S * k as f64, position_m, velocity_mps: said(k), force_n: 0.0 };
+                going.speed(&last, &sample, 0.002, DT_S / (DT_S + LEARNED_S));
+                last = sample;
+            }
+            going.tells_late()
+        };
+        let step = |k: usize| if k < 1000 { 0.002 } else { 0.004 };
+        let ramp = |k: usize| (0.002 + 0.0001 * (k as f64 - 990.0)).clamp(0.002, 0.004);
+        assert!(!late(&step, &step, 0.0));
+        assert!(late(&step, &ramp, 0.0));
+        assert!(!late(&step, &ramp, 1e-6), "a micrometre at 200 Hz is a tenth of the speed");
+        // From rest: said to move for two samples before it does.
+        let from = |first: usize| move |k: usize| if k < first { 0.0 } else { 0.002 };
+        assert!(!late(&from(100), &from(100), 0.0) && late(&from(100), &from(98), 0.0));
     }
 
     #[test]
@@ -206,7 +294,7 @@ mod tests {
         assert!(found[..98].iter().all(|f| *f == (0.0, false)), "{:?}", &found[85..99]);
         assert!(found[99].1, "when it sets off, nobody knows when: {:?}", found[99]);
         let (mps, apart) = found[150];
-        assert!(!apart && mps == 0.002);
+        assert!(!apart && (mps - 0.002).abs() < 1e-9);
     }
 
     /// Said before and now, in m/s, the mean speed of the positions over 5 ms, and what is usual.

@@ -103,6 +103,12 @@ impl Layers {
         }
     }
 
+    /// The tip feels nothing, or nobody knows: it may be in a gap, or in the air still.
+    #[inline(always)]
+    pub(super) fn may_be_free(&self) -> bool {
+        !self.settled
+    }
+
     #[inline(always)]
     fn regressor(&self, x: f64, drive: f64) -> [f64; N] {
         let (a, q) = if self.passed > 0 { (drive, 0.0) } else { (1.0, drive) };
@@ -156,6 +162,13 @@ impl Layers {
         self.belief.x[K] + self.belief.x[F] * drive
     }
 
+    /// The same, and its standard deviation.
+    pub(super) fn slope_and_sd(&self, drive: f64, noise: &Noise) -> (f64, f64) {
+        let g = &self.belief;
+        let variance = g.p[K][K] + drive * (2.0 * g.cov(F, K) + drive * g.p[F][F]);
+        (self.slope(drive), libm::sqrt(at_least(0.0, variance) * noise.variance))
+    }
+
     /// A rupture at `position_m`, known to `sd_m`.
     pub(crate) fn rupture(
         &mut self,
@@ -183,6 +196,9 @@ impl Layers {
             }
         }
         let before = if self.free { self.scale } else { self.slope(drive).abs().max(1.0) };
+        if self.free {
+            self.was_not_free(drive, unit);
+        }
         let before = before.min(libm::sqrt(WIDEST / unit) / MEMORY_M);
         let known = self.belief.x[FP].max(0.0);
         let b = self.belief.x[F].clamp(-before / drive, before / drive);
@@ -214,6 +230,18 @@ impl Layers {
         self.passed += 1;
         self.last = None;
         self.free_before = [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
+    }
+
+    /// What has lost force was a layer, which looked like friction that grows on: any part of the slope may have been elastic.
+    pub(super) fn was_not_free(&mut self, drive: f64, unit: f64) {
+        let half = 0.5 * self.slope(drive);
+        let g = &mut self.belief;
+        (g.x[K], g.x[F]) = (g.x[K] + half, g.x[F] - half / drive);
+        let variance = half * half * unit;
+        g.p[K][K] += variance;
+        g.p[F][F] += variance / (drive * drive);
+        g.p[F][K] -= variance / drive;
+        self.free = false;
     }
 
     /// A layer of unknown stiffness and friction begins at a place that is known to `sd_m`: on either side of it friction per
@@ -752,13 +780,19 @@ mod tests {
     fn a_layer_that_began_behind_a_gap_takes_its_doubt_about_its_begin_with_it() {
         let (mut layers, noise) = knowing(2);
         (layers.start_sd_m, layers.free) = (8e-4, true);
-        layers.belief.x[F] = 83.0;
-        let (g, mut behind) = (layers.belief, Behind::default());
+        (layers.belief.x[K], layers.belief.x[F]) = (0.0, 83.0);
+        let (mut g, mut behind) = (layers.belief, Behind::default());
         behind[1] = [0.013, 0.031, 5.0];
         let mut map = Matrix::default();
         (map[A][A], map[A][F], map[KP][K], map[FP][F]) = (1.0, 1e-6, 1.0, 1.0);
+        // A tip that has lost force was not free: any part of the slope of 24.9 N/m may have been elastic.
+        (g.x[K], g.x[F]) = (12.45, 41.5);
+        let variance = 12.45 * 12.45 / noise.variance;
+        g.p[K][K] += variance;
+        g.p[F][F] += variance / (0.3 * 0.3);
+        g.p[F][K] -= variance / 0.3;
         // A free tip's slope says nothing of layers: the scale stays. What looked like an error of the zero is gone.
-        let (mut x, mut p) = after_a_rupture(&map, (&g, &noise), 90.0, 83.0);
+        let (mut x, mut p) = after_a_rupture(&map, (&g, &noise), 90.0, 41.5);
         x[ZERO] = 0.07;
         p[ZERO][ZERO] += 1.0 / 400.0;
         // Nor does a layer end before it has begun.

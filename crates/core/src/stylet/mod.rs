@@ -71,6 +71,8 @@ pub(crate) struct Stylet {
     low_passed_n: f64,
     above: u32,
     spikes: u8,
+    /// The last sample was far off, and it is not known yet whether that was the speed.
+    doubted: bool,
     /// Samples since the last rupture, and the count at which the ruptured layer is reported next.
     since: u32,
     report_at: u32,
@@ -136,6 +138,7 @@ impl Stylet {
             low_passed_n: 0.0,
             above: 0,
             spikes: 0,
+            doubted: false,
             since: 0,
             report_at: u32::MAX,
             fallen: None,
@@ -232,6 +235,7 @@ mod tests {
         stylet.layers = Layers::contact(0.0, 0.0, 0.0, 100.0, 0.002, &stylet.noise);
         stylet.layers.belief =
             Gaussian::new([0.6, 60.0, 9000.0, 25.0, 0.0, 0.07], [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]);
+        stylet.layers.settled = true;
         (stylet.before, stylet.before_m) = (stylet.layers, 0.0097);
         (stylet.in_tissue, stylet.started, stylet.last) = (true, true, sample(0.0099, 1.5));
         (stylet.first_m, stylet.deepest_m) = (0.001, 0.0099);

@@ -10,7 +10,8 @@
 //!
 //! so the evidence for each is the density of the belief at that point over what it was when the layer began (Dickey 1971, Ann. Math.
 //! Statist. 42, 204): no second filter. Once one of them is [`ODDS`] times as probable, it is what the estimator believes. The end of the gap is a bend of
-//! the force, found by the same sums as a drop: upwards a face, where a layer begins; downwards the far face, where friction stops to grow.
+//! the force, found by the same sums as a drop: upwards a face, where a layer begins; downwards the far face, where friction stops to grow. As long as the
+//! odds are open, upwards alone: a layer's law is straight, and what goes down may be its drop.
 
 use super::alarm::Alarm;
 use super::gaussian::at_least;
@@ -25,11 +26,13 @@ const SLOW_SHIFT: f64 = 0.5;
 const MOST_NATS: f64 = 500.0;
 /// How many times the logarithm of those odds it takes to be sure of the contrary: weaker layers look free for a while.
 const SETTLED: f64 = 4.0;
+/// Variance that is left of what is taken to be so, as a share.
+const TIGHT: f64 = 1e-9;
 /// Samples between two looks at the odds.
 const EVERY: u32 = 8;
 /// Multiplications and additions of a look at the odds, of the sums, and of a bend (a linear map of six unknowns).
 const WORK_LOOK: u32 = 60;
-const WORK_SUMS: u32 = 42;
+pub(super) const WORK_SUMS: u32 = 42;
 pub(super) const WORK_BEND: u32 = 2 * 216 + 2 * 126;
 
 /// Whether the tip is free, and what would end that.
@@ -80,6 +83,20 @@ impl Slack {
         self.down.rest();
     }
 
+    /// Nothing says that the force is about to bend upwards.
+    pub(super) fn is_straight(&self) -> bool {
+        self.up.slow == 0.0
+    }
+
+    /// Whether the force has risen above a straight line, by samples like this one with the standardised innovation `z`.
+    pub(super) fn bends_up(&mut self, z: f64, before: &Layers, last_m: f64) -> bool {
+        let bent = self.up.take(-z, before, last_m);
+        if bent {
+            self.rest();
+        }
+        bent
+    }
+
     /// After a sample at `position_m` that the estimator took with the standardised innovation `z` (`before`, while the tip is free, is the estimator
     /// without it, `last_m` the position of the sample before). Returns the work done, and whether the force has bent.
     #[inline(always)]
@@ -92,49 +109,58 @@ impl Slack {
         noise: &Noise,
         behind: &mut Behind,
     ) -> (u32, bool) {
-        if layers.passed == 0 {
-            return (0, false);
-        }
-        let Some(before) = &before else {
-            if layers.settled || !count.is_multiple_of(EVERY) {
-                return (0, false);
-            }
-            if layers.consider_free(ODDS, noise) {
+        let Some(before) = &before else { return (0, false) };
+        let mut work = WORK_SUMS;
+        if !layers.free && count.is_multiple_of(EVERY) {
+            work += WORK_LOOK;
+            if layers.consider_free(ODDS, self.is_straight(), noise) {
                 self.rest();
+                return (work, false);
             }
-            return (WORK_LOOK, false);
-        };
+        }
         let bent_up = self.up.take(-z, before, last_m);
-        let bent_down = self.down.take(z, before, last_m);
+        // As long as there may be a layer, what goes down may be its drop.
+        let bent_down = layers.free && self.down.take(z, before, last_m);
         if !bent_up && !bent_down {
-            return (WORK_SUMS, false);
+            return (work, false);
         }
         let side = if bent_up { &self.up } else { &self.down };
         let (span_m, at_m) = ((position_m - side.before_m).max(0.0), side.before_m);
         *layers = side.before;
+        if span_m == 0.0 {
+            // No layer begins where the needle stands: what it feels there it has felt before.
+            if layers.free {
+                layers.was_not_free(drive, 1.0 / noise.variance);
+            }
+            self.rest();
+            return (work, true);
+        }
+        if !layers.free {
+            // The law of a layer is straight: there was none, whatever friction did.
+            layers.nothing_felt();
+        }
         layers.bend(at_m, span_m / libm::sqrt(12.0), bent_up, drive, noise, behind);
         self.rest();
-        (WORK_SUMS + WORK_BEND, true)
+        (work + WORK_BEND, true)
     }
 }
 
 impl Layers {
     /// Takes the tip to be free where that is `odds` times as probable as a layer that began at the rupture.
-    fn consider_free(&mut self, odds: f64, noise: &Noise) -> bool {
+    fn consider_free(&mut self, odds: f64, straight: bool, noise: &Noise) -> bool {
         let [before_follows, before_ends] = self.free_before;
         let follows = self.log_density_of_free(true, noise) - before_follows;
         let ends = self.log_density_of_free(false, noise) - before_ends;
         // A layer has begun, and it is not looked at again, when it is that much more probable than a free tip.
-        self.settled = follows.max(ends) < -SETTLED * libm::log(odds);
+        self.settled = straight && self.belief.x[K] > 0.0 && follows.max(ends) < -SETTLED * libm::log(odds);
         // As probable as that against both others together: that a layer has begun, and the other way to be free.
         let others = libm::log(odds * (1.0 + odds * libm::exp(follows.min(ends).min(MOST_NATS))));
         if follows.max(ends) < others || !(follows + ends).is_finite() {
             return false;
         }
         self.free = true;
-        let tight = |p: f64| 1e-9 * p;
-        let none = self.belief.innovation([K], [1.0], 0.0, tight(self.belief.p[K][K]));
-        self.belief.take(&none);
+        let tight = |p: f64| TIGHT * p;
+        self.nothing_felt();
         if follows > ends {
             let same = self.belief.innovation([F, FP], [1.0, -1.0], 0.0, tight(self.belief.p[F][F]));
             self.belief.take(&same);
@@ -143,6 +169,12 @@ impl Layers {
             self.belief.take(&ended);
         }
         true
+    }
+
+    /// The tip has felt nothing in this layer.
+    fn nothing_felt(&mut self) {
+        let none = self.belief.innovation([K], [1.0], 0.0, TIGHT * self.belief.p[K][K]);
+        self.belief.take(&none);
     }
 
     /// Logarithm of the belief's density (up to a constant) at `K = 0` and `b = bp` or `b = 0`.
@@ -223,11 +255,11 @@ mod tests {
     #[test]
     fn a_tip_is_free_where_nothing_is_felt_and_friction_grows_on_or_stays() {
         let (mut gap, noise) = behind_a_rupture(0.0, 9000.0);
-        assert!(gap.consider_free(ODDS, &noise) && gap.free && !gap.settled);
+        assert!(gap.consider_free(ODDS, true, &noise) && gap.free && !gap.settled);
         assert!(gap.belief.x[K].abs() < 1e-3, "{}", gap.belief.x[K]);
         assert!((gap.belief.x[F] / 9000.0 - 1.0).abs() < 0.02, "{}", gap.belief.x[F]);
         let (mut end, noise) = behind_a_rupture(0.0, 0.0);
-        assert!(end.consider_free(ODDS, &noise) && end.free);
+        assert!(end.consider_free(ODDS, true, &noise) && end.free);
         assert!(end.belief.x[F].abs() < 10.0, "{}", end.belief.x[F]);
     }
 
@@ -235,7 +267,7 @@ mod tests {
     fn a_layer_that_has_begun_is_no_gap_and_is_not_looked_at_again() {
         for (stiffness, friction) in [(60.0, 9000.0), (0.0, 20_000.0), (30.0, 0.0)] {
             let (mut layers, noise) = behind_a_rupture(stiffness, friction);
-            assert!(!layers.consider_free(ODDS, &noise) && !layers.free, "{stiffness} N/m");
+            assert!(!layers.consider_free(ODDS, true, &noise) && !layers.free, "{stiffness} N/m");
             assert!(layers.settled, "{stiffness} N/m");
         }
     }
@@ -276,7 +308,7 @@ mod tests {
         ] {
             let (mut layers, noise) = with_evidence(follows, ends);
             let was = layers.belief;
-            assert_eq!(layers.consider_free(ODDS, &noise), free, "{follows} {ends}");
+            assert_eq!(layers.consider_free(ODDS, true, &noise), free, "{follows} {ends}");
             assert_eq!((layers.free, layers.settled), (free, settled), "{follows} {ends}");
             // What is believed then: no stiffness, and the friction of the layer before or none.
             let mut expected = was;
@@ -323,24 +355,85 @@ mod tests {
     fn evidence_is_looked_at_every_eighth_sample_until_it_is_settled_or_the_tip_is_free() {
         let (noise, mut behind) = (noise(), Behind::default());
         let mut follow = |layers: &mut Layers, slack: &mut Slack, count: u32| {
-            slack.follow(layers, (None, 0.024), (0.02405, 0.0, 0.002), count, &noise, &mut behind)
+            let before = layers.may_be_free().then_some(*layers);
+            slack.follow(layers, (before, 0.024), (0.02405, 0.0, 0.002), count, &noise, &mut behind)
         };
         let (mut layers, _) = behind_a_rupture(60.0, 9000.0);
         let mut slack = Slack::new(0.05, 0.005, &layers);
-        assert_eq!([7, 9, 12].map(|count| follow(&mut layers, &mut slack, count)), [(0, false); 3]);
+        assert_eq!([7, 9, 12].map(|count| follow(&mut layers, &mut slack, count)), [(42, false); 3]);
         assert!(!layers.settled);
-        assert_eq!(follow(&mut layers, &mut slack, 16), (60, false));
+        // A force that may be bending upwards settles nothing.
+        slack.up.take(-3.0, &layers, 0.0);
+        assert_eq!(follow(&mut layers, &mut slack, 16), (102, false));
+        assert!(!layers.settled);
+        slack.rest();
+        assert_eq!(follow(&mut layers, &mut slack, 16), (102, false));
         assert!(layers.settled && !layers.free);
         assert_eq!(follow(&mut layers, &mut slack, 24), (0, false));
-        // Nothing is behind the first layer but air.
-        (layers.settled, layers.passed) = (false, 0);
-        assert_eq!(follow(&mut layers, &mut slack, 16), (0, false));
         let (mut layers, _) = behind_a_rupture(0.0, 9000.0);
         for side in [&mut slack.up, &mut slack.down] {
             side.take(-3.0, &layers, 0.0);
         }
-        assert_eq!(follow(&mut layers, &mut slack, 8), (60, false));
+        assert_eq!(follow(&mut layers, &mut slack, 8), (102, false));
         assert!(layers.free && slack.up.slow == 0.0 && slack.down.slow == 0.0, "the sums begin then");
+    }
+
+    #[test]
+    fn a_layer_without_stiffness_is_not_settled() {
+        for stiffness in [60.0, -60.0] {
+            let (mut layers, noise) = behind_a_rupture(stiffness, 9000.0);
+            assert!(!layers.consider_free(ODDS, true, &noise) && !layers.free);
+            assert_eq!(layers.settled, stiffness > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_gap_that_was_not_known_for_one_ends_where_the_force_bends_upwards() {
+        let (noise, mut behind) = (noise(), Behind::default());
+        // As long as nobody knows, what goes down may be the drop of a layer.
+        let (undecided, _) = behind_a_rupture(0.0, 9000.0);
+        for (z, bent) in [(9.0, true), (-9.0, false)] {
+            let (mut layers, mut slack) = (undecided, Slack::new(0.05, 0.005, &undecided));
+            let mut follow = |layers: &mut Layers, last_m: f64, z: f64| {
+                let next = (last_m + 1e-4, z, 0.0021);
+                slack.follow(layers, (Some(undecided), last_m), next, 3, &noise, &mut behind).1
+            };
+            assert!(!follow(&mut layers, 0.0241, 0.2 * z));
+            assert_eq!(follow(&mut layers, 0.0242, z), bent);
+            if bent {
+                let mut expected = undecided;
+                expected.nothing_felt();
+                expected.bend(0.0241, 2e-4 / 12.0_f64.sqrt(), true, 0.0021, &noise, &mut Behind::default());
+                near(layers.start_m, 0.0241);
+                for i in 0..6 {
+                    near(layers.belief.x[i], expected.belief.x[i]);
+                    near(layers.belief.p[i][i], expected.belief.p[i][i]);
+                }
+            } else {
+                near(layers.start_m, undecided.start_m);
+            }
+        }
+    }
+
+    #[test]
+    fn no_layer_begins_where_the_needle_stands() {
+        let (noise, mut behind) = (noise(), Behind::default());
+        for free in [true, false] {
+            let (mut layers, _) = behind_a_rupture(0.0, 9000.0);
+            assert!(!free || layers.consider_free(ODDS, true, &noise));
+            let before = layers;
+            let mut slack = Slack::new(0.05, 0.005, &layers);
+            let mut follow = |layers: &mut Layers, z: f64| {
+                slack.follow(layers, (Some(before), 0.024), (0.024, z, 0.002), 3, &noise, &mut behind).1
+            };
+            assert!(!follow(&mut layers, 2.0) && follow(&mut layers, 9.0));
+            assert_eq!((layers.free, layers.start_m), (false, before.start_m));
+            // What friction was thought to do by itself, 18 N/m, may have been elastic for any part.
+            let part = if free { 9.0 } else { 0.0 };
+            assert!((layers.belief.x[K] - before.belief.x[K] - part).abs() < 0.2, "{}", layers.belief.x[K]);
+            let slope = |layers: &Layers| layers.slope(0.002);
+            near(slope(&layers), slope(&before));
+        }
     }
 
     #[test]
@@ -348,7 +441,7 @@ mod tests {
         for up in [true, false] {
             let (mut layers, noise) = behind_a_rupture(0.0, 9000.0);
             let mut behind = Behind::default();
-            assert!(layers.consider_free(ODDS, &noise));
+            assert!(layers.consider_free(ODDS, true, &noise));
             let before = layers;
             let mut slack = Slack::new(0.05, 0.005, &layers);
             let mut follow = |layers: &mut Layers, last_m: f64, z: f64| {

@@ -12,6 +12,7 @@ mod stylet_finds;
 mod stylet_gaps;
 mod stylet_holds;
 mod stylet_intervals;
+mod stylet_late_logs;
 mod stylet_origins;
 mod stylet_without_a_law;
 mod support;

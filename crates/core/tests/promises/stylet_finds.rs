@@ -176,3 +176,25 @@ fn a_configured_friction_law_takes_dry_friction_away_in_a_hold() {
     let raw = last.map(|i| (samples[i].force_n - tip_n[i]).abs()).sum::<f64>() / 500.0;
     assert!(off < 0.15 * raw, "{off} N off, {raw} N of friction");
 }
+
+#[test]
+fn a_contact_that_was_none_is_taken_back_where_the_force_begins_to_rise() {
+    for seed in 0..20 {
+        // A cable that moves in the air: 50 mN more from 2 mm before the surface on.
+        let mut data = insertion(&gels(), -0.005, 50.0, 200.0, 0.01, seed, |_| 0.0023);
+        for sample in data.samples.iter_mut().filter(|s| s.position_m > -0.002) {
+            sample.force_n += 0.05;
+        }
+        let outputs = enhance(&stylet(), &data.samples);
+        let touched = |until_m: f64| {
+            let k = data.samples.iter().position(|s| s.position_m > until_m).expect("it goes there");
+            outputs[k].contact_m.expect("a contact")
+        };
+        assert!(touched(-0.001) < -0.0015, "seed {seed}: the cable is taken for the surface");
+        assert!((touched(0.005)).abs() < 0.0015, "seed {seed}: {} m", touched(0.005));
+        assert_eq!(outputs.iter().filter(|o| o.detection.is_some()).count(), 3, "seed {seed}");
+        let (first, stiffness) = (last_estimates(&outputs)[0], gels().layers[0].stiffness_n_per_m);
+        let off = first.stiffness_n_per_m / stiffness - 1.0;
+        assert!(off.abs() < 0.05, "seed {seed}: {off} of the first layer's stiffness");
+    }
+}
