@@ -392,6 +392,8 @@ mod tests {
         let single = Blocks::new(&recorded(even(20), force), &[], 0.001);
         assert_eq!((single.samples, single.len()), (1, 20));
         assert!(single.used.iter().all(|u| *u));
+        let none = Blocks { from_s: Vec::new(), to_s: Vec::new(), ..single };
+        assert_eq!((none.len(), none.is_empty(), none.span_s()), (0, true, (0.0, 0.0)));
     }
 
     #[test]
