@@ -400,6 +400,19 @@ mod tests {
         let told = pieces(&m, &[(0.4, 0.55), (0.55, 0.6)], Shown::Sampled);
         assert_eq!(told.len(), 2);
         is(&told[1], 1, (0.55, 0.6), 1.015, -1.0);
+        // Nor does one nearer to it than a millionth of the span, on either side; a turn neither.
+        let cuts =
+            |m: &Motion, from_s: f64, to_s: f64| pieces(m, &[(from_s, to_s)], Shown::Sampled).len() - 1;
+        let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
+        let v: Vec<f64> = t.iter().map(|t| 1.0 - 1.8 * t).collect();
+        let turn = Motion::from_knots(&t, &[0.0; 13], &v, &[], 0.0, 0.0);
+        for m in [&m, &turn] {
+            for (share, wanted) in [(3e-7, 0), (3e-6, 1)] {
+                assert_eq!(cuts(m, 0.55 - 0.2 * share, 0.75), wanted);
+                assert_eq!(cuts(m, 0.35, 0.55 + 0.2 * share), wanted);
+                assert_eq!(cuts(m, 0.55 - 0.02 * share, 0.57), wanted);
+            }
+        }
     }
 
     #[test]
@@ -491,11 +504,16 @@ mod tests {
         // A jump elsewhere is not this turn.
         let kink =
             |sample: usize| Kink { sample, t: 0.1 * sample as f64 - 0.05, z: 0.0, v: [1.0, 0.9], sd_m: 0.0 };
-        let turns = |sample: usize| {
+        let both = |sample: usize| {
             let v: Vec<f64> = t.iter().map(|t| 1.0 - 2.2 * t).collect();
-            Motion::from_knots(&t, &[0.0; 13], &v, &[kink(sample)], 0.0, 0.0).turns.len()
+            Motion::from_knots(&t, &[0.0; 13], &v, &[kink(sample)], 0.0, 0.0)
         };
-        assert_eq!([turns(4), turns(5), turns(6)], [1, 0, 1]);
+        assert_eq!([4, 5, 6].map(|sample| both(sample).turns.len()), [1, 0, 1]);
+        // What comes after a span does not cut it, a jump at 0.35 s and a turn at 0.45 s.
+        let told = pieces(&both(4), &[(0.0, 0.3), (0.3, 0.5)], Shown::Sampled);
+        let ends: Vec<f64> = told.iter().map(|p| p.to_s).collect();
+        assert_eq!(ends.len(), 4);
+        ends.iter().zip([0.3, 0.35, 0.45, 0.5]).for_each(|(told, wanted)| near(*told, wanted));
     }
 
     #[test]
