@@ -626,7 +626,7 @@ mod tests {
         let size = |k: usize| 0.001 * (k + 1) as f64 * if k == 3 || k == 11 { 100.0 } else { 1.0 };
         let force = |t: f64| {
             let i = (t / 0.005).round() as usize;
-            0.5 + size(i / 4) * if i % 2 == 0 { 1.0 } else { -1.0 }
+            0.5 + size(i / 4) * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
         };
         let b = of(even(80), force);
         let calm: f64 = (0..20).filter(|k| *k != 3 && *k != 11).map(|k| size(k) * size(k)).sum();

@@ -414,7 +414,8 @@ mod tests {
     fn every_form_is_found_as_it_is() {
         let t = cells(400);
         let wave = |t: f64, hz: f64, a: f64| a * (TAU * hz * t + 0.4).sin();
-        let forms: [(&dyn Fn(f64) -> f64, usize, &[f64]); 6] = [
+        type Form<'a> = (&'a dyn Fn(f64) -> f64, usize, &'a [f64]);
+        let forms: [Form; 6] = [
             (&|_| 0.05, 0, &[]),
             (&|t| 0.05 - 0.003 * t, 1, &[]),
             (&|t| 0.004 * t + 0.0005 * t * t, 2, &[]),

@@ -611,6 +611,15 @@ mod tests {
         for (told, place) in told.iter().zip([0.011, 0.035, 0.045]) {
             assert!((told - place / 0.004).abs() < 1e-6, "{told}");
         }
+        // At an uneven speed, too.
+        let course = |t: f64| 0.004 * t + 0.0015 * (2.0 * t).sin();
+        let t: Vec<f64> = (0..2400).map(|k| f64::from(k) * 0.005).collect();
+        let z = t.iter().map(|t| course(*t)).collect();
+        let rippled = Blocks::new(&Recording::new(t, z, vec![0.0; 2400]).expect("a recording"), &[], BLOCK_S);
+        let told = free(&compiled(|_| ()), &rippled.pieces_seen(false, 0.0, None));
+        for (told, place) in told.iter().zip([0.011, 0.035, 0.045]) {
+            assert!((course(*told) - place).abs() < 2e-7, "{told}: {} for {place}", course(*told));
+        }
         let stiff = compiled(|m| m.tissue.layers[2].puncture_n = Some(5.0));
         assert_eq!(free(&stiff, &b.pieces_seen(false, 0.0, None))[2], NEVER);
     }

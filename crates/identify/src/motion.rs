@@ -458,7 +458,7 @@ mod tests {
         // v = 1 + 3 t at the samples, and between them on lines: so it is anywhere.
         let t: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();
         let v: Vec<f64> = t.iter().map(|t| 1.0 + 3.0 * t).collect();
-        let m = Motion::from_knots(&t, &vec![0.25; 20], &v, &[], 0.0, 0.0);
+        let m = Motion::from_knots(&t, &[0.25; 20], &v, &[], 0.0, 0.0);
         for p in pieces(&m, &[(0.23, 0.61), (0.61, 0.75), (1.0, 1.1)], Shown::Sampled) {
             assert!((p.a_mps2 - 3.0).abs() < 1e-9, "{p:?}");
             near(p.v_mps, 1.0 + 1.5 * (p.from_s + p.to_s));

@@ -305,7 +305,7 @@ mod tests {
         let z: Vec<f64> = t.iter().map(|t| 0.003 * t + 0.02 * t * t).collect();
         assert!(position_noise(&t, &z) < 1e-14);
         // Alternating by one to either side: third differences of eight, over the root of 1 + 9 + 9 + 1.
-        let rough = |a: f64, k: usize| a * if k % 2 == 0 { 1.0 } else { -1.0 };
+        let rough = |a: f64, k: usize| a * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let z: Vec<f64> = (0..200).map(|k| 1e-3 * k as f64 + rough(1e-6, k)).collect();
         let told = position_noise(&even(200), &z);
         assert!((told / (8e-6 * 1.4826 / 20.0_f64.sqrt()) - 1.0).abs() < 1e-4, "{told}");
