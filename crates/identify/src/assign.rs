@@ -121,3 +121,178 @@ pub fn assign(model: &Model, b: &Blocks, drops: &[Drop], trust: f64, noise_n: f6
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocks::BLOCK_S;
+    use crate::model::Belief;
+    use std::sync::Arc;
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue};
+
+    /// Layers by thickness (mm), stiffness (N/m), puncture force (N), from 10 mm on; tolerances of a fifth and a tenth.
+    fn model(layers: &[(f64, f64, Option<f64>)]) -> Model {
+        let layer = |&(thick_mm, stiffness_n_per_m, puncture_n): &(f64, f64, Option<f64>)| Layer {
+            thickness_m: thick_mm * 1e-3,
+            stiffness_n_per_m,
+            friction_ns_per_m2: 4000.0,
+            puncture_n,
+            name: String::new(),
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.01, layers: layers.iter().map(layer).collect() },
+            given: Vec::new(),
+            tolerance: vec![0.2; layers.len()],
+            thickness_tolerance: vec![0.1; layers.len()],
+            surface_tolerance_m: 0.002,
+        };
+        Model::base(Arc::new(belief), 1)
+    }
+
+    /// A needle that goes in evenly from 0.1 mm on, at 10 mm/s, as far as so many mm.
+    fn blocks(to_mm: f64) -> Blocks {
+        let n = (to_mm / 10.0 * 200.0).round() as usize + 1;
+        let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.005).collect();
+        let z = t.iter().map(|t| 0.0001 + 0.01 * t).collect();
+        Blocks::new(&Recording::new(t, z, vec![0.0; n]).expect("a recording"), &[], BLOCK_S)
+    }
+
+    /// A drop at a position (mm) of a size (N).
+    fn drop(at_mm: f64, size_n: f64, score: f64) -> Drop {
+        Drop { time_s: (at_mm - 0.1) / 10.0, position_m: at_mm * 1e-3, size_n, score }
+    }
+
+    /// Where each layer is said to give way, in mm.
+    fn places(model: &Model, to_mm: f64, drops: &[Drop]) -> Vec<f64> {
+        assign(model, &blocks(to_mm), drops, 1.0, 0.01).iter().map(|t| 0.1 + 10.0 * t).collect()
+    }
+
+    fn are(told: &[f64], wanted: &[f64]) {
+        let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() < 1e-9;
+        assert!(told.len() == wanted.len() && told.iter().zip(wanted).all(near), "{told:?} for {wanted:?}");
+    }
+
+    #[test]
+    fn a_layer_is_expected_to_give_way_at_its_force_or_at_its_far_face() {
+        let m = model(&[(20.0, 200.0, Some(2.0)), (10.0, 100.0, Some(3.0)), (30.0, 50.0, None)]);
+        let told = expected(&m, 0.5);
+        // Six tenths of what is believed to be uncertain, in mm: the surface, each thickness.
+        let (surface, first, second, third) = (0.6 * 2.0_f64, 0.6 * 2.0_f64, 0.6 * 1.0_f64, 0.6 * 3.0_f64);
+        let own = |sd_mm: f64, thick_mm: f64| 1e-3 * (0.5 * sd_mm).hypot(0.2 + 0.01 * thick_mm);
+        let wanted = [
+            // 2 N at 200 N/m are 10 mm, known to 17 percent.
+            (10.0, 20.0, own(surface.hypot(0.17 * 10.0), 20.0), 200.0),
+            // 3 N at 100 N/m are 30 mm: the face comes before, or not.
+            (30.0, 40.0, own(surface.hypot(first).hypot(second).hypot(0.3 * 0.17 * 30.0), 10.0), 100.0),
+            (40.0, 70.0, own(surface.hypot(first).hypot(second).hypot(third), 30.0), 50.0),
+        ];
+        for (told, (front_mm, place_mm, sd_m, stiffness)) in told.iter().zip(wanted) {
+            assert!((told.front_m - 1e-3 * front_mm).abs() < 1e-12, "{told:?}");
+            assert!((told.place_m - 1e-3 * place_mm).abs() < 1e-12, "{told:?}");
+            assert!((told.sd_m - sd_m).abs() < 1e-12, "{told:?} for {sd_m}");
+            assert_eq!(told.stiffness, stiffness);
+        }
+    }
+
+    #[test]
+    fn without_a_drop_a_layer_gives_way_where_it_is_expected_to_if_the_needle_gets_there() {
+        let m = model(&[(20.0, 20.0, Some(0.2)), (20.0, 2.0, None)]);
+        // At 20 and at 50 mm: in the middle of the first block whose middle is there, of 0.2 mm each.
+        let first = |mm: f64| {
+            let b = blocks(60.0);
+            let middle = |k: usize| 0.1 + 10.0 * 0.5 * (b.from_s[k] + b.to_s[k]);
+            (0..b.len()).map(middle).find(|z| *z >= mm - 1e-9).expect("a block")
+        };
+        are(&places(&m, 60.0, &[]), &[first(20.0), first(50.0)]);
+        are(&places(&m, 49.0, &[]), &[first(20.0), NEVER]);
+        are(&places(&m, 19.0, &[]), &[NEVER, NEVER]);
+    }
+
+    #[test]
+    fn a_layer_that_gives_way_shows_a_drop_unless_it_is_too_weak() {
+        // At 20 mm, with 10 mm of stiffness over noise of 0.01 N: what is missed costs a fiftieth of that squared, 12 nats at most.
+        // Not to give way is free until it is passed by two and a half standard deviations.
+        let of = |stiffness: f64, to_mm: f64| {
+            let m = model(&[(20.0, stiffness, Some(stiffness * 0.01))]);
+            places(&m, to_mm, &[])[0].is_finite()
+        };
+        let sd_mm = 1.2_f64.hypot(1.7).hypot(0.4);
+        // `beyond` standard deviations further: half of its square and two nats.
+        let to = |beyond: f64| 20.0 + sd_mm * (2.5 + beyond);
+        let price = |stiffness: f64| (0.02 * (stiffness * 0.01 / 0.01).powi(2)).min(12.0);
+        for stiffness in [12.0, 20.0, 80.0] {
+            let even = (2.0 * (price(stiffness) - 2.0)).max(0.0).sqrt();
+            assert!(!of(stiffness, to(even - 0.1)), "{stiffness}");
+            assert!(of(stiffness, to(even + 0.1)), "{stiffness}");
+        }
+        // Price nearly nothing: yet only where it is passed.
+        assert!(!of(1.0, to(-2.4)) && !of(9.0, to(-0.1)) && of(9.0, to(0.1)));
+    }
+
+    #[test]
+    fn a_drop_is_taken_by_a_layer_when_that_costs_less_than_to_leave_it() {
+        // Expected at 20 mm; the needle ends there, so that nothing else would cost anything.
+        let m = model(&[(20.0, 200.0, Some(2.0))]);
+        let sd_mm = 1.2_f64.hypot(1.7).hypot(0.4);
+        let taken = |at_mm: f64, size_n: f64, score: f64| {
+            let told = places(&m, 19.9, &[drop(at_mm, size_n, score)]);
+            told[0].is_finite().then(|| are(&told, &[at_mm])).is_some()
+        };
+        // A drop as large as the layer's force there, `off` standard deviations before: half of its square against 0.075 of the score's.
+        for score in [5.0, 8.0, 12.0] {
+            let off = (2.0 * (0.075_f64 * score * score).min(12.0)).sqrt();
+            for side in [-1.0, 1.0] {
+                let at = |off: f64| 20.0 + side * off * sd_mm;
+                let whole = |mm: f64| 0.2 * (mm - 10.0);
+                assert!(taken(at(off - 0.01), whole(at(off - 0.01)), score), "{score}");
+                assert!(!taken(at(off + 0.01), whole(at(off + 0.01)), score), "{score}");
+            }
+        }
+        // Never more than 12 nats.
+        assert!(!taken(20.0 - 5.0 * sd_mm, 0.2, 100.0));
+        // Larger or smaller by a factor: its logarithm in units of 0.6, four nats at most.
+        for score in [5.0, 7.0] {
+            let ratio = (0.6 * (0.15_f64 * score * score).sqrt()).exp();
+            for (factor, within) in [(ratio * 0.99, true), (ratio * 1.01, false)] {
+                assert_eq!(taken(20.0, 2.0 * factor, score), within, "{score}");
+                assert_eq!(taken(20.0, 2.0 / factor, score), within, "{score}");
+            }
+        }
+        assert!(taken(20.0, 2e-3, 7.5) && taken(20.0, 200.0, 7.5));
+    }
+
+    #[test]
+    fn a_drop_before_a_layer_is_not_its_own() {
+        // Expected right behind its front at 10 mm: two standard deviations before the front is as early as it may be.
+        let m = model(&[(20.0, 200.0, Some(0.02))]);
+        let sd_mm = 1.2_f64.hypot(0.017).hypot(0.4);
+        let taken = |at_mm: f64| places(&m, 10.05, &[drop(at_mm, 0.02, 9.0)])[0].is_finite();
+        assert!(taken(10.0 - 1.95 * sd_mm) && !taken(10.0 - 2.05 * sd_mm));
+    }
+
+    #[test]
+    fn layers_give_way_in_their_order() {
+        let m = model(&[(20.0, 200.0, Some(2.0)), (20.0, 200.0, Some(2.0))]);
+        // At 20 and 40 mm.
+        let (one, two) = (drop(20.4, 2.0, 15.0), drop(39.0, 2.0, 15.0));
+        are(&places(&m, 60.0, &[one, two]), &[20.4, 39.0]);
+        // The other way round they are told all the same.
+        are(&places(&m, 60.0, &[two, one]), &[20.4, 39.0]);
+        // One drop is of one layer: the nearer one; the other gives way where it is expected to.
+        let told = places(&m, 60.0, &[drop(37.0, 2.0, 15.0)]);
+        assert!((told[0] - 20.0).abs() < 0.25 && told[1] == 37.0, "{told:?}");
+        // One that is expected before another does not give way after it.
+        let near = model(&[(20.0, 200.0, Some(3.0)), (20.0, 200.0, Some(0.2))]);
+        // At 25 and at 31 mm; drops at 30 and at 28 mm, of whatever size.
+        let told = places(&near, 60.0, &[drop(28.0, 2.0, 30.0), drop(30.0, 2.0, 30.0)]);
+        are(&told, &[28.0, 30.0]);
+        // What lies behind a layer that never gave way did not either.
+        are(&places(&m, 19.0, &[drop(18.9, 1e-6, 0.1)]), &[NEVER, NEVER]);
+    }
+
+    #[test]
+    fn a_tissue_without_layers_has_no_instants() {
+        are(&places(&model(&[]), 30.0, &[drop(20.0, 1.0, 9.0)]), &[]);
+    }
+}

@@ -327,3 +327,312 @@ impl Blocks {
         (self.from_s.first().copied().unwrap_or(0.0), self.to_s.last().copied().unwrap_or(0.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::Jump;
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-3), "{told} for {wanted}");
+    }
+
+    fn are(told: &[f64], wanted: impl IntoIterator<Item = f64>) {
+        let wanted: Vec<f64> = wanted.into_iter().collect();
+        assert_eq!(told.len(), wanted.len());
+        told.iter().zip(wanted).for_each(|(told, wanted)| near(*told, wanted));
+    }
+
+    /// A needle that goes evenly; the force at these instants (s).
+    fn recorded(t: Vec<f64>, force: impl Fn(f64) -> f64) -> Recording {
+        let z = t.iter().map(|t| 0.002 * t).collect();
+        let f = t.iter().map(|t| force(*t)).collect();
+        Recording::new(t, z, f).expect("a recording")
+    }
+
+    fn even(n: usize) -> Vec<f64> {
+        (0..n).map(|k| k as f64 * 0.005).collect()
+    }
+
+    /// Blocks of four samples at 200 Hz.
+    fn of(t: Vec<f64>, force: impl Fn(f64) -> f64) -> Blocks {
+        Blocks::new(&recorded(t, force), &[], BLOCK_S)
+    }
+
+    /// The same with one jump of the speed.
+    fn with_jump(b: &Blocks, at_s: f64, between_s: f64, doubt_s: f64) -> Blocks {
+        let jump = Jump { at_s, between_s, doubt_s, z_m: 0.002 * at_s, v_mps: [0.002, 0.0] };
+        let mut motion = (*b.motion).clone();
+        motion.jumps = vec![jump];
+        Blocks { motion: Arc::new(motion), ..b.clone() }
+    }
+
+    #[test]
+    fn a_block_is_the_mean_of_its_samples_and_ends_half_way_to_the_next() {
+        // Instants that lie up to a millisecond off the even ones, mostly none.
+        let off = [0.0, 0.0, 0.0, 0.001, -0.001, 0.0, 0.0];
+        let t: Vec<f64> = even(43).iter().enumerate().map(|(k, t)| t + off[k % 7]).collect();
+        let force = |t: f64| 1.0 + (40.0 * t).sin();
+        let b = of(t.clone(), force);
+        assert_eq!((b.len(), b.samples, b.is_empty()), (11, 4, false));
+        near(b.step_s, 0.005);
+        let ends: Vec<f64> = (1..11).map(|k| 0.5 * (t[4 * k - 1] + t[4 * k])).collect();
+        are(&b.from_s, [-0.0025].into_iter().chain(ends.iter().copied()));
+        are(&b.to_s, ends.iter().copied().chain([t[42] + 0.0025]));
+        are(&b.f, t.chunks(4).map(|t| t.iter().map(|t| force(*t)).sum::<f64>() / t.len() as f64));
+        // Three of four samples are more than half of a block.
+        assert_eq!(b.used, [true; 11]);
+        assert_eq!(b.restart, core::array::from_fn::<bool, 11, _>(|k| k == 0));
+        assert_eq!(*b.raw_block, (0..43).map(|k| k / 4).collect::<Vec<u32>>());
+        near(b.span_s().0, -0.0025);
+        near(b.span_s().1, t[42] + 0.0025);
+        assert_eq!((b.at(-1.0), b.at(ends[4]), b.at(ends[4] - 1e-6), b.at(9.0)), (0, 5, 4, 11));
+        // Two samples of four are not, and a block of one sample is one.
+        assert_eq!(of(even(42), force).used[10..], [false]);
+        let single = Blocks::new(&recorded(even(20), force), &[], 0.001);
+        assert_eq!((single.samples, single.len()), (1, 20));
+        assert!(single.used.iter().all(|u| *u));
+        let none = Blocks { from_s: Vec::new(), to_s: Vec::new(), ..single };
+        assert_eq!((none.len(), none.is_empty(), none.span_s()), (0, true, (0.0, 0.0)));
+    }
+
+    #[test]
+    fn samples_that_are_excluded_do_not_count_and_half_a_block_of_them_is_none() {
+        let excluded = [1, 8, 9, 12, 13, 14, 15, 40];
+        let exclude: Vec<bool> = (0..43).map(|k| excluded.contains(&k)).collect();
+        let b = Blocks::new(&recorded(even(43), |t| 200.0 * t), &exclude, BLOCK_S);
+        let used: Vec<usize> = (0..b.len()).filter(|k| b.used[*k]).collect();
+        // Of the last three samples two are left, more than half of them.
+        assert_eq!(used, [0, 1, 4, 5, 6, 7, 8, 9, 10]);
+        are(&b.f[..5], [5.0 / 3.0, 5.5, 10.5, 0.0, 17.5]);
+        near(b.f[10], 41.5);
+        let restart: Vec<usize> = (0..b.len()).filter(|k| b.restart[*k]).collect();
+        assert_eq!(restart, [0, 3, 4]);
+    }
+
+    #[test]
+    fn a_gap_is_bridged_by_blocks_that_are_not_compared_unless_it_is_long() {
+        let t = |gap_s: f64| -> Vec<f64> {
+            even(40).iter().enumerate().map(|(k, t)| if k < 19 { *t } else { t + gap_s - 0.005 }).collect()
+        };
+        let b = of(t(0.1), |t| 3.0 + t);
+        // Samples 16 to 18, then 0.095 s in five blocks, then four samples each.
+        assert_eq!(b.len(), 5 + 5 + 6);
+        let edges: Vec<f64> = (0..=5).map(|k| 0.0925 + 0.019 * f64::from(k)).collect();
+        are(&b.from_s[5..10], edges[..5].iter().copied());
+        are(&b.to_s[5..10], edges[1..].iter().copied());
+        are(&b.f[4..10], [3.085; 6]);
+        let told: Vec<bool> = (0..16).map(|k| !(5..10).contains(&k)).collect();
+        assert_eq!(b.used[..15], told[..15]);
+        assert!(!b.used[15]);
+        let restart: Vec<usize> = (0..16).filter(|k| b.restart[*k]).collect();
+        assert_eq!(restart, [0, 6, 7, 8, 9, 10]);
+        near(b.from_s[10], 0.1875);
+        assert_eq!((b.raw_block[18], b.raw_block[19], b.raw_block[23]), (4, 10, 11));
+        // Up to two seconds, the half steps beside them not counted.
+        assert_eq!(of(t(2.004), |t| t).len(), 11 + 100);
+        let open = of(t(2.006), |t| t);
+        assert_eq!(open.len(), 11);
+        assert_eq!((0..11).filter(|k| open.restart[*k]).collect::<Vec<_>>(), [0, 5]);
+        // Less than 1.8 steps is no gap; more is one, bridged by one block.
+        assert_eq!(of(t(0.0089), |t| t).len(), 10);
+        assert_eq!(of(t(0.0091), |t| t).len(), 11 + 1);
+    }
+
+    /// So near to a jump that it may have either speed, or that the instant is not known better.
+    #[test]
+    fn a_block_is_left_out_when_a_sample_of_it_is_at_a_jump_of_the_speed() {
+        let t = even(40);
+        let b = of(t.clone(), |t| t);
+        let left_out = |at_s: f64, doubt_s: f64| -> Vec<usize> {
+            let mut b = with_jump(&b, at_s, at_s, doubt_s);
+            b.leave_out_jumps(&t);
+            (0..b.len()).filter(|k| !b.used[*k]).collect()
+        };
+        // Sample 18 at 0.09 s is in block 4, which lies from 0.0775 to 0.0975 s.
+        assert_eq!(left_out(0.09, 0.0), [4]);
+        assert_eq!(left_out(0.09 + 0.00014, 0.0), [4]);
+        assert_eq!(left_out(0.09 - 0.00014, 0.0), [4]);
+        assert_eq!(left_out(0.09 + 0.00016, 0.0), [0_usize; 0]);
+        assert_eq!(left_out(0.09 - 0.00016, 0.0), [0_usize; 0]);
+        assert_eq!(left_out(0.0925, 0.0024), [0_usize; 0]);
+        assert_eq!(left_out(0.0925, 0.0026), [4]);
+        // All blocks within the doubt, as far as there are any.
+        assert_eq!(left_out(0.0775, 0.003), [3, 4]);
+        assert_eq!(left_out(0.0775, 0.021), [2, 3, 4, 5]);
+        assert_eq!(left_out(0.19, 0.03), [8, 9]);
+        // Of a recording, too: the needle stops at its sample 60, in block 15.
+        let t = even(400);
+        let z: Vec<f64> = t.iter().map(|t| 0.002 * t.min(0.3)).collect();
+        let b = Blocks::new(&Recording::new(t, z, vec![0.0; 400]).expect("a recording"), &[], BLOCK_S);
+        assert_eq!((0..100).filter(|k| !b.used[*k]).collect::<Vec<_>>(), [15]);
+    }
+
+    #[test]
+    fn coarser_blocks_are_means_of_whole_groups_and_none_reaches_across_what_is_open() {
+        // 36 samples, nothing for three seconds, 32 samples: nine blocks and eight.
+        let t: Vec<f64> =
+            even(68).iter().enumerate().map(|(k, t)| if k < 36 { *t } else { t + 3.0 }).collect();
+        let exclude: Vec<bool> = (0..68).map(|k| (12..16).contains(&k)).collect();
+        let b = Blocks::new(&recorded(t, |t| (9.0 * t).cos()), &exclude, BLOCK_S);
+        assert_eq!(b.len(), 17);
+        let fine = b.pieces_seen(true, 0.0, None);
+        let c = b.coarser(4);
+        let groups = [(0, 4), (4, 8), (8, 9), (9, 13), (13, 17)];
+        assert_eq!((c.len(), c.samples), (5, 16));
+        are(&c.from_s, groups.map(|g| b.from_s[g.0]));
+        are(&c.to_s, groups.map(|g| b.to_s[g.1 - 1]));
+        are(&c.f, groups.map(|g| b.f[g.0..g.1].iter().sum::<f64>() / (g.1 - g.0) as f64));
+        // The first one holds a block that is not compared, the third is not whole.
+        assert_eq!(c.used, [false, true, false, true, true]);
+        assert_eq!(c.restart, [true, true, false, true, false]);
+        assert_eq!((c.size_n.len(), c.doubt_n.len()), (5, 5));
+        // Pieces are those of the coarser blocks, however they are shown.
+        for pieces in [c.pieces_seen(false, 0.0, None), c.pieces_seen(true, 0.0, None)] {
+            assert_eq!(pieces.iter().map(|p| p.block).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+            are(&pieces.iter().map(|p| p.to_s).collect::<Vec<_>>(), c.to_s.iter().copied());
+        }
+        assert_eq!(fine.len(), 17);
+    }
+
+    #[test]
+    fn the_size_of_the_force_is_that_of_its_mean_over_a_tenth_of_a_second() {
+        // Blocks of 30 ms: two on each side.
+        let b = Blocks::new(&recorded(even(66), |t| (20.0 * t).sin()), &[], 0.03);
+        assert_eq!((b.len(), b.samples), (11, 6));
+        let around = |k: usize| -> Vec<f64> {
+            (0..11).filter(|i: &usize| i.abs_diff(k) <= 2).map(|i| b.f[i]).collect()
+        };
+        are(&b.size_n, (0..11).map(|k| (around(k).iter().sum::<f64>() / around(k).len() as f64).abs()));
+        // However long the blocks are, one on each side.
+        let long = Blocks::new(&recorded(even(200), |t| t), &[], 0.2);
+        are(&long.size_n[..2], [0.5 * (long.f[0] + long.f[1]), long.f[1]]);
+    }
+
+    #[test]
+    fn a_mean_is_uncertain_by_a_sample_where_the_speed_jumps() {
+        let force = |t: f64| if t < 0.096 { 1.0 } else { 3.0 };
+        let b = of(even(40), force);
+        let doubts = |at_s: f64, between_s: f64| {
+            let mut b = with_jump(&b, at_s, between_s, 0.0);
+            b.finish();
+            b.doubt_n
+        };
+        // A quarter of two newtons, spread evenly; block 4 ends at 0.0975 s.
+        let at = |block: usize| (0..10).map(move |k| if k == block { 0.5 * 0.289 } else { 0.0 });
+        are(&doubts(0.0, 0.096), at(4));
+        are(&doubts(0.096, 0.098), at(5));
+        // At either end nobody knows what it jumps to.
+        for between_s in [0.0, 0.19, 0.5] {
+            are(&doubts(0.096, between_s), [0.0; 10]);
+        }
+        // As large as the largest of two jumps.
+        let mut two = with_jump(&b, 0.0, 0.09, 0.0);
+        two.doubt_jump(0.09);
+        two.doubt_n[4] *= 3.0;
+        two.doubt_jump(0.09);
+        near(two.doubt_n[4], 1.5 * 0.289);
+    }
+
+    #[test]
+    fn a_late_force_is_uncertain_also_where_nobody_knows_between_which_samples_it_jumps() {
+        let b = of(even(60), |t| 100.0 * t * t);
+        let size = |k: usize| (b.f[k + 1] - b.f[k - 1]).abs() / 4.0 * 0.289;
+        let late = |doubt_s: f64, late_s: f64| -> Vec<usize> {
+            let seen = with_jump(&b, 0.06, 0.062, doubt_s).seen_late(late_s);
+            let told: Vec<usize> = (0..15).filter(|k| seen.doubt_n[*k] > 0.0).collect();
+            told.iter().for_each(|k| near(seen.doubt_n[*k], size(*k)));
+            told
+        };
+        // Between samples it is in block 3, as it would be without a delay.
+        assert_eq!(late(0.0, 0.0772), [3]);
+        // Around 0.1375 s, between samples at 0.135 and 0.14, the end of block 6: known until the doubt holds a sample.
+        assert_eq!(late(0.0024, 0.0775), [3]);
+        assert_eq!(late(0.0026, 0.0775), [3, 6, 7]);
+        // A sample nearer than three hundredths of a step has either speed.
+        assert_eq!(late(0.0, 0.08 + 0.00014), [3, 7]);
+        assert_eq!(late(0.0, 0.08 - 0.00014), [3, 7]);
+        assert_eq!(late(0.0, 0.08 + 0.00016), [3]);
+        assert_eq!(late(0.0, 0.08 - 0.00016), [3]);
+    }
+
+    #[test]
+    fn an_instant_lies_in_the_middle_between_the_samples_around_it() {
+        let t: Vec<f64> = even(20).iter().map(|t| if *t < 0.048 { *t } else { t + 0.1 }).collect();
+        let b = of(t, |t| t);
+        near(b.between(0.0131), 0.0125);
+        near(b.between(0.0149), 0.0125);
+        near(b.between(0.0151), 0.0175);
+        // In a gap, and outside, the samples say nothing.
+        for at_s in [0.0799, -0.003, 0.2] {
+            near(b.between(at_s), at_s);
+        }
+        near(b.between(0.0), 0.0025);
+    }
+
+    #[test]
+    fn motion_is_cut_where_a_force_shows_the_jumps_of_the_speed() {
+        let t = even(120);
+        let z: Vec<f64> = t.iter().map(|t| 0.002 * t.min(0.3013)).collect();
+        let b = Blocks::new(&Recording::new(t, z, vec![0.0; 120]).expect("a recording"), &[], BLOCK_S);
+        let cut = |smeared: bool, late_s: f64, placed: Option<f64>| {
+            let pieces = b.pieces_seen(smeared, late_s, placed);
+            let ends: Vec<f64> =
+                pieces.windows(2).filter(|p| p[0].block == p[1].block).map(|p| p[0].to_s).collect();
+            assert_eq!((pieces.len(), ends.len()), (31, 1));
+            (ends[0], pieces.iter().find(|p| p.to_s == ends[0]).map_or(0.0, |p| p.v_mps))
+        };
+        let is = |(at_s, v): (f64, f64), wanted: f64| {
+            assert!((at_s - wanted).abs() < 1e-5 && (v - 0.002).abs() < 1e-7, "{at_s} for {wanted}, {v}");
+        };
+        is(cut(false, 0.0, None), 0.3025);
+        is(cut(false, 0.0, Some(0.02)), 0.3025);
+        is(cut(true, 0.0, None), 0.3013);
+        is(cut(true, 0.0, Some(0.02)), 0.3013);
+        for smeared in [false, true] {
+            is(cut(smeared, 0.0271, None), 0.3284);
+        }
+        is(cut(true, 0.0271, Some(0.0271)), 0.3284);
+        is(cut(false, 0.0271, Some(0.0271)), 0.3275);
+        is(cut(false, 0.0271, Some(0.0301)), 0.3325);
+    }
+
+    #[test]
+    fn residuals_of_samples_follow_a_straight_course_of_those_of_the_blocks() {
+        let b = of(even(48), |t| 2.0 - 30.0 * t);
+        let e: Vec<f64> = (0..12).map(|k| 0.3 + 0.01 * f64::from(k)).collect();
+        // The middle of block k is at sample 4 k + 1.5.
+        are(&b.raw_residual(&e), (0..48).map(|i| 0.3 + 0.01 * (f64::from(i) - 1.5) / 4.0));
+        // What a sample has beside that course is its own.
+        let mut raw = (*b.raw_f).clone();
+        raw[21] += 0.7;
+        let spiked = Blocks { raw_f: Arc::new(raw), ..b.clone() };
+        let told: Vec<f64> =
+            spiked.raw_residual(&e).iter().zip(b.raw_residual(&e)).map(|(a, b)| a - b).collect();
+        are(&told, (0..48).map(|i| if i == 21 { 0.7 } else { 0.0 }));
+        // Of curved means the slope is that from neighbour to neighbour.
+        let mut bent = e.clone();
+        bent[5] += 0.4;
+        let told = b.raw_residual(&bent);
+        for (i, off) in [(16, -1.5), (17, -0.5), (18, 0.5), (19, 1.5)] {
+            near(told[i], 0.3 + 0.01 * (i as f64 - 1.5) / 4.0 + 0.4 / 8.0 * off);
+        }
+        near(told[20], 0.3 + 0.01 * 18.5 / 4.0 + 0.4);
+    }
+
+    #[test]
+    fn what_samples_differ_within_a_block_is_told_without_the_roughest_tenth() {
+        // In block k samples lie k + 1 millinewtons above and below, in two of twenty a hundred times as much.
+        let size = |k: usize| 0.001 * (k + 1) as f64 * if k == 3 || k == 11 { 100.0 } else { 1.0 };
+        let force = |t: f64| {
+            let i = (t / 0.005).round() as usize;
+            0.5 + size(i / 4) * if i.is_multiple_of(2) { 1.0 } else { -1.0 }
+        };
+        let b = of(even(80), force);
+        let calm: f64 = (0..20).filter(|k| *k != 3 && *k != 11).map(|k| size(k) * size(k)).sum();
+        assert!((b.within_n() - (calm / 18.0).sqrt()).abs() < 1e-9, "{}", b.within_n());
+        // One sample more is a block without a spread.
+        assert!((of(even(81), force).within_n() - b.within_n()).abs() < 1e-9);
+        assert_eq!(Blocks::new(&recorded(even(80), force), &[], 0.001).within_n(), 0.0);
+    }
+}

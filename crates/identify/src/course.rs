@@ -303,3 +303,344 @@ fn solve(
     }
     (left <= squares.max(1e-30) * 1.001 + 1e-18).then_some((x, left))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-6), "{told} for {wanted}");
+    }
+
+    /// Normal numbers: twelve even ones of a linear congruence (Knuth's MMIX) each.
+    fn normal(n: usize) -> Vec<f64> {
+        let mut state = 11_u64;
+        let mut even = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..n).map(|_| (0..12).map(|_| even()).sum::<f64>() - 6.0).collect()
+    }
+
+    const CELL_S: f64 = 0.02;
+
+    /// Middles of cells from 3 s on.
+    fn cells(n: usize) -> Vec<f64> {
+        (0..n).map(|k| 3.0 + CELL_S * k as f64).collect()
+    }
+
+    /// Positions with 10 um of noise.
+    fn noisy(t: &[f64], course: impl Fn(f64) -> f64) -> Vec<f64> {
+        t.iter().zip(normal(t.len())).map(|(t, n)| course(*t) + 1e-5 * n).collect()
+    }
+
+    fn frame<'a>(t: &'a [f64], z: &'a [f64]) -> Frame<'a> {
+        let (first, last) = (t[0], t[t.len() - 1]);
+        Frame { middle: 0.5 * (first + last), half: 0.5 * (last - first), cell_s: CELL_S, t, z }
+    }
+
+    fn plain(poly: [f64; 4], waves: &[[f64; 3]], sd_m: f64) -> Course {
+        Course { middle: 4.0, half: 2.0, poly, waves: waves.to_vec(), sd_m, cost: 0.0, white: false }
+    }
+
+    #[test]
+    fn a_course_is_a_cubic_and_waves_with_their_slopes() {
+        let c = plain([0.3, 0.5, -0.7, 0.11], &[[5.0, 0.2, -0.4], [9.0, 0.05, 0.01]], 1.0);
+        for t in [2.0_f64, 3.1, 4.0, 5.7] {
+            let s = (t - 4.0) / 2.0;
+            let cubic = 0.3 + 0.5 * s - 0.7 * s.powi(2) + 0.11 * s.powi(3);
+            let wave = |w: f64, x: f64, y: f64| x * (w * (t - 4.0)).cos() + y * (w * (t - 4.0)).sin();
+            near(c.at(t).0, cubic + wave(5.0, 0.2, -0.4) + wave(9.0, 0.05, 0.01));
+            // The slope of a wave is one a quarter further, as large as it is fast.
+            let slope = 0.5 - 1.4 * s + 0.33 * s.powi(2);
+            near(c.at(t).1, slope / 2.0 + wave(5.0, 5.0 * -0.4, -5.0 * 0.2) + wave(9.0, 0.09, -0.45));
+        }
+        assert_eq!(c.frequencies().collect::<Vec<_>>(), [5.0, 9.0]);
+    }
+
+    #[test]
+    fn what_has_neither_slope_nor_wave_rests() {
+        assert!(plain([0.3, 0.0, 0.0, 0.0], &[], 1.0).rests());
+        for k in 1..4 {
+            let mut poly = [0.3, 0.0, 0.0, 0.0];
+            poly[k] = 1e-9;
+            assert!(!plain(poly, &[], 1.0).rests());
+        }
+        assert!(!plain([0.3, 0.0, 0.0, 0.0], &[[1.0, 0.0, 0.1]], 1.0).rests());
+    }
+
+    #[test]
+    fn waves_are_as_large_as_both_their_parts_together() {
+        let c = plain([0.0; 4], &[[1.0, 0.3, -0.4], [2.0, 5.0, 12.0]], 1.0);
+        assert!(c.waves_beyond(0.499) && !c.waves_beyond(0.501));
+        assert!(plain([0.0; 4], &[], 1.0).waves_beyond(9.0));
+    }
+
+    #[test]
+    fn columns_are_means_over_a_cell() {
+        let t = cells(50);
+        let f = frame(&t, &t);
+        for (w, cell_s) in [(3.0, 0.3), (40.0, 0.05), (1e-5, 0.02)] {
+            let mut row = [7.0; MOST];
+            f.row(&mut row, 3.4, 1, &[w, 2.0 * w], cell_s);
+            near(row[0], 1.0);
+            near(row[1], (3.4 - f.middle) / f.half);
+            let mean = |g: &dyn Fn(f64) -> f64| {
+                let n = 20_000;
+                (0..n)
+                    .map(|k| g(3.4 - f.middle + cell_s * ((f64::from(k) + 0.5) / f64::from(n) - 0.5)))
+                    .sum::<f64>()
+                    / f64::from(n)
+            };
+            let wanted = [
+                mean(&|s| (w * s).cos()),
+                mean(&|s| (w * s).sin()),
+                mean(&|s| (2.0 * w * s).cos()),
+                mean(&|s| (2.0 * w * s).sin()),
+            ];
+            for (told, wanted) in row[2..].iter().zip(wanted) {
+                assert!((told - wanted).abs() < 1e-7, "{told} for {wanted}");
+            }
+        }
+        let mut row = [7.0; MOST];
+        f.row(&mut row, 4.2, 3, &[], CELL_S);
+        let s = (4.2 - f.middle) / f.half;
+        near(row[2], s * s);
+        near(row[3], s * s * s);
+        assert_eq!(row[4..], [7.0; 2]);
+    }
+
+    #[test]
+    fn every_form_is_found_as_it_is() {
+        let t = cells(400);
+        let wave = |t: f64, hz: f64, a: f64| a * (TAU * hz * t + 0.4).sin();
+        type Form<'a> = (&'a dyn Fn(f64) -> f64, usize, &'a [f64]);
+        let forms: [Form; 6] = [
+            (&|_| 0.05, 0, &[]),
+            (&|t| 0.05 - 0.003 * t, 1, &[]),
+            (&|t| 0.004 * t + 0.0005 * t * t, 2, &[]),
+            (&|t| 0.004 * t - 0.0003 * (t - 6.0).powi(3), 3, &[]),
+            (&|t| 0.003 * t + wave(t, 0.77, 0.0004), 1, &[0.77]),
+            (&|t| 0.003 * t + wave(t, 0.9, 0.0004) + wave(t, 2.3, 0.0002), 1, &[0.9, 2.3]),
+        ];
+        for (form, degree, hz) in forms {
+            let z = noisy(&t, form);
+            let c = Course::of(&t, &z, CELL_S, &[], 0.0).expect("a form");
+            assert!(c.white);
+            assert_eq!(c.poly.iter().rposition(|x| *x != 0.0), Some(degree));
+            assert_eq!(c.rests(), degree == 0);
+            assert_eq!(c.waves.len(), hz.len());
+            for (told, hz) in c.frequencies().zip(hz) {
+                assert!((told / TAU - hz).abs() < 2e-3, "{} for {hz}", told / TAU);
+            }
+            assert!((c.sd_m / 1e-5 - 1.0).abs() < 0.1, "{}", c.sd_m);
+            // Means over 20 ms make the waves hardly smaller.
+            for t in &t[20..380] {
+                let (z, v) = c.at(*t);
+                let slope = (form(t + 1e-5) - form(t - 1e-5)) / 2e-5;
+                assert!((z - form(*t)).abs() < 8e-6 && (v - slope).abs() < 6e-5, "{z} {v} at {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_form_costs_what_it_leaves_and_its_numbers() {
+        let t = cells(60);
+        let z = noisy(&t, |t| 0.002 * t + 0.0004 * (TAU * 0.9 * t).sin());
+        let f = frame(&t, &z);
+        for (degree, waves) in [(0, &[][..]), (1, &[]), (3, &[]), (1, &[5.0]), (0, &[5.0, 9.0])] {
+            let c = f.fit(degree, waves).expect("a form");
+            // A frequency is a number, too.
+            let numbers = (degree + 1 + 3 * waves.len()) as f64;
+            let mut x = [0.0; MOST];
+            let count = degree + 1 + 2 * waves.len();
+            x[..=degree].copy_from_slice(&c.poly[..=degree]);
+            for (k, wave) in c.waves.iter().enumerate() {
+                assert_eq!(wave[0], waves[k]);
+                x[degree + 1 + 2 * k..degree + 3 + 2 * k].copy_from_slice(&wave[1..]);
+            }
+            let left = |t: f64, z: f64| {
+                let mut row = [0.0; MOST];
+                f.row(&mut row, t, degree, waves, CELL_S);
+                z - (0..count).map(|k| row[k] * x[k]).sum::<f64>()
+            };
+            let squares: f64 = t.iter().zip(&z).map(|(t, z)| left(*t, *z).powi(2)).sum();
+            let variance = squares / (60.0 - numbers);
+            near(c.sd_m, variance.sqrt());
+            near(c.cost, 30.0 * variance.ln() + numbers * 60.0_f64.ln());
+            // Nothing that the columns hold is left.
+            for k in 0..count {
+                let with = |t: f64| {
+                    let mut row = [0.0; MOST];
+                    f.row(&mut row, t, degree, waves, CELL_S);
+                    row[k]
+                };
+                let together: f64 = t.iter().zip(&z).map(|(t, z)| left(*t, *z) * with(*t)).sum();
+                assert!(together.abs() < 1e-8 * (squares * 60.0).sqrt(), "{together}");
+            }
+            if degree == 1 && !waves.is_empty() {
+                near(f.off(&[], 5.0 / TAU, &t, &z, CELL_S), squares);
+            }
+        }
+        // Of the same cells in another unit the choice is the same: cost differs by a constant.
+        let exact: Vec<f64> = t.iter().map(|t| 0.002 * t).collect();
+        near(frame(&t, &exact).fit(1, &[]).expect("a form").sd_m, 1e-10);
+    }
+
+    #[test]
+    fn four_cells_more_than_numbers_tell_a_form() {
+        let f = |n: usize, degree: usize, waves: &[f64]| {
+            let (t, z) = (cells(n), normal(n));
+            frame(&t, &z).fit(degree, waves).is_some()
+        };
+        assert!(f(5, 0, &[]) && !f(4, 0, &[]));
+        assert!(f(8, 3, &[]) && !f(7, 3, &[]));
+        assert!(f(9, 1, &[50.0]) && !f(8, 1, &[50.0]));
+        assert!(f(12, 1, &[50.0, 90.0]) && !f(11, 1, &[50.0, 90.0]));
+        let of = |n: usize| Course::of(&cells(n), &normal(n), CELL_S, &[], 0.0);
+        assert!(of(12).is_some() && of(11).is_none());
+    }
+
+    #[test]
+    fn a_residual_is_white_when_its_means_vary_as_single_cells_say() {
+        // Eight cells off alike: their mean squared is eight times what white noise of that size gives.
+        let white = |n: usize, off: f64, sd_m: f64| {
+            let t = cells(n);
+            let (poly, waves) = ([0.2, 0.1, -0.3, 0.05], [[6.0, 0.01, 0.02]]);
+            let mut c = plain(poly, &waves, sd_m);
+            let f = frame(&t, &t);
+            (c.middle, c.half) = (f.middle, f.half);
+            // Every other group on the other side.
+            let z: Vec<f64> = t
+                .iter()
+                .enumerate()
+                .map(|(k, t)| {
+                    let mean = (6.0 * 0.5 * CELL_S).sin() / (6.0 * 0.5 * CELL_S);
+                    let cubic = plain(poly, &[], 1.0);
+                    let smooth = Course { middle: f.middle, half: f.half, ..cubic }.at(*t).0;
+                    let wave = 0.01 * (6.0 * (t - f.middle)).cos() + 0.02 * (6.0 * (t - f.middle)).sin();
+                    let group = if k / 8 % 2 == 0 { off } else { -off };
+                    // What is left over after the last whole group does not count.
+                    smooth + mean * wave + if k >= n / 8 * 8 { 9.0 } else { group }
+                })
+                .collect();
+            frame(&t, &z).is_white(&c)
+        };
+        for (groups, most) in
+            [(10_usize, 1.0 + 5.0 * 0.2_f64.sqrt()), (100, 1.0 + 5.0 * 0.02_f64.sqrt()), (400, 1.5)]
+        {
+            for beyond in [0, 5] {
+                let limit = (most / 8.0_f64).sqrt() * 3e-5;
+                assert!(white(8 * groups + beyond, 0.999 * limit, 3e-5), "{groups}");
+                assert!(!white(8 * groups + beyond, 1.001 * limit, 3e-5), "{groups}");
+            }
+        }
+    }
+
+    #[test]
+    fn least_squares_need_more_cells_than_numbers_and_room_for_them() {
+        let row = |row: &mut [f64; MOST], t: f64| *row = core::array::from_fn(|k| t.powi(k as i32));
+        let t = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        let z = t.map(|t| 1e4 + 2.0 * t - 0.5 * t * t);
+        let (x, left) = solve(&t, &z, 3, &row).expect("a solution");
+        for (told, wanted) in x.iter().zip([1e4, 2.0, -0.5, 0.0, 0.0, 0.0]) {
+            assert!((told - wanted).abs() < 1e-9, "{x:?}");
+        }
+        assert!(left < 1e-20);
+        // A mean leaves what the values differ from it.
+        let (x, left) = solve(&t[..4], &[1.0, 2.0, 3.0, 6.0], 1, &row).expect("a solution");
+        near(x[0], 3.0);
+        near(left, 14.0);
+        assert!(solve(&t[..4], &z[..4], 3, &row).is_some() && solve(&t[..3], &z[..3], 3, &row).is_none());
+        assert!(solve(&t, &z, 6, &row).is_some() && solve(&t, &z, 7, &row).is_none());
+    }
+
+    #[test]
+    fn the_cheaper_of_two_is_taken() {
+        let of = |cost: f64| Course { cost, ..plain([cost; 4], &[], 1.0) };
+        assert_eq!(better(of(1.0), Some(of(2.0))).cost, 1.0);
+        assert_eq!(better(of(3.0), Some(of(2.0))).cost, 2.0);
+        assert_eq!(better(of(3.0), None).cost, 3.0);
+    }
+
+    #[test]
+    fn a_frequency_is_found_to_a_thousandth_of_what_the_stretch_resolves() {
+        for (n, hz) in [(300, 0.31), (300, 2.9), (1500, 1.37), (60, 1.1)] {
+            let t = cells(n);
+            let z: Vec<f64> = t.iter().map(|t| 0.003 * t + 3e-4 * (TAU * hz * t + 1.0).sin()).collect();
+            let f = frame(&t, &z);
+            let resolved = 1.0 / (2.0 * f.half);
+            let told = f.wave(&[]).expect("a wave").waves[0][0] / TAU;
+            assert!((told - hz).abs() < 1e-3 * resolved, "{told} for {hz}");
+            // From somewhere near.
+            for off in [-0.19, 0.12] {
+                let told =
+                    f.refined(&[], hz + off * resolved, 0.2 * resolved).expect("a wave").waves[0][0] / TAU;
+                assert!((told - hz).abs() < 1e-3 * resolved, "{told} for {hz}");
+            }
+            // Not further than it is looked for.
+            let told = f.refined(&[], hz - 0.5 * resolved, 0.2 * resolved).expect("a wave").waves[0][0] / TAU;
+            assert!((told - (hz - 0.3 * resolved)).abs() < 0.01 * resolved, "{told} for {hz}");
+        }
+        // Faster than three oscillations a second, or than cells tell, none is looked for.
+        let at_most = |n: usize, hz: f64| {
+            let t = cells(n);
+            let z: Vec<f64> = t.iter().map(|t| 3e-4 * (TAU * hz * t).sin()).collect();
+            frame(&t, &z).wave(&[]).expect("a wave").waves[0][0] / TAU
+        };
+        assert!(at_most(300, 3.6) < 3.1 && at_most(300, 2.95) > 2.9);
+    }
+
+    #[test]
+    fn a_second_wave_is_another_one() {
+        let t = cells(500);
+        let z: Vec<f64> =
+            t.iter().map(|t| 4e-4 * (TAU * 0.8 * t).sin() + 1e-4 * (TAU * 1.9 * t).cos()).collect();
+        let f = frame(&t, &z);
+        // The same one would not be found again: the nearer one is known.
+        let told = f.wave(&[TAU * 0.8]).expect("two waves");
+        assert_eq!(told.waves[0][0], TAU * 0.8);
+        assert!((told.waves[1][0] / TAU - 1.9).abs() < 1e-3);
+        // Cells are taken for means, which are smaller than the wave.
+        for (wave, size) in told.waves.iter().zip([4e-4, 1e-4]) {
+            let mean = (0.5 * CELL_S * wave[0]).sin() / (0.5 * CELL_S * wave[0]);
+            assert!((wave[1].hypot(wave[2]) * mean / size - 1.0).abs() < 1e-5, "{wave:?}");
+        }
+        assert!(told.sd_m < 1e-9 && told.poly[1].abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_long_union_is_tried_with_the_waves_of_its_parts_alone() {
+        let (long, short) = (cells(400), cells(290));
+        let of = |t: &[f64], hints: &[f64]| {
+            let z = noisy(t, |t| 0.003 * t + 4e-4 * (TAU * 0.8 * t).sin());
+            Course::of(t, &z, CELL_S, hints, 0.0).expect("a form")
+        };
+        assert!(of(&long, &[TAU * 0.81]).white);
+        assert_eq!(of(&long, &[TAU * 0.81]).waves.len(), 1);
+        assert!(!of(&long, &[TAU * 1.6]).white);
+        // Near what is hinted at it is looked for, by a third of what the stretch resolves.
+        assert!(of(&long, &[TAU * (0.8 + 0.28 / 8.0)]).white);
+        assert!(!of(&long, &[TAU * (0.8 + 0.45 / 8.0)]).white);
+        // Shorter than six seconds it is looked for anywhere.
+        assert!(of(&short, &[TAU * 1.6]).white);
+        // A short one may pass for a cubic, and is a wave all the same.
+        let t = cells(120);
+        let z = noisy(&t, |t| 0.003 * t + 4e-4 * (TAU * 0.3 * t).sin());
+        let cubic = Course::of(&t, &z, CELL_S, &[], 0.0).expect("a form");
+        let wave = Course::of(&t, &z, CELL_S, &[1e-3], 0.0).expect("a form");
+        assert!(wave.cost <= cubic.cost);
+    }
+
+    #[test]
+    fn a_wave_that_rounding_makes_is_none() {
+        let t = cells(400);
+        let z = noisy(&t, |t| 0.003 * t + 2e-5 * (TAU * 0.8 * t).sin());
+        let of = |rounded_m: f64| Course::of(&t, &z, CELL_S, &[], rounded_m).expect("a form");
+        let wave = of(1.8e-5);
+        assert!(wave.white && wave.waves.len() == 1);
+        let line = of(2.2e-5);
+        assert!(line.white && line.waves.is_empty() && !line.rests());
+        assert!(line.sd_m > wave.sd_m);
+    }
+}

@@ -122,3 +122,203 @@ fn step(b: &Blocks, motion: &[(f64, f64)], k: usize, half: usize) -> (f64, f64, 
     let noise = (left.max(0.0) / (count - N as f64).max(1.0)).sqrt();
     (x[5], factor.inverse_diagonal()[5].sqrt(), noise)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocks::BLOCK_S;
+    use stylet_record::Recording;
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-6 * wanted.abs().max(1e-6), "{told} for {wanted}");
+    }
+
+    /// Blocks of one sample each, every 20 ms; the needle goes by 3 mm/s up to `stop_s` and rests then.
+    fn blocks(n: usize, stop_s: f64, force: impl Fn(usize) -> f64) -> Blocks {
+        let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.02).collect();
+        let z = t.iter().map(|t| 0.003 * t.min(stop_s)).collect();
+        let f = (0..n).map(force).collect();
+        Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+    }
+
+    fn motion(b: &Blocks) -> Vec<(f64, f64)> {
+        (0..b.len()).map(|k| b.motion.at(0.5 * (b.from_s[k] + b.to_s[k]))).collect()
+    }
+
+    /// A fixed sequence about zero without a trend.
+    fn rough(k: usize) -> f64 {
+        (1.7 * (k * k % 101) as f64).sin()
+    }
+
+    /// Least-squares line through the values at -1, -2, ... or 1, 2, ...: its value at zero, and the sum of squares that it leaves.
+    fn line(x: &[f64]) -> (f64, f64) {
+        let n = x.len() as f64;
+        let (mt, mx) = (0.5 * (n + 1.0), x.iter().sum::<f64>() / n);
+        let with_t = |f: &dyn Fn(f64, f64) -> f64| {
+            x.iter().enumerate().map(|(k, x)| f(k as f64 + 1.0 - mt, x - mx)).sum::<f64>()
+        };
+        let slope = with_t(&|t, x| t * x) / with_t(&|t, _| t * t);
+        (mx - slope * mt, with_t(&|t, x| (x - slope * t).powi(2)))
+    }
+
+    /// At an even speed, two straight lines.
+    #[test]
+    fn a_step_is_the_distance_of_the_lines_on_both_sides() {
+        let b = blocks(60, 99.0, |k| 0.02 * k as f64 - if k > 30 { 0.5 } else { 0.0 } + 0.01 * rough(k));
+        for (k, half) in [(30, 10), (30, 25), (25, 10), (12, 8)] {
+            let (size, sd, noise) = step(&b, &motion(&b), k, half);
+            let left: Vec<f64> = (1..=half).map(|i| b.f[k - i]).collect();
+            let right: Vec<f64> = (1..=half).map(|i| b.f[k + i]).collect();
+            let ((at_left, off_left), (at_right, off_right)) = (line(&left), line(&right));
+            near(size, at_right - at_left);
+            // The value of a line one step outside n points.
+            let n = half as f64;
+            near(sd, (2.0 * 2.0 * (2.0 * n + 1.0) / (n * (n - 1.0))).sqrt());
+            near(noise, ((off_left + off_right) / (2.0 * n - 6.0)).sqrt());
+        }
+    }
+
+    #[test]
+    fn blocks_that_are_not_compared_tell_no_step_and_four_on_each_side_are_needed() {
+        let mut b = blocks(40, 99.0, |k| if k > 20 { 1.0 } else { 2.0 });
+        for k in [13, 16, 24, 26] {
+            b.used[k] = false;
+            b.f[k] = 77.0;
+        }
+        let told = |b: &Blocks| step(b, &motion(b), 20, 7);
+        near(told(&b).0, -1.0);
+        for k in [14, 22] {
+            let mut less = b.clone();
+            less.used[k] = false;
+            assert!(told(&less).1.is_finite());
+            less.used[k + 1] = false;
+            assert_eq!(told(&less), (0.0, f64::INFINITY, f64::INFINITY));
+        }
+    }
+
+    #[test]
+    fn the_block_with_the_step_in_it_does_not_count() {
+        let told = |blended: f64| {
+            let force = |k: usize| {
+                if k == 20 {
+                    blended
+                } else if k > 20 {
+                    1.0
+                } else {
+                    2.0
+                }
+            };
+            let b = blocks(40, 99.0, force);
+            step(&b, &motion(&b), 20, 7)
+        };
+        near(told(55.0).0, -1.0);
+        assert_eq!(told(55.0), told(1.5));
+    }
+
+    /// Two oscillations a second of the speed: friction that follows them is no step.
+    #[test]
+    fn what_follows_the_speed_is_no_drop() {
+        let t: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.02).collect();
+        let w = core::f64::consts::TAU * 2.0;
+        let course = |t: f64| (0.003 * t - 0.002 / w * (w * t).cos(), 0.003 + 0.002 * (w * t).sin());
+        let of = |force: &dyn Fn(f64) -> f64| {
+            let f = t.iter().map(|t| force(*t)).collect();
+            let z = t.iter().map(|t| course(*t).0).collect();
+            let mut b = Blocks::new(&Recording::new(t.clone(), z, f).expect("a recording"), &[], BLOCK_S);
+            b.used = vec![true; 300];
+            b
+        };
+        let rubbed = of(&|t| 0.3 + 200.0 * course(t).1);
+        let told = motion(&rubbed);
+        let size = |k: usize| step(&rubbed, &told, k, 25).0.abs();
+        let most = (25..275).map(size).fold(0.0, f64::max);
+        // A tenth of what the friction itself goes up and down by.
+        assert!(most < 0.08, "{most} N");
+        let fallen = of(&|t| 200.0 * course(t).1 - if t > 2.01 { 0.5 } else { 0.0 });
+        let size = step(&fallen, &told, 100, 25).0;
+        assert!((size + 0.5).abs() < 0.03, "{size}");
+    }
+
+    #[test]
+    fn a_drop_is_found_where_it_is_with_its_size_and_standard_deviations() {
+        // Half of it in block 150.
+        let force = |k: usize| {
+            let fallen = if k > 150 {
+                0.4
+            } else if k == 150 {
+                0.2
+            } else {
+                0.0
+            };
+            0.01 * k as f64 - fallen + 0.01 * rough(k)
+        };
+        let b = blocks(300, 99.0, force);
+        let told = drops(&b);
+        assert_eq!(told.len(), 1, "{told:?}");
+        near(told[0].time_s, 3.0);
+        near(told[0].position_m, 0.009);
+        // As the window of 0.2 s says it, ten blocks on each side.
+        let (size, sd, noise) = step(&b, &motion(&b), 150, 10);
+        near(told[0].size_n, -size);
+        // No place is quieter than seven tenths of the typical one.
+        let mut all: Vec<f64> = (10..290).map(|k| step(&b, &motion(&b), k, 10).2).collect();
+        let least = 0.7 * median(&mut all);
+        near(told[0].score, -size / (sd * noise.max(least)));
+        // What rises is no drop.
+        assert_eq!(drops(&blocks(300, 99.0, |k| -force(k))), []);
+        // Nor is there one in half a window beside the ends, or in a recording without room.
+        assert_eq!(drops(&blocks(21, 99.0, |k| if k > 10 { 0.0 } else { 1.0 } + 0.01 * rough(k))), []);
+        assert_eq!(drops(&blocks(22, 99.0, |k| if k > 10 { 0.0 } else { 1.0 } + 0.01 * rough(k))).len(), 1);
+    }
+
+    #[test]
+    fn a_drop_has_five_standard_deviations() {
+        let b =
+            |size_n: f64| blocks(300, 99.0, move |k| 0.01 * rough(k) - if k > 150 { size_n } else { 0.0 });
+        // The score grows with the size and not with the noise.
+        let (large, small) = (drops(&b(0.4))[0].score, drops(&b(0.2))[0].score);
+        assert!(large > small && small > 5.0, "{large}, {small}");
+        // Smaller ones the wider window sees alone.
+        let weak = drops(&b(0.03));
+        assert_eq!(weak.len(), 1, "{weak:?}");
+        let (size, sd, noise) = step(&b(0.03), &motion(&b(0.03)), 150, 10);
+        assert!(-size / (sd * noise) < 5.0);
+        assert!((weak[0].time_s - 3.01).abs() < 0.05, "{weak:?}");
+        assert_eq!(drops(&b(0.015)), []);
+    }
+
+    #[test]
+    fn drops_nearer_than_a_window_lets_tell_are_one_and_all_are_in_order_of_time() {
+        let at = |second: usize| {
+            let force = move |k: usize| {
+                0.005 * rough(k) - if k >= 150 { 0.5 } else { 0.0 } - if k >= second { 0.8 } else { 0.0 }
+            };
+            drops(&blocks(400, 99.0, force)).iter().map(|d| d.time_s).collect::<Vec<_>>()
+        };
+        // Within a tenth of a second the larger one.
+        assert_eq!(at(154).len(), 1, "{:?}", at(154));
+        for apart in [25, 60, 150] {
+            let told = at(150 + apart);
+            assert_eq!(told.len(), 2, "{told:?}");
+            assert!(
+                (told[0] - 2.99).abs() < 0.02 && (told[1] - told[0] - 0.02 * apart as f64).abs() < 0.03,
+                "{told:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_drop_is_told_across_a_gap() {
+        // Nothing for three seconds after sample 150; lower then.
+        let t: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.02 + if k > 150 { 3.0 } else { 0.0 }).collect();
+        let z = t.iter().map(|t| 0.003 * t).collect();
+        let f = (0..300).map(|k| if k > 150 { 0.0 } else { 1.0 } + 0.01 * rough(k)).collect();
+        let b = Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S);
+        assert_eq!(drops(&b), []);
+        // Where one block is not compared, a drop is seen all the same.
+        let mut b = blocks(300, 99.0, |k| if k > 150 { 0.0 } else { 1.0 } + 0.01 * rough(k));
+        b.used[145] = false;
+        b.restart[146] = true;
+        assert_eq!(drops(&b).len(), 1);
+    }
+}

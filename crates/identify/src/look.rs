@@ -120,3 +120,181 @@ pub fn scaled(info: &EffectInfo, group: &[&[f64]], coefficients: &[f64]) -> Vec<
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocks::{BLOCK_S, Blocks};
+    use crate::model::{Belief, NEVER};
+    use crate::noise::Noise;
+    use crate::objective::residuals;
+    use std::sync::Arc;
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue, info};
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-6 * wanted.abs().max(1e-9), "{told} for {wanted}");
+    }
+
+    /// Two recordings of a layer that does not give way, and a law that is a little off.
+    fn given() -> (Fit, Data) {
+        let layer = Layer {
+            thickness_m: 0.03,
+            stiffness_n_per_m: 100.0,
+            friction_ns_per_m2: 3000.0,
+            puncture_n: None,
+            name: String::new(),
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.002, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.002,
+        };
+        let mut model = Model::base(Arc::new(belief), 2);
+        model.free.own_surface = true;
+        model.instants = vec![vec![NEVER]; 2];
+        let recorded = |seed: usize| {
+            let t: Vec<f64> = (0..800).map(|k| f64::from(k) * 0.005).collect();
+            let z: Vec<f64> = t.iter().map(|t| 0.004 * t + 4e-4 * (2.0 * t).sin()).collect();
+            let force = |(k, z): (usize, &f64)| {
+                110.0 * (z - 0.002).max(0.0) + 0.05 + 0.02 * (1.7 * (k * k % (89 + seed)) as f64).sin()
+            };
+            let f = z.iter().enumerate().map(force).collect();
+            Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+        };
+        let data = Data::new(Arc::new(vec![recorded(0), recorded(12)]), Noise::white(0.2), 0.0);
+        let residuals = residuals(&model, &data).expect("a replay");
+        (Fit { model, residuals }, data)
+    }
+
+    /// Gauss's elimination with pivots.
+    fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
+        let n = b.len();
+        for i in 0..n {
+            let p = (i..n).max_by(|x, y| a[*x][i].abs().total_cmp(&a[*y][i].abs())).expect("a row");
+            a.swap(i, p);
+            b.swap(i, p);
+            for r in i + 1..n {
+                let q = a[r][i] / a[i][i];
+                for c in i..n {
+                    a[r][c] -= q * a[i][c];
+                }
+                b[r] -= q * b[i];
+            }
+        }
+        for i in (0..n).rev() {
+            let sum: f64 = (i + 1..n).map(|c| a[i][c] * b[c]).sum();
+            b[i] = (b[i] - sum) / a[i][i];
+        }
+        b
+    }
+
+    fn product(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
+
+    #[test]
+    fn columns_gain_what_they_would_in_one_system_with_all_that_is_fitted() {
+        let (fit, data) = given();
+        let look = Look::new(&fit, &data);
+        let n = look.tangent.matrix.size;
+        // Surface, stiffness, friction, thickness; a surface of each recording's own, and an instant that never was.
+        assert_eq!(n, 8);
+        let force = |f: &dyn Fn(usize, f64) -> f64| -> Vec<Vec<f64>> {
+            let one = |r: usize| data.blocks[r].from_s.iter().map(|t| f(r, *t)).collect();
+            (0..2).map(one).collect()
+        };
+        let columns = [
+            look.of_force(&force(&|_, _| 1.0)),
+            look.of_force(&force(&|r, t| if r == 1 { 0.3 * t * t } else { 0.1 })),
+        ];
+        let told = look.gain(&columns);
+        // Everything at once.
+        let against: Vec<Vec<f64>> = columns.iter().map(|c| look.tangent.against(c, 2)).collect();
+        let mut whole = vec![vec![0.0; n + 2]; n + 2];
+        let mut slope = look.tangent.slope.clone();
+        for i in 0..n {
+            for j in 0..n {
+                whole[i][j] = look.tangent.matrix.at(i.max(j), i.min(j));
+            }
+            if whole[i][i] == 0.0 {
+                whole[i][i] = 1.0;
+            }
+        }
+        let base: Vec<Vec<f64>> = whole[..n].iter().map(|row| row[..n].to_vec()).collect();
+        for (c, column) in columns.iter().enumerate() {
+            for i in 0..n {
+                whole[i][n + c] = against[c][i];
+                whole[n + c][i] = against[c][i];
+            }
+            for (d, other) in columns.iter().enumerate() {
+                whole[n + c][n + d] = column.dot_all(other);
+            }
+            slope.push(column.dot_all(&look.tangent.rest));
+        }
+        let x = solved(whole.clone(), slope.clone());
+        let without = solved(base.clone(), slope[..n].to_vec());
+        near(told.nats, 0.5 * (product(&x, &slope) - product(&without, &slope[..n])));
+        assert!(told.nats > 1.0);
+        for (told, wanted) in told.coefficients.iter().zip(&x[n..]) {
+            near(*told, *wanted);
+        }
+        // What is left of both columns together when all others have imitated them.
+        let both: Vec<f64> = (0..n).map(|i| against[0][i] + against[1][i]).collect();
+        let size: f64 =
+            (0..2).flat_map(|c| (0..2).map(move |d| (c, d))).map(|(c, d)| whole[n + c][n + d]).sum();
+        let left = size - product(&both, &solved(base, both.clone()));
+        near(told.visible, 0.5 * left);
+        near(told.left, left / size);
+        let none = look.gain(&[]);
+        assert_eq!((none.nats, none.visible, none.left), (0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn an_effect_has_the_column_of_its_force() {
+        let (fit, data) = given();
+        let look = Look::new(&fit, &data);
+        let bias = Choice::new(info("force_bias").expect("in the library"), &[0.03]);
+        let told = look.column(&bias).expect("a column");
+        let force: Vec<Vec<f64>> = data.blocks.iter().map(|b| vec![0.03; b.len()]).collect();
+        let wanted = look.of_force(&force);
+        let changed = look.change(&fit.model.with(bias)).expect("a column");
+        for r in 0..2 {
+            assert_eq!((told.rows[r].len(), wanted.rows[r].len()), (4, 4));
+            assert!(told.rows[r].iter().chain(&wanted.rows[r]).all(|x| *x == 0.0));
+            for ((told, changed), wanted) in told.w[r].iter().zip(&changed.w[r]).zip(&wanted.w[r]) {
+                assert!((told - wanted).abs() < 1e-9 && told == changed, "{told} for {wanted}");
+            }
+        }
+        // Rough residuals weigh less: a force beyond two and a half standard deviations by the root of its excess.
+        let mut rough = fit.clone();
+        rough.residuals.w[0][7] = -10.0;
+        let weighed = Look::new(&rough, &data).of_force(&force);
+        near(weighed.w[0][7] / wanted.w[0][7], 0.5);
+        near(weighed.w[0][8], wanted.w[0][8]);
+    }
+
+    #[test]
+    fn strengths_are_scaled_within_a_wider_range_than_is_searched() {
+        let of = |id: &str, group: &[&[f64]], coefficients: &[f64]| {
+            scaled(info(id).expect("in the library"), group, coefficients)
+        };
+        near(of("force_bias", &[&[0.1]], &[7.0])[0], 0.7);
+        // Searched from -2 to 2 N: once that further down, three times further up.
+        assert_eq!(of("force_bias", &[&[0.1]], &[1e3]), [14.0]);
+        assert_eq!(of("force_bias", &[&[0.1]], &[-1e3]), [-6.0]);
+        // As far as the library allows.
+        assert_eq!(of("rate_dependent_puncture", &[&[0.02]], &[1e3]), [2.0]);
+        assert_eq!(of("coulomb_friction", &[&[1.0]], &[-3.0]), [0.0]);
+        near(of("coulomb_friction", &[&[1.0]], &[1e4])[0], 100.0 + 3.0 * 99.95);
+        // Two columns: strengths add up, the speed stays.
+        let told = of("stribeck_friction", &[&[1.0, 1.0, 3e-4], &[0.0, 1.0, 3e-4]], &[2.0, 0.5]);
+        assert_eq!(told, [2.0, 2.5, 3e-4]);
+        // Softness adds up, down to a tenth of the softest that is searched.
+        near(of("needle_compliance", &[&[1500.0]], &[2.0])[0], 750.0);
+        near(of("needle_compliance", &[&[1500.0]], &[1e4])[0], 5.0);
+        near(of("needle_compliance", &[&[1500.0]], &[-1.0])[0], 1e12);
+    }
+}

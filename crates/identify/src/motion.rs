@@ -81,7 +81,7 @@ impl Motion {
         let told = velocity(t, z);
         let recorded_sd = roughness(&recording.velocity_mps);
         let mut noise_m = position_noise(t, z);
-        let (mut z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
+        let (z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
             noise_m = noise_m.min(1e-6);
             (z.clone(), told.v, told.kinks, told.noise_mps)
         } else {
@@ -94,9 +94,6 @@ impl Motion {
                 |k: &Kink| Kink { v: [v[k.sample.saturating_sub(1)], v[k.sample.min(v.len() - 1)]], ..*k };
             let kinks: Vec<Kink> = kinks.iter().map(sides).collect();
             return Self::from_knots(t, &z, v, &kinks, recorded_sd, noise_m);
-        }
-        if z.len() != t.len() {
-            z.clone_from(&recording.position_m);
         }
         Self::from_knots(t, &z, &v, &kinks, sd, noise_m)
     }
@@ -137,7 +134,7 @@ impl Motion {
                 && sgn(v) != sgn(was)
                 && !self.jumps.iter().any(|j| j.at_s >= then && j.at_s <= now)
             {
-                let share = if v == was { 0.5 } else { (was / (was - v)).clamp(0.0, 1.0) };
+                let share = (was / (was - v)).clamp(0.0, 1.0);
                 self.turns.push((then + share * (now - then), 0.5 * (then + now)));
             }
             before = Some((now, v));
@@ -318,8 +315,258 @@ fn roughness(x: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::Motion;
-    use stylet_record::Recording;
+    use super::*;
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9, "{told} for {wanted}");
+    }
+
+    /// At 2 m/s, from 0.53 s on back at 1 m/s, sampled every 0.1 s up to 1.2 s.
+    fn bent() -> Motion {
+        let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
+        let z: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 * t } else { 1.06 - (t - 0.53) }).collect();
+        let v: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 } else { -1.0 }).collect();
+        let kink = Kink { sample: 6, t: 0.53, z: 1.06, v: [2.0, -1.0], sd_m: 0.006 };
+        Motion::from_knots(&t, &z, &v, &[kink], 0.0, 0.0)
+    }
+
+    /// A piece by its block, borders, mean position and velocity.
+    fn is(piece: &Piece, block: u32, (from_s, to_s): (f64, f64), z_m: f64, v_mps: f64) {
+        assert_eq!(piece.block, block);
+        near(piece.from_s, from_s);
+        near(piece.to_s, to_s);
+        near(piece.z_m, z_m);
+        near(piece.v_mps, v_mps);
+        assert!(piece.a_mps2.abs() < 1e-9, "{piece:?}");
+    }
+
+    fn pieces(m: &Motion, spans: &[(f64, f64)], shown: Shown) -> Vec<Piece> {
+        // Between samples every 0.1 s.
+        m.pieces(spans.iter().copied(), shown, |t| 0.1 * (10.0 * t).floor() + 0.05)
+    }
+
+    #[test]
+    fn position_and_velocity_lie_on_lines_between_samples_and_jumps() {
+        let m = bent();
+        for (at_s, z, v) in [(0.0, 0.0, 2.0), (0.34, 0.68, 2.0), (0.52, 1.04, 2.0), (0.54, 1.05, -1.0)] {
+            near(m.at(at_s).0, z);
+            near(m.at(at_s).1, v);
+        }
+        near(m.at(0.97).0, 0.62);
+        // Outside it is at the first and last sample.
+        assert_eq!(m.at(-0.4), (0.0, 2.0));
+        near(m.at(7.0).0, 0.39);
+        // A speed that changes between samples.
+        let slowing = Motion::from_knots(&[1.0, 1.5, 3.0], &[0.0, 1.0, 4.0], &[3.0, 1.0, 7.0], &[], 0.0, 0.0);
+        near(slowing.at(1.125).1, 2.5);
+        near(slowing.at(2.0).0, 2.0);
+        near(slowing.at(2.0).1, 3.0);
+    }
+
+    #[test]
+    fn a_jump_of_the_speed_is_known_as_well_as_the_place_where_both_sides_meet() {
+        let told = bent().jumps[0];
+        near(told.at_s, 0.53);
+        near(told.between_s, 0.55);
+        near(told.doubt_s, 0.002);
+        assert_eq!((told.z_m, told.v_mps), (1.06, [2.0, -1.0]));
+        // Between its samples, whatever is said of its instant; a change of the speed counts from a micrometre per second on.
+        let kink =
+            |sample: usize, t: f64, after: f64| Kink { sample, t, z: 0.0, v: [1.0, after], sd_m: 3e-6 };
+        let of = |kinks: &[Kink]| {
+            Motion::from_knots(&[0.0, 1.0, 2.0, 3.0], &[0.0; 4], &[1.0; 4], kinks, 0.0, 0.0).jumps
+        };
+        let told = of(&[kink(0, 0.0, 2.0), kink(1, 1.2, 1.5), kink(3, 1.7, 1.0), kink(4, 3.5, 2.0)]);
+        assert_eq!(told.iter().map(|j| (j.at_s, j.between_s)).collect::<Vec<_>>(), [(1.0, 0.5), (2.0, 2.5)]);
+        near(told[0].doubt_s, 6e-6);
+        near(told[1].doubt_s, 3.0);
+    }
+
+    #[test]
+    fn pieces_are_means_of_the_motion_as_samples_show_it() {
+        let m = bent();
+        let spans = [(-0.1, 0.1), (0.3, 0.5), (0.5, 0.7), (0.7, 0.77), (1.15, 1.25)];
+        let told = pieces(&m, &spans, Shown::Sampled);
+        assert_eq!(told.len(), 6);
+        // Before the first sample it is where it is then, and as fast.
+        is(&told[0], 0, (-0.1, 0.1), 0.25 * 0.2, 2.0);
+        is(&told[1], 1, (0.3, 0.5), 0.8, 2.0);
+        // The jump shows in the middle between its samples, each side as it went.
+        is(&told[2], 2, (0.5, 0.55), 1.05, 2.0);
+        is(&told[3], 2, (0.55, 0.7), 0.965, -1.0);
+        is(&told[4], 3, (0.7, 0.77), 0.855, -1.0);
+        is(&told[5], 4, (1.15, 1.25), 0.5 * (0.415 + 0.39), -1.0);
+        // A border at a jump cuts nothing.
+        let told = pieces(&m, &[(0.4, 0.55), (0.55, 0.6)], Shown::Sampled);
+        assert_eq!(told.len(), 2);
+        is(&told[1], 1, (0.55, 0.6), 1.015, -1.0);
+        // Nor does one nearer to it than a millionth of the span, on either side; a turn neither.
+        let cuts =
+            |m: &Motion, from_s: f64, to_s: f64| pieces(m, &[(from_s, to_s)], Shown::Sampled).len() - 1;
+        let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
+        let v: Vec<f64> = t.iter().map(|t| 1.0 - 1.8 * t).collect();
+        let turn = Motion::from_knots(&t, &[0.0; 13], &v, &[], 0.0, 0.0);
+        for m in [&m, &turn] {
+            for (share, wanted) in [(3e-7, 0), (3e-6, 1)] {
+                assert_eq!(cuts(m, 0.55 - 0.2 * share, 0.75), wanted);
+                assert_eq!(cuts(m, 0.35, 0.55 + 0.2 * share), wanted);
+                assert_eq!(cuts(m, 0.55 - 0.02 * share, 0.57), wanted);
+            }
+        }
+    }
+
+    #[test]
+    fn a_late_force_shows_the_motion_of_before() {
+        let m = bent();
+        let told = pieces(&m, &[(0.3, 0.5), (0.5, 0.7), (0.7, 0.9)], Shown::Late(0.04));
+        assert_eq!(told.len(), 4);
+        is(&told[0], 0, (0.3, 0.5), 0.72, 2.0);
+        is(&told[1], 1, (0.5, 0.57), 2.0 * 0.495, 2.0);
+        is(&told[2], 1, (0.57, 0.7), 1.06 - 0.065, -1.0);
+        is(&told[3], 2, (0.7, 0.9), 1.06 - 0.23, -1.0);
+        // Without a delay it shows the instant.
+        let told = pieces(&m, &[(0.5, 0.7)], Shown::Late(0.0));
+        is(&told[0], 0, (0.5, 0.53), 1.03, 2.0);
+        is(&told[1], 0, (0.53, 0.7), 1.06 - 0.085, -1.0);
+    }
+
+    #[test]
+    fn a_late_force_that_is_sampled_shows_each_side_up_to_the_middle_between_samples() {
+        let m = bent();
+        let spans = [(0.3, 0.5), (0.5, 0.7), (0.7, 0.9)];
+        let placed = |late_s: f64, placed_s: f64| pieces(&m, &spans, Shown::SampledLate { late_s, placed_s });
+        // It jumps at 0.57 s and shows so at 0.55 s: the way back lasts longer than it did.
+        let told = placed(0.04, 0.04);
+        assert_eq!(told.len(), 4);
+        is(&told[0], 0, (0.3, 0.5), 0.72, 2.0);
+        is(&told[1], 1, (0.5, 0.55), 2.0 * 0.485, 2.0);
+        is(&told[2], 1, (0.55, 0.7), 1.06 - (0.625 - 0.57), -1.0);
+        is(&told[3], 2, (0.7, 0.9), 1.06 - (0.8 - 0.57), -1.0);
+        // It jumps at 0.54 s: the way in does.
+        let told = placed(0.01, 0.01);
+        is(&told[1], 1, (0.5, 0.55), 2.0 * 0.515, 2.0);
+        is(&told[2], 1, (0.55, 0.7), 1.06 - (0.625 - 0.54), -1.0);
+        // Where it is placed need not be where it is late to.
+        let told = placed(0.01, 0.08);
+        assert_eq!(told.len(), 4);
+        is(&told[1], 1, (0.5, 0.65), 2.0 * 0.565, 2.0);
+        is(&told[2], 1, (0.65, 0.7), 1.06 - (0.675 - 0.54), -1.0);
+    }
+
+    #[test]
+    fn a_piece_knows_how_the_speed_grows() {
+        // v = 1 + 3 t at the samples, and between them on lines: so it is anywhere.
+        let t: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();
+        let v: Vec<f64> = t.iter().map(|t| 1.0 + 3.0 * t).collect();
+        let m = Motion::from_knots(&t, &[0.25; 20], &v, &[], 0.0, 0.0);
+        for p in pieces(&m, &[(0.23, 0.61), (0.61, 0.75), (1.0, 1.1)], Shown::Sampled) {
+            assert!((p.a_mps2 - 3.0).abs() < 1e-9, "{p:?}");
+            near(p.v_mps, 1.0 + 1.5 * (p.from_s + p.to_s));
+            near(p.z_m, 0.25);
+            near(p.at(p.from_s).1, 1.0 + 3.0 * p.from_s);
+            near(p.at(p.to_s).0, 0.25 + p.v_mps * 0.5 * (p.to_s - p.from_s));
+        }
+    }
+
+    #[test]
+    fn dry_friction_jumps_where_the_speed_smoothly_turns() {
+        let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
+        let of = |v: &dyn Fn(f64) -> f64, sd: f64| {
+            let v: Vec<f64> = t.iter().map(|t| v(*t)).collect();
+            Motion::from_knots(&t, &[0.0; 13], &v, &[], sd, 0.0)
+        };
+        // 1 m/s at first, through zero at 5/11 s.
+        let slowing = of(&|t| 1.0 - 2.2 * t, 0.0);
+        assert_eq!(slowing.turns.len(), 1);
+        near(slowing.turns[0].0, 1.0 / 2.2);
+        near(slowing.turns[0].1, 0.45);
+        // Samples show it in their middle, a late force when it gets there.
+        let cut = |shown: Shown| {
+            let told = pieces(&slowing, &[(0.3, 0.4), (0.4, 0.6)], shown);
+            assert_eq!(told.iter().map(|p| p.block).collect::<Vec<_>>(), [0, 1, 1]);
+            told[1].to_s
+        };
+        near(cut(Shown::Sampled), 0.45);
+        near(cut(Shown::Late(0.02)), 1.0 / 2.2 + 0.02);
+        near(cut(Shown::SampledLate { late_s: 0.02, placed_s: 0.06 }), 0.55);
+        // There and back: one turn each.
+        let swinging = of(&|t| (core::f64::consts::TAU * (t + 0.03)).cos(), 0.0);
+        let middles: Vec<f64> = swinging.turns.iter().map(|t| t.1).collect();
+        assert_eq!(middles.len(), 2);
+        near(middles[0], 0.25);
+        near(middles[1], 0.75);
+        // None without a change of the sign, in a hold, or where the speed jumps; noisy positions tell none.
+        assert!(of(&|t| 1.0 - 0.8 * t, 0.0).turns.is_empty());
+        assert!(of(&|_| 0.0, 0.0).turns.is_empty());
+        assert!(bent().turns.is_empty());
+        assert_eq!(of(&|t| 1.0 - 2.2 * t, NOISY_MPS).turns.len(), 1);
+        assert!(of(&|t| 1.0 - 2.2 * t, 1.01 * NOISY_MPS).turns.is_empty());
+        // A jump elsewhere is not this turn.
+        let kink =
+            |sample: usize| Kink { sample, t: 0.1 * sample as f64 - 0.05, z: 0.0, v: [1.0, 0.9], sd_m: 0.0 };
+        let both = |sample: usize| {
+            let v: Vec<f64> = t.iter().map(|t| 1.0 - 2.2 * t).collect();
+            Motion::from_knots(&t, &[0.0; 13], &v, &[kink(sample)], 0.0, 0.0)
+        };
+        assert_eq!([4, 5, 6].map(|sample| both(sample).turns.len()), [1, 0, 1]);
+        // What comes after a span does not cut it, a jump at 0.35 s and a turn at 0.45 s.
+        let told = pieces(&both(4), &[(0.0, 0.3), (0.3, 0.5)], Shown::Sampled);
+        let ends: Vec<f64> = told.iter().map(|p| p.to_s).collect();
+        assert_eq!(ends.len(), 4);
+        ends.iter().zip([0.3, 0.35, 0.45, 0.5]).for_each(|(told, wanted)| near(*told, wanted));
+    }
+
+    #[test]
+    fn a_motion_that_comes_to_rest_smoothly_turns_where_it_does() {
+        let t: Vec<f64> = (0..8).map(f64::from).collect();
+        let v = [0.3, 0.2, 0.1, 0.0, 0.0, -0.2, -0.1, -0.1];
+        let m = Motion::from_knots(&t, &[0.0; 8], &v, &[], 0.0, 0.0);
+        assert_eq!(m.turns, [(3.0, 2.5), (4.0, 4.5)]);
+    }
+
+    #[test]
+    fn roughness_is_what_third_differences_leave() {
+        let parabola: Vec<f64> = (0..40).map(|k| f64::from(k * k) - 3.0 * f64::from(k)).collect();
+        near(roughness(&parabola), 0.0);
+        // Alternating by one to either side: third differences of eight.
+        let rough: Vec<f64> =
+            parabola.iter().enumerate().map(|(k, x)| x + if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        assert!((roughness(&rough) - 8.0 * 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3, "{}", roughness(&rough));
+        // A step in two samples of forty is none.
+        let cubic: Vec<f64> = (0..40).map(|k| f64::from(k).powi(3) / 6.0).collect();
+        assert!((roughness(&cubic) - 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_measured_velocity_is_taken_when_it_is_better_than_what_positions_tell() {
+        let t: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.005).collect();
+        // Rough positions; slower from a second and a half on.
+        let z: Vec<f64> = t
+            .iter()
+            .enumerate()
+            .map(|(k, t)| 0.025 * t.min(1.5013) + 0.005 * t + 3e-4 * (1.7 * (k * k % 101) as f64).sin())
+            .collect();
+        let of = |rough_mps: f64, measured: bool| {
+            let v: Vec<f64> = (0..600)
+                .map(|k| if k <= 300 { 0.031 } else { 0.0051 } + rough_mps * f64::from(k % 2))
+                .collect();
+            let mut r =
+                Recording::with_velocity(t.clone(), z.clone(), v, vec![0.0; 600]).expect("a recording");
+            r.velocity_measured = measured;
+            Motion::of(&r)
+        };
+        let told = of(0.0, true);
+        assert_eq!((told.at(1.0).1, told.at(2.5).1), (0.031, 0.0051));
+        assert_eq!(told.velocity_sd_mps, 0.0);
+        // Where they jump the positions tell.
+        assert_eq!(told.jumps.len(), 1);
+        assert!((told.jumps[0].at_s - 1.5).abs() < 0.05, "{:?}", told.jumps);
+        // Nobody measured, or too roughly.
+        for from_positions in [of(0.0, false), of(0.01, true)] {
+            assert!((from_positions.at(1.0).1 - 0.03).abs() < 3e-4, "{}", from_positions.at(1.0).1);
+            assert!(from_positions.velocity_sd_mps > NOISY_MPS);
+        }
+    }
 
     /// At 1.1 mm/s an encoder of 50 um stands still in eight samples of nine, at 0.2 mm/s in forty-nine of fifty.
     #[test]

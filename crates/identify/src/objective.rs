@@ -228,3 +228,148 @@ pub fn prior_nats(model: &Model) -> f64 {
         .sum();
     shared + own
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocks::BLOCK_S;
+    use crate::model::{Belief, Own};
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue};
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
+    }
+
+    /// A layer that gives way by its force after 5 mm, at 9 mm; two recordings of different lengths at 4 mm/s.
+    fn given() -> (Model, Data) {
+        let layer = Layer {
+            thickness_m: 0.02,
+            stiffness_n_per_m: 200.0,
+            friction_ns_per_m2: 3000.0,
+            puncture_n: Some(1.0),
+            name: String::new(),
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.004, layers: vec![layer] },
+            given: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.002,
+        };
+        let mut model = Model::base(Arc::new(belief), 2);
+        model.free.own_surface = true;
+        model.instants = vec![vec![2.2], vec![2.3]];
+        model.scatter.force = 0.05;
+        let recorded = |n: usize| {
+            let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.005).collect();
+            let z = t.iter().map(|t| 0.004 * t).collect();
+            let f = t.iter().map(|t| 0.9 * (t - 1.0).max(0.0) + 0.01 * (90.0 * t).sin()).collect();
+            let exclude: Vec<bool> = (0..n).map(|k| (40..52).contains(&k)).collect();
+            Blocks::new(&Recording::new(t, z, f).expect("a recording"), &exclude, BLOCK_S)
+        };
+        (model, Data::new(Arc::new(vec![recorded(800), recorded(600)]), Noise::white(0.05), 0.0))
+    }
+
+    #[test]
+    fn recordings_are_counted_chosen_and_judged_by_their_noise() {
+        let (_, d) = given();
+        assert_eq!((d.recordings(), d.compared()), (2, 200 + 150 - 2 * 3));
+        let second = d.only(&[1]);
+        assert_eq!((second.recordings(), second.blocks[0].len(), second.compared()), (1, 150, 147));
+        let e = vec![0.1; 150];
+        let w = d.whiten(1, &e);
+        for (k, w) in w.iter().enumerate() {
+            near(*w, if (10..13).contains(&k) { 0.0 } else { 2.0 });
+        }
+        assert_eq!(second.whiten(0, &e), w);
+        let coloured = d.colour(1, &w);
+        assert!(
+            coloured
+                .iter()
+                .enumerate()
+                .all(|(k, e)| (e - if (10..13).contains(&k) { 0.0 } else { 0.1 }).abs() < 1e-12)
+        );
+        near(d.with_noise(Noise::white(0.2)).whiten(1, &e)[0], 0.5);
+        // The noise that residuals tell is nowhere less than the floor.
+        let told =
+            Data { floor_n: 0.3, ..d.clone() }.judged_by(&[vec![0.01; 200], vec![0.01; 150]], From::Whole);
+        assert_eq!(told.noise.bins.iter().map(|b| b.sd_n).fold(1.0, f64::min), 0.3);
+        assert_eq!(told.floor_n, 0.3);
+    }
+
+    #[test]
+    fn work_is_counted_in_blocks_that_are_replayed() {
+        let (m, d) = given();
+        let cost = |of: &dyn Fn()| {
+            let before = d.work();
+            of();
+            d.work() - before
+        };
+        assert_eq!(cost(&|| assert!(replay(&m, &d, 0).is_some())), 200);
+        assert_eq!(cost(&|| assert!(residuals(&m, &d).is_some())), 350);
+        assert_eq!(cost(&|| d.worked(7)), 7);
+        let trail = Trail::new(&m, &d, 1).expect("a trail");
+        assert_eq!(cost(&|| assert!(Trail::new(&m, &d, 1).is_some())), 150);
+        assert_eq!(cost(&|| assert!(trail.replay(&m, &d, 1).is_some())), 75);
+        assert_eq!(cost(&|| assert!(trail.nats_at(&m, &d, 1, &[2.0]).is_finite())), 75);
+        // Under another noise it is the same account.
+        let other = d.with_noise(Noise::white(1.0));
+        other.worked(5);
+        assert_eq!(other.work(), d.work());
+    }
+
+    #[test]
+    fn nats_are_those_of_residuals_of_ruptures_and_of_priors() {
+        let (mut m, d) = given();
+        m.own = [1e-4, -3e-4].map(|surface_m| Own { surface_m, ..Own::default() }).to_vec();
+        m.tissue.layers[0].stiffness_n_per_m = 230.0;
+        m.tissue.surface_m = 0.005;
+        let left = residuals(&m, &d).expect("a replay");
+        // A tenth and a half of the stiffness, half of what the surface is uncertain by, and two of the spread between recordings.
+        let stiffness = 0.5 * (0.15_f64 / 0.3).powi(2);
+        let surface = 0.5 * 0.5_f64.powi(2);
+        let own: f64 = [1e-4, 3e-4].iter().map(|x| 0.5 * (x / m.scatter.surface_m).powi(2)).sum();
+        near(prior_nats(&m), stiffness + surface + own);
+        let events: f64 = (0..2).map(|r| judge(&left.events[r][0], &m.scatter).nats).sum();
+        near(event_nats(&m, &left), events);
+        let mut sum = 0.0;
+        for r in 0..2 {
+            let f = replay(&m, &d, r).expect("a replay").f;
+            for k in 0..d.blocks[r].len() {
+                near(left.e[r][k], d.blocks[r].f[k] - f[k]);
+                if d.blocks[r].used[k] {
+                    let w: f64 = (left.e[r][k] / 0.05).abs();
+                    sum += if w < 2.5 { 0.5 * w * w } else { 2.5 * (w - 1.25) };
+                }
+            }
+        }
+        near(left.nats, sum + events + stiffness + surface + own);
+        near(nats(&m, &left), left.nats);
+    }
+
+    #[test]
+    fn nats_at_other_instants_are_those_of_the_model_that_has_them() {
+        let (m, d) = given();
+        let d = d.only(&[0]);
+        let m = m.only(&[0]);
+        let mut trail = Trail::new(&m, &d, 0).expect("a trail");
+        let at = |t: f64| {
+            let there = Model { instants: vec![vec![t]], ..m.clone() };
+            residuals(&there, &d).expect("a replay").nats - prior_nats(&there)
+        };
+        for stand in [2.2, 3.0] {
+            trail.stand(&d, 0, &[stand]);
+            for t in [1.5, 2.2, 2.21, 3.4, NEVER] {
+                near(trail.nats_at(&m, &d, 0, &[t]), at(t));
+            }
+        }
+        // One newton at 200 N/m, 9 mm at 4 mm/s.
+        assert!((trail.own_instants()[0] - 2.25).abs() < 1e-6);
+        let moved = Model { instants: vec![vec![2.5]], ..m.clone() };
+        assert_eq!(
+            trail.replay(&moved, &d, 0).expect("a replay").f,
+            replay(&moved, &d, 0).expect("a replay").f
+        );
+    }
+}

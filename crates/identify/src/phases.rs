@@ -386,6 +386,10 @@ mod tests {
         assert_eq!(of(24, 1e-4), 1);
         assert_eq!(of(26, 1e-4), 2);
         assert_eq!(of(20, 2e-4), 2);
+        // At the very end as much counts as there is.
+        let f: Vec<f64> = (0..303).map(|k| if k < 300 { -3.0 } else { -2.0 }).collect();
+        let last = releases(&recording(&f, 1e-4, 100), &Phases { start: 0, deepest: 99, back: 100 }, 5);
+        assert_eq!(last.iter().map(|r| r.size_n).collect::<Vec<_>>(), [1.0]);
         // Eight tenths of what makes a drop.
         let small = |size: f64| {
             let f: Vec<f64> = (0..300).map(|k| -2.0 + if k >= 150 { size } else { 0.0 }).collect();

@@ -74,3 +74,154 @@ fn one(model: &Model, data: &Data, r: usize, drops: &[f64]) -> (Vec<f64>, bool) 
     }
     (instants, moved)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocks::{BLOCK_S, Blocks};
+    use crate::model::Belief;
+    use crate::noise::Noise;
+    use crate::objective::replay;
+    use std::sync::Arc;
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue};
+
+    /// Three layers of 15 mm, 100 N/m each; the needle goes in by 5 mm/s.
+    fn model(puncture: [f64; 3]) -> Model {
+        let layer = |k: usize| Layer {
+            thickness_m: 0.015,
+            stiffness_n_per_m: 100.0,
+            friction_ns_per_m2: 2000.0,
+            puncture_n: Some(puncture[k]),
+            name: String::new(),
+        };
+        let belief = Belief {
+            tissue: Tissue { surface_m: 0.005, layers: (0..3).map(layer).collect() },
+            given: Vec::new(),
+            tolerance: vec![0.3; 3],
+            thickness_tolerance: vec![0.1; 3],
+            surface_tolerance_m: 0.002,
+        };
+        Model::base(Arc::new(belief), 1)
+    }
+
+    /// The force that a model gives with ruptures at these instants, up to so many s.
+    fn data(model: &Model, instants: &[f64], to_s: f64) -> Data {
+        let n = (to_s * 200.0).round() as usize;
+        let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.005).collect();
+        let z = t.iter().map(|t| 0.005 * t).collect();
+        let r = Recording::new(t, z, vec![0.0; n]).expect("a recording");
+        let mut blocks = Blocks::new(&r, &[], BLOCK_S);
+        let silent = Data::new(Arc::new(vec![blocks.clone()]), Noise::white(0.01), 0.0);
+        let truth = Model { instants: vec![instants.to_vec()], ..model.clone() };
+        blocks.f = replay(&truth, &silent, 0).expect("a replay").f;
+        Data::new(Arc::new(vec![blocks]), Noise::white(0.01), 0.0)
+    }
+
+    /// Where `retime` moves ruptures to in data of ruptures at `truth`, and whether it says so.
+    fn moved(model: &Model, truth: &[f64], from: &[f64], drops: &[f64], to_s: f64) -> (Vec<f64>, bool) {
+        let mut model = model.clone();
+        // A wide scatter: the force itself tells.
+        model.scatter.force = 0.3;
+        model.scatter.place_m = 5e-3;
+        model.instants = vec![from.to_vec()];
+        let data = data(&model, truth, to_s);
+        let any = retime(&mut model, &data, &[drops.to_vec()]);
+        (model.instants[0].clone(), any)
+    }
+
+    #[test]
+    fn instants_move_by_blocks_to_where_the_force_falls() {
+        let m = model([1.3; 3]);
+        let truth = [3.013, 6.017, 8.551];
+        // Moves by half a block, one, two, four, nine, twenty, and what they add up to.
+        for blocks in [0.5, 1.0, 2.0, 4.0, 9.0, 20.0] {
+            for side in [-1.0, 1.0] {
+                for layer in 0..3 {
+                    let mut from = truth;
+                    from[layer] += side * blocks * 0.02;
+                    let (told, any) = moved(&m, &truth, &from, &[], 11.0);
+                    assert!(any);
+                    for (told, truth) in told.iter().zip(truth) {
+                        assert!((told - truth).abs() < 1e-9, "{blocks} {layer}: {told} for {truth}");
+                    }
+                }
+            }
+        }
+        assert_eq!(moved(&m, &truth, &truth, &[], 11.0), (truth.to_vec(), false));
+    }
+
+    #[test]
+    fn a_drop_far_away_is_tried_too() {
+        let m = model([1.3; 3]);
+        let truth = [3.013, 6.017, 8.551];
+        let from = [3.013, 4.4, 8.551];
+        let (told, any) = moved(&m, &truth, &from, &[6.017, 7.7], 11.0);
+        assert!(any && told == truth, "{told:?}");
+        assert_ne!(moved(&m, &truth, &from, &[], 11.0).0, truth);
+    }
+
+    #[test]
+    fn the_laws_own_ruptures_are_tried_all_at_once() {
+        // By its force each layer gives way 10 mm behind its front: an earlier rupture makes those after it late.
+        let m = model([1.0; 3]);
+        let own = {
+            let silent = data(&m, &[NEVER; 3], 11.0);
+            Trail::new(&m, &silent, 0).expect("a trail").own_instants()
+        };
+        assert!(own.iter().all(|t| *t < 11.0), "{own:?}");
+        let from: Vec<f64> = own.iter().map(|t| t - 1.3).collect();
+        let (told, any) = moved(&m, &own, &from, &[], 11.0);
+        assert!(any && told == own, "{told:?} for {own:?}");
+    }
+
+    #[test]
+    fn a_layer_that_never_gave_way_may_have_and_the_other_way_round() {
+        let m = model([1.3, 1.3, 100.0]);
+        // The last one: by a drop where the force has one.
+        let truth = [3.013, 6.017, 8.551];
+        let (told, any) = moved(&m, &truth, &[3.013, 6.017, NEVER], &[8.551], 9.5);
+        assert!(any && told == truth, "{told:?}");
+        // Nothing fell: it never did.
+        let never = [3.013, 6.017, NEVER];
+        let (told, any) = moved(&m, &never, &[3.013, 6.017, 9.1], &[], 9.5);
+        assert!(any && told == never, "{told:?}");
+        // One that another came after gave way.
+        let (told, _) = moved(&m, &never, &[3.1, NEVER, NEVER], &[6.017, 3.013], 9.5);
+        assert_eq!(told, never);
+        let (told, _) = moved(&m, &[NEVER; 3], &[NEVER; 3], &[], 2.5);
+        assert_eq!(told, [NEVER; 3]);
+    }
+
+    #[test]
+    fn instants_stay_in_their_order_and_inside_the_recording() {
+        let m = model([1.3; 3]);
+        let truth = [3.013, 6.017, 8.551];
+        // Drops that are tried for every layer, most of them out of order, some outside.
+        let drops: Vec<f64> = (-10..=130).map(|k| 0.1 * f64::from(k)).collect();
+        for from in [[5.0, 5.01, 5.02], [1.0, 9.0, 9.1], [0.1, 0.2, 10.0], [3.0, 3.0, 3.0]] {
+            let (told, _) = moved(&m, &truth, &from, &drops, 11.0);
+            assert!(told[0] <= told[1] && told[1] <= told[2], "{told:?}");
+            assert!(told.iter().all(|t| *t == NEVER || (-0.0025..=11.0).contains(t)), "{told:?}");
+        }
+    }
+
+    #[test]
+    fn every_recording_has_drops_of_its_own() {
+        let mut m = model([1.3; 3]);
+        m.scatter.force = 0.3;
+        m.scatter.place_m = 5e-3;
+        let (one, two) = ([3.013, 6.017, 8.551], [3.113, 6.317, 8.951]);
+        let blocks = vec![data(&m, &one, 11.0).blocks[0].clone(), data(&m, &two, 11.0).blocks[0].clone()];
+        let both = Data::new(Arc::new(blocks), Noise::white(0.01), 0.0);
+        m.own.push(m.own[0]);
+        m.instants = vec![vec![3.013, 4.4, 8.551], vec![3.113, 4.4, 8.951]];
+        let first = m.clone();
+        assert!(retime(&mut m, &both, &[vec![6.017], vec![6.317]]));
+        assert_eq!(m.instants, [one, two]);
+        // A recording that nobody gave drops of is tried all the same.
+        let mut m = first;
+        assert!(retime(&mut m, &both, &[vec![6.017]]));
+        assert_eq!(m.instants[0], one);
+    }
+}

@@ -312,7 +312,286 @@ fn widest(t: &[f64], z: &[f64], i: usize, (from, to): (usize, usize), noise_m: f
 
 #[cfg(test)]
 mod tests {
-    use super::settle;
+    use super::*;
+
+    /// Cells every 20 ms with 10 um of noise.
+    struct Given {
+        t: Vec<f64>,
+        z: Vec<f64>,
+    }
+
+    impl Given {
+        fn new(n: usize, course: impl Fn(f64) -> f64) -> Self {
+            let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
+            let z = t.iter().enumerate().map(|(k, t)| course(*t) + 1e-5 * rough(k)).collect();
+            Self { t, z }
+        }
+
+        fn cells(&self) -> Cells<'_> {
+            Cells { t: &self.t, z: &self.z, dt: 0.02, noise_m: 1e-5, rounded_m: 0.0 }
+        }
+
+        fn stretches(&self, edges: &[usize]) -> Vec<Stretch> {
+            edges.windows(2).map(|e| Stretch::new(&self.cells(), (e[0], e[1]), &[])).collect()
+        }
+    }
+
+    fn borders(stretches: &[Stretch]) -> Vec<(usize, usize)> {
+        stretches.iter().map(|s| (s.from, s.to)).collect()
+    }
+
+    /// A line that bends at an instant.
+    fn bent(at_s: f64, before: f64, after: f64) -> impl Fn(f64) -> f64 {
+        move |t| if t < at_s { before * (t - at_s) } else { after * (t - at_s) }
+    }
+
+    #[test]
+    fn a_stretch_is_one_form_of_the_cells_that_lie_beside_no_jump() {
+        let mut given = Given::new(100, |t| 0.003 * t);
+        // Cells beside jumps have both speeds.
+        for k in [20, 79] {
+            given.z[k] += 0.01;
+        }
+        let s = Stretch::new(&given.cells(), (20, 80), &[]);
+        let course = s.course.as_ref().expect("a form");
+        assert!((s.at(&given.t, 1.0).1 - 0.003).abs() < 1e-5 && s.local.is_empty());
+        assert_eq!(s.cost, course.cost);
+        // The slope of a line over 58 cells of 20 ms, doubled.
+        let sd = 2.0 * course.sd_m * (12.0 / 58.0_f64).sqrt() / (58.0 * 0.02);
+        assert_eq!(s.sds.len(), 60);
+        assert!(s.sds.iter().all(|x| (x / sd - 1.0).abs() < 1e-12));
+        // At the ends of the recording all cells count.
+        given.z[20] -= 0.01;
+        given.z[79] -= 0.01;
+        for k in [0, 99] {
+            given.z[k] += 0.01;
+        }
+        let form = |from: usize, to: usize| Stretch::new(&given.cells(), (from, to), &[]).course.is_some();
+        assert!(form(20, 80) && !form(0, 80) && !form(20, 100));
+        // Of a rest the velocity is known.
+        let rest = Given::new(100, |_| 0.07);
+        assert_eq!(Stretch::new(&rest.cells(), (0, 100), &[]).sds, [0.0; 100]);
+        // Twice the positions' noise is too much of a residual.
+        let course = Stretch::new(&rest.cells(), (0, 100), &[]).course.expect("a form");
+        let quieter = |share: f64| Cells { noise_m: course.sd_m * share, ..rest.cells() };
+        assert!(Stretch::new(&quieter(0.51), (0, 100), &[]).course.is_some());
+        assert!(Stretch::new(&quieter(0.49), (0, 100), &[]).course.is_none());
+        // Thirteen cells between jumps, or beside one, or all there are.
+        let few = |from: usize, to: usize| Stretch::new(&rest.cells(), (from, to), &[]).course.is_some();
+        assert!(few(20, 35) && !few(20, 34));
+        let short = Given::new(13, |_| 0.07);
+        assert!(Stretch::new(&short.cells(), (0, 13), &[]).course.is_some());
+        let short = Given::new(12, |_| 0.07);
+        assert!(Stretch::new(&short.cells(), (0, 12), &[]).course.is_none());
+    }
+
+    #[test]
+    fn without_a_form_positions_and_velocities_go_on_lines_from_cell_to_cell() {
+        let s = Stretch {
+            from: 2,
+            to: 5,
+            course: None,
+            local: vec![(1.0, 3.0), (2.0, 5.0), (6.0, -1.0)],
+            sds: vec![1.0; 3],
+            cost: f64::INFINITY,
+        };
+        let t = [0.0, 1.0, 2.0, 3.0, 5.0, 6.0];
+        let wanted = [
+            (1.5, -0.5, 3.0),
+            (2.0, 1.0, 3.0),
+            (2.25, 1.25, 3.5),
+            (3.0, 2.0, 5.0),
+            (4.5, 5.0, 0.5),
+            (7.0, 4.0, -1.0),
+        ];
+        for (at, z, v) in wanted {
+            let told = s.at(&t, at);
+            assert!((told.0 - z).abs() < 1e-12 && (told.1 - v).abs() < 1e-12, "{told:?} at {at}");
+        }
+    }
+
+    #[test]
+    fn what_is_one_form_is_joined_and_what_bends_is_not() {
+        let line = Given::new(200, |t| 0.003 * t);
+        assert_eq!(borders(&joined(&line.cells(), line.stretches(&[0, 60, 110, 200]))), [(0, 200)]);
+        let bend = Given::new(200, bent(2.2, 0.003, 0.004));
+        assert_eq!(
+            borders(&joined(&bend.cells(), bend.stretches(&[0, 60, 110, 200]))),
+            [(0, 110), (110, 200)]
+        );
+        // Parts of a ripple pass for cubics; together they are a wave.
+        let ripple = Given::new(200, |t| 0.003 * t + 4e-4 * (3.0 * t).sin());
+        let told = joined(&ripple.cells(), ripple.stretches(&[0, 35, 70, 105, 200]));
+        assert_eq!(borders(&told), [(0, 200)]);
+        let hz: Vec<f64> = told[0].course.iter().flat_map(Course::frequencies).collect();
+        assert!(hz.len() == 1 && (hz[0] - 3.0).abs() < 0.02, "{hz:?}");
+    }
+
+    #[test]
+    fn a_stretch_that_is_no_form_is_cut_where_it_ceases_to_be_one() {
+        for bend in [60_usize, 130, 170] {
+            let given = Given::new(260, bent(0.02 * bend as f64, 0.003, 0.009));
+            let told = split(&given.cells(), given.stretches(&[0, 260]));
+            assert_eq!(told.len(), 2, "{:?}", borders(&told));
+            assert_eq!((told[0].from, told[0].to, told[1].to), (0, told[1].from, 260));
+            assert!(told[1].from.abs_diff(bend) <= 16, "{:?}", borders(&told));
+            assert!(told[0].course.is_some() && told[1].course.is_some());
+        }
+        // Two bends, and a stretch that is one form and stays so.
+        let given = Given::new(400, |t| {
+            if t < 2.0 {
+                0.003 * t
+            } else if t < 4.0 {
+                0.006 + 0.005 * (t - 2.0)
+            } else {
+                0.016 + 0.002 * (t - 4.0)
+            }
+        });
+        let told = split(&given.cells(), given.stretches(&[0, 300, 400]));
+        let b = borders(&told);
+        assert_eq!(b.len(), 4, "{b:?}");
+        assert!(b.windows(2).all(|p| p[0].1 == p[1].0) && b[3] == (300, 400), "{b:?}");
+        assert!(b[0].1.abs_diff(100) <= 12 && b[1].1.abs_diff(200) <= 12, "{b:?}");
+        // Where not even the beginning is one, or there is no room for two, it is left whole.
+        let wild = Given {
+            t: given.t.clone(),
+            z: (0..400).map(|k| 1e-3 * (0.9 * f64::from(k * k)).sin() * f64::from(k)).collect(),
+        };
+        assert_eq!(borders(&split(&wild.cells(), wild.stretches(&[0, 400]))), [(0, 400)]);
+        let room = |n: usize| {
+            let given = Given::new(n, bent(0.02 * 24.0, 0.003, 0.03));
+            split(&given.cells(), given.stretches(&[0, n])).len()
+        };
+        assert_eq!((room(47), room(48)), (1, 2));
+    }
+
+    #[test]
+    fn borders_move_to_where_both_forms_meet() {
+        let given = Given::new(240, bent(2.4, 0.002, 0.006));
+        let lines = [0.002, 0.006].map(|v| Given::new(240, move |t| v * (t - 2.4)));
+        for border in [100, 110, 119, 120, 121, 132, 140] {
+            let one = Stretch::new(&lines[0].cells(), (0, border), &[]);
+            let two = Stretch::new(&lines[1].cells(), (border, 240), &[]);
+            let told = moved(&given.cells(), vec![one, two]);
+            let b = borders(&told);
+            assert!(b[0].1 == b[1].0 && b[0].1.abs_diff(120) <= 1, "{b:?} from {border}");
+            for (s, v) in told.iter().zip([0.002, 0.006]) {
+                assert!((s.at(&given.t, 2.4).1 - v).abs() < 2e-5);
+            }
+        }
+        // Not so far that one side is left without cells.
+        let short = Given::new(240, bent(0.2, 0.002, 0.006));
+        let mut both = short.stretches(&[0, 14, 240]);
+        both[0] = Stretch::new(&Given::new(240, |t| 0.002 * (t - 0.2)).cells(), (0, 14), &[]);
+        assert_eq!(borders(&moved(&short.cells(), both)), [(0, 14), (14, 240)]);
+        // Where a side has no form nothing moves.
+        let mut half = given.stretches(&[0, 110, 240]);
+        half[1].course = None;
+        assert_eq!(borders(&moved(&given.cells(), half)), [(0, 110), (110, 240)]);
+    }
+
+    #[test]
+    fn two_forms_meet_at_one_instant_near_their_border() {
+        // Lines of 2 and 6 mm/s, that meet at 2.4 s; the border is at cell 114, half a cell before 2.28 s.
+        let (one, two) = (Given::new(240, |t| 0.002 * (t - 2.4)), Given::new(240, |t| 0.006 * (t - 2.4)));
+        let of = |given: &Given, from: usize, to: usize| Stretch::new(&given.cells(), (from, to), &[]);
+        let whole = Given::new(240, bent(2.4, 0.002, 0.006));
+        let at = meeting(&of(&one, 0, 114), &of(&two, 114, 240), &whole.cells()).expect("an instant");
+        assert!((at - 2.4).abs() < 2e-3, "{at}");
+        // Further than half a second from the border nobody looks.
+        let at = meeting(&of(&one, 0, 60), &of(&two, 60, 240), &whole.cells()).expect("an instant");
+        assert!((at - (1.19 + 0.5)).abs() < 1e-9, "{at}");
+        let at = meeting(&of(&one, 0, 180), &of(&two, 180, 240), &whole.cells()).expect("an instant");
+        assert!((at - (3.59 - 0.5)).abs() < 1e-9, "{at}");
+        // Forms side by side meet at their border.
+        let beside = Given::new(240, |t| 0.002 * (t - 2.4) + 1e-4);
+        let mut pair = [of(&one, 0, 100), of(&beside, 100, 240)];
+        pair[1].course = pair[0].course.clone();
+        let at = meeting(&pair[0], &pair[1], &one.cells()).expect("an instant");
+        assert!((at - 1.99).abs() < 1e-9, "{at}");
+        pair[0].course = None;
+        assert_eq!(meeting(&pair[0], &pair[1], &one.cells()), None);
+    }
+
+    #[test]
+    fn a_jump_of_the_speed_is_where_forms_meet_or_as_it_was_found_or_at_the_border() {
+        let given = Given::new(240, bent(2.4, 0.002, 0.006));
+        let samples: Vec<f64> = (0..960).map(|k| 0.005 * f64::from(k)).collect();
+        let mut both = given.stretches(&[0, 120, 240]);
+        let of =
+            |both: &[Stretch], found: &[Break]| meet(&both[0], &both[1], found, &given.cells(), &samples);
+        let kink = of(&both, &[]);
+        assert!((kink.t - 2.4).abs() < 2e-3 && kink.z.abs() < 1e-5, "{kink:?}");
+        assert!((kink.v[0] - 0.002).abs() < 2e-5 && (kink.v[1] - 0.006).abs() < 2e-5, "{kink:?}");
+        assert!(samples[kink.sample] >= kink.t && samples[kink.sample - 1] < kink.t);
+        let sd = |s: &Stretch| s.course.as_ref().map_or(0.0, |c| 3.0 * c.sd_m / 120.0_f64.sqrt());
+        assert!((kink.sd_m - sd(&both[0]).hypot(sd(&both[1]))).abs() < 1e-12);
+        // Without a form, as it was found at that cell.
+        both[0].course = None;
+        both[0].local = (0..120).map(|k| (given.z[k], 0.002)).collect();
+        let found = [(90, (1.7, 5.0, 6.0), 7.0), (120, (2.3931, 0.1, 0.2), 0.3)];
+        let kink = of(&both, &found);
+        assert_eq!((kink.t, kink.z, kink.v, kink.sd_m), (2.3931, 0.1, [0.2, 0.3], 1e-5));
+        assert_eq!(kink.sample, 479);
+        // Or half a cell before the border, half-way between both sides.
+        let kink = of(&both, &found[..1]);
+        assert!((kink.t - 2.39).abs() < 1e-12);
+        let sides = [both[0].at(&given.t, kink.t), both[1].at(&given.t, kink.t)];
+        assert!((kink.z - 0.5 * (sides[0].0 + sides[1].0)).abs() < 1e-15);
+        assert_eq!(kink.v, [sides[0].1, sides[1].1]);
+    }
+
+    #[test]
+    fn the_widest_window_that_agrees_with_all_narrower_ones_tells_the_velocity() {
+        // A parabola is one whatever the window.
+        let t: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+        let z: Vec<f64> = t.iter().map(|t| 0.01 + 0.003 * t + 0.002 * t * t).collect();
+        // Slope of a line over n cells: sd = noise sqrt(12/n) over the span; at the end of a parabola four times that.
+        let sd = |n: f64, off: f64| {
+            1e-5 * (12.0 / n).sqrt() / (0.02 * (n - 1.0)) * (1.0 + 15.0 * off * off).sqrt()
+        };
+        // By cell, borders, and how many cells the widest window has, off its middle by what share of its half.
+        let cases = [
+            (100, (0, 200), 121.0, 0.0),
+            (80, (0, 200), 121.0, 0.0),
+            (0, (0, 200), 61.0, 1.0),
+            (199, (0, 200), 61.0, 1.0),
+            (20, (0, 200), 81.0, 20.0 / 40.0),
+            (100, (90, 140), 50.0, 14.5 / 24.5),
+            (100, (97, 105), 8.0, 0.5 / 3.5),
+        ];
+        for (i, (from, to), n, off) in cases {
+            let told = widest(&t, &z, i, (from, to), 1e-5);
+            assert!(
+                (told.0 - z[i]).abs() < 1e-9 && (told.1 - 0.003 - 0.004 * t[i]).abs() < 1e-8,
+                "{told:?} at {i}"
+            );
+            assert!((told.2 / sd(n, off) - 1.0).abs() < 1e-9, "{told:?} at {i}: {}", sd(n, off));
+        }
+        // Where the speed changes within twelve cells the window ends before.
+        let kink: Vec<f64> =
+            t.iter().map(|t| 0.003 * t + if *t > 2.2 { 0.02 * (t - 2.2) } else { 0.0 }).collect();
+        let told = widest(&t, &kink, 100, (0, 200), 1e-5);
+        assert!((told.1 - 0.003).abs() < 1e-5, "{told:?}");
+        assert!(told.2 >= sd(25.0, 0.0) * 0.999 && told.2 < sd(7.0, 0.0), "{told:?}");
+        // Three cells tell a position and no velocity.
+        assert_eq!(widest(&t, &z, 100, (99, 102), 1e-5), (z[100], 0.0, f64::INFINITY));
+        assert!(widest(&t, &z, 100, (99, 103), 1e-5).2.is_finite());
+    }
+
+    #[test]
+    fn a_recording_without_room_for_a_search_is_differentiated() {
+        let of = |n: usize| {
+            let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
+            let z: Vec<f64> = t.iter().enumerate().map(|(k, t)| 0.003 * t + 1e-5 * rough(k)).collect();
+            (settle(&t, &z), stylet_record::differentiate(&t, &z, 0.1), z)
+        };
+        let (told, v, z) = of(31);
+        assert_eq!((told.z, told.v, told.sd_mps), (z, v, f64::INFINITY));
+        assert!(told.kinks.is_empty());
+        let (told, _, _) = of(32);
+        assert!(told.sd_mps < 1e-3 && told.v.iter().all(|v| (v - 0.003).abs() < 1e-4));
+    }
 
     /// Advance with ripple, a hold, a retraction.
     fn course(t: f64) -> (f64, f64) {

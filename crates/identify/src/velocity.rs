@@ -224,7 +224,215 @@ fn slope_at(t: &[f64], z: &[f64], at: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::velocity;
+    use super::*;
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-6), "{told} for {wanted}");
+    }
+
+    fn even(n: usize) -> Vec<f64> {
+        (0..n).map(|k| k as f64 / 200.0).collect()
+    }
+
+    #[test]
+    fn a_parabola_is_the_one_of_least_squares() {
+        let t = [1.0, 1.2, 1.3, 1.9, 2.4];
+        let exact = t.map(|t: f64| 4.0 - 3.0 * (t - 1.5) + 7.0 * (t - 1.5).powi(2));
+        let (told, off) = parabola(&t, &exact, 1.5);
+        [4.0, -3.0, 7.0].iter().zip(told).for_each(|(wanted, told)| near(told, *wanted));
+        assert!(off < 1e-20);
+        // What no parabola holds is left: the third difference of five even values, (1, -2, 0, 2, -1).
+        let five = [0.0, 1.0, 2.0, 3.0, 4.0];
+        let added = [1.0, -2.0, 0.0, 2.0, -1.0];
+        let z: Vec<f64> = five.iter().zip(added).map(|(t, a)| 2.0 + 0.5 * t - t * t + 0.3 * a).collect();
+        let (told, off) = parabola(&five, &z, 0.0);
+        [2.0, 0.5, -1.0].iter().zip(told).for_each(|(wanted, told)| near(told, *wanted));
+        near(off, 0.09 * 10.0);
+    }
+
+    #[test]
+    fn a_slope_is_that_of_a_parabola_or_of_two_samples() {
+        near(slope_at(&[1.0, 2.0, 4.0], &[1.0, 4.0, 16.0], 3.0), 6.0);
+        near(slope_at(&[1.0, 4.0], &[1.0, 16.0], 3.0), 5.0);
+        assert_eq!((slope_at(&[1.0], &[3.0], 1.0), slope_at(&[], &[], 1.0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn rounded_positions_tell_their_step_unless_the_needle_goes_evenly() {
+        let rounded = |n: usize, speed: f64, step: f64| -> Vec<f64> {
+            even(n).iter().map(|t| (speed * t / step).round() * step).collect()
+        };
+        near(rounding(&rounded(1000, 0.003, 5e-5)), 5e-5);
+        near(rounding(&rounded(1000, 0.013, 5e-5)), 5e-5);
+        // A step a sample, always: even motion.
+        assert_eq!(rounding(&rounded(1000, 0.01, 5e-5)), 0.0);
+        // Up to one change of the pace in 200 samples is even motion.
+        let paced = |changes: usize| -> Vec<f64> {
+            let mut z = 0.0;
+            (0..1000)
+                .map(|k| {
+                    z += if k / 50 % 2 == 1 && k / 50 < changes { 2e-4 } else { 1e-4 };
+                    z
+                })
+                .collect()
+        };
+        assert_eq!(rounding(&paced(5)), 0.0);
+        near(rounding(&paced(7)), 1e-4);
+        // One difference in a hundred may be no whole number of steps.
+        let broken = |count: usize| {
+            let mut z = rounded(1000, 0.013, 5e-5);
+            (0..count).for_each(|k| z[50 * k + 7..].iter_mut().for_each(|z| *z += 2e-5));
+            rounding(&z)
+        };
+        near(broken(10), 5e-5);
+        assert_eq!(broken(11), 0.0);
+        // By two hundredths a difference is still whole.
+        let off = |share: f64| {
+            let bent = |(k, z): (usize, &f64)| z + if k % 3 == 0 { share * 5e-5 } else { 0.0 };
+            let z: Vec<f64> = rounded(1000, 0.013, 5e-5).iter().enumerate().map(bent).collect();
+            rounding(&z)
+        };
+        assert!(off(0.005) > 0.0 && off(0.03) == 0.0);
+        assert_eq!((rounding(&[]), rounding(&[1.0]), rounding(&[0.4; 50])), (0.0, 0.0, 0.0));
+        // Steps below a nanometre are those of the numbers.
+        assert_eq!(rounding(&rounded(1000, 0.003, 5e-10)), 0.0);
+    }
+
+    #[test]
+    fn noise_of_positions_is_told_by_third_differences_however_irregular_the_instants() {
+        // A parabola has none, at any instants.
+        let t: Vec<f64> = (0..200).map(|k| 0.005 * (f64::from(k) + 0.3 * f64::from(k % 3))).collect();
+        let z: Vec<f64> = t.iter().map(|t| 0.003 * t + 0.02 * t * t).collect();
+        assert!(position_noise(&t, &z) < 1e-14);
+        // Alternating by one to either side: third differences of eight, over the root of 1 + 9 + 9 + 1.
+        let rough = |a: f64, k: usize| a * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let z: Vec<f64> = (0..200).map(|k| 1e-3 * k as f64 + rough(1e-6, k)).collect();
+        let told = position_noise(&even(200), &z);
+        assert!((told / (8e-6 * 1.4826 / 20.0_f64.sqrt()) - 1.0).abs() < 1e-4, "{told}");
+        // A rest does not count; rounding leaves at least its own.
+        let rests: Vec<f64> = (0..200).map(|k| if k < 40 { rough(1e-6, k) } else { 1e-6 }).collect();
+        assert!((position_noise(&even(200), &rests) / told - 1.0).abs() < 1e-3);
+        let z: Vec<f64> = even(2000).iter().map(|t| (0.0011 * t / 5e-5).round() * 5e-5).collect();
+        assert!(position_noise(&even(2000), &z) >= 0.999 * 5e-5 / 12.0_f64.sqrt());
+        // By the instants: a spacing in which one sample is ten times further away.
+        let (t, z) = ([0.0, 1.0, 2.0, 12.0], [0.0, 0.0, 1.0, 0.0]);
+        // Newton: weights 1/prod(t_i - t_j) are -1/24, 1/11, -1/20, 1/1320.
+        let weights = [-1.0 / 24.0, 1.0 / 11.0, -1.0 / 20.0, 1.0 / 1320.0_f64];
+        let size = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        assert!((position_noise(&t, &z) / (1.4826 * 0.05 / size) - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_break_is_where_both_parabolas_meet() {
+        let t = even(200);
+        let bent = |at_s: f64, change: f64| -> Vec<f64> {
+            t.iter().map(|t| 0.003 * t + 0.01 * t * t + change * (t - at_s).max(0.0)).collect()
+        };
+        let one =
+            |at_s: f64, change: f64, gap_s: f64, doubt: f64| breaks(&t, &bent(at_s, change), 8, gap_s, doubt);
+        // Between samples 100 and 101.
+        let found = one(0.5031, -0.004, 0.01, 0.0);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let (sample, (at, z, before), after) = found[0];
+        assert_eq!(sample, 101);
+        assert!((at - 0.5031).abs() < 2e-5 && (z - 0.003 * at - 0.01 * at * at).abs() < 2e-7, "{found:?}");
+        // Slopes beside it: of the sample before, and of the one after.
+        assert!(
+            (before - 0.003 - 0.02 * 0.5).abs() < 1e-8 && (after - 0.003 - 0.02 * 0.505 + 0.004).abs() < 1e-8
+        );
+        // A smaller one than is looked for, or than the noise lets tell, is none.
+        assert_eq!(one(0.5031, 0.0, 0.01, 0.0), []);
+        let straight = |change: f64| {
+            let z: Vec<f64> = t.iter().map(|t| change * (t - 0.5031).max(0.0)).collect();
+            breaks(&t, &z, 8, 0.01, 0.0).len()
+        };
+        assert_eq!((straight(1.9e-5), straight(2.1e-5)), (0, 1));
+        // Nor is one of less than twice what the curvature changes from sample to sample, here by 0.2 mm/s.
+        assert_eq!((one(0.5031, 1.5e-4, 0.01, 0.0).len(), one(0.5031, 6e-4, 0.01, 0.0).len()), (0, 1));
+        assert_eq!(one(0.5031, 0.004, 0.01, 0.0038).len(), 1);
+        assert_eq!(one(0.5031, 0.004, 0.01, 0.0041), []);
+        // One across a gap is none.
+        assert_eq!(one(0.5031, 0.004, 0.0049, 0.0), []);
+        assert_eq!(one(0.0381, 0.004, 0.01, 0.0).len(), 1);
+        // Two that are further apart than a side are two.
+        let two = |apart: f64| {
+            let z: Vec<f64> = t
+                .iter()
+                .map(|t| 0.004 * (t - 0.4031).max(0.0) - 0.004 * (t - 0.4031 - apart).max(0.0))
+                .collect();
+            breaks(&t, &z, 8, 0.01, 0.0).iter().map(|b| b.0).collect::<Vec<_>>()
+        };
+        assert_eq!(two(0.1), [81, 101]);
+        assert_eq!(two(0.05), [81, 91]);
+    }
+
+    #[test]
+    fn a_smooth_curve_has_no_break() {
+        let t = even(200);
+        let z: Vec<f64> = t.iter().map(|t| 0.05 * (6.0 * t).sin()).collect();
+        assert_eq!(breaks(&t, &z, 6, 0.01, 0.0), []);
+    }
+
+    #[test]
+    fn nothing_reaches_across_a_gap_and_a_jump_in_a_smaller_one_is_where_both_sides_meet() {
+        // So many steps are missing after sample 200; from 1.01 s on it goes back.
+        let of = |steps: f64| {
+            let t: Vec<f64> =
+                even(400).iter().map(|t| if *t < 1.0025 { *t } else { t + 0.005 * (steps - 1.0) }).collect();
+            let z: Vec<f64> = t
+                .iter()
+                .map(|t| if *t < 1.01 { 0.003 * t } else { 0.003 * 1.01 - 0.002 * (t - 1.01) })
+                .collect();
+            let found = velocity(&t, &z);
+            // The last sample before a gap has no side of its own.
+            for (k, v) in found.v.iter().enumerate().filter(|(k, _)| *k != 200) {
+                let wanted = if k <= 200 { 0.003 } else { -0.002 };
+                assert!((v - wanted).abs() < 1e-7, "{v} at {k}");
+            }
+            found.kinks
+        };
+        let told = of(5.0);
+        assert_eq!(told.len(), 1);
+        assert_eq!(told[0].sample, 201);
+        assert!((told[0].t - 1.01).abs() < 1e-6 && (told[0].z - 0.00303).abs() < 1e-8, "{told:?}");
+        assert!((told[0].v[0] - 0.003).abs() < 1e-7 && (told[0].v[1] + 0.002).abs() < 1e-7);
+        assert!(told[0].sd_m <= 1e-6);
+        assert!(of(6.0).iter().all(|k| k.sample != 201));
+    }
+
+    #[test]
+    fn a_window_is_as_wide_as_the_noise_asks_for_and_no_wider_than_twelve() {
+        // A line over 2 m + 1 samples has sd = noise / (step sqrt(m (m + 1) (2 m + 1) / 3)).
+        let gain = |m: f64| 200.0 / (m * (m + 1.0) * (2.0 * m + 1.0) / 3.0).sqrt();
+        let t = even(600);
+        let of = |noise_m: f64| {
+            let z: Vec<f64> = t
+                .iter()
+                .enumerate()
+                .map(|(k, t)| 0.003 * t + noise_m * if k % 2 == 0 { 1.0 } else { -1.0 })
+                .collect();
+            (velocity(&t, &z).noise_mps, position_noise(&t, &z))
+        };
+        // The noise that makes `m` enough.
+        for m in [1.0, 2.0, 5.0, 11.0, 12.0, 13.0_f64] {
+            let unit = of(1e-9).1 / 1e-9;
+            let (told, noise_m) = of(0.999 * 5e-6 / gain(m) / unit);
+            near(told, noise_m * gain(m.min(12.0)));
+            let (told, noise_m) = of(1.001 * 5e-6 / gain(m) / unit);
+            near(told, noise_m * gain((m + 1.0).min(12.0)));
+        }
+    }
+
+    #[test]
+    fn beside_an_edge_a_window_is_one_sided_and_exact_for_a_parabola() {
+        let z: Vec<f64> = even(9).iter().map(|t| 0.003 * t + 0.5 * t * t).collect();
+        for (v, t) in velocity(&even(9), &z).v.iter().zip(even(9)) {
+            assert!((v - 0.003 - t).abs() < 1e-9, "{v} at {t}");
+        }
+        let few = velocity(&even(7), &z[..7]);
+        assert_eq!((few.v, few.noise_mps), (vec![0.0; 7], f64::INFINITY));
+        assert!(velocity(&even(8), &z[..8]).noise_mps.is_finite());
+    }
 
     /// Ripple, a stop between two samples, a retraction.
     fn course(t: f64) -> (f64, f64) {
