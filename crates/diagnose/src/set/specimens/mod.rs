@@ -88,8 +88,8 @@ pub struct Specimens {
 struct One {
     errors: Vec<(f64, f64)>,
     laws: Vec<Model>,
-    /// Errors of the last law without its curvature.
-    straight: (f64, f64),
+    /// The same for each law without its curvature.
+    straight: Vec<((f64, f64), Model)>,
 }
 
 /// The effect of a curved spring.
@@ -168,19 +168,28 @@ pub fn look(believed: &Tissue, runs: &[Insertion]) -> Option<Specimens> {
             standing = k;
         }
     }
-    // A ramp that is too fast shows its curvature only when the relaxation is known.
-    let last = done.len() - 1;
-    if standing == last {
+    let curved = look_at_curvature(&each, &mut done, standing);
+    let numbers = numbers(&each, standing, curved);
+    Some(Specimens { used: each.len(), unused, punctured, rungs: done, numbers })
+}
+
+/// Whether the law of the rung that stands is a curved one. A ramp of a relaxing spring looks curved, and one that is too fast shows its curvature only when the
+/// relaxation is known: once there is one it tells.
+fn look_at_curvature(each: &[One], rungs: &mut [Rung], standing: usize) -> bool {
+    let Some(at) = rungs.iter().position(|r| r.effect.as_deref() == Some(curvature())) else { return false };
+    if standing > at {
         let both = |e: (f64, f64)| e.0 + e.1;
-        let with = median_of(each.iter().map(|o| both(o.errors[last])));
-        let without = median_of(each.iter().map(|o| both(o.straight)));
-        let better = each.iter().filter(|o| both(o.errors[last]) < both(o.straight)).count() as f64;
-        if let Some(rung) = done.iter_mut().find(|r| r.effect.as_deref() == Some(curvature())) {
-            rung.kept |= with < (1.0 - LEAST_GAIN) * without && better >= LEAST_SHARE * each.len() as f64;
+        let with = median_of(each.iter().map(|o| both(o.errors[standing])));
+        let without = median_of(each.iter().map(|o| both(o.straight[standing].0)));
+        let better =
+            each.iter().filter(|o| both(o.errors[standing]) < both(o.straight[standing].0)).count() as f64;
+        rungs[at].kept = with < (1.0 - LEAST_GAIN) * without && better >= LEAST_SHARE * each.len() as f64;
+        if !rungs[at].kept {
+            rungs[standing].fitted_n = median_of(each.iter().map(|o| o.straight[standing].0.0));
+            rungs[standing].left_out_n = median_of(each.iter().map(|o| o.straight[standing].0.1));
         }
     }
-    let numbers = numbers(&each, standing);
-    Some(Specimens { used: each.len(), unused, punctured, rungs: done, numbers })
+    rungs[at].kept
 }
 
 /// Whether a recording is a ramp and a hold.
@@ -210,7 +219,7 @@ fn one(believed: &Tissue, run: &Insertion) -> Option<One> {
         Data::new(Arc::new(vec![Blocks::new(r, excluded, BLOCK_S)]), Noise::white(noise), noise)
     };
     let (first, all) = (on(&late), on(&vec![false; t.len()]));
-    let mut out = One { errors: Vec::new(), laws: Vec::new(), straight: (0.0, 0.0) };
+    let mut out = One { errors: Vec::new(), laws: Vec::new(), straight: Vec::new() };
     let errors = |model: &Model| -> Option<(f64, f64)> {
         let left = residuals(model, &all)?;
         let b = all.blocks.first()?;
@@ -235,27 +244,28 @@ fn one(believed: &Tissue, run: &Insertion) -> Option<One> {
             .filter_map(|start| fit(&start, &first, EFFORT))
             .min_by(|a, b| a.nats().total_cmp(&b.nats()))?;
         out.errors.push(errors(&fitted.model)?);
-        model = fitted.model.clone();
-        out.laws.push(fitted.model);
-    }
-    if let Some(k) = model.effects.iter().position(|c| c.info.id == curvature()) {
-        out.straight = errors(&fit(&model.without(k), &first, EFFORT)?.model)?;
+        model = fitted.model;
+        let bent = model.effects.iter().position(|c| c.info.id == curvature());
+        let straight = bent
+            .map_or_else(|| Some(model.clone()), |k| Some(fit(&model.without(k), &first, EFFORT)?.model))?;
+        out.straight.push((errors(&straight)?, straight));
+        out.laws.push(model.clone());
     }
     Some(out)
 }
 
 /// The effects' numbers of the kept law over the specimens.
-fn numbers(each: &[One], rung: usize) -> Vec<Over> {
-    let Some(first) = each.first() else { return Vec::new() };
-    let paths = first.laws[rung].effects.iter().flat_map(|c| c.info.parameters.iter());
+fn numbers(each: &[One], rung: usize, curved: bool) -> Vec<Over> {
+    let laws: Vec<&Model> =
+        each.iter().map(|o| if curved { &o.laws[rung] } else { &o.straight[rung].1 }).collect();
+    let Some(first) = laws.first() else { return Vec::new() };
+    let paths = first.effects.iter().flat_map(|c| c.info.parameters.iter());
     paths
         .map(|p| {
             let log = p.path.ends_with("time_constant_s");
-            let all = stylet_stats::sorted(each.iter().filter_map(|o| value(&o.laws[rung], p.path)).map(
-                |x| {
-                    if log { libm::log(x) } else { x }
-                },
-            ));
+            let all = stylet_stats::sorted(
+                laws.iter().filter_map(|law| value(law, p.path)).map(|x| if log { libm::log(x) } else { x }),
+            );
             let n = all.len();
             let middle = mean(&all);
             let reach = student::quantile(0.975, (n.max(2) - 1) as f64) * sd(&all) / libm::sqrt(n as f64);
@@ -398,11 +408,12 @@ mod tests {
             .map(|k| super::One {
                 errors: Vec::new(),
                 laws: vec![law(&[]), law(&[relaxing(&[(fractions[k], times[k])])])],
-                straight: (0.0, 0.0),
+                straight: vec![((0.0, 0.0), law(&[])), ((0.0, 0.0), law(&[relaxing(&[(0.7, 9.0)])]))],
             })
             .collect();
-        assert!(numbers(&each, 0).is_empty() && numbers(&[], 0).is_empty());
-        let told = numbers(&each, 1);
+        assert!(numbers(&each, 0, true).is_empty() && numbers(&[], 0, true).is_empty());
+        assert!((numbers(&each, 1, false)[0].mean - 0.7).abs() < 1e-9, "those of the law without curvature");
+        let told = numbers(&each, 1, true);
         let of = |x: &[f64]| {
             let mean = x.iter().sum::<f64>() / 5.0;
             let sd = (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 4.0).sqrt();
@@ -466,6 +477,14 @@ mod tests {
         assert_eq!(s.kept().count(), 0, "{:?}", s.rungs);
         assert_eq!(s.diagnosis(&plain).verdict, Verdict::None);
         assert!(look(&tissue(300.0), &runs[4..]).is_none());
+        // A quick relaxation bends the ramp as a curved spring would.
+        let quick = [relaxing(&[(0.4, 0.9)])];
+        let quick: Vec<Insertion> =
+            (0..4).map(|k| specimen(&format!("{k}"), 280.0 + 20.0 * k as f64, &quick, 4.0, k)).collect();
+        let s = look(&tissue(300.0), &quick).expect("specimens");
+        assert_eq!(s.kept().collect::<Vec<_>>(), ["stress_relaxation"], "{:?}", s.rungs);
+        assert!(s.numbers.iter().all(|n| n.name.starts_with("terms.")), "{:?}", s.numbers);
+        assert!((s.numbers[0].mean - 0.4).abs() < 0.02, "{:?}", s.numbers);
         // A curved one that relaxes with two terms.
         let both: [AnyEffect; 2] =
             [NonlinearElasticity { kappa_per_m: 150.0 }.into(), relaxing(&[(0.25, 0.3), (0.3, 3.0)])];
