@@ -287,29 +287,16 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 #[cfg(test)]
 mod tests {
     use super::{advice, bought, cause, confidence, dropped, evidence, speeds};
-    use crate::made::believed;
+    use crate::made;
     use crate::set::Insertion;
-    use crate::set::fitted::Fitted;
     use crate::set::laws::{Kind, Law, Laws, Part};
     use crate::set::numbers::Told;
-    use std::sync::Arc;
-    use stylet_identify::fit::Fit;
-    use stylet_identify::model::{Choice, Model};
-    use stylet_identify::noise::Noise;
-    use stylet_identify::objective::{Data, Residuals};
     use stylet_record::Recording;
-    use stylet_tissue::{CoulombFriction, Effect};
+    use stylet_tissue::{AnyEffect, CoulombFriction};
 
     fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {
-        let belief = believed(&[[0.02, 100.0, 1000.0]]);
-        let mut model = Model::base(belief, 0);
-        if with {
-            model.effects = vec![Choice::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
-        }
-        let residuals = Residuals { e: Vec::new(), w: Vec::new(), events: Vec::new(), nats };
-        let data = Data::new(Arc::new(Vec::new()), Noise::white(1.0), 0.0);
-        let fitted = Fitted { fit: Fit { model, residuals }, data, drops: Vec::new(), starts: (8, 3) };
-        Law { kind, fitted, errors_n: errors_n.to_vec() }
+        let rubs: [AnyEffect; 1] = [CoulombFriction { c_n_per_m: 3.0 }.into()];
+        made::law(kind, &rubs[..usize::from(with)], errors_n, nats)
     }
 
     #[test]
