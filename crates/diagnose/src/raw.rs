@@ -386,6 +386,38 @@ mod tests {
         assert_eq!(look(&[&slow], &[Vec::new()]).spikes.map(|s| s.count), Some(2));
     }
 
+    /// The neighbours stand at nothing but for one, on either side: a spike stands out of it by seven tenths of the least, and both
+    /// neighbours agree to half of it.
+    #[test]
+    fn a_spike_stands_out_of_both_its_neighbours_and_they_agree() {
+        let beside = |size: f64, neighbour: f64, before: bool| {
+            let mut f = alternating(1000, D);
+            for k in [200, 430, 776] {
+                f[k - 2..k + 3].fill(0.0);
+                f[k] = size * LEAST;
+                f[if before { k - 1 } else { k + 1 }] = neighbour * LEAST;
+            }
+            look(&[&recording(f)], &[Vec::new()]).spikes.map(|s| s.count)
+        };
+        for before in [true, false] {
+            assert_eq!((beside(1.1, 0.35, before), beside(1.1, 0.45, before)), (Some(3), None));
+            assert_eq!((beside(3.0, 1.4, before), beside(3.0, 1.6, before)), (Some(3), None));
+            assert_eq!((beside(3.0, -1.4, before), beside(3.0, -1.6, before)), (Some(3), None));
+        }
+    }
+
+    /// The first sixty samples are judged by the first hundred and twenty, mostly quiet, the next by the first hundred and eighty, mostly
+    /// loud; the two at either end do not count.
+    #[test]
+    fn sixty_samples_share_a_scatter() {
+        for (place, count) in [(60, 2), (61, 2), (62, 0)] {
+            let mut f = alternating(75, D);
+            f.extend(alternating(925, 3.0 * D).iter().map(|f| -f));
+            (f[30], f[place]) = (1.5 * LEAST, 1.5 * LEAST);
+            assert_eq!(look(&[&recording(f)], &[Vec::new()]).spikes.map_or(0, |s| s.count), count, "{place}");
+        }
+    }
+
     #[test]
     fn a_limit_holds_six_samples_or_three_times_what_a_grid_holds_near_it() {
         let ramp = |at_limit: usize| {
@@ -443,6 +475,16 @@ mod tests {
         assert_eq!(step(&[&recording(vec![0.0; 20])], &[vec![quantised(0.05)]]), Some(0.05));
         let raw = look(&[&r], &[vec![quantised(0.05)]]);
         assert!((raw.step_n.expect("a step") - 0.0503).abs() < 1e-9);
+    }
+
+    #[test]
+    fn half_of_the_recordings_tell_a_step_and_a_step_of_nothing_is_none() {
+        let r = recording((0..50).map(|k| 0.25 * f64::from(k % 7)).collect());
+        let notes = |steps: &[f64]| steps.iter().map(|s| vec![quantised(*s)]).collect::<Vec<_>>();
+        assert_eq!(step(&[&r, &r], &notes(&[0.25])), Some(0.25));
+        assert_eq!(step(&[&r, &r, &r], &notes(&[0.25])), None);
+        assert_eq!(step(&[&r], &notes(&[0.0])), None);
+        assert_eq!(step(&[], &[]), None);
     }
 
     #[test]
