@@ -56,10 +56,20 @@ pub const SENSOR_N: f64 = 0.01;
 
 /// Insertions into the gel by 16 mm, with a rest of a second, and back, at 50 Hz: each at a speed (m/s), its surface moved by so much (m).
 pub fn insertions(effects: &[AnyEffect], all: &[[f64; 2]]) -> Vec<Insertion> {
-    all.iter().enumerate().map(|(k, at)| insertion(k, effects, *at)).collect()
+    showing(effects, all, |_| 0.0)
 }
 
-fn insertion(k: usize, effects: &[AnyEffect], [speed, moved_m]: [f64; 2]) -> Insertion {
+/// The same, read off a sensor that shows so much (N) more at every instant (s).
+pub fn showing(effects: &[AnyEffect], all: &[[f64; 2]], more_n: impl Fn(f64) -> f64) -> Vec<Insertion> {
+    all.iter().enumerate().map(|(k, at)| insertion(k, effects, *at, &more_n)).collect()
+}
+
+fn insertion(
+    k: usize,
+    effects: &[AnyEffect],
+    [speed, moved_m]: [f64; 2],
+    more_n: &impl Fn(f64) -> f64,
+) -> Insertion {
     let mut tissue = gel();
     tissue.surface_m += moved_m;
     let law = TissueLaw::new(&tissue, effects).expect("a law");
@@ -83,7 +93,7 @@ fn insertion(k: usize, effects: &[AnyEffect], [speed, moved_m]: [f64; 2]) -> Ins
         };
         t.push(at);
         z.push(place);
-        f.push(law.step(&mut state, at, place, v, |_| {}).total_n + SENSOR_N * normal());
+        f.push(law.step(&mut state, at, place, v, |_| {}).total_n + more_n(at) + SENSOR_N * normal());
     }
     Insertion::new(format!("run {k}"), Recording::new(t, z, f).expect("clean columns"), 1)
 }

@@ -406,6 +406,42 @@ mod tests {
         }
     }
 
+    /// On a level far from nothing, and beside samples at a limit or where the speed changed long before, spikes are spikes all the same.
+    #[test]
+    fn what_lies_far_from_a_spike_does_not_matter() {
+        let size = 3.0 * LEAST;
+        let spiky = |level: f64| {
+            let mut f: Vec<f64> = alternating(1000, D).iter().map(|f| level + f).collect();
+            for k in [200, 600, 800] {
+                f[k] += size;
+            }
+            f
+        };
+        let count = |r: &Recording| look(&[r], &[Vec::new()]).spikes.map(|s| s.count);
+        assert_eq!(count(&recording(spiky(5.0))), Some(3));
+        let mut limited = spiky(0.0);
+        limited[400..411].fill(2.0);
+        assert_eq!(count(&recording(limited)), Some(3));
+        // The needle slows down at 300 and stops at 600: there a spike could be anything.
+        let mut slowed = recording(spiky(0.0));
+        slowed.velocity_mps = (0..1000)
+            .map(|k| match k {
+                0..300 => 1e-2,
+                300..601 => 5e-3,
+                _ => 0.0,
+            })
+            .collect();
+        assert_eq!(count(&slowed), Some(2));
+        // Outlying samples below half of what makes a spike are noise, wherever the spikes' size puts them.
+        for (small, seen) in [(0.45, Some(3)), (0.55, None)] {
+            let mut f = alternating(1000, D);
+            for (k, s) in [(100, 1.15), (250, 1.15), (400, 1.15), (550, small), (700, small)] {
+                f[k] = s * LEAST;
+            }
+            assert_eq!(count(&recording(f)), seen, "{small}");
+        }
+    }
+
     /// The first sixty samples are judged by the first hundred and twenty, mostly quiet, the next by the first hundred and eighty, mostly
     /// loud; the two at either end do not count.
     #[test]
