@@ -280,13 +280,12 @@ mod tests {
         assert_eq!(with(&[PositionScale { eps: 0.01 }.into()]), (false, false));
     }
 
-    /// Insertions all moved by so much, in a gel whose surface and thickness are free: whether tightening names an effect, and what stays free.
-    fn tightened(moved_m: f64) -> (bool, Free) {
+    /// Insertions all moved by so much, in a gel whose surface or thickness is free: whether tightening names an effect, and what stays free.
+    fn tightened(moved_m: f64, surface: bool, thickness: bool) -> (bool, Free) {
         let runs = insertions(&[], &[[4e-3, moved_m], [5e-3, moved_m], [6e-3, moved_m]]);
         let f = settled(&[], &runs.iter().collect::<Vec<_>>());
         let mut model = f.fit.model.clone();
-        model.free =
-            Free { surface: true, thickness: true, own_surface: false, own_friction: false, ..model.free };
+        model.free = Free { surface, thickness, own_surface: false, own_friction: false, ..model.free };
         model.own.iter_mut().for_each(|o| (o.surface_m, o.friction) = (0.0, 0.0));
         let prepared = Prepared::new(model.belief.clone(), f.data.blocks.to_vec(), 0.0);
         let begun = fit(&model, &f.data, Effort::FULL).expect("a fit");
@@ -299,9 +298,12 @@ mod tests {
     #[test]
     fn faces_that_came_out_as_believed_are_fixed_and_others_stay_free() {
         for (moved_m, surface) in [(0.0, false), (1e-3, true)] {
-            let (named, free) = tightened(moved_m);
+            let (named, free) = tightened(moved_m, true, true);
             assert_eq!((named, free.surface, free.thickness), (false, surface, false), "{moved_m}");
         }
+        // What was not free is not made free.
+        let (named, free) = tightened(1e-3, false, false);
+        assert_eq!((named, free.surface, free.thickness), (false, false, false));
     }
 
     #[test]

@@ -366,4 +366,28 @@ mod tests {
         assert!(v[1] > 30.0 && v[1] < 400.0, "{v:?}");
         assert!(start.nats > 20.0 && start.visible > 0.0);
     }
+
+    /// An effect that only adds is not proposed to take away: every start has a strength.
+    #[test]
+    fn every_start_has_a_strength() {
+        let membrane = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        let inside = |t: f64| if t > 3.0 { 0.1 } else { 0.0 };
+        for f in
+            [unaware(|t| 0.02 * t), unaware(inside), unaware(|t| -inside(t)), without(&[membrane.into()])]
+        {
+            let (all, _) = proposed(&f, &[], "");
+            assert!(all.len() > 3);
+            for s in all.iter().flatten() {
+                let strong = |(p, x): (&stylet_tissue::ParameterInfo, &f64)| {
+                    p.strength && (x - p.neutral).abs() > 1e-12 && *x < 1e9
+                };
+                assert!(
+                    s.choice.info.parameters.iter().zip(&s.choice.values).any(strong),
+                    "{} {:?}",
+                    s.choice.info.id,
+                    s.choice.values
+                );
+            }
+        }
+    }
 }
