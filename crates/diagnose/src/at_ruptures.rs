@@ -108,3 +108,82 @@ impl Layer {
         self.factors.iter().map(of).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1.0, 0.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Layer, MOST_NATS};
+    use crate::made::believed;
+    use stylet_identify::events::{Event, judge};
+    use stylet_identify::model::{Belief, Model, Scatter};
+
+    /// A rupture so far beyond the puncture force, relative to it, long before the far face.
+    fn rupture(force: f64) -> Event {
+        Event {
+            force,
+            place_m: -0.01,
+            force_rate: 0.5,
+            place_rate: 4e-3,
+            elastic_n: 1.0,
+            ruptured: true,
+            step_s: 0.02,
+        }
+    }
+
+    fn model(puncture_n: f64) -> Model {
+        let belief = believed(&[[0.02, 100.0, 1000.0]]);
+        let mut tissue = belief.tissue.clone();
+        tissue.layers[0].puncture_n = Some(2.0);
+        let mut model = Model::base(std::sync::Arc::new(Belief { tissue, ..(*belief).clone() }), 3);
+        model.tissue.layers[0].puncture_n = Some(puncture_n);
+        model
+    }
+
+    #[test]
+    fn each_rupture_asks_for_the_factor_that_puts_the_puncture_force_where_it_gave_way() {
+        let whole = Event { ruptured: false, ..rupture(0.4) };
+        let events: Vec<Vec<Event>> =
+            [rupture(0.1), whole, rupture(-0.2), rupture(f64::NEG_INFINITY)].map(|e| vec![e]).to_vec();
+        let layer = Layer::new(&model(2.0), &events, 0);
+        assert_eq!(layer.events.len(), 4);
+        assert_eq!(layer.factors, [1.0, 1.1, 0.8]);
+        // Where the force stands elsewhere factors are of what it is now, and end where the force may not go further.
+        let layer = Layer::new(&model(1.8), &events, 0);
+        assert!(layer.factors.iter().zip([1.0, 1.1, 0.8]).all(|(a, b)| (a - b).abs() < 1e-12));
+        let far = Layer::new(&model(2.0), &[vec![rupture(1e9)], vec![rupture(-1.0)]], 0);
+        let role = stylet_identify::model::Role::Puncture(0);
+        let n = model(2.0).shared().into_iter().find(|n| n.role == role).expect("free");
+        assert_eq!(far.factors, [1.0, n.high, n.low]);
+        // A layer without a puncture force is left as it is.
+        assert_eq!(
+            Layer::new(&Model::base(believed(&[[0.02, 100.0, 1000.0]]), 3), &events, 0).factors,
+            [1.0]
+        );
+    }
+
+    #[test]
+    fn the_best_factor_is_the_one_under_which_the_ruptures_are_likeliest() {
+        let scatter = Scatter { force: 0.02, ..Scatter::default() };
+        let nats = |forces: &[f64], factor: f64| -> f64 {
+            let moved = |f: &f64| Event { force_rate: 0.5 / factor, ..rupture((1.0 + f) / factor - 1.0) };
+            forces.iter().map(|f| judge(&moved(f), &scatter).nats.min(12.0)).sum()
+        };
+        for forces in [vec![0.1, 0.11, 0.09], vec![-0.2, -0.21, 0.3], vec![0.0, 0.004, -0.2], vec![0.5, -0.5]]
+        {
+            let layer = Layer {
+                events: forces.iter().map(|f| rupture(*f)).collect(),
+                factors: std::iter::once(1.0).chain(forces.iter().map(|f| 1.0 + f)).collect(),
+            };
+            let (factor, told) = layer.best(&scatter);
+            let least = layer.factors.iter().map(|f| nats(&forces, *f)).fold(f64::INFINITY, f64::min);
+            assert!(
+                (told - least).abs() < 1e-9 && (nats(&forces, factor) - least).abs() < 1e-9,
+                "{forces:?}"
+            );
+        }
+        // One that is off by fifty deviations says no more than one that is off by ten.
+        let alone = Layer { events: vec![rupture(1.0)], factors: vec![1.0] };
+        assert_eq!(alone.best(&scatter), (1.0, MOST_NATS));
+        let none = Layer { events: Vec::new(), factors: Vec::new() };
+        assert_eq!(none.best(&scatter), (1.0, 0.0));
+    }
+}

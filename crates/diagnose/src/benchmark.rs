@@ -4,7 +4,7 @@ use crate::base::{Prepared, base};
 use crate::diagnose::{Evidence, Options, belief, diagnose};
 use crate::held_out::{by_its_own, rms};
 use crate::hidden::{self, Drawn, Kind, Size, Sketch};
-use crate::outcome::Verdict;
+use crate::outcome::{Estimate, Verdict};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
@@ -181,19 +181,8 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Result> {
             if p.whole {
                 continue;
             }
-            let (mut value, mut low, mut high) = (found.value, found.low, found.high);
-            if p.unit == "rad" {
-                let turn = ((truth - value) / core::f64::consts::TAU).round() * core::f64::consts::TAU;
-                value += turn;
-                low += turn;
-                high += turn;
-            }
-            let size = if p.unit == "rad" { 1.0 } else { truth.abs().max(1e-12) };
-            errors.push((
-                format!("{}.{}", effect.id(), p.path),
-                (value - truth).abs() / size,
-                low <= truth && truth <= high,
-            ));
+            let (error, held) = error(p.unit, found, truth);
+            errors.push((format!("{}.{}", effect.id(), p.path), error, held));
         }
     }
     // What the truth would leave.
@@ -231,6 +220,17 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Result> {
         seconds,
         samples: case.recordings.iter().map(stylet_record::Recording::len).sum(),
     })
+}
+
+/// How far a number is off, relative to the truth or, for an angle, in radians, and whether its interval holds the truth. An angle may be
+/// told whole turns away.
+fn error(unit: &str, found: &Estimate, truth: f64) -> (f64, bool) {
+    const TURN: f64 = core::f64::consts::TAU;
+    let angle = unit == "rad";
+    let turns = if angle { ((truth - found.value) / TURN).round() * TURN } else { 0.0 };
+    let size = if angle { 1.0 } else { truth.abs().max(1e-12) };
+    let held = found.low + turns <= truth && truth <= found.high + turns;
+    ((found.value + turns - truth).abs() / size, held)
 }
 
 /// Wilson's 95 % interval of a rate, in per cent.
@@ -405,9 +405,9 @@ fn gain() -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::{Result, aim, examine, gain, strength, summary, wilson};
+    use super::{Result, aim, error, examine, gain, strength, summary, wilson};
     use crate::hidden::{Drawn, Kind, Motions, Outside, Size, Sketch};
-    use crate::outcome::Verdict;
+    use crate::outcome::{Estimate, Verdict};
     use stylet_tissue::{AnyEffect, CoulombFriction, ForceGain, ForceSpikes, PeriodicInterference};
 
     #[test]
@@ -620,5 +620,22 @@ mod tests {
         assert!(scaled.right && scaled.verdict == Verdict::None, "{:?}", scaled.verdict);
         let outside = Drawn { outside: Some(Outside::new(3, [0.2; 4], 0.01)), ..drawn(Vec::new()) };
         assert_eq!(examine(1, Kind::Outside, &outside).expect("a diagnosis").hidden, ["chirp"]);
+    }
+
+    #[test]
+    fn a_number_is_off_by_its_share_and_an_angle_by_what_is_left_of_whole_turns() {
+        let said = |value: f64, half: f64| Estimate { value, low: value - half, high: value + half };
+        let near = |(error, held): (f64, bool), wanted: f64, holds: bool| {
+            assert!((error - wanted).abs() < 1e-12 && held == holds, "{error} {held}");
+        };
+        near(error("N", &said(2.2, 0.3), 2.0), 0.1, true);
+        near(error("N", &said(-2.2, 0.1), -2.0), 0.1, false);
+        near(error("N", &said(1.8, 0.1), 2.0), 0.1, false);
+        near(error("N", &said(2.0, 0.0), 2.0), 0.0, true);
+        let turn = std::f64::consts::TAU;
+        near(error("rad", &said(0.3, 0.2), 0.5 + turn), 0.2, true);
+        near(error("rad", &said(0.3 + 2.0 * turn, 0.1), 0.5), 0.2, false);
+        near(error("rad", &said(6.2, 0.2), 0.1), 0.1 + turn - 6.2, true);
+        near(error("rad", &said(0.1, 0.2), 6.2), 0.1 + turn - 6.2, true);
     }
 }

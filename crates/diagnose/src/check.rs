@@ -31,9 +31,7 @@ pub(crate) fn check(scenario: &Scenario, evidence: &[Evidence]) -> Result<Vec<Op
     let mut times = Vec::with_capacity(evidence.len());
     for e in evidence {
         let r = &e.recording;
-        let usable = (0..r.len())
-            .filter(|&i| (r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite());
-        let usable: Vec<usize> = usable.collect();
+        let usable: Vec<usize> = (0..r.len()).filter(|i| whole(r, *i)).collect();
         let name = || e.name.clone();
         if usable.len() < LEAST_SAMPLES {
             return Err(DiagnoseError::TooShort {
@@ -145,10 +143,14 @@ fn force(scenario: &Scenario, e: &Evidence, usable: &[usize]) -> Result<Option<f
     Ok((correlation > 0.5).then_some(ratio))
 }
 
+/// Whether a sample is all finite numbers.
+fn whole(r: &Recording, i: usize) -> bool {
+    [&r.time_s, &r.position_m, &r.velocity_mps, &r.force_n].iter().all(|x| x[i].is_finite())
+}
+
 /// The recording without samples that are not finite.
 pub(crate) fn finite(r: &Recording) -> Recording {
-    let good = |i: usize| (r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite();
-    let kept: Vec<usize> = (0..r.len()).filter(|i| good(*i)).collect();
+    let kept: Vec<usize> = (0..r.len()).filter(|i| whole(r, *i)).collect();
     if kept.len() == r.len() {
         return r.clone();
     }
@@ -165,9 +167,7 @@ pub(crate) fn finite(r: &Recording) -> Recording {
 
 /// A remark on samples that are not finite: they are cut out.
 pub(crate) fn holes(r: &Recording) -> Option<QualityNote> {
-    let bad: Vec<usize> = (0..r.len())
-        .filter(|&i| !(r.time_s[i] + r.position_m[i] + r.velocity_mps[i] + r.force_n[i]).is_finite())
-        .collect();
+    let bad: Vec<usize> = (0..r.len()).filter(|i| !whole(r, *i)).collect();
     let first = *bad.first()?;
     let message = format!(
         "{} sample(s) are not finite numbers, the first is number {}: they were cut out",

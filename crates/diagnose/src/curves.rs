@@ -227,6 +227,10 @@ mod tests {
         {
             assert!((m - w).abs() < 1e-12, "{mean:?}");
         }
+        // In bins of a quarter, the same.
+        let quarter: Vec<f64> = x.iter().map(|x| 0.25 * x).collect();
+        let (at, small) = binned(&quarter, &e, &used, 4);
+        assert_eq!((at, small), (vec![0.625, 1.125, 1.375], mean));
         assert_eq!(binned(&[1.0; 9], &[1.0; 9], &[true; 9], 4), (vec![], vec![]));
         assert_eq!(binned(&[], &[], &[], 4), (vec![], vec![]));
     }
@@ -270,6 +274,7 @@ mod tests {
             ("length inside x direction", Box::new(|k| inside(k) * sign(k))),
             ("force", Box::new(|k| c.force_n[k])),
         ];
+        assert_eq!(told.len(), of.len());
         for ((name, r), (wanted, x)) in told.iter().zip(&of) {
             assert_eq!(name, wanted);
             let (x, e): (Vec<f64>, Vec<f64>) = kept.iter().map(|k| (x(*k), c.base_n[*k])).unzip();

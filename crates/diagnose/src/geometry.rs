@@ -154,14 +154,20 @@ fn patterns(model: &Model) -> Vec<Choice> {
 
 #[cfg(test)]
 mod tests {
-    use super::{fixed, patterns, price, unsure};
+    use super::{fixed, is_worth, patterns, price, priced, tighten, unsure};
+    use crate::base::Prepared;
+    use crate::made::{insertions, settled, showing};
+    use crate::select::Search;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::{Effort, fit};
     use stylet_identify::model::{Belief, Choice, Free, Model};
-    use stylet_identify::noise::Noise;
+    use stylet_identify::noise::{From, Noise};
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
-    use stylet_tissue::{AnyEffect, BoundaryShift, CoulombFriction, Effect, Layer, PositionScale, Tissue};
+    use stylet_tissue::{
+        AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, Layer, PositionScale, Tissue,
+    };
 
     /// Layers of 20, 30, 40 and so on mm, each off by so many tenths of a mm.
     fn model(off: &[f64], effects: &[AnyEffect]) -> Model {
@@ -272,5 +278,46 @@ mod tests {
         assert_eq!(with(&[CoulombFriction { c_n_per_m: 1.0 }.into()]), (true, true));
         assert_eq!(with(&[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]), (false, false));
         assert_eq!(with(&[PositionScale { eps: 0.01 }.into()]), (false, false));
+    }
+
+    /// Insertions all moved by so much, in a gel whose surface or thickness is free: whether tightening names an effect, and what stays free.
+    fn tightened(moved_m: f64, surface: bool, thickness: bool) -> (bool, Free) {
+        let runs = insertions(&[], &[[4e-3, moved_m], [5e-3, moved_m], [6e-3, moved_m]]);
+        let f = settled(&[], &runs.iter().collect::<Vec<_>>());
+        let mut model = f.fit.model.clone();
+        model.free = Free { surface, thickness, own_surface: false, own_friction: false, ..model.free };
+        model.own.iter_mut().for_each(|o| (o.surface_m, o.friction) = (0.0, 0.0));
+        let prepared = Prepared::new(model.belief.clone(), f.data.blocks.to_vec(), 0.0);
+        let begun = fit(&model, &f.data, Effort::FULL).expect("a fit");
+        let data = f.data.judged_by(&begun.residuals.e, From::Calm);
+        let begun = fit(&begun.model, &data, Effort::FULL).expect("a fit");
+        let mut search = Search::of(begun, data);
+        (tighten(&mut search, &prepared), search.best.model.free)
+    }
+
+    #[test]
+    fn faces_that_came_out_as_believed_are_fixed_and_others_stay_free() {
+        for (moved_m, surface) in [(0.0, false), (1e-3, true)] {
+            let (named, free) = tightened(moved_m, true, true);
+            assert_eq!((named, free.surface, free.thickness), (false, surface, false), "{moved_m}");
+        }
+        // What was not free is not made free.
+        let (named, free) = tightened(1e-3, false, false);
+        assert_eq!((named, free.surface, free.thickness), (false, false, false));
+    }
+
+    #[test]
+    fn an_effect_is_worth_its_price_when_it_gains_it_under_the_noise_that_it_leaves() {
+        let drift: AnyEffect = ForceDrift { rate_n_per_s: 0.02 }.into();
+        for (rate, worth) in [(0.02, true), (0.0, false)] {
+            let runs = showing(&[], &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], |t| rate * t);
+            let all: Vec<_> = runs.iter().collect();
+            let (with, without) = (settled(std::slice::from_ref(&drift), &all), settled(&[], &all));
+            assert_eq!(is_worth(&with.fit, &without.fit, &with.data), worth);
+            let f = &with.fit;
+            // The drift's number, and a free surface and thickness.
+            let wanted = f.nats() + 4.0 + 3.0 * 0.5 * (with.data.compared() as f64).ln();
+            assert!((priced(f, &with.data) - wanted).abs() < 1e-9, "{} for {wanted}", priced(f, &with.data));
+        }
     }
 }

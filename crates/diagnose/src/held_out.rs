@@ -163,12 +163,17 @@ pub fn floor(data: &Data) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Left, floor, rms};
+    use super::{Left, borne, by_its_own, floor, left_out, left_out_granted, rms, without};
+    use crate::made::{insertions, settled};
+    use crate::set::Insertion;
+    use crate::set::fitted::Fitted;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::{Effort, fit};
     use stylet_identify::noise::Noise;
-    use stylet_identify::objective::Data;
+    use stylet_identify::objective::{Data, Trail};
     use stylet_record::Recording;
+    use stylet_tissue::{AnyEffect, CoulombFriction};
 
     /// Four samples a block that alternate by so much.
     fn blocks(within_n: f64) -> Blocks {
@@ -194,5 +199,95 @@ mod tests {
         assert_eq!(rms(&[None, None], &data), 0.0);
         let wanted = (data.noise.sd_n().powi(2) + 0.5 * (wa * wa + wb * wb)).sqrt();
         assert!((floor(&data) - wanted).abs() < 1e-12);
+    }
+
+    fn rubbing(moved_m: &[f64]) -> Fitted {
+        let rubs: AnyEffect = CoulombFriction { c_n_per_m: 150.0 }.into();
+        let all: Vec<[f64; 2]> =
+            moved_m.iter().enumerate().map(|(k, m)| [[0.008, 0.016][k % 2], *m]).collect();
+        let runs = insertions(std::slice::from_ref(&rubs), &all);
+        settled(&[rubs], &runs.iter().collect::<Vec<&Insertion>>())
+    }
+
+    /// A law whose puncture force is off by a little gives way early or late by a sample or so.
+    #[test]
+    fn a_rupture_may_be_early_or_late_by_two_samples_as_fits_best() {
+        let told = rubbing(&[0.0]);
+        let data = &told.data;
+        let b = &data.blocks[0];
+        let mut moved = 0;
+        for factor in [0.96, 0.98, 1.0, 1.02, 1.04] {
+            let mut model = told.fit.model.clone();
+            model.tissue.layers[0].puncture_n = model.tissue.layers[0].puncture_n.map(|f| f * factor);
+            let mut trail = Trail::new(&model, data, 0).expect("a trail");
+            let own = trail.own_instants();
+            trail.stand(data, 0, &own);
+            let left = by_its_own(&model, data, 0).expect("a replay");
+            let at = |instants: &[f64]| trail.nats_at(&model, data, 0, instants);
+            let best = at(&left.instants);
+            let samples = (left.instants[0] - own[0]) / b.step_s;
+            assert!([0.0, 0.5, 1.0, 2.0].iter().any(|k| (samples.abs() - k).abs() < 1e-6), "{samples}");
+            for k in [0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0] {
+                assert!(at(&[own[0] + k * b.step_s]) >= best - 1e-9, "{factor}: {k}");
+            }
+            moved += usize::from(samples != 0.0);
+            let kept: Vec<f64> = (0..b.len()).filter(|k| b.used[*k]).map(|k| left.e[k]).collect();
+            let square = kept.iter().map(|e| e * e).sum::<f64>() / kept.len() as f64;
+            assert!((left.square_n2 - square).abs() < 1e-15 && left.blocks == kept.len());
+        }
+        assert!(moved >= 2, "{moved}");
+        // One that never gives way stays whole.
+        let mut model = told.fit.model.clone();
+        model.tissue.layers[0].puncture_n = Some(1e3);
+        assert_eq!(by_its_own(&model, data, 0).expect("a replay").instants, [f64::INFINITY]);
+    }
+
+    #[test]
+    fn a_recording_is_predicted_by_a_fit_to_the_others_with_nothing_of_its_own_but_what_is_granted() {
+        let told = rubbing(&[4e-4, 0.0, -3e-4]);
+        let (best, data) = (&told.fit, &told.data);
+        let (plain, granted) = (left_out(best, data), left_out_granted(best, data));
+        for r in 0..3 {
+            let others: Vec<usize> = (0..3).filter(|k| *k != r).collect();
+            let wanted =
+                fit(&best.model.only(&others), &data.only(&others), Effort { turns: 2, enough: 0.5 });
+            let mut model = without(best, data, r).expect("a fit");
+            assert_eq!(model.tissue, wanted.expect("a fit").model.tissue);
+            let of = |l: &Option<Left>| l.as_ref().expect("a prediction").e.clone();
+            assert_eq!(of(&plain[r]), of(&by_its_own(&model, data, r)), "{r}");
+            model.own[r] = best.model.own[r];
+            assert_eq!(of(&granted[r]), of(&by_its_own(&model, data, r)), "{r}");
+        }
+        assert!(rms(&granted, data) < rms(&plain, data));
+        // One alone is what the fit says of it.
+        let alone = rubbing(&[4e-4]);
+        let told = left_out(&alone.fit, &alone.data);
+        let wanted = by_its_own(&alone.fit.model, &alone.data, 0).expect("a prediction");
+        assert_eq!(told[0].as_ref().map(|l| &l.e), Some(&wanted.e));
+    }
+
+    #[test]
+    fn a_cause_has_the_jackknifes_error_and_the_share_that_comes_back_without_it() {
+        let told = rubbing(&[1e-4, 0.0, -1e-4, 2e-4]);
+        let (best, data) = (&told.fit, &told.data);
+        let of = &borne(best, data, 0.003)[0];
+        let strength = |r: usize| without(best, data, r).expect("a fit").effects[0].values[0];
+        let values: Vec<f64> = (0..4).map(strength).collect();
+        let mean = stylet_stats::mean(&values);
+        let error = (0.75 * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt() / mean;
+        assert!((of.spread / error - 1.0).abs() < 1e-9 && error < 0.2, "{} for {error}", of.spread);
+        let square = |left: &[Option<Left>]| {
+            let all: Vec<&Left> = left.iter().flatten().collect();
+            let blocks: usize = all.iter().map(|l| l.blocks).sum();
+            all.iter().map(|l| l.square_n2 * l.blocks as f64).sum::<f64>() / blocks as f64
+        };
+        let less = fit(&best.model.without(0), data, Effort { turns: 3, enough: 1.0 }).expect("a fit");
+        let (with, less) = (square(&left_out(best, data)), square(&left_out(&less, data)));
+        let wanted = (less - with) / (less - 0.003 * 0.003);
+        assert!((of.gain / wanted - 1.0).abs() < 1e-9 && wanted > 0.1, "{} for {wanted}", of.gain);
+        // A single recording tells nothing of that.
+        let alone = rubbing(&[0.0]);
+        let told = borne(&alone.fit, &alone.data, 0.003);
+        assert_eq!((told.len(), told[0].spread, told[0].gain), (1, 0.0, 0.0));
     }
 }

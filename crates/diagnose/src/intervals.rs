@@ -291,12 +291,13 @@ fn raise(matrix: &mut Symmetric, tangent: &Tangent, fit: &Fit, kind: Kind, (from
 
 #[cfg(test)]
 mod tests {
-    use super::Spread;
+    use super::{RAISED, Spread};
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::{Effort, Tangent, fit};
+    use stylet_identify::linear::Symmetric;
     use stylet_identify::model::{Belief, Choice, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, Trail, replay};
@@ -419,5 +420,48 @@ mod tests {
             let ratio = half / by_derivative;
             assert!(ratio > least && ratio < most, "{slow}: {ratio}");
         }
+    }
+
+    /// A scatter that makes a share of a variance takes the square of that share over its degrees of freedom, a noise told anew half the
+    /// square of how variable it leaves it (Welch and Satterthwaite).
+    #[test]
+    fn a_deviation_has_the_degrees_of_freedom_of_what_its_variance_is_made_of() {
+        let (model, data) = insertions(&[0.0, 0.0], |_, _| ());
+        let told = fit(&model, &data, Effort { turns: 1, enough: 1.0 }).expect("a fit");
+        let of = |raised: &[(f64, f64)], again: &[f64]| {
+            let known = Spread::known(&told, &data);
+            let size = known.tangent.matrix.size;
+            // A variance of so much for each number.
+            let even = |variance: f64| {
+                let mut m = Symmetric::zeros(size);
+                (0..size).for_each(|i| m.add(i, i, 1.0 / variance));
+                m.factor()
+            };
+            let spread = Spread {
+                factor: even(0.5),
+                raised: raised.iter().map(|(s, f)| (even(0.5 * (1.0 + RAISED * s)), *f)).collect(),
+                again: again.iter().map(|a| even(0.5 * a)).collect(),
+                ..known
+            };
+            let mut gradient = vec![0.0; size];
+            (gradient[0], gradient[1]) = (0.8, 0.6);
+            spread.deviation(&gradient)
+        };
+        let near = |(sd, freedom): (f64, f64), variance: f64, wanted: f64| {
+            assert!((sd / variance.sqrt() - 1.0).abs() < 1e-4, "{sd} for {}", variance.sqrt());
+            assert!((freedom / wanted - 1.0).abs() < 1e-3, "{freedom} for {wanted}");
+        };
+        near(of(&[], &[]), 0.5, 1e4);
+        near(of(&[(0.5, 3.0), (0.25, 5.0)], &[]), 0.5, 1.0 / (0.25 / 3.0 + 0.0625 / 5.0));
+        // More than the whole of it is the whole, less than nothing nothing; one degree of freedom is the least.
+        near(of(&[(3.0, 7.0)], &[]), 0.5, 7.0);
+        near(of(&[(-0.5, 7.0)], &[]), 0.5, 1e4);
+        near(of(&[(1.0, 0.4)], &[]), 0.5, 1.0);
+        // Noise told anew at four fifths, and by a fifth of one more or less.
+        near(of(&[], &[0.6, 0.8, 1.0]), 0.5 / 0.8, 2.0 * 16.0);
+        near(of(&[(0.5, 3.0)], &[0.6, 0.8, 1.0]), 0.5 / 0.8, 1.0 / (0.25 / 3.0 + 1.0 / 32.0));
+        // Where it would be larger nothing is taken away; one alone says nothing.
+        near(of(&[], &[1.2, 1.4]), 0.5, 2.0 * (1.3 / 0.02_f64.sqrt()).powi(2));
+        near(of(&[], &[0.5]), 0.5, 1e4);
     }
 }

@@ -230,6 +230,35 @@ mod tests {
         assert!((peak as f64 * bin_hz - 11.3).abs() < bin_hz, "{}", peak as f64 * bin_hz);
     }
 
+    /// A spectrum has room for the time from the first sample to the last, but no more than for twice the samples and one.
+    #[test]
+    fn long_gaps_take_no_more_room_than_the_samples() {
+        let tone = wave(0.3, 11.3, 0.4);
+        let bins = |seconds: f64, keep: &dyn Fn(usize) -> bool| {
+            let (fit, data) = in_air(&[&tone], seconds, keep);
+            power(&fit, &data, 1).1.len()
+        };
+        assert_eq!((bins(10.23, &|_| true), bins(10.26, &|_| true)), (512, 1024));
+        // 512 samples beside a gap of a minute: 1025 places; 511 have 1023.
+        assert_eq!(bins(70.0, &|k| !(256..7000 - 256).contains(&k)), 1024);
+        assert_eq!(bins(70.0, &|k| !(256..7000 - 255).contains(&k)), 512);
+    }
+
+    #[test]
+    fn a_recording_of_another_rate_has_no_part_in_the_spectrum() {
+        let (tone, other) = (wave(0.3, 11.3, 0.4), wave(0.9, 31.0, 0.4));
+        let (fit, data) = in_air(&[&tone, &other], 20.0, |_| true);
+        let (alone, alone_data) = in_air(&[&tone], 20.0, |_| true);
+        let one = power(&alone, &alone_data, 1).1;
+        for (by, counts) in [(1.009, true), (1.011, false)] {
+            let mut blocks = data.blocks.to_vec();
+            blocks[1].step_s *= by;
+            let p = power(&fit, &data.on(blocks), 1).1;
+            let same = p.iter().zip(&one).all(|(p, one)| (p - one).abs() <= 1e-9 * one);
+            assert_eq!(!same, counts, "{by}");
+        }
+    }
+
     #[test]
     fn outlying_samples_are_cut_at_six_times_the_median() {
         let spike = |t: f64| if (t - 12.0).abs() < 0.004 { 900.0 } else { wave(0.3, 11.3, 0.4)(t) };

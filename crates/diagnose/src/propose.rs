@@ -251,3 +251,143 @@ fn breaks(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<St
     out.truncate(2);
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Start, slopes, starts};
+    use crate::base::Prepared;
+    use crate::made::{insertions, settled, showing};
+    use crate::set::fitted::Fitted;
+    use stylet_identify::look::Look;
+    use stylet_tissue::{AnyEffect, ForceDrift, HiddenMembrane, Respiration};
+
+    /// Speeds (m/s) of the insertions, and by how much (m) their surfaces are moved.
+    const AT: [[f64; 2]; 3] = [[2e-3, 3e-4], [3e-3, -3e-4], [4e-3, 0.0]];
+
+    /// Insertions with these effects, fitted without them.
+    fn without(effects: &[AnyEffect]) -> Fitted {
+        let runs = insertions(effects, &AT);
+        settled(&[], &runs.iter().collect::<Vec<_>>())
+    }
+
+    /// The starts for these insertions, and the first of one effect.
+    fn proposed(f: &Fitted, lines: &[f64], id: &str) -> (Vec<Vec<Start>>, Option<Start>) {
+        let prepared = Prepared::new(f.fit.model.belief.clone(), f.data.blocks.to_vec(), 0.0);
+        let all = starts(&Look::new(&f.fit, &f.data), &prepared, lines);
+        let own = all.iter().find(|s| s[0].choice.info.id == id).map(|s| s[0].clone());
+        (all, own)
+    }
+
+    /// Insertions off a sensor that shows so much more, fitted without it.
+    fn unaware(more_n: impl Fn(f64) -> f64) -> Fitted {
+        let runs = showing(&[], &AT, more_n);
+        settled(&[], &runs.iter().collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn effects_start_where_they_would_gain_most_at_most_twice_each() {
+        let f = unaware(|t| 0.02 * t);
+        let (all, own) = proposed(&f, &[], "force_drift");
+        let own = own.expect("a drift");
+        assert!((own.choice.values[0] - 0.02).abs() < 2e-3, "{:?}", own.choice.values);
+        assert!(own.nats > 1.0 && all.iter().all(|s| s.len() <= 2));
+        assert!(all.windows(2).all(|w| w[0][0].nats >= w[1][0].nats));
+        assert!(all.iter().all(|s| s.windows(2).all(|w| w[0].nats >= w[1].nats)));
+        assert!(proposed(&f, &[], "periodic_interference").1.is_none(), "no line, no tone");
+        // What is in the law already is proposed no more.
+        let runs = showing(&[], &AT, |t| 0.02 * t);
+        let drift: AnyEffect = ForceDrift { rate_n_per_s: 0.02 }.into();
+        let f = settled(&[drift], &runs.iter().collect::<Vec<_>>());
+        assert!(proposed(&f, &[], "force_drift").1.is_none());
+        let bias = proposed(&unaware(|_| -0.1), &[], "force_bias").1.expect("a bias");
+        assert!((bias.choice.values[0] + 0.1).abs() < 0.02, "{:?}", bias.choice.values);
+    }
+
+    #[test]
+    fn a_tone_starts_with_its_amplitude_and_phase_at_the_line_that_was_found() {
+        for (amplitude_n, phase_rad) in [(0.05, 0.7), (0.03, -2.1)] {
+            let f = unaware(|t| amplitude_n * (std::f64::consts::TAU * 1.7 * t + phase_rad).sin());
+            let start = proposed(&f, &[1.7], "periodic_interference").1.expect("a tone");
+            let v = &start.choice.values;
+            assert!((v[0] / amplitude_n - 1.0).abs() < 0.1, "{v:?}");
+            assert!(v[1] == 1.7 && (v[2] - phase_rad).abs() < 0.1, "{v:?}");
+        }
+    }
+
+    #[test]
+    fn a_breath_starts_near_its_frequency_with_its_amplitude_and_phase() {
+        let breath = Respiration { amplitude_m: 1.5e-4, frequency_hz: 0.4, phase_rad: 0.9 };
+        let f = without(&[breath.into()]);
+        let start = proposed(&f, &[], "respiration").1.expect("a breath");
+        let v = &start.choice.values;
+        assert!((v[1] - 0.4).abs() < 0.03, "{v:?}");
+        assert!((v[0] / 1.5e-4 - 1.0).abs() < 0.3, "{v:?}");
+        // At the middle of the recordings the phase is that of the breath, whatever the grid made of the frequency.
+        let at = |hz: f64, phase: f64| std::f64::consts::TAU * hz * 7.0 + phase;
+        assert!((at(v[1], v[2]) - at(0.4, 0.9)).cos() > 0.8, "{v:?}");
+    }
+
+    /// Before the layer gives way the force is stiffness times depth and friction times speed times depth.
+    #[test]
+    fn the_force_changes_with_depth_by_the_stiffness_and_with_speed_by_the_friction_inside() {
+        let f = without(&[]);
+        let (fz, fv) = slopes(&Look::new(&f.fit, &f.data)).expect("slopes");
+        let model = &f.fit.model;
+        let layer = &model.tissue.layers[0];
+        let mut count = 0;
+        for (r, b) in f.data.blocks.iter().enumerate() {
+            let friction = layer.friction_ns_per_m2 * model.own[r].friction.exp();
+            let surface_m = model.tissue.surface_m + model.own[r].surface_m;
+            for k in 0..b.len() {
+                let (z, v) = b.motion.at(0.5 * (b.from_s[k] + b.to_s[k]));
+                let inside = z - surface_m;
+                if v > 1e-3 && (1e-3..5e-3).contains(&inside) {
+                    let (wanted_z, wanted_v) = (layer.stiffness_n_per_m + friction * v, friction * inside);
+                    assert!((fz[r][k] / wanted_z - 1.0).abs() < 0.05, "{} for {wanted_z}", fz[r][k]);
+                    assert!((fv[r][k] / wanted_v - 1.0).abs() < 0.05, "{} for {wanted_v}", fv[r][k]);
+                    count += 1;
+                } else if inside < -1e-3 {
+                    assert_eq!((fz[r][k], fv[r][k]), (0.0, 0.0));
+                }
+            }
+        }
+        assert!(count > 50, "{count}");
+    }
+
+    /// A membrane that begins 2 mm deep and breaks after 3 mm leaves a rise and a drop that no layer takes.
+    #[test]
+    fn a_membrane_starts_where_the_force_rose_and_broke_off() {
+        let membrane = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        let f = without(&[membrane.into()]);
+        let start = proposed(&f, &[], "hidden_membrane").1.expect("a membrane");
+        let v = &start.choice.values;
+        // It breaks 5 mm deep; the grid of depths is a millimetre wide.
+        assert!((v[0] + v[2] / v[1] - 5e-3).abs() < 1.1e-3, "{v:?}");
+        assert!(v[1] > 30.0 && v[1] < 400.0, "{v:?}");
+        assert!(start.nats > 20.0 && start.visible > 0.0);
+    }
+
+    /// An effect that only adds is not proposed to take away: every start has a strength.
+    #[test]
+    fn every_start_has_a_strength() {
+        let membrane = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        let inside = |t: f64| if t > 3.0 { 0.1 } else { 0.0 };
+        for f in
+            [unaware(|t| 0.02 * t), unaware(inside), unaware(|t| -inside(t)), without(&[membrane.into()])]
+        {
+            let (all, _) = proposed(&f, &[], "");
+            assert!(all.len() > 3);
+            for s in all.iter().flatten() {
+                let strong = |(p, x): (&stylet_tissue::ParameterInfo, &f64)| {
+                    p.strength && (x - p.neutral).abs() > 1e-12 && *x < 1e9
+                };
+                assert!(
+                    s.choice.info.parameters.iter().zip(&s.choice.values).any(strong),
+                    "{} {:?}",
+                    s.choice.info.id,
+                    s.choice.values
+                );
+            }
+        }
+    }
+}

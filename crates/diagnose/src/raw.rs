@@ -386,6 +386,74 @@ mod tests {
         assert_eq!(look(&[&slow], &[Vec::new()]).spikes.map(|s| s.count), Some(2));
     }
 
+    /// The neighbours stand at nothing but for one, on either side: a spike stands out of it by seven tenths of the least, and both
+    /// neighbours agree to half of it.
+    #[test]
+    fn a_spike_stands_out_of_both_its_neighbours_and_they_agree() {
+        let beside = |size: f64, neighbour: f64, before: bool| {
+            let mut f = alternating(1000, D);
+            for k in [200, 430, 776] {
+                f[k - 2..k + 3].fill(0.0);
+                f[k] = size * LEAST;
+                f[if before { k - 1 } else { k + 1 }] = neighbour * LEAST;
+            }
+            look(&[&recording(f)], &[Vec::new()]).spikes.map(|s| s.count)
+        };
+        for before in [true, false] {
+            assert_eq!((beside(1.1, 0.35, before), beside(1.1, 0.45, before)), (Some(3), None));
+            assert_eq!((beside(3.0, 1.4, before), beside(3.0, 1.6, before)), (Some(3), None));
+            assert_eq!((beside(3.0, -1.4, before), beside(3.0, -1.6, before)), (Some(3), None));
+        }
+    }
+
+    /// On a level far from nothing, and beside samples at a limit or where the speed changed long before, spikes are spikes all the same.
+    #[test]
+    fn what_lies_far_from_a_spike_does_not_matter() {
+        let size = 3.0 * LEAST;
+        let spiky = |level: f64| {
+            let mut f: Vec<f64> = alternating(1000, D).iter().map(|f| level + f).collect();
+            for k in [200, 600, 800] {
+                f[k] += size;
+            }
+            f
+        };
+        let count = |r: &Recording| look(&[r], &[Vec::new()]).spikes.map(|s| s.count);
+        assert_eq!(count(&recording(spiky(5.0))), Some(3));
+        let mut limited = spiky(0.0);
+        limited[400..411].fill(2.0);
+        assert_eq!(count(&recording(limited)), Some(3));
+        // The needle slows down at 300 and stops at 600: there a spike could be anything.
+        let mut slowed = recording(spiky(0.0));
+        slowed.velocity_mps = (0..1000)
+            .map(|k| match k {
+                0..300 => 1e-2,
+                300..601 => 5e-3,
+                _ => 0.0,
+            })
+            .collect();
+        assert_eq!(count(&slowed), Some(2));
+        // Outlying samples below half of what makes a spike are noise, wherever the spikes' size puts them.
+        for (small, seen) in [(0.45, Some(3)), (0.55, None)] {
+            let mut f = alternating(1000, D);
+            for (k, s) in [(100, 1.15), (250, 1.15), (400, 1.15), (550, small), (700, small)] {
+                f[k] = s * LEAST;
+            }
+            assert_eq!(count(&recording(f)), seen, "{small}");
+        }
+    }
+
+    /// The first sixty samples are judged by the first hundred and twenty, mostly quiet, the next by the first hundred and eighty, mostly
+    /// loud; the two at either end do not count.
+    #[test]
+    fn sixty_samples_share_a_scatter() {
+        for (place, count) in [(60, 2), (61, 2), (62, 0)] {
+            let mut f = alternating(75, D);
+            f.extend(alternating(925, 3.0 * D).iter().map(|f| -f));
+            (f[30], f[place]) = (1.5 * LEAST, 1.5 * LEAST);
+            assert_eq!(look(&[&recording(f)], &[Vec::new()]).spikes.map_or(0, |s| s.count), count, "{place}");
+        }
+    }
+
     #[test]
     fn a_limit_holds_six_samples_or_three_times_what_a_grid_holds_near_it() {
         let ramp = |at_limit: usize| {
@@ -443,6 +511,16 @@ mod tests {
         assert_eq!(step(&[&recording(vec![0.0; 20])], &[vec![quantised(0.05)]]), Some(0.05));
         let raw = look(&[&r], &[vec![quantised(0.05)]]);
         assert!((raw.step_n.expect("a step") - 0.0503).abs() < 1e-9);
+    }
+
+    #[test]
+    fn half_of_the_recordings_tell_a_step_and_a_step_of_nothing_is_none() {
+        let r = recording((0..50).map(|k| 0.25 * f64::from(k % 7)).collect());
+        let notes = |steps: &[f64]| steps.iter().map(|s| vec![quantised(*s)]).collect::<Vec<_>>();
+        assert_eq!(step(&[&r, &r], &notes(&[0.25])), Some(0.25));
+        assert_eq!(step(&[&r, &r, &r], &notes(&[0.25])), None);
+        assert_eq!(step(&[&r], &notes(&[0.0])), None);
+        assert_eq!(step(&[], &[]), None);
     }
 
     #[test]

@@ -424,8 +424,9 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Search, Stage, at_a_bound, extra, first_of, simpler_first};
-    use crate::made::believed;
+    use super::{Search, Stage, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
+    use crate::made::{believed, settled, showing};
+    use crate::set::fitted::Fitted;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::Fit;
@@ -434,7 +435,7 @@ mod tests {
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
     use stylet_tissue::{
-        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, StribeckFriction,
+        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, StribeckFriction,
     };
 
     fn data() -> Data {
@@ -540,5 +541,43 @@ mod tests {
         assert!((gained - 20.0 - more).abs() < 1e-9, "{gained}");
         assert_eq!(search.stages[1].taken, Some(("force_drift", 9.0)));
         assert_eq!(search.best.model.effects[0].info.id, "force_bias");
+    }
+
+    /// Insertions whose force drifts by 20 mN/s; with these effects fitted.
+    fn drifting(effects: &[AnyEffect]) -> Fitted {
+        let runs = showing(&[], &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], |t| 0.02 * t);
+        settled(effects, &runs.iter().collect::<Vec<_>>())
+    }
+
+    fn drift(rate_n_per_s: f64) -> AnyEffect {
+        ForceDrift { rate_n_per_s }.into()
+    }
+
+    #[test]
+    fn an_effect_that_the_others_can_do_without_goes_and_the_last_one_stays() {
+        let pruned = |effects: &[AnyEffect]| {
+            let f = drifting(effects);
+            let mut search = Search::of(f.fit, f.data);
+            search.prune();
+            search.best.model.effects.iter().map(|e| e.info.id).collect::<Vec<_>>()
+        };
+        let bias: AnyEffect = ForceBias { force_n: 0.002 }.into();
+        assert_eq!(pruned(&[drift(0.01), bias.clone()]), ["force_drift"]);
+        assert_eq!(pruned(&[bias.clone(), drift(0.01)]), ["force_drift"]);
+        assert_eq!(pruned(&[bias]), ["force_bias"]);
+    }
+
+    #[test]
+    fn a_strength_is_told_when_it_lies_five_standard_deviations_from_none() {
+        let bias: AnyEffect = ForceBias { force_n: 0.002 }.into();
+        let f = drifting(&[drift(0.01), bias]);
+        assert!(every_strength_is_told(&f.fit, 0, &f.data));
+        assert!(!every_strength_is_told(&f.fit, 1, &f.data));
+        // Every insertion tells the drift by its noise over its length: at a five-thousandth of it nothing is told.
+        let mut less = f.fit.clone();
+        less.model.effects[0].values[0] = 1e-6;
+        assert!(!every_strength_is_told(&less, 0, &f.data));
+        less.model.effects[0].values[0] = -0.02;
+        assert!(every_strength_is_told(&less, 0, &f.data));
     }
 }

@@ -112,19 +112,20 @@ fn unresolved(search: &Search, k: usize) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{at_every_sample, unresolved, unsure};
-    use crate::made::believed;
+    use super::{at_every_sample, small, unresolved, unsure};
+    use crate::held_out::left_out_granted;
+    use crate::made::{believed, settled, showing};
     use crate::outcome::Cause;
     use crate::select::{Search, Stage};
     use std::collections::BTreeMap;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
-    use stylet_identify::fit::Fit;
+    use stylet_identify::fit::{Effort, Fit, fit};
     use stylet_identify::model::{Choice, Model};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, Residuals};
     use stylet_record::Recording;
-    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, LowPassLag, Respiration};
+    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, ForceBias, ForceDrift, LowPassLag, Respiration};
 
     fn search(effects: &[AnyEffect]) -> Search {
         let belief = believed(&[]);
@@ -207,6 +208,48 @@ mod tests {
             "saturation",
         ] {
             assert!(!shows(id), "{id}");
+        }
+    }
+
+    /// What is said of a drift of 20 mN/s that gained so many nats, and of a bias beside it, of this size (N) and in the law.
+    fn said(bias_n: f64, drift_nats: f64) -> (Search, Vec<(String, String)>) {
+        let at = [[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]];
+        let runs = showing(&[], &at, |t| bias_n + 0.02 * t);
+        let effects: [AnyEffect; 2] =
+            [ForceDrift { rate_n_per_s: 0.02 }.into(), ForceBias { force_n: bias_n }.into()];
+        let f = settled(&effects, &runs.iter().collect::<Vec<_>>());
+        let search = Search::of(f.fit, f.data);
+        let after = left_out_granted(&search.best, &search.data);
+        let cause = |e: &AnyEffect, gain_nats: f64| Cause {
+            effect: e.id().to_owned(),
+            equivalent: Vec::new(),
+            confidence: 1.0,
+            parameters: BTreeMap::new(),
+            gain_nats,
+            share: 0.0,
+        };
+        let told = small(&search, &after, &[cause(&effects[0], drift_nats), cause(&effects[1], 0.0)], &[]);
+        (search, told.into_iter().map(|s| (s.effect, s.why)).collect())
+    }
+
+    /// What gains less than 7 % of the force of a greater cause, 0.49 % of its nats, may be that cause's law's error.
+    #[test]
+    fn a_cause_is_small_beside_one_whose_law_may_err_by_as_much() {
+        // Recordings left out show both, be the bias as large as the drift or as the noise.
+        assert!(said(0.2, 0.0).1.is_empty());
+        let (search, told) = said(0.02, 0.0);
+        assert!(told.is_empty(), "{told:?}");
+        let without = fit(&search.best.model.without(1), &search.data, Effort { turns: 4, enough: 0.5 })
+            .expect("a fit");
+        let lost = without.nats() - search.best.nats();
+        assert!(lost > 10.0, "{lost}");
+        for (share, small) in [(0.9, false), (1.1, true)] {
+            let (_, told) = said(0.02, lost / 0.0049 * share);
+            assert_eq!(!told.is_empty(), small, "{told:?}");
+            assert!(
+                told.iter().all(|t| t.0 == "force_bias" && t.1.contains("far greater cause")),
+                "{told:?}"
+            );
         }
     }
 }

@@ -69,12 +69,13 @@ pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
 
 #[cfg(test)]
 mod tests {
-    use super::{price, with};
-    use crate::made::believed;
+    use super::{price, varied, with};
+    use crate::made::{believed, insertions, settled};
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::{Effort, fit};
     use stylet_identify::model::{Free, Model, Own};
-    use stylet_identify::noise::Noise;
+    use stylet_identify::noise::{From, Noise};
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
 
@@ -115,5 +116,34 @@ mod tests {
             };
             assert_eq!(out.own[1], wanted);
         }
+    }
+
+    /// What each insertion gets of its own where its surface was moved by so much, from a law that grants both kinds of numbers or none.
+    fn chosen(moved_m: &[f64], granted: bool) -> (bool, bool) {
+        let at: Vec<[f64; 2]> = moved_m.iter().zip([4e-3, 5e-3, 6e-3]).map(|(m, v)| [v, *m]).collect();
+        let runs = insertions(&[], &at);
+        let f = settled(&[], &runs.iter().collect::<Vec<_>>());
+        let begun = with(&f.fit.model, granted, granted);
+        let begun = fit(&begun, &f.data, Effort::FULL).expect("a fit");
+        let data = f.data.judged_by(&begun.residuals.e, From::Calm);
+        let begun = fit(&begun.model, &data, Effort::FULL).expect("a fit");
+        let free = varied(begun, data).0.model.free;
+        (free.own_surface, free.own_friction)
+    }
+
+    #[test]
+    fn insertions_get_a_surface_of_their_own_where_it_differs() {
+        assert_eq!(chosen(&[8e-4, -8e-4, 0.0], false), (true, false));
+        assert_eq!(chosen(&[8e-4, -8e-4, 0.0], true), (true, false));
+    }
+
+    #[test]
+    fn insertions_that_do_not_differ_get_nothing_of_their_own() {
+        assert_eq!((chosen(&[0.0; 3], true), chosen(&[0.0; 3], false)), ((false, false), (false, false)));
+    }
+
+    #[test]
+    fn one_insertion_alone_has_nothing_to_differ_from() {
+        assert_eq!((chosen(&[8e-4], true), chosen(&[8e-4], false)), ((true, true), (false, false)));
     }
 }

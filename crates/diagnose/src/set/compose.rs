@@ -121,7 +121,9 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
 
 #[cfg(test)]
 mod tests {
-    use super::together;
+    use super::{Kind, compose, together};
+    use crate::made::{gel, insertions};
+    use crate::set::Insertion;
     use std::sync::Arc;
     use stylet_identify::model::{Belief, Choice, Model};
     use stylet_tissue::{AnyEffect, CoulombFriction, Effect, Layer, LetGo, ShaftSlip, Tissue};
@@ -194,5 +196,23 @@ mod tests {
         assert!(m.days.is_empty() && m.day_of.is_empty() && m.bound.is_empty());
         assert!(together(&believed, &[], 0.0).is_none());
         assert!(together(&tissue(&["one"], 0.0, 0.03, 1.0), &[&first, &second], 0.0).is_none());
+    }
+
+    /// A stack that is the layer itself, set up a millimetre deeper.
+    #[test]
+    fn a_layer_alone_predicts_the_stack_that_it_is_wherever_that_begins() {
+        let alone = insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, 0.0]]);
+        let whole = insertions(&[], &[[0.008, 1e-3], [0.016, 1e-3], [0.008, 1e-3]]);
+        let runs: Vec<&Insertion> = whole.iter().collect();
+        let told = compose(Kind::Base, &gel(), &[("gel".to_owned(), alone)], &runs).expect("a law");
+        let [(name, floor_n, error_n)] = &told.alone[..] else { unreachable!("one layer") };
+        // The one at the other speed has nobody beside it.
+        assert_eq!((name.as_str(), *floor_n), ("gel", None));
+        assert!(*error_n > 0.0 && *error_n < 0.3, "{error_n}");
+        assert_eq!(told.composed_n.len(), 2);
+        assert!(told.composed_n.iter().all(|e| *e > 0.005 && *e < 0.3), "{:?}", told.composed_n);
+        assert!((told.mean_n - 0.5 * (told.composed_n[0] + told.composed_n[1])).abs() < 1e-12);
+        // Without the layer or its runs there is nothing to put together.
+        assert!(compose(Kind::Base, &gel(), &[], &runs).is_none());
     }
 }

@@ -317,6 +317,8 @@ mod tests {
         assert!(
             matches("*_run?.csv", "x_run?.csv") && matches("a*b*c", "a--b-b-c") && matches("same", "same")
         );
+        // What stands last has to be the end, wherever else it stands.
+        assert!(matches("a*b", "abxb") && matches("*.csv", "a.csv.csv"));
         assert!(!matches("skin_*.csv", "skin-on-muscle_1mmps_run5.csv") && !matches("a*b", "ac"));
     }
 

@@ -515,6 +515,9 @@ mod tests {
         all[2].ruptures_s[1] = NEVER;
         let refs: Vec<&Insertion> = all.iter().collect();
         assert_eq!(plain(&believed(), &refs).tissue.layers[1].puncture_n, None);
+        // Three of six are half of them.
+        let six = [&refs[..], &[&all[3], &all[3]]].concat();
+        assert!(plain(&believed(), &six).tissue.layers[1].puncture_n.is_some());
         let p = pressed(&believed(), &all[3]);
         let f = frame(&believed(), &[&all[3]], 0.0);
         for l in 0..2 {

@@ -241,3 +241,193 @@ pub fn fitted(
     out.sort_by(|a, b| a.rms_n().total_cmp(&b.rms_n()));
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Guess, SET_BLOCK_S, blocks, guess, refitted, settle, spreads, unsettled};
+    use crate::made::{SENSOR_N, believed, gel, insertions, settled};
+    use crate::raw::Raw;
+    use crate::set::Insertion;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use std::sync::Arc;
+    use stylet_identify::fit::{Fit, Tangent};
+    use stylet_identify::model::{Choice, Day, Model, Role};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, residuals};
+    use stylet_tissue::{AnyEffect, Effect, LetGo};
+
+    /// What a start begins with, each as its place between the ends of what is thought possible: none at the lower one, 1 at the upper.
+    fn places(g: &Guess) -> Vec<f64> {
+        let even = |x: f64, low: f64, high: f64| (x - low) / (high - low);
+        let by_factors = |x: f64, low: f64, high: f64| (x / low).ln() / (high / low).ln();
+        vec![
+            even(g.straight, 0.1, 0.9),
+            even(g.hold, 0.3, 0.9),
+            even(g.pull, 0.3, 0.9),
+            even(g.kept, 0.4, 1.0),
+            by_factors(g.exponent, 4.0, 18.0),
+            even(g.wear_per_m[0], 0.0, 80.0),
+            even(g.wear_per_m[1], 0.0, 120.0),
+            even(g.rate, -0.3, 0.1),
+            even(g.fractions[0], 0.02, 0.4),
+            even(g.fractions[1], 0.02, 0.4),
+            by_factors(g.times_s[0], 0.03, 3.0),
+            by_factors(g.times_s[1], 4.0, 20.0),
+            by_factors(g.waits, 6.0, 20.0),
+            even(g.surface_m, -1.5e-3, 5e-4),
+        ]
+    }
+
+    #[test]
+    fn the_first_start_begins_in_the_middle_of_what_is_thought_possible_and_the_others_anywhere_in_it() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let first = guess(0, &mut rng);
+        assert!(places(&first).iter().all(|x| (x - 0.5).abs() < 1e-12), "{:?}", places(&first));
+        assert!((first.gives_way_m.expect("behind its front") - 1e-3).abs() < 1e-15);
+        let all: Vec<Guess> = (1..=1500).map(|k| guess(k, &mut rng)).collect();
+        for place in 0..14 {
+            let mut x: Vec<f64> = all.iter().map(|g| places(g)[place]).collect();
+            x.sort_by(f64::total_cmp);
+            assert!(x[0] >= 0.0 && x[0] < 0.01 && x[1499] <= 1.0 && x[1499] > 0.99, "{place}");
+            assert!((x[750] - 0.5).abs() < 0.05, "{place}: {}", x[750]);
+        }
+        // Six of ten give way behind their front, the others where the force drops.
+        let behind: Vec<f64> = all.iter().filter_map(|g| g.gives_way_m).collect();
+        assert!((behind.len() as f64 / 1500.0 - 0.6).abs() < 0.05, "{}", behind.len());
+        assert!(behind.iter().all(|m| *m > 0.0 && *m <= 6e-3) && stylet_stats::mean(&behind) > 2.7e-3);
+    }
+
+    #[test]
+    fn blocks_of_a_set_are_eight_hundredths_of_a_second_long_and_leave_out_what_the_raw_force_excludes() {
+        let all = insertions(&[], &[[0.004, 0.0], [0.004, 0.0]]);
+        let runs: Vec<&Insertion> = all.iter().collect();
+        let n = all[0].recording.len();
+        let exclude = vec![(0..n).map(|k| (100..150).contains(&k)).collect()];
+        let told = blocks(&runs, &Raw { exclude, ..Raw::default() });
+        assert_eq!(told.len(), 2);
+        assert!((told[0].to_s[7] - told[0].from_s[7] - SET_BLOCK_S).abs() < 1e-9);
+        let left_out = |b: &stylet_identify::blocks::Blocks| {
+            (0..b.len()).filter(|k| !b.used[*k]).map(|k| b.to_s[k] - b.from_s[k]).sum::<f64>()
+        };
+        // A second, but for the blocks at its ends; of the other recording nothing is excluded.
+        let more = left_out(&told[0]) - left_out(&told[1]);
+        assert!((more - 1.0).abs() < 0.17, "{} {}", left_out(&told[0]), left_out(&told[1]));
+        // The first noise is a tenth of the largest force.
+        let largest = told.iter().flat_map(|b| &b.size_n).fold(0.0_f64, |m, x| m.max(*x));
+        assert!((unsettled(told).noise.sd_n() / (0.1 * largest) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_set_settles_at_its_law_and_at_the_noise_that_it_has() {
+        let all = insertions(&[], &[[0.004, 3e-4], [0.004, -2e-4], [0.008, 1e-4], [0.008, -2e-4]]);
+        let runs: Vec<&Insertion> = all.iter().collect();
+        let told = settled(&[], &runs);
+        let layer = &told.fit.model.tissue.layers[0];
+        let gel = &gel().layers[0];
+        assert!((layer.stiffness_n_per_m / gel.stiffness_n_per_m - 1.0).abs() < 0.02, "{layer:?}");
+        assert!((layer.friction_ns_per_m2 / gel.friction_ns_per_m2 - 1.0).abs() < 0.02, "{layer:?}");
+        // Four samples are averaged in a block.
+        let block_n = SENSOR_N / 2.0;
+        assert!((told.rms_n() / block_n - 1.0).abs() < 0.1, "{}", told.rms_n());
+        let sd_n = told.data.noise.sd_n();
+        assert!((sd_n / block_n - 1.0).abs() < 0.1, "{sd_n}");
+        assert_eq!(told.starts, (1, 1));
+        // Where the surfaces of the runs lie apart they are told apart, and so is how much.
+        let moved: Vec<f64> = told.fit.model.own.iter().map(|o| o.surface_m).collect();
+        for (own, wanted) in moved.iter().zip([3e-4, -2e-4, 1e-4, -2e-4]) {
+            assert!((own - wanted).abs() < 2e-5, "{moved:?}");
+        }
+        let spread = told.fit.model.scatter.surface_m;
+        assert!((spread - 2.1e-4).abs() < 3e-5, "{spread}");
+        // Another law goes on from there; without a round there is no fit.
+        let stiff = told.with(&told.fit.model).expect("a fit");
+        assert!((stiff.rms_n() / told.rms_n() - 1.0).abs() < 0.01 && stiff.drops == told.drops);
+        assert!(settle(&told.fit.model, told.data.clone(), &told.drops, &[]).is_none());
+        let again = refitted(&told.fit.model, told.data.blocks.to_vec(), told.drops.clone()).expect("a fit");
+        assert!((again.rms_n() / told.rms_n() - 1.0).abs() < 0.01);
+    }
+
+    /// A model with numbers of each recording's own, where it stands in recordings that it did not make.
+    fn standing(noise_n: f64, change: impl Fn(&mut Model)) -> (Fit, Data) {
+        let all = insertions(&[], &[[0.004, 0.0], [0.008, 0.0], [0.008, 0.0]]);
+        let runs: Vec<&Insertion> = all.iter().collect();
+        let data = Data::new(Arc::new(blocks(&runs, &Raw::default())), Noise::white(noise_n), 0.0);
+        let mut model = Model::base(believed(&[[0.05, 250.0, 2e4]]), 3);
+        change(&mut model);
+        let residuals = residuals(&model, &data).expect("a replay");
+        (Fit { model, residuals }, data)
+    }
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told / wanted - 1.0).abs() < 1e-4, "{told} for {wanted}");
+    }
+
+    /// Expectation maximisation: the mean of the squares and of the variances that the data leave of them, here by the inverse of two by two.
+    #[test]
+    fn a_spread_between_recordings_is_that_of_their_numbers_and_of_what_the_data_leave_open() {
+        for noise_n in [0.01, 3.0] {
+            let (at, data) = standing(noise_n, |m| {
+                (m.free.own_surface, m.free.own_friction) = (true, true);
+                for (own, x) in m.own.iter_mut().zip([[3e-4, -0.02], [-5e-4, 0.07], [1e-4, 0.03]]) {
+                    [own.surface_m, own.friction] = x;
+                }
+            });
+            let tangent = Tangent::new(&at.model, &data, &at.residuals);
+            let (mut surface, mut friction) = (0.0, 0.0);
+            for r in 0..3 {
+                let (i, j) = (tangent.place(0, r), tangent.place(1, r));
+                let (a, b, c) = (tangent.matrix.at(i, i), tangent.matrix.at(j, i), tangent.matrix.at(j, j));
+                let own = at.model.own[r];
+                surface += own.surface_m.powi(2) + c / (a * c - b * b);
+                friction += own.friction.powi(2) + a / (a * c - b * b);
+            }
+            let mut told = at.model.clone();
+            spreads(&mut told, &data, &at);
+            near(told.scatter.surface_m, (surface / 3.0).sqrt());
+            near(told.scatter.friction, (friction / 3.0).sqrt());
+            assert_eq!(told.own, at.model.own);
+        }
+    }
+
+    #[test]
+    fn a_number_that_nobody_can_see_keeps_the_spread_that_it_had() {
+        // The tissue lies deeper than the needle goes.
+        let (at, data) = standing(0.01, |m| {
+            (m.free.own_surface, m.free.own_friction, m.free.own_effects) = (true, true, true);
+            m.tissue.surface_m = 0.1;
+            let release: AnyEffect = LetGo::default().into();
+            m.effects = vec![Choice::new(release.info(), &release.parameters())];
+            (m.scatter.surface_m, m.scatter.friction, m.scatter.differing[0]) = (7e-4, 0.03, 9e-4);
+        });
+        let mut told = at.model.clone();
+        told.scatter.surface_m = 1.0;
+        spreads(&mut told, &data, &at);
+        near(told.scatter.surface_m, 7e-4);
+        near(told.scatter.friction, 0.03);
+        near(told.scatter.differing[0], 9e-4);
+    }
+
+    /// What is expected of days counts as four more of them.
+    #[test]
+    fn few_days_tell_a_spread_between_days_together_with_what_is_expected_of_it() {
+        let (at, data) = standing(0.5, |m| {
+            (m.free.day_surface, m.free.day_friction) = (true, true);
+            m.day_of = vec![0, 1, 1];
+            m.days = vec![Day { surface_m: 8e-4, friction: -0.06 }, Day { surface_m: -3e-4, friction: 0.09 }];
+        });
+        let tangent = Tangent::new(&at.model, &data, &at.residuals);
+        let (mut surface, mut friction) = (4.0 * 3e-4 * 3e-4, 4.0 * 0.03 * 0.03);
+        for (i, n) in tangent.shared.iter().enumerate() {
+            let open = 1.0 / tangent.matrix.at(i, i);
+            match n.role {
+                Role::DaySurface(d) => surface += at.model.days[d].surface_m.powi(2) + open,
+                Role::DayFriction(d) => friction += at.model.days[d].friction.powi(2) + open,
+                _ => {}
+            }
+        }
+        let mut told = at.model.clone();
+        spreads(&mut told, &data, &at);
+        near(told.scatter.day_surface_m, (surface / 6.0).sqrt());
+        near(told.scatter.day_friction, (friction / 6.0).sqrt());
+    }
+}

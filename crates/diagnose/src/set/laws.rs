@@ -143,30 +143,40 @@ pub fn laws(
         .map(|f| Law::new(Kind::Library, f, runs));
     progress("fitting a shaft that slips, from several starts");
     let slip = slipping(believed, runs, raw, rng);
-    let mut best = base.clone();
-    for law in slip.iter().chain(&library) {
+    let mut best = best_of(&base, slip.as_ref(), library.as_ref()).clone();
+    progress("what each part of the law is worth");
+    let parts = parts(&mut best, runs);
+    Some(Laws { base, library, slip, best, parts })
+}
+
+/// Of the laws that were tried the one that predicts recordings left out best; the base law where the others are hardly better.
+fn best_of<'a>(base: &'a Law, slip: Option<&'a Law>, library: Option<&'a Law>) -> &'a Law {
+    let mut best = base;
+    for law in slip.into_iter().chain(library) {
         let worth = law.left_out_n() < (1.0 - WORTH) * base.left_out_n();
         let many = law.kind == Kind::Library
             && best.kind == Kind::Slip
             && effects(&law.fitted.fit.model).len() > ONE_STORY;
         let margin = if many { MANY_STORIES } else { 0.0 };
         if worth && law.left_out_n() < (1.0 - margin) * best.left_out_n() {
-            best = law.clone();
+            best = law;
         }
     }
-    progress("what each part of the law is worth");
-    let parts = parts(&mut best, runs);
-    Some(Laws { base, library, slip, best, parts })
+    best
 }
 
 /// The law of a shaft that slips: of the best fits, the one that predicts recordings left out best.
 #[must_use]
 pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut ChaCha8Rng) -> Option<Law> {
-    let starts = (START_FITS / runs.len().max(1)).clamp(STARTS, 3 * STARTS);
-    fitted(believed, runs, raw, starts, rng)
+    fitted(believed, runs, raw, starts(runs.len()), rng)
         .into_iter()
         .map(|f| Law::new(Kind::Slip, f, runs))
         .min_by(|a, b| a.left_out_n().total_cmp(&b.left_out_n()))
+}
+
+/// From how many starts the law of a shaft that slips is fitted to so many recordings.
+fn starts(recordings: usize) -> usize {
+    (START_FITS / recordings.max(1)).clamp(STARTS, 3 * STARTS)
 }
 
 /// Some of the insertions, as many of every speed and stroke: what the library adds is searched for in these.
@@ -361,12 +371,23 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{candidates, effects, held, less, several};
-    use crate::made::believed;
+    use super::{
+        DRAWS, Kind, Law, TURNS, best_of, candidates, coarse, effects, held, judged, less, parts, several,
+        some, starts,
+    };
+    use crate::base::Prepared;
+    use crate::made::{self, believed, insertions, settled};
+    use crate::raw::Raw;
     use crate::set::Insertion;
+    use crate::set::fitted::blocks;
+    use crate::set::left_out::{score, without};
+    use crate::set::population::predict;
     use stylet_identify::model::{Bound, Choice, Model};
     use stylet_record::Recording;
-    use stylet_tissue::{AnyEffect, CoulombFriction, DelayedPuncture, Effect, LetGo, ShaftSlip};
+    use stylet_tissue::{
+        AnyEffect, CoulombFriction, DelayedPuncture, Effect, ForceBias, ForceDrift, LetGo, PowerLawFriction,
+        ShaftSlip,
+    };
 
     fn model(all: &[AnyEffect]) -> Model {
         let belief = believed(&[[0.02, 100.0, 1000.0]; 2]);
@@ -486,5 +507,130 @@ mod tests {
         };
         let (a, b, c) = (run(0.002), run(0.002), run(0.004));
         assert!(!several(&[&a, &b]) && several(&[&a, &c]));
+    }
+
+    fn rubs(c_n_per_m: f64) -> AnyEffect {
+        CoulombFriction { c_n_per_m }.into()
+    }
+
+    #[test]
+    fn a_law_beats_the_base_law_by_two_per_cent_and_many_stories_beat_one_by_ten() {
+        let drift: AnyEffect = ForceDrift { rate_n_per_s: 0.1 }.into();
+        let bend: AnyEffect = PowerLawFriction { exponent: 0.5 }.into();
+        let base = made::law(Kind::Base, &[], &[0.9, 1.1], 0.0);
+        let slip = |e: f64| made::law(Kind::Slip, &[slips(1)], &[e, e], 0.0);
+        let library = |e: f64| made::law(Kind::Library, &[rubs(3.0), drift.clone()], &[e, e], 0.0);
+        let many = |e: f64| made::law(Kind::Library, &[rubs(3.0), drift.clone(), bend.clone()], &[e, e], 0.0);
+        let kind =
+            |slip: Option<Law>, library: Option<Law>| best_of(&base, slip.as_ref(), library.as_ref()).kind;
+        assert_eq!(kind(None, None), Kind::Base);
+        // Two per cent of the base law's 1 N.
+        assert_eq!(kind(Some(slip(0.985)), Some(library(0.985))), Kind::Base);
+        assert_eq!(kind(Some(slip(0.975)), None), Kind::Slip);
+        assert_eq!(kind(None, Some(library(0.975))), Kind::Library);
+        assert_eq!(kind(None, Some(many(0.975))), Kind::Library);
+        // One or two effects against a shaft that slips: the better one; three have to be better by a tenth.
+        assert_eq!(kind(Some(slip(0.5)), Some(library(0.49))), Kind::Library);
+        assert_eq!(kind(Some(slip(0.5)), Some(library(0.51))), Kind::Slip);
+        assert_eq!(kind(Some(slip(0.5)), Some(many(0.46))), Kind::Slip);
+        assert_eq!(kind(Some(slip(0.5)), Some(many(0.44))), Kind::Library);
+        // What could not be judged is no law.
+        assert_eq!(kind(Some(slip(f64::INFINITY)), Some(many(0.97))), Kind::Library);
+    }
+
+    #[test]
+    fn few_recordings_are_begun_from_more_starts() {
+        assert_eq!([1, 4, 5, 10, 12, 13, 40].map(starts), [72, 72, 60, 30, 25, 24, 24]);
+        assert_eq!(starts(0), 72);
+    }
+
+    #[test]
+    fn the_library_is_searched_with_as_many_insertions_of_every_speed() {
+        let one = insertions(&[], &[[0.008, 0.0]]).remove(0);
+        let of = |speeds: &[f64]| {
+            let runs: Vec<Insertion> =
+                speeds.iter().map(|v| Insertion { speed_mps: *v, ..one.clone() }).collect();
+            let runs: Vec<&Insertion> = runs.iter().collect();
+            let mut all = blocks(&runs, &Raw::default());
+            // Told apart by their first force.
+            all.iter_mut().enumerate().for_each(|(k, b)| b.f[0] = k as f64);
+            let prepared = Prepared::new(believed(&[[0.05, 250.0, 2e4]]), all, 0.3);
+            let (part, which) = some(&prepared, &runs);
+            assert_eq!(part.blocks.iter().map(|b| b.f[0] as usize).collect::<Vec<_>>(), which);
+            assert_eq!((part.drops.len(), part.floor_n), (which.len(), prepared.floor_n));
+            which
+        };
+        assert_eq!(of(&[1.0; 9]), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(of(&[1.0; 2]), [0, 1]);
+        assert_eq!(of(&[3.0, 1.0, 1.0, 3.0, 2.0, 3.0, 2.0, 1.0, 2.0]), [0, 1, 2, 3, 4, 6]);
+        // More speeds than insertions are wanted: one of each.
+        assert_eq!(of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 7.0]), [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    #[test]
+    fn a_law_is_judged_on_blocks_three_times_as_long_and_longer_ones_stay() {
+        let runs = insertions(&[], &[[0.004, 0.0], [0.008, 1e-4]]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let fine = settled(&[], &runs);
+        let long = coarse(&fine);
+        for (a, b) in fine.data.blocks.iter().zip(long.data.blocks.iter()) {
+            assert!(
+                (b.to_s[3] - b.from_s[3] - 0.24).abs() < 1e-9 && b.len() == a.len().div_ceil(3),
+                "{}",
+                b.len()
+            );
+        }
+        let again = coarse(&long);
+        assert_eq!(again.data.blocks[0].len(), long.data.blocks[0].len());
+    }
+
+    /// Of at most eight every one is left out by itself, of more every third with it.
+    #[test]
+    fn a_law_is_judged_by_what_it_says_of_recordings_that_took_no_part() {
+        let speeds = [0.008, 0.016];
+        for (count, fold) in [(4, vec![1]), (8, vec![1]), (9, vec![1, 4, 7])] {
+            let all: Vec<[f64; 2]> = (0..count).map(|k| [speeds[k % 2], 1e-4 * (k % 3) as f64]).collect();
+            let runs = insertions(&[], &all);
+            let runs: Vec<&Insertion> = runs.iter().collect();
+            let fitted = settled(&[], &runs);
+            let told = judged(&fitted, &runs);
+            assert_eq!(told.len(), count);
+            let others = without(&coarse(&fitted), &runs, &fold, &[TURNS]).expect("a fit");
+            for r in fold {
+                let wanted = score(runs[r], &predict(&others, runs[r], None, DRAWS)).rmse_n;
+                assert!((told[r] - wanted).abs() < 1e-12, "{r} of {count}: {} for {wanted}", told[r]);
+            }
+            assert!(told.iter().all(|e| *e > 0.0 && *e < 0.5), "{told:?}");
+        }
+    }
+
+    #[test]
+    fn a_part_that_recordings_left_out_do_not_miss_goes_and_one_that_they_miss_stays() {
+        let true_one = rubs(150.0);
+        let runs = insertions(
+            std::slice::from_ref(&true_one),
+            &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]],
+        );
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let bias: AnyEffect = ForceBias { force_n: 1e-3 }.into();
+        let mut law = Law::new(Kind::Library, settled(&[bias.clone(), true_one], &runs), &runs);
+        let before = law.left_out_n();
+        let told = parts(&mut law, &runs);
+        let said: Vec<(&str, &str, bool)> =
+            told.iter().map(|p| (p.effect, p.name.as_str(), p.kept)).collect();
+        assert_eq!(
+            said,
+            [("force_bias", "force_bias", false), ("coulomb_friction", "coulomb_friction", true)]
+        );
+        let mean = |k: usize| stylet_stats::mean(&told[k].without_n);
+        assert!(mean(0) < 1.01 * before && mean(1) > 1.05 * before, "{before}: {} {}", mean(0), mean(1));
+        assert_eq!((effects(&law.fitted.fit.model), law.kind), (vec!["coulomb_friction"], Kind::Library));
+        assert!(law.left_out_n() < 1.01 * before);
+        // A law that has lost all its parts is the base law.
+        let runs = insertions(&[], &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let mut law = Law::new(Kind::Library, settled(&[bias], &runs), &runs);
+        assert!(!parts(&mut law, &runs)[0].kept);
+        assert_eq!((law.kind, law.fitted.fit.model.effects.len()), (Kind::Base, 0));
     }
 }

@@ -152,10 +152,12 @@ pub fn floor(runs: &[&Insertion]) -> Vec<Option<(Score, usize)>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{floor, score};
+    use super::{floor, one_left_out, runs_out, score, speeds_out, without};
+    use crate::made;
     use crate::set::Insertion;
-    use crate::set::population::Prediction;
-    use stylet_identify::model::NEVER;
+    use crate::set::fitted::Fitted;
+    use crate::set::population::{DRAWS, Prediction, predict};
+    use stylet_identify::model::{Day, NEVER};
     use stylet_record::Recording;
 
     /// In by 20 mm in 5 s, a rest of 2 s, and back; the force is the position times 100 and so much more.
@@ -246,5 +248,45 @@ mod tests {
             assert!((s.rmse_n - wanted).abs() < 0.02, "{k}: {}", s.rmse_n);
         }
         assert!(told[3].is_none(), "nobody is like it");
+    }
+
+    /// The set, the days of its runs and the surfaces (m) of these days.
+    fn with_days(speeds: &[f64], days: &[usize], surfaces_m: &[f64]) -> (Vec<Insertion>, Fitted) {
+        let all: Vec<[f64; 2]> = speeds.iter().map(|v| [*v, 0.0]).collect();
+        let runs = made::insertions(&[], &all);
+        let mut fitted = made::settled(&[], &runs.iter().collect::<Vec<_>>());
+        fitted.fit.model.day_of = days.to_vec();
+        fitted.fit.model.days = surfaces_m.iter().map(|x| Day { surface_m: *x, ..Day::default() }).collect();
+        (runs, fitted)
+    }
+
+    #[test]
+    fn a_run_left_out_is_predicted_on_its_day_where_another_one_was_made_on_it() {
+        let (runs, fitted) = with_days(&[0.008, 0.016, 0.008], &[1, 0, 1], &[4e-4, -2e-4]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let told = runs_out(&fitted, &runs);
+        for (r, day) in [(0, Some(1)), (1, None), (2, Some(1))] {
+            let others = without(&fitted, &runs, &[r], &[5]).expect("a fit");
+            assert_eq!((others.recordings, others.law.days.len()), (2, 2));
+            let wanted = predict(&others, runs[r], day, DRAWS);
+            assert_eq!(told[r].prediction.mean, wanted.mean, "{r}");
+            assert_eq!(told[r].score, score(runs[r], &wanted), "{r}");
+            assert!(told[r].population.is_some());
+        }
+        assert_eq!(one_left_out(&fitted, &runs), told.into_iter().map(|o| o.score).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_whole_speed_is_left_out_where_there_is_another_one() {
+        let (runs, fitted) = with_days(&[0.008, 0.016, 0.008], &[], &[]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let told = speeds_out(&fitted, &runs);
+        for (r, group) in [(0, vec![0, 2]), (1, vec![1]), (2, vec![0, 2])] {
+            let others = without(&fitted, &runs, &group, &[10, 6]).expect("a fit");
+            assert_eq!(others.recordings, 3 - group.len());
+            assert_eq!(told[r], score(runs[r], &predict(&others, runs[r], None, DRAWS)), "{r}");
+        }
+        let one = [runs[0], runs[2]];
+        assert!(speeds_out(&fitted, &one).is_empty());
     }
 }

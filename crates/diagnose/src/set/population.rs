@@ -246,12 +246,15 @@ pub fn friction(population: &Population, recording: &Recording, instants: &[f64]
 #[cfg(test)]
 mod tests {
     use super::{DRAWS, PRIMES, Part, Population, drawn, friction, halton, part, predict, single};
+    use crate::made;
     use crate::set::Insertion;
     use std::sync::Arc;
     use stylet_identify::model::{Belief, Choice, Day, Model, NEVER};
     use stylet_record::Recording;
     use stylet_stats::normal::quantile;
-    use stylet_tissue::{DelayedPuncture, Effect, Law, LawState, Layer, LetGo, ShaftSlip, Tissue};
+    use stylet_tissue::{
+        DelayedPuncture, DriveFriction, Effect, Law, LawState, Layer, LetGo, PositionScale, ShaftSlip, Tissue,
+    };
 
     #[test]
     fn halton_points_are_digits_mirrored_at_the_point() {
@@ -472,5 +475,67 @@ mod tests {
                 assert!((told[i] - f.friction_n).abs() < 1e-12, "{instants:?} {i}");
             }
         }
+    }
+
+    /// Root mean squares of the blocks compared in each part, with the noise that blocks average away.
+    #[test]
+    fn what_a_law_leaves_is_told_part_by_part() {
+        let all = made::insertions(&[], &[[0.004, 0.0], [0.008, 0.0]]);
+        let runs: Vec<&Insertion> = all.iter().collect();
+        let mut fitted = made::settled(&[], &runs);
+        for (r, e) in fitted.fit.residuals.e.iter_mut().enumerate() {
+            e.iter_mut().enumerate().for_each(|(k, e)| *e = 1e-3 * ((k * (r + 3)) % 17) as f64);
+        }
+        let mut blocks = fitted.data.blocks.to_vec();
+        blocks[1].used[20..30].fill(false);
+        fitted.data = fitted.data.on(blocks);
+        let told = Population::of(&fitted, &runs);
+        let noise_n = 0.5 * (single(&all[0].recording) + single(&all[1].recording));
+        for wanted in [Part::Loading, Part::Cutting, Part::Hold, Part::Back] {
+            let mut e = Vec::new();
+            for (r, b) in fitted.data.blocks.iter().enumerate() {
+                let first = fitted.fit.model.instants[r][0];
+                let here = |k: &usize| part(runs[r], 0.5 * (b.from_s[*k] + b.to_s[*k]), first) == wanted;
+                e.extend(
+                    (0..b.len()).filter(|k| b.used[*k]).filter(here).map(|k| fitted.fit.residuals.e[r][k]),
+                );
+            }
+            assert!(e.len() > 10, "{wanted:?}");
+            let square = e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64 + noise_n * noise_n;
+            assert!((told.residual_n[wanted as usize] - square.sqrt()).abs() < 1e-12, "{wanted:?}");
+        }
+        assert_eq!((told.recordings, told.law.own.len()), (2, 0));
+    }
+
+    /// The scale of the position acts on way and speed, and what is measured is what a drive adds to the tissue's force.
+    #[test]
+    fn a_drawn_force_is_measured_as_the_instrument_measures() {
+        let run = run();
+        let with = |effects: &[stylet_tissue::AnyEffect]| {
+            let mut p = population();
+            p.law.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+            drawn(&p, &run, 3, Some(0)).expect("a force")
+        };
+        let plain = with(&[]);
+        let drive = with(&[DriveFriction { force_n: 0.3 }.into()]);
+        let r = &run.recording;
+        let moving = |i: &usize| r.velocity_mps[*i].abs() > 1e-3;
+        for i in (0..r.len()).filter(moving) {
+            let wanted = plain[i] + 0.3 * r.velocity_mps[i].signum();
+            assert!((drive[i] - wanted).abs() < 1e-9, "{i}: {} for {wanted}", drive[i]);
+        }
+        // What is written down is too long by a tenth.
+        let scaled = with(&[PositionScale { eps: 0.1 }.into()]);
+        let mut shorter = run.clone();
+        let scale = Model {
+            effects: vec![Choice::new(PositionScale { eps: 0.1 }.info(), &[0.1])],
+            ..population().law
+        };
+        let to_true = scale.compile(0).expect("a law").to_true;
+        assert!((to_true - 1.0).abs() > 0.05, "{to_true}");
+        shorter.recording.position_m.iter_mut().for_each(|z| *z *= to_true);
+        shorter.recording.velocity_mps.iter_mut().for_each(|v| *v *= to_true);
+        let wanted = drawn(&population(), &shorter, 3, Some(0)).expect("a force");
+        assert!(scaled.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 }

@@ -355,3 +355,242 @@ pub fn quality(runs: &[&Insertion]) -> Vec<Quality> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{AtSpeed, Standing, at_speed, bare, by_part, each, mean_report, quality, varies};
+    use crate::made::{believed, insertions, law};
+    use crate::set::Insertion;
+    use crate::set::laws::{Kind, Law};
+    use crate::set::left_out::{Out, Score};
+    use stylet_identify::events::Event;
+    use stylet_identify::model::{Day, NEVER, Own};
+    use stylet_record::{QualityKind, QualityNote};
+
+    fn score(rmse_n: f64, covered: f64) -> Score {
+        Score { rmse_n, covered, ..Score::default() }
+    }
+
+    fn out(rmse_n: f64, covered: f64) -> Out {
+        Out { score: score(rmse_n, covered), ..Out::default() }
+    }
+
+    /// Three runs, two of them at one speed.
+    struct Made {
+        runs: Vec<Insertion>,
+        law: Law,
+        out: Vec<Out>,
+        base_out: Vec<Out>,
+        speed_out: Vec<Score>,
+        base_speed_out: Vec<Score>,
+        floors: Vec<Option<(Score, usize)>>,
+    }
+
+    fn made() -> Made {
+        let runs = insertions(&[], &[[0.008, 0.0], [0.004, 0.0], [0.0082, 0.0]]);
+        let mut law = law(Kind::Library, &[], &[0.1; 3], 0.0);
+        let model = &mut law.fitted.fit.model;
+        let layers = believed(&[[0.02, 100.0, 1000.0]; 2]);
+        (model.tissue, model.belief) = (layers.tissue.clone(), layers);
+        model.own = [(3e-4, 0.05), (-2e-4, -0.1), (0.0, 0.2)]
+            .map(|(surface_m, friction)| Own { surface_m, friction, ..Own::default() })
+            .to_vec();
+        model.days = vec![Day { surface_m: 1e-3, friction: 0.3 }, Day { surface_m: -5e-3, friction: 0.02 }];
+        model.day_of = vec![1, 0, 1];
+        model.instants = vec![vec![2.0, NEVER], vec![1.0, 3.0], vec![NEVER, NEVER]];
+        Made {
+            runs,
+            law,
+            out: vec![out(0.1, 0.9), out(0.2, 0.8), out(0.4, 0.6)],
+            base_out: vec![out(0.5, 0.0), out(0.7, 0.0), out(1.1, 0.0)],
+            speed_out: vec![score(1.0, 0.5), score(2.0, 0.3), score(4.0, 0.1)],
+            base_speed_out: vec![score(10.0, 0.0), score(20.0, 0.0), score(40.0, 0.0)],
+            floors: vec![Some((score(0.3, 0.0), 1)), None, Some((score(0.5, 0.0), 3))],
+        }
+    }
+
+    fn with<T>(m: &Made, look: impl Fn(&Standing) -> T) -> T {
+        let runs: Vec<&Insertion> = m.runs.iter().collect();
+        look(&Standing {
+            runs: &runs,
+            law: &m.law,
+            out: &m.out,
+            base_out: &m.base_out,
+            speed_out: Some(&m.speed_out),
+            base_speed_out: Some(&m.base_speed_out),
+            floors: &m.floors,
+        })
+    }
+
+    #[test]
+    fn a_run_is_told_with_its_own_numbers_its_days_and_where_it_gave_way() {
+        let mut m = made();
+        let event = |elastic_n: f64| Event { elastic_n, ..Event::UNSEEN };
+        m.law.fitted.fit.residuals.events = vec![vec![event(1.5), event(9.0)], vec![event(1.1), event(2.2)]];
+        let told = with(&m, each);
+        assert_eq!(told.iter().map(|r| r.name.as_str()).collect::<Vec<_>>(), ["run 0", "run 1", "run 2"]);
+        for (r, shift_m, friction) in [(0, -4.7e-3, 0.07_f64), (1, 8e-4, 0.2), (2, -5e-3, 0.22)] {
+            assert!((told[r].shift_m - shift_m).abs() < 1e-15, "{r}: {}", told[r].shift_m);
+            assert!((told[r].friction - friction.exp()).abs() < 1e-12, "{r}: {}", told[r].friction);
+            assert_eq!(
+                (told[r].speed_mps, &told[r].releases_m),
+                (m.runs[r].speed_mps, &m.runs[r].releases_m)
+            );
+        }
+        // Only what ruptured has a force, and only where a fit tells it.
+        assert_eq!(
+            told.iter().map(|r| r.puncture_n.clone()).collect::<Vec<_>>(),
+            [vec![Some(1.5), None], vec![Some(1.1), Some(2.2)], vec![None, None]]
+        );
+        let errors: Vec<_> = told.iter().map(|r| (r.base_n, r.extended_n, r.covered, r.floor_n)).collect();
+        assert_eq!(errors, [(0.5, 0.1, 0.9, Some(0.3)), (0.7, 0.2, 0.8, None), (1.1, 0.4, 0.6, Some(0.5))]);
+    }
+
+    #[test]
+    fn a_speed_has_the_means_of_its_runs_and_the_whole_those_of_the_speeds() {
+        let m = made();
+        let fast = with(&m, |s| at_speed(0.0081, &[0, 2], s));
+        let near =
+            |a: Option<f64>, b: f64| assert!((a.expect("a number") - b).abs() < 1e-12, "{a:?} for {b}");
+        assert_eq!((fast.speed_mps, fast.runs), (0.0081, 2));
+        near(fast.floor_n, 0.4);
+        // About a mean of n others one more scatters by sqrt((n + 1)/n) of what runs scatter by.
+        near(fast.floor_bare_n, 0.5 * (0.3 / 2.0_f64.sqrt() + 0.5 / (4.0_f64 / 3.0).sqrt()));
+        near(Some(bare(4)), 0.8_f64.sqrt());
+        near(Some(fast.base_n), 0.8);
+        near(Some(fast.extended_n), 0.25);
+        near(Some(fast.covered), 0.75);
+        near(fast.speed_left_out_n, 2.5);
+        near(fast.speed_covered, 0.3);
+        near(fast.base_speed_left_out_n, 25.0);
+        // A run alone has no floor, and where speeds were not left out nothing is told of it.
+        let slow = with(&m, |s| {
+            at_speed(0.004, &[1], &Standing { speed_out: Some(&[]), base_speed_out: None, ..*s })
+        });
+        assert_eq!((slow.floor_n, slow.floor_bare_n), (None, None));
+        assert_eq!(
+            (slow.speed_left_out_n, slow.speed_covered, slow.base_speed_left_out_n),
+            (None, None, None)
+        );
+        let all = mean_report(&[fast.clone(), AtSpeed { floor_n: Some(0.8), covered: 0.25, ..fast.clone() }]);
+        near(all.floor_n, 0.6);
+        near(Some(all.covered), 0.5);
+        assert_eq!(
+            (all.floor_bare_n, all.base_n, all.extended_n, all.speed_left_out_n),
+            (fast.floor_bare_n, fast.base_n, fast.extended_n, fast.speed_left_out_n)
+        );
+        assert_eq!(
+            (all.speed_covered, all.base_speed_left_out_n),
+            (fast.speed_covered, fast.base_speed_left_out_n)
+        );
+        let all = mean_report(&[fast, slow]);
+        assert_eq!((all.floor_n, all.floor_bare_n, all.speed_left_out_n), (None, None, None));
+        near(Some(all.base_n), 0.75);
+        near(Some(all.extended_n), 0.225);
+    }
+
+    /// Of the runs' sums of squares; what no run has is not told.
+    #[test]
+    fn parts_of_an_insertion_are_pooled_over_the_runs() {
+        let mut m = made();
+        m.out[0].score.parts = [(8.0, 2.0), (0.0, 0.0), (1.0, 4.0), (0.0, 0.0), (3.0, 1.0)];
+        m.out[2].score.parts = [(1.0, 7.0), (0.0, 0.0), (0.0, 0.0), (0.0, 5.0), (0.0, 0.0)];
+        m.floors[0] = Some((
+            Score { parts: [(2.0, 4.0), (9.0, 9.0), (0.0, 0.0), (4.0, 1.0), (0.0, 0.0)], ..Score::default() },
+            2,
+        ));
+        m.floors[2] = Some((
+            Score { parts: [(7.0, 5.0), (9.0, 9.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)], ..Score::default() },
+            2,
+        ));
+        let told: Vec<(&str, Option<f64>, f64)> =
+            with(&m, by_part).iter().map(|p| (p.part, p.floor_n, p.extended_n)).collect();
+        assert_eq!(
+            told,
+            [
+                ("loading", Some(1.0), 1.0),
+                ("cutting", None, 0.5),
+                ("hold", Some(2.0), 0.0),
+                ("back", None, 3.0_f64.sqrt())
+            ]
+        );
+    }
+
+    #[test]
+    fn what_varies_is_told_only_where_it_was_free_to() {
+        let mut m = made();
+        for (run, (ruptures, releases)) in m.runs.iter_mut().zip([
+            (vec![1.0, 2.0], vec![Some(0.010), None]),
+            (vec![1.0, NEVER], vec![Some(0.012), None]),
+            (vec![NEVER, NEVER], vec![None, Some(0.02)]),
+        ]) {
+            (run.ruptures_s, run.releases_m) = (ruptures, releases);
+        }
+        let scatter = &mut m.law.fitted.fit.model.scatter;
+        (scatter.surface_m, scatter.friction, scatter.force) = (1e-4, 0.02, 0.07);
+        (scatter.day_surface_m, scatter.day_friction) = (3e-4, 0.04);
+        let told = with(&m, varies);
+        assert_eq!(
+            (told.surface_m, told.friction, told.puncture, told.day_surface_m, told.day_friction),
+            (0.0, 0.0, 0.07, 0.0, 0.0)
+        );
+        assert_eq!(told.drops, [2, 1]);
+        let (middle, sd) = told.lets_go_m[0].expect("two releases");
+        assert!((middle - 0.011).abs() < 1e-15 && (sd - 0.002 / 2.0_f64.sqrt()).abs() < 1e-15, "{sd}");
+        // One alone does not scatter.
+        assert_eq!(told.lets_go_m[1], Some((0.02, 0.0)));
+        m.runs[2].releases_m[1] = None;
+        assert_eq!(with(&m, varies).lets_go_m[1], None);
+        let free = &mut m.law.fitted.fit.model.free;
+        (free.own_surface, free.own_friction, free.day_surface, free.day_friction) = (true, true, true, true);
+        let told = with(&m, varies);
+        assert_eq!(
+            (told.surface_m, told.friction, told.day_surface_m, told.day_friction),
+            (1e-4, 0.02, 3e-4, 0.04)
+        );
+    }
+
+    #[test]
+    fn the_data_are_told_speed_by_speed_and_then_run_by_run() {
+        let mut m = made();
+        m.runs[1].notes = vec![QualityNote {
+            kind: QualityKind::Jitter,
+            message: "a remark".to_owned(),
+            numbers: Default::default(),
+            lines: Vec::new(),
+            grave: false,
+        }];
+        // Half a second is missing on the way in.
+        let r = &m.runs[2].recording;
+        let kept = |x: &[f64]| -> Vec<f64> {
+            x.iter().enumerate().filter(|(k, _)| !(26..50).contains(k)).map(|(_, x)| *x).collect()
+        };
+        let gapped = stylet_record::Recording::new(kept(&r.time_s), kept(&r.position_m), kept(&r.force_n));
+        let speed_mps = m.runs[2].speed_mps;
+        m.runs[2] =
+            Insertion { speed_mps, ..Insertion::new("run 2".to_owned(), gapped.expect("clean columns"), 1) };
+        let runs: Vec<&Insertion> = m.runs.iter().collect();
+        let told = quality(&runs);
+        let named: Vec<&str> = told.iter().map(|q| q.recording.as_str()).collect();
+        assert_eq!(named[2..], ["run 0", "run 1", "run 1", "run 2"]);
+        assert!(named[0] == "all at 4.00 mm/s" && named[1].starts_with("all at 8."), "{named:?}");
+        assert_eq!(told[3].note.message, "a remark");
+        let slow = &told[0].note.numbers;
+        for (name, wanted) in
+            [("speed_mps", 0.004), ("sample_hz", 50.0), ("largest_gap_s", 0.02), ("stroke_m", 0.016)]
+        {
+            assert!((slow[name] - wanted).abs() < 1e-9 + 1e-6 * wanted, "{name}: {}", slow[name]);
+        }
+        let fast = &told[1].note.numbers;
+        assert!((fast["largest_gap_s"] - 0.5).abs() < 1e-9, "{fast:?}");
+        let hz = |r: &Insertion| (r.recording.len() - 1) as f64 / r.recording.duration_s();
+        assert!((fast["sample_hz"] - 0.5 * (hz(&m.runs[0]) + hz(&m.runs[2]))).abs() < 1e-9, "{fast:?}");
+        let message = &told[1].note.message;
+        assert!(
+            message.starts_with("2 recording(s) at 8.") && message.contains("largest gap 500 ms"),
+            "{message}"
+        );
+        assert!(message.ends_with("stroke ends at 16.0 mm"), "{message}");
+        assert!(told[0].note.message.contains("really 50.0 samples per second"), "{}", told[0].note.message);
+    }
+}

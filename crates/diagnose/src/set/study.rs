@@ -286,30 +286,21 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{advice, bought, cause, confidence, dropped, evidence, speeds};
-    use crate::made::believed;
+    use super::{advice, bought, cause, confidence, diagnosis, dropped, evidence, speeds};
+    use crate::made;
+    use crate::outcome::{Diagnosis, Verdict};
+    use crate::raw::Raw;
     use crate::set::Insertion;
-    use crate::set::fitted::Fitted;
+    use crate::set::instrument::Instrument;
     use crate::set::laws::{Kind, Law, Laws, Part};
     use crate::set::numbers::Told;
-    use std::sync::Arc;
-    use stylet_identify::fit::Fit;
-    use stylet_identify::model::{Choice, Model};
-    use stylet_identify::noise::Noise;
-    use stylet_identify::objective::{Data, Residuals};
+    use crate::set::repeats::{MeanReport, Repeats, Varies};
     use stylet_record::Recording;
-    use stylet_tissue::{CoulombFriction, Effect};
+    use stylet_tissue::{AnyEffect, CoulombFriction};
 
     fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {
-        let belief = believed(&[[0.02, 100.0, 1000.0]]);
-        let mut model = Model::base(belief, 0);
-        if with {
-            model.effects = vec![Choice::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
-        }
-        let residuals = Residuals { e: Vec::new(), w: Vec::new(), events: Vec::new(), nats };
-        let data = Data::new(Arc::new(Vec::new()), Noise::white(1.0), 0.0);
-        let fitted = Fitted { fit: Fit { model, residuals }, data, drops: Vec::new(), starts: (8, 3) };
-        Law { kind, fitted, errors_n: errors_n.to_vec() }
+        let rubs: [AnyEffect; 1] = [CoulombFriction { c_n_per_m: 3.0 }.into()];
+        made::law(kind, &rubs[..usize::from(with)], errors_n, nats)
     }
 
     #[test]
@@ -460,5 +451,93 @@ mod tests {
         let told = speeds(&refs);
         assert_eq!(told.iter().map(|s| s.1.clone()).collect::<Vec<_>>(), [vec![1, 2], vec![0]]);
         assert!((told[0].0 - 0.002025).abs() < 1e-12 && told[1].0 == all[0].speed_mps);
+    }
+
+    /// Repeats whose base law, extended law and floor leave so much (N); the noise is 0.1 N.
+    fn repeats(base_n: f64, extended_n: f64, floor_n: Option<f64>) -> Repeats {
+        Repeats {
+            runs: Vec::new(),
+            speeds: Vec::new(),
+            mean: MeanReport { floor_n, base_n, extended_n, ..MeanReport::default() },
+            parts_of_insertion: Vec::new(),
+            population: Varies {
+                surface_m: 0.0,
+                friction: 0.0,
+                puncture: 0.0,
+                day_surface_m: 0.0,
+                day_friction: 0.0,
+                drops: Vec::new(),
+                lets_go_m: Vec::new(),
+                residual_n: Vec::new(),
+            },
+            starts: (8, 3),
+            bought: Vec::new(),
+            instrument: Instrument { noise_n: Some(0.1), ..Instrument::default() },
+            parts: None,
+        }
+    }
+
+    fn told(laws: &Laws, repeats: &Repeats) -> Diagnosis {
+        diagnosis(laws, &[], &made::gel(), &[], repeats, &Raw::default())
+    }
+
+    /// Unknown is what a law leaves beyond the floor when that is a tenth of what the base law leaves, and a fifth of the floor.
+    #[test]
+    fn a_set_is_unknown_when_its_law_leaves_a_tenth_of_what_is_beyond_the_floor() {
+        let share = |base: f64, extended: f64| (extended * extended - 0.01) / (base * base - 0.01);
+        for (base_n, extended_n, unknown) in [
+            (0.5, 0.18, false),
+            (0.5, 0.19, true),
+            // Less than a fifth above the floor is no structure.
+            (0.13, 0.119, false),
+            (0.13, 0.121, true),
+        ] {
+            let d = told(&laws(), &repeats(base_n, extended_n, Some(0.1)));
+            assert_eq!(d.verdict, if unknown { Verdict::Unknown } else { Verdict::Named }, "{extended_n}");
+            assert!((d.leftover.share - share(base_n, extended_n)).abs() < 1e-9, "{}", d.leftover.share);
+            assert_eq!(
+                (d.gain.floor_n, d.gain.rmse_before_n, d.gain.rmse_after_n),
+                (0.1, base_n, extended_n)
+            );
+        }
+        // A law that is worse than the base law leaves all, and one below the floor nothing.
+        assert_eq!(told(&laws(), &repeats(0.5, 0.6, Some(0.1))).leftover.share, 1.0);
+        assert_eq!(told(&laws(), &repeats(0.5, 0.05, Some(0.1))).leftover.share, 0.0);
+        // Without repeats of one speed nobody knows the floor; it is at least the noise.
+        let d = told(&laws(), &repeats(0.5, 0.4, None));
+        assert_eq!((d.verdict, d.gain.floor_n, d.noise.sd_n), (Verdict::Named, 0.1, 0.1));
+    }
+
+    #[test]
+    fn the_base_law_alone_is_right_or_unknown() {
+        let plain = Laws { best: law(Kind::Base, &[0.5, 0.7], -20.0, false), ..laws() };
+        let d = told(&plain, &repeats(0.119, 0.119, Some(0.1)));
+        assert_eq!((d.verdict, d.leftover.share, d.causes.len()), (Verdict::None, 0.0, 0));
+        let d = told(&plain, &repeats(0.121, 0.121, Some(0.1)));
+        assert_eq!((d.verdict, d.leftover.share), (Verdict::Unknown, 1.0));
+    }
+
+    /// Of several parts a cause is judged by its own, where that was kept.
+    #[test]
+    fn a_cause_is_judged_by_the_part_that_was_kept_of_it() {
+        let mut laws = laws();
+        laws.best = law(Kind::Library, &[0.2, 0.1], -90.0, true);
+        let part = |name: &str, without_n: &[f64], kept| Part {
+            effect: "coulomb_friction",
+            name: name.to_owned(),
+            without_n: without_n.to_vec(),
+            kept,
+        };
+        laws.parts = vec![
+            part("coulomb_friction", &[0.9, 0.9], false),
+            part("wear", &[0.5, 0.6], true),
+            part("coulomb_friction", &[0.3, 0.4], true),
+        ];
+        let d = told(&laws, &repeats(0.5, 0.12, Some(0.1)));
+        assert_eq!(d.causes.len(), 1);
+        // Mean squares 0.37, 0.025 and 0.125.
+        assert!((d.causes[0].share - 0.1 / 0.345).abs() < 1e-12, "{}", d.causes[0].share);
+        assert_eq!(d.causes[0].confidence, confidence(&[0.3, 0.4], &[0.2, 0.1]));
+        assert_eq!(d.evidence[0].taken.as_deref(), Some("coulomb_friction"));
     }
 }

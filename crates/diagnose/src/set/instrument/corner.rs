@@ -302,6 +302,42 @@ mod tests {
         assert_eq!(said(4.0, LEAST_S - 0.03, 0.0), None);
     }
 
+    /// The jackknife: the delays that the others tell when each insertion in turn is left out, scattered by `(n - 1) / sqrt(n)`.
+    #[test]
+    fn the_interval_of_a_delay_is_that_of_what_the_other_insertions_tell() {
+        let runs: Vec<Insertion> = [0.26, 0.3, 0.36]
+            .iter()
+            .enumerate()
+            .map(|(k, by)| run(&format!("{k}"), 4.0, *by, 0.0, 17 + 5 * k as u64))
+            .collect();
+        let told = late(&runs.iter().collect::<Vec<_>>()).expect("late");
+        let others: Vec<f64> = (0..3)
+            .map(|out| {
+                let rest: Vec<&Insertion> = (0..3).filter(|k| *k != out).map(|k| &runs[k]).collect();
+                late(&rest).expect("late").by_s
+            })
+            .collect();
+        let mean = others.iter().sum::<f64>() / 3.0;
+        let sd = (others.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
+        // Student's 97.5 % point of two degrees of freedom.
+        let half = 4.302_653 * sd * 2.0 / 3.0_f64.sqrt();
+        assert!(half > 0.02, "{half}");
+        assert!((told.high_s - told.by_s - half).abs() < 1e-6, "{told:?} for {half}");
+        assert!((told.low_s - (told.by_s - half).max(0.0)).abs() < 1e-6, "{told:?} for {half}");
+    }
+
+    #[test]
+    fn two_corners_at_least_and_half_of_the_insertions_tell_a_delay() {
+        let told = |with: usize, without: usize| {
+            let runs: Vec<Insertion> = (0..with + without)
+                .map(|k| run(&format!("{k}"), if k < with { 4.0 } else { 0.5 }, 0.26, 0.0, 17 + 5 * k as u64))
+                .collect();
+            late(&runs.iter().collect::<Vec<_>>()).is_some()
+        };
+        assert!(told(2, 2) && told(3, 3));
+        assert!(!told(1, 0) && !told(2, 3));
+    }
+
     #[test]
     fn a_corner_counts_only_when_it_stands_alone() {
         let has = |run: &Insertion| [At::Back, At::Stop].map(|at| Corner::of(run, at).is_some());

@@ -385,6 +385,51 @@ mod tests {
         assert_eq!(bias(&[refs[0], &late, &later]), None);
     }
 
+    /// An insertion from so far before a surface at 0 and back, 20 s, with a force in air that changes at this rate (N/s).
+    fn drifting(k: usize, ahead_m: f64, rate_n_per_s: f64) -> Insertion {
+        let t: Vec<f64> = (0..1000).map(|i| 0.02 * i as f64).collect();
+        let at = |t: f64| if t < 12.0 { 0.002 * t - ahead_m } else { 0.024 - ahead_m - 0.004 * (t - 12.0) };
+        let z: Vec<f64> = t.iter().map(|t| at(*t)).collect();
+        let noise = |i: usize| 1e-3 * (((i * 7919 + 31 * k) % 101) as f64 / 101.0 - 0.5);
+        let f = t
+            .iter()
+            .enumerate()
+            .map(|(i, t)| 0.2 + rate_n_per_s * t + 150.0 * at(*t).max(0.0) + noise(i))
+            .collect();
+        Insertion::new(format!("{k}"), Recording::new(t, z, f).expect("clean columns"), 1)
+    }
+
+    #[test]
+    fn half_of_the_insertions_tell_a_drift_over_an_insertion() {
+        let (run, deep) = (drifting(0, 0.008, 0.02), drifting(1, -0.001, 0.02));
+        let drift = |with: usize, without: usize| {
+            let all: Vec<&Insertion> =
+                std::iter::repeat_n(&run, with).chain(std::iter::repeat_n(&deep, without)).collect();
+            Instrument::look(&Checks::default(), &all, 0.0).drift_n
+        };
+        // 20 mN/s over 19.98 s.
+        for (with, without) in [(1, 0), (2, 0), (1, 1), (2, 2)] {
+            let told = drift(with, without);
+            assert_eq!(told.is_some(), with >= 1 && 2 * with >= (with + without).max(2));
+            assert!(told.is_none_or(|d| (d - 0.3996).abs() < 0.01), "{told:?}");
+        }
+        assert_eq!((drift(1, 2), drift(2, 3)), (None, None));
+    }
+
+    /// A drift worth a word makes of a load what it was at first; one that is nothing leaves its median.
+    #[test]
+    fn a_load_is_read_at_its_beginning_where_the_sensor_drifts() {
+        let f = (0..200).map(|k| 5.7 + 0.01 * f64::from(k) + 1e-3 * f64::from((k * 37) % 11)).collect();
+        let weight = still(f);
+        for (rate, level) in [(0.02, 5.5), (1e-3, 5.5 + 0.995)] {
+            let run = drifting(0, 0.008, rate);
+            let checks = Checks { load: Some((&weight, 5.0)), ..Checks::default() };
+            let seen = Instrument::look(&checks, &[&run, &run], 0.0);
+            let gain = seen.gain.expect("a gain");
+            assert!((gain - (level / 5.0 - 1.0)).abs() < 4e-3, "{rate}: {gain}");
+        }
+    }
+
     #[test]
     fn the_timing_of_a_run_is_told_as_it_is() {
         let t = vec![0.0, 0.01, 0.02, 0.035, 0.05];

@@ -184,6 +184,22 @@ mod tests {
         assert_eq!(bent.force_n, kept);
     }
 
+    /// A fiftieth of the largest force is nothing worth a word, a spike's too.
+    #[test]
+    fn spikes_count_from_a_fiftieth_of_the_largest_force_on() {
+        let spikes = |size: f64| {
+            let mut f: Vec<f64> = (0..600).map(|k| 10.0 + if k % 2 == 0 { 1e-3 } else { -1e-3 }).collect();
+            for k in [100, 250, 400] {
+                f[k] = 10.0 + size;
+            }
+            let t = (0..600).map(|k| 0.01 * f64::from(k)).collect();
+            let r = Recording::new(t, vec![0.0; 600], f).expect("clean columns");
+            let run = Insertion::new("one".to_owned(), r, 1);
+            Instrument::default().undo(&[&run]).raw.spikes.map(|s| s.count)
+        };
+        assert_eq!((spikes(0.2), spikes(0.21)), (None, Some(3)));
+    }
+
     fn shows(all: Vec<AnyEffect>) -> Instrument {
         let shown = all.into_iter().map(|e| Shown {
             effect: e.id().to_owned(),
