@@ -39,30 +39,38 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
         cells
     });
     // Only where there is a truth for them.
-    let estimates = rows.iter().filter(|r| r.enhancement_rms_relative.is_some()).map(|r| {
-        let mut cells = head(r);
-        let enhancement = Cell::number(shown(r.enhancement_rms_relative, 100.0, 2));
-        cells.push(
-            enhancement
-                .status(r.enhancement_rms_relative.map_or(Status::Plain, |x| Status::at_most(x, 0.05, 0.2))),
-        );
-        cells.push(Cell::number(intervals(&[r.enhancement_interval])));
-        cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
-        cells.push(Cell::number(list(&r.stiffness_error)));
-        cells.push(Cell::number(list(&r.friction_error)));
-        // The widest last: what a narrow window cuts off is what one can do without.
-        cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
-        cells
-    });
-    let calibrated = rows.iter().filter(|r| r.coverage.tip_force.is_some()).map(|r| {
-        let mut cells = head(r);
-        let c = &r.coverage;
-        for share in [c.stiffness, c.friction, c.cumulative_friction, c.tip_force] {
-            let status = share.map_or(Status::Plain, |x| Status::at_most((x - 0.94).abs(), 0.04, 0.1));
-            cells.push(Cell::number(shown(share, 100.0, 3)).status(status));
-        }
-        cells
-    });
+    let estimates: Vec<_> =
+        rows.iter()
+            .filter(|r| r.enhancement_rms_relative.is_some())
+            .map(|r| {
+                let mut cells = head(r);
+                let enhancement = Cell::number(shown(r.enhancement_rms_relative, 100.0, 2));
+                cells.push(enhancement.status(
+                    r.enhancement_rms_relative.map_or(Status::Plain, |x| Status::at_most(x, 0.05, 0.2)),
+                ));
+                cells.push(Cell::number(intervals(&[r.enhancement_interval])));
+                cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
+                cells.push(Cell::number(list(&r.stiffness_error)));
+                cells.push(Cell::number(list(&r.friction_error)));
+                // The widest last: what a narrow window cuts off is what one can do without.
+                cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
+                cells
+            })
+            .collect();
+    let calibrated: Vec<_> = rows
+        .iter()
+        .filter(|r| r.coverage.tip_force.is_some())
+        .map(|r| {
+            let mut cells = head(r);
+            let c = &r.coverage;
+            for share in [c.stiffness, c.friction, c.cumulative_friction, c.tip_force] {
+                let status = share.map_or(Status::Plain, |x| Status::at_most((x - 0.94).abs(), 0.04, 0.1));
+                cells.push(Cell::number(shown(share, 100.0, 3)).status(status));
+            }
+            cells
+        })
+        .collect();
+    let (estimated, has_intervals) = (!estimates.is_empty(), !calibrated.is_empty());
     let ruptures = Table::new(
         "Ruptures missed and false alarms",
         &[
@@ -86,14 +94,14 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
             "friction, layer by layer",
             "the stiffness's 95 % intervals",
         ],
-        estimates.collect(),
+        estimates,
     );
     let covered = Table::new(
         "Covered, %",
         &["scenario", "algorithm", "stiffness", "friction", "cumulative friction", "tip force"],
-        calibrated.collect(),
+        calibrated,
     );
-    Page::new("Algorithms compared")
+    let mut page = Page::new("Algorithms compared")
         .subtitle(format!("{seeds} noise seeds per scenario and algorithm; the same insertions for each"))
         .fact("version", env!("CARGO_PKG_VERSION"))
         .section(
@@ -103,8 +111,10 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                      missed and false together, Wilson's (a count's where there are more than ruptures).",
                 )
                 .table(ruptures),
-        )
-        .section(
+        );
+    // A world of the referee knows ruptures alone.
+    if estimated {
+        page = page.section(
             Section::new("Estimates")
                 .text(
                     "Medians over the seeds, with their intervals between order statistics. Enhanced force: RMS of \
@@ -112,13 +122,31 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                      beside it the same with the sensor's noise.",
                 )
                 .table(errors),
-        )
-        .section(
+        );
+    }
+    if has_intervals {
+        page = page.section(
             Section::new("Calibration")
                 .text(
                     "How often the truth lay in a 95 % interval, in %: over layers and seeds, the tip's force over samples. \
                      An algorithm that gives no intervals is not listed.",
                 )
                 .table(covered),
-        )
+        );
+    }
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use super::page;
+    use stylet_sweep::compare::{Row, Scored};
+
+    #[test]
+    fn a_world_that_knows_ruptures_alone_has_no_empty_sections() {
+        let heard = Scored { ruptures: 4, missed: 1, ..Scored::default() };
+        let html = page(&[Row::new("rich world, clean", "Stylet", 2, &heard)], 2).to_html();
+        assert!(html.contains("1 / 0 of 4"));
+        assert!(!html.contains("Estimates") && !html.contains("Calibration"));
+    }
 }
