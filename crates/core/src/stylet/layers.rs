@@ -234,7 +234,8 @@ impl Layers {
 
     /// What has lost force was a layer, which looked like friction that grows on: any part of the slope may have been elastic.
     pub(super) fn was_not_free(&mut self, drive: f64, unit: f64) {
-        let half = 0.5 * self.slope(drive);
+        let widest = libm::sqrt(WIDEST / unit) / MEMORY_M;
+        let half = (0.5 * self.slope(drive)).clamp(-widest, widest);
         let g = &mut self.belief;
         (g.x[K], g.x[F]) = (g.x[K] + half, g.x[F] - half / drive);
         let variance = half * half * unit;
@@ -800,6 +801,17 @@ mod tests {
         assert_belief(&layers.belief, &x, &p);
         assert_eq!((layers.previous_sd_m, layers.start_sd_m, layers.free), (8e-4, 0.0, false));
         near(layers.previous_m, 1e-6, 1e-9);
+    }
+
+    #[test]
+    fn no_more_of_a_slope_is_in_doubt_than_what_can_be_told_from_the_noise() {
+        for (friction, half) in [(400.0, 60.0), (1e9, 1000.0), (-1e9, -1000.0)] {
+            let (mut layers, _) = knowing(2);
+            layers.belief = Gaussian::new([130.0, 0.0, friction, 44.0, 7100.0, 0.06], [1.0; N]);
+            layers.was_not_free(0.3, 1e8);
+            near(layers.belief.x[K], half, 1e-9);
+            near(layers.belief.p[K][K], 1.0 + half * half * 1e8, 1e-9);
+        }
     }
 
     #[test]

@@ -85,7 +85,8 @@ fn the_papers_algorithm_survives_the_same_torture() {
 
 #[test]
 fn nothing_that_a_robot_or_a_logger_does_spoils_the_beliefs() {
-    for seed in 0..tortured(60) {
+    // The last has spoilt them once: a slope of 10^8 N/m beside a noise of 0.1 mN.
+    for seed in (0..tortured(60)).chain([4374]) {
         let mut core = core();
         let (mut used, mut bounded, mut last) = (0, 0, None);
         torture(seed, 12_000, |sample| {
