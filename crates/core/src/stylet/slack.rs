@@ -97,7 +97,7 @@ impl Slack {
         bent
     }
 
-    /// After a sample at `position_m` that the estimator took with the standardised innovation `z` (`before`, while the tip is free, is the estimator
+    /// After a sample at `position_m` that the estimator took with the standardised innovation `z` (`before`, while the tip may be free, is the estimator
     /// without it, `last_m` the position of the sample before). Returns the work done, and whether the force has bent.
     #[inline(always)]
     pub(super) fn follow(

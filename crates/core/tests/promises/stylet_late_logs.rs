@@ -7,7 +7,7 @@ const HZ: f64 = 200.0;
 /// Samples on either side that a velocity is the slope of: 50 ms.
 const HALF: usize = 10;
 
-/// With the velocity that the positions of eleven samples on both sides have as their slope.
+/// With the velocity that the positions of ten samples on both sides have as their slope.
 fn differentiated(mut data: Insertion) -> Insertion {
     let at: Vec<(f64, f64)> = data.samples.iter().map(|s| (s.time_s, s.position_m)).collect();
     for (k, sample) in data.samples.iter_mut().enumerate() {
