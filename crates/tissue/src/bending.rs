@@ -27,6 +27,9 @@ const NEARLY: f64 = 1e-9;
 /// Evaluations of the law per search at most.
 const MAX_TRIALS: usize = 80;
 
+/// Evaluations after which the bracket is only halved: those left are enough for any.
+const SECANTS: usize = 16;
+
 /// Just outside the dead band.
 const SLIDING_MPS: f64 = SGN_DEAD_BAND_MPS * (1.0 + 1e-9);
 
@@ -295,7 +298,8 @@ impl Law {
             }
             if let (Some(low), Some(high)) = (low, high) {
                 let inside = f64::min(low, high) < next && next < f64::max(low, high);
-                if !inside || turn % 4 == 3 {
+                // Where the force jumps, secants creep: a search that takes long halves the bracket alone.
+                if !inside || turn % 4 == 3 || turn >= SECANTS {
                     next = 0.5 * (low + high);
                 }
             } else if turn > 3 {

@@ -315,36 +315,87 @@ fn the_balance_holds_with_every_effect_of_the_tissue() {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+/// Any needle, with the effects that make the balance hardest: in balance wherever the force is a
+/// rising function of depth and speed, finite and bounded everywhere.
+#[derive(Clone, Copy, Debug)]
+struct Hard {
+    log_ks: f64,
+    rate_hz: f64,
+    mean_mps: f64,
+    ripple_mps: f64,
+    c_n_per_m: f64,
+    c_extra_n_per_m: f64,
+    cut_n: f64,
+    rho: f64,
+    g: f64,
+}
 
-    /// Any needle, with the effects that make the balance hardest: in balance wherever the force
-    /// is a rising function of depth and speed, finite and bounded everywhere.
-    #[test]
-    fn the_balance_is_found_for_any_needle(
-        log_ks in 1.0f64..6.0, rate in 20.0f64..2000.0, mean in 0.0005f64..0.013, ripple in 0.0f64..0.013,
-        c in 0.0f64..30.0, c_extra in 0.0f64..30.0, cut in 0.0f64..1.0, rho in 0.0f64..1.0, g in 0.0f64..0.9,
-    ) {
-        let ks = 10f64.powf(log_ks);
-        let motion = ripple_hold_retract(-0.002, mean, ripple, 0.7, rate);
+impl Hard {
+    /// What is wrong with the balance, if anything.
+    fn fault(&self) -> Result<(), String> {
+        let ks = 10f64.powf(self.log_ks);
+        let motion = ripple_hold_retract(-0.002, self.mean_mps, self.ripple_mps, 0.7, self.rate_hz);
+        let c = self.c_n_per_m;
         let rising: Vec<AnyEffect> = vec![
             spring(ks),
             CoulombFriction { c_n_per_m: c }.into(),
-            CuttingForce { force_n: cut }.into(),
-            StressRelaxation { terms: vec![PronyTerm { fraction: g, time_constant_s: 0.5 }] }.into(),
+            CuttingForce { force_n: self.cut_n }.into(),
+            StressRelaxation { terms: vec![PronyTerm { fraction: self.g, time_constant_s: 0.5 }] }.into(),
             PreslidingFriction { c_n_per_m: c, delta_m: 1e-3 }.into(),
             AsymmetricFriction { eps: 0.3 }.into(),
         ];
         let (f, tips, _) = bend(&three_gels(), &rising, &motion);
         for (&(_, z, _), (force, tip)) in motion.iter().zip(f.iter().zip(&tips)) {
-            prop_assert!((tip - z + force.total_n / ks).abs() < 1e-11, "{} {} {:?}", tip, z, force);
+            if (tip - z + force.total_n / ks).abs() >= 1e-11 {
+                return Err(format!("tip at {tip}, base at {z}: {force:?}"));
+            }
         }
         let mut falling = rising;
-        falling.push(StribeckFriction { c_n_per_m: c, c_static_n_per_m: c + c_extra, v_stribeck_mps: 1e-3 }.into());
-        falling.push(IncompleteRelease { fraction: rho }.into());
+        falling.push(
+            StribeckFriction {
+                c_n_per_m: c,
+                c_static_n_per_m: c + self.c_extra_n_per_m,
+                v_stribeck_mps: 1e-3,
+            }
+            .into(),
+        );
+        falling.push(IncompleteRelease { fraction: self.rho }.into());
         falling.push(SoftBoundary { width_m: 0.003 }.into());
         falling.push(NonlinearElasticity { kappa_per_m: -10.0 }.into());
         let (f, _, _) = bend(&three_gels(), &falling, &motion);
-        prop_assert!(f.iter().all(|f| f.total_n.is_finite() && f.total_n.abs() < 100.0));
+        match f.iter().find(|f| !f.total_n.is_finite() || f.total_n.abs() >= 100.0) {
+            Some(wild) => Err(format!("{wild:?}")),
+            None => Ok(()),
+        }
+    }
+}
+
+#[test]
+fn a_tip_that_stands_at_a_face_before_which_the_force_jumps_is_held_there() {
+    // Before the face nothing is felt, behind it half a newton of cutting: the spring's 50 uN hold the tip in the jump.
+    let hard = Hard {
+        log_ks: 2.1927527601298804,
+        rate_hz: 1231.1370581036226,
+        mean_mps: 0.006372165221684076,
+        ripple_mps: 0.0028029613510873975,
+        c_n_per_m: 12.794145357660849,
+        c_extra_n_per_m: 0.0,
+        cut_n: 0.5473179780853707,
+        rho: 0.0,
+        g: 0.8958698323822238,
+    };
+    hard.fault().expect("in balance");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_balance_is_found_for_any_needle(
+        log_ks in 1.0f64..6.0, rate_hz in 20.0f64..2000.0, mean_mps in 0.0005f64..0.013, ripple_mps in 0.0f64..0.013,
+        c_n_per_m in 0.0f64..30.0, c_extra_n_per_m in 0.0f64..30.0, cut_n in 0.0f64..1.0, rho in 0.0f64..1.0, g in 0.0f64..0.9,
+    ) {
+        let hard = Hard { log_ks, rate_hz, mean_mps, ripple_mps, c_n_per_m, c_extra_n_per_m, cut_n, rho, g };
+        prop_assert_eq!(hard.fault(), Ok(()));
     }
 }

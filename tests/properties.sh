@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# The property tests with other cases than those of `cargo test`, which are always the same: ROUNDS times (20), from the seed FIRST (1) on.
+# Ends at the first property that does not hold; its case is printed, and belongs into a test of its own. Some ten seconds a round on two cores.
+#   tests/properties.sh [ROUNDS [FIRST]]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+rounds=${1:-20} first=${2:-1}
+for ((seed = first; seed < first + rounds; seed++)); do
+    echo "seed $seed"
+    while read -r crate tests; do
+        # shellcheck disable=SC2086
+        PROPTEST_RNG_SEED=$seed cargo test --quiet --release -p "stylet-$crate" $tests >"${TMPDIR:-/tmp}/properties.log" 2>&1 || {
+            cat "${TMPDIR:-/tmp}/properties.log"
+            echo "seed $seed of stylet-$crate does not hold" >&2
+            exit 1
+        }
+    done <<'CRATES'
+tissue --test base_law --test effect_library --test measurement_chain --test needle_compliance --test shaft_slip
+plan --test limits_are_kept
+sweep --test distributions
+scenario --lib --test promises
+record --lib --test reading --test round_trip
+core --test promises estimation
+CRATES
+done
+echo "$rounds rounds: every property holds"
