@@ -9,7 +9,7 @@
 mod server;
 mod support;
 
-use server::{Ended, Server, shim};
+use server::{Ended, Server, preloaded, shim};
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
@@ -188,6 +188,26 @@ fn all_commands_stand_every_fault_at_every_call() {
         let begun = Instant::now();
         let faults = every_fault(&shim, &case, &out_of(&scratch), "kateEnNs", 1);
         println!("{}: {faults} faults in {:.0} s, no mixture", case.name, begun.elapsed().as_secs_f64());
+    }
+}
+
+#[test]
+fn clocks_that_jump_change_no_byte() {
+    let scratch = Scratch::in_memory("faults-clocks");
+    let Some(clock) = preloaded(scratch.path(), "clock") else { return };
+    let out = out_of(&scratch);
+    for case in cases(&scratch).iter().filter(|case| case.name != "reproduce") {
+        let new = made(&case.new, &out);
+        restore(&out, &Files::new());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
+        let output = command.args(to(&case.new, &out)).env("LD_PRELOAD", &clock).output().expect("it starts");
+        assert!(output.status.success(), "{}: {}", case.name, said(&output));
+        assert!(
+            held(&out) == new && left_over(&out).is_empty(),
+            "{}: the clock is in its results",
+            case.name
+        );
+        restore(&out, &Files::new());
     }
 }
 

@@ -7,8 +7,13 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 
 /// The library that brings the faults, compiled into `folder`; `None`, and said so, where there is no `cc`.
 pub fn shim(folder: &Path) -> Option<PathBuf> {
-    let library = folder.join("shim.so");
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/shim.c");
+    preloaded(folder, "shim")
+}
+
+/// The library of `tests/faults/NAME.c`, if there is a compiler.
+pub fn preloaded(folder: &Path, name: &str) -> Option<PathBuf> {
+    let library = folder.join(format!("{name}.so"));
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/faults/{name}.c"));
     let made = Command::new("cc")
         .args(["-O1", "-shared", "-fPIC", "-o"])
         .args([&library, &source])
@@ -16,11 +21,11 @@ pub fn shim(folder: &Path) -> Option<PathBuf> {
         .status();
     match made {
         Ok(status) => {
-            assert!(status.success(), "tests/faults/shim.c compiles");
+            assert!(status.success(), "tests/faults/{name}.c compiles");
             Some(library)
         }
         Err(why) => {
-            let _ = writeln!(std::io::stderr(), "SKIPPED faults of a disk: cc does not run: {why}");
+            let _ = writeln!(std::io::stderr(), "SKIPPED faults: cc does not run: {why}");
             None
         }
     }
