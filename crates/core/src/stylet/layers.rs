@@ -15,7 +15,7 @@
 //! *before* it (the force that is left is friction), and every sample before about `D` after: the joint least-squares solution without
 //! buffer or replay.
 
-use super::gaussian::{Gaussian, WIDEST, at_least};
+use super::gaussian::{Gaussian, Innovation, WIDEST, at_least};
 use super::local::MEMORY_M;
 use super::noise::Noise;
 use crate::compensation::MAX_LAYERS;
@@ -131,6 +131,13 @@ impl Layers {
     /// Takes a sample; returns the innovation in N and its variance in units of the noise's.
     #[inline(always)]
     pub(crate) fn take(&mut self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> (f64, f64) {
+        let innovation = self.innovation(position_m, drive, force_n, rho);
+        self.learn(&innovation, position_m, drive, force_n)
+    }
+
+    /// What a sample says before it is taken.
+    #[inline(always)]
+    pub(crate) fn innovation(&self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> Innovation<6> {
         let x = position_m - self.start_m;
         let (mut w, mut y, mut r) = (self.regressor(x, drive), force_n, 1.0);
         if rho != 0.0 {
@@ -143,13 +150,24 @@ impl Layers {
                 r = 1.0 / (1.0 - rho * rho);
             }
         }
-        let innovation = if self.passed > 0 {
+        if self.passed > 0 {
             self.belief.innovation([A, K, F, ZERO], [w[A], w[K], w[F], w[ZERO]], y, r)
         } else {
             self.belief.innovation([A, K, F, KP, ZERO], [w[A], w[K], w[F], w[KP], w[ZERO]], y, r)
-        };
-        self.belief.take(&innovation);
-        self.last = Some([x, drive, force_n]);
+        }
+    }
+
+    /// Takes the sample of an [`Layers::innovation`].
+    #[inline(always)]
+    pub(crate) fn learn(
+        &mut self,
+        innovation: &Innovation<6>,
+        position_m: f64,
+        drive: f64,
+        force_n: f64,
+    ) -> (f64, f64) {
+        self.belief.take(innovation);
+        self.last = Some([position_m - self.start_m, drive, force_n]);
         (innovation.e, innovation.s)
     }
 
