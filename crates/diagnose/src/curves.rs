@@ -203,6 +203,11 @@ mod tests {
                 assert!((x - w).abs() < 1e-12 || (x.is_nan() && w.is_nan()), "{rows:?}");
             }
         }
+        // A hundredth of a millimetre a second is a hold, and the surface is in the first layer.
+        let ties = [curve(1, 0.0, 1e-5, 20, 0.4), curve(1, 0.0, -1e-5, 20, 0.4)];
+        for tie in ties {
+            assert!((by_layer_and_phase(&[tie], |c| &c.base_n, 1)[1][1] - 0.4).abs() < 1e-12);
+        }
         // Different samples together: the root of their mean square.
         let two = [curve(1, 0.01, 0.002, 10, 0.3), curve(1, 0.01, 0.002, 30, 0.5)];
         let told = by_layer_and_phase(&two, |c| &c.base_n, 1)[1][0];

@@ -231,6 +231,22 @@ mod tests {
         assert!(patterns(&taken).is_empty());
     }
 
+    /// Layers of a quarter of a metre each, off by so many in 1024 of one: sums without rounding.
+    #[test]
+    fn what_differs_by_just_a_fifth_follows_no_pattern() {
+        let count = |off: &[i32]| {
+            let mut m = model(&vec![0.0; off.len()], &[]);
+            m.tissue.layers.iter_mut().for_each(|l| l.thickness_m = 0.25);
+            m.belief = Arc::new(Belief { tissue: m.tissue.clone(), ..Belief::clone(&m.belief) });
+            m.tissue.layers.iter_mut().zip(off).for_each(|(l, o)| l.thickness_m += f64::from(*o) / 1024.0);
+            patterns(&m).len()
+        };
+        // A face that is elsewhere, for the next layer and for the others; a scale.
+        assert_eq!((count(&[10, -9, 0]), count(&[10, -8, 0])), (1, 0));
+        assert_eq!((count(&[10, -10, 1]), count(&[10, -10, 2])), (1, 0));
+        assert_eq!((count(&[11, 9, 0]), count(&[12, 8, 0])), (1, 0));
+    }
+
     #[test]
     fn what_is_fixed_lies_where_it_is_believed() {
         let m = model(&[10.0, -9.0, 0.5], &[]);
@@ -287,6 +303,9 @@ mod tests {
         let mut model = f.fit.model.clone();
         model.free = Free { surface, thickness, own_surface: false, own_friction: false, ..model.free };
         model.own.iter_mut().for_each(|o| (o.surface_m, o.friction) = (0.0, 0.0));
+        if !surface {
+            model.tissue.surface_m = model.belief.tissue.surface_m;
+        }
         let prepared = Prepared::new(model.belief.clone(), f.data.blocks.to_vec(), 0.0);
         let begun = fit(&model, &f.data, Effort::FULL).expect("a fit");
         let data = f.data.judged_by(&begun.residuals.e, From::Calm);
@@ -304,6 +323,11 @@ mod tests {
         // What was not free is not made free.
         let (named, free) = tightened(1e-3, false, false);
         assert_eq!((named, free.surface, free.thickness), (false, false, false));
+        // The one that is free is fixed beside it.
+        for (surface, thickness) in [(true, false), (false, true)] {
+            let (_, free) = tightened(0.0, surface, thickness);
+            assert_eq!((free.surface, free.thickness), (false, false), "{surface}");
+        }
     }
 
     #[test]
@@ -314,6 +338,9 @@ mod tests {
             let all: Vec<_> = runs.iter().collect();
             let (with, without) = (settled(std::slice::from_ref(&drift), &all), settled(&[], &all));
             assert_eq!(is_worth(&with.fit, &without.fit, &with.data), worth);
+            // What saves its price is worth what it loses, and nothing gained is nothing.
+            assert_eq!(is_worth(&without.fit, &with.fit, &with.data), !worth);
+            assert!(!is_worth(&with.fit, &with.fit, &with.data));
             let f = &with.fit;
             // The drift's number, and a free surface and thickness.
             let wanted = f.nats() + 4.0 + 3.0 * 0.5 * (with.data.compared() as f64).ln();

@@ -319,6 +319,8 @@ mod tests {
         );
         // What stands last has to be the end, wherever else it stands.
         assert!(matches("a*b", "abxb") && matches("*.csv", "a.csv.csv"));
+        // What stood for one piece does not stand for the next.
+        assert!(matches("a*bb*b", "abbb") && !matches("a*bb*b", "abb"));
         assert!(!matches("skin_*.csv", "skin-on-muscle_1mmps_run5.csv") && !matches("a*b", "ac"));
     }
 

@@ -400,7 +400,7 @@ mod tests {
             (m.scatter.surface_m, m.scatter.friction, m.scatter.differing[0]) = (7e-4, 0.03, 9e-4);
         });
         let mut told = at.model.clone();
-        told.scatter.surface_m = 1.0;
+        (told.scatter.surface_m, told.scatter.friction, told.scatter.differing[0]) = (1.0, 1.0, 1.0);
         spreads(&mut told, &data, &at);
         near(told.scatter.surface_m, 7e-4);
         near(told.scatter.friction, 0.03);

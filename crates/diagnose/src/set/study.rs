@@ -286,7 +286,7 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{advice, bought, cause, confidence, diagnosis, dropped, evidence, speeds};
+    use super::{BEYOND_FLOOR, advice, bought, cause, confidence, diagnosis, dropped, evidence, speeds};
     use crate::made;
     use crate::outcome::{Diagnosis, Verdict};
     use crate::raw::Raw;
@@ -316,6 +316,8 @@ mod tests {
         assert!((confidence(&more, &[&with[..], &[0.5]].concat()) - wanted).abs() < 1e-12);
         assert_eq!(confidence(&[f64::INFINITY; 3], &with[..3]), 1.0);
         assert_eq!((confidence(&[], &[]), confidence(&[0.5], &[0.4])), (0.0, 0.0));
+        // Two tell already: worse by 1 and by 3 is 2 with an error of 1.
+        assert_eq!(confidence(&[1.5, 3.5], &[0.5, 0.5]), stylet_stats::normal::cdf(2.0));
     }
 
     #[test]
@@ -330,7 +332,8 @@ mod tests {
             high: 4.5,
             at_bound,
         };
-        let other = Told { owner: "let_go".to_owned(), at_bound: true, ..told(false) };
+        let other =
+            Told { owner: "let_go".to_owned(), path: "depth_m".to_owned(), at_bound: true, ..told(false) };
         let c = cause("coulomb_friction", &[told(false), other.clone()], 0.97, &[0.3, 0.4], &best, &base);
         // Mean squares 0.37, 0.025 and 0.125.
         assert!((c.share - (0.125 - 0.025) / (0.37 - 0.025)).abs() < 1e-12, "{}", c.share);
@@ -499,6 +502,11 @@ mod tests {
                 (d.gain.floor_n, d.gain.rmse_before_n, d.gain.rmse_after_n),
                 (0.1, base_n, extended_n)
             );
+        }
+        // Just a tenth (8 of 80 N^2 beyond a floor of 1 N), or just a fifth above the floor, is known still.
+        for (base_n, extended_n) in [(9.0, 3.0), (2.0, 1.0 + BEYOND_FLOOR)] {
+            let d = told(&laws(), &repeats(base_n, extended_n, Some(1.0)));
+            assert_eq!(d.verdict, Verdict::Named, "{extended_n}");
         }
         // A law that is worse than the base law leaves all, and one below the floor nothing.
         assert_eq!(told(&laws(), &repeats(0.5, 0.6, Some(0.1))).leftover.share, 1.0);
