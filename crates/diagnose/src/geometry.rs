@@ -155,7 +155,7 @@ fn patterns(model: &Model) -> Vec<Choice> {
 #[cfg(test)]
 mod tests {
     use super::{fixed, is_worth, patterns, price, priced, tighten, unsure};
-    use crate::base::Prepared;
+    use crate::base::{Prepared, base};
     use crate::made::{insertions, settled, showing};
     use crate::select::Search;
     use std::sync::Arc;
@@ -166,7 +166,8 @@ mod tests {
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
     use stylet_tissue::{
-        AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, Layer, PositionScale, Tissue,
+        AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, Law, LawState, Layer, PositionScale,
+        Tissue,
     };
 
     /// Layers of 20, 30, 40 and so on mm, each off by so many tenths of a mm.
@@ -346,5 +347,55 @@ mod tests {
             let wanted = f.nats() + 4.0 + 3.0 * 0.5 * (with.data.compared() as f64).ln();
             assert!((priced(f, &with.data) - wanted).abs() < 1e-9, "{} for {wanted}", priced(f, &with.data));
         }
+    }
+
+    /// Three layers whose first face lies 1 mm deeper than believed: what one effect says with one number, free thicknesses say with three.
+    #[test]
+    fn a_face_that_lies_elsewhere_is_named_where_free_thicknesses_cost_more() {
+        let layer = |thickness_m, stiffness_n_per_m, puncture_n| Layer {
+            name: String::new(),
+            thickness_m,
+            stiffness_n_per_m,
+            friction_ns_per_m2: 9000.0,
+            puncture_n,
+        };
+        let layers = vec![
+            layer(0.0085, 150.0, Some(0.8)),
+            layer(0.0092, 200.0, Some(1.1)),
+            layer(0.0131, 170.0, None),
+        ];
+        let tissue = Tissue { surface_m: 0.0, layers };
+        let law = Law::new(&tissue, &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]).expect("a law");
+        let mut seed = 5_u64;
+        let blocks = [0.004, 0.005, 0.0034].map(|speed| {
+            let t: Vec<f64> =
+                (0..(100.0 * 0.031 / speed) as usize).map(|k| f64::from(k as u32) / 100.0).collect();
+            let z: Vec<f64> = t.iter().map(|t| speed * t - 0.002 + 3e-4 * (1.0 - (4.0 * t).cos())).collect();
+            let mut state = LawState::default();
+            let f = t.iter().zip(&z).map(|(t, z)| {
+                seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
+                let v = speed + 12e-4 * (4.0 * t).sin();
+                law.step(&mut state, *t, *z, v, |_| {}).total_n + 0.03 * (seed as f64 / 2_147_483_648.0 - 0.5)
+            });
+            let f = f.collect();
+            Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+        });
+        let belief = Belief {
+            tissue,
+            given: Vec::new(),
+            tolerance: vec![0.3; 3],
+            thickness_tolerance: vec![0.1; 3],
+            surface_tolerance_m: 0.002,
+        };
+        let prepared = Prepared::new(Arc::new(belief), blocks.to_vec(), 0.0);
+        let (begun, data) = base(&prepared).expect("a fit");
+        let mut search = Search::of(begun, data);
+        assert!(tighten(&mut search, &prepared));
+        let model = &search.best.model;
+        assert_eq!(
+            (model.effects[0].info.id, model.free.surface, model.free.thickness),
+            ("boundary_shift", false, false)
+        );
+        assert!((model.effects[0].values[1] - 1e-3).abs() < 2e-4, "{:?}", model.effects[0].values);
     }
 }

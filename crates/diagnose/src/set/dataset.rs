@@ -500,4 +500,28 @@ mod tests {
         let still = folder.file("still.csv", &still);
         assert!(plain.runs(std::slice::from_ref(&still), 1).is_err());
     }
+
+    /// Of specimens in one file what is too short is left to the study; a fault of the sensor in all of them is not, nor is every remark a
+    /// fault.
+    #[test]
+    fn specimens_that_are_all_unusable_are_refused_but_for_the_short_ones() {
+        let folder = Folder::new("grave");
+        let set =
+            Dataset { split_by: vec!["specimen".to_owned()], ..Dataset::parse("set", TEXT).expect("a set") };
+        let key = |k: usize| if k.is_multiple_of(2) { "p".to_owned() } else { "q".to_owned() };
+        let rising = rows(|k| (key(k), 0.02 * (k / 2) as f64 + 0.001 * (k % 7) as f64));
+        let short: Vec<&str> = rising.lines().take(61).collect();
+        let gap: Vec<&str> =
+            rising.lines().enumerate().filter(|(k, _)| !(100..160).contains(k)).map(|l| l.1).collect();
+        for (name, text, count) in [
+            ("dead", rows(|k| (key(k), 0.5)), None),
+            ("short", short.join("\n"), Some(2)),
+            ("gap", gap.join("\n"), Some(2)),
+        ] {
+            let file = folder.file(&format!("{name}.csv"), &text);
+            let told = set.runs(&[file], 2).ok();
+            assert_eq!(told.as_ref().map(Vec::len), count, "{name}");
+            assert!(told.is_none_or(|runs| runs.iter().all(|r| !r.notes.is_empty())), "{name}");
+        }
+    }
 }
