@@ -252,6 +252,8 @@ mod tests {
             c.base_n[k] = 0.3 * (0.19 * x).sin() + 0.5 * (0.61 * x).cos() + 0.01 * x;
         }
         c.used[7] = false;
+        // At rest there is no direction.
+        c.velocity_mps[11] = 0.0;
         let slab = |front_m, thickness_m| Slab {
             front_m,
             thickness_m,
@@ -269,7 +271,7 @@ mod tests {
         let told = correlations(&[c.clone()], |c| &c.base_n, &slabs);
         let kept: Vec<usize> = (0..n).filter(|k| *k != 7).collect();
         let inside = |k: usize| (c.position_m[k].clamp(0.005, 0.05) - 0.005).max(0.0);
-        let sign = |k: usize| c.velocity_mps[k].signum();
+        let sign = |k: usize| if k == 11 { 0.0 } else { c.velocity_mps[k].signum() };
         let of: [Named; 7] = [
             ("time", Box::new(|k| c.time_s[k])),
             ("depth", Box::new(|k| c.position_m[k])),

@@ -430,6 +430,8 @@ mod tests {
         assert_eq!(names("b_*.csv"), Some(vec!["b_1.csv".to_owned(), "b_2.csv".to_owned()]));
         assert_eq!(names("a_1.csv"), Some(vec!["a_1.csv".to_owned()]));
         assert_eq!((names("c_*.csv"), names("c_1.csv"), names("no/b_*.csv")), (None, None, None));
+        let measured = std::env::var_os("STYLET_MEASURED");
+        assert_eq!(super::folder(), PathBuf::from(measured.unwrap_or("../shared/measured".into())));
         let text = find("no such file.csv").err().map(|e| e.to_string()).unwrap_or_default();
         assert!(text.contains("no file matches no such file.csv"), "{text}");
     }

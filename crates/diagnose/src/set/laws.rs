@@ -117,11 +117,7 @@ pub fn laws(
     progress: &mut impl FnMut(&str),
 ) -> Option<Laws> {
     progress("fitting the base law");
-    let prepared = Prepared::new(
-        Arc::new(plain(believed, runs)),
-        blocks(runs, raw),
-        raw.step_n.unwrap_or(0.0) * EVENLY_SD,
-    );
+    let prepared = Prepared::new(Arc::new(plain(believed, runs)), blocks(runs, raw), floor_n(raw));
     let (fit, data) = base(&prepared)?;
     let (fit, data) = varied(fit, data);
     let (searched, which) = some(&prepared, runs);
@@ -147,6 +143,11 @@ pub fn laws(
     progress("what each part of the law is worth");
     let parts = parts(&mut best, runs);
     Some(Laws { base, library, slip, best, parts })
+}
+
+/// Noise (N) that the steps of a sensor make.
+fn floor_n(raw: &Raw) -> f64 {
+    raw.step_n.unwrap_or(0.0) * EVENLY_SD
 }
 
 /// Of the laws that were tried the one that predicts recordings left out best; the base law where the others are hardly better.
@@ -542,6 +543,13 @@ mod tests {
         assert_eq!(best_of(&base, Some(&slip(1.9)), None).kind, Kind::Slip);
         // What could not be judged is no law.
         assert_eq!(kind(Some(slip(f64::INFINITY)), Some(many(0.97))), Kind::Library);
+    }
+
+    #[test]
+    fn a_sensor_with_steps_has_the_noise_of_what_is_spread_evenly_over_one() {
+        let noise_n = super::floor_n(&Raw { step_n: Some(0.6), ..Raw::default() });
+        assert!((noise_n / (0.6 / 12.0_f64.sqrt()) - 1.0).abs() < 2e-3, "{noise_n}");
+        assert_eq!(super::floor_n(&Raw::default()), 0.0);
     }
 
     #[test]

@@ -305,6 +305,10 @@ mod tests {
         let mut unsure = Instrument::default();
         unsure.of_sensor(None, Some(&lines), 20.0, 1.0);
         assert_eq!(unsure.drift_n, None);
+        // Beside no force at all nothing is small.
+        let mut nothing = Instrument::default();
+        nothing.of_sensor(None, Some(&[lines[0]; 3]), 20.0, 0.0);
+        assert_eq!(nothing.drift_n, None);
         let mut both = Instrument::default();
         both.of_sensor(Some(&air), Some(&lines), 20.0, 10.0);
         assert_eq!((both.bias_n, both.drift_n), (Some(0.31), Some(0.4)));

@@ -151,9 +151,8 @@ pub fn look(believed: &Tissue, runs: &[Insertion]) -> Option<Specimens> {
         let of = |j: usize, left_out: bool| {
             median_of(each.iter().map(|o| if left_out { o.errors[j].1 } else { o.errors[j].0 }))
         };
-        let both = |o: &One, j: usize| o.errors[j].0 + o.errors[j].1;
-        let better =
-            each.iter().filter(|o| both(o, k) < both(o, standing)).count() as f64 / each.len() as f64;
+        let better = each.iter().filter(|o| both(o.errors[k]) < both(o.errors[standing])).count() as f64
+            / each.len() as f64;
         let gains = |left_out: bool| of(k, left_out) < (1.0 - LEAST_GAIN) * of(standing, left_out);
         let kept = k == 0 || ((gains(true) || gains(false)) && better >= LEAST_SHARE);
         done.push(Rung {
@@ -173,12 +172,16 @@ pub fn look(believed: &Tissue, runs: &[Insertion]) -> Option<Specimens> {
     Some(Specimens { used: each.len(), unused, punctured, rungs: done, numbers })
 }
 
+/// What a law leaves of the samples it was fitted to and of those left out, together.
+fn both(errors: (f64, f64)) -> f64 {
+    errors.0 + errors.1
+}
+
 /// Whether the law of the rung that stands is a curved one. A ramp of a relaxing spring looks curved, and one that is too fast shows its curvature only when the
 /// relaxation is known: once there is one it tells.
 fn look_at_curvature(each: &[One], rungs: &mut [Rung], standing: usize) -> bool {
     let Some(at) = rungs.iter().position(|r| r.effect.as_deref() == Some(curvature())) else { return false };
     if standing > at {
-        let both = |e: (f64, f64)| e.0 + e.1;
         let with = median_of(each.iter().map(|o| both(o.errors[standing])));
         let without = median_of(each.iter().map(|o| both(o.straight[standing].0)));
         let better =
