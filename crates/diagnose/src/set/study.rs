@@ -63,7 +63,7 @@ pub fn study(
     let laws = laws(believed, runs, &raw, &mut rng, &mut progress)?;
     progress("every run predicted without it");
     let out = runs_out(&laws.best.fitted, runs);
-    let base_out = if laws.best.kind == Kind::Base { out.clone() } else { runs_out(&laws.base.fitted, runs) };
+    let base_out = base_out(&laws, &out, runs);
     let by_speed = |law: &Law| several(runs).then(|| speeds_out(&law.fitted, runs));
     let (speed_out, base_speed_out) = (by_speed(&laws.best), by_speed(&laws.base));
     let floors = floor(runs);
@@ -80,6 +80,11 @@ pub fn study(
     let diagnosis = diagnosis(&laws, runs, believed, &out, &repeats, &raw);
     let extended = extended(name, &laws.best.fitted.fit.model, runs, &repeats.instrument);
     Some(Study { laws, out, base_out, diagnosis, repeats, extended, runs: undone })
+}
+
+/// Every run predicted without it by the base law, `out` being what the best one predicts.
+fn base_out(laws: &Laws, out: &[Out], runs: &[&Insertion]) -> Vec<Out> {
+    if laws.best.kind == Kind::Base { out.to_vec() } else { runs_out(&laws.base.fitted, runs) }
 }
 
 /// What each law and each part of the best one buys.
@@ -286,13 +291,16 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{BEYOND_FLOOR, advice, bought, cause, confidence, diagnosis, dropped, evidence, speeds};
+    use super::{
+        BEYOND_FLOOR, advice, base_out, bought, cause, confidence, diagnosis, dropped, evidence, speeds,
+    };
     use crate::made;
     use crate::outcome::{Diagnosis, Verdict};
     use crate::raw::Raw;
     use crate::set::Insertion;
     use crate::set::instrument::Instrument;
     use crate::set::laws::{Kind, Law, Laws, Part};
+    use crate::set::left_out::Out;
     use crate::set::numbers::Told;
     use crate::set::repeats::{MeanReport, Repeats, Varies};
     use stylet_record::Recording;
@@ -547,5 +555,17 @@ mod tests {
         assert!((d.causes[0].share - 0.1 / 0.345).abs() < 1e-12, "{}", d.causes[0].share);
         assert_eq!(d.causes[0].confidence, confidence(&[0.3, 0.4], &[0.2, 0.1]));
         assert_eq!(d.evidence[0].taken.as_deref(), Some("coulomb_friction"));
+    }
+
+    #[test]
+    fn the_base_law_predicts_by_itself_unless_it_is_the_best_one() {
+        let runs = made::insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, 0.0]]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let base = Law { fitted: made::settled(&[], &runs), ..law(Kind::Base, &[0.1; 3], 0.0, false) };
+        let best = vec![Out::default(); 3];
+        let laws = Laws { base, ..laws() };
+        assert!(base_out(&laws, &best, &runs).iter().all(|o| o.score.rmse_n > 0.0 && o.population.is_some()));
+        let laws = Laws { best: laws.base.clone(), ..laws };
+        assert!(base_out(&laws, &best, &runs).iter().all(|o| o.population.is_none()));
     }
 }
