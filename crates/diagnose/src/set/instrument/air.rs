@@ -1,7 +1,7 @@
 //! A sensor that touches nothing: what it shows in air, in a recording of its own or before an insertion reaches the tissue.
 
 use crate::set::first::Insertion;
-use stylet_identify::linear::Symmetric;
+use stylet_identify::linear::{Symmetric, dot};
 use stylet_identify::phases::noise_n;
 use stylet_record::Recording;
 use stylet_stats::{mean, median_of, rms};
@@ -30,12 +30,11 @@ pub struct Line {
 #[must_use]
 pub fn line(t: &[f64], f: &[f64]) -> Line {
     let (middle, level) = (mean(t), mean(f));
-    let (tt, tf) = t.iter().zip(f).fold((0.0, 0.0), |(tt, tf), (t, f)| {
-        (tt + (t - middle) * (t - middle), tf + (t - middle) * (f - level))
-    });
-    let rate = tf / tt.max(1e-12);
-    let rest: Vec<f64> = t.iter().zip(f).map(|(t, f)| f - level - rate * (t - middle)).collect();
-    Line { first_n: level + rate * (t[0] - middle), rate_n_per_s: rate, sd_n: rms(&rest) }
+    let about = |x: &[f64], mean: f64| x.iter().map(|x| x - mean).collect::<Vec<_>>();
+    let (t, f) = (about(t, middle), about(f, level));
+    let rate = dot(&t, &f) / dot(&t, &t).max(1e-12);
+    let rest: Vec<f64> = t.iter().zip(&f).map(|(t, f)| f - rate * t).collect();
+    Line { first_n: level + rate * t[0], rate_n_per_s: rate, sd_n: rms(&rest) }
 }
 
 /// Coefficients of the combination of columns that leaves least squares, and what it leaves.

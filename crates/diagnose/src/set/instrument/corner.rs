@@ -14,6 +14,8 @@ use stylet_stats::{interpolate, sd, student};
 
 /// Stretch (s) before the corner, and behind it.
 const AROUND_S: (f64, f64) = (1.0, 0.8);
+/// Until so long before the corner the needle has not turned (s).
+const RESTS_S: f64 = 0.2;
 /// Delays and lags are tried up to so much (s), in these steps.
 const MOST_S: f64 = 0.8;
 /// Steps (s).
@@ -190,13 +192,11 @@ impl<'a> Corner<'a> {
             let at_m = interpolate(time, z, at_s);
             let u = match self.at {
                 At::Stop => (at_s - self.at_s).max(0.0),
-                At::Back if at_s < self.at_s - 0.2 * AROUND_S.0 => 0.0,
+                At::Back if at_s < self.at_s - RESTS_S => 0.0,
                 At::Back => (self.turned_m - at_m).max(0.0),
             };
-            let share = match (lag_s > 0.0, i == from) {
-                (false, _) | (_, true) => 1.0,
-                _ => 1.0 - libm::exp(-(time[i] - time[i - 1]) / lag_s),
-            };
+            // All of it where there is no lag.
+            let share = if i == from { 1.0 } else { 1.0 - libm::exp(-(time[i] - time[i - 1]) / lag_s) };
             for (s, x) in slow.iter_mut().zip([at_m, u / delta, 1.0 - libm::exp(-u / delta)]) {
                 *s += (x - *s) * share;
             }
