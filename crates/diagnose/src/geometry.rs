@@ -156,7 +156,7 @@ fn patterns(model: &Model) -> Vec<Choice> {
 mod tests {
     use super::{fixed, is_worth, patterns, price, priced, tighten, unsure};
     use crate::base::{Prepared, base};
-    use crate::made::{insertions, settled, showing};
+    use crate::made::{evenly, insertions, settled, showing};
     use crate::select::Search;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
@@ -366,16 +366,15 @@ mod tests {
         ];
         let tissue = Tissue { surface_m: 0.0, layers };
         let law = Law::new(&tissue, &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]).expect("a law");
-        let mut seed = 5_u64;
+        let mut spread = evenly(5);
         let blocks = [0.004, 0.005, 0.0034].map(|speed| {
             let t: Vec<f64> =
                 (0..(100.0 * 0.031 / speed) as usize).map(|k| f64::from(k as u32) / 100.0).collect();
             let z: Vec<f64> = t.iter().map(|t| speed * t - 0.002 + 3e-4 * (1.0 - (4.0 * t).cos())).collect();
             let mut state = LawState::default();
             let f = t.iter().zip(&z).map(|(t, z)| {
-                seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
                 let v = speed + 12e-4 * (4.0 * t).sin();
-                law.step(&mut state, *t, *z, v, |_| {}).total_n + 0.03 * (seed as f64 / 2_147_483_648.0 - 0.5)
+                law.step(&mut state, *t, *z, v, |_| {}).total_n + 0.03 * (spread() - 0.5)
             });
             let f = f.collect();
             Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)

@@ -217,6 +217,7 @@ const COLUMNS: usize = 4;
 #[cfg(test)]
 mod tests {
     use super::{AROUND_S, At, Corner, DELTA, How, LEAST_S, Left, STEP_S, late, lowest, together};
+    use crate::made::evenly;
     use crate::set::Insertion;
     use stylet_record::Recording;
 
@@ -470,13 +471,12 @@ mod tests {
     /// A force half a second late under noise of as much as it changes.
     #[test]
     fn a_delay_that_hardly_leaves_less_is_none() {
-        let mut seed = 11_u64;
+        let mut spread = evenly(11);
         let runs: Vec<Insertion> = (0..4)
             .map(|k| {
                 let mut r = run(&format!("{k}"), 4.0, 0.4, 0.0, 17 + 5 * k);
                 for f in &mut r.recording.force_n {
-                    seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
-                    *f = 0.25 * *f + 1.5 * (seed as f64 / 2_147_483_648.0 - 0.5);
+                    *f = 0.25 * *f + 1.5 * (spread() - 0.5);
                 }
                 r.ruptures_s.fill(f64::INFINITY);
                 r
