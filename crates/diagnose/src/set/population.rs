@@ -548,11 +548,11 @@ mod tests {
         assert!(scaled.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 
-    /// Twice as many samples per second come on the way in as on the average.
+    /// Nearly twice as many samples a second come on the way in as behind it.
     #[test]
     fn a_force_comes_late_by_the_same_time_where_samples_come_faster() {
-        let t: Vec<f64> =
-            (0..1200).map(|k| f64::from(k.min(600)) / 100.0 + f64::from((k - 600).max(0)) / 20.0).collect();
+        let at = |k: i32| f64::from(k.min(216)) / 36.0 + f64::from((k - 216).max(0)) / 20.0;
+        let t: Vec<f64> = (0..1200).map(at).collect();
         let z: Vec<f64> = t.iter().map(|t| (0.005 * t).min(0.03)).collect();
         let n = t.len();
         let run =
@@ -563,8 +563,9 @@ mod tests {
             drawn(&p, &run, 3, Some(0)).expect("a force")
         };
         let (plain, late) = (with(&[]), with(&[TimeDelay { delay_s: 2.0 }.into()]));
-        for i in 201..600 {
-            assert!((late[i] - plain[i - 200]).abs() < 1e-6, "{i}: {} for {}", late[i], plain[i - 200]);
+        for i in 73..216 {
+            assert!((late[i] - plain[i - 72]).abs() < 1e-6, "{i}: {} for {}", late[i], plain[i - 72]);
         }
+        assert!(late[200] < plain[200] - 0.1);
     }
 }
