@@ -232,20 +232,24 @@ mod tests {
         assert!(patterns(&taken).is_empty());
     }
 
-    /// Layers of a quarter of a metre each, off by so many in 1024 of one: sums without rounding.
+    /// Thicknesses (m) whose differences, or their shares, are numbers without rounding.
     #[test]
-    fn what_differs_by_just_a_fifth_follows_no_pattern() {
-        let count = |off: &[i32]| {
-            let mut m = model(&vec![0.0; off.len()], &[]);
-            m.tissue.layers.iter_mut().for_each(|l| l.thickness_m = 0.25);
+    fn what_differs_by_just_as_much_as_is_allowed_follows_no_pattern() {
+        let count = |believed: [f64; 3], here: [f64; 3]| {
+            let mut m = model(&[0.0; 3], &[]);
+            m.tissue.layers.iter_mut().zip(believed).for_each(|(l, d)| l.thickness_m = d);
             m.belief = Arc::new(Belief { tissue: m.tissue.clone(), ..Belief::clone(&m.belief) });
-            m.tissue.layers.iter_mut().zip(off).for_each(|(l, o)| l.thickness_m += f64::from(*o) / 1024.0);
+            m.tissue.layers.iter_mut().zip(here).for_each(|(l, d)| l.thickness_m = d);
             patterns(&m).len()
         };
         // A face that is elsewhere, for the next layer and for the others; a scale.
-        assert_eq!((count(&[10, -9, 0]), count(&[10, -8, 0])), (1, 0));
-        assert_eq!((count(&[10, -10, 1]), count(&[10, -10, 2])), (1, 0));
-        assert_eq!((count(&[11, 9, 0]), count(&[12, 8, 0])), (1, 0));
+        let off = |by: [i32; 3]| count([0.25; 3], by.map(|k| 0.25 + f64::from(k) / 1024.0));
+        assert_eq!((off([10, -9, 0]), off([10, -8, 0])), (1, 0));
+        assert_eq!((off([10, -10, 1]), off([10, -10, 2])), (1, 0));
+        assert_eq!((off([11, 9, 0]), off([12, 8, 0])), (1, 0));
+        // Two hundredths of a millimetre, and a ten-thousandth.
+        assert_eq!(count([2e-5, 0.25, 0.25], [4e-5, 0.25 - 2e-5, 0.25]), 0);
+        assert_eq!(count([1e4; 3], [1e4 + 1.0, 1e4 + 1.0, 1e4]), 0);
     }
 
     #[test]
