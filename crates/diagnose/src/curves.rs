@@ -203,6 +203,11 @@ mod tests {
                 assert!((x - w).abs() < 1e-12 || (x.is_nan() && w.is_nan()), "{rows:?}");
             }
         }
+        // A hundredth of a millimetre a second is a hold, and the surface is in the first layer.
+        let ties = [curve(1, 0.0, 1e-5, 20, 0.4), curve(1, 0.0, -1e-5, 20, 0.4)];
+        for tie in ties {
+            assert!((by_layer_and_phase(&[tie], |c| &c.base_n, 1)[1][1] - 0.4).abs() < 1e-12);
+        }
         // Different samples together: the root of their mean square.
         let two = [curve(1, 0.01, 0.002, 10, 0.3), curve(1, 0.01, 0.002, 30, 0.5)];
         let told = by_layer_and_phase(&two, |c| &c.base_n, 1)[1][0];
@@ -247,6 +252,8 @@ mod tests {
             c.base_n[k] = 0.3 * (0.19 * x).sin() + 0.5 * (0.61 * x).cos() + 0.01 * x;
         }
         c.used[7] = false;
+        // At rest there is no direction.
+        c.velocity_mps[11] = 0.0;
         let slab = |front_m, thickness_m| Slab {
             front_m,
             thickness_m,
@@ -264,7 +271,7 @@ mod tests {
         let told = correlations(&[c.clone()], |c| &c.base_n, &slabs);
         let kept: Vec<usize> = (0..n).filter(|k| *k != 7).collect();
         let inside = |k: usize| (c.position_m[k].clamp(0.005, 0.05) - 0.005).max(0.0);
-        let sign = |k: usize| c.velocity_mps[k].signum();
+        let sign = |k: usize| if k == 11 { 0.0 } else { c.velocity_mps[k].signum() };
         let of: [Named; 7] = [
             ("time", Box::new(|k| c.time_s[k])),
             ("depth", Box::new(|k| c.position_m[k])),

@@ -155,8 +155,8 @@ fn patterns(model: &Model) -> Vec<Choice> {
 #[cfg(test)]
 mod tests {
     use super::{fixed, is_worth, patterns, price, priced, tighten, unsure};
-    use crate::base::Prepared;
-    use crate::made::{insertions, settled, showing};
+    use crate::base::{Prepared, base};
+    use crate::made::{evenly, insertions, settled, showing};
     use crate::select::Search;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
@@ -166,7 +166,8 @@ mod tests {
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
     use stylet_tissue::{
-        AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, Layer, PositionScale, Tissue,
+        AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, Law, LawState, Layer, PositionScale,
+        Tissue,
     };
 
     /// Layers of 20, 30, 40 and so on mm, each off by so many tenths of a mm.
@@ -231,6 +232,26 @@ mod tests {
         assert!(patterns(&taken).is_empty());
     }
 
+    /// Thicknesses (m) whose differences, or their shares, are numbers without rounding.
+    #[test]
+    fn what_differs_by_just_as_much_as_is_allowed_follows_no_pattern() {
+        let count = |believed: [f64; 3], here: [f64; 3]| {
+            let mut m = model(&[0.0; 3], &[]);
+            m.tissue.layers.iter_mut().zip(believed).for_each(|(l, d)| l.thickness_m = d);
+            m.belief = Arc::new(Belief { tissue: m.tissue.clone(), ..Belief::clone(&m.belief) });
+            m.tissue.layers.iter_mut().zip(here).for_each(|(l, d)| l.thickness_m = d);
+            patterns(&m).len()
+        };
+        // A face that is elsewhere, for the next layer and for the others; a scale.
+        let off = |by: [i32; 3]| count([0.25; 3], by.map(|k| 0.25 + f64::from(k) / 1024.0));
+        assert_eq!((off([10, -9, 0]), off([10, -8, 0])), (1, 0));
+        assert_eq!((off([10, -10, 1]), off([10, -10, 2])), (1, 0));
+        assert_eq!((off([11, 9, 0]), off([12, 8, 0])), (1, 0));
+        // Two hundredths of a millimetre, and a ten-thousandth.
+        assert_eq!(count([2e-5, 0.25, 0.25], [4e-5, 0.25 - 2e-5, 0.25]), 0);
+        assert_eq!(count([1e4; 3], [1e4 + 1.0, 1e4 + 1.0, 1e4]), 0);
+    }
+
     #[test]
     fn what_is_fixed_lies_where_it_is_believed() {
         let m = model(&[10.0, -9.0, 0.5], &[]);
@@ -287,6 +308,9 @@ mod tests {
         let mut model = f.fit.model.clone();
         model.free = Free { surface, thickness, own_surface: false, own_friction: false, ..model.free };
         model.own.iter_mut().for_each(|o| (o.surface_m, o.friction) = (0.0, 0.0));
+        if !surface {
+            model.tissue.surface_m = model.belief.tissue.surface_m;
+        }
         let prepared = Prepared::new(model.belief.clone(), f.data.blocks.to_vec(), 0.0);
         let begun = fit(&model, &f.data, Effort::FULL).expect("a fit");
         let data = f.data.judged_by(&begun.residuals.e, From::Calm);
@@ -304,6 +328,11 @@ mod tests {
         // What was not free is not made free.
         let (named, free) = tightened(1e-3, false, false);
         assert_eq!((named, free.surface, free.thickness), (false, false, false));
+        // The one that is free is fixed beside it.
+        for (surface, thickness) in [(true, false), (false, true)] {
+            let (_, free) = tightened(0.0, surface, thickness);
+            assert_eq!((free.surface, free.thickness), (false, false), "{surface}");
+        }
     }
 
     #[test]
@@ -314,10 +343,62 @@ mod tests {
             let all: Vec<_> = runs.iter().collect();
             let (with, without) = (settled(std::slice::from_ref(&drift), &all), settled(&[], &all));
             assert_eq!(is_worth(&with.fit, &without.fit, &with.data), worth);
+            // What saves its price is worth what it loses, and nothing gained is nothing.
+            assert_eq!(is_worth(&without.fit, &with.fit, &with.data), !worth);
+            assert!(!is_worth(&with.fit, &with.fit, &with.data));
             let f = &with.fit;
             // The drift's number, and a free surface and thickness.
             let wanted = f.nats() + 4.0 + 3.0 * 0.5 * (with.data.compared() as f64).ln();
             assert!((priced(f, &with.data) - wanted).abs() < 1e-9, "{} for {wanted}", priced(f, &with.data));
         }
+    }
+
+    /// Three layers whose first face lies 1 mm deeper than believed: what one effect says with one number, free thicknesses say with three.
+    #[test]
+    fn a_face_that_lies_elsewhere_is_named_where_free_thicknesses_cost_more() {
+        let layer = |thickness_m, stiffness_n_per_m, puncture_n| Layer {
+            name: String::new(),
+            thickness_m,
+            stiffness_n_per_m,
+            friction_ns_per_m2: 9000.0,
+            puncture_n,
+        };
+        let layers = vec![
+            layer(0.0085, 150.0, Some(0.8)),
+            layer(0.0092, 200.0, Some(1.1)),
+            layer(0.0131, 170.0, None),
+        ];
+        let tissue = Tissue { surface_m: 0.0, layers };
+        let law = Law::new(&tissue, &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]).expect("a law");
+        let mut spread = evenly(5);
+        let blocks = [0.004, 0.005, 0.0034].map(|speed| {
+            let t: Vec<f64> =
+                (0..(100.0 * 0.031 / speed) as usize).map(|k| f64::from(k as u32) / 100.0).collect();
+            let z: Vec<f64> = t.iter().map(|t| speed * t - 0.002 + 3e-4 * (1.0 - (4.0 * t).cos())).collect();
+            let mut state = LawState::default();
+            let f = t.iter().zip(&z).map(|(t, z)| {
+                let v = speed + 12e-4 * (4.0 * t).sin();
+                law.step(&mut state, *t, *z, v, |_| {}).total_n + 0.03 * (spread() - 0.5)
+            });
+            let f = f.collect();
+            Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+        });
+        let belief = Belief {
+            tissue,
+            given: Vec::new(),
+            tolerance: vec![0.3; 3],
+            thickness_tolerance: vec![0.1; 3],
+            surface_tolerance_m: 0.002,
+        };
+        let prepared = Prepared::new(Arc::new(belief), blocks.to_vec(), 0.0);
+        let (begun, data) = base(&prepared).expect("a fit");
+        let mut search = Search::of(begun, data);
+        assert!(tighten(&mut search, &prepared));
+        let model = &search.best.model;
+        assert_eq!(
+            (model.effects[0].info.id, model.free.surface, model.free.thickness),
+            ("boundary_shift", false, false)
+        );
+        assert!((model.effects[0].values[1] - 1e-3).abs() < 2e-4, "{:?}", model.effects[0].values);
     }
 }

@@ -116,3 +116,11 @@ pub fn settled(effects: &[AnyEffect], runs: &[&Insertion]) -> Fitted {
     let drops = runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect());
     refitted(&model, crate::set::fitted::blocks(runs, &raw), drops.collect()).expect("a fit")
 }
+
+/// Numbers spread evenly between nothing and one, the same ones for a seed.
+pub fn evenly(mut seed: u64) -> impl FnMut() -> f64 {
+    move || {
+        seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
+        seed as f64 / 2_147_483_648.0
+    }
+}

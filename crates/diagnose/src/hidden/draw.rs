@@ -233,3 +233,15 @@ pub fn case(drawn: &Drawn) -> Case {
     }
     Case { believed: scenario(), truth, recordings, ruptures }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::library_ids;
+
+    #[test]
+    fn every_effect_of_the_library_can_be_hidden() {
+        let ids = library_ids();
+        assert_eq!(ids.len(), stylet_tissue::library().count());
+        assert!(ids.contains(&"force_spikes") && ids.contains(&"coulomb_friction"));
+    }
+}

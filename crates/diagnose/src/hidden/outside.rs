@@ -116,5 +116,8 @@ mod tests {
             }
         }
         assert_eq!(Outside::new(11, [0.0; 4], 1.0).kind, 3);
+        // What lies at a depth begins behind the surface.
+        assert_eq!(Outside::new(0, [0.25; 4], 1.0).force(0.0, 0.0, 1e-3, 0.0, 0.0), 0.0);
+        assert_eq!(Outside::new(7, [0.25; 4], 1.0).force(0.0, -0.004, 1e-3, 0.0, 0.01), 0.0);
     }
 }

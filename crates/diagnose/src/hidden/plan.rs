@@ -111,18 +111,18 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
             drawn.effects.extend(draw_effect(info, &mut between));
         }
         Kind::Two => {
-            let first = fitted[between(0.0, fitted.len() as f64 - 1e-9) as usize];
+            let count = fitted.len() as f64;
+            let first = fitted[between(0.0, count) as usize];
             let mut second = first;
             while second.id == first.id || one_in_the_other(first.id, second.id) {
-                second = fitted[between(0.0, fitted.len() as f64 - 1e-9) as usize];
+                second = fitted[between(0.0, count) as usize];
             }
             drawn.effects.extend(draw_effect(first, &mut between));
             drawn.effects.extend(draw_effect(second, &mut between));
         }
         Kind::Outside => {
-            let kind = (turn % OUTSIDE.len() as u64) as usize;
             let u = [between(0.0, 1.0), between(0.0, 1.0), between(0.0, 1.0), between(0.0, 1.0)];
-            drawn.outside = Some(Outside::new(kind, u, 0.02 * target));
+            drawn.outside = Some(Outside::new(turn as usize, u, 0.02 * target));
         }
     }
     Sketch { kind, target, drawn }
@@ -154,8 +154,8 @@ impl Harder {
             Harder::Velocity => drawn.velocity_noise_mps = 1e-4,
             Harder::One => drawn.motions = Motions::One,
             Harder::AndOutside => {
-                let kind = (drawn.seed % 8) as usize;
-                drawn.outside = Some(Outside::new(kind, [0.3, 0.5, 0.7, 0.4], 0.02 * sketch.target));
+                let u = [0.3, 0.5, 0.7, 0.4];
+                drawn.outside = Some(Outside::new(drawn.seed as usize, u, 0.02 * sketch.target));
             }
         }
         sketch

@@ -332,7 +332,11 @@ mod tests {
     /// thickness and face, then what differs between insertions, then the effects'.
     #[test]
     fn a_drawn_model_is_off_by_what_its_numbers_may_be() {
-        let k = Known::new(Some(&diagnosis()), &[blocks()]);
+        let mut k = Known::new(Some(&diagnosis()), &[blocks()]);
+        let coulomb = k.effects[0].2;
+        // What is known of another effect's number, or of another number of this effect, is not this one's.
+        k.effects.insert(0, ("stribeck_friction".to_owned(), "c_n_per_m".to_owned(), 50.0));
+        k.effects.insert(0, ("coulomb_friction".to_owned(), "c".to_owned(), 50.0));
         let m = model();
         for seed in [1, 5, 9] {
             let out = k.drawn(&m, 0, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -351,7 +355,7 @@ mod tests {
             }
             near(out.own[0].surface_m, 2e-4 * n());
             near(out.own[0].friction, 0.05 * n());
-            near(out.belief.given[0].parameters()[0], 8.0 + k.effects[0].2 * n());
+            near(out.belief.given[0].parameters()[0], 8.0 + coulomb * n());
         }
         // Nothing falls below nothing, a force not below a hundredth, a layer not below a twentieth.
         let mut wild = k.clone();

@@ -40,8 +40,6 @@ pub fn own(model: &Model, data: &Data, refit: &[Refit]) -> Option<Vec<Own>> {
     };
     let mut model = Model::base(belief.into(), data.recordings());
     model.free = Free {
-        surface: false,
-        thickness: false,
         own_surface: refit.contains(&Refit::Surface),
         own_friction: refit.contains(&Refit::Friction),
         ..Free::default()

@@ -212,6 +212,12 @@ mod tests {
         assert_eq!(told.composed_n.len(), 2);
         assert!(told.composed_n.iter().all(|e| *e > 0.005 && *e < 0.3), "{:?}", told.composed_n);
         assert!((told.mean_n - 0.5 * (told.composed_n[0] + told.composed_n[1])).abs() < 1e-12);
+        // A speed is told by the mean of its runs: one of them twice is that one.
+        let [one, twice] = [&runs[..1], &[runs[0], runs[0]]].map(|runs| {
+            let alone = insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, 0.0]]);
+            compose(Kind::Base, &gel(), &[("gel".to_owned(), alone)], runs).expect("a law").mean_n
+        });
+        assert_eq!(one, twice);
         // Without the layer or its runs there is nothing to put together.
         assert!(compose(Kind::Base, &gel(), &[], &runs).is_none());
     }

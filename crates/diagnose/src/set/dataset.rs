@@ -319,6 +319,8 @@ mod tests {
         );
         // What stands last has to be the end, wherever else it stands.
         assert!(matches("a*b", "abxb") && matches("*.csv", "a.csv.csv"));
+        // What stood for one piece does not stand for the next.
+        assert!(matches("a*bb*b", "abbb") && !matches("a*bb*b", "abb"));
         assert!(!matches("skin_*.csv", "skin-on-muscle_1mmps_run5.csv") && !matches("a*b", "ac"));
     }
 
@@ -428,6 +430,8 @@ mod tests {
         assert_eq!(names("b_*.csv"), Some(vec!["b_1.csv".to_owned(), "b_2.csv".to_owned()]));
         assert_eq!(names("a_1.csv"), Some(vec!["a_1.csv".to_owned()]));
         assert_eq!((names("c_*.csv"), names("c_1.csv"), names("no/b_*.csv")), (None, None, None));
+        let measured = std::env::var_os("STYLET_MEASURED");
+        assert_eq!(super::folder(), PathBuf::from(measured.unwrap_or("../shared/measured".into())));
         let text = find("no such file.csv").err().map(|e| e.to_string()).unwrap_or_default();
         assert!(text.contains("no file matches no such file.csv"), "{text}");
     }
@@ -497,5 +501,29 @@ mod tests {
             .collect();
         let still = folder.file("still.csv", &still);
         assert!(plain.runs(std::slice::from_ref(&still), 1).is_err());
+    }
+
+    /// Of specimens in one file what is too short is left to the study; a fault of the sensor in all of them is not, nor is every remark a
+    /// fault.
+    #[test]
+    fn specimens_that_are_all_unusable_are_refused_but_for_the_short_ones() {
+        let folder = Folder::new("grave");
+        let set =
+            Dataset { split_by: vec!["specimen".to_owned()], ..Dataset::parse("set", TEXT).expect("a set") };
+        let key = |k: usize| if k.is_multiple_of(2) { "p".to_owned() } else { "q".to_owned() };
+        let rising = rows(|k| (key(k), 0.02 * (k / 2) as f64 + 0.001 * (k % 7) as f64));
+        let short: Vec<&str> = rising.lines().take(61).collect();
+        let gap: Vec<&str> =
+            rising.lines().enumerate().filter(|(k, _)| !(100..160).contains(k)).map(|l| l.1).collect();
+        for (name, text, count) in [
+            ("dead", rows(|k| (key(k), 0.5)), None),
+            ("short", short.join("\n"), Some(2)),
+            ("gap", gap.join("\n"), Some(2)),
+        ] {
+            let file = folder.file(&format!("{name}.csv"), &text);
+            let told = set.runs(&[file], 2).ok();
+            assert_eq!(told.as_ref().map(Vec::len), count, "{name}");
+            assert!(told.is_none_or(|runs| runs.iter().all(|r| !r.notes.is_empty())), "{name}");
+        }
     }
 }

@@ -337,8 +337,8 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
         let common = model.effects[effect].values[parameter];
         let range = model.effects[effect].info.parameters[parameter];
         for (r, run) in runs.iter().enumerate() {
-            if let Some(z) = run.releases_m.get(k).copied().flatten() {
-                let depth_m = z - fronts[k.min(layers - 1)];
+            if let Some((z, front)) = run.releases_m.get(k).copied().flatten().zip(fronts.get(k)) {
+                let depth_m = z - front;
                 model.own[r].differing[k] = depth_m.clamp(range.low, range.high) - common;
             }
         }
@@ -348,7 +348,7 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
 
 #[cfg(test)]
 mod tests {
-    use super::{Guess, Insertion, first, frame, groups, plain, pressed};
+    use super::{Guess, Insertion, RATE, SAME_SPEED, SAME_STROKE_M, first, frame, groups, plain, pressed};
     use stylet_identify::model::{Bound, NEVER};
     use stylet_record::Recording;
     use stylet_tissue::{Layer, Tissue};
@@ -439,6 +439,44 @@ mod tests {
         let refs: Vec<&Insertion> = all.iter().collect();
         // The stroke of the last differs by 1.1 mm from its group's first.
         assert_eq!(groups(&refs), vec![vec![1, 4], vec![5], vec![0, 2], vec![3]]);
+    }
+
+    /// From a tenth more speed or a millimetre more way on.
+    #[test]
+    fn what_differs_by_just_as_much_as_groups_may_is_a_group_of_its_own() {
+        let one = run("a", 0.005, 0.026);
+        let of = |speed_mps: f64, stroke_m: f64| Insertion { speed_mps, stroke_m, ..one.clone() };
+        let (slow, fast) = (0.004, 0.004 * (1.0 + SAME_SPEED));
+        let all = [of(slow, 0.0), of(fast, 0.0), of(slow, SAME_STROKE_M)];
+        let refs: Vec<&Insertion> = all.iter().collect();
+        assert_eq!(groups(&refs), vec![vec![0], vec![2], vec![1]]);
+        // Two such speeds are not one: they tell what a rate does.
+        let m = first(&believed(), &refs[..2], &guess());
+        assert_eq!((m.effects[0].values[RATE], m.days.len()), (guess().rate, 2));
+    }
+
+    #[test]
+    fn a_frame_needs_neither_insertions_nor_depth_and_looks_no_further_than_a_recording() {
+        // A centimetre beyond the believed surface where nobody went anywhere.
+        let f = frame(&believed(), &[], 0.0);
+        assert_eq!(f.fronts_m[0], 0.001);
+        assert!((f.indented_m[0] - 0.01).abs() < 1e-12, "{:?}", f.indented_m);
+        // Where an insertion ends within two millimetres of the surface, the next face lies no further behind it than that.
+        let shallow = Insertion { stroke_m: 0.005, ..run("a", 0.005, 0.026) };
+        let f = frame(&believed(), &[&shallow], 0.0);
+        assert!((f.fronts_m[1] - f.fronts_m[0] - 2e-3).abs() < 1e-12, "{:?}", f.fronts_m);
+        // A rupture lies where the needle was at its very instant, and one behind the last sample where that was.
+        let mut r = run("a", 0.005, 0.026);
+        let place = r.recording.position_m.clone();
+        for (t, wanted) in [(r.recording.time_s[150], place[150]), (1e3, place[place.len() - 1])] {
+            r.ruptures_s[0] = t;
+            let f = frame(&believed(), &[&r], 0.0);
+            assert!(
+                (f.indented_m[0] - (wanted - f.fronts_m[0]).max(2e-3)).abs() < 1e-12,
+                "{t}: {:?}",
+                f.indented_m
+            );
+        }
     }
 
     #[test]
@@ -624,6 +662,13 @@ mod tests {
         );
         assert_eq!(m.effects[0].values[6], 0.0);
         assert!(!m.free.day_surface && !m.free.day_friction && m.days.len() == 1);
+        // Passed is what lies behind, not what stands at it.
+        let front = frame(&believed(), &refs, 3e-4).fronts_m[1];
+        let place = &all[0].recording.position_m;
+        let exact = |z: &f64| *z > front + 1e-3 && front + (z - front) == *z;
+        let k = place.iter().position(exact).expect("a sample whose depth is a sum");
+        let at = first(&believed(), &refs, &Guess { gives_way_m: Some(place[k] - front), ..guess() });
+        assert_eq!(at.instants[0][1], all[0].recording.time_s[k + 1]);
         // Without a guess layers give way where the force drops.
         assert_eq!(m.instants, all.iter().map(|r| r.ruptures_s.clone()).collect::<Vec<_>>());
         // A layer that would give way before the one above waits for two samples behind it.

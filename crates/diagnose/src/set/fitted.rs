@@ -198,6 +198,19 @@ fn from_all(models: &[Model], data: &Data, drops: &[Vec<f64>], rounds: &[usize])
     found
 }
 
+/// Of fits that leave so much, the smallest first: how many agree with the best one, and which few differ and are looked at closely.
+fn apart(errors: &[f64]) -> (usize, Vec<usize>) {
+    let best = errors.first().copied().unwrap_or(f64::NAN);
+    let agree = errors.iter().filter(|e| **e < best * (1.0 + AGREE)).count();
+    let mut apart: Vec<usize> = Vec::new();
+    for (k, e) in errors.iter().enumerate().filter(|(_, e)| **e < best * WITHIN) {
+        if apart.len() < FEW_FITS && apart.iter().all(|f| *e > errors[*f] * (1.0 + SAME)) {
+            apart.push(k);
+        }
+    }
+    (agree, apart)
+}
+
 /// Fits of a set from `starts` starts: the best few that differ, those that leave least first.
 ///
 /// What leaves least need not predict best: which of them stands is for recordings left out to say. Deterministic for any number of
@@ -221,20 +234,13 @@ pub fn fitted(
     found.truncate(GO_ON);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
     let found = from_all(&promising, &coarse, &drops, &LONG_LOOK);
-    let Some(best) = found.first().map(|f| f.0) else { return Vec::new() };
-    let agree = found.iter().filter(|f| f.0 < best * (1.0 + AGREE)).count();
-    let mut apart: Vec<&(f64, Model)> = Vec::new();
-    for one in found.iter().filter(|f| f.0 < best * WITHIN) {
-        if apart.len() < FEW_FITS && apart.iter().all(|f| one.0 > f.0 * (1.0 + SAME)) {
-            apart.push(one);
-        }
-    }
+    let errors: Vec<f64> = found.iter().map(|f| f.0).collect();
+    let (agree, apart) = apart(&errors);
     let whole = unsettled(fine);
-    let models: Vec<Model> = apart.into_iter().map(|f| f.1.clone()).collect();
-    let mut out: Vec<Fitted> = models
+    let mut out: Vec<Fitted> = apart
         .par_iter()
-        .filter_map(|model| {
-            let (fit, data) = settle(model, whole.clone(), &drops, &[4, 8, 10])?;
+        .filter_map(|k| {
+            let (fit, data) = settle(&found[*k].1, whole.clone(), &drops, &[4, 8, 10])?;
             Some(Fitted { fit, data, drops: drops.clone(), starts: (found.len(), agree) })
         })
         .collect();
@@ -244,7 +250,9 @@ pub fn fitted(
 
 #[cfg(test)]
 mod tests {
-    use super::{Guess, SET_BLOCK_S, blocks, guess, refitted, settle, spreads, unsettled};
+    use super::{
+        AGREE, Guess, SAME, SET_BLOCK_S, WITHIN, apart, blocks, guess, refitted, settle, spreads, unsettled,
+    };
     use crate::made::{SENSOR_N, believed, gel, insertions, settled};
     use crate::raw::Raw;
     use crate::set::Insertion;
@@ -400,7 +408,7 @@ mod tests {
             (m.scatter.surface_m, m.scatter.friction, m.scatter.differing[0]) = (7e-4, 0.03, 9e-4);
         });
         let mut told = at.model.clone();
-        told.scatter.surface_m = 1.0;
+        (told.scatter.surface_m, told.scatter.friction, told.scatter.differing[0]) = (1.0, 1.0, 1.0);
         spreads(&mut told, &data, &at);
         near(told.scatter.surface_m, 7e-4);
         near(told.scatter.friction, 0.03);
@@ -429,5 +437,14 @@ mod tests {
         spreads(&mut told, &data, &at);
         near(told.scatter.day_surface_m, (surface / 6.0).sqrt());
         near(told.scatter.day_friction, (friction / 6.0).sqrt());
+    }
+
+    /// Three per cent for agreement, two thousandths for the same, two fifths for being looked at: just as much is too much, or too little.
+    #[test]
+    fn fits_agree_that_leave_about_the_same_and_the_best_few_that_differ_are_looked_at() {
+        assert_eq!(apart(&[2.0, 2.003, 2.005, 2.059, 2.07, 2.79, 2.81]), (4, vec![0, 2, 3, 4]));
+        assert_eq!(apart(&[2.0, 2.79, 2.81]), (1, vec![0, 1]));
+        assert_eq!(apart(&[2.0, 2.0 * (1.0 + SAME), 2.0 * (1.0 + AGREE), 2.0 * WITHIN]), (2, vec![0, 2]));
+        assert_eq!(apart(&[]), (0, vec![]));
     }
 }

@@ -117,11 +117,7 @@ pub fn laws(
     progress: &mut impl FnMut(&str),
 ) -> Option<Laws> {
     progress("fitting the base law");
-    let prepared = Prepared::new(
-        Arc::new(plain(believed, runs)),
-        blocks(runs, raw),
-        raw.step_n.unwrap_or(0.0) * EVENLY_SD,
-    );
+    let prepared = Prepared::new(Arc::new(plain(believed, runs)), blocks(runs, raw), floor_n(raw));
     let (fit, data) = base(&prepared)?;
     let (fit, data) = varied(fit, data);
     let (searched, which) = some(&prepared, runs);
@@ -147,6 +143,11 @@ pub fn laws(
     progress("what each part of the law is worth");
     let parts = parts(&mut best, runs);
     Some(Laws { base, library, slip, best, parts })
+}
+
+/// Noise (N) that the steps of a sensor make.
+fn floor_n(raw: &Raw) -> f64 {
+    raw.step_n.unwrap_or(0.0) * EVENLY_SD
 }
 
 /// Of the laws that were tried the one that predicts recordings left out best; the base law where the others are hardly better.
@@ -372,21 +373,21 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::{
-        DRAWS, Kind, Law, TURNS, best_of, candidates, coarse, effects, held, judged, less, parts, several,
-        some, starts,
+        DRAWS, Kind, Law, TURNS, WORTH, best_of, candidates, coarse, effects, held, judged, less, parts,
+        several, some, starts,
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
     use crate::raw::Raw;
     use crate::set::Insertion;
-    use crate::set::fitted::blocks;
+    use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks};
     use crate::set::left_out::{score, without};
     use crate::set::population::predict;
     use stylet_identify::model::{Bound, Choice, Model};
     use stylet_record::Recording;
     use stylet_tissue::{
         AnyEffect, CoulombFriction, DelayedPuncture, Effect, ForceBias, ForceDrift, LetGo, PowerLawFriction,
-        ShaftSlip,
+        ShaftSlip, StribeckFriction,
     };
 
     fn model(all: &[AnyEffect]) -> Model {
@@ -456,6 +457,7 @@ mod tests {
         // Without a slipping shaft only whole effects go.
         assert_eq!(candidates(&model(&[CoulombFriction { c_n_per_m: 3.0 }.into()])).len(), 1);
         assert!(candidates(&model(&[])).is_empty());
+        assert_eq!(candidates(&model(&[slips(1)])).len(), 4);
     }
 
     #[test]
@@ -534,8 +536,20 @@ mod tests {
         assert_eq!(kind(Some(slip(0.5)), Some(library(0.51))), Kind::Slip);
         assert_eq!(kind(Some(slip(0.5)), Some(many(0.46))), Kind::Slip);
         assert_eq!(kind(Some(slip(0.5)), Some(many(0.44))), Kind::Library);
+        // Just two per cent are not better, nor is a law as good as another.
+        assert_eq!(kind(Some(slip(1.0 - WORTH)), None), Kind::Base);
+        assert_eq!(kind(Some(slip(0.5)), Some(library(0.5))), Kind::Slip);
+        let base = made::law(Kind::Base, &[], &[2.0, 2.0], 0.0);
+        assert_eq!(best_of(&base, Some(&slip(1.9)), None).kind, Kind::Slip);
         // What could not be judged is no law.
         assert_eq!(kind(Some(slip(f64::INFINITY)), Some(many(0.97))), Kind::Library);
+    }
+
+    #[test]
+    fn a_sensor_with_steps_has_the_noise_of_what_is_spread_evenly_over_one() {
+        let noise_n = super::floor_n(&Raw { step_n: Some(0.6), ..Raw::default() });
+        assert!((noise_n / (0.6 / 12.0_f64.sqrt()) - 1.0).abs() < 2e-3, "{noise_n}");
+        assert_eq!(super::floor_n(&Raw::default()), 0.0);
     }
 
     #[test]
@@ -582,6 +596,11 @@ mod tests {
         }
         let again = coarse(&long);
         assert_eq!(again.data.blocks[0].len(), long.data.blocks[0].len());
+        // Longer are blocks of more than one and a half of the first ones.
+        let mut blocks = fine.data.blocks.to_vec();
+        blocks.iter_mut().for_each(|b| (b.samples, b.step_s) = (1, 1.5 * SET_BLOCK_S));
+        let half_more = Fitted { data: fine.data.on(blocks), ..fine.clone() };
+        assert_eq!(coarse(&half_more).data.blocks[0].len(), long.data.blocks[0].len());
     }
 
     /// Of at most eight every one is left out by itself, of more every third with it.
@@ -632,5 +651,34 @@ mod tests {
         let mut law = Law::new(Kind::Library, settled(&[bias], &runs), &runs);
         assert!(!parts(&mut law, &runs)[0].kept);
         assert_eq!((law.kind, law.fitted.fit.model.effects.len()), (Kind::Base, 0));
+    }
+
+    /// Friction that either of two effects explains: one goes, and is then missed in the other's place.
+    #[test]
+    fn of_two_parts_that_say_the_same_one_stays() {
+        let true_one = rubs(150.0);
+        let runs = insertions(
+            std::slice::from_ref(&true_one),
+            &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]],
+        );
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let same: AnyEffect =
+            StribeckFriction { c_n_per_m: 75.0, c_static_n_per_m: 75.0, v_stribeck_mps: 2e-3 }.into();
+        let mut law = Law::new(Kind::Library, settled(&[rubs(75.0), same], &runs), &runs);
+        let told = parts(&mut law, &runs);
+        assert_eq!(told.iter().filter(|p| p.kept).count(), 1, "{told:?}");
+        assert_eq!(law.fitted.fit.model.effects.len(), 1);
+    }
+
+    /// What the law does not know is an oscillation of 4 N: a part is worth its share of the error, however large that is.
+    #[test]
+    fn a_part_goes_under_large_errors_as_under_small_ones() {
+        let all = [[0.008, 0.0], [0.008, 1e-4], [0.016, 0.0], [0.016, 1e-4]];
+        let runs = made::showing(&[], &all, |t| 4.0 * (9.0 * t).sin());
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let bias: AnyEffect = ForceBias { force_n: 1e-3 }.into();
+        let mut law = Law::new(Kind::Library, settled(&[bias], &runs), &runs);
+        assert!(law.left_out_n() > 1.5, "{}", law.left_out_n());
+        assert!(!parts(&mut law, &runs)[0].kept);
     }
 }

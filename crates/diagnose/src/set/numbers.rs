@@ -85,7 +85,7 @@ pub fn estimates(fitted: &Fitted, out: &[Out]) -> Vec<Told> {
         .map(|(i, (owner, path, value, at_bound))| {
             let all: Vec<f64> = others.iter().filter_map(|o| o.get(i)).map(|o| o.2).collect();
             // The sample variance divides by n - 1; the jackknife's is (n - 1)/n times the sum of squares.
-            let error = if all.len() > 1 { sd(&all) * (n - 1.0) / n.sqrt() } else { f64::NAN };
+            let error = sd(&all) * (n - 1.0) / n.sqrt();
             let reach = student::quantile(0.975, (n - 1.0).max(1.0)) * error;
             let reach = if reach.is_finite() { reach } else { value.abs() };
             Told { owner, path, value, low: value - reach, high: value + reach, at_bound }
@@ -291,6 +291,9 @@ mod tests {
             (at(&m, "0.exponent"), at(&m, "1.exponent"), at(&m, "1.force_n")),
             (Some(true), Some(true), Some(false))
         );
+        // Its other numbers stand for themselves.
+        m.effects[0].values[1] = m.effects[0].info.parameters[1].low;
+        assert_eq!((at(&m, "0.force_n"), at(&m, "1.force_n")), (Some(true), Some(false)));
         assert_eq!(at(&m, "0.layer"), Some(false), "which layer is no number of a fit");
     }
 

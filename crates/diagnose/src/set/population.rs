@@ -253,7 +253,8 @@ mod tests {
     use stylet_record::Recording;
     use stylet_stats::normal::quantile;
     use stylet_tissue::{
-        DelayedPuncture, DriveFriction, Effect, Law, LawState, Layer, LetGo, PositionScale, ShaftSlip, Tissue,
+        DelayedPuncture, DriveFriction, Effect, ForceDrift, Law, LawState, Layer, LetGo, PositionScale,
+        ShaftSlip, TimeDelay, Tissue,
     };
 
     #[test]
@@ -455,10 +456,14 @@ mod tests {
 
     #[test]
     fn friction_is_that_of_the_mean_law_with_layers_that_rupture_when_told() {
-        let p = population();
+        let mut p = population();
         let run = run();
         let r = &run.recording;
-        let law = Law::new(&tissue(), &[]).expect("a law");
+        // Behind a rupture the tissue holds the shaft.
+        let slips: [stylet_tissue::AnyEffect; 2] =
+            [1, 2].map(|layer| ShaftSlip { layer, push_n: 1.0, ..ShaftSlip::default() }.into());
+        p.law.effects = slips.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+        let law = Law::new(&tissue(), &slips).expect("a law");
         for instants in [vec![], vec![2.5], vec![2.5, 5.0], vec![5.0, 2.5]] {
             let told = friction(&p, r, &instants).expect("friction");
             let mut state = LawState::default();
@@ -524,6 +529,10 @@ mod tests {
             let wanted = plain[i] + 0.3 * r.velocity_mps[i].signum();
             assert!((drive[i] - wanted).abs() < 1e-9, "{i}: {} for {wanted}", drive[i]);
         }
+        let drift = with(&[ForceDrift { rate_n_per_s: 0.05 }.into()]);
+        for (i, t) in r.time_s.iter().enumerate() {
+            assert!((drift[i] - plain[i] - 0.05 * t).abs() < 1e-9, "{i}: {}", drift[i]);
+        }
         // What is written down is too long by a tenth.
         let scaled = with(&[PositionScale { eps: 0.1 }.into()]);
         let mut shorter = run.clone();
@@ -537,5 +546,26 @@ mod tests {
         shorter.recording.velocity_mps.iter_mut().for_each(|v| *v *= to_true);
         let wanted = drawn(&population(), &shorter, 3, Some(0)).expect("a force");
         assert!(scaled.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+
+    /// Nearly twice as many samples a second come on the way in as behind it.
+    #[test]
+    fn a_force_comes_late_by_the_same_time_where_samples_come_faster() {
+        let at = |k: i32| f64::from(k.min(216)) / 36.0 + f64::from((k - 216).max(0)) / 20.0;
+        let t: Vec<f64> = (0..1200).map(at).collect();
+        let z: Vec<f64> = t.iter().map(|t| (0.005 * t).min(0.03)).collect();
+        let n = t.len();
+        let run =
+            Insertion::new("a".to_owned(), Recording::new(t, z, vec![0.0; n]).expect("clean columns"), 2);
+        let with = |effects: &[stylet_tissue::AnyEffect]| {
+            let mut p = population();
+            p.law.effects = effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
+            drawn(&p, &run, 3, Some(0)).expect("a force")
+        };
+        let (plain, late) = (with(&[]), with(&[TimeDelay { delay_s: 2.0 }.into()]));
+        for i in 73..216 {
+            assert!((late[i] - plain[i - 72]).abs() < 1e-6, "{i}: {} for {}", late[i], plain[i - 72]);
+        }
+        assert!(late[200] < plain[200] - 0.1);
     }
 }

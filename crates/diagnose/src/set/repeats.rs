@@ -591,6 +591,11 @@ mod tests {
             "{message}"
         );
         assert!(message.ends_with("stroke ends at 16.0 mm"), "{message}");
+        // As far as it went from where it began.
+        let mut moved = m.runs[1].clone();
+        moved.recording.position_m.iter_mut().for_each(|z| *z += 0.002);
+        let told_moved = quality(&[&moved]);
+        assert!((told_moved[0].note.numbers["stroke_m"] - 0.016).abs() < 1e-6, "{told_moved:?}");
         assert!(told[0].note.message.contains("really 50.0 samples per second"), "{}", told[0].note.message);
     }
 }

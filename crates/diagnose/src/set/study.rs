@@ -63,7 +63,7 @@ pub fn study(
     let laws = laws(believed, runs, &raw, &mut rng, &mut progress)?;
     progress("every run predicted without it");
     let out = runs_out(&laws.best.fitted, runs);
-    let base_out = if laws.best.kind == Kind::Base { out.clone() } else { runs_out(&laws.base.fitted, runs) };
+    let base_out = base_out(&laws, &out, runs);
     let by_speed = |law: &Law| several(runs).then(|| speeds_out(&law.fitted, runs));
     let (speed_out, base_speed_out) = (by_speed(&laws.best), by_speed(&laws.base));
     let floors = floor(runs);
@@ -80,6 +80,11 @@ pub fn study(
     let diagnosis = diagnosis(&laws, runs, believed, &out, &repeats, &raw);
     let extended = extended(name, &laws.best.fitted.fit.model, runs, &repeats.instrument);
     Some(Study { laws, out, base_out, diagnosis, repeats, extended, runs: undone })
+}
+
+/// Every run predicted without it by the base law, `out` being what the best one predicts.
+fn base_out(laws: &Laws, out: &[Out], runs: &[&Insertion]) -> Vec<Out> {
+    if laws.best.kind == Kind::Base { out.to_vec() } else { runs_out(&laws.base.fitted, runs) }
 }
 
 /// What each law and each part of the best one buys.
@@ -286,13 +291,16 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{advice, bought, cause, confidence, diagnosis, dropped, evidence, speeds};
+    use super::{
+        BEYOND_FLOOR, advice, base_out, bought, cause, confidence, diagnosis, dropped, evidence, speeds,
+    };
     use crate::made;
     use crate::outcome::{Diagnosis, Verdict};
     use crate::raw::Raw;
     use crate::set::Insertion;
     use crate::set::instrument::Instrument;
     use crate::set::laws::{Kind, Law, Laws, Part};
+    use crate::set::left_out::Out;
     use crate::set::numbers::Told;
     use crate::set::repeats::{MeanReport, Repeats, Varies};
     use stylet_record::Recording;
@@ -316,6 +324,8 @@ mod tests {
         assert!((confidence(&more, &[&with[..], &[0.5]].concat()) - wanted).abs() < 1e-12);
         assert_eq!(confidence(&[f64::INFINITY; 3], &with[..3]), 1.0);
         assert_eq!((confidence(&[], &[]), confidence(&[0.5], &[0.4])), (0.0, 0.0));
+        // Two tell already: worse by 1 and by 3 is 2 with an error of 1.
+        assert_eq!(confidence(&[1.5, 3.5], &[0.5, 0.5]), stylet_stats::normal::cdf(2.0));
     }
 
     #[test]
@@ -330,7 +340,8 @@ mod tests {
             high: 4.5,
             at_bound,
         };
-        let other = Told { owner: "let_go".to_owned(), at_bound: true, ..told(false) };
+        let other =
+            Told { owner: "let_go".to_owned(), path: "depth_m".to_owned(), at_bound: true, ..told(false) };
         let c = cause("coulomb_friction", &[told(false), other.clone()], 0.97, &[0.3, 0.4], &best, &base);
         // Mean squares 0.37, 0.025 and 0.125.
         assert!((c.share - (0.125 - 0.025) / (0.37 - 0.025)).abs() < 1e-12, "{}", c.share);
@@ -500,6 +511,11 @@ mod tests {
                 (0.1, base_n, extended_n)
             );
         }
+        // Just a tenth (8 of 80 N^2 beyond a floor of 1 N), or just a fifth above the floor, is known still.
+        for (base_n, extended_n) in [(9.0, 3.0), (2.0, 1.0 + BEYOND_FLOOR)] {
+            let d = told(&laws(), &repeats(base_n, extended_n, Some(1.0)));
+            assert_eq!(d.verdict, Verdict::Named, "{extended_n}");
+        }
         // A law that is worse than the base law leaves all, and one below the floor nothing.
         assert_eq!(told(&laws(), &repeats(0.5, 0.6, Some(0.1))).leftover.share, 1.0);
         assert_eq!(told(&laws(), &repeats(0.5, 0.05, Some(0.1))).leftover.share, 0.0);
@@ -539,5 +555,19 @@ mod tests {
         assert!((d.causes[0].share - 0.1 / 0.345).abs() < 1e-12, "{}", d.causes[0].share);
         assert_eq!(d.causes[0].confidence, confidence(&[0.3, 0.4], &[0.2, 0.1]));
         assert_eq!(d.evidence[0].taken.as_deref(), Some("coulomb_friction"));
+    }
+
+    #[test]
+    fn the_base_law_predicts_by_itself_unless_it_is_the_best_one() {
+        let runs = made::insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, 0.0]]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let base = Law { fitted: made::settled(&[], &runs), ..law(Kind::Base, &[0.1; 3], 0.0, false) };
+        let best = vec![Out::default(); 3];
+        let laws = Laws { base, ..laws() };
+        let told = base_out(&laws, &best, &runs);
+        assert_eq!(told.iter().filter(|o| o.score.rmse_n > 0.0 && o.population.is_some()).count(), 3);
+        let laws = Laws { best: laws.base.clone(), ..laws };
+        let told = base_out(&laws, &best, &runs);
+        assert_eq!(told.iter().filter(|o| o.population.is_none()).count(), 3);
     }
 }

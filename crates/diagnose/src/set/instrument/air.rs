@@ -1,7 +1,7 @@
 //! A sensor that touches nothing: what it shows in air, in a recording of its own or before an insertion reaches the tissue.
 
 use crate::set::first::Insertion;
-use stylet_identify::linear::Symmetric;
+use stylet_identify::linear::{Symmetric, dot};
 use stylet_identify::phases::noise_n;
 use stylet_record::Recording;
 use stylet_stats::{mean, median_of, rms};
@@ -30,12 +30,11 @@ pub struct Line {
 #[must_use]
 pub fn line(t: &[f64], f: &[f64]) -> Line {
     let (middle, level) = (mean(t), mean(f));
-    let (tt, tf) = t.iter().zip(f).fold((0.0, 0.0), |(tt, tf), (t, f)| {
-        (tt + (t - middle) * (t - middle), tf + (t - middle) * (f - level))
-    });
-    let rate = tf / tt.max(1e-12);
-    let rest: Vec<f64> = t.iter().zip(f).map(|(t, f)| f - level - rate * (t - middle)).collect();
-    Line { first_n: level + rate * (t[0] - middle), rate_n_per_s: rate, sd_n: rms(&rest) }
+    let about = |x: &[f64], mean: f64| x.iter().map(|x| x - mean).collect::<Vec<_>>();
+    let (t, f) = (about(t, middle), about(f, level));
+    let rate = dot(&t, &f) / dot(&t, &t).max(1e-12);
+    let rest: Vec<f64> = t.iter().zip(&f).map(|(t, f)| f - rate * t).collect();
+    Line { first_n: level + rate * t[0], rate_n_per_s: rate, sd_n: rms(&rest) }
 }
 
 /// Coefficients of the combination of columns that leaves least squares, and what it leaves.
@@ -177,7 +176,10 @@ fn tone(t: &[f64], e: &[f64]) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Air, Line, before_contact, between, common, in_air_m, line, regress, tone};
+    use super::{
+        Air, Line, MOVES_MPS, before_contact, between, common, in_air_m, line, regress, straight, tone,
+        way_there,
+    };
     use crate::set::first::Insertion;
     use stylet_record::Recording;
 
@@ -271,6 +273,13 @@ mod tests {
         assert!(tone(&t[..20], &wave(3.25, 0.4, 0.3)[..20]).is_some());
         assert_eq!(tone(&[1.0; 30], &[0.5; 30]), None);
         assert!(tone(&t, &wave(7.0, 1.0, 0.0)).expect("a tone").1 < 25.0);
+        // Not on uneven stamps either, where half the rate is no mirror; and silence has no tone.
+        let uneven: Vec<f64> =
+            (0..33).map(f64::from).map(|k| k + 0.3 * (0.25 * std::f64::consts::PI * k).sin()).collect();
+        let most = 0.5 * 33.0 / 32.0;
+        let e: Vec<f64> = uneven.iter().map(|t| (std::f64::consts::TAU * most * t).cos()).collect();
+        assert!((uneven[32] - 32.0).abs() < 1e-12 && tone(&uneven, &e).expect("a tone").1 < most - 1e-9);
+        assert_eq!(tone(&t, &[0.0; 201]), Some((0.0, 0.0)));
     }
 
     #[test]
@@ -281,6 +290,7 @@ mod tests {
         assert_eq!(common(&[0.1, 0.2, 0.29]), 0.2);
         assert_eq!(common(&[0.05, 0.2, 0.4]), 0.0);
         assert_eq!(common(&[-0.2, 0.1, 0.3]), 0.0);
+        assert_eq!(common(&[1.0, 2.0, 3.0]), 0.0);
     }
 
     /// An insertion from 10 mm before a surface at 0: half of the way counts as air.
@@ -323,5 +333,57 @@ mod tests {
         let rate = between(&insertion(0.3, 0.0, 0.5), 0.0).expect("air on both sides");
         assert!((rate * (t1 - t0) - 0.5).abs() < 0.01, "{}", rate * (t1 - t0));
         assert_eq!(between(&insertion(0.3, 0.02, 0.0), 0.03), None);
+    }
+
+    #[test]
+    fn a_drive_is_told_by_more_than_twenty_samples_each_way_at_more_than_its_least_speed() {
+        let told = |back: usize, speed: f64| {
+            let v: Vec<f64> = (0..120)
+                .map(|k| {
+                    if k < 40 {
+                        speed
+                    } else if k < 40 + back {
+                        -speed
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            let t: Vec<f64> = (0..120).map(|k| 0.02 * f64::from(k)).collect();
+            let f = v.iter().enumerate().map(|(k, v)| 0.1 * v.signum() + 1e-3 * (k % 3) as f64).collect();
+            let air = Recording::with_velocity(t, vec![0.0; 120], v, f).expect("clean columns");
+            Air::of(&air).drive_n.is_some()
+        };
+        assert_eq!([(21, 1e-3), (20, 1e-3), (40, MOVES_MPS)].map(|(n, v)| told(n, v)), [true, false, false]);
+    }
+
+    /// The air ends where a sample lies beyond half of the way; a line takes twenty samples.
+    #[test]
+    fn the_air_before_an_insertion_ends_beyond_half_of_its_way() {
+        let r = recording(64, 0.02, |t| ((t - 0.5) * 50.0).round() / 64.0, |k, _| 1e-3 * (k % 3) as f64);
+        assert_eq!(way_there(&r, 40.0 / 64.0), Some(0..21));
+        assert_eq!((way_there(&r, 0.0), way_there(&r, -0.1)), (None, None));
+        assert!(straight(&r, 0..20).is_some() && straight(&r, 0..19).is_none());
+    }
+
+    /// Out of the air at the 30th sample and back so many before the last: the later half of these tells the level.
+    #[test]
+    fn the_air_after_an_insertion_begins_behind_the_last_sample_beyond_half_of_its_way() {
+        let told = |back: usize, edge: f64| {
+            let place = |k: usize| if (30..200 - back).contains(&k) { 1.0 } else { 0.0 };
+            let mut r = recording(
+                200,
+                0.02,
+                |t| place(((t - 0.5) * 50.0).round() as usize),
+                |k, _| 0.25 + 0.01 * k as f64 + 1e-6 * (k % 3) as f64,
+            );
+            r.position_m[200 - back] = edge;
+            between(&Insertion { recording: r, ..insertion(0.0, 0.0, 0.0) }, 0.5)
+        };
+        let rate = told(80, 0.0).expect("air on both sides");
+        assert!((rate - 0.5).abs() < 1e-5, "{rate}");
+        // Twenty samples are enough; what lies at half of the way is air.
+        assert!(told(39, 0.0).is_some() && told(38, 0.0).is_none());
+        assert!(told(39, 0.25).is_some());
     }
 }

@@ -14,6 +14,8 @@ use stylet_stats::{interpolate, sd, student};
 
 /// Stretch (s) before the corner, and behind it.
 const AROUND_S: (f64, f64) = (1.0, 0.8);
+/// Until so long before the corner the needle has not turned (s).
+const RESTS_S: f64 = 0.2;
 /// Delays and lags are tried up to so much (s), in these steps.
 const MOST_S: f64 = 0.8;
 /// Steps (s).
@@ -190,13 +192,11 @@ impl<'a> Corner<'a> {
             let at_m = interpolate(time, z, at_s);
             let u = match self.at {
                 At::Stop => (at_s - self.at_s).max(0.0),
-                At::Back if at_s < self.at_s - 0.2 * AROUND_S.0 => 0.0,
+                At::Back if at_s < self.at_s - RESTS_S => 0.0,
                 At::Back => (self.turned_m - at_m).max(0.0),
             };
-            let share = match (lag_s > 0.0, i == from) {
-                (false, _) | (_, true) => 1.0,
-                _ => 1.0 - libm::exp(-(time[i] - time[i - 1]) / lag_s),
-            };
+            // All of it where there is no lag.
+            let share = if i == from { 1.0 } else { 1.0 - libm::exp(-(time[i] - time[i - 1]) / lag_s) };
             for (s, x) in slow.iter_mut().zip([at_m, u / delta, 1.0 - libm::exp(-u / delta)]) {
                 *s += (x - *s) * share;
             }
@@ -216,7 +216,8 @@ const COLUMNS: usize = 4;
 
 #[cfg(test)]
 mod tests {
-    use super::{At, Corner, How, LEAST_S, Left, STEP_S, late, lowest, together};
+    use super::{AROUND_S, At, Corner, DELTA, How, LEAST_S, Left, STEP_S, late, lowest, together};
+    use crate::made::evenly;
     use crate::set::Insertion;
     use stylet_record::Recording;
 
@@ -369,5 +370,118 @@ mod tests {
         assert!((corner.time_s[0] - (corner.at_s - 1.0)).abs() < 0.021);
         assert!((corner.time_s[corner.time_s.len() - 1] - (corner.at_s + 0.8)).abs() < 0.021);
         assert_eq!(corner.time_s[0], whole.recording.time_s[corner.first]);
+    }
+
+    /// Where the needle turns, and the samples just a second before and four fifths behind: the first belongs to the corner.
+    #[test]
+    fn a_corner_has_what_lies_from_a_second_before_to_four_fifths_behind() {
+        let mut r = run("a", 4.0, 0.0, 0.0, 3);
+        let (stop, back) = (r.phases.deepest, r.phases.back);
+        let t = r.recording.time_s.clone();
+        let first = t.partition_point(|x| *x < t[back] - AROUND_S.0 - 1e-6);
+        let end = t.partition_point(|x| *x < t[back] + AROUND_S.1 - 1e-6);
+        r.recording.time_s[first] = t[back] - AROUND_S.0;
+        r.recording.time_s[end] = t[back] + AROUND_S.1;
+        let corner = Corner::of(&r, At::Back).expect("a corner");
+        assert_eq!((corner.first, corner.time_s.len()), (first, end - first));
+        // Nothing comes behind it: no corner.
+        let mut short = r.clone();
+        short.recording.time_s.truncate(end + 1);
+        assert!(Corner::of(&short, At::Back).is_none());
+        // The other corner just at the end of the stretch, or at its beginning, or a play's length away.
+        let has = |at: At, times: &dyn Fn(&mut Vec<f64>)| {
+            let mut r = run("a", 4.0, 0.0, 0.0, 3);
+            times(&mut r.recording.time_s);
+            Corner::of(&r, at).is_some()
+        };
+        assert!(!has(At::Stop, &|x| x[back] = t[stop] + AROUND_S.1));
+        assert!(!has(At::Back, &|x| x[stop] = t[back] - AROUND_S.0));
+        assert!(!has(At::Back, &|x| {
+            x.iter_mut().for_each(|x| *x -= t[back]);
+            (x[stop], x[back]) = (0.0, LEAST_S);
+        }));
+    }
+
+    #[test]
+    fn a_corner_of_sixteen_samples_is_too_few_for_four_columns() {
+        let whole = run("a", 4.0, 0.0, 0.0, 3);
+        let at_s = whole.recording.time_s[whole.phases.back];
+        for (count, told) in [(16, false), (17, true)] {
+            // All others lie before and behind.
+            let mut r = whole.clone();
+            for (k, t) in r.recording.time_s.iter_mut().enumerate() {
+                let place = k as f64 - whole.phases.back as f64;
+                *t = at_s
+                    + if place < -8.0 {
+                        place - 1.0
+                    } else if place >= f64::from(count) - 8.0 {
+                        place
+                    } else {
+                        0.02 * place
+                    };
+            }
+            r.recording.time_s[whole.phases.back - 8] = at_s - 0.16;
+            assert_eq!(Corner::of(&r, At::Back).is_some(), told, "{count}");
+        }
+    }
+
+    /// Without noise and late in nothing, the force that the corner supposes leaves nothing.
+    #[test]
+    fn the_force_of_a_corner_is_a_line_before_it_and_a_spring_and_friction_behind() {
+        for (at, delta) in [(At::Stop, DELTA[1][2]), (At::Back, DELTA[0][3])] {
+            let mut r = run("a", 4.0, 0.0, 0.0, 3);
+            let (stop, back) = (r.phases.deepest, r.phases.back);
+            let corner_s = r.recording.time_s[if at == At::Stop { stop } else { back }];
+            // It creeps until shortly before it turns: that is no way back.
+            for k in stop..back - 5 {
+                r.recording.position_m[k] -= if at == At::Back { 5e-4 } else { 0.0 };
+            }
+            let turned = r.recording.position_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            for k in 0..r.recording.len() {
+                let (t, z) = (r.recording.time_s[k] - corner_s, r.recording.position_m[k]);
+                let (u, before) = match at {
+                    At::Stop => (t.max(0.0), 90.0 * z),
+                    At::Back if t < -0.2 => (0.0, 0.3 * t),
+                    At::Back => (turned - z, 0.3 * t),
+                };
+                r.recording.force_n[k] = 1.0 + before - 0.2 * u / delta - 0.7 * (1.0 - (-u / delta).exp());
+            }
+            let corner = Corner::of(&r, at).expect("a corner");
+            let left = corner.squares(How::Delayed, 0.0, delta);
+            assert!(left < 1e-12, "{at:?}: {left:e}");
+            assert!(corner.squares(How::Delayed, 0.3, delta) > 1e-4);
+        }
+    }
+
+    /// Five time constants.
+    #[test]
+    fn a_filter_begins_where_it_has_forgotten_what_was() {
+        let mut r = run("a", 4.0, 0.0, 0.3, 3);
+        let of = |r: &Insertion| Corner::of(r, At::Stop).expect("a corner").squares(How::Slow, 0.3, 0.4);
+        let (was, begins) = (of(&r), r.recording.time_s[r.phases.deepest] - AROUND_S.0);
+        for (t, z) in r.recording.time_s.iter().zip(&mut r.recording.position_m) {
+            *z -= if *t < begins - 1.55 { 5e-3 } else { 0.0 };
+        }
+        assert_eq!(of(&r), was);
+        let late = r.recording.time_s.partition_point(|t| *t < begins - 1.45);
+        r.recording.position_m[late] -= 5e-3;
+        assert!(of(&r) != was);
+    }
+
+    /// A force half a second late under noise of as much as it changes.
+    #[test]
+    fn a_delay_that_hardly_leaves_less_is_none() {
+        let mut spread = evenly(11);
+        let runs: Vec<Insertion> = (0..4)
+            .map(|k| {
+                let mut r = run(&format!("{k}"), 4.0, 0.4, 0.0, 17 + 5 * k);
+                for f in &mut r.recording.force_n {
+                    *f = 0.25 * *f + 1.5 * (spread() - 0.5);
+                }
+                r.ruptures_s.fill(f64::INFINITY);
+                r
+            })
+            .collect();
+        assert_eq!(late(&runs.iter().collect::<Vec<_>>()), None);
     }
 }

@@ -263,7 +263,7 @@ pub fn timing(recording: &Recording) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Air, Checks, Instrument, Line, load, timing};
+    use super::{Air, Checks, Instrument, Line, NOTHING, common, load, timing};
     use crate::set::Insertion;
     use stylet_record::Recording;
 
@@ -305,6 +305,10 @@ mod tests {
         let mut unsure = Instrument::default();
         unsure.of_sensor(None, Some(&lines), 20.0, 1.0);
         assert_eq!(unsure.drift_n, None);
+        // Beside no force at all nothing is small.
+        let mut nothing = Instrument::default();
+        nothing.of_sensor(None, Some(&[lines[0]; 3]), 20.0, 0.0);
+        assert_eq!(nothing.drift_n, None);
         let mut both = Instrument::default();
         both.of_sensor(Some(&air), Some(&lines), 20.0, 10.0);
         assert_eq!((both.bias_n, both.drift_n), (Some(0.31), Some(0.4)));
@@ -313,6 +317,9 @@ mod tests {
         // A bias of nothing beside the force leaves the check's.
         let mut small = Instrument::default();
         small.of_sensor(Some(&air), Some(&lines), 20.0, 20.0);
+        assert_eq!(small.bias_n, Some(0.05));
+        let just = line(NOTHING * 10.0, 0.01);
+        small.of_sensor(Some(&air), Some(&[just; 3]), 20.0, 10.0);
         assert_eq!(small.bias_n, Some(0.05));
         let mut none = Instrument::default();
         none.of_sensor(Some(&air), None, 20.0, 10.0);
@@ -348,6 +355,10 @@ mod tests {
             (cause.effect.as_str(), cause.confidence, cause.parameters["force_n"].value),
             ("drive_friction", 0.99, -0.22)
         );
+        // Just a fiftieth is shown.
+        let mut just = Instrument { bias_n: Some(NOTHING * 10.0), ..Instrument::default() };
+        just.judge(10.0, 20.0, true, None);
+        assert_eq!((just.shown.len(), just.excluded.len()), (1, 0));
         // Without a check in air neither tones nor the drive are told.
         seen.judge(10.0, 20.0, false, None);
         assert_eq!(seen.shown.len(), 2);
@@ -405,7 +416,13 @@ mod tests {
         let drift = |with: usize, without: usize| {
             let all: Vec<&Insertion> =
                 std::iter::repeat_n(&run, with).chain(std::iter::repeat_n(&deep, without)).collect();
-            Instrument::look(&Checks::default(), &all, 0.0).drift_n
+            let seen = Instrument::look(&Checks::default(), &all, 0.0);
+            // From before to after tells more than a slope before.
+            let rates: Vec<f64> = seen.drifts_n_per_s.iter().copied().flatten().collect();
+            if seen.drift_n.is_some() {
+                assert_eq!(seen.drift_n, Some(common(&rates) * run.recording.duration_s()));
+            }
+            seen.drift_n
         };
         // 20 mN/s over 19.98 s.
         for (with, without) in [(1, 0), (2, 0), (1, 1), (2, 2)] {

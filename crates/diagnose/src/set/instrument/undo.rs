@@ -160,6 +160,9 @@ mod tests {
         }
         assert_eq!(earlier(&r, 0.0), r);
         assert_eq!(earlier(&r, -0.3), r);
+        // Of two as near the later one.
+        let quarters = Recording { time_s: (0..30).map(|k| 0.25 * f64::from(k)).collect(), ..r.clone() };
+        assert_eq!(earlier(&quarters, 0.125).force_n[3], r.force_n[4]);
         // A delay longer than the recording leaves two samples.
         assert_eq!(earlier(&r, 9.0).len(), 2);
     }

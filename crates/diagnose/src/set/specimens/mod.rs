@@ -151,9 +151,8 @@ pub fn look(believed: &Tissue, runs: &[Insertion]) -> Option<Specimens> {
         let of = |j: usize, left_out: bool| {
             median_of(each.iter().map(|o| if left_out { o.errors[j].1 } else { o.errors[j].0 }))
         };
-        let both = |o: &One, j: usize| o.errors[j].0 + o.errors[j].1;
-        let better =
-            each.iter().filter(|o| both(o, k) < both(o, standing)).count() as f64 / each.len() as f64;
+        let better = each.iter().filter(|o| both(o.errors[k]) < both(o.errors[standing])).count() as f64
+            / each.len() as f64;
         let gains = |left_out: bool| of(k, left_out) < (1.0 - LEAST_GAIN) * of(standing, left_out);
         let kept = k == 0 || ((gains(true) || gains(false)) && better >= LEAST_SHARE);
         done.push(Rung {
@@ -173,12 +172,16 @@ pub fn look(believed: &Tissue, runs: &[Insertion]) -> Option<Specimens> {
     Some(Specimens { used: each.len(), unused, punctured, rungs: done, numbers })
 }
 
+/// The errors on what was fitted and on the rest of the hold together.
+fn both(errors: (f64, f64)) -> f64 {
+    errors.0 + errors.1
+}
+
 /// Whether the law of the rung that stands is a curved one. A ramp of a relaxing spring looks curved, and one that is too fast shows its curvature only when the
 /// relaxation is known: once there is one it tells.
 fn look_at_curvature(each: &[One], rungs: &mut [Rung], standing: usize) -> bool {
     let Some(at) = rungs.iter().position(|r| r.effect.as_deref() == Some(curvature())) else { return false };
     if standing > at {
-        let both = |e: (f64, f64)| e.0 + e.1;
         let with = median_of(each.iter().map(|o| both(o.errors[standing])));
         let without = median_of(each.iter().map(|o| both(o.straight[standing].0)));
         let better =
@@ -302,7 +305,10 @@ fn value(law: &Model, path: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Over, look, numbers, relaxing, value, whole};
+    use super::{
+        FITTED, LEAST_GAIN, One, Over, Rung, Specimens, curvature, look, look_at_curvature, numbers,
+    };
+    use super::{one, relaxing, value, whole};
     use crate::outcome::Verdict;
     use crate::set::Insertion;
     use crate::set::first::pressed;
@@ -376,6 +382,12 @@ mod tests {
             r.phases.back = n;
             assert_eq!(whole(&r).is_ok(), fine, "{count}");
         }
+        // Just three seconds are enough.
+        let mut just = good.clone();
+        let t: Vec<f64> = (0..64).map(|k| 0.125 * f64::from(k)).collect();
+        just.recording = Recording::new(t, vec![0.0; 64], vec![0.0; 64]).expect("clean columns");
+        (just.phases.deepest, just.phases.back) = (63 - 24, 64);
+        assert_eq!(whole(&just), Ok(()));
         let mut back = good;
         back.phases.back -= 5;
         assert_eq!(whole(&back).err().as_deref(), Some("the tool comes back"));
@@ -397,6 +409,8 @@ mod tests {
             .map(|p| value(&m, p));
             assert_eq!(told, [Some(0.2), Some(0.5), Some(0.3), Some(6.0), Some(30.0)]);
         }
+        let alike = two((0.2, 0.5), (0.3, 0.5));
+        assert_eq!(value(&alike, "terms.0.fraction"), Some(0.2), "as they stand where neither is faster");
         let one = law(&[relaxing(&[(0.2, 0.5)])]);
         assert_eq!((value(&one, "terms.0.fraction"), value(&one, "terms.1.fraction")), (Some(0.2), None));
     }
@@ -498,5 +512,70 @@ mod tests {
             ["nonlinear_elasticity", "stress_relaxation"]
         );
         assert_eq!(d.causes[0].parameters.keys().collect::<Vec<_>>(), ["kappa_per_m"]);
+    }
+
+    /// Three fifths of the hold are fitted: a force that changes behind them is no matter of the fit.
+    #[test]
+    fn a_specimen_is_fitted_without_the_rest_of_its_hold_and_judged_on_it() {
+        let mut r = specimen("a", 300.0, &[], 4.0, 1);
+        let t = r.recording.time_s.clone();
+        let stop_s = t[r.phases.deepest];
+        let end_s = stop_s + FITTED * (t[t.len() - 1] - stop_s);
+        for (f, t) in r.recording.force_n.iter_mut().zip(&t) {
+            *f += if *t > end_s { 0.5 } else { 0.0 };
+        }
+        let (fitted_n, rest_n) = one(&tissue(300.0), &r).expect("a fit").errors[0];
+        assert!(fitted_n < 2e-3 && (rest_n - 0.5).abs() < 0.01, "{fitted_n} {rest_n}");
+    }
+
+    /// Specimens with these errors (N, on what was fitted and on the rest) under the third law, and without its curvature.
+    fn judged(all: &[[(f64, f64); 2]]) -> Vec<One> {
+        let of = |[with, without]: &[(f64, f64); 2]| One {
+            errors: vec![*with; 3],
+            laws: Vec::new(),
+            straight: vec![(*without, law(&[])); 3],
+        };
+        all.iter().map(of).collect()
+    }
+
+    fn rung(effect: &str, better: f64, kept: bool) -> Rung {
+        let effect = Some(effect.to_owned()).filter(|e| !e.is_empty());
+        Rung { step: String::new(), effect, fitted_n: 7.0, left_out_n: 8.0, better, kept }
+    }
+
+    /// A tenth less of both errors together in three of four specimens.
+    #[test]
+    fn a_curvature_stays_when_most_specimens_lose_by_going_without_it() {
+        let told = |all: &[[(f64, f64); 2]], standing: usize| {
+            let mut rungs =
+                [rung("", 0.0, true), rung(curvature(), 1.0, true), rung("stress_relaxation", 1.0, true)];
+            let kept = look_at_curvature(&judged(all), &mut rungs, standing);
+            assert_eq!(rungs[1].kept, kept);
+            (kept, (rungs[standing].fitted_n, rungs[standing].left_out_n))
+        };
+        let without = (1.2, 0.8);
+        for (with, kept) in
+            [((0.4, 1.3), true), ((1.3, 0.6), false), ((1.0 - LEAST_GAIN, 1.0 - LEAST_GAIN), false)]
+        {
+            let numbers = if kept { (7.0, 8.0) } else { without };
+            assert_eq!(told(&[[with, without]; 4], 2), (kept, numbers), "{with:?}");
+        }
+        let (good, equal) = ([(0.5, 0.4), without], [without, without]);
+        assert!(told(&[good, good, good, equal], 2).0 && !told(&[good, good, good, equal, equal], 2).0);
+        // Where the curved law is the last one, it stands as it was told.
+        assert_eq!(told(&[equal], 1), (true, (7.0, 8.0)));
+    }
+
+    #[test]
+    fn a_cause_is_as_sure_as_the_best_of_its_kept_rungs() {
+        let rungs = vec![
+            rung("", 0.0, true),
+            rung(curvature(), 0.8, true),
+            rung("stress_relaxation", 0.9, true),
+            rung("stress_relaxation", 1.0, false),
+        ];
+        let s = Specimens { used: 4, unused: Vec::new(), punctured: Vec::new(), rungs, numbers: Vec::new() };
+        let sure: Vec<f64> = s.diagnosis(&[]).causes.iter().map(|c| c.confidence).collect();
+        assert_eq!(sure, [0.8, 0.9]);
     }
 }
