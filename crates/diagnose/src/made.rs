@@ -1,5 +1,6 @@
 //! What unit tests of several modules make up.
 
+use crate::select::Stage;
 use crate::set::Insertion;
 use crate::set::fitted::{Fitted, refitted};
 use crate::set::laws::{Kind, Law};
@@ -115,4 +116,12 @@ pub fn settled(effects: &[AnyEffect], runs: &[&Insertion]) -> Fitted {
     let raw = crate::raw::Raw::default();
     let drops = runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect());
     refitted(&model, crate::set::fitted::blocks(runs, &raw), drops.collect()).expect("a fit")
+}
+
+/// A stage of a search that took this effect among rivals that gained so many nats.
+pub fn stage(taken: Option<(&'static str, f64)>, needed: f64, rivals: &[(AnyEffect, f64)]) -> Stage {
+    let choice = |(e, _): &(AnyEffect, f64)| Choice::new(e.info(), &e.parameters());
+    let choices: Vec<Choice> = rivals.iter().map(choice).collect();
+    let gained = choices.iter().zip(rivals).map(|(c, r)| (c.info.id, r.1, c.values.len())).collect();
+    Stage { stood: Vec::new(), rivals: gained, taken, needed, choices }
 }

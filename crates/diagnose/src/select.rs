@@ -424,8 +424,8 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Search, Stage, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
-    use crate::made::{believed, settled, showing};
+    use super::{Search, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
+    use crate::made::{believed, settled, showing, stage};
     use crate::set::fitted::Fitted;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
@@ -531,8 +531,7 @@ mod tests {
         let new = fit(&[ForceBias { force_n: 0.9 }.into()]);
         let more = old.nats() - new.nats();
         let mut search = Search::of(old, data());
-        let stage =
-            |taken| Stage { stood: Vec::new(), rivals: Vec::new(), taken, needed: 0.0, choices: Vec::new() };
+        let stage = |taken| stage(taken, 0.0, &[]);
         search.stages =
             vec![stage(Some(("coulomb_friction", 20.0))), stage(Some(("force_drift", 9.0))), stage(None)];
         search.swap(0, new);

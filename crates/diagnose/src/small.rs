@@ -114,9 +114,9 @@ fn unresolved(search: &Search, k: usize) -> Option<String> {
 mod tests {
     use super::{at_every_sample, small, unresolved, unsure};
     use crate::held_out::left_out_granted;
-    use crate::made::{believed, settled, showing};
+    use crate::made::{believed, settled, showing, stage};
     use crate::outcome::Cause;
-    use crate::select::{Search, Stage};
+    use crate::select::Search;
     use std::collections::BTreeMap;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
@@ -166,13 +166,7 @@ mod tests {
     #[test]
     fn a_cause_is_unsure_when_less_speaks_against_none_than_the_search_asked_for() {
         let mut s = search(&[]);
-        s.stages = vec![Stage {
-            stood: Vec::new(),
-            rivals: Vec::new(),
-            taken: Some(("force_bias", 30.0)),
-            needed: 8.0,
-            choices: Vec::new(),
-        }];
+        s.stages = vec![stage(Some(("force_bias", 30.0)), 8.0, &[])];
         let cause = |effect: &str| Cause {
             effect: effect.to_owned(),
             equivalent: Vec::new(),
