@@ -103,7 +103,7 @@ mod tests {
     use stylet_identify::model::Choice;
     use stylet_tissue::{
         AnyEffect, AsymmetricFriction, CoulombFriction, CuttingForce, DriveFriction, Effect, ForceBias,
-        ForceDrift, PreslidingFriction, StribeckFriction, TimeDelay, ToolInertia,
+        ForceDrift, PeriodicInterference, PreslidingFriction, StribeckFriction, TimeDelay, ToolInertia,
     };
 
     fn drift() -> AnyEffect {
@@ -253,10 +253,12 @@ mod tests {
         rivals(&mut s);
         assert_eq!(s.best.model.effects[0].info.id, "presliding_friction");
         // Seemingly ahead, but nothing of it is left when all that is left is noise.
-        let mut s = search(&[rubs(50.0)], 0.0, &[(rubs(50.0), 900.0, &tried)]);
+        let tone = PeriodicInterference { amplitude_n: 1e-3, frequency_hz: 1.0, phase_rad: 0.5 };
+        let tried = [(drift(), 900.0), (tone.into(), 899.0)];
+        let mut s = search(&[], 5e-4, &[(drift(), 900.0, &tried)]);
         s.best.residuals.nats += 300.0;
         let classes = rivals(&mut s);
-        assert_eq!(s.best.model.effects[0].info.id, "coulomb_friction");
+        assert_eq!(s.best.model.effects[0].info.id, "force_drift");
         assert!(classes[0][0].behind < -50.0);
     }
 
