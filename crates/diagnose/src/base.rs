@@ -128,11 +128,18 @@ fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Prepared, roughness};
-    use crate::made::believed;
+    use super::{FIRST_SHARE, Prepared, anew, base, given, roughness, sketched};
+    use crate::made::{believed, gel, insertions, settled};
+    use std::sync::Arc;
+    use stylet_identify::assign::assign;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::drops::Drop;
+    use stylet_identify::fit::{Effort, Fit, fit};
+    use stylet_identify::model::{Choice, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::Data;
     use stylet_record::Recording;
+    use stylet_tissue::{CoulombFriction, Effect};
 
     fn blocks(f: impl Fn(f64) -> f64) -> Blocks {
         let t: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
@@ -176,5 +183,71 @@ mod tests {
             p.drops.iter().map(|d| d.iter().map(|d: &Drop| d.time_s).collect::<Vec<_>>()).collect::<Vec<_>>()
         );
         assert!(times[0].iter().any(|t| (t - 4.0).abs() < 0.05), "{times:?}");
+    }
+
+    /// Insertions into the gel that rub by so much (N/m), made ready, with blocks and noise as a fit from the truth has them.
+    fn gels(c_n_per_m: f64) -> (Prepared, Data) {
+        let runs = insertions(&[CoulombFriction { c_n_per_m }.into()], &[[4e-3, 0.0], [6e-3, 0.0]]);
+        let f = settled(&[], &runs.iter().collect::<Vec<_>>());
+        (Prepared::new(f.fit.model.belief.clone(), f.data.blocks.to_vec(), 0.0), f.data)
+    }
+
+    fn rubs() -> Choice {
+        Choice::new(CoulombFriction::default().info(), &[1.0])
+    }
+
+    #[test]
+    fn the_base_law_is_found_from_what_is_believed() {
+        let (prepared, _) = gels(0.0);
+        let (f, data) = base(&prepared).expect("a fit");
+        let (told, there) = (&f.model.tissue.layers[0], &gel().layers[0]);
+        assert!((told.stiffness_n_per_m / there.stiffness_n_per_m - 1.0).abs() < 0.02, "{told:?}");
+        assert!(f.model.effects.is_empty() && f.model.instants.iter().all(|t| t[0].is_finite()));
+        assert!((2e-3..2e-2).contains(&data.noise.sd_n()), "{}", data.noise.sd_n());
+    }
+
+    #[test]
+    fn an_effect_begun_anew_or_sketched_has_its_strength() {
+        let (prepared, data) = gels(60.0);
+        let strength = |f: Option<Fit>| f.expect("a fit").model.effects[0].values[0];
+        let coarse = data.on(data.blocks.iter().map(|b| b.coarser(3)).collect());
+        for told in [anew(&prepared, &[rubs()], &data), sketched(&prepared, &[rubs()], &coarse)] {
+            let told = strength(told);
+            assert!((told / 60.0 - 1.0).abs() < 0.2, "{told}");
+        }
+    }
+
+    /// A sketch sees nothing but the blocks that it is given.
+    #[test]
+    fn a_sketch_knows_the_coarse_blocks_alone() {
+        let (prepared, data) = gels(60.0);
+        let coarse = data.on(data.blocks.iter().map(|b| b.coarser(3)).collect());
+        let less = Prepared { blocks: Arc::clone(&coarse.blocks), ..prepared.clone() };
+        let told = |p: &Prepared| {
+            let f = sketched(p, &[rubs()], &coarse).expect("a fit");
+            (f.nats(), f.model.tissue.layers[0].stiffness_n_per_m)
+        };
+        assert_eq!(told(&prepared), told(&less));
+    }
+
+    /// Noise as large as a share of the largest force, or as the blocks' own; the better of a trusting and a doubting giving away.
+    #[test]
+    fn drops_are_given_away_from_afar() {
+        let (prepared, _) = gels(60.0);
+        let (told, data) = given(&prepared, &[]).expect("a fit");
+        assert!((data.noise.sd_n() / (FIRST_SHARE * prepared.largest_n()) - 1.0).abs() < 1e-12);
+        let rough_n = roughness(&prepared.blocks);
+        assert!(rough_n < 0.5 * data.noise.sd_n());
+        let wide = Data::new(Arc::clone(&prepared.blocks), Noise::white(data.noise.sd_n()), 0.0);
+        let given_by = |from: &Model, trust: f64| {
+            let both = prepared.blocks.iter().zip(&prepared.drops);
+            let instants = both.map(|(b, d)| assign(from, b, d, trust, rough_n)).collect();
+            let next = Model { instants, ..from.clone() };
+            fit(&next, &wide, Effort { turns: 4, enough: 0.3 }).expect("a fit")
+        };
+        let first = given_by(&Model::base(prepared.belief.clone(), 2), 1.0);
+        let second = given_by(&first.model, 0.5);
+        assert_eq!(told.nats(), first.nats().min(second.nats()));
+        assert!(told.model.instants.iter().all(|t| t[0].is_finite()));
     }
 }

@@ -478,13 +478,28 @@ fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
 
 #[cfg(test)]
 mod tests {
-    use super::{excess, line_p, raw_causes};
+    use super::{
+        base_parameters, colour, differences, each, excess, extended, judge, line_p, raw_causes, step,
+        take_traces,
+    };
+    use crate::held_out::Left;
+    use crate::intervals::Spread;
+    use crate::made::{settled, showing, stage};
+    use crate::outcome::{Cause, Diagnosis, Verdict};
     use crate::raw::{Raw, Spikes};
+    use crate::rivals::Rival;
+    use crate::select::Search;
+    use crate::small::Small;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::fit::{Effort, Fit, fit};
+    use stylet_identify::model::{Choice, Free, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
+    use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
 
     /// Fisher 1929: `m (1 + x)^(1 - m)` for a line `x` times all others among `m` half the blocks.
     #[test]
@@ -567,5 +582,203 @@ mod tests {
         // Steps of less than three tenths of the noise are nobody's matter.
         assert_eq!(raw_causes(&Raw { step_n: Some(0.029), ..Raw::default() }, 0.1).len(), 0);
         assert_eq!(raw_causes(&raw, 0.2).len(), 2);
+    }
+
+    const AT: [[f64; 2]; 4] = [[3e-3, 3e-4], [4e-3, -3e-4], [5e-3, 0.0], [6e-3, 1e-4]];
+
+    /// A search that found these effects in insertions off a sensor that shows so much more (N), its base law fitted beside.
+    fn found(effects: &[AnyEffect], runs: usize, more_n: impl Fn(f64) -> f64) -> Search {
+        let runs = showing(&[], &AT[..runs], more_n);
+        let f = settled(effects, &runs.iter().collect::<Vec<_>>());
+        let mut search = Search::of(f.fit, f.data);
+        search.settle(search.best.clone());
+        let mut base = search.best.model.clone();
+        base.effects.clear();
+        search.base = fit(&base, &search.data, Effort::FULL).expect("a fit");
+        search.stages = effects.iter().map(|e| stage(Some((e.id(), 50.0)), 48.0, &[])).collect();
+        search
+    }
+
+    fn drift() -> AnyEffect {
+        ForceDrift { rate_n_per_s: 0.02 }.into()
+    }
+
+    fn slow(amplitude_n: f64) -> impl Fn(f64) -> f64 {
+        move |t| amplitude_n * (1.5 * t).sin()
+    }
+
+    /// A slow wave that all have in common: with several recordings it counts from eight tenths of the noise's variance on where it is
+    /// more than chance, with one from three times that on.
+    #[test]
+    fn what_recordings_have_in_common_is_unknown_where_it_is_large_against_the_noise() {
+        let rows = [(4, 0.0, false), (4, 0.004, false), (4, 0.015, true), (1, 0.012, false), (1, 0.03, true)];
+        for (runs, amplitude_n, unknown) in rows {
+            let mut search = found(&[], runs, slow(amplitude_n));
+            let left = excess(&search.data, &search.best.residuals.e);
+            let told = judge(&mut search, &[]);
+            assert_eq!(told.unknown, unknown, "{runs} {amplitude_n} {left}");
+            assert!(!told.lined && told.causes.is_empty() && (told.leftover.share - 1.0).abs() < 1e-3);
+            if runs == 4 {
+                // Neither large enough at sight, nor a stretch.
+                assert!(left < 6.0 && unknown == (left > 0.8), "{left}");
+                assert_eq!(told.leftover.depends_on, if unknown { vec!["time"] } else { Vec::new() });
+                assert_eq!(told.leftover.p_value < 1e-6, unknown);
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_left_depends_on_frequency_and_is_no_noise() {
+        let mut search = found(&[], 4, |t| 0.03 * (14.0 * t).sin());
+        let before = search.data.noise.sd_n();
+        let told = judge(&mut search, &[]);
+        assert!(told.unknown && told.lined && search.data.noise.sd_n() < 0.5 * before);
+        assert_eq!(told.leftover.depends_on, ["frequency"]);
+        let after = excess(&search.data, &search.best.residuals.e);
+        let chance = line_p(after, search.data.compared());
+        assert!(told.leftover.p_value == chance && chance < 1e-50, "{chance}");
+    }
+
+    fn rival(effect: &AnyEffect, behind: f64) -> Rival {
+        Rival { name: effect.id(), behind, choice: Choice::new(effect.info(), &effect.parameters()) }
+    }
+
+    #[test]
+    fn a_cause_is_as_sure_as_its_rivals_are_behind_and_as_it_gained_beyond_what_it_needed() {
+        let bias: AnyEffect = ForceBias { force_n: 0.05 }.into();
+        let mut search = found(&[bias.clone(), drift()], 2, |t| 0.02 * t + 0.05);
+        search.stages[1] = stage(Some(("force_drift", 70.0)), 69.0, &[]);
+        let rivals = vec![rival(&bias, 1.0), rival(&drift(), 3.0), rival(&bias, -5.0)];
+        let told = judge(&mut search, &[rivals, Vec::new()]);
+        let ids: Vec<&str> = told.causes.iter().map(|c| c.effect.as_str()).collect();
+        assert_eq!(ids, ["force_drift", "force_bias"], "the one that gained most comes first");
+        let (first, second) = (&told.causes[0], &told.causes[1]);
+        assert!((first.confidence - 1.0 / (1.0 + (-4.0_f64).exp())).abs() < 1e-12);
+        // None is counted as if it were more than three nats ahead.
+        let weights = (-1.0_f64).exp() + (-3.0_f64).exp() + 3.0_f64.exp();
+        assert!((second.confidence - 1.0 / (1.0 + weights + (-5.0_f64).exp())).abs() < 1e-12);
+        assert_eq!((first.gain_nats, second.gain_nats), (70.0, 50.0));
+        // Three nats behind is no class any more.
+        assert_eq!(
+            (first.equivalent.len(), &second.equivalent[..]),
+            (0, &["force_bias".to_owned(), "force_bias".to_owned()][..])
+        );
+        let mut against: Vec<&str> = told.against_none.iter().map(|a| a.0.as_str()).collect();
+        against.sort_unstable();
+        assert_eq!(against, ["force_bias", "force_drift"]);
+        let e = first.parameters["rate_n_per_s"];
+        assert!(e.low < 0.02 && 0.02 < e.high && e.high - e.low < 4e-3, "{e:?}");
+        let of = |f: &Fit| excess(&search.data, &f.residuals.e);
+        let less = fit(&search.best.model.without(1), &search.data, Effort { turns: 3, enough: 1.0 });
+        let share = (of(&less.expect("a fit")) - of(&search.best)) / of(&search.base);
+        assert!((first.share / share - 1.0).abs() < 1e-9 && second.share < share && share < 0.9, "{share}");
+        assert!(!told.unknown && !told.lined && told.leftover.depends_on.is_empty());
+    }
+
+    #[test]
+    fn base_parameters_are_told_beside_what_was_assumed() {
+        let mut search = found(&[], 3, |_| 0.0);
+        let mut belief = search.best.model.belief.as_ref().clone();
+        belief.tissue.layers[0].stiffness_n_per_m *= 0.8;
+        belief.tissue.layers[0].friction_ns_per_m2 *= 1.3;
+        search.best.model.belief = Arc::new(belief);
+        let spread = Spread::new(&search.best, &search.data, &mut ChaCha8Rng::seed_from_u64(1));
+        let told = base_parameters(&search, &spread);
+        let names: Vec<(usize, &str)> = told.iter().map(|p| (p.layer, p.name.as_str())).collect();
+        let of_layer = ["stiffness_n_per_m", "friction_ns_per_m2", "puncture_n"].map(|n| (1, n));
+        assert_eq!(names, [&of_layer[..], &[(0, "surface_m")]].concat());
+        // What is there is what the insertions were made with.
+        for (p, (there, changed)) in
+            told.iter().zip([(250.0, true), (2e4, true), (2.0, false), (4e-3, false)])
+        {
+            assert!((p.value / there - 1.0).abs() < 0.01, "{p:?}");
+            assert!(p.low < p.value && (p.high + p.low - 2.0 * p.value).abs() < 1e-9 * p.value, "{p:?}");
+            assert_eq!((p.changed, p.at_bound), (changed, false), "{p:?}");
+        }
+        let role = Role::Thickness(0);
+        search.best.model.free.thickness = true;
+        let unsure = Spread::new(&search.best, &search.data, &mut ChaCha8Rng::seed_from_u64(1));
+        let told = base_parameters(&search, &unsure);
+        assert_eq!(
+            unsure.of(role).is_some(),
+            told.iter().any(|p| (p.layer, &p.name[..]) == (1, "thickness_m"))
+        );
+    }
+
+    #[test]
+    fn what_is_told_of_every_recording_is_its_own() {
+        let mut search = found(&[drift()], 2, |t| 0.02 * t);
+        let left = |square_n2: f64| Some(Left { square_n2, ..Left::default() });
+        let within = search.data.blocks[1].within_n();
+        let told = each(&[None, left(0.04)], &[left(0.01), left(0.09)], &search);
+        assert!(told[0].0.is_nan() && within > 1e-3);
+        assert_eq!(told[1], ((0.04 + within * within).sqrt(), (0.09 + within * within).sqrt()));
+        let s = &mut search.best.model;
+        (s.scatter.force, s.scatter.place_m, s.scatter.surface_m, s.scatter.friction) =
+            (0.1, 2e-3, 3e-4, 0.4);
+        for (own_surface, own_friction) in [(true, false), (false, true)] {
+            search.best.model.free = Free { own_surface, own_friction, ..search.best.model.free };
+            let d = differences(&search);
+            assert_eq!((d.puncture, d.face_m), (0.1, 2e-3));
+            assert_eq!(d.surface_m, if own_surface { 3e-4 } else { 0.0 });
+            assert_eq!(d.friction, if own_friction { 0.4 } else { 0.0 });
+        }
+        let mut noise = Noise::white(0.5);
+        (noise.bins[0].a[0], noise.bins[0].a[1]) = (0.3, -0.2);
+        search.data = search.data.with_noise(noise);
+        assert_eq!(colour(&search), [0.3, -0.2]);
+        let told = step(&stage(Some(("force_drift", 9.0)), 7.0, &[(drift(), 12.0)]));
+        assert_eq!((told.taken.as_deref(), told.needed_nats), (Some("force_drift"), 7.0));
+        assert_eq!((told.rivals[0].effect.as_str(), told.rivals[0].gain_nats), ("force_drift", 12.0));
+    }
+
+    /// A diagnosis that names these, and nothing else of it.
+    fn diagnosis(verdict: Verdict, causes: Vec<Cause>) -> Diagnosis {
+        let none = r#"{"verdict": "none", "causes": [], "base_parameters": [], "invisible": [], "data_quality": [], "evidence": [],
+            "gain": {"held_out": false, "recordings": [], "rmse_before_n": 0, "rmse_after_n": 0, "floor_n": 0, "each_n": []},
+            "leftover": {"p_value": 1, "depends_on": [], "nats": 0}, "noise": {"sd_n": 0, "ar": [0, 0], "from_air": false},
+            "advice": []}"#;
+        Diagnosis { verdict, causes, ..serde_json::from_str(none).expect("a diagnosis") }
+    }
+
+    #[test]
+    fn a_scenario_is_extended_by_the_causes_and_the_law_that_they_are_part_of() {
+        let mut search = found(&[drift(), ForceBias { force_n: 0.05 }.into()], 2, |t| 0.02 * t + 0.05);
+        let scenario = stylet_scenario::parse(
+            "a scenario",
+            r#"(name: "a", tissue: (surface_m: 0.0, layers: []), motion: Recorded)"#,
+        );
+        let scenario = scenario.expect("a scenario");
+        let (best, base) = (search.best.model.tissue.clone(), search.base.model.tissue.clone());
+        assert!(best != base);
+        let saturated = || raw_causes(&Raw { limit_n: Some(2.5), ..Raw::default() }, 0.1).remove(0);
+        let drifts = || Cause { effect: "force_drift".to_owned(), ..saturated() };
+        let of = |search: &Search, verdict, causes| {
+            let s = extended(&scenario, search, &diagnosis(verdict, causes));
+            (s.tissue, s.effects.iter().map(|e| e.id()).collect::<Vec<_>>())
+        };
+        assert_eq!(of(&search, Verdict::Named, vec![drifts()]), (best.clone(), vec!["force_drift"]));
+        // Effects that are no causes go with their law; what the raw numbers show belongs to neither.
+        assert_eq!(of(&search, Verdict::None, vec![]), (base.clone(), vec![]));
+        assert_eq!(of(&search, Verdict::Named, vec![saturated()]), (base.clone(), vec!["saturation"]));
+        let both = vec![drifts(), saturated()];
+        assert_eq!(of(&search, Verdict::Unknown, both).1, ["force_drift", "saturation"]);
+        search.best.model.effects.clear();
+        assert_eq!(of(&search, Verdict::None, vec![]), (best, vec![]));
+        assert_eq!(of(&search, Verdict::Unknown, vec![]), (base, vec![]));
+    }
+
+    #[test]
+    fn causes_that_are_too_small_become_traces() {
+        let mut search = found(&[drift(), ForceBias { force_n: 0.05 }.into()], 2, |t| 0.02 * t + 0.05);
+        let mut judged = judge(&mut search, &[]);
+        let small = |effect: &str| Small { effect: effect.to_owned(), why: "a reason".to_owned() };
+        let told = take_traces(&mut judged, vec![small("time_delay"), small("force_bias")]);
+        assert_eq!(
+            told.iter().map(|t| (&t.effect[..], &t.why[..])).collect::<Vec<_>>(),
+            [("force_bias", "a reason")]
+        );
+        assert!(told[0].parameters.contains_key("force_n"));
+        assert_eq!(judged.causes.iter().map(|c| &c.effect[..]).collect::<Vec<_>>(), ["force_drift"]);
     }
 }

@@ -296,11 +296,11 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
-    use stylet_identify::fit::{Effort, Tangent, fit};
+    use stylet_identify::fit::{Effort, Fit, Tangent, fit};
     use stylet_identify::linear::Symmetric;
     use stylet_identify::model::{Belief, Choice, Model, Role};
     use stylet_identify::noise::Noise;
-    use stylet_identify::objective::{Data, Trail, replay};
+    use stylet_identify::objective::{Data, Trail, replay, residuals};
     use stylet_record::Recording;
     use stylet_stats::student;
     use stylet_tissue::{Layer, Tissue};
@@ -463,5 +463,77 @@ mod tests {
         // Where it would be larger nothing is taken away; one alone says nothing.
         near(of(&[], &[1.2, 1.4]), 0.5, 2.0 * (1.3 / 0.02_f64.sqrt()).powi(2));
         near(of(&[], &[0.5]), 0.5, 1e4);
+    }
+
+    /// A model where it stands, fitted or not.
+    fn standing(model: Model, data: &Data) -> Fit {
+        Fit { residuals: residuals(&model, data).expect("a replay"), model }
+    }
+
+    #[test]
+    fn a_shared_number_stands_at_a_bound_within_a_millionth() {
+        let (model, data) = insertions(&[0.0], |_, _| ());
+        let n = *model.shared().iter().find(|n| n.role == Role::Stiffness(0)).expect("free");
+        let near = 1e-6 * (n.high - n.low).min(1.0);
+        for (x, at) in [
+            (n.low + 0.9 * near, true),
+            (n.low + 1.1 * near, false),
+            (n.mean, false),
+            (n.high - 1.1 * near, false),
+            (n.high - 0.9 * near, true),
+        ] {
+            let mut moved = model.clone();
+            moved.set(n.role, 0, x);
+            let fit = standing(moved, &data);
+            let spread = Spread::known(&fit, &data);
+            assert_eq!(spread.at_bound(n.role), at, "{x}");
+            assert!(!spread.at_bound(Role::Puncture(0)), "nothing punctures");
+        }
+    }
+
+    /// A time goes by its logarithm, what is rigid when neutral by its reciprocal.
+    #[test]
+    fn intervals_lie_evenly_in_the_scale_of_the_fit() {
+        let (model, data) = insertions(&[0.0, 0.0], |_, _| ());
+        let of = |id: &str, values: &[f64], parameter: usize| {
+            let choice = Choice::new(stylet_tissue::info(id).expect("in the library"), values);
+            let fit = standing(model.with(choice), &data);
+            let spread = Spread::known(&fit, &data);
+            (spread.parameter(0, parameter), spread.against_none(0))
+        };
+        let (e, _) = of("periodic_interference", &[3e-4, 1.7, 0.2], 1);
+        assert!(e.low < 1.7 && e.high < 3.0, "{e:?}");
+        assert!((e.low * e.high / (1.7 * 1.7) - 1.0).abs() < 1e-9, "{e:?}");
+        let (e, against) = of("needle_compliance", &[40_000.0], 0);
+        let (below, above) = (1.0 / e.value - 1.0 / e.high, 1.0 / e.low - 1.0 / e.value);
+        assert!(below > 0.0 && (below / above - 1.0).abs() < 1e-9, "{e:?}");
+        let deviations = 1.0 / e.value / above * stylet_stats::Z95;
+        let wanted = 0.5 * deviations * deviations;
+        let against = against.expect("a strength");
+        assert!((against / wanted - 1.0).abs() < 0.02, "{against} for {wanted}");
+        // So stiff that it may as well be rigid.
+        let (e, against) = of("needle_compliance", &[1e9], 0);
+        assert!(e.high == 1e300 && e.low > 1e4 && e.low < 1e9, "{e:?}");
+        assert!(against.is_some_and(|nats| nats < 0.5), "{against:?}");
+        // None of less than nothing.
+        let (e, against) = of("coulomb_friction", &[1e-4], 0);
+        assert!(e.low == 0.0 && e.high > 1e-3 && against.is_some_and(|nats| nats < 0.5), "{e:?}");
+    }
+
+    #[test]
+    fn what_is_not_free_has_no_interval_and_what_nothing_tells_that_of_its_prior() {
+        let (mut model, data) = insertions(&[0.0, 0.0], |_, _| ());
+        let fit = standing(model.clone(), &data);
+        let spread = Spread::known(&fit, &data);
+        assert!(spread.of(Role::Puncture(0)).is_none());
+        let (value, half) = spread.of(Role::Stiffness(0)).expect("free");
+        assert!(value == fit.model.get(Role::Stiffness(0), 0) && half > 0.0 && half < 0.1, "{half}");
+        // A layer that the needle never leaves.
+        let n = *model.shared().iter().find(|n| n.role == Role::Thickness(0)).expect("free");
+        let (_, half) = spread.of(n.role).expect("free");
+        assert!((half / (n.sd * stylet_stats::Z95) - 1.0).abs() < 0.01, "{half} for {}", n.sd);
+        model.free.thickness = false;
+        let fit = standing(model, &data);
+        assert!(Spread::known(&fit, &data).of(n.role).is_none());
     }
 }

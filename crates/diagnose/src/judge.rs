@@ -27,12 +27,37 @@ pub fn cost(numbers: usize, blocks: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::cost;
+    use super::{cost, gain};
+    use crate::made::{settled, showing};
+    use stylet_identify::fit::{Effort, fit};
+    use stylet_identify::noise::From;
+    use stylet_tissue::{AnyEffect, ForceBias, ForceDrift};
 
     #[test]
     fn a_number_costs_half_the_logarithm_of_the_number_of_blocks() {
         assert!((cost(3, 700) - 1.5 * 700.0_f64.ln()).abs() < 1e-12);
         assert!((cost(2, 1) - 2.0_f64.ln()).abs() < 1e-12);
         assert_eq!(cost(0, 700), 0.0);
+    }
+
+    #[test]
+    fn a_larger_model_gains_by_the_noise_that_it_leaves_itself() {
+        let drift: AnyEffect = ForceDrift { rate_n_per_s: 2e-3 }.into();
+        let runs = showing(&[], &[[4e-3, 3e-4], [6e-3, -3e-4]], |t| 2e-3 * t);
+        let with = settled(&[drift, ForceBias { force_n: 1e-4 }.into()], &runs.iter().collect::<Vec<_>>());
+        let data = &with.data;
+        let under = |m: &stylet_identify::model::Model| fit(m, data, Effort::FULL).expect("a fit");
+        let (no_drift, no_bias) = (under(&with.fit.model.without(0)), under(&with.fit.model.without(1)));
+        let own = data.judged_by(&with.fit.residuals.e, From::Whole);
+        let nats = |m| fit(m, &own, Effort::FULL).expect("a fit").nats();
+        let wanted = nats(&no_drift.model) - nats(&with.fit.model);
+        let told = gain(&no_drift, &with.fit, data);
+        assert!(wanted > 10.0 && (told / wanted - 1.0).abs() < 0.02, "{told} for {wanted}");
+        let told = gain(&no_bias, &with.fit, data);
+        assert!((-0.1..1.5).contains(&told), "{told}");
+        // What cannot be replayed gains nothing.
+        let mut broken = with.fit.clone();
+        broken.model.effects[0].values[0] = f64::NAN;
+        assert_eq!(gain(&no_bias, &broken, data), f64::NEG_INFINITY);
     }
 }

@@ -1,5 +1,6 @@
 //! What unit tests of several modules make up.
 
+use crate::select::Stage;
 use crate::set::Insertion;
 use crate::set::fitted::{Fitted, refitted};
 use crate::set::laws::{Kind, Law};
@@ -123,4 +124,12 @@ pub fn evenly(mut seed: u64) -> impl FnMut() -> f64 {
         seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
         seed as f64 / 2_147_483_648.0
     }
+}
+
+/// A stage of a search that took this effect among rivals that gained so many nats.
+pub fn stage(taken: Option<(&'static str, f64)>, needed: f64, rivals: &[(AnyEffect, f64)]) -> Stage {
+    let choice = |(e, _): &(AnyEffect, f64)| Choice::new(e.info(), &e.parameters());
+    let choices: Vec<Choice> = rivals.iter().map(choice).collect();
+    let gained = choices.iter().zip(rivals).map(|(c, r)| (c.info.id, r.1, c.values.len())).collect();
+    Stage { stood: Vec::new(), rivals: gained, taken, needed, choices }
 }

@@ -78,7 +78,7 @@ fn start(
     let nats = if one_sided && gain.coefficients.iter().any(|c| *c <= 0.0) {
         // Columns whose coefficient has the wrong sign are of no use; the others may be.
         let kept: Vec<usize> = (0..group.len()).filter(|k| gain.coefficients[*k] > 0.0).collect();
-        if kept.is_empty() || kept.len() == group.len() {
+        if kept.is_empty() {
             return None;
         }
         let part: Vec<Column> = kept.iter().map(|k| columns[*k].clone()).collect();
@@ -215,7 +215,7 @@ fn breaks(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<St
     depths.truncate(30);
     let grid = (deepest / 50.0).max(1e-3);
     depths.extend((1..50).map(|k| grid * f64::from(k)));
-    depths.retain(|d| *d > 5e-4 && *d < deepest);
+    depths.retain(|d| *d < deepest);
     let mut out: Vec<Start> = depths
         .par_iter()
         .flat_map_iter(|depth| {
@@ -256,10 +256,21 @@ fn breaks(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<St
 mod tests {
     use super::{Start, slopes, starts};
     use crate::base::Prepared;
-    use crate::made::{insertions, settled, showing};
+    use crate::made::{believed, insertions, settled, showing};
     use crate::set::fitted::Fitted;
-    use stylet_identify::look::Look;
-    use stylet_tissue::{AnyEffect, ForceDrift, HiddenMembrane, Respiration};
+    use std::sync::Arc;
+    use stylet_identify::blocks::{BLOCK_S, Blocks};
+    use stylet_identify::drops::Drop;
+    use stylet_identify::fit::{Column, Fit};
+    use stylet_identify::look::{Gain, Look};
+    use stylet_identify::model::{Choice, Model};
+    use stylet_identify::noise::Noise;
+    use stylet_identify::objective::{Data, residuals};
+    use stylet_record::Recording;
+    use stylet_tissue::{
+        AnyEffect, CoulombFriction, EffectInfo, ForceDrift, HiddenMembrane, RateDependentPuncture,
+        Respiration,
+    };
 
     /// Speeds (m/s) of the insertions, and by how much (m) their surfaces are moved.
     const AT: [[f64; 2]; 3] = [[2e-3, 3e-4], [3e-3, -3e-4], [4e-3, 0.0]];
@@ -388,6 +399,188 @@ mod tests {
                     s.choice.values
                 );
             }
+        }
+    }
+
+    fn info(id: &str) -> &'static EffectInfo {
+        stylet_tissue::info(id).expect("in the library")
+    }
+
+    /// What an effect adds to the force, and not to the instants of ruptures.
+    fn force(look: &Look, choice: &Choice) -> Column {
+        let mut column = look.column(choice).expect("a column");
+        column.rows.iter_mut().for_each(|r| r.fill(0.0));
+        column
+    }
+
+    /// The force moves with the tissue: a breath gains what its sine and its cosine gain together, and stands where they do.
+    #[test]
+    fn a_breath_at_any_frequency_gains_what_its_two_columns_do() {
+        let breath = Respiration { amplitude_m: 1.5e-4, frequency_hz: 0.4, phase_rad: 0.9 };
+        let f = without(&[breath.into()]);
+        let look = Look::new(&f.fit, &f.data);
+        let told = super::breath(info("respiration"), &look);
+        let longest = f.data.blocks.iter().map(|b| b.span_s().1 - b.span_s().0).fold(0.0, f64::max);
+        assert_eq!(told.len(), (1.15 * longest / 0.6) as usize);
+        for (k, s) in told.iter().enumerate() {
+            let [amplitude, hz, phase] = s.choice.values[..] else { unreachable!("three numbers") };
+            assert!((hz - 0.05 - k as f64 * 0.6 / longest).abs() < 1e-12, "{hz}");
+            let columns = [0.0, 0.5 * std::f64::consts::PI]
+                .map(|phase| force(&look, &Choice::new(s.choice.info, &[1e-6, hz, phase])));
+            let gain = look.gain(&columns);
+            assert!((s.nats / gain.nats - 1.0).abs() < 0.01, "{hz}: {} for {}", s.nats, gain.nats);
+            let (a, b) = (1e-6 * gain.coefficients[0], 1e-6 * gain.coefficients[1]);
+            let off = (amplitude * phase.cos() - a).hypot(amplitude * phase.sin() - b);
+            assert!(off < 0.01 * a.hypot(b), "{hz}: {amplitude} {phase} for {a} {b}");
+        }
+    }
+
+    /// A needle in air, and a residual of nothing at all.
+    #[test]
+    fn what_has_no_amplitude_does_not_start() {
+        let t: Vec<f64> = (0..600).map(|k| 0.02 * f64::from(k)).collect();
+        let z = t.iter().map(|t| -0.05 + 1e-3 * t).collect();
+        let r = Recording::new(t, z, vec![0.0; 600]).expect("a recording");
+        let data = Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S)]), Noise::white(0.02), 0.0);
+        let model = Model::base(believed(&[[0.02, 100.0, 1000.0]]), 1);
+        let fit = Fit { residuals: residuals(&model, &data).expect("a replay"), model };
+        let look = Look::new(&fit, &data);
+        assert!(super::breath(info("respiration"), &look).is_empty());
+        assert!(super::lines(info("periodic_interference"), &look, &[1.7]).is_empty());
+    }
+
+    #[test]
+    fn dry_friction_does_not_change_with_speed_at_rest() {
+        let rubs: AnyEffect = CoulombFriction { c_n_per_m: 50.0 }.into();
+        let runs = insertions(std::slice::from_ref(&rubs), &AT);
+        let f = settled(&[rubs], &runs.iter().collect::<Vec<_>>());
+        let (_, fv) = slopes(&Look::new(&f.fit, &f.data)).expect("slopes");
+        let mut rests = 0;
+        for (fv, b) in fv.iter().zip(f.data.blocks.iter()) {
+            for (k, slope) in fv.iter().enumerate() {
+                let (z, v) = b.motion.at(0.5 * (b.from_s[k] + b.to_s[k]));
+                rests += usize::from(v == 0.0 && z > 0.01);
+                assert!(slope.abs() < 1e5, "{slope} at {z}");
+            }
+        }
+        assert!(rests > 10, "{rests}");
+    }
+
+    #[test]
+    fn columns_of_the_wrong_sign_are_left_out_where_an_effect_only_adds() {
+        let f = without(&[CoulombFriction { c_n_per_m: 50.0 }.into()]);
+        let look = Look::new(&f.fit, &f.data);
+        let started = |id: &str, group: &[&[f64]], coefficients: &[f64]| {
+            let columns: Vec<_> =
+                group.iter().filter_map(|v| look.column(&Choice::new(info(id), v))).collect();
+            let gain = Gain { nats: 7.0, coefficients: coefficients.to_vec(), visible: 1.0, left: 1.0 };
+            super::start(info(id), &look, group, &columns, gain)
+        };
+        for (id, values, adds) in [
+            ("coulomb_friction", [1.0], true),
+            ("needle_compliance", [1500.0], true),
+            ("force_bias", [0.1], false),
+            ("asymmetric_friction", [0.01], false),
+        ] {
+            assert_eq!(started(id, &[&values], &[0.5]).map(|s| s.nats), Some(7.0), "{id}");
+            assert_eq!(started(id, &[&values], &[0.0]).is_none(), adds, "{id}");
+            assert_eq!(started(id, &[&values], &[-0.5]).is_none(), adds, "{id}");
+        }
+        let group: [&[f64]; 2] = [&[1.0, 1.0, 2e-3], &[0.0, 1.0, 2e-3]];
+        let both = |a, b| started("stribeck_friction", &group, &[a, b]);
+        assert_eq!(both(2.0, 0.5).map(|s| s.choice.values), Some(vec![2.0, 2.5, 2e-3]));
+        let first = super::columns(info("stribeck_friction"), &look, &group[..1]).expect("more friction");
+        assert!(first.nats > 1.0 && first.choice.values[0] == first.choice.values[1]);
+        let second =
+            super::columns(info("stribeck_friction"), &look, &group[1..]).expect("more at low speed");
+        for (a, b, alone) in [(2.0, 0.0, &first), (-2.0, 3.0, &second), (0.0, 3.0, &second)] {
+            let told = both(a, b).expect("the other one");
+            assert_eq!((told.nats, &told.choice.values), (alone.nats, &alone.choice.values));
+        }
+        assert!(both(-2.0, -0.5).is_none());
+    }
+
+    #[test]
+    fn what_only_ruptures_show_starts_from_a_model_of_its_own() {
+        let later = RateDependentPuncture { alpha: 0.4 };
+        let (all, own) = proposed(&without(&[later.into()]), &[], "rate_dependent_puncture");
+        assert!(own.expect("a start").model.is_some());
+        let at_ruptures = |s: &Start| s.choice.info.place == stylet_tissue::Place::Puncture;
+        assert!(all.iter().flatten().all(|s| s.model.is_none() || at_ruptures(s)));
+    }
+
+    /// What may break, by insertions with a membrane, where the force dropped at these depths (m) at these instants (s).
+    fn breaking(f: &Fitted, drops: &[(f64, f64)]) -> Vec<Start> {
+        let surface_m = f.fit.model.tissue.surface_m;
+        let drop = |&(depth_m, time_s): &(f64, f64)| Drop {
+            time_s,
+            position_m: surface_m + depth_m,
+            size_n: 0.3,
+            score: 9.0,
+        };
+        let mut prepared = Prepared::new(f.fit.model.belief.clone(), f.data.blocks.to_vec(), 0.0);
+        prepared.drops = vec![drops.iter().map(drop).collect(), Vec::new(), Vec::new()];
+        super::breaks(info("hidden_membrane"), &Look::new(&f.fit, &f.data), &prepared)
+    }
+
+    /// Depths (m) at which the starts break.
+    fn depths(starts: &[Start]) -> Vec<f64> {
+        starts.iter().map(|s| &s.choice.values).map(|v| v[0] + v[2] / v[1]).collect()
+    }
+
+    #[test]
+    fn what_may_break_gains_what_its_force_does_and_nothing_after() {
+        let membrane = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        let runs = insertions(&[membrane.into()], &AT.map(|[speed, _]| [speed, 0.0]));
+        let f = settled(&[], &runs.iter().collect::<Vec<_>>());
+        let look = Look::new(&f.fit, &f.data);
+        let told = breaking(&f, &[]);
+        assert_eq!(told.len(), 2);
+        assert!(told[0].nats >= told[1].nats);
+        for s in &told {
+            let v = &s.choice.values;
+            // Weak enough to break there, and not to shift a face.
+            let broken = Choice::new(s.choice.info, &[v[0], 1e-3, 1e-3 * v[2] / v[1]]);
+            let gain = look.gain(&[force(&look, &broken)]);
+            // But for the block in which it breaks.
+            assert!((s.nats / gain.nats - 1.0).abs() < 0.15, "{} for {}", s.nats, gain.nats);
+            assert!((1e-3 * gain.coefficients[0] / v[1] - 1.0).abs() < 0.15, "{v:?}");
+        }
+    }
+
+    #[test]
+    fn what_may_break_breaks_at_drops_that_no_layer_took_or_at_whole_millimetres() {
+        let membrane = HiddenMembrane { depth_m: 2.25e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        let f = without(&[membrane.into()]);
+        let rupture_s = f.fit.model.instants[0][0];
+        let at = 5.25e-3;
+        let breaks_at = |drops: &[(f64, f64)]| depths(&breaking(&f, drops))[0];
+        let whole = breaks_at(&[]);
+        assert!((whole - 5e-3).abs() < 1e-9, "{whole}");
+        // Nearer in time than 0.15 s a layer has taken a drop.
+        for (apart_s, taken) in [(-0.14, true), (0.14, true), (-0.16, false), (0.16, false)] {
+            let told = breaks_at(&[(at, rupture_s + apart_s)]);
+            assert!((told - if taken { whole } else { at }).abs() < 1e-9, "{apart_s}: {told}");
+        }
+        // Of two drops nearer than 0.3 mm the first stands for both.
+        for (before_m, told_m) in [(2.5e-4, at - 2.5e-4), (3.5e-4, at)] {
+            let told = breaks_at(&[(at, 1.0), (at - before_m, 1.0)]);
+            assert!((told - told_m).abs() < 1e-9, "{told}");
+        }
+    }
+
+    #[test]
+    fn what_may_break_begins_within_the_tissue_and_breaks_where_the_needle_has_been() {
+        let whole = HiddenMembrane { depth_m: 5e-3, stiffness_n_per_m: 120.0, puncture_n: 9.0 };
+        let at_surface = HiddenMembrane { depth_m: 0.0, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        for membrane in [whole, at_surface] {
+            let told = breaking(&without(&[membrane.into()]), &[]);
+            assert!(!told.is_empty());
+            let ends = depths(&told);
+            assert!(
+                told.iter().zip(&ends).all(|(s, end)| s.choice.values[0] > 1e-9 && *end < 0.0121),
+                "{ends:?}"
+            );
         }
     }
 }

@@ -424,18 +424,25 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Search, Stage, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
-    use crate::made::{believed, settled, showing};
+    use super::{Search, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
+    use crate::base::Prepared;
+    use crate::judge::gain;
+    use crate::made::{believed, settled, showing, stage};
+    use crate::propose::{Start, starts};
     use crate::set::fitted::Fitted;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
-    use stylet_identify::fit::Fit;
+    use stylet_identify::fit::{Effort, Fit};
+    use stylet_identify::look::Look;
     use stylet_identify::model::{Choice, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
     use stylet_tissue::{
-        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, StribeckFriction,
+        AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, HiddenMembrane,
+        PeriodicInterference, Place, PreslidingFriction, StribeckFriction,
     };
 
     fn data() -> Data {
@@ -531,8 +538,7 @@ mod tests {
         let new = fit(&[ForceBias { force_n: 0.9 }.into()]);
         let more = old.nats() - new.nats();
         let mut search = Search::of(old, data());
-        let stage =
-            |taken| Stage { stood: Vec::new(), rivals: Vec::new(), taken, needed: 0.0, choices: Vec::new() };
+        let stage = |taken| stage(taken, 0.0, &[]);
         search.stages =
             vec![stage(Some(("coulomb_friction", 20.0))), stage(Some(("force_drift", 9.0))), stage(None)];
         search.swap(0, new);
@@ -579,5 +585,234 @@ mod tests {
         assert!(!every_strength_is_told(&less, 0, &f.data));
         less.model.effects[0].values[0] = -0.02;
         assert!(every_strength_is_told(&less, 0, &f.data));
+    }
+
+    fn rubs(c_n_per_m: f64) -> AnyEffect {
+        CoulombFriction { c_n_per_m }.into()
+    }
+
+    /// Insertions with these effects off a sensor that shows so much more (N), fitted with others, and made ready for a search.
+    fn under_way(
+        there: &[AnyEffect],
+        fitted: &[AnyEffect],
+        more_n: impl Fn(f64) -> f64,
+    ) -> (Search, Prepared) {
+        let runs = showing(there, &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], more_n);
+        let f = settled(fitted, &runs.iter().collect::<Vec<_>>());
+        let prepared = Prepared::new(f.fit.model.belief.clone(), f.data.blocks.to_vec(), 0.0);
+        (Search::of(f.fit, f.data), prepared)
+    }
+
+    /// A fit of the best of a search with one more effect.
+    fn with(search: &Search, effect: &AnyEffect) -> Fit {
+        let model = search.best.model.with(Choice::new(effect.info(), &effect.parameters()));
+        stylet_identify::fit::fit(&model, &search.data, Effort::FULL).expect("a fit")
+    }
+
+    /// Nats of a fit without one of its effects.
+    fn nats_without(search: &Search, f: &Fit, effect: usize) -> f64 {
+        let less = stylet_identify::fit::fit(&f.model.without(effect), &search.data, Effort::FULL);
+        less.expect("a fit").nats()
+    }
+
+    #[test]
+    fn the_best_so_far_begins_anew_where_the_leader_only_had_a_better_start() {
+        let (mut search, _) = under_way(&[], &[], |_| 0.0);
+        let good = search.best.clone();
+        let leader = with(&search, &drift(1e-4));
+        let again = nats_without(&search, &leader, 0);
+        let started = |search: &mut Search, ahead: f64, leader_ahead: f64, restarts: usize| {
+            let mut leader = leader.clone();
+            (search.best, search.base) = (good.clone(), good.clone());
+            search.best.residuals.nats = again + ahead;
+            leader.residuals.nats = search.best.nats() - leader_ahead;
+            search.base.residuals.nats = f64::INFINITY;
+            search.restarts = restarts;
+            (search.started_too_far(&[leader]), search.restarts, search.base.nats().is_finite())
+        };
+        assert_eq!(started(&mut search, 4.1, 4.1, 0), (false, 0, false));
+        assert_eq!(started(&mut search, 3.9, 4.1, 3), (false, 3, false));
+        assert_eq!(started(&mut search, 4.1, 3.9, 3), (false, 3, false));
+        // Then other noise is left.
+        assert_eq!(started(&mut search, 4.1, 4.1, 3), (true, 2, true));
+        assert!(!search.started_too_far(&[]) && !search.started_too_far(std::slice::from_ref(&good)));
+        // What stands with an effect is no base.
+        let (mut search, _) = under_way(&[], &[drift(1e-4)], |_| 0.0);
+        let mut leader = with(&search, &rubs(0.1));
+        search.restarts = 1;
+        search.best.residuals.nats = nats_without(&search, &leader, 1) + 9.0;
+        search.base.residuals.nats = f64::INFINITY;
+        leader.residuals.nats = search.best.nats() - 9.0;
+        assert!(search.started_too_far(&[leader]));
+        assert_eq!(search.base.nats(), f64::INFINITY);
+    }
+
+    #[test]
+    fn lines_are_seen_and_the_noise_is_told_beside_them() {
+        let tone = |t: f64| 0.1 * (std::f64::consts::TAU * 2.3 * t).sin();
+        let (mut search, _) = under_way(&[], &[], tone);
+        let before = search.data.noise.sd_n();
+        search.see_lines();
+        assert_eq!(search.lines.len(), 1);
+        assert!((search.lines[0] - 2.3).abs() < 0.02, "{:?}", search.lines);
+        assert!(search.data.noise.sd_n() < 0.5 * before);
+        let left = residuals(&search.best.model, &search.data).expect("a replay").nats;
+        assert_eq!(search.best.nats(), left);
+        let coarse = search.coarse();
+        assert_eq!(coarse.blocks[0].len(), search.data.blocks[0].len().div_ceil(3));
+        // Without one all stays as it is.
+        let (mut search, _) = under_way(&[], &[], |_| 0.0);
+        let (noise, nats) = (search.data.noise.clone(), search.best.nats());
+        search.see_lines();
+        assert!(search.lines.is_empty() && search.data.noise == noise && search.best.nats() == nats);
+    }
+
+    #[test]
+    fn effects_begin_anew_where_even_the_leader_leaves_more_than_noise() {
+        let there = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+        let membrane: AnyEffect = there.into();
+        let (mut search, prepared) = under_way(std::slice::from_ref(&membrane), &[], |_| 0.0);
+        let start = |e: &AnyEffect| {
+            let choice = Choice::new(e.info(), &e.parameters());
+            vec![Start { choice, nats: 1.0, visible: 1.0, model: None }]
+        };
+        let full = [with(&search, &rubs(1.0))];
+        let weak = [start(&drift(1e-4)), start(&ForceBias { force_n: 1e-3 }.into())];
+        let ranked = [weak.to_vec(), vec![start(&membrane); 4]].concat();
+        let begun = |search: &mut Search, full: &[Fit], ranked: &[Vec<Start>], beginnings: usize| {
+            search.beginnings = beginnings;
+            let names = search.anew(full, ranked, &prepared).map(|all| {
+                all.iter().map(|f| f.model.effects.last().map_or("", |e| e.info.id)).collect::<Vec<_>>()
+            });
+            (names, search.beginnings)
+        };
+        // Three at most, and none that comes less than half as near.
+        assert_eq!(begun(&mut search, &full, &ranked, 2), (Some(vec!["hidden_membrane"; 3]), 1));
+        assert_eq!(begun(&mut search, &full, &ranked[..3], 1), (Some(vec!["hidden_membrane"]), 0));
+        assert_eq!(begun(&mut search, &full, &ranked, 0), (None, 0));
+        assert_eq!(begun(&mut search, &[], &ranked, 2), (None, 2));
+        // Noise alone, and noise beside something slow.
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut leader = full[0].clone();
+        for e in &mut leader.residuals.e {
+            e.iter_mut().for_each(|e| *e = 0.01 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0));
+        }
+        let leaves = |slow_n: f64| {
+            let mut f = leader.clone();
+            for e in &mut f.residuals.e {
+                e.iter_mut().enumerate().for_each(|(k, e)| *e += slow_n * (0.02 * k as f64).sin());
+            }
+            [f]
+        };
+        assert_eq!(begun(&mut search, &leaves(0.0), &ranked, 2), (None, 2));
+        assert_eq!(begun(&mut search, &leaves(0.03), &ranked, 2).1, 1);
+    }
+
+    #[test]
+    fn an_effect_stays_when_it_gains_four_nats_more_than_its_numbers_cost() {
+        let mut seen = [0, 0];
+        for bias_n in [0.0, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3] {
+            let bias: AnyEffect = ForceBias { force_n: 1e-4 }.into();
+            let (mut search, _) = under_way(&[], &[drift(0.02), bias], |t| 0.02 * t + bias_n);
+            let less = stylet_identify::fit::fit(&search.best.model.without(1), &search.data, Effort::FULL);
+            let gained = gain(&less.expect("a fit"), &search.best, &search.data);
+            let wanted = 0.5 * (search.data.compared() as f64).ln() + 4.0;
+            search.prune();
+            let stays = search.best.model.effects.len() == 2;
+            assert_eq!(stays, gained > wanted, "{gained} of {wanted}");
+            if (gained - wanted).abs() < 2.7 {
+                seen[usize::from(stays)] += 1;
+            }
+        }
+        assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
+    }
+
+    /// A search by one step, and the starts of that step; judged by its calm stretches or by all that is left.
+    /// A search by one step, and the starts of that step; judged by its calm stretches or by all that is left.
+    fn grown(
+        calm: bool,
+        beginnings: usize,
+        there: &[AnyEffect],
+        more_n: impl Fn(f64) -> f64,
+    ) -> (Search, Vec<Start>) {
+        let (mut search, prepared) = under_way(there, &[], more_n);
+        if calm {
+            search.settle(search.best.clone());
+        }
+        search.beginnings = beginnings;
+        let first = starts(&Look::new(&search.best, &search.data), &prepared, &[]);
+        let any = search.grow(&prepared);
+        assert_eq!(any, search.stages.last().is_some_and(|s| s.taken.is_some()));
+        (search, first.into_iter().map(|s| s[0].clone()).collect())
+    }
+
+    #[test]
+    fn an_effect_is_fitted_when_it_promises_half_of_what_it_needs() {
+        let mut seen = [0, 0];
+        for drift_n_per_s in [6e-4, 8e-4] {
+            let (search, first) = grown(false, 0, &[], |t| drift_n_per_s * t);
+            let tried = |s: &Start| search.stages[0].rivals.iter().any(|r| r.0 == s.choice.info.id);
+            for s in first.iter().filter(|s| s.choice.info.place != Place::Puncture) {
+                let numbers = s.choice.info.parameters.len() as f64;
+                let needed = 0.5 * numbers * (search.data.compared() as f64).ln() + 4.0;
+                assert!(s.nats > 0.5 * needed || !tried(s), "{} of {needed}", s.nats);
+                if ["force_drift", "force_bias"].contains(&s.choice.info.id) {
+                    assert_eq!(tried(s), s.nats > 0.5 * needed, "{} of {needed}", s.nats);
+                    seen[usize::from(tried(s))] += 1;
+                }
+            }
+            assert!(search.stages[0].rivals.iter().any(|r| r.0 == "rate_dependent_puncture"));
+        }
+        assert_eq!(seen, [1, 3]);
+    }
+
+    #[test]
+    fn rivals_far_behind_are_not_fitted_to_the_end() {
+        let names = |there: &[AnyEffect], beginnings: usize, drift_n_per_s: f64| {
+            let (search, _) = grown(true, beginnings, there, |t| drift_n_per_s * t);
+            let price = |numbers: usize| 0.5 * numbers as f64 * (search.data.compared() as f64).ln();
+            let worth: Vec<f64> = search.stages[0].rivals.iter().map(|r| r.1 - price(r.2)).collect();
+            assert!(worth.windows(2).all(|w| w[0] >= w[1]), "{worth:?}");
+            search.stages[0].rivals.iter().map(|r| r.0).collect::<Vec<_>>()
+        };
+        let punctures = "rate_dependent_puncture";
+        assert_eq!(names(&[], 0, 0.02), ["force_drift", "force_bias", punctures]);
+        // Within thirty nats of the best nobody is far behind.
+        assert_eq!(
+            names(&[], 0, 3e-4),
+            ["respiration", "cutting_force", "asymmetric_friction", "incomplete_release", punctures]
+        );
+        assert_eq!(
+            names(&[rubs(50.0)], 0, 0.0).last(),
+            Some(&"hidden_membrane"),
+            "it gains least and costs most"
+        );
+    }
+
+    #[test]
+    fn a_shape_is_told_whatever_it_is() {
+        let tone = PeriodicInterference { amplitude_n: 0.1, frequency_hz: 1.7, phase_rad: 0.0 };
+        let sine = |t: f64| 0.1 * (std::f64::consts::TAU * 1.7 * t).sin();
+        let (mut search, _) = under_way(&[], &[tone.into(), drift(1e-6)], sine);
+        search.best.model.effects[0].values[2] = 0.0;
+        assert!(every_strength_is_told(&search.best, 0, &search.data));
+        assert!(!every_strength_is_told(&search.best, 1, &search.data));
+    }
+
+    #[test]
+    fn a_leader_whose_further_numbers_gain_stays_before_its_special_case_unless_one_is_at_a_bound() {
+        let slides: AnyEffect = PreslidingFriction { c_n_per_m: 50.0, delta_m: 1e-3 }.into();
+        let (search, _) = under_way(std::slice::from_ref(&slides), &[], |_| 0.0);
+        let (whole, part) = (with(&search, &slides), with(&search, &rubs(50.0)));
+        let first = |leader: &Fit| {
+            let order = simpler_first(vec![leader.clone(), part.clone()], &search.data);
+            order[0].model.effects[0].info.id
+        };
+        assert_eq!(first(&whole), "presliding_friction");
+        let mut bound = whole.clone();
+        let role = Role::Effect { effect: 0, parameter: 1 };
+        let n = bound.model.shared().into_iter().find(|n| n.role == role).expect("free");
+        bound.model.set(role, 0, n.low);
+        assert_eq!(first(&bound), "coulomb_friction");
     }
 }

@@ -113,10 +113,10 @@ fn unresolved(search: &Search, k: usize) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{at_every_sample, small, unresolved, unsure};
-    use crate::held_out::left_out_granted;
-    use crate::made::{believed, settled, showing};
+    use crate::held_out::{Left, floor, left_out_granted, rms};
+    use crate::made::{believed, settled, showing, stage};
     use crate::outcome::Cause;
-    use crate::select::{Search, Stage};
+    use crate::select::Search;
     use std::collections::BTreeMap;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
@@ -126,6 +126,17 @@ mod tests {
     use stylet_identify::objective::{Data, Residuals};
     use stylet_record::Recording;
     use stylet_tissue::{AnyEffect, CoulombFriction, Effect, ForceBias, ForceDrift, LowPassLag, Respiration};
+
+    fn cause(effect: &str, gain_nats: f64) -> Cause {
+        Cause {
+            effect: effect.to_owned(),
+            equivalent: Vec::new(),
+            confidence: 1.0,
+            parameters: BTreeMap::new(),
+            gain_nats,
+            share: 0.0,
+        }
+    }
 
     fn search(effects: &[AnyEffect]) -> Search {
         let belief = believed(&[]);
@@ -166,24 +177,11 @@ mod tests {
     #[test]
     fn a_cause_is_unsure_when_less_speaks_against_none_than_the_search_asked_for() {
         let mut s = search(&[]);
-        s.stages = vec![Stage {
-            stood: Vec::new(),
-            rivals: Vec::new(),
-            taken: Some(("force_bias", 30.0)),
-            needed: 8.0,
-            choices: Vec::new(),
-        }];
-        let cause = |effect: &str| Cause {
-            effect: effect.to_owned(),
-            equivalent: Vec::new(),
-            confidence: 1.0,
-            parameters: BTreeMap::new(),
-            gain_nats: 0.0,
-            share: 0.0,
-        };
-        let told = |effect: &str, nats: f64| unsure(&cause(effect), &[("force_bias".to_owned(), nats)], &s);
+        s.stages = vec![stage(Some(("force_bias", 30.0)), 8.0, &[])];
+        let told =
+            |effect: &str, nats: f64| unsure(&cause(effect, 0.0), &[("force_bias".to_owned(), nats)], &s);
         assert!(told("force_bias", 7.9) && !told("force_bias", 8.0) && !told("force_drift", 1.0));
-        assert!(!unsure(&cause("force_bias"), &[], &s));
+        assert!(!unsure(&cause("force_bias", 0.0), &[], &s));
     }
 
     #[test]
@@ -220,15 +218,8 @@ mod tests {
         let f = settled(&effects, &runs.iter().collect::<Vec<_>>());
         let search = Search::of(f.fit, f.data);
         let after = left_out_granted(&search.best, &search.data);
-        let cause = |e: &AnyEffect, gain_nats: f64| Cause {
-            effect: e.id().to_owned(),
-            equivalent: Vec::new(),
-            confidence: 1.0,
-            parameters: BTreeMap::new(),
-            gain_nats,
-            share: 0.0,
-        };
-        let told = small(&search, &after, &[cause(&effects[0], drift_nats), cause(&effects[1], 0.0)], &[]);
+        let causes = [cause(effects[0].id(), drift_nats), cause(effects[1].id(), 0.0)];
+        let told = small(&search, &after, &causes, &[]);
         (search, told.into_iter().map(|s| (s.effect, s.why)).collect())
     }
 
@@ -251,5 +242,51 @@ mod tests {
                 "{told:?}"
             );
         }
+    }
+
+    /// What is said of a bias of this size (N) where recordings left out have this error (N), told from the error without it and the noise.
+    fn asked(bias_n: f64, with_n: impl Fn(f64, f64) -> f64) -> Option<String> {
+        let bias: AnyEffect = ForceBias { force_n: bias_n }.into();
+        let runs = showing(&[], &[[4e-3, 0.0], [6e-3, 0.0]], |_| bias_n);
+        let f = settled(std::slice::from_ref(&bias), &runs.iter().collect::<Vec<_>>());
+        let mut model = f.fit.model;
+        (model.free.own_surface, model.free.own_friction) = (false, false);
+        let fitted = |m: &Model, effort| fit(m, &f.data, effort).expect("a fit");
+        let search = Search::of(fitted(&model, Effort::FULL), f.data.clone());
+        let without = fitted(&search.best.model.without(0), Effort { turns: 4, enough: 0.5 });
+        let left = rms(&left_out_granted(&without, &f.data), &f.data);
+        let square_n2 = with_n(left, floor(&f.data)).powi(2) - f.data.blocks[0].within_n().powi(2);
+        let after = [Some(Left { square_n2, blocks: 1, ..Left::default() }), None];
+        small(&search, &after, &[cause(bias.id(), 0.0)], &[]).pop().map(|s| s.why)
+    }
+
+    #[test]
+    fn a_weak_cause_has_to_pay_on_recordings_left_out() {
+        let pays = |share: f64| asked(3e-3, |left, noise| left - share * noise);
+        assert_eq!(pays(-0.1).as_deref(), Some("makes left-out recordings no better"));
+        assert_eq!(
+            pays(0.0015).as_deref(),
+            Some("changes left-out recordings by less than 0.2 % of the noise")
+        );
+        assert_eq!((pays(0.0025), pays(0.02)), (None, None));
+        // A strong one is not asked.
+        assert_eq!(asked(0.05, |left, _| 2.0 * left), None);
+    }
+
+    #[test]
+    fn where_recordings_have_numbers_of_their_own_these_are_granted() {
+        let bias: AnyEffect = ForceBias { force_n: 1e-5 }.into();
+        let runs = showing(&[], &[[4e-3, 0.0], [6e-3, 0.0]], |_| 0.0);
+        let f = settled(std::slice::from_ref(&bias), &runs.iter().collect::<Vec<_>>());
+        let mut search = Search::of(f.fit, f.data);
+        let cause = cause(bias.id(), 0.0);
+        // Left out with nothing granted they are far off.
+        let after = [Some(Left { square_n2: 1.0, blocks: 1, ..Left::default() }), None];
+        let mut told = |own_surface: bool, own_friction: bool| {
+            let free = &mut search.best.model.free;
+            (free.own_surface, free.own_friction) = (own_surface, own_friction);
+            small(&search, &after, std::slice::from_ref(&cause), &[]).len()
+        };
+        assert_eq!((told(true, true), told(true, false), told(false, false)), (0, 0, 1));
     }
 }
