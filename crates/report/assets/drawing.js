@@ -3,6 +3,7 @@ const payload = JSON.parse(document.getElementById("data").textContent);
 const darkScreen = matchMedia("(prefers-color-scheme: dark)");
 let printing = false;
 const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
+const CROWD = 100;
 const DASHES = { solid: [], step: [], points: [], dashed: [7, 4], dotted: [1.5, 3.5] };
 
 function isDark() { return darkScreen.matches && !printing; }
@@ -52,6 +53,8 @@ function drawCurve(view, curve) {
   }
   if (curve.spec.style === "points") {
     ctx.fill();
+    // Few points have a rim of paper; in a crowd it would erase what lies below it.
+    if (points > CROWD) return points;
     ctx.strokeStyle = isDark() ? "#12161b" : "#ffffff";
     ctx.lineWidth = 1.2 * ratio;
   }

@@ -3,8 +3,8 @@
 #[path = "support/synthetic.rs"]
 mod synthetic;
 
-use stylet_report::RunReport;
 use stylet_report::svg::{BarChart, FigureOptions, HeatMap, Theme, bar_chart, figure, heat_map};
+use stylet_report::{Chart, Colour, RunReport, Series};
 
 #[test]
 fn the_same_report_gives_the_same_bytes() {
@@ -82,4 +82,19 @@ fn pictures_are_well_formed_in_every_theme() {
             assert_eq!(svg.contains("prefers-color-scheme"), theme == Theme::Auto);
         }
     }
+}
+
+#[test]
+fn points_of_a_crowd_do_not_erase_one_another() {
+    // A rim of paper around each would paint over its neighbours.
+    let rims = |count: usize| {
+        let x: Vec<f64> = (0..count).map(|k| k as f64 / count as f64).collect();
+        let points = Series::points("trials", Colour::Blue, x.clone(), x);
+        let chart = Chart::new("", "", "").with_series(points);
+        let svg = figure(&[chart], &FigureOptions::default());
+        (svg.matches("class=\"p f-").count(), svg.matches("class=\"f-blue\"").count())
+    };
+    assert_eq!(rims(20).1, 0);
+    assert_eq!(rims(2000).1, 2000);
+    assert!(rims(20).0 >= 20 && rims(2000).0 <= 1, "the key alone has a rim: {:?}", rims(2000));
 }

@@ -159,7 +159,7 @@ pub(super) fn reversed<A: Along>(recording: &A) -> Result<Option<QualityNote>, A
     }
     let message = format!(
         "the force runs the other way: it falls by {wrong_n:.4} N while the needle goes in, and should be positive when it resists \
-         the insertion; give a column map with force: (name: \"force_n\", scale: -1)"
+         the insertion; give a column map with `scale: -1` in its `force`"
     );
     let numbers = [("wrong_n", wrong_n), ("right_n", right_n)];
     Ok(Some(QualityNote::forbidding(QualityKind::Reversed, message, numbers)))

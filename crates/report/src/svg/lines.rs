@@ -194,6 +194,9 @@ fn dash(style: LineStyle) -> &'static str {
     }
 }
 
+/// Points up to this many have a rim of paper; in a crowd it would erase what lies below it.
+const CROWD: usize = 100;
+
 fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
     let mut runs: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
     for (x, y) in series.x.iter().zip(&series.y) {
@@ -213,8 +216,9 @@ fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
         run.push(point);
     }
     if series.style == LineStyle::Points {
+        let rim = if series.x.len() > CROWD { "" } else { "p " };
         for (x, y) in runs.into_iter().flatten() {
-            canvas.circle(x, y, series.width_px, &format!("p f-{}", series.colour.name()));
+            canvas.circle(x, y, series.width_px, &format!("{rim}f-{}", series.colour.name()));
         }
         return;
     }
