@@ -1,16 +1,18 @@
 #!/usr/bin/env bash
 # The property tests with other cases than those of `cargo test`, which are always the same: ROUNDS times (20), from the seed FIRST (1) on.
-# Ends at the first property that does not hold; its case is printed, and belongs into a test of its own. Some ten seconds a round on two cores.
+# Ends at the first property that does not hold; its case is printed, and belongs into a test of its own.
 #   tests/properties.sh [ROUNDS [FIRST]]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 rounds=${1:-20} first=${2:-1}
+said=$(mktemp)
+trap 'rm -f "$said"' EXIT
 for ((seed = first; seed < first + rounds; seed++)); do
     echo "seed $seed"
     while read -r crate tests; do
         # shellcheck disable=SC2086
-        PROPTEST_RNG_SEED=$seed cargo test --quiet --release -p "stylet-$crate" $tests >"${TMPDIR:-/tmp}/properties.log" 2>&1 || {
-            cat "${TMPDIR:-/tmp}/properties.log"
+        PROPTEST_RNG_SEED=$seed cargo test --quiet --release -p "stylet-$crate" $tests >"$said" 2>&1 || {
+            cat "$said"
             echo "seed $seed of stylet-$crate does not hold" >&2
             exit 1
         }

@@ -54,7 +54,7 @@ fn a_drop_of_twice_the_noise_is_noticed_before_the_predictor_has_learned_it() {
         let found = outputs.iter().find_map(|o| o.detection).expect("the first");
         delays_s.push(found.time_s - data.ruptures[0].time_s);
     }
-    // 54 ms where the predictor alone is asked.
+    // Where the predictor alone is asked it takes two samples more.
     let mean_s = delays_s.iter().sum::<f64>() / delays_s.len() as f64;
     println!("the first drop is noticed {:.0} ms late in the mean", 1e3 * mean_s);
     assert!(mean_s < 0.048, "{mean_s} s");

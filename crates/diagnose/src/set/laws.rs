@@ -623,13 +623,13 @@ mod tests {
         }
     }
 
+    /// Two insertions each at two speeds.
+    const FOUR: [[f64; 2]; 4] = [[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]];
+
     #[test]
     fn a_part_that_recordings_left_out_do_not_miss_goes_and_one_that_they_miss_stays() {
         let true_one = rubs(150.0);
-        let runs = insertions(
-            std::slice::from_ref(&true_one),
-            &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]],
-        );
+        let runs = insertions(std::slice::from_ref(&true_one), &FOUR);
         let runs: Vec<&Insertion> = runs.iter().collect();
         let bias: AnyEffect = ForceBias { force_n: 1e-3 }.into();
         let mut law = Law::new(Kind::Library, settled(&[bias.clone(), true_one], &runs), &runs);
@@ -646,7 +646,7 @@ mod tests {
         assert_eq!((effects(&law.fitted.fit.model), law.kind), (vec!["coulomb_friction"], Kind::Library));
         assert!(law.left_out_n() < 1.01 * before);
         // A law that has lost all its parts is the base law.
-        let runs = insertions(&[], &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]]);
+        let runs = insertions(&[], &FOUR);
         let runs: Vec<&Insertion> = runs.iter().collect();
         let mut law = Law::new(Kind::Library, settled(&[bias], &runs), &runs);
         assert!(!parts(&mut law, &runs)[0].kept);
@@ -657,10 +657,7 @@ mod tests {
     #[test]
     fn of_two_parts_that_say_the_same_one_stays() {
         let true_one = rubs(150.0);
-        let runs = insertions(
-            std::slice::from_ref(&true_one),
-            &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0], [0.016, 1e-4]],
-        );
+        let runs = insertions(std::slice::from_ref(&true_one), &FOUR);
         let runs: Vec<&Insertion> = runs.iter().collect();
         let same: AnyEffect =
             StribeckFriction { c_n_per_m: 75.0, c_static_n_per_m: 75.0, v_stribeck_mps: 2e-3 }.into();
