@@ -165,7 +165,7 @@ impl Repeated {
 /// What the online core hears in run `i`, and what it leaves of the way back with the friction of a law fitted to the other runs.
 fn listen(run: &Insertion, study: &Study, i: usize) -> Online {
     let r = &run.recording;
-    let trace = Trace::record(r, &r.force_n, &EnhanceConfig::paper(), 0.0, |_, _| {});
+    let trace = Trace::record(r, &r.force_n, &EnhanceConfig::default(), 0.0, |_, _| {});
     let drops: Vec<usize> = run.drops().iter().map(|drop| drop.at).collect();
     let measured = Measured {
         name: &run.name,

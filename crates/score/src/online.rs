@@ -24,7 +24,7 @@ pub struct Online {
     pub false_back: usize,
     /// Force on the way back, in the tissue (N rms): all of it is friction, for nothing pushes the tip.
     pub back_raw_n: f64,
-    /// What the core leaves of it with its own friction estimate (N rms).
+    /// What the core's enhanced force leaves of it (N rms).
     pub back_before_n: f64,
     /// What is left with the friction of a law fitted to the other runs, punctures taken where the core found them.
     pub back_after_n: f64,

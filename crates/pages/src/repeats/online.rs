@@ -27,7 +27,7 @@ pub fn summary(all: &[Online]) -> String {
     if measured_n.is_finite() {
         let _ = writeln!(
             out,
-            "  force on the way back, all of it friction (N rms): {measured_n:.3} measured, {:.3} left by the core, {:.3} with the extended law's friction",
+            "  force on the way back, all of it friction (N rms): {measured_n:.3} measured, {:.3} left by the core alone, {:.3} with the extended law's friction",
             mean(all, |o| o.back_before_n),
             mean(all, |o| o.back_after_n)
         );
@@ -55,8 +55,8 @@ pub(super) fn section(all: &[Online]) -> Section {
     Section::new("The online core on these insertions")
         .text(
             "On the way back nothing pushes the tip: all force there is friction, and an enhanced force should be zero. \
-             Before: the core with its own viscous estimate. After: the friction of the extended law fitted to the other \
-             runs, a layer counting as punctured from the moment the core says so.",
+             Core: what its enhanced force leaves, with the friction that it learns by itself. Extended law: the friction of the law fitted to \
+             the other runs, a layer counting as punctured from the moment the core says so.",
         )
         .text(said)
         .table(Table::new("By run", &headers, rows).grouped(&groups))
