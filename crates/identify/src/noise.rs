@@ -4,6 +4,7 @@
 
 use crate::blocks::Blocks;
 use crate::linear::Symmetric;
+use rayon::prelude::*;
 use stylet_stats::order::{median, quantile_of_sorted};
 
 /// Highest order.
@@ -96,6 +97,8 @@ pub struct Laid {
     rows: Vec<Row>,
     /// Some range has a slow wander.
     wander: bool,
+    /// Blocks one after the other of one range, all with [`ORDER`] before them and without a wander: first, end, range.
+    even: Vec<(usize, usize, u32)>,
 }
 
 /// How one block is whitened.
@@ -157,7 +160,7 @@ impl Noise {
     pub fn estimate(blocks: &[Blocks], e: &[Vec<f64>], from: From, floor_n: f64) -> Self {
         let columns: Vec<Vec<f64>> = match from {
             From::Whole | From::Lasting | From::Drawn => e.to_vec(),
-            From::Calm => blocks.iter().zip(e).map(|(b, e)| calm(b, e)).collect(),
+            From::Calm => blocks.par_iter().zip(e).map(|(b, e)| calm(b, e)).collect(),
         };
         let mut sizes: Vec<f64> = Vec::new();
         for b in blocks {
@@ -168,9 +171,10 @@ impl Noise {
         let edges_n: Vec<f64> =
             (1..count).map(|k| quantile_of_sorted(&sizes, k as f64 / count as f64)).collect();
         let mut noise = Self { edges_n, bins: Vec::new(), lasting: from.lasts() };
-        for bin in 0..count {
-            noise.bins.push(noise.fit(blocks, &columns, bin, from, floor_n.max(FLOOR_N)));
-        }
+        noise.bins = (0..count)
+            .into_par_iter()
+            .map(|bin| noise.fit(blocks, &columns, bin, from, floor_n.max(FLOOR_N)))
+            .collect();
         noise
     }
 
@@ -266,7 +270,21 @@ impl Noise {
             let sd_n = if b.doubt_n[k] > 0.0 { libm::hypot(sd, b.doubt_n[k]) } else { sd };
             Row { bin: bin as u32, run: run as u32, reach: if lasting { k as u32 } else { run as u32 }, sd_n }
         });
-        Laid { rows: rows.collect(), wander: self.bins.iter().any(Bin::wanders) }
+        let rows: Vec<Row> = rows.collect();
+        let mut even: Vec<(usize, usize, u32)> = Vec::new();
+        for (k, row) in rows.iter().enumerate() {
+            if row.sd_n == f64::INFINITY
+                || (row.run as usize) < ORDER
+                || self.bins[row.bin as usize].wanders()
+            {
+                continue;
+            }
+            match even.last_mut() {
+                Some((_, end, bin)) if *end == k && *bin == row.bin => *end += 1,
+                _ => even.push((k, k + 1, row.bin)),
+            }
+        }
+        Laid { rows, wander: self.bins.iter().any(Bin::wanders), even }
     }
 
     /// Normalised innovations of residuals `e` (N) of a recording; blocks that are not compared give zero.
@@ -277,7 +295,7 @@ impl Noise {
             (true, false) => sums(e, |_| true),
             (true, true) => sums(e, |k| laid.rows[k].sd_n.is_finite()),
         };
-        let one = |(k, row): (usize, &Row)| {
+        let one = |k: usize, row: &Row| {
             if row.sd_n == f64::INFINITY {
                 return 0.0;
             }
@@ -293,7 +311,35 @@ impl Noise {
             }
             w / row.sd_n
         };
-        laid.rows.iter().enumerate().map(one).collect()
+        let mut out = vec![0.0; e.len()];
+        // Where there is nothing, and nothing is remembered, nothing comes out.
+        let reach = if laid.wander { SLOW[SLOW.len() - 1].1 } else { ORDER };
+        let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
+        let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
+        let mut at = first;
+        for &(from, to, bin) in laid.even.iter().chain([&(e.len(), e.len(), 0)]) {
+            let (from, to) = (from.clamp(first, end.max(first)), to.min(end));
+            for k in at..from {
+                out[k] = one(k, &laid.rows[k]);
+            }
+            if from >= to {
+                at = at.max(from);
+                continue;
+            }
+            let a = &self.bins[bin as usize].a;
+            let rows = &laid.rows[from..to];
+            for ((out, row), e) in
+                out[from..to].iter_mut().zip(rows).zip(e[from - ORDER..to].windows(ORDER + 1))
+            {
+                let mut w = e[ORDER];
+                for i in 0..ORDER {
+                    w -= a[i] * e[ORDER - 1 - i];
+                }
+                *out = w / row.sd_n;
+            }
+            at = to;
+        }
+        out
     }
 
     /// Residuals (N) of a recording whose normalised innovations are `w`: the inverse of [`whiten`](Self::whiten), nothing where blocks
@@ -397,17 +443,22 @@ fn foretold(
     let mut a = [0.0; ROW - 1];
     let mut s = if turns == 1 { f64::INFINITY } else { sd_n };
     for _ in 0..turns {
-        let mut h = Symmetric::zeros(columns.len());
-        let mut g = vec![0.0; columns.len()];
+        let mut sums = [[0.0; ROW]; ROW - 1];
         for row in rows {
             let w = weight(innovation(row, &a) / s);
-            for (i, x) in columns.iter().enumerate() {
-                g[i] += w * row[x + 1] * row[0];
-                for (j, y) in columns.iter().enumerate().take(i + 1) {
-                    h.add(i, j, w * row[x + 1] * row[y + 1]);
+            for (sums, i) in sums.iter_mut().zip(columns) {
+                let x = w * row[i + 1];
+                sums[0] += x * row[0];
+                for (sum, j) in sums[1..].iter_mut().zip(columns) {
+                    *sum += x * row[j + 1];
                 }
             }
         }
+        let mut h = Symmetric::zeros(columns.len());
+        for (i, sums) in sums.iter().enumerate().take(columns.len()) {
+            (0..=i).for_each(|j| h.add(i, j, sums[j + 1]));
+        }
+        let g: Vec<f64> = sums.iter().take(columns.len()).map(|sums| sums[0]).collect();
         for (x, value) in columns.iter().zip(h.factor().solve(&g)) {
             a[*x] = value;
         }
@@ -665,6 +716,30 @@ mod tests {
             w -= slow * stretch.map(|j| e[j]).sum::<f64>() / (to - from) as f64;
         }
         w / sd
+    }
+
+    /// By the definition, wherever they begin and end.
+    #[test]
+    fn residuals_that_are_nothing_at_their_ends_leave_nothing_beyond_their_memory() {
+        let normals = normal(9, 900);
+        for wanders in [false, true] {
+            let (mut noise, b) = wandering(false);
+            for bin in noise.bins.iter_mut().filter(|_| !wanders) {
+                bin.slow = [0.0; SLOW.len()];
+                bin.first.iter_mut().for_each(|f| f.slow = bin.slow);
+            }
+            let laid = noise.laid(&b);
+            assert_eq!(laid.even.is_empty(), wanders);
+            for something in [0..900, 0..1, 299..303, 411..640, 898..900, 500..500] {
+                let e: Vec<f64> =
+                    (0..900).map(|k| if something.contains(&k) { normals[k] } else { 0.0 }).collect();
+                let w = noise.whiten(&laid, &e);
+                for k in 0..900 {
+                    let wanted = if b.used[k] { innovation_of(&noise, &b, &e, k) } else { 0.0 };
+                    assert!((w[k] - wanted).abs() < 1e-9, "{} for {wanted} at {k}", w[k]);
+                }
+            }
+        }
     }
 
     #[test]
