@@ -271,10 +271,18 @@ impl Tangent {
         (self.matrix, self.slope) = (h, g);
     }
 
-    /// Scalar product of one of the columns with another one over a recording.
+    /// As [`Column::dot`] of one of the columns with another one, over the blocks where the first is something.
     fn dot(&self, i: usize, c: &Column, r: usize) -> f64 {
-        let (own, lit) = (&self.columns[i], self.lit[i][r].clone());
-        dot(&own.w[r][lit.clone()], &c.w[r][lit]) + dot(&own.rows[r], &c.rows[r])
+        let own = &self.columns[i];
+        let blocks = match (self.lit[i].get(r), own.w.get(r), c.w.get(r)) {
+            (Some(lit), Some(a), Some(b)) => {
+                let end = lit.end.min(b.len());
+                let lit = lit.start.min(end)..end;
+                dot(&a[lit.clone()], &b[lit])
+            }
+            _ => 0.0,
+        };
+        blocks + own.rows.get(r).zip(c.rows.get(r)).map_or(0.0, |(a, b)| dot(a, b))
     }
 
     /// Scalar products of a column with all of the tangent's.
@@ -801,6 +809,21 @@ mod tests {
         far.tissue.layers[0].stiffness_n_per_m = 300.0;
         let bound = fit(&m, &data(&far, 0.002), Effort::FULL).expect("a fit");
         near(bound.model.tissue.layers[0].stiffness_n_per_m, 260.0);
+    }
+
+    /// A number whose neighbour cannot be replayed.
+    #[test]
+    fn a_column_that_is_not_there_is_nothing() {
+        let (m, d) = smooth();
+        let at = residuals(&m, &d).expect("a replay");
+        let mut t = Tangent::new(&m, &d, &at);
+        let first = t.columns[1].clone();
+        t.columns[0] = Column::default();
+        t.assemble(&m, 2);
+        near(t.matrix.at(0, 0), 1.0 / (t.shared[0].sd * t.shared[0].sd));
+        assert_eq!((t.matrix.at(1, 0), t.against(&first, 2)[0]), (0.0, 0.0));
+        near(t.against(&first, 2)[1], first.dot_all(&first));
+        assert!(t.against(&Column::default(), 2).iter().all(|x| *x == 0.0));
     }
 
     #[test]
