@@ -61,6 +61,38 @@ fn a_cutting_force_whose_steps_look_like_ruptures_is_found_from_what_is_believed
     assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.right), "{table}");
 }
 
+/// Further than a thickness may be off: once it was a scale of the positions, friction that is not given back, nothing, or another face.
+#[test]
+fn a_moved_face_is_told_from_thicknesses_that_are_a_little_wrong() {
+    let of = |(wrong, index): (Wrong, u64)| CaseId {
+        world: World::Plain,
+        wrong,
+        grade: Grade::Large,
+        hide: Hide::One,
+        size: Size::Strong,
+        seed: 128,
+        index,
+    };
+    let rows = [
+        (Wrong::Nothing, 38),
+        (Wrong::Ar2, 17),
+        (Wrong::Thickness, 0),
+        (Wrong::Thickness, 37),
+        (Wrong::Coefficients, 44),
+        (Wrong::ScatterSurface, 21),
+    ];
+    let outcomes = run(&rows.map(of), None, &answer, &|_, _| {}).expect("a run");
+    let table = table::text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.worth.right), "{table}");
+    let shifts: Vec<_> =
+        outcomes.iter().flat_map(|o| &o.numbers).filter(|n| n.name == "boundary_shift.shift_m").collect();
+    assert!(
+        shifts.len() == rows.len()
+            && shifts.iter().filter(|n| n.held == Some(true)).count() + 1 >= rows.len(),
+        "{table}"
+    );
+}
+
 /// In these worlds it was taken for scatter between insertions once.
 #[test]
 fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once() {

@@ -91,7 +91,8 @@ fn given(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
     let data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
-    let start = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
+    let mut start = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
+    start.free.far = true;
     let model = effects.iter().fold(start, |m, choice| m.with(choice.clone()));
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {

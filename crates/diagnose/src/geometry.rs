@@ -3,7 +3,8 @@
 //! Surface and thicknesses are free from the start and are no causes. When they come out as believed, they are fixed there:
 //! that saves their numbers. A scale of the position moves every face in proportion, a shifted face trades one thickness
 //! for the next: with the geometry free neither can be seen; that the free numbers fall into such a pattern by chance is what
-//! the saved numbers are paid for.
+//! the saved numbers are paid for. A thickness that is off by more than its tolerance is no belief that was a little wrong: that
+//! costs what a moved face costs.
 
 use crate::base::Prepared;
 use crate::judge::{LEAST, cost, gain};
@@ -21,7 +22,9 @@ const PATTERN: f64 = 0.2;
 /// Nats that the effects and the free geometry of a model cost.
 fn price(m: &Model, data: &Data) -> f64 {
     let geometry = usize::from(m.free.surface) + if m.free.thickness { m.layers() } else { 0 };
-    cost(m.effect_numbers() + geometry, data.compared()) + LEAST * m.effects.len() as f64
+    let strained = usize::from((0..m.layers()).any(|l| m.is_strained(l)));
+    cost(m.effect_numbers() + geometry + strained, data.compared())
+        + LEAST * (m.effects.len() + strained) as f64
 }
 
 /// Nats of a fit with that price.
@@ -59,6 +62,7 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
             tried.push(fixed(&best.model, f).with(choice.clone()));
         }
     }
+    tried.extend(unstrained(&best.model));
     let stands = priced(best, &search.data);
     let fits: Vec<Fit> = tried
         .into_par_iter()
@@ -89,7 +93,20 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
     if let Some(f) = told.or(plain) {
         search.best = f;
     }
+    if new {
+        within_tolerance(search, prepared);
+    }
     new
+}
+
+/// Where a moved face is told the base law is the one that may not move it.
+fn within_tolerance(search: &mut Search, prepared: &Prepared) {
+    let mut model = search.base.model.clone();
+    model.free.far = false;
+    retime(&mut model, &search.data, &prepared.drop_times());
+    if let Some(f) = fit(&model, &search.data, Effort::FULL) {
+        search.base = f;
+    }
 }
 
 /// Whether a fit with an effect for the geometry is worth its price when all that it leaves is noise, however slow.
@@ -107,6 +124,36 @@ pub fn unsure(model: &Model) -> Model {
         m.free = Free { surface: true, thickness: true, ..m.free };
     }
     m
+}
+
+/// Where thicknesses are off by more than their tolerances: models in which a face was moved and the rest is as likely as it can be.
+fn unstrained(model: &Model) -> Vec<Model> {
+    let strained = |l: usize| model.is_strained(l);
+    let taken = |i: &EffectInfo| model.effects.iter().any(|e| e.info.id == i.id);
+    let moves = |i: &&EffectInfo| matches!(i.proposal, Proposal::Faces(_)) && !taken(i);
+    let (belief, layers) = (&model.belief, &model.tissue.layers);
+    // Off what is believed, in metres, and the weight of it.
+    let off = |l: usize| {
+        let believed = belief.tissue.layers[l].thickness_m;
+        let sd = (belief.thickness_tolerance[l] * believed).max(1e-9);
+        (layers[l].thickness_m - believed, 1.0 / (sd * sd))
+    };
+    let mut out = Vec::new();
+    for info in library().filter(moves) {
+        for l in (1..model.layers()).filter(|l| strained(l - 1) || strained(*l)) {
+            let ((front, wf), (back, wb)) = (off(l - 1), off(l));
+            let shift = (wf * front - wb * back) / (wf + wb);
+            let mut m = model.clone();
+            m.tissue.layers[l - 1].thickness_m -= shift;
+            m.tissue.layers[l].thickness_m += shift;
+            let m = m.with(Choice::new(info, &[l as f64, shift]));
+            for (surface, thickness) in [(false, false), (false, true), (true, false), (true, true)] {
+                let surface = surface && model.free.surface;
+                out.push(fixed(&m, Free { surface, thickness, far: false, ..m.free }));
+            }
+        }
+    }
+    out
 }
 
 /// Effects that would move the faces as the free geometry has moved them.
@@ -154,10 +201,12 @@ fn patterns(model: &Model) -> Vec<Choice> {
 
 #[cfg(test)]
 mod tests {
-    use super::{fixed, is_worth, patterns, price, priced, tighten, unsure};
+    use super::{fixed, is_worth, patterns, price, priced, tighten, unstrained, unsure};
     use crate::base::{Prepared, base};
     use crate::made::{evenly, insertions, settled, showing};
     use crate::select::Search;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::{Effort, fit};
@@ -353,9 +402,9 @@ mod tests {
         }
     }
 
-    /// Three layers whose first face lies 1 mm deeper than believed: what one effect says with one number, free thicknesses say with three.
-    #[test]
-    fn a_face_that_lies_elsewhere_is_named_where_free_thicknesses_cost_more() {
+    /// Three layers whose first face lies so much deeper than believed, in insertions that are searched for what their geometry is.
+    /// `off` are the shares by which the believed thicknesses are wrong beside.
+    fn searched(shift_m: f64, off: [f64; 3]) -> (Search, Prepared) {
         let layer = |thickness_m, stiffness_n_per_m, puncture_n| Layer {
             name: String::new(),
             thickness_m,
@@ -368,8 +417,8 @@ mod tests {
             layer(0.0092, 200.0, Some(1.1)),
             layer(0.0131, 170.0, None),
         ];
-        let tissue = Tissue { surface_m: 0.0, layers };
-        let law = Law::new(&tissue, &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]).expect("a law");
+        let mut tissue = Tissue { surface_m: 0.0, layers };
+        let law = Law::new(&tissue, &[BoundaryShift { layer: 1, shift_m }.into()]).expect("a law");
         let mut spread = evenly(5);
         let blocks = [0.004, 0.005, 0.0034].map(|speed| {
             let t: Vec<f64> =
@@ -383,6 +432,7 @@ mod tests {
             let f = f.collect();
             Blocks::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
         });
+        tissue.layers.iter_mut().zip(off).for_each(|(l, off)| l.thickness_m *= 1.0 + off);
         let belief = Belief {
             tissue,
             given: Vec::new(),
@@ -392,7 +442,13 @@ mod tests {
         };
         let prepared = Prepared::new(Arc::new(belief), blocks.to_vec(), 0.0);
         let (begun, data) = base(&prepared).expect("a fit");
-        let mut search = Search::of(begun, data);
+        (Search::of(begun, data), prepared)
+    }
+
+    /// What one effect says with one number free thicknesses say with three.
+    #[test]
+    fn a_face_that_lies_elsewhere_is_named_where_free_thicknesses_cost_more() {
+        let (mut search, prepared) = searched(1e-3, [0.0; 3]);
         assert!(tighten(&mut search, &prepared));
         let model = &search.best.model;
         assert_eq!(
@@ -400,5 +456,63 @@ mod tests {
             ("boundary_shift", false, false)
         );
         assert!((model.effects[0].values[1] - 1e-3).abs() < 2e-4, "{:?}", model.effects[0].values);
+    }
+
+    /// By 3 mm the next layer is a third thinner than believed, whatever else is wrong about the thicknesses; by none they are what a
+    /// belief may be wrong about.
+    #[test]
+    fn a_face_is_named_where_a_thickness_would_be_off_by_more_than_its_tolerance() {
+        let off = [0.06, -0.08, 0.07];
+        let (mut search, prepared) = searched(3e-3, off);
+        assert!(
+            (0..3).any(|l| search.best.model.is_strained(l)) && unstrained(&search.best.model).len() >= 4
+        );
+        let reached = search.best.residuals.nats;
+        assert!(tighten(&mut search, &prepared));
+        let model = &search.best.model;
+        assert_eq!((model.effects[0].info.id, model.effects[0].values[0]), ("boundary_shift", 1.0));
+        assert!(!model.free.far && (0..3).all(|l| !model.is_strained(l)));
+        assert!(search.best.nats() < reached + 1.0, "{} for {reached}", search.best.nats());
+        // The base law, that may not move it, is far off, and so is the law without the effect.
+        assert!(!search.base.model.free.far && search.base.nats() > reached + 100.0);
+        // How far is only as sure as the thicknesses are.
+        let spread =
+            crate::intervals::Spread::new(&search.best, &search.data, &mut ChaCha8Rng::seed_from_u64(1));
+        let shift = spread.parameter(0, 1);
+        assert!(shift.low < 3e-3 && 3e-3 < shift.high && shift.high - shift.low > 1e-3, "{shift:?}");
+        let (mut search, prepared) = searched(0.0, off);
+        assert!(
+            (0..3).all(|l| !search.best.model.is_strained(l)) && unstrained(&search.best.model).is_empty()
+        );
+        assert!(!tighten(&mut search, &prepared));
+    }
+
+    /// As likely as it can be: the shift that leaves least of all thicknesses' priors.
+    #[test]
+    fn a_strained_thickness_is_shared_between_the_face_and_what_may_be_wrong() {
+        let mut m = model(&[46.0, -60.0, 0.0], &[]);
+        m.free = Free { surface: false, thickness: true, far: true, ..Free::default() };
+        assert!(m.is_strained(0) && !m.is_strained(1) && !m.is_strained(2));
+        let all = unstrained(&m);
+        // 20 and 30 mm to 10 %: 4.6 mm weigh by 1/4, -6 mm by 1/9.
+        let shift = (4.6e-3 / 4.0 + 6e-3 / 9.0) / (1.0 / 4.0 + 1.0 / 9.0);
+        for m in &all {
+            assert_eq!(
+                (m.effects[0].info.id, m.effects[0].values[0], m.free.far),
+                ("boundary_shift", 1.0, false)
+            );
+            assert!((m.effects[0].values[1] / shift - 1.0).abs() < 1e-12);
+            let off = if m.free.thickness { 4.6e-3 - shift } else { 0.0 };
+            assert!((m.tissue.layers[0].thickness_m - 0.02 - off).abs() < 1e-12);
+        }
+        assert!(all.iter().any(|m| m.free.thickness) && all.iter().any(|m| !m.free.thickness));
+        // Both faces of a layer in the middle; none where one is moved already.
+        assert_eq!(
+            unstrained(&model(&[0.0, 70.0, 0.0], &[])).iter().map(|m| m.effects[0].values[0]).sum::<f64>(),
+            4.0 * 3.0
+        );
+        assert!(
+            unstrained(&model(&[46.0, 0.0], &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()])).is_empty()
+        );
     }
 }

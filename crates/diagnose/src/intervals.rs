@@ -15,10 +15,10 @@ use rand::Rng;
 use stylet_identify::events::{judge, spreads};
 use stylet_identify::fit::{Fit, Tangent};
 use stylet_identify::linear::{Factor, Symmetric};
-use stylet_identify::model::{Number, Role};
+use stylet_identify::model::{Model, Number, Role};
 use stylet_identify::objective::Data;
 use stylet_stats::{normal, student};
-use stylet_tissue::FitScale;
+use stylet_tissue::{FitScale, Proposal};
 
 /// Probability below the upper end of a 95 % interval.
 const UPPER: f64 = 0.975;
@@ -68,13 +68,13 @@ impl<'a> Spread<'a> {
         let mut tangent = Tangent::new(&fit.model, data, &fit.residuals);
         let mut wide_m = 0.0;
         for _ in 0..WIDER {
-            let Some(next_m) = uncertainty_m(&tangent) else { break };
+            let Some(next_m) = uncertainty_m(&tangent, &fit.model) else { break };
             if (next_m / wide_m - 1.0).abs() < SETTLED {
                 break;
             }
             wide_m = next_m;
             // All by the same: what moves one face there and back again has to stay where it is.
-            let step = |n: &Number| bends(n.role).then_some(wide_m.min(0.25 * (n.high - n.low)));
+            let step = |n: &Number| bends(n.role, &fit.model).then_some(wide_m.min(0.25 * (n.high - n.low)));
             tangent = tangent.widened(&fit.model, data, &fit.residuals, &step);
         }
         let told: Vec<(Kind, f64, f64)> = KINDS
@@ -206,16 +206,20 @@ impl<'a> Spread<'a> {
 }
 
 /// How uncertain in m the faces are at which the force bends: the middle one.
-fn uncertainty_m(tangent: &Tangent) -> Option<f64> {
+fn uncertainty_m(tangent: &Tangent, model: &Model) -> Option<f64> {
     let variances = tangent.factor().inverse_diagonal();
-    let bent = tangent.shared.iter().zip(variances).filter(|(n, v)| bends(n.role) && v.is_finite());
+    let bent = tangent.shared.iter().zip(variances).filter(|(n, v)| bends(n.role, model) && v.is_finite());
     let mut sd: Vec<f64> = bent.filter(|(n, v)| v.sqrt() > n.step).map(|(_, v)| v.sqrt()).collect();
     (!sd.is_empty()).then(|| stylet_stats::order::median(&mut sd))
 }
 
 /// Whether the force bends where such a number puts a face.
-fn bends(role: Role) -> bool {
-    matches!(role, Role::Surface | Role::Thickness(_) | Role::OwnSurface)
+fn bends(role: Role, model: &Model) -> bool {
+    match role {
+        Role::Surface | Role::Thickness(_) | Role::OwnSurface => true,
+        Role::Effect { effect, .. } => matches!(model.effects[effect].info.proposal, Proposal::Faces(_)),
+        _ => false,
+    }
 }
 
 /// How many numbers tell a scatter of a fit, and how many degrees of freedom are left of them; `None` where there is no such

@@ -45,6 +45,8 @@ pub fn starts(look: &Look, prepared: &Prepared, lines: &[f64]) -> Vec<Vec<Start>
 fn of(info: &'static EffectInfo, look: &Look, prepared: &Prepared, hz: &[f64]) -> Vec<Start> {
     match info.proposal {
         Proposal::Columns(groups) => groups.iter().filter_map(|g| columns(info, look, g)).collect(),
+        // Free thicknesses move every face already.
+        Proposal::Faces(_) if look.fit.model.free.thickness => Vec::new(),
         Proposal::Faces(shift) => {
             (1..look.fit.model.layers()).filter_map(|l| columns(info, look, &[&[l as f64, shift]])).collect()
         }

@@ -55,6 +55,8 @@ pub struct Free {
     pub surface: bool,
     /// The thicknesses.
     pub thickness: bool,
+    /// They may be off by more than their tolerances.
+    pub far: bool,
     /// A surface of each recording's own.
     pub own_surface: bool,
     /// Friction of each recording's own.
@@ -373,6 +375,15 @@ impl Model {
         })
     }
 
+    /// Whether a thickness is further from what is believed than its tolerance allows.
+    #[must_use]
+    pub fn is_strained(&self, layer: usize) -> bool {
+        let b = &self.belief;
+        let believed = b.tissue.layers[layer].thickness_m;
+        let off = (self.tissue.layers[layer].thickness_m - believed).abs();
+        off > TOLERATED * b.thickness_tolerance[layer] * believed
+    }
+
     /// The numbers that every recording shares.
     #[must_use]
     pub fn shared(&self) -> Vec<Number> {
@@ -392,14 +403,15 @@ impl Model {
         }
         if self.free.surface && b.surface_tolerance_m > 0.0 {
             let (at, sd) = (b.tissue.surface_m, b.surface_tolerance_m);
-            let (low, high) = (at - BEYOND * sd, at + BEYOND * sd);
+            let (low, high) = (at - TOLERATED * sd, at + TOLERATED * sd);
             out.push(Number { role: Role::Surface, low, high, mean: at, sd, step: 1e-7 });
         }
         if self.free.thickness {
             for (layer, l) in b.tissue.layers.iter().enumerate() {
                 let (d, sd) = (l.thickness_m, b.thickness_tolerance[layer] * l.thickness_m);
                 if sd > 0.0 {
-                    let (low, high) = ((d - BEYOND * sd).max(0.05 * d), d + BEYOND * sd);
+                    let most = if self.free.far { FARTHEST } else { TOLERATED } * sd;
+                    let (low, high) = ((d - most).max(0.05 * d), d + most);
                     out.push(Number { role: Role::Thickness(layer), low, high, mean: d, sd, step: 1e-7 });
                 }
             }
@@ -579,8 +591,10 @@ impl Model {
 
 /// Smallest share of what is believed that a stiffness, friction or puncture force may have.
 const LEAST_SHARE: f64 = 0.02;
-/// How many standard deviations of their priors surface and thicknesses may go.
-const BEYOND: f64 = 2.0;
+/// By how many of its tolerances a surface or a thickness may be off.
+pub const TOLERATED: f64 = 2.0;
+/// By how many of them one may be off while faces are looked for that only an effect can have moved.
+const FARTHEST: f64 = 5.0;
 
 #[cfg(test)]
 mod tests {
@@ -668,6 +682,18 @@ mod tests {
         let mut fixed = base();
         fixed.free = Free::default();
         assert_eq!(fixed.shared().len(), 6);
+        // Two tolerances, or five.
+        let mut far = base();
+        let of = |m: &Model| m.shared().into_iter().find(|n| n.role == Role::Thickness(0)).expect("free");
+        for (is_far, low, high) in [(false, 0.0096, 0.0144), (true, 0.006, 0.018)] {
+            far.free.far = is_far;
+            near(of(&far).low, low);
+            near(of(&far).high, high);
+        }
+        for (thickness_m, strained) in [(0.0097, false), (0.0095, true), (0.0143, false), (0.0145, true)] {
+            far.tissue.layers[0].thickness_m = thickness_m;
+            assert_eq!(far.is_strained(0), strained, "{thickness_m}");
+        }
         let mut sure = belief();
         sure.surface_tolerance_m = 0.0;
         assert!(!Model::base(Arc::new(sure), 1).shared().iter().any(|n| n.role == Role::Surface));

@@ -306,6 +306,7 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     model.free = Free {
         surface: true,
         thickness: true,
+        far: false,
         own_surface: true,
         own_friction: true,
         own_effects: true,
