@@ -71,8 +71,10 @@ const EXCESS_ALONE: f64 = 3.0;
 const EXCESS_SLOW: f64 = 6.0;
 /// Beside something unknown a cause stands when recordings left out lose so much of their misfit by it ...
 const BORNE: f64 = 0.27;
-/// ... and its strengths are the same whichever recording is left out, to this share.
+/// ... its strengths are the same whichever recording is left out, to this share ...
 const SAME: f64 = 0.12;
+/// ... and it would gain no more than this share of what it explains by acting otherwise.
+const OTHERWISE: f64 = 0.07;
 
 /// What is drawn is the same for the same recordings.
 const SEED: u64 = 1;
@@ -118,7 +120,7 @@ pub fn diagnose(
     } else {
         small::small(&search, &after, &judged.causes, &judged.against_none)
     };
-    let traces = take_traces(&mut judged, small);
+    let mut traces = take_traces(&mut judged, small);
     let mut from_raw = raw_causes(&raw, noise_n);
     let coarse = raw.step_n.is_some_and(|s| s > 0.5 * noise_n);
     let unknown = judged.unknown && !coarse;
@@ -129,10 +131,13 @@ pub fn diagnose(
         // Of a force with several lines one tone is no cause.
         let tone = |i: &EffectInfo| matches!(i.proposal, Proposal::Line | Proposal::Breath);
         let kept: Vec<&str> = effects
-            .filter(|(e, b)| b.gain > BORNE && b.spread < SAME && !(judged.lined && tone(e.info)))
+            .filter(|(e, b)| {
+                let alike = b.spread < SAME && b.otherwise < OTHERWISE;
+                b.gain > BORNE && alike && !(judged.lined && tone(e.info))
+            })
             .map(|(e, _)| e.info.id)
             .collect();
-        causes.retain(|c| kept.contains(&c.effect.as_str()));
+        traces.extend(beside_unknown(&mut causes, &kept));
     }
     // Where none of its effects is a cause, the base law is what is left.
     let after = if explains(&search, &causes) { after } else { before.clone() };
@@ -330,6 +335,16 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
         search.data = quiet;
     }
     Judged { causes, against_none, base_parameters, leftover, unknown, lined }
+}
+
+/// Takes causes that something unknown may have imitated: they become traces.
+fn beside_unknown(causes: &mut Vec<Cause>, kept: &[&str]) -> Vec<Trace> {
+    let (stay, gone) = std::mem::take(causes).into_iter().partition(|c| kept.contains(&c.effect.as_str()));
+    *causes = stay;
+    let why = "what no effect of the library explains may imitate it";
+    gone.into_iter()
+        .map(|c: Cause| Trace { effect: c.effect, parameters: c.parameters, why: why.to_owned() })
+        .collect()
 }
 
 /// Moves causes that are too small to `traces`.

@@ -1,7 +1,9 @@
 //! How much better the extended model is on recordings that took no part in the fit.
 
+use crate::otherwise::otherwise;
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::look::Look;
 use stylet_identify::model::{Model, NEVER, Own};
 use stylet_identify::objective::{Data, Trail, replay};
 
@@ -87,6 +89,8 @@ pub struct Borne {
     pub spread: f64,
     /// Share of what the model without it leaves on left-out recordings, beyond `with`, in mean square.
     pub gain: f64,
+    /// Share of what the fit loses without it that its force would gain by acting otherwise ([`otherwise`](crate::otherwise)).
+    pub otherwise: f64,
 }
 
 /// How the effects of a fit fare on recordings left out; `floor_n` is the noise.
@@ -107,6 +111,7 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
     let with: Vec<Option<Left>> =
         models.iter().enumerate().map(|(r, m)| by_its_own(m.as_ref()?, data, r)).collect();
     let with = square(&with);
+    let look = Look::new(best, data);
     (0..best.model.effects.len())
         .map(|k| {
             let choice = &best.model.effects[k];
@@ -118,11 +123,11 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
                 let count = values.len() as f64;
                 spread = spread.max((sum * (count - 1.0) / count).sqrt() / mean.abs().max(1e-300));
             }
-            let gain = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 }).map_or(0.0, |f| {
-                let less = square(&left_out(&f, data));
-                (less - with) / (less - floor_n * floor_n).max(1e-12)
-            });
-            Borne { spread, gain }
+            let without = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 });
+            let Some(without) = without else { return Borne { spread, gain: 0.0, otherwise: f64::INFINITY } };
+            let less = square(&left_out(&without, data));
+            let gain = (less - with) / (less - floor_n * floor_n).max(1e-12);
+            Borne { spread, gain, otherwise: otherwise(&look, k, without.nats() - best.nats()) }
         })
         .collect()
 }

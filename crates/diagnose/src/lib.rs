@@ -13,6 +13,7 @@
 //! | [`rivals`] | effects that explain the data as well |
 //! | [`intervals`] | intervals of every number |
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
+//! | [`otherwise`] | whether an effect beside something unknown acts by its own law |
 //! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
 //! | [`predict`] | a model against recordings that took no part |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
@@ -38,6 +39,7 @@ pub mod leftover;
 pub mod lines;
 #[cfg(test)]
 mod made;
+pub mod otherwise;
 pub mod outcome;
 pub mod predict;
 pub mod propose;
