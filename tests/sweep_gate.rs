@@ -74,6 +74,8 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
     let output = stylet(&["gate", file]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{text}");
+    let quiet = stylet(&["gate", file, "--quiet"]);
+    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty(), "{}", said(&quiet));
     assert!(text.contains("ruptures[0].delay_s P95: ") && text.contains(" -> "), "{text}");
 }
 

@@ -104,6 +104,7 @@ fn summary(plan: &Plan) -> String {
                 significant(p.nats_after, 3)
             );
         }
+        let _ = writeln!(out, "  {A_NAT}");
     }
     if !plan.never.is_empty() {
         let _ = writeln!(out, "  no motion within these limits shows: {}", plan.never.join(", "));
@@ -140,6 +141,9 @@ pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
     args.results.conclude(&folder, &found.output()?, || words(&found.shown))
 }
 
+/// What a nat is.
+const A_NAT: &str = "(a nat is a factor of 2.7 in how likely the data are: 3 are odds of 20 to 1)";
+
 fn words(shown: &Identifiability) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "{:<26} {:>10}  {:<44} as well", "effect", "nats", "seen from");
@@ -154,6 +158,9 @@ fn words(shown: &Identifiability) -> String {
     }
     if !shown.invisible.is_empty() {
         let _ = writeln!(out, "\ninvisible at their typical size: {}", shown.invisible.join(", "));
+    }
+    if !shown.effects.is_empty() {
+        let _ = writeln!(out, "\n{A_NAT}");
     }
     for c in &shown.classes {
         let _ = writeln!(out, "cannot be told apart: {}", c.join(", "));

@@ -185,4 +185,7 @@ pub struct GateArgs {
     /// Write the results as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+    /// Print the bounds that do not hold alone, and no progress.
+    #[arg(long, short)]
+    pub quiet: bool,
 }

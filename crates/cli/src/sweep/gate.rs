@@ -19,7 +19,7 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let gates = load(&args.gates, args.seed)?;
     let at = args.baseline.clone().unwrap_or_else(|| args.gates.with_extension("baseline.json"));
     let old = read(&at)?;
-    let progress = Progress::new(gates.iter().map(|g| g.trials()).sum(), "trials", false);
+    let progress = Progress::new(gates.iter().map(|g| g.trials()).sum(), "trials", args.quiet);
     let judged: Vec<Judged> = with_threads(args.threads.unwrap_or(0), || {
         let all: Result<Vec<Vec<Judged>>, _> =
             gates.iter().map(|gate| gate.judge(&|n| progress.advance(n))).collect();
@@ -28,7 +28,7 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     progress.finish();
     let mut text = String::new();
     let mut heading = String::new();
-    for j in &judged {
+    for j in judged.iter().filter(|j| !(args.quiet && j.passed)) {
         if j.gate != heading {
             heading.clone_from(&j.gate);
             let _ = writeln!(text, "{heading}");
@@ -36,7 +36,9 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
         let _ = writeln!(text, "  {} {}", if j.passed { "pass" } else { "FAIL" }, describe(j));
     }
     let new = baseline(&judged);
-    if let Some(old) = &old {
+    if args.quiet {
+        // What changed is nobody's failure.
+    } else if let Some(old) = &old {
         let changes = changes(old, &new);
         if changes.is_empty() {
             let _ = writeln!(text, "No number differs from {}.", at.display());
@@ -51,7 +53,9 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     }
     if args.update {
         write_file(&at, &json(&new)?)?;
-        let _ = writeln!(text, "{} is the baseline now.", at.display());
+        if !args.quiet {
+            let _ = writeln!(text, "{} is the baseline now.", at.display());
+        }
     }
     if let Some(path) = &args.junit {
         write_file(path, junit(&judged).as_bytes())?;
@@ -59,7 +63,7 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     if let Some(path) = &args.json {
         write_file(path, &json(&judged)?)?;
     }
-    let said = say(&text);
+    let said = if text.is_empty() { Ok(()) } else { say(&text) };
     let failed = judged.iter().filter(|j| !j.passed).count();
     // A verdict outweighs that nobody could be told of it.
     if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { said }
