@@ -90,6 +90,12 @@ fn summary(d: &Diagnosis) -> String {
             stylet_report::chance(d.leftover.p_value)
         );
     }
+    let imitated = d.traces.iter().filter(|t| t.why == stylet_diagnose::IMITATED);
+    let imitated: Vec<&str> = imitated.map(|t| t.effect.as_str()).collect();
+    if !imitated.is_empty() {
+        let _ =
+            writeln!(out, "  the library's nearest, which may only look like it: {}", imitated.join(", "));
+    }
     if !d.invisible.is_empty() {
         let _ = writeln!(out, "  these recordings cannot show: {}", d.invisible.join(", "));
     }

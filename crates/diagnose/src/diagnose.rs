@@ -75,6 +75,8 @@ const BORNE: f64 = 0.27;
 const SAME: f64 = 0.12;
 /// ... and it would gain no more than this share of what it explains by acting otherwise.
 const OTHERWISE: f64 = 0.07;
+/// Why an effect beside something unknown is a trace.
+pub const IMITATED: &str = "what no effect of the library explains may imitate it";
 
 /// What is drawn is the same for the same recordings.
 const SEED: u64 = 1;
@@ -341,9 +343,8 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
 fn beside_unknown(causes: &mut Vec<Cause>, kept: &[&str]) -> Vec<Trace> {
     let (stay, gone) = std::mem::take(causes).into_iter().partition(|c| kept.contains(&c.effect.as_str()));
     *causes = stay;
-    let why = "what no effect of the library explains may imitate it";
     gone.into_iter()
-        .map(|c: Cause| Trace { effect: c.effect, parameters: c.parameters, why: why.to_owned() })
+        .map(|c: Cause| Trace { effect: c.effect, parameters: c.parameters, why: IMITATED.to_owned() })
         .collect()
 }
 

@@ -53,7 +53,7 @@ mod told_again;
 pub mod varied;
 mod visible;
 
-pub use diagnose::{Evidence, Examined, Options, belief, diagnose};
+pub use diagnose::{Evidence, Examined, IMITATED, Options, belief, diagnose};
 pub use error::DiagnoseError;
 pub use outcome::{Diagnosis, Verdict};
 pub use rivals::CLASS_NATS;
