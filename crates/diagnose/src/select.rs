@@ -36,6 +36,8 @@ const COARSER: usize = 3;
 const MISFIT: f64 = 1.2;
 /// By so many tolerances of a thickness a face is moved to see whether it lies better elsewhere.
 const MOVES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
+/// Of what the leader gains a sketch may lack this share to be begun anew.
+const SKETCHED: f64 = 0.05;
 /// Effects that are begun anew to the end.
 const ANEW: usize = 3;
 /// Stages of a search in which effects are begun anew from what is believed.
@@ -275,6 +277,7 @@ impl Search {
         // In short for all, and beside the law without; to the end for those that come near the best of them.
         let coarse = self.coarse();
         let coarse = coarse.judged_by(&residuals(&leader.model, &coarse)?.e, From::Calm);
+        let led = residuals(&leader.model, &coarse)?.nats;
         let stood = sketched(prepared, &self.best.model.effects, &coarse)?.nats();
         let mut sketches: Vec<(f64, Vec<Choice>)> = ranked
             .par_iter()
@@ -285,7 +288,9 @@ impl Search {
             .collect();
         sketches.sort_by(|a, b| a.0.total_cmp(&b.0));
         let most = stood - sketches.first()?.0;
-        sketches.retain(|s| stood - s.0 > BEHIND * most);
+        // None that is sketched further behind the leader comes before it in the end.
+        let reach = led + SKETCHED * (stood - led).max(0.0);
+        sketches.retain(|s| stood - s.0 > BEHIND * most && s.0 < reach);
         sketches.truncate(ANEW);
         let mut begun: Vec<Fit> = Vec::new();
         for (_, effects) in sketches {
@@ -481,7 +486,7 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Search, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
-    use crate::base::Prepared;
+    use crate::base::{Prepared, anew};
     use crate::judge::gain;
     use crate::made::{believed, settled, showing, stage};
     use crate::propose::{Start, starts};
@@ -740,7 +745,9 @@ mod tests {
             let choice = Choice::new(e.info(), &e.parameters());
             vec![Start { choice, nats: 1.0, visible: 1.0, model: None }]
         };
-        let full = [with(&search, &rubs(1.0))];
+        let good = [with(&search, &rubs(1.0))];
+        let mut full = good.clone();
+        full[0].model.tissue.layers[0].stiffness_n_per_m *= 0.8;
         let weak = [start(&drift(1e-4)), start(&ForceBias { force_n: 1e-3 }.into())];
         let ranked = [weak.to_vec(), vec![start(&membrane); 4]].concat();
         let begun = |search: &mut Search, full: &[Fit], ranked: &[Vec<Start>], beginnings: usize| {
@@ -753,6 +760,10 @@ mod tests {
         // Three at most, and none that comes less than half as near.
         assert_eq!(begun(&mut search, &full, &ranked, 2), (Some(vec!["hidden_membrane"; 3]), 1));
         assert_eq!(begun(&mut search, &full, &ranked[..3], 1), (Some(vec!["hidden_membrane"]), 0));
+        // Nor one that is sketched behind the leader, and ends there.
+        assert_eq!(begun(&mut search, &good, &ranked, 2), (Some(vec![]), 1));
+        let ended = anew(&prepared, &[ranked[2][0].choice.clone()], &search.data).expect("a fit");
+        assert!(ended.nats() > good[0].nats(), "{} for {}", ended.nats(), good[0].nats());
         assert_eq!(begun(&mut search, &full, &ranked, 0), (None, 0));
         assert_eq!(begun(&mut search, &[], &ranked, 2), (None, 2));
         // The first that leaves nothing but noise ends it.
