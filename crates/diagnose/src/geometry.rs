@@ -147,8 +147,8 @@ fn unstrained(model: &Model) -> Vec<Model> {
             m.tissue.layers[l - 1].thickness_m -= shift;
             m.tissue.layers[l].thickness_m += shift;
             let m = m.with(Choice::new(info, &[l as f64, shift]));
-            for (surface, thickness) in [(false, false), (false, true), (true, false), (true, true)] {
-                let surface = surface && model.free.surface;
+            let tried = [(false, false), (false, true), (true, false), (true, true)];
+            for (surface, thickness) in tried.into_iter().filter(|t| model.free.surface || !t.0) {
                 out.push(fixed(&m, Free { surface, thickness, far: false, ..m.free }));
             }
         }
