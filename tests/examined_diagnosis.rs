@@ -26,6 +26,11 @@ fn answer(question: &Question) -> Result<Answer, String> {
     Answer::from_json(&json).map_err(|e| e.to_string())
 }
 
+/// A case of the plain world, all strong and by the largest grade.
+fn case(wrong: Wrong, hide: Hide, seed: u64, index: u64) -> CaseId {
+    CaseId { world: World::Plain, wrong, grade: Grade::Large, hide, size: Size::Strong, seed, index }
+}
+
 #[test]
 fn in_a_world_that_it_did_not_make_clean_data_are_not_accused_and_strong_effects_are_found() {
     let plan = Plan { hide: vec![Hide::Clean, Hide::One], cases: 8, seed: 1, ..Plan::default() };
@@ -45,17 +50,9 @@ fn in_a_world_that_it_did_not_make_clean_data_are_not_accused_and_strong_effects
 /// back, and the answer was unknown, or a scale of the position and a membrane beside it.
 #[test]
 fn a_cutting_force_whose_steps_look_like_ruptures_is_found_from_what_is_believed() {
-    let of = |(wrong, index): (Wrong, u64)| CaseId {
-        world: World::Plain,
-        wrong,
-        grade: Grade::Large,
-        hide: Hide::One,
-        size: Size::Strong,
-        seed: 128,
-        index,
-    };
-    let cases: Vec<CaseId> =
-        [(Wrong::Nothing, 35), (Wrong::ScatterPuncture, 29), (Wrong::Thickness, 1)].map(of).to_vec();
+    let cases: Vec<CaseId> = [(Wrong::Nothing, 35), (Wrong::ScatterPuncture, 29), (Wrong::Thickness, 1)]
+        .map(|(wrong, index)| case(wrong, Hide::One, 128, index))
+        .to_vec();
     let outcomes = run(&cases, None, &answer, &|_, _| {}).expect("a run");
     let table = table::text(&outcomes);
     assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.right), "{table}");
@@ -64,15 +61,6 @@ fn a_cutting_force_whose_steps_look_like_ruptures_is_found_from_what_is_believed
 /// Further than a thickness may be off: once it was a scale of the positions, friction that is not given back, nothing, or another face.
 #[test]
 fn a_moved_face_is_told_from_thicknesses_that_are_a_little_wrong() {
-    let of = |(wrong, index): (Wrong, u64)| CaseId {
-        world: World::Plain,
-        wrong,
-        grade: Grade::Large,
-        hide: Hide::One,
-        size: Size::Strong,
-        seed: 128,
-        index,
-    };
     let rows = [
         (Wrong::Nothing, 38),
         (Wrong::Ar2, 17),
@@ -81,7 +69,9 @@ fn a_moved_face_is_told_from_thicknesses_that_are_a_little_wrong() {
         (Wrong::Coefficients, 44),
         (Wrong::ScatterSurface, 21),
     ];
-    let outcomes = run(&rows.map(of), None, &answer, &|_, _| {}).expect("a run");
+    let outcomes =
+        run(&rows.map(|(wrong, index)| case(wrong, Hide::One, 128, index)), None, &answer, &|_, _| {})
+            .expect("a run");
     let table = table::text(&outcomes);
     assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.worth.right), "{table}");
     let shifts: Vec<_> =
@@ -98,18 +88,8 @@ fn a_moved_face_is_told_from_thicknesses_that_are_a_little_wrong() {
 fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once() {
     let rows =
         [(Wrong::Growing, 11), (Wrong::Encoder, 17), (Wrong::SurfaceEach, 18), (Wrong::ScatterFriction, 13)];
-    let of = |(wrong, index): (Wrong, u64)| {
-        let id = |hide, index| CaseId {
-            world: World::Plain,
-            wrong,
-            grade: Grade::Large,
-            hide,
-            size: Size::Strong,
-            seed: 3,
-            index,
-        };
-        [id(Hide::One, index), id(Hide::Clean, 0)]
-    };
+    let of =
+        |(wrong, index): (Wrong, u64)| [case(wrong, Hide::One, 3, index), case(wrong, Hide::Clean, 3, 0)];
     let cases: Vec<CaseId> = rows.into_iter().flat_map(of).collect();
     let outcomes = run(&cases, None, &answer, &|_, _| {}).expect("a run");
     let table = table::text(&outcomes);
@@ -122,16 +102,8 @@ fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once(
 /// Two lines close together and of one size: one of them was named, and an autoregression took the other for the noise's colour.
 #[test]
 fn beats_are_not_called_a_tone() {
-    let id = CaseId {
-        world: World::Plain,
-        wrong: Wrong::Nothing,
-        grade: Grade::Large,
-        hide: Hide::Outside,
-        size: Size::Strong,
-        seed: 142,
-        index: 6,
-    };
-    let outcomes = run(&[id], None, &answer, &|_, _| {}).expect("a run");
+    let outcomes =
+        run(&[case(Wrong::Nothing, Hide::Outside, 142, 6)], None, &answer, &|_, _| {}).expect("a run");
     let table = table::text(&outcomes);
     assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.right), "{table}");
 }
@@ -140,15 +112,7 @@ fn beats_are_not_called_a_tone() {
 /// single recording, was taken for the noise's colour where starts are ranked.
 #[test]
 fn a_wandering_zero_is_no_shifted_face_and_hides_no_tone() {
-    let of = |(wrong, hide, seed, index): (Wrong, Hide, u64, u64)| CaseId {
-        world: World::Plain,
-        wrong,
-        grade: Grade::Large,
-        hide,
-        size: Size::Strong,
-        seed,
-        index,
-    };
+    let of = |(wrong, hide, seed, index)| case(wrong, hide, seed, index);
     let cases = [
         (Wrong::Wander, Hide::Clean, 141, 0),
         (Wrong::Wander, Hide::Clean, 141, 5),

@@ -126,7 +126,6 @@ pub fn diagnose(
     let mut from_raw = raw_causes(&raw, noise_n);
     let coarse = raw.step_n.is_some_and(|s| s > 0.5 * noise_n);
     let unknown = judged.unknown && !coarse;
-    let mut causes = judged.causes;
     if unknown {
         let borne = crate::held_out::borne(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&borne);
@@ -139,8 +138,11 @@ pub fn diagnose(
             })
             .map(|(e, _)| e.info.id)
             .collect();
-        traces.extend(beside_unknown(&mut causes, &kept));
+        let gone = judged.causes.iter().filter(|c| !kept.contains(&c.effect.as_str()));
+        let gone = gone.map(|c| Small { effect: c.effect.clone(), why: IMITATED.to_owned() }).collect();
+        traces.extend(take_traces(&mut judged, gone));
     }
+    let mut causes = judged.causes;
     // Where none of its effects is a cause, the base law is what is left.
     let after = if explains(&search, &causes) { after } else { before.clone() };
     let verdict = if unknown {
@@ -339,16 +341,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     Judged { causes, against_none, base_parameters, leftover, unknown, lined }
 }
 
-/// Takes causes that something unknown may have imitated: they become traces.
-fn beside_unknown(causes: &mut Vec<Cause>, kept: &[&str]) -> Vec<Trace> {
-    let (stay, gone) = std::mem::take(causes).into_iter().partition(|c| kept.contains(&c.effect.as_str()));
-    *causes = stay;
-    gone.into_iter()
-        .map(|c: Cause| Trace { effect: c.effect, parameters: c.parameters, why: IMITATED.to_owned() })
-        .collect()
-}
-
-/// Moves causes that are too small to `traces`.
+/// Moves causes that are none to `traces`.
 fn take_traces(judged: &mut Judged, small: Vec<Small>) -> Vec<Trace> {
     let mut traces = Vec::new();
     for s in small {

@@ -4,9 +4,9 @@
 //! the travel since a reversal for a slack of the clamp, a bias for a force that goes with the square of the acceleration. An effect that
 //! is there needs no change where its force is let vary; one that imitates would rather act otherwise.
 
-use stylet_identify::fit::{Column, Fit};
+use stylet_identify::fit::Column;
 use stylet_identify::look::Look;
-use stylet_identify::objective::{Data, replay};
+use stylet_identify::objective::replay;
 
 /// Slower than this (m/s) is rest.
 const REST_MPS: f64 = 2e-4;
@@ -18,11 +18,12 @@ const WITH: usize = 6;
 /// first order beside everything that is fitted, as a share of `lost`, the nats that the fit loses without the effect.
 #[must_use]
 pub fn otherwise(look: &Look<'_>, effect: usize, lost: f64) -> f64 {
-    let Some(columns) = columns(look.fit, look.data, look, effect) else { return f64::INFINITY };
+    let Some(columns) = columns(look, effect) else { return f64::INFINITY };
     look.gain(&columns).nats / lost.max(1.0)
 }
 
-fn columns(fit: &Fit, data: &Data, look: &Look<'_>, effect: usize) -> Option<Vec<Column>> {
+fn columns(look: &Look<'_>, effect: usize) -> Option<Vec<Column>> {
+    let (fit, data) = (look.fit, look.data);
     let less = fit.model.without(effect);
     let mut forces: Vec<Vec<f64>> = Vec::with_capacity(data.recordings());
     let mut with: [Vec<Vec<f64>>; WITH] = std::array::from_fn(|_| Vec::new());

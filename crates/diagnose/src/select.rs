@@ -185,10 +185,10 @@ impl Search {
         full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
         let mut names: Vec<&str> = Vec::new();
         full.retain(|f| first_of(&mut names, f));
-        if let Some(moved) = full.first().and_then(|f| self.with_a_face_moved(f, &times)) {
+        if let Some(moved) = full.first().and_then(|f| self.with_a_face_moved(f, &coarse, &times)) {
             full[0] = moved;
         }
-        if let Some(more) = self.anew(&full, &ranked, prepared) {
+        if let Some(more) = self.anew(&full, &ranked, &coarse, prepared) {
             full.extend(more);
             full.sort_by(|a, b| (a.nats() + worth(&a.model)).total_cmp(&(b.nats() + worth(&b.model))));
             let mut names: Vec<&str> = Vec::new();
@@ -235,12 +235,11 @@ impl Search {
 
     /// The leader with a face moved, where it leaves more than noise and that is likelier: a face that was fitted to the ruptures of a law
     /// that lacked something does not come back by small steps.
-    fn with_a_face_moved(&self, leader: &Fit, times: &[Vec<f64>]) -> Option<Fit> {
+    fn with_a_face_moved(&self, leader: &Fit, coarse: &Data, times: &[Vec<f64>]) -> Option<Fit> {
         if !leader.model.free.thickness || self.leaves_noise(leader) {
             return None;
         }
-        let coarse = self.coarse();
-        let coarse = coarse.judged_by(&residuals(&leader.model, &coarse)?.e, From::Calm);
+        let coarse = coarse.judged_by(&residuals(&leader.model, coarse)?.e, From::Calm);
         let belief = &leader.model.belief;
         let tolerance_m = |l: usize| belief.thickness_tolerance[l] * belief.tissue.layers[l].thickness_m;
         let moved = |l: usize, tolerances: f64| {
@@ -263,7 +262,13 @@ impl Search {
 
     /// Effects that promise something, begun anew from what is believed until one leaves nothing but noise, when even the leader leaves far
     /// more: the fits so far may stand on what the law without the effect took for ruptures.
-    fn anew(&mut self, full: &[Fit], ranked: &[Vec<Start>], prepared: &Prepared) -> Option<Vec<Fit>> {
+    fn anew(
+        &mut self,
+        full: &[Fit],
+        ranked: &[Vec<Start>],
+        coarse: &Data,
+        prepared: &Prepared,
+    ) -> Option<Vec<Fit>> {
         let leader = full.first()?;
         if self.beginnings == 0 || self.leaves_noise(leader) {
             return None;
@@ -275,8 +280,7 @@ impl Search {
             Some(effects)
         };
         // In short for all, and beside the law without; to the end for those that come near the best of them.
-        let coarse = self.coarse();
-        let coarse = coarse.judged_by(&residuals(&leader.model, &coarse)?.e, From::Calm);
+        let coarse = coarse.judged_by(&residuals(&leader.model, coarse)?.e, From::Calm);
         let led = residuals(&leader.model, &coarse)?.nats;
         let stood = sketched(prepared, &self.best.model.effects, &coarse)?.nats();
         let mut sketches: Vec<(f64, Vec<Choice>)> = ranked
@@ -752,7 +756,7 @@ mod tests {
         let ranked = [weak.to_vec(), vec![start(&membrane); 4]].concat();
         let begun = |search: &mut Search, full: &[Fit], ranked: &[Vec<Start>], beginnings: usize| {
             search.beginnings = beginnings;
-            let names = search.anew(full, ranked, &prepared).map(|all| {
+            let names = search.anew(full, ranked, &search.coarse(), &prepared).map(|all| {
                 all.iter().map(|f| f.model.effects.last().map_or("", |e| e.info.id)).collect::<Vec<_>>()
             });
             (names, search.beginnings)
@@ -776,7 +780,8 @@ mod tests {
         drifts.beginnings = 1;
         let full_too = [with(&drifts, &rubs(1.0))];
         let names = |all: Vec<Fit>| all.iter().map(|f| f.model.effects[0].info.id).collect::<Vec<_>>();
-        let begun_too = drifts.anew(&full_too, &vec![start(&drift(1e-4)); 4], &prepared_too).map(names);
+        let begun_too =
+            drifts.anew(&full_too, &vec![start(&drift(1e-4)); 4], &drifts.coarse(), &prepared_too).map(names);
         assert_eq!(begun_too, Some(vec!["force_drift"]));
         // Noise alone, and noise beside something slow.
         let mut rng = ChaCha8Rng::seed_from_u64(1);

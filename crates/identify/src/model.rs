@@ -592,7 +592,7 @@ impl Model {
 /// Smallest share of what is believed that a stiffness, friction or puncture force may have.
 const LEAST_SHARE: f64 = 0.02;
 /// By how many of its tolerances a surface or a thickness may be off.
-pub const TOLERATED: f64 = 2.0;
+const TOLERATED: f64 = 2.0;
 /// By how many of them one may be off while faces are looked for that only an effect can have moved.
 const FARTHEST: f64 = 5.0;
 

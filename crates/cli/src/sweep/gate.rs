@@ -36,26 +36,11 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
         let _ = writeln!(text, "  {} {}", if j.passed { "pass" } else { "FAIL" }, describe(j));
     }
     let new = baseline(&judged);
-    if args.quiet {
-        // What changed is nobody's failure.
-    } else if let Some(old) = &old {
-        let changes = changes(old, &new);
-        if changes.is_empty() {
-            let _ = writeln!(text, "No number differs from {}.", at.display());
-        } else {
-            let _ = writeln!(text, "Against {}:", at.display());
-            for line in changes {
-                let _ = writeln!(text, "  {line}");
-            }
-        }
-    } else if !args.update {
-        let _ = writeln!(text, "There is no baseline {}; --update writes one.", at.display());
-    }
     if args.update {
         write_file(&at, &json(&new)?)?;
-        if !args.quiet {
-            let _ = writeln!(text, "{} is the baseline now.", at.display());
-        }
+    }
+    if !args.quiet {
+        text.push_str(&against(old.as_ref(), &new, &at, args.update));
     }
     if let Some(path) = &args.junit {
         write_file(path, junit(&judged).as_bytes())?;
@@ -67,6 +52,29 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let failed = judged.iter().filter(|j| !j.passed).count();
     // A verdict outweighs that nobody could be told of it.
     if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { said }
+}
+
+/// How the numbers differ from the baseline, and which one stands now.
+fn against(old: Option<&Baseline>, new: &Baseline, at: &Path, updated: bool) -> String {
+    let at = at.display();
+    let mut text = String::new();
+    if let Some(old) = old {
+        let changes = changes(old, new);
+        if changes.is_empty() {
+            let _ = writeln!(text, "No number differs from {at}.");
+        } else {
+            let _ = writeln!(text, "Against {at}:");
+            for line in changes {
+                let _ = writeln!(text, "  {line}");
+            }
+        }
+    } else if !updated {
+        let _ = writeln!(text, "There is no baseline {at}; --update writes one.");
+    }
+    if updated {
+        let _ = writeln!(text, "{at} is the baseline now.");
+    }
+    text
 }
 
 fn read(path: &Path) -> Result<Option<Baseline>, Failure> {
