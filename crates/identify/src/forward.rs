@@ -25,29 +25,55 @@ struct Walk<'a> {
     step_s: f64,
     /// Puncture force in N of the active layer at the span before.
     threshold_n: f64,
-    /// Until then (s) the tip of a needle that gives is still on its way to where a jump sends it.
+    /// Until then (s) the tip of a needle that gives, or a sensor that lags, is still on its way to where a jump sends it.
     restless_s: f64,
+    /// Where the samples of the block lie.
+    grid: Grid,
 }
 
-/// So long in s after a jump of the speed or a rupture the force of a needle that gives changes within a block as well.
+/// Samples of a block, evenly spaced.
+#[derive(Clone, Copy, Debug, Default)]
+struct Grid {
+    from_s: f64,
+    to_s: f64,
+    /// Between two of them.
+    step_s: f64,
+}
+
+impl Grid {
+    fn new(blocks: &Blocks, k: usize) -> Self {
+        let (from_s, to_s) = (blocks.from_s[k], blocks.to_s[k]);
+        let samples = ((to_s - from_s) / blocks.step_s).round().max(1.0);
+        Self { from_s, to_s, step_s: (to_s - from_s) / samples }
+    }
+
+    /// The samples from one instant on to before another.
+    fn within(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = f64> {
+        let place = |t: f64| ((t - self.from_s) / self.step_s - 0.5).ceil().max(0.0) as u32;
+        let (first_s, step_s) = (self.from_s + 0.5 * self.step_s, self.step_s);
+        (place(from_s)..place(to_s)).map(move |k| first_s + f64::from(k) * step_s)
+    }
+
+    fn is(&self, from_s: f64, to_s: f64) -> bool {
+        from_s <= self.from_s && to_s >= self.to_s
+    }
+}
+
+/// So long in s after a jump of the speed or a rupture the force of a needle that gives, or of a sensor that lags, changes within a block as well.
 const RESTLESS_S: f64 = 0.3;
 /// A smaller change of the speed in m/s is no jump.
 const LEAST_JUMP_MPS: f64 = 2e-5;
-/// The two places in a span, as shares of it, whose mean is right for a cubic (Gauss and Legendre).
-const TWO: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
-
 /// A threshold that changes by this share from one span to the next has jumped.
 const JUMPED: f64 = 0.01;
 
 impl Walk<'_> {
     /// Law and chain over a span of smooth motion: mean force times the span.
     fn span(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
+        if self.model.smears && (from_s < self.restless_s || !self.grid.is(from_s, to_s)) {
+            return self.sampled(piece, from_s, to_s);
+        }
         let t = 0.5 * (from_s + to_s);
-        let total_n = if from_s < self.restless_s {
-            TWO.iter().map(|share| self.stand(piece, from_s + share * (to_s - from_s))).sum::<f64>() / 2.0
-        } else {
-            self.stand(piece, t)
-        };
+        let total_n = self.stand(piece, t);
         let span_s = to_s - from_s;
         let Some(chain) = &mut self.chain else { return total_n * span_s };
         let cell = Cell {
@@ -59,6 +85,35 @@ impl Walk<'_> {
             tissue_n: total_n,
         };
         self.model.chain.mean(chain, &cell) * span_s
+    }
+
+    /// Law and chain over a span in which the force changes from sample to sample: the sum of the samples, times their step.
+    fn sampled(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
+        let (mut at_s, mut sum) = (from_s, 0.0);
+        let grid = self.grid;
+        for sample_s in grid.within(from_s, to_s) {
+            sum += self.reading(piece, at_s, sample_s);
+            at_s = sample_s;
+        }
+        self.reading(piece, at_s, to_s);
+        sum * grid.step_s
+    }
+
+    /// Law and chain from one instant to another: the force at that one.
+    fn reading(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
+        // What a lag makes of a force goes by its mean.
+        let lags = self.model.chain.smears();
+        let total_n = self.stand(piece, if lags { 0.5 * (from_s + to_s) } else { to_s });
+        let Some(chain) = &mut self.chain else { return total_n };
+        let cell = Cell {
+            time_s: to_s,
+            span_s: to_s - from_s,
+            samples: 1.0,
+            velocity_mps: piece.at(to_s).1 * self.model.to_true,
+            acceleration_mps2: piece.a_mps2 * self.model.to_true,
+            tissue_n: total_n,
+        };
+        self.model.chain.after(chain, &cell)
     }
 
     /// The law at an instant of a piece: its force in N.
@@ -79,12 +134,19 @@ impl Walk<'_> {
     /// the way turns there, not in the middle between the blocks.
     fn pass(&mut self, before: &Piece, next: &Piece) {
         let jump_mps = (next.at(next.from_s).1 - before.at(before.to_s).1).abs();
-        let bends = self.model.law.bends();
-        if jump_mps > LEAST_JUMP_MPS && (bends || before.v_mps * next.v_mps < 0.0) {
+        if jump_mps <= LEAST_JUMP_MPS {
+            return;
+        }
+        if self.model.law.bends() || before.v_mps * next.v_mps < 0.0 {
             self.stand(before, before.to_s);
-            if bends {
-                self.restless_s = before.to_s + RESTLESS_S;
-            }
+        }
+        self.jumps(before.to_s);
+    }
+
+    /// The force jumps, or would if nothing smeared it.
+    fn jumps(&mut self, at_s: f64) {
+        if self.model.smears {
+            self.restless_s = at_s + RESTLESS_S;
         }
     }
 
@@ -134,9 +196,7 @@ impl Walk<'_> {
                 if s.puncture_n.is_finite() { stiffness * tip_v.max(0.0) / s.puncture_n } else { 0.0 };
         }
         self.done += 1;
-        if self.model.law.bends() {
-            self.restless_s = at_s + RESTLESS_S;
-        }
+        self.jumps(at_s);
         // And just after: what the layer lets go.
         let after = &mut self.events[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.done, |s| {
@@ -390,6 +450,7 @@ fn go_on(
         step_s: blocks.step_s,
         threshold_n,
         restless_s,
+        grid: Grid::default(),
     };
     let end_s = pieces.last().map_or(0.0, |p| p.to_s);
     for (index, piece) in pieces.iter().enumerate().skip(first) {
@@ -404,6 +465,9 @@ fn go_on(
             out.f[k] = sum / (blocks.to_s[k] - blocks.from_s[k]);
             (block, sum) = (piece.block, 0.0);
         }
+        if model.smears {
+            walk.grid = Grid::new(blocks, block as usize);
+        }
         if let Some(before) = index.checked_sub(1).and_then(|k| pieces.get(k)) {
             walk.pass(before, piece);
         }
@@ -417,6 +481,9 @@ fn go_on(
                 if next > at {
                     sum += walk.span(piece, at, next);
                     at = next;
+                }
+                if breaks <= rupture {
+                    walk.jumps(at);
                 }
                 if rupture <= breaks {
                     walk.rupture(piece, pieces.get(index + 1), at);

@@ -216,6 +216,12 @@ pub trait Effect {
         self.sense(time_s, span_s, force_n, memory)
     }
 
+    /// [`Place::Sensor`]: what the sensor makes of a force at the end of a span: `force_n` is the mean of what comes in over the
+    /// `span_s` seconds before `time_s`.
+    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut Memory) -> f64 {
+        self.sense(time_s, span_s, force_n, memory)
+    }
+
     /// [`Place::Sensor`]: time in s by which the whole force comes late.
     fn delay_s(&self) -> f64 {
         0.0

@@ -173,6 +173,23 @@ impl Measurement {
         force
     }
 
+    /// The recorded force at the end of a span whose means `cell` has, `cell.time_s` being that end: for stretches in which a mean over several
+    /// samples is not what the samples give. The state is that of [`Measurement::mean`].
+    pub fn after(&self, state: &mut MeasurementState, cell: &Cell) -> f64 {
+        let mut force = cell.tissue_n;
+        for effect in &self.tool {
+            force += effect.tool_force(cell.velocity_mps, cell.acceleration_mps2);
+        }
+        for (effect, memory) in self.before_delay.iter().zip(&mut state.memory) {
+            force = effect.sense_after(cell.time_s, cell.span_s, force, memory);
+        }
+        let mut none = [0.0; 8];
+        for effect in &self.before_noise {
+            force = effect.sense_after(cell.time_s, cell.span_s, force, &mut none);
+        }
+        force
+    }
+
     /// The recorded position (or velocity) for a true one.
     #[must_use]
     #[inline]

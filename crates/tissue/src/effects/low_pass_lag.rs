@@ -87,4 +87,8 @@ impl Effect for LowPassLag {
         memory[6] = before + change;
         force_n - change / ratio
     }
+    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut Memory) -> f64 {
+        self.sense_mean(time_s, span_s, 1.0, force_n, memory);
+        memory[6]
+    }
 }

@@ -161,6 +161,7 @@ macro_rules! effects {
             fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
             fn sense(time_s: f64, dt_s: f64, force_n: f64, memory: &mut Memory) -> f64;
             fn sense_mean(time_s: f64, span_s: f64, samples: f64, force_n: f64, memory: &mut Memory) -> f64;
+            fn sense_after(time_s: f64, span_s: f64, force_n: f64, memory: &mut Memory) -> f64;
             fn delay_s() -> f64;
             fn break_depth_m() -> Option<f64>;
             fn position_factor() -> f64;
