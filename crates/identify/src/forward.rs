@@ -63,6 +63,8 @@ impl Grid {
 const RESTLESS_S: f64 = 0.3;
 /// A smaller change of the speed in m/s is no jump.
 const LEAST_JUMP_MPS: f64 = 2e-5;
+/// Neighbours whose speeds differ by less than this share are of one motion; a jump of the speed is more.
+const ALIKE: f64 = 0.3;
 /// A threshold that changes by this share from one span to the next has jumped.
 const JUMPED: f64 = 0.01;
 
@@ -151,7 +153,7 @@ impl Walk<'_> {
     }
 
     /// The rupture of the active layer at an instant.
-    fn rupture(&mut self, piece: &Piece, after: Option<&Piece>, at_s: f64) {
+    fn rupture(&mut self, piece: &Piece, after: Option<&Piece>, at_s: f64, gathers_mps2: f64) {
         let (z, v) = piece.at(at_s);
         let (z, v) = (z * self.model.to_true, v * self.model.to_true);
         let layer = self.done;
@@ -165,6 +167,12 @@ impl Walk<'_> {
                 strained = Some(s);
             }
         });
+        let (law, state) = (&self.model.law, self.state);
+        let threshold_n = |v_mps: f64| {
+            let mut then = f64::INFINITY;
+            law.step_imposed(&mut { state }, at_s, z, v_mps, layer, |s| then = s.puncture_n);
+            then
+        };
         // Where the threshold itself has jumped, with the speed, it passed the force on the way.
         if let (Some(s), Some(event)) = (strained, self.events.get_mut(layer))
             && s.puncture_n.is_finite()
@@ -175,10 +183,7 @@ impl Walk<'_> {
             } else if let Some(next) = after.filter(|_| event.force < 0.0 && piece.to_s - at_s < self.step_s)
             {
                 // The speed jumps within a sample of here: so may the threshold.
-                let mut then = f64::INFINITY;
-                let v = next.v_mps * self.model.to_true;
-                let mut peek = self.state;
-                self.model.law.step_imposed(&mut peek, at_s, z, v, layer, |s| then = s.puncture_n);
+                let then = threshold_n(next.v_mps * self.model.to_true);
                 if jumped(then, s.puncture_n) && s.elastic_n > then {
                     event.force = 0.0;
                 }
@@ -192,8 +197,15 @@ impl Walk<'_> {
             event.elastic_n = s.elastic_n;
             event.place_rate = tip_v.max(0.0);
             let stiffness = self.model.stiffness.get(layer).copied().unwrap_or(0.0);
-            event.force_rate =
-                if s.puncture_n.is_finite() { stiffness * tip_v.max(0.0) / s.puncture_n } else { 0.0 };
+            // As the force rises and the threshold falls.
+            event.force_rate = if s.puncture_n.is_finite() {
+                let ahead_s = self.step_s;
+                let then = threshold_n(v + gathers_mps2 * self.model.to_true * ahead_s);
+                let falls = if then.is_finite() { (s.puncture_n - then) / ahead_s } else { 0.0 };
+                (stiffness * tip_v.max(0.0) + falls).max(0.0) / s.puncture_n
+            } else {
+                0.0
+            };
         }
         self.done += 1;
         self.jumps(at_s);
@@ -205,6 +217,17 @@ impl Walk<'_> {
             }
         });
     }
+}
+
+/// How fast the base gathers speed around a piece: by the pieces beside it, where they are about as fast.
+fn gathers_mps2(pieces: &[Piece], index: usize) -> f64 {
+    let Some(here) = pieces.get(index) else { return 0.0 };
+    let alike = |p: &&Piece| (p.v_mps - here.v_mps).abs() < ALIKE * here.v_mps.abs();
+    let before = index.checked_sub(1).and_then(|k| pieces.get(k)).filter(alike).unwrap_or(here);
+    let after = pieces.get(index + 1).filter(alike).unwrap_or(here);
+    let middle_s = |p: &Piece| 0.5 * (p.from_s + p.to_s);
+    let between_s = middle_s(after) - middle_s(before);
+    if between_s > 0.0 { (after.v_mps - before.v_mps) / between_s } else { here.a_mps2 }
 }
 
 /// Keeps the largest strain of every layer while it is active.
@@ -486,7 +509,7 @@ fn go_on(
                     walk.jumps(at);
                 }
                 if rupture <= breaks {
-                    walk.rupture(piece, pieces.get(index + 1), at);
+                    walk.rupture(piece, pieces.get(index + 1), at, gathers_mps2(pieces, index));
                 }
                 continue;
             }
