@@ -11,6 +11,8 @@ use stylet_record::Recording;
 pub const BLOCK_S: f64 = 0.02;
 /// A time step of more than so many sampling steps is a gap.
 const GAP: f64 = 1.8;
+/// Samples missing between two that are compared in one block with them: a gap of no more than so many blocks.
+const MISSING: f64 = 1.0;
 /// A longer gap, in s, is left open.
 const BRIDGED_S: f64 = 2.0;
 /// A sample so near (share of a step) to a jump of the speed may have either speed.
@@ -85,8 +87,17 @@ impl Blocks {
         let mut i = 0;
         let mut raw_block = Vec::with_capacity(n);
         while i < n {
+            // Where a block began with samples missing, they count as places of it.
+            let spans = |k: usize| {
+                let gap = t[k] - t[k - 1];
+                let missing = gap > GAP * step_s && gap <= (q as f64 * MISSING + 0.8) * step_s && q > 1;
+                (gap <= GAP * step_s || missing).then_some(if missing { (gap / step_s).round() as usize } else { 1 })
+            };
+            let begun_s = b.to_s.last().copied().filter(|_| i > 0 && spans(i).is_some_and(|s| s > 1));
+            let mut places = begun_s.map_or(1, |s| ((t[i] - s) / step_s + 0.5).round().max(1.0) as usize);
             let mut to = i + 1;
-            while to < n && to - i < q && t[to] - t[to - 1] <= GAP * step_s {
+            while to < n && spans(to).is_some_and(|s| places + s <= q) {
+                places += spans(to).unwrap_or(1);
                 to += 1;
             }
             let good = |k: &usize| !exclude.get(*k).copied().unwrap_or(false);
@@ -95,12 +106,13 @@ impl Blocks {
             let from_s = if i > 0 && t[i] - t[i - 1] <= GAP * step_s {
                 0.5 * (t[i] + t[i - 1])
             } else {
-                t[i] - 0.5 * step_s
+                begun_s.unwrap_or(t[i] - 0.5 * step_s)
             };
             let to_s = if to < n && t[to] - t[to - 1] <= GAP * step_s {
                 0.5 * (t[to] + t[to - 1])
             } else {
-                t[to - 1] + 0.5 * step_s
+                let missing = if to < n && spans(to).is_some() { q.saturating_sub(places) } else { 0 };
+                t[to - 1] + (missing as f64 + 0.5) * step_s
             };
             b.bridge(from_s, length_s);
             b.from_s.push(from_s);
@@ -434,9 +446,24 @@ mod tests {
         let open = of(t(2.006), |t| t);
         assert_eq!(open.len(), 11);
         assert_eq!((0..11).filter(|k| open.restart[*k]).collect::<Vec<_>>(), [0, 5]);
-        // Less than 1.8 steps is no gap; more is one, bridged by one block.
+        // Less than 1.8 steps is no gap.
         assert_eq!(of(t(0.0089), |t| t).len(), 10);
-        assert_eq!(of(t(0.0091), |t| t).len(), 11 + 1);
+        // Samples that miss for longer than a block leave a gap.
+        assert_eq!(of(t(0.0239), |t| t).len(), 11);
+        assert_eq!(of(t(0.0241), |t| t).len(), 11 + 1);
+    }
+
+    /// Where samples are missing the others lie in the blocks in which they would lie without, and the noise's memory goes on.
+    #[test]
+    fn a_few_missing_samples_leave_the_blocks_as_they_are() {
+        let missing = [5, 11, 12, 19, 20, 21, 30, 39];
+        let t = even(43).into_iter().enumerate().filter(|(k, _)| !missing.contains(k)).map(|(_, t)| t);
+        let (b, whole) = (of(t.collect(), |t| 200.0 * t), of(even(43), |t| 200.0 * t));
+        are(&b.from_s, whole.from_s.iter().copied());
+        are(&b.to_s, whole.to_s.iter().copied());
+        are(&b.f[1..6], [17.0 / 3.0, 9.0, 14.0, 17.0, 22.5]);
+        assert_eq!((0..11).filter(|k| !b.used[*k]).collect::<Vec<_>>(), [5]);
+        assert_eq!((0..11).filter(|k| b.restart[*k]).collect::<Vec<_>>(), [0, 6]);
     }
 
     /// So near to a jump that it may have either speed, or that the instant is not known better.

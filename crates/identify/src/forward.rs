@@ -27,36 +27,40 @@ struct Walk<'a> {
     threshold_n: f64,
     /// Until then (s) the tip of a needle that gives, or a sensor that lags, is still on its way to where a jump sends it.
     restless_s: f64,
-    /// Where the samples of the block lie.
-    grid: Grid,
+    /// Where the samples of the block lie, if it may matter.
+    grid: Grid<'a>,
 }
 
-/// Samples of a block, evenly spaced.
+/// Where the samples of a block lie.
 #[derive(Clone, Copy, Debug, Default)]
-struct Grid {
+struct Grid<'a> {
     from_s: f64,
     to_s: f64,
-    /// Between two of them.
-    step_s: f64,
+    /// Their instants in s.
+    samples: &'a [f64],
 }
 
-impl Grid {
-    fn new(blocks: &Blocks, k: usize) -> Self {
+impl<'a> Grid<'a> {
+    fn new(blocks: &'a Blocks, k: usize) -> Self {
         let (from_s, to_s) = (blocks.from_s[k], blocks.to_s[k]);
-        let samples = ((to_s - from_s) / blocks.step_s).round().max(1.0);
-        Self { from_s, to_s, step_s: (to_s - from_s) / samples }
-    }
-
-    /// The samples from one instant on to before another.
-    fn within(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = f64> {
-        let place = |t: f64| ((t - self.from_s) / self.step_s - 0.5).ceil().max(0.0) as u32;
-        let (first_s, step_s) = (self.from_s + 0.5 * self.step_s, self.step_s);
-        (place(from_s)..place(to_s)).map(move |k| first_s + f64::from(k) * step_s)
+        Self { from_s, to_s, samples: between(&blocks.raw_t, from_s, to_s) }
     }
 
     fn is(&self, from_s: f64, to_s: f64) -> bool {
         from_s <= self.from_s && to_s >= self.to_s
     }
+
+    /// A sample's share of the block, in s.
+    fn each_s(&self) -> f64 {
+        (self.to_s - self.from_s) / self.samples.len() as f64
+    }
+}
+
+/// Those of some instants that lie from one on to before another.
+fn between(instants: &[f64], from_s: f64, to_s: f64) -> &[f64] {
+    let first = instants.partition_point(|t| *t < from_s);
+    let count = instants[first..].iter().take_while(|t| **t < to_s).count();
+    &instants[first..first + count]
 }
 
 /// So long in s after a jump of the speed or a rupture the force of a needle that gives, or of a sensor that lags, changes within a block as well.
@@ -71,7 +75,8 @@ const JUMPED: f64 = 0.01;
 impl Walk<'_> {
     /// Law and chain over a span of smooth motion: mean force times the span.
     fn span(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
-        if self.model.smears && (from_s < self.restless_s || !self.grid.is(from_s, to_s)) {
+        let fast = from_s < self.restless_s || !self.grid.is(from_s, to_s);
+        if fast && !self.grid.samples.is_empty() {
             return self.sampled(piece, from_s, to_s);
         }
         let t = 0.5 * (from_s + to_s);
@@ -89,16 +94,16 @@ impl Walk<'_> {
         self.model.chain.mean(chain, &cell) * span_s
     }
 
-    /// Law and chain over a span in which the force changes from sample to sample: the sum of the samples, times their step.
+    /// Law and chain over a span in which the force changes from sample to sample: the sum of the samples, each times its share of the block.
     fn sampled(&mut self, piece: &Piece, from_s: f64, to_s: f64) -> f64 {
         let (mut at_s, mut sum) = (from_s, 0.0);
         let grid = self.grid;
-        for sample_s in grid.within(from_s, to_s) {
-            sum += self.reading(piece, at_s, sample_s);
-            at_s = sample_s;
+        for sample_s in between(grid.samples, from_s, to_s) {
+            sum += self.reading(piece, at_s, *sample_s);
+            at_s = *sample_s;
         }
         self.reading(piece, at_s, to_s);
-        sum * grid.step_s
+        sum * grid.each_s()
     }
 
     /// Law and chain from one instant to another: the force at that one.
