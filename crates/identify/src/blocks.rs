@@ -91,7 +91,11 @@ impl Blocks {
             let spans = |k: usize| {
                 let gap = t[k] - t[k - 1];
                 let missing = gap > GAP * step_s && gap <= (q as f64 * MISSING + 0.8) * step_s && q > 1;
-                (gap <= GAP * step_s || missing).then_some(if missing { (gap / step_s).round() as usize } else { 1 })
+                (gap <= GAP * step_s || missing).then_some(if missing {
+                    (gap / step_s).round() as usize
+                } else {
+                    1
+                })
             };
             let begun_s = b.to_s.last().copied().filter(|_| i > 0 && spans(i).is_some_and(|s| s > 1));
             let mut places = begun_s.map_or(1, |s| ((t[i] - s) / step_s + 0.5).round().max(1.0) as usize);
