@@ -43,7 +43,7 @@ pub fn compose(
         fits.push((Population::of(&fit, &runs), fit));
     }
     let models: Vec<&Model> = fits.iter().map(|(_, f)| &f.fit.model).collect();
-    // Where the whole lies is a matter of its set-up: it begins where its force does.
+    // Where the whole begins is a matter of its set-up: where its force does. What lies beneath lies where it did.
     let begins = |runs: &mut dyn Iterator<Item = &Insertion>| median_of(runs.map(|r| r.contact_m));
     let moved_m = begins(&mut whole.iter().copied()) - begins(&mut alone.first()?.1.iter());
     let population = Population { law: together(believed, &models, moved_m)?, ..fits.first()?.0.clone() };
@@ -70,7 +70,7 @@ fn by_itself(kind: Kind, tissue: &Tissue, runs: &[&Insertion]) -> Option<Fitted>
     refitted(&model, blocks(runs, &raw), drops.collect())
 }
 
-/// One model of the layers of several, each where it was found.
+/// One model of the layers of several: each where it was found, but the first one's surface, which has moved by so many m.
 fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> {
     let first = *alone.first()?;
     let mut model = first.only(&[]);
@@ -82,7 +82,8 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
         let mut layer = part.tissue.layers.first()?.clone();
         layer.name.clone_from(&believed.layers.get(i)?.name);
         if let Some(next) = alone.get(i + 1) {
-            layer.thickness_m = (next.tissue.surface_m - part.tissue.surface_m).max(LEAST_M);
+            let front_m = if i == 0 { tissue.surface_m } else { part.tissue.surface_m };
+            layer.thickness_m = (next.tissue.surface_m - front_m).max(LEAST_M);
         }
         tissue.layers.push(layer);
         let differs: Vec<(usize, usize)> = part.differing().collect();
@@ -168,10 +169,10 @@ mod tests {
         assert!((m.tissue.surface_m - 0.0047).abs() < 1e-15);
         let [a, b] = &m.tissue.layers[..] else { unreachable!("two layers") };
         assert_eq!((a.name.as_str(), b.name.as_str(), b.thickness_m), ("skin", "muscle", 0.05));
-        // As thick as the next one's surface lies behind, a millimetre at least.
-        assert!((a.thickness_m - 0.0115).abs() < 1e-15, "{}", a.thickness_m);
+        // As thick as the next one's surface lies behind where the whole begins, a millimetre at least.
+        assert!((a.thickness_m - 0.0108).abs() < 1e-15, "{}", a.thickness_m);
         assert_eq!((a.stiffness_n_per_m, b.stiffness_n_per_m), (100.0, 250.0));
-        let near = alone(0.0041, 250.0, &[]);
+        let near = alone(0.0048, 250.0, &[]);
         assert_eq!(
             together(&believed, &[&first, &near], 0.0).expect("a law").tissue.layers[0].thickness_m,
             1e-3
