@@ -205,8 +205,9 @@ impl Walk<'_> {
             // As the force rises and the threshold falls.
             event.force_rate = if s.puncture_n.is_finite() {
                 let ahead_s = self.step_s;
-                let then = threshold_n(v + gathers_mps2 * self.model.to_true * ahead_s);
-                let falls = if then.is_finite() { (s.puncture_n - then) / ahead_s } else { 0.0 };
+                let (now, then) =
+                    (threshold_n(v), threshold_n(v + gathers_mps2 * self.model.to_true * ahead_s));
+                let falls = if now == then { 0.0 } else { (now - then) / ahead_s };
                 (stiffness * tip_v.max(0.0) + falls).max(0.0) / s.puncture_n
             } else {
                 0.0

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::discrepancy::discrepancy;
-use stylet_identify::fit::{Effort, Fit, Tangent, fit};
+use stylet_identify::fit::{Effort, Fit, Tangent, fit_past_kinks};
 use stylet_identify::model::{Model, Role};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::Data;
@@ -126,7 +126,7 @@ pub fn settle(model: &Model, data: Data, drops: &[Vec<f64>], rounds: &[usize]) -
             retime(&mut from, &data, drops);
             spreads(&mut from, &data, best);
         }
-        best = Some(fit(&from, &data, Effort { turns: *turns, enough: 0.05 })?);
+        best = Some(fit_past_kinks(&from, &data, Effort { turns: *turns, enough: 0.05 })?);
     }
     let best = best?;
     data = data.with_noise(discrepancy(&data.blocks, &best.residuals.e, data.floor_n));
