@@ -22,6 +22,8 @@ use stylet_tissue::{FitScale, Proposal};
 
 /// Probability below the upper end of a 95 % interval.
 const UPPER: f64 = 0.975;
+/// What an interval ends with that has no end.
+const NO_END: f64 = 1e300;
 /// A scatter's variance is raised by this share to see what comes from it.
 const RAISED: f64 = 0.02;
 /// The curvature is taken anew at most so often over the standard deviations that it gave ...
@@ -191,6 +193,12 @@ impl<'a> Spread<'a> {
         if p.whole {
             return Estimate { value, low: value, high: value };
         }
+        if value == f64::INFINITY {
+            // As good as rigid: told by the reciprocal alone.
+            let (x, half) = self.of(Role::Effect { effect, parameter }).unwrap_or_default();
+            let low = (1.0 / (x + half)).min(NO_END).max(p.low);
+            return Estimate { value: NO_END, low, high: NO_END };
+        }
         let half = self.half_width(&self.gradient(effect, parameter));
         let (low, high) = match p.fit_scale() {
             FitScale::Log => (value * libm::exp(-half / value), value * libm::exp(half / value)),
@@ -201,7 +209,7 @@ impl<'a> Spread<'a> {
             }
             FitScale::Linear => (value - half, value + half),
         };
-        Estimate { value, low: low.max(p.low), high: high.min(p.high).min(1e300) }
+        Estimate { value, low: low.max(p.low), high: high.min(p.high).min(NO_END) }
     }
 }
 
@@ -519,6 +527,8 @@ mod tests {
         let (e, against) = of("needle_compliance", &[1e9], 0);
         assert!(e.high == 1e300 && e.low > 1e4 && e.low < 1e9, "{e:?}");
         assert!(against.is_some_and(|nats| nats < 0.5), "{against:?}");
+        let (e, _) = of("needle_compliance", &[f64::INFINITY], 0);
+        assert!(e.value == 1e300 && e.high == 1e300 && e.low > 1e4 && e.low < 1e9, "{e:?}");
         // None of less than nothing.
         let (e, against) = of("coulomb_friction", &[1e-4], 0);
         assert!(e.low == 0.0 && e.high > 1e-3 && against.is_some_and(|nats| nats < 0.5), "{e:?}");

@@ -207,7 +207,8 @@ impl Walk<'_> {
                 let ahead_s = self.step_s;
                 let (now, then) =
                     (threshold_n(v), threshold_n(v + gathers_mps2 * self.model.to_true * ahead_s));
-                let falls = if now == then { 0.0 } else { (now - then) / ahead_s };
+                // Where it is no force any more, it does not tell.
+                let falls = Some((now - then) / ahead_s).filter(|f| f.is_finite()).unwrap_or(0.0);
                 (stiffness * tip_v.max(0.0) + falls).max(0.0) / s.puncture_n
             } else {
                 0.0
