@@ -57,9 +57,9 @@ pub fn tighten(search: &mut Search, prepared: &Prepared) -> bool {
         .filter(|f| (!f.surface || best.model.free.surface) && (!f.thickness || best.model.free.thickness))
         .map(|f| fixed(&best.model, f))
         .collect();
-    for choice in patterns(&best.model) {
+    for choice in patterns(&best.model, passed(&best.model, &search.data)) {
         for f in [free(false, false), free(true, false)] {
-            tried.push(fixed(&best.model, f).with(choice.clone()));
+            tried.push(fixed(&in_its_scale(&best.model, &choice), f).with(choice.clone()));
         }
     }
     tried.extend(unstrained(&best.model));
@@ -156,8 +156,28 @@ fn unstrained(model: &Model) -> Vec<Model> {
     out
 }
 
-/// Effects that would move the faces as the free geometry has moved them.
-fn patterns(model: &Model) -> Vec<Choice> {
+/// Whether the needle went beyond the last face in any recording, so that its thickness is told as the others are.
+fn passed(model: &Model, data: &Data) -> bool {
+    let end = model.tissue.surface_m + model.tissue.layers.iter().map(|l| l.thickness_m).sum::<f64>();
+    data.blocks.iter().any(|b| b.from_s.iter().any(|t| b.motion.at(*t).0 > end))
+}
+
+/// Stiffness and friction as they are where positions are `1 + eps` times what they were: a force over a depth, and over a depth and a
+/// speed. A fit that begins with those of the scaled positions is far from its end, and may not find there.
+fn in_its_scale(model: &Model, choice: &Choice) -> Model {
+    let mut m = model.clone();
+    if choice.info.place == Place::Position {
+        let scale = 1.0 + choice.values.first().copied().unwrap_or(0.0);
+        for l in &mut m.tissue.layers {
+            l.stiffness_n_per_m *= scale;
+            l.friction_ns_per_m2 *= scale * scale;
+        }
+    }
+    m
+}
+
+/// Effects that would move the faces as the free geometry has moved them; the last thickness counts where its face was passed.
+fn patterns(model: &Model, passed: bool) -> Vec<Choice> {
     let believed = &model.belief.tissue.layers;
     let off: Vec<f64> =
         model.tissue.layers.iter().zip(believed).map(|(l, b)| l.thickness_m - b.thickness_m).collect();
@@ -180,15 +200,12 @@ fn patterns(model: &Model) -> Vec<Choice> {
             }
             Proposal::Columns(_) if info.place == Place::Position => {
                 let ratios: Vec<f64> = off.iter().zip(believed).map(|(o, b)| o / b.thickness_m).collect();
-                let reached = ratios.len().max(2) - 1;
-                let mean = ratios[..reached.min(ratios.len())].iter().sum::<f64>()
-                    / reached.min(ratios.len()).max(1) as f64;
+                let told = &ratios[..ratios.len().saturating_sub(usize::from(!passed))];
+                let mean = stylet_stats::mean(told);
                 // One thickness alone is in proportion to anything.
-                if reached > 1
+                if told.len() > 1
                     && mean.abs() > 1e-4
-                    && ratios[..reached.min(ratios.len())]
-                        .iter()
-                        .all(|r| (r - mean).abs() < PATTERN * mean.abs())
+                    && told.iter().all(|r| (r - mean).abs() < PATTERN * mean.abs())
                 {
                     out.push(Choice::new(info, &[mean]));
                 }
@@ -201,7 +218,9 @@ fn patterns(model: &Model) -> Vec<Choice> {
 
 #[cfg(test)]
 mod tests {
-    use super::{fixed, is_worth, patterns, price, priced, tighten, unstrained, unsure};
+    use super::{
+        fixed, in_its_scale, is_worth, passed, patterns, price, priced, tighten, unstrained, unsure,
+    };
     use crate::base::{Prepared, base};
     use crate::made::{evenly, insertions, settled, showing};
     use crate::select::Search;
@@ -212,7 +231,7 @@ mod tests {
     use stylet_identify::fit::{Effort, fit};
     use stylet_identify::model::{Belief, Choice, Free, Model};
     use stylet_identify::noise::{From, Noise};
-    use stylet_identify::objective::Data;
+    use stylet_identify::objective::{Data, replay};
     use stylet_record::Recording;
     use stylet_tissue::{
         AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, Law, LawState, Layer, PositionScale,
@@ -246,7 +265,10 @@ mod tests {
 
     fn found(off: &[f64]) -> Vec<(&'static str, Vec<f64>)> {
         let round = |x: &f64| (x * 1e9).round() / 1e9;
-        patterns(&model(off, &[])).iter().map(|c| (c.info.id, c.values.iter().map(round).collect())).collect()
+        patterns(&model(off, &[]), false)
+            .iter()
+            .map(|c| (c.info.id, c.values.iter().map(round).collect()))
+            .collect()
     }
 
     #[test]
@@ -261,11 +283,11 @@ mod tests {
         // Two hundredths of a millimetre are none.
         assert!(found(&[0.21, -0.21, 0.0]).len() == 1 && found(&[0.19, -0.19, 0.0]).is_empty());
         let taken = model(&[10.0, -9.0, 0.5], &[BoundaryShift { layer: 1, shift_m: 1e-3 }.into()]);
-        assert!(patterns(&taken).is_empty());
+        assert!(patterns(&taken, true).is_empty());
     }
 
     #[test]
-    fn a_wrong_scale_makes_every_layer_but_the_last_thicker_in_proportion() {
+    fn a_wrong_scale_makes_every_layer_thicker_in_proportion_but_one_whose_end_was_not_reached() {
         // 20, 30 and 40 mm by 5, 4.2 and 99 per cent.
         let all = found(&[10.0, 12.6, 396.0]);
         assert_eq!(all.len(), 1);
@@ -277,8 +299,12 @@ mod tests {
         // A ten-thousandth is none, and one layer alone is in proportion to anything.
         assert!(found(&[0.021, 0.0315, 0.0]).len() == 1 && found(&[0.019, 0.0285, 0.0]).is_empty());
         assert!(found(&[10.0, 0.0]).is_empty() && found(&[10.0]).is_empty());
+        // Where the last face was passed the last thickness counts as the others do, and two are enough.
+        let with = |off: &[f64]| patterns(&model(off, &[]), true).len();
+        assert!(with(&[10.0, 15.0]) == 1 && with(&[10.0, 0.0]) == 0 && with(&[10.0]) == 0);
+        assert!(with(&[10.0, 15.0, 20.0]) == 1 && with(&[10.0, 15.0, 10.0]) == 0);
         let taken = model(&[10.0, 15.0, 0.0], &[PositionScale { eps: 0.01 }.into()]);
-        assert!(patterns(&taken).is_empty());
+        assert!(patterns(&taken, true).is_empty());
     }
 
     /// Thicknesses (m) whose differences, or their shares, are numbers without rounding.
@@ -289,7 +315,7 @@ mod tests {
             m.tissue.layers.iter_mut().zip(believed).for_each(|(l, d)| l.thickness_m = d);
             m.belief = Arc::new(Belief { tissue: m.tissue.clone(), ..Belief::clone(&m.belief) });
             m.tissue.layers.iter_mut().zip(here).for_each(|(l, d)| l.thickness_m = d);
-            patterns(&m).len()
+            patterns(&m, false).len()
         };
         // A face that is elsewhere, for the next layer and for the others; a scale.
         let off = |by: [i32; 3]| count([0.25; 3], by.map(|k| 0.25 + f64::from(k) / 1024.0));
@@ -312,6 +338,44 @@ mod tests {
         assert_eq!((surface.tissue.surface_m, &surface.tissue.layers), (0.004, &m.belief.tissue.layers));
         let thickness = fixed(&m, free(false, true));
         assert_eq!((thickness.tissue.surface_m, &thickness.tissue.layers), (0.003, &m.tissue.layers));
+    }
+
+    /// A needle that goes 30 mm in and comes back.
+    fn there_and_back() -> Data {
+        let t: Vec<f64> = (0..4000).map(|k| f64::from(k) / 200.0).collect();
+        let z = t.iter().map(|t| 3e-3 * (10.0 - (t - 10.0).abs())).collect();
+        let r = Recording::new(t, z, vec![0.0; 4000]).expect("a recording");
+        Data::new(Arc::new(vec![Blocks::new(&r, &[], BLOCK_S)]), Noise::white(0.5), 0.0)
+    }
+
+    #[test]
+    fn a_scale_of_the_positions_says_the_same_as_scaled_faces_with_coefficients_in_its_scale() {
+        let data = there_and_back();
+        let scale = Choice::new(PositionScale { eps: 0.05 }.info(), &[0.05]);
+        let mut faces = model(&[0.0, 0.0], &[]);
+        faces.tissue.surface_m = 1.05 * 0.003;
+        faces.tissue.layers.iter_mut().for_each(|l| l.thickness_m *= 1.05);
+        let force = |m: &Model| replay(m, &data, 0).expect("a replay").f;
+        let off = |m: Model| {
+            let scaled = fixed(&m, Free::default()).with(scale.clone());
+            let differ =
+                force(&faces).iter().zip(force(&scaled)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            differ / force(&faces).into_iter().fold(0.0, f64::max)
+        };
+        assert!(off(in_its_scale(&faces, &scale)) < 1e-9, "{}", off(in_its_scale(&faces, &scale)));
+        assert!(off(faces.clone()) > 0.04, "{}", off(faces.clone()));
+        // What moves no position has no scale.
+        let friction = Choice::new(CoulombFriction { c_n_per_m: 1.0 }.info(), &[1.0]);
+        assert_eq!(in_its_scale(&faces, &friction).tissue, faces.tissue);
+    }
+
+    #[test]
+    fn the_last_face_is_passed_where_the_needle_went_beyond_it() {
+        let data = there_and_back();
+        // 20 mm from 4 mm on; 20 and 30 mm.
+        assert!(passed(&model(&[0.0], &[]), &data) && !passed(&model(&[0.0, 0.0], &[]), &data));
+        // Beyond, not at it.
+        assert!(passed(&model(&[59.0], &[]), &data) && !passed(&model(&[61.0], &[]), &data));
     }
 
     /// Half the logarithm of the number of blocks for every number, four nats for every effect.
