@@ -5,7 +5,6 @@
 //!
 //! | module | what lives there |
 //! |---|---|
-//! | [`raw`] | saturation, quantisation, spikes: read off the raw force, named without a law |
 //! | [`base`] | the base law with its geometry: drops given to layers, numbers and instants in turn |
 //! | [`propose`], [`lines`] | what every effect would gain to first order, and where its fit starts |
 //! | [`select`], [`judge`] | effects enter by what they gain and leave when the others can do without them |
@@ -43,7 +42,6 @@ pub mod otherwise;
 pub mod outcome;
 pub mod predict;
 pub mod propose;
-pub mod raw;
 pub mod rivals;
 pub mod select;
 pub mod set;

@@ -3,9 +3,10 @@
 //! The mean over a block in which a layer ruptures lies between the force before and after, so that a predicted mean is
 //! continuous in the instant of the rupture; and a recording at 1 kHz costs as much as one at 200 Hz.
 
-use crate::motion::{Motion, Piece, Shown};
 use std::sync::{Arc, OnceLock};
 use stylet_record::Recording;
+use stylet_record::motion::{Motion, Piece, Shown};
+use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 
 /// Length of a block in s: short against layers, relaxation and ripple, long against samples at 200 Hz and more.
 pub const BLOCK_S: f64 = 0.02;
@@ -64,7 +65,7 @@ impl Blocks {
         let steps = recording.time_s.windows(2).map(|w| w[1] - w[0]);
         let step_s = stylet_stats::order::median_of(steps).max(1e-9);
         let q = ((length_s / step_s).round() as usize).max(1);
-        let motion = Arc::new(Motion::of(recording));
+        let motion = Arc::new(Motion::of(recording, SGN_DEAD_BAND_MPS));
         let t = &recording.time_s;
         let n = t.len();
         let mut b = Self {
@@ -347,7 +348,7 @@ impl Blocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Jump;
+    use stylet_record::motion::Jump;
 
     fn near(told: f64, wanted: f64) {
         assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-3), "{told} for {wanted}");

@@ -2,12 +2,12 @@
 
 use crate::events::{rows_like, scatter_of};
 use crate::forward::Replayed;
-use crate::linear::{Factor, Symmetric, dot};
 use crate::model::{Model, NEVER, Number, Role};
-use crate::noise::weight;
+use crate::noise::LOSS;
 use crate::objective::{Data, Residuals, Trail, nats, replay, residuals};
 use core::ops::Range;
 use rayon::prelude::*;
+use stylet_stats::linear::{Factor, Symmetric, dot};
 
 /// A fitted model.
 #[derive(Clone, Debug)]
@@ -106,7 +106,7 @@ impl Tangent {
     pub fn new(model: &Model, data: &Data, at: &Residuals) -> Self {
         let (shared, own) = (model.shared(), model.own_numbers());
         let roots: Vec<Vec<f64>> =
-            at.w.iter().map(|w| w.iter().map(|w| weight(*w).sqrt()).collect()).collect();
+            at.w.iter().map(|w| w.iter().map(|w| LOSS.weight(*w).sqrt()).collect()).collect();
         let mut t = Self {
             rest: Column { w: weighted(&at.w, &roots), rows: event_rows(model, at, at) },
             shared,

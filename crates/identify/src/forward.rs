@@ -3,7 +3,7 @@
 use crate::blocks::Blocks;
 use crate::events::Event;
 use crate::model::{Compiled, NEVER};
-use crate::motion::Piece;
+use stylet_record::motion::Piece;
 use stylet_tissue::{Cell, LawState, MeasurementState, Strain};
 
 /// Buffers of a replay.
@@ -573,9 +573,9 @@ mod tests {
     use super::*;
     use crate::blocks::BLOCK_S;
     use crate::model::{Belief, Choice, Model};
-    use crate::motion::Shown;
     use std::sync::Arc;
     use stylet_record::Recording;
+    use stylet_record::motion::Shown;
     use stylet_tissue::{Layer, Tissue, info};
 
     fn near(told: f64, wanted: f64) {

@@ -2,7 +2,6 @@
 //! recordings left out.
 
 use crate::base::{Prepared, base};
-use crate::raw::Raw;
 use crate::select::Search;
 use crate::set::first::{Insertion, groups, plain};
 use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks, fitted, refitted};
@@ -15,6 +14,7 @@ use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::{Effort, fit as fitted_on};
 use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
+use stylet_record::raw::Raw;
 use stylet_tissue::{AnyEffect, Effect, EffectInfo, ShaftSlip, Tissue};
 
 /// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
@@ -378,13 +378,13 @@ mod tests {
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
-    use crate::raw::Raw;
     use crate::set::Insertion;
     use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks};
     use crate::set::left_out::{score, without};
     use crate::set::population::predict;
     use stylet_identify::model::{Bound, Choice, Model};
     use stylet_record::Recording;
+    use stylet_record::raw::Raw;
     use stylet_tissue::{
         AnyEffect, CoulombFriction, DelayedPuncture, Effect, ForceBias, ForceDrift, LetGo, PowerLawFriction,
         ShaftSlip, StribeckFriction,

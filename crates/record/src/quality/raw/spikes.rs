@@ -1,20 +1,19 @@
-//! What the raw numbers say before any law: saturation, quantisation, spikes.
+//! Isolated samples that stand out of both neighbours, all by about the same.
 
-use stylet_record::{QualityKind, QualityNote, Recording};
+use crate::Recording;
 use stylet_stats::order::median;
 
-/// What was found in the raw force.
-#[derive(Clone, Debug, Default)]
-pub struct Raw {
-    /// Samples per recording that cannot be compared: saturated or spikes.
-    pub exclude: Vec<Vec<bool>>,
-    /// Range of the sensor in N, if it was reached.
-    pub limit_n: Option<f64>,
-    /// Step of the recorded force in N.
-    pub step_n: Option<f64>,
-    /// Spikes.
-    pub spikes: Option<Spikes>,
-}
+/// A spike stands out of its neighbours by so many robust standard deviations.
+const SPIKE_SD: f64 = 6.5;
+
+/// Half width in samples of the window in which the scatter around a sample is judged: noise may grow with the force.
+const AROUND: usize = 60;
+/// Samples that tell a scatter.
+const ENOUGH: usize = 20;
+/// Spikes have one size: the relative spread of their sizes. Tails of a distribution have many.
+const ONE_SIZE: f64 = 0.35;
+/// ... and hardly any outlying sample is smaller: at most this share of their number between a third and two thirds.
+const BETWEEN: f64 = 0.35;
 
 /// Spikes of one size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,87 +52,8 @@ impl Spikes {
     }
 }
 
-/// Fewest equal extremes that make a saturation.
-const EXTREMES: usize = 6;
-/// With fewer levels than this up to the largest force, a limit must hold far more samples.
-const COARSE_LEVELS: f64 = 20.0;
-/// A spike stands out of its neighbours by so many robust standard deviations.
-const SPIKE_SD: f64 = 6.5;
-
-/// Looks the raw forces over.
-#[must_use]
-pub fn look(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Raw {
-    let mut raw =
-        Raw { exclude: recordings.iter().map(|r| vec![false; r.len()]).collect(), ..Raw::default() };
-    raw.step_n = step(recordings, notes);
-    raw.limit_n = limit(recordings, raw.step_n);
-    if let Some(limit) = raw.limit_n {
-        for (exclude, recording) in raw.exclude.iter_mut().zip(recordings) {
-            for (x, f) in exclude.iter_mut().zip(&recording.force_n) {
-                *x |= f.abs() >= limit * (1.0 - 1e-9);
-            }
-        }
-    }
-    raw.spikes = spikes(recordings, &mut raw.exclude, raw.step_n.unwrap_or(0.0));
-    raw
-}
-
-/// The step on which all forces lie.
-fn step(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Option<f64> {
-    let mut steps: Vec<f64> = notes
-        .iter()
-        .flatten()
-        .filter(|n| n.kind == QualityKind::Quantisation && n.message.starts_with("force_n"))
-        .filter_map(|n| n.numbers.get("smallest_step").copied())
-        .filter(|s| *s > 0.0)
-        .collect();
-    if 2 * steps.len() < recordings.len().max(1) {
-        return None;
-    }
-    let rough = median(&mut steps);
-    // The step from all levels at once: level number against value, by least squares through zero.
-    let (mut nf, mut nn) = (0.0, 0.0);
-    for f in recordings.iter().flat_map(|r| &r.force_n) {
-        let n = (f / rough).round();
-        nf += n * f;
-        nn += n * n;
-    }
-    let fine = if nn > 0.0 { nf / nn } else { rough };
-    Some(if (fine / rough - 1.0).abs() < 0.02 { fine } else { rough })
-}
-
-/// The level at which the force stops.
-fn limit(recordings: &[&Recording], step: Option<f64>) -> Option<f64> {
-    let all = || recordings.iter().flat_map(|r| &r.force_n);
-    let most = all().fold(0.0_f64, |m, f| m.max(f.abs()));
-    if most <= 0.0 {
-        return None;
-    }
-    let at = all().filter(|f| f.abs() >= most * (1.0 - 1e-9)).count();
-    let expected = match step {
-        None => 0,
-        // On a grid several samples share the last level; below the limit they thin out.
-        Some(step) => {
-            let level = |k: f64| all().filter(|f| (f.abs() - (most - k * step)).abs() < 0.25 * step).count();
-            // A force that is held within one of few levels looks like a limit.
-            let factor = if COARSE_LEVELS * step > most { 12 } else { 3 };
-            factor * level(1.0).max(level(2.0)).max(2)
-        }
-    };
-    (at >= EXTREMES && at > expected).then_some(most)
-}
-
-/// Half width in samples of the window in which the scatter around a sample is judged: noise may grow with the force.
-const AROUND: usize = 60;
-/// Samples that tell a scatter.
-const ENOUGH: usize = 20;
-/// Spikes have one size: the relative spread of their sizes. Tails of a distribution have many.
-const ONE_SIZE: f64 = 0.35;
-/// ... and hardly any outlying sample is smaller: at most this share of their number between a third and two thirds.
-const BETWEEN: f64 = 0.35;
-
 /// Isolated samples that stand out of both neighbours, all by about the same.
-fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Option<Spikes> {
+pub(super) fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Option<Spikes> {
     let mut seen_s = 0.0;
     let mut found: Vec<(usize, usize, f64)> = Vec::new();
     let mut smaller: Vec<f64> = Vec::new();
@@ -206,11 +126,11 @@ fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step: f64) -> Op
 
 #[cfg(test)]
 mod tests {
-    use super::{Spikes, limit, look, step};
+    use super::super::look;
+    use super::super::tests::{alternating, quantised, recording};
+    use super::*;
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
-    use std::collections::BTreeMap;
-    use stylet_record::{QualityKind, QualityNote, Recording};
 
     #[test]
     fn noise_between_samples_that_stand_at_the_sensors_limit_is_no_spike() {
@@ -257,27 +177,8 @@ mod tests {
         assert!(low < 3.0 && high > 3.0 && high - low > 0.05 && high - low < 0.13, "{low} {high}");
     }
 
-    fn recording(f: Vec<f64>) -> Recording {
-        let t: Vec<f64> = (0..f.len()).map(|k| 0.01 * k as f64).collect();
-        Recording::new(t, vec![0.0; f.len()], f).expect("clean columns")
-    }
-
-    fn quantised(step: f64) -> QualityNote {
-        QualityNote {
-            kind: QualityKind::Quantisation,
-            message: "force_n moves in steps".to_owned(),
-            numbers: BTreeMap::from([("smallest_step".to_owned(), step)]),
-            lines: Vec::new(),
-            grave: false,
-        }
-    }
-
-    /// Samples that alternate about nothing by `d` stand out of their neighbours by `d`, each: the scatter is 1.4826 `d`.
-    fn alternating(n: usize, d: f64) -> Vec<f64> {
-        (0..n).map(|k| if k % 2 == 0 { d } else { -d }).collect()
-    }
-
     const D: f64 = 0.01;
+
     /// What a spike has to stand out by: six and a half of these scatters.
     const LEAST: f64 = 6.5 * stylet_stats::MAD_TO_SD * D;
 
@@ -452,87 +353,6 @@ mod tests {
             (f[30], f[place]) = (1.5 * LEAST, 1.5 * LEAST);
             assert_eq!(look(&[&recording(f)], &[Vec::new()]).spikes.map_or(0, |s| s.count), count, "{place}");
         }
-    }
-
-    #[test]
-    fn a_limit_holds_six_samples_or_three_times_what_a_grid_holds_near_it() {
-        let ramp = |at_limit: usize| {
-            let mut f: Vec<f64> = (0..300).map(|k| 0.0101 * f64::from(k)).collect();
-            f.iter_mut().rev().take(at_limit).for_each(|f| *f = -3.5);
-            recording(f)
-        };
-        assert_eq!(limit(&[&ramp(5)], None), None);
-        assert_eq!(limit(&[&ramp(6)], None), Some(3.5));
-        assert_eq!(limit(&[&recording(vec![0.0; 50])], None), None);
-        // On a grid of 0.1 N up to 3.5 N, four samples share the level below and two the one below that.
-        let grid = |at: usize, below: usize, further: usize| {
-            let mut f: Vec<f64> = (0..300).map(|k| 0.1 * f64::from(k % 10)).collect();
-            f[..at].fill(3.5);
-            f[at..at + below].fill(3.4);
-            f[at + below..at + below + further].fill(3.3);
-            limit(&[&recording(f)], Some(0.1))
-        };
-        assert_eq!(grid(12, 4, 2), None);
-        assert_eq!(grid(13, 4, 2), Some(3.5));
-        assert_eq!(grid(13, 2, 5), None);
-        assert_eq!(grid(16, 2, 5), Some(3.5));
-        // Two at least are expected.
-        assert_eq!((grid(6, 0, 0), grid(7, 1, 0)), (None, Some(3.5)));
-        // With fewer than twenty levels a limit holds twelve times as many.
-        let coarse = |at: usize, step: f64| {
-            let mut f: Vec<f64> = (0..300).map(|k| step * f64::from(k % 5)).collect();
-            f[..at].fill(3.8);
-            limit(&[&recording(f)], Some(step))
-        };
-        assert_eq!((coarse(24, 0.2), coarse(25, 0.2)), (None, Some(3.8)));
-        assert_eq!(coarse(24, 0.19), Some(3.8));
-    }
-
-    #[test]
-    fn the_step_is_that_of_all_levels_at_once() {
-        let f: Vec<f64> = (0..500).map(|k| 0.0503 * f64::from((k * 37) % 61 - 20)).collect();
-        let r = recording(f);
-        // Told roughly, found finely.
-        let fine = step(&[&r], &[vec![quantised(0.05)]]).expect("a step");
-        assert!((fine - 0.0503).abs() < 1e-9, "{fine}");
-        // What is told and found differ by more than two per cent: what is told stands.
-        let two = recording((0..60).map(|k| if k % 3 == 0 { -0.0503 } else { 0.0503 }).collect());
-        assert_eq!(step(&[&two], &[vec![quantised(0.049)]]), Some(0.049));
-        assert!((step(&[&two], &[vec![quantised(0.0495)]]).expect("a step") - 0.0503).abs() < 1e-9);
-        assert_eq!(step(&[&two], &[vec![quantised(0.052)]]), Some(0.052));
-        // Half of the recordings have to be on a grid; other remarks, and steps of nothing, do not count.
-        assert!(step(&[&r, &r], &[vec![quantised(0.05)], Vec::new()]).is_some());
-        assert_eq!(step(&[&r, &r, &r], &[vec![quantised(0.05)], Vec::new(), Vec::new()]), None);
-        assert_eq!(step(&[&r], &[vec![quantised(0.0)]]), None);
-        let of_position = QualityNote { message: "position_m moves in steps".to_owned(), ..quantised(0.05) };
-        let gaps = QualityNote { kind: QualityKind::Gaps, ..quantised(0.05) };
-        assert_eq!(step(&[&r], &[vec![of_position, gaps]]), None);
-        // Without any force the rough one is all there is.
-        assert_eq!(step(&[&recording(vec![0.0; 20])], &[vec![quantised(0.05)]]), Some(0.05));
-        let raw = look(&[&r], &[vec![quantised(0.05)]]);
-        assert!((raw.step_n.expect("a step") - 0.0503).abs() < 1e-9);
-    }
-
-    #[test]
-    fn half_of_the_recordings_tell_a_step_and_a_step_of_nothing_is_none() {
-        let r = recording((0..50).map(|k| 0.25 * f64::from(k % 7)).collect());
-        let notes = |steps: &[f64]| steps.iter().map(|s| vec![quantised(*s)]).collect::<Vec<_>>();
-        assert_eq!(step(&[&r, &r], &notes(&[0.25])), Some(0.25));
-        assert_eq!(step(&[&r, &r, &r], &notes(&[0.25])), None);
-        assert_eq!(step(&[&r], &notes(&[0.0])), None);
-        assert_eq!(step(&[], &[]), None);
-    }
-
-    #[test]
-    fn samples_at_the_limit_are_marked_whatever_their_sign() {
-        let mut f: Vec<f64> = (0..300).map(|k| (0.1 * f64::from(k)).sin()).collect();
-        f[100..107].fill(1.25);
-        f[200..203].fill(-1.25);
-        f[150] = 1.25 * (1.0 - 1e-6);
-        let raw = look(&[&recording(f)], &[Vec::new()]);
-        assert_eq!(raw.limit_n, Some(1.25));
-        let marked: Vec<usize> = (0..300).filter(|k| raw.exclude[0][*k]).collect();
-        assert_eq!(marked, (100..107).chain(200..203).collect::<Vec<_>>());
     }
 
     #[test]

@@ -6,8 +6,8 @@
 //! numbers are estimated from all its samples, and the velocity is known a hundred times better. A stretch
 //! that is none of them (its residual is coloured) is left to local windows (`settle`).
 
-use crate::linear::Symmetric;
 use core::f64::consts::{PI, TAU};
+use stylet_stats::linear::Symmetric;
 
 /// Highest frequency in Hz that is looked for.
 const HIGHEST_HZ: f64 = 3.0;
@@ -23,11 +23,11 @@ const TOGETHER: usize = 8;
 /// Most numbers: a line and two sinusoids.
 const MOST: usize = 6;
 /// Fewest cells of a stretch.
-pub(crate) const FEWEST: usize = 12;
+pub(super) const FEWEST: usize = 12;
 
 /// A form with its numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct Course {
+pub(super) struct Course {
     middle: f64,
     half: f64,
     /// Coefficients of `1, s, s², s³` with `s = (t - middle) / half`.

@@ -1,11 +1,11 @@
 //! Velocity from recorded positions, as exactly as they allow, and where it jumps.
 //!
 //! Friction turns an error of the velocity into one of the force (0.01 mm/s are 5 mN at 500 Ns/m), so the wide
-//! windows that suit noisy positions (`stylet_record::differentiate`) would leave structure at every ripple and
+//! windows that suit noisy positions (`crate::differentiate`) would leave structure at every ripple and
 //! every stop. Here the window is the narrowest that the positions' own noise allows, and none reaches across a
 //! jump of the velocity, of which the positions tell the instant: where the parabolas on both sides meet.
 
-use crate::linear::Symmetric;
+use stylet_stats::linear::Symmetric;
 use stylet_stats::order::median;
 
 /// Noise of the velocity in m/s that is asked for.
@@ -94,7 +94,7 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
 
 /// Standard deviation of positions about a smooth course, by their third divided differences: irregular instants are no
 /// noise.
-pub(crate) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
+pub(super) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
     let mut d: Vec<f64> = t
         .windows(4)
         .zip(z.windows(4))
@@ -124,7 +124,7 @@ const UNEVEN: f64 = 0.005;
 ///
 /// A needle that needs several samples for a step rests in most of them, and moves by a whole step in the others: no difference tells
 /// the noise then.
-pub(crate) fn rounding(z: &[f64]) -> f64 {
+pub(super) fn rounding(z: &[f64]) -> f64 {
     let moves = || z.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite());
     let mut sizes: Vec<f64> = moves().map(f64::abs).filter(|d| *d > LEAST_STEP_M).collect();
     if sizes.is_empty() {
@@ -142,10 +142,10 @@ pub(crate) fn rounding(z: &[f64]) -> f64 {
 }
 
 /// A break of the slope: the sample after it, the instant with position and slope before, the slope after.
-pub(crate) type Break = (usize, (f64, f64, f64), f64);
+pub(super) type Break = (usize, (f64, f64, f64), f64);
 
 /// Where parabolas on both sides of a gap between two samples meet with different slopes.
-pub(crate) fn breaks(t: &[f64], z: &[f64], side: usize, gap_s: f64, doubt_mps: f64) -> Vec<Break> {
+pub(super) fn breaks(t: &[f64], z: &[f64], side: usize, gap_s: f64, doubt_mps: f64) -> Vec<Break> {
     let n = t.len();
     let mut found: Vec<(f64, Break)> = Vec::new();
     for i in side..n.saturating_sub(side) {
@@ -187,7 +187,7 @@ pub(crate) fn breaks(t: &[f64], z: &[f64], side: usize, gap_s: f64, doubt_mps: f
 }
 
 /// Least-squares parabola `a + b s + c s^2`, `s = t - at`, and the sum of squares that it leaves.
-pub(crate) fn parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
+pub(super) fn parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
     let span = t.last().zip(t.first()).map_or(1.0, |(b, a)| (b - a).max(1e-12));
     let base = z.first().copied().unwrap_or(0.0);
     let mut m = [[0.0; 3]; 3];

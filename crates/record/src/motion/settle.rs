@@ -5,8 +5,8 @@
 //! when that leaves white noise. Else every cell takes the widest of a ladder of windows whose
 //! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
 
-use crate::course::{Course, FEWEST};
-use crate::velocity::{Break, Kink, breaks, parabola, position_noise, rounding};
+use super::course::{Course, FEWEST};
+use super::velocity::{Break, Kink, breaks, parabola, position_noise, rounding};
 use stylet_stats::order::median;
 
 /// Length of a cell in s.
@@ -49,7 +49,7 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     let (tc, zc) = (mean(&t[..n]), mean(&z[..n]));
     let cells = tc.len();
     if cells < 2 * SIDE + 2 {
-        let v = stylet_record::differentiate(t, z, 0.1);
+        let v = crate::differentiate(t, z, 0.1);
         return Settled { z: z.to_vec(), v, kinks: Vec::new(), sd_mps: f64::INFINITY };
     }
     let step_m = rounding(z);
@@ -584,7 +584,7 @@ mod tests {
         let of = |n: usize| {
             let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
             let z: Vec<f64> = t.iter().enumerate().map(|(k, t)| 0.003 * t + 1e-5 * rough(k)).collect();
-            (settle(&t, &z), stylet_record::differentiate(&t, &z, 0.1), z)
+            (settle(&t, &z), crate::differentiate(&t, &z, 0.1), z)
         };
         let (told, v, z) = of(31);
         assert_eq!((told.z, told.v, told.sd_mps), (z, v, f64::INFINITY));
