@@ -16,22 +16,17 @@
 //! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
 //! | [`predict`] | a model against recordings that took no part |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
-//! | `hidden`, `benchmark` (feature `own_world`) | cases drawn with this law, for comparison with older tables |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 mod at_ruptures;
 pub mod base;
-#[cfg(feature = "own_world")]
-pub mod benchmark;
 mod check;
 pub mod curves;
 mod diagnose;
 mod error;
 pub mod geometry;
 pub mod held_out;
-#[cfg(feature = "own_world")]
-pub mod hidden;
 pub mod intervals;
 pub mod judge;
 pub mod leftover;

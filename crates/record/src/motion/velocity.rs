@@ -203,10 +203,8 @@ pub(super) fn parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
         }
     }
     let mut h = Symmetric::zeros(3);
-    for a in 0..3 {
-        for b in 0..=a {
-            h.add(a, b, m[a][b]);
-        }
+    for (a, row) in m.iter().enumerate() {
+        row.iter().enumerate().take(a + 1).for_each(|(b, x)| h.add(a, b, *x));
     }
     let x = h.factor().solve(&g);
     let left = |(t, z): (&f64, &f64)| {

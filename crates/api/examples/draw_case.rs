@@ -1,7 +1,7 @@
 //! Writes a drawn case as files: `draw_case DIR EFFECT VALUES SEED AR`, or that of the benchmark:
 //! `draw_case DIR sketch INDEX SEED`.
-use stylet_diagnose::benchmark::aim;
-use stylet_diagnose::hidden::{self, Drawn, Motions};
+use stylet_api::benchmark::own::aim;
+use stylet_own_world::{self as hidden, Drawn, Motions};
 use stylet_tissue::AnyEffect;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

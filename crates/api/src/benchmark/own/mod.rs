@@ -1,13 +1,20 @@
 //! Cases drawn with the diagnosis' own law, for comparison with older tables.
 
+mod case;
+mod strength;
+mod summary;
+
+pub use case::{Case, examine, run};
+pub use strength::aim;
+pub use summary::summary;
+
 use super::journal::Journal;
 use crate::error::Error;
 use crate::folder::{Claim, write_file};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use stylet_diagnose::benchmark::{Result as Case, run, summary};
-use stylet_diagnose::hidden::sketch;
+use stylet_own_world::sketch;
 
 /// Diagnoses so many cases, writes them to `folder`, and gives the table in words. `done` is told how many there are.
 ///

@@ -5,7 +5,7 @@ use super::motion::Motions;
 use super::outside::{OUTSIDE, Outside};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use stylet_tissue::{AnyEffect, EffectInfo};
+use stylet_tissue::{AnyEffect, CoulombFriction, Effect, EffectInfo, ForceGain, StribeckFriction};
 
 /// What kind of case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -103,7 +103,8 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
         velocity_noise_mps: 0.0,
     };
     let entries: Vec<&'static EffectInfo> = stylet_tissue::library().collect();
-    let fitted: Vec<&'static EffectInfo> = entries.iter().copied().filter(|i| i.id != "force_gain").collect();
+    let fitted: Vec<&'static EffectInfo> =
+        entries.iter().copied().filter(|i| i.id != ForceGain::ID).collect();
     match kind {
         Kind::Clean => {}
         Kind::Single => {
@@ -164,7 +165,7 @@ impl Harder {
 
 /// Coulomb and Stribeck friction together are a Stribeck friction, exactly.
 fn one_in_the_other(a: &str, b: &str) -> bool {
-    let pair = ["coulomb_friction", "stribeck_friction"];
+    let pair = [CoulombFriction::ID, StribeckFriction::ID];
     pair.contains(&a) && pair.contains(&b)
 }
 
@@ -172,23 +173,26 @@ fn one_in_the_other(a: &str, b: &str) -> bool {
 fn draw_effect(info: &EffectInfo, between: &mut dyn FnMut(f64, f64) -> f64) -> Option<AnyEffect> {
     let log = |between: &mut dyn FnMut(f64, f64) -> f64, lo: f64, hi: f64| between(lo.ln(), hi.ln()).exp();
     let sign = if between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
-    let values: Vec<f64> = match info.id {
-        "stress_relaxation" => vec![0.3, log(between, 0.2, 8.0)],
-        "stribeck_friction" => vec![3.0, 3.0 * between(1.8, 3.5), log(between, 0.6e-3, 3e-3)],
-        "presliding_friction" => vec![4.0, log(between, 2e-4, 3e-3)],
-        "power_law_friction" => vec![if sign < 0.0 { 0.7 } else { 1.3 }],
-        "hidden_membrane" => vec![between(0.008, 0.085), log(between, 80.0, 400.0), 0.5],
-        "boundary_shift" => vec![if between(0.0, 1.0) < 0.5 { 1.0 } else { 2.0 }, sign * 0.002],
-        "respiration" => vec![0.001, between(0.15, 0.4), between(-3.0, 3.0)],
-        "periodic_interference" => vec![0.03, log(between, 0.5, 40.0), between(-3.0, 3.0)],
-        "needle_compliance" => vec![800.0],
-        "saturation" => vec![3.0],
-        "force_spikes" => vec![between(0.2, 1.0), 1.0],
-        "nonlinear_elasticity" => vec![5.0],
-        "position_scale" | "asymmetric_friction" => vec![sign * 0.03],
-        "rate_dependent_puncture" => vec![sign * 0.08],
-        "force_bias" | "force_drift" | "force_gain" => vec![sign * info.parameters[0].start],
-        _ => info.parameters.iter().map(|p| p.start).collect(),
+    let starts: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
+    let values: Vec<f64> = match AnyEffect::from_parameters(info.id, &starts)? {
+        AnyEffect::StressRelaxation(_) => vec![0.3, log(between, 0.2, 8.0)],
+        AnyEffect::StribeckFriction(_) => vec![3.0, 3.0 * between(1.8, 3.5), log(between, 0.6e-3, 3e-3)],
+        AnyEffect::PreslidingFriction(_) => vec![4.0, log(between, 2e-4, 3e-3)],
+        AnyEffect::PowerLawFriction(_) => vec![if sign < 0.0 { 0.7 } else { 1.3 }],
+        AnyEffect::HiddenMembrane(_) => vec![between(0.008, 0.085), log(between, 80.0, 400.0), 0.5],
+        AnyEffect::BoundaryShift(_) => vec![if between(0.0, 1.0) < 0.5 { 1.0 } else { 2.0 }, sign * 0.002],
+        AnyEffect::Respiration(_) => vec![0.001, between(0.15, 0.4), between(-3.0, 3.0)],
+        AnyEffect::PeriodicInterference(_) => vec![0.03, log(between, 0.5, 40.0), between(-3.0, 3.0)],
+        AnyEffect::NeedleCompliance(_) => vec![800.0],
+        AnyEffect::Saturation(_) => vec![3.0],
+        AnyEffect::ForceSpikes(_) => vec![between(0.2, 1.0), 1.0],
+        AnyEffect::NonlinearElasticity(_) => vec![5.0],
+        AnyEffect::PositionScale(_) | AnyEffect::AsymmetricFriction(_) => vec![sign * 0.03],
+        AnyEffect::RateDependentPuncture(_) => vec![sign * 0.08],
+        AnyEffect::ForceBias(_) | AnyEffect::ForceDrift(_) | AnyEffect::ForceGain(_) => {
+            vec![sign * starts[0]]
+        }
+        _ => starts,
     };
     AnyEffect::from_parameters(info.id, &values)
 }
@@ -196,47 +200,42 @@ fn draw_effect(info: &EffectInfo, between: &mut dyn FnMut(f64, f64) -> f64) -> O
 /// The effect stronger by a factor.
 #[must_use]
 pub fn scaled(effect: &AnyEffect, factor: f64, largest_n: f64) -> Option<AnyEffect> {
-    use stylet_tissue::Effect;
     let mut v = effect.parameters();
-    let id = effect.id();
-    match id {
-        "stribeck_friction" => {
+    match effect {
+        AnyEffect::StribeckFriction(_) => {
             v[0] *= factor;
             v[1] *= factor;
         }
-        "stress_relaxation" => v[0] = (v[0] * factor).min(0.8),
-        "power_law_friction" => v[0] = 1.0 + ((v[0] - 1.0) * factor).clamp(-0.7, 0.8),
-        "hidden_membrane" => v[2] = (v[2] * factor.sqrt().clamp(0.3, 3.0)).min(3.0),
-        "boundary_shift" => v[1] = (v[1] * factor).clamp(-0.012, 0.012),
-        "needle_compliance" => v[0] = (v[0] / factor).clamp(80.0, 2e4),
-        "saturation" => {
+        AnyEffect::StressRelaxation(_) => v[0] = (v[0] * factor).min(0.8),
+        AnyEffect::PowerLawFriction(_) => v[0] = 1.0 + ((v[0] - 1.0) * factor).clamp(-0.7, 0.8),
+        AnyEffect::HiddenMembrane(_) => v[2] = (v[2] * factor.sqrt().clamp(0.3, 3.0)).min(3.0),
+        AnyEffect::BoundaryShift(_) => v[1] = (v[1] * factor).clamp(-0.012, 0.012),
+        AnyEffect::NeedleCompliance(_) => v[0] = (v[0] / factor).clamp(80.0, 2e4),
+        AnyEffect::Saturation(_) => {
             v[0] = largest_n * (1.0 - (1.0 - v[0] / largest_n).max(0.02) * factor.sqrt()).clamp(0.25, 0.995)
         }
-        "force_spikes" => v[1] *= factor,
-        "incomplete_release" => v[0] = (v[0] * factor).min(0.9),
-        "asymmetric_friction" => v[0] = (v[0] * factor).clamp(-0.8, 0.8),
-        "position_scale" => v[0] = (v[0] * factor).clamp(-0.15, 0.15),
-        "rate_dependent_puncture" => v[0] = (v[0] * factor).clamp(-0.3, 0.3),
-        "force_gain" => v[0] = (v[0] * factor).clamp(-0.2, 0.2),
-        "respiration" => v[0] = (v[0] * factor).min(0.012),
-        "soft_boundary" => v[0] = (v[0] * factor).min(0.015),
-        "low_pass_lag" => v[0] = (v[0] * factor).min(0.6),
-        "time_delay" => v[0] = (v[0] * factor).min(0.4),
-        "nonlinear_elasticity" => v[0] = (v[0] * factor).min(60.0),
-        "tool_inertia" => v[0] = (v[0] * factor).min(5.0),
+        AnyEffect::ForceSpikes(_) => v[1] *= factor,
+        AnyEffect::IncompleteRelease(_) => v[0] = (v[0] * factor).min(0.9),
+        AnyEffect::AsymmetricFriction(_) => v[0] = (v[0] * factor).clamp(-0.8, 0.8),
+        AnyEffect::PositionScale(_) => v[0] = (v[0] * factor).clamp(-0.15, 0.15),
+        AnyEffect::RateDependentPuncture(_) => v[0] = (v[0] * factor).clamp(-0.3, 0.3),
+        AnyEffect::ForceGain(_) => v[0] = (v[0] * factor).clamp(-0.2, 0.2),
+        AnyEffect::Respiration(_) => v[0] = (v[0] * factor).min(0.012),
+        AnyEffect::SoftBoundary(_) => v[0] = (v[0] * factor).min(0.015),
+        AnyEffect::LowPassLag(_) => v[0] = (v[0] * factor).min(0.6),
+        AnyEffect::TimeDelay(_) => v[0] = (v[0] * factor).min(0.4),
+        AnyEffect::NonlinearElasticity(_) => v[0] = (v[0] * factor).min(60.0),
+        AnyEffect::ToolInertia(_) => v[0] = (v[0] * factor).min(5.0),
         _ => v[0] *= factor,
     }
-    AnyEffect::from_parameters(id, &v)
+    AnyEffect::from_parameters(effect.id(), &v)
 }
 
 /// Largest force of a case, for placing a saturation.
 #[must_use]
 pub fn largest_force(drawn: &Drawn) -> f64 {
     let mut plain = drawn.clone();
-    plain.effects.retain(|e| {
-        use stylet_tissue::Effect;
-        e.id() != "saturation"
-    });
+    plain.effects.retain(|e| !matches!(e, AnyEffect::Saturation(_)));
     case(&plain).recordings.iter().flat_map(|r| &r.force_n).fold(0.0_f64, |m, f| m.max(f.abs()))
 }
 
