@@ -12,7 +12,7 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
             if !["tests", "target", "fuzz"].iter().any(|skip| name == *skip) {
                 sources(&path, out);
             }
-        } else if path.extension().is_some_and(|e| e == "rs") {
+        } else if path.extension().is_some_and(|e| e == "rs") && name != "tests.rs" {
             out.push(path);
         }
     }
