@@ -99,7 +99,11 @@ pub fn diagnose(
     progress("fitting the base law");
     let blocks: Vec<Blocks> =
         recordings.par_iter().zip(&raw.exclude).map(|(r, x)| Blocks::new(r, x, BLOCK_S)).collect();
-    let prepared = Prepared::new(Arc::new(belief(scenario)), blocks, raw.step_n.unwrap_or(0.0) * UNIFORM_SD);
+    let prepared = Prepared::new(
+        Arc::new(belief(scenario)),
+        blocks,
+        raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
+    );
     let (fitted, data) = base(&prepared).ok_or(DiagnoseError::NoFit)?;
     let (fitted, data) = varied(fitted, data);
     let mut search = Search::run(&prepared, fitted, data, &mut progress);
@@ -215,9 +219,6 @@ pub(crate) fn ready(evidence: &[Evidence]) -> Ready {
     let raw = raw::look(&borrowed, &notes);
     Ready { recordings, notes, raw }
 }
-
-/// Standard deviation of a number spread evenly over one.
-const UNIFORM_SD: f64 = 0.289;
 
 /// What a scenario believes, and how surely.
 #[must_use]

@@ -91,7 +91,14 @@ mod tests {
     /// A tone stands where it is; a few samples tell none.
     #[test]
     fn a_residual_of_a_few_samples_has_no_lines() {
-        let tone = |t: f64| 0.02 * (0.37 * (1e3 * t).round()).sin() + wave(0.2, 20.0, 0.2)(t);
+        // Evenly within 0.01 of nothing, by a scramble of the instant (SplitMix64).
+        let noise = |t: f64| {
+            let mut z = ((t * 1e4).round() as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            0.02 * (((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+        };
+        let tone = |t: f64| noise(t) + wave(0.2, 20.0, 0.2)(t);
         let (fit, data) = in_air(&[&tone], 20.0, |_| true);
         assert!((lines(&fit, &data)[0] - 20.0).abs() < 0.01, "{:?}", lines(&fit, &data));
         for (samples, any) in [(63, false), (64, true)] {

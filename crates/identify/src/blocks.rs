@@ -6,6 +6,7 @@
 use std::sync::{Arc, OnceLock};
 use stylet_record::Recording;
 use stylet_record::motion::{Motion, Piece, Shown};
+use stylet_stats::UNIFORM_SD;
 use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 
 /// Length of a block in s: short against layers, relaxation and ripple, long against samples at 200 Hz and more.
@@ -18,8 +19,6 @@ const MISSING: f64 = 1.0;
 const BRIDGED_S: f64 = 2.0;
 /// A sample so near (share of a step) to a jump of the speed may have either speed.
 const AT_A_JUMP: f64 = 0.03;
-/// Standard deviation of a number spread evenly over one.
-const UNIFORM_SD: f64 = 0.289;
 /// Seconds over which the size of the force is smoothed.
 const SMOOTH_S: f64 = 0.1;
 

@@ -13,6 +13,7 @@
 //! | [`noise`] | autoregressive noise per range of the force, whitening |
 //! | [`discrepancy`](mod@discrepancy) | what an unfinished law leaves, as noise |
 //! | [`objective`], [`fit`], [`retime`] | the likelihood, its optimum, instants moved |
+//! | [`nats`] | nats that say by what they were reckoned |
 //! | [`late`] | a delay to a fraction of a sampling step |
 //! | [`phases`] | advance, hold and way back; sudden falls and releases in the raw force |
 //! | [`drops`], [`assign`] | drops of the force, and which layer each belongs to |
@@ -30,6 +31,7 @@ pub mod forward;
 pub mod late;
 pub mod look;
 pub mod model;
+pub mod nats;
 pub mod noise;
 pub mod objective;
 pub mod phases;

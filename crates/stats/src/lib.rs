@@ -40,11 +40,14 @@ pub use interval::{Interval, mean_interval, wilson, wilson_at};
 pub use moments::{Moments, Sum, mean, rms, sd, variance};
 pub use order::{
     MAD_TO_SD, extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of,
-    quantile_of_sorted, sorted,
+    quantile_of_sorted, roughness, sorted,
 };
 pub use rank::spearman;
 pub use robust::Loss;
 pub use select::quantiles_along;
+
+/// Standard deviation of a number spread evenly over one, to three digits.
+pub const UNIFORM_SD: f64 = 0.289;
 
 /// Half width of the two-sided 95 % interval of a normal distribution, in standard deviations.
 pub const Z95: f64 = 1.959_963_984_540_054;

@@ -1,4 +1,5 @@
 //! Small dense linear algebra in a fixed order of operations: the same bits on every machine.
+#![allow(clippy::needless_range_loop, reason = "rows and columns share the index")]
 
 /// A symmetric matrix by rows.
 #[derive(Clone, Debug, Default)]

@@ -23,8 +23,6 @@ const STARTS: usize = 24;
 const START_FITS: usize = 300;
 /// The library is searched for what it adds with about so many insertions.
 const SEARCHED: usize = 6;
-/// Standard deviation of a number spread evenly over one.
-const EVENLY_SD: f64 = 0.289;
 /// A law is judged by so many parts of the set, each left out once ...
 const FOLDS: usize = 3;
 /// ... and by single recordings left out when there are no more than so many: two thirds of few say little of a law.
@@ -147,7 +145,7 @@ pub fn laws(
 
 /// Noise (N) that the steps of a sensor make.
 fn floor_n(raw: &Raw) -> f64 {
-    raw.step_n.unwrap_or(0.0) * EVENLY_SD
+    raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD
 }
 
 /// Of the laws that were tried the one that predicts recordings left out best; the base law where the others are hardly better.

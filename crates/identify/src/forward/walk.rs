@@ -3,7 +3,7 @@
 use crate::blocks::Blocks;
 use crate::events::Event;
 use crate::model::Compiled;
-use stylet_record::motion::Piece;
+use stylet_record::motion::{LEAST_JUMP_MPS, Piece};
 use stylet_tissue::{Cell, LawState, MeasurementState, Strain};
 
 /// What is remembered on the way.
@@ -56,8 +56,6 @@ fn between(instants: &[f64], from_s: f64, to_s: f64) -> &[f64] {
 
 /// So long in s after a jump of the speed or a rupture the force of a needle that gives, or of a sensor that lags, changes within a block as well.
 const RESTLESS_S: f64 = 0.3;
-/// A smaller change of the speed in m/s is no jump.
-const LEAST_JUMP_MPS: f64 = 2e-5;
 /// Neighbours whose speeds differ by less than this share are of one motion; a jump of the speed is more.
 const ALIKE: f64 = 0.3;
 /// A threshold that changes by this share from one span to the next has jumped.

@@ -16,7 +16,7 @@ mod velocity;
 
 pub use pieces::{Piece, Shown};
 pub use settle::{Settled, settle};
-pub use velocity::{Kink, Velocity, velocity};
+pub use velocity::{Kink, LEAST_JUMP_MPS, Velocity, velocity};
 
 use crate::Recording;
 use knots::Knots;
@@ -64,7 +64,7 @@ impl Motion {
     pub fn of(recording: &Recording, still_mps: f64) -> Self {
         let (t, z) = (&recording.time_s, &recording.position_m);
         let told = velocity(t, z);
-        let recorded_sd = roughness(&recording.velocity_mps);
+        let recorded_sd = stylet_stats::roughness([recording.velocity_mps.as_slice()]);
         let mut noise_m = position_noise(t, z);
         let (z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
             noise_m = noise_m.min(1e-6);
@@ -149,12 +149,6 @@ impl Motion {
     }
 }
 
-/// Standard deviation of a column about a smooth course, by its third differences.
-fn roughness(x: &[f64]) -> f64 {
-    let mut d: Vec<f64> = x.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
-    stylet_stats::order::median(&mut d) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -228,19 +222,6 @@ mod tests {
         let v = [0.3, 0.2, 0.1, 0.0, 0.0, -0.2, -0.1, -0.1];
         let m = from_knots(&t, &[0.0; 8], &v, &[], 0.0, 0.0);
         assert_eq!(m.turns, [(3.0, 2.5), (4.0, 4.5)]);
-    }
-
-    #[test]
-    fn roughness_is_what_third_differences_leave() {
-        let parabola: Vec<f64> = (0..40).map(|k| f64::from(k * k) - 3.0 * f64::from(k)).collect();
-        near(roughness(&parabola), 0.0);
-        // Alternating by one to either side: third differences of eight.
-        let rough: Vec<f64> =
-            parabola.iter().enumerate().map(|(k, x)| x + if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
-        assert!((roughness(&rough) - 8.0 * 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3, "{}", roughness(&rough));
-        // A step in two samples of forty is none.
-        let cubic: Vec<f64> = (0..40).map(|k| f64::from(k).powi(3) / 6.0).collect();
-        assert!((roughness(&cubic) - 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3);
     }
 
     #[test]

@@ -15,7 +15,7 @@ const WIDEST: usize = 12;
 /// No window reaches across a gap of more than so many steps; a jump in a smaller one is where both sides meet.
 const GAP: f64 = 5.5;
 /// Smallest jump of the velocity in m/s that is looked for.
-const LEAST_JUMP_MPS: f64 = 2e-5;
+pub const LEAST_JUMP_MPS: f64 = 2e-5;
 
 /// A jump of the velocity between two samples; where, the positions tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
