@@ -8,8 +8,8 @@ use nix::sys::resource::{UsageWho, getrusage};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
-use stylet_diagnose::benchmark::aim;
-use stylet_diagnose::hidden::{self, Drawn, sketch};
+use stylet_api::benchmark::own::aim;
+use stylet_own_world::{self as hidden, Drawn, sketch};
 use stylet_tissue::Effect;
 
 const SEED: u64 = 51;

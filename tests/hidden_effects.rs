@@ -4,9 +4,9 @@
 //! same table.
 
 use rayon::prelude::*;
-use stylet_diagnose::benchmark::{Result, run, summary};
-use stylet_diagnose::hidden::{self, Drawn, Harder, Kind, Motions, Size, sketch_of};
+use stylet_api::benchmark::own::{Case as Result, run, summary};
 use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
+use stylet_own_world::{self as hidden, Drawn, Harder, Kind, Motions, Size, sketch_of};
 use stylet_tissue::AnyEffect;
 
 fn examine(kind: Kind, turns: &[u64]) -> Vec<Result> {

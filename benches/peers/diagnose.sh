@@ -1,21 +1,47 @@
 #!/usr/bin/env bash
-# Stylet's diagnosis and sparse regressions on the same cases with hidden effects, in one run, on one thread.
+# Stylet's diagnosis and sparse regressions on the referee's cases, in one run, on one thread.
 #
-#   bash benches/peers/diagnose.sh [CASES] [SEED]
+#   bash benches/peers/diagnose.sh [CASES] [SEED] [WORLD...]
 #
-# Draws 40 cases of the public seed 701 to tune the peers on, and CASES (80) cases of SEED (702) to judge all on, lets Stylet
-# diagnose them, and prints the table. Drawing goes on where it was interrupted. TUNING_CASES changes the 40.
-# The picture goes to docs/diagnosis_peers.svg, or to $FIGURE. Needs `bash benches/peers/setup.sh` once before.
+# Per world (plain and rich): exports TUNING_CASES (40) cases of the public seed 701 to tune the peers on and CASES (100) cases of SEED
+# (702) to judge all on, half of them with nothing wrong and half with thicknesses wrong by the largest grade; two of five hide one effect,
+# one two effects, one something that the library lacks, one nothing. Writes what regressions are given, lets Stylet diagnose, tunes the
+# peers, lets them answer, and judges every answer by `stylet benchmark judge`. What is there already is not made again (remove
+# target/peers_cases to begin anew). Needs `bash benches/peers/setup.sh` once before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cases=${1:-80}
+cases=${1:-100}
 seed=${2:-702}
+worlds=("${@:3}")
+[ ${#worlds[@]} -gt 0 ] || worlds=(plain rich)
 tuning=${TUNING_CASES:-40}
 export RAYON_NUM_THREADS=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 python=${STYLET_PEERS_PYTHON:-target/peers/bin/python}
 "$python" -c 'import pysindy, sklearn, sysidentpy' || { echo "no peers: run bash benches/peers/setup.sh first" >&2; exit 2; }
-cargo build --release --quiet -p stylet-diagnose --features own_world --example peers_cases
-draw=target/release/examples/peers_cases
-"$draw" target/peers_cases "$tuning" 701 >&2
-"$draw" target/peers_cases "$cases" "$seed" >&2
-"$python" benches/peers/diagnose.py target/peers_cases "$tuning" 701 "$cases" "$seed" "${FIGURE:-docs/diagnosis_peers.svg}"
+cargo build --release --quiet
+cargo build --release --quiet -p stylet-diagnose --example peers_terms
+cargo build --release --quiet -p stylet-examine --example truth
+stylet=target/release/stylet
+
+given() { # world, cases, seed -> the challenge, exported and with its terms
+    local of=target/peers_cases/$1-$2-$3
+    [ -d "$of" ] || "$stylet" benchmark export --world "$1" --wrong nothing,thickness --grade large \
+        --hide one,one,two,outside,clean --cases "$((($2 + 1) / 2))" --seed "$3" --out "$of" >&2
+    target/release/examples/peers_terms "$of" "$of.terms" >&2
+    echo "$of"
+}
+
+mkdir -p target/peers_cases
+for world in "${worlds[@]}"; do
+    tune=$(given "$world" "$tuning" 701)
+    test=$(given "$world" "$cases" "$seed")
+    target/release/examples/truth "$tune" >"$tune.truth.json"
+    echo "== world $world, $cases cases of seed $seed"
+    "$python" benches/peers/diagnose.py "$tune.terms" "$tune.truth.json" "$test.terms" "$test.answers"
+    for answers in stylet lassocv frols stlsq sr3; do
+        echo
+        echo "-- $answers"
+        "$stylet" benchmark judge "$test" "$test.answers/$answers.json" | sed -n '/^wrong/,/^all rows/{/^all rows/!p};/^all rows/,/^$/p'
+    done
+    echo
+done

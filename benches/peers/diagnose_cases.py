@@ -1,56 +1,38 @@
-"""The cases that `peers_cases` wrote, the problem a regression is given, and when an answer is right."""
+"""The cases of a challenge as `peers_terms` wrote them, the problem a regression is given, its answer, and what an answer is worth
+while a peer is tuned (as the referee judges: `crates/examine/src/judge/answers.rs`)."""
 
 import json
 
 import numpy as np
 
-RAW = {"saturation", "quantisation", "force_spikes"}
-STRENGTHS = [("strong", 5.0, np.inf), ("medium", 0.5, 5.0), ("faint", 0.15, 0.5)]
 SAME = 0.98
+LARGEST_CLASS = 4
 
 
 class Case:
-    """One case: what is known of it, the truth, Stylet's answer."""
+    """One case; with `truth`, what a right answer says."""
 
-    def __init__(self, path):
-        self.path = path
+    def __init__(self, path, truth=None):
+        self.number, self.path = path.name.split(".")[0], path
         self.about = json.loads(path.read_text())
-        self.answer = json.loads(path.with_suffix(".stylet.json").read_text())
-        self.hidden = self.about["hidden"]
-        self.kind = self.about["kind"]
-        self.strength = self.answer["strength"]
-        self.raw = bool(RAW & set(self.hidden))
-        self.unseen = self.hidden == ["force_gain"]
-
-    def counts(self):
-        """Whether it is one of the main rows: seen by somebody, and as a term of the residual."""
-        faintest = STRENGTHS[-1][1]
-        return not self.raw and not self.unseen and (self.kind != "single" or self.strength >= faintest)
+        self.truth = truth
 
     def problem(self, whitened, ruptures):
-        about = self.about
-        names = [c["effect"] for c in about["columns"]]
-        flat = np.fromfile(self.path.with_suffix(".f32"), "<f4")
-        table = flat.reshape(len(names) + 1, about["rows"]).T.astype(float)
-        recording, count = np.array(about["recording"]), about["recordings"]
-        (a1, a2), sd = about["noise_ar"], about["noise_sd_n"]
-        parts = [table[recording == k] for k in range(count)]
-        if whitened:
-            rho = a1 / (1.0 - a2)
-            inner = np.sqrt(max(1.0 - a1 * rho - a2 * (a2 + a1 * rho), 1e-4))
-            parts = [(p[2:] - a1 * p[1:-1] - a2 * p[:-2]) / inner for p in parts]
-        groups = [np.full(len(p), k) for k, p in enumerate(parts)]
-        if ruptures:
-            parts.append(table[recording >= count])
-            groups.append(recording[recording >= count] - count)
-        return Problem(np.vstack(parts) / sd, names, np.concatenate(groups))
+        names, rows = self.about["columns"], self.about["rows"]
+        table = np.fromfile(self.path.with_suffix(".white.f32" if whitened else ".plain.f32"), "<f4")
+        table = table.reshape(len(names) + 1, rows).T.astype(float)
+        recording, count = np.array(self.about["recording"]), self.about["recordings"]
+        keep = np.ones(rows, bool) if ruptures else recording < count
+        return Problem(table[keep], names, recording[keep] % count)
 
 
 class Problem:
-    """Residual `y` and columns `x` less what the base parameters imitate, in noise standard deviations; columns of
+    """Residual `y` and columns `x` less what the base law's numbers imitate, in noise standard deviations; columns of
     unit RMS with the effect that each belongs to in `names`, `groups` the recording of every row."""
 
     def __init__(self, table, names, groups):
+        order = np.argsort(groups, kind="stable")
+        table, groups = table[order], groups[order]
         base = table[:, 1:][:, [n == "" for n in names]]
         base = base[:, np.any(base != 0.0, axis=0)]
         q, _ = np.linalg.qr(base / np.linalg.norm(base, axis=0))
@@ -73,10 +55,14 @@ class Problem:
             out[name] = (size, [int(k) for k in index[c != 0.0]])
         return out
 
-    def stands_for(self, effect, columns):
-        """Whether one of these columns is nearly one of the effect's."""
-        own = [k for k, n in enumerate(self.names) if n == effect]
-        return any(abs(self.gram[k, j]) > SAME for k in own for j in columns)
+    def like(self, effect, columns):
+        """Other effects with a column that is nearly one of these, most alike first; no more than a class may have."""
+        alike = {}
+        for k, name in enumerate(self.names):
+            if name != effect:
+                alike[name] = max(alike.get(name, 0.0), *(abs(self.gram[k, j]) for j in columns))
+        order = sorted((n for n in alike if alike[n] > SAME), key=lambda n: (-alike[n], n))
+        return order[: LARGEST_CLASS - 1]
 
 
 def chosen(contributions, least, share, most):
@@ -86,50 +72,33 @@ def chosen(contributions, least, share, most):
     return [(name, columns) for name, (size, columns) in order[:most] if size > 0.0 and size >= limit]
 
 
-def judge(case, problem, named):
-    """Whether a regression's answer is exactly right, and whether it is right when classes count."""
-    names = [name for name, _ in named]
-    if case.kind in ("clean", "outside") or case.unseen:
-        return not names, not names
-    meant = set()
-    for name, columns in named:
-        near = [h for h in case.hidden if problem.stands_for(h, columns)]
-        meant.add(name if name in case.hidden else near[0] if near else None)
-    return sorted(names) == sorted(case.hidden), len(names) == len(case.hidden) and meant == set(case.hidden)
+def answer(problem, named):
+    """A regression's answer to the challenge."""
+    causes = [{"effect": name, "equivalent": problem.like(name, columns)} for name, columns in named]
+    if not causes:
+        return {"verdict": "none", "causes": []}
+    return {"verdict": "ambiguous" if any(c["equivalent"] for c in causes) else "named", "causes": causes}
 
 
-def judge_stylet(case):
-    """The same for Stylet's answer."""
-    verdict, named = case.answer["verdict"], case.answer["named"]
-    if case.kind == "clean" or case.unseen:
-        return verdict == "none", verdict == "none"
-    if case.kind == "outside":
-        right = verdict not in ("named", "ambiguous")
-        return right, right
-    exactly = sorted(n[0] for n in named) == sorted(case.hidden)
-    return exactly, len(named) == len(case.hidden) and all(any(h in n for n in named) for h in case.hidden)
+def right(truth, said):
+    """Whether an answer that is not `unknown` is right."""
+    classes = [[c["effect"], *c["equivalent"]] for c in said["causes"]]
+    taken, missing = set(), False
 
+    def fits(wanted, members):
+        names = {wanted["effect"], *wanted["also"]}
+        return not wanted["unseen"] and len(members) <= LARGEST_CLASS and bool(names & set(members))
 
-def wilson(right, of):
-    """95 % interval of a rate."""
-    p, z = right / of, 1.96
-    middle = (p + z * z / (2 * of)) / (1 + z * z / of)
-    half = z / (1 + z * z / of) * np.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
-    return max(middle - half, 0.0), min(middle + half, 1.0)
-
-
-def rows(cases):
-    """The rows of the table: name, cases, whether the right or the wrong answers are counted."""
-
-    def of(kind):
-        return [c for c in cases if c.kind == kind and c.counts()]
-
-    out = [("clean: falsely accused", of("clean"), False)]
-    for name, low, high in STRENGTHS:
-        members = [c for c in of("single") if low <= c.strength < high]
-        out.append((f"one effect, {name}: named, or in its class", members, True))
-    out.append(("two effects, both named", of("two"), True))
-    out.append(("outside the library: wrongly named", of("outside"), False))
-    out.append(("read off the raw force", [c for c in cases if c.raw and c.kind == "single"], True))
-    out.append(("force_gain: nothing named", [c for c in cases if c.unseen], True))
-    return out
+    for wanted in sorted(truth["wanted"], key=lambda w: all(c[0] != w["effect"] for c in classes)):
+        free = [k for k, c in enumerate(classes) if k not in taken and fits(wanted, c)]
+        exact = [k for k in free if classes[k][0] == wanted["effect"]]
+        if free:
+            taken.add((exact or free)[0])
+        else:
+            missing |= not wanted["may_be_silent"]
+    described = set(truth["optional"]) | set(truth["allowed"])
+    stray = any(k not in taken and not described & set(c) for k, c in enumerate(classes))
+    if truth["outside"]:
+        return bool(truth["wanted"]) and not missing
+    says_allowed = any(set(truth["allowed"]) & set(c) for c in classes)
+    return not missing and not stray and (says_allowed or not truth["asks_for_allowed"])

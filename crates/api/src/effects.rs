@@ -15,15 +15,7 @@ pub struct Reference {
 /// Inserts into three gels with ripple, holds at 10 s, goes on at 14 s, retracts from 20 s on.
 #[must_use]
 pub fn reference(entry: &EffectInfo) -> Reference {
-    let typical: Vec<f64> = entry
-        .parameters
-        .iter()
-        .map(|p| match (entry.id, p.path) {
-            ("saturation", _) => 1.6,
-            ("hidden_membrane", "depth_m") => 0.005,
-            _ => p.start,
-        })
-        .collect();
+    let typical: Vec<f64> = entry.parameters.iter().map(|p| p.shown.unwrap_or(p.start)).collect();
     let with: Vec<AnyEffect> = AnyEffect::from_parameters(entry.id, &typical).into_iter().collect();
     Reference { base_n: force(&[]), changed_n: force(&with), typical }
 }

@@ -27,7 +27,7 @@ const FAULTS: [(&str, Fault); 8] = [
         let at = |t: f64| 0.3 * (std::f64::consts::TAU * HUM_HZ * t).sin();
         t.iter().zip(f).map(|(t, f)| f + at(*t)).collect()
     }),
-    ("saturation", |_, f| f.iter().map(|f| f.clamp(-LIMIT_N, LIMIT_N)).collect()),
+    (stylet_tissue::Saturation::ID, |_, f| f.iter().map(|f| f.clamp(-LIMIT_N, LIMIT_N)).collect()),
     ("steps", |_, f| f.iter().map(|f| 0.25 * (f / 0.25).round()).collect()),
     ("delay", |t, f| t.iter().map(|at| interpolate(t, f, at - 0.3)).collect()),
     ("lag", |t, f| {

@@ -10,9 +10,9 @@ use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use stylet_diagnose::raw::Raw;
 use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_out};
 use stylet_diagnose::set::{Insertion, first, laws};
+use stylet_record::raw::Raw;
 use stylet_record::{ColumnMap, ReadOptions, read_csv_with_holes};
 use stylet_tissue::{Layer, Tissue};
 

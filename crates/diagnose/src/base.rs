@@ -50,11 +50,7 @@ const FIRST_SHARE: f64 = 0.03;
 
 /// Standard deviation in N of blocks about their neighbours.
 pub(crate) fn roughness(blocks: &[Blocks]) -> f64 {
-    let third = |b: &Blocks| -> Vec<f64> {
-        b.f.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect()
-    };
-    let mut all: Vec<f64> = blocks.iter().flat_map(third).collect();
-    (stylet_stats::order::median(&mut all) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()).max(1e-6)
+    stylet_stats::roughness(blocks.iter().map(|b| b.f.as_slice())).max(1e-6)
 }
 
 /// Fits the base law; returns it with the noise by which it is judged. `None` when it cannot be replayed.

@@ -2,12 +2,10 @@
 
 use crate::diagnose::Evidence;
 use crate::error::DiagnoseError;
-use stylet_record::{QualityKind, QualityNote, Recording};
+use stylet_record::{LEAST_SAMPLES, QualityKind, QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_tissue::{Law, replay};
 
-/// Fewest samples of a recording.
-const LEAST_SAMPLES: usize = stylet_record::LEAST_SAMPLES;
 /// Most layers: so many were seen to be told apart, with clean data and no cause named.
 const MOST_LAYERS: usize = 40;
 

@@ -4,7 +4,7 @@ use crate::diagnose::Examined;
 use crate::held_out::by_its_own;
 use crate::outcome::Verdict;
 use stylet_identify::fit::Fit;
-use stylet_identify::linear::dot;
+use stylet_stats::linear::dot;
 use stylet_tissue::Slab;
 
 /// Curves of one recording.

@@ -6,7 +6,6 @@ use crate::held_out::{Left, floor, left_out, rms};
 use crate::intervals::Spread;
 use crate::leftover;
 use crate::outcome::*;
-use crate::raw;
 use crate::rivals::{CLASS_NATS, Rival, rivals};
 use crate::select::Search;
 use crate::small::{self, Small};
@@ -21,6 +20,7 @@ use stylet_identify::fit::{Effort, fit};
 use stylet_identify::model::{Belief, Role};
 use stylet_identify::noise::From as NoiseFrom;
 use stylet_identify::objective::Data;
+use stylet_record::raw;
 use stylet_record::{QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
 use stylet_tissue::{AnyEffect, EffectInfo, Proposal};
@@ -99,7 +99,11 @@ pub fn diagnose(
     progress("fitting the base law");
     let blocks: Vec<Blocks> =
         recordings.par_iter().zip(&raw.exclude).map(|(r, x)| Blocks::new(r, x, BLOCK_S)).collect();
-    let prepared = Prepared::new(Arc::new(belief(scenario)), blocks, raw.step_n.unwrap_or(0.0) * UNIFORM_SD);
+    let prepared = Prepared::new(
+        Arc::new(belief(scenario)),
+        blocks,
+        raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
+    );
     let (fitted, data) = base(&prepared).ok_or(DiagnoseError::NoFit)?;
     let (fitted, data) = varied(fitted, data);
     let mut search = Search::run(&prepared, fitted, data, &mut progress);
@@ -215,9 +219,6 @@ pub(crate) fn ready(evidence: &[Evidence]) -> Ready {
     let raw = raw::look(&borrowed, &notes);
     Ready { recordings, notes, raw }
 }
-
-/// Standard deviation of a number spread evenly over one.
-const UNIFORM_SD: f64 = 0.289;
 
 /// What a scenario believes, and how surely.
 #[must_use]
@@ -495,7 +496,6 @@ mod tests {
     use crate::intervals::Spread;
     use crate::made::{settled, showing, stage};
     use crate::outcome::{Cause, Diagnosis, Verdict};
-    use crate::raw::{Raw, Spikes};
     use crate::rivals::Rival;
     use crate::select::Search;
     use crate::small::Small;
@@ -508,6 +508,7 @@ mod tests {
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::Data;
     use stylet_record::Recording;
+    use stylet_record::raw::{Raw, Spikes};
     use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
 
     /// Fisher 1929: `m (1 + x)^(1 - m)` for a line `x` times all others among `m` half the blocks.

@@ -111,7 +111,7 @@ fn within_tolerance(search: &mut Search, prepared: &Prepared) {
 
 /// Whether a fit with an effect for the geometry is worth its price when all that it leaves is noise, however slow.
 fn is_worth(f: &Fit, rival: &Fit, data: &Data) -> bool {
-    gain(rival, f, data) > price(&f.model, data) - price(&rival.model, data)
+    gain(rival, f, data).pays(price(&f.model, data) - price(&rival.model, data))
 }
 
 /// A model with its geometry as unsure as it is believed to be: numbers whose intervals suppose faces that nobody measured are too

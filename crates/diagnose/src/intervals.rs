@@ -14,9 +14,9 @@ use crate::told_again::told_again;
 use rand::Rng;
 use stylet_identify::events::{judge, spreads};
 use stylet_identify::fit::{Fit, Tangent};
-use stylet_identify::linear::{Factor, Symmetric};
 use stylet_identify::model::{Model, Number, Role};
 use stylet_identify::objective::Data;
+use stylet_stats::linear::{Factor, Symmetric};
 use stylet_stats::{normal, student};
 use stylet_tissue::{FitScale, Proposal};
 
@@ -309,11 +309,11 @@ mod tests {
     use std::sync::Arc;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::fit::{Effort, Fit, Tangent, fit};
-    use stylet_identify::linear::Symmetric;
     use stylet_identify::model::{Belief, Choice, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, Trail, replay, residuals};
     use stylet_record::Recording;
+    use stylet_stats::linear::Symmetric;
     use stylet_stats::student;
     use stylet_tissue::{Layer, Tissue};
 

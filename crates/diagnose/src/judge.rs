@@ -1,6 +1,7 @@
 //! Whether a larger model is worth its numbers: both under the noise that the larger one leaves.
 
 use stylet_identify::fit::{Effort, Fit, fit_sharp};
+use stylet_identify::nats::{Nats, OfTheLarger};
 use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
 
@@ -9,13 +10,13 @@ pub const LEAST: f64 = 4.0;
 
 /// What `larger` gains over `smaller` when all that `larger` leaves is noise.
 #[must_use]
-pub fn gain(smaller: &Fit, larger: &Fit, data: &Data) -> f64 {
+pub fn gain(smaller: &Fit, larger: &Fit, data: &Data) -> Nats<OfTheLarger> {
     let own = data.judged_by(&larger.residuals.e, From::Whole);
     let effort = Effort { turns: 3, enough: 0.2 };
     let under = |f: &Fit| fit_sharp(&f.model, &own, effort);
     match rayon::join(|| under(smaller), || under(larger)) {
-        (Some(a), Some(b)) => a.nats() - b.nats(),
-        _ => f64::NEG_INFINITY,
+        (Some(a), Some(b)) => Nats::new(a.nats() - b.nats()),
+        _ => Nats::new(f64::NEG_INFINITY),
     }
 }
 
@@ -51,13 +52,13 @@ mod tests {
         let own = data.judged_by(&with.fit.residuals.e, From::Whole);
         let nats = |m| fit(m, &own, Effort::FULL).expect("a fit").nats();
         let wanted = nats(&no_drift.model) - nats(&with.fit.model);
-        let told = gain(&no_drift, &with.fit, data);
+        let told = gain(&no_drift, &with.fit, data).number();
         assert!(wanted > 10.0 && (told / wanted - 1.0).abs() < 0.02, "{told} for {wanted}");
-        let told = gain(&no_bias, &with.fit, data);
+        let told = gain(&no_bias, &with.fit, data).number();
         assert!((-0.1..1.5).contains(&told), "{told}");
         // What cannot be replayed gains nothing.
         let mut broken = with.fit.clone();
         broken.model.effects[0].values[0] = f64::NAN;
-        assert_eq!(gain(&no_bias, &broken, data), f64::NEG_INFINITY);
+        assert_eq!(gain(&no_bias, &broken, data).number(), f64::NEG_INFINITY);
     }
 }

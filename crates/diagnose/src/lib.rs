@@ -5,7 +5,6 @@
 //!
 //! | module | what lives there |
 //! |---|---|
-//! | [`raw`] | saturation, quantisation, spikes: read off the raw force, named without a law |
 //! | [`base`] | the base law with its geometry: drops given to layers, numbers and instants in turn |
 //! | [`propose`], [`lines`] | what every effect would gain to first order, and where its fit starts |
 //! | [`select`], [`judge`] | effects enter by what they gain and leave when the others can do without them |
@@ -17,22 +16,17 @@
 //! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
 //! | [`predict`] | a model against recordings that took no part |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
-//! | `hidden`, `benchmark` (feature `own_world`) | cases drawn with this law, for comparison with older tables |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 mod at_ruptures;
 pub mod base;
-#[cfg(feature = "own_world")]
-pub mod benchmark;
 mod check;
 pub mod curves;
 mod diagnose;
 mod error;
 pub mod geometry;
 pub mod held_out;
-#[cfg(feature = "own_world")]
-pub mod hidden;
 pub mod intervals;
 pub mod judge;
 pub mod leftover;
@@ -43,7 +37,6 @@ pub mod otherwise;
 pub mod outcome;
 pub mod predict;
 pub mod propose;
-pub mod raw;
 pub mod rivals;
 pub mod select;
 pub mod set;

@@ -113,7 +113,7 @@ pub fn settled(effects: &[AnyEffect], runs: &[&Insertion]) -> Fitted {
     (model.free.own_surface, model.free.own_friction, model.steady) = (true, true, true);
     model.scatter.surface_m = 2e-4;
     model.instants = runs.iter().map(|r| r.ruptures_s.clone()).collect();
-    let raw = crate::raw::Raw::default();
+    let raw = stylet_record::raw::Raw::default();
     let drops = runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect());
     refitted(&model, crate::set::fitted::blocks(runs, &raw), drops.collect()).expect("a fit")
 }

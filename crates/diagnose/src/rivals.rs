@@ -38,7 +38,7 @@ pub fn rivals(search: &mut Search) -> Vec<Vec<Rival>> {
         let worth = |f: &Fit| {
             f.model.effect_numbers() <= search.best.model.effect_numbers()
                 || (!at_a_bound(f, k)
-                    && gain(&search.best, f, &search.data) > extra(&search.best, f, &search.data))
+                    && gain(&search.best, f, &search.data).pays(extra(&search.best, f, &search.data)))
         };
         if let Some((f, _)) = ahead.filter(|r| swaps < 3 && worth(&r.0)) {
             search.swap(k, f.clone());

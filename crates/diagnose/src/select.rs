@@ -8,6 +8,7 @@ use stylet_identify::fit::{Effort, Fit, Tangent, fit, fit_below, fit_sharp};
 use stylet_identify::late::placed;
 use stylet_identify::look::Look;
 use stylet_identify::model::{Choice, Model, Role};
+use stylet_identify::nats::Nats;
 use stylet_identify::noise::From;
 use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
@@ -214,10 +215,10 @@ impl Search {
                 continue;
             }
             let judged = gain(&self.best, &f, &self.data);
-            if judged < needed {
+            if judged < Nats::new(needed) {
                 continue;
             }
-            stage.taken = Some((name(&f), judged));
+            stage.taken = Some((name(&f), judged.number()));
             self.settle(f);
             self.enlarge(&times);
             break;
@@ -371,7 +372,7 @@ impl Search {
             if let Some(f) = whole
                 && !at_a_bound(&f, k)
                 && every_strength_is_told(&f, k, &self.data)
-                && gain(&self.best, &f, &self.data) > extra(&self.best, &f, &self.data)
+                && gain(&self.best, &f, &self.data).pays(extra(&self.best, &f, &self.data))
             {
                 self.settle(f);
             }
@@ -420,7 +421,7 @@ impl Search {
             };
             let worst = less.into_iter().map(|(_, f)| (lost(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
             match worst {
-                Some((lost, f)) if lost < 0.0 => self.settle(f),
+                Some((lost, f)) if lost < Nats::new(0.0) => self.settle(f),
                 _ => return,
             }
         }
@@ -443,7 +444,7 @@ fn simpler_first(mut full: Vec<Fit>, data: &Data) -> Vec<Fit> {
     let special = |f: &Fit| f.model.effects.last().is_some_and(|e| e.info.nested_in.contains(&id));
     let Some(k) = full.iter().position(special) else { return full };
     let last = leader.model.effects.len().saturating_sub(1);
-    if at_a_bound(leader, last) || gain(&full[k], leader, data) < extra(&full[k], leader, data) {
+    if at_a_bound(leader, last) || gain(&full[k], leader, data) < Nats::new(extra(&full[k], leader, data)) {
         let f = full.remove(k);
         full.insert(0, f);
     }
@@ -807,7 +808,7 @@ mod tests {
             let bias: AnyEffect = ForceBias { force_n: 1e-4 }.into();
             let (mut search, _) = under_way(&[], &[drift(0.02), bias], |t| 0.02 * t + bias_n);
             let less = stylet_identify::fit::fit(&search.best.model.without(1), &search.data, Effort::FULL);
-            let gained = gain(&less.expect("a fit"), &search.best, &search.data);
+            let gained = gain(&less.expect("a fit"), &search.best, &search.data).number();
             let wanted = 0.5 * (search.data.compared() as f64).ln() + 4.0;
             search.prune();
             let stays = search.best.model.effects.len() == 2;

@@ -8,9 +8,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use stylet_identify::fit::Tangent;
-use stylet_identify::linear::{Symmetric, dot};
 use stylet_identify::noise::From;
 use stylet_identify::objective::Data;
+use stylet_stats::linear::{Symmetric, dot};
 
 /// So many times.
 const TIMES: usize = 8;

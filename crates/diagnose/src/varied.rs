@@ -59,7 +59,7 @@ pub fn varied(best: Fit, data: Data) -> (Fit, Data) {
     let paid = price(other.model.free, &data) - price(now, &data);
     let gained =
         if kinds(&other) >= kinds(&best) { gain(&best, &other, &data) } else { -gain(&other, &best, &data) };
-    if gained <= paid {
+    if !gained.pays(paid) {
         return (best, data);
     }
     let data = data.judged_by(&other.residuals.e, From::Calm);

@@ -1,8 +1,8 @@
 //! Promise: recordings that cannot belong to the scenario are refused with a message that says what is
 //! wrong and what would be right; a hole in a recording is no reason to refuse it.
 
-use stylet_diagnose::hidden::{self, Drawn, Motions};
 use stylet_diagnose::{DiagnoseError, Diagnosis, Evidence, Options, Verdict, diagnose};
+use stylet_own_world::{self as hidden, Drawn, Motions};
 use stylet_record::Recording;
 
 fn case() -> hidden::Case {

@@ -16,10 +16,10 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use recorded::Told;
-use stylet_diagnose::hidden::{self, Drawn, Harder, Kind, Motions, Outside};
 use stylet_diagnose::outcome::Cause;
 use stylet_diagnose::predict::{Refit, predict};
 use stylet_diagnose::{Evidence, Examined, Options, Verdict, diagnose};
+use stylet_own_world::{self as hidden, Drawn, Harder, Kind, Motions, Outside};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_tissue::{

@@ -7,10 +7,10 @@ mod recorded;
 
 use drawn::{Drawn, EXPONENT, SHIFT_M, believed};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use stylet_diagnose::raw::Raw;
 use stylet_diagnose::set::fitted::{Fitted, fitted};
 use stylet_diagnose::set::left_out::{floor, one_left_out};
 use stylet_diagnose::set::{Insertion, first};
+use stylet_record::raw::Raw;
 
 fn drawn(seed: u64) -> Vec<Insertion> {
     drawn::drawn(&Drawn { seed, ..Drawn::default() })

@@ -3,9 +3,11 @@
 //! The mean over a block in which a layer ruptures lies between the force before and after, so that a predicted mean is
 //! continuous in the instant of the rupture; and a recording at 1 kHz costs as much as one at 200 Hz.
 
-use crate::motion::{Motion, Piece, Shown};
 use std::sync::{Arc, OnceLock};
 use stylet_record::Recording;
+use stylet_record::motion::{Motion, Piece, Shown};
+use stylet_stats::UNIFORM_SD;
+use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 
 /// Length of a block in s: short against layers, relaxation and ripple, long against samples at 200 Hz and more.
 pub const BLOCK_S: f64 = 0.02;
@@ -17,8 +19,6 @@ const MISSING: f64 = 1.0;
 const BRIDGED_S: f64 = 2.0;
 /// A sample so near (share of a step) to a jump of the speed may have either speed.
 const AT_A_JUMP: f64 = 0.03;
-/// Standard deviation of a number spread evenly over one.
-const UNIFORM_SD: f64 = 0.289;
 /// Seconds over which the size of the force is smoothed.
 const SMOOTH_S: f64 = 0.1;
 
@@ -64,7 +64,7 @@ impl Blocks {
         let steps = recording.time_s.windows(2).map(|w| w[1] - w[0]);
         let step_s = stylet_stats::order::median_of(steps).max(1e-9);
         let q = ((length_s / step_s).round() as usize).max(1);
-        let motion = Arc::new(Motion::of(recording));
+        let motion = Arc::new(Motion::of(recording, SGN_DEAD_BAND_MPS));
         let t = &recording.time_s;
         let n = t.len();
         let mut b = Self {
@@ -347,7 +347,7 @@ impl Blocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Jump;
+    use stylet_record::motion::Jump;
 
     fn near(told: f64, wanted: f64) {
         assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-3), "{told} for {wanted}");

@@ -5,7 +5,7 @@
 //! speed; what remains as a fall is a rupture, of a layer or of something that the layers do not know.
 
 use crate::blocks::Blocks;
-use crate::linear::Symmetric;
+use stylet_stats::linear::Symmetric;
 use stylet_stats::order::median;
 
 /// One drop.

@@ -6,38 +6,33 @@
 //!
 //! | module | what lives there |
 //! |---|---|
-//! | [`velocity`], [`settle`], `course` | velocity and its jumps from exact and from noisy positions |
-//! | [`motion`], [`blocks`] | the motion between samples; a recording as means over blocks of 20 ms |
+//! | [`blocks`] | a recording as means over blocks of 20 ms |
 //! | [`model`] | what is fitted: numbers with their priors and bounds |
 //! | [`forward`] | the law replayed with imposed ruptures, or its own |
 //! | [`events`] | the likelihood of a rupture: by force or by place |
 //! | [`noise`] | autoregressive noise per range of the force, whitening |
 //! | [`discrepancy`](mod@discrepancy) | what an unfinished law leaves, as noise |
 //! | [`objective`], [`fit`], [`retime`] | the likelihood, its optimum, instants moved |
+//! | [`nats`] | nats that say by what they were reckoned |
 //! | [`late`] | a delay to a fraction of a sampling step |
 //! | [`phases`] | advance, hold and way back; sudden falls and releases in the raw force |
 //! | [`drops`], [`assign`] | drops of the force, and which layer each belongs to |
 //! | [`look`] | what every effect would gain, to first order |
-//! | [`linear`] | small dense algebra |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod assign;
 pub mod blocks;
-mod course;
 pub mod discrepancy;
 pub mod drops;
 pub mod events;
 pub mod fit;
 pub mod forward;
 pub mod late;
-pub mod linear;
 pub mod look;
 pub mod model;
-pub mod motion;
+pub mod nats;
 pub mod noise;
 pub mod objective;
 pub mod phases;
 pub mod retime;
-pub mod settle;
-pub mod velocity;

@@ -1,10 +1,10 @@
 //! What every effect would gain, to first order: columns projected out of everything that is fitted already.
 
 use crate::fit::{Column, Fit, Tangent};
-use crate::linear::{Factor, Symmetric};
 use crate::model::{Choice, Model};
-use crate::noise::weight;
+use crate::noise::LOSS;
 use crate::objective::Data;
+use stylet_stats::linear::{Factor, Symmetric};
 use stylet_tissue::{EffectInfo, FitScale};
 
 /// The linear picture of a fit, ready for columns.
@@ -53,10 +53,11 @@ impl<'a> Look<'a> {
         let mut g = vec![0.0; m];
         let (mut visible, mut whole) = (0.0, 0.0);
         for i in 0..m {
-            g[i] = columns[i].dot_all(&self.tangent.rest) - crate::linear::dot(&halves[i], &self.slope);
+            g[i] =
+                columns[i].dot_all(&self.tangent.rest) - stylet_stats::linear::dot(&halves[i], &self.slope);
             for j in 0..=i {
                 let all = columns[i].dot_all(&columns[j]);
-                let left = all - crate::linear::dot(&halves[i], &halves[j]);
+                let left = all - stylet_stats::linear::dot(&halves[i], &halves[j]);
                 s.add(i, j, if i == j { left.max(1e-9 * all) } else { left });
                 let twice = if i == j { 1.0 } else { 2.0 };
                 visible += 0.5 * twice * left;
@@ -87,7 +88,7 @@ impl<'a> Look<'a> {
         let mut column = Column::default();
         for (r, force) in force.iter().enumerate() {
             let mut w = self.data.whiten(r, force);
-            w.iter_mut().zip(&self.fit.residuals.w[r]).for_each(|(w, at)| *w *= weight(*at).sqrt());
+            w.iter_mut().zip(&self.fit.residuals.w[r]).for_each(|(w, at)| *w *= LOSS.weight(*at).sqrt());
             column.w.push(w);
             column.rows.push(vec![0.0; 4 * self.fit.residuals.events[r].len()]);
         }

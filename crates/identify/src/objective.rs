@@ -4,11 +4,11 @@ use crate::blocks::Blocks;
 use crate::events::{Event, judge};
 use crate::forward::{Replayed, Track, free, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
-use crate::motion::Piece;
-use crate::noise::{From, Laid, Noise, rho};
+use crate::noise::{From, LOSS, Laid, Noise};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
+use stylet_record::motion::Piece;
 
 /// Recordings in blocks and the noise by which they are judged.
 #[derive(Clone, Debug)]
@@ -170,7 +170,7 @@ impl Trail {
         let e: Vec<f64> = b.f.iter().zip(&now.f).map(|(y, f)| y - f).collect();
         let w = data.whiten(r, &e);
         let events: f64 = now.events.iter().map(|e| judge(e, &model.scatter).nats).sum();
-        let sum = w.iter().map(|w| rho(*w)).sum::<f64>() + events;
+        let sum = w.iter().map(|w| LOSS.value(*w)).sum::<f64>() + events;
         if sum.is_finite() { sum } else { NEVER }
     }
 
@@ -204,7 +204,7 @@ pub fn residuals(model: &Model, data: &Data) -> Option<Residuals> {
 /// Nats of residuals that are at hand.
 #[must_use]
 pub fn nats(model: &Model, r: &Residuals) -> f64 {
-    let mut sum: f64 = r.w.iter().map(|w| w.iter().map(|w| rho(*w)).sum::<f64>()).sum();
+    let mut sum: f64 = r.w.iter().map(|w| w.iter().map(|w| LOSS.value(*w)).sum::<f64>()).sum();
     sum += event_nats(model, r);
     sum + prior_nats(model)
 }

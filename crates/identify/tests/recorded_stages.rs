@@ -19,14 +19,15 @@ use stylet_identify::fit::{Column, Effort, Fit, Tangent, fit, fit_below, fit_sha
 use stylet_identify::late::{late_s, placed};
 use stylet_identify::look::{Look, scaled};
 use stylet_identify::model::{Belief, Choice, Day, Model, NEVER, Role};
-use stylet_identify::motion::{Motion, Piece};
 use stylet_identify::noise::{From, Noise};
 use stylet_identify::objective::{Data, Trail, event_nats, prior_nats, replay, residuals};
 use stylet_identify::phases;
 use stylet_identify::retime::retime;
-use stylet_identify::settle::settle;
-use stylet_identify::velocity::{Kink, velocity};
 use stylet_record::Recording;
+use stylet_record::motion::settle;
+use stylet_record::motion::{Kink, velocity};
+use stylet_record::motion::{Motion, Piece};
+use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissue, info, library};
 
 // ---- What is written down ----
@@ -453,7 +454,7 @@ fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
     said.column("settled mps", &calm.v);
     said.number("settled sd_mps", calm.sd_mps);
     said.kinks("settled", &calm.kinks);
-    let motion = Motion::of(r);
+    let motion = Motion::of(r, SGN_DEAD_BAND_MPS);
     said.numbers("motion noise", &[motion.velocity_sd_mps, motion.noise_m * 100.0]);
     for (i, j) in motion.jumps.iter().enumerate().take(6) {
         said.numbers(&format!("motion jump {i} instants_s"), &[j.at_s, j.between_s, j.doubt_s]);

@@ -1,8 +1,8 @@
 //! Scalar products of columns with everything that is fitted beside them taken out.
 
 use stylet_identify::fit::{Column, Tangent};
-use stylet_identify::linear::{Symmetric, dot};
 use stylet_identify::objective::Data;
+use stylet_stats::linear::{Symmetric, dot};
 
 /// Products of the shared numbers' columns and of further ones, the numbers of each recording's own (instants of ruptures
 /// among them) eliminated; no priors of shared numbers. In squares of whitened residuals: half of a product is nats.

@@ -12,12 +12,12 @@ use std::sync::Arc;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
 use stylet_identify::fit::{Column, Tangent};
 use stylet_identify::forward::{Replayed, free, imposed};
-use stylet_identify::linear::Symmetric;
 use stylet_identify::model::{Model, NEVER, Own, Role};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::{Data, pieces, replay, residuals};
 use stylet_record::Recording;
 use stylet_scenario::Motion;
+use stylet_stats::linear::Symmetric;
 
 /// Motions are compared over blocks of so many s ...
 const COARSE_S: f64 = 0.06;

@@ -26,9 +26,11 @@
 //! | [`long`] | recordings of any length, on disk |
 //! | [`foreign`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
 //! | `quality` | [`QualityNote`]s: dead, reversed, in air, mixed-up units, stuck, gaps, jitter, saturation, spikes, quantisation, unlike its repeats |
+//! | [`raw`] | samples that no law can be compared with: at the sensor's limit, spikes |
 //! | [`scratch`] | columns of numbers on disk |
 //! | [`thin`](mod@thin) | recordings of hours, thinned |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
+//! | [`motion`] | the motion between samples, with the instants at which the speed jumps, from exact and from noisy positions |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 
 mod along;
@@ -39,6 +41,7 @@ pub mod foreign;
 pub mod holes;
 mod layout;
 pub mod long;
+pub mod motion;
 mod quality;
 pub mod read;
 pub mod recording;
@@ -53,7 +56,7 @@ pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 pub use error::RecordError;
 pub use holes::read_csv_with_holes;
 pub use long::{LongRecording, read_long_csv};
-pub use quality::{LEAST_SAMPLES, QualityKind, QualityNote, assess, unlike_the_others, usable};
+pub use quality::{LEAST_SAMPLES, QualityKind, QualityNote, assess, raw, unlike_the_others, usable};
 pub use read::{ReadOptions, read_csv, read_csv_bytes};
 pub use recording::{JOINTS, Recording, Sample};
 pub use thin::thin;

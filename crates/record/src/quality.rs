@@ -5,6 +5,7 @@
 //! named; [`usable`] turns it into an error that says what to do. The thresholds stand in [`QualityKind`].
 
 mod likeness;
+pub mod raw;
 mod runs;
 mod sense;
 mod timing;

@@ -270,6 +270,24 @@ fn burg(stretches: &[&[f64]], order: usize, mut take: impl FnMut(&Ar, f64)) {
     }
 }
 
+/// Whether a process with these coefficients, newest first, has a finite variance (Schur-Cohn by Levinson's recursion downwards);
+/// partial autocorrelations of 0.999 and more count as none.
+#[must_use]
+pub fn stationary(a: &[f64]) -> bool {
+    let mut a = a.to_vec();
+    while let Some(k) = a.pop() {
+        if k.abs() >= 0.999 {
+            return false;
+        }
+        let rest = a.clone();
+        let m = rest.len();
+        for i in 0..m {
+            a[i] = (rest[i] + k * rest[m - 1 - i]) / (1.0 - k * k);
+        }
+    }
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -451,5 +469,36 @@ mod tests {
         assert!((ar.ln_likelihood(&[x, y], &mut [0.0; 2]) - two).abs() < 1e-14);
         assert!((ar.ln_sd_sum(2) - (2.0_f64 * 2.0 * 0.8).ln()).abs() < 1e-14);
         assert_eq!(ar.ln_likelihood(&[], &mut []), 0.0);
+    }
+
+    /// The roots of the characteristic polynomial all lie inside the unit circle.
+    #[test]
+    fn a_process_is_stationary_when_its_roots_are_inside_the_unit_circle() {
+        // Coefficients of `(1 - p z)(1 - q z)(1 - r z)`.
+        let product = |p: f64, q: f64, r: f64| [p + q + r, -(p * q + p * r + q * r), p * q * r];
+        for (p, q, r, wanted) in [
+            (0.5, 0.3, -0.4, true),
+            (0.95, 0.9, 0.85, true),
+            (0.95, -0.97, 0.3, true),
+            (1.05, 0.4, 0.2, false),
+            (0.5, -1.02, 0.1, false),
+            (0.2, 1.2, 0.9, false),
+            (0.2, 1.2, 0.7, false),
+        ] {
+            assert_eq!(stationary(&product(p, q, r)), wanted, "{p} {q} {r}");
+        }
+        // The triangle of two coefficients.
+        for (a, b, wanted) in [
+            (0.5, 0.45, true),
+            (0.5, 0.55, false),
+            (-1.4, -0.6, true),
+            (-1.7, -0.6, false),
+            (0.2, -0.998, true),
+            (0.2, -0.9995, false),
+            (1.5, -0.6, true),
+        ] {
+            assert_eq!(stationary(&[a, b]), wanted, "{a} {b}");
+        }
+        assert!(stationary(&[]) && stationary(&[0.998]) && !stationary(&[0.999]) && !stationary(&[-1.0]));
     }
 }

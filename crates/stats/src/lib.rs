@@ -7,8 +7,11 @@
 //! | [`normal`], [`student`], [`tails`] | distributions: densities, tails, quantiles |
 //! | [`robust`] | Huber and Student losses, weights, M-estimate of location |
 //! | [`ar`] | autoregressive noise: fit, order, exact whitening, likelihood |
+//! | [`foretell`] | what the numbers of a row foretell of its first one, by robust least squares |
 //! | [`moments`] | sums in order, compensated; running mean and variance |
 //! | [`select`] | quantiles of more numbers than memory holds |
+//! | [`linear`] | small dense matrices: Cholesky, products |
+//! | [`spectrum`] | power of evenly sampled columns, its lines |
 //! | [`rank`] | ranks and Spearman's correlation |
 //!
 //! Everything is `f64`, deterministic (`libm`, sums in the order given: the same bits on every machine and for any
@@ -18,13 +21,16 @@
 
 pub mod ar;
 pub mod curve;
+pub mod foretell;
 pub mod interval;
+pub mod linear;
 pub mod moments;
 pub mod normal;
 pub mod order;
 pub mod rank;
 pub mod robust;
 pub mod select;
+pub mod spectrum;
 pub mod student;
 pub mod tails;
 
@@ -34,11 +40,14 @@ pub use interval::{Interval, mean_interval, wilson, wilson_at};
 pub use moments::{Moments, Sum, mean, rms, sd, variance};
 pub use order::{
     MAD_TO_SD, extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of,
-    quantile_of_sorted, sorted,
+    quantile_of_sorted, roughness, sorted,
 };
 pub use rank::spearman;
 pub use robust::Loss;
 pub use select::quantiles_along;
+
+/// Standard deviation of a number spread evenly over one, to three digits.
+pub const UNIFORM_SD: f64 = 0.289;
 
 /// Half width of the two-sided 95 % interval of a normal distribution, in standard deviations.
 pub const Z95: f64 = 1.959_963_984_540_054;

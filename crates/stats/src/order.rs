@@ -105,6 +105,15 @@ pub(crate) fn between(low: f64, high: f64, share: f64) -> f64 {
     if low == high { low } else { low + share * (high - low) }
 }
 
+/// Standard deviation of columns about smooth courses, by their third differences (which of independent noise have twenty times its
+/// variance): the scaled median of all.
+#[must_use]
+pub fn roughness<'a>(columns: impl IntoIterator<Item = &'a [f64]>) -> f64 {
+    let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+    let mut all: Vec<f64> = columns.into_iter().flat_map(|x| x.windows(4).map(third)).collect();
+    median(&mut all) * MAD_TO_SD / 20.0_f64.sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,5 +181,22 @@ mod tests {
         assert_eq!(quantile_of_sorted(&[1.0, 3.0], 0.25), 1.5);
         assert_eq!(quantile_of_sorted(&[1.0, 3.0], 1.0), 3.0);
         assert!(quantile_of_sorted(&[], 0.5).is_nan() && quantile_of_sorted(&[1.0], -0.1).is_nan());
+    }
+
+    #[test]
+    fn roughness_is_what_third_differences_leave() {
+        let parabola: Vec<f64> = (0..40).map(|k| f64::from(k * k) - 3.0 * f64::from(k)).collect();
+        assert!(roughness([parabola.as_slice()]) < 1e-9);
+        // Alternating by one to either side: third differences of eight.
+        let rough: Vec<f64> =
+            parabola.iter().enumerate().map(|(k, x)| x + if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        assert!(
+            (roughness([rough.as_slice()]) - 8.0 * 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3,
+            "{}",
+            roughness([rough.as_slice()])
+        );
+        // A step in two samples of forty is none.
+        let cubic: Vec<f64> = (0..40).map(|k| f64::from(k).powi(3) / 6.0).collect();
+        assert!((roughness([cubic.as_slice()]) - 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3);
     }
 }

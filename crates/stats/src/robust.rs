@@ -187,4 +187,19 @@ mod tests {
         }
         assert_eq!(location(&[1.0, 2.0, 6.0], 1.0, Loss::Squares), (3.0, 3.0));
     }
+
+    #[test]
+    fn the_weight_in_least_squares_is_the_slope_of_the_loss_over_the_deviate() {
+        let loss = Loss::Huber { k: 2.5 };
+        for (w, value, weight) in
+            [(1.3, 0.845, 1.0), (-2.4, 2.88, 1.0), (4.0, 6.875, 0.625), (-7.5, 15.625, 1.0 / 3.0)]
+        {
+            assert!((loss.value(w) - value).abs() < 1e-12 && (loss.weight(w) - weight).abs() < 1e-12, "{w}");
+        }
+        assert_eq!(loss.weight(2.5), 1.0);
+        for w in [-6.3, -1.1, 0.4, 2.2, 3.7] {
+            let slope = (loss.value(w + 1e-6) - loss.value(w - 1e-6)) / 2e-6;
+            assert!((loss.weight(w) * w - slope).abs() < 1e-6, "{w}");
+        }
+    }
 }

@@ -93,6 +93,9 @@ pub struct ParameterInfo {
     pub start: f64,
     /// Where a fit should look, for forces of 0.5-6 N, layers of 5-80 mm and 0.5-13 mm/s.
     pub search: (f64, f64),
+    /// Where it shows in a reference insertion of some newtons and centimetres, when a typical value does not.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub shown: Option<f64>,
     /// True when the search should go in the logarithm.
     pub log: bool,
     /// True when only whole numbers make sense.
@@ -125,6 +128,7 @@ impl ParameterInfo {
             strength: true,
             start: 1.0,
             search: (0.0, 1.0),
+            shown: None,
             log: false,
             whole: false,
             differs: 0.0,
@@ -149,6 +153,11 @@ impl ParameterInfo {
     /// Typical value and range of a fit.
     pub(crate) const fn search(self, start: f64, low: f64, high: f64) -> Self {
         Self { start, search: (low, high), ..self }
+    }
+
+    /// A value that shows in a reference insertion.
+    pub(crate) const fn shown(self, shown: f64) -> Self {
+        Self { shown: Some(shown), ..self }
     }
 
     /// To be searched in the logarithm.

@@ -5,7 +5,7 @@ mod engine;
 mod examine;
 mod journal;
 #[cfg(feature = "own_world")]
-mod own;
+pub mod own;
 
 pub use again::Planning;
 pub use examine::{Asked, Examination};

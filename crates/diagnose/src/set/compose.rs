@@ -1,6 +1,5 @@
 //! Layers measured alone, put together: does a layer behave alone as it does in a stack?
 
-use crate::raw::{self, Raw};
 use crate::set::first::{Insertion, plain};
 use crate::set::fitted::{Fitted, blocks, refitted};
 use crate::set::laws::{Kind, slipping};
@@ -13,6 +12,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::model::{Belief, Choice, Day, Model};
 use stylet_record::Recording;
+use stylet_record::raw::{self, Raw};
 use stylet_stats::median_of;
 use stylet_tissue::Tissue;
 

@@ -1,6 +1,5 @@
 //! The fit of a set from several starts: the objective has many optima, and one start in three finds the best.
 
-use crate::raw::Raw;
 use crate::set::first::{DAY_FRICTION, DAY_SURFACE_M, Guess, Insertion, first};
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rayon::prelude::*;
@@ -12,6 +11,7 @@ use stylet_identify::model::{Model, Role};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
+use stylet_record::raw::Raw;
 use stylet_tissue::Tissue;
 
 /// Length of the blocks of a set in s: insertions repeat no better.
@@ -254,7 +254,6 @@ mod tests {
         AGREE, Guess, SAME, SET_BLOCK_S, WITHIN, apart, blocks, guess, refitted, settle, spreads, unsettled,
     };
     use crate::made::{SENSOR_N, believed, gel, insertions, settled};
-    use crate::raw::Raw;
     use crate::set::Insertion;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use std::sync::Arc;
@@ -262,6 +261,7 @@ mod tests {
     use stylet_identify::model::{Choice, Day, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, residuals};
+    use stylet_record::raw::Raw;
     use stylet_tissue::{AnyEffect, Effect, LetGo};
 
     /// What a start begins with, each as its place between the ends of what is thought possible: none at the lower one, 1 at the upper.

@@ -2,7 +2,6 @@
 //! recordings left out.
 
 use crate::base::{Prepared, base};
-use crate::raw::Raw;
 use crate::select::Search;
 use crate::set::first::{Insertion, groups, plain};
 use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks, fitted, refitted};
@@ -15,6 +14,7 @@ use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::{Effort, fit as fitted_on};
 use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
+use stylet_record::raw::Raw;
 use stylet_tissue::{AnyEffect, Effect, EffectInfo, ShaftSlip, Tissue};
 
 /// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
@@ -23,8 +23,6 @@ const STARTS: usize = 24;
 const START_FITS: usize = 300;
 /// The library is searched for what it adds with about so many insertions.
 const SEARCHED: usize = 6;
-/// Standard deviation of a number spread evenly over one.
-const EVENLY_SD: f64 = 0.289;
 /// A law is judged by so many parts of the set, each left out once ...
 const FOLDS: usize = 3;
 /// ... and by single recordings left out when there are no more than so many: two thirds of few say little of a law.
@@ -147,7 +145,7 @@ pub fn laws(
 
 /// Noise (N) that the steps of a sensor make.
 fn floor_n(raw: &Raw) -> f64 {
-    raw.step_n.unwrap_or(0.0) * EVENLY_SD
+    raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD
 }
 
 /// Of the laws that were tried the one that predicts recordings left out best; the base law where the others are hardly better.
@@ -378,13 +376,13 @@ mod tests {
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
-    use crate::raw::Raw;
     use crate::set::Insertion;
     use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks};
     use crate::set::left_out::{score, without};
     use crate::set::population::predict;
     use stylet_identify::model::{Bound, Choice, Model};
     use stylet_record::Recording;
+    use stylet_record::raw::Raw;
     use stylet_tissue::{
         AnyEffect, CoulombFriction, DelayedPuncture, Effect, ForceBias, ForceDrift, LetGo, PowerLawFriction,
         ShaftSlip, StribeckFriction,

@@ -5,7 +5,6 @@ use crate::outcome::{
     Cause, Diagnosis, Differences, Estimate, EvidenceStep, Gain, LeftoverReport, NoiseReport, Rival, Trace,
     Verdict,
 };
-use crate::raw;
 use crate::set::first::{Insertion, groups};
 use crate::set::instrument::{Checks, Instrument, Undone};
 use crate::set::laws::{Kind, Law, Laws, effects, laws, several, slip};
@@ -16,6 +15,7 @@ use crate::set::scenario::extended;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::collections::BTreeMap;
 use stylet_identify::phases::noise_n;
+use stylet_record::raw;
 use stylet_scenario::Scenario;
 use stylet_tissue::{Effect, PowerLawFriction, RateDependentPuncture, Tissue};
 
@@ -296,7 +296,6 @@ mod tests {
     };
     use crate::made;
     use crate::outcome::{Diagnosis, Verdict};
-    use crate::raw::Raw;
     use crate::set::Insertion;
     use crate::set::instrument::Instrument;
     use crate::set::laws::{Kind, Law, Laws, Part};
@@ -304,6 +303,7 @@ mod tests {
     use crate::set::numbers::Told;
     use crate::set::repeats::{MeanReport, Repeats, Varies};
     use stylet_record::Recording;
+    use stylet_record::raw::Raw;
     use stylet_tissue::{AnyEffect, CoulombFriction};
 
     fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {

@@ -34,7 +34,8 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("depth_m", "m", "depth below the surface")
             .allowed(0.0, 1.0)
             .neutral(0.02)
-            .search(0.02, 0.001, 0.2),
+            .search(0.02, 0.001, 0.2)
+            .shown(0.005),
         ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness")
             .allowed(0.0, 1e6)
             .search(100.0, 5.0, 5000.0)

@@ -86,6 +86,11 @@ macro_rules! effects {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
         }
 
+        $(impl $name {
+            /// Its name in files.
+            pub const ID: &'static str = stringify!($module);
+        })*
+
         $(impl From<$name> for AnyEffect {
             fn from(effect: $name) -> Self { Self::$name(effect) }
         })*

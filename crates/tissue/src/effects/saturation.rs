@@ -30,6 +30,7 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(0.0, f64::INFINITY)
         .neutral(f64::INFINITY)
         .search(4.0, 0.2, 50.0)
+        .shown(1.6)
         .log()],
     larger: None,
     proposal: Proposal::Raw,

@@ -8,6 +8,7 @@ use stylet_examine::reality::motion::{Path, Piece};
 use stylet_examine::{Again, Answer, CaseId};
 use stylet_plan::Limits;
 use stylet_scenario::{Motion, Segment};
+use stylet_tissue::ForceGain;
 
 /// One case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,7 +64,7 @@ fn go_through(id: &CaseId, case: &mut Case) -> Result<(), String> {
     let mut first = Again::new(id);
     case.hidden = first.hidden().join("+");
     // A gain cannot be seen in any motion.
-    if case.hidden == "force_gain" {
+    if case.hidden == ForceGain::ID {
         return Ok(());
     }
     first.insert(first.constant()).map_err(|e| text(&e))?;

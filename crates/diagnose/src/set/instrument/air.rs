@@ -1,9 +1,9 @@
 //! A sensor that touches nothing: what it shows in air, in a recording of its own or before an insertion reaches the tissue.
 
 use crate::set::first::Insertion;
-use stylet_identify::linear::{Symmetric, dot};
 use stylet_identify::phases::noise_n;
 use stylet_record::Recording;
+use stylet_stats::linear::{Symmetric, dot};
 use stylet_stats::{mean, median_of, rms};
 
 /// Share of the way to the believed surface that counts as air: the surface may be nearer than believed.

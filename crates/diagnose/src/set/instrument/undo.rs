@@ -1,9 +1,9 @@
 //! Insertions as an instrument without its faults would have measured them.
 
 use super::{Instrument, NOTHING};
-use crate::raw::{self, Raw};
 use crate::set::first::Insertion;
 use stylet_record::Recording;
+use stylet_record::raw::{self, Raw};
 use stylet_tissue::AnyEffect;
 
 /// The slope of the force is taken over so many samples to either side.

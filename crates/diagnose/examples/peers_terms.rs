@@ -1,0 +1,171 @@
+//! What sparse regressions are given of the cases of an exported challenge, and this diagnosis's own answers:
+//! `cargo run --release -p stylet-diagnose --example peers_terms -- CHALLENGE OUT`
+//!
+//! Per case `NNNN.json` (columns by name, times) with two tables, `NNNN.plain.f32` and `NNNN.white.f32`: the residual of the fitted
+//! base law, what each of the base law's numbers changes, and what every effect of the library adds at the values from which the
+//! diagnosis's own search begins (of effects with a frequency or a depth of their own at the two best of that search). In standard
+//! deviations of the noise, plain or whitened as the diagnosis does; column after column, little-endian. `NNNN.stylet.json` is the
+//! diagnosis. Files that are there stay: an interrupted run goes on where it stopped.
+use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+use stylet_diagnose::base::{Prepared, base};
+use stylet_diagnose::propose::starts;
+use stylet_diagnose::{Evidence, Options, belief, diagnose};
+use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_identify::fit::{Column, Fit};
+use stylet_identify::look::Look;
+use stylet_identify::model::Choice;
+use stylet_identify::noise::Noise;
+use stylet_identify::objective::{Data, residuals};
+use stylet_record::{ReadOptions, read_csv};
+use stylet_scenario::Scenario;
+use stylet_tissue::{Proposal, library};
+
+type Error = Box<dyn std::error::Error>;
+
+fn main() -> Result<(), Error> {
+    let args: Vec<String> = std::env::args().collect();
+    let [_, challenge, out] = &args[..] else { return Err("peers_terms CHALLENGE OUT".into()) };
+    let out = Path::new(out);
+    std::fs::create_dir_all(out)?;
+    let mut cases: Vec<_> =
+        std::fs::read_dir(Path::new(challenge).join("cases"))?.collect::<Result<_, _>>()?;
+    cases.sort_by_key(std::fs::DirEntry::file_name);
+    for case in &cases {
+        let stem = out.join(case.file_name());
+        let (about, answer) = (stem.with_extension("json"), stem.with_extension("stylet.json"));
+        if about.exists() && answer.exists() {
+            continue;
+        }
+        let (scenario, evidence) = given(&case.path())?;
+        if !about.exists() {
+            write_terms(&stem, &scenario, &evidence)?;
+        }
+        let start = Instant::now();
+        let examined = diagnose(&scenario, &evidence, &Options::default(), |_| {})?;
+        let mut said = serde_json::to_value(&examined.diagnosis)?;
+        said["seconds"] = json!(start.elapsed().as_secs_f64());
+        put(&answer, &serde_json::to_vec(&said)?)?;
+        println!("{} of {}", case.file_name().display(), cases.len());
+    }
+    Ok(())
+}
+
+/// What an entrant to the challenge sees.
+fn given(folder: &Path) -> Result<(Scenario, Vec<Evidence>), Error> {
+    let believed = folder.join("believed.ron");
+    let scenario = Scenario::parse(&believed.display().to_string(), &std::fs::read_to_string(&believed)?)?;
+    let mut evidence = Vec::new();
+    for k in 1.. {
+        let path = folder.join(format!("{k}.csv"));
+        if !path.exists() {
+            break;
+        }
+        let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
+        evidence.push(Evidence { name: format!("{k}.csv"), recording, notes });
+    }
+    Ok((scenario, evidence))
+}
+
+fn write_terms(stem: &Path, scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Error> {
+    let start = Instant::now();
+    let blocks: Vec<Blocks> = evidence.iter().map(|e| Blocks::new(&e.recording, &[], BLOCK_S)).collect();
+    let prepared = Prepared::new(Arc::new(belief(scenario)), blocks, 0.0);
+    let (fit, data) = base(&prepared).ok_or("no base fit")?;
+    let base_s = start.elapsed().as_secs_f64();
+    let chosen = choices(&fit, &data, &prepared);
+    let plain = data.with_noise(Noise::white(data.noise.sd_n()));
+    let again = residuals(&fit.model, &plain).ok_or("no replay")?;
+    let (names, groups) = table(&fit, &data, &chosen, &stem.with_extension("white.f32"))?;
+    let as_plain = Fit { residuals: again, ..fit };
+    table(&as_plain, &plain, &chosen, &stem.with_extension("plain.f32"))?;
+    let about = json!({
+        "recordings": evidence.len(),
+        "rows": groups.len(),
+        "recording": groups,
+        "columns": names,
+        "base_s": base_s,
+        "terms_s": start.elapsed().as_secs_f64() - base_s,
+    });
+    put(&stem.with_extension("json"), &serde_json::to_vec(&about)?)
+}
+
+/// Effects at the values from which the search begins.
+fn choices(fit: &Fit, data: &Data, prepared: &Prepared) -> Vec<Choice> {
+    let look = Look::new(fit, data);
+    let lines = stylet_diagnose::lines::lines(fit, data);
+    let mut out = Vec::new();
+    for info in library() {
+        match info.proposal {
+            Proposal::Columns(groups) => {
+                out.extend(groups.iter().flat_map(|g| g.iter()).map(|v| Choice::new(info, v)));
+            }
+            Proposal::Faces(shift) => {
+                out.extend((1..fit.model.layers()).map(|l| Choice::new(info, &[l as f64, shift])));
+            }
+            _ => {}
+        }
+    }
+    let sought = starts(&look, prepared, &lines).into_iter().flatten().map(|s| s.choice);
+    out.extend(
+        sought.filter(|c| matches!(c.info.proposal, Proposal::Breath | Proposal::Line | Proposal::Break)),
+    );
+    out
+}
+
+/// Writes a table; gives the effect of every column but the residual's, nothing for those of the base law, and the recording of every
+/// row, those of the rows of ruptures beyond the number of recordings.
+fn table(
+    fit: &Fit,
+    data: &Data,
+    choices: &[Choice],
+    path: &Path,
+) -> Result<(Vec<&'static str>, Vec<usize>), Error> {
+    let look = Look::new(fit, data);
+    let (recordings, shared) = (data.recordings(), look.tangent.shared.len());
+    let mut names = Vec::new();
+    let mut columns: Vec<Vec<f64>> = vec![rows(&look.tangent.rest, |_| true)];
+    for (k, column) in look.tangent.columns.iter().enumerate() {
+        // A recording's own number changes that recording alone.
+        for own in 0..if k < shared { 1 } else { recordings } {
+            columns.push(rows(column, |r| k < shared || r == own));
+            names.push("");
+        }
+    }
+    for choice in choices {
+        if let Some(column) = look.column(choice) {
+            columns.push(rows(&column, |_| true));
+            names.push(choice.info.id);
+        }
+    }
+    let rest = &look.tangent.rest;
+    let of = |parts: &[Vec<f64>], from: usize| -> Vec<usize> {
+        parts.iter().enumerate().flat_map(|(r, x)| vec![from + r; x.len()]).collect()
+    };
+    let groups = [of(&rest.w, 0), of(&rest.rows, recordings)].concat();
+    let bytes: Vec<u8> = columns.into_iter().flatten().flat_map(|x| (x as f32).to_le_bytes()).collect();
+    put(path, &bytes)?;
+    Ok((names, groups))
+}
+
+/// A column's rows: blocks recording by recording, then ruptures.
+fn rows(column: &Column, which: impl Fn(usize) -> bool) -> Vec<f64> {
+    let mut out = Vec::new();
+    for parts in [&column.w, &column.rows] {
+        for (r, part) in parts.iter().enumerate() {
+            out.extend(part.iter().map(|x| if which(r) && x.is_finite() { *x } else { 0.0 }));
+        }
+    }
+    out
+}
+
+/// Written beside, then renamed.
+fn put(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    std::fs::write(&beside, bytes)?;
+    std::fs::rename(&beside, path)?;
+    Ok(())
+}

@@ -1,0 +1,19 @@
+//! What a challenge hides, for who has its key and tunes on it: case number -> what a right answer says, as JSON.
+//! `cargo run --release -p stylet-examine --example truth -- CHALLENGE > truth.json`
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use stylet_examine::case;
+use stylet_examine::challenge::{Key, key_path};
+use stylet_examine::judge::answers::expected;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("truth CHALLENGE")?);
+    let key: Key = serde_json::from_slice(&std::fs::read(key_path(&folder))?)?;
+    let mut out = BTreeMap::new();
+    for (number, id) in &key.cases {
+        out.insert(number, expected(id, &case(id)?.setup));
+    }
+    println!("{}", serde_json::to_string_pretty(&out)?);
+    Ok(())
+}

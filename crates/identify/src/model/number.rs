@@ -1,0 +1,58 @@
+/// What a number is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Stiffness of a layer (0-based).
+    Stiffness(usize),
+    /// Friction of a layer.
+    Friction(usize),
+    /// Puncture force of a layer.
+    Puncture(usize),
+    /// Position of the surface.
+    Surface,
+    /// Thickness of a layer.
+    Thickness(usize),
+    /// A parameter of an effect.
+    Effect {
+        /// Which effect of the model.
+        effect: usize,
+        /// Which of its parameters.
+        parameter: usize,
+    },
+    /// Surface of each recording's own: as many numbers as recordings.
+    OwnSurface,
+    /// Friction of each recording's own.
+    OwnFriction,
+    /// One of the numbers that differ between insertions ([`Model::differing`]).
+    OwnEffect(usize),
+    /// Surface of a day.
+    DaySurface(usize),
+    /// Friction of a day.
+    DayFriction(usize),
+    /// The instant of a layer's rupture (0-based), one number per recording.
+    Instant(usize),
+}
+
+impl Role {
+    /// Whether every recording has such a number of its own.
+    #[must_use]
+    pub fn is_own(self) -> bool {
+        matches!(self, Role::OwnSurface | Role::OwnFriction | Role::OwnEffect(_) | Role::Instant(_))
+    }
+}
+
+/// A number of the fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Number {
+    /// What it is.
+    pub role: Role,
+    /// Smallest value.
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+    /// Middle of the prior.
+    pub mean: f64,
+    /// Standard deviation of the prior; infinite for none.
+    pub sd: f64,
+    /// Step of the numeric derivative.
+    pub step: f64,
+}

@@ -1,0 +1,323 @@
+//! Normalised innovations of residuals, and residuals of innovations.
+
+use super::slow::{SLOW, slow_means, sums};
+use super::{Bin, Noise, ORDER};
+use crate::blocks::Blocks;
+
+/// How the blocks of one recording are whitened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Laid {
+    rows: Vec<Row>,
+    /// Some range has a slow wander.
+    wander: bool,
+    /// Blocks one after the other of one range, all with [`ORDER`] before them and without a wander: first, end, range.
+    even: Vec<(usize, usize, u32)>,
+}
+
+/// How one block is whitened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Row {
+    /// Range of the force.
+    bin: u32,
+    /// Blocks that are known before it, without a break.
+    run: u32,
+    /// Blocks before it to which the memory of a slow wander reaches.
+    reach: u32,
+    /// Standard deviation of its innovation in N; infinite when it is not compared.
+    sd_n: f64,
+}
+
+impl Noise {
+    /// How the blocks of a recording are whitened.
+    #[must_use]
+    pub fn laid(&self, b: &Blocks) -> Laid {
+        let mut run = 0;
+        let lasting = self.lasting;
+        let rows = (0..b.len()).map(|k| {
+            run = if b.restart[k] { 0 } else { run + 1 };
+            if !b.used[k] {
+                return Row { bin: 0, run: 0, reach: 0, sd_n: f64::INFINITY };
+            }
+            let bin = self.bin(b.size_n[k]).min(self.bins.len() - 1);
+            let of = &self.bins[bin];
+            let sd = of.size_n(run);
+            let sd_n = if b.doubt_n[k] > 0.0 { libm::hypot(sd, b.doubt_n[k]) } else { sd };
+            Row { bin: bin as u32, run: run as u32, reach: if lasting { k as u32 } else { run as u32 }, sd_n }
+        });
+        let rows: Vec<Row> = rows.collect();
+        let mut even: Vec<(usize, usize, u32)> = Vec::new();
+        for (k, row) in rows.iter().enumerate() {
+            if row.sd_n == f64::INFINITY
+                || (row.run as usize) < ORDER
+                || self.bins[row.bin as usize].wanders()
+            {
+                continue;
+            }
+            match even.last_mut() {
+                Some((_, end, bin)) if *end == k && *bin == row.bin => *end += 1,
+                _ => even.push((k, k + 1, row.bin)),
+            }
+        }
+        Laid { rows, wander: self.bins.iter().any(Bin::wanders), even }
+    }
+
+    /// Normalised innovations of residuals `e` (N) of a recording; blocks that are not compared give zero.
+    #[must_use]
+    pub fn whiten(&self, laid: &Laid, e: &[f64]) -> Vec<f64> {
+        let sums = match (laid.wander, self.lasting) {
+            (false, _) => Vec::new(),
+            (true, false) => sums(e, |_| true),
+            (true, true) => sums(e, |k| laid.rows[k].sd_n.is_finite()),
+        };
+        let one = |k: usize, row: &Row| {
+            if row.sd_n == f64::INFINITY {
+                return 0.0;
+            }
+            let (near, slow) = self.memory(row);
+            let mut w = e[k];
+            for (a, before) in near.iter().zip(e[k - ORDER.min(row.run as usize)..k].iter().rev()) {
+                w -= a * before;
+            }
+            if laid.wander && *slow != [0.0; SLOW.len()] {
+                for (mean, slow) in slow_means(&sums, k, row.reach as usize).iter().zip(slow) {
+                    w -= slow * mean;
+                }
+            }
+            w / row.sd_n
+        };
+        let mut out = vec![0.0; e.len()];
+        // Where there is nothing, and nothing is remembered, nothing comes out.
+        let reach = if laid.wander { SLOW[SLOW.len() - 1].1 } else { ORDER };
+        let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
+        let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
+        let mut at = first;
+        for &(from, to, bin) in laid.even.iter().chain([&(e.len(), e.len(), 0)]) {
+            let (from, to) = (from.clamp(first, end.max(first)), to.min(end));
+            for k in at..from {
+                out[k] = one(k, &laid.rows[k]);
+            }
+            if from >= to {
+                at = at.max(from);
+                continue;
+            }
+            let a = &self.bins[bin as usize].a;
+            let rows = &laid.rows[from..to];
+            for ((out, row), e) in
+                out[from..to].iter_mut().zip(rows).zip(e[from - ORDER..to].windows(ORDER + 1))
+            {
+                let mut w = e[ORDER];
+                for i in 0..ORDER {
+                    w -= a[i] * e[ORDER - 1 - i];
+                }
+                *out = w / row.sd_n;
+            }
+            at = to;
+        }
+        out
+    }
+
+    /// Residuals (N) of a recording whose normalised innovations are `w`: the inverse of [`whiten`](Self::whiten), nothing where blocks
+    /// are not compared.
+    #[must_use]
+    pub fn colour(&self, laid: &Laid, w: &[f64]) -> Vec<f64> {
+        let mut e = vec![0.0; w.len()];
+        let mut sums = vec![0.0; w.len() + 1];
+        for (k, row) in laid.rows.iter().enumerate() {
+            if row.sd_n.is_finite() {
+                let (near, slow) = self.memory(row);
+                let run = ORDER.min(row.run as usize);
+                let mut x = w[k] * row.sd_n;
+                for (a, before) in near.iter().zip(e[k - run..k].iter().rev()) {
+                    x += a * before;
+                }
+                if laid.wander {
+                    let means = slow_means(&sums, k, row.reach as usize);
+                    x += means.iter().zip(slow).map(|(mean, slow)| slow * mean).sum::<f64>();
+                }
+                e[k] = x;
+            }
+            sums[k + 1] = sums[k] + e[k];
+        }
+        e
+    }
+
+    /// How a block is foretold: coefficients of those before it, and of the means of stretches further back.
+    fn memory(&self, row: &Row) -> (&[f64; ORDER], &[f64; SLOW.len()]) {
+        let bin = &self.bins[row.bin as usize];
+        bin.first.get(row.run as usize).map_or((&bin.a, &bin.slow), |f| (&f.a, &f.slow))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::First;
+    use super::super::tests::{near, normal, still};
+    use super::*;
+    use stylet_stats::Ar;
+    use stylet_stats::linear::Symmetric;
+
+    /// Bins whose first blocks after a break are foretold as those of an autoregressive process of a known covariance are.
+    fn of_process(ar: &Ar) -> (Bin, Vec<f64>) {
+        let mut c = vec![0.0; 12];
+        ar.autocovariance(&mut c);
+        let mut bin = Bin::white(c[0].sqrt());
+        for run in 0..=ORDER {
+            let mut h = Symmetric::zeros(run);
+            for i in 0..run {
+                for j in 0..=i {
+                    h.add(i, j, c[i - j]);
+                }
+            }
+            let a = h.factor().solve(&c[1..=run]);
+            let left = c[0] - a.iter().zip(&c[1..]).map(|(a, c)| a * c).sum::<f64>();
+            let mut padded = [0.0; ORDER];
+            padded[..run].copy_from_slice(&a);
+            if run == ORDER {
+                (bin.a, bin.innovation_n) = (padded, left.sqrt());
+            } else {
+                bin.first[run] = First { a: padded, slow: [0.0; SLOW.len()], sd_n: left.sqrt() };
+            }
+        }
+        (bin, c)
+    }
+
+    /// The logarithm of the density of a normal vector with this covariance, by a naive factor.
+    fn ln_density(e: &[f64], covariance: impl Fn(usize, usize) -> f64) -> f64 {
+        let n = e.len();
+        let mut l = vec![vec![0.0; n]; n];
+        let (mut y, mut sum) = (vec![0.0; n], -0.5 * n as f64 * libm::log(core::f64::consts::TAU));
+        for i in 0..n {
+            for j in 0..=i {
+                let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+                let left = covariance(i, j) - known;
+                l[i][j] = if i == j { left.sqrt() } else { left / l[j][j] };
+            }
+            let known: f64 = (0..i).map(|k| l[i][k] * y[k]).sum();
+            y[i] = (e[i] - known) / l[i][i];
+            sum -= 0.5 * y[i] * y[i] + libm::log(l[i][i]);
+        }
+        sum
+    }
+
+    #[test]
+    fn whitened_noise_has_the_likelihood_of_the_dense_covariance() {
+        let ar = Ar::from_reflection(&[0.6, -0.35, 0.2, 0.1], 0.03);
+        let (bin, c) = of_process(&ar);
+        let mut b = still(12);
+        // A block that is not compared ends the memory.
+        b.used[7] = false;
+        b.restart[8] = true;
+        let noise = Noise { edges_n: Vec::new(), bins: vec![bin], lasting: false };
+        let e: Vec<f64> = normal(5, 12).into_iter().map(|x| 0.03 * x).collect();
+        let w = noise.whiten(&noise.laid(&b), &e);
+        let told: f64 = -w.iter().map(|w| 0.5 * w * w).sum::<f64>()
+            - noise.ln_sizes(std::slice::from_ref(&b))
+            - 0.5 * 11.0 * libm::log(core::f64::consts::TAU);
+        let toeplitz = |i: usize, j: usize| c[i.abs_diff(j)];
+        near(told, ln_density(&e[..7], toeplitz) + ln_density(&e[8..], toeplitz));
+        assert_eq!(w[7], 0.0);
+        // What sampling leaves open of a block is added to its own size alone.
+        b.doubt_n[4] = 0.05;
+        let doubted = noise.whiten(&noise.laid(&b), &e);
+        near(doubted[4], w[4] * bin.innovation_n / (bin.innovation_n * bin.innovation_n + 0.0025).sqrt());
+        assert_eq!([doubted[3], doubted[5]], [w[3], w[5]]);
+    }
+
+    /// Two ranges with a slow wander of their own, breaks, and blocks that are not compared.
+    fn wandering(lasting: bool) -> (Noise, Blocks) {
+        let mut b = still(900);
+        for k in 0..900 {
+            b.size_n[k] = if k % 7 < 3 { 0.4 } else { 1.1 };
+            b.used[k] = k % 53 != 0;
+            b.restart[k] = k % 53 == 1 || k == 300;
+        }
+        let bin = |x: f64| {
+            let mut bin = Bin::white(0.02 * x);
+            bin.a = [0.3 * x, 0.1, -0.05 * x, 0.02];
+            bin.slow = [0.2, 0.1 * x, 0.15];
+            bin.innovation_n = 0.015 * x;
+            for (k, first) in bin.first.iter_mut().enumerate() {
+                first.a[..k].copy_from_slice(&[0.31 * x, 0.11, 0.05][..k]);
+                first.slow = [0.25, 0.11, 0.05 * x];
+                first.sd_n = 0.03 - 0.002 * k as f64;
+            }
+            bin
+        };
+        (Noise { edges_n: vec![0.9], bins: vec![bin(1.0), bin(1.3)], lasting }, b)
+    }
+
+    /// One block by the definition: those before it since the break, and the means of stretches before those.
+    fn innovation_of(noise: &Noise, b: &Blocks, e: &[f64], k: usize) -> f64 {
+        let since = (0..=k).rev().find(|j| b.restart[*j]).unwrap_or(0);
+        let bin = &noise.bins[usize::from(b.size_n[k] >= 0.9)];
+        let run = k - since;
+        let (a, slow, sd) = match bin.first.get(run) {
+            Some(f) => (f.a, f.slow, f.sd_n),
+            None => (bin.a, bin.slow, bin.innovation_n),
+        };
+        let mut w = e[k];
+        for i in 1..=run.min(4) {
+            w -= a[i - 1] * e[k - i];
+        }
+        let begin = if noise.lasting { 0 } else { since };
+        for (slow, (from, to)) in slow.iter().zip([(4, 24), (24, 124), (124, 624)]) {
+            let counts = |j: &usize| *j >= begin && (!noise.lasting || b.used[*j]);
+            let stretch = (k.saturating_sub(to)..k.saturating_sub(from)).filter(counts);
+            w -= slow * stretch.map(|j| e[j]).sum::<f64>() / (to - from) as f64;
+        }
+        w / sd
+    }
+
+    /// By the definition, wherever they begin and end.
+    #[test]
+    fn residuals_that_are_nothing_at_their_ends_leave_nothing_beyond_their_memory() {
+        let normals = normal(9, 900);
+        for wanders in [false, true] {
+            let (mut noise, b) = wandering(false);
+            for bin in noise.bins.iter_mut().filter(|_| !wanders) {
+                bin.slow = [0.0; SLOW.len()];
+                bin.first.iter_mut().for_each(|f| f.slow = bin.slow);
+            }
+            let laid = noise.laid(&b);
+            assert_eq!(laid.even.is_empty(), wanders);
+            for something in [0..900, 0..1, 299..303, 411..640, 898..900, 500..500] {
+                let e: Vec<f64> =
+                    (0..900).map(|k| if something.contains(&k) { normals[k] } else { 0.0 }).collect();
+                let w = noise.whiten(&laid, &e);
+                for k in 0..900 {
+                    let wanted = if b.used[k] { innovation_of(&noise, &b, &e, k) } else { 0.0 };
+                    assert!((w[k] - wanted).abs() < 1e-9, "{} for {wanted} at {k}", w[k]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_slow_wander_is_foretold_from_the_means_of_stretches_before() {
+        for lasting in [false, true] {
+            let (noise, b) = wandering(lasting);
+            let e = normal(7, b.len());
+            let laid = noise.laid(&b);
+            let w = noise.whiten(&laid, &e);
+            for k in 0..b.len() {
+                near(w[k], if b.used[k] { innovation_of(&noise, &b, &e, k) } else { 0.0 });
+            }
+            let sizes = |k: usize| {
+                let since = (0..=k).rev().find(|j| b.restart[*j]).unwrap_or(0);
+                let bin = &noise.bins[usize::from(b.size_n[k] >= 0.9)];
+                libm::log(bin.first.get(k - since).map_or(bin.innovation_n, |f| f.sd_n))
+            };
+            near(
+                noise.ln_sizes(&[b.clone(), b.clone()]),
+                2.0 * (0..b.len()).filter(|k| b.used[*k]).map(sizes).sum::<f64>(),
+            );
+            // Coloured again it is what it was, where it is compared; what is not is nothing.
+            let bare: Vec<f64> =
+                e.iter().zip(&b.used).map(|(e, used)| if *used { *e } else { 0.0 }).collect();
+            let again = noise.colour(&laid, &noise.whiten(&laid, &bare));
+            for (told, wanted) in again.iter().zip(&bare) {
+                assert!((told - wanted).abs() < 1e-9, "{told} for {wanted}");
+            }
+        }
+    }
+}

@@ -1,0 +1,718 @@
+//! Position and velocity from noisy or coarsely rounded positions: as wide a window as the course allows.
+//!
+//! Samples are averaged in cells of about 20 ms. Jumps of the speed are where parabolas on both sides of a gap between
+//! cells meet with clearly different slopes. A stretch between two jumps is what a robot was told to do (`course`)
+//! when that leaves white noise. Else every cell takes the widest of a ladder of windows whose
+//! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
+
+use super::course::{Course, FEWEST};
+use super::velocity::{Break, Kink, breaks, parabola, position_noise, rounding};
+use stylet_stats::order::median;
+
+/// Length of a cell in s.
+const CELL_S: f64 = 0.02;
+/// Cells on each side in the search for a jump.
+const SIDE: usize = 15;
+/// Half windows in cells.
+const LADDER: [usize; 8] = [3, 5, 8, 12, 18, 27, 40, 60];
+/// Width of the confidence intervals in standard deviations.
+const GAMMA: f64 = 2.2;
+/// What leaves so many times the positions' noise is no form.
+const NO_NOISE: f64 = 2.0;
+/// A frequency (1/s) for a union of stretches of which none has one: too slow to matter.
+const NO_HINT: f64 = 1e-3;
+/// Cells within which the instant of a jump is moved to where both sides meet.
+const REACH: usize = 25;
+
+/// A smoothed course at the times of the samples.
+#[derive(Clone, Debug, Default)]
+pub struct Settled {
+    /// Position in m.
+    pub z: Vec<f64>,
+    /// Velocity in m/s.
+    pub v: Vec<f64>,
+    /// Jumps of the speed.
+    pub kinks: Vec<Kink>,
+    /// Typical standard deviation of the velocity in m/s.
+    pub sd_mps: f64,
+}
+
+/// Smooths positions `z` (m) at times `t` (s).
+#[must_use]
+pub fn settle(t: &[f64], z: &[f64]) -> Settled {
+    let n = t.len().min(z.len());
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let step = median(&mut steps).max(1e-9);
+    let q = ((CELL_S / step).round() as usize).max(1);
+    let mean =
+        |x: &[f64]| -> Vec<f64> { x.chunks(q).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect() };
+    let (tc, zc) = (mean(&t[..n]), mean(&z[..n]));
+    let cells = tc.len();
+    if cells < 2 * SIDE + 2 {
+        let v = crate::differentiate(t, z, 0.1);
+        return Settled { z: z.to_vec(), v, kinks: Vec::new(), sd_mps: f64::INFINITY };
+    }
+    let step_m = rounding(z);
+    let noise_m = position_noise(t, z) / (q as f64).sqrt();
+    let dt = step * q as f64;
+    // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
+    let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (SIDE as f64).powf(1.5));
+    let found = breaks(&tc, &zc, SIDE, 1.8 * dt, doubt);
+    let mut edges: Vec<usize> = found.iter().map(|b| b.0).collect();
+    edges.extend([0, cells]);
+    edges.sort_unstable();
+    edges.dedup();
+    let rounded_m = step_m / core::f64::consts::PI;
+    let cells = Cells { t: &tc, z: &zc, dt, noise_m, rounded_m };
+    let first = edges.windows(2).map(|e| Stretch::new(&cells, (e[0], e[1]), &[])).collect();
+    let stretches = moved(&cells, joined(&cells, split(&cells, joined(&cells, first))));
+    let kinks: Vec<Kink> = stretches.windows(2).map(|p| meet(&p[0], &p[1], &found, &cells, t)).collect();
+    let mut course = 0;
+    let (z, v): (Vec<f64>, Vec<f64>) = (0..n)
+        .map(|i| {
+            while kinks.get(course).is_some_and(|k| k.t <= t[i]) {
+                course += 1;
+            }
+            stretches[course.min(stretches.len() - 1)].at(&tc, t[i])
+        })
+        .unzip();
+    let mut sds: Vec<f64> = stretches.iter().flat_map(|s| s.sds.iter().copied()).collect();
+    Settled { z, v, kinks, sd_mps: median(&mut sds).max(1e-9) }
+}
+
+/// Means of samples: middle (s), position (m), length (s), standard deviation of the noise (m), amplitude of the first harmonic of what
+/// rounding does at an even speed (m).
+#[derive(Clone, Copy)]
+struct Cells<'a> {
+    t: &'a [f64],
+    z: &'a [f64],
+    dt: f64,
+    noise_m: f64,
+    rounded_m: f64,
+}
+
+/// What happens between two jumps of the speed.
+struct Stretch {
+    from: usize,
+    to: usize,
+    /// A form that leaves white noise.
+    course: Option<Course>,
+    /// Else position and velocity per cell.
+    local: Vec<(f64, f64)>,
+    /// Standard deviation of the velocity in m/s per cell.
+    sds: Vec<f64>,
+    /// Nats of the residual and of the numbers spent; infinite without a form.
+    cost: f64,
+}
+
+impl Stretch {
+    fn new(cells: &Cells, (from, to): (usize, usize), hints: &[f64]) -> Self {
+        let Cells { t: tc, z: zc, dt, noise_m, rounded_m } = *cells;
+        // A cell beside a jump has both speeds.
+        let (lo, hi) = (if from > 0 { from + 1 } else { 0 }, if to < tc.len() { to - 1 } else { to });
+        let course =
+            if hi > lo + FEWEST { Course::of(&tc[lo..hi], &zc[lo..hi], dt, hints, rounded_m) } else { None };
+        let course = course.filter(|c| c.white && c.sd_m < NO_NOISE * noise_m);
+        if let Some(course) = course {
+            let cells = (hi - lo) as f64;
+            // Slope of a line, doubled for a curved one.
+            let slope = 2.0 * course.sd_m * (12.0 / cells).sqrt() / (cells * dt);
+            let sd = if course.rests() { 0.0 } else { slope };
+            let cost = course.cost;
+            return Self {
+                from,
+                to,
+                course: Some(course),
+                local: Vec::new(),
+                sds: vec![sd; to - from],
+                cost,
+            };
+        }
+        let (mut local, mut sds) = (Vec::new(), Vec::new());
+        for i in from..to {
+            let (z, v, sd) = widest(tc, zc, i, (from, to), noise_m);
+            local.push((z, v));
+            sds.push(sd);
+        }
+        Self { from, to, course: None, local, sds, cost: f64::INFINITY }
+    }
+
+    /// Position and velocity at an instant within.
+    fn at(&self, tc: &[f64], t: f64) -> (f64, f64) {
+        if let Some(course) = &self.course {
+            return course.at(t);
+        }
+        let after = tc[self.from..self.to].partition_point(|c| *c < t);
+        let (z1, v1) = self.local[after.min(self.local.len() - 1)];
+        let t1 = tc[self.from + after.min(self.local.len() - 1)];
+        if after == 0 || after == self.local.len() {
+            return (z1 + v1 * (t - t1), v1);
+        }
+        let (z0, v0) = self.local[after - 1];
+        let t0 = tc[self.from + after - 1];
+        let share = (t - t0) / (t1 - t0);
+        (z0 + share * (z1 - z0), v0 + share * (v1 - v0))
+    }
+}
+
+/// Neighbours that are one form together were no neighbours: a fast ripple looks like a chain of jumps.
+fn joined(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
+    loop {
+        let before = stretches.len();
+        let mut out: Vec<Stretch> = Vec::new();
+        for next in stretches {
+            if let Some(last) = out.last_mut() {
+                let hints: Vec<f64> = [&*last, &next]
+                    .iter()
+                    .flat_map(|s| s.course.iter().flat_map(Course::frequencies))
+                    .collect();
+                let hints = if hints.is_empty() { vec![NO_HINT] } else { hints };
+                let both = Stretch::new(cells, (last.from, next.to), &hints);
+                if both.course.is_some() && both.cost < last.cost + next.cost {
+                    *last = both;
+                    continue;
+                }
+            }
+            out.push(next);
+        }
+        if out.len() == before {
+            return out;
+        }
+        stretches = out;
+    }
+}
+
+/// Cuts what is no form where its beginning ceases to be one: a small jump of the speed is not seen in a short window.
+fn split(cells: &Cells, stretches: Vec<Stretch>) -> Vec<Stretch> {
+    let mut out = Vec::new();
+    let mut todo: Vec<Stretch> = stretches.into_iter().rev().collect();
+    while let Some(stretch) = todo.pop() {
+        let (from, to) = (stretch.from, stretch.to);
+        let (mut good, mut bad) = (from + 2 * FEWEST, to);
+        let part = |end: usize| Stretch::new(cells, (from, end), &[]);
+        if stretch.course.is_some() || good + 2 * FEWEST > to || part(good).course.is_none() {
+            out.push(stretch);
+            continue;
+        }
+        while bad - good > 2 {
+            let middle = usize::midpoint(good, bad);
+            if part(middle).course.is_some() { good = middle } else { bad = middle }
+        }
+        if good + FEWEST > to {
+            out.push(stretch);
+            continue;
+        }
+        out.push(part(good));
+        todo.push(Stretch::new(cells, (good, to), &[]));
+    }
+    out
+}
+
+/// Moves borders to where both forms meet.
+fn moved(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
+    for _ in 0..2 {
+        for k in 1..stretches.len() {
+            let (left, right) = (&stretches[k - 1], &stretches[k]);
+            let Some(at) = meeting(left, right, cells) else { continue };
+            let edge = cells.t.partition_point(|t| *t < at);
+            let apart = edge.abs_diff(right.from);
+            if apart == 0 || edge < left.from + FEWEST || edge + FEWEST > right.to {
+                continue;
+            }
+            let hints = |s: &Stretch| -> Vec<f64> { s.course.iter().flat_map(Course::frequencies).collect() };
+            let one = Stretch::new(cells, (left.from, edge), &hints(left));
+            let two = Stretch::new(cells, (edge, right.to), &hints(right));
+            if one.course.is_some() && two.course.is_some() {
+                stretches[k - 1] = one;
+                stretches[k] = two;
+            }
+        }
+    }
+    stretches
+}
+
+/// The instant near their border at which two forms agree about the position; of several (a ripple comes back to a line) the one under
+/// which the cells around are followed best, the one form before it and the other after.
+fn meeting(left: &Stretch, right: &Stretch, cells: &Cells) -> Option<f64> {
+    let (Some(a), Some(b)) = (&left.course, &right.course) else { return None };
+    let near = cells.t[right.from] - 0.5 * cells.dt;
+    let reach = REACH as f64 * cells.dt;
+    let apart = |t: f64| a.at(t).0 - b.at(t).0;
+    let newton = |from: f64| {
+        let mut at = from;
+        for _ in 0..12 {
+            let slope = a.at(at).1 - b.at(at).1;
+            if slope.abs() > 1e-7 {
+                at = (at - apart(at) / slope).clamp(near - reach, near + reach);
+            }
+        }
+        at
+    };
+    let grid = || (0..=2 * REACH).map(|k| near - reach + k as f64 * cells.dt);
+    let crosses = |(s, t): (f64, f64)| apart(s) * apart(t) < 0.0;
+    let crossings = grid().zip(grid().skip(1)).filter(|p| crosses(*p)).map(|(s, t)| newton(0.5 * (s + t)));
+    let (lo, hi) = (right.from.saturating_sub(REACH).max(left.from), (right.from + REACH).min(right.to));
+    let misfit = |at: f64| {
+        let off = |k: usize| cells.z[k] - if cells.t[k] < at { a } else { b }.at(cells.t[k]).0;
+        (lo..hi).map(|k| off(k).powi(2)).sum::<f64>()
+    };
+    let told = crossings.chain([newton(near)]).map(|at| (misfit(at), at));
+    told.min_by(|x, y| x.0.total_cmp(&y.0)).map(|t| t.1)
+}
+
+/// The jump of the speed between two stretches.
+fn meet(left: &Stretch, right: &Stretch, found: &[Break], cells: &Cells, t: &[f64]) -> Kink {
+    let kink = |at: f64, z: f64, v: [f64; 2], sd_m: f64| {
+        let sample = t.partition_point(|t| *t < at).clamp(1, t.len() - 1);
+        Kink { sample, t: at, z, v, sd_m }
+    };
+    if let (Some(a), Some(b), Some(at)) = (&left.course, &right.course, meeting(left, right, cells)) {
+        // A value at the end of a curved form, over that many cells.
+        let end = |s: &Stretch, c: &Course| 3.0 * c.sd_m / ((s.to - s.from) as f64).sqrt();
+        let sd_m = end(left, a).hypot(end(right, b));
+        return kink(at, 0.5 * (a.at(at).0 + b.at(at).0), [a.at(at).1, b.at(at).1], sd_m);
+    }
+    match found.iter().find(|b| b.0 == right.from) {
+        Some(&(_, (at, z, before), after)) => kink(at, z, [before, after], cells.noise_m),
+        None => {
+            let at = cells.t[right.from] - 0.5 * cells.dt;
+            let (one, two) = (left.at(cells.t, at), right.at(cells.t, at));
+            kink(at, 0.5 * (one.0 + two.0), [one.1, two.1], cells.noise_m)
+        }
+    }
+}
+
+/// Position, velocity and its standard deviation at cell `i` from the widest window that agrees with all narrower ones.
+fn widest(t: &[f64], z: &[f64], i: usize, (from, to): (usize, usize), noise_m: f64) -> (f64, f64, f64) {
+    let mut best = (z[i], 0.0, f64::INFINITY);
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for half in LADDER {
+        let (lo, hi) = (i.saturating_sub(half).max(from), (i + half + 1).min(to));
+        let n = hi - lo;
+        if n < 4 {
+            continue;
+        }
+        let span = (t[hi - 1] - t[lo]).max(1e-9);
+        // Slope of a parabola over n cells: in the middle as of a line, at the end four times as uncertain.
+        let off = ((2.0 * t[i] - t[lo] - t[hi - 1]) / span).abs().min(1.0);
+        let sd = noise_m * (12.0 / n as f64).sqrt() / span * (1.0 + 15.0 * off * off).sqrt();
+        let [value, slope, _] = parabola(&t[lo..hi], &z[lo..hi], t[i]).0;
+        low = low.max(slope - GAMMA * sd);
+        high = high.min(slope + GAMMA * sd);
+        if low > high {
+            break;
+        }
+        best = (value, slope, sd);
+        if lo == from && hi == to {
+            break;
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells every 20 ms with 10 um of noise.
+    struct Given {
+        t: Vec<f64>,
+        z: Vec<f64>,
+    }
+
+    impl Given {
+        fn new(n: usize, course: impl Fn(f64) -> f64) -> Self {
+            let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
+            let z = t.iter().enumerate().map(|(k, t)| course(*t) + 1e-5 * rough(k)).collect();
+            Self { t, z }
+        }
+
+        fn cells(&self) -> Cells<'_> {
+            Cells { t: &self.t, z: &self.z, dt: 0.02, noise_m: 1e-5, rounded_m: 0.0 }
+        }
+
+        fn stretches(&self, edges: &[usize]) -> Vec<Stretch> {
+            edges.windows(2).map(|e| Stretch::new(&self.cells(), (e[0], e[1]), &[])).collect()
+        }
+    }
+
+    fn borders(stretches: &[Stretch]) -> Vec<(usize, usize)> {
+        stretches.iter().map(|s| (s.from, s.to)).collect()
+    }
+
+    /// A line that bends at an instant.
+    fn bent(at_s: f64, before: f64, after: f64) -> impl Fn(f64) -> f64 {
+        move |t| if t < at_s { before * (t - at_s) } else { after * (t - at_s) }
+    }
+
+    #[test]
+    fn a_stretch_is_one_form_of_the_cells_that_lie_beside_no_jump() {
+        let mut given = Given::new(100, |t| 0.003 * t);
+        // Cells beside jumps have both speeds.
+        for k in [20, 79] {
+            given.z[k] += 0.01;
+        }
+        let s = Stretch::new(&given.cells(), (20, 80), &[]);
+        let course = s.course.as_ref().expect("a form");
+        assert!((s.at(&given.t, 1.0).1 - 0.003).abs() < 1e-5 && s.local.is_empty());
+        assert_eq!(s.cost, course.cost);
+        // The slope of a line over 58 cells of 20 ms, doubled.
+        let sd = 2.0 * course.sd_m * (12.0 / 58.0_f64).sqrt() / (58.0 * 0.02);
+        assert_eq!(s.sds.len(), 60);
+        assert!(s.sds.iter().all(|x| (x / sd - 1.0).abs() < 1e-12));
+        // At the ends of the recording all cells count.
+        given.z[20] -= 0.01;
+        given.z[79] -= 0.01;
+        for k in [0, 99] {
+            given.z[k] += 0.01;
+        }
+        let form = |from: usize, to: usize| Stretch::new(&given.cells(), (from, to), &[]).course.is_some();
+        assert!(form(20, 80) && !form(0, 80) && !form(20, 100));
+        // Of a rest the velocity is known.
+        let rest = Given::new(100, |_| 0.07);
+        assert_eq!(Stretch::new(&rest.cells(), (0, 100), &[]).sds, [0.0; 100]);
+        // Twice the positions' noise is too much of a residual.
+        let course = Stretch::new(&rest.cells(), (0, 100), &[]).course.expect("a form");
+        let quieter = |share: f64| Cells { noise_m: course.sd_m * share, ..rest.cells() };
+        assert!(Stretch::new(&quieter(0.51), (0, 100), &[]).course.is_some());
+        assert!(Stretch::new(&quieter(0.49), (0, 100), &[]).course.is_none());
+        // Thirteen cells between jumps, or beside one, or all there are.
+        let few = |from: usize, to: usize| Stretch::new(&rest.cells(), (from, to), &[]).course.is_some();
+        assert!(few(20, 35) && !few(20, 34));
+        let short = Given::new(13, |_| 0.07);
+        assert!(Stretch::new(&short.cells(), (0, 13), &[]).course.is_some());
+        let short = Given::new(12, |_| 0.07);
+        assert!(Stretch::new(&short.cells(), (0, 12), &[]).course.is_none());
+    }
+
+    #[test]
+    fn without_a_form_positions_and_velocities_go_on_lines_from_cell_to_cell() {
+        let s = Stretch {
+            from: 2,
+            to: 5,
+            course: None,
+            local: vec![(1.0, 3.0), (2.0, 5.0), (6.0, -1.0)],
+            sds: vec![1.0; 3],
+            cost: f64::INFINITY,
+        };
+        let t = [0.0, 1.0, 2.0, 3.0, 5.0, 6.0];
+        let wanted = [
+            (1.5, -0.5, 3.0),
+            (2.0, 1.0, 3.0),
+            (2.25, 1.25, 3.5),
+            (3.0, 2.0, 5.0),
+            (4.5, 5.0, 0.5),
+            (7.0, 4.0, -1.0),
+        ];
+        for (at, z, v) in wanted {
+            let told = s.at(&t, at);
+            assert!((told.0 - z).abs() < 1e-12 && (told.1 - v).abs() < 1e-12, "{told:?} at {at}");
+        }
+    }
+
+    #[test]
+    fn what_is_one_form_is_joined_and_what_bends_is_not() {
+        let line = Given::new(200, |t| 0.003 * t);
+        assert_eq!(borders(&joined(&line.cells(), line.stretches(&[0, 60, 110, 200]))), [(0, 200)]);
+        let bend = Given::new(200, bent(2.2, 0.003, 0.004));
+        assert_eq!(
+            borders(&joined(&bend.cells(), bend.stretches(&[0, 60, 110, 200]))),
+            [(0, 110), (110, 200)]
+        );
+        // Parts of a ripple pass for cubics; together they are a wave.
+        let ripple = Given::new(200, |t| 0.003 * t + 4e-4 * (3.0 * t).sin());
+        let told = joined(&ripple.cells(), ripple.stretches(&[0, 35, 70, 105, 200]));
+        assert_eq!(borders(&told), [(0, 200)]);
+        let hz: Vec<f64> = told[0].course.iter().flat_map(Course::frequencies).collect();
+        assert!(hz.len() == 1 && (hz[0] - 3.0).abs() < 0.02, "{hz:?}");
+    }
+
+    #[test]
+    fn a_stretch_that_is_no_form_is_cut_where_it_ceases_to_be_one() {
+        for bend in [60_usize, 130, 170] {
+            let given = Given::new(260, bent(0.02 * bend as f64, 0.003, 0.009));
+            let told = split(&given.cells(), given.stretches(&[0, 260]));
+            assert_eq!(told.len(), 2, "{:?}", borders(&told));
+            assert_eq!((told[0].from, told[0].to, told[1].to), (0, told[1].from, 260));
+            assert!(told[1].from.abs_diff(bend) <= 16, "{:?}", borders(&told));
+            assert!(told[0].course.is_some() && told[1].course.is_some());
+        }
+        // Two bends, and a stretch that is one form and stays so.
+        let given = Given::new(400, |t| {
+            if t < 2.0 {
+                0.003 * t
+            } else if t < 4.0 {
+                0.006 + 0.005 * (t - 2.0)
+            } else {
+                0.016 + 0.002 * (t - 4.0)
+            }
+        });
+        let told = split(&given.cells(), given.stretches(&[0, 300, 400]));
+        let b = borders(&told);
+        assert_eq!(b.len(), 4, "{b:?}");
+        assert!(b.windows(2).all(|p| p[0].1 == p[1].0) && b[3] == (300, 400), "{b:?}");
+        assert!(b[0].1.abs_diff(100) <= 12 && b[1].1.abs_diff(200) <= 12, "{b:?}");
+        // Where not even the beginning is one, or there is no room for two, it is left whole.
+        let wild = Given {
+            t: given.t.clone(),
+            z: (0..400).map(|k| 1e-3 * (0.9 * f64::from(k * k)).sin() * f64::from(k)).collect(),
+        };
+        assert_eq!(borders(&split(&wild.cells(), wild.stretches(&[0, 400]))), [(0, 400)]);
+        let room = |n: usize| {
+            let given = Given::new(n, bent(0.02 * 24.0, 0.003, 0.03));
+            split(&given.cells(), given.stretches(&[0, n])).len()
+        };
+        assert_eq!((room(47), room(48)), (1, 2));
+    }
+
+    #[test]
+    fn borders_move_to_where_both_forms_meet() {
+        let given = Given::new(240, bent(2.4, 0.002, 0.006));
+        let lines = [0.002, 0.006].map(|v| Given::new(240, move |t| v * (t - 2.4)));
+        for border in [100, 110, 119, 120, 121, 132, 140] {
+            let one = Stretch::new(&lines[0].cells(), (0, border), &[]);
+            let two = Stretch::new(&lines[1].cells(), (border, 240), &[]);
+            let told = moved(&given.cells(), vec![one, two]);
+            let b = borders(&told);
+            assert!(b[0].1 == b[1].0 && b[0].1.abs_diff(120) <= 1, "{b:?} from {border}");
+            for (s, v) in told.iter().zip([0.002, 0.006]) {
+                assert!((s.at(&given.t, 2.4).1 - v).abs() < 2e-5);
+            }
+        }
+        // Not so far that one side is left without cells.
+        let short = Given::new(240, bent(0.2, 0.002, 0.006));
+        let mut both = short.stretches(&[0, 14, 240]);
+        both[0] = Stretch::new(&Given::new(240, |t| 0.002 * (t - 0.2)).cells(), (0, 14), &[]);
+        assert_eq!(borders(&moved(&short.cells(), both)), [(0, 14), (14, 240)]);
+        // Where a side has no form nothing moves.
+        let mut half = given.stretches(&[0, 110, 240]);
+        half[1].course = None;
+        assert_eq!(borders(&moved(&given.cells(), half)), [(0, 110), (110, 240)]);
+    }
+
+    #[test]
+    fn two_forms_meet_at_one_instant_near_their_border() {
+        // Lines of 2 and 6 mm/s, that meet at 2.4 s; the border is at cell 114, half a cell before 2.28 s.
+        let (one, two) = (Given::new(240, |t| 0.002 * (t - 2.4)), Given::new(240, |t| 0.006 * (t - 2.4)));
+        let of = |given: &Given, from: usize, to: usize| Stretch::new(&given.cells(), (from, to), &[]);
+        let whole = Given::new(240, bent(2.4, 0.002, 0.006));
+        let at = meeting(&of(&one, 0, 114), &of(&two, 114, 240), &whole.cells()).expect("an instant");
+        assert!((at - 2.4).abs() < 2e-3, "{at}");
+        // Further than half a second from the border nobody looks.
+        let at = meeting(&of(&one, 0, 60), &of(&two, 60, 240), &whole.cells()).expect("an instant");
+        assert!((at - (1.19 + 0.5)).abs() < 1e-9, "{at}");
+        let at = meeting(&of(&one, 0, 180), &of(&two, 180, 240), &whole.cells()).expect("an instant");
+        assert!((at - (3.59 - 0.5)).abs() < 1e-9, "{at}");
+        // Forms side by side meet at their border.
+        let beside = Given::new(240, |t| 0.002 * (t - 2.4) + 1e-4);
+        let mut pair = [of(&one, 0, 100), of(&beside, 100, 240)];
+        pair[1].course = pair[0].course.clone();
+        let at = meeting(&pair[0], &pair[1], &one.cells()).expect("an instant");
+        assert!((at - 1.99).abs() < 1e-9, "{at}");
+        pair[0].course = None;
+        assert_eq!(meeting(&pair[0], &pair[1], &one.cells()), None);
+    }
+
+    #[test]
+    fn a_jump_of_the_speed_is_where_forms_meet_or_as_it_was_found_or_at_the_border() {
+        let given = Given::new(240, bent(2.4, 0.002, 0.006));
+        let samples: Vec<f64> = (0..960).map(|k| 0.005 * f64::from(k)).collect();
+        let mut both = given.stretches(&[0, 120, 240]);
+        let of =
+            |both: &[Stretch], found: &[Break]| meet(&both[0], &both[1], found, &given.cells(), &samples);
+        let kink = of(&both, &[]);
+        assert!((kink.t - 2.4).abs() < 2e-3 && kink.z.abs() < 1e-5, "{kink:?}");
+        assert!((kink.v[0] - 0.002).abs() < 2e-5 && (kink.v[1] - 0.006).abs() < 2e-5, "{kink:?}");
+        assert!(samples[kink.sample] >= kink.t && samples[kink.sample - 1] < kink.t);
+        let sd = |s: &Stretch| s.course.as_ref().map_or(0.0, |c| 3.0 * c.sd_m / 120.0_f64.sqrt());
+        assert!((kink.sd_m - sd(&both[0]).hypot(sd(&both[1]))).abs() < 1e-12);
+        // Without a form, as it was found at that cell.
+        both[0].course = None;
+        both[0].local = (0..120).map(|k| (given.z[k], 0.002)).collect();
+        let found = [(90, (1.7, 5.0, 6.0), 7.0), (120, (2.3931, 0.1, 0.2), 0.3)];
+        let kink = of(&both, &found);
+        assert_eq!((kink.t, kink.z, kink.v, kink.sd_m), (2.3931, 0.1, [0.2, 0.3], 1e-5));
+        assert_eq!(kink.sample, 479);
+        // Or half a cell before the border, half-way between both sides.
+        let kink = of(&both, &found[..1]);
+        assert!((kink.t - 2.39).abs() < 1e-12);
+        let sides = [both[0].at(&given.t, kink.t), both[1].at(&given.t, kink.t)];
+        assert!((kink.z - 0.5 * (sides[0].0 + sides[1].0)).abs() < 1e-15);
+        assert_eq!(kink.v, [sides[0].1, sides[1].1]);
+    }
+
+    #[test]
+    fn the_widest_window_that_agrees_with_all_narrower_ones_tells_the_velocity() {
+        // A parabola is one whatever the window.
+        let t: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+        let z: Vec<f64> = t.iter().map(|t| 0.01 + 0.003 * t + 0.002 * t * t).collect();
+        // Slope of a line over n cells: sd = noise sqrt(12/n) over the span; at the end of a parabola four times that.
+        let sd = |n: f64, off: f64| {
+            1e-5 * (12.0 / n).sqrt() / (0.02 * (n - 1.0)) * (1.0 + 15.0 * off * off).sqrt()
+        };
+        // By cell, borders, and how many cells the widest window has, off its middle by what share of its half.
+        let cases = [
+            (100, (0, 200), 121.0, 0.0),
+            (80, (0, 200), 121.0, 0.0),
+            (0, (0, 200), 61.0, 1.0),
+            (199, (0, 200), 61.0, 1.0),
+            (20, (0, 200), 81.0, 20.0 / 40.0),
+            (100, (90, 140), 50.0, 14.5 / 24.5),
+            (100, (97, 105), 8.0, 0.5 / 3.5),
+        ];
+        for (i, (from, to), n, off) in cases {
+            let told = widest(&t, &z, i, (from, to), 1e-5);
+            assert!(
+                (told.0 - z[i]).abs() < 1e-9 && (told.1 - 0.003 - 0.004 * t[i]).abs() < 1e-8,
+                "{told:?} at {i}"
+            );
+            assert!((told.2 / sd(n, off) - 1.0).abs() < 1e-9, "{told:?} at {i}: {}", sd(n, off));
+        }
+        // Where the speed changes within twelve cells the window ends before.
+        let kink: Vec<f64> =
+            t.iter().map(|t| 0.003 * t + if *t > 2.2 { 0.02 * (t - 2.2) } else { 0.0 }).collect();
+        let told = widest(&t, &kink, 100, (0, 200), 1e-5);
+        assert!((told.1 - 0.003).abs() < 1e-5, "{told:?}");
+        assert!(told.2 >= sd(25.0, 0.0) * 0.999 && told.2 < sd(7.0, 0.0), "{told:?}");
+        // Three cells tell a position and no velocity.
+        assert_eq!(widest(&t, &z, 100, (99, 102), 1e-5), (z[100], 0.0, f64::INFINITY));
+        assert!(widest(&t, &z, 100, (99, 103), 1e-5).2.is_finite());
+    }
+
+    #[test]
+    fn a_recording_without_room_for_a_search_is_differentiated() {
+        let of = |n: usize| {
+            let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
+            let z: Vec<f64> = t.iter().enumerate().map(|(k, t)| 0.003 * t + 1e-5 * rough(k)).collect();
+            (settle(&t, &z), crate::differentiate(&t, &z, 0.1), z)
+        };
+        let (told, v, z) = of(31);
+        assert_eq!((told.z, told.v, told.sd_mps), (z, v, f64::INFINITY));
+        assert!(told.kinks.is_empty());
+        let (told, _, _) = of(32);
+        assert!(told.sd_mps < 1e-3 && told.v.iter().all(|v| (v - 0.003).abs() < 1e-4));
+    }
+
+    /// Advance with ripple, a hold, a retraction.
+    fn course(t: f64) -> (f64, f64) {
+        let w = core::f64::consts::TAU * 0.4;
+        let a = 0.001;
+        if t < 6.0 {
+            (0.003 * t + a / w * (1.0 - (w * t).cos()), 0.003 + a * (w * t).sin())
+        } else if t < 9.0 {
+            (course(6.0 - 1e-9).0, 0.0)
+        } else {
+            (course(7.0).0 - 0.004 * (t - 9.0), -0.004)
+        }
+    }
+
+    fn error(course: impl Fn(f64) -> (f64, f64), noise: impl Fn(usize) -> f64, round_m: f64) -> (f64, usize) {
+        let t: Vec<f64> = (0..2400).map(|k| k as f64 / 200.0).collect();
+        let round = |z: f64| if round_m > 0.0 { (z / round_m).round() * round_m } else { z };
+        let z: Vec<f64> = t.iter().enumerate().map(|(k, t)| round(course(*t).0 + noise(k))).collect();
+        let found = settle(&t, &z);
+        let mut off: Vec<f64> = found.v.iter().zip(&t).map(|(v, t)| (v - course(*t).1).abs()).collect();
+        off.sort_unstable_by(f64::total_cmp);
+        (off[off.len() * 9 / 10], found.kinks.len())
+    }
+
+    /// A fixed sequence that looks like noise of unit variance.
+    fn rough(k: usize) -> f64 {
+        let mut h = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            h ^= h >> 29;
+            h = h.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            sum += (h >> 40) as f64 / (1u64 << 24) as f64;
+        }
+        sum - 6.0
+    }
+
+    #[test]
+    fn positions_with_20_um_of_noise_give_the_velocity_to_a_hundredth_of_a_millimetre_per_second() {
+        let (off, kinks) = error(course, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 1e-5, "{off}");
+        assert_eq!(kinks, 2);
+    }
+
+    #[test]
+    fn so_do_positions_in_steps_of_50_um() {
+        let (off, kinks) = error(course, |_| 0.0, 5e-5);
+        assert!(off < 1e-5, "{off}");
+        assert_eq!(kinks, 2);
+    }
+
+    /// 4.93 mm/s are 98.6 steps of 50 um in a second, nearly one in two samples at 200 Hz: a beat of 3 Hz, a tenth of a millimetre per second.
+    #[test]
+    fn steps_that_beat_with_the_sampling_are_no_ripple() {
+        for speed_mps in [0.00493, 0.00494, 0.00495, 0.00506, 0.00507] {
+            let line = |t: f64| if t < 2.0 { (0.0, 0.0) } else { (speed_mps * (t - 2.0), speed_mps) };
+            let (off, kinks) = error(line, |_| 0.0, 5e-5);
+            assert!(off < 1e-5, "{speed_mps}: {off}");
+            assert_eq!(kinks, 1, "{speed_mps}");
+        }
+    }
+
+    #[test]
+    fn a_fast_ripple_is_no_chain_of_jumps() {
+        let w = core::f64::consts::TAU * 1.4;
+        let rippled = move |t: f64| {
+            let s = (t - 5.0).max(0.0);
+            (0.003 * t + 0.002 / w * (1.0 - (w * s).cos()), 0.003 + 0.002 * (w * s).sin())
+        };
+        let (off, kinks) = error(rippled, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 2e-5, "{off}");
+        assert!(kinks <= 1, "{kinks}");
+    }
+
+    #[test]
+    fn a_jump_of_a_third_of_a_millimetre_per_second_is_found() {
+        let bent = |t: f64| {
+            if t < 6.0 { (0.003 * t, 0.003) } else { (0.018 + 0.0033 * (t - 6.0), 0.0033) }
+        };
+        let (off, kinks) = error(bent, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 1e-5, "{off}");
+        assert_eq!(kinks, 1);
+    }
+
+    /// A ripple that begins at a line comes back to it: the two meet more than once.
+    #[test]
+    fn a_line_goes_over_into_a_strong_ripple_where_it_does_and_not_where_they_would_meet_too() {
+        let w = core::f64::consts::TAU * 1.22;
+        let ripple =
+            move |s: f64| (0.0069 * s + 0.0055 / w * (1.0 - (w * s).cos()), 0.0069 + 0.0055 * (w * s).sin());
+        let told = move |begin: f64| {
+            move |t: f64| {
+                let s = t - begin;
+                let at = 0.0039 * begin;
+                if s < 0.0 {
+                    (0.0039 * t, 0.0039)
+                } else if s < 3.86 {
+                    (at + ripple(s).0, ripple(s).1)
+                } else {
+                    (at + ripple(3.86).0 + 0.0056 * (s - 3.86), 0.0056)
+                }
+            }
+        };
+        let t: Vec<f64> = (0..1800).map(|k| f64::from(k) / 200.0).collect();
+        for k in 0..12 {
+            let begin = 4.0 + 0.0137 * f64::from(k);
+            let z: Vec<f64> = t.iter().map(|t| (told(begin)(*t).0 / 5e-5).round() * 5e-5).collect();
+            let found = settle(&t, &z);
+            let calm = |t: f64| t < begin + 3.5 && (t - begin).abs() > 0.03;
+            let off = |(t, v): (&f64, &f64)| if calm(*t) { (v - told(begin)(*t).1).abs() } else { 0.0 };
+            let most = t.iter().zip(&found.v).map(off).fold(0.0, f64::max);
+            assert!(most < 5e-4, "begin {begin}: {most}");
+        }
+    }
+
+    #[test]
+    fn a_motion_of_no_known_form_is_followed_by_windows() {
+        // A ripple that gets faster and faster: no polynomial of low degree and no sinusoid.
+        let drawn = |t: f64| {
+            (0.002 * t + 4e-4 * (1.0 + (0.3 * t * t).sin()), 0.002 + 2.4e-4 * t * (0.3 * t * t).cos())
+        };
+        let (off, _) = error(drawn, |k| 2e-5 * rough(k), 0.0);
+        assert!(off < 8e-4, "{off}");
+    }
+}
