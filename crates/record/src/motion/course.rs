@@ -62,6 +62,11 @@ impl Course {
         self.waves.is_empty() && self.poly[1..].iter().all(|c| *c == 0.0)
     }
 
+    /// Whether it stands or goes at one speed.
+    pub fn is_even(&self) -> bool {
+        self.waves.is_empty() && self.poly[2..].iter().all(|c| *c == 0.0)
+    }
+
     /// Whether all its waves are larger than so many m.
     fn waves_beyond(&self, amplitude_m: f64) -> bool {
         self.waves.iter().all(|[_, x, y]| libm::hypot(*x, *y) > amplitude_m)
@@ -106,6 +111,16 @@ impl Course {
             }
         }
         Some(best)
+    }
+}
+
+impl Course {
+    /// The better of a rest and a line.
+    pub fn even(t: &[f64], z: &[f64], cell_s: f64) -> Option<Self> {
+        let (first, last) = (*t.first()?, *t.last()?);
+        let frame =
+            Frame { middle: 0.5 * (first + last), half: (0.5 * (last - first)).max(1e-9), cell_s, t, z };
+        Some(better(frame.fit(0, &[])?, frame.fit(1, &[])))
     }
 }
 

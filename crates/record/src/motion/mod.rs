@@ -4,13 +4,14 @@
 //! | module | what |
 //! |---|---|
 //! | `velocity` | velocity and its jumps from exact positions |
-//! | `settle`, `course` | from noisy ones: stretches of what robots are told to do |
+//! | `settle`, `course`, `ramp` | from noisy ones: stretches of what robots are told to do, and how they go from one to the next |
 //! | `knots` | position and velocity between samples |
 //! | `pieces` | means over spans, cut where the speed jumps or turns |
 
 mod course;
 mod knots;
 mod pieces;
+mod ramp;
 mod settle;
 mod velocity;
 

@@ -6,6 +6,7 @@
 //! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
 
 use super::course::{Course, FEWEST};
+use super::ramp::Ramp;
 use super::velocity::{Break, Kink, breaks, parabola, position_noise, rounding};
 use stylet_stats::order::median;
 
@@ -23,6 +24,10 @@ const NO_NOISE: f64 = 2.0;
 const NO_HINT: f64 = 1e-3;
 /// Cells within which the instant of a jump is moved to where both sides meet.
 const REACH: usize = 25;
+/// Cells left out at either end of an even stretch: a drive takes up to half a second from one speed to the next.
+const RAMPS: [usize; 4] = [1, 3, 6, 12];
+/// Nats that a ramp costs per cell: most drives reach their speed within a few.
+const RAMP_NATS: f64 = 0.5;
 
 /// A smoothed course at the times of the samples.
 #[derive(Clone, Debug, Default)]
@@ -65,17 +70,23 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     let rounded_m = step_m / core::f64::consts::PI;
     let cells = Cells { t: &tc, z: &zc, dt, noise_m, rounded_m };
     let first = edges.windows(2).map(|e| Stretch::new(&cells, (e[0], e[1]), &[])).collect();
-    let stretches = moved(&cells, joined(&cells, split(&cells, joined(&cells, first))));
+    let stretches = joined(&cells, split(&cells, joined(&cells, first)));
+    let stretches = moved(&cells, straightened(&cells, stretches));
     let kinks: Vec<Kink> = stretches.windows(2).map(|p| meet(&p[0], &p[1], &found, &cells, t)).collect();
+    let ramps: Vec<Option<Ramp>> =
+        stretches.windows(2).zip(&kinks).map(|(p, k)| Ramp::between(&p[0], &p[1], k, &cells)).collect();
     let mut course = 0;
     let (z, v): (Vec<f64>, Vec<f64>) = (0..n)
         .map(|i| {
             while kinks.get(course).is_some_and(|k| k.t <= t[i]) {
                 course += 1;
             }
-            stretches[course.min(stretches.len() - 1)].at(&tc, t[i])
+            let beside = ramps[course.saturating_sub(1)..(course + 1).min(ramps.len())].iter().flatten();
+            let ramp = beside.filter_map(|r| r.at(t[i])).next();
+            ramp.unwrap_or_else(|| stretches[course.min(stretches.len() - 1)].at(&tc, t[i]))
         })
         .unzip();
+    let kinks = kinks.into_iter().zip(&ramps).filter(|(_, r)| r.is_none()).map(|(k, _)| k).collect();
     let mut sds: Vec<f64> = stretches.iter().flat_map(|s| s.sds.iter().copied()).collect();
     Settled { z, v, kinks, sd_mps: median(&mut sds).max(1e-9) }
 }
@@ -83,20 +94,20 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
 /// Means of samples: middle (s), position (m), length (s), standard deviation of the noise (m), amplitude of the first harmonic of what
 /// rounding does at an even speed (m).
 #[derive(Clone, Copy)]
-struct Cells<'a> {
-    t: &'a [f64],
-    z: &'a [f64],
-    dt: f64,
-    noise_m: f64,
+pub(super) struct Cells<'a> {
+    pub t: &'a [f64],
+    pub z: &'a [f64],
+    pub dt: f64,
+    pub noise_m: f64,
     rounded_m: f64,
 }
 
 /// What happens between two jumps of the speed.
-struct Stretch {
-    from: usize,
-    to: usize,
+pub(super) struct Stretch {
+    pub from: usize,
+    pub to: usize,
     /// A form that leaves white noise.
-    course: Option<Course>,
+    pub course: Option<Course>,
     /// Else position and velocity per cell.
     local: Vec<(f64, f64)>,
     /// Standard deviation of the velocity in m/s per cell.
@@ -109,10 +120,14 @@ impl Stretch {
     fn new(cells: &Cells, (from, to): (usize, usize), hints: &[f64]) -> Self {
         let Cells { t: tc, z: zc, dt, noise_m, rounded_m } = *cells;
         // A cell beside a jump has both speeds.
-        let (lo, hi) = (if from > 0 { from + 1 } else { 0 }, if to < tc.len() { to - 1 } else { to });
+        let (lo, hi) = inside((from, to), 1, tc.len());
         let course =
             if hi > lo + FEWEST { Course::of(&tc[lo..hi], &zc[lo..hi], dt, hints, rounded_m) } else { None };
         let course = course.filter(|c| c.white && c.sd_m < NO_NOISE * noise_m);
+        let course = match course {
+            Some(c) if c.is_even() => Some(c),
+            other => cheaper(other, Self::even(cells, (from, to))),
+        };
         if let Some(course) = course {
             let cells = (hi - lo) as f64;
             // Slope of a line, doubled for a curved one.
@@ -137,6 +152,29 @@ impl Stretch {
         Self { from, to, course: None, local, sds, cost: f64::INFINITY }
     }
 
+    /// A rest or a line between two ramps of the speed, at most a third of it.
+    fn even(cells: &Cells, (from, to): (usize, usize)) -> Option<Course> {
+        let mut best = None;
+        for cut in RAMPS {
+            let (lo, hi) = inside((from, to), cut, cells.t.len());
+            if hi <= lo + FEWEST || 3 * (hi - lo) < 2 * (to - from) {
+                break;
+            }
+            let course = Course::even(&cells.t[lo..hi], &cells.z[lo..hi], cells.dt);
+            let mut course = course.filter(|c| c.white && c.sd_m < NO_NOISE * cells.noise_m);
+            if let Some(c) = course.as_mut() {
+                // The ramps are as well described as the rest, by a number more, and are the less likely the longer they are.
+                let (all, n) = ((to - from) as f64, (hi - lo) as f64);
+                c.cost += (all - n) * libm::log(c.sd_m);
+                if cut > 1 {
+                    c.cost += libm::log(all) + RAMP_NATS * (cut - 1) as f64;
+                }
+            }
+            best = cheaper(best, course);
+        }
+        best
+    }
+
     /// Position and velocity at an instant within.
     fn at(&self, tc: &[f64], t: f64) -> (f64, f64) {
         if let Some(course) = &self.course {
@@ -152,6 +190,18 @@ impl Stretch {
         let t0 = tc[self.from + after - 1];
         let share = (t - t0) / (t1 - t0);
         (z0 + share * (z1 - z0), v0 + share * (v1 - v0))
+    }
+}
+
+/// A stretch without so many cells at borders that are not those of the recording.
+fn inside((from, to): (usize, usize), cut: usize, cells: usize) -> (usize, usize) {
+    (if from > 0 { from + cut } else { 0 }, if to < cells { to.saturating_sub(cut) } else { to })
+}
+
+fn cheaper(a: Option<Course>, b: Option<Course>) -> Option<Course> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.cost < a.cost { b } else { a }),
+        (a, b) => a.or(b),
     }
 }
 
@@ -198,14 +248,64 @@ fn split(cells: &Cells, stretches: Vec<Stretch>) -> Vec<Stretch> {
             let middle = usize::midpoint(good, bad);
             if part(middle).course.is_some() { good = middle } else { bad = middle }
         }
-        if good + FEWEST > to {
+        // A form goes some way beyond its end before noise shows that it has ceased to be one, and bends on the way.
+        let until = |beyond: usize| (good + beyond).min(to);
+        let within = (from + FEWEST, good.min(to - FEWEST));
+        let end =
+            [2 * REACH, 2 * FEWEST].iter().find_map(|beyond| cheapest(cells, (from, until(*beyond)), within));
+        let Some(good) = end.or(Some(good)).filter(|g| g + FEWEST <= to) else {
             out.push(stretch);
             continue;
-        }
+        };
         out.push(part(good));
         todo.push(Stretch::new(cells, (good, to), &[]));
     }
     out
+}
+
+/// The border between `low` and `high` at which what lies before and after it costs least together; none where they never are two forms.
+fn cheapest(cells: &Cells, (from, to): (usize, usize), (low, high): (usize, usize)) -> Option<usize> {
+    let cost =
+        |at: usize| Stretch::new(cells, (from, at), &[]).cost + Stretch::new(cells, (at, to), &[]).cost;
+    let (mut begin, mut end) = (low, high);
+    let mut best = (f64::INFINITY, high);
+    let mut apart = ((high - low) / FEWEST).max(1);
+    loop {
+        for at in (begin..=end).step_by(apart) {
+            let told = cost(at);
+            if told < best.0 {
+                best = (told, at);
+            }
+        }
+        if apart == 1 {
+            return best.0.is_finite().then_some(best.1);
+        }
+        (begin, end) = (best.1.saturating_sub(apart).max(low), (best.1 + apart).min(high));
+        apart = (apart / 4).max(1);
+    }
+}
+
+/// Moves borders beside what is bent or no form at all to where both sides cost least: a jump that was found a few tenths of a second
+/// early or late leaves an end of one form in the other, which bends for it.
+fn straightened(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
+    for k in 1..stretches.len() {
+        let (left, right) = (&stretches[k - 1], &stretches[k]);
+        if [left, right].iter().all(|s| s.course.as_ref().is_some_and(Course::is_even)) {
+            continue;
+        }
+        let edge = right.from;
+        let around = (left.from.max(edge.saturating_sub(2 * REACH)), right.to.min(edge + 2 * REACH));
+        let within = (around.0.max(edge.saturating_sub(REACH)), around.1.min(edge + REACH));
+        let Some(at) = cheapest(cells, around, within) else { continue };
+        let hints = |s: &Stretch| -> Vec<f64> { s.course.iter().flat_map(Course::frequencies).collect() };
+        let one = Stretch::new(cells, (left.from, at), &hints(left));
+        let two = Stretch::new(cells, (at, right.to), &hints(right));
+        if one.cost + two.cost < left.cost + right.cost {
+            stretches[k - 1] = one;
+            stretches[k] = two;
+        }
+    }
+    stretches
 }
 
 /// Moves borders to where both forms meet.
@@ -343,6 +443,74 @@ mod tests {
     /// A line that bends at an instant.
     fn bent(at_s: f64, before: f64, after: f64) -> impl Fn(f64) -> f64 {
         move |t| if t < at_s { before * (t - at_s) } else { after * (t - at_s) }
+    }
+
+    /// Samples every 5 ms with so much noise (m) of the positions of a needle that goes at speeds of time.
+    fn driven(speed: impl Fn(f64) -> f64, lasts_s: f64, noise_m: f64, seed: usize) -> (Vec<f64>, Settled) {
+        let t: Vec<f64> = (0..(lasts_s / 0.005) as usize).map(|k| 0.005 * k as f64).collect();
+        let mut at = 0.0;
+        let z: Vec<f64> = t
+            .iter()
+            .enumerate()
+            .map(|(k, t)| {
+                let here = at + noise_m * rough(k + 10_000 * seed);
+                at += (0..50).map(|j| 1e-4 * speed(t + 1e-4 * (f64::from(j) + 0.5))).sum::<f64>();
+                here
+            })
+            .collect();
+        let told = settle(&t, &z);
+        (t, told)
+    }
+
+    /// 20 um of noise hide jumps of 1 mm/s from a window of 0.3 s, and half a second of a wave passes for a rest with the start of a move.
+    #[test]
+    fn a_needle_rests_where_it_rests_however_slow_it_goes_on() {
+        for ([before, after], rest_s) in [
+            ([5.27e-3, 0.98e-3], 0.95),
+            ([5.27e-3, 0.98e-3], 0.6),
+            ([2e-3, 0.8e-3], 1.5),
+            ([5e-3, -0.7e-3], 1.0),
+            ([2e-3, 2e-3], 1.0),
+            ([5e-3, 0.98e-3], 2.5),
+        ] {
+            let speed = |t: f64| match t {
+                ..1.5 => before,
+                _ if t < 1.5 + rest_s => 0.0,
+                _ => after,
+            };
+            for seed in 0..12 {
+                let (t, told) = driven(speed, 8.5 + rest_s, 2e-5, seed);
+                let rests = |t: f64| t > 1.55 && t < 1.45 + rest_s;
+                let worst = t
+                    .iter()
+                    .zip(&told.v)
+                    .filter(|(t, _)| rests(**t))
+                    .fold(0.0_f64, |m, (_, v)| m.max(v.abs()));
+                assert!(worst < 5e-5, "{before} m/s, {rest_s} s, {after} m/s, seed {seed}: {worst} m/s");
+            }
+        }
+    }
+
+    /// 5 mm/s from 1 s on, a rest from 6 s, 1 mm/s from 7.5 s, a rest from 12 s, back at 3 mm/s from 13 s; every change takes a while.
+    #[test]
+    fn a_drive_takes_its_time_from_one_speed_to_the_next() {
+        for (ramp_s, noise_m, all_mps) in
+            [(0.05, 5e-6, 5e-5), (0.1, 2e-5, 1e-4), (0.2, 2e-5, 1e-4), (0.3, 2e-5, 1e-4)]
+        {
+            let changes = [(1.0, 5e-3), (6.0, -5e-3), (7.5, 1e-3), (12.0, -1e-3), (13.0, -3e-3)];
+            let speed =
+                |t: f64| changes.iter().map(|(at, by)| by * ((t - at) / ramp_s).clamp(0.0, 1.0)).sum::<f64>();
+            let (mut squares, mut n) = (0.0, 0.0);
+            for seed in 0..8 {
+                let (t, told) = driven(speed, 18.0, noise_m, seed);
+                for (t, v) in t.iter().zip(&told.v) {
+                    squares += (v - speed(*t)).powi(2);
+                    n += 1.0;
+                }
+            }
+            let rms = f64::sqrt(squares / n);
+            assert!(rms < all_mps, "{ramp_s} s, {noise_m} m: {rms} m/s");
+        }
     }
 
     #[test]
