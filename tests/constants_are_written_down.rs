@@ -89,6 +89,7 @@ fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason
     let page = std::fs::read_to_string(root.join("docs/constants.md")).expect("docs/constants.md");
     let (mut told, mut faults) = (Constants::new(), Vec::new());
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
+    let (mut choices, mut of_sets) = (0, 0);
     for row in rows(&page) {
         let [place, name, value, unit, kind, reason] = row.as_slice() else {
             faults.push(format!("six cells are wanted: {row:?}"));
@@ -101,6 +102,10 @@ fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason
             faults.push(format!("{place}: {name}: unit and reason are wanted"));
         }
         *kinds.entry(kind.clone()).or_default() += 1;
+        if ["definition", "prior", "effort"].contains(&kind.as_str()) {
+            choices += 1;
+            of_sets += usize::from(place.starts_with("diagnose/src/set/"));
+        }
         told.insert((place.clone(), name.clone()), value.clone());
     }
     let there = in_sources(root);
@@ -121,6 +126,14 @@ fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason
             .filter(|k| !there.contains_key(*k))
             .map(|(p, n)| format!("{p}: there is no {n} any more")),
     );
+    let sums = format!(
+        "{} in all, {choices} of them choices (definitions, priors, effort): {} of these serve single recordings, {of_sets} sets of repeats",
+        told.len(),
+        choices - of_sets
+    );
+    if !page.contains(&sums) {
+        faults.push(format!("the page has to say `{sums}`"));
+    }
     for (kind, count) in kinds {
         if !page.contains(&format!("| {kind} | {count} |")) {
             faults.push(format!("the page has to say `| {kind} | {count} |`"));

@@ -39,9 +39,8 @@ for world in "${worlds[@]}"; do
     echo "== world $world, $cases cases of seed $seed"
     "$python" benches/peers/diagnose.py "$tune.terms" "$tune.truth.json" "$test.terms" "$test.answers"
     for answers in stylet lassocv frols stlsq sr3; do
-        echo
         echo "-- $answers"
-        "$stylet" benchmark judge "$test" "$test.answers/$answers.json" | sed -n '/^wrong/,/^all rows/{/^all rows/!p};/^all rows/,/^$/p'
+        "$stylet" benchmark judge "$test" "$test.answers/$answers.json" | sed -n '/^all rows together/,/^$/p'
     done
     echo
 done

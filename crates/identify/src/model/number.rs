@@ -22,7 +22,7 @@ pub enum Role {
     OwnSurface,
     /// Friction of each recording's own.
     OwnFriction,
-    /// One of the numbers that differ between insertions ([`Model::differing`]).
+    /// One of the numbers that differ between insertions ([`Model::differing`](super::Model::differing)).
     OwnEffect(usize),
     /// Surface of a day.
     DaySurface(usize),

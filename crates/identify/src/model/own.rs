@@ -10,7 +10,7 @@ pub struct Own {
     pub surface_m: f64,
     /// Natural logarithm of the factor on friction.
     pub friction: f64,
-    /// What effects say differs between insertions, beyond the common value, in the order of [`Model::differing`].
+    /// What effects say differs between insertions, beyond the common value, in the order of [`Model::differing`](super::Model::differing).
     pub differing: [f64; 8],
 }
 
@@ -45,7 +45,7 @@ pub struct Scatter {
     pub surface_m: f64,
     /// Standard deviation of the logarithm of friction.
     pub friction: f64,
-    /// Standard deviations of what differs by effects, in the order of [`Model::differing`]; zero: as the library says.
+    /// Standard deviations of what differs by effects, in the order of [`Model::differing`](super::Model::differing); zero: as the library says.
     pub differing: [f64; 8],
     /// Standard deviation of the surface between days, in m.
     pub day_surface_m: f64,
