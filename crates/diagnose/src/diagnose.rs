@@ -498,10 +498,10 @@ fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
 #[cfg(test)]
 mod tests {
     use super::{
-        base_parameters, colour, differences, each, excess, extended, judge, line_p, raw_causes, step,
-        take_traces,
+        base_parameters, colour, differences, each, excess, extended, judge, line_p, raw_causes, stands,
+        step, take_traces,
     };
-    use crate::held_out::Left;
+    use crate::held_out::{Borne, Left};
     use crate::intervals::Spread;
     use crate::made::{settled, showing, stage};
     use crate::outcome::{Cause, Diagnosis, Verdict};
@@ -509,6 +509,7 @@ mod tests {
     use crate::rivals::Rival;
     use crate::select::Search;
     use crate::small::Small;
+    use crate::unmoved::Moved;
     use rand::SeedableRng;
     use rand::rngs::ChaCha8Rng;
     use std::sync::Arc;
@@ -658,6 +659,26 @@ mod tests {
         let after = excess(&search.data, &search.best.residuals.e);
         let chance = line_p(after, search.data.compared());
         assert!(told.leftover.p_value == chance && chance < 1e-50, "{chance}");
+        // What is fitted later is held against the same noise.
+        for f in [&search.base, &search.best] {
+            let nats = residuals(&f.model, &search.data).expect("a replay").nats;
+            assert_eq!(f.nats(), nats);
+        }
+    }
+
+    #[test]
+    fn beside_something_unknown_a_cause_that_pays_must_not_surely_move_and_one_that_does_not_must_be_seen_to_stay()
+     {
+        let told = |gain: f64, told: f64, surely: f64| {
+            let alike = Borne { spread: 0.1, gain, otherwise: 0.06, moved: Moved { told, surely } };
+            let (scattered, imitates) =
+                (Borne { spread: 0.13, ..alike.clone() }, Borne { otherwise: 0.08, ..alike.clone() });
+            assert!(!stands(&scattered) && !stands(&imitates));
+            stands(&alike)
+        };
+        assert!(told(0.3, 0.2, 0.04) && !told(0.3, 0.2, 0.06));
+        assert!(told(0.1, 0.04, 0.0) && !told(0.1, 0.06, 0.0));
+        assert!(!told(-0.01, 0.0, 0.0));
     }
 
     fn rival(effect: &AnyEffect, behind: f64) -> Rival {
