@@ -204,10 +204,7 @@ fn hat(knots: &[f64], knot: usize, x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Moved, hat, moved};
-    use crate::made::{settled, showing};
-    use stylet_identify::look::Look;
-    use stylet_tissue::{AnyEffect, CoulombFriction, ForceBias, ForceDrift};
+    use super::hat;
 
     #[test]
     fn a_function_is_straight_between_its_knots() {
@@ -216,28 +213,5 @@ mod tests {
         assert_eq!(of(1.0), [0.0, 1.0, 0.0]);
         assert_eq!(of(2.5), [0.0, 0.25, 0.75]);
         assert_eq!((of(-1.0), of(9.0)), ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]));
-    }
-
-    /// How far an effect moves of insertions that have some and show so much more at every instant.
-    fn told(there: &[AnyEffect], effect: AnyEffect, more_n: impl Fn(f64) -> f64) -> Moved {
-        let runs = showing(there, &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], more_n);
-        let f = settled(&[effect], &runs.iter().collect::<Vec<_>>());
-        moved(&Look::new(&f.fit, &f.data), 0)
-    }
-
-    #[test]
-    fn what_is_there_stays_beside_any_shape_and_what_stands_for_another_moves() {
-        let rubs = |c_n_per_m: f64| -> AnyEffect { CoulombFriction { c_n_per_m }.into() };
-        let drift = || -> AnyEffect { ForceDrift { rate_n_per_s: 0.05 }.into() };
-        let wave = |t: f64| 0.1 * (0.9 * t).sin();
-        let there = told(&[], drift(), |t| 0.05 * t + wave(t));
-        let rubbing = told(&[rubs(20.0)], rubs(20.0), wave);
-        let imitates = told(&[], drift(), |t| 0.3 * (0.35 * t).sin());
-        let bias = told(&[], ForceBias { force_n: 0.1 }.into(), |t| 0.1 * (0.35 * t).sin());
-        assert!(there.surely < 0.05 && rubbing.surely < 0.05, "{there:?} {rubbing:?}");
-        assert!(imitates.surely > 0.05 && bias.told > 0.05, "{imitates:?} {bias:?}");
-        for m in [there, rubbing, imitates, bias] {
-            assert!(m.surely <= m.told);
-        }
     }
 }
