@@ -2,7 +2,7 @@
 
 use crate::base::{Prepared, base};
 use crate::error::DiagnoseError;
-use crate::held_out::{Left, floor, left_out, rms};
+use crate::held_out::{Borne, Left, borne, floor, left_out, rms};
 use crate::intervals::Spread;
 use crate::leftover;
 use crate::outcome::*;
@@ -19,7 +19,7 @@ use stylet_identify::blocks::{BLOCK_S, Blocks};
 use stylet_identify::fit::{Effort, fit};
 use stylet_identify::model::{Belief, Role};
 use stylet_identify::noise::From as NoiseFrom;
-use stylet_identify::objective::Data;
+use stylet_identify::objective::{Data, residuals};
 use stylet_record::raw;
 use stylet_record::{QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
@@ -69,12 +69,15 @@ const EXCESS: f64 = 0.8;
 const EXCESS_ALONE: f64 = 3.0;
 /// Slow noise of more than two and a half times the fast one is none any more, whatever its colour.
 const EXCESS_SLOW: f64 = 6.0;
-/// Beside something unknown a cause stands when recordings left out lose so much of their misfit by it ...
-const BORNE: f64 = 0.27;
-/// ... its strengths are the same whichever recording is left out, to this share ...
+/// Beside something unknown a cause stands when its strengths are the same whichever recording is left out, to this share, ...
 const SAME: f64 = 0.12;
-/// ... and it would gain no more than this share of what it explains by acting otherwise.
+/// ... it would gain no more than this share of what it explains by acting otherwise, ...
 const OTHERWISE: f64 = 0.07;
+/// ... and its strength moves by no more than this share beside any other shape of what is left: surely so where recordings left out lose
+/// as much of their misfit by it as ...
+const UNMOVED: f64 = 0.05;
+/// ... this share; where they gain less, since what is unknown drowns it, it has to be seen to stay.
+const BORNE: f64 = 0.27;
 /// Why an effect beside something unknown is a trace.
 pub const IMITATED: &str = "what no effect of the library explains may imitate it";
 
@@ -131,15 +134,12 @@ pub fn diagnose(
     let coarse = raw.step_n.is_some_and(|s| s > 0.5 * noise_n);
     let unknown = judged.unknown && !coarse;
     if unknown {
-        let borne = crate::held_out::borne(&search.best, &search.data, noise_n);
+        let borne = borne(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&borne);
         // Of a force with several lines one tone is no cause.
         let tone = |i: &EffectInfo| matches!(i.proposal, Proposal::Line | Proposal::Breath);
         let kept: Vec<&str> = effects
-            .filter(|(e, b)| {
-                let alike = b.spread < SAME && b.otherwise < OTHERWISE;
-                b.gain > BORNE && alike && !(judged.lined && tone(e.info))
-            })
+            .filter(|(e, b)| !(judged.lined && tone(e.info)) && stands(b))
             .map(|(e, _)| e.info.id)
             .collect();
         let gone = judged.causes.iter().filter(|c| !kept.contains(&c.effect.as_str()));
@@ -337,9 +337,19 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
         share,
     };
     if lined {
+        // Nats are of one noise.
+        for fit in [&mut search.base, &mut search.best] {
+            fit.residuals = residuals(&fit.model, &quiet).unwrap_or_else(|| fit.residuals.clone());
+        }
         search.data = quiet;
     }
     Judged { causes, against_none, base_parameters, leftover, unknown, lined }
+}
+
+/// Whether an effect beside something unknown is a cause.
+fn stands(b: &Borne) -> bool {
+    let moved = if b.gain > BORNE { b.moved.surely } else { b.moved.told };
+    b.gain > 0.0 && b.spread < SAME && b.otherwise < OTHERWISE && moved < UNMOVED
 }
 
 /// Moves causes that are none to `traces`.
@@ -489,16 +499,17 @@ fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
 #[cfg(test)]
 mod tests {
     use super::{
-        base_parameters, colour, differences, each, excess, extended, judge, line_p, raw_causes, step,
-        take_traces,
+        base_parameters, colour, differences, each, excess, extended, judge, line_p, raw_causes, stands,
+        step, take_traces,
     };
-    use crate::held_out::Left;
+    use crate::held_out::{Borne, Left};
     use crate::intervals::Spread;
     use crate::made::{settled, showing, stage};
     use crate::outcome::{Cause, Diagnosis, Verdict};
     use crate::rivals::Rival;
     use crate::select::Search;
     use crate::small::Small;
+    use crate::unmoved::Moved;
     use rand::SeedableRng;
     use rand::rngs::ChaCha8Rng;
     use std::sync::Arc;
@@ -506,7 +517,7 @@ mod tests {
     use stylet_identify::fit::{Effort, Fit, fit};
     use stylet_identify::model::{Choice, Free, Role};
     use stylet_identify::noise::Noise;
-    use stylet_identify::objective::Data;
+    use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
     use stylet_record::raw::{Raw, Spikes};
     use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
@@ -649,6 +660,26 @@ mod tests {
         let after = excess(&search.data, &search.best.residuals.e);
         let chance = line_p(after, search.data.compared());
         assert!(told.leftover.p_value == chance && chance < 1e-50, "{chance}");
+        // What is fitted later is held against the same noise.
+        for f in [&search.base, &search.best] {
+            let nats = residuals(&f.model, &search.data).expect("a replay").nats;
+            assert_eq!(f.nats(), nats);
+        }
+    }
+
+    #[test]
+    fn beside_something_unknown_a_cause_that_pays_must_not_surely_move_and_one_that_does_not_must_be_seen_to_stay()
+     {
+        let told = |gain: f64, told: f64, surely: f64| {
+            let alike = Borne { spread: 0.1, gain, otherwise: 0.06, moved: Moved { told, surely } };
+            let (scattered, imitates) =
+                (Borne { spread: 0.13, ..alike.clone() }, Borne { otherwise: 0.08, ..alike.clone() });
+            assert!(!stands(&scattered) && !stands(&imitates));
+            stands(&alike)
+        };
+        assert!(told(0.3, 0.2, 0.04) && !told(0.3, 0.2, 0.06));
+        assert!(told(0.1, 0.04, 0.0) && !told(0.1, 0.06, 0.0));
+        assert!(!told(-0.01, 0.0, 0.0));
     }
 
     fn rival(effect: &AnyEffect, behind: f64) -> Rival {

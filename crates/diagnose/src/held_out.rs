@@ -1,6 +1,7 @@
 //! How much better the extended model is on recordings that took no part in the fit.
 
 use crate::otherwise::otherwise;
+use crate::unmoved::{Moved, moved};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
@@ -83,7 +84,7 @@ fn left_out_with(best: &Fit, data: &Data, own: impl Fn(usize) -> Own + Sync) -> 
 }
 
 /// How a cause fares when one recording is left out of the fit.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Borne {
     /// Standard error of its strengths by the jackknife, relative to them; the largest.
     pub spread: f64,
@@ -91,6 +92,8 @@ pub struct Borne {
     pub gain: f64,
     /// Share of what the fit loses without it that its force would gain by acting otherwise ([`otherwise`](crate::otherwise)).
     pub otherwise: f64,
+    /// How far its strength moves beside forces of other shapes ([`unmoved`](crate::unmoved)).
+    pub moved: Moved,
 }
 
 /// How the effects of a fit fare on recordings left out; `floor_n` is the noise.
@@ -98,7 +101,8 @@ pub struct Borne {
 pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
     let n = data.recordings();
     if n < 2 {
-        return vec![Borne::default(); best.model.effects.len()];
+        let none = Borne { spread: 0.0, gain: 0.0, otherwise: 0.0, moved: Moved::UNKNOWN };
+        return vec![none; best.model.effects.len()];
     }
     let square = |left: &[Option<Left>]| {
         let (sum, blocks) = left
@@ -124,10 +128,17 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
                 spread = spread.max((sum * (count - 1.0) / count).sqrt() / mean.abs().max(1e-300));
             }
             let without = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 });
-            let Some(without) = without else { return Borne { spread, gain: 0.0, otherwise: f64::INFINITY } };
+            let Some(without) = without else {
+                return Borne { spread, gain: 0.0, otherwise: f64::INFINITY, moved: Moved::UNKNOWN };
+            };
             let less = square(&left_out(&without, data));
             let gain = (less - with) / (less - floor_n * floor_n).max(1e-12);
-            Borne { spread, gain, otherwise: otherwise(&look, k, without.nats() - best.nats()) }
+            Borne {
+                spread,
+                gain,
+                otherwise: otherwise(&look, k, without.nats() - best.nats()),
+                moved: moved(&look, k),
+            }
         })
         .collect()
 }

@@ -4,9 +4,9 @@
 //! the travel since a reversal for a slack of the clamp, a bias for a force that goes with the square of the acceleration. An effect that
 //! is there needs no change where its force is let vary; one that imitates would rather act otherwise.
 
+use crate::unmoved::force;
 use stylet_identify::fit::Column;
 use stylet_identify::look::Look;
-use stylet_identify::objective::replay;
 
 /// Slower than this (m/s) is rest.
 const REST_MPS: f64 = 2e-4;
@@ -23,13 +23,10 @@ pub fn otherwise(look: &Look<'_>, effect: usize, lost: f64) -> f64 {
 }
 
 fn columns(look: &Look<'_>, effect: usize) -> Option<Vec<Column>> {
-    let (fit, data) = (look.fit, look.data);
-    let less = fit.model.without(effect);
-    let mut forces: Vec<Vec<f64>> = Vec::with_capacity(data.recordings());
+    let data = look.data;
+    let forces = force(look, effect)?;
     let mut with: [Vec<Vec<f64>>; WITH] = std::array::from_fn(|_| Vec::new());
     for (r, b) in data.blocks.iter().enumerate() {
-        let (all, rest) = (replay(&fit.model, data, r)?.f, replay(&less, data, r)?.f);
-        forces.push(all.iter().zip(&rest).map(|(a, b)| a - b).collect());
         with.iter_mut().for_each(|w| w.push(Vec::with_capacity(b.len())));
         for k in 0..b.len() {
             let t = 0.5 * (b.from_s[k] + b.to_s[k]);

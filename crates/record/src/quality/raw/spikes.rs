@@ -107,13 +107,8 @@ pub(super) fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step:
             }
         }
     }
-    let size = stylet_stats::order::median_of(found.iter().map(|f| f.2));
-    let spread =
-        stylet_stats::MAD_TO_SD * stylet_stats::order::median_of(found.iter().map(|f| (f.2 - size).abs()));
-    let all = found.iter().map(|f| f.2).chain(smaller);
-    let between = all.filter(|s| *s > size / 3.0 && *s < 2.0 * size / 3.0).count();
-    let of_one_size = spread < ONE_SIZE * size && (between as f64) <= BETWEEN * found.len() as f64;
-    if found.len() < 2 || !of_one_size {
+    keep_one_size(&mut found, smaller);
+    if found.len() < 2 {
         return None;
     }
     for (r, i, _) in &found {
@@ -122,6 +117,28 @@ pub(super) fn spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], step:
     let sizes: Vec<f64> = found.iter().map(|f| f.2).collect();
     let (size_n, size_sd_n) = (stylet_stats::moments::mean(&sizes), stylet_stats::moments::sd(&sizes));
     Some(Spikes { count: found.len(), size_n, size_sd_n, seen_s })
+}
+
+/// Keeps as many of the largest as have one size and hardly anything between them and the noise: what heavy tails let stand out beside them
+/// is no spike. `smaller` are the sizes of samples that do not stand out far enough. Nothing is kept where no two are alike.
+fn keep_one_size(found: &mut Vec<(usize, usize, f64)>, smaller: Vec<f64>) {
+    let mut sizes: Vec<f64> = found.iter().map(|f| f.2).collect();
+    sizes.sort_unstable_by(|a, b| b.total_cmp(a));
+    let mut all: Vec<f64> = sizes.iter().copied().chain(smaller).collect();
+    all.sort_unstable_by(f64::total_cmp);
+    let one_size = |n: usize| {
+        let size = 0.5 * (sizes[(n - 1) / 2] + sizes[n / 2]);
+        let below = |x: f64| all.partition_point(|s| *s < x);
+        let above_a_third = all.partition_point(|s| *s <= size / 3.0);
+        let between = below(2.0 * size / 3.0).saturating_sub(above_a_third);
+        let spread = || stylet_stats::order::median_of(sizes[..n].iter().map(|s| (s - size).abs()));
+        sizes[n - 1] > size / 3.0
+            && between as f64 <= BETWEEN * n as f64
+            && stylet_stats::MAD_TO_SD * spread() < ONE_SIZE * size
+    };
+    let kept = (2..=sizes.len()).rev().find(|n| one_size(*n));
+    let least = kept.map_or(f64::INFINITY, |n| sizes[n - 1]);
+    found.retain(|f| f.2 >= least);
 }
 
 #[cfg(test)]
@@ -371,5 +388,26 @@ mod tests {
         let one = Spikes { count: 1, ..s };
         let half = stylet_stats::student::quantile(0.975, 1.0) * 0.3;
         assert!((one.size_interval_n().1 - 1.7 - half).abs() < 1e-9);
+    }
+
+    /// Noise with three degrees of freedom lets a sample in a few hundred stand out; spikes of one size are told from it, and it has none.
+    #[test]
+    fn spikes_are_found_beside_the_outliers_of_heavy_tails() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut normal = move || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let noise: Vec<f64> = (0..20_000)
+            .map(|_| 0.0115 * normal() / ((0..3).map(|_| normal().powi(2)).sum::<f64>() / 3.0).sqrt())
+            .collect();
+        assert_eq!(look(&[&recording(noise.clone())], &[Vec::new()]).spikes, None);
+        let mut f = noise;
+        let places: Vec<usize> = (0..45).map(|k| 100 + 431 * k).collect();
+        for (n, k) in places.iter().enumerate() {
+            f[*k] += if n % 2 == 0 { 0.9 } else { -0.9 };
+        }
+        let raw = look(&[&recording(f)], &[Vec::new()]);
+        let told = raw.spikes.expect("spikes");
+        assert!((44..=46).contains(&told.count) && (told.size_n - 0.9).abs() < 0.02, "{told:?}");
+        let found = places.iter().filter(|k| raw.exclude[0][**k]).count();
+        assert!(found >= 44, "{found}");
     }
 }
