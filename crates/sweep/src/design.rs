@@ -25,6 +25,7 @@ pub const SOBOL_DIMENSIONS: usize = 21;
 const POINT: u64 = 1;
 const REDRAW: u64 = 2;
 const SHIFT: u64 = 3;
+const CLOCK: u64 = 4;
 
 fn generator(seed: u64, purpose: u64, number: u64) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
@@ -50,6 +51,12 @@ pub fn scatter(x: u64) -> u64 {
 #[must_use]
 pub fn trial_seed(seed: u64, trial: u64) -> u64 {
     scatter(scatter(seed) ^ trial)
+}
+
+/// Where within a sampling step the motion of an insertion with this seed begins, 0 to 1.
+#[must_use]
+pub fn share_of_a_step(seed: u64) -> f64 {
+    open_unit(generator(seed, CLOCK, 0).next_u64())
 }
 
 /// Makes the points of one sweep.

@@ -27,7 +27,7 @@ impl Stylet {
         }
         self.out.estimate = Some(LayerEstimate {
             layer: self.out.ruptures,
-            start_m: l.start_m - d,
+            start_m: l.gave_way_m - d,
             thickness_m: d,
             stiffness_n_per_m: k,
             friction: b,
@@ -125,7 +125,8 @@ mod tests {
         let mut stylet = inside();
         let l = &mut stylet.layers;
         l.belief = Gaussian::new([200.0, 60.0, 9000.0, 50.0, 8000.0, 0.07], [900.0, 4.0, 5.0, 6.0, 7.0, 0.5]);
-        (l.passed, l.previous_m, l.previous_sd_m, l.gap_m, l.start_m) = (1, 0.02, 5e-4, 0.003, 0.005);
+        (l.passed, l.previous_m, l.previous_sd_m, l.gap_m) = (1, 0.02, 5e-4, 0.003);
+        (l.gave_way_m, l.start_m) = (0.005, 0.008);
         stylet.behind[0] = [-0.015, 0.008, 8000.0];
         stylet.out.ruptures = 1;
         stylet.drive = 0.0021;
