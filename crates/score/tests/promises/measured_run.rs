@@ -1,6 +1,8 @@
 //! A measured run without a truth: the core's detections against the drops of the raw force, and what it leaves of the way back.
 
 use crate::support::detection;
+use std::cell::RefCell;
+use stylet_core::EnhanceConfig;
 use stylet_record::Recording;
 use stylet_score::{Measured, Online, Trace};
 
@@ -28,12 +30,12 @@ fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Onli
         back: 24,
         contact_m: 0.010,
     };
-    let mut asked = Vec::new();
-    let online = Online::of(&measured, &trace, |instants| {
-        asked = instants.to_vec();
+    let asked = RefCell::new(None);
+    let online = Online::of(&measured, &trace, &EnhanceConfig::default(), |instants| {
+        asked.borrow_mut().get_or_insert_with(|| instants.to_vec());
         friction.map(|f| vec![f; recording.len()])
     });
-    (online, asked)
+    (online, asked.into_inner().unwrap_or_default())
 }
 
 #[test]
@@ -81,5 +83,5 @@ fn the_way_back_ends_where_the_tip_is_at_the_surface() {
     let trace = Trace { enhanced_n: recording.force_n.clone(), ..Trace::default() };
     let measured =
         Measured { name: "", recording: &recording, drops: &[], deepest: 20, back: 24, contact_m: 0.010 };
-    assert_eq!(Online::of(&measured, &trace, |_| None).back_raw_n, 3.0);
+    assert_eq!(Online::of(&measured, &trace, &EnhanceConfig::default(), |_| None).back_raw_n, 3.0);
 }
