@@ -42,6 +42,8 @@ struct Back {
     force_n: f64,
     pull_n: f64,
     delta_m: f64,
+    /// By how much friction pulls less than it is taught to, in N, where no tracker says that.
+    less_n: f64,
     tracker: Tracker,
 }
 
@@ -87,7 +89,7 @@ impl Shaft {
                 self.back = None;
                 self.level_n = self.level_n.min(self.smooth_n.max(0.0));
             } else {
-                return back.take(felt);
+                return back.take(felt, self.smooth_n);
             }
         }
         if !self.passed {
@@ -122,6 +124,7 @@ impl Shaft {
             force_n: force,
             pull_n: pull,
             delta_m: RELAX_M / libm::log(1.0 + force / pull),
+            less_n: 0.0,
             tracker: Tracker::new(TRACK_M, felt.position_m, 0.0),
         });
     }
@@ -129,11 +132,16 @@ impl Shaft {
 
 impl Back {
     #[inline(never)]
-    fn take(&mut self, felt: &Felt) -> (f64, f64) {
+    fn take(&mut self, felt: &Felt, smooth_n: f64) -> (f64, f64) {
         let travel = self.tracker.travel(felt.position_m);
         let x = (self.turn_m - self.tracker.deepest_m).max(0.0);
         let taught = -self.pull_n + (self.force_n + self.pull_n) * libm::exp(-x / self.delta_m);
-        if felt.track { self.tracker.take(felt, travel, taught) } else { (taught, 0.25 * felt.peak_n) }
+        if felt.track {
+            return self.tracker.take(felt, travel, taught);
+        }
+        // No tip pushes on the way back: friction pulls no more than the force does, and less than it is taught to for a while after.
+        self.less_n = (self.less_n * libm::exp(-travel / TRACK_M)).max(smooth_n - taught);
+        (taught + self.less_n, 0.25 * felt.peak_n)
     }
 }
 
@@ -237,10 +245,24 @@ mod tests {
         // Half way to zero the exponential has gone by the root of what it goes by in all: -1 + 4/2.
         assert!((middle_n - 1.0).abs() < 1e-9, "{middle_n}");
         assert!(at(0.0025, 0.0).0.abs() < 1e-9);
-        // A quarter of the largest force pulls in the end, whatever the sensor says.
-        assert!((at(0.03, 2.0).0 + 1.0).abs() < 1e-3);
+        // A quarter of the largest force pulls in the end, however much the sensor shows.
+        assert!((at(0.03, -3.0).0 + 1.0).abs() < 1e-3);
         // What was travelled back is not travelled back again.
-        assert!((at(0.02, 2.0).0 + 1.0).abs() < 1e-3);
+        assert!((at(0.02, -3.0).0 + 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn on_the_way_back_friction_never_pulls_more_than_the_force_does_and_less_for_two_millimetres_after() {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.03, 3.0));
+        let mut at = |x: f64, force_n: f64| shaft.take(&Felt { track: false, ..back(0.03 - x, force_n) }).0;
+        at(0.0, 3.0);
+        at(0.02, -3.0);
+        // A shaft that has let go.
+        assert!((at(0.02, -0.2) + 0.2).abs() < 1e-12);
+        // What is pulled then is the tip's, and friction comes back to what it is taught to be.
+        let later_n = at(0.022, -1.5);
+        assert!((later_n + 1.0 - 0.8 * (-1.0_f64).exp()).abs() < 1e-3, "{later_n}");
     }
 
     #[test]
@@ -362,8 +384,12 @@ mod tests {
         ] {
             let mut shaft = Shaft::default();
             shaft.rupture(0.02, hold_n);
-            let at =
-                |x: f64| Felt { peak_n, noise_n2: noise_n * noise_n, track: false, ..back(0.03 - x, hold_n) };
+            let at = |x: f64| Felt {
+                peak_n,
+                noise_n2: noise_n * noise_n,
+                track: false,
+                ..back(0.03 - x, if x > 0.0 { -9.0 } else { hold_n })
+            };
             let (begin_n, sd_n) = shaft.take(&at(0.0));
             near(begin_n, force_n);
             near(sd_n, 0.25 * peak_n);
