@@ -197,6 +197,15 @@ fn directions(dimension: usize) -> [u32; 32] {
 mod tests {
     use super::*;
 
+    #[test]
+    fn motions_begin_anywhere_within_a_sampling_step_and_at_the_same_place_for_a_seed() {
+        let tenth = |seed: u64| (10.0 * super::share_of_a_step(seed)) as usize;
+        let mut found = [false; 10];
+        (0..400).for_each(|seed| found[tenth(seed)] = true);
+        assert_eq!(found, [true; 10]);
+        assert_eq!(super::share_of_a_step(7).to_bits(), super::share_of_a_step(7).to_bits());
+    }
+
     fn column(sampling: Sampling, trials: u64, dimensions: usize, d: usize) -> Vec<f64> {
         let design = Design::new(sampling, 7, trials, dimensions);
         let mut point = vec![0.0; dimensions];
