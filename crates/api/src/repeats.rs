@@ -165,7 +165,8 @@ impl Repeated {
 /// What the online core hears in run `i`, and what it leaves of the way back with the friction of a law fitted to the other runs.
 fn listen(run: &Insertion, study: &Study, i: usize) -> Online {
     let r = &run.recording;
-    let trace = Trace::record(r, &r.force_n, &EnhanceConfig::default(), 0.0, |_, _| {});
+    let config = EnhanceConfig::default();
+    let trace = Trace::record(r, &r.force_n, &config, 0.0, |_, _| {});
     let drops: Vec<usize> = run.drops().iter().map(|drop| drop.at).collect();
     let measured = Measured {
         name: &run.name,
@@ -176,7 +177,7 @@ fn listen(run: &Insertion, study: &Study, i: usize) -> Online {
         contact_m: run.contact_m,
     };
     let population = study.out.get(i).and_then(|o| o.population.as_ref());
-    Online::of(&measured, &trace, |instants| population.and_then(|p| friction(p, r, instants)))
+    Online::of(&measured, &trace, &config, |instants| population.and_then(|p| friction(p, r, instants)))
 }
 
 /// A recording that a data set names; with recordings given by hand it may be missing.

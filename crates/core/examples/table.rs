@@ -5,8 +5,8 @@
 //! cargo run --release -p stylet-core --example table -- [SEEDS] [ROW] [FALSE ALARMS PER HOUR]
 //! ```
 #![allow(clippy::unwrap_used, reason = "an example that stops is its own message")]
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use stylet_core::config::{Algorithm, Contact, StyletConfig};
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Sample};
@@ -139,7 +139,11 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             ..EnhanceConfig::default()
         };
         let mut core = Enhancer::new(config, 0.0, []);
-        let mut z = -0.005;
+        // A robot does not start with the sensor's clock: the first sample is taken somewhere within the first step of the motion.
+        let mut clock = ChaCha8Rng::seed_from_u64(1000 + seed);
+        clock.set_stream(1);
+        let late_s = clock.random::<f64>() * dt;
+        let mut z = -0.005 + 0.5 * ((row.v)(0.0) + (row.v)(late_s)) * late_s;
         let mut noise: f64 = {
             let w: f64 = StandardNormal.sample(&mut rng);
             w * row.noise
@@ -149,7 +153,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
         let mut est: Vec<LayerEstimate> = vec![];
         let (mut miss2, mut tip2) = (0.0, 0.0);
         for k in 0..n {
-            let t = k as f64 * dt;
+            let t = late_s + k as f64 * dt;
             let v = (row.v)(t);
             let mut now = vec![];
             let f = law.step(&mut state, t, z, v, |r| now.push((r.time_s, r.position_m)));

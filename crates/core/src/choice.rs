@@ -76,6 +76,15 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
+    /// Enhanced force of the last sample in N and its 95 % band, the core's own friction replaced by what a law fitted elsewhere says: the
+    /// extended law of a diagnosis, say, in which a layer counts as punctured from the sample on at which the core has declared a rupture. To be asked
+    /// once after every [`Enhancer::step`]. On the way back `Stylet` corrects such a law by what the force shows, as it does
+    /// its own ([`StyletConfig::track_way_back`](crate::config::StyletConfig::track_way_back)). `None` from the others.
+    pub fn with_law(&mut self, friction_n: f64) -> Option<(f64, [f64; 2])> {
+        let config = self.paper.config();
+        self.stylet.as_mut().and_then(|stylet| stylet.with_law(config, friction_n))
+    }
+
     /// Whether everything that is remembered is a number and every covariance positive definite. `Stylet` sees to it itself and
     /// starts afresh where rounding or senseless data have spoilt a belief; this is for tests and monitors.
     #[must_use]

@@ -7,6 +7,7 @@ mod online;
 mod score;
 mod scorer;
 mod trace;
+mod with_law;
 
 pub use detection::{EARLIEST_S, LATEST_S, RuptureScore, match_ruptures};
 pub use offline::{LayerSample, OfflineEstimate, offline};
@@ -15,3 +16,4 @@ pub use score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
 pub use scorer::{Heard, Moment, Scorer};
 pub use stylet_record::LayerTruth;
 pub use trace::{STORAGE_SAMPLES, Trace, algorithm_name, coefficients, model_name, score_run};
+pub use with_law::WithLaw;

@@ -3,7 +3,9 @@
 
 use crate::detection::{EARLIEST_S, LATEST_S};
 use crate::trace::Trace;
+use crate::with_law::WithLaw;
 use serde::Serialize;
+use stylet_core::EnhanceConfig;
 use stylet_record::Recording;
 use stylet_stats::rms;
 
@@ -26,8 +28,10 @@ pub struct Online {
     pub back_raw_n: f64,
     /// What the core's enhanced force leaves of it (N rms).
     pub back_before_n: f64,
-    /// What is left with the friction of a law fitted to the other runs, punctures taken where the core found them.
+    /// What is left with the friction of a law fitted to the other runs as it is replayed, punctures taken where the core found them (N rms).
     pub back_after_n: f64,
+    /// The core with that law.
+    pub with_law: Option<WithLaw>,
 }
 
 /// What is known of a measured run without the core.
@@ -47,10 +51,15 @@ pub struct Measured<'a> {
 }
 
 impl Online {
-    /// Judges what the core made of a run. `friction` says the friction (N, one value per sample) of a law fitted to other runs, from
+    /// Judges what the core made of a run, so configured. `friction` says the friction (N, one value per sample) of a law fitted to other runs, from
     /// the instants (s) at which layers count as punctured.
     #[must_use]
-    pub fn of(run: &Measured, trace: &Trace, friction: impl FnOnce(&[f64]) -> Option<Vec<f64>>) -> Self {
+    pub fn of(
+        run: &Measured,
+        trace: &Trace,
+        config: &EnhanceConfig,
+        friction: impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) -> Self {
         let r = run.recording;
         let mut taken = vec![false; trace.detections.len()];
         let mut found = 0;
@@ -74,7 +83,7 @@ impl Online {
         };
         // Causally: a layer counts as punctured from the sample at which the core says so.
         let instants: Vec<f64> = trace.detections.iter().map(|d| d.time_s).collect();
-        let friction = friction(&instants);
+        let replayed = friction(&instants);
         let inside: Vec<usize> = (run.back..r.len()).filter(|i| r.position_m[*i] > run.contact_m).collect();
         let of = |what: &dyn Fn(usize) -> f64| rms(&inside.iter().map(|i| what(*i)).collect::<Vec<_>>());
         Self {
@@ -86,7 +95,8 @@ impl Online {
             false_back: count(back, f64::INFINITY),
             back_raw_n: of(&|i| r.force_n[i]),
             back_before_n: of(&|i| trace.enhanced_n[i]),
-            back_after_n: friction.map_or(f64::NAN, |friction| of(&|i| r.force_n[i] - friction[i])),
+            back_after_n: replayed.map_or(f64::NAN, |friction| of(&|i| r.force_n[i] - friction[i])),
+            with_law: WithLaw::of(run, config, friction),
         }
     }
 }

@@ -82,6 +82,33 @@ impl Trace {
         trace
     }
 
+    /// Enhanced force (N, one value per sample) with the friction that a law fitted elsewhere says. `law` tells it for a recording, from the
+    /// instants (s) at which layers count as punctured, and for no sample from later ones; `None` where it cannot, or the algorithm takes no law.
+    #[must_use]
+    pub fn with_law(
+        recording: &Recording,
+        force_n: &[f64],
+        config: &EnhanceConfig,
+        law: impl Fn(&[f64]) -> Option<Vec<f64>>,
+    ) -> Option<Vec<f64>> {
+        let heard = Self::record(recording, force_n, config, 0.0, |_, _| {});
+        let instants: Vec<f64> = heard.detections.iter().map(|d| d.time_s).collect();
+        let friction = law(&instants)?;
+        let mut core = Enhancer::new(config.clone(), 0.0, []);
+        let samples = recording.samples().zip(force_n).zip(friction);
+        samples
+            .map(|((s, &force_n), friction_n)| {
+                core.step_brief(Sample {
+                    time_s: s.time_s,
+                    position_m: s.position_m,
+                    velocity_mps: s.velocity_mps,
+                    force_n,
+                });
+                core.with_law(friction_n).map_or(Some(force_n), |(enhanced_n, _)| Some(enhanced_n))
+            })
+            .collect()
+    }
+
     /// Adds what the core says of a sample to the columns.
     pub fn push(&mut self, out: &stylet_core::Output) {
         let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);

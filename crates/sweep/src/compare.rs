@@ -1,5 +1,6 @@
 //! The same insertions, heard by several algorithms: one row per scenario and algorithm.
 
+use crate::design::share_of_a_step;
 use crate::trial::{self, Workspace};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -121,7 +122,9 @@ pub const fn name(algorithm: Algorithm) -> &'static str {
     }
 }
 
-/// The row of a scenario heard by an algorithm, over so many noise seeds from the scenario's own on; `done` is told of each insertion.
+/// The row of a scenario heard by an algorithm, over so many seeds from the scenario's own on; `done` is told of each insertion. A seed
+/// draws the noise, and where within a sampling step the motion begins: a face is never at the same place between two samples,
+/// as it would be if the robot started with the sensor's clock. What a seed draws is the same for every algorithm.
 ///
 /// # Errors
 /// [`SimulateError`] when the scenario cannot be replayed.
@@ -139,7 +142,7 @@ pub fn row(
         .map_init(Workspace::default, |workspace, seed| {
             let mut scenario = scenario.clone();
             scenario.seed = scenario.seed.wrapping_add(seed);
-            let score = trial::run(&scenario, workspace);
+            let score = trial::run_late(&scenario, share_of_a_step(scenario.seed), workspace);
             done(1);
             score
         })

@@ -25,6 +25,7 @@ pub const SOBOL_DIMENSIONS: usize = 21;
 const POINT: u64 = 1;
 const REDRAW: u64 = 2;
 const SHIFT: u64 = 3;
+const CLOCK: u64 = 4;
 
 fn generator(seed: u64, purpose: u64, number: u64) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
@@ -50,6 +51,12 @@ pub fn scatter(x: u64) -> u64 {
 #[must_use]
 pub fn trial_seed(seed: u64, trial: u64) -> u64 {
     scatter(scatter(seed) ^ trial)
+}
+
+/// Where within a sampling step the motion of an insertion with this seed begins, 0 to 1.
+#[must_use]
+pub fn share_of_a_step(seed: u64) -> f64 {
+    open_unit(generator(seed, CLOCK, 0).next_u64())
 }
 
 /// Makes the points of one sweep.
@@ -189,6 +196,15 @@ fn directions(dimension: usize) -> [u32; 32] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn motions_begin_anywhere_within_a_sampling_step_and_at_the_same_place_for_a_seed() {
+        let tenth = |seed: u64| (10.0 * super::share_of_a_step(seed)) as usize;
+        let mut found = [false; 10];
+        (0..400).for_each(|seed| found[tenth(seed)] = true);
+        assert_eq!(found, [true; 10]);
+        assert_eq!(super::share_of_a_step(7).to_bits(), super::share_of_a_step(7).to_bits());
+    }
 
     fn column(sampling: Sampling, trials: u64, dimensions: usize, d: usize) -> Vec<f64> {
         let design = Design::new(sampling, 7, trials, dimensions);

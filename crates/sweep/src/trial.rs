@@ -41,12 +41,12 @@ impl Default for Block {
 impl Block {
     /// Where the needle is, and where it is recorded to be, from sample number `first` on.
     #[inline(never)]
-    fn place(&mut self, plan: &MotionPlan, measuring: &Measuring, rates: &Rates, first: usize) {
+    fn place(&mut self, plan: &MotionPlan, measuring: &Measuring, rates: &Rates, first: usize, late_s: f64) {
         self.count = BLOCK.min(rates.samples - first);
         for (k, (point, sample)) in (first..rates.samples).zip(self.points.iter_mut().zip(&mut self.samples))
         {
             // Signed, because that is one instruction: a number of samples never needs the last bit.
-            let time_s = k as i64 as f64 / rates.sample_hz;
+            let time_s = late_s + k as i64 as f64 / rates.sample_hz;
             *point = plan.at(time_s);
             sample.time_s = time_s;
             sample.position_m = measuring.position(point.position_m);
@@ -122,6 +122,15 @@ pub struct Workspace {
 /// # Errors
 /// [`SimulateError`] when the scenario cannot be replayed.
 pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, SimulateError> {
+    run_late(scenario, 0.0, workspace)
+}
+
+/// The same, the first sample being taken so much later than the motion begins, as a share of a sampling step: a robot does not start
+/// with the sensor's clock.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_late(scenario: &Scenario, late: f64, workspace: &mut Workspace) -> Result<Score, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
     let law = Law::new(&scenario.tissue, &scenario.effects)?;
     let Sensor::ForceTorque(sensor) = &scenario.sensor else {
@@ -131,6 +140,7 @@ pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, Simu
         });
     };
     let rates = rates(scenario, plan.duration_s());
+    let late_s = late / rates.sample_hz;
     let mut measuring = Measuring::new(&scenario.effects, sensor, scenario.seed, scenario.sample_hz);
     let layers = stylet_testbed::layers(law.slabs());
     let surface_m = layers.first().map_or(0.0, |l| l.front_m);
@@ -145,7 +155,7 @@ pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, Simu
     let mut state = LawState::default();
     let mut block = Block::default();
     for first in (0..rates.samples).step_by(BLOCK) {
-        block.place(&plan, &measuring, &rates, first);
+        block.place(&plan, &measuring, &rates, first, late_s);
         block.load(&law, &mut state, |r| ruptures.push(r));
         block.measure(&mut measuring);
         block.enhance(&mut core, &mut scorer);

@@ -106,3 +106,22 @@ fn a_trial_has_the_scores_of_the_ordinary_run() {
         assert_eq!(ours, score);
     }
 }
+
+/// With the start of the robot on the clock of the sensor every insertion would have its faces at the same places between two samples.
+#[test]
+fn an_insertion_whose_first_sample_is_late_has_its_ruptures_elsewhere_between_two_samples() {
+    let sweep = sweep(&[("sensor.noise_n", Distribution::Uniform(0.0, 0.001))], 1);
+    let scenario = Drawer::new(&sweep).draw(0).expect("a valid draw").scenario;
+    let mut workspace = trial::Workspace::default();
+    let mut delay_steps = |late: f64| {
+        let score = trial::run_late(&scenario, late, &mut workspace).expect("it runs");
+        let delay_s = score.ruptures.first().and_then(|r| r.delay_s).expect("a rupture that is found");
+        delay_s * scenario.sample_hz
+    };
+    // The rupture stays where it is, and the samples move.
+    let at_once = delay_steps(0.0);
+    for late in [0.25, 0.5, 0.9] {
+        let moved = (delay_steps(late) - at_once).rem_euclid(1.0);
+        assert!((moved - late).abs() < 0.01, "{moved} for {late}");
+    }
+}

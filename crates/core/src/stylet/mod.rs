@@ -14,6 +14,7 @@ mod noise;
 mod shaft;
 mod slack;
 mod speak;
+mod track;
 
 use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample};

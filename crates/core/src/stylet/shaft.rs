@@ -10,23 +10,17 @@
 //! - In a hold both relax, and nothing tells one from the other: their ratio stays.
 //! - On the way back the tip feels nothing unless it is caught: the force is friction, from the force of the hold over zero to a pull of its own,
 //!   `P(x) = -S + (F + S) exp(-x/delta)`. The way in cannot teach `S` and `delta`; [`PULL`] and [`RELAX_M`] are prior means.
-//!   What the way back itself shows is added by a tracker: changes over more than [`TRACK_M`] count as friction, faster ones as the tip's, and a sudden
-//!   release of the pull, which a tip that is only pulled cannot make, as friction.
+//!   What the way back itself shows is added by a tracker (`track.rs`).
 
 use super::gaussian::{at_least, at_most};
 use super::local::MEMORY_M;
+use super::track::{TRACK_M, Told, Tracker};
 
 /// Pull of the friction on the way back as a share of the largest force: with a puncture that leaves half of its force as friction, and a pull of
 /// half the push (Okamura 2004: asymmetric friction), a quarter.
 const PULL: f64 = 0.25;
 /// Travel over which the force of the hold relaxes to zero on the way back, in m: presliding of soft tissue reaches over millimetres.
-const RELAX_M: f64 = 2.5e-3;
-/// Travel of the tracker, in m: a change at the tip keeps `exp(-x/2 mm)` of itself after a travel `x`.
-const TRACK_M: f64 = 2e-3;
-/// Travel over which the tracker's slope is learned, in m: several times its own.
-const SLOPE_M: f64 = 8e-3;
-/// Travel over which it gives in to an excess push, which no tip can make on the way back, in m.
-const EXCESS_M: f64 = 1e-3;
+pub(super) const RELAX_M: f64 = 2.5e-3;
 /// Smoothing of the force in s, shorter than a drop.
 pub(crate) const SMOOTH_S: f64 = 0.05;
 
@@ -38,20 +32,19 @@ pub(crate) struct Shaft {
     rupture_m: f64,
     passed: bool,
     back: Option<Back>,
+    told: Told,
 }
 
 /// The way back.
 #[derive(Clone, Copy, Debug)]
 struct Back {
     turn_m: f64,
-    deepest_back_m: f64,
     force_n: f64,
     pull_n: f64,
     delta_m: f64,
-    off_n: f64,
-    slope: f64,
-    last_n: f64,
-    scatter_n2: f64,
+    /// By how much friction pulls less than it is taught to, in N, where no tracker says that.
+    less_n: f64,
+    tracker: Tracker,
 }
 
 /// One sample, as the shaft's friction needs it.
@@ -96,7 +89,7 @@ impl Shaft {
                 self.back = None;
                 self.level_n = self.level_n.min(self.smooth_n.max(0.0));
             } else {
-                return back.take(felt);
+                return back.take(felt, self.smooth_n);
             }
         }
         if !self.passed {
@@ -117,51 +110,38 @@ impl Shaft {
         (self.level_n, 0.25 * self.level_n)
     }
 
+    /// The same of the sample that was taken last, of which a law fitted elsewhere says that `law_n` is friction.
+    pub(crate) fn told(&mut self, felt: &Felt, law_n: f64) -> (f64, f64) {
+        self.told.take(felt, self.smooth_n, law_n)
+    }
+
     #[cold]
     fn turn(&mut self, felt: &Felt, force_n: f64) {
         let pull = (PULL * felt.peak_n).max(libm::sqrt(felt.noise_n2)).max(1e-9);
         let force = force_n.max(0.05 * pull);
         self.back = Some(Back {
             turn_m: felt.position_m,
-            deepest_back_m: felt.position_m,
             force_n: force,
             pull_n: pull,
             delta_m: RELAX_M / libm::log(1.0 + force / pull),
-            off_n: 0.0,
-            slope: 0.0,
-            last_n: 0.0,
-            scatter_n2: 0.0,
+            less_n: 0.0,
+            tracker: Tracker::new(TRACK_M, felt.position_m, 0.0),
         });
     }
 }
 
 impl Back {
     #[inline(never)]
-    fn take(&mut self, felt: &Felt) -> (f64, f64) {
-        let travel = (self.deepest_back_m - felt.position_m).max(0.0);
-        if travel > 0.0 {
-            self.deepest_back_m = felt.position_m;
-        }
-        let x = (self.turn_m - self.deepest_back_m).max(0.0);
+    fn take(&mut self, felt: &Felt, smooth_n: f64) -> (f64, f64) {
+        let travel = self.tracker.travel(felt.position_m);
+        let x = (self.turn_m - self.tracker.deepest_m).max(0.0);
         let taught = -self.pull_n + (self.force_n + self.pull_n) * libm::exp(-x / self.delta_m);
-        if !felt.track {
-            return (taught, 0.25 * felt.peak_n);
+        if felt.track {
+            return self.tracker.take(felt, travel, taught);
         }
-        self.off_n += self.slope * travel;
-        let mut rest = felt.force_n - taught - self.off_n;
-        if felt.jumped && rest > 0.0 {
-            let released = (rest - self.last_n).clamp(0.0, rest);
-            self.off_n += released;
-            rest -= released;
-        }
-        self.last_n = rest;
-        let friction = taught + self.off_n;
-        let reach = if rest < 0.0 { TRACK_M } else { EXCESS_M };
-        self.off_n += (1.0 - libm::exp(-travel / reach)) * rest;
-        self.slope += travel / (TRACK_M * SLOPE_M) * rest;
-        let bounded = rest.clamp(-felt.peak_n, felt.peak_n);
-        self.scatter_n2 += travel / (travel + TRACK_M) * (bounded * bounded - self.scatter_n2);
-        (friction, libm::sqrt(self.scatter_n2))
+        // No tip pushes on the way back: friction pulls no more than the force does, and less than it is taught to for a while after.
+        self.less_n = (self.less_n * libm::exp(-travel / TRACK_M)).max(smooth_n - taught);
+        (taught + self.less_n, 0.25 * felt.peak_n)
     }
 }
 
@@ -265,10 +245,24 @@ mod tests {
         // Half way to zero the exponential has gone by the root of what it goes by in all: -1 + 4/2.
         assert!((middle_n - 1.0).abs() < 1e-9, "{middle_n}");
         assert!(at(0.0025, 0.0).0.abs() < 1e-9);
-        // A quarter of the largest force pulls in the end, whatever the sensor says.
-        assert!((at(0.03, 2.0).0 + 1.0).abs() < 1e-3);
+        // A quarter of the largest force pulls in the end, however much the sensor shows.
+        assert!((at(0.03, -3.0).0 + 1.0).abs() < 1e-3);
         // What was travelled back is not travelled back again.
-        assert!((at(0.02, 2.0).0 + 1.0).abs() < 1e-3);
+        assert!((at(0.02, -3.0).0 + 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn on_the_way_back_friction_never_pulls_more_than_the_force_does_and_less_for_two_millimetres_after() {
+        let mut shaft = ruptured();
+        shaft.take(&felt(0.03, 3.0));
+        let mut at = |x: f64, force_n: f64| shaft.take(&Felt { track: false, ..back(0.03 - x, force_n) }).0;
+        at(0.0, 3.0);
+        at(0.02, -3.0);
+        // A shaft that has let go.
+        assert!((at(0.02, -0.2) + 0.2).abs() < 1e-12);
+        // What is pulled then is the tip's, and friction comes back to what it is taught to be.
+        let later_n = at(0.022, -1.5);
+        assert!((later_n + 1.0 - 0.8 * (-1.0_f64).exp()).abs() < 1e-3, "{later_n}");
     }
 
     #[test]
@@ -390,8 +384,12 @@ mod tests {
         ] {
             let mut shaft = Shaft::default();
             shaft.rupture(0.02, hold_n);
-            let at =
-                |x: f64| Felt { peak_n, noise_n2: noise_n * noise_n, track: false, ..back(0.03 - x, hold_n) };
+            let at = |x: f64| Felt {
+                peak_n,
+                noise_n2: noise_n * noise_n,
+                track: false,
+                ..back(0.03 - x, if x > 0.0 { -9.0 } else { hold_n })
+            };
             let (begin_n, sd_n) = shaft.take(&at(0.0));
             near(begin_n, force_n);
             near(sd_n, 0.25 * peak_n);

@@ -27,7 +27,7 @@ impl Stylet {
         }
         self.out.estimate = Some(LayerEstimate {
             layer: self.out.ruptures,
-            start_m: l.start_m - d,
+            start_m: l.gave_way_m - d,
             thickness_m: d,
             stiffness_n_per_m: k,
             friction: b,
@@ -63,17 +63,7 @@ impl Stylet {
         let behind_variance = variance;
         variance *= u * u;
         if self.in_tissue {
-            let felt = Felt {
-                share: self.shares[2],
-                position_m: sample.position_m,
-                force_n: sample.force_n - self.noise.bias_n(),
-                advancing: sample.velocity_mps > standstill,
-                retracting,
-                peak_n: self.peak_n,
-                jumped: self.releasing_s > 0.0,
-                noise_n2: marginal,
-                track: config.stylet.track_way_back,
-            };
+            let felt = self.felt(config, sample);
             let (dry_n, sd) = self.shaft.take(&felt);
             if self.dry && config.stylet.law == FrictionLaw::Auto {
                 (friction, variance) = (dry_n, sd * sd);
@@ -93,6 +83,36 @@ impl Stylet {
         out.enhanced_n = sample.force_n - friction;
         let half = 1.96 * libm::sqrt(marginal + at_least(0.0, variance));
         out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
+    }
+
+    /// A sample as the shaft's friction needs it.
+    #[inline(always)]
+    fn felt(&self, config: &EnhanceConfig, sample: &Sample) -> Felt {
+        let standstill = config.drop.standstill_mps;
+        Felt {
+            share: self.shares[2],
+            position_m: sample.position_m,
+            force_n: sample.force_n - self.noise.bias_n(),
+            advancing: sample.velocity_mps > standstill,
+            retracting: sample.velocity_mps < -standstill,
+            peak_n: self.peak_n,
+            jumped: self.releasing_s > 0.0,
+            noise_n2: self.noise.marginal(),
+            track: config.stylet.track_way_back,
+        }
+    }
+
+    /// Enhanced force of the last sample and its band, where a law fitted elsewhere says that `law_n` of the force is friction.
+    pub(crate) fn with_law(&mut self, config: &EnhanceConfig, law_n: f64) -> Option<(f64, [f64; 2])> {
+        let out = &self.out;
+        if !out.used || !self.in_tissue || !law_n.is_finite() {
+            return out.band_n.map(|band| (out.enhanced_n, band));
+        }
+        let felt = self.felt(config, &self.last);
+        let (friction_n, sd) = self.shaft.told(&felt, law_n);
+        let enhanced_n = self.last.force_n - friction_n;
+        let half = 1.96 * libm::sqrt(felt.noise_n2 + sd * sd);
+        Some((enhanced_n, [enhanced_n - half, enhanced_n + half]))
     }
 
     /// Fills in what only callers of the whole output look at.
@@ -125,7 +145,8 @@ mod tests {
         let mut stylet = inside();
         let l = &mut stylet.layers;
         l.belief = Gaussian::new([200.0, 60.0, 9000.0, 50.0, 8000.0, 0.07], [900.0, 4.0, 5.0, 6.0, 7.0, 0.5]);
-        (l.passed, l.previous_m, l.previous_sd_m, l.gap_m, l.start_m) = (1, 0.02, 5e-4, 0.003, 0.005);
+        (l.passed, l.previous_m, l.previous_sd_m, l.gap_m) = (1, 0.02, 5e-4, 0.003);
+        (l.gave_way_m, l.start_m) = (0.005, 0.008);
         stylet.behind[0] = [-0.015, 0.008, 8000.0];
         stylet.out.ruptures = 1;
         stylet.drive = 0.0021;

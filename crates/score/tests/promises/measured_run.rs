@@ -1,8 +1,10 @@
 //! A measured run without a truth: the core's detections against the drops of the raw force, and what it leaves of the way back.
 
 use crate::support::detection;
+use std::cell::RefCell;
+use stylet_core::EnhanceConfig;
 use stylet_record::Recording;
-use stylet_score::{Measured, Online, Trace};
+use stylet_score::{Measured, Online, Trace, WithLaw};
 
 /// One sample per 0.5 s: in until 10 s, held until 12 s, back to the surface at 10 mm and out of it.
 fn run() -> Recording {
@@ -28,12 +30,12 @@ fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Onli
         back: 24,
         contact_m: 0.010,
     };
-    let mut asked = Vec::new();
-    let online = Online::of(&measured, &trace, |instants| {
-        asked = instants.to_vec();
+    let asked = RefCell::new(None);
+    let online = Online::of(&measured, &trace, &EnhanceConfig::default(), |instants| {
+        asked.borrow_mut().get_or_insert_with(|| instants.to_vec());
         friction.map(|f| vec![f; recording.len()])
     });
-    (online, asked)
+    (online, asked.into_inner().unwrap_or_default())
 }
 
 #[test]
@@ -81,5 +83,41 @@ fn the_way_back_ends_where_the_tip_is_at_the_surface() {
     let trace = Trace { enhanced_n: recording.force_n.clone(), ..Trace::default() };
     let measured =
         Measured { name: "", recording: &recording, drops: &[], deepest: 20, back: 24, contact_m: 0.010 };
-    assert_eq!(Online::of(&measured, &trace, |_| None).back_raw_n, 3.0);
+    assert_eq!(Online::of(&measured, &trace, &EnhanceConfig::default(), |_| None).back_raw_n, 3.0);
+}
+
+/// At 2 mm/s in by 20 mm, a rest of 2 s, and back; friction grips, is stretched and slips on the way back.
+fn gripped() -> (Recording, Vec<f64>, usize) {
+    let time_s: Vec<f64> = (0..2450).map(|i| 0.01 * f64::from(i)).collect();
+    let position_m: Vec<f64> =
+        time_s.iter().map(|t| -0.005 + 0.002 * t.min(12.5) - 0.002 * (t - 14.5).max(0.0)).collect();
+    let back = time_s.iter().rposition(|t| *t <= 14.5).expect("a way back");
+    let friction = |i: usize| {
+        if i < back { 0.0 } else { -1.5 + 3.5 * (-(position_m[back] - position_m[i]) / 2.5e-3).exp() }
+    };
+    let law: Vec<f64> = (0..time_s.len()).map(friction).collect();
+    let force_n = (0..law.len()).map(|i| if i < back { 100.0 * position_m[i].max(0.0) } else { law[i] });
+    let force_n = force_n.collect();
+    (Recording::new(time_s, position_m, force_n).expect("a recording"), law, back)
+}
+
+#[test]
+fn a_law_that_is_off_by_a_fifth_leaves_little_of_the_way_back_and_a_pull_is_kept() {
+    let (recording, law, back) = gripped();
+    let measured =
+        Measured { name: "", recording: &recording, drops: &[], deepest: 1250, back, contact_m: 0.001 };
+    let of = |factor: f64| {
+        let law = |_: &[f64]| Some(law.iter().map(|f| factor * f).collect());
+        WithLaw::of(&measured, &EnhanceConfig::default(), law).expect("a law")
+    };
+    let (exact, off) = (of(1.0), of(1.2));
+    assert!(exact.left_n < 0.02 && exact.spike_n < 0.1, "{exact:?}");
+    // Replayed it leaves 0.2 of 1.2 N rms.
+    assert!(off.left_n < 0.12 && off.left_n > exact.left_n, "{off:?}");
+    for kept in [exact, off] {
+        assert!((0.75..0.9).contains(&kept.pulse_kept), "{kept:?}");
+        assert!((0.55..0.75).contains(&kept.step_kept), "{kept:?}");
+    }
+    let none = WithLaw::of(&measured, &EnhanceConfig::default(), |_| None);
+    assert_eq!(none, None);
 }
