@@ -6,8 +6,8 @@ use crate::raw::Raw;
 use crate::select::Search;
 use crate::set::first::{Insertion, groups, plain};
 use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks, fitted, refitted};
-use crate::set::left_out::{score, without};
-use crate::set::population::predict;
+use crate::set::left_out::{PARTS, Score, score, without};
+use crate::set::population::{Population, predict};
 use crate::varied::varied;
 use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
@@ -15,6 +15,7 @@ use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::{Effort, fit as fitted_on};
 use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
+use stylet_stats::student;
 use stylet_tissue::{AnyEffect, Effect, EffectInfo, ShaftSlip, Tissue};
 
 /// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
@@ -41,8 +42,10 @@ const WORTH: f64 = 0.02;
 const ONE_STORY: usize = 2;
 /// only when they predict recordings left out better by this share.
 const MANY_STORIES: f64 = 0.1;
-/// A part of a law stays when recordings left out are predicted worse by this share without it.
+/// A part of a law stays when recordings left out are predicted worse by this share without it,
 const PART_WORTH: f64 = 0.01;
+/// and by more than their own scatter makes believe of one part in so many laws, over all parts that were asked.
+const CHANCE: f64 = 0.05;
 
 /// Where a law comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,12 +67,16 @@ pub struct Law {
     pub fitted: Fitted,
     /// Error (N) on every recording when its part of the set is left out.
     pub errors_n: Vec<f64>,
+    /// The same by part of an insertion; none where it could not be predicted.
+    pub scores: Vec<Option<Score>>,
 }
 
 impl Law {
-    fn new(kind: Kind, fitted: Fitted, runs: &[&Insertion]) -> Self {
-        let errors_n = judged(&fitted, runs);
-        Self { kind, fitted, errors_n }
+    /// A fit, judged.
+    pub(super) fn new(kind: Kind, fitted: Fitted, runs: &[&Insertion]) -> Self {
+        let scores = judged(&fitted, runs);
+        let errors_n = errors_n(&scores);
+        Self { kind, fitted, errors_n, scores }
     }
 
     /// Mean error (N) on parts left out.
@@ -88,6 +95,8 @@ pub struct Part {
     pub name: String,
     /// Error (N) on every recording left out, without it.
     pub without_n: Vec<f64>,
+    /// What every recording left out loses without it, as a share of what is left.
+    pub loses: Vec<f64>,
     /// Whether it stayed.
     pub kept: bool,
 }
@@ -151,7 +160,7 @@ fn floor_n(raw: &Raw) -> f64 {
 }
 
 /// Of the laws that were tried the one that predicts recordings left out best; the base law where the others are hardly better.
-fn best_of<'a>(base: &'a Law, slip: Option<&'a Law>, library: Option<&'a Law>) -> &'a Law {
+pub(super) fn best_of<'a>(base: &'a Law, slip: Option<&'a Law>, library: Option<&'a Law>) -> &'a Law {
     let mut best = base;
     for law in slip.into_iter().chain(library) {
         let worth = law.left_out_n() < (1.0 - WORTH) * base.left_out_n();
@@ -196,7 +205,7 @@ fn some(prepared: &Prepared, runs: &[&Insertion]) -> (Prepared, Vec<usize>) {
 }
 
 /// The same on longer blocks; what is on them already stays.
-fn coarse(fitted: &Fitted) -> Fitted {
+pub(super) fn coarse(fitted: &Fitted) -> Fitted {
     let long = |b: &Blocks| b.samples as f64 * b.step_s > 1.5 * SET_BLOCK_S;
     if fitted.data.blocks.iter().all(long) {
         return fitted.clone();
@@ -205,27 +214,43 @@ fn coarse(fitted: &Fitted) -> Fitted {
     Fitted { data: fitted.data.on(blocks), ..fitted.clone() }
 }
 
-/// Error (N) on every recording, its part of the set left out.
-fn judged(fitted: &Fitted, runs: &[&Insertion]) -> Vec<f64> {
+/// The parts of a set of so many recordings that are left out in turn.
+pub(super) fn folds(recordings: usize) -> Vec<Vec<usize>> {
+    let count = if recordings <= FEW { recordings } else { FOLDS };
+    (0..count).map(|k| (k..recordings).step_by(count.max(1)).collect()).collect()
+}
+
+/// How well a law predicts recordings that it has not seen.
+pub(super) fn foretold(
+    law: &Population,
+    day_of: &[usize],
+    runs: &[&Insertion],
+    which: &[usize],
+) -> Vec<(usize, Score)> {
+    let one = |r: usize| score(runs[r], &predict(law, runs[r], day_of.get(r).copied(), DRAWS));
+    which.iter().map(|r| (*r, one(*r))).collect()
+}
+
+/// How well every recording is predicted, its part of the set left out.
+fn judged(fitted: &Fitted, runs: &[&Insertion]) -> Vec<Option<Score>> {
     let at = coarse(fitted);
-    let count = if runs.len() <= FEW { runs.len() } else { FOLDS };
-    let folds: Vec<Vec<usize>> =
-        (0..count).map(|k| (k..runs.len()).step_by(count.max(1)).collect()).collect();
-    let done: Vec<Vec<(usize, f64)>> = folds
+    let done: Vec<Vec<(usize, Score)>> = folds(runs.len())
         .par_iter()
         .map(|fold| {
             let Some(p) = without(&at, runs, fold, &[TURNS]) else { return Vec::new() };
-            let day = |r: usize| at.fit.model.day_of.get(r).copied();
-            fold.iter()
-                .map(|r| (*r, score(runs[*r], &predict(&p, runs[*r], day(*r), DRAWS)).rmse_n))
-                .collect()
+            foretold(&p, &at.fit.model.day_of, runs, fold)
         })
         .collect();
-    let mut out = vec![f64::INFINITY; runs.len()];
-    for (r, e) in done.into_iter().flatten() {
-        out[r] = if e.is_finite() { e } else { f64::INFINITY };
+    let mut out = vec![None; runs.len()];
+    for (r, s) in done.into_iter().flatten() {
+        out[r] = Some(s).filter(|s| s.rmse_n.is_finite());
     }
     out
+}
+
+/// Error (N) on every recording; without end where it could not be predicted.
+fn errors_n(scores: &[Option<Score>]) -> Vec<f64> {
+    scores.iter().map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.rmse_n)).collect()
 }
 
 /// The effect that a shaft that slips is.
@@ -314,23 +339,70 @@ fn held(model: &Model, numbers: &[(&str, f64)]) -> Option<Model> {
     any.then_some(out)
 }
 
+/// Probability that errors `without` something are larger on new runs than those `with` it (Student, one-sided, paired: runs are
+/// what is independent).
+pub(super) fn confidence(without: &[f64], with: &[f64]) -> f64 {
+    let worth: Vec<f64> = without.iter().zip(with).map(|(a, b)| a - b).filter(|d| d.is_finite()).collect();
+    if worth.len() < 2 {
+        return f64::from(u8::from(!without.is_empty() && worth.is_empty()));
+    }
+    let error = stylet_stats::sd(&worth) / (worth.len() as f64).sqrt();
+    student::cdf(stylet_stats::mean(&worth) / error.max(1e-9), worth.len() as f64 - 1.0)
+}
+
+/// What every recording loses `without` something, as a share of what is left `with` it: squares of the parts of an insertion, each by
+/// what is left there of all recordings. Where a puncture falls is mostly chance, a hold is not: a score by parts (the likelihood of
+/// noise that every part has its own size of) sees what the whole hides.
+fn loses(without: &[Option<Score>], with: &[Option<Score>]) -> Vec<f64> {
+    let mut left = [(0.0, 0.0); PARTS.len()];
+    for s in with.iter().flatten() {
+        for (sum, part) in left.iter_mut().zip(s.parts) {
+            *sum = (sum.0 + part.0, sum.1 + part.1);
+        }
+    }
+    let one = |(without, with): (&Option<Score>, &Option<Score>)| match (without, with) {
+        (_, None) => 0.0,
+        (None, _) => f64::INFINITY,
+        (Some(without), Some(with)) => {
+            let samples: f64 = with.parts.iter().map(|p| p.1).sum();
+            let more = |k: usize| {
+                let square = left[k].0 / f64::max(left[k].1, 1.0);
+                if square > 0.0 { (without.parts[k].0 - with.parts[k].0) / square } else { 0.0 }
+            };
+            (0..PARTS.len()).map(more).sum::<f64>() / samples.max(1.0)
+        }
+    };
+    without.iter().zip(with).map(one).collect()
+}
+
+/// Whether a part, one of so many that were asked, is worth more than chance: what recordings lose without it is something on the mean, and
+/// more than its own scatter would have it (Student, one-sided; runs are what is independent).
+fn pays(loses: &[f64], asked: usize) -> bool {
+    let none = vec![0.0; loses.len()];
+    // Squares are twice as much worse as their roots.
+    stylet_stats::mean(loses) >= 2.0 * PART_WORTH
+        && (loses.iter().any(|l| *l == f64::INFINITY)
+            || confidence(loses, &none) > 1.0 - CHANCE / asked.max(1) as f64)
+}
+
 /// Says what each part of a law is worth, and takes away what recordings left out do not miss.
-fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
-    let stands = best.left_out_n();
+pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
     let at = coarse(&best.fitted);
+    let whole = best.scores.clone();
     let mut out: Vec<Part> = candidates(&at.fit.model)
         .into_par_iter()
         .map(|(effect, name, model)| {
-            let errors = at.with(&model).map_or_else(Vec::new, |f| judged(&f, runs));
-            Part { effect, name, without_n: errors, kept: true }
+            let scores = at.with(&model).map_or_else(Vec::new, |f| judged(&f, runs));
+            let (without_n, loses) = (errors_n(&scores), loses(&scores, &whole));
+            Part { effect, name, without_n, loses, kept: true }
         })
         .collect();
-    let mut order: Vec<usize> = (0..out.len()).collect();
-    let loss = |p: &Part| stylet_stats::mean(&p.without_n) / stands - 1.0;
-    order.sort_by(|a, b| loss(&out[*a]).total_cmp(&loss(&out[*b])));
+    let asked = out.len();
+    let mut order: Vec<usize> = (0..asked).collect();
+    order.sort_by(|a, b| stylet_stats::mean(&out[*a].loses).total_cmp(&stylet_stats::mean(&out[*b].loses)));
     for k in order {
-        if loss(&out[k]) >= PART_WORTH || out[k].without_n.is_empty() {
-            break;
+        if out[k].loses.is_empty() || pays(&out[k].loses, asked) {
+            continue;
         }
         // Beside what went before it.
         let Some((_, _, model)) =
@@ -340,7 +412,8 @@ fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
         };
         let Some(smaller) = best.fitted.with(&model) else { continue };
         let smaller = Law::new(best.kind, smaller, runs);
-        if smaller.left_out_n() < (1.0 + PART_WORTH) * stands {
+        let beside = loses(&smaller.scores, &whole);
+        if !pays(&beside, asked) {
             *best = smaller;
             out[k].kept = false;
         }

@@ -1,12 +1,14 @@
 //! An insertion nobody has seen: draws from what varies between recordings and days, their mean and their band.
 
 use crate::set::first::Insertion;
-use crate::set::fitted::Fitted;
+use crate::set::fitted::{EXPECTED_DAYS, Fitted};
 use crate::set::instrument::line;
+use crate::set::open::Open;
+use std::collections::BTreeSet;
 use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
 use stylet_record::Recording;
-use stylet_stats::median_of;
 use stylet_stats::normal::quantile;
+use stylet_stats::{median_of, student};
 use stylet_tissue::{Effect, LawState, Reading};
 
 /// Draws of a prediction.
@@ -34,6 +36,10 @@ pub struct Population {
     pub residual_n: [f64; 4],
     /// Recordings that the law was fitted to: what varies between them is known as well as so many can tell.
     pub recordings: usize,
+    /// Days that they were made on.
+    pub days: usize,
+    /// What the recordings leave open of the law itself: drawn, too, where it is asked for a speed that took no part.
+    pub open: Option<Open>,
 }
 
 /// Radical inverse of `k` in a base: points of the Halton sequence.
@@ -68,7 +74,14 @@ impl Population {
         // Blocks average the noise of single samples away.
         let noise_n = median_of(runs.iter().map(|r| single(&r.recording)));
         let of = |(s, n): (f64, f64)| (s / f64::max(n, 1.0) + noise_n * noise_n).sqrt();
-        Self { law: model.only(&[]), residual_n: sums.map(of), recordings: runs.len() }
+        let days: BTreeSet<usize> = model.day_of.iter().copied().collect();
+        Self {
+            law: model.only(&[]),
+            residual_n: sums.map(of),
+            recordings: runs.len(),
+            days: days.len(),
+            open: None,
+        }
     }
 
     /// What is left of a recording that takes no part, over what is left of one that does: about a mean of `n` values another one scatters
@@ -81,14 +94,18 @@ impl Population {
     /// The `k`-th drawn insertion, from 1 on; on a known day or on one that is drawn too.
     fn draw(&self, k: usize, day: Option<usize>) -> Model {
         let mut dimension = 0;
-        // What varies is drawn about a mean that so many recordings tell no better.
-        let n = self.recordings.max(2) as f64;
-        let mut normal = || {
+        let mut place = || {
             let base = PRIMES[dimension % PRIMES.len()];
             dimension += 1;
-            quantile(halton(k, base)) * (1.0 + 1.0 / n).sqrt()
+            halton(k, base)
         };
+        // What varies is drawn about a mean, and with a spread, that so many recordings tell no better: Student's.
+        let dof = self.recordings.max(2) as f64 - 1.0;
+        let mut normal = || student::quantile(place(), dof) * self.beyond();
         let mut model = self.law.clone();
+        if let Some(open) = &self.open {
+            open.draw(k, &mut model);
+        }
         let s = &self.law.scatter;
         let (surface, friction) = (normal(), normal());
         let free = model.free;
@@ -116,7 +133,11 @@ impl Population {
                 own.differing[k] = self.law.differing_sd(k) * normal();
             }
         }
-        let drawn = Day { surface_m: s.day_surface_m * normal(), friction: s.day_friction * normal() };
+        // Days were as few as they are, and what is expected of them counts as some more.
+        let days = self.days as f64;
+        let wide = (1.0 + 1.0 / days.max(1.0)).sqrt();
+        let mut of_day = || student::quantile(place(), days.max(1.0) + EXPECTED_DAYS - 1.0) * wide;
+        let drawn = Day { surface_m: s.day_surface_m * of_day(), friction: s.day_friction * of_day() };
         let day = day.unwrap_or_else(|| {
             model.days.push(Day {
                 surface_m: if free.day_surface { drawn.surface_m } else { 0.0 },
@@ -291,7 +312,7 @@ mod tests {
         (law.free.own_surface, law.free.own_friction, law.free.day_surface, law.free.day_friction) =
             (true, true, true, true);
         law.days = vec![Day { surface_m: 1e-3, friction: 0.2 }];
-        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5 }
+        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1, open: None }
     }
 
     /// In by 30 mm in 6 s, a rest of 2 s, and back.

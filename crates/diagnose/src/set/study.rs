@@ -8,7 +8,8 @@ use crate::outcome::{
 use crate::raw;
 use crate::set::first::{Insertion, groups};
 use crate::set::instrument::{Checks, Instrument, Undone};
-use crate::set::laws::{Kind, Law, Laws, effects, laws, several, slip};
+use crate::set::laws::{Kind, Law, Laws, confidence, effects, laws, several, slip};
+use crate::set::nested::nested;
 use crate::set::left_out::{Out, floor, runs_out, speeds_out};
 use crate::set::numbers::{Told, base_parameters, estimates};
 use crate::set::repeats::{Bought, Repeats, Standing, repeats};
@@ -82,6 +83,14 @@ pub fn study(
     Some(Study { laws, out, base_out, diagnosis, repeats, extended, runs: undone })
 }
 
+impl Study {
+    /// Asks what parts of the set are predicted to when the law and its parts are chosen without them.
+    pub fn nest(&mut self) {
+        let runs: Vec<&Insertion> = self.runs.iter().collect();
+        self.repeats.nested = nested(&self.laws, &runs);
+    }
+}
+
 /// Every run predicted without it by the base law, `out` being what the best one predicts.
 fn base_out(laws: &Laws, out: &[Out], runs: &[&Insertion]) -> Vec<Out> {
     if laws.best.kind == Kind::Base { out.to_vec() } else { runs_out(&laws.base.fitted, runs) }
@@ -111,16 +120,6 @@ fn bought(laws: &Laws) -> Vec<Bought> {
         });
     }
     out
-}
-
-/// Probability that errors `without` something are larger on new runs than those `with` it (normal, one-sided, paired).
-fn confidence(without: &[f64], with: &[f64]) -> f64 {
-    let worth: Vec<f64> = without.iter().zip(with).map(|(a, b)| a - b).filter(|d| d.is_finite()).collect();
-    if worth.len() < 2 {
-        return f64::from(u8::from(!without.is_empty() && worth.is_empty()));
-    }
-    let error = stylet_stats::sd(&worth) / (worth.len() as f64).sqrt();
-    stylet_stats::normal::cdf(stylet_stats::mean(&worth) / error.max(1e-9))
 }
 
 fn diagnosis(
@@ -157,10 +156,10 @@ fn diagnosis(
     let share = if best.kind == Kind::Base {
         1.0
     } else {
-        (beyond(mean.extended_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
+        (beyond(mean.law_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
     };
     let unknown =
-        share > UNEXPLAINED && mean.extended_n > (1.0 + BEYOND_FLOOR) * floor_n && mean.floor_n.is_some();
+        share > UNEXPLAINED && mean.law_n > (1.0 + BEYOND_FLOOR) * floor_n && mean.floor_n.is_some();
     let told_left = leftover::test(&best.fitted.fit, &best.fitted.data).sure;
     let verdict = match (unknown, causes.is_empty()) {
         (true, _) => Verdict::Unknown,

@@ -1,0 +1,85 @@
+//! What recordings leave open of the law itself.
+//!
+//! Around the best fit the nats are a bowl: its curvature tells how far the numbers may be off, and with which others (Laplace). Numbers
+//! of days are among them, so that a number which only differs from day to day, like the rate of a hold, is as open as the days leave
+//! it. Laws draw their bowls with kinks; a draw that costs more nats than its bowl allows is taken back towards the fit.
+
+use crate::set::fitted::Fitted;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use stylet_identify::fit::Tangent;
+use stylet_identify::model::{Model, Number};
+use stylet_identify::objective::residuals;
+
+/// Laws that are drawn, each together with its mirror image at the fit, so that their mean stays there.
+const LAWS: u64 = 16;
+/// A draw is halved so many times at most.
+const HALVED: usize = 6;
+/// Nats that are no matter.
+const SLACK: f64 = 0.5;
+
+/// Laws as likely as the fit leaves them.
+#[derive(Clone, Debug)]
+pub struct Open {
+    numbers: Vec<Number>,
+    /// Steps of the numbers from the fit.
+    steps: Vec<Vec<f64>>,
+}
+
+impl Open {
+    /// What a fit leaves open.
+    #[must_use]
+    pub fn of(fitted: &Fitted) -> Self {
+        let (model, data) = (&fitted.fit.model, &fitted.data);
+        let tangent = Tangent::new(model, data, &fitted.fit.residuals);
+        let factor = tangent.factor();
+        let stands = fitted.fit.nats();
+        let moved = |step: &[f64], share: f64| {
+            let mut out = model.clone();
+            move_by(&mut out, &tangent.shared, step, share, 0);
+            for r in 0..data.recordings() {
+                let at = tangent.place(0, r);
+                move_by(&mut out, &tangent.own, step.get(at..).unwrap_or_default(), share, r);
+            }
+            out
+        };
+        let one = |k: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(k);
+            let z: Vec<f64> = (0..factor.size()).map(|_| StandardNormal.sample(&mut rng)).collect();
+            let bowl: f64 = 0.5 * z.iter().map(|z| z * z).sum::<f64>();
+            let step = factor.back(&z);
+            let mut share = 1.0;
+            for _ in 0..HALVED {
+                let costs = |share: f64| {
+                    residuals(&moved(&step, share), data).map_or(f64::INFINITY, |r| r.nats - stands)
+                };
+                if costs(share).max(costs(-share)) <= bowl + SLACK {
+                    return step[..tangent.shared.len()].iter().map(|x| share * x).collect();
+                }
+                share *= 0.5;
+            }
+            vec![0.0; tangent.shared.len()]
+        };
+        let steps = (0..LAWS).into_par_iter().map(one).collect();
+        Self { numbers: tangent.shared.clone(), steps }
+    }
+
+    /// Moves a model to the `k`-th law.
+    pub fn draw(&self, k: usize, model: &mut Model) {
+        let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        if let Some(step) = self.steps.get(k / 2 % self.steps.len().max(1)) {
+            move_by(model, &self.numbers, step, sign, 0);
+        }
+    }
+}
+
+/// Moves the numbers of a recording by a share of a step, within their bounds.
+fn move_by(model: &mut Model, numbers: &[Number], step: &[f64], share: f64, r: usize) {
+    for (n, step) in numbers.iter().zip(step) {
+        let x = model.get(n.role, r);
+        if x.is_finite() && step.is_finite() {
+            model.set(n.role, r, (x + share * step).clamp(n.low, n.high));
+        }
+    }
+}
