@@ -48,6 +48,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let population = Population { recordings: ALL, ..Population::of(&found.laws.best.fitted, &refs) };
     println!("{file}: {} runs follow {}", refs.len(), has.join(", "));
     tell(&found.laws);
+    let m = &found.repeats.mean;
+    println!(
+        "    {:.3} N on runs left out, {:.3} N with what is alike, floor {:.3} N, in band {:.3}; speed left out {:.3} N, in band {:.3}",
+        m.law_n,
+        m.extended_n,
+        m.floor_n.unwrap_or(f64::NAN),
+        m.covered,
+        m.speed_left_out_n.unwrap_or(f64::NAN),
+        m.speed_covered.unwrap_or(f64::NAN)
+    );
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Every seed has draws of its own.
     let from = usize::try_from(seed.abs_diff(SEED))? * sets * refs.len();

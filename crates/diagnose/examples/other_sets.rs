@@ -51,7 +51,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             "{k}: {}, {layers} layer(s), {} runs at {:?} mm/s",
             if k % 2 == 1 { "rich" } else { "slips" },
             runs.len(),
-            stylet_diagnose::set::study::speeds(&refs).iter().map(|s| (1e5 * s.0).round() / 100.0).collect::<Vec<_>>()
+            stylet_diagnose::set::study::speeds(&refs)
+                .iter()
+                .map(|s| (1e5 * s.0).round() / 100.0)
+                .collect::<Vec<_>>()
         );
         let Some(s) = study("other", &believed(layers), &refs, &Checks::default(), |_| {}) else {
             println!("{what}: no law");
@@ -179,7 +182,8 @@ fn ingredients(rng: &mut ChaCha8Rng) -> Ingredients {
     };
     let foundation = Foundation { softness: 0.5 * times(rng, FACTOR), lag_s: 0.5 * times(rng, FACTOR) };
     let damage = Damage { exponent: 10.0, time_s: times(rng, FACTOR) };
-    let tearing = Tearing { steps: 1 + (rng.random::<f64>() * 3.0) as u32, travel_m: 1e-3 * times(rng, FACTOR) };
+    let tearing =
+        Tearing { steps: 1 + (rng.random::<f64>() * 3.0) as u32, travel_m: 1e-3 * times(rng, FACTOR) };
     Ingredients {
         bristles: Some(bristles),
         foundation: Some(foundation),
@@ -205,14 +209,25 @@ fn path(m: Motion) -> Path {
     )
 }
 
-fn rich_run(layers: usize, thick_m: f64, strong: [f64; 2], with: &Ingredients, m: Motion, by: Differs) -> Columns {
+fn rich_run(
+    layers: usize,
+    thick_m: f64,
+    strong: [f64; 2],
+    with: &Ingredients,
+    m: Motion,
+    by: Differs,
+) -> Columns {
     let layer = |thickness_m: f64, strong: f64| real::Layer {
         thickness_m,
         stiffness_n_per_m: 150.0 * strong,
         friction_ns_per_m2: 1.5e4 * strong * by[1].exp(),
         puncture_n: Some(strong * (1.0 + by[2]).max(0.2)),
     };
-    let thick = if layers > 1 { vec![layer(thick_m, strong[0]), layer(0.08, strong[1])] } else { vec![layer(0.08, strong[0])] };
+    let thick = if layers > 1 {
+        vec![layer(thick_m, strong[0]), layer(0.08, strong[1])]
+    } else {
+        vec![layer(0.08, strong[0])]
+    };
     let tissue = real::Tissue { surface_m: 0.004 + by[0], layers: thick };
     let path = path(m);
     let at: Vec<f64> = (0..(path.duration_s() * SAMPLE_HZ) as usize).map(|k| k as f64 / SAMPLE_HZ).collect();
@@ -220,7 +235,12 @@ fn rich_run(layers: usize, thick_m: f64, strong: [f64; 2], with: &Ingredients, m
     (done.time_s, done.position_m, done.force_n)
 }
 
-fn slip_run(slips: &[Vec<AnyEffect>], thick_m: f64, m: Motion, by: Differs) -> Result<Columns, Box<dyn Error>> {
+fn slip_run(
+    slips: &[Vec<AnyEffect>],
+    thick_m: f64,
+    m: Motion,
+    by: Differs,
+) -> Result<Columns, Box<dyn Error>> {
     let mut tissue = believed(slips.len());
     tissue.surface_m += by[0];
     if slips.len() > 1 {
@@ -232,7 +252,9 @@ fn slip_run(slips: &[Vec<AnyEffect>], thick_m: f64, m: Motion, by: Differs) -> R
     let mut effects: Vec<AnyEffect> = slips.iter().flatten().cloned().collect();
     for effect in &mut effects {
         match effect {
-            AnyEffect::ShaftSlip(s) => (s.push_n, s.pull_n) = (s.push_n * by[1].exp(), s.pull_n * by[1].exp()),
+            AnyEffect::ShaftSlip(s) => {
+                (s.push_n, s.pull_n) = (s.push_n * by[1].exp(), s.pull_n * by[1].exp())
+            }
             AnyEffect::DelayedPuncture(d) => d.force_n *= (1.0 + by[2]).max(0.2),
             _ => {}
         }

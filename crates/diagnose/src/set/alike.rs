@@ -71,8 +71,10 @@ pub fn alike(run: &Insertion, told: &Prediction, others: &[(&Insertion, Vec<f64>
     let time_s = &run.recording.time_s;
     let (mut mean, mut noise) = (Vec::with_capacity(time_s.len()), Vec::with_capacity(time_s.len()));
     for (i, t) in time_s.iter().enumerate() {
-        let all: Vec<f64> =
-            left.iter().map(|(there, time_s, e)| interpolate(time_s, e, interpolate(&here, there, *t))).collect();
+        let all: Vec<f64> = left
+            .iter()
+            .map(|(there, time_s, e)| interpolate(time_s, e, interpolate(&here, there, *t)))
+            .collect();
         let m = all.iter().sum::<f64>() / n;
         // What the law expects of the scatter counts as one more recording.
         let expected = (told.high[i] - told.low[i]) / (2.0 * HALF_BAND);
@@ -96,4 +98,90 @@ pub fn alike(run: &Insertion, told: &Prediction, others: &[(&Insertion, Vec<f64>
         out.sd_n.push((share * noise[i]).sqrt());
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HALF_BAND, alike};
+    use crate::set::Insertion;
+    use crate::set::population::Prediction;
+    use stylet_record::Recording;
+
+    /// In by 20 mm from `start_s` on in 5 s, a rest of so many s, and back: the force is the position times 100 and so much more.
+    fn run(start_s: f64, rest_s: f64, more_n: impl Fn(f64) -> f64) -> Insertion {
+        let t: Vec<f64> = (0..800).map(|k| 0.02 * f64::from(k)).collect();
+        let z = |t: f64| match t - start_s {
+            x if x < 0.0 => 0.0,
+            x if x < 5.0 => 0.004 * x,
+            x if x < 5.0 + rest_s => 0.02,
+            x => (0.02 - 0.008 * (x - 5.0 - rest_s)).max(0.0),
+        };
+        let z: Vec<f64> = t.iter().map(|t| z(*t)).collect();
+        let f = z.iter().zip(&t).map(|(z, t)| 100.0 * z + more_n(*t)).collect();
+        Insertion::new(String::new(), Recording::new(t, z, f).expect("clean columns"), 1)
+    }
+
+    /// A law that knows the position only, with a band of so many standard deviations (N).
+    fn law(run: &Insertion, sd_n: f64) -> Prediction {
+        let mean: Vec<f64> = run.recording.position_m.iter().map(|z| 100.0 * z).collect();
+        let edge = |by: f64| mean.iter().map(|f| f + by * HALF_BAND * sd_n).collect();
+        Prediction { low: edge(-1.0), high: edge(1.0), mean: mean.clone() }
+    }
+
+    #[test]
+    fn what_a_law_lacks_in_all_runs_of_a_speed_is_added_to_it() {
+        let runs = [0.50, 0.52, 0.48, 0.50].map(|more| run(1.0, 2.0, |_| more));
+        let others: Vec<_> = runs[1..].iter().map(|r| (r, law(r, 0.1).mean)).collect();
+        let told = law(&runs[0], 0.1);
+        let a = alike(&runs[0], &told, &others);
+        // Squares of three about their mean, and one more of a tenth of a newton: by chance a mean of 0.034 N.
+        let by_chance = (0.02_f64 * 0.02 * 2.0 + 0.01) / 9.0;
+        let share = 1.0 - by_chance / 0.25;
+        for i in [10, 300, 700] {
+            assert!((a.mean_n[i] - 0.5 * share).abs() < 1e-6, "{}", a.mean_n[i]);
+            assert!((a.sd_n[i] - (share * by_chance).sqrt()).abs() < 1e-6);
+            let both = a.beside(&told);
+            assert!((both.mean[i] - told.mean[i] - a.mean_n[i]).abs() < 1e-12);
+            // The band goes along, wider by what is learned badly.
+            let half = HALF_BAND * 0.1_f64.hypot(a.sd_n[i]);
+            assert!((both.high[i] - both.mean[i] - half).abs() < 1e-9);
+            assert!((both.mean[i] - both.low[i] - half).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_differs_from_run_to_run_is_not_learned() {
+        let runs = [0.1, 0.3, -0.3, 0.1, -0.1].map(|more| run(1.0, 2.0, |_| more));
+        let others: Vec<_> = runs[1..].iter().map(|r| (r, law(r, 0.2).mean)).collect();
+        let told = law(&runs[0], 0.2);
+        let a = alike(&runs[0], &told, &others);
+        assert!(a.mean_n.iter().all(|m| *m == 0.0) && a.beside(&told).mean == told.mean);
+        // Nobody to learn from.
+        assert_eq!(alike(&runs[0], &told, &[]).beside(&told).mean, told.mean);
+    }
+
+    /// A bump half a second after the way back begins: the runs begin at other times and rest for other times.
+    #[test]
+    fn runs_are_laid_upon_each_other_where_they_begin_stand_and_go_back() {
+        let bump = |back_s: f64| move |t: f64| if (t - back_s - 0.5).abs() < 0.3 { 1.0 } else { 0.0 };
+        let here = run(1.0, 2.0, bump(8.0));
+        let there = [(0.5, 3.0, 8.5), (1.5, 2.5, 9.0), (2.0, 2.0, 9.0)]
+            .map(|(s, rest, back)| run(s, rest, bump(back)));
+        let others: Vec<_> = there.iter().map(|r| (r, law(r, 0.05).mean)).collect();
+        let a = alike(&here, &law(&here, 0.05), &others);
+        let at = |t: f64| a.mean_n[(t / 0.02) as usize];
+        assert!(at(8.5) > 0.9 && at(8.0) < 0.1 && at(9.0) < 0.1, "{} {} {}", at(8.0), at(8.5), at(9.0));
+    }
+
+    #[test]
+    fn what_a_sensor_cannot_show_is_not_what_the_law_lacks() {
+        let mut runs = [0.0; 4].map(|more| run(1.0, 2.0, |_| more));
+        for r in &mut runs {
+            r.recording.force_n.iter_mut().for_each(|f| *f = f.min(1.5));
+            r.limit_n = Some(1.5);
+        }
+        let others: Vec<_> = runs[1..].iter().map(|r| (r, law(r, 0.1).mean)).collect();
+        let a = alike(&runs[0], &law(&runs[0], 0.1), &others);
+        assert!(a.mean_n.iter().all(|m| m.abs() < 1e-12));
+    }
 }

@@ -176,12 +176,13 @@ pub fn floor(runs: &[&Insertion]) -> Vec<Option<(Score, usize)>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{floor, one_left_out, runs_out, score, speeds_out, without};
+    use super::{fit_without, floor, one_left_out, runs_out, score, speeds_out, staying, without};
     use crate::made;
     use crate::set::Insertion;
+    use crate::set::alike::alike;
     use crate::set::fitted::Fitted;
     use crate::set::open::Open;
-use crate::set::population::{DRAWS, Prediction, predict};
+    use crate::set::population::{DRAWS, Population, Prediction, predict};
     use stylet_identify::model::{Day, NEVER};
     use stylet_record::Recording;
 
@@ -294,11 +295,19 @@ use crate::set::population::{DRAWS, Prediction, predict};
             let others = without(&fitted, &runs, &[r], &[5]).expect("a fit");
             assert_eq!((others.recordings, others.law.days.len()), (2, 2));
             let wanted = predict(&others, runs[r], day, DRAWS);
-            assert_eq!(told[r].prediction.mean, wanted.mean, "{r}");
-            assert_eq!(told[r].score, score(runs[r], &wanted), "{r}");
+            assert_eq!(told[r].law_n, wanted.mean, "{r}");
+            assert_eq!(told[r].law, score(runs[r], &wanted), "{r}");
+            // Beside it stands what the other run of its speed leaves, where there is one.
+            let other = (day.is_some()).then(|| {
+                let o = runs[2 - r];
+                (o, predict(&others, o, day, DRAWS).mean)
+            });
+            let both = alike(runs[r], &wanted, &Vec::from_iter(other)).beside(&wanted);
+            assert_eq!(told[r].prediction.mean, both.mean, "{r}");
+            assert_eq!(told[r].score, score(runs[r], &both), "{r}");
             assert!(told[r].population.is_some());
         }
-        assert_eq!(one_left_out(&fitted, &runs), told.into_iter().map(|o| o.score).collect::<Vec<_>>());
+        assert_eq!(one_left_out(&fitted, &runs), told.into_iter().map(|o| o.law).collect::<Vec<_>>());
     }
 
     #[test]
@@ -307,7 +316,9 @@ use crate::set::population::{DRAWS, Prediction, predict};
         let runs: Vec<&Insertion> = runs.iter().collect();
         let told = speeds_out(&fitted, &runs);
         for (r, group) in [(0, vec![0, 2]), (1, vec![1]), (2, vec![0, 2])] {
-            let others = without(&fitted, &runs, &group, &[10, 6]).expect("a fit");
+            let others = fit_without(&fitted, &group, &[10, 6]).expect("a fit");
+            let open = Some(Open::of(&others));
+            let others = Population { open, ..Population::of(&others, &staying(&runs, &group)) };
             assert_eq!(others.recordings, 3 - group.len());
             assert_eq!(told[r], score(runs[r], &predict(&others, runs[r], None, DRAWS)), "{r}");
         }

@@ -83,3 +83,43 @@ fn move_by(model: &mut Model, numbers: &[Number], step: &[f64], share: f64, r: u
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LAWS, Open};
+    use crate::made;
+    use crate::set::Insertion;
+    use stylet_identify::fit::Tangent;
+    use stylet_identify::model::Role;
+
+    #[test]
+    fn laws_scatter_about_the_fit_as_its_curvature_says() {
+        let runs = made::insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, -1e-4]]);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let fitted = made::settled(&[], &runs);
+        let model = &fitted.fit.model;
+        let open = Open::of(&fitted);
+        let tangent = Tangent::new(model, &fitted.data, &fitted.fit.residuals);
+        let variances = tangent.factor().inverse_diagonal();
+        for (i, n) in tangent.shared.iter().enumerate().filter(|(_, n)| n.role != Role::Puncture(0)) {
+            let stands = model.get(n.role, 0);
+            let moved: Vec<f64> = (2..2 + 2 * LAWS as usize)
+                .map(|k| {
+                    let mut m = model.clone();
+                    open.draw(k, &mut m);
+                    m.get(n.role, 0) - stands
+                })
+                .collect();
+            // Each with its mirror image.
+            assert!(moved.iter().sum::<f64>().abs() < 1e-6 * stands.abs().max(1e-3), "{:?}", n.role);
+            let square = moved.iter().map(|x| x * x).sum::<f64>() / moved.len() as f64;
+            let ratio = (square / variances[i]).sqrt();
+            assert!((0.6..1.4).contains(&ratio), "{:?}: {ratio}", n.role);
+        }
+        // The same every time.
+        let (mut a, mut b) = (model.clone(), model.clone());
+        open.draw(5, &mut a);
+        Open::of(&fitted).draw(5, &mut b);
+        assert_eq!(a.tissue, b.tissue);
+    }
+}

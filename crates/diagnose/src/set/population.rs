@@ -273,6 +273,7 @@ mod tests {
     use stylet_identify::model::{Belief, Choice, Day, Model, NEVER};
     use stylet_record::Recording;
     use stylet_stats::normal::quantile;
+    use stylet_stats::student;
     use stylet_tissue::{
         DelayedPuncture, DriveFriction, Effect, ForceDrift, Law, LawState, Layer, LetGo, PositionScale,
         ShaftSlip, TimeDelay, Tissue,
@@ -333,12 +334,16 @@ mod tests {
     }
 
     /// Every number that varies has a dimension of the Halton sequence of its own, in the order surface, friction, each layer's force, the
-    /// numbers of effects, the day; wider by what a mean of so many leaves open.
+    /// numbers of effects, the day: Student's, wider by what a mean and a spread of so many leave open.
     #[test]
     fn a_drawn_insertion_has_its_numbers_by_the_points_of_a_sequence() {
         let mut p = population();
-        let wide = (1.0_f64 + 1.0 / 5.0).sqrt();
-        let n = |k: usize, dimension: usize| quantile(halton(k, PRIMES[dimension])) * wide;
+        let wide = (6.0_f64 / 4.0).sqrt();
+        let n = |k: usize, dimension: usize| student::quantile(halton(k, PRIMES[dimension]), 4.0) * wide;
+        // One day, and four more that are expected.
+        let day = |k: usize, dimension: usize| {
+            student::quantile(halton(k, PRIMES[dimension]), 4.0) * 2.0_f64.sqrt()
+        };
         for k in [1, 7, 50] {
             let m = p.draw(k, None);
             let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{k}: {a} for {b}");
@@ -346,16 +351,21 @@ mod tests {
             near(m.own[0].friction, 0.07 * n(k, 1));
             near(m.tissue.layers[0].puncture_n.unwrap_or(0.0), 1.1 * (1.0 + 0.05 * n(k, 2)));
             near(m.tissue.layers[1].puncture_n.unwrap_or(0.0), 1.9 * (1.0 + 0.05 * n(k, 3)));
-            near(m.days[1].surface_m, 7e-4 * n(k, 4));
-            near(m.days[1].friction, 0.11 * n(k, 5));
+            near(m.days[1].surface_m, 7e-4 * day(k, 4));
+            near(m.days[1].friction, 0.11 * day(k, 5));
             assert_eq!((m.day_of.as_slice(), m.instants.as_slice()), (&[1][..], &[vec![NEVER; 2]][..]));
             assert_eq!(p.draw(k, Some(0)).day_of, [0]);
             assert_eq!(p.draw(k, Some(0)).days.len(), 1);
         }
         // A mean of two or one is as open as one of two.
         p.recordings = 1;
-        let open = p.draw(7, None).own[0].surface_m / (3e-4 * quantile(halton(7, 2)));
-        assert!((open - 1.5_f64.sqrt()).abs() < 1e-12, "{open}");
+        let open = p.draw(7, None).own[0].surface_m / (3e-4 * student::quantile(halton(7, 2), 1.0));
+        assert!((open - 3.0_f64.sqrt()).abs() < 1e-12, "{open}");
+        // Days by what they are.
+        p.days = 3;
+        let open = p.draw(7, None).days[1].surface_m / (7e-4 * student::quantile(halton(7, PRIMES[4]), 6.0));
+        assert!((open - (4.0_f64 / 3.0).sqrt()).abs() < 1e-12, "{open}");
+        p.days = 1;
         p.recordings = 5;
         p.law.free = stylet_identify::model::Free::default();
         let m = p.draw(7, None);
@@ -381,8 +391,8 @@ mod tests {
         p.law.free.own_effects = true;
         p.law.scatter.differing[0] = 4e-4;
         let m = p.draw(9, Some(0));
-        let wide = (1.0_f64 + 1.0 / 5.0).sqrt();
-        let n = |dimension: usize| quantile(halton(9, PRIMES[dimension])) * wide;
+        let wide = (6.0_f64 / 4.0).sqrt();
+        let n = |dimension: usize| student::quantile(halton(9, PRIMES[dimension]), 4.0) * wide;
         let force = m.effects[1].values[1];
         assert!((force - 2.0 * (1.0 + 0.05 * n(3))).abs() < 1e-12, "{force}");
         let differing = p.law.differing().count();

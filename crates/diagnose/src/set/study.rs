@@ -9,8 +9,8 @@ use crate::raw;
 use crate::set::first::{Insertion, groups};
 use crate::set::instrument::{Checks, Instrument, Undone};
 use crate::set::laws::{Kind, Law, Laws, confidence, effects, laws, several, slip};
-use crate::set::nested::nested;
 use crate::set::left_out::{Out, floor, runs_out, speeds_out};
+use crate::set::nested::nested;
 use crate::set::numbers::{Told, base_parameters, estimates};
 use crate::set::repeats::{Bought, Repeats, Standing, repeats};
 use crate::set::scenario::extended;
@@ -290,15 +290,13 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        BEYOND_FLOOR, advice, base_out, bought, cause, confidence, diagnosis, dropped, evidence, speeds,
-    };
+    use super::{BEYOND_FLOOR, advice, base_out, bought, cause, diagnosis, dropped, evidence, speeds};
     use crate::made;
     use crate::outcome::{Diagnosis, Verdict};
     use crate::raw::Raw;
     use crate::set::Insertion;
     use crate::set::instrument::Instrument;
-    use crate::set::laws::{Kind, Law, Laws, Part};
+    use crate::set::laws::{Kind, Law, Laws, Part, confidence};
     use crate::set::left_out::Out;
     use crate::set::numbers::Told;
     use crate::set::repeats::{MeanReport, Repeats, Varies};
@@ -308,23 +306,6 @@ mod tests {
     fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {
         let rubs: [AnyEffect; 1] = [CoulombFriction { c_n_per_m: 3.0 }.into()];
         made::law(kind, &rubs[..usize::from(with)], errors_n, nats)
-    }
-
-    #[test]
-    fn confidence_is_the_chance_that_the_mean_of_what_is_worse_lies_above_nothing() {
-        let (without, with) = ([0.5, 0.7, 0.4, 0.9], [0.45, 0.5, 0.42, 0.6]);
-        let d: [f64; 4] = std::array::from_fn(|k| without[k] - with[k]);
-        let mean = d.iter().sum::<f64>() / 4.0;
-        let sd = (d.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3.0).sqrt();
-        let wanted = stylet_stats::normal::cdf(mean / (sd / 2.0));
-        assert!((confidence(&without, &with) - wanted).abs() < 1e-12);
-        // A recording that cannot be predicted without it does not count; where none can be, nothing else is left.
-        let more: Vec<f64> = without.iter().copied().chain([f64::INFINITY]).collect();
-        assert!((confidence(&more, &[&with[..], &[0.5]].concat()) - wanted).abs() < 1e-12);
-        assert_eq!(confidence(&[f64::INFINITY; 3], &with[..3]), 1.0);
-        assert_eq!((confidence(&[], &[]), confidence(&[0.5], &[0.4])), (0.0, 0.0));
-        // Two tell already: worse by 1 and by 3 is 2 with an error of 1.
-        assert_eq!(confidence(&[1.5, 3.5], &[0.5, 0.5]), stylet_stats::normal::cdf(2.0));
     }
 
     #[test]
@@ -363,6 +344,7 @@ mod tests {
             effect: "shaft_slip",
             name: name.to_owned(),
             without_n: without_n.to_vec(),
+            loses: Vec::new(),
             kept,
         };
         Laws {
@@ -468,7 +450,7 @@ mod tests {
         Repeats {
             runs: Vec::new(),
             speeds: Vec::new(),
-            mean: MeanReport { floor_n, base_n, extended_n, ..MeanReport::default() },
+            mean: MeanReport { floor_n, base_n, law_n: extended_n, extended_n, ..MeanReport::default() },
             parts_of_insertion: Vec::new(),
             population: Varies {
                 surface_m: 0.0,
@@ -484,6 +466,7 @@ mod tests {
             bought: Vec::new(),
             instrument: Instrument { noise_n: Some(0.1), ..Instrument::default() },
             parts: None,
+            nested: None,
         }
     }
 
@@ -518,6 +501,10 @@ mod tests {
         // A law that is worse than the base law leaves all, and one below the floor nothing.
         assert_eq!(told(&laws(), &repeats(0.5, 0.6, Some(0.1))).leftover.share, 1.0);
         assert_eq!(told(&laws(), &repeats(0.5, 0.05, Some(0.1))).leftover.share, 0.0);
+        // What is learned beside the law does not make it known.
+        let mut learned = repeats(0.5, 0.19, Some(0.1));
+        learned.mean.extended_n = 0.1;
+        assert_eq!(told(&laws(), &learned).verdict, Verdict::Unknown);
         // Without repeats of one speed nobody knows the floor; it is at least the noise.
         let d = told(&laws(), &repeats(0.5, 0.4, None));
         assert_eq!((d.verdict, d.gain.floor_n, d.noise.sd_n), (Verdict::Named, 0.1, 0.1));
@@ -541,6 +528,7 @@ mod tests {
             effect: "coulomb_friction",
             name: name.to_owned(),
             without_n: without_n.to_vec(),
+            loses: Vec::new(),
             kept,
         };
         laws.parts = vec![
