@@ -98,6 +98,8 @@ pub struct Part {
     pub without_n: Vec<f64>,
     /// What every recording left out loses without it, as a share of what is left.
     pub loses: Vec<f64>,
+    /// The same with whole speeds left out; nothing where there is one only.
+    pub speeds_lose: Vec<f64>,
     /// Whether it stayed.
     pub kept: bool,
 }
@@ -176,13 +178,25 @@ pub(super) fn best_of<'a>(base: &'a Law, slip: Option<&'a Law>, library: Option<
     best
 }
 
-/// The law of a shaft that slips: of the best fits, the one that predicts recordings left out best.
+/// The law of a shaft that slips: of the best fits the one that leaves least, unless another one predicts recordings left out better by
+/// more than chance. The least of several errors would be too good to compare with: a law without a part has one fit only.
 #[must_use]
 pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut ChaCha8Rng) -> Option<Law> {
-    fitted(believed, runs, raw, starts(runs.len()), rng)
-        .into_iter()
-        .map(|f| Law::new(Kind::Slip, f, runs))
-        .min_by(|a, b| a.left_out_n().total_cmp(&b.left_out_n()))
+    let laws = fitted(believed, runs, raw, starts(runs.len()), rng);
+    surest(laws.into_iter().map(|f| Law::new(Kind::Slip, f, runs)).collect())
+}
+
+/// The first law, unless another one is better by more than chance; then the best of those.
+fn surest(laws: Vec<Law>) -> Option<Law> {
+    let others = laws.len().saturating_sub(1);
+    let mut best: Option<Law> = None;
+    let first = laws.first()?.clone();
+    for law in laws.into_iter().skip(1).filter(|l| pays(&loses(&first.scores, &l.scores), others)) {
+        if best.as_ref().is_none_or(|b| law.left_out_n() < b.left_out_n()) {
+            best = Some(law);
+        }
+    }
+    best.or(Some(first))
 }
 
 /// From how many starts the law of a shaft that slips is fitted to so many recordings.
@@ -235,11 +249,21 @@ pub(super) fn foretold(
 /// How well every recording is predicted, its part of the set left out.
 fn judged(fitted: &Fitted, runs: &[&Insertion]) -> Vec<Option<Score>> {
     let at = coarse(fitted);
-    let done: Vec<Vec<(usize, Score)>> = folds(runs.len())
+    left_out(&at, runs, &folds(runs.len()), &at.fit.model.day_of)
+}
+
+/// How well every recording is predicted, its whole speed and stroke left out; nothing where there is one only.
+fn by_speed(fitted: &Fitted, runs: &[&Insertion]) -> Vec<Option<Score>> {
+    if several(runs) { left_out(&coarse(fitted), runs, &groups(runs), &[]) } else { Vec::new() }
+}
+
+/// How well every recording is predicted by fits without its part of the set, on days that are known where they are named.
+fn left_out(at: &Fitted, runs: &[&Insertion], parts: &[Vec<usize>], day_of: &[usize]) -> Vec<Option<Score>> {
+    let done: Vec<Vec<(usize, Score)>> = parts
         .par_iter()
-        .map(|fold| {
-            let Some(p) = without(&at, runs, fold, &[TURNS]) else { return Vec::new() };
-            foretold(&p, &at.fit.model.day_of, runs, fold)
+        .map(|part| {
+            let Some(p) = without(at, runs, part, &[TURNS]) else { return Vec::new() };
+            foretold(&p, day_of, runs, part)
         })
         .collect();
     let mut out = vec![None; runs.len()];
@@ -386,16 +410,18 @@ fn pays(loses: &[f64], asked: usize) -> bool {
             || confidence(loses, &none) > 1.0 - CHANCE / asked.max(1) as f64)
 }
 
-/// Says what each part of a law is worth, and takes away what recordings left out do not miss.
+/// Says what each part of a law is worth, and takes away what neither recordings left out nor whole speeds left out miss.
 pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
     let at = coarse(&best.fitted);
-    let whole = best.scores.clone();
+    let (whole, speeds) = (best.scores.clone(), by_speed(&best.fitted, runs));
     let mut out: Vec<Part> = candidates(&at.fit.model)
         .into_par_iter()
         .map(|(effect, name, model)| {
-            let scores = at.with(&model).map_or_else(Vec::new, |f| judged(&f, runs));
+            let smaller = at.with(&model);
+            let scores = smaller.as_ref().map_or_else(Vec::new, |f| judged(f, runs));
+            let speeds_lose = smaller.map_or_else(Vec::new, |f| loses(&by_speed(&f, runs), &speeds));
             let (without_n, loses) = (errors_n(&scores), loses(&scores, &whole));
-            Part { effect, name, without_n, loses, kept: true }
+            Part { effect, name, without_n, loses, speeds_lose, kept: true }
         })
         .collect();
     // A number of an effect that stays accuses nobody: only effects that may go can be named wrongly.
@@ -403,7 +429,7 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
     let mut order: Vec<usize> = (0..out.len()).collect();
     order.sort_by(|a, b| stylet_stats::mean(&out[*a].loses).total_cmp(&stylet_stats::mean(&out[*b].loses)));
     for k in order {
-        if out[k].loses.is_empty() || pays(&out[k].loses, asked) {
+        if out[k].loses.is_empty() || pays(&out[k].loses, asked) || pays(&out[k].speeds_lose, asked) {
             continue;
         }
         // Beside what went before it.
@@ -414,8 +440,8 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
         };
         let Some(smaller) = best.fitted.with(&model) else { continue };
         let smaller = Law::new(best.kind, smaller, runs);
-        let beside = loses(&smaller.scores, &whole);
-        if !pays(&beside, asked) {
+        let speeds_lose = loses(&by_speed(&smaller.fitted, runs), &speeds);
+        if !pays(&loses(&smaller.scores, &whole), asked) && !pays(&speeds_lose, asked) {
             *best = smaller;
             out[k].kept = false;
         }
@@ -449,7 +475,7 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 mod tests {
     use super::{
         DRAWS, Kind, Law, TURNS, WORTH, best_of, candidates, coarse, confidence, effects, errors_n, held,
-        judged, less, loses, parts, pays, several, some, starts,
+        judged, less, loses, parts, pays, several, some, starts, surest,
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
@@ -637,6 +663,23 @@ mod tests {
             assert_eq!(pays(&about(mean, t), asked), wanted, "{mean} {t} {asked}");
         }
         assert!(pays(&[0.0, f64::INFINITY, 0.0], 1) && !pays(&[], 1));
+    }
+
+    /// Of chance the least of several errors is too good.
+    #[test]
+    fn the_fit_that_leaves_least_stands_unless_another_one_predicts_better_by_more_than_chance() {
+        let law = |errors: &[f64]| made::law(Kind::Slip, &[slips(1)], errors, 0.0);
+        let first = [1.0, 1.1, 0.9, 1.2, 1.0];
+        let chosen = |others: &[[f64; 5]]| {
+            let all = [first].iter().chain(others).map(|e| law(e)).collect();
+            surest(all).expect("a law").errors_n
+        };
+        assert_eq!(chosen(&[]), first);
+        // Better by a sixth on the mean, for one recording alone.
+        assert_eq!(chosen(&[[1.0, 1.1, 0.9, 0.3, 1.0]]), first);
+        let (better, best) = ([0.8, 0.9, 0.7, 1.0, 0.8], [0.7, 0.8, 0.6, 0.9, 0.7]);
+        assert_eq!(chosen(&[better, best, better]), best);
+        assert!(surest(Vec::new()).is_none());
     }
 
     fn rubs(c_n_per_m: f64) -> AnyEffect {

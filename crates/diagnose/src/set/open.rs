@@ -9,7 +9,7 @@ use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use stylet_identify::fit::Tangent;
-use stylet_identify::model::{Model, Number};
+use stylet_identify::model::{Model, Number, Role};
 use stylet_identify::objective::residuals;
 
 /// Laws that are drawn, each together with its mirror image at the fit, so that their mean stays there.
@@ -33,7 +33,13 @@ impl Open {
     pub fn of(fitted: &Fitted) -> Self {
         let (model, data) = (&fitted.fit.model, &fitted.data);
         let tangent = Tangent::new(model, data, &fitted.fit.residuals);
-        let factor = tangent.factor();
+        // Ruptures stay where they were seen: a derivative sees the block alone in which one lies.
+        let (shared, own) = (tangent.shared.len(), tangent.own.len());
+        let timed =
+            |i: &usize| *i >= shared && matches!(tangent.own[(i - shared) % own].role, Role::Instant(_));
+        let size = shared + own * data.recordings();
+        let places: Vec<usize> = (0..size).filter(|i| !timed(i)).collect();
+        let factor = tangent.matrix.part(&places).factor();
         let stands = fitted.fit.nats();
         let moved = |step: &[f64], share: f64| {
             let mut out = model.clone();
@@ -48,18 +54,19 @@ impl Open {
             let mut rng = ChaCha8Rng::seed_from_u64(k);
             let z: Vec<f64> = (0..factor.size()).map(|_| StandardNormal.sample(&mut rng)).collect();
             let bowl: f64 = 0.5 * z.iter().map(|z| z * z).sum::<f64>();
-            let step = factor.back(&z);
+            let mut step = vec![0.0; size];
+            places.iter().zip(factor.back(&z)).for_each(|(i, x)| step[*i] = x);
             let mut share = 1.0;
             for _ in 0..HALVED {
                 let costs = |share: f64| {
                     residuals(&moved(&step, share), data).map_or(f64::INFINITY, |r| r.nats - stands)
                 };
                 if costs(share).max(costs(-share)) <= bowl + SLACK {
-                    return step[..tangent.shared.len()].iter().map(|x| share * x).collect();
+                    return step[..shared].iter().map(|x| share * x).collect();
                 }
                 share *= 0.5;
             }
-            vec![0.0; tangent.shared.len()]
+            vec![0.0; shared]
         };
         let steps = (0..LAWS).into_par_iter().map(one).collect();
         Self { numbers: tangent.shared.clone(), steps }
@@ -100,8 +107,13 @@ mod tests {
         let model = &fitted.fit.model;
         let open = Open::of(&fitted);
         let tangent = Tangent::new(model, &fitted.data, &fitted.fit.residuals);
-        let variances = tangent.factor().inverse_diagonal();
-        for (i, n) in tangent.shared.iter().enumerate().filter(|(_, n)| n.role != Role::Puncture(0)) {
+        // But for the instants, which come last of a recording's own two.
+        let places: Vec<usize> = (0..tangent.factor().size())
+            .filter(|i| *i < tangent.shared.len() || (i - tangent.shared.len()) % 3 < 2)
+            .collect();
+        assert!(tangent.own.len() == 3 && tangent.own[2].role == Role::Instant(0));
+        let variances = tangent.matrix.part(&places).factor().inverse_diagonal();
+        for (i, n) in tangent.shared.iter().enumerate().filter(|(i, _)| variances[*i].is_finite()) {
             let stands = model.get(n.role, 0);
             let moved: Vec<f64> = (2..2 + 2 * LAWS as usize)
                 .map(|k| {

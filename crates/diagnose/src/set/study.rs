@@ -345,6 +345,7 @@ mod tests {
             name: name.to_owned(),
             without_n: without_n.to_vec(),
             loses: Vec::new(),
+            speeds_lose: Vec::new(),
             kept,
         };
         Laws {
@@ -529,6 +530,7 @@ mod tests {
             name: name.to_owned(),
             without_n: without_n.to_vec(),
             loses: Vec::new(),
+            speeds_lose: Vec::new(),
             kept,
         };
         laws.parts = vec![
