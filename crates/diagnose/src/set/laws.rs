@@ -11,7 +11,6 @@ use crate::set::population::{Population, predict};
 use crate::varied::varied;
 use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::{Effort, fit as fitted_on};
@@ -43,10 +42,10 @@ const WORTH: f64 = 0.02;
 const ONE_STORY: usize = 2;
 /// only when they predict recordings left out better by this share.
 const MANY_STORIES: f64 = 0.1;
-/// A part of a law stays when recordings left out are predicted worse by this share without it,
-const PART_WORTH: f64 = 0.01;
-/// and by more than chance has it in so many laws, over all effects of a law that may go.
-const CHANCE: f64 = 0.05;
+/// A part of a law stays when recordings left out are predicted worse by this share without it, and by more than one standard error
+/// (Breiman and others 1984: of laws that predict about as well the simplest). It has to be more than the part would seem to be worth
+/// by chance: a law without it has been looked for less.
+const PART_WORTH: f64 = 0.05;
 
 /// Where a law comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -188,10 +187,9 @@ pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut Cha
 
 /// The first law, unless another one is better by more than chance; then the best of those.
 fn surest(laws: Vec<Law>) -> Option<Law> {
-    let others = laws.len().saturating_sub(1);
     let mut best: Option<Law> = None;
     let first = laws.first()?.clone();
-    for law in laws.into_iter().skip(1).filter(|l| pays(&loses(&first.scores, &l.scores), others)) {
+    for law in laws.into_iter().skip(1).filter(|l| pays(&loses(&first.scores, &l.scores))) {
         if best.as_ref().is_none_or(|b| law.left_out_n() < b.left_out_n()) {
             best = Some(law);
         }
@@ -400,14 +398,13 @@ fn loses(without: &[Option<Score>], with: &[Option<Score>]) -> Vec<f64> {
     without.iter().zip(with).map(one).collect()
 }
 
-/// Whether a part, beside so many effects that may go, is worth more than chance: what recordings lose without it is something on the mean, and
-/// more than its own scatter would have it (Student, one-sided; runs are what is independent).
-fn pays(loses: &[f64], asked: usize) -> bool {
-    let none = vec![0.0; loses.len()];
+/// Whether a part is worth having: what recordings lose without it is enough, and more than its standard error over the recordings, which
+/// are what is independent.
+fn pays(loses: &[f64]) -> bool {
+    let mean = stylet_stats::mean(loses);
+    let error = stylet_stats::sd(loses) / (loses.len() as f64).sqrt();
     // Squares are twice as much worse as their roots.
-    stylet_stats::mean(loses) >= 2.0 * PART_WORTH
-        && (loses.iter().any(|l| *l == f64::INFINITY)
-            || confidence(loses, &none) > 1.0 - CHANCE / asked.max(1) as f64)
+    mean >= 2.0 * PART_WORTH && (mean == f64::INFINITY || mean > error)
 }
 
 /// Says what each part of a law is worth, and takes away what neither recordings left out nor whole speeds left out miss.
@@ -424,12 +421,10 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
             Part { effect, name, without_n, loses, speeds_lose, kept: true }
         })
         .collect();
-    // A number of an effect that stays accuses nobody: only effects that may go can be named wrongly.
-    let asked = out.iter().map(|p| p.effect).filter(|e| *e != slip().id).collect::<BTreeSet<_>>().len();
     let mut order: Vec<usize> = (0..out.len()).collect();
     order.sort_by(|a, b| stylet_stats::mean(&out[*a].loses).total_cmp(&stylet_stats::mean(&out[*b].loses)));
     for k in order {
-        if out[k].loses.is_empty() || pays(&out[k].loses, asked) || pays(&out[k].speeds_lose, asked) {
+        if out[k].loses.is_empty() || pays(&out[k].loses) || pays(&out[k].speeds_lose) {
             continue;
         }
         // Beside what went before it.
@@ -441,7 +436,7 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
         let Some(smaller) = best.fitted.with(&model) else { continue };
         let smaller = Law::new(best.kind, smaller, runs);
         let speeds_lose = loses(&by_speed(&smaller.fitted, runs), &speeds);
-        if !pays(&loses(&smaller.scores, &whole), asked) && !pays(&speeds_lose, asked) {
+        if !pays(&loses(&smaller.scores, &whole)) && !pays(&speeds_lose) {
             *best = smaller;
             out[k].kept = false;
         }
@@ -643,26 +638,19 @@ mod tests {
         assert_eq!(loses(&[with[0].clone(), None], &[None, with[1].clone()])[0], 0.0);
     }
 
-    /// Five recordings: Student's with four degrees of freedom, 2.13 at 5 % and 2.78 at half of that.
     #[test]
-    fn a_part_pays_that_is_worth_more_than_two_per_cent_of_squares_and_than_chance() {
-        let about = |mean: f64, t: f64| -> Vec<f64> {
+    fn a_part_pays_that_is_worth_a_twentieth_and_more_than_its_standard_error() {
+        let about = |mean: f64, errors: f64| -> Vec<f64> {
             // Errors of the mean of these five are sqrt(0.5).
-            let scale = mean / t / 0.5_f64.sqrt();
+            let scale = mean / errors / 0.5_f64.sqrt();
             [-2.0, -1.0, 0.0, 1.0, 2.0].map(|x| mean + scale * x).to_vec()
         };
-        for (mean, t, asked, wanted) in [
-            (0.1, 2.2, 1, true),
-            (0.1, 2.05, 1, false),
-            (0.1, 2.7, 2, false),
-            (0.1, 2.85, 2, true),
-            (0.021, 9.0, 1, true),
-            (0.019, 9.0, 1, false),
-            (-0.1, 9.0, 1, false),
-        ] {
-            assert_eq!(pays(&about(mean, t), asked), wanted, "{mean} {t} {asked}");
+        for (mean, errors, wanted) in
+            [(0.2, 1.1, true), (0.2, 0.9, false), (0.101, 9.0, true), (0.099, 9.0, false), (-0.2, 9.0, false)]
+        {
+            assert_eq!(pays(&about(mean, errors)), wanted, "{mean} {errors}");
         }
-        assert!(pays(&[0.0, f64::INFINITY, 0.0], 1) && !pays(&[], 1));
+        assert!(pays(&[0.0, f64::INFINITY, 0.0]) && !pays(&[]));
     }
 
     /// Of chance the least of several errors is too good.
@@ -676,7 +664,7 @@ mod tests {
         };
         assert_eq!(chosen(&[]), first);
         // Better by a sixth on the mean, for one recording alone.
-        assert_eq!(chosen(&[[1.0, 1.1, 0.9, 0.3, 1.0]]), first);
+        assert_eq!(chosen(&[[1.02, 1.1, 0.9, 0.3, 1.0]]), first);
         let (better, best) = ([0.8, 0.9, 0.7, 1.0, 0.8], [0.7, 0.8, 0.6, 0.9, 0.7]);
         assert_eq!(chosen(&[better, best, better]), best);
         assert!(surest(Vec::new()).is_none());
