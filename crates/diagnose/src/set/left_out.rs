@@ -3,7 +3,6 @@
 use crate::set::alike::alike;
 use crate::set::first::{Insertion, groups};
 use crate::set::fitted::{Fitted, settle};
-use crate::set::open::Open;
 use crate::set::population::{DRAWS, Part, Population, Prediction, part, predict};
 use rayon::prelude::*;
 use stylet_identify::model::NEVER;
@@ -132,9 +131,7 @@ pub fn speeds_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
     let done: Vec<Vec<(usize, Score)>> = groups
         .par_iter()
         .map(|group| {
-            let Some(fitted) = fit_without(all, group, &[10, 6]) else { return Vec::new() };
-            let open = Some(Open::of(&fitted));
-            let p = Population { open, ..Population::of(&fitted, &staying(runs, group)) };
+            let Some(p) = without(all, runs, group, &[10, 6]) else { return Vec::new() };
             group.iter().map(|r| (*r, score(runs[*r], &predict(&p, runs[*r], None, DRAWS)))).collect()
         })
         .collect();
@@ -176,13 +173,12 @@ pub fn floor(runs: &[&Insertion]) -> Vec<Option<(Score, usize)>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{fit_without, floor, one_left_out, runs_out, score, speeds_out, staying, without};
+    use super::{floor, one_left_out, runs_out, score, speeds_out, without};
     use crate::made;
     use crate::set::Insertion;
     use crate::set::alike::alike;
     use crate::set::fitted::Fitted;
-    use crate::set::open::Open;
-    use crate::set::population::{DRAWS, Population, Prediction, predict};
+    use crate::set::population::{DRAWS, Prediction, predict};
     use stylet_identify::model::{Day, NEVER};
     use stylet_record::Recording;
 
@@ -316,9 +312,7 @@ mod tests {
         let runs: Vec<&Insertion> = runs.iter().collect();
         let told = speeds_out(&fitted, &runs);
         for (r, group) in [(0, vec![0, 2]), (1, vec![1]), (2, vec![0, 2])] {
-            let others = fit_without(&fitted, &group, &[10, 6]).expect("a fit");
-            let open = Some(Open::of(&others));
-            let others = Population { open, ..Population::of(&others, &staying(&runs, &group)) };
+            let others = without(&fitted, &runs, &group, &[10, 6]).expect("a fit");
             assert_eq!(others.recordings, 3 - group.len());
             assert_eq!(told[r], score(runs[r], &predict(&others, runs[r], None, DRAWS)), "{r}");
         }

@@ -8,7 +8,6 @@
 //! | [`laws`] | the base law, what the library adds, a shaft that slips: which predicts recordings left out |
 //! | [`population`] | an insertion nobody has seen: draws from what varies, mean and band |
 //! | [`nested`](mod@nested) | parts of the set predicted by laws that were chosen without them |
-//! | [`open`] | what recordings leave open of the law itself: laws as likely as the fit leaves them |
 //! | [`alike`](mod@alike) | what runs of one speed leave alike, learned beside the law |
 //! | [`left_out`] | recordings and whole days left out; the mean of the others as the floor; by phase |
 //! | [`instrument`] | what a motion in air and a known load show of the instrument, and what they exclude |
@@ -26,7 +25,6 @@ pub mod laws;
 pub mod left_out;
 pub mod nested;
 pub mod numbers;
-pub mod open;
 pub mod population;
 pub mod repeats;
 pub mod scenario;

@@ -3,7 +3,6 @@
 use crate::set::first::Insertion;
 use crate::set::fitted::{EXPECTED_DAYS, Fitted};
 use crate::set::instrument::line;
-use crate::set::open::Open;
 use std::collections::BTreeSet;
 use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
 use stylet_record::Recording;
@@ -38,8 +37,6 @@ pub struct Population {
     pub recordings: usize,
     /// Days that they were made on.
     pub days: usize,
-    /// What the recordings leave open of the law itself: drawn, too, where it is asked for a speed that took no part.
-    pub open: Option<Open>,
 }
 
 /// Radical inverse of `k` in a base: points of the Halton sequence.
@@ -75,13 +72,7 @@ impl Population {
         let noise_n = median_of(runs.iter().map(|r| single(&r.recording)));
         let of = |(s, n): (f64, f64)| (s / f64::max(n, 1.0) + noise_n * noise_n).sqrt();
         let days: BTreeSet<usize> = model.day_of.iter().copied().collect();
-        Self {
-            law: model.only(&[]),
-            residual_n: sums.map(of),
-            recordings: runs.len(),
-            days: days.len(),
-            open: None,
-        }
+        Self { law: model.only(&[]), residual_n: sums.map(of), recordings: runs.len(), days: days.len() }
     }
 
     /// What is left of a recording that takes no part, over what is left of one that does: about a mean of `n` values another one scatters
@@ -103,9 +94,6 @@ impl Population {
         let dof = self.recordings.max(2) as f64 - 1.0;
         let mut normal = || student::quantile(place(), dof) * self.beyond();
         let mut model = self.law.clone();
-        if let Some(open) = &self.open {
-            open.draw(k, &mut model);
-        }
         let s = &self.law.scatter;
         let (surface, friction) = (normal(), normal());
         let free = model.free;
@@ -313,7 +301,7 @@ mod tests {
         (law.free.own_surface, law.free.own_friction, law.free.day_surface, law.free.day_friction) =
             (true, true, true, true);
         law.days = vec![Day { surface_m: 1e-3, friction: 0.2 }];
-        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1, open: None }
+        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1 }
     }
 
     /// In by 30 mm in 6 s, a rest of 2 s, and back.
