@@ -124,6 +124,8 @@ pub fn repeats(
     let checks = Checks { air: air.as_ref(), load: known };
     let mut study = study(&set.name, &set.tissue, &refs, &checks, &mut *progress)
         .ok_or_else(|| Error::internal("no law could be fitted to these recordings"))?;
+    progress("the law chosen without parts of the set");
+    study.nest();
     if !set.parts.is_empty() {
         progress("layers measured alone, put together");
         study.repeats.parts = parts(set, &study, given)?;

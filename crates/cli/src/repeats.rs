@@ -65,13 +65,14 @@ fn summary(study: &Study) -> String {
     }
     let _ = writeln!(
         out,
-        "\n  each run predicted without it (N rms)\n    {:>10} {:>5} {:>8} {:>8} {:>9} {:>9} {:>16}",
-        "mm/s", "runs", "floor", "base", "extended", "in band", "speed left out"
+        "\n  each run predicted without it (N rms)\n    {:>10} {:>5} {:>8} {:>8} {:>9} {:>9} {:>9} {:>16}",
+        "mm/s", "runs", "floor", "base", "extended", "and alike", "in band", "speed left out"
     );
-    let mut line = |name: String, runs: usize, floor, base: f64, extended: f64, covered: f64, speed| {
+    let mut line = |name: String, runs: usize, floor, errors: [f64; 3], covered: f64, speed| {
+        let [base, law, alike] = errors;
         let _ = writeln!(
             out,
-            "    {name:>10} {runs:>5} {:>8} {base:>8.3} {extended:>9.3} {:>8.1}% {:>16}",
+            "    {name:>10} {runs:>5} {:>8} {base:>8.3} {law:>9.3} {alike:>9.3} {:>8.1}% {:>16}",
             three(floor),
             100.0 * covered,
             three(speed)
@@ -82,14 +83,31 @@ fn summary(study: &Study) -> String {
             format!("{:.2}", 1e3 * s.speed_mps),
             s.runs,
             s.floor_n,
-            s.base_n,
-            s.extended_n,
+            [s.base_n, s.law_n, s.extended_n],
             s.covered,
             s.speed_left_out_n,
         );
     }
     let m = &r.mean;
-    line("mean".to_owned(), r.runs.len(), m.floor_n, m.base_n, m.extended_n, m.covered, m.speed_left_out_n);
+    line(
+        "mean".to_owned(),
+        r.runs.len(),
+        m.floor_n,
+        [m.base_n, m.law_n, m.extended_n],
+        m.covered,
+        m.speed_left_out_n,
+    );
+    let _ = writeln!(
+        out,
+        "  and alike: with what the law leaves alike of the other runs of a speed, learned beside it; it names no cause"
+    );
+    if let Some(nested) = &r.nested {
+        let _ = writeln!(
+            out,
+            "  parts of the set left out: {:.3} N by the law, {:.3} N by laws chosen without them",
+            nested.chosen_with_n, nested.chosen_without_n
+        );
+    }
     let _ = writeln!(out, "  base law with a whole speed left out: {} N", three(m.base_speed_left_out_n));
     let _ = writeln!(
         out,
@@ -100,7 +118,14 @@ fn summary(study: &Study) -> String {
         let _ = writeln!(out, "  in the band of a speed that took no part: {:.1} %", 100.0 * covered);
     }
     for p in &r.parts_of_insertion {
-        let _ = writeln!(out, "  {:<28} {:.3} N, floor {}", p.part, p.extended_n, three(p.floor_n));
+        let _ = writeln!(
+            out,
+            "  {:<28} law {:.3} N, and alike {:.3} N, floor {}",
+            p.part,
+            p.law_n,
+            p.extended_n,
+            three(p.floor_n)
+        );
     }
     if r.starts.0 > 1 {
         let _ = writeln!(out, "  {} of {} starts of the fit agree", r.starts.1, r.starts.0);

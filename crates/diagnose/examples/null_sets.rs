@@ -5,7 +5,8 @@
 //! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example null_sets -- scenarios/measured/skin.ron 40
 //! ```
 //! Every drawn set has the motions of the measured one; what the law leaves is drawn beside it as slow noise, and the sensor's as white noise.
-//! The belief is the base law, so that every effect of the law is one that is taken away from it.
+//! The belief is the base law, so that every effect of the law is one that is taken away from it. A third word is another seed of what is
+//! drawn.
 
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,7 +15,7 @@ use std::path::Path;
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::dataset::{Dataset, find};
 use stylet_diagnose::set::instrument::Checks;
-use stylet_diagnose::set::laws::effects;
+use stylet_diagnose::set::laws::{Laws, effects};
 use stylet_diagnose::set::population::{Population, drawn, part};
 use stylet_diagnose::set::study::study;
 use stylet_stats::wilson;
@@ -23,6 +24,8 @@ use stylet_stats::wilson;
 const SEED: u64 = 125;
 /// Correlation time (s) of what the law leaves.
 const SLOW_S: f64 = 0.5;
+/// Recordings of a population that is known.
+const ALL: usize = 1_000_000;
 /// Noise of the sensor (N).
 const NOISE_N: f64 = 0.012;
 
@@ -30,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let file = words.next().ok_or("name a data set")?;
     let sets: usize = words.next().map_or(Ok(40), |w| w.parse())?;
+    let seed: u64 = words.next().map_or(Ok(SEED), |w| w.parse())?;
     let set = Dataset::load(Path::new(&file))?;
     let mut files = Vec::new();
     for pattern in &set.recordings {
@@ -40,15 +44,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     let refs: Vec<&Insertion> = measured.iter().collect();
     let found = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}).ok_or("no law")?;
     let has = effects(&found.laws.best.fitted.fit.model);
-    let population = Population::of(&found.laws.best.fitted, &refs);
+    // The population itself, not what so many recordings tell of it.
+    let population = Population { recordings: ALL, ..Population::of(&found.laws.best.fitted, &refs) };
     println!("{file}: {} runs follow {}", refs.len(), has.join(", "));
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    tell(&found.laws);
+    let m = &found.repeats.mean;
+    println!(
+        "    {:.3} N on runs left out, {:.3} N with what is alike, floor {:.3} N, in band {:.3}; speed left out {:.3} N, in band {:.3}",
+        m.law_n,
+        m.extended_n,
+        m.floor_n.unwrap_or(f64::NAN),
+        m.covered,
+        m.speed_left_out_n.unwrap_or(f64::NAN),
+        m.speed_covered.unwrap_or(f64::NAN)
+    );
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Every seed has draws of its own.
+    let from = usize::try_from(seed.abs_diff(SEED))? * sets * refs.len();
     let (mut accused, mut named) = (0, vec![0; has.len()]);
     for k in 0..sets {
         let runs: Vec<Insertion> = refs
             .iter()
             .enumerate()
-            .filter_map(|(r, run)| one(&population, run, k * refs.len() + r + 1, layers, &mut rng))
+            .filter_map(|(r, run)| one(&population, run, from + k * refs.len() + r + 1, layers, &mut rng))
             .collect();
         let refs: Vec<&Insertion> = runs.iter().collect();
         let Some(s) = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}) else {
@@ -63,16 +81,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let m = &s.repeats.mean;
         println!(
-            "{k}: {:?} {} (thirds out: base law {:.3}, library {:.3}, slip {:.3}); {:.3} N on runs left out, floor {:.3} N, in band {:.2}",
+            "{k}: {:?} {} (left out: base law {:.3}, library {:.3}, slip {:.3}); {:.3} N on runs left out, floor {:.3} N, in band {:.2}",
             s.diagnosis.verdict,
             names.join(", "),
             s.laws.base.left_out_n(),
             s.laws.library.as_ref().map_or(f64::NAN, |l| l.left_out_n()),
             s.laws.slip.as_ref().map_or(f64::NAN, |l| l.left_out_n()),
-            m.extended_n,
+            m.law_n,
             m.floor_n.unwrap_or(f64::NAN),
             m.covered
         );
+        tell(&s.laws);
     }
     let rate = |hits: usize| {
         let i = wilson(hits, sets);
@@ -83,6 +102,21 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{effect} named: {}", rate(*n));
     }
     Ok(())
+}
+
+/// What the parts of a law are worth.
+fn tell(laws: &Laws) {
+    for p in &laws.parts {
+        let error = stylet_stats::sd(&p.loses) / (p.loses.len() as f64).sqrt();
+        println!(
+            "    {}: without it squares are {:.1} % larger, standard error {:.1} %; with a speed left out {:.1} %{}",
+            p.name,
+            1e2 * stylet_stats::mean(&p.loses),
+            1e2 * error,
+            1e2 * stylet_stats::mean(&p.speeds_lose),
+            if p.kept { "" } else { "; taken away" }
+        );
+    }
 }
 
 /// A drawn insertion.

@@ -4,6 +4,7 @@ use crate::select::Stage;
 use crate::set::Insertion;
 use crate::set::fitted::{Fitted, refitted};
 use crate::set::laws::{Kind, Law};
+use crate::set::left_out::Score;
 use std::sync::Arc;
 use stylet_identify::fit::Fit;
 use stylet_identify::model::{Belief, Choice, Model};
@@ -37,7 +38,11 @@ pub fn law(kind: Kind, effects: &[AnyEffect], errors_n: &[f64], nats: f64) -> La
     let residuals = Residuals { e: Vec::new(), w: Vec::new(), events: Vec::new(), nats };
     let data = Data::new(Arc::new(Vec::new()), Noise::white(1.0), 0.0);
     let fitted = Fitted { fit: Fit { model, residuals }, data, drops: Vec::new(), starts: (8, 3) };
-    Law { kind, fitted, errors_n: errors_n.to_vec() }
+    let score = |e: &f64| {
+        let parts = [(100.0 * e * e, 100.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)];
+        Some(Score { rmse_n: *e, covered: 0.0, parts }).filter(|_| e.is_finite())
+    };
+    Law { kind, fitted, errors_n: errors_n.to_vec(), scores: errors_n.iter().map(score).collect() }
 }
 
 /// One layer of gel from 4 mm on that gives way at 2 N.

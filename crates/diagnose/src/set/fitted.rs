@@ -21,7 +21,7 @@ const COARSE: usize = 3;
 /// The first fits see misfits of this share of the largest force as noise.
 const FIRST_SHARE: f64 = 0.1;
 /// The spread between days that is expected counts as that of so many days.
-const EXPECTED_DAYS: f64 = 4.0;
+pub(super) const EXPECTED_DAYS: f64 = 4.0;
 /// Turns of the fits of a first look, and of those that go on;
 const FIRST_LOOK: [usize; 2] = [6, 6];
 /// the latter start from numbers that stand.

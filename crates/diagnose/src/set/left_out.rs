@@ -1,5 +1,6 @@
 //! Recordings and whole days left out, and the floor: another real insertion as the predictor.
 
+use crate::set::alike::alike;
 use crate::set::first::{Insertion, groups};
 use crate::set::fitted::{Fitted, settle};
 use crate::set::population::{DRAWS, Part, Population, Prediction, part, predict};
@@ -55,48 +56,68 @@ pub fn score(run: &Insertion, p: &Prediction) -> Score {
     out
 }
 
-/// The fit again without some of the recordings, and what it says of insertions in general.
+/// The recordings that stay when some are left out.
 #[must_use]
-pub fn without(all: &Fitted, runs: &[&Insertion], out: &[usize], rounds: &[usize]) -> Option<Population> {
-    let kept: Vec<usize> = (0..runs.len()).filter(|r| !out.contains(r)).collect();
-    let some: Vec<&Insertion> = kept.iter().map(|r| runs[*r]).collect();
+pub fn staying<'a>(runs: &[&'a Insertion], out: &[usize]) -> Vec<&'a Insertion> {
+    (0..runs.len()).filter(|r| !out.contains(r)).map(|r| runs[r]).collect()
+}
+
+/// The fit again without some of the recordings.
+#[must_use]
+pub fn fit_without(all: &Fitted, out: &[usize], rounds: &[usize]) -> Option<Fitted> {
+    let kept: Vec<usize> = (0..all.drops.len()).filter(|r| !out.contains(r)).collect();
     let drops: Vec<Vec<f64>> = kept.iter().map(|r| all.drops[*r].clone()).collect();
     let (fit, data) = settle(&all.fit.model.only(&kept), all.data.only(&kept), &drops, rounds)?;
-    let fitted = Fitted { fit, data, drops, starts: all.starts };
-    Some(Population::of(&fitted, &some))
+    Some(Fitted { fit, data, drops, starts: all.starts })
+}
+
+/// The same, and what it says of insertions in general.
+#[must_use]
+pub fn without(all: &Fitted, runs: &[&Insertion], out: &[usize], rounds: &[usize]) -> Option<Population> {
+    Some(Population::of(&fit_without(all, out, rounds)?, &staying(runs, out)))
 }
 
 /// A recording predicted by a fit without it.
 #[derive(Clone, Debug, Default)]
 pub struct Out {
-    /// How well.
+    /// How well, by the law together with what the others of its speed and stroke leave alike.
     pub score: Score,
-    /// The prediction.
+    /// That prediction.
     pub prediction: Prediction,
+    /// How well by the law alone.
+    pub law: Score,
+    /// Mean force (N) of the law alone.
+    pub law_n: Vec<f64>,
     /// The law and its population without this recording; none when it cannot be fitted.
     pub population: Option<Population>,
 }
 
-/// Every recording predicted by a fit without it.
+/// Every recording predicted by a fit without it; by the law alone.
 #[must_use]
 pub fn one_left_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
-    runs_out(all, runs).into_iter().map(|o| o.score).collect()
+    runs_out(all, runs).into_iter().map(|o| o.law).collect()
 }
 
-/// The same with the predictions and the laws.
+/// Every recording predicted without it, by the law alone and together with what the others of its group leave alike.
 #[must_use]
 pub fn runs_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Out> {
-    (0..runs.len())
-        .into_par_iter()
-        .map(|r| {
-            let day_of = &all.fit.model.day_of;
-            // A day is known when another recording was made on it.
-            let day = day_of.get(r).copied().filter(|day| day_of.iter().filter(|d| *d == day).count() > 1);
-            let Some(population) = without(all, runs, &[r], &[5]) else { return Out::default() };
-            let prediction = predict(&population, runs[r], day, DRAWS);
-            Out { score: score(runs[r], &prediction), prediction, population: Some(population) }
-        })
-        .collect()
+    let groups = groups(runs);
+    let one = |r: usize| {
+        let day_of = &all.fit.model.day_of;
+        // A day is known when another recording was made on it.
+        let day = day_of.get(r).copied().filter(|day| day_of.iter().filter(|d| *d == day).count() > 1);
+        let population = without(all, runs, &[r], &[5])?;
+        let by_law = |r: usize| predict(&population, runs[r], day, DRAWS);
+        let told = by_law(r);
+        let law = score(runs[r], &told);
+        let group = groups.iter().find(|g| g.contains(&r)).map_or(&[][..], Vec::as_slice);
+        let others: Vec<(&Insertion, Vec<f64>)> =
+            group.iter().filter(|o| **o != r).map(|o| (runs[*o], by_law(*o).mean)).collect();
+        let prediction = alike(runs[r], &told, &others).beside(&told);
+        let law_n = told.mean;
+        Some(Out { score: score(runs[r], &prediction), prediction, law, law_n, population: Some(population) })
+    };
+    (0..runs.len()).into_par_iter().map(|r| one(r).unwrap_or_default()).collect()
 }
 
 /// Every recording predicted by a fit without its whole day (speed and stroke); empty when there is one day only.
@@ -155,6 +176,7 @@ mod tests {
     use super::{floor, one_left_out, runs_out, score, speeds_out, without};
     use crate::made;
     use crate::set::Insertion;
+    use crate::set::alike::alike;
     use crate::set::fitted::Fitted;
     use crate::set::population::{DRAWS, Prediction, predict};
     use stylet_identify::model::{Day, NEVER};
@@ -269,11 +291,19 @@ mod tests {
             let others = without(&fitted, &runs, &[r], &[5]).expect("a fit");
             assert_eq!((others.recordings, others.law.days.len()), (2, 2));
             let wanted = predict(&others, runs[r], day, DRAWS);
-            assert_eq!(told[r].prediction.mean, wanted.mean, "{r}");
-            assert_eq!(told[r].score, score(runs[r], &wanted), "{r}");
+            assert_eq!(told[r].law_n, wanted.mean, "{r}");
+            assert_eq!(told[r].law, score(runs[r], &wanted), "{r}");
+            // Beside it stands what the other run of its speed leaves, where there is one.
+            let other = (day.is_some()).then(|| {
+                let o = runs[2 - r];
+                (o, predict(&others, o, day, DRAWS).mean)
+            });
+            let both = alike(runs[r], &wanted, &Vec::from_iter(other)).beside(&wanted);
+            assert_eq!(told[r].prediction.mean, both.mean, "{r}");
+            assert_eq!(told[r].score, score(runs[r], &both), "{r}");
             assert!(told[r].population.is_some());
         }
-        assert_eq!(one_left_out(&fitted, &runs), told.into_iter().map(|o| o.score).collect::<Vec<_>>());
+        assert_eq!(one_left_out(&fitted, &runs), told.into_iter().map(|o| o.law).collect::<Vec<_>>());
     }
 
     #[test]

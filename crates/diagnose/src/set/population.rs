@@ -1,12 +1,13 @@
 //! An insertion nobody has seen: draws from what varies between recordings and days, their mean and their band.
 
 use crate::set::first::Insertion;
-use crate::set::fitted::Fitted;
+use crate::set::fitted::{EXPECTED_DAYS, Fitted};
 use crate::set::instrument::line;
+use std::collections::BTreeSet;
 use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
 use stylet_record::Recording;
-use stylet_stats::median_of;
 use stylet_stats::normal::quantile;
+use stylet_stats::{median_of, student};
 use stylet_tissue::{Effect, LawState, Reading};
 
 /// Draws of a prediction.
@@ -34,6 +35,8 @@ pub struct Population {
     pub residual_n: [f64; 4],
     /// Recordings that the law was fitted to: what varies between them is known as well as so many can tell.
     pub recordings: usize,
+    /// Days that they were made on.
+    pub days: usize,
 }
 
 /// Radical inverse of `k` in a base: points of the Halton sequence.
@@ -68,7 +71,8 @@ impl Population {
         // Blocks average the noise of single samples away.
         let noise_n = median_of(runs.iter().map(|r| single(&r.recording)));
         let of = |(s, n): (f64, f64)| (s / f64::max(n, 1.0) + noise_n * noise_n).sqrt();
-        Self { law: model.only(&[]), residual_n: sums.map(of), recordings: runs.len() }
+        let days: BTreeSet<usize> = model.day_of.iter().copied().collect();
+        Self { law: model.only(&[]), residual_n: sums.map(of), recordings: runs.len(), days: days.len() }
     }
 
     /// What is left of a recording that takes no part, over what is left of one that does: about a mean of `n` values another one scatters
@@ -81,13 +85,14 @@ impl Population {
     /// The `k`-th drawn insertion, from 1 on; on a known day or on one that is drawn too.
     fn draw(&self, k: usize, day: Option<usize>) -> Model {
         let mut dimension = 0;
-        // What varies is drawn about a mean that so many recordings tell no better.
-        let n = self.recordings.max(2) as f64;
-        let mut normal = || {
+        let mut place = || {
             let base = PRIMES[dimension % PRIMES.len()];
             dimension += 1;
-            quantile(halton(k, base)) * (1.0 + 1.0 / n).sqrt()
+            halton(k, base)
         };
+        // What varies is drawn about a mean, and with a spread, that so many recordings tell no better: Student's.
+        let dof = self.recordings.max(2) as f64 - 1.0;
+        let mut normal = || student::quantile(place(), dof) * self.beyond();
         let mut model = self.law.clone();
         let s = &self.law.scatter;
         let (surface, friction) = (normal(), normal());
@@ -116,7 +121,11 @@ impl Population {
                 own.differing[k] = self.law.differing_sd(k) * normal();
             }
         }
-        let drawn = Day { surface_m: s.day_surface_m * normal(), friction: s.day_friction * normal() };
+        // Days were as few as they are, and what is expected of them counts as some more.
+        let days = self.days as f64;
+        let wide = (1.0 + 1.0 / days.max(1.0)).sqrt();
+        let mut of_day = || student::quantile(place(), days.max(1.0) + EXPECTED_DAYS - 1.0) * wide;
+        let drawn = Day { surface_m: s.day_surface_m * of_day(), friction: s.day_friction * of_day() };
         let day = day.unwrap_or_else(|| {
             model.days.push(Day {
                 surface_m: if free.day_surface { drawn.surface_m } else { 0.0 },
@@ -252,6 +261,7 @@ mod tests {
     use stylet_identify::model::{Belief, Choice, Day, Model, NEVER};
     use stylet_record::Recording;
     use stylet_stats::normal::quantile;
+    use stylet_stats::student;
     use stylet_tissue::{
         DelayedPuncture, DriveFriction, Effect, ForceDrift, Law, LawState, Layer, LetGo, PositionScale,
         ShaftSlip, TimeDelay, Tissue,
@@ -291,7 +301,7 @@ mod tests {
         (law.free.own_surface, law.free.own_friction, law.free.day_surface, law.free.day_friction) =
             (true, true, true, true);
         law.days = vec![Day { surface_m: 1e-3, friction: 0.2 }];
-        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5 }
+        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1 }
     }
 
     /// In by 30 mm in 6 s, a rest of 2 s, and back.
@@ -312,12 +322,16 @@ mod tests {
     }
 
     /// Every number that varies has a dimension of the Halton sequence of its own, in the order surface, friction, each layer's force, the
-    /// numbers of effects, the day; wider by what a mean of so many leaves open.
+    /// numbers of effects, the day: Student's, wider by what a mean and a spread of so many leave open.
     #[test]
     fn a_drawn_insertion_has_its_numbers_by_the_points_of_a_sequence() {
         let mut p = population();
-        let wide = (1.0_f64 + 1.0 / 5.0).sqrt();
-        let n = |k: usize, dimension: usize| quantile(halton(k, PRIMES[dimension])) * wide;
+        let wide = (6.0_f64 / 4.0).sqrt();
+        let n = |k: usize, dimension: usize| student::quantile(halton(k, PRIMES[dimension]), 4.0) * wide;
+        // One day, and four more that are expected.
+        let day = |k: usize, dimension: usize| {
+            student::quantile(halton(k, PRIMES[dimension]), 4.0) * 2.0_f64.sqrt()
+        };
         for k in [1, 7, 50] {
             let m = p.draw(k, None);
             let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{k}: {a} for {b}");
@@ -325,16 +339,21 @@ mod tests {
             near(m.own[0].friction, 0.07 * n(k, 1));
             near(m.tissue.layers[0].puncture_n.unwrap_or(0.0), 1.1 * (1.0 + 0.05 * n(k, 2)));
             near(m.tissue.layers[1].puncture_n.unwrap_or(0.0), 1.9 * (1.0 + 0.05 * n(k, 3)));
-            near(m.days[1].surface_m, 7e-4 * n(k, 4));
-            near(m.days[1].friction, 0.11 * n(k, 5));
+            near(m.days[1].surface_m, 7e-4 * day(k, 4));
+            near(m.days[1].friction, 0.11 * day(k, 5));
             assert_eq!((m.day_of.as_slice(), m.instants.as_slice()), (&[1][..], &[vec![NEVER; 2]][..]));
             assert_eq!(p.draw(k, Some(0)).day_of, [0]);
             assert_eq!(p.draw(k, Some(0)).days.len(), 1);
         }
         // A mean of two or one is as open as one of two.
         p.recordings = 1;
-        let open = p.draw(7, None).own[0].surface_m / (3e-4 * quantile(halton(7, 2)));
-        assert!((open - 1.5_f64.sqrt()).abs() < 1e-12, "{open}");
+        let open = p.draw(7, None).own[0].surface_m / (3e-4 * student::quantile(halton(7, 2), 1.0));
+        assert!((open - 3.0_f64.sqrt()).abs() < 1e-12, "{open}");
+        // Days by what they are.
+        p.days = 3;
+        let open = p.draw(7, None).days[1].surface_m / (7e-4 * student::quantile(halton(7, PRIMES[4]), 6.0));
+        assert!((open - (4.0_f64 / 3.0).sqrt()).abs() < 1e-12, "{open}");
+        p.days = 1;
         p.recordings = 5;
         p.law.free = stylet_identify::model::Free::default();
         let m = p.draw(7, None);
@@ -360,8 +379,8 @@ mod tests {
         p.law.free.own_effects = true;
         p.law.scatter.differing[0] = 4e-4;
         let m = p.draw(9, Some(0));
-        let wide = (1.0_f64 + 1.0 / 5.0).sqrt();
-        let n = |dimension: usize| quantile(halton(9, PRIMES[dimension])) * wide;
+        let wide = (6.0_f64 / 4.0).sqrt();
+        let n = |dimension: usize| student::quantile(halton(9, PRIMES[dimension]), 4.0) * wide;
         let force = m.effects[1].values[1];
         assert!((force - 2.0 * (1.0 + 0.05 * n(3))).abs() < 1e-12, "{force}");
         let differing = p.law.differing().count();

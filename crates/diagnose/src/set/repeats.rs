@@ -5,6 +5,7 @@ use crate::set::first::Insertion;
 use crate::set::instrument::{Instrument, timing};
 use crate::set::laws::Law;
 use crate::set::left_out::{Out, PARTS, Score};
+use crate::set::nested::Nested;
 use crate::set::study::speeds;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -25,6 +26,8 @@ pub struct AtSpeed {
     /// Base law, this run left out (N).
     pub base_n: f64,
     /// Extended law, this run left out (N).
+    pub law_n: f64,
+    /// The same together with what the law leaves alike of the other runs of this speed (N).
     pub extended_n: f64,
     /// Share of the samples of left-out runs within the 90 % band.
     pub covered: f64,
@@ -57,6 +60,8 @@ pub struct InPart {
     /// Mean of the other runs of the speed as the predictor (N).
     pub floor_n: Option<f64>,
     /// Extended law on runs left out (N).
+    pub law_n: f64,
+    /// The same together with what it leaves alike (N).
     pub extended_n: f64,
 }
 
@@ -102,6 +107,8 @@ pub struct Repeats {
     pub instrument: Instrument,
     /// Layers measured alone, put together.
     pub parts: Option<Alone>,
+    /// What parts of the set are predicted to when the law is chosen without them, where that was asked.
+    pub nested: Option<Nested>,
 }
 
 /// One run.
@@ -122,6 +129,8 @@ pub struct RunReport {
     /// Error of the base law fitted to the others (N).
     pub base_n: f64,
     /// Error of the extended law fitted to the others (N).
+    pub law_n: f64,
+    /// The same together with what it leaves alike of the others of this speed (N).
     pub extended_n: f64,
     /// Share within the band.
     pub covered: f64,
@@ -139,6 +148,8 @@ pub struct MeanReport {
     /// Base law (N).
     pub base_n: f64,
     /// Extended law (N).
+    pub law_n: f64,
+    /// Together with what it leaves alike of the other runs of a speed (N).
     pub extended_n: f64,
     /// Coverage of the 90 % band.
     pub covered: f64,
@@ -192,6 +203,7 @@ pub fn repeats(s: &Standing, bought: Vec<Bought>, instrument: Instrument) -> Rep
         bought,
         instrument,
         parts: None,
+        nested: None,
         speeds,
         runs,
     }
@@ -218,7 +230,8 @@ fn each(s: &Standing) -> Vec<RunReport> {
                 friction: libm::exp(own.friction + day.friction),
                 puncture_n: (0..model.layers()).map(at).collect(),
                 releases_m: run.releases_m.clone(),
-                base_n: s.base_out[r].score.rmse_n,
+                base_n: s.base_out[r].law.rmse_n,
+                law_n: s.out[r].law.rmse_n,
                 extended_n: s.out[r].score.rmse_n,
                 covered: s.out[r].score.covered,
                 floor_n: s.floors[r].as_ref().map(|f| f.0.rmse_n),
@@ -250,7 +263,8 @@ fn at_speed(v: f64, members: &[usize], s: &Standing) -> AtSpeed {
         runs: members.len(),
         floor_n: floor(&|f| f.0.rmse_n),
         floor_bare_n: floor(&|f| f.0.rmse_n * bare(f.1)),
-        base_n: of(&|i| s.base_out[i].score.rmse_n),
+        base_n: of(&|i| s.base_out[i].law.rmse_n),
+        law_n: of(&|i| s.out[i].law.rmse_n),
         extended_n: of(&|i| s.out[i].score.rmse_n),
         covered: of(&|i| s.out[i].score.covered),
         speed_left_out_n: left(s.speed_out, &|o| o.rmse_n),
@@ -268,6 +282,7 @@ fn mean_report(speeds: &[AtSpeed]) -> MeanReport {
         floor_n: optional(&|s| s.floor_n),
         floor_bare_n: optional(&|s| s.floor_bare_n),
         base_n: mean(speeds.iter().map(|s| s.base_n)),
+        law_n: mean(speeds.iter().map(|s| s.law_n)),
         extended_n: mean(speeds.iter().map(|s| s.extended_n)),
         covered: mean(speeds.iter().map(|s| s.covered)),
         speed_left_out_n: optional(&|s| s.speed_left_out_n),
@@ -287,7 +302,8 @@ fn by_part(s: &Standing) -> Vec<InPart> {
         .filter_map(|(k, part)| {
             let extended_n = pooled(&mut s.out.iter().map(|o| &o.score), k)?;
             let floor_n = pooled(&mut s.floors.iter().flatten().map(|f| &f.0), k);
-            Some(InPart { part, floor_n, extended_n })
+            let law_n = pooled(&mut s.out.iter().map(|o| &o.law), k)?;
+            Some(InPart { part, floor_n, law_n, extended_n })
         })
         .collect()
 }
@@ -372,7 +388,8 @@ mod tests {
     }
 
     fn out(rmse_n: f64, covered: f64) -> Out {
-        Out { score: score(rmse_n, covered), ..Out::default() }
+        let law = score(rmse_n, covered);
+        Out { score: law.clone(), law, ..Out::default() }
     }
 
     /// Three runs, two of them at one speed.
@@ -493,6 +510,7 @@ mod tests {
     #[test]
     fn parts_of_an_insertion_are_pooled_over_the_runs() {
         let mut m = made();
+        m.out[0].law.parts = [(16.0, 1.0); 5];
         m.out[0].score.parts = [(8.0, 2.0), (0.0, 0.0), (1.0, 4.0), (0.0, 0.0), (3.0, 1.0)];
         m.out[2].score.parts = [(1.0, 7.0), (0.0, 0.0), (0.0, 0.0), (0.0, 5.0), (0.0, 0.0)];
         m.floors[0] = Some((
@@ -503,6 +521,7 @@ mod tests {
             Score { parts: [(7.0, 5.0), (9.0, 9.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)], ..Score::default() },
             2,
         ));
+        assert!(with(&m, by_part).iter().all(|p| p.law_n == 4.0));
         let told: Vec<(&str, Option<f64>, f64)> =
             with(&m, by_part).iter().map(|p| (p.part, p.floor_n, p.extended_n)).collect();
         assert_eq!(

@@ -7,8 +7,9 @@ use crate::outcome::{
 };
 use crate::set::first::{Insertion, groups};
 use crate::set::instrument::{Checks, Instrument, Undone};
-use crate::set::laws::{Kind, Law, Laws, effects, laws, several, slip};
+use crate::set::laws::{Kind, Law, Laws, confidence, effects, laws, several, slip};
 use crate::set::left_out::{Out, floor, runs_out, speeds_out};
+use crate::set::nested::nested;
 use crate::set::numbers::{Told, base_parameters, estimates};
 use crate::set::repeats::{Bought, Repeats, Standing, repeats};
 use crate::set::scenario::extended;
@@ -82,6 +83,14 @@ pub fn study(
     Some(Study { laws, out, base_out, diagnosis, repeats, extended, runs: undone })
 }
 
+impl Study {
+    /// Asks what parts of the set are predicted to when the law and its parts are chosen without them.
+    pub fn nest(&mut self) {
+        let runs: Vec<&Insertion> = self.runs.iter().collect();
+        self.repeats.nested = nested(&self.laws, &runs);
+    }
+}
+
 /// Every run predicted without it by the base law, `out` being what the best one predicts.
 fn base_out(laws: &Laws, out: &[Out], runs: &[&Insertion]) -> Vec<Out> {
     if laws.best.kind == Kind::Base { out.to_vec() } else { runs_out(&laws.base.fitted, runs) }
@@ -111,16 +120,6 @@ fn bought(laws: &Laws) -> Vec<Bought> {
         });
     }
     out
-}
-
-/// Probability that errors `without` something are larger on new runs than those `with` it (normal, one-sided, paired).
-fn confidence(without: &[f64], with: &[f64]) -> f64 {
-    let worth: Vec<f64> = without.iter().zip(with).map(|(a, b)| a - b).filter(|d| d.is_finite()).collect();
-    if worth.len() < 2 {
-        return f64::from(u8::from(!without.is_empty() && worth.is_empty()));
-    }
-    let error = stylet_stats::sd(&worth) / (worth.len() as f64).sqrt();
-    stylet_stats::normal::cdf(stylet_stats::mean(&worth) / error.max(1e-9))
 }
 
 fn diagnosis(
@@ -157,10 +156,10 @@ fn diagnosis(
     let share = if best.kind == Kind::Base {
         1.0
     } else {
-        (beyond(mean.extended_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
+        (beyond(mean.law_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
     };
     let unknown =
-        share > UNEXPLAINED && mean.extended_n > (1.0 + BEYOND_FLOOR) * floor_n && mean.floor_n.is_some();
+        share > UNEXPLAINED && mean.law_n > (1.0 + BEYOND_FLOOR) * floor_n && mean.floor_n.is_some();
     let told_left = leftover::test(&best.fitted.fit, &best.fitted.data).sure;
     let verdict = match (unknown, causes.is_empty()) {
         (true, _) => Verdict::Unknown,
@@ -291,14 +290,12 @@ pub fn speeds(runs: &[&Insertion]) -> Vec<(f64, Vec<usize>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        BEYOND_FLOOR, advice, base_out, bought, cause, confidence, diagnosis, dropped, evidence, speeds,
-    };
+    use super::{BEYOND_FLOOR, advice, base_out, bought, cause, diagnosis, dropped, evidence, speeds};
     use crate::made;
     use crate::outcome::{Diagnosis, Verdict};
     use crate::set::Insertion;
     use crate::set::instrument::Instrument;
-    use crate::set::laws::{Kind, Law, Laws, Part};
+    use crate::set::laws::{Kind, Law, Laws, Part, confidence};
     use crate::set::left_out::Out;
     use crate::set::numbers::Told;
     use crate::set::repeats::{MeanReport, Repeats, Varies};
@@ -309,23 +306,6 @@ mod tests {
     fn law(kind: Kind, errors_n: &[f64], nats: f64, with: bool) -> Law {
         let rubs: [AnyEffect; 1] = [CoulombFriction { c_n_per_m: 3.0 }.into()];
         made::law(kind, &rubs[..usize::from(with)], errors_n, nats)
-    }
-
-    #[test]
-    fn confidence_is_the_chance_that_the_mean_of_what_is_worse_lies_above_nothing() {
-        let (without, with) = ([0.5, 0.7, 0.4, 0.9], [0.45, 0.5, 0.42, 0.6]);
-        let d: [f64; 4] = std::array::from_fn(|k| without[k] - with[k]);
-        let mean = d.iter().sum::<f64>() / 4.0;
-        let sd = (d.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3.0).sqrt();
-        let wanted = stylet_stats::normal::cdf(mean / (sd / 2.0));
-        assert!((confidence(&without, &with) - wanted).abs() < 1e-12);
-        // A recording that cannot be predicted without it does not count; where none can be, nothing else is left.
-        let more: Vec<f64> = without.iter().copied().chain([f64::INFINITY]).collect();
-        assert!((confidence(&more, &[&with[..], &[0.5]].concat()) - wanted).abs() < 1e-12);
-        assert_eq!(confidence(&[f64::INFINITY; 3], &with[..3]), 1.0);
-        assert_eq!((confidence(&[], &[]), confidence(&[0.5], &[0.4])), (0.0, 0.0));
-        // Two tell already: worse by 1 and by 3 is 2 with an error of 1.
-        assert_eq!(confidence(&[1.5, 3.5], &[0.5, 0.5]), stylet_stats::normal::cdf(2.0));
     }
 
     #[test]
@@ -364,6 +344,8 @@ mod tests {
             effect: "shaft_slip",
             name: name.to_owned(),
             without_n: without_n.to_vec(),
+            loses: Vec::new(),
+            speeds_lose: Vec::new(),
             kept,
         };
         Laws {
@@ -469,7 +451,7 @@ mod tests {
         Repeats {
             runs: Vec::new(),
             speeds: Vec::new(),
-            mean: MeanReport { floor_n, base_n, extended_n, ..MeanReport::default() },
+            mean: MeanReport { floor_n, base_n, law_n: extended_n, extended_n, ..MeanReport::default() },
             parts_of_insertion: Vec::new(),
             population: Varies {
                 surface_m: 0.0,
@@ -485,6 +467,7 @@ mod tests {
             bought: Vec::new(),
             instrument: Instrument { noise_n: Some(0.1), ..Instrument::default() },
             parts: None,
+            nested: None,
         }
     }
 
@@ -519,6 +502,10 @@ mod tests {
         // A law that is worse than the base law leaves all, and one below the floor nothing.
         assert_eq!(told(&laws(), &repeats(0.5, 0.6, Some(0.1))).leftover.share, 1.0);
         assert_eq!(told(&laws(), &repeats(0.5, 0.05, Some(0.1))).leftover.share, 0.0);
+        // What is learned beside the law does not make it known.
+        let mut learned = repeats(0.5, 0.19, Some(0.1));
+        learned.mean.extended_n = 0.1;
+        assert_eq!(told(&laws(), &learned).verdict, Verdict::Unknown);
         // Without repeats of one speed nobody knows the floor; it is at least the noise.
         let d = told(&laws(), &repeats(0.5, 0.4, None));
         assert_eq!((d.verdict, d.gain.floor_n, d.noise.sd_n), (Verdict::Named, 0.1, 0.1));
@@ -542,6 +529,8 @@ mod tests {
             effect: "coulomb_friction",
             name: name.to_owned(),
             without_n: without_n.to_vec(),
+            loses: Vec::new(),
+            speeds_lose: Vec::new(),
             kept,
         };
         laws.parts = vec![

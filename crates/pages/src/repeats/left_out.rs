@@ -17,6 +17,7 @@ pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
                 Cell::number(s.runs.to_string()),
                 Cell::number(three(s.floor_n)),
                 Cell::number(three(Some(s.base_n))),
+                Cell::number(three(Some(s.law_n))),
                 Cell::number(three(Some(s.extended_n))),
                 Cell::number(format!("{:.1} %", 100.0 * s.covered)),
                 Cell::number(three(s.base_speed_left_out_n)),
@@ -28,6 +29,7 @@ pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
             Cell::number(r.runs.len().to_string()),
             Cell::number(three(r.mean.floor_n)),
             Cell::number(three(Some(r.mean.base_n))),
+            Cell::number(three(Some(r.mean.law_n))),
             Cell::number(three(Some(r.mean.extended_n))),
             Cell::number(format!("{:.1} %", 100.0 * r.mean.covered)),
             Cell::number(three(r.mean.base_speed_left_out_n)),
@@ -43,14 +45,25 @@ pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
                 "mean of the others",
                 "base law",
                 "extended law",
+                "and what is alike",
                 "in the 90 % band",
                 "base law",
                 "extended law",
             ],
             rows,
         )
-        .grouped(&[("", 2), ("one run left out", 4), ("a whole speed left out", 2)]),
+        .grouped(&[("", 2), ("one run left out", 5), ("a whole speed left out", 2)]),
     );
+    section = section.text(
+        "What is alike: what the law leaves of the other runs of a speed, as far as it is more than their scatter, is learned beside the law and added to \
+         what it predicts. It says nothing of another speed and names no cause.",
+    );
+    if let Some(nested) = &r.nested {
+        section = section.text(format!(
+            "Parts of the set left out: {:.3} N by the law, {:.3} N by laws that were chosen without them.",
+            nested.chosen_with_n, nested.chosen_without_n
+        ));
+    }
     if let Some(parts) = &r.parts {
         let mut paragraphs: Vec<String> = parts
             .alone
@@ -77,13 +90,15 @@ pub(super) fn before_and_after(runs: &[&Insertion], study: &Study) -> Section {
         section = section.chart(
             Chart::new(format!("{} ({:.2} mm/s)", run.name, 1e3 * v), "Time (s)", "Force (N)")
                 .caption(format!(
-                    "Measured, and predicted by laws fitted to the other runs: base law {:.3} N, extended law {:.3} N rms; thin lines hold 90 %.",
-                    r.runs[i].base_n, r.runs[i].extended_n
+                    "Measured, and predicted by laws fitted to the other runs: base law {:.3} N, extended law {:.3} N rms, with what is alike {:.3} N; thin \
+                     lines hold 90 %.",
+                    r.runs[i].base_n, r.runs[i].law_n, r.runs[i].extended_n
                 ))
                 .height(320)
                 .with_series(line("measured", Colour::Grey, &run.recording.force_n).width(3.0))
-                .with_series(line("base law", Colour::Vermillion, &study.base_out[i].prediction.mean).width(1.1))
-                .with_series(line("extended law", Colour::Blue, &p.mean).width(1.5))
+                .with_series(line("base law", Colour::Vermillion, &study.base_out[i].law_n).width(1.1))
+                .with_series(line("extended law", Colour::Blue, &study.out[i].law_n).width(1.5))
+                .with_series(line("and what is alike", Colour::Green, &p.mean).width(1.1))
                 .with_series(line("5 %", Colour::SkyBlue, &p.low).width(0.8).styled(LineStyle::Dashed))
                 .with_series(line("95 %", Colour::SkyBlue, &p.high).width(0.8).styled(LineStyle::Dashed)),
         );
@@ -104,13 +119,13 @@ pub(super) fn residual(runs: &[&Insertion], study: &Study) -> Section {
             [("base law", Colour::Vermillion, &study.base_out), ("extended law", Colour::Blue, &study.out)]
         {
             let (mut x, mut y) = (Vec::new(), Vec::new());
-            for (run, p) in runs.iter().zip(predictions).map(|(run, out)| (run, &out.prediction)) {
+            for (run, law_n) in runs.iter().zip(predictions).map(|(run, out)| (run, &out.law_n)) {
                 let r = &run.recording;
                 for i in 0..r.len() {
                     let here = if back { i >= run.phases.back } else { i <= run.phases.deepest };
                     if here {
                         x.push(1e3 * r.position_m[i]);
-                        y.push(r.force_n[i] - p.mean.get(i).copied().unwrap_or(f64::NAN));
+                        y.push(r.force_n[i] - law_n.get(i).copied().unwrap_or(f64::NAN));
                     }
                 }
             }

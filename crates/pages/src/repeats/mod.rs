@@ -69,7 +69,11 @@ fn verdict(study: &Study) -> Section {
         Tile::new(
             "A run that took no part",
             format!("{:.3} → {:.3} N", m.base_n, m.extended_n),
-            format!("base law → extended law, root mean square; another real insertion: {} N", three(floor)),
+            format!(
+                "base law → extended law ({:.3} N) with what it leaves alike of the other runs, root mean square; another real insertion: {} N",
+                m.law_n,
+                three(floor)
+            ),
         )
         .status(floor.map_or(Status::Plain, |f| Status::at_most(m.extended_n, 1.2 * f, 1.5 * f))),
         Tile::new(

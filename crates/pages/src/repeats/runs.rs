@@ -25,6 +25,7 @@ pub(super) fn repeats(study: &Study) -> Section {
                 Cell::number(list(&run.releases_m, 1e3)),
                 Cell::number(three(run.floor_n)),
                 Cell::number(three(Some(run.base_n))),
+                Cell::number(three(Some(run.law_n))),
                 Cell::number(three(Some(run.extended_n))),
                 Cell::number(format!("{:.0} %", 100.0 * run.covered)),
             ]
@@ -63,6 +64,7 @@ pub(super) fn repeats(study: &Study) -> Section {
             vec![
                 Cell::text(p.part),
                 Cell::number(three(p.floor_n)),
+                Cell::number(format!("{:.3}", p.law_n)),
                 Cell::number(format!("{:.3}", p.extended_n)),
             ]
         })
@@ -71,7 +73,7 @@ pub(super) fn repeats(study: &Study) -> Section {
         .texts(text)
         .table(Table::new(
             "By part of an insertion, on runs left out (N rms)",
-            &["", "mean of the others", "extended law"],
+            &["", "mean of the others", "extended law", "and what is alike"],
             by_part,
         ))
         .table(Table::new(
