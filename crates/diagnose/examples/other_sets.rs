@@ -166,7 +166,6 @@ fn slipping(layer: usize, rng: &mut ChaCha8Rng) -> Vec<AnyEffect> {
         time_constants_s: [by(0.8), by(9.0)],
         kept: by(0.6).min(1.0),
         rate: 0.1 * normal(rng),
-        ..ShaftSlip::default()
     };
     let waits = DelayedPuncture { layer, force_n: 4.0 * times(rng, FACTOR), exponent: 10.0 };
     vec![slip.into(), waits.into(), LetGo { layer, depth_m: 1e-3 * times(rng, FACTOR) }.into()]
