@@ -7,7 +7,7 @@
 
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Column;
-use stylet_identify::linear::{Factor, Symmetric, dot};
+use stylet_stats::linear::{Factor, Symmetric, dot};
 use stylet_identify::look::Look;
 use stylet_identify::model::Role;
 use stylet_identify::objective::replay;
