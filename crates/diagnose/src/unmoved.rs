@@ -7,10 +7,10 @@
 
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Column;
-use stylet_stats::linear::{Factor, Symmetric, dot};
 use stylet_identify::look::Look;
 use stylet_identify::model::Role;
 use stylet_identify::objective::replay;
+use stylet_stats::linear::{Factor, Symmetric, dot};
 use stylet_stats::order::quantile_of_sorted;
 use stylet_tissue::effect::sgn;
 
