@@ -44,6 +44,8 @@ const MANY_STORIES: f64 = 0.1;
 /// (Breiman and others 1984: of laws that predict about as well the simplest). It has to be more than the part would seem to be worth
 /// by chance: a law without it has been looked for less.
 const PART_WORTH: f64 = 0.05;
+/// The same of what only shapes an effect that stands: it accuses nobody, and what it costs is a number.
+const SHAPE_WORTH: f64 = 0.01;
 
 /// Where a law comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,7 +189,7 @@ pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut Cha
 fn surest(laws: Vec<Law>) -> Option<Law> {
     let mut best: Option<Law> = None;
     let first = laws.first()?.clone();
-    for law in laws.into_iter().skip(1).filter(|l| pays(&loses(&first.scores, &l.scores))) {
+    for law in laws.into_iter().skip(1).filter(|l| pays(&loses(&first.scores, &l.scores), PART_WORTH)) {
         if best.as_ref().is_none_or(|b| law.left_out_n() < b.left_out_n()) {
             best = Some(law);
         }
@@ -396,13 +398,13 @@ fn loses(without: &[Option<Score>], with: &[Option<Score>]) -> Vec<f64> {
     without.iter().zip(with).map(one).collect()
 }
 
-/// Whether a part is worth having: what recordings lose without it is enough, and more than its standard error over the recordings, which
-/// are what is independent.
-fn pays(loses: &[f64]) -> bool {
+/// Whether a part is worth having: what recordings lose without it is at least `worth`, and more than its standard error over the
+/// recordings, which are what is independent.
+fn pays(loses: &[f64], worth: f64) -> bool {
     let mean = stylet_stats::mean(loses);
     let error = stylet_stats::sd(loses) / (loses.len() as f64).sqrt();
     // Squares are twice as much worse as their roots.
-    mean >= 2.0 * PART_WORTH && (mean == f64::INFINITY || mean > error)
+    mean >= 2.0 * worth && (mean == f64::INFINITY || mean > error)
 }
 
 /// Says what each part of a law is worth, and takes away what neither recordings left out nor whole speeds left out miss.
@@ -422,7 +424,8 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
     let mut order: Vec<usize> = (0..out.len()).collect();
     order.sort_by(|a, b| stylet_stats::mean(&out[*a].loses).total_cmp(&stylet_stats::mean(&out[*b].loses)));
     for k in order {
-        if out[k].loses.is_empty() || pays(&out[k].loses) || pays(&out[k].speeds_lose) {
+        let worth = if out[k].name == out[k].effect { PART_WORTH } else { SHAPE_WORTH };
+        if out[k].loses.is_empty() || pays(&out[k].loses, worth) || pays(&out[k].speeds_lose, worth) {
             continue;
         }
         // Beside what went before it.
@@ -434,7 +437,7 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
         let Some(smaller) = best.fitted.with(&model) else { continue };
         let smaller = Law::new(best.kind, smaller, runs);
         let speeds_lose = loses(&by_speed(&smaller.fitted, runs), &speeds);
-        if !pays(&loses(&smaller.scores, &whole)) && !pays(&speeds_lose) {
+        if !pays(&loses(&smaller.scores, &whole), worth) && !pays(&speeds_lose, worth) {
             *best = smaller;
             out[k].kept = false;
         }
@@ -467,8 +470,8 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::{
-        DRAWS, Kind, Law, TURNS, WORTH, best_of, candidates, coarse, confidence, effects, errors_n, held,
-        judged, less, loses, parts, pays, several, some, starts, surest,
+        DRAWS, Kind, Law, PART_WORTH, SHAPE_WORTH, TURNS, WORTH, best_of, candidates, coarse, confidence,
+        effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts, surest,
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
@@ -646,9 +649,11 @@ mod tests {
         for (mean, errors, wanted) in
             [(0.2, 1.1, true), (0.2, 0.9, false), (0.101, 9.0, true), (0.099, 9.0, false), (-0.2, 9.0, false)]
         {
-            assert_eq!(pays(&about(mean, errors)), wanted, "{mean} {errors}");
+            assert_eq!(pays(&about(mean, errors), PART_WORTH), wanted, "{mean} {errors}");
         }
-        assert!(pays(&[0.0, f64::INFINITY, 0.0]) && !pays(&[]));
+        assert!(pays(&[0.0, f64::INFINITY, 0.0], PART_WORTH) && !pays(&[], PART_WORTH));
+        // A shape is asked for less.
+        assert!(pays(&about(0.03, 9.0), SHAPE_WORTH) && !pays(&about(0.03, 9.0), PART_WORTH));
     }
 
     /// Of chance the least of several errors is too good.
