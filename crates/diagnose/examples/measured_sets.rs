@@ -6,6 +6,9 @@
 //! Files are `needle_phantom/{skin-on-muscle,skin,muscle}_*.csv` in that folder; names after `--` choose some of the three, `shifted` adds
 //! the stack with the runs of its second speed moved by 1.5 mm. Prints tables, writes nothing.
 
+mod guess;
+
+use guess::believed;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -14,7 +17,6 @@ use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_o
 use stylet_diagnose::set::{Insertion, first, laws};
 use stylet_record::raw::Raw;
 use stylet_record::{ColumnMap, ReadOptions, read_csv_with_holes};
-use stylet_tissue::{Layer, Tissue};
 
 /// Seed of what they begin with.
 const SEED: u64 = 15;
@@ -53,19 +55,6 @@ fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<Insertion>, Box<
         out.push(Insertion::new(name, read_csv_with_holes(&file, &options)?.0, layers));
     }
     Ok(out)
-}
-
-/// What one would guess before any insertion.
-fn believed(layers: usize) -> Tissue {
-    let layer = |thickness_m| Layer {
-        name: String::new(),
-        thickness_m,
-        stiffness_n_per_m: 300.0,
-        friction_ns_per_m2: 0.0,
-        puncture_n: Some(4.0),
-    };
-    let thick = if layers > 1 { vec![layer(0.011), layer(0.08)] } else { vec![layer(0.08)] };
-    Tissue { surface_m: 0.004, layers: thick }
 }
 
 fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(), Box<dyn Error>> {

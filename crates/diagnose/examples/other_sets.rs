@@ -9,6 +9,9 @@
 //! is the error on runs left out over the floor, the mean of the other runs at the same speed: of the law, and of law and what it
 //! leaves alike.
 
+mod guess;
+
+use guess::believed;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
@@ -21,7 +24,7 @@ use stylet_examine::reality::rich::{Bristles, Damage, Foundation, Ingredients, R
 use stylet_examine::reality::sensor::Instrument;
 use stylet_examine::reality::tissue as real;
 use stylet_record::Recording;
-use stylet_tissue::{AnyEffect, DelayedPuncture, Law, LawState, Layer, LetGo, ShaftSlip, Tissue};
+use stylet_tissue::{AnyEffect, DelayedPuncture, Law, LawState, LetGo, ShaftSlip};
 
 /// Numbers of a law lie up to this factor from those of the phantoms.
 const FACTOR: f64 = 2.5;
@@ -85,19 +88,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     }
     Ok(())
-}
-
-/// What one would guess before any insertion.
-fn believed(layers: usize) -> Tissue {
-    let layer = |thickness_m| Layer {
-        name: String::new(),
-        thickness_m,
-        stiffness_n_per_m: 300.0,
-        friction_ns_per_m2: 0.0,
-        puncture_n: Some(4.0),
-    };
-    let thick = if layers > 1 { vec![layer(0.011), layer(0.08)] } else { vec![layer(0.08)] };
-    Tissue { surface_m: 0.004, layers: thick }
 }
 
 /// A motion: stroke (m), speed (m/s), rest (s).

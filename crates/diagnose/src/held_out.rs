@@ -1,7 +1,7 @@
 //! How much better the extended model is on recordings that took no part in the fit.
 
 use crate::otherwise::otherwise;
-use crate::unmoved::{Moved, moved};
+use crate::unmoved::{Moved, moved, shapes};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
@@ -116,6 +116,7 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
         models.iter().enumerate().map(|(r, m)| by_its_own(m.as_ref()?, data, r)).collect();
     let with = square(&with);
     let look = Look::new(best, data);
+    let shapes = shapes(&look);
     (0..best.model.effects.len())
         .map(|k| {
             let choice = &best.model.effects[k];
@@ -137,7 +138,7 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
                 spread,
                 gain,
                 otherwise: otherwise(&look, k, without.nats() - best.nats()),
-                moved: moved(&look, k),
+                moved: moved(&look, &shapes, k),
             }
         })
         .collect()

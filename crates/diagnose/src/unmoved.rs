@@ -38,22 +38,29 @@ impl Moved {
     pub const UNKNOWN: Self = Self { told: f64::INFINITY, surely: f64::INFINITY };
 }
 
+/// Forces that what is left may be: for each of the things that insertions go by columns that span its smooth functions. They are the same for
+/// every effect of a fit.
+#[must_use]
+pub fn shapes(look: &Look<'_>) -> Vec<Vec<Column>> {
+    along(look).iter().map(|x| functions(look, x)).collect()
+}
+
 /// How far the strength of an effect moves beside forces of other shapes; shapes that leave nothing of the effect are not asked.
 #[must_use]
-pub fn moved(look: &Look<'_>, effect: usize) -> Moved {
+pub fn moved(look: &Look<'_>, shapes: &[Vec<Column>], effect: usize) -> Moved {
     let Some(force) = force(look, effect) else { return Moved::UNKNOWN };
     let others = Others::new(look, effect);
     let own = look.of_force(&force);
     let Some(stands) = others.strength(&own, &[]) else { return Moved::UNKNOWN };
-    let beside = |along: &Vec<Vec<f64>>| {
-        let now = others.strength(&own, &functions(look, along))?;
+    let beside = |shape: &Vec<Column>| {
+        let now = others.strength(&own, shape)?;
         // What such a force takes away adds to the variance.
         let error = now.error * (1.0 - now.left).max(0.0).sqrt();
         let told = (now.more - stands.more).abs();
         (now.left > TOLD).then(|| Moved { told, surely: (told - SURE * error).max(0.0) })
     };
     let most = |a: Moved, b: Moved| Moved { told: a.told.max(b.told), surely: a.surely.max(b.surely) };
-    along(look).iter().filter_map(beside).fold(Moved { told: 0.0, surely: 0.0 }, most)
+    shapes.iter().filter_map(beside).fold(Moved { told: 0.0, surely: 0.0 }, most)
 }
 
 /// The force of an effect in every block (N), by recording.

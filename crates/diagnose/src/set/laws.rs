@@ -31,7 +31,7 @@ const FEW: usize = 8;
 /// Blocks are averaged by so many to judge a law,
 const COARSE: usize = 3;
 /// its fits go on for so many steps at most,
-const TURNS: usize = 5;
+pub(super) const TURNS: usize = 5;
 /// and it is drawn so many times.
 const DRAWS: usize = 16;
 /// A law has to predict recordings left out better than the base law by this share.
@@ -436,8 +436,8 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
         };
         let Some(smaller) = best.fitted.with(&model) else { continue };
         let smaller = Law::new(best.kind, smaller, runs);
-        let speeds_lose = loses(&by_speed(&smaller.fitted, runs), &speeds);
-        if !pays(&loses(&smaller.scores, &whole), worth) && !pays(&speeds_lose, worth) {
+        let speeds_lose = || loses(&by_speed(&smaller.fitted, runs), &speeds);
+        if !pays(&loses(&smaller.scores, &whole), worth) && !pays(&speeds_lose(), worth) {
             *best = smaller;
             out[k].kept = false;
         }

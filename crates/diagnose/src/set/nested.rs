@@ -4,13 +4,10 @@
 //! part of the set is kept away from the choice, too, which leaves parts of what is left out in its turn (Varma and Simon 2006).
 
 use crate::set::first::Insertion;
-use crate::set::laws::{Law, Laws, best_of, coarse, effects, folds, foretold, parts};
+use crate::set::laws::{Law, Laws, TURNS, best_of, coarse, effects, folds, foretold, parts};
 use crate::set::left_out::{fit_without, staying};
 use crate::set::population::Population;
 use serde::Serialize;
-
-/// A fit that has lost a part of its set goes on for so many steps.
-const TURNS: usize = 5;
 
 /// What parts of a set are predicted to.
 #[derive(Clone, Debug, PartialEq, Serialize)]

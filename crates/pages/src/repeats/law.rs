@@ -76,7 +76,7 @@ pub(super) fn causes(study: &Study) -> Section {
              cling to the shaft, slip, give way after a while and let go. The one that predicts parts of the set left out best \
              was taken, the base law where the others are better by less than 2 %, and more than two effects of the library \
              only when they are better than a slipping shaft by a tenth. Then every part of it went in turn, and stayed away \
-             where the others do without it to 1 %.",
+             where the others, and whole speeds left out, lose less than a twentieth without it (a hundredth for what only shapes an effect), or no more than chance.",
         )
         .picture("Error on runs left out of every law, and without every part", gain_figure(study))
         .table(causes)

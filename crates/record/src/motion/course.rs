@@ -85,9 +85,7 @@ impl Course {
         if n < FEWEST {
             return None;
         }
-        let (first, last) = (t[0], t[n - 1]);
-        let frame =
-            Frame { middle: 0.5 * (first + last), half: (0.5 * (last - first)).max(1e-9), cell_s, t, z };
+        let frame = Frame::new(t, z, cell_s)?;
         let mut best = frame.fit(0, &[])?;
         for degree in 1..=3 {
             best = better(best, frame.fit(degree, &[]));
@@ -112,20 +110,16 @@ impl Course {
         }
         Some(best)
     }
-}
 
-impl Course {
     /// The better of a rest and a line.
     pub fn even(t: &[f64], z: &[f64], cell_s: f64) -> Option<Self> {
-        let (first, last) = (*t.first()?, *t.last()?);
-        let frame =
-            Frame { middle: 0.5 * (first + last), half: (0.5 * (last - first)).max(1e-9), cell_s, t, z };
+        let frame = Frame::new(t, z, cell_s)?;
         Some(better(frame.fit(0, &[])?, frame.fit(1, &[])))
     }
 }
 
 /// The cheaper of two.
-fn better(a: Course, b: Option<Course>) -> Course {
+pub(super) fn better(a: Course, b: Option<Course>) -> Course {
     match b {
         Some(b) if b.cost < a.cost => b,
         _ => a,
@@ -141,7 +135,12 @@ struct Frame<'a> {
     z: &'a [f64],
 }
 
-impl Frame<'_> {
+impl<'a> Frame<'a> {
+    fn new(t: &'a [f64], z: &'a [f64], cell_s: f64) -> Option<Self> {
+        let (first, last) = (*t.first()?, *t.last()?);
+        Some(Self { middle: 0.5 * (first + last), half: (0.5 * (last - first)).max(1e-9), cell_s, t, z })
+    }
+
     /// Least squares of a polynomial of a degree and waves of given frequencies.
     fn fit(&self, degree: usize, waves: &[f64]) -> Option<Course> {
         let rows = |row: &mut [f64; MOST], t: f64| self.row(row, t, degree, waves, self.cell_s);
@@ -350,8 +349,7 @@ mod tests {
     }
 
     fn frame<'a>(t: &'a [f64], z: &'a [f64]) -> Frame<'a> {
-        let (first, last) = (t[0], t[t.len() - 1]);
-        Frame { middle: 0.5 * (first + last), half: 0.5 * (last - first), cell_s: CELL_S, t, z }
+        Frame::new(t, z, CELL_S).expect("cells")
     }
 
     fn plain(poly: [f64; 4], waves: &[[f64; 3]], sd_m: f64) -> Course {

@@ -5,7 +5,7 @@
 //! when that leaves white noise. Else every cell takes the widest of a ladder of windows whose
 //! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
 
-use super::course::{Course, FEWEST};
+use super::course::{Course, FEWEST, better};
 use super::ramp::Ramp;
 use super::velocity::{Break, Kink, breaks, parabola, position_noise, rounding};
 use stylet_stats::order::median;
@@ -175,6 +175,11 @@ impl Stretch {
         best
     }
 
+    /// Angular frequencies of its form in 1/s.
+    fn frequencies(&self) -> Vec<f64> {
+        self.course.iter().flat_map(Course::frequencies).collect()
+    }
+
     /// Position and velocity at an instant within.
     fn at(&self, tc: &[f64], t: f64) -> (f64, f64) {
         if let Some(course) = &self.course {
@@ -198,10 +203,11 @@ fn inside((from, to): (usize, usize), cut: usize, cells: usize) -> (usize, usize
     (if from > 0 { from + cut } else { 0 }, if to < cells { to.saturating_sub(cut) } else { to })
 }
 
+/// The cheaper of what there is.
 fn cheaper(a: Option<Course>, b: Option<Course>) -> Option<Course> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if b.cost < a.cost { b } else { a }),
-        (a, b) => a.or(b),
+    match a {
+        Some(a) => Some(better(a, b)),
+        None => b,
     }
 }
 
@@ -212,10 +218,7 @@ fn joined(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
         let mut out: Vec<Stretch> = Vec::new();
         for next in stretches {
             if let Some(last) = out.last_mut() {
-                let hints: Vec<f64> = [&*last, &next]
-                    .iter()
-                    .flat_map(|s| s.course.iter().flat_map(Course::frequencies))
-                    .collect();
+                let hints = [last.frequencies(), next.frequencies()].concat();
                 let hints = if hints.is_empty() { vec![NO_HINT] } else { hints };
                 let both = Stretch::new(cells, (last.from, next.to), &hints);
                 if both.course.is_some() && both.cost < last.cost + next.cost {
@@ -297,9 +300,8 @@ fn straightened(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
         let around = (left.from.max(edge.saturating_sub(2 * REACH)), right.to.min(edge + 2 * REACH));
         let within = (around.0.max(edge.saturating_sub(REACH)), around.1.min(edge + REACH));
         let Some(at) = cheapest(cells, around, within) else { continue };
-        let hints = |s: &Stretch| -> Vec<f64> { s.course.iter().flat_map(Course::frequencies).collect() };
-        let one = Stretch::new(cells, (left.from, at), &hints(left));
-        let two = Stretch::new(cells, (at, right.to), &hints(right));
+        let one = Stretch::new(cells, (left.from, at), &left.frequencies());
+        let two = Stretch::new(cells, (at, right.to), &right.frequencies());
         if one.cost + two.cost < left.cost + right.cost {
             stretches[k - 1] = one;
             stretches[k] = two;
@@ -319,9 +321,8 @@ fn moved(cells: &Cells, mut stretches: Vec<Stretch>) -> Vec<Stretch> {
             if apart == 0 || edge < left.from + FEWEST || edge + FEWEST > right.to {
                 continue;
             }
-            let hints = |s: &Stretch| -> Vec<f64> { s.course.iter().flat_map(Course::frequencies).collect() };
-            let one = Stretch::new(cells, (left.from, edge), &hints(left));
-            let two = Stretch::new(cells, (edge, right.to), &hints(right));
+            let one = Stretch::new(cells, (left.from, edge), &left.frequencies());
+            let two = Stretch::new(cells, (edge, right.to), &right.frequencies());
             if one.course.is_some() && two.course.is_some() {
                 stretches[k - 1] = one;
                 stretches[k] = two;
