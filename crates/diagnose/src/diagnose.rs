@@ -3,7 +3,7 @@
 use crate::base::{Prepared, base};
 use crate::error::DiagnoseError;
 use crate::held_out::{Borne, Left, borne, floor, left_out, rms};
-use crate::intervals::Spread;
+use crate::intervals::{Spread, untied};
 use crate::leftover;
 use crate::outcome::*;
 use crate::rivals::{CLASS_NATS, Rival, rivals};
@@ -296,6 +296,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
     let settled = fit(&crate::geometry::unsure(&search.best.model), &whole, Effort { turns: 3, enough: 0.1 })
         .unwrap_or_else(|| search.best.clone());
+    let settled = untied(settled, &whole);
     let spread = Spread::new(&settled, &whole, &mut ChaCha8Rng::seed_from_u64(SEED));
     let (mut causes, mut against_none) = (Vec::new(), Vec::new());
     for (k, choice) in settled.model.effects.iter().enumerate() {
@@ -369,8 +370,8 @@ fn base_parameters(search: &Search, spread: &Spread) -> Vec<BaseParameter> {
     let believed = &search.best.model.belief.tissue;
     let mut add = |layer: usize, name: &str, role: Role, assumed: f64, scale: f64| {
         let Some((x, half)) = spread.of(role) else { return };
-        let (value, half) = (x * scale, half * scale);
-        let (low, high) = (value - half, value + half);
+        let (value, low) = (x * scale, (x - half) * scale);
+        let high = spread.open_above(role).map_or(x + half, |open| open.max(x + half)) * scale;
         out.push(BaseParameter {
             layer,
             name: name.to_owned(),

@@ -12,8 +12,8 @@
 use crate::outcome::Estimate;
 use crate::told_again::told_again;
 use rand::Rng;
-use stylet_identify::events::{judge, spreads};
-use stylet_identify::fit::{Fit, Tangent};
+use stylet_identify::events::{Event, judge, spreads};
+use stylet_identify::fit::{Effort, Fit, Tangent};
 use stylet_identify::model::{Model, Number, Role};
 use stylet_identify::objective::Data;
 use stylet_stats::linear::{Factor, Symmetric};
@@ -174,6 +174,13 @@ impl<'a> Spread<'a> {
         Some((self.fit.model.get(role, 0), if half > 0.0 { half } else { by_prior() }))
     }
 
+    /// As far as a puncture force may lie beyond its value, in the scale of the fit, where no measurement ends it.
+    #[must_use]
+    pub fn open_above(&self, role: Role) -> Option<f64> {
+        let n = self.tangent.shared.iter().find(|n| n.role == role)?;
+        open_above(self.fit, n).then(|| n.mean + n.sd * normal::quantile(UPPER))
+    }
+
     /// Whether a shared number stands at a bound.
     #[must_use]
     pub fn at_bound(&self, role: Role) -> bool {
@@ -211,6 +218,39 @@ impl<'a> Spread<'a> {
         };
         Estimate { value, low: low.max(p.low), high: high.min(p.high).min(NO_END) }
     }
+}
+
+/// Nats that an end of a 95 % interval may lack.
+fn rare_nats() -> f64 {
+    0.5 * normal::quantile(UPPER).powi(2)
+}
+
+/// Whether a puncture force that every insertion came up to just where its layer's face was may as well never have been reached.
+fn open_above(fit: &Fit, n: &Number) -> bool {
+    let Role::Puncture(layer) = n.role else { return false };
+    let scatter = &fit.model.scatter;
+    let times = n.high / fit.model.get(n.role, 0);
+    let lost = |e: &Event| {
+        let force = (e.force + 1.0) / times - 1.0;
+        let beyond = Event { force, force_rate: e.force_rate / times, ..*e };
+        judge(&beyond, scatter).nats - judge(e, scatter).nats
+    };
+    fit.residuals.events.iter().filter_map(|e| e.get(layer)).map(lost).sum::<f64>() < rare_nats()
+}
+
+/// A fit whose puncture forces that may as well never have been reached are as believed, and hold nothing any more: what holds a force to
+/// where it happened to stand at a face holds stiffness and relaxation with it.
+#[must_use]
+pub fn untied(fit: Fit, data: &Data) -> Fit {
+    let below = |n: &Number| n.mean > fit.model.get(n.role, 0) && open_above(&fit, n);
+    let open: Vec<Number> = fit.model.shared().into_iter().filter(below).collect();
+    if open.is_empty() {
+        return fit;
+    }
+    let mut model = fit.model.clone();
+    open.iter().for_each(|n| model.set(n.role, 0, n.mean));
+    let free = stylet_identify::fit::fit(&model, data, Effort::FULL);
+    free.filter(|f| f.nats() < fit.nats() + rare_nats()).unwrap_or(fit)
 }
 
 /// How uncertain in m the faces are at which the force bends: the middle one.

@@ -53,7 +53,7 @@ fn of(info: &'static EffectInfo, look: &Look, prepared: &Prepared, hz: &[f64]) -
         Proposal::Breath => breath(info, look),
         Proposal::Line => lines(info, look, hz),
         Proposal::Break => breaks(info, look, prepared),
-        Proposal::Raw | Proposal::PerLayer => Vec::new(),
+        Proposal::Split(_) | Proposal::Raw | Proposal::PerLayer => Vec::new(),
     }
 }
 

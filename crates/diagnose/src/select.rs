@@ -351,15 +351,18 @@ impl Search {
         crate::lines::judged_beside(&seen, &coarse, &self.lines)
     }
 
-    /// Gives effects that have a larger form (a second time constant of relaxation) that form, where it is worth its numbers.
+    /// Gives effects that have a larger form (a second time constant of relaxation) that form, where it is worth its numbers;
+    /// it names no further cause, and need not gain what a name has to.
     fn enlarge(&mut self, times: &[Vec<f64>]) {
         for k in 0..self.best.model.effects.len() {
             let Some(larger) = self.best.model.effects[k].info.larger else { continue };
-            let Proposal::Columns(starts) = larger.proposal else { continue };
+            let Proposal::Split(starts) = larger.proposal else { continue };
             let coarse = self.coarse();
-            let begun = |group: &&[&[f64]]| {
+            let values = &self.best.model.effects[k].values;
+            let begun = |factors: &&[f64]| {
                 let mut model = self.best.model.clone();
-                model.effects[k] = Choice::new(larger, group.first()?);
+                let split: Vec<f64> = values.iter().cycle().zip(*factors).map(|(v, f)| v * f).collect();
+                model.effects[k] = Choice::new(larger, &split);
                 fit(&model, &coarse, Effort::SHORT)
             };
             let tried: Vec<Fit> = starts.par_iter().filter_map(begun).collect();
@@ -372,7 +375,10 @@ impl Search {
             if let Some(f) = whole
                 && !at_a_bound(&f, k)
                 && every_strength_is_told(&f, k, &self.data)
-                && gain(&self.best, &f, &self.data).pays(extra(&self.best, &f, &self.data))
+                && gain(&self.best, &f, &self.data).pays(cost(
+                    f.model.effect_numbers() - self.best.model.effect_numbers(),
+                    self.data.compared(),
+                ))
             {
                 self.settle(f);
             }

@@ -43,7 +43,7 @@ fn shows(info: &'static EffectInfo, look: &Look) -> bool {
             let values: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
             look.column(&Choice::new(info, &values)).is_some_and(|c| look.gain(&[c]).visible >= LEAST_NATS)
         }
-        Proposal::Raw | Proposal::PerLayer => true,
+        Proposal::Split(_) | Proposal::Raw | Proposal::PerLayer => true,
     }
 }
 

@@ -52,6 +52,8 @@ pub enum Proposal {
     Line,
     /// An element that stretches and breaks, at any depth.
     Break,
+    /// The [larger form](EffectInfo::larger) of an effect that stands: factors of its numbers, repeated until they are as many.
+    Split(&'static [&'static [f64]]),
     /// Read off the raw samples before any law.
     Raw,
     /// Describes one layer at a time: not sought in single insertions.

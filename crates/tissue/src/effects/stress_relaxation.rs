@@ -67,17 +67,20 @@ static TWO_TERMS: EffectInfo = EffectInfo {
         ParameterInfo { path: "terms.1.fraction", ..FRACTION },
         ParameterInfo { path: "terms.1.time_constant_s", ..TIME }.search(3.0, 0.2, 120.0),
     ],
-    proposal: Proposal::Columns(&[
-        &[&[0.2, 0.1, 0.2, 1.0]],
-        &[&[0.2, 0.3, 0.2, 3.0]],
-        &[&[0.2, 0.3, 0.2, 8.0]],
-        &[&[0.2, 1.0, 0.2, 8.0]],
-        &[&[0.2, 1.0, 0.2, 25.0]],
+    // What one term stands for may be two of its strength on both sides of its time, or a weak one far from it.
+    proposal: Proposal::Split(&[
+        &[0.5, 0.1, 0.5, 1.5],
+        &[0.5, 0.3, 0.5, 3.0],
+        &[0.2, 0.05, 0.8, 1.2],
+        &[0.8, 0.8, 0.2, 10.0],
     ]),
     ..ONE
 };
 
 static ONE_TERM: EffectInfo = EffectInfo { larger: Some(&TWO_TERMS), ..ONE };
+
+/// Place of the second share among the numbers.
+const SECOND: usize = 2;
 
 impl Described for StressRelaxation {
     fn values(&self) -> Vec<f64> {
@@ -90,6 +93,22 @@ impl Described for StressRelaxation {
         }
         let term = |&[fraction, time_constant_s]: &[f64; 2]| PronyTerm { fraction, time_constant_s };
         Some(Self { terms: pairs.iter().map(term).collect() })
+    }
+    /// The second share as a share of what the first leaves: both in 0 to 1 are then allowed.
+    fn coordinates(&self) -> Vec<f64> {
+        let mut out = self.values();
+        if let [first, second] = &self.terms[..] {
+            let left = 1.0 - first.fraction;
+            out[SECOND] = if left > 0.0 { (second.fraction / left).min(1.0) } else { 0.0 };
+        }
+        out
+    }
+    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
+        let mut out = Self::from_values(coordinates)?;
+        if let [first, second] = &mut out.terms[..] {
+            second.fraction *= 1.0 - first.fraction;
+        }
+        Some(out)
     }
     fn check_together(&self) -> Result<(), ParameterError> {
         let error = |path, value, allowed| Err(ParameterError { effect: ONE.id, path, value, allowed });

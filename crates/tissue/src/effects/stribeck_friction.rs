@@ -69,6 +69,14 @@ impl Described for StribeckFriction {
         let [c_n_per_m, c_static_n_per_m, v_stribeck_mps] = *values else { return None };
         Some(Self { c_n_per_m, c_static_n_per_m, v_stribeck_mps })
     }
+    /// The force at low speed beyond that at high speed in place of the whole, which may not be less.
+    fn coordinates(&self) -> alloc::vec::Vec<f64> {
+        alloc::vec![self.c_n_per_m, self.c_static_n_per_m - self.c_n_per_m, self.v_stribeck_mps]
+    }
+    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
+        let [c_n_per_m, beyond, v_stribeck_mps] = *coordinates else { return None };
+        Some(Self { c_n_per_m, c_static_n_per_m: c_n_per_m + beyond, v_stribeck_mps })
+    }
     fn check_together(&self) -> Result<(), ParameterError> {
         if self.c_static_n_per_m >= self.c_n_per_m {
             return Ok(());
