@@ -265,7 +265,10 @@ fn uncertainty_m(tangent: &Tangent, model: &Model) -> Option<f64> {
 fn bends(role: Role, model: &Model) -> bool {
     match role {
         Role::Surface | Role::Thickness(_) | Role::OwnSurface => true,
-        Role::Effect { effect, .. } => matches!(model.effects[effect].info.proposal, Proposal::Faces(_)),
+        Role::Effect { effect, parameter } => {
+            let info = model.effects[effect].info;
+            matches!(info.proposal, Proposal::Faces(_) | Proposal::Break) && info.parameters[parameter].unit == "m"
+        }
         _ => false,
     }
 }

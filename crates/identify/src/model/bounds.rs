@@ -72,7 +72,9 @@ impl Model {
                         let wide = to - from;
                         let low = if p.low == 0.0 { 0.0 } else { (from - wide).max(p.low) };
                         let high = (to + 3.0 * wide).min(p.high);
-                        (low, high, 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4))
+                        // What moves with a face has to move as finely.
+                        let fine = 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4);
+                        (low, high, if p.unit == "m" { 1e-7 } else { fine })
                     }
                 };
                 out.push(Number { role, low, high, mean: 0.0, sd: f64::INFINITY, step });
