@@ -463,7 +463,9 @@ pub(crate) fn raw_causes(raw: &raw::Raw, noise_n: f64) -> Vec<Cause> {
     };
     let about = |value: f64, sd: f64| (value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd);
     if let Some(limit_n) = raw.limit_n {
-        add(stylet_tissue::Saturation { limit_n }.into(), &[about(limit_n, 1e-6 * limit_n)]);
+        // A force that comes in steps shows its limit at the nearest one.
+        let half_n = 0.5 * raw.step_n.unwrap_or(0.0) + 1e-6 * limit_n;
+        add(stylet_tissue::Saturation { limit_n }.into(), &[(limit_n - half_n, limit_n + half_n)]);
     }
     if let Some(step_n) = raw.step_n.filter(|s| *s > 0.3 * noise_n) {
         add(stylet_tissue::Quantisation { step_n }.into(), &[about(step_n, 1e-4 * step_n)]);

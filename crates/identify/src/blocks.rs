@@ -57,6 +57,23 @@ pub struct Blocks {
     smeared: Arc<OnceLock<Arc<Vec<Piece>>>>,
 }
 
+/// Mean of forces over a stretch of time. Where samples are missing of it each of the others stands for the time that is nearest to it: what
+/// rises or jumps meanwhile has the mean that it would have with them.
+fn mean_over((from_s, to_s): (f64, f64), samples: impl Iterator<Item = (f64, f64)>, whole: bool) -> f64 {
+    let samples: Vec<(f64, f64)> = samples.collect();
+    let n = samples.len();
+    if whole || n < 2 {
+        return samples.iter().map(|s| s.1).sum::<f64>() / n.max(1) as f64;
+    }
+    let edge = |k: usize| match k {
+        0 => from_s,
+        k if k == n => to_s,
+        k => 0.5 * (samples[k - 1].0 + samples[k].0),
+    };
+    let parts = samples.iter().enumerate().map(|(k, s)| s.1 * (edge(k + 1) - edge(k)));
+    parts.sum::<f64>() / (to_s - from_s)
+}
+
 impl Blocks {
     /// The blocks of a recording, about `length_s` long; samples marked in `exclude` are not compared.
     #[must_use]
@@ -105,8 +122,7 @@ impl Blocks {
                 to += 1;
             }
             let good = |k: &usize| !exclude.get(*k).copied().unwrap_or(false);
-            let kept = (i..to).filter(good).count();
-            let sum: f64 = (i..to).filter(good).map(|k| recording.force_n[k]).sum();
+            let kept: Vec<usize> = (i..to).filter(good).collect();
             let from_s = if i > 0 && t[i] - t[i - 1] <= GAP * step_s {
                 0.5 * (t[i] + t[i - 1])
             } else {
@@ -121,8 +137,9 @@ impl Blocks {
             b.bridge(from_s, length_s);
             b.from_s.push(from_s);
             b.to_s.push(to_s);
-            b.f.push(if kept > 0 { sum / kept as f64 } else { 0.0 });
-            b.used.push(2 * kept > q.min(to - i) && 2 * (to - i) > q);
+            let whole = kept.len() == places;
+            b.f.push(mean_over((from_s, to_s), kept.iter().map(|k| (t[*k], recording.force_n[*k])), whole));
+            b.used.push(2 * kept.len() > q.min(to - i) && 2 * (to - i) > q);
             raw_block.resize(to, (b.f.len() - 1) as u32);
             i = to;
         }
@@ -216,11 +233,14 @@ impl Blocks {
         self.pieces = Arc::new(self.pieces_shown(Shown::Sampled));
     }
 
-    /// A force that jumps with the speed jumps between two samples: its mean is known to a step of one sample.
+    /// A force that jumps with the speed jumps between two samples: its mean is known to what lies between them.
     fn doubt_jump(&mut self, at_s: f64) {
         let k = self.at(at_s);
         if k > 0 && k + 1 < self.len() {
-            let step = (self.f[k + 1] - self.f[k - 1]).abs() / self.samples as f64 * UNIFORM_SD;
+            let after = self.raw_t.partition_point(|t| *t <= at_s).clamp(1, self.raw_t.len() - 1);
+            let steps = ((self.raw_t[after] - self.raw_t[after - 1]) / self.step_s).round();
+            let open = steps.clamp(1.0, self.samples as f64) / self.samples as f64;
+            let step = (self.f[k + 1] - self.f[k - 1]).abs() * open * UNIFORM_SD;
             self.doubt_n[k] = self.doubt_n[k].max(step);
         }
     }
@@ -248,7 +268,7 @@ impl Blocks {
     fn between(&self, at_s: f64) -> f64 {
         let k = self.raw_t.partition_point(|t| *t <= at_s);
         match (k.checked_sub(1).and_then(|k| self.raw_t.get(k)), self.raw_t.get(k)) {
-            (Some(before), Some(after)) if after - before <= GAP * self.step_s => 0.5 * (before + after),
+            (Some(before), Some(after)) if after - before < (self.samples as f64 * MISSING + 0.8) * self.step_s => 0.5 * (before + after),
             _ => at_s,
         }
     }
@@ -420,8 +440,9 @@ mod tests {
         let used: Vec<usize> = (0..b.len()).filter(|k| b.used[*k]).collect();
         // Of the last three samples two are left, more than half of them.
         assert_eq!(used, [0, 1, 4, 5, 6, 7, 8, 9, 10]);
-        are(&b.f[..5], [5.0 / 3.0, 5.5, 10.5, 0.0, 17.5]);
-        near(b.f[10], 41.5);
+        are(&b.f[..5], [1.5, 5.5, 10.25, 0.0, 17.5]);
+        // Sample 41 stands for the one before it, too.
+        near(b.f[10], 124.0 / 3.0);
         let restart: Vec<usize> = (0..b.len()).filter(|k| b.restart[*k]).collect();
         assert_eq!(restart, [0, 3, 4]);
     }
@@ -465,7 +486,8 @@ mod tests {
         let (b, whole) = (of(t.collect(), |t| 200.0 * t), of(even(43), |t| 200.0 * t));
         are(&b.from_s, whole.from_s.iter().copied());
         are(&b.to_s, whole.to_s.iter().copied());
-        are(&b.f[1..6], [17.0 / 3.0, 9.0, 14.0, 17.0, 22.5]);
+        // A straight force has its mean where samples are missing within, and half as far off as theirs where they miss at an end.
+        are(&b.f[1..6], [5.5, 9.0, 13.75, 17.0, 22.25]);
         assert_eq!((0..11).filter(|k| !b.used[*k]).collect::<Vec<_>>(), [5]);
         assert_eq!((0..11).filter(|k| b.restart[*k]).collect::<Vec<_>>(), [0, 6]);
     }
