@@ -137,7 +137,7 @@ impl Blocks {
             b.bridge(from_s, length_s);
             b.from_s.push(from_s);
             b.to_s.push(to_s);
-            let whole = kept.len() == places;
+            let whole = kept.len() as f64 + 0.5 > (to_s - from_s) / step_s;
             b.f.push(mean_over((from_s, to_s), kept.iter().map(|k| (t[*k], recording.force_n[*k])), whole));
             b.used.push(2 * kept.len() > q.min(to - i) && 2 * (to - i) > q);
             raw_block.resize(to, (b.f.len() - 1) as u32);
@@ -487,7 +487,7 @@ mod tests {
         are(&b.from_s, whole.from_s.iter().copied());
         are(&b.to_s, whole.to_s.iter().copied());
         // A straight force has its mean where samples are missing within, and half as far off as theirs where they miss at an end.
-        are(&b.f[1..6], [5.5, 9.0, 13.75, 17.0, 22.25]);
+        are(&b.f[1..6], [5.5, 9.25, 13.75, 17.25, 22.25]);
         assert_eq!((0..11).filter(|k| !b.used[*k]).collect::<Vec<_>>(), [5]);
         assert_eq!((0..11).filter(|k| b.restart[*k]).collect::<Vec<_>>(), [0, 6]);
     }

@@ -62,7 +62,7 @@ pub fn settle(t: &[f64], z: &[f64]) -> Settled {
     let dt = step * q as f64;
     // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
     let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (SIDE as f64).powf(1.5));
-    let found = breaks(&tc, &zc, SIDE, 1.8 * dt, doubt);
+    let found = breaks(&tc, &zc, SIDE, (1.8 * dt, 1.8 * dt), doubt);
     let mut edges: Vec<usize> = found.iter().map(|b| b.0).collect();
     edges.extend([0, cells]);
     edges.sort_unstable();

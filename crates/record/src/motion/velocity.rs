@@ -12,8 +12,10 @@ use stylet_stats::order::median;
 const WANTED_MPS: f64 = 5e-6;
 /// Widest half window in samples.
 const WIDEST: usize = 12;
-/// No window reaches across a gap of more than so many steps; a jump in a smaller one is where both sides meet.
+/// No window reaches across a gap of more than so many steps.
 const GAP: f64 = 5.5;
+/// In a gap of no more than so many seconds a drive changes its speed once at most: a jump is where both sides meet.
+const MEETING_S: f64 = 0.1;
 /// Smallest jump of the velocity in m/s that is looked for.
 pub const LEAST_JUMP_MPS: f64 = 2e-5;
 
@@ -63,13 +65,10 @@ pub fn velocity(t: &[f64], z: &[f64]) -> Velocity {
     edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > GAP * step));
     edges.push(n);
     let mut kinks = Vec::new();
-    for whole in edges.clone().windows(2) {
-        let (from, to) = (whole[0], whole[1]);
-        for (i, left, right) in breaks(&t[from..to], &z[from..to], side, GAP * step, doubt) {
-            let v = [left.2, right];
-            kinks.push(Kink { sample: from + i, t: left.0, z: left.1, v, sd_m: noise_m.min(1e-6) });
-            edges.push(from + i);
-        }
+    for (i, left, right) in breaks(t, z, side, (GAP * step, MEETING_S.max(GAP * step)), doubt) {
+        let v = [left.2, right];
+        kinks.push(Kink { sample: i, t: left.0, z: left.1, v, sd_m: noise_m.min(1e-6) });
+        edges.push(i);
     }
     edges.sort_unstable();
     edges.dedup();
@@ -144,12 +143,21 @@ pub(super) fn rounding(z: &[f64]) -> f64 {
 /// A break of the slope: the sample after it, the instant with position and slope before, the slope after.
 pub(super) type Break = (usize, (f64, f64, f64), f64);
 
-/// Where parabolas on both sides of a gap between two samples meet with different slopes.
-pub(super) fn breaks(t: &[f64], z: &[f64], side: usize, gap_s: f64, doubt_mps: f64) -> Vec<Break> {
+/// Where parabolas on both sides of a gap between two samples meet with different slopes. Neither reaches across a gap longer than the first
+/// of `gaps_s` (s); none longer than the second is bridged.
+pub(super) fn breaks(
+    t: &[f64],
+    z: &[f64],
+    side: usize,
+    (gap_s, longest_s): (f64, f64),
+    doubt_mps: f64,
+) -> Vec<Break> {
     let n = t.len();
+    let gaps: Vec<usize> = (1..n).filter(|i| t[*i] - t[i - 1] > gap_s).collect();
+    let within = |from: usize, to: usize| !gaps.iter().any(|g| *g > from && *g < to);
     let mut found: Vec<(f64, Break)> = Vec::new();
     for i in side..n.saturating_sub(side) {
-        if t[i] - t[i - 1] > gap_s {
+        if t[i] - t[i - 1] > longest_s || !within(i - side, i) || !within(i, i + side) {
             continue;
         }
         let (left, off_left) = parabola(&t[i - side..i], &z[i - side..i], t[i - 1]);
@@ -163,7 +171,12 @@ pub(super) fn breaks(t: &[f64], z: &[f64], side: usize, gap_s: f64, doubt_mps: f
             continue;
         }
         // Where z_left + v_left s = z_right - v_right (dt - s).
-        let s = ((right[0] - right[1] * dt - left[0]) / (left[1] - right[1])).clamp(0.0, dt);
+        let s = (right[0] - right[1] * dt - left[0]) / (left[1] - right[1]);
+        // In a long gap they may have done what neither side shows.
+        if dt > gap_s && !(0.0..=dt).contains(&s) {
+            continue;
+        }
+        let s = s.clamp(0.0, dt);
         found.push((off_left + off_right, (i, (t[i - 1] + s, left[0] + left[1] * s, left[1]), right[1])));
     }
     // Of neighbours the one that leaves least.
@@ -331,7 +344,7 @@ mod tests {
             t.iter().map(|t| 0.003 * t + 0.01 * t * t + change * (t - at_s).max(0.0)).collect()
         };
         let one =
-            |at_s: f64, change: f64, gap_s: f64, doubt: f64| breaks(&t, &bent(at_s, change), 8, gap_s, doubt);
+            |at_s: f64, change: f64, gap_s: f64, doubt: f64| breaks(&t, &bent(at_s, change), 8, (gap_s, gap_s), doubt);
         // Between samples 100 and 101.
         let found = one(0.5031, -0.004, 0.01, 0.0);
         assert_eq!(found.len(), 1, "{found:?}");
@@ -346,7 +359,7 @@ mod tests {
         assert_eq!(one(0.5031, 0.0, 0.01, 0.0), []);
         let straight = |change: f64| {
             let z: Vec<f64> = t.iter().map(|t| change * (t - 0.5031).max(0.0)).collect();
-            breaks(&t, &z, 8, 0.01, 0.0).len()
+            breaks(&t, &z, 8, (0.01, 0.01), 0.0).len()
         };
         assert_eq!((straight(1.9e-5), straight(2.1e-5)), (0, 1));
         // Nor is one of less than twice what the curvature changes from sample to sample, here by 0.2 mm/s.
@@ -362,7 +375,7 @@ mod tests {
                 .iter()
                 .map(|t| 0.004 * (t - 0.4031).max(0.0) - 0.004 * (t - 0.4031 - apart).max(0.0))
                 .collect();
-            breaks(&t, &z, 8, 0.01, 0.0).iter().map(|b| b.0).collect::<Vec<_>>()
+            breaks(&t, &z, 8, (0.01, 0.01), 0.0).iter().map(|b| b.0).collect::<Vec<_>>()
         };
         assert_eq!(two(0.1), [81, 101]);
         assert_eq!(two(0.05), [81, 91]);
@@ -372,18 +385,18 @@ mod tests {
     fn a_smooth_curve_has_no_break() {
         let t = even(200);
         let z: Vec<f64> = t.iter().map(|t| 0.05 * (6.0 * t).sin()).collect();
-        assert_eq!(breaks(&t, &z, 6, 0.01, 0.0), []);
+        assert_eq!(breaks(&t, &z, 6, (0.01, 0.01), 0.0), []);
     }
 
     #[test]
-    fn nothing_reaches_across_a_gap_and_a_jump_in_a_smaller_one_is_where_both_sides_meet() {
-        // So many steps are missing after sample 200; from 1.01 s on it goes back.
-        let of = |steps: f64| {
+    fn no_window_reaches_across_a_gap_and_a_jump_in_a_short_one_is_where_both_sides_meet() {
+        // So many steps are missing after sample 200; from then on it goes back.
+        let of = |steps: f64, turns_s: f64| {
             let t: Vec<f64> =
                 even(400).iter().map(|t| if *t < 1.0025 { *t } else { t + 0.005 * (steps - 1.0) }).collect();
             let z: Vec<f64> = t
                 .iter()
-                .map(|t| if *t < 1.01 { 0.003 * t } else { 0.003 * 1.01 - 0.002 * (t - 1.01) })
+                .map(|t| if *t < 1.01 { 0.003 * t } else { 0.003 * turns_s - 0.002 * (t - turns_s) })
                 .collect();
             let found = velocity(&t, &z);
             for (k, v) in found.v.iter().enumerate() {
@@ -392,13 +405,17 @@ mod tests {
             }
             found.kinks
         };
-        let told = of(5.0);
-        assert_eq!(told.len(), 1);
-        assert_eq!(told[0].sample, 201);
-        assert!((told[0].t - 1.01).abs() < 1e-6 && (told[0].z - 0.00303).abs() < 1e-8, "{told:?}");
-        assert!((told[0].v[0] - 0.003).abs() < 1e-7 && (told[0].v[1] + 0.002).abs() < 1e-7);
-        assert!(told[0].sd_m <= 1e-6);
-        assert_eq!(of(6.0), []);
+        for steps in [5.0, 6.0, 19.0] {
+            let told = of(steps, 1.01);
+            assert_eq!(told.len(), 1);
+            assert_eq!(told[0].sample, 201);
+            assert!((told[0].t - 1.01).abs() < 1e-6 && (told[0].z - 0.00303).abs() < 1e-8, "{told:?}");
+            assert!((told[0].v[0] - 0.003).abs() < 1e-7 && (told[0].v[1] + 0.002).abs() < 1e-7);
+            assert!(told[0].sd_m <= 1e-6);
+        }
+        // In a longer one it may have rested, too, and where both sides meet outside it did.
+        assert_eq!(of(21.0, 1.01), []);
+        assert_eq!(of(19.0, 1.11), []);
     }
 
     #[test]
