@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use std::sync::Arc;
-use stylet_identify::assign::assign;
+use stylet_identify::assign::assign_all;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::drops::{Drop, drops};
 use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
@@ -93,12 +93,7 @@ fn given(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model);
-        let instants = prepared
-            .blocks
-            .iter()
-            .zip(&prepared.drops)
-            .map(|(b, d)| assign(from, b, d, trust, rough_n))
-            .collect();
+        let instants = assign_all(from, &prepared.blocks, &prepared.drops, trust, rough_n);
         let next = Model { instants, ..from.clone() };
         if let Some(new) = fit(&next, &data, Effort { turns: 4, enough: 0.3 })
             && best.as_ref().is_none_or(|b| new.nats() < b.nats())
@@ -128,7 +123,7 @@ mod tests {
     use super::{FIRST_SHARE, Prepared, anew, base, given, roughness, sketched};
     use crate::made::{believed, gel, insertions, settled};
     use std::sync::Arc;
-    use stylet_identify::assign::assign;
+    use stylet_identify::assign::assign_all;
     use stylet_identify::blocks::{BLOCK_S, Blocks};
     use stylet_identify::drops::Drop;
     use stylet_identify::fit::{Effort, Fit, fit};
@@ -237,8 +232,7 @@ mod tests {
         assert!(rough_n < 0.5 * data.noise.sd_n());
         let wide = Data::new(Arc::clone(&prepared.blocks), Noise::white(data.noise.sd_n()), 0.0);
         let given_by = |from: &Model, trust: f64| {
-            let both = prepared.blocks.iter().zip(&prepared.drops);
-            let instants = both.map(|(b, d)| assign(from, b, d, trust, rough_n)).collect();
+            let instants = assign_all(from, &prepared.blocks, &prepared.drops, trust, rough_n);
             let next = Model { instants, ..from.clone() };
             fit(&next, &wide, Effort { turns: 4, enough: 0.3 }).expect("a fit")
         };

@@ -267,7 +267,8 @@ fn bends(role: Role, model: &Model) -> bool {
         Role::Surface | Role::Thickness(_) | Role::OwnSurface => true,
         Role::Effect { effect, parameter } => {
             let info = model.effects[effect].info;
-            matches!(info.proposal, Proposal::Faces(_) | Proposal::Break) && info.parameters[parameter].unit == "m"
+            matches!(info.proposal, Proposal::Faces(_) | Proposal::Break)
+                && info.parameters[parameter].unit == "m"
         }
         _ => false,
     }

@@ -16,8 +16,26 @@ const SIZE_SD: f64 = 0.6;
 /// A layer that the needle has passed by so many standard deviations must have given way.
 const PASSED_SD: f64 = 2.5;
 
+/// Recordings agree where a layer gives way when they are no further apart than this (m).
+const AGREED_M: f64 = 1e-3;
+/// No layer gives way where the needle is further back than it has been, by so much (m).
+const OLD_GROUND_M: f64 = 1e-3;
+/// Speeds so long before and after a drop (s) tell whether the needle slowed down there.
+const BESIDE_S: f64 = 0.05;
+
+/// Viscous friction at a depth, in N per m/s.
+fn friction(model: &Model, position_m: f64) -> f64 {
+    let mut front = model.tissue.surface_m;
+    let mut sum = 0.0;
+    for layer in &model.tissue.layers {
+        sum += layer.friction_ns_per_m2 * (position_m - front).clamp(0.0, layer.thickness_m);
+        front += layer.thickness_m;
+    }
+    sum
+}
+
 /// What is expected of a layer.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Expected {
     front_m: f64,
     place_m: f64,
@@ -57,14 +75,64 @@ fn expected(model: &Model, trust: f64) -> Vec<Expected> {
     out
 }
 
-/// The instants (s) of all layers of one recording.
+/// The instants (s) of all layers of several recordings. Where most recordings agree on where a layer gives way, it does so in the others,
+/// whether they show a drop there or not.
 #[must_use]
-pub fn assign(model: &Model, b: &Blocks, drops: &[Drop], trust: f64, noise_n: f64) -> Vec<f64> {
+pub fn assign_all(
+    model: &Model,
+    blocks: &[Blocks],
+    drops: &[Vec<Drop>],
+    trust: f64,
+    noise_n: f64,
+) -> Vec<Vec<f64>> {
     let layers = expected(model, trust);
+    let given = |layers: &[Expected]| -> Vec<Vec<f64>> {
+        blocks.iter().zip(drops).map(|(b, d)| assign(model, layers, b, d, noise_n)).collect()
+    };
+    let first = given(&layers);
+    let at =
+        |r: usize, l: usize| first[r].get(l).filter(|t| t.is_finite()).map(|t| blocks[r].motion.at(*t).0);
+    let mut agreed = layers.clone();
+    for (l, layer) in agreed.iter_mut().enumerate() {
+        let places: Vec<f64> = (0..blocks.len()).filter_map(|r| at(r, l)).collect();
+        if places.is_empty() {
+            continue;
+        }
+        let middle = stylet_stats::order::median(&mut places.clone());
+        let near = places.iter().filter(|z| (**z - middle).abs() < AGREED_M).count();
+        if near > 1 && 2 * near > blocks.len() && near < blocks.len() {
+            (layer.place_m, layer.sd_m) = (middle, AGREED_M);
+        }
+    }
+    if agreed == layers { first } else { given(&agreed) }
+}
+
+/// The instants (s) of all layers of one recording.
+fn assign(model: &Model, layers: &[Expected], b: &Blocks, drops: &[Drop], noise_n: f64) -> Vec<f64> {
     let z: Vec<f64> = (0..b.len()).map(|k| b.motion.at(0.5 * (b.from_s[k] + b.to_s[k])).0).collect();
     let deepest = z.iter().fold(f64::NEG_INFINITY, |m, z| m.max(*z));
     let crossing =
         |place: f64| z.iter().position(|z| *z >= place).map_or(NEVER, |k| 0.5 * (b.from_s[k] + b.to_s[k]));
+    let mut so_far = f64::NEG_INFINITY;
+    let reached: Vec<f64> = z
+        .iter()
+        .map(|z| {
+            so_far = so_far.max(*z);
+            so_far
+        })
+        .collect();
+    let new_ground = |d: &&Drop| reached.get(b.at(d.time_s)).is_none_or(|r| d.position_m > r - OLD_GROUND_M);
+    // Where the needle slows down, or turns, friction falls: that much of a drop is nobody's.
+    let drops: Vec<Drop> = drops
+        .iter()
+        .filter(new_ground)
+        .map(|d| {
+            let v = |by_s: f64| b.motion.at(d.time_s + by_s).1;
+            let rubs = friction(model, d.position_m) * (v(-BESIDE_S) - v(BESIDE_S));
+            let left = (1.0 - rubs.max(0.0) / d.size_n.max(1e-9)).max(0.0);
+            Drop { size_n: left * d.size_n, score: left * d.score, ..*d }
+        })
+        .collect();
     // Candidates of every layer: instant and cost; taking a drop saves what it costs spare.
     let spare = |d: &Drop| (SPARE_SHARE * 0.5 * d.score * d.score).min(MOST);
     let candidates: Vec<Vec<(f64, f64)>> = layers
@@ -165,7 +233,10 @@ mod tests {
 
     /// Where each layer is said to give way, in mm.
     fn places(model: &Model, to_mm: f64, drops: &[Drop]) -> Vec<f64> {
-        assign(model, &blocks(to_mm), drops, 1.0, 0.01).iter().map(|t| 0.1 + 10.0 * t).collect()
+        assign(model, &expected(model, 1.0), &blocks(to_mm), drops, 0.01)
+            .iter()
+            .map(|t| 0.1 + 10.0 * t)
+            .collect()
     }
 
     fn are(told: &[f64], wanted: &[f64]) {
@@ -289,6 +360,44 @@ mod tests {
         are(&told, &[28.0, 30.0]);
         // What lies behind a layer that never gave way did not either.
         are(&places(&m, 19.0, &[drop(18.9, 1e-6, 0.1)]), &[NEVER, NEVER]);
+    }
+
+    /// A needle that goes in at 10 mm/s as far as `to_mm`, rests there, and goes back after 5 s.
+    fn there_and_back(to_mm: f64) -> Blocks {
+        let there_s = (to_mm - 0.1) / 10.0;
+        let t: Vec<f64> = (0..1800).map(|k| f64::from(k) * 0.005).collect();
+        let z = t.iter().map(|t| 1e-4 + 0.01 * (t.min(there_s) - (t - 5.0).max(0.0))).collect();
+        Blocks::new(&Recording::new(t, z, vec![0.0; 1800]).expect("a recording"), &[], BLOCK_S)
+    }
+
+    /// Friction that ends where the needle stops is no layer that gives way, nor is what falls on the way back.
+    #[test]
+    fn no_layer_gives_way_where_the_needle_stops_or_on_old_ground() {
+        let m = model(&[(20.0, 200.0, Some(4.0))]);
+        let of = |to_mm: f64, d: Drop| assign(&m, &expected(&m, 1.0), &there_and_back(to_mm), &[d], 0.01)[0];
+        // 20 mm of 4000 N s/m^2 are 0.8 N at 10 mm/s; the layer is expected at its face, 30 mm deep.
+        let stop =
+            |to_mm: f64, size_n: f64| Drop { time_s: (to_mm - 0.1) / 10.0, ..drop(to_mm, size_n, 30.0) };
+        assert_eq!(of(29.0, stop(29.0, 2.0)), stop(29.0, 2.0).time_s, "more than friction");
+        assert_eq!(of(29.0, stop(29.0, 0.7)), NEVER, "no more than friction");
+        let back = Drop { time_s: 5.0 + 0.4, ..drop(29.0, 2.0, 30.0) };
+        assert_ne!(of(33.0, back), back.time_s);
+        assert_eq!(of(33.0, drop(29.0, 2.0, 30.0)), drop(29.0, 2.0, 30.0).time_s);
+    }
+
+    #[test]
+    fn where_most_recordings_agree_the_others_give_way_too() {
+        let m = model(&[(20.0, 200.0, Some(2.0))]);
+        let all = [blocks(60.0), blocks(60.0), blocks(60.0)];
+        let told = |drops: [&[Drop]; 3]| -> Vec<f64> {
+            let drops: Vec<Vec<Drop>> = drops.iter().map(|d| d.to_vec()).collect();
+            assign_all(&m, &all, &drops, 1.0, 0.01).iter().map(|t| 0.1 + 10.0 * t[0]).collect()
+        };
+        let (at, far) = (drop(22.5, 2.0, 30.0), drop(26.0, 2.0, 30.0));
+        let near = |told: f64| (told - 22.5).abs() < 0.2;
+        assert!(near(told([&[at], &[at], &[]])[2]));
+        // Half is not most.
+        assert!(told([&[at], &[far], &[]])[1] == 26.0);
     }
 
     #[test]

@@ -268,7 +268,11 @@ impl Blocks {
     fn between(&self, at_s: f64) -> f64 {
         let k = self.raw_t.partition_point(|t| *t <= at_s);
         match (k.checked_sub(1).and_then(|k| self.raw_t.get(k)), self.raw_t.get(k)) {
-            (Some(before), Some(after)) if after - before < (self.samples as f64 * MISSING + 0.8) * self.step_s => 0.5 * (before + after),
+            (Some(before), Some(after))
+                if after - before < (self.samples as f64 * MISSING + 0.8) * self.step_s =>
+            {
+                0.5 * (before + after)
+            }
             _ => at_s,
         }
     }

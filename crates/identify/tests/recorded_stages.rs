@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
-use stylet_identify::assign::assign;
+use stylet_identify::assign::assign_all;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
 use stylet_identify::discrepancy::discrepancy;
 use stylet_identify::drops::drops;
@@ -524,8 +524,7 @@ fn base_stages(said: &mut Said, belief: &Arc<Belief>, blocks: &Arc<Vec<Blocks>>)
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model).clone();
-        let told = blocks.iter().zip(&found).map(|(b, d)| assign(&from, b, d, trust, rough_n));
-        let instants: Vec<Vec<f64>> = told.collect();
+        let instants = assign_all(&from, blocks, &found, trust, rough_n);
         for (r, i) in instants.iter().enumerate() {
             said.instants(&format!("assigned with {trust} of {r} instants_s"), i);
         }

@@ -2,7 +2,7 @@
 
 use crate::base::roughness;
 use serde::{Deserialize, Serialize};
-use stylet_identify::assign::assign;
+use stylet_identify::assign::assign_all;
 use stylet_identify::drops::drops;
 use stylet_identify::fit::{Effort, fit};
 use stylet_identify::model::{Belief, Free, Model, Own};
@@ -47,8 +47,7 @@ pub fn own(model: &Model, data: &Data, refit: &[Refit]) -> Option<Vec<Own>> {
     (model.scatter.surface_m, model.scatter.friction) = (WIDE_M, WIDE);
     let noise_n = roughness(&data.blocks);
     let found: Vec<_> = data.blocks.iter().map(drops).collect();
-    model.instants =
-        data.blocks.iter().zip(&found).map(|(b, d)| assign(&model, b, d, 0.5, noise_n)).collect();
+    model.instants = assign_all(&model, &data.blocks, &found, 0.5, noise_n);
     let times: Vec<Vec<f64>> = found.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect();
     let first = fit(&model, data, Effort { turns: 6, enough: 0.3 })?;
     let mut model = first.model;
