@@ -343,8 +343,9 @@ mod tests {
         let bent = |at_s: f64, change: f64| -> Vec<f64> {
             t.iter().map(|t| 0.003 * t + 0.01 * t * t + change * (t - at_s).max(0.0)).collect()
         };
-        let one =
-            |at_s: f64, change: f64, gap_s: f64, doubt: f64| breaks(&t, &bent(at_s, change), 8, (gap_s, gap_s), doubt);
+        let one = |at_s: f64, change: f64, gap_s: f64, doubt: f64| {
+            breaks(&t, &bent(at_s, change), 8, (gap_s, gap_s), doubt)
+        };
         // Between samples 100 and 101.
         let found = one(0.5031, -0.004, 0.01, 0.0);
         assert_eq!(found.len(), 1, "{found:?}");

@@ -14,7 +14,7 @@ use spikes::spikes;
 /// What was found in the raw force.
 #[derive(Clone, Debug, Default)]
 pub struct Raw {
-    /// Samples per recording that cannot be compared: saturated or spikes.
+    /// Samples per recording that cannot be compared: saturated, spikes, or at rest within a step of the sensor.
     pub exclude: Vec<Vec<bool>>,
     /// Range of the sensor in N, if it was reached.
     pub limit_n: Option<f64>,
@@ -39,7 +39,29 @@ pub fn look(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Raw {
         }
     }
     raw.spikes = spikes(recordings, &mut raw.exclude, raw.step_n.unwrap_or(0.0));
+    if raw.step_n.is_some() {
+        for (exclude, recording) in raw.exclude.iter_mut().zip(recordings) {
+            leave_out_ends(exclude, &recording.force_n);
+        }
+    }
     raw
+}
+
+/// Samples of one number in a row that noise would have moved.
+const STANDS: usize = 20;
+
+/// Leaves out a force that stands at one number before it first changes, and after it last does: a needle in air rests somewhere within a
+/// step, always at the same place of it, where a needle in tissue goes through many.
+fn leave_out_ends(exclude: &mut [bool], f: &[f64]) {
+    let (Some(first), Some(last)) = (f.first(), f.last()) else { return };
+    let before = f.iter().take_while(|x| *x == first).count();
+    let after = f.iter().rev().take_while(|x| *x == last).count();
+    if before > STANDS {
+        exclude.iter_mut().take(before).for_each(|x| *x = true);
+    }
+    if after > STANDS {
+        exclude.iter_mut().rev().take(after).for_each(|x| *x = true);
+    }
 }
 
 #[cfg(test)]
@@ -66,6 +88,22 @@ mod tests {
     /// Samples that alternate about nothing by `d` stand out of their neighbours by `d`, each: the scatter is 1.4826 `d`.
     pub(in crate::quality::raw) fn alternating(n: usize, d: f64) -> Vec<f64> {
         (0..n).map(|k| if k % 2 == 0 { d } else { -d }).collect()
+    }
+
+    #[test]
+    fn a_force_in_steps_is_not_compared_while_it_stands_at_its_ends() {
+        let steps = |from: usize, to: usize| -> Vec<f64> {
+            (0..300).map(|k| if k < from || k >= to { 0.5 } else { 0.5 * (k / 7) as f64 }).collect()
+        };
+        let marked = |f: Vec<f64>, notes: Vec<QualityNote>| -> Vec<usize> {
+            let raw = look(&[&recording(f)], &[notes]);
+            (0..300).filter(|k| raw.exclude[0][*k]).collect()
+        };
+        let ends: Vec<usize> = (0..40).chain(250..300).collect();
+        assert_eq!(marked(steps(40, 250), vec![quantised(0.5)]), ends);
+        // Not where nothing says that it comes in steps, nor where it moves on soon.
+        assert!(marked(steps(40, 250), Vec::new()).is_empty());
+        assert!(marked(steps(3, 290), vec![quantised(0.5)]).is_empty());
     }
 
     #[test]
