@@ -136,10 +136,15 @@ pub fn diagnose(
     if unknown {
         let borne = borne(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&borne);
-        // Of a force with several lines one tone is no cause.
-        let tone = |i: &EffectInfo| matches!(i.proposal, Proposal::Line | Proposal::Breath);
+        // Of a force with several lines one tone is no cause, nor is a breath beside whatever else comes and goes: it takes the part of it
+        // that any slow sine would.
+        let tone = |i: &EffectInfo| match i.proposal {
+            Proposal::Line => judged.lined,
+            Proposal::Breath => true,
+            _ => false,
+        };
         let kept: Vec<&str> = effects
-            .filter(|(e, b)| !(judged.lined && tone(e.info)) && stands(b))
+            .filter(|(e, b)| !tone(e.info) && stands(b))
             .map(|(e, _)| e.info.id)
             .collect();
         let gone = judged.causes.iter().filter(|c| !kept.contains(&c.effect.as_str()));
