@@ -143,10 +143,8 @@ pub fn diagnose(
             Proposal::Breath => true,
             _ => false,
         };
-        let kept: Vec<&str> = effects
-            .filter(|(e, b)| !tone(e.info) && stands(b))
-            .map(|(e, _)| e.info.id)
-            .collect();
+        let kept: Vec<&str> =
+            effects.filter(|(e, b)| !tone(e.info) && stands(b)).map(|(e, _)| e.info.id).collect();
         let gone = judged.causes.iter().filter(|c| !kept.contains(&c.effect.as_str()));
         let gone = gone.map(|c| Small { effect: c.effect.clone(), why: IMITATED.to_owned() }).collect();
         traces.extend(take_traces(&mut judged, gone));
@@ -590,10 +588,8 @@ mod tests {
             ["saturation", "quantisation", "force_spikes"]
         );
         let limit = causes[0].parameters["limit_n"];
-        assert!(
-            (limit.low - 2.5 * (1.0 - z * 1e-6)).abs() < 1e-12
-                && (limit.high - 2.5 * (1.0 + z * 1e-6)).abs() < 1e-12
-        );
+        let half = 0.5 * 0.031 + 2.5e-6;
+        assert!((limit.low - 2.5 + half).abs() < 1e-12 && (limit.high - 2.5 - half).abs() < 1e-12);
         let step = causes[1].parameters["step_n"];
         assert!(
             (step.low - 0.031 * (1.0 - z * 1e-4)).abs() < 1e-12

@@ -347,7 +347,7 @@ fn raise(matrix: &mut Symmetric, tangent: &Tangent, fit: &Fit, kind: Kind, (from
 
 #[cfg(test)]
 mod tests {
-    use super::{RAISED, Spread};
+    use super::{RAISED, Spread, untied};
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
     use std::sync::Arc;
@@ -394,8 +394,13 @@ mod tests {
 
     /// Insertions that differ in what one number of each recording's own is told by `set`, with a little noise.
     fn insertions(own: &[f64], set: impl Fn(&mut Model, f64)) -> (Model, Data) {
+        into(belief(), own, set)
+    }
+
+    /// The same into what is believed to be so.
+    fn into(belief: Belief, own: &[f64], set: impl Fn(&mut Model, f64)) -> (Model, Data) {
         let blank = Data::new(Arc::new(vec![blocks(); own.len()]), Noise::white(1e-3), 0.0);
-        let model = Model::base(Arc::new(belief()), own.len());
+        let model = Model::base(Arc::new(belief), own.len());
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut full: Vec<Blocks> = blank.blocks.to_vec();
         for (r, x) in own.iter().enumerate() {
@@ -407,6 +412,39 @@ mod tests {
             full[r].f.iter_mut().for_each(|f| *f += 3.4e-3 * (rng.random::<f64>() - 0.5));
         }
         (model, Data::new(Arc::new(full), Noise::white(1e-3), 0.0))
+    }
+
+    /// A layer of 6 mm comes to 0.54 N at its far face: there it gives way, whether 0.54 N would have broken it or not.
+    #[test]
+    fn a_puncture_force_that_no_insertion_reached_may_be_any_larger_one() {
+        let of = |believed_n: f64, true_n: f64| {
+            let mut b = belief();
+            b.tissue.layers[0].thickness_m = 0.006;
+            b.tissue.layers[0].puncture_n = Some(believed_n);
+            into(b, &[0.0, 0.0], |m, _| m.tissue.layers[0].puncture_n = Some(true_n))
+        };
+        let at = |model: &Model, data: &Data, f_n: f64| {
+            let mut model = model.clone();
+            for r in 0..2 {
+                model.instants[r] = Trail::new(&model, data, r).expect("a trail").own_instants();
+            }
+            model.tissue.layers[0].puncture_n = Some(f_n);
+            fit(&model, data, Effort::FULL).expect("a fit")
+        };
+        let role = Role::Puncture(0);
+        let (model, data) = of(0.7, 0.7);
+        let tied = at(&model, &data, 0.54);
+        let open = Spread::known(&tied, &data).open_above(role).expect("open");
+        assert!((open - 1.0 - 0.3 * 1.96).abs() < 1e-3, "{open}");
+        let free = untied(tied.clone(), &data);
+        assert!((free.model.get(role, 0) - 1.0).abs() < 1e-6, "{}", free.model.get(role, 0));
+        assert!(free.nats() < tied.nats() + 1.93);
+        // One that broke the layer before its face is told.
+        let (model, data) = of(0.4, 0.4);
+        let told = at(&model, &data, 0.4);
+        assert_eq!(Spread::known(&told, &data).open_above(role), None);
+        assert_eq!(untied(told.clone(), &data).model.get(role, 0), told.model.get(role, 0));
+        assert_eq!(Spread::known(&told, &data).open_above(Role::Stiffness(0)), None);
     }
 
     /// The mean of four that differ is known as well as four numbers tell a mean: Student's interval of three degrees of freedom.
