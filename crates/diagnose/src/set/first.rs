@@ -124,6 +124,13 @@ pub fn groups(runs: &[&Insertion]) -> Vec<Vec<usize>> {
     out
 }
 
+/// Whether all insertions have one speed.
+#[must_use]
+pub fn one_speed(runs: &[&Insertion]) -> bool {
+    let slowest = runs.iter().map(|r| r.speed_mps).fold(f64::INFINITY, f64::min);
+    runs.iter().all(|r| r.speed_mps < slowest * (1.0 + SAME_SPEED))
+}
+
 /// Where a fit begins, beyond what the data say: shares and exponents that several starts vary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guess {
@@ -254,8 +261,7 @@ fn wide(tissue: Tissue) -> Belief {
 pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     let Frame { mut tissue, fronts_m: fronts, loads_n, indented_m } = frame(believed, runs, guess.surface_m);
     let days = groups(runs);
-    let slowest = days.first().map_or(0.0, |g| runs[g[0]].speed_mps);
-    let one_speed = days.iter().flatten().all(|r| runs[*r].speed_mps < slowest * (1.0 + SAME_SPEED));
+    let one_speed = one_speed(runs);
     let mut effects: Vec<AnyEffect> = Vec::new();
     let mut bound = Vec::new();
     for (l, layer) in tissue.layers.iter_mut().enumerate() {

@@ -211,26 +211,24 @@ fn apart(errors: &[f64]) -> (usize, Vec<usize>) {
     (agree, apart)
 }
 
-/// Fits of a set from `starts` starts: the best few that differ, those that leave least first.
+/// Where `starts` fits of a set begin; `rng` draws it.
+#[must_use]
+pub fn began(believed: &Tissue, runs: &[&Insertion], starts: usize, rng: &mut ChaCha8Rng) -> Vec<Model> {
+    (0..starts.max(1)).map(|k| first(believed, runs, &guess(k, rng))).collect()
+}
+
+/// Fits of a set from where they begin: the best few that differ, those that leave least first.
 ///
 /// What leaves least need not predict best: which of them stands is for recordings left out to say. Deterministic for any number of
-/// threads; `rng` draws what the starts begin with.
+/// threads.
 #[must_use]
-pub fn fitted(
-    believed: &Tissue,
-    runs: &[&Insertion],
-    raw: &Raw,
-    starts: usize,
-    rng: &mut ChaCha8Rng,
-) -> Vec<Fitted> {
+pub fn fitted(began: &[Model], runs: &[&Insertion], raw: &Raw) -> Vec<Fitted> {
     let fine = blocks(runs, raw);
     let drops: Vec<Vec<f64>> =
         runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let coarse = unsettled(fine.iter().map(|b| b.coarser(COARSE)).collect());
-    let guesses: Vec<Guess> = (0..starts.max(1)).map(|k| guess(k, rng)).collect();
-    let began: Vec<Model> = guesses.iter().map(|g| first(believed, runs, g)).collect();
     // Most starts are given up after a look; those that promise most go on.
-    let mut found = from_all(&began, &coarse, &drops, &FIRST_LOOK);
+    let mut found = from_all(began, &coarse, &drops, &FIRST_LOOK);
     found.truncate(GO_ON);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
     let found = from_all(&promising, &coarse, &drops, &LONG_LOOK);

@@ -346,6 +346,7 @@ mod tests {
             without_n: without_n.to_vec(),
             loses: Vec::new(),
             speeds_lose: Vec::new(),
+            nats: 0.0,
             kept,
         };
         Laws {
@@ -531,6 +532,7 @@ mod tests {
             without_n: without_n.to_vec(),
             loses: Vec::new(),
             speeds_lose: Vec::new(),
+            nats: 0.0,
             kept,
         };
         laws.parts = vec![
