@@ -199,7 +199,7 @@ pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut Cha
     let id = DelayedPuncture::default().info().id;
     let gives_way = look(&began.iter().map(|m| less(m, id)).collect::<Vec<_>>());
     match (&waits, &gives_way) {
-        (Some(w), Some(g)) if Missed::new(&w.fitted, Some(&g.fitted), &w.scores, &g.scores).effect() => waits,
+        (Some(w), Some(g)) if pays(&loses(&g.scores, &w.scores), PART_WORTH) => waits,
         _ => gives_way.or(waits),
     }
 }

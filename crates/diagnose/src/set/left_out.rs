@@ -131,7 +131,8 @@ pub fn speeds_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
     let done: Vec<Vec<(usize, Score)>> = groups
         .par_iter()
         .map(|group| {
-            let Some(p) = without(all, runs, group, &[10, 6]) else { return Vec::new() };
+            let Some(fit) = fit_without(all, group, &[10, 6]) else { return Vec::new() };
+            let p = Population::of(&fit, &staying(runs, group)).opened(&fit);
             group.iter().map(|r| (*r, score(runs[*r], &predict(&p, runs[*r], None, DRAWS)))).collect()
         })
         .collect();
