@@ -400,7 +400,8 @@ mod tests {
     fn a_drawn_insertion_has_its_numbers_by_the_points_of_a_sequence() {
         let mut p = population();
         let wide = (6.0_f64 / 4.0).sqrt();
-        let n = |k: usize, dimension: usize| student::quantile(halton(k, PRIMES[dimension]), 4.0) * wide;
+        // Four numbers vary, each told by five recordings.
+        let n = |k: usize, dimension: usize| student::quantile(halton(k, PRIMES[dimension]), 16.0) * wide;
         // One day, and four more that are expected.
         let day = |k: usize, dimension: usize| {
             student::quantile(halton(k, PRIMES[dimension]), 4.0) * 2.0_f64.sqrt()
@@ -420,7 +421,7 @@ mod tests {
         }
         // A mean of two or one is as open as one of two.
         p.recordings = 1;
-        let open = p.draw(7, None).own[0].surface_m / (3e-4 * student::quantile(halton(7, 2), 1.0));
+        let open = p.draw(7, None).own[0].surface_m / (3e-4 * student::quantile(halton(7, 2), 4.0));
         assert!((open - 3.0_f64.sqrt()).abs() < 1e-12, "{open}");
         // Days by what they are.
         p.days = 3;
@@ -453,7 +454,7 @@ mod tests {
         p.law.scatter.differing[0] = 4e-4;
         let m = p.draw(9, Some(0));
         let wide = (6.0_f64 / 4.0).sqrt();
-        let n = |dimension: usize| student::quantile(halton(9, PRIMES[dimension]), 4.0) * wide;
+        let n = |dimension: usize| student::quantile(halton(9, PRIMES[dimension]), 20.0) * wide;
         let force = m.effects[1].values[1];
         assert!((force - 2.0 * (1.0 + 0.05 * n(3))).abs() < 1e-12, "{force}");
         let differing = p.law.differing().count();
