@@ -8,7 +8,7 @@ use stylet_stats::order::median_of;
 use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, LetGo, ShaftSlip, Tissue};
 
 /// Speeds that differ by less than this share are one speed, measured on one day.
-const SAME_SPEED: f64 = 0.1;
+pub(super) const SAME_SPEED: f64 = 0.1;
 /// Strokes that differ by less than this (m) are one stroke.
 const SAME_STROKE_M: f64 = 1e-3;
 /// Standard deviation of the surface about where the force first rises, in m.
@@ -16,7 +16,7 @@ const SURFACE_SD_M: f64 = 1.5e-3;
 /// The same where a blunt tool comes to rest on soft tissue before it presses.
 const PRESSED_SD_M: f64 = 2e-3;
 /// Places of the exponent of the speed in `shaft_slip` and of the exponent in `delayed_puncture`.
-const RATE: usize = 6;
+pub(super) const RATE: usize = 6;
 const WAITS: usize = 2;
 /// Relative standard deviation of a thickness about what is believed or seen.
 const THICKNESS_SD: f64 = 0.2;

@@ -1,18 +1,18 @@
 //! The fit of a set from several starts: the objective has many optima, and one start in three finds the best.
 
-use crate::set::first::{DAY_FRICTION, DAY_SURFACE_M, Guess, Insertion, first};
+use crate::set::first::{DAY_FRICTION, DAY_SURFACE_M, Guess, Insertion, RATE, SAME_SPEED, first};
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::discrepancy::discrepancy;
 use stylet_identify::fit::{Effort, Fit, Tangent, fit_past_kinks};
-use stylet_identify::model::{Model, Role};
+use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
 use stylet_record::raw::Raw;
-use stylet_tissue::Tissue;
+use stylet_tissue::{AnyEffect, Effect, Tissue};
 
 /// Length of the blocks of a set in s: insertions repeat no better.
 pub const SET_BLOCK_S: f64 = 0.08;
@@ -121,6 +121,7 @@ pub fn settle(model: &Model, data: Data, drops: &[Vec<f64>], rounds: &[usize]) -
     let mut best: Option<Fit> = None;
     for turns in rounds {
         let mut from = best.as_ref().map_or(model, |b| &b.model).clone();
+        across(&mut from, &data);
         if let Some(best) = &best {
             data = data.with_noise(discrepancy(&data.blocks, &best.residuals.e, data.floor_n));
             retime(&mut from, &data, drops);
@@ -131,6 +132,44 @@ pub fn settle(model: &Model, data: Data, drops: &[Vec<f64>], rounds: &[usize]) -
     let best = best?;
     data = data.with_noise(discrepancy(&data.blocks, &best.residuals.e, data.floor_n));
     Some((best, data))
+}
+
+/// Logarithm of the speed (in mm/s) of an advance.
+fn ln_speed(blocks: &Blocks) -> f64 {
+    let fastest = blocks.pieces.iter().map(|p| p.v_mps).fold(0.0, f64::max);
+    let advance = blocks.pieces.iter().map(|p| p.v_mps).filter(|v| *v > 0.5 * fastest);
+    libm::log(1e3 * stylet_stats::median_of(advance))
+}
+
+/// Gives what friction does from day to day along the logarithm of their speeds to the rate of the hold: that is the same force with days
+/// that differ least, and a fit hardly moves along such a valley.
+fn across(model: &mut Model, data: &Data) {
+    let held = |e: usize| model.bound.iter().any(|b| (b.effect, b.parameter, b.like) == (e, RATE, None));
+    let slips = |e: &usize| matches!(model.effects[*e].effect(), Some(AnyEffect::ShaftSlip(_)));
+    let which: Vec<usize> = (0..model.effects.len()).filter(slips).collect();
+    let speed =
+        |day| model.day_of.iter().position(|d| *d == day).and_then(|r| data.blocks.get(r)).map(ln_speed);
+    let days: Vec<(usize, f64)> =
+        (0..model.days.len()).filter_map(|d| Some((d, speed(d).filter(|x| x.is_finite())?))).collect();
+    let n = days.len() as f64;
+    let (x, y) = days.iter().fold((0.0, 0.0), |(x, y), (d, s)| (x + s / n, y + model.days[*d].friction / n));
+    let (square, product) = days.iter().fold((0.0, 0.0), |(square, product), (d, s)| {
+        (square + (s - x).powi(2), product + (s - x) * model.days[*d].friction)
+    });
+    if which.is_empty() || which.iter().any(|e| held(*e)) || square < libm::log1p(SAME_SPEED).powi(2) / 2.0 {
+        return;
+    }
+    let slope = product / square;
+    let level = y - slope * x;
+    days.iter().for_each(|(d, s)| model.days[*d].friction -= level + slope * s);
+    for e in which {
+        let choice = &model.effects[e];
+        if let Some(AnyEffect::ShaftSlip(mut s)) = choice.effect() {
+            s.rubbed(libm::exp(level));
+            s.rate += slope;
+            model.effects[e] = Choice::new(choice.info, &AnyEffect::from(s).parameters());
+        }
+    }
 }
 
 /// Spreads between recordings and between days as a fit tells them: the mean square of the numbers and of what the data leave open
@@ -176,7 +215,7 @@ fn spreads(model: &mut Model, data: &Data, at: &Fit) {
             Role::DayFriction(_) => 1,
             _ => continue,
         };
-        days[kind].0 += at.model.get(n.role, 0).powi(2) + conditional(&[i])[0];
+        days[kind].0 += model.get(n.role, 0).powi(2) + conditional(&[i])[0];
         days[kind].1 += 1.0;
     }
     // Few days tell little of their spread: what is expected of it counts as much as some more days.
