@@ -288,18 +288,19 @@ pub fn fitted(began: &[Model], runs: &[&Insertion], raw: &Raw) -> Vec<Fitted> {
 #[cfg(test)]
 mod tests {
     use super::{
-        AGREE, Guess, SAME, SET_BLOCK_S, WITHIN, apart, blocks, guess, refitted, settle, spreads, unsettled,
+        AGREE, Guess, RATE, SAME, SET_BLOCK_S, WITHIN, across, apart, blocks, guess, refitted, settle,
+        spreads, unsettled,
     };
     use crate::made::{SENSOR_N, believed, gel, insertions, settled};
     use crate::set::Insertion;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use std::sync::Arc;
     use stylet_identify::fit::{Fit, Tangent};
-    use stylet_identify::model::{Choice, Day, Model, Role};
+    use stylet_identify::model::{Bound, Choice, Day, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::raw::Raw;
-    use stylet_tissue::{AnyEffect, Effect, LetGo};
+    use stylet_tissue::{AnyEffect, Effect, LetGo, ShaftSlip};
 
     /// What a start begins with, each as its place between the ends of what is thought possible: none at the lower one, 1 at the upper.
     fn places(g: &Guess) -> Vec<f64> {
@@ -474,6 +475,43 @@ mod tests {
         spreads(&mut told, &data, &at);
         near(told.scatter.day_surface_m, (surface / 6.0).sqrt());
         near(told.scatter.day_friction, (friction / 6.0).sqrt());
+    }
+
+    /// Two speeds, each on a day of its own: days that differ as the speeds do say the same as a rate does.
+    #[test]
+    fn friction_that_goes_along_the_speeds_of_the_days_is_the_rates() {
+        let slip = ShaftSlip { push_n: 1.0, pull_n: 0.6, rate: 0.1, ..ShaftSlip::default() };
+        let friction = |m: &Model| m.days.iter().map(|d| d.friction).collect::<Vec<_>>();
+        let (at, data) = standing(0.1, |m| {
+            let slip: AnyEffect = slip.clone().into();
+            m.effects = vec![Choice::new(slip.info(), &slip.parameters())];
+            m.day_of = vec![0, 1, 1];
+            m.days = vec![Day { friction: 0.2, ..Day::default() }, Day { friction: -0.1, ..Day::default() }];
+        });
+        let mut told = at.model.clone();
+        across(&mut told, &data);
+        // Speeds of 4 and 8 mm/s.
+        let slope = -0.3 / 2.0_f64.ln();
+        let level = 0.2 - slope * 4.0_f64.ln();
+        let [push, rate] = [1, RATE].map(|k| told.effects[0].values[k]);
+        assert!(
+            (rate - 0.1 - slope).abs() < 5e-3 && (push / level.exp() - 1.0).abs() < 1e-2,
+            "{push} {rate}"
+        );
+        assert!(friction(&told).iter().all(|f| f.abs() < 1e-12), "{:?}", told.days);
+        let same = residuals(&told, &data).expect("a replay");
+        let (a, b) = (same.e.concat(), at.residuals.e.concat());
+        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.02));
+        // A rate that is held stays, and at one speed there is nothing to give.
+        let mut held = at.model.clone();
+        held.bound = vec![Bound { effect: 0, parameter: RATE, like: None }];
+        let mut one = at.model.clone();
+        one.day_of = vec![0, 0, 0];
+        for mut m in [held, one] {
+            let before = m.clone();
+            across(&mut m, &data);
+            assert_eq!((friction(&m), &m.effects[0].values), (friction(&before), &before.effects[0].values));
+        }
     }
 
     /// Three per cent for agreement, two thousandths for the same, two fifths for being looked at: just as much is too much, or too little.

@@ -545,8 +545,8 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::{
-        DRAWS, Kind, Law, PART_WORTH, SHAPE_WORTH, TURNS, WORTH, best_of, candidates, coarse, confidence,
-        effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts, surest,
+        DRAWS, Kind, Law, Missed, PART_WORTH, SHAPE_WORTH, TURNS, WORTH, best_of, candidates, coarse,
+        confidence, effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts, surest,
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
@@ -554,7 +554,8 @@ mod tests {
     use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks};
     use crate::set::left_out::{Score, score, without};
     use crate::set::population::predict;
-    use stylet_identify::model::{Bound, Choice, Model};
+    use stylet_identify::model::{Bound, Choice, DIFFERING, Model};
+    use stylet_identify::objective::residuals;
     use stylet_record::Recording;
     use stylet_record::raw::Raw;
     use stylet_tissue::{
@@ -650,17 +651,19 @@ mod tests {
 
     #[test]
     fn layers_that_waited_give_way_at_a_force_when_they_wait_no_more() {
-        let mut m = model(&[waits(2, 2.5), slips(1), waits(1, 1.5)]);
-        m.own[0].differing[0] = 3e-4;
-        m.scatter.differing[1] = 2e-4;
+        let mut m = model(&[waits(2, 2.5), slips(1), waits(1, 1.5), lets_go(1), lets_go(2)]);
+        (m.own[0].differing[0], m.scatter.differing[1]) = (3e-4, 2e-4);
         let out = less(&m, "delayed_puncture");
-        assert_eq!(out.effects.len(), 1);
+        assert_eq!(out.effects.len(), 3);
         for t in [&out.tissue, &out.belief.tissue] {
             assert_eq!([t.layers[0].puncture_n, t.layers[1].puncture_n], [Some(1.5), Some(2.5)]);
         }
         assert_eq!((out.own[0].differing, out.scatter.differing), (m.own[0].differing, m.scatter.differing));
         let same = less(&m, "shaft_slip");
-        assert_eq!((same.effects.len(), same.tissue.layers[0].puncture_n), (2, None));
+        assert_eq!((same.effects.len(), same.tissue.layers[0].puncture_n), (4, None));
+        // What differs from insertion to insertion goes with its effect, and only with it.
+        let none = less(&m, "let_go");
+        assert_eq!((none.own[0].differing, none.scatter.differing), ([0.0; DIFFERING], [0.0; DIFFERING]));
     }
 
     #[test]
@@ -729,6 +732,43 @@ mod tests {
         assert!(pays(&[0.0, f64::INFINITY, 0.0], PART_WORTH) && !pays(&[], PART_WORTH));
         // A shape is asked for less.
         assert!(pays(&about(0.03, 9.0), SHAPE_WORTH) && !pays(&about(0.03, 9.0), PART_WORTH));
+    }
+
+    #[test]
+    fn an_effect_stays_that_recordings_left_out_miss_or_the_fitted_ones_say_and_the_others_do_not_deny() {
+        let some = |mean: f64| vec![mean - 0.01, mean, mean + 0.01];
+        let missed = |loses: f64, speeds: &[f64], nats: f64| Missed {
+            loses: some(loses),
+            speeds_lose: speeds.to_vec(),
+            nats,
+        };
+        for (loses, speeds, nats, wanted) in [
+            (0.2, vec![], -9.0, true),
+            (0.02, vec![], -9.0, false),
+            (0.02, vec![], 9.0, true),
+            (-0.02, vec![], 9.0, false),
+            (-0.02, some(0.03), 9.0, true),
+            (-0.02, some(0.3), -9.0, true),
+        ] {
+            assert_eq!(missed(loses, &speeds, nats).effect(), wanted, "{loses} {speeds:?} {nats}");
+        }
+        // What shapes one pays by itself.
+        assert!(missed(0.03, &[], -9.0).shape() && !missed(0.01, &[], 9.0).shape());
+    }
+
+    /// Every number costs half the logarithm of the blocks, beside what the larger law leaves as noise.
+    #[test]
+    fn nats_of_a_part_are_beyond_what_its_numbers_cost() {
+        let bias: AnyEffect = ForceBias { force_n: 1e-3 }.into();
+        let runs = insertions(&[], &FOUR);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let (whole, less) = (settled(&[bias], &runs), settled(&[], &runs));
+        let nats = |f: &Fitted| residuals(&f.fit.model, &whole.data).expect("a replay").nats;
+        let cost = 0.5 * (whole.data.compared() as f64).ln();
+        let told = Missed::new(&whole, Some(&less), &[], &[]).nats;
+        assert!((told - (nats(&less) - nats(&whole) - cost)).abs() < 1e-9, "{told}");
+        // What a law cannot be fitted without is missed.
+        assert_eq!(Missed::new(&whole, None, &[], &[]).nats, f64::INFINITY);
     }
 
     /// Of chance the least of several errors is too good.

@@ -484,6 +484,24 @@ mod tests {
         }
     }
 
+    /// The band of a day that took no part knows what the fit leaves open of the law, that of a known day does not.
+    #[test]
+    fn a_day_that_took_no_part_is_told_less_surely() {
+        let all = made::insertions(&[], &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0]]);
+        let runs: Vec<&Insertion> = all.iter().collect();
+        let fitted = made::settled(&[], &runs);
+        let plain = Population::of(&fitted, &runs);
+        let open = plain.clone().opened(&fitted);
+        let wide = |p: &Population, day| {
+            let told = predict(p, runs[0], day, 8);
+            (told.high[150] - told.low[150], told.mean)
+        };
+        assert_eq!(wide(&open, Some(0)), wide(&plain, Some(0)));
+        let (told, without) = (wide(&open, None), wide(&plain, None));
+        assert!(told.0 > 1.001 * without.0 && told.1 == without.1, "{} {}", told.0, without.0);
+        assert!(told.0 < 2.0 * without.0);
+    }
+
     #[test]
     fn parts_of_an_insertion_follow_one_another() {
         let run = run();
