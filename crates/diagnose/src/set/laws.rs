@@ -41,9 +41,9 @@ const WORTH: f64 = 0.02;
 const ONE_STORY: usize = 2;
 /// only when they predict recordings left out better by this share.
 const MANY_STORIES: f64 = 0.1;
-/// A part of a law stays when recordings left out are predicted worse by this share without it, and by more than one standard error
-/// (Breiman and others 1984: of laws that predict about as well the simplest). It has to be more than the part would seem to be worth
-/// by chance: a law without it has been looked for less.
+/// An effect stays when recordings left out are predicted worse by this share without it, and by more than one standard error
+/// (Breiman and others 1984: of laws that predict about as well the simplest), or when the likelihood asks for it. It has to be more
+/// than the effect would seem to be worth by chance: a law without it has been looked for less.
 const PART_WORTH: f64 = 0.05;
 /// The same of what only shapes an effect that stands: it accuses nobody, and what it costs is a number.
 const SHAPE_WORTH: f64 = 0.01;
