@@ -109,11 +109,12 @@ fn tell(laws: &Laws) {
     for p in &laws.parts {
         let error = stylet_stats::sd(&p.loses) / (p.loses.len() as f64).sqrt();
         println!(
-            "    {}: without it squares are {:.1} % larger, standard error {:.1} %; with a speed left out {:.1} %{}",
+            "    {}: without it squares are {:.1} % larger, standard error {:.1} %; with a speed left out {:.1} %; {:.1} nats{}",
             p.name,
             1e2 * stylet_stats::mean(&p.loses),
             1e2 * error,
             1e2 * stylet_stats::mean(&p.speeds_lose),
+            p.nats,
             if p.kept { "" } else { "; taken away" }
         );
     }

@@ -7,7 +7,7 @@ mod recorded;
 
 use drawn::{Drawn, EXPONENT, SHIFT_M, believed};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use stylet_diagnose::set::fitted::{Fitted, fitted};
+use stylet_diagnose::set::fitted::{Fitted, began, fitted};
 use stylet_diagnose::set::left_out::{floor, one_left_out};
 use stylet_diagnose::set::{Insertion, first};
 use stylet_record::raw::Raw;
@@ -20,7 +20,7 @@ fn fit(runs: &[Insertion], threads: usize) -> Fitted {
     let runs: Vec<&Insertion> = runs.iter().collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    pool.install(|| fitted(&believed(), &runs, &Raw::default(), 4, &mut rng))
+    pool.install(|| fitted(&began(&believed(), &runs, 4, &mut rng), &runs, &Raw::default()))
         .into_iter()
         .next()
         .expect("a fit")

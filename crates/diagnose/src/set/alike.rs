@@ -6,13 +6,11 @@
 //! mean of the other runs. It is learned at one speed, says nothing of another, and names no cause.
 
 use crate::set::first::Insertion;
-use crate::set::population::Prediction;
+use crate::set::population::{HALF_BAND, Prediction};
 use stylet_stats::interpolate;
 
 /// What is alike is judged over so many seconds to either side: residuals of a law stay alike for about one.
 const REACH_S: f64 = 2.0;
-/// Half the width of a normal 90 % band in standard deviations.
-const HALF_BAND: f64 = 1.644_853_626_951_472_2;
 /// A time (s) before and after everything.
 const FAR_S: f64 = 1e4;
 
@@ -30,15 +28,10 @@ impl Alike {
     #[must_use]
     pub fn beside(&self, law: &Prediction) -> Prediction {
         let mut out = law.clone();
-        for (i, (more, sd)) in self.mean_n.iter().zip(&self.sd_n).enumerate() {
-            let wider = |half: f64| half.hypot(HALF_BAND * sd);
-            let mean = law.mean[i];
-            out.mean[i] = mean + more;
-            if let (Some(low), Some(high)) = (out.low.get_mut(i), out.high.get_mut(i)) {
-                *low = out.mean[i] - wider(mean - *low);
-                *high = out.mean[i] + wider(*high - mean);
-            }
+        for column in [&mut out.mean, &mut out.low, &mut out.high] {
+            column.iter_mut().zip(&self.mean_n).for_each(|(f, more)| *f += more);
         }
+        out.widen(&self.sd_n);
         out
     }
 }

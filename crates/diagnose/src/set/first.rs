@@ -8,7 +8,7 @@ use stylet_stats::order::median_of;
 use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, LetGo, ShaftSlip, Tissue};
 
 /// Speeds that differ by less than this share are one speed, measured on one day.
-const SAME_SPEED: f64 = 0.1;
+pub(super) const SAME_SPEED: f64 = 0.1;
 /// Strokes that differ by less than this (m) are one stroke.
 const SAME_STROKE_M: f64 = 1e-3;
 /// Standard deviation of the surface about where the force first rises, in m.
@@ -16,7 +16,7 @@ const SURFACE_SD_M: f64 = 1.5e-3;
 /// The same where a blunt tool comes to rest on soft tissue before it presses.
 const PRESSED_SD_M: f64 = 2e-3;
 /// Places of the exponent of the speed in `shaft_slip` and of the exponent in `delayed_puncture`.
-const RATE: usize = 6;
+pub(super) const RATE: usize = 6;
 const WAITS: usize = 2;
 /// Relative standard deviation of a thickness about what is believed or seen.
 const THICKNESS_SD: f64 = 0.2;
@@ -122,6 +122,13 @@ pub fn groups(runs: &[&Insertion]) -> Vec<Vec<usize>> {
     }
     out.iter_mut().for_each(|g| g.sort_unstable());
     out
+}
+
+/// Whether all insertions have one speed.
+#[must_use]
+pub fn one_speed(runs: &[&Insertion]) -> bool {
+    let slowest = runs.iter().map(|r| r.speed_mps).fold(f64::INFINITY, f64::min);
+    runs.iter().all(|r| r.speed_mps < slowest * (1.0 + SAME_SPEED))
 }
 
 /// Where a fit begins, beyond what the data say: shares and exponents that several starts vary.
@@ -254,8 +261,7 @@ fn wide(tissue: Tissue) -> Belief {
 pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     let Frame { mut tissue, fronts_m: fronts, loads_n, indented_m } = frame(believed, runs, guess.surface_m);
     let days = groups(runs);
-    let slowest = days.first().map_or(0.0, |g| runs[g[0]].speed_mps);
-    let one_speed = days.iter().flatten().all(|r| runs[*r].speed_mps < slowest * (1.0 + SAME_SPEED));
+    let one_speed = one_speed(runs);
     let mut effects: Vec<AnyEffect> = Vec::new();
     let mut bound = Vec::new();
     for (l, layer) in tissue.layers.iter_mut().enumerate() {

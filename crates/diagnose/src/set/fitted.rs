@@ -1,18 +1,18 @@
 //! The fit of a set from several starts: the objective has many optima, and one start in three finds the best.
 
-use crate::set::first::{DAY_FRICTION, DAY_SURFACE_M, Guess, Insertion, first};
+use crate::set::first::{DAY_FRICTION, DAY_SURFACE_M, Guess, Insertion, RATE, SAME_SPEED, first};
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::discrepancy::discrepancy;
 use stylet_identify::fit::{Effort, Fit, Tangent, fit_past_kinks};
-use stylet_identify::model::{Model, Role};
+use stylet_identify::model::{Choice, Model, Role};
 use stylet_identify::noise::Noise;
 use stylet_identify::objective::Data;
 use stylet_identify::retime::retime;
 use stylet_record::raw::Raw;
-use stylet_tissue::Tissue;
+use stylet_tissue::{AnyEffect, Effect, Tissue};
 
 /// Length of the blocks of a set in s: insertions repeat no better.
 pub const SET_BLOCK_S: f64 = 0.08;
@@ -121,6 +121,7 @@ pub fn settle(model: &Model, data: Data, drops: &[Vec<f64>], rounds: &[usize]) -
     let mut best: Option<Fit> = None;
     for turns in rounds {
         let mut from = best.as_ref().map_or(model, |b| &b.model).clone();
+        across(&mut from, &data);
         if let Some(best) = &best {
             data = data.with_noise(discrepancy(&data.blocks, &best.residuals.e, data.floor_n));
             retime(&mut from, &data, drops);
@@ -131,6 +132,44 @@ pub fn settle(model: &Model, data: Data, drops: &[Vec<f64>], rounds: &[usize]) -
     let best = best?;
     data = data.with_noise(discrepancy(&data.blocks, &best.residuals.e, data.floor_n));
     Some((best, data))
+}
+
+/// Logarithm of the speed (in mm/s) of an advance.
+fn ln_speed(blocks: &Blocks) -> f64 {
+    let fastest = blocks.pieces.iter().map(|p| p.v_mps).fold(0.0, f64::max);
+    let advance = blocks.pieces.iter().map(|p| p.v_mps).filter(|v| *v > 0.5 * fastest);
+    libm::log(1e3 * stylet_stats::median_of(advance))
+}
+
+/// Gives what friction does from day to day along the logarithm of their speeds to the rate of the hold: that is the same force with days
+/// that differ least, and a fit hardly moves along such a valley.
+fn across(model: &mut Model, data: &Data) {
+    let held = |e: usize| model.bound.iter().any(|b| (b.effect, b.parameter, b.like) == (e, RATE, None));
+    let slips = |e: &usize| matches!(model.effects[*e].effect(), Some(AnyEffect::ShaftSlip(_)));
+    let which: Vec<usize> = (0..model.effects.len()).filter(slips).collect();
+    let speed =
+        |day| model.day_of.iter().position(|d| *d == day).and_then(|r| data.blocks.get(r)).map(ln_speed);
+    let days: Vec<(usize, f64)> =
+        (0..model.days.len()).filter_map(|d| Some((d, speed(d).filter(|x| x.is_finite())?))).collect();
+    let n = days.len() as f64;
+    let (x, y) = days.iter().fold((0.0, 0.0), |(x, y), (d, s)| (x + s / n, y + model.days[*d].friction / n));
+    let (square, product) = days.iter().fold((0.0, 0.0), |(square, product), (d, s)| {
+        (square + (s - x).powi(2), product + (s - x) * model.days[*d].friction)
+    });
+    if which.is_empty() || which.iter().any(|e| held(*e)) || square < libm::log1p(SAME_SPEED).powi(2) / 2.0 {
+        return;
+    }
+    let slope = product / square;
+    let level = y - slope * x;
+    days.iter().for_each(|(d, s)| model.days[*d].friction -= level + slope * s);
+    for e in which {
+        let choice = &model.effects[e];
+        if let Some(AnyEffect::ShaftSlip(mut s)) = choice.effect() {
+            s.rubbed(libm::exp(level));
+            s.rate += slope;
+            model.effects[e] = Choice::new(choice.info, &AnyEffect::from(s).parameters());
+        }
+    }
 }
 
 /// Spreads between recordings and between days as a fit tells them: the mean square of the numbers and of what the data leave open
@@ -176,7 +215,7 @@ fn spreads(model: &mut Model, data: &Data, at: &Fit) {
             Role::DayFriction(_) => 1,
             _ => continue,
         };
-        days[kind].0 += at.model.get(n.role, 0).powi(2) + conditional(&[i])[0];
+        days[kind].0 += model.get(n.role, 0).powi(2) + conditional(&[i])[0];
         days[kind].1 += 1.0;
     }
     // Few days tell little of their spread: what is expected of it counts as much as some more days.
@@ -211,26 +250,24 @@ fn apart(errors: &[f64]) -> (usize, Vec<usize>) {
     (agree, apart)
 }
 
-/// Fits of a set from `starts` starts: the best few that differ, those that leave least first.
+/// Where `starts` fits of a set begin; `rng` draws it.
+#[must_use]
+pub fn began(believed: &Tissue, runs: &[&Insertion], starts: usize, rng: &mut ChaCha8Rng) -> Vec<Model> {
+    (0..starts.max(1)).map(|k| first(believed, runs, &guess(k, rng))).collect()
+}
+
+/// Fits of a set from where they begin: the best few that differ, those that leave least first.
 ///
 /// What leaves least need not predict best: which of them stands is for recordings left out to say. Deterministic for any number of
-/// threads; `rng` draws what the starts begin with.
+/// threads.
 #[must_use]
-pub fn fitted(
-    believed: &Tissue,
-    runs: &[&Insertion],
-    raw: &Raw,
-    starts: usize,
-    rng: &mut ChaCha8Rng,
-) -> Vec<Fitted> {
+pub fn fitted(began: &[Model], runs: &[&Insertion], raw: &Raw) -> Vec<Fitted> {
     let fine = blocks(runs, raw);
     let drops: Vec<Vec<f64>> =
         runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let coarse = unsettled(fine.iter().map(|b| b.coarser(COARSE)).collect());
-    let guesses: Vec<Guess> = (0..starts.max(1)).map(|k| guess(k, rng)).collect();
-    let began: Vec<Model> = guesses.iter().map(|g| first(believed, runs, g)).collect();
     // Most starts are given up after a look; those that promise most go on.
-    let mut found = from_all(&began, &coarse, &drops, &FIRST_LOOK);
+    let mut found = from_all(began, &coarse, &drops, &FIRST_LOOK);
     found.truncate(GO_ON);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
     let found = from_all(&promising, &coarse, &drops, &LONG_LOOK);
@@ -251,18 +288,19 @@ pub fn fitted(
 #[cfg(test)]
 mod tests {
     use super::{
-        AGREE, Guess, SAME, SET_BLOCK_S, WITHIN, apart, blocks, guess, refitted, settle, spreads, unsettled,
+        AGREE, Guess, RATE, SAME, SET_BLOCK_S, WITHIN, across, apart, blocks, guess, refitted, settle,
+        spreads, unsettled,
     };
     use crate::made::{SENSOR_N, believed, gel, insertions, settled};
     use crate::set::Insertion;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use std::sync::Arc;
     use stylet_identify::fit::{Fit, Tangent};
-    use stylet_identify::model::{Choice, Day, Model, Role};
+    use stylet_identify::model::{Bound, Choice, Day, Model, Role};
     use stylet_identify::noise::Noise;
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::raw::Raw;
-    use stylet_tissue::{AnyEffect, Effect, LetGo};
+    use stylet_tissue::{AnyEffect, Effect, LetGo, ShaftSlip};
 
     /// What a start begins with, each as its place between the ends of what is thought possible: none at the lower one, 1 at the upper.
     fn places(g: &Guess) -> Vec<f64> {
@@ -437,6 +475,43 @@ mod tests {
         spreads(&mut told, &data, &at);
         near(told.scatter.day_surface_m, (surface / 6.0).sqrt());
         near(told.scatter.day_friction, (friction / 6.0).sqrt());
+    }
+
+    /// Two speeds, each on a day of its own: days that differ as the speeds do say the same as a rate does.
+    #[test]
+    fn friction_that_goes_along_the_speeds_of_the_days_is_the_rates() {
+        let slip = ShaftSlip { push_n: 1.0, pull_n: 0.6, rate: 0.1, ..ShaftSlip::default() };
+        let friction = |m: &Model| m.days.iter().map(|d| d.friction).collect::<Vec<_>>();
+        let (at, data) = standing(0.1, |m| {
+            let slip: AnyEffect = slip.clone().into();
+            m.effects = vec![Choice::new(slip.info(), &slip.parameters())];
+            m.day_of = vec![0, 1, 1];
+            m.days = vec![Day { friction: 0.2, ..Day::default() }, Day { friction: -0.1, ..Day::default() }];
+        });
+        let mut told = at.model.clone();
+        across(&mut told, &data);
+        // Speeds of 4 and 8 mm/s.
+        let slope = -0.3 / 2.0_f64.ln();
+        let level = 0.2 - slope * 4.0_f64.ln();
+        let [push, rate] = [1, RATE].map(|k| told.effects[0].values[k]);
+        assert!(
+            (rate - 0.1 - slope).abs() < 5e-3 && (push / level.exp() - 1.0).abs() < 1e-2,
+            "{push} {rate}"
+        );
+        assert!(friction(&told).iter().all(|f| f.abs() < 1e-12), "{:?}", told.days);
+        let same = residuals(&told, &data).expect("a replay");
+        let (a, b) = (same.e.concat(), at.residuals.e.concat());
+        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.02));
+        // A rate that is held stays, and at one speed there is nothing to give.
+        let mut held = at.model.clone();
+        held.bound = vec![Bound { effect: 0, parameter: RATE, like: None }];
+        let mut one = at.model.clone();
+        one.day_of = vec![0, 0, 0];
+        for mut m in [held, one] {
+            let before = m.clone();
+            across(&mut m, &data);
+            assert_eq!((friction(&m), &m.effects[0].values), (friction(&before), &before.effects[0].values));
+        }
     }
 
     /// Three per cent for agreement, two thousandths for the same, two fifths for being looked at: just as much is too much, or too little.

@@ -3,8 +3,8 @@
 
 use crate::base::{Prepared, base};
 use crate::select::Search;
-use crate::set::first::{Insertion, groups, plain};
-use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks, fitted, refitted};
+use crate::set::first::{Insertion, groups, one_speed, plain};
+use crate::set::fitted::{Fitted, SET_BLOCK_S, began, blocks, fitted, refitted};
 use crate::set::left_out::{PARTS, Score, score, without};
 use crate::set::population::{Population, predict};
 use crate::varied::varied;
@@ -13,10 +13,11 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::{Effort, fit as fitted_on};
-use stylet_identify::model::{Belief, Bound, Choice, Model, Own};
+use stylet_identify::model::{Belief, Bound, Choice, DIFFERING, Model, Own};
+use stylet_identify::objective::residuals;
 use stylet_record::raw::Raw;
 use stylet_stats::student;
-use stylet_tissue::{AnyEffect, Effect, EffectInfo, ShaftSlip, Tissue};
+use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, EffectInfo, ShaftSlip, Tissue};
 
 /// Starts of the law of a shaft that slips, which about one in five brings near the best optimum, at least,
 const STARTS: usize = 24;
@@ -40,9 +41,9 @@ const WORTH: f64 = 0.02;
 const ONE_STORY: usize = 2;
 /// only when they predict recordings left out better by this share.
 const MANY_STORIES: f64 = 0.1;
-/// A part of a law stays when recordings left out are predicted worse by this share without it, and by more than one standard error
-/// (Breiman and others 1984: of laws that predict about as well the simplest). It has to be more than the part would seem to be worth
-/// by chance: a law without it has been looked for less.
+/// An effect stays when recordings left out are predicted worse by this share without it, and by more than one standard error
+/// (Breiman and others 1984: of laws that predict about as well the simplest), or when the likelihood asks for it. It has to be more
+/// than the effect would seem to be worth by chance: a law without it has been looked for less.
 const PART_WORTH: f64 = 0.05;
 /// The same of what only shapes an effect that stands: it accuses nobody, and what it costs is a number.
 const SHAPE_WORTH: f64 = 0.01;
@@ -99,6 +100,8 @@ pub struct Part {
     pub loses: Vec<f64>,
     /// The same with whole speeds left out; nothing where there is one only.
     pub speeds_lose: Vec<f64>,
+    /// Nats that the recordings say for it beyond what its numbers cost.
+    pub nats: f64,
     /// Whether it stayed.
     pub kept: bool,
 }
@@ -179,10 +182,26 @@ pub(super) fn best_of<'a>(base: &'a Law, slip: Option<&'a Law>, library: Option<
 
 /// The law of a shaft that slips: of the best fits the one that leaves least, unless another one predicts recordings left out better by
 /// more than chance. The least of several errors would be too good to compare with: a law without a part has one fit only.
+///
+/// At one speed a force that a layer bears for a while and one at which it gives way say the same: waiting is looked for with the same
+/// starts as the simpler law, and has to pay beside it.
 #[must_use]
 pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut ChaCha8Rng) -> Option<Law> {
-    let laws = fitted(believed, runs, raw, starts(runs.len()), rng);
-    surest(laws.into_iter().map(|f| Law::new(Kind::Slip, f, runs)).collect())
+    let began = began(believed, runs, starts(runs.len()), rng);
+    let look = |began: &[Model]| {
+        let laws = fitted(began, runs, raw).into_iter().map(|f| Law::new(Kind::Slip, f, runs));
+        surest(laws.collect())
+    };
+    let waits = look(&began);
+    if !one_speed(runs) {
+        return waits;
+    }
+    let id = DelayedPuncture::default().info().id;
+    let gives_way = look(&began.iter().map(|m| less(m, id)).collect::<Vec<_>>());
+    match (&waits, &gives_way) {
+        (Some(w), Some(g)) if pays(&loses(&g.scores, &w.scores), PART_WORTH) => waits,
+        _ => gives_way.or(waits),
+    }
 }
 
 /// The first law, unless another one is better by more than chance; then the best of those.
@@ -322,6 +341,14 @@ fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
 fn less(model: &Model, id: &str) -> Model {
     let mut out = model.clone();
     let mut tissue = out.belief.tissue.clone();
+    // What differs from insertion to insertion goes by the order of the effects.
+    let stays: Vec<usize> = model
+        .differing()
+        .enumerate()
+        .filter(|(_, d)| model.effects[d.0].info.id != id)
+        .map(|d| d.0)
+        .collect();
+    let kept = |all: [f64; DIFFERING]| std::array::from_fn(|k| stays.get(k).map_or(0.0, |from| all[*from]));
     while let Some(k) = out.effects.iter().position(|c| c.info.id == id) {
         if let Some(AnyEffect::DelayedPuncture(waits)) = out.effects[k].effect() {
             for t in [&mut tissue, &mut out.tissue] {
@@ -332,9 +359,8 @@ fn less(model: &Model, id: &str) -> Model {
         }
         out = out.without(k);
     }
-    // What differed from insertion to insertion goes by the order of the effects.
-    out.own.iter_mut().for_each(|o| o.differing = Default::default());
-    out.scatter.differing = Default::default();
+    out.own.iter_mut().for_each(|o| o.differing = kept(o.differing));
+    out.scatter.differing = kept(out.scatter.differing);
     out.belief = Arc::new(Belief { tissue, ..(*out.belief).clone() });
     out
 }
@@ -407,45 +433,94 @@ fn pays(loses: &[f64], worth: f64) -> bool {
     mean >= 2.0 * worth && (mean == f64::INFINITY || mean > error)
 }
 
-/// Says what each part of a law is worth, and takes away what neither recordings left out nor whole speeds left out miss.
+/// What is missed without a part of a law.
+struct Missed {
+    /// What every recording left out loses, as a share of what is left.
+    loses: Vec<f64>,
+    /// The same with whole speeds left out; nothing where there is one only.
+    speeds_lose: Vec<f64>,
+    /// Nats that the recordings say for the part, by the noise that the whole law leaves, beyond what its numbers cost: half the logarithm
+    /// of the blocks each (Schwarz 1978).
+    nats: f64,
+}
+
+impl Missed {
+    fn new(whole: &Fitted, less: Option<&Fitted>, with: &[Option<Score>], without: &[Option<Score>]) -> Self {
+        let nats = |f: &Fitted| residuals(&f.fit.model, &whole.data).map(|r| r.nats);
+        let numbers = |f: &Fitted| f.fit.model.shared().len() as f64;
+        let beyond = |less: &Fitted| {
+            let cost =
+                0.5 * (numbers(whole) - numbers(less)) * libm::log(whole.data.compared().max(1) as f64);
+            Some(nats(less)? - nats(whole)? - cost)
+        };
+        let nats = less.and_then(beyond).unwrap_or(f64::INFINITY);
+        Self { loses: loses(without, with), speeds_lose: Vec::new(), nats }
+    }
+
+    /// Whether an effect is: recordings left out miss it, or those that are fitted say so and the others do not deny it.
+    fn effect(&self) -> bool {
+        let worse = |loses: &[f64]| !loses.is_empty() && stylet_stats::mean(loses) > 0.0;
+        let told = self.nats > 0.0 && (worse(&self.loses) || worse(&self.speeds_lose));
+        told || pays(&self.loses, PART_WORTH) || pays(&self.speeds_lose, PART_WORTH)
+    }
+
+    /// Whether what shapes an effect pays.
+    fn shape(&self) -> bool {
+        pays(&self.loses, SHAPE_WORTH) || pays(&self.speeds_lose, SHAPE_WORTH)
+    }
+}
+
+/// Says what each part of a law is worth, and takes away what nobody misses.
 pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
     let at = coarse(&best.fitted);
     let (whole, speeds) = (best.scores.clone(), by_speed(&best.fitted, runs));
-    let mut out: Vec<Part> = candidates(&at.fit.model)
+    let ask = |from: &Fitted, model: &Model| {
+        let less = from.with(model);
+        let scores: Vec<Option<Score>> = less.as_ref().map_or_else(Vec::new, |f| judged(f, runs));
+        let mut missed = Missed::new(from, less.as_ref(), &whole, &scores);
+        missed.speeds_lose = less.as_ref().map_or_else(Vec::new, |f| loses(&by_speed(f, runs), &speeds));
+        (less, scores, missed)
+    };
+    let asked: Vec<_> = candidates(&at.fit.model)
         .into_par_iter()
-        .map(|(effect, name, model)| {
-            let smaller = at.with(&model);
-            let scores = smaller.as_ref().map_or_else(Vec::new, |f| judged(f, runs));
-            let speeds_lose = smaller.map_or_else(Vec::new, |f| loses(&by_speed(&f, runs), &speeds));
-            let (without_n, loses) = (errors_n(&scores), loses(&scores, &whole));
-            Part { effect, name, without_n, loses, speeds_lose, kept: true }
-        })
+        .map(|(effect, name, model)| (effect, name, ask(&at, &model)))
         .collect();
-    let mut order: Vec<usize> = (0..out.len()).collect();
-    order.sort_by(|a, b| stylet_stats::mean(&out[*a].loses).total_cmp(&stylet_stats::mean(&out[*b].loses)));
+    let mut order: Vec<usize> = (0..asked.len()).collect();
+    let lost = |k: &usize| stylet_stats::mean(&asked[*k].2.2.loses);
+    order.sort_by(|a, b| lost(a).total_cmp(&lost(b)));
+    let mut gone: Vec<usize> = Vec::new();
     for k in order {
-        let worth = if out[k].name == out[k].effect { PART_WORTH } else { SHAPE_WORTH };
-        if out[k].loses.is_empty() || pays(&out[k].loses, worth) || pays(&out[k].speeds_lose, worth) {
-            continue;
-        }
-        // Beside what went before it.
-        let Some((_, _, model)) =
-            candidates(&best.fitted.fit.model).into_iter().find(|(_, name, _)| *name == out[k].name)
-        else {
-            continue;
+        let (effect, name, (less, _, missed)) = &asked[k];
+        let stays = |m: &Missed| if name == effect { m.effect() } else { m.shape() };
+        let Some(less) = less.as_ref().filter(|_| !stays(missed)) else { continue };
+        let smaller = if gone.is_empty() {
+            best.fitted.with(&less.fit.model)
+        } else {
+            // Beside what went before it.
+            let now = candidates(&best.fitted.fit.model).into_iter().find(|c| c.1 == *name);
+            let Some((less, _, missed)) = now.map(|c| ask(&coarse(&best.fitted), &c.2)) else { continue };
+            less.filter(|_| !stays(&missed)).and_then(|f| best.fitted.with(&f.fit.model))
         };
-        let Some(smaller) = best.fitted.with(&model) else { continue };
-        let smaller = Law::new(best.kind, smaller, runs);
-        let speeds_lose = || loses(&by_speed(&smaller.fitted, runs), &speeds);
-        if !pays(&loses(&smaller.scores, &whole), worth) && !pays(&speeds_lose(), worth) {
-            *best = smaller;
-            out[k].kept = false;
+        if let Some(smaller) = smaller {
+            *best = Law::new(best.kind, smaller, runs);
+            gone.push(k);
         }
     }
     if best.fitted.fit.model.effects.is_empty() {
         best.kind = Kind::Base;
     }
-    out
+    let asked = asked.into_iter().enumerate();
+    asked
+        .map(|(k, (effect, name, (_, scores, missed)))| Part {
+            effect,
+            name,
+            without_n: errors_n(&scores),
+            loses: missed.loses,
+            speeds_lose: missed.speeds_lose,
+            nats: missed.nats,
+            kept: !gone.contains(&k),
+        })
+        .collect()
 }
 
 /// Whether the insertions were made at several speeds or strokes.
@@ -470,8 +545,8 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::{
-        DRAWS, Kind, Law, PART_WORTH, SHAPE_WORTH, TURNS, WORTH, best_of, candidates, coarse, confidence,
-        effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts, surest,
+        DRAWS, Kind, Law, Missed, PART_WORTH, SHAPE_WORTH, TURNS, WORTH, best_of, candidates, coarse,
+        confidence, effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts, surest,
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
@@ -479,7 +554,8 @@ mod tests {
     use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks};
     use crate::set::left_out::{Score, score, without};
     use crate::set::population::predict;
-    use stylet_identify::model::{Bound, Choice, Model};
+    use stylet_identify::model::{Bound, Choice, DIFFERING, Model};
+    use stylet_identify::objective::residuals;
     use stylet_record::Recording;
     use stylet_record::raw::Raw;
     use stylet_tissue::{
@@ -575,17 +651,19 @@ mod tests {
 
     #[test]
     fn layers_that_waited_give_way_at_a_force_when_they_wait_no_more() {
-        let mut m = model(&[waits(2, 2.5), slips(1), waits(1, 1.5)]);
-        m.own[0].differing[0] = 3e-4;
-        m.scatter.differing[1] = 2e-4;
+        let mut m = model(&[waits(2, 2.5), slips(1), waits(1, 1.5), lets_go(1), lets_go(2)]);
+        (m.own[0].differing[0], m.scatter.differing[1]) = (3e-4, 2e-4);
         let out = less(&m, "delayed_puncture");
-        assert_eq!(out.effects.len(), 1);
+        assert_eq!(out.effects.len(), 3);
         for t in [&out.tissue, &out.belief.tissue] {
             assert_eq!([t.layers[0].puncture_n, t.layers[1].puncture_n], [Some(1.5), Some(2.5)]);
         }
-        assert_eq!((out.own[0].differing, out.scatter.differing), ([0.0; 8], [0.0; 8]));
+        assert_eq!((out.own[0].differing, out.scatter.differing), (m.own[0].differing, m.scatter.differing));
         let same = less(&m, "shaft_slip");
-        assert_eq!((same.effects.len(), same.tissue.layers[0].puncture_n), (2, None));
+        assert_eq!((same.effects.len(), same.tissue.layers[0].puncture_n), (4, None));
+        // What differs from insertion to insertion goes with its effect, and only with it.
+        let none = less(&m, "let_go");
+        assert_eq!((none.own[0].differing, none.scatter.differing), ([0.0; DIFFERING], [0.0; DIFFERING]));
     }
 
     #[test]
@@ -654,6 +732,43 @@ mod tests {
         assert!(pays(&[0.0, f64::INFINITY, 0.0], PART_WORTH) && !pays(&[], PART_WORTH));
         // A shape is asked for less.
         assert!(pays(&about(0.03, 9.0), SHAPE_WORTH) && !pays(&about(0.03, 9.0), PART_WORTH));
+    }
+
+    #[test]
+    fn an_effect_stays_that_recordings_left_out_miss_or_the_fitted_ones_say_and_the_others_do_not_deny() {
+        let some = |mean: f64| vec![mean - 0.01, mean, mean + 0.01];
+        let missed = |loses: f64, speeds: &[f64], nats: f64| Missed {
+            loses: some(loses),
+            speeds_lose: speeds.to_vec(),
+            nats,
+        };
+        for (loses, speeds, nats, wanted) in [
+            (0.2, vec![], -9.0, true),
+            (0.02, vec![], -9.0, false),
+            (0.02, vec![], 9.0, true),
+            (-0.02, vec![], 9.0, false),
+            (-0.02, some(0.03), 9.0, true),
+            (-0.02, some(0.3), -9.0, true),
+        ] {
+            assert_eq!(missed(loses, &speeds, nats).effect(), wanted, "{loses} {speeds:?} {nats}");
+        }
+        // What shapes one pays by itself.
+        assert!(missed(0.03, &[], -9.0).shape() && !missed(0.01, &[], 9.0).shape());
+    }
+
+    /// Every number costs half the logarithm of the blocks, beside what the larger law leaves as noise.
+    #[test]
+    fn nats_of_a_part_are_beyond_what_its_numbers_cost() {
+        let bias: AnyEffect = ForceBias { force_n: 1e-3 }.into();
+        let runs = insertions(&[], &FOUR);
+        let runs: Vec<&Insertion> = runs.iter().collect();
+        let (whole, less) = (settled(&[bias], &runs), settled(&[], &runs));
+        let nats = |f: &Fitted| residuals(&f.fit.model, &whole.data).expect("a replay").nats;
+        let cost = 0.5 * (whole.data.compared() as f64).ln();
+        let told = Missed::new(&whole, Some(&less), &[], &[]).nats;
+        assert!((told - (nats(&less) - nats(&whole) - cost)).abs() < 1e-9, "{told}");
+        // What a law cannot be fitted without is missed.
+        assert_eq!(Missed::new(&whole, None, &[], &[]).nats, f64::INFINITY);
     }
 
     /// Of chance the least of several errors is too good.

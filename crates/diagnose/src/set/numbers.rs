@@ -176,7 +176,13 @@ mod tests {
                 law.tissue.layers[0].stiffness_n_per_m = *k;
                 law.tissue.layers[0].thickness_m = 0.02 + (k - 153.0) * 1e-5;
                 Out {
-                    population: Some(Population { law, residual_n: [0.0; 4], recordings: 3, days: 1 }),
+                    population: Some(Population {
+                        law,
+                        residual_n: [0.0; 4],
+                        recordings: 3,
+                        days: 1,
+                        open: None,
+                    }),
                     ..Out::default()
                 }
             })
@@ -309,7 +315,13 @@ mod tests {
                 other.tissue.layers[0].stiffness_n_per_m += 2.5 * x;
                 other.tissue.layers[1].stiffness_n_per_m += 2.5 * x;
                 Out {
-                    population: Some(Population { law: other, residual_n: [0.0; 4], recordings: 3, days: 1 }),
+                    population: Some(Population {
+                        law: other,
+                        residual_n: [0.0; 4],
+                        recordings: 3,
+                        days: 1,
+                        open: None,
+                    }),
                     ..Out::default()
                 }
             })

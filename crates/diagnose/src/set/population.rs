@@ -4,8 +4,11 @@ use crate::set::first::Insertion;
 use crate::set::fitted::{EXPECTED_DAYS, Fitted};
 use crate::set::instrument::line;
 use std::collections::BTreeSet;
-use stylet_identify::model::{Choice, Day, Model, NEVER, Own};
+use stylet_identify::fit::Tangent;
+use stylet_identify::model::{Choice, Day, Model, NEVER, Number, Own};
+use stylet_identify::objective::residuals;
 use stylet_record::Recording;
+use stylet_stats::linear::Factor;
 use stylet_stats::normal::quantile;
 use stylet_stats::{median_of, student};
 use stylet_tissue::{Effect, LawState, Reading};
@@ -37,6 +40,8 @@ pub struct Population {
     pub recordings: usize,
     /// Days that they were made on.
     pub days: usize,
+    /// What the fit leaves open of the law's own numbers, where that is asked for: the numbers, and the factor of their information.
+    pub open: Option<(Vec<Number>, Factor)>,
 }
 
 /// Radical inverse of `k` in a base: points of the Halton sequence.
@@ -72,7 +77,20 @@ impl Population {
         let noise_n = median_of(runs.iter().map(|r| single(&r.recording)));
         let of = |(s, n): (f64, f64)| (s / f64::max(n, 1.0) + noise_n * noise_n).sqrt();
         let days: BTreeSet<usize> = model.day_of.iter().copied().collect();
-        Self { law: model.only(&[]), residual_n: sums.map(of), recordings: runs.len(), days: days.len() }
+        let (law, residual_n) = (model.only(&[]), sums.map(of));
+        Self { law, residual_n, recordings: runs.len(), days: days.len(), open: None }
+    }
+
+    /// The same with what the fit leaves open of the law, which a speed that took no part has to know.
+    #[must_use]
+    pub fn opened(self, fitted: &Fitted) -> Self {
+        let model = &fitted.fit.model;
+        let open = residuals(model, &fitted.data).map(|at| {
+            let tangent = Tangent::new(model, &fitted.data, &at);
+            let factor = tangent.factor();
+            (tangent.shared, factor)
+        });
+        Self { open, ..self }
     }
 
     /// What is left of a recording that takes no part, over what is left of one that does: about a mean of `n` values another one scatters
@@ -90,8 +108,11 @@ impl Population {
             dimension += 1;
             halton(k, base)
         };
-        // What varies is drawn about a mean, and with a spread, that so many recordings tell no better: Student's.
-        let dof = self.recordings.max(2) as f64 - 1.0;
+        // What varies is drawn about a mean, and with a spread, that so many recordings tell no better: Student's. What adds up is told by
+        // each recording as often as there are numbers that vary (Satterthwaite 1946, of equal parts): with the degrees of one of them
+        // the sum would be too wide.
+        let vary = 2 + self.law.layers() + self.law.differing().count();
+        let dof = vary as f64 * (self.recordings.max(2) as f64 - 1.0);
         let mut normal = || student::quantile(place(), dof) * self.beyond();
         let mut model = self.law.clone();
         let s = &self.law.scatter;
@@ -158,8 +179,13 @@ pub fn drawn(population: &Population, run: &Insertion, k: usize, day: Option<usi
 
 /// The same with the instant (s) of its first rupture.
 fn force(population: &Population, run: &Insertion, k: usize, day: Option<usize>) -> Option<(Vec<f64>, f64)> {
+    moved(&population.draw(k, day), run)
+}
+
+/// The force (N) of a model moved as `run` was, and the instant (s) of its first rupture.
+fn moved(model: &Model, run: &Insertion) -> Option<(Vec<f64>, f64)> {
     let r = &run.recording;
-    let model = population.draw(k, day).compile(0)?;
+    let model = model.compile(0)?;
     let mut chain = model.chain.start(2.0 * r.sample_hz());
     let mut state = LawState::default();
     let mut first_s = NEVER;
@@ -203,6 +229,21 @@ pub struct Prediction {
     pub high: Vec<f64>,
 }
 
+/// Half the width of a normal 90 % band in standard deviations.
+pub(super) const HALF_BAND: f64 = 1.644_853_626_951_472_2;
+
+impl Prediction {
+    /// Makes the band as wide as something of this standard deviation (N) beside it asks for.
+    pub(super) fn widen(&mut self, sd_n: &[f64]) {
+        for ((mean, sd), (low, high)) in
+            self.mean.iter().zip(sd_n).zip(self.low.iter_mut().zip(&mut self.high))
+        {
+            *low = mean - (mean - *low).hypot(HALF_BAND * sd);
+            *high = mean + (*high - mean).hypot(HALF_BAND * sd);
+        }
+    }
+}
+
 /// Predicts a recording from its motion alone.
 #[must_use]
 pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, draws: usize) -> Prediction {
@@ -230,7 +271,39 @@ pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, dra
         all.select_nth_unstable_by(high, f64::total_cmp);
         out.high.push(all[high]);
     }
+    if let Some(sd_n) =
+        population.open.as_ref().filter(|_| day.is_none()).and_then(|o| open_n(population, o, run))
+    {
+        out.widen(&sd_n);
+    }
     out
+}
+
+/// Standard deviation (N) that the fit leaves open of a force, by its derivatives along the numbers of the law.
+fn open_n(population: &Population, open: &(Vec<Number>, Factor), run: &Insertion) -> Option<Vec<f64>> {
+    let (numbers, factor) = open;
+    let mut law = population.law.clone();
+    (law.own, law.day_of) = (vec![Own::default()], vec![law.days.len()]);
+    law.days.push(Day::default());
+    law.instants = vec![vec![NEVER; law.layers()]];
+    let here = moved(&law, run)?.0;
+    let slopes: Option<Vec<Vec<f64>>> = numbers
+        .iter()
+        .map(|n| {
+            let x = law.get(n.role, 0);
+            let step = if x + n.step > n.high { -n.step } else { n.step };
+            let mut there = law.clone();
+            there.set(n.role, 0, x + step);
+            Some(moved(&there, run)?.0.iter().zip(&here).map(|(t, h)| (t - h) / step).collect())
+        })
+        .collect();
+    let slopes = slopes?;
+    let sd = |i: usize| {
+        let mut along = vec![0.0; factor.size()];
+        along.iter_mut().zip(&slopes).for_each(|(a, s)| *a = s[i]);
+        factor.half(&along).iter().map(|y| y * y).sum::<f64>().sqrt()
+    };
+    Some((0..here.len()).map(sd).collect())
 }
 
 /// Friction along the shaft in N as the mean law has it, a layer counting as ruptured from the next of these instants (s) on and
@@ -301,7 +374,7 @@ mod tests {
         (law.free.own_surface, law.free.own_friction, law.free.day_surface, law.free.day_friction) =
             (true, true, true, true);
         law.days = vec![Day { surface_m: 1e-3, friction: 0.2 }];
-        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1 }
+        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1, open: None }
     }
 
     /// In by 30 mm in 6 s, a rest of 2 s, and back.
@@ -327,7 +400,8 @@ mod tests {
     fn a_drawn_insertion_has_its_numbers_by_the_points_of_a_sequence() {
         let mut p = population();
         let wide = (6.0_f64 / 4.0).sqrt();
-        let n = |k: usize, dimension: usize| student::quantile(halton(k, PRIMES[dimension]), 4.0) * wide;
+        // Four numbers vary, each told by five recordings.
+        let n = |k: usize, dimension: usize| student::quantile(halton(k, PRIMES[dimension]), 16.0) * wide;
         // One day, and four more that are expected.
         let day = |k: usize, dimension: usize| {
             student::quantile(halton(k, PRIMES[dimension]), 4.0) * 2.0_f64.sqrt()
@@ -347,7 +421,7 @@ mod tests {
         }
         // A mean of two or one is as open as one of two.
         p.recordings = 1;
-        let open = p.draw(7, None).own[0].surface_m / (3e-4 * student::quantile(halton(7, 2), 1.0));
+        let open = p.draw(7, None).own[0].surface_m / (3e-4 * student::quantile(halton(7, 2), 4.0));
         assert!((open - 3.0_f64.sqrt()).abs() < 1e-12, "{open}");
         // Days by what they are.
         p.days = 3;
@@ -380,7 +454,7 @@ mod tests {
         p.law.scatter.differing[0] = 4e-4;
         let m = p.draw(9, Some(0));
         let wide = (6.0_f64 / 4.0).sqrt();
-        let n = |dimension: usize| student::quantile(halton(9, PRIMES[dimension]), 4.0) * wide;
+        let n = |dimension: usize| student::quantile(halton(9, PRIMES[dimension]), 20.0) * wide;
         let force = m.effects[1].values[1];
         assert!((force - 2.0 * (1.0 + 0.05 * n(3))).abs() < 1e-12, "{force}");
         let differing = p.law.differing().count();
@@ -408,6 +482,24 @@ mod tests {
             let f = law.step(&mut state, r.time_s[i], r.position_m[i], r.velocity_mps[i], |_| {}).total_n;
             assert!((told[i] - f).abs() < 1e-9, "{i}: {} for {f}", told[i]);
         }
+    }
+
+    /// The band of a day that took no part knows what the fit leaves open of the law, that of a known day does not.
+    #[test]
+    fn a_day_that_took_no_part_is_told_less_surely() {
+        let all = made::insertions(&[], &[[0.008, 1e-4], [0.008, -1e-4], [0.016, 0.0]]);
+        let runs: Vec<&Insertion> = all.iter().collect();
+        let fitted = made::settled(&[], &runs);
+        let plain = Population::of(&fitted, &runs);
+        let open = plain.clone().opened(&fitted);
+        let wide = |p: &Population, day| {
+            let told = predict(p, runs[0], day, 8);
+            (told.high[150] - told.low[150], told.mean)
+        };
+        assert_eq!(wide(&open, Some(0)), wide(&plain, Some(0)));
+        let (told, without) = (wide(&open, None), wide(&plain, None));
+        assert!(told.0 > 1.001 * without.0 && told.1 == without.1, "{} {}", told.0, without.0);
+        assert!(told.0 < 2.0 * without.0);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use stylet_identify::phases::noise_n;
 use stylet_record::raw;
 use stylet_scenario::Scenario;
-use stylet_tissue::{Effect, PowerLawFriction, RateDependentPuncture, Tissue};
+use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPuncture, Tissue};
 
 /// Seed of what the starts begin with.
 const SEED: u64 = 1;
@@ -171,14 +171,7 @@ fn diagnosis(
         verdict,
         causes,
         base_parameters: base_parameters(&told, believed),
-        invisible: if several(runs) {
-            Vec::new()
-        } else {
-            vec![
-                PowerLawFriction { exponent: 1.0 }.info().id.to_owned(),
-                RateDependentPuncture { alpha: 0.0 }.info().id.to_owned(),
-            ]
-        },
+        invisible: untold(best, runs),
         gain: Gain {
             held_out: true,
             recordings: runs.iter().map(|r| r.name.clone()).collect(),
@@ -209,6 +202,18 @@ fn diagnosis(
         },
         advice: advice(best, &told),
     }
+}
+
+/// What insertions at one speed cannot say; that a puncture waits only where no force at which a layer gives way would do.
+fn untold(best: &Law, runs: &[&Insertion]) -> Vec<String> {
+    let all = [
+        PowerLawFriction { exponent: 1.0 }.info().id,
+        RateDependentPuncture { alpha: 0.0 }.info().id,
+        DelayedPuncture::default().info().id,
+    ];
+    let named = effects(&best.fitted.fit.model);
+    let untold = all.iter().filter(|id| !several(runs) && !named.contains(id));
+    untold.map(|id| (*id).to_owned()).collect()
 }
 
 fn cause(id: &str, told: &[Told], confidence: f64, without: &[f64], best: &Law, base: &Law) -> Cause {
@@ -346,6 +351,7 @@ mod tests {
             without_n: without_n.to_vec(),
             loses: Vec::new(),
             speeds_lose: Vec::new(),
+            nats: 0.0,
             kept,
         };
         Laws {
@@ -531,6 +537,7 @@ mod tests {
             without_n: without_n.to_vec(),
             loses: Vec::new(),
             speeds_lose: Vec::new(),
+            nats: 0.0,
             kept,
         };
         laws.parts = vec![
