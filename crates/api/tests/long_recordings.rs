@@ -55,7 +55,14 @@ fn of(config: EnhanceConfig) -> EnhanceFile {
 }
 
 /// Both ways; gives what was heard from disk, after its files were held against the other's.
-fn alike(name: &str, text: &str, config: &EnhanceFile, models: &[Model], same: &[&str]) -> Result<(), Error> {
+fn alike(
+    name: &str,
+    text: &str,
+    config: &EnhanceFile,
+    models: &[Model],
+    law: Option<&FittedLaw>,
+    same: &[&str],
+) -> Result<(), Error> {
     let scratch = Scratch::new(name);
     let path = scratch.0.join("log.csv");
     fs::write(&path, text).expect("a scratch file");
@@ -63,14 +70,14 @@ fn alike(name: &str, text: &str, config: &EnhanceFile, models: &[Model], same: &
     let (here, there) = (scratch.0.join("here"), scratch.0.join("there"));
 
     let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
-    let heard = hear(recording, notes, config.clone(), models)?;
+    let heard = hear(recording, notes, config.clone(), models, law)?;
     let found = said(&heard);
     assert!(found.contains("rupture"), "{name}: there was something to be found: {found}");
     heard.output(&source(&path))?.write(&here)?;
 
     let claim = Claim::new(&there)?;
     let (recording, notes) = read_long_csv(&path, &ReadOptions::default(), &there)?.expect("a plain file");
-    let heard = hear_long(&recording, notes, config.clone(), models, &claim)?;
+    let heard = hear_long(&recording, notes, config.clone(), models, law, &claim)?;
     assert_eq!(said(&heard), found, "{name}");
     heard.output(&source(&path))?.write_to(&claim)?;
     drop((recording, claim));
