@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use stylet_api::heard::{Heard, Source, hear, hear_long};
-use stylet_api::{Claim, EnhanceFile, Error, ReadOptions};
+use stylet_api::{Claim, EnhanceFile, Error, FittedLaw, ReadOptions, Scenario};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_record::{read_csv, read_long_csv};
 
@@ -109,6 +109,15 @@ fn said(heard: &Heard) -> String {
     said
 }
 
+/// A law whose shaft is held behind its ruptures.
+fn law() -> FittedLaw {
+    let text = r#"Scenario(name: "dry", tissue: (surface_m: 0.015, layers: [
+        (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0),
+        (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0)]),
+        effects: [CoulombFriction(c_n_per_m: 2.0), TimeDelay(delay_s: 0.01)], motion: Recorded)"#;
+    FittedLaw::new("law.ron", &Scenario::parse("law.ron", text).expect("a scenario")).expect("a law")
+}
+
 const BOTH: [Model; 2] = [Model::MultiLayer, Model::KelvinVoigt];
 const TABLES: [&str; 3] = ["enhanced.csv", "enhance.json", "events.json"];
 const ALL: [&str; 6] =
@@ -117,14 +126,16 @@ const ALL: [&str; 6] =
 #[test]
 fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memory() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("short", &log(20_000, true), &EnhanceFile::default(), &[Model::MultiLayer], &ALL)?;
-    alike("positions", &log(19_000, false), &EnhanceFile::default(), &[Model::MultiLayer], &ALL)?;
-    alike("compared", &log(17_000, true), &of(paper), &BOTH, &ALL)
+    alike("short", &log(20_000, true), &EnhanceFile::default(), &[Model::MultiLayer], None, &ALL)?;
+    alike("positions", &log(19_000, false), &EnhanceFile::default(), &[Model::MultiLayer], None, &ALL)?;
+    let law = law();
+    alike("told", &log(18_000, true), &EnhanceFile::default(), &[Model::MultiLayer], Some(&law), &ALL)?;
+    alike("compared", &log(17_000, true), &of(paper), &BOTH, None, &ALL)
 }
 
 #[test]
 fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("long", &log(60_000, true), &EnhanceFile::default(), &[Model::MultiLayer], &TABLES)?;
-    alike("long, compared", &log(50_000, false), &of(paper), &BOTH, &TABLES)
+    alike("long", &log(60_000, true), &EnhanceFile::default(), &[Model::MultiLayer], None, &TABLES)?;
+    alike("long, compared", &log(50_000, false), &of(paper), &BOTH, None, &TABLES)
 }
