@@ -112,6 +112,9 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                 )
                 .table(ruptures),
         );
+    for (algorithm, [missed, false_alarms, ruptures]) in totals(rows) {
+        page = page.fact(algorithm, format!("{missed} missed, {false_alarms} false of {ruptures} ruptures"));
+    }
     // A world of the referee knows ruptures alone.
     if estimated {
         page = page.section(
@@ -137,6 +140,21 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
     page
 }
 
+/// Missed, false and all ruptures of each algorithm over all scenarios, in the order of the rows.
+fn totals(rows: &[Row]) -> Vec<(&str, [usize; 3])> {
+    let mut totals: Vec<(&str, [usize; 3])> = Vec::new();
+    for r in rows {
+        let at = totals.iter().position(|t| t.0 == r.algorithm).unwrap_or(totals.len());
+        if at == totals.len() {
+            totals.push((&r.algorithm, [0; 3]));
+        }
+        for (sum, x) in totals[at].1.iter_mut().zip([r.missed, r.false_alarms, r.ruptures]) {
+            *sum += x;
+        }
+    }
+    totals
+}
+
 #[cfg(test)]
 mod tests {
     use super::page;
@@ -148,5 +166,20 @@ mod tests {
         let html = page(&[Row::new("rich world, clean", "Stylet", 2, &heard)], 2).to_html();
         assert!(html.contains("1 / 0 of 4"));
         assert!(!html.contains("Estimates") && !html.contains("Calibration"));
+    }
+
+    #[test]
+    fn the_page_begins_with_the_sums_of_each_algorithm() {
+        let heard = |missed, false_alarms| Scored { ruptures: 4, missed, false_alarms, ..Scored::default() };
+        let row = |scenario: &str, algorithm: &str, heard| Row::new(scenario, algorithm, 2, &heard);
+        let rows = [
+            row("a", "Paper", heard(1, 3)),
+            row("a", "Stylet", heard(0, 1)),
+            row("b", "Paper", heard(2, 2)),
+            row("b", "Stylet", heard(1, 0)),
+        ];
+        let html = page(&rows, 2).to_html();
+        assert!(html.contains("3 missed, 5 false of 8 ruptures"), "{html}");
+        assert!(html.contains("1 missed, 1 false of 8 ruptures"), "{html}");
     }
 }
