@@ -216,9 +216,10 @@ A column map for a log in microseconds and millimetres:
 A configuration: Enhance(cusum: (sigma_rupture_n: 0.1), model: MultiLayer).
 A scenario file serves too: its `enhance` part and its surface are used.
 
-With --law the friction along the shaft is what a law says that a diagnosis fitted to other insertions (`stylet diagnose`, also of a
-set of repeats), replayed sample by sample along the recorded positions, each layer punctured from where the core says so. On
-the way back the core corrects it by what the force shows. Recording and law must have the same zero of the positions.")]
+With --law the friction along the shaft is what a law says of it that `stylet diagnose` fitted to
+other insertions (single ones or a set of repeats). It is replayed sample by sample along the
+recorded positions, with each layer punctured from where the core says so, and corrected on the way
+back by what the force shows. Law and recording must have the same zero of the positions.")]
 pub struct EnhanceArgs {
     /// Recording (CSV with header).
     pub data: PathBuf,
