@@ -7,7 +7,7 @@ use stylet_record::Recording;
 use stylet_scenario::{EnhanceFile, Scenario};
 use stylet_stats::rms;
 use stylet_testbed::{Simulation, simulate};
-use stylet_tissue::{AnyEffect, Law, LawState};
+use stylet_tissue::{AnyEffect, Law, LawState, PreslidingFriction};
 
 /// Two layers whose friction is dry and builds up over millimetres; in by 48 mm, a rest of 2 s, and back.
 fn insertion(forces_n: [f64; 2], dry_n_per_m: f64, effects: &str) -> Scenario {
@@ -128,7 +128,7 @@ fn friction_is_given_as_the_sensor_shows_it() -> Result<(), Error> {
     let mut both = Vec::new();
     for s in r.samples() {
         let ruptured = usize::from(s.time_s > 5.0) + usize::from(s.time_s > 9.0);
-        let mut at = |shaft: &mut stylet_tissue::ShaftFriction| {
+        let at = |shaft: &mut stylet_tissue::ShaftFriction| {
             shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptured)
         };
         both.push([at(&mut plain), at(&mut seen)]);
@@ -160,13 +160,8 @@ fn a_law_is_refused_by_algorithms_that_take_none_and_doubted_where_it_does_not_b
     assert!(doubts.contains("surface at 30.0 mm") && doubts.contains("has 1 layer"), "{doubts}");
     // Effects that the law cannot hold all of.
     let mut many = fitted();
-    many.effects = vec![
-        many.effects
-            .first()
-            .cloned()
-            .map_or_else(|| AnyEffect::PreslidingFriction(Default::default()), |e| e);
-        17
-    ];
+    many.effects =
+        vec![AnyEffect::PreslidingFriction(PreslidingFriction { c_n_per_m: 1.0, delta_m: 0.002 }); 17];
     let why = FittedLaw::new("many.ron", &many).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(why.contains("many.ron") && why.contains("17"), "{why}");
     Ok(())

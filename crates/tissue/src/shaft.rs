@@ -50,3 +50,49 @@ impl ShaftFriction {
         self.sensor.step(&mut self.shown, &reading)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::ShaftFriction;
+    use crate::{ForceBias, ForceGain, Law, Layer, PositionScale, Tissue};
+    use alloc::vec;
+
+    fn law() -> Law {
+        let layer = |friction_ns_per_m2| Layer {
+            name: "gel".into(),
+            thickness_m: 0.02,
+            stiffness_n_per_m: 50.0,
+            friction_ns_per_m2,
+            puncture_n: None,
+        };
+        Law::base(&Tissue { surface_m: 0.0, layers: vec![layer(4000.0), layer(6000.0)] })
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
+    }
+
+    #[test]
+    fn the_passed_layers_hold_the_shaft_on_the_way_in_and_all_on_the_way_back() {
+        let mut shaft = ShaftFriction::new(law(), &[], 100.0);
+        near(shaft.step(0.0, 0.01, 0.002, 0), 0.0);
+        near(shaft.step(5.0, 0.018, 0.002, 1), 0.002 * 4000.0 * 0.018);
+        near(shaft.step(10.0, 0.025, 0.002, 1), 0.002 * 4000.0 * 0.02);
+        // What is no sample changes nothing.
+        assert!(shaft.step(11.0, f64::NAN, 0.002, 2).is_nan());
+        near(shaft.step(12.0, 0.025, 0.0, 1), 0.0);
+        near(shaft.step(13.0, 0.025, -0.002, 1), -0.002 * (4000.0 * 0.02 + 6000.0 * 0.005));
+    }
+
+    #[test]
+    fn a_gain_shows_more_of_it_a_bias_does_not_and_a_scale_of_the_positions_is_undone() {
+        let effects = [
+            ForceGain { eps: 0.5 }.into(),
+            ForceBias { force_n: 3.0 }.into(),
+            PositionScale { eps: 0.25 }.into(),
+        ];
+        let mut shaft = ShaftFriction::new(law(), &effects, 100.0);
+        near(shaft.step(0.0, 1.25 * 0.01, 1.25 * 0.002, 0), 0.0);
+        near(shaft.step(10.0, 1.25 * 0.025, 1.25 * 0.002, 1), 1.5 * 0.002 * 4000.0 * 0.02);
+    }
+}
