@@ -52,11 +52,19 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                 cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
                 cells.push(Cell::number(list(&r.stiffness_error)));
                 cells.push(Cell::number(list(&r.friction_error)));
-                // The widest last: what a narrow window cuts off is what one can do without.
-                cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
                 cells
             })
             .collect();
+    let between = rows.iter().filter(|r| r.enhancement_rms_relative.is_some()).map(|r| {
+        let mut cells = head(r);
+        cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
+        cells
+    });
+    let between = Table::new(
+        "95 % intervals of the median error of the stiffness, layer by layer, in %",
+        &["scenario", "algorithm", "stiffness"],
+        between.collect(),
+    );
     let calibrated: Vec<_> = rows
         .iter()
         .filter(|r| r.coverage.tip_force.is_some())
@@ -92,7 +100,6 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
             "with noise",
             "stiffness, layer by layer",
             "friction, layer by layer",
-            "the stiffness's 95 % intervals",
         ],
         estimates,
     );
@@ -124,7 +131,8 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                      estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; \
                      beside it the same with the sensor's noise.",
                 )
-                .table(errors),
+                .table(errors)
+                .table(between),
         );
     }
     if has_intervals {
