@@ -1,5 +1,7 @@
 //! The online core over a whole recording.
 
+use crate::error::Error;
+use crate::law::FittedLaw;
 use crate::picture::Ran;
 use stylet_core::config::Model;
 use stylet_record::Recording;
@@ -15,11 +17,44 @@ pub fn enhance(recording: &Recording, config: &EnhanceFile) -> Enhanced {
     listen(recording, config, config.enhance.model)
 }
 
-/// The same with another model.
+/// The same with what a law says of friction that was fitted to other insertions: enhanced force and its band are those of
+/// [`Enhancer::with_law`](stylet_core::Enhancer::with_law), causally, each layer punctured from the sample on at which the core says so.
+///
+/// # Errors
+/// [`Error::Request`] when the configuration's algorithm takes no law.
+pub fn enhance_with_law(
+    recording: &Recording,
+    config: &EnhanceFile,
+    law: &FittedLaw,
+) -> Result<Enhanced, Error> {
+    law.fits(&config.enhance)?;
+    Ok(listen_told(recording, config, config.enhance.model, Some(law)))
+}
+
+/// As [`enhance`] with another model.
 #[must_use]
 pub fn listen(recording: &Recording, config: &EnhanceFile, model: Model) -> Enhanced {
+    listen_told(recording, config, model, None)
+}
+
+/// With another model, and with a law where the algorithm takes one.
+pub(crate) fn listen_told(
+    recording: &Recording,
+    config: &EnhanceFile,
+    model: Model,
+    law: Option<&FittedLaw>,
+) -> Enhanced {
     let ran = combination(config, model);
-    let trace = Trace::record(recording, &recording.force_n, &ran.config, config.surface_m, |_, _| {});
+    let (force_n, surface_m) = (&recording.force_n, config.surface_m);
+    let trace = match law {
+        Some(law) => {
+            let mut shaft = law.shaft(recording.sample_hz());
+            Trace::with_law(recording, force_n, &ran.config, surface_m, |s, ruptured| {
+                shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptured)
+            })
+        }
+        None => Trace::record(recording, force_n, &ran.config, surface_m, |_, _| {}),
+    };
     Ran { trace, ..ran }
 }
 

@@ -7,6 +7,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_core::EnhanceConfig;
+use stylet_core::Sample;
 use stylet_diagnose::Diagnosis;
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::compose::compose;
@@ -179,7 +180,10 @@ fn listen(run: &Insertion, study: &Study, i: usize) -> Online {
         contact_m: run.contact_m,
     };
     let population = study.out.get(i).and_then(|o| o.population.as_ref());
-    Online::of(&measured, &trace, &config, |instants| population.and_then(|p| friction(p, r, instants)))
+    Online::of(&measured, &trace, &config, || {
+        let mut shaft = friction(population?, r)?;
+        Some(move |s: &Sample, ruptured| shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptured))
+    })
 }
 
 /// A recording that a data set names; with recordings given by hand it may be missing.

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use stylet_api::heard::{Heard, Source, hear, hear_long};
-use stylet_api::{Claim, EnhanceFile, Error, ReadOptions};
+use stylet_api::{Claim, EnhanceFile, Error, FittedLaw, ReadOptions, Scenario};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_record::{read_csv, read_long_csv};
 
@@ -55,7 +55,14 @@ fn of(config: EnhanceConfig) -> EnhanceFile {
 }
 
 /// Both ways; gives what was heard from disk, after its files were held against the other's.
-fn alike(name: &str, text: &str, config: &EnhanceFile, models: &[Model], same: &[&str]) -> Result<(), Error> {
+fn alike(
+    name: &str,
+    text: &str,
+    config: &EnhanceFile,
+    models: &[Model],
+    law: Option<&FittedLaw>,
+    same: &[&str],
+) -> Result<(), Error> {
     let scratch = Scratch::new(name);
     let path = scratch.0.join("log.csv");
     fs::write(&path, text).expect("a scratch file");
@@ -63,14 +70,14 @@ fn alike(name: &str, text: &str, config: &EnhanceFile, models: &[Model], same: &
     let (here, there) = (scratch.0.join("here"), scratch.0.join("there"));
 
     let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
-    let heard = hear(recording, notes, config.clone(), models)?;
+    let heard = hear(recording, notes, config.clone(), models, law)?;
     let found = said(&heard);
     assert!(found.contains("rupture"), "{name}: there was something to be found: {found}");
     heard.output(&source(&path))?.write(&here)?;
 
     let claim = Claim::new(&there)?;
     let (recording, notes) = read_long_csv(&path, &ReadOptions::default(), &there)?.expect("a plain file");
-    let heard = hear_long(&recording, notes, config.clone(), models, &claim)?;
+    let heard = hear_long(&recording, notes, config.clone(), models, law, &claim)?;
     assert_eq!(said(&heard), found, "{name}");
     heard.output(&source(&path))?.write_to(&claim)?;
     drop((recording, claim));
@@ -102,6 +109,15 @@ fn said(heard: &Heard) -> String {
     said
 }
 
+/// A law whose shaft is held behind its ruptures.
+fn law() -> FittedLaw {
+    let text = r#"Scenario(name: "dry", tissue: (surface_m: 0.015, layers: [
+        (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0),
+        (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0)]),
+        effects: [CoulombFriction(c_n_per_m: 2.0), TimeDelay(delay_s: 0.01)], motion: Recorded)"#;
+    FittedLaw::new("law.ron", &Scenario::parse("law.ron", text).expect("a scenario")).expect("a law")
+}
+
 const BOTH: [Model; 2] = [Model::MultiLayer, Model::KelvinVoigt];
 const TABLES: [&str; 3] = ["enhanced.csv", "enhance.json", "events.json"];
 const ALL: [&str; 6] =
@@ -110,14 +126,16 @@ const ALL: [&str; 6] =
 #[test]
 fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memory() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("short", &log(20_000, true), &EnhanceFile::default(), &[Model::MultiLayer], &ALL)?;
-    alike("positions", &log(19_000, false), &EnhanceFile::default(), &[Model::MultiLayer], &ALL)?;
-    alike("compared", &log(17_000, true), &of(paper), &BOTH, &ALL)
+    alike("short", &log(20_000, true), &EnhanceFile::default(), &[Model::MultiLayer], None, &ALL)?;
+    alike("positions", &log(19_000, false), &EnhanceFile::default(), &[Model::MultiLayer], None, &ALL)?;
+    let law = law();
+    alike("told", &log(18_000, true), &EnhanceFile::default(), &[Model::MultiLayer], Some(&law), &ALL)?;
+    alike("compared", &log(17_000, true), &of(paper), &BOTH, None, &ALL)
 }
 
 #[test]
 fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("long", &log(60_000, true), &EnhanceFile::default(), &[Model::MultiLayer], &TABLES)?;
-    alike("long, compared", &log(50_000, false), &of(paper), &BOTH, &TABLES)
+    alike("long", &log(60_000, true), &EnhanceFile::default(), &[Model::MultiLayer], None, &TABLES)?;
+    alike("long, compared", &log(50_000, false), &of(paper), &BOTH, None, &TABLES)
 }

@@ -207,19 +207,28 @@ pub struct RunArgs {
 #[command(after_help = "Examples:
   stylet enhance recording.csv
   stylet enhance log.csv --columns map.ron --config tuned.ron --out out/log
+  stylet enhance next_day.csv --law out/diagnosis/extended.ron
 
 A column map for a log in microseconds and millimetres:
   Columns(time: (name: \"time\", scale: 1e-6), position: (name: \"pz\", scale: 1e-3),
           force: (name: \"fz\"))
 
 A configuration: Enhance(cusum: (sigma_rupture_n: 0.1), model: MultiLayer).
-A scenario file serves too: its `enhance` part and its surface are used.")]
+A scenario file serves too: its `enhance` part and its surface are used.
+
+With --law the friction along the shaft is what a law says of it that `stylet diagnose` fitted to
+other insertions (single ones or a set of repeats). It is replayed sample by sample along the
+recorded positions, with each layer punctured from where the core says so, and corrected on the way
+back by what the force shows. Law and recording must have the same zero of the positions.")]
 pub struct EnhanceArgs {
     /// Recording (CSV with header).
     pub data: PathBuf,
     /// Configuration of the core (RON); without it the algorithm `Stylet` with its defaults.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Take the friction along the shaft from this law: extended.ron of a diagnosis, or any scenario (RON).
+    #[arg(long, value_name = "EXTENDED.RON")]
+    pub law: Option<PathBuf>,
     /// Column map for a foreign log (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,

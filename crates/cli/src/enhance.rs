@@ -4,7 +4,7 @@ use crate::args::EnhanceArgs;
 use crate::exit::Failure;
 use std::fmt::Write as _;
 use stylet_api::heard::{Heard, Source, hear, hear_long};
-use stylet_api::{Claim, need, read_options};
+use stylet_api::{Claim, FittedLaw, need, read_options};
 use stylet_core::config::Model;
 use stylet_record::{read_csv, read_long_csv};
 use stylet_report::{plus_minus, significant};
@@ -19,6 +19,10 @@ const LISTED: usize = 100;
 /// [`Failure`] with the exit code that fits.
 pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let config = args.config.as_deref().map(EnhanceFile::load).transpose()?.unwrap_or_default();
+    let law = args.law.as_deref().map(FittedLaw::load).transpose()?;
+    if let Some(law) = &law {
+        law.fits(&config.enhance)?;
+    }
     let options = read_options(args.columns.as_deref(), args.repair)?;
     let models = match args.compare {
         true => vec![Model::MultiLayer, Model::KelvinVoigt],
@@ -30,7 +34,7 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
         args.limits.allow(&args.data, &need, args.results.quiet)?;
         let claim = Claim::new(&folder)?;
         if let Some((recording, notes)) = read_long_csv(&args.data, &options, &folder)? {
-            let heard = hear_long(&recording, notes, config, &models, &claim)?;
+            let heard = hear_long(&recording, notes, config, &models, law.as_ref(), &claim)?;
             let said = summary(args, &heard);
             return args.results.conclude_in(&claim, &heard.output(&source)?, || said);
         }
@@ -39,14 +43,14 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
         args.limits.allow(&args.data, &need, args.results.quiet)?;
     }
     let (recording, notes) = read_csv(&args.data, &options)?;
-    let heard = hear(recording, notes, config, &models)?;
+    let heard = hear(recording, notes, config, &models, law.as_ref())?;
     let said = summary(args, &heard);
     args.results.conclude(&folder, &heard.output(&source)?, || said)
 }
 
 fn command(args: &EnhanceArgs) -> String {
     let mut command = format!("stylet enhance {}", args.data.display());
-    for (flag, path) in [("--columns", &args.columns), ("--config", &args.config)] {
+    for (flag, path) in [("--columns", &args.columns), ("--config", &args.config), ("--law", &args.law)] {
         if let Some(path) = path {
             let _ = write!(command, " {flag} {}", path.display());
         }
@@ -60,7 +64,7 @@ fn command(args: &EnhanceArgs) -> String {
 }
 
 fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
-    let Heard { extent, notes, ran, hash, .. } = heard;
+    let Heard { extent, notes, ran, hash, law, .. } = heard;
     let listed = if heard.is_long() { LISTED } else { usize::MAX };
     let mut out = String::new();
     let _ = writeln!(
@@ -76,6 +80,12 @@ fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
     }
     if let Some(note) = stylet_api::settings_note(ran) {
         let _ = writeln!(out, "  note: {note}");
+    }
+    if let Some(law) = law {
+        let _ = writeln!(out, "  law: {}", law.sentence());
+        for note in &law.notes {
+            let _ = writeln!(out, "  note: {note}");
+        }
     }
     for r in ran {
         let unit = if r.config.model == Model::MultiLayer { "N s/m²" } else { "N s/m" };

@@ -52,11 +52,19 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                 cells.push(Cell::number(shown(r.enhancement_with_noise, 100.0, 2)));
                 cells.push(Cell::number(list(&r.stiffness_error)));
                 cells.push(Cell::number(list(&r.friction_error)));
-                // The widest last: what a narrow window cuts off is what one can do without.
-                cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
                 cells
             })
             .collect();
+    let between = rows.iter().filter(|r| r.enhancement_rms_relative.is_some()).map(|r| {
+        let mut cells = head(r);
+        cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
+        cells
+    });
+    let between = Table::new(
+        "95 % intervals of the median error of the stiffness, layer by layer, in %",
+        &["scenario", "algorithm", "stiffness"],
+        between.collect(),
+    );
     let calibrated: Vec<_> = rows
         .iter()
         .filter(|r| r.coverage.tip_force.is_some())
@@ -92,7 +100,6 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
             "with noise",
             "stiffness, layer by layer",
             "friction, layer by layer",
-            "the stiffness's 95 % intervals",
         ],
         estimates,
     );
@@ -112,6 +119,9 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                 )
                 .table(ruptures),
         );
+    for (algorithm, [missed, false_alarms, ruptures]) in totals(rows) {
+        page = page.fact(algorithm, format!("{missed} missed, {false_alarms} false of {ruptures} ruptures"));
+    }
     // A world of the referee knows ruptures alone.
     if estimated {
         page = page.section(
@@ -121,7 +131,8 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
                      estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; \
                      beside it the same with the sensor's noise.",
                 )
-                .table(errors),
+                .table(errors)
+                .table(between),
         );
     }
     if has_intervals {
@@ -137,6 +148,21 @@ pub fn page(rows: &[Row], seeds: u64) -> Page {
     page
 }
 
+/// Missed, false and all ruptures of each algorithm over all scenarios, in the order of the rows.
+fn totals(rows: &[Row]) -> Vec<(&str, [usize; 3])> {
+    let mut totals: Vec<(&str, [usize; 3])> = Vec::new();
+    for r in rows {
+        let at = totals.iter().position(|t| t.0 == r.algorithm).unwrap_or(totals.len());
+        if at == totals.len() {
+            totals.push((&r.algorithm, [0; 3]));
+        }
+        for (sum, x) in totals[at].1.iter_mut().zip([r.missed, r.false_alarms, r.ruptures]) {
+            *sum += x;
+        }
+    }
+    totals
+}
+
 #[cfg(test)]
 mod tests {
     use super::page;
@@ -148,5 +174,20 @@ mod tests {
         let html = page(&[Row::new("rich world, clean", "Stylet", 2, &heard)], 2).to_html();
         assert!(html.contains("1 / 0 of 4"));
         assert!(!html.contains("Estimates") && !html.contains("Calibration"));
+    }
+
+    #[test]
+    fn the_page_begins_with_the_sums_of_each_algorithm() {
+        let heard = |missed, false_alarms| Scored { ruptures: 4, missed, false_alarms, ..Scored::default() };
+        let row = |scenario: &str, algorithm: &str, heard| Row::new(scenario, algorithm, 2, &heard);
+        let rows = [
+            row("a", "Paper", heard(1, 3)),
+            row("a", "Stylet", heard(0, 1)),
+            row("b", "Paper", heard(2, 2)),
+            row("b", "Stylet", heard(1, 0)),
+        ];
+        let html = page(&rows, 2).to_html();
+        assert!(html.contains("3 missed, 5 false of 8 ruptures"), "{html}");
+        assert!(html.contains("1 missed, 1 false of 8 ruptures"), "{html}");
     }
 }

@@ -234,7 +234,7 @@ pub fn enhance(
     let recording = recording(&time_s, &position_m, &force_n, velocity_mps.as_ref())?;
     let model = config.enhance.model;
     py.detach(|| {
-        let heard = hear(recording, Vec::new(), config, &[model])?;
+        let heard = hear(recording, Vec::new(), config, &[model], None)?;
         let named =
             Source { data: Path::new("recording"), config: None, command: "stylet.enhance".to_owned() };
         let (json, html) = (heard.json("recording")?, heard.report(&named)?.to_html());

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod detection;
+mod hearing;
 mod offline;
 mod online;
 mod score;
@@ -10,10 +11,11 @@ mod trace;
 mod with_law;
 
 pub use detection::{EARLIEST_S, LATEST_S, RuptureScore, match_ruptures};
+pub use hearing::{Hearing, STORAGE_SAMPLES, core_for};
 pub use offline::{LayerSample, OfflineEstimate, offline};
 pub use online::{Measured, Online};
 pub use score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
 pub use scorer::{Heard, Moment, Scorer};
 pub use stylet_record::LayerTruth;
-pub use trace::{STORAGE_SAMPLES, Trace, algorithm_name, coefficients, model_name, score_run};
+pub use trace::{Trace, algorithm_name, coefficients, model_name, score_run};
 pub use with_law::WithLaw;

@@ -5,7 +5,7 @@ use crate::detection::{EARLIEST_S, LATEST_S};
 use crate::trace::Trace;
 use crate::with_law::WithLaw;
 use serde::Serialize;
-use stylet_core::EnhanceConfig;
+use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
 use stylet_stats::rms;
 
@@ -51,14 +51,14 @@ pub struct Measured<'a> {
 }
 
 impl Online {
-    /// Judges what the core made of a run, so configured. `friction` says the friction (N, one value per sample) of a law fitted to other runs, from
-    /// the instants (s) at which layers count as punctured.
+    /// Judges what the core made of a run, so configured. `law` gives the friction (N) of a law fitted to other runs, from the first
+    /// sample on, told as in [`Hearing`](crate::Hearing).
     #[must_use]
-    pub fn of(
+    pub fn of<L: FnMut(&Sample, usize) -> f64>(
         run: &Measured,
         trace: &Trace,
         config: &EnhanceConfig,
-        friction: impl Fn(&[f64]) -> Option<Vec<f64>>,
+        law: impl Fn() -> Option<L>,
     ) -> Self {
         let r = run.recording;
         let mut taken = vec![false; trace.detections.len()];
@@ -82,8 +82,23 @@ impl Online {
             lost.filter(|(d, _)| d.time_s >= from && d.time_s < to).count()
         };
         // Causally: a layer counts as punctured from the sample at which the core says so.
-        let instants: Vec<f64> = trace.detections.iter().map(|d| d.time_s).collect();
-        let replayed = friction(&instants);
+        let replayed: Option<Vec<f64>> = law().map(|mut law| {
+            let mut ruptured = 0;
+            r.samples()
+                .zip(&r.force_n)
+                .map(|(s, &force_n)| {
+                    ruptured +=
+                        trace.detections[ruptured..].iter().take_while(|d| d.time_s <= s.time_s).count();
+                    let sample = Sample {
+                        time_s: s.time_s,
+                        position_m: s.position_m,
+                        velocity_mps: s.velocity_mps,
+                        force_n,
+                    };
+                    law(&sample, ruptured)
+                })
+                .collect()
+        });
         let inside: Vec<usize> = (run.back..r.len()).filter(|i| r.position_m[*i] > run.contact_m).collect();
         let of = |what: &dyn Fn(usize) -> f64| rms(&inside.iter().map(|i| what(*i)).collect::<Vec<_>>());
         Self {
@@ -96,7 +111,7 @@ impl Online {
             back_raw_n: of(&|i| r.force_n[i]),
             back_before_n: of(&|i| trace.enhanced_n[i]),
             back_after_n: replayed.map_or(f64::NAN, |friction| of(&|i| r.force_n[i] - friction[i])),
-            with_law: WithLaw::of(run, config, friction),
+            with_law: WithLaw::of(run, config, law),
         }
     }
 }

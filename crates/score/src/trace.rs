@@ -1,16 +1,14 @@
 //! What the online core made of a recording: every output as a column, and the offline estimate
 //! beside it.
 
+use crate::hearing::{Hearing, core_for};
 use crate::offline::{LayerSample, OfflineEstimate, offline};
 use crate::score::Score;
 use crate::scorer::{Moment, Scorer};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
-use stylet_core::{Detection, Enhancer, LayerEstimate, Sample, State};
+use stylet_core::{Detection, LayerEstimate, Sample, State};
 use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
-
-/// Most samples that the core keeps for its re-run; a recording with fewer is kept whole.
-pub const STORAGE_SAMPLES: usize = 1 << 18;
 
 /// The core's outputs over a recording, one value per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,16 +56,34 @@ impl Trace {
         force_n: &[f64],
         config: &EnhanceConfig,
         surface_m: f64,
+        each: impl FnMut(usize, &stylet_core::Output),
+    ) -> Self {
+        let core = core_for(recording.len(), config, surface_m);
+        Self::hear(recording, force_n, Hearing::with(core, None::<fn(&Sample, usize) -> f64>), each)
+    }
+
+    /// [`Trace::record`] with the friction that a law fitted elsewhere says, which has its place in [`Hearing`].
+    #[must_use]
+    pub fn with_law(
+        recording: &Recording,
+        force_n: &[f64],
+        config: &EnhanceConfig,
+        surface_m: f64,
+        law: impl FnMut(&Sample, usize) -> f64,
+    ) -> Self {
+        let core = core_for(recording.len(), config, surface_m);
+        Self::hear(recording, force_n, Hearing::with(core, Some(law)), |_, _| {})
+    }
+
+    fn hear<L: FnMut(&Sample, usize) -> f64>(
+        recording: &Recording,
+        force_n: &[f64],
+        mut hearing: Hearing<L>,
         mut each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
-        let mut core = Enhancer::new(
-            config.clone(),
-            surface_m,
-            vec![Sample::default(); recording.len().min(STORAGE_SAMPLES)],
-        );
         let mut trace = Trace::default();
         for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
-            let out = core.step(Sample {
+            let out = hearing.step(Sample {
                 time_s: s.time_s,
                 position_m: s.position_m,
                 velocity_mps: s.velocity_mps,
@@ -80,33 +96,6 @@ impl Trace {
         trace.contact_s =
             trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
         trace
-    }
-
-    /// Enhanced force (N, one value per sample) with the friction that a law fitted elsewhere says. `law` tells it for a recording, from the
-    /// instants (s) at which layers count as punctured, and for no sample from later ones; `None` where it cannot, or the algorithm takes no law.
-    #[must_use]
-    pub fn with_law(
-        recording: &Recording,
-        force_n: &[f64],
-        config: &EnhanceConfig,
-        law: impl Fn(&[f64]) -> Option<Vec<f64>>,
-    ) -> Option<Vec<f64>> {
-        let heard = Self::record(recording, force_n, config, 0.0, |_, _| {});
-        let instants: Vec<f64> = heard.detections.iter().map(|d| d.time_s).collect();
-        let friction = law(&instants)?;
-        let mut core = Enhancer::new(config.clone(), 0.0, []);
-        let samples = recording.samples().zip(force_n).zip(friction);
-        samples
-            .map(|((s, &force_n), friction_n)| {
-                core.step_brief(Sample {
-                    time_s: s.time_s,
-                    position_m: s.position_m,
-                    velocity_mps: s.velocity_mps,
-                    force_n,
-                });
-                core.with_law(friction_n).map_or(Some(force_n), |(enhanced_n, _)| Some(enhanced_n))
-            })
-            .collect()
     }
 
     /// Adds what the core says of a sample to the columns.

@@ -4,7 +4,7 @@
 use crate::online::Measured;
 use crate::trace::Trace;
 use serde::Serialize;
-use stylet_core::EnhanceConfig;
+use stylet_core::{EnhanceConfig, Sample};
 use stylet_stats::{median_of, rms};
 
 /// Size of the pull that is put in, in N.
@@ -29,17 +29,17 @@ pub struct WithLaw {
 }
 
 impl WithLaw {
-    /// Hears a run with a law's friction, which is told as in [`Trace::with_law`]; `None` where that gives nothing.
+    /// Hears a run with a law's friction, as [`Trace::with_law`] does; `law` gives it from the first sample on, or `None` where there is none.
     #[must_use]
-    pub fn of(
+    pub fn of<L: FnMut(&Sample, usize) -> f64>(
         run: &Measured,
         config: &EnhanceConfig,
-        law: impl Fn(&[f64]) -> Option<Vec<f64>>,
+        law: impl Fn() -> Option<L>,
     ) -> Option<Self> {
         let r = run.recording;
         let hear = |pull: &dyn Fn(f64) -> f64| {
             let force: Vec<f64> = (0..r.len()).map(|i| r.force_n[i] + pull(travelled(run, i))).collect();
-            Trace::with_law(r, &force, config, &law)
+            law().map(|law| Trace::with_law(r, &force, config, 0.0, law).enhanced_n)
         };
         let plain = hear(&|_| 0.0)?;
         let inside = || (run.back..r.len()).filter(|i| r.position_m[*i] > run.contact_m);

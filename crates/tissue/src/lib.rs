@@ -35,6 +35,7 @@ mod law;
 mod layer;
 mod measurement;
 mod replay;
+mod shaft;
 mod slab;
 mod state;
 
@@ -47,5 +48,6 @@ pub use law::{Law, MAX_EFFECTS, TooManyEffects};
 pub use layer::{Layer, Tissue};
 pub use measurement::{Cell, Measurement, MeasurementState, Reading};
 pub use replay::replay;
+pub use shaft::ShaftFriction;
 pub use slab::Slab;
 pub use state::LawState;

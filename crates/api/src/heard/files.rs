@@ -17,6 +17,9 @@ pub(super) struct EnhanceResult<'a> {
     pub sample_hz: f64,
     pub hash: &'a str,
     pub version: &'a str,
+    /// The law that the friction is taken from, where it is not the core's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<&'a str>,
     pub found: Vec<FoundBy>,
     pub data_quality: &'a [QualityNote],
 }

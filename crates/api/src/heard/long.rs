@@ -2,19 +2,20 @@
 
 use super::picture::Picture;
 use super::table::{beside, header};
-use super::{Extent, Heard, Table};
+use super::{Extent, Heard, Table, Told};
 use crate::enhance::combination;
 use crate::error::Error;
 use crate::folder::Claim;
 use crate::hash::{self, ResultHash, hashed};
+use crate::law::FittedLaw;
 use std::io::{self, Write};
 use stylet_core::config::Model;
-use stylet_core::{Enhancer, Output, Sample};
+use stylet_core::{Output, Sample};
 use stylet_record::scratch::TableWriter;
 use stylet_record::write::RowWriter;
 use stylet_record::{LongRecording, QualityNote, Recording};
 use stylet_scenario::EnhanceFile;
-use stylet_score::STORAGE_SAMPLES;
+use stylet_score::{Hearing, core_for};
 
 /// As [`hear`](super::hear) for a recording on disk: files, hash and findings have the same bytes, but for the report of a recording of
 /// over 20 000 samples, which shows a selection. `enhanced.csv` goes into the claimed folder at once, as part of a set that is
@@ -27,16 +28,21 @@ pub fn hear_long(
     notes: Vec<QualityNote>,
     config: EnhanceFile,
     models: &[Model],
+    law: Option<&FittedLaw>,
     claim: &Claim,
 ) -> Result<Heard, Error> {
     let out_of = |why: io::Error| Error::output(claim.folder(), why);
     let samples = recording.len();
     let mut ran: Vec<_> = models.iter().map(|&model| combination(&config, model)).collect();
-    let mut cores: Vec<_> = ran
+    let sample_hz = recording.sample_hz()?;
+    let mut hearings: Vec<Hearing<_>> = ran
         .iter()
         .map(|r| {
-            let storage = vec![Sample::default(); samples.min(STORAGE_SAMPLES)];
-            Enhancer::new(r.config.clone(), config.surface_m, storage)
+            let shaft = law.map(|law| law.shaft(sample_hz));
+            let law = shaft.map(|mut shaft| {
+                move |s: &Sample, ruptured| shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptured)
+            });
+            Hearing::with(core_for(samples, &r.config, config.surface_m), law)
         })
         .collect();
     let both = Both { part: claim.begin("enhanced.csv")?, hash: ResultHash::default() };
@@ -54,8 +60,8 @@ pub fn hear_long(
             force_n: s.force_n,
         };
         hashed_row.clear();
-        for ((core, out), ran) in cores.iter_mut().zip(&mut outs).zip(&mut ran) {
-            *out = core.step(sample);
+        for ((hearing, out), ran) in hearings.iter_mut().zip(&mut outs).zip(&mut ran) {
+            *out = hearing.step(sample);
             ran.trace.note(out);
             hashed_row.extend(hashed(out));
         }
@@ -67,7 +73,7 @@ pub fn hear_long(
         index += 1;
         Ok(())
     })?;
-    drop(cores);
+    drop(hearings);
     let Both { part, mut hash } = table.finish().map_err(out_of)?;
     let columns = columns.finish().map_err(out_of)?;
     let (mut piece, mut bytes) = (Vec::new(), Vec::new());
@@ -90,9 +96,10 @@ pub fn hear_long(
             ran.trace.contact_s = recording.first_at_s(contact_m)?;
         }
     }
-    let extent = Extent { samples, duration_s: recording.duration_s()?, sample_hz: recording.sample_hz()? };
+    let extent = Extent { samples, duration_s: recording.duration_s()?, sample_hz };
     let table = Table::There(part.finish()?);
-    Ok(Heard { recording: shown, extent, notes, ran, hash: hash.finish(), config, table })
+    let law = law.map(|law| Told::new(law, &ran));
+    Ok(Heard { recording: shown, extent, notes, ran, hash: hash.finish(), config, law, table })
 }
 
 /// The table's bytes go into the file and into the hash of the results.

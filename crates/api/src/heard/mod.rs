@@ -7,10 +7,11 @@ mod table;
 
 pub use long::hear_long;
 
-use crate::enhance::listen;
+use crate::enhance::listen_told;
 use crate::error::Error;
 use crate::folder::Written;
 use crate::hash;
+use crate::law::FittedLaw;
 use crate::output::{Output, json};
 use crate::picture::{Ran, report};
 use crate::run::settings_note;
@@ -34,8 +35,39 @@ pub struct Heard {
     pub ran: Vec<Ran>,
     /// Hash over all results: the same recording and configuration give the same.
     pub hash: String,
+    /// The law that it was told.
+    pub law: Option<Told>,
     config: EnhanceFile,
     table: Table,
+}
+
+/// A law that the core was told, and what is remarkable about that.
+pub struct Told {
+    /// Its file.
+    pub file: String,
+    /// Sentences for people.
+    pub notes: Vec<String>,
+}
+
+impl Told {
+    /// Whose friction it is.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        format!(
+            "friction along the shaft as {} has it, corrected on the way back by what the force shows",
+            self.file
+        )
+    }
+
+    fn new(law: &FittedLaw, ran: &[Ran]) -> Self {
+        let mut notes = ran.first().map(|r| law.doubts(&r.trace)).unwrap_or_default();
+        notes.extend(
+            ran.iter()
+                .filter(|r| law.fits(&r.config).is_err())
+                .map(|r| format!("{} takes no law: its enhanced force is its own", r.name)),
+        );
+        Self { file: law.file.clone(), notes }
+    }
 }
 
 /// How much was recorded.
@@ -66,7 +98,7 @@ pub struct Source<'a> {
     pub command: String,
 }
 
-/// Runs the core over a recording, once per model.
+/// Runs the core over a recording, once per model, and with a law fitted elsewhere where the algorithm takes one.
 ///
 /// # Errors
 /// [`Error::Recording`] when the table cannot be written.
@@ -75,8 +107,9 @@ pub fn hear(
     notes: Vec<QualityNote>,
     config: EnhanceFile,
     models: &[Model],
+    law: Option<&FittedLaw>,
 ) -> Result<Heard, Error> {
-    let ran: Vec<Ran> = models.iter().map(|&model| listen(&recording, &config, model)).collect();
+    let ran: Vec<Ran> = models.iter().map(|&model| listen_told(&recording, &config, model, law)).collect();
     let csv = table::of(&recording, &ran)?;
     let hash = hash::of_results(&csv, &ran.iter().map(|r| &r.trace).collect::<Vec<_>>());
     let extent = Extent {
@@ -84,7 +117,8 @@ pub fn hear(
         duration_s: recording.duration_s(),
         sample_hz: recording.sample_hz(),
     };
-    Ok(Heard { recording, extent, notes, ran, hash, config, table: Table::Here(csv) })
+    let law = law.map(|law| Told::new(law, &ran));
+    Ok(Heard { recording, extent, notes, ran, hash, config, law, table: Table::Here(csv) })
 }
 
 impl Heard {
@@ -93,7 +127,7 @@ impl Heard {
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
     pub fn json(&self, name: &str) -> Result<Vec<u8>, Error> {
-        let Self { extent, notes, ran, hash, .. } = self;
+        let Self { extent, notes, ran, hash, law, .. } = self;
         json(&EnhanceResult {
             recording: name.to_owned(),
             samples: extent.samples,
@@ -101,6 +135,7 @@ impl Heard {
             sample_hz: extent.sample_hz,
             hash,
             version: env!("CARGO_PKG_VERSION"),
+            law: law.as_ref().map(|law| law.file.as_str()),
             found: ran.iter().map(found_by).collect(),
             data_quality: notes,
         })
@@ -131,6 +166,8 @@ impl Heard {
                 .iter()
                 .map(|n| n.message.clone())
                 .chain(settings_note(ran))
+                .chain(self.law.iter().map(Told::sentence))
+                .chain(self.law.iter().flat_map(|law| law.notes.clone()))
                 .chain(shortened)
                 .collect(),
             ..report(

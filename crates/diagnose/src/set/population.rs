@@ -11,7 +11,7 @@ use stylet_record::Recording;
 use stylet_stats::linear::Factor;
 use stylet_stats::normal::quantile;
 use stylet_stats::{median_of, student};
-use stylet_tissue::{Effect, LawState, Reading};
+use stylet_tissue::{Effect, LawState, Reading, ShaftFriction};
 
 /// Draws of a prediction.
 pub const DRAWS: usize = 64;
@@ -306,23 +306,14 @@ fn open_n(population: &Population, open: &(Vec<Number>, Factor), run: &Insertion
     Some((0..here.len()).map(sd).collect())
 }
 
-/// Friction along the shaft in N as the mean law has it, a layer counting as ruptured from the next of these instants (s) on and
-/// not before: what a compensation may take from a measured force at every instant.
+/// Friction along the shaft as the mean law has it, which is told sample by sample how many layers have given way: what a compensation may
+/// take from a measured force at every instant.
 #[must_use]
-pub fn friction(population: &Population, recording: &Recording, instants: &[f64]) -> Option<Vec<f64>> {
+pub fn friction(population: &Population, recording: &Recording) -> Option<ShaftFriction> {
     let mut model = population.law.clone();
     model.own = vec![Own::default()];
     model.day_of = Vec::new();
-    let law = model.compile(0)?.law;
-    let layers = model.layers();
-    let mut state = LawState::default();
-    let (r, mut out) = (recording, Vec::with_capacity(recording.len()));
-    for i in 0..r.len() {
-        let ruptured = instants.iter().take(layers).take_while(|t| **t <= r.time_s[i]).count();
-        let (t, z, v) = (r.time_s[i], r.position_m[i], r.velocity_mps[i]);
-        out.push(law.step_imposed(&mut state, t, z, v, ruptured, |_| {}).friction_n);
-    }
-    Some(out)
+    Some(ShaftFriction::new(model.compile(0)?.law, &[], recording.sample_hz()))
 }
 
 #[cfg(test)]
@@ -575,20 +566,15 @@ mod tests {
             [1, 2].map(|layer| ShaftSlip { layer, push_n: 1.0, ..ShaftSlip::default() }.into());
         p.law.effects = slips.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
         let law = Law::new(&tissue(), &slips).expect("a law");
-        for instants in [vec![], vec![2.5], vec![2.5, 5.0], vec![5.0, 2.5]] {
-            let told = friction(&p, r, &instants).expect("friction");
+        for instants in [vec![], vec![2.5], vec![2.5, 5.0]] {
+            let mut told = friction(&p, r).expect("friction");
             let mut state = LawState::default();
             for i in 0..r.len() {
-                let t = r.time_s[i];
-                // In order: a second one before the first does not count.
-                let count = match instants.as_slice() {
-                    [a, ..] if t < *a => 0,
-                    [_, b] if t >= *b => 2,
-                    [_, ..] => 1,
-                    _ => 0,
-                };
-                let f = law.step_imposed(&mut state, t, r.position_m[i], r.velocity_mps[i], count, |_| {});
-                assert!((told[i] - f.friction_n).abs() < 1e-12, "{instants:?} {i}");
+                let (t, z, v) = (r.time_s[i], r.position_m[i], r.velocity_mps[i]);
+                let count = instants.iter().filter(|at| **at <= t).count();
+                let f = law.step_imposed(&mut state, t, z, v, count, |_| {});
+                let wanted = if v < 0.0 { f.friction_n } else { f.total_n - f.tip_n };
+                assert!((told.step(t, z, v, count) - wanted).abs() < 1e-12, "{instants:?} {i}");
             }
         }
     }

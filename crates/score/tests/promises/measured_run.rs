@@ -2,7 +2,7 @@
 
 use crate::support::detection;
 use std::cell::RefCell;
-use stylet_core::EnhanceConfig;
+use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
 use stylet_score::{Measured, Online, Trace, WithLaw};
 
@@ -14,7 +14,7 @@ fn run() -> Recording {
     Recording::new(time_s, position_m, force_n).expect("a recording")
 }
 
-fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Online, Vec<f64>) {
+fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Online, Vec<(f64, usize)>) {
     let recording = run();
     let trace = Trace {
         detections: detections_s.iter().enumerate().map(|(i, t)| detection(i + 1, *t)).collect(),
@@ -30,12 +30,18 @@ fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Onli
         back: 24,
         contact_m: 0.010,
     };
-    let asked = RefCell::new(None);
-    let online = Online::of(&measured, &trace, &EnhanceConfig::default(), |instants| {
-        asked.borrow_mut().get_or_insert_with(|| instants.to_vec());
-        friction.map(|f| vec![f; recording.len()])
+    let trace_len = recording.len();
+    let asked = RefCell::new(Vec::new());
+    let online = Online::of(&measured, &trace, &EnhanceConfig::default(), || {
+        let (friction, asked) = (friction?, &asked);
+        Some(move |sample: &Sample, ruptured| {
+            if asked.borrow().len() < trace_len {
+                asked.borrow_mut().push((sample.time_s, ruptured));
+            }
+            friction
+        })
     });
-    (online, asked.into_inner().unwrap_or_default())
+    (online, asked.into_inner())
 }
 
 #[test]
@@ -57,10 +63,15 @@ fn two_drops_cannot_share_a_detection_and_a_second_detection_is_false() {
 #[test]
 fn false_detections_are_counted_where_they_happen() {
     // The deepest sample is the first of the hold, and the turn the first of the way back.
-    let (online, asked) = judged(&[3.0], &[1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0], None);
+    let (online, asked) =
+        judged(&[3.0], &[1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0], Some(0.0));
     assert_eq!((online.found, online.false_in, online.false_hold, online.false_back), (1, 2, 3, 4));
     // Layers count as punctured from where the core says so, rightly or not.
-    assert_eq!(asked, [1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0]);
+    assert_eq!(asked.len(), 41);
+    for (time_s, ruptured) in asked {
+        let said = [1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0];
+        assert_eq!(ruptured, said.iter().filter(|t| **t <= time_s).count(), "{time_s} s");
+    }
 }
 
 #[test]
@@ -83,7 +94,11 @@ fn the_way_back_ends_where_the_tip_is_at_the_surface() {
     let trace = Trace { enhanced_n: recording.force_n.clone(), ..Trace::default() };
     let measured =
         Measured { name: "", recording: &recording, drops: &[], deepest: 20, back: 24, contact_m: 0.010 };
-    assert_eq!(Online::of(&measured, &trace, &EnhanceConfig::default(), |_| None).back_raw_n, 3.0);
+    assert_eq!(
+        Online::of(&measured, &trace, &EnhanceConfig::default(), || None::<fn(&Sample, usize) -> f64>)
+            .back_raw_n,
+        3.0
+    );
 }
 
 /// At 2 mm/s in by 20 mm, a rest of 2 s, and back; friction grips, is stretched and slips on the way back.
@@ -107,7 +122,10 @@ fn a_law_that_is_off_by_a_fifth_leaves_little_of_the_way_back_and_a_pull_is_kept
     let measured =
         Measured { name: "", recording: &recording, drops: &[], deepest: 1250, back, contact_m: 0.001 };
     let of = |factor: f64| {
-        let law = |_: &[f64]| Some(law.iter().map(|f| factor * f).collect());
+        let law = || {
+            let mut left = law.iter();
+            Some(move |_: &Sample, _| factor * left.next().copied().unwrap_or_default())
+        };
         WithLaw::of(&measured, &EnhanceConfig::default(), law).expect("a law")
     };
     let (exact, off) = (of(1.0), of(1.2));
@@ -118,6 +136,6 @@ fn a_law_that_is_off_by_a_fifth_leaves_little_of_the_way_back_and_a_pull_is_kept
         assert!((0.75..0.9).contains(&kept.pulse_kept), "{kept:?}");
         assert!((0.55..0.75).contains(&kept.step_kept), "{kept:?}");
     }
-    let none = WithLaw::of(&measured, &EnhanceConfig::default(), |_| None);
+    let none = WithLaw::of(&measured, &EnhanceConfig::default(), || None::<fn(&Sample, usize) -> f64>);
     assert_eq!(none, None);
 }

@@ -1,0 +1,110 @@
+//! Promise: `stylet enhance LOG --law EXTENDED.ron` takes the friction of a law that was fitted elsewhere, says so in every result, and refuses
+//! what is no law or has no place for one with a message that names file, place and remedy.
+
+mod support;
+
+use std::fs;
+use support::{Scratch, said, scenario, stylet};
+
+/// A gel whose friction is dry and builds up over 2 mm: in, a rest, and back.
+const LAW: &str = r#"Scenario(
+    name: "dry gel",
+    tissue: (surface_m: 0.005, layers: [
+        (thickness_m: 0.03, stiffness_n_per_m: 60.0, friction_ns_per_m2: 800.0, puncture_n: 1.2),
+        (thickness_m: 0.05, stiffness_n_per_m: 90.0, friction_ns_per_m2: 1200.0),
+    ]),
+    effects: [PreslidingFriction(c_n_per_m: 30.0, delta_m: 0.002)],
+    motion: Program(start_m: 0.0, segments: [
+        Move(velocity_mps: 0.004, duration_s: 9.0), Hold(duration_s: 2.0), Move(velocity_mps: -0.004, duration_s: 8.0),
+    ]),
+    robot: Replay,
+    sensor: ForceTorque(noise_n: 0.02),
+)"#;
+
+#[test]
+fn the_law_of_another_insertion_takes_the_friction_of_the_hold_away_and_every_result_says_whose_it_is() {
+    let scratch = Scratch::new("with-law");
+    let law = scratch.file("extended.ron", LAW);
+    let law = law.to_str().expect("a path");
+    let folder = |name: &str| scratch.path().join(name).to_str().expect("a path").to_owned();
+    let ran = stylet(&["run", law, "--seed", "5", "--out", &folder("run")]);
+    assert!(ran.status.success(), "{}", said(&ran));
+    let log = folder("run/recording.csv");
+    let alone = stylet(&["enhance", &log, "--out", &folder("alone")]);
+    assert!(alone.status.success(), "{}", said(&alone));
+    let told = stylet(&["enhance", &log, "--law", law, "--out", &folder("told")]);
+    assert!(told.status.success(), "{}", said(&told));
+    let terminal = String::from_utf8_lossy(&told.stdout);
+    assert!(
+        terminal.contains("friction along the shaft as") && terminal.contains("extended.ron"),
+        "{terminal}"
+    );
+
+    let read = |file: &str| fs::read_to_string(scratch.path().join(file)).expect("a result");
+    assert!(
+        read("told/enhance.json").contains("extended.ron") && !read("alone/enhance.json").contains("\"law\"")
+    );
+    let page = read("told/report.html");
+    assert!(page.contains("friction along the shaft as") && page.contains("--law"), "the page says whose");
+    // The drops are found as they are without.
+    assert_eq!(read("told/events.json"), read("alone/events.json"));
+
+    // In the hold the tip feels the second layer alone.
+    let mean = |file: &str, column: &str| {
+        let text = read(file);
+        let mut lines = text.lines();
+        let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+        let of = |name: &str| header.iter().position(|h| *h == name).expect("a column");
+        let (time, value) = (of("time_s"), of(column));
+        let rows = lines.map(|l| l.split(',').collect::<Vec<_>>());
+        let number = |s: &str| s.parse::<f64>().expect("a number");
+        let held: Vec<f64> =
+            rows.filter(|r| (9.5..10.5).contains(&number(r[time]))).map(|r| number(r[value])).collect();
+        assert!(held.len() > 100);
+        held.iter().sum::<f64>() / held.len() as f64
+    };
+    let (tip, alone, told) = (
+        mean("run/recording.csv", "true_tip_force_n"),
+        mean("alone/enhanced.csv", "enhanced_n"),
+        mean("told/enhanced.csv", "enhanced_n"),
+    );
+    assert!((told - tip).abs() < 0.05, "{told} N with the law, {tip} N at the tip");
+    assert!(
+        (told - tip).abs() < 0.5 * (alone - tip).abs(),
+        "{told} N with, {alone} N without, {tip} N at the tip"
+    );
+}
+
+#[test]
+fn what_is_no_law_or_has_no_place_for_one_is_refused() {
+    let scratch = Scratch::new("no-law");
+    let out = scratch.path().join("out");
+    let data =
+        scratch.file("d.csv", "time_s,position_m,force_n\n0.00,0.000,0.1\n0.01,0.001,0.2\n0.02,0.002,0.3\n");
+    let path = |p: &std::path::Path| p.to_str().expect("a path").to_owned();
+    let enhance = scratch.file("e.ron", "Enhance(surface_m: 0.01)");
+    let paper = scratch.file("p.ron", "Enhance(algorithm: Paper)");
+    let broken = scratch.file("b.ron", LAW.replacen("thickness_m: 0.03", "thickness_m: -0.03", 1));
+    let good = scenario("three_layer_latex_constant");
+    let cases: [(&[String], &[&str]); 4] = [
+        (&["--law".into(), path(&scratch.path().join("none.ron"))], &["none.ron"]),
+        (&["--law".into(), path(&enhance)], &["e.ron:1:1", "`Enhance`", "`Scenario` is expected"]),
+        (&["--law".into(), path(&broken)], &["b.ron:4", "-0.03", "positive"]),
+        (
+            &["--law".into(), path(&good), "--config".into(), path(&paper)],
+            &["three_layer_latex_constant", "Stylet", "runs Paper", "leave the law out"],
+        ),
+    ];
+    for (more, words) in cases {
+        let (data, folder) = (path(&data), path(&out));
+        let mut arguments = vec!["enhance", data.as_str(), "--out", folder.as_str()];
+        arguments.extend(more.iter().map(String::as_str));
+        let output = stylet(&arguments);
+        let message = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        for word in words {
+            assert!(message.contains(word), "{arguments:?} must say {word:?}, and says: {message}");
+        }
+        assert!(!out.exists(), "{arguments:?} left something behind");
+    }
+}
