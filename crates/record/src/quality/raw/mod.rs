@@ -50,18 +50,14 @@ pub fn look(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Raw {
 /// Samples of one number in a row that noise would have moved.
 const STANDS: usize = 20;
 
-/// Leaves out a force that stands at one number before it first changes, and after it last does: a needle in air rests somewhere within a
-/// step, always at the same place of it, where a needle in tissue goes through many.
+/// Leaves out a force that stands at one number until shortly before it first changes, and from shortly after it last does: a needle in air
+/// rests somewhere within a step, always at the same place of it, where a needle in tissue goes through many.
 fn leave_out_ends(exclude: &mut [bool], f: &[f64]) {
     let (Some(first), Some(last)) = (f.first(), f.last()) else { return };
     let before = f.iter().take_while(|x| *x == first).count();
     let after = f.iter().rev().take_while(|x| *x == last).count();
-    if before > STANDS {
-        exclude.iter_mut().take(before).for_each(|x| *x = true);
-    }
-    if after > STANDS {
-        exclude.iter_mut().rev().take(after).for_each(|x| *x = true);
-    }
+    exclude.iter_mut().take(before.saturating_sub(STANDS)).for_each(|x| *x = true);
+    exclude.iter_mut().rev().take(after.saturating_sub(STANDS)).for_each(|x| *x = true);
 }
 
 #[cfg(test)]
@@ -99,7 +95,7 @@ mod tests {
             let raw = look(&[&recording(f)], &[notes]);
             (0..300).filter(|k| raw.exclude[0][*k]).collect()
         };
-        let ends: Vec<usize> = (0..40).chain(250..300).collect();
+        let ends: Vec<usize> = (0..20).chain(270..300).collect();
         assert_eq!(marked(steps(40, 250), vec![quantised(0.5)]), ends);
         // Not where nothing says that it comes in steps, nor where it moves on soon.
         assert!(marked(steps(40, 250), Vec::new()).is_empty());
