@@ -20,20 +20,6 @@ const PASSED_SD: f64 = 2.5;
 const AGREED_M: f64 = 1e-3;
 /// No layer gives way where the needle is further back than it has been, by so much (m).
 const OLD_GROUND_M: f64 = 1e-3;
-/// Speeds so long before and after a drop (s) tell whether the needle slowed down there.
-const BESIDE_S: f64 = 0.05;
-
-/// Viscous friction at a depth, in N per m/s.
-fn friction(model: &Model, position_m: f64) -> f64 {
-    let mut front = model.tissue.surface_m;
-    let mut sum = 0.0;
-    for layer in &model.tissue.layers {
-        sum += layer.friction_ns_per_m2 * (position_m - front).clamp(0.0, layer.thickness_m);
-        front += layer.thickness_m;
-    }
-    sum
-}
-
 /// What is expected of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Expected {
@@ -122,17 +108,7 @@ fn assign(model: &Model, layers: &[Expected], b: &Blocks, drops: &[Drop], noise_
         })
         .collect();
     let new_ground = |d: &&Drop| reached.get(b.at(d.time_s)).is_none_or(|r| d.position_m > r - OLD_GROUND_M);
-    // Where the needle slows down, or turns, friction falls: that much of a drop is nobody's.
-    let drops: Vec<Drop> = drops
-        .iter()
-        .filter(new_ground)
-        .map(|d| {
-            let v = |by_s: f64| b.motion.at(d.time_s + by_s).1;
-            let rubs = friction(model, d.position_m) * (v(-BESIDE_S) - v(BESIDE_S));
-            let left = (1.0 - rubs.max(0.0) / d.size_n.max(1e-9)).max(0.0);
-            Drop { size_n: left * d.size_n, score: left * d.score, ..*d }
-        })
-        .collect();
+    let drops: Vec<Drop> = drops.iter().filter(new_ground).copied().collect();
     // Candidates of every layer: instant and cost; taking a drop saves what it costs spare.
     let spare = |d: &Drop| (SPARE_SHARE * 0.5 * d.score * d.score).min(MOST);
     let candidates: Vec<Vec<(f64, f64)>> = layers
@@ -370,19 +346,15 @@ mod tests {
         Blocks::new(&Recording::new(t, z, vec![0.0; 1800]).expect("a recording"), &[], BLOCK_S)
     }
 
-    /// Friction that ends where the needle stops is no layer that gives way, nor is what falls on the way back.
     #[test]
-    fn no_layer_gives_way_where_the_needle_stops_or_on_old_ground() {
+    fn no_layer_gives_way_on_old_ground() {
         let m = model(&[(20.0, 200.0, Some(4.0))]);
-        let of = |to_mm: f64, d: Drop| assign(&m, &expected(&m, 1.0), &there_and_back(to_mm), &[d], 0.01)[0];
-        // 20 mm of 4000 N s/m^2 are 0.8 N at 10 mm/s; the layer is expected at its face, 30 mm deep.
-        let stop =
-            |to_mm: f64, size_n: f64| Drop { time_s: (to_mm - 0.1) / 10.0, ..drop(to_mm, size_n, 30.0) };
-        assert_eq!(of(29.0, stop(29.0, 2.0)), stop(29.0, 2.0).time_s, "more than friction");
-        assert_eq!(of(29.0, stop(29.0, 0.7)), NEVER, "no more than friction");
-        let back = Drop { time_s: 5.0 + 0.4, ..drop(29.0, 2.0, 30.0) };
-        assert_ne!(of(33.0, back), back.time_s);
-        assert_eq!(of(33.0, drop(29.0, 2.0, 30.0)), drop(29.0, 2.0, 30.0).time_s);
+        let of = |d: Drop| assign(&m, &expected(&m, 1.0), &there_and_back(33.0), &[d], 0.01)[0];
+        // The layer is expected at its face, 30 mm deep.
+        let there = drop(29.0, 2.0, 30.0);
+        let back = Drop { time_s: 5.0 + 0.4, ..there };
+        assert_eq!(of(there), there.time_s);
+        assert_ne!(of(back), back.time_s);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! How far every number may go, and what is known of it before any measurement.
 
 use super::{Model, Number, Role};
-use stylet_tissue::FitScale;
+use stylet_tissue::{FitScale, Proposal};
 
 /// Smallest share of what is believed that a stiffness, friction or puncture force may have.
 const LEAST_SHARE: f64 = 0.02;
@@ -74,7 +74,8 @@ impl Model {
                         let high = (to + 3.0 * wide).min(p.high);
                         // What moves with a face has to move as finely.
                         let fine = 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4);
-                        (low, high, if p.unit == "m" { 1e-7 } else { fine })
+                        let bends = p.unit == "m" && choice.info.proposal == Proposal::Break;
+                        (low, high, if bends { 1e-7 } else { fine })
                     }
                 };
                 out.push(Number { role, low, high, mean: 0.0, sd: f64::INFINITY, step });
