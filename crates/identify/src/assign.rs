@@ -73,7 +73,7 @@ pub fn assign_all(
 ) -> Vec<Vec<f64>> {
     let layers = expected(model, trust);
     let given = |layers: &[Expected]| -> Vec<Vec<f64>> {
-        blocks.iter().zip(drops).map(|(b, d)| assign(model, layers, b, d, noise_n)).collect()
+        blocks.iter().zip(drops).map(|(b, d)| assign(layers, b, d, noise_n)).collect()
     };
     let first = given(&layers);
     let at =
@@ -94,7 +94,7 @@ pub fn assign_all(
 }
 
 /// The instants (s) of all layers of one recording.
-fn assign(model: &Model, layers: &[Expected], b: &Blocks, drops: &[Drop], noise_n: f64) -> Vec<f64> {
+fn assign(layers: &[Expected], b: &Blocks, drops: &[Drop], noise_n: f64) -> Vec<f64> {
     let z: Vec<f64> = (0..b.len()).map(|k| b.motion.at(0.5 * (b.from_s[k] + b.to_s[k])).0).collect();
     let deepest = z.iter().fold(f64::NEG_INFINITY, |m, z| m.max(*z));
     let crossing =
@@ -209,10 +209,7 @@ mod tests {
 
     /// Where each layer is said to give way, in mm.
     fn places(model: &Model, to_mm: f64, drops: &[Drop]) -> Vec<f64> {
-        assign(model, &expected(model, 1.0), &blocks(to_mm), drops, 0.01)
-            .iter()
-            .map(|t| 0.1 + 10.0 * t)
-            .collect()
+        assign(&expected(model, 1.0), &blocks(to_mm), drops, 0.01).iter().map(|t| 0.1 + 10.0 * t).collect()
     }
 
     fn are(told: &[f64], wanted: &[f64]) {
@@ -349,7 +346,7 @@ mod tests {
     #[test]
     fn no_layer_gives_way_on_old_ground() {
         let m = model(&[(20.0, 200.0, Some(4.0))]);
-        let of = |d: Drop| assign(&m, &expected(&m, 1.0), &there_and_back(33.0), &[d], 0.01)[0];
+        let of = |d: Drop| assign(&expected(&m, 1.0), &there_and_back(33.0), &[d], 0.01)[0];
         // The layer is expected at its face, 30 mm deep.
         let there = drop(29.0, 2.0, 30.0);
         let back = Drop { time_s: 5.0 + 0.4, ..there };
