@@ -154,7 +154,8 @@ pub(super) fn breaks(
 ) -> Vec<Break> {
     let n = t.len();
     let gaps: Vec<usize> = (1..n).filter(|i| t[*i] - t[i - 1] > gap_s).collect();
-    let within = |from: usize, to: usize| !gaps.iter().any(|g| *g > from && *g < to);
+    let within =
+        |from: usize, to: usize| gaps.get(gaps.partition_point(|g| *g <= from)).is_none_or(|g| *g >= to);
     let mut found: Vec<(f64, Break)> = Vec::new();
     for i in side..n.saturating_sub(side) {
         if t[i] - t[i - 1] > longest_s || !within(i - side, i) || !within(i, i + side) {
