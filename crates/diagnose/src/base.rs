@@ -1,5 +1,6 @@
 //! The base law fitted: drops of the force given to layers, numbers and instants in turn.
 
+use crate::varied::varied;
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::assign::assign_all;
@@ -8,7 +9,7 @@ use stylet_identify::drops::{Drop, drops};
 use stylet_identify::fit::{Effort, Fit, fit, fit_sharp};
 use stylet_identify::model::{Belief, Choice, Model};
 use stylet_identify::noise::{From, Noise};
-use stylet_identify::objective::Data;
+use stylet_identify::objective::{Data, residuals};
 use stylet_identify::retime::retime;
 
 /// Recordings made ready, with the drops of their forces.
@@ -48,24 +49,39 @@ impl Prepared {
 /// The first fits see misfits of this share of the largest force as noise: no detail traps them.
 const FIRST_SHARE: f64 = 0.03;
 
+/// What leaves so many times the noise of its calm stretches is no fit.
+pub(crate) const MISFIT: f64 = 1.2;
+/// Blocks of the search are averaged by so many to rank starts.
+pub(crate) const COARSER: usize = 3;
+/// The base law is begun anew where a sketch leaves less than this share of the nats.
+const APART: f64 = 0.5;
+
 /// Standard deviation in N of blocks about their neighbours.
 pub(crate) fn roughness(blocks: &[Blocks]) -> f64 {
     stylet_stats::roughness(blocks.iter().map(|b| b.f.as_slice())).max(1e-6)
 }
 
+/// Which numbers each recording has of its own: its surface, its friction.
+pub(crate) type Apart = (bool, bool);
+
+/// Those of a model.
+pub(crate) fn own(model: &Model) -> Apart {
+    (model.free.own_surface, model.free.own_friction)
+}
+
 /// Fits the base law; returns it with the noise by which it is judged. `None` when it cannot be replayed.
 #[must_use]
 pub fn base(prepared: &Prepared) -> Option<(Fit, Data)> {
-    from_belief(prepared, &[])
+    from_belief(prepared, &[], (false, false))
 }
 
 /// The law with effects, begun anew from what is believed: drops are given to layers by the law that makes them. Where an effect makes
 /// drops of its own, or steps at faces, the base law alone has taken them for ruptures and moved its faces, and nothing that begins there
 /// finds back.
 #[must_use]
-pub fn anew(prepared: &Prepared, effects: &[Choice], data: &Data) -> Option<Fit> {
-    let (found, own) = from_belief(prepared, effects)?;
-    data.worked(own.work());
+pub fn anew(prepared: &Prepared, effects: &[Choice], own: Apart, data: &Data) -> Option<Fit> {
+    let (found, used) = from_belief(prepared, effects, own)?;
+    data.worked(used.work());
     let mut model = found.model;
     retime(&mut model, data, &prepared.drop_times());
     fit(&model, data, Effort::FULL)
@@ -73,22 +89,54 @@ pub fn anew(prepared: &Prepared, effects: &[Choice], data: &Data) -> Option<Fit>
 
 /// The same in short, on blocks averaged further (`coarse`): enough to tell whether an effect is worth beginning anew.
 #[must_use]
-pub fn sketched(prepared: &Prepared, effects: &[Choice], coarse: &Data) -> Option<Fit> {
+pub fn sketched(prepared: &Prepared, effects: &[Choice], own: Apart, coarse: &Data) -> Option<Fit> {
     let less = Prepared { blocks: Arc::clone(&coarse.blocks), ..prepared.clone() };
-    let (found, own) = given(&less, effects)?;
-    coarse.worked(own.work());
+    let (found, used) = given(&less, effects, own)?;
+    coarse.worked(used.work());
     let mut model = found.model;
+    if own != (false, false) {
+        // Beside numbers that are not each recording's own yet, ruptures would go far to make up for them.
+        model = fit(&model, coarse, Effort { turns: 5, enough: 0.3 })?.model;
+    }
     retime(&mut model, coarse, &prepared.drop_times());
     fit(&model, coarse, Effort { turns: 5, enough: 0.3 })
 }
 
+/// The base law begun anew with a surface and a friction of each recording's own, where that leaves so much less that its ruptures must
+/// have been taken for what differs between the recordings.
+#[must_use]
+pub fn apart(prepared: &Prepared, found: Fit, data: Data) -> (Fit, Data) {
+    let better = || {
+        let sd_n = data.judged_by(&found.residuals.e, From::Calm).noise.sd_n();
+        if data.recordings() < 2 || found.rms_n(&data) < MISFIT * sd_n {
+            return None;
+        }
+        let coarse = data.on(data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
+        let coarse = coarse.judged_by(&residuals(&found.model, &coarse)?.e, From::Calm);
+        let stood = residuals(&found.model, &coarse)?.nats;
+        let sketch = sketched(prepared, &[], (true, true), &coarse)?;
+        if sketch.nats() > APART * stood {
+            return None;
+        }
+        let data = data.judged_by(&found.residuals.e, From::Calm);
+        let mut model = sketch.model;
+        retime(&mut model, &data, &prepared.drop_times());
+        let whole = fit(&model, &data, Effort::FULL)?;
+        let data = data.judged_by(&whole.residuals.e, From::Calm);
+        let (better, data) = varied(fit_sharp(&whole.model, &data, Effort::FULL)?, data);
+        (better.nats() < residuals(&found.model, &data)?.nats).then_some((better, data))
+    };
+    better().unwrap_or((found, data))
+}
+
 /// Drops given to layers and numbers fitted, in turn, seen from afar.
-fn given(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
+fn given(prepared: &Prepared, effects: &[Choice], own: Apart) -> Option<(Fit, Data)> {
     let rough_n = roughness(&prepared.blocks);
     let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_n()));
     let data = Data::new(Arc::clone(&prepared.blocks), wide, prepared.floor_n);
     let mut start = Model::base(Arc::clone(&prepared.belief), prepared.blocks.len());
     start.free.far = true;
+    (start.free.own_surface, start.free.own_friction) = own;
     let model = effects.iter().fold(start, |m, choice| m.with(choice.clone()));
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
@@ -104,12 +152,15 @@ fn given(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
     Some((best?, data))
 }
 
-fn from_belief(prepared: &Prepared, effects: &[Choice]) -> Option<(Fit, Data)> {
-    let (mut best, mut data) = given(prepared, effects)?;
+fn from_belief(prepared: &Prepared, effects: &[Choice], own: Apart) -> Option<(Fit, Data)> {
+    let (mut best, mut data) = given(prepared, effects, own)?;
     let times = prepared.drop_times();
     for round in 0..3 {
         data = data.judged_by(&best.residuals.e, From::Calm);
         let mut model = best.model.clone();
+        if round == 0 && own != (false, false) {
+            model = fit(&model, &data, Effort { turns: 5, enough: 0.3 })?.model;
+        }
         retime(&mut model, &data, &times);
         best = fit(&model, &data, if round == 2 { Effort::FULL } else { Effort { turns: 5, enough: 0.3 } })?;
     }
@@ -184,6 +235,9 @@ mod tests {
         (Prepared::new(f.fit.model.belief.clone(), f.data.blocks.to_vec(), 0.0), f.data)
     }
 
+    /// Nothing of their own.
+    const ALIKE: (bool, bool) = (false, false);
+
     fn rubs() -> Choice {
         Choice::new(CoulombFriction::default().info(), &[1.0])
     }
@@ -203,7 +257,8 @@ mod tests {
         let (prepared, data) = gels(60.0);
         let strength = |f: Option<Fit>| f.expect("a fit").model.effects[0].values[0];
         let coarse = data.on(data.blocks.iter().map(|b| b.coarser(3)).collect());
-        for told in [anew(&prepared, &[rubs()], &data), sketched(&prepared, &[rubs()], &coarse)] {
+        for told in [anew(&prepared, &[rubs()], ALIKE, &data), sketched(&prepared, &[rubs()], ALIKE, &coarse)]
+        {
             let told = strength(told);
             assert!((told / 60.0 - 1.0).abs() < 0.2, "{told}");
         }
@@ -216,7 +271,7 @@ mod tests {
         let coarse = data.on(data.blocks.iter().map(|b| b.coarser(3)).collect());
         let less = Prepared { blocks: Arc::clone(&coarse.blocks), ..prepared.clone() };
         let told = |p: &Prepared| {
-            let f = sketched(p, &[rubs()], &coarse).expect("a fit");
+            let f = sketched(p, &[rubs()], ALIKE, &coarse).expect("a fit");
             (f.nats(), f.model.tissue.layers[0].stiffness_n_per_m)
         };
         assert_eq!(told(&prepared), told(&less));
@@ -226,7 +281,7 @@ mod tests {
     #[test]
     fn drops_are_given_away_from_afar() {
         let (prepared, _) = gels(60.0);
-        let (told, data) = given(&prepared, &[]).expect("a fit");
+        let (told, data) = given(&prepared, &[], ALIKE).expect("a fit");
         assert!((data.noise.sd_n() / (FIRST_SHARE * prepared.largest_n()) - 1.0).abs() < 1e-12);
         let rough_n = roughness(&prepared.blocks);
         assert!(rough_n < 0.5 * data.noise.sd_n());

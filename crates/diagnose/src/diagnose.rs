@@ -1,6 +1,6 @@
 //! The diagnosis from end to end.
 
-use crate::base::{Prepared, base};
+use crate::base::{Prepared, apart, base};
 use crate::error::DiagnoseError;
 use crate::held_out::{Borne, Left, borne, floor, left_out, rms};
 use crate::intervals::{Spread, untied};
@@ -109,6 +109,7 @@ pub fn diagnose(
     );
     let (fitted, data) = base(&prepared).ok_or(DiagnoseError::NoFit)?;
     let (fitted, data) = varied(fitted, data);
+    let (fitted, data) = apart(&prepared, fitted, data);
     let mut search = Search::run(&prepared, fitted, data, &mut progress);
     let classes = rivals(&mut search);
     progress("judging");

@@ -2,6 +2,7 @@
 
 use crate::base::Prepared;
 use rayon::prelude::*;
+use stylet_identify::drops::Drop;
 use stylet_identify::fit::Column;
 use stylet_identify::look::{Gain, Look, scaled};
 use stylet_identify::model::{Choice, Model};
@@ -252,6 +253,34 @@ fn breaks(info: &'static EffectInfo, look: &Look, prepared: &Prepared) -> Vec<St
     out.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     out.truncate(2);
     out
+}
+
+/// Drops within so many m of each other are one place.
+const PLACE_M: f64 = 3e-3;
+/// Most places.
+const PLACES: usize = 6;
+
+/// Elements that break where every recording drops, whatever has been made of those drops, by what the drops are.
+pub(crate) fn at_drops(info: &'static EffectInfo, prepared: &Prepared) -> Vec<Choice> {
+    let surface = prepared.belief.tissue.surface_m;
+    let Some((first, others)) = prepared.drops.split_first() else { return Vec::new() };
+    let mut places: Vec<(f64, f64)> = first
+        .iter()
+        .filter_map(|d| {
+            let near = |e: &&Drop| (e.position_m - d.position_m).abs() < PLACE_M;
+            let same: Vec<&Drop> = others.iter().filter_map(|r| r.iter().find(near)).collect();
+            let n = (same.len() + 1) as f64;
+            let mean = |of: fn(&Drop) -> f64| (of(d) + same.iter().map(|d| of(d)).sum::<f64>()) / n;
+            (same.len() == others.len()).then(|| (mean(|d| d.position_m) - surface, mean(|d| d.size_n)))
+        })
+        .collect();
+    places.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
+    places.truncate(PLACES);
+    let from = |(depth, size): (f64, f64)| {
+        let shorter = STRETCHES_M.into_iter().filter(move |s| *s < depth);
+        shorter.map(move |s| Choice::new(info, &[depth - s, size / s, size]))
+    };
+    places.into_iter().flat_map(from).collect()
 }
 
 #[cfg(test)]

@@ -37,8 +37,10 @@ pub struct Blocks {
     pub restart: Vec<bool>,
     /// Size of the recorded force around the block in N.
     pub size_n: Vec<f64>,
-    /// Standard deviation in N of what sampling leaves open of the block's mean where the speed jumps.
+    /// Standard deviation in N of what sampling leaves open of the block's mean where the speed jumps or something gives way.
     pub doubt_n: Vec<f64>,
+    /// Instants in s at which something gives way.
+    falls_s: Vec<f64>,
     /// Times in s as they were recorded.
     pub raw_t: Arc<Vec<f64>>,
     /// Forces in N as they were recorded.
@@ -92,6 +94,7 @@ impl Blocks {
             restart: Vec::new(),
             size_n: Vec::new(),
             doubt_n: Vec::new(),
+            falls_s: Vec::new(),
             raw_t: Arc::new(recording.time_s.clone()),
             raw_f: Arc::new(recording.force_n.clone()),
             raw_block: Arc::default(),
@@ -227,10 +230,26 @@ impl Blocks {
                 self.f[lo..hi].iter().sum::<f64>().abs() / (hi - lo) as f64
             })
             .collect();
-        self.doubt_n = vec![0.0; n];
+        self.doubt_what_jumps();
+        self.pieces = Arc::new(self.pieces_shown(Shown::Sampled));
+    }
+
+    /// The same blocks with instants (s) at which the force falls because something gives way: it does so between two samples, and a law
+    /// that says where knows it within a sample only.
+    #[must_use]
+    pub fn falling(mut self, falls_s: Vec<f64>) -> Self {
+        self.falls_s = falls_s;
+        self.doubt_what_jumps();
+        self
+    }
+
+    fn doubt_what_jumps(&mut self) {
+        self.doubt_n = vec![0.0; self.len()];
         let motion = Arc::clone(&self.motion);
         motion.jumps.iter().for_each(|j| self.doubt_jump(j.between_s));
-        self.pieces = Arc::new(self.pieces_shown(Shown::Sampled));
+        let falls = std::mem::take(&mut self.falls_s);
+        falls.iter().for_each(|t| self.doubt_jump(*t));
+        self.falls_s = falls;
     }
 
     /// A force that jumps with the speed jumps between two samples: its mean is known to what lies between them.
@@ -250,9 +269,8 @@ impl Blocks {
     #[must_use]
     pub fn seen_late(&self, late_s: f64) -> Self {
         let mut b = self.clone();
-        b.doubt_n = vec![0.0; self.len()];
+        b.doubt_what_jumps();
         for jump in &self.motion.jumps {
-            b.doubt_jump(jump.between_s);
             let at_s = jump.at_s + late_s;
             let reach = jump.doubt_s.max(AT_A_JUMP * self.step_s);
             let of = |t: f64| self.raw_t.partition_point(|sample| *sample < t);
@@ -583,6 +601,12 @@ mod tests {
         for between_s in [0.0, 0.19, 0.5] {
             are(&doubts(0.096, between_s), [0.0; 10]);
         }
+        // As much where something gives way, and on blocks averaged further as long as a sample is.
+        let fell = of(even(40), force).falling(vec![0.09]);
+        are(&fell.doubt_n, at(4));
+        are(&fell.seen_late(0.01).doubt_n, at(4));
+        let coarse = of(even(80), force).falling(vec![0.09]).coarser(3);
+        near(coarse.doubt_n[1], 2.0 / 12.0 * 0.289);
         // As large as the largest of two jumps.
         let mut two = with_jump(&b, 0.0, 0.09, 0.0);
         two.doubt_jump(0.09);

@@ -2,7 +2,7 @@
 
 use crate::blocks::Blocks;
 use crate::events::{Event, judge};
-use crate::forward::{Replayed, Track, free, imposed};
+use crate::forward::{Replayed, Track, breaks, free, imposed};
 use crate::model::{Compiled, Model, NEVER, Number};
 use crate::noise::{From, LOSS, Laid, Noise};
 use rayon::prelude::*;
@@ -123,6 +123,19 @@ pub fn replay(model: &Model, data: &Data, r: usize) -> Option<Replayed> {
     imposed(&compiled, blocks, &pieces(&compiled, blocks), &model.instants[r], &mut out);
     data.worked(blocks.len() as u64);
     out.f.iter().all(|f| f.is_finite()).then_some(out)
+}
+
+/// The data with what sampling leaves open where something of a model's effects breaks: between two samples, and a depth that all
+/// recordings share puts it anywhere between them.
+#[must_use]
+pub fn breaking(model: &Model, data: &Data) -> Data {
+    let falling = |(r, b): (usize, &Blocks)| {
+        let falls = model.compile(r).map_or_else(Vec::new, |c| breaks(&c, &pieces(&c, b)));
+        b.clone().falling(falls)
+    };
+    let blocks: Vec<Blocks> = data.blocks.par_iter().enumerate().map(falling).collect();
+    let same = blocks.iter().zip(data.blocks.iter()).all(|(a, b)| a.doubt_n == b.doubt_n);
+    if same { data.clone() } else { data.on(blocks) }
 }
 
 /// A replay of a model with what it remembered, per recording: what neighbours of the model are computed from.

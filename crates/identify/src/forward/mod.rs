@@ -162,6 +162,23 @@ fn next_break(model: &Compiled, piece: &Piece, at_s: f64, broken: &mut [bool]) -
     if first.0 < piece.to_s { first.0 } else { NEVER }
 }
 
+/// The instants (s) at which something of an effect's own breaks, one after the other.
+pub fn breaks(model: &Compiled, pieces: &[Piece]) -> Vec<f64> {
+    let mut broken = vec![false; model.breaks_m.len()];
+    let mut instants = Vec::new();
+    for piece in pieces {
+        let mut at = piece.from_s;
+        loop {
+            at = next_break(model, piece, at, &mut broken);
+            if at == NEVER {
+                break;
+            }
+            instants.push(at);
+        }
+    }
+    instants
+}
+
 /// Replays with the law's own ruptures; returns the instants (s) at which they show in the recorded force.
 pub fn free(model: &Compiled, pieces: &[Piece]) -> Vec<f64> {
     let mut state = LawState::default();
