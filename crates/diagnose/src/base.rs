@@ -171,7 +171,7 @@ fn from_belief(prepared: &Prepared, effects: &[Choice], own: Apart) -> Option<(F
 
 #[cfg(test)]
 mod tests {
-    use super::{FIRST_SHARE, Prepared, anew, base, given, roughness, sketched};
+    use super::{FIRST_SHARE, Prepared, anew, apart, base, given, roughness, sketched};
     use crate::made::{believed, gel, insertions, settled};
     use std::sync::Arc;
     use stylet_identify::assign::assign_all;
@@ -180,7 +180,7 @@ mod tests {
     use stylet_identify::fit::{Effort, Fit, fit};
     use stylet_identify::model::{Choice, Model};
     use stylet_identify::noise::Noise;
-    use stylet_identify::objective::Data;
+    use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
     use stylet_tissue::{CoulombFriction, Effect};
 
@@ -261,6 +261,23 @@ mod tests {
         {
             let told = strength(told);
             assert!((told / 60.0 - 1.0).abs() < 0.2, "{told}");
+        }
+    }
+
+    #[test]
+    fn a_law_whose_ruptures_are_wrong_is_begun_anew_with_numbers_of_each_recordings_own() {
+        let (prepared, _) = gels(0.0);
+        let (found, data) = base(&prepared).expect("a fit");
+        let instants = |f: &Fit| f.model.instants.iter().map(|t| t[0]).collect::<Vec<_>>();
+        // What leaves noise stays as it is.
+        let (same, _) = apart(&prepared, found.clone(), data.clone());
+        assert_eq!((same.nats(), instants(&same)), (found.nats(), instants(&found)));
+        let mut wrong = found.clone();
+        wrong.model.instants.iter_mut().for_each(|t| t[0] -= 0.8);
+        wrong.residuals = residuals(&wrong.model, &data).expect("a replay");
+        let (told, _) = apart(&prepared, wrong, data);
+        for (told, there) in instants(&told).iter().zip(instants(&found)) {
+            assert!((told - there).abs() < 0.02, "{told} for {there}");
         }
     }
 

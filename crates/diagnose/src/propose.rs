@@ -601,6 +601,36 @@ mod tests {
     }
 
     #[test]
+    fn what_may_break_also_breaks_at_drops_that_all_recordings_show_whoever_took_them() {
+        let f = without(&[]);
+        let surface_m = f.fit.model.belief.tissue.surface_m;
+        let drop = |(depth_m, size_n): (f64, f64)| Drop {
+            time_s: 1.0,
+            position_m: surface_m + depth_m,
+            size_n,
+            score: 9.0,
+        };
+        let mut prepared = Prepared::new(f.fit.model.belief.clone(), f.data.blocks.to_vec(), 0.0);
+        let told = |prepared: &Prepared| {
+            let at = |c: &Choice| (c.values[0] + c.values[2] / c.values[1], c.values[2]);
+            super::at_drops(info("hidden_membrane"), prepared).iter().map(at).collect::<Vec<_>>()
+        };
+        // One place within three millimetres, another one that a recording does not show.
+        prepared.drops =
+            [[(5e-3, 0.2), (12e-3, 0.9)], [(6e-3, 0.3), (20e-3, 0.9)], [(7e-3, 0.4), (12e-3, 0.9)]]
+                .map(|of| of.map(drop).to_vec())
+                .to_vec();
+        let told_at = told(&prepared);
+        // Stretches of 0.8 and 3 mm are shorter than it is deep.
+        assert_eq!(told_at.len(), 2);
+        for (depth_m, size_n) in told_at {
+            assert!((depth_m - 6e-3).abs() < 1e-9 && (size_n - 0.3).abs() < 1e-9, "{depth_m} {size_n}");
+        }
+        prepared.drops[1].clear();
+        assert_eq!(told(&prepared), []);
+    }
+
+    #[test]
     fn what_may_break_begins_within_the_tissue_and_breaks_where_the_needle_has_been() {
         let whole = HiddenMembrane { depth_m: 5e-3, stiffness_n_per_m: 120.0, puncture_n: 9.0 };
         let at_surface = HiddenMembrane { depth_m: 0.0, stiffness_n_per_m: 120.0, puncture_n: 0.36 };

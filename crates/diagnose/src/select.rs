@@ -831,6 +831,28 @@ mod tests {
     }
 
     #[test]
+    fn what_breaks_is_found_in_another_valley_of_what_it_bears() {
+        let membrane: AnyEffect =
+            HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 }.into();
+        let (search, prepared) = under_way(std::slice::from_ref(&membrane), &[], |_| 0.0);
+        let times = prepared.drop_times();
+        let found = with(&search, &membrane);
+        let moved = |share: f64| {
+            let mut leader = found.clone();
+            leader.model.effects[0].values[2] *= share;
+            leader.residuals = residuals(&leader.model, &search.data).expect("a replay");
+            search.broken_elsewhere(&leader, &search.coarse(), &times)
+        };
+        for share in [0.6, 1.7] {
+            let told = moved(share).expect("a better place").model.effects[0].values[2];
+            assert!((told - 0.36).abs() < 0.02, "{told} from {share} times");
+        }
+        assert!(moved(1.0).is_none());
+        let rubs = with(&search, &rubs(1.0));
+        assert!(search.broken_elsewhere(&rubs, &search.coarse(), &times).is_none());
+    }
+
+    #[test]
     fn effects_begin_anew_where_even_the_leader_leaves_more_than_noise() {
         let there = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
         let membrane: AnyEffect = there.into();

@@ -307,6 +307,25 @@ fn what_breaks_in_a_piece_cuts_it_where_the_tip_gets_there() {
     near(next_break(&m, &piece, 2.0, &mut [false]), 2.5);
 }
 
+#[test]
+fn everything_that_breaks_breaks_once_in_the_order_in_which_the_tip_gets_there() {
+    let mut m = compiled(|_| ());
+    m.breaks_m = vec![0.0055, 0.0042, 0.02];
+    let piece = |from_s: f64, z_m: f64, v_mps: f64| Piece {
+        block: 0,
+        from_s,
+        to_s: from_s + 1.0,
+        z_m: z_m + 0.5 * v_mps,
+        v_mps,
+        a_mps2: 0.0,
+    };
+    // From 4 to 5 mm, back, and to 6 mm.
+    let told = breaks(&m, &[piece(2.0, 0.004, 0.001), piece(3.0, 0.005, -0.001), piece(4.0, 0.004, 0.002)]);
+    assert_eq!(told.len(), 2);
+    near(told[0], 2.2);
+    near(told[1], 4.75);
+}
+
 /// With pieces of 20 ms a replay remembers every 0.48 s: instants at those borders, beside them, and between.
 #[test]
 fn a_neighbour_whose_instants_moved_is_what_a_whole_replay_is() {
