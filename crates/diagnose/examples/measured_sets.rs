@@ -4,7 +4,7 @@
 //! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example measured_sets
 //! ```
 //! Files are `needle_phantom/{skin-on-muscle,skin,muscle}_*.csv` in that folder; names after `--` choose some of the three, `shifted` adds
-//! the stack with the runs of its second speed moved by 1.5 mm. Prints tables, writes nothing.
+//! the stack with the runs of its second speed moved by 1.5 mm. Prints tables and what one fit costs, writes nothing.
 
 mod guess;
 
@@ -12,7 +12,7 @@ use guess::believed;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use stylet_diagnose::set::fitted::{began, fitted};
 use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_out};
 use stylet_diagnose::set::{Insertion, first, laws};
 use stylet_record::raw::Raw;
@@ -57,6 +57,15 @@ fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<Insertion>, Box<
     Ok(out)
 }
 
+/// Processor time (s) of all threads of this process so far: what other load on the machine does not count in.
+fn cpu_s() -> f64 {
+    use nix::sys::resource::{UsageWho, getrusage};
+    getrusage(UsageWho::RUSAGE_SELF).map_or(f64::NAN, |usage| {
+        let (user, system) = (usage.user_time(), usage.system_time());
+        (user.tv_sec() + system.tv_sec()) as f64 + 1e-6 * (user.tv_usec() + system.tv_usec()) as f64
+    })
+}
+
 fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(), Box<dyn Error>> {
     let plain: Vec<&Insertion> = all.iter().collect();
     let groups = first::groups(&plain);
@@ -72,17 +81,18 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
         })
         .collect();
     let runs: Vec<&Insertion> = moved.iter().collect();
-    let began = Instant::now();
+    println!("\n# {name}: {} runs", runs.len());
+    let begin = began(&believed(layers), &runs, 1, &mut ChaCha8Rng::seed_from_u64(SEED));
+    let before = cpu_s();
+    let one = fitted(&begin, &runs, &Raw::default());
+    println!(
+        "one fit, from its first look to the last: {:.1} s of processor time, {:.3} N left",
+        cpu_s() - before,
+        one.first().map_or(f64::NAN, |f| f.rms_n())
+    );
     let law = laws::slipping(&believed(layers), &runs, &Raw::default(), &mut ChaCha8Rng::seed_from_u64(SEED));
     let fit = law.ok_or("no law could be fitted")?.fitted;
-    println!("\n# {name}: {} runs", runs.len());
-    println!(
-        "left by the fit {:.3} N; {} of {} starts agree; {:.1} s on the wall",
-        fit.rms_n(),
-        fit.starts.1,
-        fit.starts.0,
-        began.elapsed().as_secs_f64()
-    );
+    println!("left by the fit {:.3} N; {} of {} starts agree", fit.rms_n(), fit.starts.1, fit.starts.0);
     let model = &fit.fit.model;
     println!("surface {:.2} mm", 1e3 * model.tissue.surface_m);
     for (layer, choice) in model.tissue.layers.iter().zip(0..) {

@@ -61,6 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Every seed has draws of its own.
     let from = usize::try_from(seed.abs_diff(SEED))? * sets * refs.len();
+    let (measured_in, mut covered) = (m.covered, Vec::new());
     let (mut accused, mut named) = (0, vec![0; has.len()]);
     for k in 0..sets {
         let runs: Vec<Insertion> = refs
@@ -92,16 +93,28 @@ fn main() -> Result<(), Box<dyn Error>> {
             m.covered
         );
         tell(&s.laws);
-    }
-    let rate = |hits: usize| {
-        let i = wilson(hits, sets);
-        format!("{hits} of {sets} ({:.0} to {:.0} %)", 100.0 * i.low, 100.0 * i.high)
-    };
-    println!("accused of an effect that it does not have: {}", rate(accused));
-    for (n, effect) in named.iter().zip(&has) {
-        println!("{effect} named: {}", rate(*n));
+        covered.push(m.covered);
+        totals(accused, &named, &has, &covered, measured_in);
     }
     Ok(())
+}
+
+/// What all sets so far say.
+fn totals(accused: usize, named: &[usize], has: &[&str], covered: &[f64], measured_in: f64) {
+    let rate = |hits: usize| {
+        let i = wilson(hits, covered.len());
+        format!("{hits} of {} ({:.0} to {:.0} %)", covered.len(), 100.0 * i.low, 100.0 * i.high)
+    };
+    println!("so far: accused of an effect that it does not have: {}", rate(accused));
+    for (n, effect) in named.iter().zip(has) {
+        println!("    {effect} named: {}", rate(*n));
+    }
+    println!(
+        "    in band {:.3} in the mean, standard deviation {:.3}; as many as of the measured set ({measured_in:.3}): {}",
+        stylet_stats::mean(covered),
+        stylet_stats::sd(covered),
+        rate(covered.iter().filter(|c| **c >= measured_in).count())
+    );
 }
 
 /// What the parts of a law are worth.

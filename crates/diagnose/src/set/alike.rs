@@ -19,8 +19,9 @@ const FAR_S: f64 = 1e4;
 pub struct Alike {
     /// What the law lacks (N); zero where it lacks nothing that can be told from chance.
     pub mean_n: Vec<f64>,
-    /// Standard deviation (N) that this is told with.
-    pub sd_n: Vec<f64>,
+    /// By how much the band about it is wider than the law's: what is added is no scatter any more, and is told no better than the others
+    /// scatter.
+    pub wider: Vec<f64>,
 }
 
 impl Alike {
@@ -28,10 +29,12 @@ impl Alike {
     #[must_use]
     pub fn beside(&self, law: &Prediction) -> Prediction {
         let mut out = law.clone();
-        for column in [&mut out.mean, &mut out.low, &mut out.high] {
-            column.iter_mut().zip(&self.mean_n).for_each(|(f, more)| *f += more);
+        for (i, (more, wider)) in self.mean_n.iter().zip(&self.wider).enumerate() {
+            let mean = law.mean[i] + more;
+            out.low[i] = mean - wider * (law.mean[i] - law.low[i]);
+            out.high[i] = mean + wider * (law.high[i] - law.mean[i]);
+            out.mean[i] = mean;
         }
-        out.widen(&self.sd_n);
         out
     }
 }
@@ -63,15 +66,16 @@ pub fn alike(run: &Insertion, told: &Prediction, others: &[(&Insertion, Vec<f64>
         .collect();
     let time_s = &run.recording.time_s;
     let (mut mean, mut noise) = (Vec::with_capacity(time_s.len()), Vec::with_capacity(time_s.len()));
+    // What the law expects of the scatter counts as one more recording.
+    let expected: Vec<f64> =
+        told.low.iter().zip(&told.high).map(|(low, high)| (high - low) / (2.0 * HALF_BAND)).collect();
     for (i, t) in time_s.iter().enumerate() {
         let all: Vec<f64> = left
             .iter()
             .map(|(there, time_s, e)| interpolate(time_s, e, interpolate(&here, there, *t)))
             .collect();
         let m = all.iter().sum::<f64>() / n;
-        // What the law expects of the scatter counts as one more recording.
-        let expected = (told.high[i] - told.low[i]) / (2.0 * HALF_BAND);
-        let square = all.iter().map(|e| (e - m).powi(2)).sum::<f64>() + expected * expected;
+        let square = all.iter().map(|e| (e - m).powi(2)).sum::<f64>() + expected[i] * expected[i];
         mean.push(m);
         noise.push(square / n / n);
     }
@@ -88,7 +92,9 @@ pub fn alike(run: &Insertion, told: &Prediction, others: &[(&Insertion, Vec<f64>
         let (square, by_chance) = (squares[to] - squares[from], noises[to] - noises[from]);
         let share = if square > by_chance { 1.0 - by_chance / square } else { 0.0 };
         out.mean_n.push(share * mean[i]);
-        out.sd_n.push((share * noise[i]).sqrt());
+        // Another run scatters about the mean as these do, by what the mean is told with beside it.
+        let ratio = if expected[i] > 0.0 { (n + 1.0) * noise[i] / expected[i].powi(2) } else { 1.0 };
+        out.wider.push((1.0 - share + share * ratio).sqrt());
     }
     out
 }
@@ -132,11 +138,10 @@ mod tests {
         let share = 1.0 - by_chance / 0.25;
         for i in [10, 300, 700] {
             assert!((a.mean_n[i] - 0.5 * share).abs() < 1e-6, "{}", a.mean_n[i]);
-            assert!((a.sd_n[i] - (share * by_chance).sqrt()).abs() < 1e-6);
             let both = a.beside(&told);
             assert!((both.mean[i] - told.mean[i] - a.mean_n[i]).abs() < 1e-12);
-            // The band goes along, wider by what is learned badly.
-            let half = HALF_BAND * 0.1_f64.hypot(a.sd_n[i]);
+            // The band goes along: so far as it is trusted it is that of a run about the mean of three.
+            let half = HALF_BAND * ((1.0 - share) * 0.01 + share * 4.0 * by_chance).sqrt();
             assert!((both.high[i] - both.mean[i] - half).abs() < 1e-9);
             assert!((both.mean[i] - both.low[i] - half).abs() < 1e-9);
         }
@@ -149,8 +154,27 @@ mod tests {
         let told = law(&runs[0], 0.2);
         let a = alike(&runs[0], &told, &others);
         assert!(a.mean_n.iter().all(|m| *m == 0.0) && a.beside(&told).mean == told.mean);
+        let both = a.beside(&told);
+        assert!(both.high.iter().zip(&told.high).all(|(a, b)| (a - b).abs() < 1e-12));
         // Nobody to learn from.
         assert_eq!(alike(&runs[0], &told, &[]).beside(&told).mean, told.mean);
+    }
+
+    /// A law with a band as wide as what it lacks: beside the others, which agree, a run is told better than that.
+    #[test]
+    fn a_band_does_not_keep_what_is_learned_as_scatter() {
+        let runs = [0.50, 0.53, 0.47, 0.51, 0.49].map(|more| run(1.0, 2.0, |_| more));
+        let others: Vec<_> = runs[1..].iter().map(|r| (r, law(r, 0.5).mean)).collect();
+        let told = law(&runs[0], 0.5);
+        let both = alike(&runs[0], &told, &others).beside(&told);
+        let width = |p: &Prediction| p.high[300] - p.low[300];
+        assert!(width(&both) < 0.75 * width(&told), "{} of {}", width(&both), width(&told));
+        // Others that scatter more than the law says make it wider, where they are trusted at all.
+        let runs = [2.0, 2.6, 1.4, 2.5, 1.5].map(|more| run(1.0, 2.0, |_| more));
+        let others: Vec<_> = runs[1..].iter().map(|r| (r, law(r, 0.1).mean)).collect();
+        let told = law(&runs[0], 0.1);
+        let both = alike(&runs[0], &told, &others).beside(&told);
+        assert!(width(&both) > 4.0 * width(&told), "{} of {}", width(&both), width(&told));
     }
 
     /// A bump half a second after the way back begins: the runs begin at other times and rest for other times.

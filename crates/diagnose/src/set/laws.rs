@@ -41,12 +41,15 @@ const WORTH: f64 = 0.02;
 const ONE_STORY: usize = 2;
 /// only when they predict recordings left out better by this share.
 const MANY_STORIES: f64 = 0.1;
-/// An effect stays when recordings left out are predicted worse by this share without it, and by more than one standard error
-/// (Breiman and others 1984: of laws that predict about as well the simplest), or when the likelihood asks for it. It has to be more
-/// than the effect would seem to be worth by chance: a law without it has been looked for less.
+/// An effect stays when recordings left out are predicted worse by this share without it, and surely so, or when the likelihood asks
+/// for it. It has to be more than the effect would seem to be worth by chance: a law without it has been looked for less.
 const PART_WORTH: f64 = 0.05;
-/// The same of what only shapes an effect that stands: it accuses nobody, and what it costs is a number.
+/// The same of what only shapes an effect that stands: it accuses nobody, and what it costs is a number. More than one standard error
+/// is enough (Breiman and others 1984: of laws that predict about as well the simplest).
 const SHAPE_WORTH: f64 = 0.01;
+/// Probability that an effect which is worth nothing is named for what recordings left out lose without it. A shaft that slips is asked
+/// for two, waiting and letting go: one set of a hundred is accused.
+const ACCUSED: f64 = 0.005;
 
 /// Where a law comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,7 +202,7 @@ pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut Cha
     let id = DelayedPuncture::default().info().id;
     let gives_way = look(&began.iter().map(|m| less(m, id)).collect::<Vec<_>>());
     match (&waits, &gives_way) {
-        (Some(w), Some(g)) if pays(&loses(&g.scores, &w.scores), PART_WORTH) => waits,
+        (Some(w), Some(g)) if surely_pays(&loses(&g.scores, &w.scores)) => waits,
         _ => gives_way.or(waits),
     }
 }
@@ -427,10 +430,22 @@ fn loses(without: &[Option<Score>], with: &[Option<Score>]) -> Vec<f64> {
 /// Whether a part is worth having: what recordings lose without it is at least `worth`, and more than its standard error over the
 /// recordings, which are what is independent.
 fn pays(loses: &[f64], worth: f64) -> bool {
+    pays_beyond(loses, worth, 1.0)
+}
+
+/// Whether an effect may be named: the standard error of few recordings is hardly known itself, so that Student's distribution says how
+/// many of them chance would reach.
+fn surely_pays(loses: &[f64]) -> bool {
+    let dof = loses.len().saturating_sub(1).max(1) as f64;
+    pays_beyond(loses, PART_WORTH, student::quantile(1.0 - ACCUSED, dof))
+}
+
+/// Whether what recordings lose is at least `worth`, and more than so many standard errors.
+fn pays_beyond(loses: &[f64], worth: f64, errors: f64) -> bool {
     let mean = stylet_stats::mean(loses);
     let error = stylet_stats::sd(loses) / (loses.len() as f64).sqrt();
     // Squares are twice as much worse as their roots.
-    mean >= 2.0 * worth && (mean == f64::INFINITY || mean > error)
+    mean >= 2.0 * worth && (mean == f64::INFINITY || mean > errors * error)
 }
 
 /// What is missed without a part of a law.
@@ -461,7 +476,7 @@ impl Missed {
     fn effect(&self) -> bool {
         let worse = |loses: &[f64]| !loses.is_empty() && stylet_stats::mean(loses) > 0.0;
         let told = self.nats > 0.0 && (worse(&self.loses) || worse(&self.speeds_lose));
-        told || pays(&self.loses, PART_WORTH) || pays(&self.speeds_lose, PART_WORTH)
+        told || surely_pays(&self.loses) || surely_pays(&self.speeds_lose)
     }
 
     /// Whether what shapes an effect pays.
@@ -546,7 +561,8 @@ pub fn effects(model: &Model) -> Vec<&'static str> {
 mod tests {
     use super::{
         DRAWS, Kind, Law, Missed, PART_WORTH, SHAPE_WORTH, TURNS, WORTH, best_of, candidates, coarse,
-        confidence, effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts, surest,
+        confidence, effects, errors_n, held, judged, less, loses, parts, pays, several, some, starts,
+        surely_pays, surest,
     };
     use crate::base::Prepared;
     use crate::made::{self, believed, insertions, settled};
@@ -732,6 +748,24 @@ mod tests {
         assert!(pays(&[0.0, f64::INFINITY, 0.0], PART_WORTH) && !pays(&[], PART_WORTH));
         // A shape is asked for less.
         assert!(pays(&about(0.03, 9.0), SHAPE_WORTH) && !pays(&about(0.03, 9.0), PART_WORTH));
+    }
+
+    /// Tables of Student's distribution: of chance one of 200 means is beyond 4.604 standard errors of five recordings, 2.977 of fifteen.
+    #[test]
+    fn an_effect_is_named_for_what_recordings_miss_when_chance_would_hardly_reach_it() {
+        let about = |mean: f64, errors: f64, half: i32| -> Vec<f64> {
+            let shape: Vec<f64> = (-half..=half).map(f64::from).collect();
+            let error = stylet_stats::sd(&shape) / (shape.len() as f64).sqrt();
+            shape.iter().map(|x| mean + mean / errors / error * x).collect()
+        };
+        for (half, errors) in [(2, 4.604), (7, 2.977)] {
+            assert!(surely_pays(&about(0.2, errors + 0.01, half)), "{half}");
+            assert!(!surely_pays(&about(0.2, errors - 0.01, half)), "{half}");
+            assert!(!surely_pays(&about(0.099, 99.0, half)), "{half}");
+        }
+        // A drawn set of five was accused of waiting for this; a shape may be as unsure.
+        assert!(!surely_pays(&about(0.114, 2.5, 2)) && pays(&about(0.114, 2.5, 2), PART_WORTH));
+        assert!(surely_pays(&[0.0, f64::INFINITY]) && !surely_pays(&[]) && !surely_pays(&[0.9]));
     }
 
     #[test]

@@ -179,6 +179,7 @@ mod tests {
                     population: Some(Population {
                         law,
                         residual_n: [0.0; 4],
+                        pieces_n: [[0.0; 5]; 4],
                         recordings: 3,
                         days: 1,
                         open: None,
@@ -318,6 +319,7 @@ mod tests {
                     population: Some(Population {
                         law: other,
                         residual_n: [0.0; 4],
+                        pieces_n: [[0.0; 5]; 4],
                         recordings: 3,
                         days: 1,
                         open: None,

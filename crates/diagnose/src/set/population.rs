@@ -10,7 +10,7 @@ use stylet_identify::objective::residuals;
 use stylet_record::Recording;
 use stylet_stats::linear::Factor;
 use stylet_stats::normal::quantile;
-use stylet_stats::{median_of, student};
+use stylet_stats::{median_of, quantile_of_sorted, sorted, student};
 use stylet_tissue::{Effect, LawState, Reading, ShaftFriction};
 
 /// Draws of a prediction.
@@ -36,12 +36,34 @@ pub struct Population {
     pub law: Model,
     /// Root mean square (N) of what is left, by [`Part`], of a recording that takes part in the fit; single samples with their noise.
     pub residual_n: [f64; 4],
+    /// The same as five pieces of equal share: it is no normal distribution, most of it is where a layer gives way or lets go.
+    pub pieces_n: [[f64; PIECES]; 4],
     /// Recordings that the law was fitted to: what varies between them is known as well as so many can tell.
     pub recordings: usize,
     /// Days that they were made on.
     pub days: usize,
     /// What the fit leaves open of the law's own numbers, where that is asked for: the numbers, and the factor of their information.
     pub open: Option<(Vec<Number>, Factor)>,
+}
+
+/// Pieces of equal share that what is left is drawn as.
+pub const PIECES: usize = 5;
+
+/// What is left of a normal distribution in pieces of equal share.
+#[must_use]
+pub fn normal_pieces(sd_n: f64) -> [f64; PIECES] {
+    std::array::from_fn(|k| sd_n * quantile((k as f64 + 0.5) / PIECES as f64))
+}
+
+/// The same of these values (N), as much to either side, with so much noise beside them.
+fn pieces_of(left_n: &[f64], noise_n: f64) -> [f64; PIECES] {
+    let sizes = sorted(left_n.iter().map(|e| e.abs()));
+    let noise = normal_pieces(noise_n);
+    std::array::from_fn(|k| {
+        let share = ((2 * k + 1) as f64 / PIECES as f64 - 1.0).abs();
+        let size = if sizes.is_empty() { 0.0 } else { quantile_of_sorted(&sizes, share) };
+        size.hypot(noise[k]).copysign(noise[k]) * f64::from(u8::from(2 * k + 1 != PIECES))
+    })
 }
 
 /// Radical inverse of `k` in a base: points of the Halton sequence.
@@ -63,22 +85,23 @@ impl Population {
     /// What a fit says of insertions in general.
     #[must_use]
     pub fn of(fitted: &Fitted, runs: &[&Insertion]) -> Self {
-        let mut sums = [(0.0, 0.0); 4];
+        let mut left: [Vec<f64>; 4] = Default::default();
         let model = &fitted.fit.model;
         for (r, (b, e)) in fitted.data.blocks.iter().zip(&fitted.fit.residuals.e).enumerate() {
             let first = model.instants[r].iter().copied().fold(NEVER, f64::min);
             for k in (0..b.len()).filter(|k| b.used[*k]) {
                 let part = part(runs[r], 0.5 * (b.from_s[k] + b.to_s[k]), first) as usize;
-                sums[part].0 += e[k] * e[k];
-                sums[part].1 += 1.0;
+                left[part].push(e[k]);
             }
         }
         // Blocks average the noise of single samples away.
         let noise_n = median_of(runs.iter().map(|r| single(&r.recording)));
-        let of = |(s, n): (f64, f64)| (s / f64::max(n, 1.0) + noise_n * noise_n).sqrt();
+        let square = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>() / f64::max(e.len() as f64, 1.0);
+        let residual_n = std::array::from_fn(|p| (square(&left[p]) + noise_n * noise_n).sqrt());
+        let pieces_n = std::array::from_fn(|p| pieces_of(&left[p], noise_n));
         let days: BTreeSet<usize> = model.day_of.iter().copied().collect();
-        let (law, residual_n) = (model.only(&[]), sums.map(of));
-        Self { law, residual_n, recordings: runs.len(), days: days.len(), open: None }
+        let law = model.only(&[]);
+        Self { law, residual_n, pieces_n, recordings: runs.len(), days: days.len(), open: None }
     }
 
     /// The same with what the fit leaves open of the law, which a speed that took no part has to know.
@@ -253,16 +276,14 @@ pub fn predict(population: &Population, run: &Insertion, day: Option<usize>, dra
         return Prediction::default();
     }
     let beyond = population.beyond();
-    // Quantiles of a normal distribution in five pieces of equal share.
-    let pieces: Vec<f64> = (0..5).map(|k| quantile(0.1 + 0.2 * f64::from(k))).collect();
     let mut out = Prediction::default();
-    let mut all = Vec::with_capacity(forces.len() * pieces.len());
+    let mut all = Vec::with_capacity(forces.len() * PIECES);
     for i in 0..r.len() {
         out.mean.push(forces.iter().map(|f| f.0[i]).sum::<f64>() / forces.len() as f64);
         all.clear();
         for (force, first_s) in &forces {
-            let scatter = beyond * population.residual_n[part(run, r.time_s[i], *first_s) as usize];
-            all.extend(pieces.iter().map(|q| force[i] + scatter * q));
+            let pieces = &population.pieces_n[part(run, r.time_s[i], *first_s) as usize];
+            all.extend(pieces.iter().map(|left| force[i] + beyond * left));
         }
         let n = all.len();
         let (low, high) = (n / 20, n - 1 - n / 20);
@@ -318,7 +339,10 @@ pub fn friction(population: &Population, recording: &Recording) -> Option<ShaftF
 
 #[cfg(test)]
 mod tests {
-    use super::{DRAWS, PRIMES, Part, Population, drawn, friction, halton, part, predict, single};
+    use super::{
+        DRAWS, PRIMES, Part, Population, drawn, friction, halton, normal_pieces, part, pieces_of, predict,
+        single,
+    };
     use crate::made;
     use crate::set::Insertion;
     use std::sync::Arc;
@@ -365,7 +389,9 @@ mod tests {
         (law.free.own_surface, law.free.own_friction, law.free.day_surface, law.free.day_friction) =
             (true, true, true, true);
         law.days = vec![Day { surface_m: 1e-3, friction: 0.2 }];
-        Population { law, residual_n: [0.03, 0.05, 0.02, 0.07], recordings: 5, days: 1, open: None }
+        let residual_n = [0.03, 0.05, 0.02, 0.07];
+        let pieces_n = residual_n.map(normal_pieces);
+        Population { law, residual_n, pieces_n, recordings: 5, days: 1, open: None }
     }
 
     /// In by 30 mm in 6 s, a rest of 2 s, and back.
@@ -556,6 +582,24 @@ mod tests {
         assert_eq!(DRAWS, 64);
     }
 
+    /// By hand: of sizes 0 to 10 two fifths lie below 4, four fifths below 8; noise of 1 adds 0.524 and 1.282 of a normal distribution.
+    #[test]
+    fn what_is_left_is_drawn_as_it_is_distributed() {
+        let left: Vec<f64> =
+            (0..=10).map(|k| if k % 2 == 0 { f64::from(k) } else { -f64::from(k) }).collect();
+        let near = |told: [f64; 5], wanted: [f64; 2]| {
+            for (a, b) in told.iter().zip([-wanted[1], -wanted[0], 0.0, wanted[0], wanted[1]]) {
+                assert!((a - b).abs() < 1e-3, "{told:?}");
+            }
+        };
+        near(pieces_of(&left, 0.0), [4.0, 8.0]);
+        near(pieces_of(&left, 1.0), [(16.0 + 0.275_f64).sqrt(), (64.0 + 1.6424_f64).sqrt()]);
+        near(pieces_of(&[], 1.0), [0.5244, 1.2816]);
+        // Few large ones make the band no wider, as they would by their root mean square.
+        let spikes: Vec<f64> = left.iter().map(|e| if e.abs() < 9.0 { *e } else { 100.0 * e }).collect();
+        near(pieces_of(&spikes, 0.0), [4.0, 8.0]);
+    }
+
     #[test]
     fn friction_is_that_of_the_mean_law_with_layers_that_rupture_when_told() {
         let mut p = population();
@@ -605,6 +649,7 @@ mod tests {
             assert!(e.len() > 10, "{wanted:?}");
             let square = e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64 + noise_n * noise_n;
             assert!((told.residual_n[wanted as usize] - square.sqrt()).abs() < 1e-12, "{wanted:?}");
+            assert_eq!(told.pieces_n[wanted as usize], pieces_of(&e, noise_n), "{wanted:?}");
         }
         assert_eq!((told.recordings, told.law.own.len()), (2, 0));
     }
