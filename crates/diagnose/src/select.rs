@@ -580,10 +580,10 @@ pub fn at_a_bound(f: &Fit, which: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Search, at_a_bound, every_strength_is_told, extra, first_of, simpler_first};
-    use crate::base::{Prepared, anew};
+    use crate::base::Prepared;
     use crate::judge::gain;
     use crate::made::{believed, settled, showing, stage};
-    use crate::propose::{Start, at_drops, starts};
+    use crate::propose::{Start, starts};
     use crate::set::Insertion;
     use crate::set::fitted::Fitted;
     use rand::rngs::ChaCha8Rng;

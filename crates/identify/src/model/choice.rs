@@ -22,7 +22,7 @@ impl Choice {
         AnyEffect::from_parameters(self.info.id, &self.values)
     }
 
-    /// The numbers that a fit moves: those of [`stylet_tissue::Described::coordinates`].
+    /// The numbers that a fit moves: those in which an effect is searched.
     #[must_use]
     pub fn coordinates(&self) -> Vec<f64> {
         self.effect().map_or_else(|| self.values.clone(), |e| e.coordinates())
