@@ -107,8 +107,8 @@ pub fn sketched(prepared: &Prepared, effects: &[Choice], own: Apart, coarse: &Da
 #[must_use]
 pub fn apart(prepared: &Prepared, found: Fit, data: Data) -> (Fit, Data) {
     let better = || {
-        let sd_n = data.judged_by(&found.residuals.e, From::Calm).noise.sd_n();
-        if data.recordings() < 2 || found.rms_n(&data) < MISFIT * sd_n {
+        let calm = data.judged_by(&found.residuals.e, From::Calm);
+        if data.recordings() < 2 || found.rms_n(&data) < MISFIT * calm.noise.sd_n() {
             return None;
         }
         let coarse = data.on(data.blocks.par_iter().map(|b| b.coarser(COARSER)).collect());
@@ -118,11 +118,10 @@ pub fn apart(prepared: &Prepared, found: Fit, data: Data) -> (Fit, Data) {
         if sketch.nats() > APART * stood {
             return None;
         }
-        let data = data.judged_by(&found.residuals.e, From::Calm);
         let mut model = sketch.model;
-        retime(&mut model, &data, &prepared.drop_times());
-        let whole = fit(&model, &data, Effort::FULL)?;
-        let data = data.judged_by(&whole.residuals.e, From::Calm);
+        retime(&mut model, &calm, &prepared.drop_times());
+        let whole = fit(&model, &calm, Effort::FULL)?;
+        let data = calm.judged_by(&whole.residuals.e, From::Calm);
         let (better, data) = varied(fit_sharp(&whole.model, &data, Effort::FULL)?, data);
         (better.nats() < residuals(&found.model, &data)?.nats).then_some((better, data))
     };

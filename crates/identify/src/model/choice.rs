@@ -22,16 +22,7 @@ impl Choice {
         AnyEffect::from_parameters(self.info.id, &self.values)
     }
 
-    /// The numbers that a fit moves: those in which an effect is searched.
-    #[must_use]
-    pub fn coordinates(&self) -> Vec<f64> {
+    pub(super) fn coordinates(&self) -> Vec<f64> {
         self.effect().map_or_else(|| self.values.clone(), |e| e.coordinates())
-    }
-
-    /// The same effect at other coordinates, where it allows them.
-    #[must_use]
-    pub fn at(&self, coordinates: &[f64]) -> Option<Self> {
-        let effect = AnyEffect::from_coordinates(self.info.id, coordinates)?;
-        Some(Self { info: self.info, values: effect.parameters() })
     }
 }
