@@ -1,7 +1,6 @@
 //! How much better the extended model is on recordings that took no part in the fit.
 
 use crate::otherwise::otherwise;
-use crate::unmoved::{Moved, moved, shapes};
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::look::Look;
@@ -92,8 +91,6 @@ pub struct Borne {
     pub gain: f64,
     /// Share of what the fit loses without it that its force would gain by acting otherwise ([`otherwise`](crate::otherwise)).
     pub otherwise: f64,
-    /// How far its strength moves beside forces of other shapes ([`unmoved`](crate::unmoved)).
-    pub moved: Moved,
 }
 
 /// How the effects of a fit fare on recordings left out; `floor_n` is the noise.
@@ -101,7 +98,7 @@ pub struct Borne {
 pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
     let n = data.recordings();
     if n < 2 {
-        let none = Borne { spread: 0.0, gain: 0.0, otherwise: 0.0, moved: Moved::UNKNOWN };
+        let none = Borne { spread: 0.0, gain: 0.0, otherwise: 0.0 };
         return vec![none; best.model.effects.len()];
     }
     let square = |left: &[Option<Left>]| {
@@ -116,7 +113,6 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
         models.iter().enumerate().map(|(r, m)| by_its_own(m.as_ref()?, data, r)).collect();
     let with = square(&with);
     let look = Look::new(best, data);
-    let shapes = shapes(&look);
     (0..best.model.effects.len())
         .map(|k| {
             let choice = &best.model.effects[k];
@@ -130,16 +126,11 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
             }
             let without = fit(&best.model.without(k), data, Effort { turns: 3, enough: 1.0 });
             let Some(without) = without else {
-                return Borne { spread, gain: 0.0, otherwise: f64::INFINITY, moved: Moved::UNKNOWN };
+                return Borne { spread, gain: 0.0, otherwise: f64::INFINITY };
             };
             let less = square(&left_out(&without, data));
             let gain = (less - with) / (less - floor_n * floor_n).max(1e-12);
-            Borne {
-                spread,
-                gain,
-                otherwise: otherwise(&look, k, without.nats() - best.nats()),
-                moved: moved(&look, &shapes, k),
-            }
+            Borne { spread, gain, otherwise: otherwise(&look, k, without.nats() - best.nats()) }
         })
         .collect()
 }

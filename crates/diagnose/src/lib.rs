@@ -12,7 +12,7 @@
 //! | [`rivals`] | effects that explain the data as well |
 //! | [`intervals`] | intervals of every number |
 //! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
-//! | [`otherwise`], [`unmoved`] | whether an effect beside something unknown acts by its own law, and is as strong whatever the unknown is |
+//! | [`silent`], [`otherwise`] | what is heard where an unknown force is silent, and whether an effect beside it acts by its own law |
 //! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
 //! | [`predict`] | a model against recordings that took no part |
 //! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
@@ -40,10 +40,10 @@ pub mod propose;
 pub mod rivals;
 pub mod select;
 pub mod set;
+pub mod silent;
 pub mod small;
 mod stretch;
 mod told_again;
-pub mod unmoved;
 pub mod varied;
 mod visible;
 

@@ -4,9 +4,9 @@
 //! the travel since a reversal for a slack of the clamp, a bias for a force that goes with the square of the acceleration. An effect that
 //! is there needs no change where its force is let vary; one that imitates would rather act otherwise.
 
-use crate::unmoved::force;
 use stylet_identify::fit::Column;
 use stylet_identify::look::Look;
+use stylet_identify::objective::replay;
 
 /// Slower than this (m/s) is rest.
 const REST_MPS: f64 = 2e-4;
@@ -38,6 +38,15 @@ fn columns(look: &Look<'_>, effect: usize) -> Option<Vec<Column>> {
         }
     }
     Some(with.iter().map(|w| look.of_force(&grown(&forces, w))).collect())
+}
+
+/// The force of an effect in every block (N), by recording.
+fn force(look: &Look<'_>, effect: usize) -> Option<Vec<Vec<f64>>> {
+    let (fit, data) = (look.fit, look.data);
+    let less = fit.model.without(effect);
+    let of = |model, r| Some(replay(model, data, r)?.f);
+    let part = |r| Some(of(&fit.model, r)?.iter().zip(of(&less, r)?).map(|(a, b)| a - b).collect());
+    (0..data.recordings()).map(part).collect()
 }
 
 /// Forces times how far off its mean something is, in its standard deviations.

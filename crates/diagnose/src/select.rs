@@ -3,6 +3,7 @@
 use crate::base::{COARSER, MISFIT, Prepared, anew, own, sketched};
 use crate::judge::{LEAST, cost, gain};
 use crate::propose::{Start, at_drops, starts};
+use crate::silent::heard;
 use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, Tangent, fit, fit_below, fit_sharp};
 use stylet_identify::late::placed;
@@ -126,6 +127,50 @@ impl Search {
             search.prune();
         }
         search
+    }
+
+    /// The search gone on by what is heard where the unknown is silent.
+    #[must_use]
+    pub fn listen(&self, prepared: &Prepared) -> Option<Self> {
+        let (best, data) = heard(&self.best, &self.data)?;
+        let mut search = Self {
+            base: self.base.clone(),
+            best,
+            data,
+            stages: self.stages.clone(),
+            restarts: 0,
+            beginnings: 0,
+            lines: Vec::new(),
+        };
+        while search.best.model.effects.len() < MOST && search.grow(prepared) {
+            (search.best, search.data) = heard(&search.best, &search.data)?;
+        }
+        search.prune();
+        (search.best, search.data) = heard(&search.best, &search.data)?;
+        Some(search)
+    }
+
+    /// The search with the law of another one, which listened, where that is worth more by all that was recorded.
+    #[must_use]
+    pub fn taken_over(&self, listened: &Self, prepared: &Prepared) -> Option<Self> {
+        let mut model = listened.best.model.clone();
+        retime(&mut model, &self.data, &prepared.drop_times());
+        let f = fit(&model, &self.data, Effort::FULL)?;
+        let needed = extra(&self.best, &f, &self.data);
+        if self.best.nats() - f.nats() < needed || !gain(&self.best, &f, &self.data).pays(needed) {
+            return None;
+        }
+        let mut search = Self {
+            base: self.base.clone(),
+            best: self.best.clone(),
+            data: self.data.clone(),
+            stages: listened.stages.clone(),
+            restarts: 0,
+            beginnings: 0,
+            lines: Vec::new(),
+        };
+        search.settle(f);
+        Some(search)
     }
 
     /// Takes one more effect; false when none is worth it.
@@ -828,6 +873,25 @@ mod tests {
         let (noise, nats) = (search.data.noise.clone(), search.best.nats());
         search.see_lines();
         assert!(search.lines.is_empty() && search.data.noise == noise && search.best.nats() == nats);
+    }
+
+    /// A drift beside something in the middle of the recordings that no effect explains.
+    #[test]
+    fn a_search_goes_on_where_the_unknown_is_silent_and_takes_over_what_is_worth_it_by_all() {
+        let lump = |t: f64| 0.2 * (-(4.0 * (t - 4.0)).powi(2)).exp();
+        let (search, prepared) = under_way(&[], &[], |t| 0.02 * t + lump(t));
+        let told = search.listen(&prepared).expect("a fit");
+        let of =
+            |s: &Search| s.best.model.effects.iter().map(|e| (e.info.id, e.values[0])).collect::<Vec<_>>();
+        let found = of(&told);
+        assert!(found.len() == 1 && found[0].0 == "force_drift", "{found:?}");
+        assert!((found[0].1 / 0.02 - 1.0).abs() < 0.03, "{found:?}");
+        assert!(told.stages.last().is_some_and(|s| s.taken.is_none()) && search.stages.is_empty());
+        let taken = search.taken_over(&told, &prepared).expect("a better law");
+        assert_eq!(of(&taken)[0].0, "force_drift");
+        assert!(taken.data.blocks.iter().all(|b| b.doubt_n[b.at(4.0)] == 0.0));
+        assert!(search.taken_over(&search, &prepared).is_none());
+        assert!(taken.taken_over(&told, &prepared).is_none());
     }
 
     #[test]

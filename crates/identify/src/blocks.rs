@@ -41,6 +41,8 @@ pub struct Blocks {
     pub doubt_n: Vec<f64>,
     /// Instants in s at which something gives way.
     falls_s: Vec<f64>,
+    /// Standard deviation in N of what no law explains around every block; empty where nothing is unexplained.
+    unexplained_n: Vec<f64>,
     /// Times in s as they were recorded.
     pub raw_t: Arc<Vec<f64>>,
     /// Forces in N as they were recorded.
@@ -94,6 +96,7 @@ impl Blocks {
             restart: Vec::new(),
             size_n: Vec::new(),
             doubt_n: Vec::new(),
+            unexplained_n: Vec::new(),
             falls_s: Vec::new(),
             raw_t: Arc::new(recording.time_s.clone()),
             raw_f: Arc::new(recording.force_n.clone()),
@@ -198,6 +201,7 @@ impl Blocks {
         }
         b.used.clear();
         b.restart.clear();
+        let unexplained_n = std::mem::take(&mut b.unexplained_n);
         let n = self.len();
         let mut i = 0;
         while i < n {
@@ -210,6 +214,9 @@ impl Blocks {
             b.to_s.push(self.to_s[to - 1]);
             b.f.push(self.f[i..to].iter().sum::<f64>() / (to - i) as f64);
             b.used.push(whole);
+            if let Some(of) = unexplained_n.get(i..to) {
+                b.unexplained_n.push(of.iter().map(|u| u * u).sum::<f64>().sqrt() / of.len() as f64);
+            }
             i = to;
         }
         b.finish();
@@ -243,8 +250,17 @@ impl Blocks {
         self
     }
 
+    /// The same blocks where around each of them so much (N, standard deviation) is left that no law explains: it is in doubt by that.
+    #[must_use]
+    pub fn unexplained(mut self, sd_n: Vec<f64>) -> Self {
+        self.unexplained_n = sd_n;
+        self.doubt_what_jumps();
+        self
+    }
+
     fn doubt_what_jumps(&mut self) {
-        self.doubt_n = vec![0.0; self.len()];
+        self.doubt_n.clone_from(&self.unexplained_n);
+        self.doubt_n.resize(self.len(), 0.0);
         let motion = Arc::clone(&self.motion);
         motion.jumps.iter().for_each(|j| self.doubt_jump(j.between_s));
         let falls = std::mem::take(&mut self.falls_s);
@@ -613,6 +629,19 @@ mod tests {
         two.doubt_n[4] *= 3.0;
         two.doubt_jump(0.09);
         near(two.doubt_n[4], 1.5 * 0.289);
+    }
+
+    #[test]
+    fn a_mean_is_in_doubt_by_what_no_law_explains_around_it() {
+        let force = |t: f64| if t < 0.09 { 1.0 } else { 3.0 };
+        let left: Vec<f64> = (0..10).map(|k| 0.1 * f64::from(k)).collect();
+        let b = of(even(40), force).unexplained(left.clone());
+        are(&b.doubt_n, left.clone());
+        // Where something gives way by what is more, and white means of three are as sure as their number tells.
+        let fell = b.clone().falling(vec![0.09]);
+        are(&fell.doubt_n, left.iter().map(|l| l.max(if *l == 0.4 { 0.5 * 0.289 } else { 0.0 })));
+        near(b.coarser(2).doubt_n[1], (0.04_f64 + 0.09).sqrt() / 2.0);
+        are(&fell.unexplained(vec![0.0; 10]).falling(Vec::new()).doubt_n, [0.0; 10]);
     }
 
     #[test]
