@@ -1,6 +1,6 @@
 //! Layers measured alone, put together: does a layer behave alone as it does in a stack?
 
-use crate::set::first::{Insertion, plain};
+use crate::set::first::{Insertion, RATE, plain};
 use crate::set::fitted::{Fitted, blocks, refitted};
 use crate::set::laws::{Kind, slipping};
 use crate::set::left_out::{floor, one_left_out, score};
@@ -14,7 +14,7 @@ use stylet_identify::model::{Belief, Choice, Day, Model};
 use stylet_record::Recording;
 use stylet_record::raw::{self, Raw};
 use stylet_stats::median_of;
-use stylet_tissue::Tissue;
+use stylet_tissue::{AnyEffect, DeepIndentation, Effect, ShaftSlip, Tissue};
 
 /// Seed of what the starts begin with.
 const SEED: u64 = 2;
@@ -40,9 +40,11 @@ pub fn compose(
         let floors: Option<Vec<f64>> = floor(&runs).iter().map(|f| f.as_ref().map(|f| f.0.rmse_n)).collect();
         let errors: Vec<f64> = one_left_out(&fit, &runs).iter().map(|s| s.rmse_n).collect();
         told.push((name.clone(), floors.map(|f| stylet_stats::mean(&f)), stylet_stats::mean(&errors)));
-        fits.push((Population::of(&fit, &runs), fit));
+        let speed_mps = median_of(runs.iter().map(|r| r.speed_mps));
+        let law = Model { effects: dry(&fit.fit.model, speed_mps), ..fit.fit.model.clone() };
+        fits.push((Population::of(&fit, &runs), law));
     }
-    let models: Vec<&Model> = fits.iter().map(|(_, f)| &f.fit.model).collect();
+    let models: Vec<&Model> = fits.iter().map(|(_, law)| law).collect();
     // Where the whole begins is a matter of its set-up: where its force does. What lies beneath lies where it did.
     let begins = |runs: &mut dyn Iterator<Item = &Insertion>| median_of(runs.map(|r| r.contact_m));
     let moved_m = begins(&mut whole.iter().copied()) - begins(&mut alone.first()?.1.iter());
@@ -70,7 +72,29 @@ fn by_itself(kind: Kind, tissue: &Tissue, runs: &[&Insertion]) -> Option<Fitted>
     refitted(&model, blocks(runs, &raw), drops.collect())
 }
 
+/// The effects of a law that was measured at one speed: where it does not know what another one does, sliding is dry. The law holds the
+/// exponent of the speed at nothing, which is friction that grows with the speed as the contact slips under a force.
+fn dry(model: &Model, speed_mps: f64) -> Vec<Choice> {
+    let held = |e: usize| model.bound.iter().any(|b| (b.effect, b.parameter, b.like) == (e, RATE, None));
+    let one = |(e, choice): (usize, &Choice)| match choice.effect() {
+        Some(AnyEffect::ShaftSlip(s)) if held(e) => {
+            let dry = ShaftSlip {
+                rate: -1.0 / s.exponent,
+                push_n: s.plateau_n(speed_mps),
+                pull_n: -s.plateau_n(-speed_mps),
+                ..s
+            };
+            Choice::new(choice.info, &AnyEffect::from(dry).parameters())
+        }
+        _ => choice.clone(),
+    };
+    model.effects.iter().enumerate().map(one).collect()
+}
+
 /// One model of the layers of several: each where it was found, but the first one's surface, which has moved by so many m.
+///
+/// A layer that lies on another takes its far face along where it is pressed, which nobody has seen of a layer alone: it gives way by what
+/// it bears, where that is known, and not where the next one lies at rest.
 fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> {
     let first = *alone.first()?;
     let mut model = first.only(&[]);
@@ -105,7 +129,16 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
             }
         }
     }
+    let waits = |l: usize| {
+        let of = |c: &Choice| matches!(c.effect(), Some(AnyEffect::DelayedPuncture(d)) if d.layer == l + 1);
+        model.effects.iter().any(of)
+    };
     let layers = tissue.layers.len();
+    if tissue.layers.iter().take(layers - 1).enumerate().all(|(l, x)| x.puncture_n.is_some() || waits(l)) {
+        let pushed = DeepIndentation::default();
+        let farthest: Vec<f64> = pushed.info().parameters.iter().map(|p| p.high).collect();
+        model.effects.push(Choice::new(pushed.info(), &farthest));
+    }
     model.belief = Arc::new(Belief {
         tissue: tissue.clone(),
         given: Vec::new(),
@@ -122,12 +155,14 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
 
 #[cfg(test)]
 mod tests {
-    use super::{Kind, compose, together};
+    use super::{Kind, RATE, compose, dry, together};
     use crate::made::{gel, insertions};
     use crate::set::Insertion;
     use std::sync::Arc;
-    use stylet_identify::model::{Belief, Choice, Model};
-    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, Layer, LetGo, ShaftSlip, Tissue};
+    use stylet_identify::model::{Belief, Bound, Choice, Model};
+    use stylet_tissue::{
+        AnyEffect, CoulombFriction, DelayedPuncture, Effect, Layer, LetGo, ShaftSlip, Tissue,
+    };
 
     fn tissue(names: &[&str], surface_m: f64, thickness_m: f64, k: f64) -> Tissue {
         let layer = |name: &&str| Layer {
@@ -195,8 +230,39 @@ mod tests {
             (&[4.0, 4.0][..], &[0.0, 0.0][..])
         );
         assert!(m.days.is_empty() && m.day_of.is_empty() && m.bound.is_empty());
+        // Nobody knows what the upper one bears: it gives way at its far face.
+        let far = |m: &Model| m.effects.iter().find(|e| e.info.id == "deep_indentation").map(|e| e.values[0]);
+        assert_eq!(far(&m), None);
+        let mut known = first.clone();
+        known.tissue.layers[0].puncture_n = Some(3.0);
+        let told = together(&believed, &[&known, &second], 0.0).expect("a law");
+        assert_eq!((far(&told), told.tissue.layers[0].puncture_n), (Some(1.0), Some(3.0)));
+        let waits: AnyEffect = DelayedPuncture { layer: 1, force_n: 3.0, exponent: 10.0 }.into();
+        first.effects.push(Choice::new(waits.info(), &waits.parameters()));
+        assert_eq!(far(&together(&believed, &[&first, &second], 0.0).expect("a law")), Some(1.0));
         assert!(together(&believed, &[], 0.0).is_none());
         assert!(together(&tissue(&["one"], 0.0, 0.03, 1.0), &[&first, &second], 0.0).is_none());
+    }
+
+    /// A law of one speed slides by as much at that speed as it did, and by the same at any other one.
+    #[test]
+    fn sliding_is_dry_where_one_speed_is_all_that_was_measured() {
+        let slip = ShaftSlip { push_n: 2.0, pull_n: 1.5, exponent: 8.0, ..ShaftSlip::default() };
+        let mut m = alone(0.004, 100.0, &[slip.clone().into(), LetGo { layer: 1, depth_m: 1e-3 }.into()]);
+        let told = |m: &Model| match dry(m, 2e-3)[0].effect() {
+            Some(AnyEffect::ShaftSlip(s)) => s,
+            other => unreachable!("{other:?}"),
+        };
+        // Where a rate was fitted, it stays.
+        assert_eq!(told(&m), slip);
+        m.bound = vec![Bound { effect: 0, parameter: RATE, like: None }];
+        let s = told(&m);
+        assert!((s.plateau_n(2e-3) - slip.plateau_n(2e-3)).abs() < 1e-12);
+        for v_mps in [1e-3, 4e-3] {
+            assert!((s.plateau_n(v_mps) - slip.plateau_n(2e-3)).abs() < 1e-12);
+            assert!((s.plateau_n(-v_mps) - slip.plateau_n(-2e-3)).abs() < 1e-12);
+        }
+        assert_eq!((s.exponent, s.kept, dry(&m, 2e-3).len()), (slip.exponent, slip.kept, 2));
     }
 
     /// A stack that is the layer itself, set up a millimetre deeper.
