@@ -129,9 +129,9 @@ pub fn base_parameters(told: &[Told], believed: &Tissue) -> Vec<BaseParameter> {
 #[cfg(test)]
 mod tests {
     use super::{base_parameters, estimates, values};
-    use crate::set::population::PIECES;
     use crate::set::fitted::Fitted;
     use crate::set::left_out::Out;
+    use crate::set::population::PIECES;
     use crate::set::population::Population;
     use std::sync::Arc;
     use stylet_identify::fit::Fit;
