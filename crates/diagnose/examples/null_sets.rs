@@ -8,26 +8,22 @@
 //! The belief is the base law, so that every effect of the law is one that is taken away from it. A third word is another seed of what is
 //! drawn.
 
+mod drawn;
+
+use drawn::{ALL, one};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
 use std::path::Path;
 use stylet_diagnose::set::Insertion;
 use stylet_diagnose::set::dataset::{Dataset, find};
 use stylet_diagnose::set::instrument::Checks;
 use stylet_diagnose::set::laws::{Laws, effects};
-use stylet_diagnose::set::population::{Population, drawn, part};
+use stylet_diagnose::set::population::Population;
 use stylet_diagnose::set::study::study;
 use stylet_stats::wilson;
 
 /// Seed of what is drawn.
 const SEED: u64 = 125;
-/// Correlation time (s) of what the law leaves.
-const SLOW_S: f64 = 0.5;
-/// Recordings of a population that is known.
-const ALL: usize = 1_000_000;
-/// Noise of the sensor (N).
-const NOISE_N: f64 = 0.012;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
@@ -131,28 +127,4 @@ fn tell(laws: &Laws) {
             if p.kept { "" } else { "; taken away" }
         );
     }
-}
-
-/// A drawn insertion.
-fn one(
-    population: &Population,
-    run: &Insertion,
-    k: usize,
-    layers: usize,
-    rng: &mut ChaCha8Rng,
-) -> Option<Insertion> {
-    let mut recording = run.recording.clone();
-    recording.force_n = drawn(population, run, k, Some(0).filter(|_| !population.law.days.is_empty()))?;
-    let mut slow: f64 = StandardNormal.sample(rng);
-    let first_s = run.ruptures_s.iter().copied().fold(f64::INFINITY, f64::min);
-    for i in 0..recording.len() {
-        let t = recording.time_s[i];
-        let keep = if i > 0 { libm::exp(-(t - recording.time_s[i - 1]) / SLOW_S) } else { 0.0 };
-        let (shock, white): (f64, f64) = (StandardNormal.sample(rng), StandardNormal.sample(rng));
-        slow = keep * slow + (1.0 - keep * keep).max(0.0).sqrt() * shock;
-        let left_n = population.residual_n[part(run, t, first_s) as usize];
-        let touches = recording.position_m[i] > population.law.tissue.surface_m;
-        recording.force_n[i] += if touches { left_n * slow } else { 0.0 } + NOISE_N * white;
-    }
-    Some(Insertion::new(format!("{} {k}", run.name), recording, layers))
 }

@@ -3,7 +3,7 @@
 //! ```sh
 //! cargo run --release -p stylet-diagnose --example other_sets -- 12 1
 //! ```
-//! The words are how many sets and the seed of what is drawn. Even sets follow a shaft that slips, with numbers up to a factor of 2.5 from
+//! The words are how many sets and the seed of what is drawn; a third one studies that set alone. Even sets follow a shaft that slips, with numbers up to a factor of 2.5 from
 //! those of the phantoms; odd ones the referee's rich law (bristles, foundation springs, damage, tearing in steps). Five to fifteen
 //! runs at one to three speeds, each speed on a day of its own; one or two layers; strokes, rests and noise differ from set to set. Told
 //! is the error on runs left out over the floor, the mean of the other runs at the same speed: of the law, and of law and what it
@@ -45,8 +45,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let sets: u64 = words.next().map_or(Ok(12), |w| w.parse())?;
     let seed: u64 = words.next().map_or(Ok(1), |w| w.parse())?;
+    let only: Option<u64> = words.next().map(|w| w.parse()).transpose()?;
     let (mut by_law, mut told) = (Vec::new(), Vec::new());
-    for k in 0..sets {
+    for k in (0..sets).filter(|k| only.is_none_or(|only| *k == only)) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed * 1000 + k);
         let (layers, runs) = set(k % 2 == 1, &mut rng)?;
         let refs: Vec<&Insertion> = runs.iter().collect();

@@ -1,20 +1,21 @@
 //! Layers measured alone, put together: does a layer behave alone as it does in a stack?
 
-use crate::set::first::{Insertion, plain};
+use crate::set::first::{Insertion, RATE, plain};
 use crate::set::fitted::{Fitted, blocks, refitted};
 use crate::set::laws::{Kind, slipping};
 use crate::set::left_out::{floor, one_left_out, score};
-use crate::set::population::{DRAWS, Population, predict};
+use crate::set::numbers::reached;
+use crate::set::population::{DRAWS, Population, moved, predict};
 use crate::set::repeats::Alone;
 use crate::set::study::speeds;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rayon::prelude::*;
 use std::sync::Arc;
-use stylet_identify::model::{Belief, Choice, Day, Model};
+use stylet_identify::model::{Belief, Choice, Day, Model, NEVER, Own, Role};
 use stylet_record::Recording;
 use stylet_record::raw::{self, Raw};
 use stylet_stats::median_of;
-use stylet_tissue::Tissue;
+use stylet_tissue::{AnyEffect, DeepIndentation, Effect, ShaftSlip, Tissue};
 
 /// Seed of what the starts begin with.
 const SEED: u64 = 2;
@@ -40,15 +41,26 @@ pub fn compose(
         let floors: Option<Vec<f64>> = floor(&runs).iter().map(|f| f.as_ref().map(|f| f.0.rmse_n)).collect();
         let errors: Vec<f64> = one_left_out(&fit, &runs).iter().map(|s| s.rmse_n).collect();
         told.push((name.clone(), floors.map(|f| stylet_stats::mean(&f)), stylet_stats::mean(&errors)));
-        fits.push((Population::of(&fit, &runs), fit));
+        let speed_mps = median_of(runs.iter().map(|r| r.speed_mps));
+        let like = fits.first().and_then(|(_, law): &(Population, Model)| shaft(law));
+        let law =
+            Model { effects: told_of(&fit.fit.model, speed_mps, like.as_ref()), ..fit.fit.model.clone() };
+        fits.push((Population::of(&fit, &runs), law));
     }
-    let models: Vec<&Model> = fits.iter().map(|(_, f)| &f.fit.model).collect();
-    // Where the whole begins is a matter of its set-up: where its force does. What lies beneath lies where it did.
+    let models: Vec<&Model> = fits.iter().map(|(_, law)| law).collect();
+    // Where the whole begins is a matter of its set-up: where its force does, and where the others build theirs up. What lies beneath lies
+    // where it did.
     let begins = |runs: &mut dyn Iterator<Item = &Insertion>| median_of(runs.map(|r| r.contact_m));
     let moved_m = begins(&mut whole.iter().copied()) - begins(&mut alone.first()?.1.iter());
-    let population = Population { law: together(believed, &models, moved_m)?, ..fits.first()?.0.clone() };
-    let errors: Vec<f64> =
-        whole.par_iter().map(|run| score(run, &predict(&population, run, None, DRAWS)).rmse_n).collect();
+    let law = together(believed, &models, moved_m)?;
+    let rises_m: Vec<f64> = whole.iter().map(|run| rises_m(&law, run)).collect();
+    let one = |r: usize| {
+        let others = (0..whole.len()).filter(|o| *o != r && rises_m[*o].is_finite()).map(|o| rises_m[o]);
+        let further_m = Some(median_of(others)).filter(|m| m.is_finite()).unwrap_or(0.0);
+        let population = Population { law: moved_by(&law, further_m), ..fits[0].0.clone() };
+        score(whole[r], &predict(&population, whole[r], None, DRAWS)).rmse_n
+    };
+    let errors: Vec<f64> = (0..whole.len()).into_par_iter().map(one).collect();
     let of =
         |members: &[usize]| members.iter().map(|i| errors[*i]).sum::<f64>() / members.len().max(1) as f64;
     let composed_n: Vec<f64> = speeds(whole).iter().map(|(_, members)| of(members)).collect();
@@ -70,7 +82,108 @@ fn by_itself(kind: Kind, tissue: &Tissue, runs: &[&Insertion]) -> Option<Fitted>
     refitted(&model, blocks(runs, &raw), drops.collect())
 }
 
+/// The effects of a law that was measured alone, with what its own runs do not tell.
+///
+/// Measured at one speed it does not know what another one does: there sliding is dry. The law holds the exponent of the speed at nothing,
+/// which is friction that grows with the speed as the contact slips under a force. And where a number of the shaft's stands at its bound,
+/// nothing tells it: it is that of the first layer, `like`, for what the shaft decides is common to the layers; of a hold when pushed that
+/// is what it is to the hold when pulled, and what is held right after the rupture stays.
+fn told_of(model: &Model, speed_mps: f64, like: Option<&ShaftSlip>) -> Vec<Choice> {
+    let held = |e: usize| model.bound.iter().any(|b| (b.effect, b.parameter, b.like) == (e, RATE, None));
+    let one = |(e, choice): (usize, &Choice)| match choice.effect() {
+        Some(AnyEffect::ShaftSlip(mut s)) => {
+            let unknown = |path: &str| {
+                let place = choice.info.parameters.iter().position(|p| p.path == path);
+                place.is_some_and(|parameter| reached(model, Role::Effect { effect: e, parameter }))
+            };
+            if let Some(like) = like.filter(|l| l.push_n > 0.0 && l.pull_n > 0.0) {
+                if unknown("push_n") {
+                    let after_n = s.kept * s.push_n;
+                    s.push_n = s.pull_n * like.push_n / like.pull_n;
+                    s.kept = if s.push_n > 0.0 { after_n / s.push_n } else { like.kept }.min(1.0);
+                }
+                if unknown("exponent") {
+                    s.exponent = like.exponent;
+                }
+                if unknown("wear_per_m") {
+                    s.wear_per_m = like.wear_per_m;
+                }
+            }
+            if held(e) {
+                let (push_n, pull_n) = (s.plateau_n(speed_mps), -s.plateau_n(-speed_mps));
+                s = ShaftSlip { rate: -1.0 / s.exponent, push_n, pull_n, ..s };
+            }
+            Choice::new(choice.info, &AnyEffect::from(s).parameters())
+        }
+        _ => choice.clone(),
+    };
+    model.effects.iter().enumerate().map(one).collect()
+}
+
+/// The shaft that a law has.
+fn shaft(model: &Model) -> Option<ShaftSlip> {
+    model.effects.iter().find_map(|c| match c.effect() {
+        Some(AnyEffect::ShaftSlip(s)) => Some(s),
+        _ => None,
+    })
+}
+
+/// What a layer holds right after it has given way (N): one that gives way at this shows no drop.
+fn after_n(model: &Model, layer: usize) -> f64 {
+    let holds = model.effects.iter().find_map(|c| match c.effect() {
+        Some(AnyEffect::ShaftSlip(s)) if s.layer == layer + 1 => Some(s.kept * s.push_n),
+        _ => None,
+    });
+    holds.unwrap_or(0.0).max(f64::EPSILON)
+}
+
+/// What a layer bears before it gives way (N), at once or for a while.
+fn bears_n(model: &Model, layer: usize) -> Option<f64> {
+    let waits = model.effects.iter().find_map(|c| match c.effect() {
+        Some(AnyEffect::DelayedPuncture(d)) if d.layer == layer + 1 => Some(d.force_n),
+        _ => None,
+    });
+    waits.or(model.tissue.layers.get(layer)?.puncture_n)
+}
+
+/// A law whose surface lies so many m further in; what lies beneath the first layer stays.
+fn moved_by(law: &Model, further_m: f64) -> Model {
+    let mut out = law.clone();
+    out.tissue.surface_m += further_m;
+    if let [first, _, ..] = &mut out.tissue.layers[..] {
+        first.thickness_m = (first.thickness_m - further_m).max(LEAST_M);
+    }
+    out
+}
+
+/// How much further in (m) the surface of a law would lie where a run builds its force up as the law does: least squares from contact to
+/// the first rupture.
+fn rises_m(law: &Model, run: &Insertion) -> f64 {
+    let mut law = law.clone();
+    (law.own, law.instants) = (vec![Own::default()], vec![vec![NEVER; law.layers()]]);
+    let (r, first_s) = (&run.recording, run.ruptures_s.iter().copied().fold(NEVER, f64::min));
+    let mut further_m = 0.0;
+    for _ in 0..8 {
+        let here = moved(&moved_by(&law, further_m), run);
+        let Some((here, there)) = here.zip(moved(&moved_by(&law, further_m + 1e-6), run)) else { break };
+        let until_s = first_s.min(here.1).min(there.1);
+        let way = (run.phases.start..=run.phases.deepest.min(r.len() - 1)).filter(|i| r.time_s[*i] < until_s);
+        let (along, square) = way.fold((0.0, 0.0), |(along, square), i| {
+            let slope = 1e6 * (there.0[i] - here.0[i]);
+            (along + slope * (r.force_n[i] - here.0[i]), square + slope * slope)
+        });
+        if square > 0.0 {
+            further_m += along / square;
+        }
+    }
+    further_m
+}
+
 /// One model of the layers of several: each where it was found, but the first one's surface, which has moved by so many m.
+///
+/// A layer that lies on another takes its far face along where it is pressed, which nobody has seen of a layer alone: it gives way by what
+/// it bears, where that is known, and not where the next one lies at rest. Pressed, it rests on the next one, which bears the same force:
+/// one that bears less than the layer above has nothing left to bear when that one is through, and gives way with it.
 fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> {
     let first = *alone.first()?;
     let mut model = first.only(&[]);
@@ -105,7 +218,27 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
             }
         }
     }
-    let layers = tissue.layers.len();
+    model.tissue = tissue;
+    let layers = model.layers();
+    let bears: Vec<Option<f64>> = (0..layers).map(|l| bears_n(&model, l)).collect();
+    if bears[..layers - 1].iter().all(Option::is_some) {
+        let pushed = DeepIndentation::default();
+        let farthest: Vec<f64> = pushed.info().parameters.iter().map(|p| p.high).collect();
+        model.effects.push(Choice::new(pushed.info(), &farthest));
+    }
+    let mut above_n = 0.0;
+    for (l, bears) in bears.iter().enumerate() {
+        if bears.is_some_and(|n| n < above_n) {
+            let waits =
+                |c: &Choice| matches!(c.effect(), Some(AnyEffect::DelayedPuncture(d)) if d.layer == l + 1);
+            while let Some(k) = model.effects.iter().position(waits) {
+                model = model.without(k);
+            }
+            model.tissue.layers[l].puncture_n = Some(after_n(&model, l));
+        }
+        above_n = bears.unwrap_or(above_n).max(above_n);
+    }
+    let tissue = model.tissue.clone();
     model.belief = Arc::new(Belief {
         tissue: tissue.clone(),
         given: Vec::new(),
@@ -113,7 +246,6 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
         thickness_tolerance: vec![0.0; layers],
         surface_tolerance_m: first.belief.surface_tolerance_m,
     });
-    model.tissue = tissue;
     model.scatter.differing = sds;
     model.days = Vec::<Day>::new();
     model.day_of = Vec::new();
@@ -122,12 +254,14 @@ fn together(believed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> 
 
 #[cfg(test)]
 mod tests {
-    use super::{Kind, compose, together};
-    use crate::made::{gel, insertions};
+    use super::{Kind, RATE, compose, moved_by, rises_m, together, told_of};
+    use crate::made::{self, gel, insertions};
     use crate::set::Insertion;
     use std::sync::Arc;
-    use stylet_identify::model::{Belief, Choice, Model};
-    use stylet_tissue::{AnyEffect, CoulombFriction, Effect, Layer, LetGo, ShaftSlip, Tissue};
+    use stylet_identify::model::{Belief, Bound, Choice, Model};
+    use stylet_tissue::{
+        AnyEffect, CoulombFriction, DelayedPuncture, Effect, Layer, LetGo, ShaftSlip, Tissue,
+    };
 
     fn tissue(names: &[&str], surface_m: f64, thickness_m: f64, k: f64) -> Tissue {
         let layer = |name: &&str| Layer {
@@ -195,8 +329,121 @@ mod tests {
             (&[4.0, 4.0][..], &[0.0, 0.0][..])
         );
         assert!(m.days.is_empty() && m.day_of.is_empty() && m.bound.is_empty());
+        // Nobody knows what the upper one bears: it gives way at its far face.
+        let far = |m: &Model| m.effects.iter().find(|e| e.info.id == "deep_indentation").map(|e| e.values[0]);
+        assert_eq!(far(&m), None);
+        let mut known = first.clone();
+        known.tissue.layers[0].puncture_n = Some(3.0);
+        let told = together(&believed, &[&known, &second], 0.0).expect("a law");
+        assert_eq!((far(&told), told.tissue.layers[0].puncture_n), (Some(1.0), Some(3.0)));
+        let waits: AnyEffect = DelayedPuncture { layer: 1, force_n: 3.0, exponent: 10.0 }.into();
+        first.effects.push(Choice::new(waits.info(), &waits.parameters()));
+        assert_eq!(far(&together(&believed, &[&first, &second], 0.0).expect("a law")), Some(1.0));
+        // A layer that bears more than the one above gives way by itself, and one that bears less with it: at what it holds then.
+        for (bears_n, wanted_n) in [(4.0, 4.0), (2.9, 2.2)] {
+            let mut lower = second.clone();
+            lower.tissue.layers[0].puncture_n = Some(bears_n);
+            let m = together(&believed, &[&known, &lower], 0.0).expect("a law");
+            assert_eq!(m.tissue.layers[1].puncture_n, Some(wanted_n), "{bears_n}");
+            let waits: AnyEffect = DelayedPuncture { layer: 1, force_n: bears_n, exponent: 10.0 }.into();
+            lower.tissue.layers[0].puncture_n = None;
+            lower.effects.insert(0, Choice::new(waits.info(), &waits.parameters()));
+            let m = together(&believed, &[&known, &lower], 0.0).expect("a law");
+            let waiting = m.effects.iter().filter(|e| e.info.id == waits.info().id).count();
+            assert_eq!(
+                (m.tissue.layers[1].puncture_n, waiting),
+                if bears_n > 3.0 { (None, 1) } else { (Some(wanted_n), 0) }
+            );
+            assert_eq!(m.scatter.differing[..3], [3e-4, 5e-4, 0.0]);
+        }
         assert!(together(&believed, &[], 0.0).is_none());
         assert!(together(&tissue(&["one"], 0.0, 0.03, 1.0), &[&first, &second], 0.0).is_none());
+    }
+
+    /// A law of one speed slides by as much at that speed as it did, and by the same at any other one.
+    #[test]
+    fn sliding_is_dry_where_one_speed_is_all_that_was_measured() {
+        let slip = ShaftSlip { push_n: 2.0, pull_n: 1.5, exponent: 8.0, ..ShaftSlip::default() };
+        let mut m = alone(0.004, 100.0, &[slip.clone().into(), LetGo { layer: 1, depth_m: 1e-3 }.into()]);
+        let told = |m: &Model| match told_of(m, 2e-3, None)[0].effect() {
+            Some(AnyEffect::ShaftSlip(s)) => s,
+            other => unreachable!("{other:?}"),
+        };
+        // Where a rate was fitted, it stays.
+        assert_eq!(told(&m), slip);
+        m.bound = vec![Bound { effect: 0, parameter: RATE, like: None }];
+        let s = told(&m);
+        assert!((s.plateau_n(2e-3) - slip.plateau_n(2e-3)).abs() < 1e-12);
+        for v_mps in [1e-3, 4e-3] {
+            assert!((s.plateau_n(v_mps) - slip.plateau_n(2e-3)).abs() < 1e-12);
+            assert!((s.plateau_n(-v_mps) - slip.plateau_n(-2e-3)).abs() < 1e-12);
+        }
+        assert_eq!((s.exponent, s.kept, told_of(&m, 2e-3, None).len()), (slip.exponent, slip.kept, 2));
+    }
+
+    /// Stacks of a layer that lies half a millimetre deeper than the law has it, whatever their force does after the rupture.
+    #[test]
+    fn a_law_is_laid_where_a_run_builds_its_force_up() {
+        let mut law = Model::base(
+            made::settled(&[], &insertions(&[], &[[0.008, 0.0]]).iter().collect::<Vec<_>>()).fit.model.belief,
+            1,
+        );
+        law.tissue = gel();
+        for deeper_m in [5e-4, -8e-4, 0.0] {
+            let mut run = insertions(&[], &[[0.008, deeper_m]]).remove(0);
+            let told = rises_m(&law, &run);
+            assert!((told - deeper_m).abs() < 3e-5, "{told} for {deeper_m}");
+            let first_s = run.ruptures_s[0];
+            for (t, f) in run.recording.time_s.iter().zip(&mut run.recording.force_n) {
+                *f += f64::from(u8::from(*t > first_s));
+            }
+            assert!((rises_m(&law, &run) - told).abs() < 1e-9);
+        }
+        let moved = moved_by(
+            &together(
+                &tissue(&["a", "b"], 0.0, 0.03, 1.0),
+                &[&alone(0.004, 1.0, &[]), &alone(0.015, 1.0, &[])],
+                0.0,
+            )
+            .expect("a law"),
+            7e-4,
+        );
+        assert!(
+            (moved.tissue.surface_m - 0.0047).abs() < 1e-15
+                && (moved.tissue.front_m(1) - 0.015).abs() < 1e-15
+        );
+    }
+
+    /// Numbers of the shaft that stand at their bounds are nothing that was measured.
+    #[test]
+    fn what_a_layers_own_runs_do_not_tell_is_the_first_layers() {
+        let like = ShaftSlip {
+            push_n: 2.0,
+            pull_n: 1.0,
+            exponent: 7.0,
+            wear_per_m: 40.0,
+            kept: 0.5,
+            ..ShaftSlip::default()
+        };
+        let told = |slip: &ShaftSlip| {
+            let m = alone(0.004, 100.0, &[slip.clone().into()]);
+            match told_of(&m, 2e-3, Some(&like))[0].effect() {
+                Some(AnyEffect::ShaftSlip(s)) => s,
+                other => unreachable!("{other:?}"),
+            }
+        };
+        let known = ShaftSlip { push_n: 1.5, pull_n: 1.2, kept: 0.8, wear_per_m: 60.0, ..like.clone() };
+        assert_eq!(told(&known), known);
+        let push_n = 8.0 + 3.0 * (8.0 - 0.05);
+        let open =
+            ShaftSlip { push_n, exponent: 200.0, wear_per_m: 0.0, kept: 0.6 / push_n, ..known.clone() };
+        let s = told(&open);
+        // Twice what it holds when pulled, of which a quarter is the 0.6 N after the rupture.
+        assert!((s.push_n - 2.4).abs() < 1e-12 && (s.kept - 0.25).abs() < 1e-12, "{s:?}");
+        assert_eq!((s.pull_n, s.exponent, s.wear_per_m), (1.2, 7.0, 40.0));
+        // The first layer has nobody to ask.
+        let m = alone(0.004, 100.0, &[open.clone().into()]);
+        assert_eq!(told_of(&m, 2e-3, None)[0].effect(), Some(AnyEffect::ShaftSlip(open)));
     }
 
     /// A stack that is the layer itself, set up a millimetre deeper.
@@ -213,12 +460,12 @@ mod tests {
         assert_eq!(told.composed_n.len(), 2);
         assert!(told.composed_n.iter().all(|e| *e > 0.005 && *e < 0.3), "{:?}", told.composed_n);
         assert!((told.mean_n - 0.5 * (told.composed_n[0] + told.composed_n[1])).abs() < 1e-12);
-        // A speed is told by the mean of its runs: one of them twice is that one.
-        let [one, twice] = [&runs[..1], &[runs[0], runs[0]]].map(|runs| {
+        // A speed is told by the mean of its runs: one of them twice or three times is that one.
+        let [twice, thrice] = [&[runs[0]; 2][..], &[runs[0]; 3]].map(|runs| {
             let alone = insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, 0.0]]);
             compose(Kind::Base, &gel(), &[("gel".to_owned(), alone)], runs).expect("a law").mean_n
         });
-        assert_eq!(one, twice);
+        assert_eq!(twice, thrice);
         // Without the layer or its runs there is nothing to put together.
         assert!(compose(Kind::Base, &gel(), &[], &runs).is_none());
     }

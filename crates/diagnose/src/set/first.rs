@@ -156,8 +156,8 @@ pub struct Guess {
     pub waits: f64,
     /// Surface beyond where the force first rises, in m.
     pub surface_m: f64,
-    /// Layers beneath the first give way so far in m behind their front; none: at the drops that the force shows, which may be what is left of
-    /// a rupture after the layer above has given way.
+    /// Layers beneath the first give way so far in m behind their front, and the first one without a drop where the force shows none; none:
+    /// at the drops that the force shows, which may be what is left of a rupture after the layer above has given way.
     pub gives_way_m: Option<f64>,
 }
 
@@ -256,7 +256,16 @@ fn wide(tissue: Tissue) -> Belief {
     }
 }
 
-/// A model of these insertions, with its instants where the force shows drops.
+/// The instant (s) at which the force first reaches so much (N) on the way in.
+fn reached_s(run: &Insertion, force_n: f64) -> f64 {
+    let way = run.phases.start..=run.phases.deepest;
+    let force = run.recording.force_n.get(way).unwrap_or(&[]);
+    let at = force.iter().position(|f| *f >= force_n).map(|k| run.phases.start + k);
+    at.and_then(|k| run.recording.time_s.get(k)).copied().unwrap_or(NEVER)
+}
+
+/// A model of these insertions, with its instants where the force shows drops. The first layer may give way without one, when it holds the
+/// shaft by as much as it bears: then where the force first reaches what is held.
 #[must_use]
 pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     let Frame { mut tissue, fronts_m: fronts, loads_n, indented_m } = frame(believed, runs, guess.surface_m);
@@ -330,6 +339,9 @@ pub fn first(believed: &Tissue, runs: &[&Insertion], guess: &Guess) -> Model {
     if let Some(behind_m) = guess.gives_way_m {
         for (instants, run) in model.instants.iter_mut().zip(runs) {
             let (time, place) = (&run.recording.time_s, &run.recording.position_m);
+            if let Some((first, load)) = instants.first_mut().zip(loads_n.first()).filter(|i| *i.0 == NEVER) {
+                *first = reached_s(run, guess.hold * load);
+            }
             for l in 1..layers {
                 let before = instants[l - 1];
                 let passed = place.iter().position(|z| *z > fronts[l] + behind_m);
@@ -392,6 +404,29 @@ mod tests {
             k += 1;
         }
         Insertion::new(name.to_owned(), Recording::new(t, z, f).expect("clean columns"), 2)
+    }
+
+    /// Some starts have the first layer give way without a drop, where the force first reaches what it will hold.
+    #[test]
+    fn a_layer_whose_rupture_shows_no_drop_begins_to_give_way_where_the_force_reaches_what_is_held() {
+        let mut silent = run("a", 0.002, 0.028);
+        (silent.ruptures_s, silent.loads_n) = (vec![NEVER; 2], vec![None; 2]);
+        let (shown, none) = (run("b", 0.002, 0.028), Guess { gives_way_m: None, ..guess() });
+        let runs = [&silent, &shown];
+        let m = first(&believed(), &runs, &guess());
+        let load = shown.loads_n[0].expect("a drop");
+        let held = guess().hold * load;
+        let at = m.instants[0][0];
+        let k = silent.recording.time_s.partition_point(|t| *t < at);
+        let f = &silent.recording.force_n;
+        assert!(f[k] >= held && f[..k].iter().all(|f| *f < held), "{at} {held}");
+        // The layer beneath comes after it, and what is seen stays.
+        assert!(m.instants[0][1] > at && m.instants[0][1] < NEVER, "{:?}", m.instants[0]);
+        assert_eq!(m.instants[1][0], shown.ruptures_s[0]);
+        // Other starts go by what is seen alone, and what the force never reaches never was.
+        assert_eq!(first(&believed(), &runs, &none).instants[0], vec![NEVER; 2]);
+        let weak = first(&believed(), &runs, &Guess { hold: 1e3, ..guess() });
+        assert_eq!(weak.instants[0], vec![NEVER; 2]);
     }
 
     fn believed() -> Tissue {

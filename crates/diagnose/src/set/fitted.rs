@@ -277,7 +277,7 @@ pub fn fitted(began: &[Model], runs: &[&Insertion], raw: &Raw) -> Vec<Fitted> {
     let mut out: Vec<Fitted> = apart
         .par_iter()
         .filter_map(|k| {
-            let (fit, data) = settle(&found[*k].1, whole.clone(), &drops, &[4, 8, 10])?;
+            let (fit, data) = settle(&found[*k].1, whole.clone(), &drops, &[4, 8, 10, 6, 6, 6])?;
             Some(Fitted { fit, data, drops: drops.clone(), starts: (found.len(), agree) })
         })
         .collect();

@@ -131,7 +131,7 @@ pub fn speeds_out(all: &Fitted, runs: &[&Insertion]) -> Vec<Score> {
     let done: Vec<Vec<(usize, Score)>> = groups
         .par_iter()
         .map(|group| {
-            let Some(fit) = fit_without(all, group, &[10, 6]) else { return Vec::new() };
+            let Some(fit) = fit_without(all, group, &[10, 6, 6, 6]) else { return Vec::new() };
             let p = Population::of(&fit, &staying(runs, group)).opened(&fit);
             group.iter().map(|r| (*r, score(runs[*r], &predict(&p, runs[*r], None, DRAWS)))).collect()
         })
@@ -315,7 +315,7 @@ mod tests {
         let runs: Vec<&Insertion> = runs.iter().collect();
         let told = speeds_out(&fitted, &runs);
         for (r, group) in [(0, vec![0, 2]), (1, vec![1]), (2, vec![0, 2])] {
-            let fit = fit_without(&fitted, &group, &[10, 6]).expect("a fit");
+            let fit = fit_without(&fitted, &group, &[10, 6, 6, 6]).expect("a fit");
             let others = Population::of(&fit, &staying(&runs, &group)).opened(&fit);
             assert_eq!(others.recordings, 3 - group.len());
             assert_eq!(told[r], score(runs[r], &predict(&others, runs[r], None, DRAWS)), "{r}");

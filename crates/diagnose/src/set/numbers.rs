@@ -36,14 +36,17 @@ impl Told {
     }
 }
 
+/// Whether a number stands where it may not go further.
+pub(super) fn reached(model: &Model, role: Role) -> bool {
+    model.shared().iter().find(|n| n.role == role).is_some_and(|n| {
+        let (x, near) = (model.get(role, 0), NEAR * (n.high - n.low).min(1.0));
+        x <= n.low + near || x >= n.high - near
+    })
+}
+
 /// Values by owner and path, with bounds of the paths and whether they are reached.
 fn values(model: &Model) -> Vec<(String, String, f64, bool)> {
-    let reached = |role: Role| {
-        model.shared().iter().find(|n| n.role == role).is_some_and(|n| {
-            let (x, near) = (model.get(role, 0), NEAR * (n.high - n.low).min(1.0));
-            x <= n.low + near || x >= n.high - near
-        })
-    };
+    let reached = |role: Role| reached(model, role);
     let mut out = Vec::new();
     let mut tell =
         |owner: String, path: &str, value: f64, bound: bool| out.push((owner, path.to_owned(), value, bound));
@@ -128,6 +131,7 @@ mod tests {
     use super::{base_parameters, estimates, values};
     use crate::set::fitted::Fitted;
     use crate::set::left_out::Out;
+    use crate::set::population::PIECES;
     use crate::set::population::Population;
     use std::sync::Arc;
     use stylet_identify::fit::Fit;
@@ -179,7 +183,8 @@ mod tests {
                     population: Some(Population {
                         law,
                         residual_n: [0.0; 4],
-                        pieces_n: [[0.0; 5]; 4],
+                        pieces_n: [[0.0; PIECES]; 4],
+                        air_n: [0.0; PIECES],
                         recordings: 3,
                         days: 1,
                         open: None,
@@ -319,7 +324,8 @@ mod tests {
                     population: Some(Population {
                         law: other,
                         residual_n: [0.0; 4],
-                        pieces_n: [[0.0; 5]; 4],
+                        pieces_n: [[0.0; PIECES]; 4],
+                        air_n: [0.0; PIECES],
                         recordings: 3,
                         days: 1,
                         open: None,

@@ -1,0 +1,73 @@
+//! Does a band of 90 % hold 90 %? Sets drawn from the law that a measured set was found to follow, each fitted from that law on.
+//!
+//! ```sh
+//! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example drawn_band -- scenarios/measured/skin.ron 16
+//! ```
+//! Motions, scatter and noise as in `null_sets`; no law is looked for, so that a set costs seconds. A third word is another seed.
+
+mod drawn;
+
+use drawn::{ALL, one};
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use std::error::Error;
+use std::path::Path;
+use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::dataset::{Dataset, find};
+use stylet_diagnose::set::fitted::{Fitted, blocks, refitted};
+use stylet_diagnose::set::laws::slipping;
+use stylet_diagnose::set::left_out::runs_out;
+use stylet_diagnose::set::population::Population;
+use stylet_record::raw::Raw;
+
+/// Seed of what is drawn.
+const SEED: u64 = 77;
+/// Seed of what the starts begin with.
+const STARTS: u64 = 1;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut words = std::env::args().skip(1);
+    let file = words.next().ok_or("name a data set")?;
+    let sets: usize = words.next().map_or(Ok(16), |w| w.parse())?;
+    let seed: u64 = words.next().map_or(Ok(SEED), |w| w.parse())?;
+    let set = Dataset::load(Path::new(&file))?;
+    let mut files = Vec::new();
+    for pattern in &set.recordings {
+        files.extend(find(pattern)?);
+    }
+    let layers = set.tissue.layers.len();
+    let measured = set.runs(&files, layers)?;
+    let refs: Vec<&Insertion> = measured.iter().collect();
+    let raw = Raw::default();
+    let mut rng = ChaCha8Rng::seed_from_u64(STARTS);
+    let fit = slipping(&set.tissue, &refs, &raw, &mut rng).ok_or("no law could be fitted")?.fitted;
+    println!("measured: {:.3} in the band", covered(&fit, &refs));
+    let population = Population { recordings: ALL, ..Population::of(&fit, &refs) };
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut all = Vec::new();
+    for k in 0..sets {
+        let runs = refs.iter().enumerate();
+        let runs: Vec<Insertion> = runs
+            .filter_map(|(r, run)| one(&population, run, k * refs.len() + r + 1, layers, &mut rng))
+            .collect();
+        let refs: Vec<&Insertion> = runs.iter().collect();
+        let mut model = fit.fit.model.clone();
+        model.instants = refs.iter().map(|r| r.ruptures_s.clone()).collect();
+        let drops = refs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect());
+        let Some(again) = refitted(&model, blocks(&refs, &raw), drops.collect()) else { continue };
+        all.push(covered(&again, &refs));
+        println!("{k}: {:.3}", all.last().copied().unwrap_or(f64::NAN));
+    }
+    println!(
+        "{} drawn sets: {:.3} in the mean, standard deviation {:.3}",
+        all.len(),
+        stylet_stats::mean(&all),
+        stylet_stats::sd(&all)
+    );
+    Ok(())
+}
+
+/// Share of runs left out that lies in the band.
+fn covered(fit: &Fitted, runs: &[&Insertion]) -> f64 {
+    let out = runs_out(fit, runs);
+    out.iter().map(|o| o.score.covered).sum::<f64>() / runs.len().max(1) as f64
+}
