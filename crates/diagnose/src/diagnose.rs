@@ -71,11 +71,9 @@ const EXCESS_ALONE: f64 = 3.0;
 const EXCESS_SLOW: f64 = 6.0;
 /// Beside something unknown a cause stands when, where that is silent, its strengths are the same whichever recording is left out, to this
 /// share, ...
-const SAME: f64 = 0.12;
+const SAME: f64 = 0.1;
 /// ... and it would gain no more than this share of what it explains by acting otherwise, ...
 const OTHERWISE: f64 = 0.025;
-/// ... a wave, of which any slow force has a part, than this; ...
-const OTHERWISE_WAVE: f64 = 0.005;
 /// ... and by all that was recorded it is either the same or would gain no more than this by acting otherwise.
 const OTHERWISE_LOUD: f64 = 0.07;
 /// Why an effect beside something unknown is a trace.
@@ -164,10 +162,15 @@ pub fn diagnose(
         let borne = borne(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&borne);
         let loud = |id: &str| loud.iter().find(|l| l.0 == id).map(|l| &l.1);
-        // Of a force with several lines one tone is no cause.
-        let one_of_lines = |i: &EffectInfo| judged.lined && matches!(i.proposal, Proposal::Line);
+        // Of a force with several lines one tone is no cause, nor is a breath beside whatever else comes and goes: it takes the part of it
+        // that any slow sine would.
+        let tone = |i: &EffectInfo| match i.proposal {
+            Proposal::Line => judged.lined,
+            Proposal::Breath => true,
+            _ => false,
+        };
         let kept: Vec<&str> = effects
-            .filter(|(e, b)| stands(e.info, b, loud(e.info.id)) && !one_of_lines(e.info))
+            .filter(|(e, b)| !tone(e.info) && stands(b, loud(e.info.id)))
             .map(|(e, _)| e.info.id)
             .collect();
         let gone = judged.causes.iter().filter(|c| !kept.contains(&c.effect.as_str()));
@@ -377,11 +380,10 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
 
 /// Whether an effect beside something unknown is a cause: by what is heard where that is silent, and by all that was recorded, where it had
 /// been found.
-fn stands(effect: &EffectInfo, silent: &Borne, loud: Option<&Borne>) -> bool {
-    let wave = matches!(effect.proposal, Proposal::Line | Proposal::Breath);
+fn stands(silent: &Borne, loud: Option<&Borne>) -> bool {
     silent.gain > 0.0
         && silent.spread < SAME
-        && silent.otherwise < if wave { OTHERWISE_WAVE } else { OTHERWISE }
+        && silent.otherwise < OTHERWISE
         && loud.is_none_or(|l| l.spread < SAME || l.otherwise < OTHERWISE_LOUD)
 }
 
