@@ -894,7 +894,6 @@ mod tests {
         without.settle(without.best.clone());
         let taken = without.taken_over(&told, &prepared).expect("a better law");
         assert_eq!(of(&taken)[0].0, "force_drift");
-        assert!(without.taken_over(&without, &prepared).is_none());
     }
 
     #[test]
