@@ -3,7 +3,8 @@
 //! ```sh
 //! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example composed -- scenarios/measured/skin_on_muscle.ron
 //! ```
-//! Every part is fitted by the law of a shaft that slips. Nothing of the whole is fitted: of it the place where its force begins is taken.
+//! Every part is fitted by the law of a shaft that slips. Of the whole one number is fitted: where its surface lies, by the loading of the
+//! runs that are not predicted.
 
 use std::error::Error;
 use std::path::Path;

@@ -7,12 +7,10 @@
 
 mod drawn;
 
-use drawn::{ALL, one};
+use drawn::{ALL, Asked, asked, one};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
-use std::path::Path;
 use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::dataset::{Dataset, find};
 use stylet_diagnose::set::fitted::{Fitted, blocks, refitted};
 use stylet_diagnose::set::laws::slipping;
 use stylet_diagnose::set::left_out::runs_out;
@@ -25,22 +23,13 @@ const SEED: u64 = 77;
 const STARTS: u64 = 1;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut words = std::env::args().skip(1);
-    let file = words.next().ok_or("name a data set")?;
-    let sets: usize = words.next().map_or(Ok(16), |w| w.parse())?;
-    let seed: u64 = words.next().map_or(Ok(SEED), |w| w.parse())?;
-    let set = Dataset::load(Path::new(&file))?;
-    let mut files = Vec::new();
-    for pattern in &set.recordings {
-        files.extend(find(pattern)?);
-    }
+    let Asked { file, set, measured, sets, seed } = asked(16, SEED)?;
     let layers = set.tissue.layers.len();
-    let measured = set.runs(&files, layers)?;
     let refs: Vec<&Insertion> = measured.iter().collect();
     let raw = Raw::default();
     let mut rng = ChaCha8Rng::seed_from_u64(STARTS);
     let fit = slipping(&set.tissue, &refs, &raw, &mut rng).ok_or("no law could be fitted")?.fitted;
-    println!("measured: {:.3} in the band", covered(&fit, &refs));
+    println!("{file}: {:.3} of what was measured in the band", covered(&fit, &refs));
     let population = Population { recordings: ALL, ..Population::of(&fit, &refs) };
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut all = Vec::new();

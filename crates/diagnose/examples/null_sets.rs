@@ -10,12 +10,10 @@
 
 mod drawn;
 
-use drawn::{ALL, one};
+use drawn::{ALL, Asked, asked, one};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
-use std::path::Path;
 use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::dataset::{Dataset, find};
 use stylet_diagnose::set::instrument::Checks;
 use stylet_diagnose::set::laws::{Laws, effects};
 use stylet_diagnose::set::population::Population;
@@ -26,17 +24,8 @@ use stylet_stats::wilson;
 const SEED: u64 = 125;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut words = std::env::args().skip(1);
-    let file = words.next().ok_or("name a data set")?;
-    let sets: usize = words.next().map_or(Ok(40), |w| w.parse())?;
-    let seed: u64 = words.next().map_or(Ok(SEED), |w| w.parse())?;
-    let set = Dataset::load(Path::new(&file))?;
-    let mut files = Vec::new();
-    for pattern in &set.recordings {
-        files.extend(find(pattern)?);
-    }
+    let Asked { file, set, measured, sets, seed } = asked(40, SEED)?;
     let layers = set.tissue.layers.len();
-    let measured = set.runs(&files, layers)?;
     let refs: Vec<&Insertion> = measured.iter().collect();
     let found = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}).ok_or("no law")?;
     let has = effects(&found.laws.best.fitted.fit.model);

@@ -129,11 +129,9 @@ impl Search {
         search
     }
 
-    /// The search gone on by what is heard where the unknown is silent.
-    #[must_use]
-    pub fn listen(&self, prepared: &Prepared) -> Option<Self> {
-        let (best, data) = heard(&self.best, &self.data)?;
-        let mut search = Self {
+    /// The search with another best of other weights, which begins nothing anew.
+    fn at(&self, best: Fit, data: Data) -> Self {
+        Self {
             base: self.base.clone(),
             best,
             data,
@@ -141,7 +139,14 @@ impl Search {
             restarts: 0,
             beginnings: 0,
             lines: Vec::new(),
-        };
+        }
+    }
+
+    /// The search gone on by what is heard where the unknown is silent.
+    #[must_use]
+    pub fn listen(&self, prepared: &Prepared) -> Option<Self> {
+        let (best, data) = heard(&self.best, &self.data)?;
+        let mut search = self.at(best, data);
         while search.best.model.effects.len() < MOST && search.grow(prepared) {
             (search.best, search.data) = heard(&search.best, &search.data)?;
         }
@@ -160,15 +165,8 @@ impl Search {
         if self.best.nats() - f.nats() < needed || !gain(&self.best, &f, &self.data).pays(needed) {
             return None;
         }
-        let mut search = Self {
-            base: self.base.clone(),
-            best: self.best.clone(),
-            data: self.data.clone(),
-            stages: listened.stages.clone(),
-            restarts: 0,
-            beginnings: 0,
-            lines: Vec::new(),
-        };
+        let mut search =
+            Self { stages: listened.stages.clone(), ..self.at(self.best.clone(), self.data.clone()) };
         search.settle(f);
         Some(search)
     }

@@ -2,7 +2,10 @@
 
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::error::Error;
+use std::path::Path;
 use stylet_diagnose::set::Insertion;
+use stylet_diagnose::set::dataset::{Dataset, find};
 use stylet_diagnose::set::population::{Population, drawn, part};
 
 /// Correlation time (s) of what the law leaves.
@@ -11,6 +14,35 @@ const SLOW_S: f64 = 0.5;
 const NOISE_N: f64 = 0.012;
 /// Recordings of a population that is known.
 pub const ALL: usize = 1_000_000;
+
+/// What the command line asks for.
+pub struct Asked {
+    /// The set's file.
+    pub file: String,
+    /// The set.
+    pub set: Dataset,
+    /// Its insertions.
+    pub measured: Vec<Insertion>,
+    /// How many sets are drawn.
+    pub sets: usize,
+    /// By which seed.
+    pub seed: u64,
+}
+
+/// The words `FILE [SETS [SEED]]`, and what the file names.
+pub fn asked(sets: usize, seed: u64) -> Result<Asked, Box<dyn Error>> {
+    let mut words = std::env::args().skip(1);
+    let file = words.next().ok_or("name a data set")?;
+    let sets = words.next().map_or(Ok(sets), |w| w.parse())?;
+    let seed = words.next().map_or(Ok(seed), |w| w.parse())?;
+    let set = Dataset::load(Path::new(&file))?;
+    let mut files = Vec::new();
+    for pattern in &set.recordings {
+        files.extend(find(pattern)?);
+    }
+    let measured = set.runs(&files, set.tissue.layers.len())?;
+    Ok(Asked { file, set, measured, sets, seed })
+}
 
 /// A drawn insertion.
 pub fn one(
