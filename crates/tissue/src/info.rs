@@ -104,6 +104,9 @@ pub struct ParameterInfo {
     pub whole: bool,
     /// Standard deviation with which it typically differs from one insertion to the next; zero for a number of the law.
     pub differs: f64,
+    /// Mean and standard deviation of what was measured of it elsewhere, where a set alone says too little.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub expected: Option<(f64, f64)>,
 }
 
 impl ParameterInfo {
@@ -134,6 +137,7 @@ impl ParameterInfo {
             log: false,
             whole: false,
             differs: 0.0,
+            expected: None,
         }
     }
 
@@ -170,6 +174,11 @@ impl ParameterInfo {
     /// Another value in every insertion, with this standard deviation.
     pub(crate) const fn differs(self, sd: f64) -> Self {
         Self { differs: sd, ..self }
+    }
+
+    /// Measured elsewhere with this mean and standard deviation.
+    pub(crate) const fn expected(self, mean: f64, sd: f64) -> Self {
+        Self { expected: Some((mean, sd)), ..self }
     }
 
     /// Whole numbers only.

@@ -12,6 +12,7 @@ use rand::rngs::ChaCha8Rng;
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::blocks::Blocks;
+use stylet_identify::events::Event;
 use stylet_identify::fit::{Effort, fit as fitted_on};
 use stylet_identify::model::{Belief, Bound, Choice, DIFFERING, Model, Own};
 use stylet_identify::objective::residuals;
@@ -107,6 +108,8 @@ pub struct Part {
     pub nats: f64,
     /// Whether it stayed.
     pub kept: bool,
+    /// Whether it may be named.
+    pub sure: bool,
 }
 
 /// Laws of a set.
@@ -200,7 +203,7 @@ pub fn slipping(believed: &Tissue, runs: &[&Insertion], raw: &Raw, rng: &mut Cha
         return waits;
     }
     let id = DelayedPuncture::default().info().id;
-    let gives_way = look(&began.iter().map(|m| less(m, id)).collect::<Vec<_>>());
+    let gives_way = look(&began.iter().map(|m| less(m, &[], id)).collect::<Vec<_>>());
     match (&waits, &gives_way) {
         (Some(w), Some(g)) if surely_pays(&loses(&g.scores, &w.scores)) => waits,
         _ => gives_way.or(waits),
@@ -304,8 +307,8 @@ pub fn slip() -> &'static EffectInfo {
     ShaftSlip::default().info()
 }
 
-/// What a law may do without.
-fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
+/// What a law may do without; `events` are those of its fit.
+fn candidates(model: &Model, events: &[Vec<Event>]) -> Vec<(&'static str, String, Model)> {
     let mut out = Vec::new();
     let slips = model.effects.iter().any(|c| c.info.id == slip().id);
     let mut seen: Vec<&str> = Vec::new();
@@ -314,7 +317,7 @@ fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
             continue;
         }
         seen.push(id);
-        out.push((id, id.to_owned(), less(model, id)));
+        out.push((id, id.to_owned(), less(model, events, id)));
     }
     if slips {
         let neutral: [(&str, &[(&str, f64)]); 4] = [
@@ -340,8 +343,8 @@ fn candidates(model: &Model) -> Vec<(&'static str, String, Model)> {
     out
 }
 
-/// A model without any effect of this id; layers that waited give way at a force.
-fn less(model: &Model, id: &str) -> Model {
+/// A model without any effect of this id; layers that waited give way at the force at which they did.
+fn less(model: &Model, events: &[Vec<Event>], id: &str) -> Model {
     let mut out = model.clone();
     let mut tissue = out.belief.tissue.clone();
     // What differs from insertion to insertion goes by the order of the effects.
@@ -354,9 +357,16 @@ fn less(model: &Model, id: &str) -> Model {
     let kept = |all: [f64; DIFFERING]| std::array::from_fn(|k| stays.get(k).map_or(0.0, |from| all[*from]));
     while let Some(k) = out.effects.iter().position(|c| c.info.id == id) {
         if let Some(AnyEffect::DelayedPuncture(waits)) = out.effects[k].effect() {
+            let layer = waits.layer.saturating_sub(1);
+            let gave_way = events.iter().filter_map(|e| e.get(layer).filter(|e| e.ruptured));
+            let forces_n: Vec<f64> = gave_way.map(|e| e.elastic_n).filter(|f| *f > 0.0).collect();
+            let force_n = stylet_stats::median_of(forces_n.iter().copied());
+            if forces_n.len() > 1 {
+                out.scatter.force = out.scatter.force.max(stylet_stats::sd(&forces_n) / force_n);
+            }
             for t in [&mut tissue, &mut out.tissue] {
-                if let Some(l) = waits.layer.checked_sub(1).and_then(|l| t.layers.get_mut(l)) {
-                    l.puncture_n = Some(waits.force_n);
+                if let Some(l) = t.layers.get_mut(layer) {
+                    l.puncture_n = Some(if force_n.is_finite() { force_n } else { waits.force_n });
                 }
             }
         }
@@ -479,6 +489,11 @@ impl Missed {
         told || surely_pays(&self.loses) || surely_pays(&self.speeds_lose)
     }
 
+    /// Whether the law predicts better with an effect, if not surely: it stays, and is not named.
+    fn useful(&self) -> bool {
+        self.effect() || pays(&self.loses, PART_WORTH)
+    }
+
     /// Whether what shapes an effect pays.
     fn shape(&self) -> bool {
         pays(&self.loses, SHAPE_WORTH) || pays(&self.speeds_lose, SHAPE_WORTH)
@@ -496,7 +511,7 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
         missed.speeds_lose = less.as_ref().map_or_else(Vec::new, |f| loses(&by_speed(f, runs), &speeds));
         (less, scores, missed)
     };
-    let asked: Vec<_> = candidates(&at.fit.model)
+    let asked: Vec<_> = candidates(&at.fit.model, &at.fit.residuals.events)
         .into_par_iter()
         .map(|(effect, name, model)| (effect, name, ask(&at, &model)))
         .collect();
@@ -506,13 +521,14 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
     let mut gone: Vec<usize> = Vec::new();
     for k in order {
         let (effect, name, (less, _, missed)) = &asked[k];
-        let stays = |m: &Missed| if name == effect { m.effect() } else { m.shape() };
+        let stays = |m: &Missed| if name == effect { m.useful() } else { m.shape() };
         let Some(less) = less.as_ref().filter(|_| !stays(missed)) else { continue };
         let smaller = if gone.is_empty() {
             best.fitted.with(&less.fit.model)
         } else {
             // Beside what went before it.
-            let now = candidates(&best.fitted.fit.model).into_iter().find(|c| c.1 == *name);
+            let now = &best.fitted.fit;
+            let now = candidates(&now.model, &now.residuals.events).into_iter().find(|c| c.1 == *name);
             let Some((less, _, missed)) = now.map(|c| ask(&coarse(&best.fitted), &c.2)) else { continue };
             less.filter(|_| !stays(&missed)).and_then(|f| best.fitted.with(&f.fit.model))
         };
@@ -530,6 +546,7 @@ pub(super) fn parts(best: &mut Law, runs: &[&Insertion]) -> Vec<Part> {
             effect,
             name,
             without_n: errors_n(&scores),
+            sure: missed.effect(),
             loses: missed.loses,
             speeds_lose: missed.speeds_lose,
             nats: missed.nats,
@@ -611,7 +628,7 @@ mod tests {
     #[test]
     fn a_law_may_do_without_each_effect_and_each_part_of_a_slipping_shaft() {
         let m = model(&[slips(1), waits(1, 1.5), lets_go(1), slips(2), waits(2, 2.5), lets_go(2)]);
-        let all = candidates(&m);
+        let all = candidates(&m, &[]);
         let names: Vec<&str> = all.iter().map(|c| c.1.as_str()).collect();
         assert_eq!(
             names,
@@ -644,9 +661,9 @@ mod tests {
             assert_eq!((value(&all[4].2, e, "wear_per_m"), value(&all[5].2, e, "rate")), (0.0, 0.0));
         }
         // Without a slipping shaft only whole effects go.
-        assert_eq!(candidates(&model(&[CoulombFriction { c_n_per_m: 3.0 }.into()])).len(), 1);
-        assert!(candidates(&model(&[])).is_empty());
-        assert_eq!(candidates(&model(&[slips(1)])).len(), 4);
+        assert_eq!(candidates(&model(&[CoulombFriction { c_n_per_m: 3.0 }.into()]), &[]).len(), 1);
+        assert!(candidates(&model(&[]), &[]).is_empty());
+        assert_eq!(candidates(&model(&[slips(1)]), &[]).len(), 4);
     }
 
     #[test]
@@ -669,16 +686,16 @@ mod tests {
     fn layers_that_waited_give_way_at_a_force_when_they_wait_no_more() {
         let mut m = model(&[waits(2, 2.5), slips(1), waits(1, 1.5), lets_go(1), lets_go(2)]);
         (m.own[0].differing[0], m.scatter.differing[1]) = (3e-4, 2e-4);
-        let out = less(&m, "delayed_puncture");
+        let out = less(&m, &[], "delayed_puncture");
         assert_eq!(out.effects.len(), 3);
         for t in [&out.tissue, &out.belief.tissue] {
             assert_eq!([t.layers[0].puncture_n, t.layers[1].puncture_n], [Some(1.5), Some(2.5)]);
         }
         assert_eq!((out.own[0].differing, out.scatter.differing), (m.own[0].differing, m.scatter.differing));
-        let same = less(&m, "shaft_slip");
+        let same = less(&m, &[], "shaft_slip");
         assert_eq!((same.effects.len(), same.tissue.layers[0].puncture_n), (4, None));
         // What differs from insertion to insertion goes with its effect, and only with it.
-        let none = less(&m, "let_go");
+        let none = less(&m, &[], "let_go");
         assert_eq!((none.own[0].differing, none.scatter.differing), ([0.0; DIFFERING], [0.0; DIFFERING]));
     }
 

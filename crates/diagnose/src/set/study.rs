@@ -138,8 +138,10 @@ fn diagnosis(
         .instrument
         .noise_n
         .unwrap_or_else(|| stylet_stats::median_of(runs.iter().map(|r| noise_n(&r.recording.force_n))));
+    let unsure = |id: &str| laws.parts.iter().any(|p| p.kept && !p.sure && p.name == id);
     let mut causes: Vec<Cause> = effects(model)
         .into_iter()
+        .filter(|id| !unsure(id))
         .map(|id| {
             let whole = if id == slip().id { Some(laws.base.errors_n.clone()) } else { None };
             let without = whole
@@ -233,19 +235,20 @@ fn cause(id: &str, told: &[Told], confidence: f64, without: &[f64], best: &Law, 
     }
 }
 
-/// Parts that the law was found to do without.
+/// Parts that the law was found to do without, and effects that it predicts better with, but not surely.
 fn dropped(laws: &Laws) -> Vec<Trace> {
     let part = |p: &crate::set::laws::Part| Trace {
         effect: p.effect.to_owned(),
         parameters: BTreeMap::new(),
         why: format!(
-            "{}: recordings left out are predicted to {:.3} N without it, {:.3} N with it",
+            "{}: recordings left out are predicted to {:.3} N without it, {:.3} N with it{}",
             p.name,
             stylet_stats::mean(&p.without_n),
-            laws.best.left_out_n()
+            laws.best.left_out_n(),
+            if p.kept { ": too few to be sure, so that it stays in the law without a name" } else { "" }
         ),
     };
-    laws.parts.iter().filter(|p| !p.kept).map(part).collect()
+    laws.parts.iter().filter(|p| !p.kept || (!p.sure && p.name == p.effect)).map(part).collect()
 }
 
 fn evidence(laws: &Laws) -> EvidenceStep {
@@ -353,6 +356,7 @@ mod tests {
             speeds_lose: Vec::new(),
             nats: 0.0,
             kept,
+            sure: kept,
         };
         Laws {
             base: law(Kind::Base, &[0.5, 0.7], -20.0, false),
@@ -539,6 +543,7 @@ mod tests {
             speeds_lose: Vec::new(),
             nats: 0.0,
             kept,
+            sure: kept,
         };
         laws.parts = vec![
             part("coulomb_friction", &[0.9, 0.9], false),

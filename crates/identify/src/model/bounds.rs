@@ -78,7 +78,8 @@ impl Model {
                         (low, high, if bends { 1e-7 } else { fine })
                     }
                 };
-                out.push(Number { role, low, high, mean: 0.0, sd: f64::INFINITY, step });
+                let (mean, sd) = p.expected.unwrap_or((0.0, f64::INFINITY));
+                out.push(Number { role, low, high, mean, sd, step });
             }
         }
         let mut of_day = |role, sd, step| {

@@ -9,6 +9,8 @@ use stylet_stats::order::median;
 
 /// Highest order.
 pub const ORDER: usize = 4;
+/// Fewest blocks of a range whose memory is told.
+const ENOUGH: usize = 40;
 /// Turns of robust least squares.
 const TURNS: usize = 4;
 
@@ -65,7 +67,7 @@ impl Bin {
 }
 
 impl Noise {
-    /// Robust least squares of one range.
+    /// Robust least squares of one range: of the blocks that laws explain, where these are enough.
     pub(super) fn fit(
         &self,
         blocks: &[Blocks],
@@ -74,6 +76,20 @@ impl Noise {
         from: From,
         floor_n: f64,
     ) -> Bin {
+        let quiet = self.rows(blocks, columns, bin, Blocks::explained);
+        let (all, rows) =
+            if quiet.1.len() < ENOUGH { self.rows(blocks, columns, bin, |_, _| true) } else { quiet };
+        Self::of_rows(all, &rows, from, floor_n)
+    }
+
+    /// Residuals (N) of one range, and the rows of its regression.
+    fn rows(
+        &self,
+        blocks: &[Blocks],
+        columns: &[Vec<f64>],
+        bin: usize,
+        counts: impl Fn(&Blocks, usize) -> bool,
+    ) -> (Vec<f64>, Vec<[f64; ROW]>) {
         let mut rows: Vec<[f64; ROW]> = Vec::new();
         let mut all: Vec<f64> = Vec::new();
         for (b, e) in blocks.iter().zip(columns) {
@@ -81,7 +97,7 @@ impl Noise {
             let mut run = 0;
             for k in 0..b.len() {
                 run = if b.restart[k] { 0 } else { run + 1 };
-                if !b.used[k] || !e[k].is_finite() || self.bin(b.size_n[k]) != bin {
+                if !b.used[k] || !e[k].is_finite() || self.bin(b.size_n[k]) != bin || !counts(b, k) {
                     continue;
                 }
                 all.push(e[k].abs());
@@ -90,8 +106,12 @@ impl Noise {
                 }
             }
         }
+        (all, rows)
+    }
+
+    fn of_rows(mut all: Vec<f64>, rows: &[[f64; ROW]], from: From, floor_n: f64) -> Bin {
         let sd_n = (median(&mut all) * stylet_stats::MAD_TO_SD).max(floor_n);
-        if rows.len() < 40 {
+        if rows.len() < ENOUGH {
             return Bin::white(sd_n);
         }
         let n = rows.len() as f64;
@@ -107,7 +127,7 @@ impl Noise {
         let turns = if from == From::Drawn { 1 } else { TURNS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
             let columns: Vec<usize> = (1..=order).collect();
-            let (a, s) = foretell(&rows, &columns, (sd_n, floor_n), HUBER, turns);
+            let (a, s) = foretell(rows, &columns, (sd_n, floor_n), HUBER, turns);
             let (near, slow) = a[1..].split_at(ORDER);
             if !stationary(near) || (order > ORDER && a[1..].iter().sum::<f64>() > 0.999) {
                 continue;
@@ -130,7 +150,7 @@ impl Noise {
             // The first blocks after a break go on where those before it ended, and with one another.
             for (run, first) in best.first.iter_mut().enumerate() {
                 let columns: Vec<usize> = (1..=run).chain(ORDER + 1..ROW).collect();
-                let (a, s) = foretell(&rows, &columns, (sd_n, floor_n), HUBER, turns);
+                let (a, s) = foretell(rows, &columns, (sd_n, floor_n), HUBER, turns);
                 let (near, slow) = a[1..].split_at(ORDER);
                 *first = First {
                     a: core::array::from_fn(|i| near[i]),

@@ -97,6 +97,8 @@ const LAYER: ParameterInfo = ParameterInfo::shape("layer", "", "layer, 1-based")
 const FRACTION: ParameterInfo = ParameterInfo::shape("fractions.0", "", "share of the force that relaxes")
     .allowed(0.0, 1.0)
     .search(0.2, 0.0, 0.9);
+/// The plateau of three needles in a phantom goes with the speed to the power of `rate + 1/exponent` = -0.13 to 0.14, exponents being 8 to 12.
+const RATE: (f64, f64) = (-0.1, 0.1);
 /// Place of the second relaxing share among the parameters.
 const SECOND: usize = 9;
 const TIME: ParameterInfo = ParameterInfo::shape("time_constants_s.0", "s", "its time constant")
@@ -129,7 +131,8 @@ static INFO: EffectInfo = EffectInfo {
             .search(50.0, 0.0, 400.0),
         ParameterInfo::shape("rate", "", "exponent of the speed in the holds")
             .allowed(-2.0, 2.0)
-            .search(0.0, -0.5, 0.5),
+            .search(0.0, -0.5, 0.5)
+            .expected(RATE.0, RATE.1),
         ParameterInfo::shape("curve_n_per_m2", "N/m2", "curvature of the spring")
             .allowed(0.0, 1e9)
             .search(3e4, 0.0, 3e5),
