@@ -587,7 +587,8 @@ mod tests {
     use crate::set::fitted::{Fitted, SET_BLOCK_S, blocks};
     use crate::set::left_out::{Score, score, without};
     use crate::set::population::predict;
-    use stylet_identify::model::{Bound, Choice, DIFFERING, Model};
+    use stylet_identify::events::Event;
+    use stylet_identify::model::{Bound, Choice, DIFFERING, Model, Scatter};
     use stylet_identify::objective::residuals;
     use stylet_record::Recording;
     use stylet_record::raw::Raw;
@@ -699,6 +700,24 @@ mod tests {
         assert_eq!((none.own[0].differing, none.scatter.differing), ([0.0; DIFFERING], [0.0; DIFFERING]));
     }
 
+    /// A layer that waited gives way where it did, and as differently.
+    #[test]
+    fn the_force_of_a_layer_that_waits_no_more_is_that_at_which_it_gave_way() {
+        let m = model(&[waits(1, 1.5)]);
+        let event = |elastic_n: f64, ruptured: bool| Event { elastic_n, ruptured, ..Event::UNSEEN };
+        let events =
+            [vec![event(1.8, true)], vec![event(2.0, true)], vec![event(2.2, true)], vec![event(9.0, false)]];
+        let out = less(&m, &events, "delayed_puncture");
+        assert_eq!(
+            (out.tissue.layers[0].puncture_n, out.belief.tissue.layers[0].puncture_n),
+            (Some(2.0), Some(2.0))
+        );
+        assert!((out.scatter.force - 0.1).abs() < 1e-12, "{}", out.scatter.force);
+        // A scatter that is wider already stays.
+        let wide = Model { scatter: Scatter { force: 0.3, ..m.scatter }, ..m };
+        assert_eq!(less(&wide, &events, "delayed_puncture").scatter.force, 0.3);
+    }
+
     #[test]
     fn a_laws_effects_are_named_once_and_only_where_they_do_something() {
         let nothing: AnyEffect = CoulombFriction { c_n_per_m: 0.0 }.into();
@@ -803,6 +822,10 @@ mod tests {
         ] {
             assert_eq!(missed(loses, &speeds, nats).effect(), wanted, "{loses} {speeds:?} {nats}");
         }
+        // Without being sure of it an effect is of use where recordings lose by more than one standard error.
+        assert!(missed(0.12, &[], -9.0).useful() && !missed(0.09, &[], -9.0).useful());
+        let unsure = Missed { loses: vec![0.0, 0.2, 0.3], ..missed(0.0, &[], -9.0) };
+        assert!(unsure.useful() && !unsure.effect());
         // What shapes one pays by itself.
         assert!(missed(0.03, &[], -9.0).shape() && !missed(0.01, &[], 9.0).shape());
     }

@@ -559,6 +559,28 @@ mod tests {
     }
 
     #[test]
+    fn an_effect_that_predicts_better_but_not_surely_is_a_trace_and_stays_in_the_law() {
+        let mut laws = laws();
+        laws.best = law(Kind::Library, &[0.2, 0.1], -90.0, true);
+        laws.parts = vec![Part {
+            effect: "coulomb_friction",
+            name: "coulomb_friction".to_owned(),
+            without_n: vec![0.3, 0.2],
+            loses: Vec::new(),
+            speeds_lose: Vec::new(),
+            nats: 0.0,
+            kept: true,
+            sure: false,
+        }];
+        let d = told(&laws, &repeats(0.12, 0.12, Some(0.1)));
+        assert_eq!((d.verdict, d.causes.len(), d.traces.len()), (Verdict::None, 0, 1));
+        assert!(d.traces[0].why.contains("too few to be sure"), "{}", d.traces[0].why);
+        laws.parts[0].sure = true;
+        let d = told(&laws, &repeats(0.12, 0.12, Some(0.1)));
+        assert_eq!((d.verdict, d.causes.len(), d.traces.len()), (Verdict::Named, 1, 0));
+    }
+
+    #[test]
     fn the_base_law_predicts_by_itself_unless_it_is_the_best_one() {
         let runs = made::insertions(&[], &[[0.008, 0.0], [0.016, 1e-4], [0.008, 0.0]]);
         let runs: Vec<&Insertion> = runs.iter().collect();

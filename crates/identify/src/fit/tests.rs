@@ -2,6 +2,7 @@ use super::kinks::{freed, trusting};
 use super::step::in_order;
 use super::*;
 use crate::blocks::{BLOCK_S, Blocks};
+use crate::events::Event;
 use crate::model::{Belief, Own};
 use crate::model::{NEVER, Number, Role};
 use crate::noise::Noise;
@@ -370,4 +371,29 @@ fn spreads_are_those_of_the_recordings_own_numbers() {
     let mut bound = m.clone();
     rescatter(&mut bound, &mut at);
     assert_eq!((bound.scatter.surface_m, bound.scatter.friction), (m.scatter.surface_m, m.scatter.friction));
+}
+
+/// Two layers in four recordings: the force shows where the first gives way, nothing shows where the second does.
+#[test]
+fn a_layer_whose_ruptures_nothing_shows_does_not_say_that_none_scatters() {
+    let (m, d) = smooth();
+    let at = residuals(&m, &d).expect("a replay");
+    let event = |force: f64| Event { force, place_m: -0.01, ruptured: true, step_s: 0.01, ..Event::UNSEEN };
+    let told = |events: Vec<Vec<Event>>, steady: bool| {
+        let layers = events[0].len();
+        let mut at = Residuals { events, ..at.clone() };
+        let mut belief = (*m.belief).clone();
+        belief.tissue.layers.resize(layers, belief.tissue.layers[0].clone());
+        belief.tolerance.resize(layers, 0.3);
+        belief.thickness_tolerance.resize(layers, 0.1);
+        let mut model = Model { steady, ..Model::base(Arc::new(belief), 4) };
+        rescatter(&mut model, &mut at);
+        model.scatter.force
+    };
+    let forces = [-0.2, -0.1, 0.1, 0.2];
+    let (first, both): (Vec<_>, Vec<_>) =
+        forces.map(|f| (vec![event(f)], vec![event(f), event(1e-6)])).into_iter().unzip();
+    let alone = told(first.clone(), true);
+    assert!((0.09..0.3).contains(&alone), "{alone}");
+    assert_eq!((told(first, false), told(both, true)), (alone, alone));
 }

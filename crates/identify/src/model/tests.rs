@@ -388,3 +388,19 @@ fn every_recording_has_its_own_of_what_is_its_own() {
         assert!(!role.is_own());
     }
 }
+
+/// What was measured elsewhere of a number is its prior; of all others nothing is believed before any data.
+#[test]
+fn what_is_expected_of_a_number_of_an_effect_is_its_prior() {
+    let slips = info("shaft_slip").expect("in the library");
+    let values: Vec<f64> = slips.parameters.iter().map(|p| p.start).collect();
+    let model = base().with(Choice::new(slips, &values));
+    for n in model.shared() {
+        let Role::Effect { parameter, .. } = n.role else { continue };
+        let wanted = slips.parameters[parameter].expected.unwrap_or((0.0, f64::INFINITY));
+        assert_eq!((n.mean, n.sd), wanted, "{}", slips.parameters[parameter].path);
+    }
+    let expected: Vec<&str> =
+        slips.parameters.iter().filter(|p| p.expected.is_some()).map(|p| p.path).collect();
+    assert_eq!(expected, ["rate"]);
+}

@@ -230,4 +230,21 @@ mod tests {
         let least = Noise::estimate(&[still(60)], &[vec![0.0; 60]], From::Whole, 0.0);
         assert_eq!(least.bins[0].sd_n, 1e-6);
     }
+    /// A second of every four holds a force that no law explains.
+    #[test]
+    fn noise_is_told_by_what_laws_explain() {
+        let n = 8000;
+        let draw = normal(5, n);
+        let loud = |k: usize| k % 200 < 50;
+        let e: Vec<f64> = (0..n).map(|k| 0.01 * draw[k] + if loud(k) { 0.2 } else { 0.0 }).collect();
+        let unexplained = |share: &dyn Fn(usize) -> bool| {
+            still(n).unexplained((0..n).map(|k| if share(k) { 0.2 } else { 0.0 }).collect())
+        };
+        let of = |b: Blocks| Noise::estimate(&[b], std::slice::from_ref(&e), From::Whole, 0.0).bins[4];
+        let (plain, told) = (of(still(n)), of(unexplained(&loud)));
+        assert!(plain.sd_n > 0.0115 && (told.sd_n / 0.01 - 1.0).abs() < 0.03, "{plain:?} {told:?}");
+        assert!((told.innovation_n / 0.01 - 1.0).abs() < 0.03, "{told:?}");
+        // Where hardly anything is explained it is told by all.
+        assert_eq!(of(unexplained(&|k| k >= 43)), plain);
+    }
 }
