@@ -258,12 +258,6 @@ impl Blocks {
         self
     }
 
-    /// Whether laws explain what is around a block.
-    #[must_use]
-    pub fn explained(&self, k: usize) -> bool {
-        self.unexplained_n.get(k).is_none_or(|u| *u == 0.0)
-    }
-
     fn doubt_what_jumps(&mut self) {
         self.doubt_n.clone_from(&self.unexplained_n);
         self.doubt_n.resize(self.len(), 0.0);

@@ -9,8 +9,6 @@ use stylet_stats::order::median;
 
 /// Highest order.
 pub const ORDER: usize = 4;
-/// Fewest blocks of a range whose memory is told.
-const ENOUGH: usize = 40;
 /// Turns of robust least squares.
 const TURNS: usize = 4;
 
@@ -67,7 +65,7 @@ impl Bin {
 }
 
 impl Noise {
-    /// Robust least squares of one range: of the blocks that laws explain, where these are enough.
+    /// Robust least squares of one range.
     pub(super) fn fit(
         &self,
         blocks: &[Blocks],
@@ -76,20 +74,6 @@ impl Noise {
         from: From,
         floor_n: f64,
     ) -> Bin {
-        let quiet = self.rows(blocks, columns, bin, Blocks::explained);
-        let (all, rows) =
-            if quiet.1.len() < ENOUGH { self.rows(blocks, columns, bin, |_, _| true) } else { quiet };
-        Self::of_rows(all, &rows, from, floor_n)
-    }
-
-    /// Residuals (N) of one range, and the rows of its regression.
-    fn rows(
-        &self,
-        blocks: &[Blocks],
-        columns: &[Vec<f64>],
-        bin: usize,
-        counts: impl Fn(&Blocks, usize) -> bool,
-    ) -> (Vec<f64>, Vec<[f64; ROW]>) {
         let mut rows: Vec<[f64; ROW]> = Vec::new();
         let mut all: Vec<f64> = Vec::new();
         for (b, e) in blocks.iter().zip(columns) {
@@ -97,7 +81,7 @@ impl Noise {
             let mut run = 0;
             for k in 0..b.len() {
                 run = if b.restart[k] { 0 } else { run + 1 };
-                if !b.used[k] || !e[k].is_finite() || self.bin(b.size_n[k]) != bin || !counts(b, k) {
+                if !b.used[k] || !e[k].is_finite() || self.bin(b.size_n[k]) != bin {
                     continue;
                 }
                 all.push(e[k].abs());
@@ -106,12 +90,8 @@ impl Noise {
                 }
             }
         }
-        (all, rows)
-    }
-
-    fn of_rows(mut all: Vec<f64>, rows: &[[f64; ROW]], from: From, floor_n: f64) -> Bin {
         let sd_n = (median(&mut all) * stylet_stats::MAD_TO_SD).max(floor_n);
-        if rows.len() < ENOUGH {
+        if rows.len() < 40 {
             return Bin::white(sd_n);
         }
         let n = rows.len() as f64;
@@ -127,7 +107,7 @@ impl Noise {
         let turns = if from == From::Drawn { 1 } else { TURNS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
             let columns: Vec<usize> = (1..=order).collect();
-            let (a, s) = foretell(rows, &columns, (sd_n, floor_n), HUBER, turns);
+            let (a, s) = foretell(&rows, &columns, (sd_n, floor_n), HUBER, turns);
             let (near, slow) = a[1..].split_at(ORDER);
             if !stationary(near) || (order > ORDER && a[1..].iter().sum::<f64>() > 0.999) {
                 continue;
@@ -150,7 +130,7 @@ impl Noise {
             // The first blocks after a break go on where those before it ended, and with one another.
             for (run, first) in best.first.iter_mut().enumerate() {
                 let columns: Vec<usize> = (1..=run).chain(ORDER + 1..ROW).collect();
-                let (a, s) = foretell(rows, &columns, (sd_n, floor_n), HUBER, turns);
+                let (a, s) = foretell(&rows, &columns, (sd_n, floor_n), HUBER, turns);
                 let (near, slow) = a[1..].split_at(ORDER);
                 *first = First {
                     a: core::array::from_fn(|i| near[i]),
@@ -229,22 +209,5 @@ mod tests {
         assert_eq!((floor.bins[0].sd_n, floor.bins[0].innovation_n), (0.02, 0.02));
         let least = Noise::estimate(&[still(60)], &[vec![0.0; 60]], From::Whole, 0.0);
         assert_eq!(least.bins[0].sd_n, 1e-6);
-    }
-    /// A second of every four holds a force that no law explains.
-    #[test]
-    fn noise_is_told_by_what_laws_explain() {
-        let n = 8000;
-        let draw = normal(5, n);
-        let loud = |k: usize| k % 200 < 50;
-        let e: Vec<f64> = (0..n).map(|k| 0.01 * draw[k] + if loud(k) { 0.2 } else { 0.0 }).collect();
-        let unexplained = |share: &dyn Fn(usize) -> bool| {
-            still(n).unexplained((0..n).map(|k| if share(k) { 0.2 } else { 0.0 }).collect())
-        };
-        let of = |b: Blocks| Noise::estimate(&[b], std::slice::from_ref(&e), From::Whole, 0.0).bins[4];
-        let (plain, told) = (of(still(n)), of(unexplained(&loud)));
-        assert!(plain.sd_n > 0.0115 && (told.sd_n / 0.01 - 1.0).abs() < 0.03, "{plain:?} {told:?}");
-        assert!((told.innovation_n / 0.01 - 1.0).abs() < 0.03, "{told:?}");
-        // Where hardly anything is explained it is told by all.
-        assert_eq!(of(unexplained(&|k| k >= 43)), plain);
     }
 }
