@@ -112,6 +112,14 @@ pub struct Part {
     pub sure: bool,
 }
 
+impl Part {
+    /// Whether it is an effect that the law predicts better with, but not surely: it stays, and is not named.
+    #[must_use]
+    pub fn is_unsure(&self) -> bool {
+        self.kept && !self.sure && self.name == self.effect
+    }
+}
+
 /// Laws of a set.
 #[derive(Clone, Debug)]
 pub struct Laws {

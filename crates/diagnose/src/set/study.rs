@@ -138,7 +138,7 @@ fn diagnosis(
         .instrument
         .noise_n
         .unwrap_or_else(|| stylet_stats::median_of(runs.iter().map(|r| noise_n(&r.recording.force_n))));
-    let unsure = |id: &str| laws.parts.iter().any(|p| p.kept && !p.sure && p.name == id);
+    let unsure = |id: &str| laws.parts.iter().any(|p| p.is_unsure() && p.effect == id);
     let mut causes: Vec<Cause> = effects(model)
         .into_iter()
         .filter(|id| !unsure(id))
@@ -248,7 +248,7 @@ fn dropped(laws: &Laws) -> Vec<Trace> {
             if p.kept { ": too few to be sure, so that it stays in the law without a name" } else { "" }
         ),
     };
-    laws.parts.iter().filter(|p| !p.kept || (!p.sure && p.name == p.effect)).map(part).collect()
+    laws.parts.iter().filter(|p| !p.kept || p.is_unsure()).map(part).collect()
 }
 
 fn evidence(laws: &Laws) -> EvidenceStep {
