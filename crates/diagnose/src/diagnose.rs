@@ -5,6 +5,7 @@ use crate::error::DiagnoseError;
 use crate::held_out::{Borne, Left, borne, floor, left_out, rms};
 use crate::intervals::{Spread, untied};
 use crate::leftover;
+use crate::otherwise::{Otherwise, WITH, otherwise};
 use crate::outcome::*;
 use crate::rivals::{CLASS_NATS, Rival, rivals};
 use crate::select::Search;
@@ -16,13 +17,15 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
-use stylet_identify::fit::{Effort, fit};
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::look::Look;
 use stylet_identify::model::{Belief, Role};
 use stylet_identify::noise::From as NoiseFrom;
 use stylet_identify::objective::{Data, residuals};
 use stylet_record::raw;
 use stylet_record::{QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
+use stylet_stats::tails::chi_square_sf;
 use stylet_tissue::{AnyEffect, EffectInfo, Proposal};
 
 /// One recording with its name.
@@ -69,6 +72,10 @@ const EXCESS: f64 = 0.8;
 const EXCESS_ALONE: f64 = 3.0;
 /// Slow noise of more than two and a half times the fast one is none any more, whatever its colour.
 const EXCESS_SLOW: f64 = 6.0;
+/// An effect that would gain more than this share of what it explains by acting otherwise imitates something unknown, ...
+const IMITATES: f64 = 0.01;
+/// ... if that is so many nats: an effect by its own law gains half a nat by chance, and some tens where the motion is not known exactly.
+const IMITATES_NATS: f64 = 100.0;
 /// Beside something unknown a cause stands when, where that is silent, its strengths are the same whichever recording is left out, to this
 /// share, ...
 const SAME: f64 = 0.1;
@@ -290,8 +297,7 @@ fn excess(data: &Data, e: &[Vec<f64>]) -> f64 {
             near[lo.min(hi)..hi].fill(true);
         }
         for k in (0..b.len()).filter(|k| b.used[*k] && !near[*k]) {
-            let noise = &data.noise;
-            let sd = noise.bins[noise.bin(b.size_n[k]).min(noise.bins.len() - 1)].sd_n;
+            let sd = data.noise.of(b.size_n[k]).sd_n;
             sum += (e[k] / sd).powi(2).min(LIMIT * LIMIT);
             n += 1.0;
         }
@@ -321,7 +327,11 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let sure = if alone { after > EXCESS_ALONE } else { after > EXCESS && told.sure.p_value < LEFTOVER_P };
     let at_sight = after > EXCESS_SLOW && told.at_sight.p_value < LEFTOVER_P;
     let stretch = crate::stretch::chance(&quiet, &search.best.residuals.e);
-    let unknown = share > UNEXPLAINED && (sure || at_sight || lined || stretch.is_some());
+    let without =
+        |k: usize| fit(&search.best.model.without(k), &search.data, Effort { turns: 3, enough: 1.0 });
+    let without: Vec<Option<Fit>> = (0..search.best.model.effects.len()).map(without).collect();
+    let bent = imitates(&search.best, &search.data, &without);
+    let unknown = bent.is_some() || (share > UNEXPLAINED && (sure || at_sight || lined || stretch.is_some()));
     let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included, however slow.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
@@ -342,8 +352,7 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
         let gain_nats = stage.and_then(|s| s.taken).map_or(0.0, |t| t.1);
         let needed = stage.map_or(0.0, |s| s.needed);
         let weights: f64 = rivals.iter().map(|r| libm::exp(-r.behind.max(-3.0))).sum();
-        let without = fit(&search.best.model.without(k), &search.data, Effort { turns: 3, enough: 1.0 });
-        let back = without.map_or(0.0, |f| excess(&quiet, &f.residuals.e) - after);
+        let back = without[k].as_ref().map_or(0.0, |f| excess(&quiet, &f.residuals.e) - after);
         causes.push(Cause {
             effect: choice.info.id.to_owned(),
             equivalent: rivals.iter().filter(|r| r.behind < CLASS_NATS).map(|r| r.name.to_owned()).collect(),
@@ -359,11 +368,13 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     if lined {
         depends_on.insert(0, "frequency".to_owned());
     } else if unknown && depends_on.is_empty() {
-        depends_on.push("time".to_owned());
+        depends_on.push(bent.map_or("time", |b| b.with).to_owned());
     }
+    let bent_p =
+        bent.map_or(1.0, |b| (chi_square_sf(2.0 * b.nats, 1.0) * WITH.len() as f64).max(f64::MIN_POSITIVE));
     let line = if lined { line_p(after, search.data.compared()) } else { 1.0 };
     let leftover = LeftoverReport {
-        p_value: left.p_value.min(line).min(stretch.filter(|_| unknown).unwrap_or(1.0)),
+        p_value: left.p_value.min(line).min(bent_p).min(stretch.filter(|_| unknown).unwrap_or(1.0)),
         depends_on,
         nats: left.nats,
         share,
@@ -376,6 +387,15 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
         search.data = quiet;
     }
     Judged { causes, against_none, base_parameters, leftover, unknown, lined }
+}
+
+/// How an effect of a fit that only imitates what is there would rather act, where there is one: of several the one that would gain most.
+/// `without` are the fits without each.
+fn imitates(best: &Fit, data: &Data, without: &[Option<Fit>]) -> Option<Otherwise> {
+    let look = Look::new(best, data);
+    let of = |(k, less): (usize, &Option<Fit>)| otherwise(&look, k, less.as_ref()?.nats() - best.nats());
+    let told = without.iter().enumerate().filter_map(of);
+    told.filter(|o| o.nats > IMITATES_NATS && o.share > IMITATES).max_by(|a, b| a.nats.total_cmp(&b.nats))
 }
 
 /// Whether an effect beside something unknown is a cause: by what is heard where that is silent, and by all that was recorded, where it had
@@ -536,8 +556,8 @@ fn extended(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
 #[cfg(test)]
 mod tests {
     use super::{
-        base_parameters, colour, differences, each, excess, extended, judge, line_p, raw_causes, stands,
-        step, take_traces,
+        base_parameters, colour, differences, each, excess, extended, imitates, judge, line_p, raw_causes,
+        stands, step, take_traces,
     };
     use crate::held_out::{Borne, Left};
     use crate::intervals::Spread;
@@ -698,6 +718,18 @@ mod tests {
         for f in [&search.base, &search.best] {
             let nats = residuals(&f.model, &search.data).expect("a replay").nats;
             assert_eq!(f.nats(), nats);
+        }
+    }
+
+    #[test]
+    fn a_zero_that_runs_faster_and_faster_is_no_drift_but_something_unknown() {
+        for (bent_n_per_s2, with) in [(0.0, None), (0.0025, Some("time"))] {
+            let drift = ForceDrift { rate_n_per_s: 0.1 }.into();
+            let mut search = found(&[drift], 4, move |t| 0.1 * t + bent_n_per_s2 * t * t);
+            let less = fit(&search.best.model.without(0), &search.data, Effort { turns: 3, enough: 1.0 });
+            let told = imitates(&search.best, &search.data, &[less]);
+            assert_eq!(told.map(|o| o.with), with, "{told:?}");
+            assert_eq!(judge(&mut search, &[]).unknown, with.is_some());
         }
     }
 

@@ -130,7 +130,8 @@ pub fn borne(best: &Fit, data: &Data, floor_n: f64) -> Vec<Borne> {
             };
             let less = square(&left_out(&without, data));
             let gain = (less - with) / (less - floor_n * floor_n).max(1e-12);
-            Borne { spread, gain, otherwise: otherwise(&look, k, without.nats() - best.nats()) }
+            let otherwise = otherwise(&look, k, without.nats() - best.nats());
+            Borne { spread, gain, otherwise: otherwise.map_or(f64::INFINITY, |o| o.share) }
         })
         .collect()
 }

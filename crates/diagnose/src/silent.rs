@@ -44,8 +44,7 @@ fn loud(b: &Blocks, e: &[f64], data: &Data) -> Vec<f64> {
             let around = k.saturating_sub(half)..(k + half + 1).min(b.len());
             let (sum, n) = around.map(square).fold((0.0, 0.0), |a, s| (a.0 + s.0, a.1 + s.1));
             let left = (sum / f64::max(n, 1.0)).sqrt();
-            let noise = &data.noise;
-            let sd = noise.bins[noise.bin(b.size_n[k]).min(noise.bins.len() - 1)].sd_n;
+            let sd = data.noise.of(b.size_n[k]).sd_n;
             if left > LOUD * sd { left * n.sqrt() } else { 0.0 }
         })
         .collect()

@@ -21,13 +21,12 @@ const LEAST: f64 = 3.0;
 /// among as many as there are windows.
 #[must_use]
 pub fn chance(data: &Data, e: &[Vec<f64>]) -> Option<f64> {
-    let noise = &data.noise;
     let of = |(b, e): (&Blocks, &Vec<f64>)| -> Vec<f64> {
         let per = ((WINDOW_S / (b.step_s * b.samples as f64)).round() as usize).max(1);
         let mean = |from: usize| {
             let (mut sum, mut n) = (0.0, 0_usize);
             for k in (from..(from + per).min(b.len())).filter(|k| b.used[*k] && e[*k].is_finite()) {
-                sum += e[k] / noise.bins[noise.bin(b.size_n[k]).min(noise.bins.len() - 1)].sd_n;
+                sum += e[k] / data.noise.of(b.size_n[k]).sd_n;
                 n += 1;
             }
             // A gap is no calm.

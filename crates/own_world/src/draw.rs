@@ -11,6 +11,9 @@ use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissu
 
 /// Samples per second of the recordings.
 pub const SAMPLE_HZ: f64 = 200.0;
+/// Steps per second of the law.
+const STEP_HZ: f64 = 1000.0;
+/// One in so many steps is sampled.
 const STEPS: usize = 5;
 
 /// What a case is drawn from.
@@ -92,6 +95,11 @@ pub fn scenario() -> Scenario {
     }
 }
 
+/// Samples per second when one in `steps` is kept.
+fn sampled_hz(steps: usize) -> f64 {
+    STEP_HZ / steps as f64
+}
+
 struct Hidden {
     truth: Tissue,
     paths: Vec<Path>,
@@ -123,7 +131,7 @@ fn simulate(
     drawn: &Drawn,
     tissue: &Tissue,
     path: &Path,
-    phase_s: f64,
+    (phase_s, steps): (f64, usize),
     noise: &mut dyn FnMut() -> f64,
 ) -> ([Vec<f64>; 4], Vec<f64>) {
     let layers = tissue.layers.len();
@@ -131,16 +139,16 @@ fn simulate(
     let mut ruptures = vec![f64::INFINITY; layers];
     let Ok(law) = Law::new(tissue, &drawn.effects) else { return (out, ruptures) };
     let chain = Measurement::new(&drawn.effects);
-    let mut measuring = chain.start(SAMPLE_HZ * STEPS as f64);
+    let mut measuring = chain.start(STEP_HZ);
     let mut state = LawState::default();
     let mut outside = drawn.outside.clone();
     if let Some(o) = &mut outside {
         o.restart();
     }
-    let dt = 1.0 / (SAMPLE_HZ * STEPS as f64);
-    let n = (path.duration() * SAMPLE_HZ) as usize;
+    let dt = 1.0 / STEP_HZ;
+    let n = (path.duration() * sampled_hz(steps)) as usize;
     let end = tissue.end_m();
-    for k in 0..n * STEPS {
+    for k in 0..n * steps {
         let t = k as f64 * dt;
         let [z, v, a] = path.at(t + phase_s);
         let force = law.step(&mut state, t, z, v, |r| {
@@ -152,7 +160,7 @@ fn simulate(
         if let Some(o) = &mut outside {
             tissue_n += o.force(t, z, v, a, z.clamp(0.0, end));
         }
-        let sampled = k % STEPS == 0;
+        let sampled = k % steps == 0;
         let noise_n = if sampled { noise() } else { 0.0 };
         let reading = Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
         let recorded = chain.step(&mut measuring, &reading);
@@ -174,7 +182,7 @@ pub fn clean_force(drawn: &Drawn) -> Vec<Vec<f64>> {
         .paths
         .iter()
         .map(|p| {
-            let [_, _, _, f] = simulate(drawn, &hidden.truth, p, hidden.phase_s, &mut || 0.0).0;
+            let [_, _, _, f] = simulate(drawn, &hidden.truth, p, (hidden.phase_s, STEPS), &mut || 0.0).0;
             f
         })
         .collect()
@@ -183,6 +191,14 @@ pub fn clean_force(drawn: &Drawn) -> Vec<Vec<f64>> {
 /// Draws the case.
 #[must_use]
 pub fn case(drawn: &Drawn) -> Case {
+    case_sampled(drawn, STEPS)
+}
+
+/// Draws the case with one in `steps` (1 or more) of the law's 1000 steps a second sampled: noise of the same size and colour from sample
+/// to sample, however many there are.
+#[must_use]
+pub fn case_sampled(drawn: &Drawn, steps: usize) -> Case {
+    let steps = steps.max(1);
     let Hidden { truth, paths, phase_s, mut rng } = prepare(drawn);
     let [a1, a2] = drawn.ar;
     let rho = a1 / (1.0 - a2);
@@ -213,13 +229,13 @@ pub fn case(drawn: &Drawn) -> Case {
             e1 = e;
             let mut x = drawn.noise_n * e;
             if let Some((rate, size)) = spikes
-                && rng.random::<f64>() < rate / SAMPLE_HZ
+                && rng.random::<f64>() < rate / sampled_hz(steps)
             {
                 x += if rng.random::<bool>() { size } else { -size };
             }
             if drawn.noise_n == 0.0 { 0.0 } else { x }
         };
-        let ([t, z, mut v, f], r) = simulate(drawn, &tissue, path, phase_s, &mut noise);
+        let ([t, z, mut v, f], r) = simulate(drawn, &tissue, path, (phase_s, steps), &mut noise);
         if drawn.velocity_noise_mps > 0.0 {
             for v in &mut v {
                 let w: f64 = StandardNormal.sample(&mut rng);

@@ -10,7 +10,7 @@ mod motion;
 mod outside;
 mod plan;
 
-pub use draw::{Case, Drawn, SAMPLE_HZ, case, clean_force, library_ids, scenario};
+pub use draw::{Case, Drawn, SAMPLE_HZ, case, case_sampled, clean_force, library_ids, scenario};
 pub use motion::Motions;
 pub use outside::{OUTSIDE, Outside};
 pub use plan::{Harder, Kind, Size, Sketch, largest_force, scaled, sketch, sketch_of};

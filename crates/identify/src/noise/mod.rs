@@ -101,6 +101,12 @@ impl Noise {
         self.edges_n.iter().take_while(|e| **e <= size_n).count()
     }
 
+    /// The noise of a block of a size of the force.
+    #[must_use]
+    pub fn of(&self, size_n: f64) -> &Bin {
+        &self.bins[self.bin(size_n).min(self.bins.len() - 1)]
+    }
+
     /// Sum of the logarithms of the innovations' standard deviations, `ln(s/N)`, over the blocks compared.
     #[must_use]
     pub fn ln_sizes(&self, blocks: &[Blocks]) -> f64 {
@@ -110,8 +116,7 @@ impl Noise {
             for k in 0..b.len() {
                 run = if b.restart[k] { 0 } else { run + 1 };
                 if b.used[k] {
-                    let bin = &self.bins[self.bin(b.size_n[k]).min(self.bins.len() - 1)];
-                    sum += libm::log(bin.size_n(run));
+                    sum += libm::log(self.of(b.size_n[k]).size_n(run));
                 }
             }
         }
