@@ -26,7 +26,7 @@ use stylet_record::raw;
 use stylet_record::{QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
 use stylet_stats::tails::chi_square_sf;
-use stylet_tissue::{AnyEffect, EffectInfo, Proposal};
+use stylet_tissue::{AnyEffect, EffectInfo};
 
 /// One recording with its name.
 #[derive(Clone, Debug)]
@@ -79,12 +79,14 @@ const IMITATES_NATS: f64 = 100.0;
 /// Beside something unknown a cause stands when, where that is silent, its strengths are the same whichever recording is left out, to this
 /// share, ...
 const SAME: f64 = 0.1;
-/// ... it pays there for so much of what is left of recordings that were left out, ...
-const PAYS: f64 = 0.05;
+/// ... it pays, there and by all that was recorded, where it had been found, for so much of what is left of recordings left out, ...
+const PAYS: f64 = 0.1;
 /// ... it would gain no more than this share of what it explains by acting otherwise, ...
 const OTHERWISE: f64 = 0.001;
-/// ... and by all that was recorded, where it had been found, no more than this.
+/// ... and by all that was recorded no more than this, ...
 const OTHERWISE_LOUD: f64 = 0.03;
+/// ... or than this, where any force of its kind would be imitated.
+const OTHERWISE_IMITATES: f64 = 0.0005;
 /// Why an effect beside something unknown is a trace.
 pub const IMITATED: &str = "what no effect of the library explains may imitate it";
 
@@ -171,17 +173,8 @@ pub fn diagnose(
         let borne = borne(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&borne);
         let loud = |id: &str| loud.iter().find(|l| l.0 == id).map(|l| &l.1);
-        // Of a force with several lines one tone is no cause, nor is a breath beside whatever else comes and goes: it takes the part of it
-        // that any slow sine would.
-        let tone = |i: &EffectInfo| match i.proposal {
-            Proposal::Line => judged.lined,
-            Proposal::Breath => true,
-            _ => false,
-        };
-        let kept: Vec<&str> = effects
-            .filter(|(e, b)| !tone(e.info) && stands(b, loud(e.info.id)))
-            .map(|(e, _)| e.info.id)
-            .collect();
+        let kept: Vec<&str> =
+            effects.filter(|(e, b)| stands(e.info, b, loud(e.info.id))).map(|(e, _)| e.info.id).collect();
         let gone = judged.causes.iter().filter(|c| !kept.contains(&c.effect.as_str()));
         let gone = gone.map(|c| Small { effect: c.effect.clone(), why: IMITATED.to_owned() }).collect();
         traces.extend(take_traces(&mut judged, gone));
@@ -403,11 +396,12 @@ fn imitates(best: &Fit, data: &Data, without: &[Option<Fit>]) -> Option<Otherwis
 
 /// Whether an effect beside something unknown is a cause: by what is heard where that is silent, and by all that was recorded, where it had
 /// been found.
-fn stands(silent: &Borne, loud: Option<&Borne>) -> bool {
-    silent.gain > PAYS
-        && silent.spread < SAME
-        && silent.otherwise < OTHERWISE
-        && loud.is_none_or(|l| l.otherwise < OTHERWISE_LOUD)
+fn stands(info: &EffectInfo, silent: &Borne, loud: Option<&Borne>) -> bool {
+    let most = if info.imitates { OTHERWISE_IMITATES } else { OTHERWISE_LOUD };
+    silent.spread < SAME
+        && silent.otherwise < OTHERWISE.min(most)
+        && loud.is_none_or(|l| l.otherwise < most)
+        && [Some(silent), loud].into_iter().flatten().all(|b| b.gain > PAYS)
 }
 
 /// Moves causes that are none to `traces`.
@@ -579,7 +573,7 @@ mod tests {
     use stylet_identify::objective::{Data, residuals};
     use stylet_record::Recording;
     use stylet_record::raw::{Raw, Spikes};
-    use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
+    use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift, Respiration};
 
     /// Fisher 1929: `m (1 + x)^(1 - m)` for a line `x` times all others among `m` half the blocks.
     #[test]
@@ -738,13 +732,21 @@ mod tests {
 
     #[test]
     fn beside_something_unknown_a_cause_is_the_same_and_acts_by_its_law_where_that_is_silent() {
-        let borne = |spread: f64, otherwise: f64| Borne { spread, gain: 0.1, otherwise };
-        let heard = |spread: f64, otherwise: f64| stands(&borne(spread, otherwise), None);
-        assert!(heard(0.09, 9e-4) && !heard(0.11, 9e-4) && !heard(0.09, 1.1e-3));
-        assert!(!stands(&Borne { gain: 0.04, ..borne(0.09, 0.0) }, None));
-        // By all that was recorded it acted by its law, too.
-        let loud = |spread: f64, otherwise: f64| stands(&borne(0.09, 9e-4), Some(&borne(spread, otherwise)));
-        assert!(loud(0.4, 0.02) && !loud(0.05, 0.04));
+        let borne = |spread: f64, gain: f64, otherwise: f64| Borne { spread, gain, otherwise };
+        let (drift, breathes) = (drift(), AnyEffect::from(Respiration::default()));
+        let heard = |b: Borne| stands(drift.info(), &b, None);
+        assert!(heard(borne(0.09, 0.2, 9e-4)));
+        assert!(!heard(borne(0.11, 0.2, 9e-4)) && !heard(borne(0.09, 0.2, 1.1e-3)));
+        assert!(!heard(borne(0.09, 0.09, 0.0)));
+        // By all that was recorded it paid and acted by its law, too, if less surely.
+        let with = |info, loud: Borne| stands(info, &borne(0.09, 0.2, 4e-4), Some(&loud));
+        let loud = |b: Borne| with(drift.info(), b);
+        assert!(
+            loud(borne(0.4, 0.2, 0.02)) && !loud(borne(0.05, 0.2, 0.04)) && !loud(borne(0.05, 0.0, 0.02))
+        );
+        // A breath is seen in whatever comes and goes.
+        let breath = |otherwise: f64| with(breathes.info(), borne(0.4, 0.2, otherwise));
+        assert!(breath(4e-4) && !breath(6e-4));
     }
 
     fn rival(effect: &AnyEffect, behind: f64) -> Rival {

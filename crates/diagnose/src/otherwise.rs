@@ -4,16 +4,24 @@
 //! the travel since a reversal for a slack of the clamp, a bias for a force that goes with the square of the acceleration. An effect that
 //! is there needs no change where its force is let vary; one that imitates would rather act otherwise.
 
+use stylet_identify::blocks::Blocks;
 use stylet_identify::fit::Column;
 use stylet_identify::look::Look;
 use stylet_identify::model::Model;
 use stylet_identify::objective::replay;
+use stylet_stats::order::quantile;
+use stylet_tissue::effect::sgn;
 
 /// Slower than this (m/s) is rest.
 const REST_MPS: f64 = 2e-4;
 
 /// By what the force of an effect may vary.
-pub const WITH: [&str; 6] = ["depth", "speed", "time", "way_back", "rest", "force"];
+pub const WITH: [&str; 8] =
+    ["depth", "speed", "time", "way_back", "rest", "force", "acceleration", "travel_since_reversal"];
+/// What follows a reversal has gone down to half after so much travel, in m.
+const SINCE_M: f64 = 1e-3;
+/// Accelerations at jumps of the speed are as large as blocks are short: the last so many of either side count as the next ones.
+const RARELY: f64 = 0.01;
 /// What is left of a column after everything fitted has imitated it is rounding below this share.
 const ROUNDING: f64 = 1e-6;
 
@@ -28,9 +36,9 @@ pub struct Otherwise {
     pub share: f64,
 }
 
-/// What a fit of an effect would gain if its force could also grow with depth, speed, time or force, on the way back or at rest, whichever
-/// gains most: to first order beside everything that is fitted. `lost` is what the fit loses without the effect, in nats. None where its
-/// force cannot be told.
+/// What a fit of an effect would gain if its force could also grow with depth, speed, acceleration, time or force, after a reversal, on the
+/// way back or at rest, whichever gains most: to first order beside everything that is fitted. `lost` is what the fit loses without the
+/// effect, in nats. None where its force cannot be told.
 #[must_use]
 pub fn otherwise(look: &Look<'_>, effect: usize, lost: f64) -> Option<Otherwise> {
     let gain = |column: Column| {
@@ -47,18 +55,33 @@ fn columns(look: &Look<'_>, effect: usize) -> Option<Vec<Column>> {
     let (forces, whole) = force(look, effect)?;
     let mut with: [Forces; WITH.len()] = Default::default();
     for (b, whole) in data.blocks.iter().zip(&whole) {
-        with.iter_mut().for_each(|w| w.push(Vec::with_capacity(b.len())));
-        for (k, f) in whole.iter().enumerate() {
-            let t = 0.5 * (b.from_s[k] + b.to_s[k]);
-            let (z, v) = b.motion.at(t);
-            let (back, rest) = (f64::from(v < -REST_MPS), f64::from(v.abs() < REST_MPS));
-            // The force as it is predicted: what is measured has the noise in it, and with that anything would go.
-            for (w, x) in with.iter_mut().zip([z, v.abs(), t, back, rest, *f]) {
-                w.last_mut()?.push(x);
-            }
+        for (w, x) in with.iter_mut().zip(features(b, whole)) {
+            w.push(x);
         }
     }
     Some(with.iter().map(|w| look.of_force(&grown(&forces, w))).collect())
+}
+
+/// What the force of an effect may vary with, in every block of a recording that is predicted so (N): what is measured has the noise in
+/// it, and with that anything would go.
+fn features(b: &Blocks, predicted: &[f64]) -> [Vec<f64>; WITH.len()] {
+    let mut out: [Vec<f64>; WITH.len()] = Default::default();
+    let (mut before, mut sign, mut since_m) = (None, 0.0, 0.0);
+    for (k, f) in predicted.iter().enumerate() {
+        let t = 0.5 * (b.from_s[k] + b.to_s[k]);
+        let (z, v) = b.motion.at(t);
+        let (z0, v0) = before.replace((z, v)).unwrap_or((z, v));
+        if sgn(v) * sign < 0.0 {
+            since_m = 0.0;
+        }
+        sign = if v == 0.0 { sign } else { sgn(v) };
+        since_m += (z - z0).abs();
+        let (back, rest) = (f64::from(v < -REST_MPS), f64::from(v.abs() < REST_MPS));
+        let bent = (v - v0).abs() / (b.to_s[k] - b.from_s[k]);
+        let all = [z, v.abs(), t, back, rest, *f, bent, 1.0 / (1.0 + since_m / SINCE_M)];
+        out.iter_mut().zip(all).for_each(|(o, x)| o.push(x));
+    }
+    out
 }
 
 /// Forces in N, block by block and recording by recording.
@@ -75,17 +98,19 @@ fn force(look: &Look<'_>, effect: usize) -> Option<(Forces, Forces)> {
     Some((whole.iter().zip(&less).map(part).collect(), whole))
 }
 
-/// Forces times how far off its mean something is, in its standard deviations.
-fn grown(forces: &[Vec<f64>], with: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let all: Vec<f64> = with.iter().flatten().copied().collect();
+/// Forces times how far off its mean something is, in its standard deviations; what is rarely so far off counts as the last hundredth does.
+fn grown(forces: &[Vec<f64>], with: &[Vec<f64>]) -> Forces {
+    let mut all: Vec<f64> = with.iter().flatten().copied().collect();
+    let (low, high) = (quantile(&mut all, RARELY), quantile(&mut all, 1.0 - RARELY));
+    all.iter_mut().for_each(|x| *x = x.clamp(low, high));
     let (mean, sd) = (stylet_stats::mean(&all), stylet_stats::sd(&all));
-    let far = |x: f64| if sd > 0.0 { (x - mean) / sd } else { 0.0 };
+    let far = |x: f64| if sd > 0.0 { (x.clamp(low, high) - mean) / sd } else { 0.0 };
     forces.iter().zip(with).map(|(f, x)| f.iter().zip(x).map(|(f, x)| f * far(*x)).collect()).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Otherwise, grown, otherwise};
+    use super::{Otherwise, features, grown, otherwise};
     use crate::made::{settled, showing};
     use stylet_identify::fit::{Effort, fit};
     use stylet_identify::look::Look;
@@ -97,6 +122,26 @@ mod tests {
         let sd = (4.0_f64 / 3.0).sqrt();
         assert_eq!(told, [vec![-2.0 / sd, 2.0 / sd], vec![-3.0 / sd, -1.0 / sd]]);
         assert_eq!(grown(&[vec![2.0]], &[vec![5.0]]), [[0.0]]);
+        // One in a thousand that is far off counts as the others do.
+        let mut with: Vec<f64> = (0..1000).map(|k| f64::from(k % 2)).collect();
+        let (ones, like) = (vec![vec![1.0; 1000]], with.clone());
+        with[501] = 1e6;
+        assert_eq!(grown(&ones, &[with])[0], grown(&ones, &[like])[0]);
+    }
+
+    #[test]
+    fn travel_since_a_reversal_is_halved_in_a_millimetre_and_acceleration_has_no_sign() {
+        let runs = showing(&[], &[[4e-3, 0.0]], |_| 0.0);
+        let f = settled(&[], &runs.iter().collect::<Vec<_>>());
+        let b = &f.data.blocks[0];
+        let told = features(b, &vec![0.5; b.len()]);
+        // In by 16 mm in 4 s, a second of rest, and back.
+        let at = |t: f64| b.at(t);
+        let (since, rest, back) = (&told[7], &told[4], &told[3]);
+        assert!((since[at(2.0)] - 1.0 / 9.0).abs() < 0.01 && (since[at(4.5)] - 1.0 / 17.0).abs() < 0.01);
+        assert!((since[at(5.25)] - 0.5).abs() < 0.03, "{}", since[at(5.25)]);
+        assert_eq!((rest[at(4.5)], rest[at(2.0)], back[at(6.0)], back[at(2.0)]), (1.0, 0.0, 1.0, 0.0));
+        assert!(told[6].iter().all(|a| *a >= 0.0) && told[5].iter().all(|f| *f == 0.5));
     }
 
     /// How an effect would rather act in insertions that show so much more at every instant.

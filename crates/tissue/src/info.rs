@@ -25,6 +25,9 @@ pub struct EffectInfo {
     pub proposal: Proposal,
     /// Ids of effects that hold this one as a special case.
     pub nested_in: &'static [&'static str],
+    /// It takes the part that any force of its kind would, whatever the law behind that: a tone or a breath of whatever comes and goes,
+    /// presliding friction of any play at a turn. Beside something unknown it has to act all the more by its own law to be a cause.
+    pub imitates: bool,
 }
 
 impl EffectInfo {

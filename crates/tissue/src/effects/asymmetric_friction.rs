@@ -27,6 +27,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.01]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for AsymmetricFriction {

@@ -47,6 +47,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Faces(1e-3),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for BoundaryShift {

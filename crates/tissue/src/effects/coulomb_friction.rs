@@ -27,6 +27,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.0]]]),
     nested_in: &["stribeck_friction", "presliding_friction"],
+    imitates: false,
 };
 
 impl Described for CoulombFriction {

@@ -25,6 +25,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.1]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for ForceBias {

@@ -26,6 +26,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.01]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for ForceGain {

@@ -36,6 +36,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Raw,
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for ForceSpikes {

@@ -48,6 +48,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Break,
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for HiddenMembrane {

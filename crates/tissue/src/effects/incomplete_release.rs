@@ -28,6 +28,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.05]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for IncompleteRelease {

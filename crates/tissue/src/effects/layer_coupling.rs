@@ -47,6 +47,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for LayerCoupling {

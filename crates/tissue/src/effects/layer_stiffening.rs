@@ -46,6 +46,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for LayerStiffening {

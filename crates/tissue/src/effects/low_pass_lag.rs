@@ -30,6 +30,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.004]], &[&[0.02]], &[&[0.08]], &[&[0.3]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for LowPassLag {

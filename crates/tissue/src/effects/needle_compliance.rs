@@ -37,6 +37,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[8000.0]], &[&[1500.0]], &[&[300.0]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for NeedleCompliance {

@@ -26,6 +26,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.0]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for NonlinearElasticity {

@@ -43,6 +43,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Line,
     nested_in: &[],
+    imitates: true,
 };
 
 impl Described for PeriodicInterference {

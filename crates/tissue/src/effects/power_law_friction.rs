@@ -36,6 +36,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.02]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for PowerLawFriction {

@@ -49,6 +49,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[1.0, 6e-5]], &[&[1.0, 2.5e-4]], &[&[1.0, 1e-3]], &[&[1.0, 4e-3]]]),
     nested_in: &[],
+    imitates: true,
 };
 
 impl Described for PreslidingFriction {

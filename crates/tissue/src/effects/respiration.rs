@@ -44,6 +44,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Breath,
     nested_in: &[],
+    imitates: true,
 };
 
 impl Described for Respiration {

@@ -35,6 +35,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Raw,
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for Saturation {

@@ -144,6 +144,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for ShaftSlip {

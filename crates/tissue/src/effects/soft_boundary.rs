@@ -32,6 +32,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[3e-4]], &[&[1e-3]], &[&[3e-3]], &[&[8e-3]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for SoftBoundary {

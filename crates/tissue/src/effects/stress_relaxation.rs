@@ -58,6 +58,7 @@ const ONE: EffectInfo = EffectInfo {
         &[&[0.05, 25.0]],
     ]),
     nested_in: &[],
+    imitates: false,
 };
 
 static TWO_TERMS: EffectInfo = EffectInfo {

@@ -59,6 +59,7 @@ static INFO: EffectInfo = EffectInfo {
         &[&[1.0, 1.0, 5e-3], &[0.0, 1.0, 5e-3]],
     ]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for StribeckFriction {

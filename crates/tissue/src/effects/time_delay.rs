@@ -28,6 +28,7 @@ static INFO: EffectInfo = EffectInfo {
     larger: None,
     proposal: Proposal::Columns(&[&[&[0.003]], &[&[0.012]], &[&[0.05]], &[&[0.15]]]),
     nested_in: &[],
+    imitates: false,
 };
 
 impl Described for TimeDelay {
