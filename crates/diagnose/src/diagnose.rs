@@ -73,7 +73,7 @@ const EXCESS_ALONE: f64 = 3.0;
 /// Slow noise of more than two and a half times the fast one is none any more, whatever its colour.
 const EXCESS_SLOW: f64 = 6.0;
 /// An effect that would gain more than this share of what the effects explain by acting otherwise imitates something unknown, ...
-const IMITATES: f64 = 0.01;
+const IMITATES: f64 = 0.02;
 /// ... if that is so many nats: an effect by its own law gains half a nat by chance, and some tens where the motion is not known exactly.
 const IMITATES_NATS: f64 = 100.0;
 /// Beside something unknown a cause stands when, where that is silent, its strengths are the same whichever recording is left out, to this
