@@ -76,6 +76,8 @@ const EXCESS_SLOW: f64 = 6.0;
 const IMITATES: f64 = 0.02;
 /// ... if that is so many nats: an effect by its own law gains half a nat by chance, and some tens where the motion is not known exactly.
 const IMITATES_NATS: f64 = 100.0;
+/// ... and so many by a noise that may be as slow as what is left.
+const IMITATES_SLOW_NATS: f64 = 10.0;
 /// Beside something unknown a cause stands when, where that is silent, its strengths are the same whichever recording is left out, to this
 /// share, ...
 const SAME: f64 = 0.1;
@@ -325,14 +327,14 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
     let without =
         |k: usize| fit(&search.best.model.without(k), &search.data, Effort { turns: 3, enough: 1.0 });
     let without: Vec<Option<Fit>> = (0..search.best.model.effects.len()).map(without).collect();
-    let bent = imitates(&search.best, &search.data, &without);
-    let unknown = bent.is_some() || (share > UNEXPLAINED && (sure || at_sight || lined || stretch.is_some()));
-    let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     // Intervals by the noise as it is, structure that is left included, however slow.
     let whole = search.data.judged_by(&search.best.residuals.e, NoiseFrom::Lasting);
     let settled = fit(&crate::geometry::unsure(&search.best.model), &whole, Effort { turns: 3, enough: 0.1 })
         .unwrap_or_else(|| search.best.clone());
     let settled = untied(settled, &whole);
+    let bent = imitates(&search.best, &search.data, &without, (&settled, &whole));
+    let unknown = bent.is_some() || (share > UNEXPLAINED && (sure || at_sight || lined || stretch.is_some()));
+    let left = if unknown && !sure { &told.at_sight } else { &told.sure };
     let spread = Spread::new(&settled, &whole, &mut ChaCha8Rng::seed_from_u64(SEED));
     let (mut causes, mut against_none) = (Vec::new(), Vec::new());
     for (k, choice) in settled.model.effects.iter().enumerate() {
@@ -385,13 +387,18 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
 }
 
 /// How an effect of a fit that only imitates what is there would rather act, where there is one: of several the one that would gain most.
-/// `without` are the fits without each.
-fn imitates(best: &Fit, data: &Data, without: &[Option<Fit>]) -> Option<Otherwise> {
-    let look = Look::new(best, data);
+/// `without` are the fits without each, `slow` is the fit by a noise that may be slow: a zero that wanders bends whatever goes with time.
+fn imitates(best: &Fit, data: &Data, without: &[Option<Fit>], slow: (&Fit, &Data)) -> Option<Otherwise> {
+    let (look, slow) = (Look::new(best, data), Look::new(slow.0, slow.1));
     let lost = |less: &Option<Fit>| less.as_ref().map_or(0.0, |f| f.nats() - best.nats());
     let most = without.iter().map(lost).fold(0.0, f64::max);
-    let told = without.iter().enumerate().filter_map(|(k, less)| otherwise(&look, k, lost(less)));
-    told.filter(|o| o.nats > IMITATES_NATS.max(IMITATES * most)).max_by(|a, b| a.nats.total_cmp(&b.nats))
+    let bent = |(k, less): (usize, &Option<Fit>)| {
+        let told = otherwise(&look, k, lost(less))?;
+        let clear = told.nats > IMITATES_NATS.max(IMITATES * most)
+            && otherwise(&slow, k, lost(less))?.nats > IMITATES_SLOW_NATS;
+        clear.then_some(told)
+    };
+    without.iter().enumerate().filter_map(bent).max_by(|a, b| a.nats.total_cmp(&b.nats))
 }
 
 /// Whether an effect beside something unknown is a cause: by what is heard where that is silent, and by all that was recorded, where it had
@@ -724,7 +731,7 @@ mod tests {
             let drift = ForceDrift { rate_n_per_s: 0.1 }.into();
             let mut search = found(&[drift], 4, move |t| 0.1 * t + bent_n_per_s2 * t * t);
             let less = fit(&search.best.model.without(0), &search.data, Effort { turns: 3, enough: 1.0 });
-            let told = imitates(&search.best, &search.data, &[less]);
+            let told = imitates(&search.best, &search.data, &[less], (&search.best, &search.data));
             assert_eq!(told.map(|o| o.with), with, "{told:?}");
             assert_eq!(judge(&mut search, &[]).unknown, with.is_some());
         }
