@@ -14,6 +14,7 @@ use crate::varied::varied;
 use crate::visible;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rayon::prelude::*;
+use std::cell::LazyCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stylet_identify::blocks::{BLOCK_S, Blocks};
@@ -389,13 +390,17 @@ fn judge(search: &mut Search, classes: &[Vec<Rival>]) -> Judged {
 /// How an effect of a fit that only imitates what is there would rather act, where there is one: of several the one that would gain most.
 /// `without` are the fits without each, `slow` is the fit by a noise that may be slow: a zero that wanders bends whatever goes with time.
 fn imitates(best: &Fit, data: &Data, without: &[Option<Fit>], slow: (&Fit, &Data)) -> Option<Otherwise> {
-    let (look, slow) = (Look::new(best, data), Look::new(slow.0, slow.1));
+    if without.is_empty() {
+        return None;
+    }
+    let look = Look::new(best, data);
+    let slowly = LazyCell::new(|| Look::new(slow.0, slow.1));
     let lost = |less: &Option<Fit>| less.as_ref().map_or(0.0, |f| f.nats() - best.nats());
     let most = without.iter().map(lost).fold(0.0, f64::max);
     let bent = |(k, less): (usize, &Option<Fit>)| {
         let told = otherwise(&look, k, lost(less))?;
         let clear = told.nats > IMITATES_NATS.max(IMITATES * most)
-            && otherwise(&slow, k, lost(less))?.nats > IMITATES_SLOW_NATS;
+            && otherwise(&slowly, k, lost(less))?.nats > IMITATES_SLOW_NATS;
         clear.then_some(told)
     };
     without.iter().enumerate().filter_map(bent).max_by(|a, b| a.nats.total_cmp(&b.nats))

@@ -10,7 +10,7 @@ use stylet_scenario::Scenario;
 use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissue};
 
 /// Samples per second of the recordings.
-pub const SAMPLE_HZ: f64 = 200.0;
+pub const SAMPLE_HZ: f64 = STEP_HZ / STEPS as f64;
 /// Steps per second of the law.
 const STEP_HZ: f64 = 1000.0;
 /// One in so many steps is sampled.
