@@ -3,7 +3,7 @@
 //!
 //! An engine is a function from a [`Question`] (the believed scenario as RON text, the recordings) to an
 //! [`Answer`] (`diagnosis.json` as plain data). It is told nothing of the truth, and this crate knows nothing of
-//! it: of the crates of this project it depends on `record` alone.
+//! it: of the crates of this project it depends on those of columns and statistics alone (`record`, `stats`).
 //!
 //! ```
 //! use stylet_examine::{Answer, Hide, Plan, run, table};
