@@ -36,6 +36,11 @@ fn write(drawn: &Drawn, hz: f64, folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// The most memory that any of the commands had at once, in MB.
+fn most_megabytes() -> f64 {
+    getrusage(UsageWho::RUSAGE_CHILDREN).map_or(f64::NAN, |usage| usage.max_rss() as f64 / 1024.0)
+}
+
 fn main() {
     let cases = set("STYLET_BENCH_CASES").unwrap_or(24_u64);
     let hz = set("STYLET_BENCH_HZ").unwrap_or(SAMPLE_HZ);
@@ -62,12 +67,16 @@ fn main() {
         assert!(status.success());
         let took = start.elapsed().as_secs_f64();
         let hidden: Vec<&str> = drawn.effects.iter().map(|e| e.id()).collect();
-        println!("{index:>3}  {took:.2} s  {:?} {}", sketch.kind, hidden.join(" + "));
+        println!(
+            "{index:>3}  {took:.2} s  {:.0} MB so far  {:?} {}",
+            most_megabytes(),
+            sketch.kind,
+            hidden.join(" + ")
+        );
         seconds.push(took);
     }
     let _ = std::fs::remove_dir_all(&folder);
-    let megabytes =
-        getrusage(UsageWho::RUSAGE_CHILDREN).map_or(f64::NAN, |usage| usage.max_rss() as f64 / 1024.0);
+    let megabytes = most_megabytes();
     let of = |q: f64| quantile_of(seconds.iter().copied(), q);
     println!(
         "stylet diagnose at {hz} Hz: {:.2} s (median of {cases} cases; nine of ten within {:.2}, fastest {:.2}, slowest {:.2}), at most {megabytes:.0} MB",
