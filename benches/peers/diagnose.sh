@@ -7,7 +7,7 @@
 # (702) to judge all on, half of them with nothing wrong and half with thicknesses wrong by the largest grade; two of five hide one effect,
 # one two effects, one something that the library lacks, one nothing. Writes what regressions are given, lets Stylet diagnose, tunes the
 # peers, lets them answer, and judges every answer by `stylet benchmark judge`. What is there already is not made again (remove
-# target/peers_cases to begin anew). Needs `bash benches/peers/setup.sh` once before.
+# target/peers_cases to begin anew). Then draws target/peers_cases/diagnosis_peers.svg of the table. Needs `bash benches/peers/setup.sh` once before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 cases=${1:-100}
@@ -32,6 +32,8 @@ given() { # world, cases, seed -> the challenge, exported and with its terms
 }
 
 mkdir -p target/peers_cases
+table=target/peers_cases/table.txt
+: >"$table"
 for world in "${worlds[@]}"; do
     tune=$(given "$world" "$tuning" 701)
     test=$(given "$world" "$cases" "$seed")
@@ -41,6 +43,7 @@ for world in "${worlds[@]}"; do
     for answers in stylet lassocv frols stlsq sr3; do
         echo "-- $answers"
         "$stylet" benchmark judge "$test" "$test.answers/$answers.json" | sed -n '/^all rows together/,/^$/p'
-    done
+    done | tee -a "$table"
     echo
 done
+"$python" benches/peers/diagnose_draw.py "$table" target/peers_cases/diagnosis_peers.svg

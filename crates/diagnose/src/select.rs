@@ -994,7 +994,6 @@ mod tests {
     }
 
     /// A search by one step, and the starts of that step; judged by its calm stretches or by all that is left.
-    /// A search by one step, and the starts of that step; judged by its calm stretches or by all that is left.
     fn grown(
         calm: bool,
         beginnings: usize,
