@@ -84,15 +84,17 @@ impl Colour {
         }
     }
 
-    /// The colour of the `index`-th curve of several that are compared; repeats after five.
+    /// The colour of the `index`-th curve of several that are compared; repeats after seven.
     #[must_use]
     pub const fn nth(index: usize) -> Self {
-        match index % 5 {
+        match index % 7 {
             0 => Self::Blue,
             1 => Self::Vermillion,
             2 => Self::Green,
             3 => Self::Purple,
-            _ => Self::Orange,
+            4 => Self::Orange,
+            5 => Self::SkyBlue,
+            _ => Self::Ink,
         }
     }
 

@@ -119,10 +119,12 @@ const BLIND: f64 = 0.8;
 /// By how much a re-fitted number differs from the one assumed, and whether it may go no further.
 fn change(b: &BaseParameter) -> String {
     let place = matches!(b.name.as_str(), "surface_m" | "thickness_m");
+    // A rounded nothing has no sign.
+    let rounded = |x: f64, to: f64| (x * to).round() / to + 0.0;
     let by = if place {
-        format!("{:+.2} mm", 1e3 * (b.value - b.assumed))
+        format!("{:+.2} mm", rounded(1e3 * (b.value - b.assumed), 100.0))
     } else {
-        format!("{:+.1} %", 100.0 * (b.value / b.assumed - 1.0))
+        format!("{:+.1} %", rounded(100.0 * (b.value / b.assumed - 1.0), 10.0))
     };
     if b.at_bound { format!("{by}, at its bound") } else { by }
 }
