@@ -62,18 +62,20 @@ impl Tracker {
 pub(super) struct Told {
     /// Where the way back began, and how far off the law is on it.
     back: Option<(f64, Tracker)>,
-    last_n: f64,
+    /// The smoothed force and the law's friction of the sample before, in N.
+    before: Option<(f64, f64)>,
 }
 
 impl Told {
     /// Takes a sample of which the law says that `law_n` is friction, with the smoothed force `smooth_n`; returns the friction in N and its
     /// standard deviation.
     ///
-    /// On the way in friction is as the law says, between none and the force. On the way back the tracker corrects it, from the force of
-    /// the hold on, all of which is friction: what a law misses are features of presliding in a wrong place or size, as long as those. That the shaft lets go is for the law to say, where it does for the force: places
+    /// On the way in friction is as the law says, between none and the force. On the way back the tracker corrects it, from what the law missed
+    /// of the force before the turn on, all of which is friction: where the law jumps with the speed, so does the force. What a law misses are features of presliding in a wrong place or size, as long as those. That the shaft lets go is for the law to say, where it does for the force: places
     /// vary between insertions, and a release too early or too late would look like a tip that is caught.
     pub(super) fn take(&mut self, felt: &Felt, smooth_n: f64, law_n: f64) -> (f64, f64) {
-        let mut before_n = core::mem::replace(&mut self.last_n, law_n);
+        let (force_before_n, mut before_n) =
+            self.before.replace((smooth_n, law_n)).unwrap_or((smooth_n, law_n));
         if let Some((turn_m, _)) = self.back
             && felt.advancing
             && felt.position_m >= turn_m
@@ -81,7 +83,8 @@ impl Told {
             self.back = None;
         }
         if self.back.is_none() && felt.retracting {
-            self.back = Some((felt.position_m, Tracker::new(RELAX_M, felt.position_m, smooth_n - law_n)));
+            let off_n = force_before_n - before_n;
+            self.back = Some((felt.position_m, Tracker::new(RELAX_M, felt.position_m, off_n)));
             before_n = law_n;
         }
         let Some((_, tracker)) = &mut self.back else {
@@ -153,6 +156,22 @@ mod tests {
         assert!(largest(&tip_n(grip(0.009), grip(0.009))) < 1e-9);
     }
 
+    /// Where friction goes with the speed, force and law jump together at the turn, whether it turns from a hold or at once.
+    #[test]
+    fn a_law_that_jumps_with_the_speed_leaves_nothing_of_the_way_back() {
+        for before_n in [2.0, 0.0] {
+            let mut told = Told::default();
+            let into = Felt { advancing: before_n > 0.0, retracting: false, ..back(0.03, before_n) };
+            told.take(&into, before_n, before_n);
+            for k in 0..200 {
+                // The smoothed force follows in some samples.
+                let smooth_n = -3.0 + (3.0 + before_n) * 0.9_f64.powi(k + 1);
+                let (friction_n, _) = told.take(&back(0.03 - 2e-5 * f64::from(k), -3.0), smooth_n, -3.0);
+                assert!((friction_n + 3.0).abs() < 1e-9, "{friction_n} after {before_n} at {k}");
+            }
+        }
+    }
+
     /// A law replayed leaves 1.1 N from where it lets go to where the shaft does.
     #[test]
     fn a_shaft_that_lets_go_a_millimetre_before_or_after_the_law_looks_like_no_tip() {
@@ -197,6 +216,7 @@ mod tests {
             assert_eq!(found, (friction_n, 0.25 * friction_n));
         }
         // All of the force of the hold is friction, and so it stays until the needle is where it turned.
+        told.take(&Felt { retracting: false, ..back(0.02, 2.0) }, 2.0, 1.4);
         assert_eq!(told.take(&back(0.02, 2.0), 2.0, 1.4).0, 2.0);
         assert_eq!(told.take(&into(0.019, 2.0), 2.0, 1.4).0, 2.0);
         assert_eq!(told.take(&into(0.02, 2.0), 2.0, 1.4).0, 1.4);
