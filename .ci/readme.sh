@@ -18,7 +18,7 @@ Scenario(
     robot: Replay,
 )
 RON
-for name in a b c; do
+for name in a b c d; do
     "$stylet" run believed.ron --seed "$((1 + ${#name} * $(printf '%d' "'$name")))" --out "made-$name" --quiet
     cp "made-$name/recording.csv" "$name.csv"
 done
