@@ -350,7 +350,7 @@ fn raise(matrix: &mut Symmetric, tangent: &Tangent, fit: &Fit, kind: Kind, (from
 
 #[cfg(test)]
 mod tests {
-    use super::{RAISED, Spread, untied};
+    use super::{AS_DRAWN, RAISED, Spread, untied};
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
     use std::sync::Arc;
@@ -454,7 +454,7 @@ mod tests {
     #[test]
     fn a_number_that_differs_between_insertions_has_the_interval_of_a_mean_of_few() {
         let own = [-4e-4, 7e-4, 1e-4, -8e-4];
-        let wanted = |own: &[f64]| student::quantile(0.975, 3.0) * stylet_stats::sd(own) / 2.0;
+        let wanted = |own: &[f64]| AS_DRAWN * student::quantile(0.975, 3.0) * stylet_stats::sd(own) / 2.0;
         let (mut model, data) = insertions(&own, |m, x| m.tissue.surface_m += x);
         model.free.own_surface = true;
         model.own.iter_mut().zip(own).for_each(|(o, x)| o.surface_m = x);
@@ -488,7 +488,7 @@ mod tests {
         let told = fit(&model.with(Choice::new(drift, &[0.005])), &data, Effort::FULL).expect("a fit");
         let nats = |s: &Spread, dof: f64| {
             let e = s.parameter(0, 0);
-            0.5 * (e.value / (e.high - e.low) * 2.0 * student::quantile(0.975, dof)).powi(2)
+            0.5 * (AS_DRAWN * e.value / (e.high - e.low) * 2.0 * student::quantile(0.975, dof)).powi(2)
         };
         let known = Spread::known(&told, &data);
         let by_normal = known.against_none(0).expect("a strength");
@@ -512,7 +512,7 @@ mod tests {
             let told = fit(&model, &data, Effort::FULL).expect("a fit");
             let tangent = Tangent::new(&told.model, &data, &told.residuals);
             let at = tangent.shared.iter().position(|n| n.role == Role::Surface).expect("free");
-            let by_derivative = stylet_stats::Z95 * tangent.factor().inverse_diagonal()[at].sqrt();
+            let by_derivative = AS_DRAWN * stylet_stats::Z95 * tangent.factor().inverse_diagonal()[at].sqrt();
             let (_, half) = Spread::known(&told, &data).of(Role::Surface).expect("free");
             let ratio = half / by_derivative;
             assert!(ratio > least && ratio < most, "{slow}: {ratio}");
@@ -604,7 +604,7 @@ mod tests {
         let (e, against) = of("needle_compliance", &[40_000.0], 0);
         let (below, above) = (1.0 / e.value - 1.0 / e.high, 1.0 / e.low - 1.0 / e.value);
         assert!(below > 0.0 && (below / above - 1.0).abs() < 1e-9, "{e:?}");
-        let deviations = 1.0 / e.value / above * stylet_stats::Z95;
+        let deviations = AS_DRAWN / e.value / above * stylet_stats::Z95;
         let wanted = 0.5 * deviations * deviations;
         let against = against.expect("a strength");
         assert!((against / wanted - 1.0).abs() < 0.02, "{against} for {wanted}");
@@ -630,7 +630,7 @@ mod tests {
         // A layer that the needle never leaves.
         let n = *model.shared().iter().find(|n| n.role == Role::Thickness(0)).expect("free");
         let (_, half) = spread.of(n.role).expect("free");
-        assert!((half / (n.sd * stylet_stats::Z95) - 1.0).abs() < 0.01, "{half} for {}", n.sd);
+        assert!((half / (AS_DRAWN * n.sd * stylet_stats::Z95) - 1.0).abs() < 0.01, "{half} for {}", n.sd);
         model.free.thickness = false;
         let fit = standing(model, &data);
         assert!(Spread::known(&fit, &data).of(n.role).is_none());

@@ -159,10 +159,10 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_below_a_twentieth_of_a_step_or_a_tenth_of_the_encoders_noise_is_not_resolved() {
+    fn what_lies_below_an_eighth_of_a_step_or_a_tenth_of_the_encoders_noise_is_not_resolved() {
         let lag = |time_constant_s: f64| unresolved(&search(&[LowPassLag { time_constant_s }.into()]), 0);
-        assert_eq!(lag(4.9e-4).as_deref(), Some("below an eighth of the sampling step"));
-        assert_eq!(lag(5.1e-4), None);
+        assert_eq!(lag(1.1e-3).as_deref(), Some("below an eighth of the sampling step"));
+        assert_eq!(lag(1.3e-3), None);
         let noise_m = search(&[]).data.blocks.iter().map(|b| b.motion.noise_m).fold(0.0, f64::max);
         assert!(noise_m > 1e-6, "{noise_m}");
         let breath = |amplitude_m: f64| {

@@ -69,6 +69,22 @@ fn three() -> Scenario {
     s
 }
 
+/// Four layers, so that three faces are seen.
+fn four() -> Scenario {
+    let mut s = three();
+    let third = s.tissue.layers[2].clone();
+    s.tissue.layers.push(third);
+    for (layer, (d, f)) in s.tissue.layers.iter_mut().zip([
+        (0.006, Some(0.6)),
+        (0.0065, Some(0.9)),
+        (0.007, Some(0.8)),
+        (0.0131, None),
+    ]) {
+        (layer.thickness_m, layer.puncture_n) = (d, f);
+    }
+    s
+}
+
 /// What is there: 8 to 12 % off what is believed.
 fn truth() -> Tissue {
     let mut t = believed().tissue;
@@ -381,10 +397,20 @@ fn a_breath() {
 
 #[test]
 fn a_wrong_scale() {
-    let case = Case { believed: three(), truth: three().tissue, ..Case::default() };
+    let case = Case { believed: four(), truth: four().tissue, ..Case::default() };
     let found = Case { effects: vec![PositionScale { eps: 0.07 }.into()], ..case }.examined("a wrong scale");
     assert_eq!(named(&found), ["position_scale"]);
     holds(&found, "position_scale", "eps", 0.07);
+}
+
+/// Two thicknesses that are off in proportion may be so by chance.
+#[test]
+fn a_wrong_scale_of_two_thicknesses() {
+    let case = Case { believed: three(), truth: three().tissue, ..Case::default() };
+    let effects = vec![PositionScale { eps: 0.07 }.into()];
+    let found = Case { effects, ..case }.examined("a wrong scale of two thicknesses");
+    assert!(named(&found).is_empty(), "{:?}", named(&found));
+    assert_eq!(found.diagnosis.verdict, Verdict::None);
 }
 
 #[test]
