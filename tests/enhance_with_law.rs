@@ -108,3 +108,42 @@ fn what_is_no_law_or_has_no_place_for_one_is_refused() {
         assert!(!out.exists(), "{arguments:?} left something behind");
     }
 }
+
+/// The phantom of the README: viscous friction jumps at the turn from a motion, and the force with it.
+#[test]
+fn a_viscous_law_leaves_nothing_of_the_way_back_after_a_turn_without_a_rest() {
+    let scratch = Scratch::new("viscous-law");
+    let phantom = r#"Scenario(
+    name: "two gels",
+    tissue: (layers: [
+        (thickness_m: 0.02, stiffness_n_per_m: 50.0, friction_ns_per_m2: 9000.0, puncture_n: 0.8),
+        (thickness_m: 0.04, stiffness_n_per_m: 90.0, friction_ns_per_m2: 14000.0),
+    ]),
+    motion: Program(start_m: -0.005, segments: [
+        Move(velocity_mps: 0.002, duration_s: 15.0), Hold(duration_s: 3.0),
+        Ripple(velocity_mps: 0.003, amplitude_mps: 0.001, frequency_hz: 0.5, duration_s: 15.0),
+        Move(velocity_mps: -0.004, duration_s: 5.0),
+    ]),
+    sensor: ForceTorque(noise_n: 0.01, ar1: 0.5),
+)"#;
+    let law = scratch.file("phantom.ron", phantom);
+    let law = law.to_str().expect("a path");
+    let folder = |name: &str| scratch.path().join(name).to_str().expect("a path").to_owned();
+    let ran = stylet(&["run", law, "--out", &folder("run")]);
+    assert!(ran.status.success(), "{}", said(&ran));
+    let told = stylet(&["enhance", &folder("run/recording.csv"), "--law", law, "--out", &folder("told")]);
+    assert!(told.status.success(), "{}", said(&told));
+    let text = fs::read_to_string(scratch.path().join("told/enhanced.csv")).expect("a result");
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let at = header.iter().position(|h| *h == "enhanced_n").expect("a column");
+    // The turn is at 33 s, behind the last layer.
+    let back: Vec<f64> = lines
+        .map(|l| l.split(',').collect::<Vec<_>>())
+        .filter(|row| row[0].parse::<f64>().expect("a time") >= 33.0)
+        .map(|row| row[at].parse().expect("a force"))
+        .collect();
+    let rms_n = (back.iter().map(|f| f * f).sum::<f64>() / back.len() as f64).sqrt();
+    assert!(back.len() > 900 && rms_n < 0.06, "{rms_n} N of {} samples", back.len());
+    assert!(back.iter().all(|f| f.abs() < 0.3));
+}
