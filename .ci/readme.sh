@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the commands that the README shows, so that it cannot rot: every line of a ```sh block that begins with `stylet` (or
 # `cargo run --release --`), by the binary given (default: the one that `cargo test` made), in a folder of its own. Files that a
-# reader would bring (log.csv, believed.ron, a.csv ...) are made first. What is not run is named with the reason.
+# reader would bring (log.csv, assumed.ron, a.csv ...) are made first. What is not run is named with the reason.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 stylet=$(realpath "${1:-${CARGO_TARGET_DIR:-$root/target}/debug/stylet}")
@@ -10,7 +10,7 @@ trap 'rm -rf "$work"' EXIT
 ln -s "$root/scenarios" "$work/scenarios"
 cd "$work"
 
-cat >believed.ron <<'RON'
+cat >assumed.ron <<'RON'
 Scenario(
     name: "one gel",
     tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
@@ -19,7 +19,7 @@ Scenario(
 )
 RON
 for name in a b c d; do
-    "$stylet" run believed.ron --seed "$((1 + ${#name} * $(printf '%d' "'$name")))" --out "made-$name" --quiet
+    "$stylet" run assumed.ron --seed "$((1 + ${#name} * $(printf '%d' "'$name")))" --out "made-$name" --quiet
     cp "made-$name/recording.csv" "$name.csv"
 done
 printf 'Columns(time: (name: "time", scale: 1e-6), position: (name: "pz", scale: 1e-3), force: (name: "fz"))\n' >map.ron

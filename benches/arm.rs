@@ -13,9 +13,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, RigidBody, panda};
-use stylet_scenario::{ArmConfig, ArmLine, MotionPlan, Scenario, VirtualSensor};
-use stylet_testbed::{ArmRig, RapierArm};
-use stylet_tissue::{Law, LawState};
+use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPlan, Scenario, VirtualSensor};
+use stylet_testbed::{ArmSimulation, RapierArm};
+use stylet_tissue::{ForceLaw, ForceLawState};
 
 const DT_S: f64 = 1e-3;
 const STEPS: usize = 2000;
@@ -24,8 +24,8 @@ const BAR_US: f64 = 25.0;
 
 struct Insertion {
     plan: MotionPlan,
-    line: ArmLine,
-    law: Law,
+    line: ArmInsertionLine,
+    law: ForceLaw,
     sensor: VirtualSensor,
 }
 
@@ -34,8 +34,9 @@ fn insertion() -> Result<Insertion, Box<dyn std::error::Error>> {
     let scenario = Scenario::load(&file)?;
     let plan = scenario.motion.plan().ok_or("the scenario has a motion")?;
     let sensor = VirtualSensor { torque_noise_nm: 0.0, ..VirtualSensor::default() };
-    let line = ArmConfig::default().line(&plan, 0.0, 200.0, Some(&sensor)).map_err(|p| p.what)?;
-    let law = Law::new(&scenario.tissue, &scenario.effects)?;
+    let line =
+        ArmConfig::default().insertion_line(&plan, 0.0, 200.0, Some(&sensor)).map_err(|p| p.message)?;
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;
     Ok(Insertion { plan, line, law, sensor })
 }
 
@@ -45,9 +46,9 @@ fn whole(i: &Insertion, sensor: bool) -> f64 {
     let first = i.plan.at(0.0);
     let sensor = sensor.then_some(&i.sensor);
     let config = ArmConfig::default();
-    let rig = ArmRig::new(&config, sensor, &i.line, &first, first.position_m, DT_S, 1);
+    let rig = ArmSimulation::new(&config, sensor, &i.line, &first, first.position_m, DT_S, 1);
     let Ok(mut rig) = rig else { return f64::NAN };
-    let mut state = LawState::default();
+    let mut state = ForceLawState::default();
     let mut sum = 0.0;
     for k in 0..STEPS {
         // From 2 s on: the tip enters the tissue on the way.
@@ -55,7 +56,7 @@ fn whole(i: &Insertion, sensor: bool) -> f64 {
         let moment = rig
             .step(&i.plan.at(t), k % 5 == 0, |z, v| i.law.step(&mut state, t, z + 0.003, v, |_| {}).total_n);
         let Ok(moment) = moment else { return f64::NAN };
-        sum += moment.virtual_n.unwrap_or(moment.position_m);
+        sum += moment.virtual_force_n.unwrap_or(moment.position_m);
     }
     sum
 }
@@ -94,8 +95,8 @@ fn mjcf(arm: &Arm<7>) -> String {
     for (i, link) in model.links.iter().enumerate() {
         let mut body: RigidBody = link.body;
         if i == 6 {
-            let tool = model.flange.then(&model.tool.mount);
-            body = body.joined(&model.tool.payload.seen_from(&tool));
+            let tool = model.flange.compose(&model.tool.mount);
+            body = body.combined(&model.tool.payload.in_parent_frame(&tool));
         }
         let (p, r, c, m) =
             (link.placement.position_m, link.placement.rotation, body.com_m, body.inertia_kgm2);

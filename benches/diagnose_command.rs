@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 use stylet_api::benchmark::own::aim;
 use stylet_own_world::{self as hidden, Drawn, SAMPLE_HZ, sketch};
-use stylet_stats::order::{median_of, quantile_of};
+use stylet_stats::order_statistics::{median_of, quantile_of};
 use stylet_tissue::Effect;
 
 const SEED: u64 = 51;
@@ -23,7 +23,7 @@ fn set<T: std::str::FromStr>(name: &str) -> Option<T> {
 fn write(drawn: &Drawn, hz: f64, folder: &Path) -> Vec<PathBuf> {
     let case = hidden::case_sampled(drawn, (1000.0 / hz).round() as usize);
     std::fs::create_dir_all(folder).expect("a folder for the recordings");
-    let believed = folder.join("believed.ron");
+    let believed = folder.join("assumed.ron");
     std::fs::write(&believed, case.believed.to_ron().expect("a scenario")).expect("written");
     let mut files = vec![believed];
     for (k, recording) in case.recordings.iter().enumerate() {

@@ -13,8 +13,8 @@ use criterion::{Criterion, Throughput};
 use std::hint::black_box;
 use std::time::Instant;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use stylet_testbed::{Noise, Slide};
-use stylet_tissue::{Law, LawState, Tissue};
+use stylet_testbed::{SensorNoise, Slide};
+use stylet_tissue::{ForceLaw, ForceLawState, Tissue};
 use support::bare::{BareCore, BareLaw};
 use support::peers;
 
@@ -44,8 +44,8 @@ fn bare_law() -> f64 {
     sum
 }
 
-fn our_law(law: &Law) -> f64 {
-    let mut state = LawState::default();
+fn our_law(law: &ForceLaw) -> f64 {
+    let mut state = ForceLawState::default();
     let mut sum = 0.0;
     let mut ruptures = 0;
     for k in 0..SAMPLES {
@@ -83,15 +83,15 @@ fn our_core(samples: &[Sample], storage: &mut [Sample]) -> f64 {
 }
 
 fn noise() -> f64 {
-    let mut noise = Noise::new(1, 1, 0.02, 0.0);
+    let mut noise = SensorNoise::new(1, 1, 0.02, 0.0);
     (0..SAMPLES).map(|_| noise.draw()).sum()
 }
 
 fn slide(steps: usize) -> f64 {
     let dt = 1e-3;
     let mut slide = Slide::new(START_M, SPEED_MPS, dt);
-    let law = Law::base(&Tissue::three_gels());
-    let mut state = LawState::default();
+    let law = ForceLaw::base(&Tissue::three_gels());
+    let mut state = ForceLawState::default();
     let mut sum = 0.0;
     for k in 0..steps {
         let t = k as f64 * dt;
@@ -104,9 +104,9 @@ fn slide(steps: usize) -> f64 {
 }
 
 fn samples() -> Vec<Sample> {
-    let law = Law::base(&Tissue::three_gels());
-    let mut state = LawState::default();
-    let mut noise = Noise::new(1, 1, 0.02, 0.0);
+    let law = ForceLaw::base(&Tissue::three_gels());
+    let mut state = ForceLawState::default();
+    let mut noise = SensorNoise::new(1, 1, 0.02, 0.0);
     (0..SAMPLES)
         .map(|k| {
             let (time_s, position_m) = motion(k);
@@ -149,7 +149,7 @@ fn python_peer(data: &[Sample], core_ns: f64) {
 }
 
 fn main() {
-    let law = Law::base(&Tissue::three_gels());
+    let law = ForceLaw::base(&Tissue::three_gels());
     let data = samples();
     let mut storage = vec![Sample::default(); 16384];
 

@@ -15,10 +15,10 @@ use std::path::Path;
 use std::time::Instant;
 use stylet_core::{Enhancer, Sample};
 use stylet_scenario::{MotionPlan, Scenario};
-use stylet_score::{Heard, Moment, Scorer};
-use stylet_sweep::{Columns, Overrides, Sweep, rows_with, trial};
-use stylet_testbed::Noise;
-use stylet_tissue::{Law, LawState};
+use stylet_score::{EnhancedSample, Scorer, TrueSample};
+use stylet_sweep::{Columns, Overrides, Sweep, run_trials_with_threads, trial_simulation};
+use stylet_testbed::SensorNoise;
+use stylet_tissue::{ForceLaw, ForceLawState};
 use support::peers;
 
 fn sweep(trials: u64) -> Sweep {
@@ -41,7 +41,7 @@ fn best(passes: usize, mut work: impl FnMut()) -> f64 {
 struct Parts {
     scenario: Scenario,
     plan: MotionPlan,
-    law: Law,
+    law: ForceLaw,
     count: usize,
     samples: Vec<Sample>,
     tips: Vec<f64>,
@@ -50,11 +50,11 @@ struct Parts {
 impl Parts {
     fn new(scenario: Scenario) -> Self {
         let plan = scenario.motion.plan().expect("a motion");
-        let law = Law::new(&scenario.tissue, &scenario.effects).expect("a law");
+        let law = ForceLaw::new(&scenario.tissue, &scenario.effects).expect("a law");
         let count = (plan.duration_s() * scenario.sample_hz) as usize;
         let mut parts = Self { scenario, plan, law, count, samples: Vec::new(), tips: Vec::new() };
-        let mut noise = Noise::new(1, 1, 0.02, 0.0);
-        let mut state = LawState::default();
+        let mut noise = SensorNoise::new(1, 1, 0.02, 0.0);
+        let mut state = ForceLawState::default();
         for k in 0..count {
             let t = k as f64 / parts.scenario.sample_hz;
             let at = parts.plan.at(t);
@@ -77,34 +77,38 @@ impl Parts {
             [t, at.position_m, at.velocity_mps]
         });
         let mut sum = 0.0;
-        self.law.run(&mut LawState::default(), moments, |_| {}, |force| sum += force.total_n);
+        self.law.run(&mut ForceLawState::default(), moments, |_| {}, |force| sum += force.total_n);
         sum
     }
 
     fn noise(&self) -> f64 {
-        let mut noise = Noise::new(1, 1, 0.02, 0.0);
+        let mut noise = SensorNoise::new(1, 1, 0.02, 0.0);
         (0..self.count).map(|_| noise.draw()).sum()
     }
 
-    fn core(&self, storage: &mut [Sample]) -> Vec<Heard> {
+    fn core(&self, storage: &mut [Sample]) -> Vec<EnhancedSample> {
         let mut core = Enhancer::new(self.scenario.enhance.clone(), 0.0, storage);
         let mut heard = Vec::with_capacity(self.count);
         core.run(&self.samples, |out| heard.push(out.into()));
         heard
     }
 
-    fn score(&self, heard: &[Heard]) {
+    fn score(&self, heard: &[EnhancedSample]) {
         let mut scorer = self.scorer();
         for ((s, tip_n), heard) in self.samples.iter().zip(&self.tips).zip(heard) {
-            let moment =
-                Moment { position_m: s.position_m, force_n: s.force_n, tip_n: *tip_n, total_n: s.force_n };
-            scorer.sample(&moment, heard);
+            let moment = TrueSample {
+                position_m: s.position_m,
+                force_n: s.force_n,
+                tip_n: *tip_n,
+                total_n: s.force_n,
+            };
+            scorer.add_sample(&moment, heard);
         }
         black_box(scorer.finish());
     }
 
     fn scorer(&self) -> Scorer {
-        Scorer::new(stylet_testbed::layers(self.law.slabs()), self.scenario.enhance.model)
+        Scorer::new(stylet_testbed::true_layers(self.law.slabs()), self.scenario.enhance.model)
     }
 }
 
@@ -123,8 +127,9 @@ fn shares(sweep: &Sweep) -> f64 {
     }));
     let heard = parts.core(&mut storage);
     let score = per_sample(best(300, || parts.score(&heard)));
-    let mut workspace = trial::Workspace::default();
-    let whole = per_sample(best(300, || drop(black_box(trial::run(&parts.scenario, &mut workspace)))));
+    let mut workspace = trial_simulation::Workspace::default();
+    let whole =
+        per_sample(best(300, || drop(black_box(trial_simulation::run(&parts.scenario, &mut workspace)))));
     println!("one trial of {} samples, each part alone:", parts.count);
     for (name, ns) in [("law and motion", law), ("noise", noise), ("core", core), ("score", score)] {
         println!("  {name:<15} {ns:>6.1} ns per sample, {:>4.0} % of the whole", 100.0 * ns / whole);
@@ -133,7 +138,7 @@ fn shares(sweep: &Sweep) -> f64 {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/three_layer_latex_sinusoidal.ron");
     let swinging = Scenario::load(&file).expect("the shipped scenario");
     let samples = swinging.motion.plan().expect("a motion").duration_s() * swinging.sample_hz;
-    let seconds = best(300, || drop(black_box(trial::run(&swinging, &mut workspace))));
+    let seconds = best(300, || drop(black_box(trial_simulation::run(&swinging, &mut workspace))));
     println!("  {:<15} {:>6.1} ns per sample", "on a sinusoid", seconds / samples * 1e9);
     whole
 }
@@ -157,7 +162,7 @@ fn timed(trials: u64, threads: usize, passes: usize) -> f64 {
     let sweep = sweep(trials);
     let columns = Columns::new(&sweep);
     best(passes, || {
-        let rows = rows_with(&sweep, &columns, 0..trials, threads, &|_| {}).expect("it runs");
+        let rows = run_trials_with_threads(&sweep, &columns, 0..trials, threads, &|_| {}).expect("it runs");
         assert_eq!(rows.len() as u64, trials);
     })
 }

@@ -5,12 +5,12 @@ mod support;
 
 use std::fs;
 use std::path::Path;
-use support::{Scratch, said, scenario, stylet};
+use support::{Scratch, scenario, stderr_text, stylet};
 
-/// Asserts that a command is refused with all of `words` said and that nothing was written.
+/// Asserts that a command is refused with all of `words` stderr_text and that nothing was written.
 fn refused(arguments: &[&str], out: &Path, words: &[&str]) {
     let output = stylet(arguments);
-    let message = said(&output);
+    let message = stderr_text(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     for word in words {
         assert!(message.contains(word), "{arguments:?} must say {word:?}, and says: {message}");
@@ -150,7 +150,7 @@ fn repair_drops_backward_and_repeated_rows_and_says_which() {
     let arguments =
         ["enhance", file.to_str().expect("a path"), "--repair", "--out", out.to_str().expect("a path")];
     let output = stylet(&arguments);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     let json = fs::read_to_string(out.join("enhance.json")).expect("results");
     assert!(json.contains("repaired_rows") && json.contains("202"), "{json}");
 }
@@ -163,7 +163,7 @@ fn an_output_folder_that_cannot_be_made_is_refused_and_one_with_other_files_keep
     let inside = blocked.join("out");
     let arguments = ["run", file.to_str().expect("a path"), "--out", inside.to_str().expect("a path")];
     let output = stylet(&arguments);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
     assert_eq!(fs::read_to_string(&blocked).expect("the file"), "precious");
 
     let folder = scratch.path().join("mine");

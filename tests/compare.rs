@@ -6,7 +6,7 @@ mod support;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use support::{Scratch, root, said, stylet};
+use support::{Scratch, root, stderr_text, stylet};
 
 fn row(name: &str) -> String {
     root().join("scenarios/compare").join(name).to_str().expect("a path").to_owned()
@@ -22,7 +22,7 @@ fn compare(scratch: &Scratch, name: &str, arguments: &[&str]) -> Vec<Value> {
     let mut all = vec!["compare", "--quiet", "--out", folder.to_str().expect("a path")];
     all.extend(arguments);
     let output = stylet(&all);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     rows(&folder)
 }
 
@@ -92,7 +92,7 @@ fn one_two_and_three_threads_give_the_same_bytes() {
             .env("RAYON_NUM_THREADS", threads)
             .output()
             .expect("the binary starts");
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", stderr_text(&output));
         ["compare.json", "report.html"].map(|f| std::fs::read(folder.join(f)).expect("a result"))
     };
     let one = files("1");
@@ -116,6 +116,10 @@ fn what_cannot_be_compared_is_said() {
         (vec!["compare", "nowhere.ron", "--algorithms", "Ours"], "Ours"),
     ] {
         let output = stylet(&arguments);
-        assert!(!output.status.success() && said(&output).contains(expected), "{}", said(&output));
+        assert!(
+            !output.status.success() && stderr_text(&output).contains(expected),
+            "{}",
+            stderr_text(&output)
+        );
     }
 }

@@ -36,8 +36,8 @@ fn code(text: &str) -> String {
 /// Ids (as a source writes them) that a source names.
 fn named(text: &str) -> Vec<String> {
     let code = code(text);
-    stylet_tissue::library()
-        .chain(stylet_tissue::per_layer())
+    stylet_tissue::general_effects()
+        .chain(stylet_tissue::per_layer_effects())
         .map(|info| format!("\"{}\"", info.id))
         .filter(|id| code.contains(id))
         .collect()
@@ -68,7 +68,7 @@ fn no_source_outside_the_library_names_an_effect_by_its_id() {
         strays.join("\n")
     );
     // Each effect's own file does.
-    let effects = stylet_tissue::library().chain(stylet_tissue::per_layer()).count();
+    let effects = stylet_tissue::general_effects().chain(stylet_tissue::per_layer_effects()).count();
     assert!(in_tissue >= effects, "{in_tissue} of {effects}");
 }
 

@@ -1,10 +1,10 @@
-//! Promise: `stylet enhance LOG --law EXTENDED.ron` takes the friction of a law that was fitted elsewhere, says so in every result, and refuses
+//! Promise: `stylet enhance LOG --model EXTENDED.ron` takes the friction of a law that was fitted elsewhere, says so in every result, and refuses
 //! what is no law or has no place for one with a message that names file, place and remedy.
 
 mod support;
 
 use std::fs;
-use support::{Scratch, said, scenario, stylet};
+use support::{Scratch, scenario, stderr_text, stylet};
 
 /// A gel whose friction is dry and builds up over 2 mm: in, a rest, and back.
 const LAW: &str = r#"Scenario(
@@ -28,12 +28,12 @@ fn the_law_of_another_insertion_takes_the_friction_of_the_hold_away_and_every_re
     let law = law.to_str().expect("a path");
     let folder = |name: &str| scratch.path().join(name).to_str().expect("a path").to_owned();
     let ran = stylet(&["run", law, "--seed", "5", "--out", &folder("run")]);
-    assert!(ran.status.success(), "{}", said(&ran));
+    assert!(ran.status.success(), "{}", stderr_text(&ran));
     let log = folder("run/recording.csv");
     let alone = stylet(&["enhance", &log, "--out", &folder("alone")]);
-    assert!(alone.status.success(), "{}", said(&alone));
-    let told = stylet(&["enhance", &log, "--law", law, "--out", &folder("told")]);
-    assert!(told.status.success(), "{}", said(&told));
+    assert!(alone.status.success(), "{}", stderr_text(&alone));
+    let told = stylet(&["enhance", &log, "--model", law, "--out", &folder("told")]);
+    assert!(told.status.success(), "{}", stderr_text(&told));
     let terminal = String::from_utf8_lossy(&told.stdout);
     assert!(
         terminal.contains("friction along the shaft as") && terminal.contains("extended.ron"),
@@ -45,7 +45,7 @@ fn the_law_of_another_insertion_takes_the_friction_of_the_hold_away_and_every_re
         read("told/enhance.json").contains("extended.ron") && !read("alone/enhance.json").contains("\"law\"")
     );
     let page = read("told/report.html");
-    assert!(page.contains("friction along the shaft as") && page.contains("--law"), "the page says whose");
+    assert!(page.contains("friction along the shaft as") && page.contains("--model"), "the page says whose");
     // The drops are found as they are without.
     assert_eq!(read("told/events.json"), read("alone/events.json"));
 
@@ -87,11 +87,11 @@ fn what_is_no_law_or_has_no_place_for_one_is_refused() {
     let broken = scratch.file("b.ron", LAW.replacen("thickness_m: 0.03", "thickness_m: -0.03", 1));
     let good = scenario("three_layer_latex_constant");
     let cases: [(&[String], &[&str]); 4] = [
-        (&["--law".into(), path(&scratch.path().join("none.ron"))], &["none.ron"]),
-        (&["--law".into(), path(&enhance)], &["e.ron:1:1", "`Enhance`", "`Scenario` is expected"]),
-        (&["--law".into(), path(&broken)], &["b.ron:4", "-0.03", "positive"]),
+        (&["--model".into(), path(&scratch.path().join("none.ron"))], &["none.ron"]),
+        (&["--model".into(), path(&enhance)], &["e.ron:1:1", "`Enhance`", "`Scenario` is expected"]),
+        (&["--model".into(), path(&broken)], &["b.ron:4", "-0.03", "positive"]),
         (
-            &["--law".into(), path(&good), "--config".into(), path(&paper)],
+            &["--model".into(), path(&good), "--config".into(), path(&paper)],
             &["three_layer_latex_constant", "Stylet", "runs Paper", "leave the law out"],
         ),
     ];
@@ -100,7 +100,7 @@ fn what_is_no_law_or_has_no_place_for_one_is_refused() {
         let mut arguments = vec!["enhance", data.as_str(), "--out", folder.as_str()];
         arguments.extend(more.iter().map(String::as_str));
         let output = stylet(&arguments);
-        let message = said(&output);
+        let message = stderr_text(&output);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         for word in words {
             assert!(message.contains(word), "{arguments:?} must say {word:?}, and says: {message}");
@@ -130,9 +130,9 @@ fn a_viscous_law_leaves_nothing_of_the_way_back_after_a_turn_without_a_rest() {
     let law = law.to_str().expect("a path");
     let folder = |name: &str| scratch.path().join(name).to_str().expect("a path").to_owned();
     let ran = stylet(&["run", law, "--out", &folder("run")]);
-    assert!(ran.status.success(), "{}", said(&ran));
-    let told = stylet(&["enhance", &folder("run/recording.csv"), "--law", law, "--out", &folder("told")]);
-    assert!(told.status.success(), "{}", said(&told));
+    assert!(ran.status.success(), "{}", stderr_text(&ran));
+    let told = stylet(&["enhance", &folder("run/recording.csv"), "--model", law, "--out", &folder("told")]);
+    assert!(told.status.success(), "{}", stderr_text(&told));
     let text = fs::read_to_string(scratch.path().join("told/enhanced.csv")).expect("a result");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();

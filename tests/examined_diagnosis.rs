@@ -1,16 +1,16 @@
 //! Promise: in a world that it did not make and in which nothing is wrong, the diagnosis accuses nobody, and finds most of what is
 //! strong. A sample of `stylet benchmark diagnose`, which examines as many cases as you like.
 
-use stylet_diagnose::predict::{Refit, predict};
-use stylet_diagnose::{Evidence, Options};
+use stylet_diagnose::prediction::{Refit, predict};
+use stylet_diagnose::{NamedRecording, Options};
 use stylet_examine::{Answer, CaseId, Grade, Hide, Plan, Question, Size, World, Wrong, run, table};
 use stylet_scenario::{Motion, Scenario, Segment};
 
 /// What is believed, and what was measured.
-fn asked(question: &Question) -> Result<(Scenario, Vec<Evidence>), String> {
+fn asked(question: &Question) -> Result<(Scenario, Vec<NamedRecording>), String> {
     let scenario = Scenario::parse("believed.ron", &question.believed_ron).map_err(|e| e.to_string())?;
     let evidence = question.recordings.iter();
-    let evidence = evidence.map(|r| Evidence {
+    let evidence = evidence.map(|r| NamedRecording {
         name: r.name.clone(),
         recording: r.recording.clone(),
         notes: Vec::new(),
@@ -156,13 +156,13 @@ fn the_model_of_a_diagnosis_predicts_a_recording_that_took_no_part_to_about_its_
         let kept = evidence.split_off(evidence.len() - 1);
         let found = stylet_diagnose::diagnose(&believed, &evidence, &Options { brief: true }, |_| {})
             .expect("a diagnosis");
-        let foretold = predict(&found.extended, Some(&found.diagnosis), Some(&believed), &[], &kept)
+        let foretold = predict(&found.extended_scenario, Some(&found.diagnosis), Some(&believed), &[], &kept)
             .expect("a prediction");
         let p = &foretold.prediction;
         println!("{:?}: {p:?}", case.setup.effects);
         assert!(p.rmse_n < 1.25 * p.floor_n && p.held_out, "{p:?}");
         assert!((0.8..=0.98).contains(&p.band_coverage), "{p:?}");
-        assert!(p.believed_rmse_n.expect("of the believed scenario") > 5.0 * p.rmse_n, "{p:?}");
+        assert!(p.assumed_rmse_n.expect("of the believed scenario") > 5.0 * p.rmse_n, "{p:?}");
     }
 }
 
@@ -183,7 +183,7 @@ fn friction_and_surface_of_another_needle_are_fitted_again_and_everything_else_s
         let segments = vec![Segment::Move { velocity_mps, duration_s }];
         scenario.motion = Motion::Program { start_m: -0.004, segments };
         let recording = stylet_testbed::simulate(&scenario, seed).expect("an insertion").recording;
-        Evidence { name: format!("{seed}"), recording, notes: Vec::new() }
+        NamedRecording { name: format!("{seed}"), recording, notes: Vec::new() }
     };
     let evidence = [other(1, 0.004), other(2, 0.003)];
     let both = [Refit::Surface, Refit::Friction];

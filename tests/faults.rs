@@ -16,7 +16,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{ONE_GEL, Scratch, said, stylet, text};
+use support::{ONE_GEL, Scratch, stderr_text, stylet, text};
 
 const SWEEP: &str = r#"Sweep(scenario: "gel.ron", trials: 2060, vary: [(path: "sensor.noise_n", with: Uniform(0.01, 0.02))])"#;
 
@@ -92,7 +92,7 @@ fn to(arguments: &[String], out: &Path) -> Vec<String> {
 /// What a command writes into a folder when nothing happens to it.
 fn made(arguments: &[String], out: &Path) -> Files {
     let output = stylet(&to(arguments, out));
-    assert!(output.status.success(), "{arguments:?}: {}", said(&output));
+    assert!(output.status.success(), "{arguments:?}: {}", stderr_text(&output));
     held(out)
 }
 
@@ -109,7 +109,7 @@ fn sets(case: &Case, out: &Path) -> (Files, Files) {
 
 /// One fault, judged.
 fn judge(case: &Case, ended: &Ended, mode: char, at: u64, out: &Path, (old, new): (&Files, &Files)) {
-    let what = format!("{} with {mode} at call {at} ({}): {}", case.name, ended.hit, ended.said);
+    let what = format!("{} with {mode} at call {at} ({}): {}", case.name, ended.hit, ended.stderr_text);
     let (code, signal) = (ended.status.code(), ended.status.signal());
     let now = held(out);
     match mode {
@@ -122,7 +122,10 @@ fn judge(case: &Case, ended: &Ended, mode: char, at: u64, out: &Path, (old, new)
                 // What fails when the new set is in its places is only the tidying.
                 Some(0) => assert!(&now == new, "{what}: it says nothing and this is not the new set"),
                 Some(2) => {
-                    assert!(ended.said.contains(why) && ended.said.contains(&text(out)), "{what}");
+                    assert!(
+                        ended.stderr_text.contains(why) && ended.stderr_text.contains(&text(out)),
+                        "{what}"
+                    );
                     // A disk on which nothing can be changed any more does not let anything be put back either.
                     assert!(mode == 'E' || &now == old, "{what}: the old set is not what it was");
                 }
@@ -130,7 +133,7 @@ fn judge(case: &Case, ended: &Ended, mode: char, at: u64, out: &Path, (old, new)
             }
         }
     }
-    stylet::folder::settle(out).unwrap_or_else(|why| panic!("{what}: {why}"));
+    stylet::output_folder::recover(out).unwrap_or_else(|why| panic!("{what}: {why}"));
     let now = held(out);
     assert!(&now == old || &now == new, "{what}: a mixture of {:?}", now.keys());
 }
@@ -157,7 +160,7 @@ fn every_fault(shim: &Path, case: &Case, out: &Path, modes: &str, step: usize) -
                 // Whatever is left behind, the next command makes the whole set of it, and a sweep that goes on the same bytes.
                 let again = server.strike('-', 0);
                 let what = format!("{} after {mode} at call {at} ({})", case.name, ended.hit);
-                assert_eq!(again.status.code(), Some(0), "{what}: {}", again.said);
+                assert_eq!(again.status.code(), Some(0), "{what}: {}", again.stderr_text);
                 assert!(&held(out) == new && left_over(out).is_empty(), "{what}: {:?}", left_over(out));
             }
         }
@@ -201,7 +204,7 @@ fn clocks_that_jump_change_no_byte() {
         restore(&out, &Files::new());
         let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
         let output = command.args(to(&case.new, &out)).env("LD_PRELOAD", &clock).output().expect("it starts");
-        assert!(output.status.success(), "{}: {}", case.name, said(&output));
+        assert!(output.status.success(), "{}: {}", case.name, stderr_text(&output));
         assert!(
             held(&out) == new && left_over(&out).is_empty(),
             "{}: the clock is in its results",
@@ -247,7 +250,7 @@ fn a_hundred_kills_at_any_instant_leave_one_set() {
             met += u32::from(child.try_wait().expect("a state").is_none());
             let _ = child.kill();
             let _ = child.wait();
-            stylet::folder::settle(&out).expect("it settles");
+            stylet::output_folder::recover(&out).expect("it settles");
             let now = held(&out);
             assert!(now == old || now == new, "{} at kill {k}: a mixture of {:?}", case.name, now.keys());
             if now == old { olds += 1 } else { news += 1 }

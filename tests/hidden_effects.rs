@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 use stylet_api::benchmark::own::{Case as Result, run, summary};
-use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
+use stylet_diagnose::{NamedRecording, Options, Verdict, diagnose};
 use stylet_own_world::{self as hidden, Drawn, Harder, Kind, Motions, Size, sketch_of};
 use stylet_tissue::AnyEffect;
 
@@ -103,8 +103,8 @@ fn drawn(motions: Motions, effects: Vec<AnyEffect>) -> Drawn {
     }
 }
 
-fn evidence(case: &hidden::Case) -> Vec<Evidence> {
-    let named = |(k, r): (usize, &stylet_record::Recording)| Evidence {
+fn evidence(case: &hidden::Case) -> Vec<NamedRecording> {
+    let named = |(k, r): (usize, &stylet_record::Recording)| NamedRecording {
         name: format!("{k}.csv"),
         recording: r.clone(),
         notes: Vec::new(),
@@ -121,7 +121,7 @@ fn at_one_constant_speed_dry_friction_is_invisible_and_nothing_is_accused() {
         .diagnosis;
     assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
     for id in ["coulomb_friction", "power_law_friction", "force_gain"] {
-        assert!(found.invisible.iter().any(|i| i == id), "{id} not in {:?}", found.invisible);
+        assert!(found.not_identifiable.iter().any(|i| i == id), "{id} not in {:?}", found.not_identifiable);
     }
     assert!(!found.advice.is_empty());
 }
@@ -132,7 +132,7 @@ fn the_extended_scenario_simulates_and_the_verdict_serialises() {
     let case = hidden::case(&drawn(Motions::One, vec![drift.into()]));
     let examined =
         diagnose(&case.believed, &evidence(&case), &Options::default(), |_| {}).expect("a diagnosis");
-    let text = examined.extended.to_ron().expect("RON");
+    let text = examined.extended_scenario.to_ron().expect("RON");
     let again = stylet_scenario::Scenario::parse("extended.ron", &text).expect("a valid scenario");
     assert!(
         again

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
-use support::{Scratch, said, stylet, text};
+use support::{Scratch, stderr_text, stylet, text};
 
 const BELIEVED: &str = r#"Scenario(
     name: "one gel",
@@ -17,7 +17,7 @@ const BELIEVED: &str = r#"Scenario(
 )"#;
 
 fn flat(output: &Output) -> String {
-    let all = format!("{}\n{}", said(output), String::from_utf8_lossy(&output.stdout));
+    let all = format!("{}\n{}", stderr_text(output), String::from_utf8_lossy(&output.stdout));
     all.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -29,7 +29,7 @@ fn simulated(scratch: &Scratch, seed: u32) -> Vec<Row> {
     let out = scratch.path().join(format!("made-{seed}"));
     let output =
         stylet(&["run", &text(&believed), "--seed", &seed.to_string(), "--quiet", "--out", &text(&out)]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     let csv = fs::read_to_string(out.join("recording.csv")).expect("a recording");
     let row = |line: &str| {
         let mut numbers = line.split(',').filter_map(|x| x.parse().ok());
@@ -117,25 +117,25 @@ fn one_bad_recording_among_good_ones_is_named_in_the_same_words_wherever_it_ente
         for (how, output) in
             [("alone", alone), ("diagnose", several), ("--repeats", repeats), ("data set", of_set)]
         {
-            let said = flat(&output);
-            assert_eq!(output.status.code(), Some(2), "{name}, {how}: {said}");
+            let stderr_text = flat(&output);
+            assert_eq!(output.status.code(), Some(2), "{name}, {how}: {stderr_text}");
             for word in words.iter().chain(&[name]) {
-                assert!(said.contains(word), "{name}, {how}: does not say {word}: {said}");
+                assert!(stderr_text.contains(word), "{name}, {how}: does not say {word}: {stderr_text}");
             }
             assert!(
-                how == "alone" || said.contains("1 of 4 recordings cannot be used"),
-                "{name}, {how}: {said}"
+                how == "alone" || stderr_text.contains("1 of 4 recordings cannot be used"),
+                "{name}, {how}: {stderr_text}"
             );
-            assert!(!said.contains("lacks"), "{name}, {how}: names a cause: {said}");
+            assert!(!stderr_text.contains("lacks"), "{name}, {how}: names a cause: {stderr_text}");
             assert!(!out.exists(), "{name}, {how}: left a folder");
         }
         let enhanced = stylet(&["enhance", &bad, "--out", &folder]);
-        let said = flat(&enhanced);
-        assert!(enhanced.status.success(), "{name}: enhance shows what there is: {said}");
+        let stderr_text = flat(&enhanced);
+        assert!(enhanced.status.success(), "{name}: enhance shows what there is: {stderr_text}");
         for word in words {
-            assert!(said.contains(word), "{name}, enhance: does not say {word}: {said}");
+            assert!(stderr_text.contains(word), "{name}, enhance: does not say {word}: {stderr_text}");
         }
-        assert!(!said.contains("never stands out"), "{name}: {said}");
+        assert!(!stderr_text.contains("never stands out"), "{name}: {stderr_text}");
         fs::remove_dir_all(&out).expect("it was made");
     }
 }
@@ -169,22 +169,23 @@ fn repeats_are_repaired_as_asked_and_tell_who_is_not_like_the_others() {
         flat(&refused)
     );
     let repaired = stylet(&[&command[..], &["--repair"]].concat());
-    let said = flat(&repaired);
-    assert!(repaired.status.success(), "{said}");
-    assert!(said.contains("run4.csv: it is not like the others"), "{said}");
+    let stderr_text = flat(&repaired);
+    assert!(repaired.status.success(), "{stderr_text}");
+    assert!(stderr_text.contains("run4.csv: it is not like the others"), "{stderr_text}");
     for good in ["run1.csv", "run2.csv", "run3.csv"] {
-        assert!(!said.contains(&format!("{good}: it is not like")), "{said}");
+        assert!(!stderr_text.contains(&format!("{good}: it is not like")), "{stderr_text}");
     }
     let json = fs::read_to_string(Path::new(&folder).join("diagnosis.json")).expect("results");
-    assert!(json.contains("\"repaired_rows\"") && json.contains("\"not_like_the_others\""));
+    assert!(json.contains("\"repaired_rows\"") && json.contains("\"outlier_recording\""));
     // As recordings that need not be repeats, too.
     let command = [&["diagnose", &believed, "--repair", "--out", &folder, "--data"], &files[..]].concat();
-    let said = flat(&stylet(&command));
-    assert!(said.contains("run4.csv: it is not like the others: its force is 3.0"), "{said}");
-    assert_eq!(said.matches("it is not like the others").count(), 1, "{said}");
+    let stderr_text = flat(&stylet(&command));
+    assert!(stderr_text.contains("run4.csv: it is not like the others: its force is 3.0"), "{stderr_text}");
+    assert_eq!(stderr_text.matches("it is not like the others").count(), 1, "{stderr_text}");
     assert!(
-        said.contains("run4.csv is not like the other recordings") && !said.contains("agrees with"),
-        "{said}"
+        stderr_text.contains("run4.csv is not like the other recordings")
+            && !stderr_text.contains("agrees with"),
+        "{stderr_text}"
     );
 }
 
@@ -204,10 +205,10 @@ fn a_recording_whose_position_zero_lies_elsewhere_is_told() {
         let data = csv(rows.iter().map(|[t, z, f]| [*t, z + offset_m, *f]));
         let data = text(&scratch.file("offset.csv", data));
         let output = stylet(&["diagnose", &believed, "--data", &data, "--out", &out]);
-        let said = flat(&output);
-        assert_eq!(output.status.code(), Some(2), "{offset_m}: {said}");
+        let stderr_text = flat(&output);
+        assert_eq!(output.status.code(), Some(2), "{offset_m}: {stderr_text}");
         for word in words.iter().chain(&["offset.csv"]) {
-            assert!(said.contains(word), "{offset_m}: does not say {word}: {said}");
+            assert!(stderr_text.contains(word), "{offset_m}: does not say {word}: {stderr_text}");
         }
     }
 }
@@ -226,9 +227,9 @@ fn repeats_without_a_way_back_are_told_without_numbers_that_are_none() {
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let output =
         stylet(&[&["diagnose", &believed, "--repeats", "--out", &out, "--data"], &files[..]].concat());
-    let said = flat(&output);
-    assert!(output.status.success() && said.contains("online core"), "{said}");
-    assert!(!said.contains("NaN"), "{said}");
+    let stderr_text = flat(&output);
+    assert!(output.status.success() && stderr_text.contains("online core"), "{stderr_text}");
+    assert!(!stderr_text.contains("NaN"), "{stderr_text}");
 }
 
 #[test]
@@ -261,11 +262,11 @@ fn a_recording_too_long_to_be_compared_is_thinned_and_that_is_said() {
     let believed = text(&scratch.path().join("believed.ron"));
     let output =
         stylet(&["diagnose", &believed, "--data", &long, "--out", &text(&scratch.path().join("out"))]);
-    let said = flat(&output);
-    assert!(output.status.success(), "{said}");
+    let stderr_text = flat(&output);
+    assert!(output.status.success(), "{stderr_text}");
     assert!(
-        said.contains("139900 samples are more than a diagnosis can use: each 2 were averaged"),
-        "{said}"
+        stderr_text.contains("139900 samples are more than a diagnosis can use: each 2 were averaged"),
+        "{stderr_text}"
     );
 }
 
@@ -292,7 +293,7 @@ fn a_stack_of_layers_is_told_apart_up_to_the_limit_that_is_stated() {
         let believed = text(&many(layers));
         let out = text(&scratch.path().join(format!("made-{layers}")));
         let made = stylet(&["run", &believed, "--quiet", "--out", &out]);
-        assert!(made.status.success(), "{}", said(&made));
+        assert!(made.status.success(), "{}", stderr_text(&made));
         stylet(&[
             "diagnose",
             &believed,

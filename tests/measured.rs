@@ -8,7 +8,7 @@
 mod support;
 
 use std::path::PathBuf;
-use support::{Scratch, said, stylet};
+use support::{Scratch, stderr_text, stylet};
 
 const MAP: &str = r#"Columns(
     time: (name: "time", scale: 1e-6),
@@ -27,7 +27,7 @@ fn enhance(scratch: &Scratch, data: &std::path::Path) -> serde_json::Value {
     let out = scratch.path().join("out");
     let path = |p: &std::path::Path| p.to_str().expect("a path").to_owned();
     let output = stylet(&["enhance", &path(data), "--columns", &path(&map), "--out", &path(&out)]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     assert!(out.join("report.html").exists());
     let json = std::fs::read_to_string(out.join("enhance.json")).expect("results");
     serde_json::from_str(&json).expect("JSON")

@@ -9,15 +9,17 @@ mod support;
 use mutate::{Dice, What, feed, hold};
 use std::path::Path;
 use std::str::from_utf8;
-use stylet::{Diagnosis, Evidence, Inputs, Limits};
+use stylet::{Diagnosis, DiagnosisInputs, Limits, NamedRecording};
 use stylet_examine::challenge::Key;
 use stylet_examine::{Answer, Outcome, Plan};
-use stylet_record::{ColumnMap, ReadOptions, Recording, Truth, assess, read_csv_bytes, read_csv_with_holes};
-use stylet_scenario::{EnhanceFile, Motion, Scenario, motion_to_ron, parse};
-use stylet_sweep::gate::{Baseline, GatesFile};
+use stylet_record::{
+    ColumnMap, ReadOptions, Recording, Truth, assess, read_csv_bytes, read_csv_skip_nonfinite,
+};
+use stylet_scenario::{EnhancerConfigFile, Motion, Scenario, motion_to_ron, parse};
+use stylet_sweep::score_gate::{Baseline, GatesFile};
 use stylet_sweep::shard::{self, ShardNumber};
 use stylet_sweep::{Columns, Overrides, Sweep, SweepFile};
-use stylet_tissue::{AnyEffect, Law, LawState, library};
+use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState, general_effects};
 use support::{Scratch, root};
 
 fn shipped(folder: &str, most: u64) -> Vec<Vec<u8>> {
@@ -63,7 +65,7 @@ fn recordings_are_read_or_refused_and_what_is_read_keeps_its_promises() {
                 Ok((recording, notes)) => {
                     recording.check().expect("what is read is checked");
                     assert!(notes.iter().chain(&assess(&recording)).all(|note| !note.message.is_empty()));
-                    let _ = stylet_record::thin(&recording);
+                    let _ = stylet_record::downsample(&recording);
                     true
                 }
                 Err(error) => {
@@ -106,7 +108,7 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_their_pl
         b"Enhance(surface_m: 0.01, algorithm: Literal, model: MultiLayer)".to_vec(),
     ];
     hold("enhance", 8_000, &enhance, |bytes| {
-        std::str::from_utf8(bytes).is_ok_and(|text| told(EnhanceFile::parse("a.ron", text)).is_some())
+        std::str::from_utf8(bytes).is_ok_and(|text| told(EnhancerConfigFile::parse("a.ron", text)).is_some())
     });
     let maps = [b"Columns(time: (name: \"time\", scale: 1e-6), position: (name: \"pz\", scale: 1e-3), force: (name: \"fz\", offset: 0.1), velocity: (name: \"v\"))".to_vec()];
     hold("columns", 8_000, &maps, |bytes| {
@@ -124,14 +126,14 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_their_pl
     ];
     hold("live", 6_000, &samples, |bytes| {
         let text = String::from_utf8_lossy(bytes);
-        stylet_live::parse(1, &text).is_ok_and(|given| given.is_some())
+        stylet_live::parse_line(1, &text).is_ok_and(|given| given.is_some())
     });
 }
 
 /// A scenario per effect of the library, with typical numbers: what a diagnosis writes as `extended.ron`.
 fn extended() -> Vec<Vec<u8>> {
     let base = Scenario::load(&root().join("scenarios/three_layer_latex_constant.ron")).expect("a scenario");
-    library()
+    general_effects()
         .map(|entry| {
             let typical: Vec<f64> = entry.parameters.iter().map(|p| p.start).collect();
             let effects = AnyEffect::from_parameters(entry.id, &typical).into_iter().collect();
@@ -150,9 +152,9 @@ fn extended_models_are_read_or_refused_and_their_law_steps_whatever_comes() {
     hold("extended", 6_000, &corpus, |bytes| from_utf8(bytes).ok().and_then(read_again).is_some());
     let (laws, _) = feed("law", (4_000, What::Slow), &corpus, |bytes| {
         let Some(scenario) = from_utf8(bytes).ok().and_then(read_again) else { return false };
-        let Ok(law) = Law::new(&scenario.tissue, &scenario.effects) else { return false };
+        let Ok(law) = ForceLaw::new(&scenario.tissue, &scenario.effects) else { return false };
         let mut dice = Dice(bytes.iter().fold(7, |sum, b| sum * 31 % 1_000_003 + u64::from(*b)));
-        let (mut state, mut t, mut z) = (LawState::default(), 0.0, -0.005);
+        let (mut state, mut t, mut z) = (ForceLawState::default(), 0.0, -0.005);
         for _ in 0..200 {
             let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300, 1e-320, -1.0, 0.0];
             let mut drawn = |usual: f64| if dice.below(40) == 0 { odd[dice.below(odd.len())] } else { usual };
@@ -171,7 +173,7 @@ fn extended_models_are_read_or_refused_and_their_law_steps_whatever_comes() {
 fn data_sets_limits_and_motions_are_read_or_refused_with_their_place() {
     hold("data-set", 6_000, &shipped("scenarios/measured", 9000), |bytes| {
         from_utf8(bytes).is_ok_and(|text| {
-            told(stylet_diagnose::set::dataset::Dataset::parse("a.ron", text))
+            told(stylet_diagnose::repeated_insertions::dataset::Dataset::parse("a.ron", text))
                 .is_some_and(|set| (1..=7).contains(&set.tissue.layers.len()))
         })
     });
@@ -200,8 +202,11 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     let scratch = Scratch::in_memory("mutated");
     let scenario = Scenario::parse("gel.ron", GEL).expect("a scenario");
     let run = stylet::simulate(&scenario).expect("it can be simulated");
-    let evidence =
-        [Evidence { name: "a".to_owned(), recording: run.simulation.recording.clone(), notes: Vec::new() }];
+    let evidence = [NamedRecording {
+        name: "a".to_owned(),
+        recording: run.simulation.recording.clone(),
+        notes: Vec::new(),
+    }];
     let diagnosis =
         stylet::diagnose(&scenario, &evidence, |_| {}).and_then(|d| d.json()).expect("a diagnosis");
     let whole = [diagnosis];
@@ -211,7 +216,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     });
     let inputs =
         br#"{"scenario":"/a/gel.ron","data":["/a/1.csv","/a/2.csv"],"columns":null,"repair":false}"#.to_vec();
-    hold("inputs", 6_000, &[inputs], |bytes| serde_json::from_slice::<Inputs>(bytes).is_ok());
+    hold("inputs", 6_000, &[inputs], |bytes| serde_json::from_slice::<DiagnosisInputs>(bytes).is_ok());
     let baseline = std::fs::read(root().join("scenarios/gates/ci.baseline.json")).expect("it is shipped");
     hold("baseline", 6_000, &[baseline], |bytes| serde_json::from_slice::<Baseline>(bytes).is_ok());
     let cases = Plan { cases: 2, ..Plan::default() }.cases();
@@ -235,13 +240,14 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     });
     // From here on through files.
     let folder = scratch.path().join("set");
-    let mut set = stylet::Output::default();
+    let mut set = stylet::OutputFiles::default();
     set.add("a.csv", "1");
     set.write(&folder).expect("a set");
     let manifest = folder.join("manifest.json");
     let whole = [std::fs::read(&manifest).expect("it is there")];
     feed("manifest", (2_000, What::Text), &whole, |bytes| {
-        std::fs::write(&manifest, bytes).is_ok() && stylet::folder::verify(&folder, &["a.csv"]).is_ok()
+        std::fs::write(&manifest, bytes).is_ok()
+            && stylet::output_folder::verify_manifest(&folder, &["a.csv"]).is_ok()
     });
     let csv = scratch.path().join("holes.csv");
     let rows = |delimiter: &str| {
@@ -254,11 +260,12 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     feed("holes", (2_000, What::Text), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
         let options = ReadOptions { columns: None, repair: false };
         std::fs::write(&csv, bytes).is_ok()
-            && read_csv_with_holes(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
+            && read_csv_skip_nonfinite(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
     });
     let set = r#"Dataset(name: "two", recordings: ["two.csv"], split_by: ["specimen"],
         tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]))"#;
-    let set = stylet_diagnose::set::dataset::Dataset::parse("a.ron", set).expect("a data set");
+    let set =
+        stylet_diagnose::repeated_insertions::dataset::Dataset::parse("a.ron", set).expect("a data set");
     let mut two = "specimen,time_s,position_m,force_n\n".to_owned();
     for i in 0..120 {
         let t = 0.01 * f64::from(i % 60);
@@ -266,17 +273,17 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     }
     let csv = scratch.path().join("two.csv");
     feed("specimens", (2_000, What::Text), &[two.into_bytes()], |bytes| {
-        std::fs::write(&csv, bytes).is_ok() && set.runs(std::slice::from_ref(&csv), 1).is_ok()
+        std::fs::write(&csv, bytes).is_ok() && set.load_recordings(std::slice::from_ref(&csv), 1).is_ok()
     });
     let file = "Sweep(scenario: \"gel.ron\", trials: 3, vary: [(path: \"sensor.noise_n\", with: Uniform(0.01, 0.02))])";
     scratch.file("gel.ron", GEL);
     let sweep = Sweep::load(&scratch.file("sweep.ron", file), Overrides::default()).expect("a sweep");
     let (columns, number) = (Columns::new(&sweep), ShardNumber { shard: 1, of: 1 });
-    let rows = stylet_sweep::rows(&sweep, &columns, 0..3, &|_| {}).expect("three trials");
+    let rows = stylet_sweep::run_trials(&sweep, &columns, 0..3, &|_| {}).expect("three trials");
     shard::write(&sweep, &columns, number, &rows, scratch.path()).expect("a shard");
     let place = number.path(scratch.path());
     let whole = [std::fs::read(&place).expect("it is there")];
-    let bits = |rows: &[stylet_sweep::Row]| -> Vec<u64> {
+    let bits = |rows: &[stylet_sweep::TrialRow]| -> Vec<u64> {
         rows.iter().flat_map(|r| r.values.iter().map(|x| x.to_bits()).chain([r.trial, r.seed])).collect()
     };
     feed("shard", (2_000, What::Text), &whole, |bytes| {
@@ -306,7 +313,7 @@ fn short_recordings_are_diagnosed_or_refused() {
         let Ok((recording, notes)) = read_csv_bytes(bytes, Path::new("a.csv"), &options) else {
             return false;
         };
-        let evidence = [Evidence { name: "a.csv".to_owned(), recording, notes }];
+        let evidence = [NamedRecording { name: "a.csv".to_owned(), recording, notes }];
         match stylet::diagnose(&scenario, &evidence, |_| {}) {
             Ok(found) => found.json().is_ok() && found.extended_ron("gel.ron").is_ok(),
             Err(why) => !why.to_string().is_empty() && !matches!(why, stylet::Error::Internal(_)),

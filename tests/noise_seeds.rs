@@ -23,8 +23,8 @@ fn load(name: &str) -> Scenario {
 /// The insertion is simulated once by rapier; each seed only draws other noise.
 fn scores(scenario: &Scenario, config: &EnhanceConfig) -> Vec<Score> {
     let once = simulate(scenario, 1).expect("a simulation");
-    let layers = once.layers();
-    let noisy = |seed: u64| once.remeasured(seed).expect("a force/torque sensor");
+    let layers = once.true_layers();
+    let noisy = |seed: u64| once.measured_with_seed(seed).expect("a force/torque sensor");
     assert_eq!(noisy(1), once.recording.force_n, "drawing the noise apart must change nothing");
     (1..=SEEDS)
         .into_par_iter()
@@ -191,11 +191,11 @@ fn from_full_speed() -> Scenario {
 /// the normal equations, friction not below zero: relative error of K, layer by layer, median over the seeds.
 fn kelvin_voigt_by_least_squares(scenario: &Scenario) -> Vec<f64> {
     let once = simulate(scenario, 1).expect("a simulation");
-    let layers = once.layers();
+    let layers = once.true_layers();
     let errors: Vec<Vec<f64>> = (1..=SEEDS)
         .into_par_iter()
         .map(|seed| {
-            let force_n = once.remeasured(seed).expect("a force/torque sensor");
+            let force_n = once.measured_with_seed(seed).expect("a force/torque sensor");
             let of = |(layer, rupture): (&stylet_score::LayerTruth, &stylet_record::TrueRupture)| {
                 let [mut zz, mut zv, mut vv, mut zf, mut vf] = [0.0; 5];
                 let all =

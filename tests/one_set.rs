@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Scratch, root, said, scenario, stylet, text};
+use support::{Scratch, root, scenario, stderr_text, stylet, text};
 
 /// Every file of a folder, hidden ones too.
 fn held(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -45,7 +45,7 @@ fn a_disk_that_fills_half_way_leaves_the_old_results_as_they_were() {
     let out = scratch.path().join("out");
     let file = text(&scenario("three_layer_latex_constant"));
     let first = stylet(&["run", &file, "--seed", "1", "--quiet", "--out", &text(&out)]);
-    assert!(first.status.success(), "{}", said(&first));
+    assert!(first.status.success(), "{}", stderr_text(&first));
     let old = held(&out);
     assert!(old.contains_key("manifest.json") && old.contains_key("report.html"), "{:?}", old.keys());
     // Room for the small files, not for the large ones.
@@ -55,11 +55,12 @@ fn a_disk_that_fills_half_way_leaves_the_old_results_as_they_were() {
         out.display()
     );
     let output = Command::new("bash").args(["-c", &command]).env("NO_COLOR", "1").output().expect("bash");
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
     assert!(
-        said(&output).contains("cannot be written") && said(&output).contains("nothing was changed"),
+        stderr_text(&output).contains("cannot be written")
+            && stderr_text(&output).contains("nothing was changed"),
         "{}",
-        said(&output)
+        stderr_text(&output)
     );
     assert!(held(&out) == old, "something was changed");
     let third = stylet(&["run", &file, "--seed", "2", "--quiet", "--out", &text(&out)]);
@@ -72,14 +73,14 @@ fn a_killed_sweep_over_an_older_folder_leaves_the_draw_that_its_tables_tell_of()
     let out = scratch.path().join("out");
     let folder = text(&out);
     let first = stylet(&["sweep", &noise(), "--trials", "20", "--seed", "1", "--quiet", "--out", &folder]);
-    assert!(first.status.success(), "{}", said(&first));
+    assert!(first.status.success(), "{}", stderr_text(&first));
     let old = held(&out);
     let mut killed = begun(&folder, "2");
     killed.kill().expect("it is ours");
     killed.wait().expect("it ends");
     assert!(held(&out) == old, "the tables and what was drawn are of one sweep");
     let replayed = stylet(&["replay", &folder, "3", "--quiet"]);
-    assert!(replayed.status.success(), "{}", said(&replayed));
+    assert!(replayed.status.success(), "{}", stderr_text(&replayed));
     let seed = |csv: &[u8]| {
         let text = String::from_utf8_lossy(csv).into_owned();
         text.lines().nth(4).and_then(|row| row.split(',').nth(1)).expect("trial 3").to_owned()
@@ -99,16 +100,16 @@ fn two_sweeps_do_not_share_a_folder() {
     first.kill().expect("it is ours");
     first.wait().expect("it ends");
     for other in [second, merge, run] {
-        assert_eq!(other.status.code(), Some(2), "{}", said(&other));
+        assert_eq!(other.status.code(), Some(2), "{}", stderr_text(&other));
         assert!(
-            said(&other).contains("another stylet") && said(&other).contains("--out"),
+            stderr_text(&other).contains("another stylet") && stderr_text(&other).contains("--out"),
             "{}",
-            said(&other)
+            stderr_text(&other)
         );
     }
     // The lock went with its holder.
     let run = stylet(&["run", &text(&scenario("three_layer_latex_constant")), "--quiet", "--out", &folder]);
-    assert!(run.status.success(), "{}", said(&run));
+    assert!(run.status.success(), "{}", stderr_text(&run));
 }
 
 #[test]
@@ -117,11 +118,15 @@ fn a_draw_that_was_exchanged_under_its_tables_is_not_replayed() {
     let out = scratch.path().join("out");
     let folder = text(&out);
     let first = stylet(&["sweep", &noise(), "--trials", "20", "--quiet", "--out", &folder]);
-    assert!(first.status.success(), "{}", said(&first));
+    assert!(first.status.success(), "{}", stderr_text(&first));
     let draw = fs::read_to_string(out.join("sweep.ron")).expect("the draw");
     assert!(draw.contains("seed: 1"), "{draw}");
     fs::write(out.join("sweep.ron"), draw.replace("seed: 1", "seed: 2")).expect("it can be written");
     let output = stylet(&["replay", &folder, "3", "--quiet"]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("sweep.ron") && said(&output).contains("same set"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
+    assert!(
+        stderr_text(&output).contains("sweep.ron") && stderr_text(&output).contains("same set"),
+        "{}",
+        stderr_text(&output)
+    );
 }

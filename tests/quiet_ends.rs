@@ -5,7 +5,7 @@ mod support;
 
 use std::fs::File;
 use std::process::{Command, Stdio};
-use support::{ONE_GEL, Scratch, root, said, scenario, stylet, text};
+use support::{ONE_GEL, Scratch, root, scenario, stderr_text, stylet, text};
 
 /// Exit code and standard error of a command whose standard output is `out`.
 fn ended(arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
@@ -66,15 +66,21 @@ fn a_reader_that_goes_away_changes_no_exit_code_and_a_full_disk_is_told_in_a_sen
         (&["replay", &swept, "3", "--out", &replayed], 0),
     ];
     for (command, code) in commands {
-        let (found, said) = ended(command, gone());
-        assert_eq!(found, Some(code), "{command:?} into a pipe that nobody reads: {said}");
-        assert!(!said.contains("panicked") && !said.contains("please report"), "{command:?}: {said}");
+        let (found, stderr_text) = ended(command, gone());
+        assert_eq!(found, Some(code), "{command:?} into a pipe that nobody reads: {stderr_text}");
+        assert!(
+            !stderr_text.contains("panicked") && !stderr_text.contains("please report"),
+            "{command:?}: {stderr_text}"
+        );
         let Some(full) = full() else { continue };
-        let (found, said) = ended(command, full);
-        assert!(!said.contains("panicked"), "{command:?}: {said}");
+        let (found, stderr_text) = ended(command, full);
+        assert!(!stderr_text.contains("panicked"), "{command:?}: {stderr_text}");
         // A verdict outweighs that it could not be printed.
-        assert_eq!(found, Some(if code == 1 { 1 } else { 2 }), "{command:?} onto a full disk: {said}");
-        assert!(code == 1 || said.contains("standard output cannot be written"), "{command:?}: {said}");
+        assert_eq!(found, Some(if code == 1 { 1 } else { 2 }), "{command:?} onto a full disk: {stderr_text}");
+        assert!(
+            code == 1 || stderr_text.contains("standard output cannot be written"),
+            "{command:?}: {stderr_text}"
+        );
     }
 }
 
@@ -84,8 +90,8 @@ fn an_impossible_number_of_shards_is_refused() {
     let out = text(&scratch.path().join("out"));
     let sweep = text(&root().join("scenarios/sweeps/noise.ron"));
     let output = stylet(&["sweep", "run-shard", "1/18446744073709551615", &sweep, "--out", &out]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("at most 999999"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
+    assert!(stderr_text(&output).contains("at most 999999"), "{}", stderr_text(&output));
 }
 
 #[test]
@@ -102,13 +108,17 @@ fn an_error_seventy_thousand_columns_to_the_right_is_told_with_its_place() {
     let wide = ONE_GEL.replace('\n', " ").replace("robot", &format!("{}robbot", " ".repeat(70_000)));
     let file = scratch.file("wide.ron", wide);
     let output = stylet(&["run", &text(&file)]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("wide.ron:1:70"), "{}", said(&output));
-    assert!(said(&output).contains("robbot") && said(&output).contains("robot"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
+    assert!(stderr_text(&output).contains("wide.ron:1:70"), "{}", stderr_text(&output));
+    assert!(
+        stderr_text(&output).contains("robbot") && stderr_text(&output).contains("robot"),
+        "{}",
+        stderr_text(&output)
+    );
     // A line that fits a screen is shown, with what is wrong underlined.
     let short = scratch.file("short.ron", ONE_GEL.replace("robot", "robbot"));
     let output = stylet(&["run", &text(&short)]);
-    assert!(said(&output).contains("── here"), "{}", said(&output));
+    assert!(stderr_text(&output).contains("── here"), "{}", stderr_text(&output));
 }
 
 #[test]
@@ -143,18 +153,19 @@ fn too_much_work_is_refused_before_it_begins_with_what_would_help() {
     ];
     for (command, words) in cases {
         let output = stylet(&[command, &["--out", &folder]].concat());
-        assert_eq!(output.status.code(), Some(2), "{command:?}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{command:?}: {}", stderr_text(&output));
         // The terminal breaks lines between words and after hyphens.
-        let said = said(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
-        let said = said.replace("- ", "-");
+        let stderr_text =
+            stderr_text(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        let stderr_text = stderr_text.replace("- ", "-");
         for word in words {
-            assert!(said.contains(word), "{command:?} does not say {word}: {said}");
+            assert!(stderr_text.contains(word), "{command:?} does not say {word}: {stderr_text}");
         }
         assert!(!out.exists(), "{command:?} left a folder");
     }
     let output =
         stylet(&["run", &gel, "--limit-memory", "10MB", "--limit-time", "1h", "--quiet", "--out", &folder]);
-    assert!(output.status.success(), "what is within the limits runs: {}", said(&output));
+    assert!(output.status.success(), "what is within the limits runs: {}", stderr_text(&output));
 }
 
 #[test]
@@ -169,11 +180,11 @@ fn a_refused_sweep_leaves_no_folder() {
     );
     let out = scratch.path().join("made/for/it");
     let output = stylet(&["sweep", &text(&file), "--out", &text(&out)]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
     assert!(!scratch.path().join("made").exists(), "an empty folder stays behind");
     let merged =
         stylet(&["sweep", "merge", &text(&root().join("scenarios/sweeps/noise.ron")), "--out", &text(&out)]);
-    assert_eq!(merged.status.code(), Some(2), "{}", said(&merged));
+    assert_eq!(merged.status.code(), Some(2), "{}", stderr_text(&merged));
     assert!(!scratch.path().join("made").exists(), "an empty folder stays behind");
 }
 
@@ -205,14 +216,15 @@ fn what_is_wrong_with_a_log_is_told_with_file_line_and_remedy() {
     for (name, content, words) in cases {
         let file = scratch.file(name, content);
         let output = stylet(&["enhance", &text(&file), "--out", &text(&out)]);
-        let said = said(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
+        let stderr_text =
+            stderr_text(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(output.status.code(), Some(2), "{name}: {stderr_text}");
         for word in words.iter().chain(&[name]) {
-            assert!(said.contains(word), "{name} does not say {word}: {said}");
+            assert!(stderr_text.contains(word), "{name} does not say {word}: {stderr_text}");
         }
     }
     // Bars between the columns are read like commas.
     let bars = scratch.file("bars.csv", format!("{head}{rows}").replace(',', "|"));
     let output = stylet(&["enhance", &text(&bars), "--quiet", "--out", &text(&out)]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
 }

@@ -6,7 +6,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use support::{Scratch, root, said, stylet, text};
+use support::{Scratch, root, stderr_text, stylet, text};
 
 const GOOD: &str = r#"Sweep(
     scenario: "SCENARIO",
@@ -65,17 +65,17 @@ fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
     for (name, from, to, words) in cases {
         let file = scratch.file(&format!("{name}.ron"), good().replacen(from, to, 1));
         let output = stylet(&["sweep", &text(&file), "--out", &text(&out)]);
-        let said = said(&output);
-        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
-        assert!(said.contains(&format!("{name}.ron:")), "{name}: {said}");
+        let stderr_text = stderr_text(&output);
+        assert_eq!(output.status.code(), Some(2), "{name}: {stderr_text}");
+        assert!(stderr_text.contains(&format!("{name}.ron:")), "{name}: {stderr_text}");
         for word in words {
-            assert!(said.contains(word), "{name} does not say {word}: {said}");
+            assert!(stderr_text.contains(word), "{name} does not say {word}: {stderr_text}");
         }
         assert!(!out.exists(), "{name}: nothing is written");
     }
     let file = scratch.file("good.ron", good());
     let output = stylet(&["sweep", &text(&file), "--trials", "0", "--out", &text(&out)]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
     assert!(stylet(&["sweep", &text(&file), "--quiet", "--out", &text(&out)]).status.success());
 }
 
@@ -88,7 +88,7 @@ fn draws_that_no_scenario_allows_are_redrawn_and_hopeless_ones_are_reported() {
     let file = scratch.file("wide.ron", wide);
     let out = text(&scratch.path().join("out"));
     let output = stylet(&["sweep", &text(&file), "--quiet", "--out", &out]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     let csv = fs::read_to_string(Path::new(&out).join("trials.csv")).expect("a table");
     let redrawn = csv.lines().skip(1).filter(|l| l.split(',').nth(2) != Some("0")).count();
     assert!((8..=32).contains(&redrawn), "half of the draws are negative: {redrawn} of 40");
@@ -97,7 +97,7 @@ fn draws_that_no_scenario_allows_are_redrawn_and_hopeless_ones_are_reported() {
     let output = stylet(&["sweep", &text(&file), "--out", &text(&scratch.path().join("none"))]);
     assert_eq!(output.status.code(), Some(2));
     for word in ["trial 0", "sensor.noise_n", "narrow the distributions"] {
-        assert!(said(&output).contains(word), "{}", said(&output));
+        assert!(stderr_text(&output).contains(word), "{}", stderr_text(&output));
     }
 }
 
@@ -108,7 +108,7 @@ fn shards(scratch: &Scratch, name: &str, extra: &[&str]) -> std::path::PathBuf {
         let folder = text(&out);
         let base = ["sweep", "run-shard", shard, &text(&file), "--out", &folder];
         let output = stylet(&[&base[..], extra].concat());
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", stderr_text(&output));
     }
     out
 }
@@ -127,9 +127,13 @@ fn merge_refuses_missing_damaged_and_foreign_shards_by_name_and_keeps_the_others
         change(&mut bytes);
         fs::write(out.join(second), &bytes).expect("it can be written");
         let output = merge(&scratch, &out);
-        assert_eq!(output.status.code(), Some(2), "{name}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr_text(&output));
         for word in words.iter().chain(&["000002-of-000002.shard"]) {
-            assert!(said(&output).contains(word), "{name} does not say {word}: {}", said(&output));
+            assert!(
+                stderr_text(&output).contains(word),
+                "{name} does not say {word}: {}",
+                stderr_text(&output)
+            );
         }
         assert!(out.join("shards/000001-of-000002.shard").exists(), "{name}: the good shard is kept");
         assert!(!out.join("trials.csv").exists(), "{name}");
@@ -155,15 +159,15 @@ fn merge_refuses_missing_damaged_and_foreign_shards_by_name_and_keeps_the_others
     let out = shards(&scratch, "missing", &[]);
     fs::remove_file(out.join(second)).expect("it goes");
     let output = merge(&scratch, &out);
-    assert!(said(&output).contains("shard 2 of 2 is missing"), "{}", said(&output));
+    assert!(stderr_text(&output).contains("shard 2 of 2 is missing"), "{}", stderr_text(&output));
 
     let out = shards(&scratch, "foreign", &["--seed", "9"]);
     let output = merge(&scratch, &out);
     assert_eq!(output.status.code(), Some(2));
-    assert!(said(&output).contains("another seed: 9 instead of 1"), "{}", said(&output));
+    assert!(stderr_text(&output).contains("another seed: 9 instead of 1"), "{}", stderr_text(&output));
 
     let output = merge(&scratch, &scratch.path().join("nowhere"));
-    assert!(said(&output).contains("holds no shards"), "{}", said(&output));
+    assert!(stderr_text(&output).contains("holds no shards"), "{}", stderr_text(&output));
 }
 
 #[test]
@@ -179,16 +183,16 @@ fn a_file_size_limit_or_an_unwritable_folder_is_told_and_nothing_is_lost() {
         out.display()
     );
     let output = Command::new("bash").args(["-c", &command]).env("NO_COLOR", "1").output().expect("bash");
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("cannot be written"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
+    assert!(stderr_text(&output).contains("cannot be written"), "{}", stderr_text(&output));
     assert!(!out.join("trials.csv").exists());
     let parts = fs::read_dir(out.join("shards")).map_or(0, Iterator::count);
     assert_eq!(parts, 0, "nothing half-written stays");
 
     let blocked = scratch.file("a_file", "precious");
     let output = stylet(&["sweep", &text(&file), "--trials", "6", "--out", &text(&blocked.join("out"))]);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("cannot be written"), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
+    assert!(stderr_text(&output).contains("cannot be written"), "{}", stderr_text(&output));
     assert_eq!(fs::read_to_string(&blocked).expect("the file"), "precious");
 }
 
@@ -226,13 +230,13 @@ fn a_read_only_folder_is_told_and_its_shards_are_kept_for_the_next_attempt() {
         println!("SKIPPED: nobody may not start the binary here, and root may write to read-only folders");
         return;
     };
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
     for word in ["cannot be written", "000002-of-000002.shard", "finished shards are kept"] {
-        assert!(said(&output).contains(word), "it does not say {word}: {}", said(&output));
+        assert!(stderr_text(&output).contains(word), "it does not say {word}: {}", stderr_text(&output));
     }
     let sweep = unprivileged(&["sweep", &file, "--out", &text(&out.join("deeper"))]).expect("it starts");
-    assert_eq!(sweep.status.code(), Some(2), "{}", said(&sweep));
-    assert!(said(&sweep).contains("cannot be written"), "{}", said(&sweep));
+    assert_eq!(sweep.status.code(), Some(2), "{}", stderr_text(&sweep));
+    assert!(stderr_text(&sweep).contains("cannot be written"), "{}", stderr_text(&sweep));
     assert_eq!(fs::read(&first).expect("it is still there"), before);
     permit(0o755);
     assert!(stylet(&second).status.success());

@@ -4,7 +4,7 @@
 mod support;
 
 use std::fs;
-use support::{Scratch, root, said, stylet};
+use support::{Scratch, root, stderr_text, stylet};
 
 fn gates() -> String {
     root().join("scenarios/gates/ci.ron").to_str().expect("a path").to_owned()
@@ -14,7 +14,7 @@ fn gates() -> String {
 fn the_shipped_gates_pass_on_the_committed_baseline_and_on_ten_other_seeds() {
     let output = stylet(&["gate", &gates()]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{text}{}", said(&output));
+    assert!(output.status.success(), "{text}{}", stderr_text(&output));
     assert!(text.contains("No number differs"), "update the baseline with --update: {text}");
     // None of these seeds had been looked at when the bounds were set.
     for seed in 21..=30 {
@@ -59,7 +59,7 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
         json.to_str().expect("a path"),
     ]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{text}{}", said(&output));
+    assert_eq!(output.status.code(), Some(1), "{text}{}", stderr_text(&output));
     assert!(text.contains("FAIL ruptures[0].delay_s"), "{text}");
     assert!(scratch.path().join("gates/ci.baseline.json").exists());
     let junit = fs::read_to_string(junit).expect("JUnit");
@@ -75,7 +75,11 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{text}");
     let quiet = stylet(&["gate", file, "--quiet"]);
-    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty(), "{}", said(&quiet));
+    assert!(
+        quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty(),
+        "{}",
+        stderr_text(&quiet)
+    );
     assert!(text.contains("ruptures[0].delay_s P95: ") && text.contains(" -> "), "{text}");
 }
 
@@ -96,9 +100,13 @@ fn wrong_gates_are_refused_with_their_place() {
     ] {
         let file = scratch.file("g.ron", good.replacen(from, to, 1));
         let output = stylet(&["gate", file.to_str().expect("a path")]);
-        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
         for word in words {
-            assert!(said(&output).contains(word), "{to} does not say {word}: {}", said(&output));
+            assert!(
+                stderr_text(&output).contains(word),
+                "{to} does not say {word}: {}",
+                stderr_text(&output)
+            );
         }
     }
 }

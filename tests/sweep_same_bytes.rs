@@ -8,7 +8,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Scratch, root, said, stylet, text};
+use support::{Scratch, root, stderr_text, stylet, text};
 
 const FILES: [&str; 5] = ["trials.csv", "summary.json", "report.html", "sweep.ron", "scenario.ron"];
 
@@ -25,7 +25,7 @@ fn sweep(out: &Path, extra: &[&str]) -> Vec<Vec<u8>> {
     let mut arguments = vec!["sweep", &file, "--quiet", "--out", &folder];
     arguments.extend(extra);
     let output = stylet(&arguments);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     files(out)
 }
 
@@ -63,11 +63,11 @@ fn any_split_into_shards_in_any_order_gives_the_bytes_of_the_sequential_run() {
                 ["sweep", "run-shard", &format!("{shard}/{of}"), &text(&noise()), "--trials", "50"];
             let folder = text(&out);
             let output = stylet(&[&arguments[..], &["--threads", "1", "--out", &folder]].concat());
-            assert!(output.status.success(), "{}", said(&output));
+            assert!(output.status.success(), "{}", stderr_text(&output));
         }
         let output =
             stylet(&["sweep", "merge", &text(&noise()), "--trials", "50", "--quiet", "--out", &text(&out)]);
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", stderr_text(&output));
         assert_same(&whole, &files(&out), &format!("in {of} shards"));
         assert!(!out.join("shards").exists());
     }
@@ -140,7 +140,7 @@ fn an_unfinished_sweep_is_not_overwritten_without_being_told_to() {
     assert!(stylet(&shard).status.success());
     let output = stylet(&["sweep", &text(&noise()), "--trials", "8", "--out", &out]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(said(&output).contains("--resume"), "{}", said(&output));
+    assert!(stderr_text(&output).contains("--resume"), "{}", stderr_text(&output));
     assert!(scratch.path().join("shards").exists());
 }
 
@@ -150,7 +150,7 @@ fn a_trial_replayed_alone_has_the_scores_of_its_row() {
     let effects = root().join("scenarios/sweeps/effects.ron");
     let out = text(scratch.path());
     let output = stylet(&["sweep", &text(&effects), "--trials", "40", "--quiet", "--out", &out]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", stderr_text(&output));
     let csv = fs::read_to_string(scratch.path().join("trials.csv")).expect("a table");
     let names: Vec<&str> = csv.lines().next().expect("a header").split(',').collect();
     let column = |name: &str| names.iter().position(|n| *n == name).expect("a column");
@@ -158,7 +158,7 @@ fn a_trial_replayed_alone_has_the_scores_of_its_row() {
     for trial in [0, 7, 23, 39] {
         let row: Vec<&str> = csv.lines().nth(trial + 1).expect("a row").split(',').collect();
         let output = stylet(&["replay", &out, &trial.to_string(), "--quiet"]);
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", stderr_text(&output));
         let score = scratch.path().join(format!("trial-{trial}/score.json"));
         let score: serde_json::Value =
             serde_json::from_str(&fs::read_to_string(score).expect("a score")).expect("JSON");

@@ -19,7 +19,7 @@ fn path(file: &str) -> PathBuf {
 
 fn scores(scenario: &Scenario, seed: u64) -> Vec<(&'static str, Score)> {
     let run = simulate(scenario, seed).expect("simulated");
-    let layers = run.layers();
+    let layers = run.true_layers();
     run.readings
         .iter()
         .map(|reading| {

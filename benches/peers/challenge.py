@@ -1,8 +1,8 @@
 """An entrant to the challenge of `stylet benchmark export`: a sparse regression (LassoCV) that sees the exported files alone.
 
-    stylet benchmark export --wrong nothing,thickness --grade large --cases 60 --seed 702 --out out/challenge
+    stylet benchmark export --wrong nothing,thickness --severity large --cases 60 --seed 702 --out out/challenge
     target/peers/bin/python benches/peers/challenge.py out/challenge out/answers.json
-    stylet benchmark judge out/challenge out/answers.json
+    stylet benchmark score out/challenge out/answers.json
 
 Per recording: means over 20 ms; ruptures where the force falls most between 60 % of a layer and 12 % beyond its far face. Columns:
 the believed law's `K` and `b` of every layer, which are fitted freely, and what the library's effects that are linear in their
@@ -86,7 +86,7 @@ def columns(t, z, v, count, fronts):
 
 
 def answer(folder):
-    surface, layers = believed((folder / "believed.ron").read_text())
+    surface, layers = believed((folder / "assumed.ron").read_text())
     fronts = surface + np.concatenate([[0.0], np.cumsum(layers[:, 0])])
     base, extra, force, quiet = [], [], [], []
     for path in sorted(folder.glob("*.csv")):

@@ -10,7 +10,7 @@ Every peer is tuned by itself on the tuning challenge, to the most right answers
 whether residual and columns are whitened with the noise's colour, as Stylet does; whether what the ruptures say comes as further
 rows; the smallest contribution that counts, in noise standard deviations and as a share of the largest; the largest number of
 effects, where of equal scores the larger number is taken. Then it answers the test challenge: ANSWERS/NAME.json, for
-`stylet benchmark judge`; Stylet's own answers go to ANSWERS/stylet.json. An effect with a chosen column stands with its class: those
+`stylet benchmark score`; Stylet's own answers go to ANSWERS/stylet.json. An effect with a chosen column stands with its class: those
 with a column that correlates with it above 0.98.
 
 Saturation, quantisation and spikes are read off the raw force and are no terms of a residual: no peer can name them. Nor does a

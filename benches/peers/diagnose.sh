@@ -6,7 +6,7 @@
 # Per world (plain and rich): exports TUNING_CASES (40) cases of the public seed 701 to tune the peers on and CASES (100) cases of SEED
 # (702) to judge all on, half of them with nothing wrong and half with thicknesses wrong by the largest grade; two of five hide one effect,
 # one two effects, one something that the library lacks, one nothing. Writes what regressions are given, lets Stylet diagnose, tunes the
-# peers, lets them answer, and judges every answer by `stylet benchmark judge`. What is there already is not made again (remove
+# peers, lets them answer, and judges every answer by `stylet benchmark score`. What is there already is not made again (remove
 # target/peers_cases to begin anew). Then draws target/peers_cases/diagnosis_peers.svg of the table. Needs `bash benches/peers/setup.sh` once before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -25,7 +25,7 @@ stylet=target/release/stylet
 
 given() { # world, cases, seed -> the challenge, exported and with its terms
     local of=target/peers_cases/$1-$2-$3
-    [ -d "$of" ] || "$stylet" benchmark export --world "$1" --wrong nothing,thickness --grade large \
+    [ -d "$of" ] || "$stylet" benchmark export --world "$1" --wrong nothing,thickness --severity large \
         --hide one,one,two,outside,clean --cases "$((($2 + 1) / 2))" --seed "$3" --out "$of" >&2
     target/release/examples/peers_terms "$of" "$of.terms" >&2
     echo "$of"
@@ -42,7 +42,7 @@ for world in "${worlds[@]}"; do
     "$python" benches/peers/diagnose.py "$tune.terms" "$tune.truth.json" "$test.terms" "$test.answers"
     for answers in stylet lassocv frols stlsq sr3; do
         echo "-- $answers"
-        "$stylet" benchmark judge "$test" "$test.answers/$answers.json" | sed -n '/^all rows together/,/^$/p'
+        "$stylet" benchmark score "$test" "$test.answers/$answers.json" | sed -n '/^all rows together/,/^$/p'
     done | tee -a "$table"
     echo
 done

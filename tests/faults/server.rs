@@ -5,7 +5,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 
-/// The library that brings the faults, compiled into `folder`; `None`, and said so, where there is no `cc`.
+/// The library that brings the faults, compiled into `folder`; `None`, and stderr_text so, where there is no `cc`.
 pub fn shim(folder: &Path) -> Option<PathBuf> {
     preloaded(folder, "shim")
 }
@@ -39,34 +39,34 @@ pub struct Ended {
     /// What the fault hit; empty when there was none.
     pub hit: String,
     /// Standard error in one line.
-    pub said: String,
+    pub stderr_text: String,
 }
 
 pub struct Server {
     child: Child,
     orders: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
-    said: PathBuf,
+    stderr_text: PathBuf,
 }
 
 impl Server {
     /// Starts the command; it stops before the first change of the disk at or below `out`.
     pub fn new(shim: &Path, out: &Path, arguments: &[String]) -> Self {
-        let said = out.with_extension("said");
+        let stderr_text = out.with_extension("stderr_text");
         let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
             .args(arguments)
             .env("NO_COLOR", "1")
             .env("RAYON_NUM_THREADS", "1")
             .env("LD_PRELOAD", shim)
             .env("STYLET_FAULT_BELOW", out)
-            .env("STYLET_FAULT_SAID", &said)
+            .env("STYLET_FAULT_SAID", &stderr_text)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .expect("the binary starts");
         let orders = child.stdin.take();
         let answers = BufReader::new(child.stdout.take().expect("a pipe"));
-        Self { child, orders, answers, said }
+        Self { child, orders, answers, stderr_text }
     }
 
     /// Lets the command go on, with a fault of a `mode` at its call `at`.
@@ -78,13 +78,13 @@ impl Server {
         let mut words = line.trim_end().splitn(3, ' ');
         let status = words.next().and_then(|w| w.parse().ok()).expect("a status");
         let calls = words.next().and_then(|w| w.parse().ok()).expect("a number of calls");
-        let said = std::fs::read(&self.said).unwrap_or_default();
-        let said = String::from_utf8_lossy(&said).replace('│', " ");
+        let stderr_text = std::fs::read(&self.stderr_text).unwrap_or_default();
+        let stderr_text = String::from_utf8_lossy(&stderr_text).replace('│', " ");
         Ended {
             status: ExitStatus::from_raw(status),
             calls,
             hit: words.next().unwrap_or_default().to_owned(),
-            said: said.split_whitespace().collect::<Vec<_>>().join(" "),
+            stderr_text: stderr_text.split_whitespace().collect::<Vec<_>>().join(" "),
         }
     }
 }
@@ -94,6 +94,6 @@ impl Drop for Server {
         // No more orders: it ends.
         drop(self.orders.take());
         let _ = self.child.wait();
-        let _ = std::fs::remove_file(&self.said);
+        let _ = std::fs::remove_file(&self.stderr_text);
     }
 }

@@ -78,7 +78,7 @@ pub fn stylet<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
 }
 
 /// Standard error as text, without the line breaks and frames that a terminal's width brings.
-pub fn said(output: &Output) -> String {
+pub fn stderr_text(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }

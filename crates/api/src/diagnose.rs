@@ -1,30 +1,30 @@
 //! What a scenario gets wrong about measured recordings. The only file here that knows the engine.
 
+use crate::diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE};
 use crate::error::Error;
-use crate::inputs::{INPUTS, Inputs};
-use crate::output::{Output, json};
-use stylet_diagnose::predict::{Foretold, Refit};
-use stylet_diagnose::{Diagnosis, Evidence, Examined, Options};
-use stylet_record::{QualityNote, assess, thin, usable};
+use crate::output_files::{OutputFiles, to_json_bytes};
+use stylet_diagnose::prediction::{PredictionResult, Refit};
+use stylet_diagnose::{Diagnosis, DiagnosisResult, NamedRecording, Options};
+use stylet_record::{QualityNote, assess, check_usable, downsample};
 use stylet_scenario::Scenario;
 
 /// What a diagnosis gives.
-pub struct Diagnosed {
+pub struct DiagnosisReport {
     /// Verdict, causes, intervals, gain.
     pub diagnosis: Diagnosis,
     /// The scenario with re-fitted parameters and the effects found.
     pub extended: Scenario,
     /// All that the engine knows, for the report.
-    pub examined: Examined,
+    pub details: DiagnosisResult,
 }
 
-impl Diagnosed {
+impl DiagnosisReport {
     /// `diagnosis.json`.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
     pub fn json(&self) -> Result<Vec<u8>, Error> {
-        json(&self.diagnosis)
+        to_json_bytes(&self.diagnosis)
     }
 
     /// `extended.ron`; `believed` names the scenario in its first line.
@@ -42,19 +42,19 @@ impl Diagnosed {
     /// The report: `believed` was read from `file`, `command` repeats it.
     #[must_use]
     pub fn html(&self, believed: &Scenario, file: &str, command: String) -> String {
-        stylet_pages::diagnosis::page(believed, file, command, &self.examined).to_html()
+        stylet_pages::diagnosis::page(believed, file, command, &self.details).to_html()
     }
 
     /// All files that `stylet diagnose` writes for single recordings; `believed` was read from the inputs' scenario.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
-    pub fn output(&self, believed: &Scenario, inputs: &Inputs) -> Result<Output, Error> {
+    pub fn output(&self, believed: &Scenario, inputs: &DiagnosisInputs) -> Result<OutputFiles, Error> {
         let file = inputs.scenario.display().to_string();
-        let mut output = Output::default();
-        output.add("report.html", self.html(believed, &file, inputs.command()));
+        let mut output = OutputFiles::default();
+        output.add("report.html", self.html(believed, &file, inputs.command_line()));
         output.add("diagnosis.json", self.json()?);
-        output.add_json(INPUTS, &inputs.absolute())?;
+        output.add_json(INPUTS_FILE, &inputs.with_absolute_paths())?;
         output.add("extended.ron", self.extended_ron(&file)?);
         Ok(output)
     }
@@ -70,12 +70,16 @@ impl Diagnosed {
 /// [`Error::Diagnose`] when the recordings do not fit the scenario.
 pub fn diagnose(
     believed: &Scenario,
-    evidence: &[Evidence],
+    evidence: &[NamedRecording],
     progress: impl FnMut(&str),
-) -> Result<Diagnosed, Error> {
+) -> Result<DiagnosisReport, Error> {
     let thinned = within_reach_all(evidence)?;
     let examined = stylet_diagnose::diagnose(believed, &thinned, &Options::default(), progress)?;
-    Ok(Diagnosed { diagnosis: examined.diagnosis.clone(), extended: examined.extended.clone(), examined })
+    Ok(DiagnosisReport {
+        diagnosis: examined.diagnosis.clone(),
+        extended: examined.extended_scenario.clone(),
+        details: examined,
+    })
 }
 
 /// How well a scenario predicts recordings that took no part in making it. `diagnosis` is the one it came from, for noise,
@@ -84,33 +88,33 @@ pub fn diagnose(
 ///
 /// # Errors
 /// As [`diagnose`].
-pub fn forecast(
+pub fn predict_recordings(
     model: &Scenario,
     diagnosis: Option<&Diagnosis>,
     believed: Option<&Scenario>,
     refit: &[Refit],
-    evidence: &[Evidence],
-) -> Result<Foretold, Error> {
+    evidence: &[NamedRecording],
+) -> Result<PredictionResult, Error> {
     let thinned = within_reach_all(evidence)?;
-    Ok(stylet_diagnose::predict::predict(model, diagnosis, believed, refit, &thinned)?)
+    Ok(stylet_diagnose::prediction::predict(model, diagnosis, believed, refit, &thinned)?)
 }
 
 /// The recordings as long as the engine can use them, if it can.
-fn within_reach_all(evidence: &[Evidence]) -> Result<Vec<Evidence>, Error> {
+fn within_reach_all(evidence: &[NamedRecording]) -> Result<Vec<NamedRecording>, Error> {
     let mut judged: Vec<(&str, Vec<QualityNote>)> = Vec::with_capacity(evidence.len());
     for e in evidence {
         // Samples that are no numbers are the engine's to cut out.
         let notes = if e.recording.check().is_ok() { assess(&e.recording) } else { Vec::new() };
         judged.push((&e.name, notes));
     }
-    usable(judged.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
+    check_usable(judged.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
     Ok(evidence.iter().map(within_reach).collect())
 }
 
 /// The recording as long as a diagnosis can use it.
-fn within_reach(evidence: &Evidence) -> Evidence {
-    let Some((recording, note)) = thin(&evidence.recording) else { return evidence.clone() };
+fn within_reach(evidence: &NamedRecording) -> NamedRecording {
+    let Some((recording, note)) = downsample(&evidence.recording) else { return evidence.clone() };
     let mut notes = evidence.notes.clone();
     notes.push(note);
-    Evidence { name: evidence.name.clone(), recording, notes }
+    NamedRecording { name: evidence.name.clone(), recording, notes }
 }

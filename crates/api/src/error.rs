@@ -2,7 +2,7 @@
 
 use miette::Diagnostic;
 use std::path::Path;
-use stylet_diagnose::set::dataset::DatasetError;
+use stylet_diagnose::repeated_insertions::dataset::DatasetError;
 use stylet_plan::PlanError;
 use stylet_sweep::shard::ShardError;
 
@@ -14,8 +14,8 @@ pub enum Error {
     #[diagnostic(transparent)]
     Input(Box<stylet_scenario::InputError>),
     /// A number of a scenario or sweep that did not come from a file is wrong.
-    #[error("{}: {}", .0.path, .0.what)]
-    Problem(stylet_scenario::Problem),
+    #[error("{}: {}", .0.path, .0.message)]
+    Problem(stylet_scenario::FieldError),
     /// A recording is wrong.
     #[error(transparent)]
     Recording(#[from] stylet_record::RecordError),
@@ -52,7 +52,7 @@ pub enum Error {
         "{path}: cannot be written: {why}; the new results are whole in its folder .stylet-set, and the next stylet command that uses \
          {path} puts them in their places: mend the disk and give it again"
     )]
-    Begun {
+    Unfinished {
         /// Folder.
         path: String,
         /// What the system says.
@@ -71,7 +71,7 @@ pub enum Error {
         "{path}: does not belong to the same set of results as the folder's manifest.json: it was changed or replaced; make the \
          results anew, or put the file back"
     )]
-    NotOneSet {
+    InconsistentSet {
         /// File.
         path: String,
     },
@@ -86,8 +86,8 @@ impl From<stylet_scenario::InputError> for Error {
     }
 }
 
-impl From<stylet_scenario::Problem> for Error {
-    fn from(problem: stylet_scenario::Problem) -> Self {
+impl From<stylet_scenario::FieldError> for Error {
+    fn from(problem: stylet_scenario::FieldError) -> Self {
         Self::Problem(problem)
     }
 }

@@ -1,13 +1,15 @@
 //! A sweep in its folder: shards that outlive a kill, the tables made of them, one trial of it again.
 
 use crate::error::Error;
-use crate::folder::{self, Claim};
-use crate::sweep::results;
+use crate::output_folder::{self, OutputLock};
+use crate::sweep::write_result_files;
 use std::path::Path;
 use std::time::Instant;
 use stylet_scenario::Scenario;
 use stylet_sweep::shard::{self, ShardNumber};
-use stylet_sweep::{Columns, Drawer, Overrides, Row, Summary, Sweep, TrialsOnDisk, TrialsWriter, rows};
+use stylet_sweep::{
+    Columns, DiskTrialTable, Overrides, Summary, Sweep, TrialRow, TrialSampler, TrialTableWriter, run_trials,
+};
 
 /// Trials of a shard when a whole sweep splits the work itself: what a kill can cost at most.
 pub const SHARD_TRIALS: u64 = 1024;
@@ -19,13 +21,19 @@ const PROBE: u64 = 32;
 ///
 /// # Errors
 /// [`Error::Request`] with what would be right.
-pub fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool) -> Result<(), Error> {
-    let unfinished = shard::split_of(out);
+pub fn check_unfinished(
+    sweep: &Sweep,
+    columns: &Columns,
+    out: &Path,
+    of: u64,
+    resume: bool,
+) -> Result<(), Error> {
+    let unfinished = shard::shard_count(out);
     if let (Ok(split), false) = (&unfinished, resume) {
         let what = format!(
             "{}: holds an unfinished sweep in {split} shards; go on with --resume, or remove {}",
             out.display(),
-            out.join(shard::FOLDER).display()
+            out.join(shard::SHARD_FOLDER).display()
         );
         return Err(Error::Request(what));
     }
@@ -48,14 +56,14 @@ pub fn begin(sweep: &Sweep, columns: &Columns, out: &Path, of: u64, resume: bool
 ///
 /// # Errors
 /// [`Error::Trial`] for a trial that gives no row, [`Error::Request`] for a shard that is foreign or cannot be written.
-pub fn all_shards(
+pub fn run_all_shards(
     sweep: &Sweep,
     columns: &Columns,
     out: &Path,
     of: u64,
     there: &(dyn Fn(u64) + Sync),
     done: &(dyn Fn(u64) + Sync),
-) -> Result<TrialsOnDisk, Error> {
+) -> Result<DiskTrialTable, Error> {
     let mut all = Gathered::new(columns, out)?;
     for shard in 1..=of {
         let number = ShardNumber { shard, of };
@@ -65,7 +73,7 @@ pub fn all_shards(
             all.take(&rows)?;
             continue;
         }
-        let rows = rows(sweep, columns, number.range(sweep.trials()), done)?;
+        let rows = run_trials(sweep, columns, number.range(sweep.trials()), done)?;
         shard::write(sweep, columns, number, &rows, out)?;
         all.take(&rows)?;
     }
@@ -75,20 +83,20 @@ pub fn all_shards(
 /// Rows of one shard after the other.
 struct Gathered<'a> {
     out: &'a Path,
-    rows: TrialsWriter,
+    rows: TrialTableWriter,
 }
 
 impl<'a> Gathered<'a> {
     fn new(columns: &Columns, out: &'a Path) -> Result<Self, Error> {
-        let rows = TrialsWriter::new(out, columns).map_err(|why| Error::output(out, why))?;
+        let rows = TrialTableWriter::new(out, columns).map_err(|why| Error::output(out, why))?;
         Ok(Self { out, rows })
     }
 
-    fn take(&mut self, rows: &[Row]) -> Result<(), Error> {
+    fn take(&mut self, rows: &[TrialRow]) -> Result<(), Error> {
         rows.iter().try_for_each(|row| self.rows.push(row)).map_err(|why| Error::output(self.out, why))
     }
 
-    fn finish(self) -> Result<TrialsOnDisk, Error> {
+    fn finish(self) -> Result<DiskTrialTable, Error> {
         self.rows.finish().map_err(|why| Error::output(self.out, why))
     }
 }
@@ -97,18 +105,18 @@ impl<'a> Gathered<'a> {
 ///
 /// # Errors
 /// As [`all_shards`]; [`Error::Busy`] when a whole sweep is written there.
-pub fn one_shard(
+pub fn run_shard(
     sweep: &Sweep,
     columns: &Columns,
     number: ShardNumber,
     out: &Path,
     resume: bool,
 ) -> Result<(), Error> {
-    let _claim = Claim::shared(out)?;
+    let _claim = OutputLock::lock_shared(out)?;
     if resume && shard::read(sweep, columns, number, out).is_ok() {
         return Ok(());
     }
-    let rows = rows(sweep, columns, number.range(sweep.trials()), &|_| {})?;
+    let rows = run_trials(sweep, columns, number.range(sweep.trials()), &|_| {})?;
     Ok(shard::write(sweep, columns, number, &rows, out)?)
 }
 
@@ -116,8 +124,8 @@ pub fn one_shard(
 ///
 /// # Errors
 /// [`Error::Request`] when one is missing or foreign.
-pub fn merged(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<TrialsOnDisk, Error> {
-    let of = shard::split_of(out)?;
+pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<DiskTrialTable, Error> {
+    let of = shard::shard_count(out)?;
     let mut all = Gathered::new(columns, out)?;
     for shard in 1..=of {
         all.take(&shard::read(sweep, columns, ShardNumber { shard, of }, out)?)?;
@@ -129,15 +137,15 @@ pub fn merged(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<TrialsOnDi
 ///
 /// # Errors
 /// [`Error::Output`].
-pub fn conclude(
+pub fn write_results(
     sweep: &Sweep,
     columns: &Columns,
-    rows: &TrialsOnDisk,
-    (claim, out): (&Claim, &Path),
+    rows: &DiskTrialTable,
+    (claim, out): (&OutputLock, &Path),
 ) -> Result<Summary, Error> {
-    let (output, summary) = results(sweep, columns, rows, claim)?;
-    output.write_to(claim)?;
-    let _ = std::fs::remove_dir_all(out.join(shard::FOLDER));
+    let (output, summary) = write_result_files(sweep, columns, rows, claim)?;
+    output.write_locked(claim)?;
+    let _ = std::fs::remove_dir_all(out.join(shard::SHARD_FOLDER));
     Ok(summary)
 }
 
@@ -145,10 +153,10 @@ pub fn conclude(
 ///
 /// # Errors
 /// [`Error::Trial`] for a trial that gives no row.
-pub fn trial_s(sweep: &Sweep, columns: &Columns) -> Result<f64, Error> {
+pub fn measure_trial_s(sweep: &Sweep, columns: &Columns) -> Result<f64, Error> {
     let probe = PROBE.min(sweep.trials());
     let start = Instant::now();
-    rows(sweep, columns, 0..probe, &|_| {})?;
+    run_trials(sweep, columns, 0..probe, &|_| {})?;
     Ok(start.elapsed().as_secs_f64() / probe as f64)
 }
 
@@ -156,19 +164,19 @@ pub fn trial_s(sweep: &Sweep, columns: &Columns) -> Result<f64, Error> {
 ///
 /// # Errors
 /// [`Error::Request`] when it is no such folder or has no such trial, [`Error::NotOneSet`] when its files were changed.
-pub fn trial_of(folder: &Path, trial: u64) -> Result<Scenario, Error> {
+pub fn trial_scenario(folder: &Path, trial: u64) -> Result<Scenario, Error> {
     let file = folder.join("sweep.ron");
-    folder::settle(folder)?;
+    output_folder::recover(folder)?;
     if !file.exists() {
         let what = format!("{}: is not the folder of a sweep (it holds no sweep.ron)", folder.display());
         return Err(Error::Request(what));
     }
-    folder::verify(folder, &["scenario.ron", "sweep.ron", "trials.csv"])?;
+    output_folder::verify_manifest(folder, &["scenario.ron", "sweep.ron", "trials.csv"])?;
     let sweep = Sweep::load(&file, Overrides::default())?;
     if trial >= sweep.trials() {
         let what = format!("trial {trial}: the sweep has trials 0 to {}", sweep.trials() - 1);
         return Err(Error::Request(what));
     }
-    let drawn = Drawer::new(&sweep).draw(trial).map_err(|e| Error::Request(e.to_string()))?;
+    let drawn = TrialSampler::new(&sweep).draw(trial).map_err(|e| Error::Request(e.to_string()))?;
     Ok(drawn.scenario)
 }

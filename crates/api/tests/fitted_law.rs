@@ -1,13 +1,13 @@
 //! Promise: with a law that was fitted to other insertions the enhanced force is nearer to what the tip feels than without, in a hold and on the
 //! way back, and near to it on the way in; causally, and with punctures where the core says so rather than where the law has them.
 
-use stylet_api::{Error, FittedLaw, enhance, enhance_with_law};
+use stylet_api::{Error, IdentifiedModel, enhance, enhance_with_model};
 use stylet_core::config::{Algorithm, EnhanceConfig};
 use stylet_record::Recording;
-use stylet_scenario::{EnhanceFile, Scenario};
+use stylet_scenario::{EnhancerConfigFile, Scenario};
 use stylet_stats::rms;
 use stylet_testbed::{Simulation, simulate};
-use stylet_tissue::{AnyEffect, Law, LawState, PreslidingFriction};
+use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState, PreslidingFriction};
 
 /// Two layers whose friction is dry and builds up over millimetres; in by 48 mm, a rest of 2 s, and back.
 fn insertion(forces_n: [f64; 2], dry_n_per_m: f64, effects: &str) -> Scenario {
@@ -50,8 +50,8 @@ fn off_n(simulation: &Simulation, enhanced_n: &[f64], from_s: f64, to_s: f64) ->
 
 /// The law replayed with the ruptures that it has by itself.
 fn by_itself(law: &Scenario, r: &Recording) -> Vec<f64> {
-    let law = Law::new(&law.tissue, &law.effects).expect("a law");
-    let mut state = LawState::default();
+    let law = ForceLaw::new(&law.tissue, &law.effects).expect("a law");
+    let mut state = ForceLawState::default();
     let tip = |(i, s): (usize, stylet_record::Sample)| {
         let force = law.step(&mut state, s.time_s, s.position_m, s.velocity_mps, |_| {});
         let friction_n = if s.velocity_mps < 0.0 { force.friction_n } else { force.total_n - force.tip_n };
@@ -62,14 +62,14 @@ fn by_itself(law: &Scenario, r: &Recording) -> Vec<f64> {
 
 #[test]
 fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Result<(), Error> {
-    let law = FittedLaw::new("extended.ron", &fitted())?;
-    let config = EnhanceFile::default();
+    let law = IdentifiedModel::new("extended.ron", &fitted())?;
+    let config = EnhancerConfigFile::default();
     let (mut without, mut with, mut own) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for seed in 1..=12 {
         let drawn = drawn(seed);
         let r = &drawn.recording;
         let alone = enhance(r, &config).trace;
-        let told = enhance_with_law(r, &config, &law)?.trace;
+        let told = enhance_with_model(r, &config, &law)?.trace;
         assert_eq!(told.detections, alone.detections, "a law changes nothing of what is found");
         assert_eq!(told.detections.len(), 2, "seed {seed}: both ruptures");
         let replayed = by_itself(&fitted(), r);
@@ -101,16 +101,16 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
 
 #[test]
 fn what_is_said_of_a_sample_does_not_depend_on_later_ones() -> Result<(), Error> {
-    let law = FittedLaw::new("extended.ron", &fitted())?;
+    let law = IdentifiedModel::new("extended.ron", &fitted())?;
     let whole = drawn(1).recording;
-    let told = enhance_with_law(&whole, &EnhanceFile::default(), &law)?.trace;
+    let told = enhance_with_model(&whole, &EnhancerConfigFile::default(), &law)?.trace;
     for samples in [1500, 2500, 3300] {
         let mut begin = whole.clone();
         begin.time_s.truncate(samples);
         begin.position_m.truncate(samples);
         begin.velocity_mps.truncate(samples);
         begin.force_n.truncate(samples);
-        let first = enhance_with_law(&begin, &EnhanceFile::default(), &law)?.trace;
+        let first = enhance_with_model(&begin, &EnhancerConfigFile::default(), &law)?.trace;
         assert_eq!(first.enhanced_n, told.enhanced_n[..samples]);
         assert_eq!(first.low_n, told.low_n[..samples]);
     }
@@ -121,10 +121,10 @@ fn what_is_said_of_a_sample_does_not_depend_on_later_ones() -> Result<(), Error>
 #[test]
 fn friction_is_given_as_the_sensor_shows_it() -> Result<(), Error> {
     let through = ", ForceGain(eps: 0.5), TimeDelay(delay_s: 0.1), ForceBias(force_n: 7.0)";
-    let plain = FittedLaw::new("plain.ron", &fitted())?;
-    let seen = FittedLaw::new("seen.ron", &insertion([1.2, 1.5], 30.0, through))?;
+    let plain = IdentifiedModel::new("plain.ron", &fitted())?;
+    let seen = IdentifiedModel::new("seen.ron", &insertion([1.2, 1.5], 30.0, through))?;
     let r = drawn(1).recording;
-    let (mut plain, mut seen) = (plain.shaft(r.sample_hz()), seen.shaft(r.sample_hz()));
+    let (mut plain, mut seen) = (plain.shaft_friction(r.sample_hz()), seen.shaft_friction(r.sample_hz()));
     let mut both = Vec::new();
     for s in r.samples() {
         let ruptured = usize::from(s.time_s > 5.0) + usize::from(s.time_s > 9.0);
@@ -143,26 +143,26 @@ fn friction_is_given_as_the_sensor_shows_it() -> Result<(), Error> {
 #[test]
 fn a_law_is_refused_by_algorithms_that_take_none_and_doubted_where_it_does_not_belong() -> Result<(), Error> {
     let r = drawn(1).recording;
-    let law = FittedLaw::new("extended.ron", &fitted())?;
+    let law = IdentifiedModel::new("extended.ron", &fitted())?;
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    let config = EnhanceFile { enhance: paper, ..EnhanceFile::default() };
-    let why = enhance_with_law(&r, &config, &law).err().map(|e| e.to_string()).unwrap_or_default();
+    let config = EnhancerConfigFile { enhance: paper, ..EnhancerConfigFile::default() };
+    let why = enhance_with_model(&r, &config, &law).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(
         why.contains("extended.ron") && why.contains("Paper") && why.contains("algorithm: Stylet"),
         "{why}"
     );
-    let trace = enhance_with_law(&r, &EnhanceFile::default(), &law)?.trace;
-    assert!(law.doubts(&trace).is_empty(), "{:?}", law.doubts(&trace));
+    let trace = enhance_with_model(&r, &EnhancerConfigFile::default(), &law)?.trace;
+    assert!(law.warnings(&trace).is_empty(), "{:?}", law.warnings(&trace));
     let mut elsewhere = fitted();
     elsewhere.tissue.surface_m = 0.03;
     elsewhere.tissue.layers.truncate(1);
-    let doubts = FittedLaw::new("other.ron", &elsewhere)?.doubts(&trace).join("; ");
+    let doubts = IdentifiedModel::new("other.ron", &elsewhere)?.warnings(&trace).join("; ");
     assert!(doubts.contains("surface at 30.0 mm") && doubts.contains("has 1 layer"), "{doubts}");
     // Effects that the law cannot hold all of.
     let mut many = fitted();
     many.effects =
         vec![AnyEffect::PreslidingFriction(PreslidingFriction { c_n_per_m: 1.0, delta_m: 0.002 }); 17];
-    let why = FittedLaw::new("many.ron", &many).err().map(|e| e.to_string()).unwrap_or_default();
+    let why = IdentifiedModel::new("many.ron", &many).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(why.contains("many.ron") && why.contains("17"), "{why}");
     Ok(())
 }

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use stylet_api::heard::{Heard, Source, hear, hear_long};
-use stylet_api::{Claim, EnhanceFile, Error, FittedLaw, ReadOptions, Scenario};
+use stylet_api::enhancement::{EnhancementResult, ResultSource, enhance_long_recording, enhance_recording};
+use stylet_api::{EnhancerConfigFile, Error, IdentifiedModel, OutputLock, ReadOptions, Scenario};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_record::{read_csv, read_long_csv};
 
@@ -50,36 +50,37 @@ fn log(samples: usize, velocity: bool) -> String {
     text
 }
 
-fn of(config: EnhanceConfig) -> EnhanceFile {
-    EnhanceFile { enhance: config, ..EnhanceFile::default() }
+fn of(config: EnhanceConfig) -> EnhancerConfigFile {
+    EnhancerConfigFile { enhance: config, ..EnhancerConfigFile::default() }
 }
 
 /// Both ways; gives what was heard from disk, after its files were held against the other's.
 fn alike(
     name: &str,
     text: &str,
-    config: &EnhanceFile,
+    config: &EnhancerConfigFile,
     models: &[Model],
-    law: Option<&FittedLaw>,
+    law: Option<&IdentifiedModel>,
     same: &[&str],
 ) -> Result<(), Error> {
     let scratch = Scratch::new(name);
     let path = scratch.0.join("log.csv");
     fs::write(&path, text).expect("a scratch file");
-    let source = |path| Source { data: path, config: None, command: "stylet enhance log.csv".to_owned() };
+    let source =
+        |path| ResultSource { data: path, config: None, command: "stylet enhance log.csv".to_owned() };
     let (here, there) = (scratch.0.join("here"), scratch.0.join("there"));
 
     let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
-    let heard = hear(recording, notes, config.clone(), models, law)?;
+    let heard = enhance_recording(recording, notes, config.clone(), models, law)?;
     let found = said(&heard);
     assert!(found.contains("rupture"), "{name}: there was something to be found: {found}");
-    heard.output(&source(&path))?.write(&here)?;
+    heard.output_files(&source(&path))?.write(&here)?;
 
-    let claim = Claim::new(&there)?;
+    let claim = OutputLock::new(&there)?;
     let (recording, notes) = read_long_csv(&path, &ReadOptions::default(), &there)?.expect("a plain file");
-    let heard = hear_long(&recording, notes, config.clone(), models, law, &claim)?;
+    let heard = enhance_long_recording(&recording, notes, config.clone(), models, law, &claim)?;
     assert_eq!(said(&heard), found, "{name}");
-    heard.output(&source(&path))?.write_to(&claim)?;
+    heard.output_files(&source(&path))?.write_locked(&claim)?;
     drop((recording, claim));
 
     for file in same {
@@ -98,9 +99,9 @@ fn alike(
     Ok(())
 }
 
-fn said(heard: &Heard) -> String {
+fn said(heard: &EnhancementResult) -> String {
     let mut said = format!("{:?} {}", heard.extent, heard.hash);
-    for ran in &heard.ran {
+    for ran in &heard.algorithm_runs {
         let trace = &ran.trace;
         let _ = write!(said, "\n{} contact {:?} {:?}", ran.name, trace.contact_m, trace.contact_s);
         trace.detections.iter().for_each(|d| said += &format!("\nrupture {d:?}"));
@@ -110,12 +111,12 @@ fn said(heard: &Heard) -> String {
 }
 
 /// A law whose shaft is held behind its ruptures.
-fn law() -> FittedLaw {
+fn law() -> IdentifiedModel {
     let text = r#"Scenario(name: "dry", tissue: (surface_m: 0.015, layers: [
         (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0),
         (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0)]),
         effects: [CoulombFriction(c_n_per_m: 2.0), TimeDelay(delay_s: 0.01)], motion: Recorded)"#;
-    FittedLaw::new("law.ron", &Scenario::parse("law.ron", text).expect("a scenario")).expect("a law")
+    IdentifiedModel::new("law.ron", &Scenario::parse("law.ron", text).expect("a scenario")).expect("a law")
 }
 
 const BOTH: [Model; 2] = [Model::MultiLayer, Model::KelvinVoigt];
@@ -126,16 +127,30 @@ const ALL: [&str; 6] =
 #[test]
 fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memory() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("short", &log(20_000, true), &EnhanceFile::default(), &[Model::MultiLayer], None, &ALL)?;
-    alike("positions", &log(19_000, false), &EnhanceFile::default(), &[Model::MultiLayer], None, &ALL)?;
+    alike("short", &log(20_000, true), &EnhancerConfigFile::default(), &[Model::MultiLayer], None, &ALL)?;
+    alike(
+        "positions",
+        &log(19_000, false),
+        &EnhancerConfigFile::default(),
+        &[Model::MultiLayer],
+        None,
+        &ALL,
+    )?;
     let law = law();
-    alike("told", &log(18_000, true), &EnhanceFile::default(), &[Model::MultiLayer], Some(&law), &ALL)?;
+    alike(
+        "told",
+        &log(18_000, true),
+        &EnhancerConfigFile::default(),
+        &[Model::MultiLayer],
+        Some(&law),
+        &ALL,
+    )?;
     alike("compared", &log(17_000, true), &of(paper), &BOTH, None, &ALL)
 }
 
 #[test]
 fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("long", &log(60_000, true), &EnhanceFile::default(), &[Model::MultiLayer], None, &TABLES)?;
+    alike("long", &log(60_000, true), &EnhancerConfigFile::default(), &[Model::MultiLayer], None, &TABLES)?;
     alike("long, compared", &log(50_000, false), &of(paper), &BOTH, None, &TABLES)
 }

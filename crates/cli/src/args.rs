@@ -1,6 +1,6 @@
 //! What can be typed.
 
-use crate::limits::Limits;
+use crate::limits::ResourceLimits;
 use crate::sweep::args::{GateArgs, ReplayArgs, SweepArgs};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -76,18 +76,18 @@ pub struct CompareArgs {
     pub hide: Vec<String>,
     /// Algorithms, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "Paper,Stylet", ignore_case = true)]
-    pub algorithms: Vec<Which>,
+    pub algorithms: Vec<AlgorithmArg>,
     /// Noise seeds per scenario and algorithm; with --world drawn cases per row.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub seeds: u64,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
 }
 
 /// An algorithm of the online core, by its name in scenarios.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Which {
+pub enum AlgorithmArg {
     /// The paper's.
     #[value(name = "Paper")]
     Paper,
@@ -153,7 +153,7 @@ The folder then holds index.html (open it beside the paper's supplement), claims
 and every figure as SVG. The same seeds give the same bytes for any number of threads.")]
 pub struct ReproduceArgs {
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// Number of noise seeds; fewer than 50 are a quick look.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(2..=100_000))]
     pub seeds: u64,
@@ -164,7 +164,7 @@ pub struct ReproduceArgs {
 
 /// Where results go and what is said meanwhile: the same for every command that makes a folder.
 #[derive(Clone, Debug, Default, Args)]
-pub struct Results {
+pub struct OutputArgs {
     /// Folder for the results [default: stylet-out/<name of the input>; for `replay` DIR/trial-<TRIAL>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -196,10 +196,10 @@ pub struct RunArgs {
     pub compare: bool,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// How much it may take.
     #[command(flatten)]
-    pub limits: Limits,
+    pub limits: ResourceLimits,
 }
 
 /// Arguments of `stylet enhance`.
@@ -207,7 +207,7 @@ pub struct RunArgs {
 #[command(after_help = "Examples:
   stylet enhance recording.csv
   stylet enhance log.csv --columns map.ron --config tuned.ron --out out/log
-  stylet enhance next_day.csv --law out/diagnosis/extended.ron
+  stylet enhance next_day.csv --model out/diagnosis/extended.ron
 
 A column map for a log in microseconds and millimetres:
   Columns(time: (name: \"time\", scale: 1e-6), position: (name: \"pz\", scale: 1e-3),
@@ -216,7 +216,7 @@ A column map for a log in microseconds and millimetres:
 A configuration: Enhance(cusum: (sigma_rupture_n: 0.1), model: MultiLayer).
 A scenario file serves too: its `enhance` part and its surface are used.
 
-With --law the friction along the shaft is what a law says of it that `stylet diagnose` fitted to
+With --model the friction along the shaft is what a law says of it that `stylet diagnose` fitted to
 other insertions (single ones or a set of repeats). It is replayed sample by sample along the
 recorded positions, with each layer punctured from where the core says so, and corrected on the way
 back by what the force shows. Law and recording must have the same zero of the positions.")]
@@ -228,7 +228,7 @@ pub struct EnhanceArgs {
     pub config: Option<PathBuf>,
     /// Take the friction along the shaft from this law: extended.ron of a diagnosis, or any scenario (RON).
     #[arg(long, value_name = "EXTENDED.RON")]
-    pub law: Option<PathBuf>,
+    pub model: Option<PathBuf>,
     /// Column map for a foreign log (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -240,10 +240,10 @@ pub struct EnhanceArgs {
     pub compare: bool,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// How much it may take.
     #[command(flatten)]
-    pub limits: Limits,
+    pub limits: ResourceLimits,
 }
 
 /// Arguments of `stylet convert`.
@@ -302,10 +302,10 @@ pub struct DiagnoseArgs {
     pub repair: bool,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// How much it may take.
     #[command(flatten)]
-    pub limits: Limits,
+    pub limits: ResourceLimits,
 }
 
 /// Arguments of `stylet predict`.
@@ -326,11 +326,11 @@ pub struct PredictArgs {
     pub data: Vec<PathBuf>,
     /// What was believed before (RON), for comparison [default: what inputs.json beside the model names].
     #[arg(long, value_name = "FILE")]
-    pub believed: Option<PathBuf>,
+    pub assumed: Option<PathBuf>,
     /// Numbers that may be fitted to the new recordings first; with two or more recordings each is predicted by what the
     /// others say.
     #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
-    pub refit: Vec<Again>,
+    pub refit: Vec<RefitArg>,
     /// Column map for foreign logs (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -339,15 +339,15 @@ pub struct PredictArgs {
     pub repair: bool,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// How much it may take.
     #[command(flatten)]
-    pub limits: Limits,
+    pub limits: ResourceLimits,
 }
 
 /// A number that another needle or another day may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Again {
+pub enum RefitArg {
     /// Friction: one factor for all layers.
     Friction,
     /// The position of the surface.
@@ -379,10 +379,10 @@ pub struct IdentifiabilityArgs {
     pub repair: bool,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// How much it may take.
     #[command(flatten)]
-    pub resources: Limits,
+    pub resources: ResourceLimits,
 }
 
 /// Arguments of `stylet plan`.
@@ -423,7 +423,7 @@ pub struct PlanArgs {
     pub quiet: bool,
     /// How much it may take.
     #[command(flatten)]
-    pub resources: Limits,
+    pub resources: ResourceLimits,
 }
 
 /// Arguments of `stylet effects`.
@@ -438,18 +438,18 @@ pub struct EffectsArgs {
 pub struct BenchmarkArgs {
     /// What to examine.
     #[command(subcommand)]
-    pub what: BenchmarkWhat,
+    pub command: BenchmarkCommand,
 }
 
 /// What can be examined.
 #[derive(Debug, Subcommand)]
-pub enum BenchmarkWhat {
+pub enum BenchmarkCommand {
     /// Diagnose cases of worlds that the diagnosis did not make, and write the table and a map of where it fails.
     Diagnose(BenchmarkDiagnoseArgs),
     /// Write such cases for others to diagnose: believed scenarios and recordings without the truth.
     Export(BenchmarkExportArgs),
     /// Judge anybody's answers to exported cases with the same table.
-    Judge(BenchmarkJudgeArgs),
+    Score(BenchmarkScoreArgs),
     /// Insert again, as planned, where one insertion at constant speed leaves the cause open: how often is it found then?
     Plan(BenchmarkPlanArgs),
 }
@@ -466,7 +466,7 @@ pub struct CaseArgs {
     pub wrong: Vec<String>,
     /// How much of it: small, medium, large.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "small,medium,large")]
-    pub grade: Vec<String>,
+    pub severity: Vec<String>,
     /// What is hidden in the cases; those of a row and grade go round the list.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "one,one,clean")]
     pub hide: Vec<String>,
@@ -489,11 +489,11 @@ pub struct CaseArgs {
 /// Arguments of `stylet benchmark diagnose`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  stylet benchmark diagnose --grade large
-  stylet benchmark diagnose --wrong thickness,encoder --grade large --cases 60 --seed 7
+  stylet benchmark diagnose --severity large
+  stylet benchmark diagnose --wrong thickness,encoder --severity large --cases 60 --seed 7
   stylet benchmark diagnose --wrong all --cases 60 --out out/baseline
   stylet benchmark diagnose --hide outside --cases 48
-  stylet benchmark diagnose --wrong all --grade large --effect time_delay --cases 60
+  stylet benchmark diagnose --wrong all --severity large --effect time_delay --cases 60
   stylet benchmark diagnose --world rich --hide one --cases 60
   stylet benchmark diagnose --world own --cases 1000
 
@@ -510,11 +510,11 @@ pub struct BenchmarkDiagnoseArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
     /// Cases run side by side [default: as many as there are cores].
-    #[arg(long, value_name = "N", value_parser = crate::limits::threads)]
+    #[arg(long, value_name = "N", value_parser = crate::limits::parse_threads)]
     pub threads: Option<usize>,
     /// Run nothing: write table and page of the asked-for cases that the folder's cases.jsonl holds already.
     #[arg(long)]
-    pub look: bool,
+    pub from_journal: bool,
     /// Folder for the results [default: stylet-out/benchmark-diagnose-<world>-<seed>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -523,9 +523,9 @@ pub struct BenchmarkDiagnoseArgs {
 /// Arguments of `stylet benchmark export`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  stylet benchmark export --wrong thickness,encoder --grade large --cases 30 --seed 20261 --out out/challenge
+  stylet benchmark export --wrong thickness,encoder --severity large --cases 30 --seed 20261 --out out/challenge
 
-The folder then holds README.md (the task), names.txt (admissible names) and cases/NNNN with believed.ron and the
+The folder then holds README.md (the task), names.txt (admissible names) and cases/NNNN with assumed.ron and the
 recordings as CSV. The key that says what was hidden goes beside the folder, to DIR.key.json: keep it, and choose a
 seed that nobody would guess.")]
 pub struct BenchmarkExportArgs {
@@ -540,7 +540,7 @@ pub struct BenchmarkExportArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   stylet benchmark plan --cases 60 --seed 7
-  stylet benchmark plan --wrong thickness --grade medium --cases 30 --seed 7
+  stylet benchmark plan --wrong thickness --severity medium --cases 30 --seed 7
 
 A case hides one strong effect (never force_gain, which no motion shows). Its first insertion has one constant speed and no way
 back; cases in which the diagnosis then has the effect in a class or lists it as invisible are left open. These get a second
@@ -555,7 +555,7 @@ pub struct BenchmarkPlanArgs {
     pub wrong: Vec<String>,
     /// How much of it: small, medium, large.
     #[arg(long, value_name = "WORD", default_value = "medium")]
-    pub grade: String,
+    pub severity: String,
     /// Open cases per row.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub cases: u64,
@@ -563,24 +563,24 @@ pub struct BenchmarkPlanArgs {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
     /// Cases run side by side [default: as many as there are cores].
-    #[arg(long, value_name = "N", value_parser = crate::limits::threads)]
+    #[arg(long, value_name = "N", value_parser = crate::limits::parse_threads)]
     pub threads: Option<usize>,
     /// Run nothing: write the table of the cases that the folder's cases.jsonl holds already.
     #[arg(long)]
-    pub look: bool,
+    pub from_journal: bool,
     /// Folder for the results [default: stylet-out/benchmark-plan-<world>-<seed>].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `stylet benchmark judge`.
+/// Arguments of `stylet benchmark score`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  stylet benchmark judge out/challenge answers.json
+  stylet benchmark score out/challenge answers.json
 
 answers.json: {\"0001\": {\"verdict\": \"named\", \"causes\": [{\"effect\": \"coulomb_friction\"}]}, \"0002\": {\"verdict\": \"none\"}};
 each answer as in diagnosis.json, of which all but `verdict` and `effect` may be left out.")]
-pub struct BenchmarkJudgeArgs {
+pub struct BenchmarkScoreArgs {
     /// Folder of the challenge, with its key beside it.
     pub folder: PathBuf,
     /// The answers (JSON).

@@ -1,21 +1,21 @@
 //! `stylet compare`: the same insertions, heard by several algorithms.
 
-use crate::args::{CompareArgs, Which};
+use crate::args::{AlgorithmArg, CompareArgs};
 use crate::exit::Failure;
 use crate::progress::Progress;
 use std::path::Path;
-use stylet_api::compare::{kinds, output, replayed};
+use stylet_api::compare_algorithms::{case_groups, compare_on_scenario, output_files};
 use stylet_core::config::Algorithm;
-use stylet_pages::words::shown;
+use stylet_pages::formatting::significant_or_dash;
 use stylet_scenario::Scenario;
-use stylet_sweep::compare::Row;
+use stylet_sweep::algorithm_comparison::ComparisonRow;
 
-impl From<Which> for Algorithm {
-    fn from(which: Which) -> Self {
+impl From<AlgorithmArg> for Algorithm {
+    fn from(which: AlgorithmArg) -> Self {
         match which {
-            Which::Paper => Self::Paper,
-            Which::Literal => Self::Literal,
-            Which::Stylet => Self::Stylet,
+            AlgorithmArg::Paper => Self::Paper,
+            AlgorithmArg::Literal => Self::Literal,
+            AlgorithmArg::Stylet => Self::Stylet,
         }
     }
 }
@@ -28,7 +28,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let algorithms: Vec<Algorithm> = args.algorithms.iter().map(|which| (*which).into()).collect();
     let scenarios = args.scenarios.iter().map(|path| Scenario::load(path)).collect::<Result<Vec<_>, _>>()?;
     let worlds = match &args.world {
-        Some(world) => kinds(world, &args.hide, args.seeds, args.seed)?,
+        Some(world) => case_groups(world, &args.hide, args.seeds, args.seed)?,
         None => Vec::new(),
     };
     let progress = Progress::new(
@@ -40,15 +40,21 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let mut rows = Vec::new();
     for (scenario, path) in scenarios.iter().zip(&args.scenarios) {
         for algorithm in &algorithms {
-            rows.push(replayed(scenario, &path.display().to_string(), *algorithm, args.seeds, &done)?);
+            rows.push(compare_on_scenario(
+                scenario,
+                &path.display().to_string(),
+                *algorithm,
+                args.seeds,
+                &done,
+            )?);
         }
     }
     for world in &worlds {
-        rows.extend(world.listen(&algorithms, &done)?);
+        rows.extend(world.run_algorithms(&algorithms, &done)?);
     }
     progress.finish();
-    let folder = args.results.folder(Path::new("compare"), "");
-    args.results.conclude(&folder, &output(&rows, args.seeds)?, || {
+    let folder = args.results.output_folder(Path::new("compare"), "");
+    args.results.write_and_print(&folder, &output_files(&rows, args.seeds)?, || {
         let head = format!(
             "{:44} {:8} {:>13} {:>13} {:>18} {:>9}  covered K b D band %",
             "", "", "missed/false", "delay ms", "K error %", "enh. off"
@@ -57,18 +63,24 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     })
 }
 
-fn line(r: &Row) -> String {
-    let list = |v: &[Option<f64>]| v.iter().map(|x| shown(*x, 100.0, 2)).collect::<Vec<_>>().join("/");
+fn line(r: &ComparisonRow) -> String {
+    let list =
+        |v: &[Option<f64>]| v.iter().map(|x| significant_or_dash(*x, 100.0, 2)).collect::<Vec<_>>().join("/");
     let c = &r.coverage;
-    let covered = [c.stiffness, c.friction, c.cumulative_friction, c.tip_force].map(|x| shown(x, 100.0, 3));
+    let covered = [c.stiffness, c.friction, c.cumulative_friction, c.tip_force]
+        .map(|x| significant_or_dash(x, 100.0, 3));
     format!(
         "{:44} {:8} {:>13} {:>13} {:>18} {:>9}  {}",
         r.scenario,
         r.algorithm,
         format!("{}/{} of {}", r.missed, r.false_alarms, r.ruptures),
-        format!("{}/{}", shown(r.delay_s.median, 1e3, 2), shown(r.delay_s.p95, 1e3, 2)),
+        format!(
+            "{}/{}",
+            significant_or_dash(r.delay_s.median, 1e3, 2),
+            significant_or_dash(r.delay_s.p95, 1e3, 2)
+        ),
         list(&r.stiffness_error),
-        shown(r.enhancement_rms_relative, 1.0, 2),
+        significant_or_dash(r.enhancement_rms_relative, 1.0, 2),
         covered.join(" ")
     )
 }

@@ -2,9 +2,9 @@
 
 use crate::args::ConvertArgs;
 use crate::exit::Failure;
-use crate::terminal::{say, tell};
+use crate::terminal::{print, print_error};
 use std::path::Path;
-use stylet_api::folder::write_file;
+use stylet_api::output_folder::write_file_atomically;
 use stylet_api::read_options;
 use stylet_record::{Recording, read_csv, write_csv};
 
@@ -16,12 +16,12 @@ pub fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let write = writer(&args.to)?;
     let options = read_options(args.columns.as_deref(), args.repair)?;
     let (recording, notes) = read_csv(&args.from, &options)?;
-    write_file(&args.to, &write(&recording, &args.to)?)?;
+    write_file_atomically(&args.to, &write(&recording, &args.to)?)?;
     if !args.quiet {
         for note in notes {
-            tell(&format!("{}: {}\n", args.from.display(), note.message));
+            print_error(&format!("{}: {}\n", args.from.display(), note.message));
         }
-        say(&format!("{}: {} samples\n", args.to.display(), recording.len()))?;
+        print(&format!("{}: {} samples\n", args.to.display(), recording.len()))?;
     }
     Ok(())
 }
@@ -38,9 +38,9 @@ fn writer(to: &Path) -> Result<Write, Failure> {
             Ok(bytes)
         }),
         #[cfg(feature = "formats")]
-        "parquet" => Ok(|recording, path| Ok(stylet_record::foreign::to_parquet(recording, path)?)),
+        "parquet" => Ok(|recording, path| Ok(stylet_record::file_formats::to_parquet(recording, path)?)),
         #[cfg(feature = "formats")]
-        "mcap" => Ok(|recording, path| Ok(stylet_record::foreign::to_mcap(recording, path)?)),
+        "mcap" => Ok(|recording, path| Ok(stylet_record::file_formats::to_mcap(recording, path)?)),
         #[cfg(not(feature = "formats"))]
         "parquet" | "mcap" => Err(Failure::Check(format!(
             "{}: this build writes CSV alone: install with `cargo install --path . --features formats`",

@@ -2,19 +2,19 @@
 
 use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
-use crate::terminal::teller;
+use crate::terminal::stage_printer;
 use std::fmt::Write as _;
-use stylet_api::folder::settle_beside;
-use stylet_api::{Inputs, need};
+use stylet_api::output_folder::recover_parent;
+use stylet_api::{DiagnosisInputs, resource_estimate};
 use stylet_diagnose::Diagnosis;
-use stylet_pages::diagnosis::{differ, sentence};
+use stylet_pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
 impl DiagnoseArgs {
     /// What the diagnosis is made of.
-    pub fn inputs(&self) -> Inputs {
-        Inputs {
+    pub fn inputs(&self) -> DiagnosisInputs {
+        DiagnosisInputs {
             scenario: self.scenario.clone(),
             data: self.data.clone(),
             columns: self.columns.clone(),
@@ -29,8 +29,8 @@ impl DiagnoseArgs {
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     // It may be what an earlier diagnosis extended.
-    settle_beside(&args.scenario)?;
-    if args.repeats || stylet_diagnose::set::dataset::is_dataset(&args.scenario)? {
+    recover_parent(&args.scenario)?;
+    if args.repeats || stylet_diagnose::repeated_insertions::dataset::is_dataset(&args.scenario)? {
         return crate::repeats::diagnose(args);
     }
     if args.data.is_empty() {
@@ -40,17 +40,21 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         ));
     }
     let scenario = Scenario::load(&args.scenario)?;
-    args.limits.allow(&args.scenario, &need::of_diagnose(&args.data), args.results.quiet)?;
+    args.limits.check(
+        &args.scenario,
+        &resource_estimate::estimate_diagnose(&args.data),
+        args.results.quiet,
+    )?;
     let inputs = args.inputs();
-    let tell = teller(args.results.quiet, " ...");
-    let found = stylet_api::diagnose(&scenario, &inputs.evidence()?, tell)?;
-    let folder = args.results.folder(&args.scenario, "-diagnosis");
-    args.results.conclude(&folder, &found.output(&scenario, &inputs)?, || summary(&found.diagnosis))
+    let tell = stage_printer(args.results.quiet, " ...");
+    let found = stylet_api::diagnose(&scenario, &inputs.read_recordings()?, tell)?;
+    let folder = args.results.output_folder(&args.scenario, "-diagnosis");
+    args.results.write_and_print(&folder, &found.output(&scenario, &inputs)?, || summary(&found.diagnosis))
 }
 
 fn summary(d: &Diagnosis) -> String {
     let mut out = String::new();
-    let _ = writeln!(out, "{}", sentence(d));
+    let _ = writeln!(out, "{}", summary_sentence(d));
     for c in &d.causes {
         let _ = writeln!(out, "\n  {}, confidence {}", c.effect, significant(c.confidence, 3));
         for (path, e) in &c.parameters {
@@ -79,25 +83,25 @@ fn summary(d: &Diagnosis) -> String {
         significant(g.rmse_after_n, 3),
         significant(g.floor_n, 3)
     );
-    if let Some(differ) = differ(d) {
+    if let Some(differ) = recording_differences(d) {
         let _ = writeln!(out, "  {differ}");
     }
-    if d.leftover.p_value < 1e-3 {
+    if d.residual_structure.p_value < 1e-3 {
         let _ = writeln!(
             out,
             "  what remains still depends on {} ({})",
-            d.leftover.depends_on.join(", "),
-            stylet_report::chance(d.leftover.p_value)
+            d.residual_structure.depends_on.join(", "),
+            stylet_report::p_value(d.residual_structure.p_value)
         );
     }
-    let imitated = d.traces.iter().filter(|t| t.why == stylet_diagnose::IMITATED);
+    let imitated = d.negligible.iter().filter(|t| t.reason == stylet_diagnose::REASON_IMITATES_UNMODELLED);
     let imitated: Vec<&str> = imitated.map(|t| t.effect.as_str()).collect();
     if !imitated.is_empty() {
         let _ =
             writeln!(out, "  the library's nearest, which may only look like it: {}", imitated.join(", "));
     }
-    if !d.invisible.is_empty() {
-        let _ = writeln!(out, "  these recordings cannot show: {}", d.invisible.join(", "));
+    if !d.not_identifiable.is_empty() {
+        let _ = writeln!(out, "  these recordings cannot show: {}", d.not_identifiable.join(", "));
     }
     for q in &d.data_quality {
         let _ = writeln!(out, "  note: {}: {}", q.recording, q.note.message);

@@ -2,11 +2,11 @@
 
 use crate::args::EffectsArgs;
 use crate::exit::Failure;
-use crate::terminal::say;
+use crate::terminal::print;
 use std::fmt::Write as _;
-use stylet_api::effects::{Reference, reference};
+use stylet_api::reference_insertion::{ReferenceInsertion, reference_insertion};
 use stylet_report::significant;
-use stylet_tissue::{EffectInfo, info, library, per_layer};
+use stylet_tissue::{EffectInfo, effect_info, general_effects, per_layer_effects};
 
 /// The command.
 ///
@@ -16,19 +16,19 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
     match &args.name {
         None => {
             let mut text = String::new();
-            for entry in library().chain(per_layer()) {
+            for entry in general_effects().chain(per_layer_effects()) {
                 let _ =
                     writeln!(text, "{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
             }
             text +=
                 "stylet effects NAME shows one: its parameters, its source, what it does to an insertion.\n";
-            say(&text)
+            print(&text)
         }
-        Some(name) => match info(name) {
-            Some(entry) => say(&one(entry)),
+        Some(name) => match effect_info(name) {
+            Some(entry) => print(&one(entry)),
             None => {
-                let known: Vec<&str> = library().chain(per_layer()).map(|e| e.id).collect();
-                let hint = stylet_scenario::closest(name, &known)
+                let known: Vec<&str> = general_effects().chain(per_layer_effects()).map(|e| e.id).collect();
+                let hint = stylet_scenario::closest_name(name, &known)
                     .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
                 Err(Failure::Check(format!("there is no effect `{name}`{hint} `stylet effects` lists them")))
             }
@@ -53,7 +53,7 @@ fn one(entry: &EffectInfo) -> String {
             p.meaning,
             significant(p.low, 3),
             significant(p.high, 3),
-            significant(p.neutral, 3),
+            significant(p.inactive, 3),
             significant(p.start, 3)
         );
     }
@@ -65,7 +65,8 @@ fn one(entry: &EffectInfo) -> String {
 fn picture(entry: &EffectInfo) -> String {
     const WIDE: usize = 90;
     const HIGH: usize = 18;
-    let Reference { typical, base_n: base, changed_n: changed } = reference(entry);
+    let ReferenceInsertion { parameters: typical, base_n: base, with_effect_n: changed } =
+        reference_insertion(entry);
     let all = || base.iter().chain(&changed).copied();
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     let mut rows = vec![vec![' '; WIDE]; HIGH];

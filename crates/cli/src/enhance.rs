@@ -3,12 +3,12 @@
 use crate::args::EnhanceArgs;
 use crate::exit::Failure;
 use std::fmt::Write as _;
-use stylet_api::heard::{Heard, Source, hear, hear_long};
-use stylet_api::{Claim, FittedLaw, need, read_options};
+use stylet_api::enhancement::{EnhancementResult, ResultSource, enhance_long_recording, enhance_recording};
+use stylet_api::{IdentifiedModel, OutputLock, read_options, resource_estimate};
 use stylet_core::config::Model;
 use stylet_record::{read_csv, read_long_csv};
 use stylet_report::{plus_minus, significant};
-use stylet_scenario::EnhanceFile;
+use stylet_scenario::EnhancerConfigFile;
 
 /// Ruptures and layers of a long recording that are said.
 const LISTED: usize = 100;
@@ -18,39 +18,39 @@ const LISTED: usize = 100;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
-    let config = args.config.as_deref().map(EnhanceFile::load).transpose()?.unwrap_or_default();
-    let law = args.law.as_deref().map(FittedLaw::load).transpose()?;
+    let config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    let law = args.model.as_deref().map(IdentifiedModel::load).transpose()?;
     if let Some(law) = &law {
-        law.fits(&config.enhance)?;
+        law.check_algorithm(&config.enhance)?;
     }
     let options = read_options(args.columns.as_deref(), args.repair)?;
     let models = match args.compare {
         true => vec![Model::MultiLayer, Model::KelvinVoigt],
         false => vec![config.enhance.model],
     };
-    let source = Source { data: &args.data, config: args.config.as_deref(), command: command(args) };
-    let folder = args.results.folder(&args.data, "");
-    if let Some(need) = need::of_long_enhance(&args.data, models.len()) {
-        args.limits.allow(&args.data, &need, args.results.quiet)?;
-        let claim = Claim::new(&folder)?;
+    let source = ResultSource { data: &args.data, config: args.config.as_deref(), command: command(args) };
+    let folder = args.results.output_folder(&args.data, "");
+    if let Some(need) = resource_estimate::estimate_long_enhance(&args.data, models.len()) {
+        args.limits.check(&args.data, &need, args.results.quiet)?;
+        let claim = OutputLock::new(&folder)?;
         if let Some((recording, notes)) = read_long_csv(&args.data, &options, &folder)? {
-            let heard = hear_long(&recording, notes, config, &models, law.as_ref(), &claim)?;
+            let heard = enhance_long_recording(&recording, notes, config, &models, law.as_ref(), &claim)?;
             let said = summary(args, &heard);
-            return args.results.conclude_in(&claim, &heard.output(&source)?, || said);
+            return args.results.write_locked_and_print(&claim, &heard.output_files(&source)?, || said);
         }
     }
-    if let Some(need) = need::of_enhance(&args.data, models.len()) {
-        args.limits.allow(&args.data, &need, args.results.quiet)?;
+    if let Some(need) = resource_estimate::estimate_enhance(&args.data, models.len()) {
+        args.limits.check(&args.data, &need, args.results.quiet)?;
     }
     let (recording, notes) = read_csv(&args.data, &options)?;
-    let heard = hear(recording, notes, config, &models, law.as_ref())?;
+    let heard = enhance_recording(recording, notes, config, &models, law.as_ref())?;
     let said = summary(args, &heard);
-    args.results.conclude(&folder, &heard.output(&source)?, || said)
+    args.results.write_and_print(&folder, &heard.output_files(&source)?, || said)
 }
 
 fn command(args: &EnhanceArgs) -> String {
     let mut command = format!("stylet enhance {}", args.data.display());
-    for (flag, path) in [("--columns", &args.columns), ("--config", &args.config), ("--law", &args.law)] {
+    for (flag, path) in [("--columns", &args.columns), ("--config", &args.config), ("--model", &args.model)] {
         if let Some(path) = path {
             let _ = write!(command, " {flag} {}", path.display());
         }
@@ -63,8 +63,8 @@ fn command(args: &EnhanceArgs) -> String {
     command
 }
 
-fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
-    let Heard { extent, notes, ran, hash, law, .. } = heard;
+fn summary(args: &EnhanceArgs, heard: &EnhancementResult) -> String {
+    let EnhancementResult { extent, notes, algorithm_runs: ran, hash, model: law, .. } = heard;
     let listed = if heard.is_long() { LISTED } else { usize::MAX };
     let mut out = String::new();
     let _ = writeln!(
@@ -82,7 +82,7 @@ fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
         let _ = writeln!(out, "  note: {note}");
     }
     if let Some(law) = law {
-        let _ = writeln!(out, "  law: {}", law.sentence());
+        let _ = writeln!(out, "  law: {}", law.summary());
         for note in &law.notes {
             let _ = writeln!(out, "  note: {note}");
         }
@@ -96,7 +96,7 @@ fn summary(args: &EnhanceArgs, heard: &Heard) -> String {
             }
             _ => {
                 // A finding about the recording says it better.
-                let grave = notes.iter().any(|n| n.grave);
+                let grave = notes.iter().any(|n| n.blocking);
                 let why =
                     if grave { "see the note" } else { "the force never stands out of its noise in air" };
                 let _ = writeln!(out, "  no contact found: {why}");

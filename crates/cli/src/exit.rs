@@ -24,7 +24,7 @@ pub enum Failure {
         "standard output cannot be written: {0}; files in the output folder are complete, only what would be printed is lost: make room \
          where it goes, or use --quiet"
     )]
-    Say(std::io::Error),
+    Stdout(std::io::Error),
     /// What was asked for cannot be done with what was given; the sentence says why and what would.
     #[error("{0}")]
     Check(String),
@@ -53,7 +53,7 @@ from!(
     stylet_api::Error,
     stylet_scenario::InputError,
     stylet_record::RecordError,
-    stylet_diagnose::set::dataset::DatasetError,
+    stylet_diagnose::repeated_insertions::dataset::DatasetError,
     stylet_sweep::TrialError
 );
 
@@ -68,7 +68,7 @@ impl Failure {
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
             Failure::Work(why) if matches!(**why, stylet_api::Error::Internal(_)) => INTERNAL,
-            Failure::Work(_) | Failure::Say(_) | Failure::Check(_) => INPUT_WRONG,
+            Failure::Work(_) | Failure::Stdout(_) | Failure::Check(_) => INPUT_WRONG,
             Failure::Gate { .. } => CHECK_FAILED,
         })
     }

@@ -53,7 +53,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::from(exit::DONE),
         Err(failure) => {
             let code = failure.code();
-            terminal::tell(&rendered(failure));
+            terminal::print_error(&rendered(failure));
             code
         }
     }

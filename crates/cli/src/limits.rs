@@ -1,15 +1,15 @@
 //! What a command will need, told before it begins: refused above a limit, said when it is much.
 
 use crate::exit::Failure;
-use crate::terminal::tell;
+use crate::terminal::print_error;
 use clap::Args;
 use std::fmt::Write as _;
 use std::path::Path;
-use stylet_api::need::Need;
+use stylet_api::resource_estimate::ResourceEstimate;
 use stylet_report::significant;
 
 /// Most threads that can be asked for.
-pub const MOST_THREADS: u64 = 1024;
+pub const MAX_THREADS: u64 = 1024;
 
 /// What is said without being asked: so many bytes, so many seconds.
 const MUCH_BYTES: f64 = 5e8;
@@ -17,7 +17,7 @@ const LONG_S: f64 = 60.0;
 
 /// How much a command may take.
 #[derive(Clone, Copy, Debug, Args)]
-pub struct Limits {
+pub struct ResourceLimits {
     /// Refuse work that needs more memory, as estimated beforehand: 500MB, 2GB.
     #[arg(long, value_name = "SIZE", default_value = "2GB", value_parser = size)]
     pub limit_memory: f64,
@@ -26,20 +26,20 @@ pub struct Limits {
     pub limit_time: Option<f64>,
 }
 
-impl Default for Limits {
+impl Default for ResourceLimits {
     fn default() -> Self {
         Self { limit_memory: 2e9, limit_time: None }
     }
 }
 
-impl Limits {
+impl ResourceLimits {
     /// Refuses what is over a limit; says on standard error what will take long.
     ///
     /// # Errors
     /// [`Failure::Check`] with the estimate, the limit and what would help.
-    pub fn allow(&self, at: &Path, need: &Need, quiet: bool) -> Result<(), Failure> {
+    pub fn check(&self, at: &Path, need: &ResourceEstimate, quiet: bool) -> Result<(), Failure> {
         let at = at.display();
-        let Need { what, bytes, seconds, remedy } = need;
+        let ResourceEstimate { description: what, memory_bytes: bytes, duration_s: seconds, remedy } = need;
         if *bytes > self.limit_memory {
             return Err(Failure::Check(format!(
                 "{at}: {what} need about {} of memory, and the limit is {}: {remedy}, or raise --limit-memory",
@@ -57,7 +57,7 @@ impl Limits {
         if !quiet && (*bytes > MUCH_BYTES || *seconds > LONG_S) {
             let mut text = String::new();
             let _ = writeln!(text, "{at}: {what}: about {} of memory and {}", memory(*bytes), time(*seconds));
-            tell(&text);
+            print_error(&text);
         }
         Ok(())
     }
@@ -97,11 +97,11 @@ fn duration(text: &str) -> Result<f64, String> {
 }
 
 /// A number of threads; 0 is one per core.
-pub fn threads(text: &str) -> Result<usize, String> {
+pub fn parse_threads(text: &str) -> Result<usize, String> {
     match text.parse::<u64>() {
-        Ok(n) if n <= MOST_THREADS => Ok(n as usize),
+        Ok(n) if n <= MAX_THREADS => Ok(n as usize),
         _ => Err(format!(
-            "must be a number of threads up to {MOST_THREADS}; 0 is one per core, and more than cores gain nothing"
+            "must be a number of threads up to {MAX_THREADS}; 0 is one per core, and more than cores gain nothing"
         )),
     }
 }
@@ -119,29 +119,30 @@ mod tests {
         }
         assert!(duration("10").is_err() && duration("0s").is_err());
         assert!(
-            threads("0").is_ok()
-                && threads("1024").is_ok()
-                && threads("100000").is_err()
-                && threads("-1").is_err()
+            parse_threads("0").is_ok()
+                && parse_threads("1024").is_ok()
+                && parse_threads("100000").is_err()
+                && parse_threads("-1").is_err()
         );
     }
 
     #[test]
     fn what_is_over_a_limit_is_refused_with_the_estimate_and_what_would_help() {
-        let need = Need {
-            what: "1e9 trials".to_owned(),
-            bytes: 8e11,
-            seconds: 7300.0,
+        let need = ResourceEstimate {
+            description: "1e9 trials".to_owned(),
+            memory_bytes: 8e11,
+            duration_s: 7300.0,
             remedy: "run fewer (--trials)",
         };
-        let said = Limits::default().allow(Path::new("a.ron"), &need, true).expect_err("800 GB").to_string();
+        let said =
+            ResourceLimits::default().check(Path::new("a.ron"), &need, true).expect_err("800 GB").to_string();
         for word in ["a.ron: 1e9 trials", "800 GB", "2 GB", "--trials", "--limit-memory"] {
             assert!(said.contains(word), "{said}");
         }
-        let all = Limits { limit_memory: 1e12, limit_time: None };
-        assert!(all.allow(Path::new("a.ron"), &need, true).is_ok());
-        let hour = Limits { limit_time: Some(3600.0), ..all };
-        let said = hour.allow(Path::new("a.ron"), &need, true).expect_err("two hours").to_string();
+        let all = ResourceLimits { limit_memory: 1e12, limit_time: None };
+        assert!(all.check(Path::new("a.ron"), &need, true).is_ok());
+        let hour = ResourceLimits { limit_time: Some(3600.0), ..all };
+        let said = hour.check(Path::new("a.ron"), &need, true).expect_err("two hours").to_string();
         assert!(said.contains("2 h") && said.contains("60 min") && said.contains("--limit-time"), "{said}");
     }
 }

@@ -7,8 +7,8 @@ use std::net::{TcpListener, UdpSocket};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use stylet_live::{Hub, Session};
-use stylet_scenario::EnhanceFile;
+use stylet_live::{Broadcast, Session};
+use stylet_scenario::EnhancerConfigFile;
 
 /// The largest datagram there is.
 const DATAGRAM: usize = 65_536;
@@ -20,8 +20,8 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
-    let config = args.config.as_deref().map(EnhanceFile::load).transpose()?.unwrap_or_default();
-    let hub = Arc::new(Hub::default());
+    let config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    let hub = Arc::new(Broadcast::default());
     let mut session = Session::new(&config, hub.clone());
     let bind = |what: &str, why: std::io::Error| Failure::Check(format!("{what}: {why}"));
     let socket = args.udp.map(|port| {
@@ -40,9 +40,9 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         let page = TcpListener::bind((args.host.as_str(), port));
         let page = page.map_err(|e| bind(&format!("--page {port}: cannot be served"), e))?;
         let address = page.local_addr().map_err(|e| bind("--page", e))?;
-        crate::terminal::tell(&format!("live page: http://{address}/\n"));
+        crate::terminal::print_error(&format!("live page: http://{address}/\n"));
         let hub = hub.clone();
-        std::thread::spawn(move || stylet_live::serve(page, hub));
+        std::thread::spawn(move || stylet_live::serve_page(page, hub));
     }
     match socket {
         Some(socket) => from_udp(&socket, &mut session, args.duration_s)?,
@@ -54,14 +54,14 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         let _ = reader.join();
     }
     let json = serde_json::to_string(&session.counts()).map_err(Failure::internal)?;
-    crate::terminal::tell(&format!("{json}\n"));
+    crate::terminal::print_error(&format!("{json}\n"));
     Ok(())
 }
 
-fn complain(bad: &stylet_live::BadLine, told: &mut bool) {
+fn complain(bad: &stylet_live::InvalidLine, told: &mut bool) {
     // Once: a stream of nonsense would bury everything else. The count is in the summary.
     if !std::mem::replace(told, true) {
-        crate::terminal::tell(&format!("{bad} (further ones are counted)\n"));
+        crate::terminal::print_error(&format!("{bad} (further ones are counted)\n"));
     }
 }
 
@@ -79,7 +79,7 @@ fn from_udp(socket: &UdpSocket, session: &mut Session, duration_s: Option<f64>) 
                 if text.trim() == "end" {
                     break;
                 }
-                if let Err(bad) = session.hear(&text, arrived) {
+                if let Err(bad) = session.process_text(&text, arrived) {
                     complain(&bad, &mut told);
                 }
             }
@@ -94,7 +94,7 @@ fn from_lines(session: &mut Session) -> Result<(), Failure> {
     let mut told = false;
     for line in std::io::stdin().lock().lines() {
         let line = line.map_err(|e| Failure::Check(format!("standard input: {e}")))?;
-        if let Err(bad) = session.hear(if line.is_empty() { " " } else { &line }, Instant::now()) {
+        if let Err(bad) = session.process_text(if line.is_empty() { " " } else { &line }, Instant::now()) {
             complain(&bad, &mut told);
         }
     }
@@ -102,8 +102,8 @@ fn from_lines(session: &mut Session) -> Result<(), Failure> {
 }
 
 /// A thread that prints every line, as fast as the terminal takes them.
-fn printed(hub: &Hub) -> JoinHandle<()> {
-    let reader = hub.reader();
+fn printed(hub: &Broadcast) -> JoinHandle<()> {
+    let reader = hub.subscribe();
     std::thread::spawn(move || {
         let mut out = std::io::stdout().lock();
         while let Some(lines) = reader.take(PATIENCE) {
@@ -112,15 +112,15 @@ fn printed(hub: &Hub) -> JoinHandle<()> {
                 break;
             }
         }
-        reader.leave();
+        reader.unsubscribe();
     })
 }
 
 /// A thread that sends every line as a datagram.
-fn forwarded(hub: &Hub, to: &str) -> std::io::Result<JoinHandle<()>> {
+fn forwarded(hub: &Broadcast, to: &str) -> std::io::Result<JoinHandle<()>> {
     let socket = UdpSocket::bind(("0.0.0.0", 0))?;
     socket.connect(to)?;
-    let reader = hub.reader();
+    let reader = hub.subscribe();
     Ok(std::thread::spawn(move || {
         while let Some(lines) = reader.take(PATIENCE) {
             for line in lines {
@@ -128,6 +128,6 @@ fn forwarded(hub: &Hub, to: &str) -> std::io::Result<JoinHandle<()>> {
                 let _ = socket.send(line.as_bytes());
             }
         }
-        reader.leave();
+        reader.unsubscribe();
     }))
 }

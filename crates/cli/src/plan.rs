@@ -3,10 +3,10 @@
 use crate::args::{IdentifiabilityArgs, PlanArgs};
 use crate::exit::Failure;
 use crate::results::default_folder;
-use crate::terminal::teller;
+use crate::terminal::stage_printer;
 use std::fmt::Write as _;
-use stylet_api::{Inputs, need};
-use stylet_pages::words;
+use stylet_api::{DiagnosisInputs, resource_estimate};
+use stylet_pages::formatting;
 use stylet_plan::Plan;
 use stylet_plan::identifiability::Identifiability;
 use stylet_report::significant;
@@ -17,26 +17,30 @@ use stylet_scenario::Motion;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
-    let limits = stylet_api::plan::limits(&args.limits)?;
+    let limits = stylet_api::plan_insertion::load_limits(&args.limits)?;
     let inputs = if args.from.is_dir() {
-        Inputs::of_folder(&args.from)?
+        DiagnosisInputs::from_folder(&args.from)?
     } else {
-        Inputs {
+        DiagnosisInputs {
             scenario: args.from.clone(),
             data: args.data.clone(),
             columns: args.columns.clone(),
             repair: args.repair,
         }
     };
-    args.resources.allow(&inputs.scenario, &need::of_diagnose(&inputs.data), args.quiet)?;
-    let tell = teller(args.quiet, " ...");
-    let made = stylet_api::plan::plan(&inputs, (&args.limits, &limits), !args.quick, &tell)?;
+    args.resources.check(
+        &inputs.scenario,
+        &resource_estimate::estimate_diagnose(&inputs.data),
+        args.quiet,
+    )?;
+    let tell = stage_printer(args.quiet, " ...");
+    let made = stylet_api::plan_insertion::plan(&inputs, (&args.limits, &limits), !args.quick, &tell)?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&args.from, "-plan").join("plan.ron"));
     made.write(&out)?;
     if args.quiet {
         return Ok(());
     }
-    crate::terminal::say(&format!(
+    crate::terminal::print(&format!(
         "{}\nMotion: {}\nReport: {}\n",
         summary(&made.plan),
         out.display(),
@@ -46,7 +50,7 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
 
 fn summary(plan: &Plan) -> String {
     let mut out = String::new();
-    let told: Vec<_> = plan.pairs.iter().filter(|p| p.told).collect();
+    let told: Vec<_> = plan.pairs.iter().filter(|p| p.distinguishable).collect();
     let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     let Motion::Program { start_m, segments } = &plan.motion else { return out };
     let _ = writeln!(
@@ -63,13 +67,13 @@ fn summary(plan: &Plan) -> String {
             out,
             "  nothing is left to tell apart that a motion within these limits could; intervals become sharper:"
         );
-        for i in plan.intervals.iter().filter(|i| i.after < 0.98 * i.before) {
+        for i in plan.intervals.iter().filter(|i| i.half_width_after < 0.98 * i.half_width_before) {
             let _ = writeln!(
                 out,
                 "    {:<32} +-{} -> +-{}",
                 i.name,
-                significant(i.before, 2),
-                significant(i.after, 2)
+                significant(i.half_width_before, 2),
+                significant(i.half_width_after, 2)
             );
         }
     } else {
@@ -78,7 +82,7 @@ fn summary(plan: &Plan) -> String {
             "  the next diagnosis names the right single cause with probability {} (now {}), by {}",
             percent(plan.probability_decided),
             percent(plan.probability_now),
-            if plan.probability_from == "simulated" {
+            if plan.probability_source == "simulated" {
                 "simulated insertions and expected gaps"
             } else {
                 "expected gaps"
@@ -88,7 +92,7 @@ fn summary(plan: &Plan) -> String {
             let _ = writeln!(
                 out,
                 "    simulated with {:<26} right and alone in {} of {}",
-                t.candidate, t.decided, t.of
+                t.candidate, t.correct, t.trials
             );
         }
         let mut worst = told.clone();
@@ -106,8 +110,8 @@ fn summary(plan: &Plan) -> String {
         }
         let _ = writeln!(out, "  {A_NAT}");
     }
-    if !plan.never.is_empty() {
-        let _ = writeln!(out, "  no motion within these limits shows: {}", plan.never.join(", "));
+    if !plan.never_detectable.is_empty() {
+        let _ = writeln!(out, "  no motion within these limits shows: {}", plan.never_detectable.join(", "));
     }
     if let Some(r) = &plan.repeats {
         let _ = writeln!(
@@ -117,7 +121,7 @@ fn summary(plan: &Plan) -> String {
             r.insertions,
             significant(1e3 * r.speeds_mps[0], 2),
             significant(1e3 * r.speeds_mps[1], 2),
-            100.0 * r.mean_within
+            100.0 * r.mean_half_width
         );
     }
     out
@@ -128,17 +132,21 @@ fn summary(plan: &Plan) -> String {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
-    let inputs = Inputs {
+    let inputs = DiagnosisInputs {
         scenario: args.scenario.clone(),
         data: args.data.clone(),
         columns: args.columns.clone(),
         repair: args.repair,
     };
-    args.resources.allow(&inputs.scenario, &need::of_diagnose(&inputs.data), args.results.quiet)?;
-    let tell = teller(args.results.quiet, " ...");
-    let found = stylet_api::plan::identifiability(&inputs, args.motion.as_deref(), &tell)?;
-    let folder = args.results.folder(&args.scenario, "-identifiability");
-    args.results.conclude(&folder, &found.output()?, || words(&found.shown))
+    args.resources.check(
+        &inputs.scenario,
+        &resource_estimate::estimate_diagnose(&inputs.data),
+        args.results.quiet,
+    )?;
+    let tell = stage_printer(args.results.quiet, " ...");
+    let found = stylet_api::plan_insertion::identifiability(&inputs, args.motion.as_deref(), &tell)?;
+    let folder = args.results.output_folder(&args.scenario, "-identifiability");
+    args.results.write_and_print(&folder, &found.output()?, || words(&found.identifiability))
 }
 
 /// What a nat is.
@@ -148,16 +156,20 @@ fn words(shown: &Identifiability) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "{:<26} {:>10}  {:<44} as well", "effect", "nats", "seen from");
     for e in &shown.effects {
-        let from = match &e.smallest {
-            Some(numbers) => words::numbers(&e.effect, numbers),
+        let from = match &e.smallest_detectable {
+            Some(numbers) => formatting::strength_parameters(&e.effect, numbers),
             None => "at no plausible size".to_owned(),
         };
-        let line =
-            format!("{:<26} {:>10}  {from:<44} {}", e.effect, significant(e.nats, 3), e.like.join(", "));
+        let line = format!(
+            "{:<26} {:>10}  {from:<44} {}",
+            e.effect,
+            significant(e.nats, 3),
+            e.indistinguishable_from.join(", ")
+        );
         let _ = writeln!(out, "{}", line.trim_end());
     }
-    if !shown.invisible.is_empty() {
-        let _ = writeln!(out, "\ninvisible at their typical size: {}", shown.invisible.join(", "));
+    if !shown.not_identifiable.is_empty() {
+        let _ = writeln!(out, "\ninvisible at their typical size: {}", shown.not_identifiable.join(", "));
     }
     if !shown.effects.is_empty() {
         let _ = writeln!(out, "\n{A_NAT}");

@@ -1,13 +1,13 @@
 //! `stylet predict`: a model against recordings that took no part in making it.
 
-use crate::args::{Again, PredictArgs};
+use crate::args::{PredictArgs, RefitArg};
 use crate::exit::Failure;
 use std::fmt::Write as _;
-use stylet_api::folder::settle_beside;
-use stylet_api::prediction::{Origin, output};
-use stylet_api::{Prediction, Refit, need, read_all, read_options};
-use stylet_pages::prediction::sentence;
-use stylet_pages::words::shown;
+use stylet_api::output_folder::recover_parent;
+use stylet_api::prediction_files::{ModelOrigin, output_files};
+use stylet_api::{Prediction, Refit, read_options, read_recordings, resource_estimate};
+use stylet_pages::formatting::significant_or_dash;
+use stylet_pages::prediction::summary_sentence;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -16,33 +16,36 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
-    settle_beside(&args.model)?;
+    recover_parent(&args.model)?;
     let model = Scenario::load(&args.model)?;
-    args.limits.allow(&args.model, &need::of_predict(&args.data), args.results.quiet)?;
-    let Origin { diagnosis, believed } = Origin::beside(&args.model, args.believed.as_deref())?;
-    let evidence = read_all(&args.data, &read_options(args.columns.as_deref(), args.repair)?)?;
+    args.limits.check(&args.model, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
+    let ModelOrigin { diagnosis, assumed: believed } =
+        ModelOrigin::of_model_file(&args.model, args.assumed.as_deref())?;
+    let evidence = read_recordings(&args.data, &read_options(args.columns.as_deref(), args.repair)?)?;
     let refit: Vec<Refit> = args
         .refit
         .iter()
         .map(|a| match a {
-            Again::Friction => Refit::Friction,
-            Again::Surface => Refit::Surface,
+            RefitArg::Friction => Refit::Friction,
+            RefitArg::Surface => Refit::Surface,
         })
         .collect();
-    let found = stylet_api::forecast(&model, diagnosis.as_ref(), believed.as_ref(), &refit, &evidence)?;
-    let folder = args.results.folder(&args.model, "-prediction");
-    args.results.conclude(&folder, &output(&model, &args.model, &found)?, || summary(&found.prediction))
+    let found =
+        stylet_api::predict_recordings(&model, diagnosis.as_ref(), believed.as_ref(), &refit, &evidence)?;
+    let folder = args.results.output_folder(&args.model, "-prediction");
+    args.results
+        .write_and_print(&folder, &output_files(&model, &args.model, &found)?, || summary(&found.prediction))
 }
 
 fn summary(p: &Prediction) -> String {
-    let mut out = format!("{}\n", sentence(p));
+    let mut out = format!("{}\n", summary_sentence(p));
     let _ = writeln!(
         out,
         "\n  {:<24} {:>10} {:>10} {:>12} {:>12}",
         "recording", "left, N", "believed", "in the band", "peak off, N"
     );
     for r in &p.recordings {
-        let before = shown(r.believed_rmse_n, 1.0, 3);
+        let before = significant_or_dash(r.assumed_rmse_n, 1.0, 3);
         let _ = writeln!(
             out,
             "  {:<24} {:>10} {:>10} {:>10.0} % {:>12}",
@@ -63,7 +66,7 @@ fn summary(p: &Prediction) -> String {
         out,
         "\n  noise {} N; the band holds {}",
         significant(p.floor_n, 3),
-        p.band_holds.join(", ")
+        p.band_includes.join(", ")
     );
     if !p.held_out {
         let _ = writeln!(

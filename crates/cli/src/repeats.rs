@@ -2,14 +2,14 @@
 
 use crate::args::DiagnoseArgs;
 use crate::exit::Failure;
-use crate::terminal::teller;
+use crate::terminal::stage_printer;
 use std::fmt::Write as _;
-use stylet_api::need;
-use stylet_api::repeats::{data_set, files, repeats};
-use stylet_api::specimens::{Indented, specimens};
-use stylet_diagnose::set::study::Study;
-use stylet_pages::repeats::{online, sentence};
-use stylet_pages::words::three;
+use stylet_api::diagnose_repeats::{diagnose_repeats, load_data_set, recording_files};
+use stylet_api::diagnose_specimens::{SpecimensReport, diagnose_specimens};
+use stylet_api::resource_estimate;
+use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
+use stylet_pages::formatting::three_decimals;
+use stylet_pages::repeated_insertions::{online_enhancement, summary_sentence};
 use stylet_record::QualityKind;
 use stylet_report::significant;
 
@@ -19,35 +19,35 @@ use stylet_report::significant;
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let (inputs, results) = (args.inputs(), &args.results);
-    let set = data_set(&inputs)?;
-    let files = files(&set, &args.data)?;
-    args.limits.allow(&args.scenario, &need::of_diagnose(&files), results.quiet)?;
-    let runs = set.runs(&files, set.tissue.layers.len())?;
-    let folder = results.folder(&args.scenario, "-diagnosis");
+    let set = load_data_set(&inputs)?;
+    let files = recording_files(&set, &args.data)?;
+    args.limits.check(&args.scenario, &resource_estimate::estimate_diagnose(&files), results.quiet)?;
+    let runs = set.load_recordings(&files, set.tissue.layers.len())?;
+    let folder = results.output_folder(&args.scenario, "-diagnosis");
     if !set.split_by.is_empty() {
-        let found = specimens(&set, &runs)?;
-        return results.conclude(&folder, &found.output(&set, &inputs)?, || indented(&found));
+        let found = diagnose_specimens(&set, &runs)?;
+        return results.write_and_print(&folder, &found.output(&set, &inputs)?, || indented(&found));
     }
-    let mut tell = teller(results.quiet, "");
-    let found = repeats(&set, &runs, !args.data.is_empty(), &mut tell)?;
-    results.conclude(&folder, &found.output(&set, &inputs)?, || {
-        format!("{}{}", summary(&found.study), online::summary(&found.online))
+    let mut tell = stage_printer(results.quiet, "");
+    let found = diagnose_repeats(&set, &runs, !args.data.is_empty(), &mut tell)?;
+    results.write_and_print(&folder, &found.output(&set, &inputs)?, || {
+        format!("{}{}", summary(&found.study), online_enhancement::summary(&found.online))
     })
 }
 
-fn summary(study: &Study) -> String {
+fn summary(study: &SetDiagnosis) -> String {
     let mut out = String::new();
-    let (d, r) = (&study.diagnosis, &study.repeats);
-    let _ = writeln!(out, "{}\n", sentence(study));
+    let (d, r) = (&study.diagnosis, &study.report);
+    let _ = writeln!(out, "{}\n", summary_sentence(study));
     let _ = writeln!(
         out,
         "  what each law and each part of the best one buys (N on parts of the set left out)\n    {:<40} {:.3}",
         "base law",
-        study.laws.base.left_out_n()
+        study.candidates.base.held_out_n()
     );
-    for b in &r.bought {
+    for b in &r.ablation {
         let line = match b.without_n {
-            None => format!("{:<40} {:.3}", b.step, b.left_out_n),
+            None => format!("{:<40} {:.3}", b.step, b.held_out_n),
             Some(e) => format!(
                 "{:<40}       {e:.3} without it{}",
                 format!("  {}", b.step),
@@ -73,29 +73,29 @@ fn summary(study: &Study) -> String {
         let _ = writeln!(
             out,
             "    {name:>10} {runs:>5} {:>8} {base:>8.3} {law:>9.3} {alike:>9.3} {:>8.1}% {:>16}",
-            three(floor),
+            three_decimals(floor),
             100.0 * covered,
-            three(speed)
+            three_decimals(speed)
         );
     };
     for s in &r.speeds {
         line(
             format!("{:.2}", 1e3 * s.speed_mps),
-            s.runs,
+            s.recordings,
             s.floor_n,
-            [s.base_n, s.law_n, s.extended_n],
-            s.covered,
-            s.speed_left_out_n,
+            [s.base_n, s.model_n, s.with_discrepancy_n],
+            s.coverage,
+            s.held_out_speed_n,
         );
     }
     let m = &r.mean;
     line(
         "mean".to_owned(),
-        r.runs.len(),
+        r.recordings.len(),
         m.floor_n,
-        [m.base_n, m.law_n, m.extended_n],
-        m.covered,
-        m.speed_left_out_n,
+        [m.base_n, m.model_n, m.with_discrepancy_n],
+        m.coverage,
+        m.held_out_speed_n,
     );
     let _ = writeln!(
         out,
@@ -105,26 +105,30 @@ fn summary(study: &Study) -> String {
         let _ = writeln!(
             out,
             "  parts of the set left out: {:.3} N by the law, {:.3} N by laws chosen without them",
-            nested.chosen_with_n, nested.chosen_without_n
+            nested.selected_with_n, nested.selected_without_n
         );
     }
-    let _ = writeln!(out, "  base law with a whole speed left out: {} N", three(m.base_speed_left_out_n));
+    let _ = writeln!(
+        out,
+        "  base law with a whole speed left out: {} N",
+        three_decimals(m.base_held_out_speed_n)
+    );
     let _ = writeln!(
         out,
         "  the floor is the mean of the others, which scatters itself; without that: {} N",
-        three(m.floor_bare_n)
+        three_decimals(m.floor_unbiased_n)
     );
-    if let Some(covered) = m.speed_covered {
+    if let Some(covered) = m.held_out_speed_coverage {
         let _ = writeln!(out, "  in the band of a speed that took no part: {:.1} %", 100.0 * covered);
     }
-    for p in &r.parts_of_insertion {
+    for p in &r.phases {
         let _ = writeln!(
             out,
             "  {:<28} law {:.3} N, and alike {:.3} N, floor {}",
-            p.part,
-            p.law_n,
-            p.extended_n,
-            three(p.floor_n)
+            p.phase,
+            p.model_n,
+            p.with_discrepancy_n,
+            three_decimals(p.floor_n)
         );
     }
     if r.starts.0 > 1 {
@@ -133,13 +137,14 @@ fn summary(study: &Study) -> String {
     for said in &d.advice {
         let _ = writeln!(out, "  {said}");
     }
-    if let Some(parts) = &r.parts {
-        for (name, floor, error) in &parts.alone {
-            let _ = writeln!(out, "  {name}: {error:.3} N on runs left out, floor {}", three(*floor));
+    if let Some(parts) = &r.composition {
+        for (name, floor, error) in &parts.single_layers {
+            let _ =
+                writeln!(out, "  {name}: {error:.3} N on runs left out, floor {}", three_decimals(*floor));
         }
         let _ = writeln!(out, "  put together, on the whole: {:.3} N", parts.mean_n);
     }
-    for e in &r.instrument.shown {
+    for e in &r.instrument.detected {
         let _ = writeln!(out, "  shown by the instrument: {}: {}", e.effect, e.evidence);
     }
     for e in &r.instrument.excluded {
@@ -148,32 +153,32 @@ fn summary(study: &Study) -> String {
     for q in d.data_quality.iter().filter(|q| q.recording.starts_with("all at")) {
         let _ = writeln!(out, "  data: {}", q.note.message);
     }
-    for q in d.data_quality.iter().filter(|q| q.note.kind == QualityKind::NotLikeTheOthers) {
+    for q in d.data_quality.iter().filter(|q| q.note.kind == QualityKind::OutlierRecording) {
         let _ = writeln!(out, "  note: {}: {}", q.recording, q.note.message);
     }
     out
 }
 
-fn indented(Indented { found, diagnosis: d }: &Indented) -> String {
+fn indented(SpecimensReport { specimens: found, diagnosis: d }: &SpecimensReport) -> String {
     let mut out = String::new();
-    let _ = writeln!(out, "{}\n", stylet_pages::specimens::sentence(found));
+    let _ = writeln!(out, "{}\n", stylet_pages::indented_specimens::summary_sentence(found));
     let _ = writeln!(
         out,
         "    {:<36} {:>10} {:>16} {:>8}",
         "median error, mN", "fitted", "rest of hold", "better"
     );
-    for r in &found.rungs {
+    for r in &found.candidates {
         let _ = writeln!(
             out,
             "    {:<36} {:>10.2} {:>16.2} {:>7.0} % {}",
             r.step,
             1e3 * r.fitted_n,
-            1e3 * r.left_out_n,
-            100.0 * r.better,
+            1e3 * r.held_out_n,
+            100.0 * r.improved_share,
             if r.kept { "" } else { "not kept" }
         );
     }
-    for n in &found.numbers {
+    for n in &found.parameters {
         let _ = writeln!(
             out,
             "    {} = {} (95 %: {} to {}; nine of ten specimens {} to {})",
@@ -181,8 +186,8 @@ fn indented(Indented { found, diagnosis: d }: &Indented) -> String {
             significant(n.mean, 3),
             significant(n.low, 3),
             significant(n.high, 3),
-            significant(n.nine_of_ten.0, 2),
-            significant(n.nine_of_ten.1, 2)
+            significant(n.range_90.0, 2),
+            significant(n.range_90.1, 2)
         );
     }
     let _ = writeln!(

@@ -7,21 +7,21 @@ use crate::terminal;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
-use stylet_api::Output;
+use stylet_api::OutputFiles;
 
 /// The command.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
-    let folder = args.results.folder(Path::new("reproduce"), "");
+    let folder = args.results.output_folder(Path::new("reproduce"), "");
     let begun = Instant::now();
     let plan = stylet_reproduce::plan(args.first_seed, args.seeds);
     let progress = Progress::new(plan.recordings_in_all(), "recordings", args.results.quiet);
     let made = stylet_reproduce::reproduce(&plan, &|| progress.advance(1));
     progress.finish();
     let made = made.map_err(Failure::internal)?;
-    let mut output = Output::default();
+    let mut output = OutputFiles::default();
     let mut text = String::new();
     for claim in &made.claims {
         let _ =
@@ -44,7 +44,7 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
             begun.elapsed().as_secs_f64(),
             folder.join("index.html").display()
         );
-        terminal::say(&text)?;
+        terminal::print(&text)?;
     }
     Ok(())
 }

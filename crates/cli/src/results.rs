@@ -1,14 +1,14 @@
 //! Where results go, and the last words of a command that makes a folder.
 
-use crate::args::Results;
+use crate::args::OutputArgs;
 use crate::exit::Failure;
-use crate::terminal::say;
+use crate::terminal::print;
 use std::path::{Path, PathBuf};
-use stylet_api::{Claim, Output};
+use stylet_api::{OutputFiles, OutputLock};
 
-impl Results {
+impl OutputArgs {
     /// The folder for the results: the one that is named, else `stylet-out/` and the input's name with `more` behind it.
-    pub fn folder(&self, input: &Path, more: &str) -> PathBuf {
+    pub fn output_folder(&self, input: &Path, more: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| default_folder(input, more))
     }
 
@@ -16,10 +16,10 @@ impl Results {
     ///
     /// # Errors
     /// [`Failure`] when they cannot be written, or nothing can be said.
-    pub fn conclude(
+    pub fn write_and_print(
         &self,
         folder: &Path,
-        output: &Output,
+        output: &OutputFiles,
         said: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
         output.write(folder)?;
@@ -30,13 +30,13 @@ impl Results {
     ///
     /// # Errors
     /// [`Failure`] when they cannot be written, or nothing can be said.
-    pub fn conclude_in(
+    pub fn write_locked_and_print(
         &self,
-        claim: &Claim,
-        output: &Output,
+        claim: &OutputLock,
+        output: &OutputFiles,
         said: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
-        output.write_to(claim)?;
+        output.write_locked(claim)?;
         self.report(claim.folder(), said)
     }
 
@@ -44,7 +44,7 @@ impl Results {
         if self.quiet {
             return Ok(());
         }
-        say(&format!("{}\nReport: {}\n", said(), folder.join("report.html").display()))
+        print(&format!("{}\nReport: {}\n", said(), folder.join("report.html").display()))
     }
 }
 

@@ -3,36 +3,36 @@
 use crate::exit::Failure;
 use std::fmt::Write as _;
 use std::io::{IsTerminal as _, Write as _};
-use stylet_api::picture::name_of;
+use stylet_api::run_report::layer_name;
 use stylet_api::{Run, settings_note, virtual_note};
-use stylet_pages::words::{or_dash, shown};
+use stylet_pages::formatting::{or_dash, significant_or_dash};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
-use stylet_score::{Compared, Score, Trace};
+use stylet_score::{EstimateError, Score, Trace};
 
 /// Prints to standard output. A reader that has gone away, as in `stylet run ... | head`, is no error.
 ///
 /// # Errors
 /// [`Failure::Say`] when standard output cannot be written, as on a full disk.
-pub fn say(text: &str) -> Result<(), Failure> {
+pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(why) if why.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Say(why)),
+        Err(why) if why.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Stdout(why)),
         _ => Ok(()),
     }
 }
 
 /// Tells on standard error how it goes, or what went wrong. Nobody listening is no error: there is nowhere to say so.
-pub fn tell(text: &str) {
+pub fn print_error(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// Tells on standard error what is being done, with `after` behind it, when somebody looks at a terminal.
-pub fn teller(quiet: bool, after: &'static str) -> impl Fn(&str) {
+pub fn stage_printer(quiet: bool, after: &'static str) -> impl Fn(&str) {
     let talk = !quiet && std::io::stderr().is_terminal();
     move |what| {
         if talk {
-            tell(&format!("  {what}{after}\n"));
+            print_error(&format!("  {what}{after}\n"));
         }
     }
 }
@@ -54,10 +54,10 @@ pub fn scorecard(finished: &Run) -> String {
     if let Some(note) = virtual_note(&finished.simulation) {
         let _ = writeln!(out, "{note}");
     }
-    if let Some(note) = settings_note(&finished.ran) {
+    if let Some(note) = settings_note(&finished.algorithm_runs) {
         let _ = writeln!(out, "note: {note}");
     }
-    for ran in &finished.ran {
+    for ran in &finished.algorithm_runs {
         let Some(score) = &ran.score else { continue };
         let _ = writeln!(out, "\n{}", ran.name);
         ruptures(&mut out, scenario, score, &ran.trace);
@@ -84,7 +84,7 @@ fn ruptures(out: &mut String, scenario: &Scenario, score: &Score, trace: &Trace)
             out,
             "    {} {:<26} {:>8.3}  {:>8}  {:>8}  {:>8}  {cause}",
             r.layer,
-            name_of(scenario, r.layer - 1).chars().take(26).collect::<String>(),
+            layer_name(scenario, r.layer - 1).chars().take(26).collect::<String>(),
             r.true_s,
             or_dash(r.detected_s.map(|t| format!("{t:.3}"))),
             or_dash(r.delay_s.map(|d| format!("{:.1}", d * 1e3))),
@@ -101,14 +101,14 @@ fn layers(out: &mut String, score: &Score) {
         return;
     }
     let _ = writeln!(out, "  estimates          true   online    error  offline");
-    let mut row = |name: String, c: Compared, offline: Option<f64>| {
+    let mut row = |name: String, c: EstimateError, offline: Option<f64>| {
         let _ = writeln!(
             out,
             "    {name:<12} {:>8} {:>8} {:>8} {:>8}",
             significant(c.truth, 4),
-            shown(c.estimated, 1.0, 4),
+            significant_or_dash(c.estimated, 1.0, 4),
             or_dash(c.relative_error.map(percent)),
-            shown(offline, 1.0, 4),
+            significant_or_dash(offline, 1.0, 4),
         );
     };
     for l in &score.layers {
@@ -135,5 +135,6 @@ fn summary(out: &mut String, score: &Score) {
         share(score.enhancement.in_tissue_relative),
         share(score.enhancement.after_exit_relative),
     );
-    let _ = writeln!(out, "  reconstruction  {} N rms", shown(score.reconstruction_rms_n, 1.0, 3));
+    let _ =
+        writeln!(out, "  reconstruction  {} N rms", significant_or_dash(score.reconstruction_rms_n, 1.0, 3));
 }

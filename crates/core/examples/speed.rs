@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::time::Instant;
 use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use stylet_tissue::{Law, LawState, Tissue};
+use stylet_tissue::{ForceLaw, ForceLawState, Tissue};
 
 /// Seconds per sample of whole insertions, the least of many.
 fn least(samples: &[Sample], mut one: impl FnMut(&mut Enhancer<Vec<Sample>>) -> f64) -> (f64, f64) {
@@ -47,9 +47,9 @@ fn main() -> std::io::Result<()> {
     if let Some(path) = std::env::args().nth(1) {
         return given(&path);
     }
-    let law = Law::base(&Tissue::three_gels());
+    let law = ForceLaw::base(&Tissue::three_gels());
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut state = LawState::default();
+    let mut state = ForceLawState::default();
     let samples: Vec<Sample> = (0..10_000)
         .map(|k| {
             let (time_s, velocity_mps) = (0.005 * f64::from(k), 0.0023);

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use stylet_core::config::{Algorithm, Contact, StyletConfig};
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Sample};
 use stylet_tissue::SoftBoundary;
-use stylet_tissue::{AnyEffect, Law, LawState, Tissue};
+use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState, Tissue};
 
 struct Row {
     name: &'static str,
@@ -120,7 +120,7 @@ fn median(v: &mut [f64], q: f64) -> f64 {
 }
 
 fn run(row: &Row, seeds: u64, rate: f64) {
-    let law = Law::new(&row.tissue, &row.effects).expect("few effects");
+    let law = ForceLaw::new(&row.tissue, &row.effects).expect("few effects");
     let dt = 1.0 / row.fs;
     let n = (row.dur * row.fs) as usize;
     let (mut missed, mut fals, mut total) = (0, 0, 0);
@@ -131,7 +131,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
     let mut verbose = if std::env::var_os("VERBOSE").is_some() { 5 } else { 0 };
     for seed in 0..seeds {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
-        let mut state = LawState::default();
+        let mut state = ForceLawState::default();
         let config = EnhanceConfig {
             algorithm: Algorithm::Stylet,
             contact: Contact::Detected,

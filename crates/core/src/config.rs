@@ -165,7 +165,7 @@ pub struct DropConfig {
     /// Travel of ForceDropMeasuring in m; 0.005 \[L\].
     pub travel_m: f64,
     /// Longest time in ForceDropMeasuring in s, not counting standstill; 5 \[L\].
-    pub longest_s: f64,
+    pub max_duration_s: f64,
     /// Travel of ForceCompensation in m; half of the former.
     pub compensation_travel_m: f64,
     /// ForceCompensation lasts at least this long after the cumulative friction has changed, in s, so
@@ -191,7 +191,7 @@ impl Default for DropConfig {
     fn default() -> Self {
         Self {
             travel_m: 0.005,
-            longest_s: 5.0,
+            max_duration_s: 5.0,
             compensation_travel_m: 0.0025,
             settle_s: 0.1,
             standstill_mps: 5e-5,
@@ -217,7 +217,7 @@ pub struct ContactConfig {
     /// Samples above the threshold in a row.
     pub samples: usize,
     /// Noise sd in N that is assumed at least, so that noiseless data work.
-    pub smallest_noise_n: f64,
+    pub min_noise_n: f64,
     /// Time in air, in s, from which bias and noise are learnt before contact can be declared.
     pub learn_s: f64,
     /// Travel after the declaration over which the loading line is fitted and extrapolated back
@@ -231,7 +231,7 @@ impl Default for ContactConfig {
             time_constant_s: 0.05,
             noise_sds: 5.0,
             samples: 5,
-            smallest_noise_n: 1e-4,
+            min_noise_n: 1e-4,
             learn_s: 0.25,
             extrapolate_over_m: 0.001,
         }
@@ -251,7 +251,7 @@ pub struct GuardConfig {
     pub sudden_mps2: f64,
     /// Ground is old where the tip is this far above its deepest point, in m: more than the noise of
     /// the position.
-    pub old_ground_m: f64,
+    pub revisit_margin_m: f64,
     /// Detection rests this long after a sudden change, a reversal or a hold, in s.
     pub rest_s: f64,
     /// A trailing edge does not count while the speed falls faster than this share per second.
@@ -264,7 +264,7 @@ impl Default for GuardConfig {
             blind_travel_m: 0.002,
             acceleration_time_constant_s: 0.01,
             sudden_mps2: 0.05,
-            old_ground_m: 1e-4,
+            revisit_margin_m: 1e-4,
             rest_s: 0.25,
             slowing_per_s: 0.1,
         }
@@ -321,20 +321,20 @@ pub struct StyletConfig {
     pub false_alarms_per_hour: f64,
     /// Where the tissue does not follow the law of layers, a fall counts as a rupture from this share of the largest
     /// force so far, 0 to 1; smaller falls are texture.
-    pub smallest_drop: f64,
+    pub min_drop_share: f64,
     /// The friction along the shaft.
-    pub law: FrictionLaw,
+    pub friction_law: FrictionLaw,
     /// Whether slow changes of the force on the way back count as friction; off: only what the way in has taught.
-    pub track_way_back: bool,
+    pub track_retraction: bool,
 }
 
 impl Default for StyletConfig {
     fn default() -> Self {
         Self {
             false_alarms_per_hour: 0.05,
-            smallest_drop: 0.08,
-            law: FrictionLaw::Auto,
-            track_way_back: true,
+            min_drop_share: 0.08,
+            friction_law: FrictionLaw::Auto,
+            track_retraction: true,
         }
     }
 }
@@ -383,7 +383,7 @@ impl EnhanceConfig {
 
     /// The algorithm that runs: [`Algorithm::Stylet`] has no Kelvin-Voigt model and takes no known depths.
     #[must_use]
-    pub fn in_force(&self) -> Algorithm {
+    pub fn active_algorithm(&self) -> Algorithm {
         match self.algorithm {
             Algorithm::Stylet if self.model == Model::KelvinVoigt || self.depths != Depths::Unknown => {
                 Algorithm::Paper

@@ -20,27 +20,27 @@
 
 extern crate alloc;
 
-mod choice;
-mod compensation;
 pub mod config;
-mod contact;
-mod drop;
+mod contact_detection;
 mod enhancer;
-mod filter;
-mod front;
-mod guard;
-mod history;
-mod line;
-mod reweigh;
+mod force_drop;
+mod friction_compensation;
+mod layer_replay;
+mod line_fit;
+mod low_pass;
+mod motion_guard;
+mod paper_enhancer;
+mod preprocessing;
 mod rls;
 mod sample;
+mod sample_ring;
+mod state_machine;
 mod stylet;
-mod transition;
 
-pub use choice::Enhancer;
-pub use compensation::MAX_LAYERS;
 pub use config::EnhanceConfig;
+pub use enhancer::Enhancer;
+pub use friction_compensation::MAX_LAYERS;
 
 pub use rls::Rls;
 pub use sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
-pub use transition::{TRANSITIONS, Transition, Trigger};
+pub use state_machine::{TRANSITIONS, Transition, Trigger};

@@ -12,11 +12,13 @@ use guess::believed;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use stylet_diagnose::set::fitted::{began, fitted};
-use stylet_diagnose::set::left_out::{PARTS, Score, floor, one_left_out, speeds_out};
-use stylet_diagnose::set::{Insertion, first, laws};
-use stylet_record::raw::Raw;
-use stylet_record::{ColumnMap, ReadOptions, read_csv_with_holes};
+use stylet_diagnose::repeated_insertions::cross_validation::{
+    PHASE_NAMES, PredictionScore, leave_one_out_scores, leave_speed_out, repeatability_floor,
+};
+use stylet_diagnose::repeated_insertions::multistart_fit::{draw_starts, multistart_fit};
+use stylet_diagnose::repeated_insertions::{SegmentedRecording, model_selection, start_values};
+use stylet_record::sensor_artefacts::SensorArtefacts;
+use stylet_record::{ColumnMap, ReadOptions, read_csv_skip_nonfinite};
 
 /// Seed of what they begin with.
 const SEED: u64 = 15;
@@ -42,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<Insertion>, Box<dyn Error>> {
+fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<SegmentedRecording>, Box<dyn Error>> {
     let columns: ColumnMap = stylet_scenario::parse("columns", COLUMNS)?;
     let options = ReadOptions { columns: Some(columns), ..ReadOptions::default() };
     let start = format!("{name}_");
@@ -52,7 +54,7 @@ fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<Insertion>, Box<
     let mut out = Vec::new();
     for file in files {
         let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        out.push(Insertion::new(name, read_csv_with_holes(&file, &options)?.0, layers));
+        out.push(SegmentedRecording::new(name, read_csv_skip_nonfinite(&file, &options)?.0, layers));
     }
     Ok(out)
 }
@@ -66,10 +68,10 @@ fn cpu_s() -> f64 {
     })
 }
 
-fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(), Box<dyn Error>> {
-    let plain: Vec<&Insertion> = all.iter().collect();
-    let groups = first::groups(&plain);
-    let moved: Vec<Insertion> = all
+fn study(name: &str, all: &[SegmentedRecording], layers: usize, shift_m: f64) -> Result<(), Box<dyn Error>> {
+    let plain: Vec<&SegmentedRecording> = all.iter().collect();
+    let groups = start_values::group_by_speed_and_stroke(&plain);
+    let moved: Vec<SegmentedRecording> = all
         .iter()
         .enumerate()
         .map(|(i, run)| {
@@ -77,21 +79,26 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
             if shift_m != 0.0 && groups.get(1).is_some_and(|g| g.contains(&i)) {
                 recording.position_m.iter_mut().for_each(|z| *z += shift_m);
             }
-            Insertion::new(run.name.clone(), recording, layers)
+            SegmentedRecording::new(run.name.clone(), recording, layers)
         })
         .collect();
-    let runs: Vec<&Insertion> = moved.iter().collect();
+    let runs: Vec<&SegmentedRecording> = moved.iter().collect();
     println!("\n# {name}: {} runs", runs.len());
-    let begin = began(&believed(layers), &runs, 1, &mut ChaCha8Rng::seed_from_u64(SEED));
+    let begin = draw_starts(&believed(layers), &runs, 1, &mut ChaCha8Rng::seed_from_u64(SEED));
     let before = cpu_s();
-    let one = fitted(&begin, &runs, &Raw::default());
+    let one = multistart_fit(&begin, &runs, &SensorArtefacts::default());
     println!(
         "one fit, from its first look to the last: {:.1} s of processor time, {:.3} N left",
         cpu_s() - before,
         one.first().map_or(f64::NAN, |f| f.rms_n())
     );
-    let law = laws::slipping(&believed(layers), &runs, &Raw::default(), &mut ChaCha8Rng::seed_from_u64(SEED));
-    let fit = law.ok_or("no law could be fitted")?.fitted;
+    let law = model_selection::fit_stick_slip(
+        &believed(layers),
+        &runs,
+        &SensorArtefacts::default(),
+        &mut ChaCha8Rng::seed_from_u64(SEED),
+    );
+    let fit = law.ok_or("no law could be fitted")?.set_fit;
     println!("left by the fit {:.3} N; {} of {} starts agree", fit.rms_n(), fit.starts.1, fit.starts.0);
     let model = &fit.fit.model;
     println!("surface {:.2} mm", 1e3 * model.tissue.surface_m);
@@ -112,20 +119,21 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
     println!(
         "between runs: surface {:.2} mm, friction {:.1} %, puncture {:.1} %; between days: surface {:.2} mm, friction {:.1} %",
         1e3 * s.surface_m,
-        1e2 * s.friction,
-        1e2 * s.force,
+        1e2 * s.ln_friction,
+        1e2 * s.rupture_force,
         1e3 * s.day_surface_m,
-        1e2 * s.day_friction
+        1e2 * s.day_ln_friction
     );
     for (day, g) in model.days.iter().zip(&groups) {
         let speed = 1e3 * runs[g[0]].speed_mps;
         println!(
             "day of {speed:.2} mm/s: surface {:+.2} mm, friction {:+.3}",
             1e3 * day.surface_m,
-            day.friction
+            day.ln_friction
         );
     }
-    let (floors, one, day) = (floor(&runs), one_left_out(&fit, &runs), speeds_out(&fit, &runs));
+    let (floors, one, day) =
+        (repeatability_floor(&runs), leave_one_out_scores(&fit, &runs), leave_speed_out(&fit, &runs));
     println!("| mm/s | floor | floor, not inflated | left out | in band | speed left out | in band |");
     let mean = |g: &[usize], f: &dyn Fn(usize) -> Option<f64>| {
         let known: Vec<f64> = g.iter().filter_map(|i| f(*i)).collect();
@@ -143,9 +151,9 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
             mean(g, &inflated),
             mean(g, &bare),
             mean(g, &|i| Some(one[i].rmse_n)),
-            mean(g, &|i| Some(one[i].covered)),
+            mean(g, &|i| Some(one[i].coverage)),
             mean(g, &|i| day.get(i).map(|s| s.rmse_n)),
-            mean(g, &|i| day.get(i).map(|s| s.covered))
+            mean(g, &|i| day.get(i).map(|s| s.coverage))
         );
     };
     for g in &groups {
@@ -153,11 +161,12 @@ fn study(name: &str, all: &[Insertion], layers: usize, shift_m: f64) -> Result<(
     }
     line("all".to_owned(), &(0..runs.len()).collect::<Vec<_>>());
     println!("| part | floor | left out | of the floor |");
-    let pooled = |scores: &mut dyn Iterator<Item = &Score>, k: usize| {
-        let (sum, n) = scores.fold((0.0, 0.0), |(s, n), x| (s + x.parts[k].0, n + x.parts[k].1));
+    let pooled = |scores: &mut dyn Iterator<Item = &PredictionScore>, k: usize| {
+        let (sum, n) =
+            scores.fold((0.0, 0.0), |(s, n), x| (s + x.phase_squares[k].0, n + x.phase_squares[k].1));
         (sum / f64::max(n, 1.0)).sqrt()
     };
-    for (k, name) in PARTS.iter().enumerate() {
+    for (k, name) in PHASE_NAMES.iter().enumerate() {
         let (f, o) = (pooled(&mut floors.iter().flatten().map(|f| &f.0), k), pooled(&mut one.iter(), k));
         println!("| {name} | {f:.3} | {o:.3} | {:.2} |", o / f.max(1e-9));
     }

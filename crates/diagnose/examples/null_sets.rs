@@ -13,11 +13,11 @@ mod drawn;
 use drawn::{ALL, Asked, asked, one};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
-use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::instrument::Checks;
-use stylet_diagnose::set::laws::{Laws, effects};
-use stylet_diagnose::set::population::Population;
-use stylet_diagnose::set::study::study;
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::diagnose_set::diagnose_set;
+use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings;
+use stylet_diagnose::repeated_insertions::model_selection::{CandidateModels, active_effects};
+use stylet_diagnose::repeated_insertions::population_prediction::Population;
 use stylet_stats::wilson;
 
 /// Seed of what is drawn.
@@ -26,36 +26,39 @@ const SEED: u64 = 125;
 fn main() -> Result<(), Box<dyn Error>> {
     let Asked { file, set, measured, sets, seed } = asked(40, SEED)?;
     let layers = set.tissue.layers.len();
-    let refs: Vec<&Insertion> = measured.iter().collect();
-    let found = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}).ok_or("no law")?;
-    let has = effects(&found.laws.best.fitted.fit.model);
+    let refs: Vec<&SegmentedRecording> = measured.iter().collect();
+    let found = diagnose_set(&set.name, &set.tissue, &refs, &ReferenceRecordings::default(), |_| {})
+        .ok_or("no law")?;
+    let has = active_effects(&found.candidates.best.set_fit.fit.model);
     // The population itself, not what so many recordings tell of it.
-    let population = Population { recordings: ALL, ..Population::of(&found.laws.best.fitted, &refs) };
+    let population =
+        Population { recordings: ALL, ..Population::from_fit(&found.candidates.best.set_fit, &refs) };
     println!("{file}: {} runs follow {}", refs.len(), has.join(", "));
-    tell(&found.laws);
-    let m = &found.repeats.mean;
+    tell(&found.candidates);
+    let m = &found.report.mean;
     println!(
         "    {:.3} N on runs left out, {:.3} N with what is alike, floor {:.3} N, in band {:.3}; speed left out {:.3} N, in band {:.3}",
-        m.law_n,
-        m.extended_n,
+        m.model_n,
+        m.with_discrepancy_n,
         m.floor_n.unwrap_or(f64::NAN),
-        m.covered,
-        m.speed_left_out_n.unwrap_or(f64::NAN),
-        m.speed_covered.unwrap_or(f64::NAN)
+        m.coverage,
+        m.held_out_speed_n.unwrap_or(f64::NAN),
+        m.held_out_speed_coverage.unwrap_or(f64::NAN)
     );
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Every seed has draws of its own.
     let from = usize::try_from(seed.abs_diff(SEED))? * sets * refs.len();
-    let (measured_in, mut covered) = (m.covered, Vec::new());
+    let (measured_in, mut covered) = (m.coverage, Vec::new());
     let (mut accused, mut named) = (0, vec![0; has.len()]);
     for k in 0..sets {
-        let runs: Vec<Insertion> = refs
+        let runs: Vec<SegmentedRecording> = refs
             .iter()
             .enumerate()
             .filter_map(|(r, run)| one(&population, run, from + k * refs.len() + r + 1, layers, &mut rng))
             .collect();
-        let refs: Vec<&Insertion> = runs.iter().collect();
-        let Some(s) = study(&set.name, &set.tissue, &refs, &Checks::default(), |_| {}) else {
+        let refs: Vec<&SegmentedRecording> = runs.iter().collect();
+        let Some(s) = diagnose_set(&set.name, &set.tissue, &refs, &ReferenceRecordings::default(), |_| {})
+        else {
             println!("{k}: no law");
             continue;
         };
@@ -65,20 +68,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (n, effect) in named.iter_mut().zip(&has) {
             *n += usize::from(names.contains(effect));
         }
-        let m = &s.repeats.mean;
+        let m = &s.report.mean;
         println!(
             "{k}: {:?} {} (left out: base law {:.3}, library {:.3}, slip {:.3}); {:.3} N on runs left out, floor {:.3} N, in band {:.2}",
             s.diagnosis.verdict,
             names.join(", "),
-            s.laws.base.left_out_n(),
-            s.laws.library.as_ref().map_or(f64::NAN, |l| l.left_out_n()),
-            s.laws.slip.as_ref().map_or(f64::NAN, |l| l.left_out_n()),
-            m.law_n,
+            s.candidates.base.held_out_n(),
+            s.candidates.library.as_ref().map_or(f64::NAN, |l| l.held_out_n()),
+            s.candidates.slip.as_ref().map_or(f64::NAN, |l| l.held_out_n()),
+            m.model_n,
             m.floor_n.unwrap_or(f64::NAN),
-            m.covered
+            m.coverage
         );
-        tell(&s.laws);
-        covered.push(m.covered);
+        tell(&s.candidates);
+        covered.push(m.coverage);
         totals(accused, &named, &has, &covered, measured_in);
     }
     Ok(())
@@ -103,16 +106,16 @@ fn totals(accused: usize, named: &[usize], has: &[&str], covered: &[f64], measur
 }
 
 /// What the parts of a law are worth.
-fn tell(laws: &Laws) {
-    for p in &laws.parts {
-        let error = stylet_stats::sd(&p.loses) / (p.loses.len() as f64).sqrt();
+fn tell(laws: &CandidateModels) {
+    for p in &laws.terms {
+        let error = stylet_stats::sd(&p.held_out_loss) / (p.held_out_loss.len() as f64).sqrt();
         println!(
             "    {}: without it squares are {:.1} % larger, standard error {:.1} %; with a speed left out {:.1} %; {:.1} nats{}",
             p.name,
-            1e2 * stylet_stats::mean(&p.loses),
+            1e2 * stylet_stats::mean(&p.held_out_loss),
             1e2 * error,
-            1e2 * stylet_stats::mean(&p.speeds_lose),
-            p.nats,
+            1e2 * stylet_stats::mean(&p.held_out_speed_loss),
+            p.gain_nats,
             if p.kept { "" } else { "; taken away" }
         );
     }

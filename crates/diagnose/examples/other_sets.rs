@@ -15,16 +15,16 @@ use guess::believed;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
-use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::instrument::Checks;
-use stylet_diagnose::set::study::study;
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::diagnose_set::diagnose_set;
+use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings;
 use stylet_examine::reality::insertion::insert;
 use stylet_examine::reality::motion::{Path, Piece};
 use stylet_examine::reality::rich::{Bristles, Damage, Foundation, Ingredients, Rich, Tearing};
 use stylet_examine::reality::sensor::Instrument;
 use stylet_examine::reality::tissue as real;
 use stylet_record::Recording;
-use stylet_tissue::{AnyEffect, DelayedPuncture, Law, LawState, LetGo, ShaftSlip};
+use stylet_tissue::{AnyEffect, DelayedPuncture, ForceLaw, ForceLawState, ReleaseDepth, ShaftSlip};
 
 /// Numbers of a law lie up to this factor from those of the phantoms.
 const FACTOR: f64 = 2.5;
@@ -50,32 +50,34 @@ fn main() -> Result<(), Box<dyn Error>> {
     for k in (0..sets).filter(|k| only.is_none_or(|only| *k == only)) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed * 1000 + k);
         let (layers, runs) = set(k % 2 == 1, &mut rng)?;
-        let refs: Vec<&Insertion> = runs.iter().collect();
+        let refs: Vec<&SegmentedRecording> = runs.iter().collect();
         let what = format!(
             "{k}: {}, {layers} layer(s), {} runs at {:?} mm/s",
             if k % 2 == 1 { "rich" } else { "slips" },
             runs.len(),
-            stylet_diagnose::set::study::speeds(&refs)
+            stylet_diagnose::repeated_insertions::diagnose_set::mean_speeds(&refs)
                 .iter()
                 .map(|s| (1e5 * s.0).round() / 100.0)
                 .collect::<Vec<_>>()
         );
-        let Some(s) = study("other", &believed(layers), &refs, &Checks::default(), |_| {}) else {
+        let Some(s) =
+            diagnose_set("other", &believed(layers), &refs, &ReferenceRecordings::default(), |_| {})
+        else {
             println!("{what}: no law");
             continue;
         };
-        let m = &s.repeats.mean;
+        let m = &s.report.mean;
         let floor_n = m.floor_n.unwrap_or(f64::NAN);
-        by_law.push(m.law_n / floor_n);
-        told.push(m.extended_n / floor_n);
+        by_law.push(m.model_n / floor_n);
+        told.push(m.with_discrepancy_n / floor_n);
         let names: Vec<&str> = s.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
         println!(
             "{what}: floor {floor_n:.3} N, law {:.2} of it, with what is alike {:.2}, in band {:.0} %; speed left out {:.3} N, in band {:.0} %; {:?} {}",
-            m.law_n / floor_n,
-            m.extended_n / floor_n,
-            100.0 * m.covered,
-            m.speed_left_out_n.unwrap_or(f64::NAN),
-            100.0 * m.speed_covered.unwrap_or(f64::NAN),
+            m.model_n / floor_n,
+            m.with_discrepancy_n / floor_n,
+            100.0 * m.coverage,
+            m.held_out_speed_n.unwrap_or(f64::NAN),
+            100.0 * m.held_out_speed_coverage.unwrap_or(f64::NAN),
             s.diagnosis.verdict,
             names.join(", ")
         );
@@ -103,7 +105,7 @@ struct Motion {
 type Differs = [f64; 3];
 
 /// The number of layers and the runs of a set.
-fn set(rich: bool, rng: &mut ChaCha8Rng) -> Result<(usize, Vec<Insertion>), Box<dyn Error>> {
+fn set(rich: bool, rng: &mut ChaCha8Rng) -> Result<(usize, Vec<SegmentedRecording>), Box<dyn Error>> {
     let layers = 1 + usize::from(rng.random::<f64>() < 0.4);
     let speeds = 1 + (rng.random::<f64>() * 3.0) as usize;
     let each = (5 + (rng.random::<f64>() * 11.0) as usize).max(3 * speeds) / speeds;
@@ -128,7 +130,7 @@ fn set(rich: bool, rng: &mut ChaCha8Rng) -> Result<(usize, Vec<Insertion>), Box<
             };
             add_noise(&time_s, &mut force_n, rng);
             let recording = Recording::new(time_s, position_m, force_n)?;
-            runs.push(Insertion::new(format!("{speed} {k}"), recording, layers));
+            runs.push(SegmentedRecording::new(format!("{speed} {k}"), recording, layers));
         }
     }
     Ok((layers, runs))
@@ -152,14 +154,14 @@ fn slipping(layer: usize, rng: &mut ChaCha8Rng) -> Vec<AnyEffect> {
         pull_n: by(1.2),
         exponent: by(9.0).clamp(4.0, 16.0),
         wear_per_m: by(30.0),
-        curve_n_per_m2: by(4e4),
+        curvature_n_per_m2: by(4e4),
         fractions: [by(0.1).min(0.3), by(0.2).min(0.4)],
         time_constants_s: [by(0.8), by(9.0)],
-        kept: by(0.6).min(1.0),
+        retained_share: by(0.6).min(1.0),
         rate: 0.1 * normal(rng),
     };
     let waits = DelayedPuncture { layer, force_n: 4.0 * times(rng, FACTOR), exponent: 10.0 };
-    vec![slip.into(), waits.into(), LetGo { layer, depth_m: 1e-3 * times(rng, FACTOR) }.into()]
+    vec![slip.into(), waits.into(), ReleaseDepth { layer, depth_m: 1e-3 * times(rng, FACTOR) }.into()]
 }
 
 /// What the rich law has.
@@ -249,9 +251,9 @@ fn slip_run(
             _ => {}
         }
     }
-    let law = Law::new(&tissue, &effects)?;
+    let law = ForceLaw::new(&tissue, &effects)?;
     let path = path(m);
-    let (mut state, mut piece) = (LawState::default(), 0);
+    let (mut state, mut piece) = (ForceLawState::default(), 0);
     let mut out: Columns = Default::default();
     for k in 0..(path.duration_s() * SAMPLE_HZ) as usize {
         let t = k as f64 / SAMPLE_HZ;

@@ -10,18 +10,18 @@ use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
-use stylet_diagnose::base::{Prepared, base};
-use stylet_diagnose::propose::starts;
-use stylet_diagnose::{Evidence, Options, belief, diagnose};
-use stylet_identify::blocks::{BLOCK_S, Blocks};
-use stylet_identify::fit::{Column, Fit};
-use stylet_identify::look::Look;
-use stylet_identify::model::Choice;
+use stylet_diagnose::base_law_fit::{PreparedRecordings, fit_base_law};
+use stylet_diagnose::effect_start_values::effect_starts;
+use stylet_diagnose::{NamedRecording, Options, assumptions_of, diagnose};
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::fit::{Fit, JacobianColumn};
+use stylet_identify::likelihood::{FitData, residuals};
+use stylet_identify::model::EffectTerm;
 use stylet_identify::noise::Noise;
-use stylet_identify::objective::{Data, residuals};
+use stylet_identify::score_test::ScoreTest;
 use stylet_record::{ReadOptions, read_csv};
 use stylet_scenario::Scenario;
-use stylet_tissue::{Proposal, library};
+use stylet_tissue::{Proposal, general_effects};
 
 type Error = Box<dyn std::error::Error>;
 
@@ -54,7 +54,7 @@ fn main() -> Result<(), Error> {
 }
 
 /// What an entrant to the challenge sees.
-fn given(folder: &Path) -> Result<(Scenario, Vec<Evidence>), Error> {
+fn given(folder: &Path) -> Result<(Scenario, Vec<NamedRecording>), Error> {
     let believed = folder.join("believed.ron");
     let scenario = Scenario::parse(&believed.display().to_string(), &std::fs::read_to_string(&believed)?)?;
     let mut evidence = Vec::new();
@@ -64,16 +64,17 @@ fn given(folder: &Path) -> Result<(Scenario, Vec<Evidence>), Error> {
             break;
         }
         let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
-        evidence.push(Evidence { name: format!("{k}.csv"), recording, notes });
+        evidence.push(NamedRecording { name: format!("{k}.csv"), recording, notes });
     }
     Ok((scenario, evidence))
 }
 
-fn write_terms(stem: &Path, scenario: &Scenario, evidence: &[Evidence]) -> Result<(), Error> {
+fn write_terms(stem: &Path, scenario: &Scenario, evidence: &[NamedRecording]) -> Result<(), Error> {
     let start = Instant::now();
-    let blocks: Vec<Blocks> = evidence.iter().map(|e| Blocks::new(&e.recording, &[], BLOCK_S)).collect();
-    let prepared = Prepared::new(Arc::new(belief(scenario)), blocks, 0.0);
-    let (fit, data) = base(&prepared).ok_or("no base fit")?;
+    let blocks: Vec<BlockAverages> =
+        evidence.iter().map(|e| BlockAverages::new(&e.recording, &[], BLOCK_S)).collect();
+    let prepared = PreparedRecordings::new(Arc::new(assumptions_of(scenario)), blocks, 0.0);
+    let (fit, data) = fit_base_law(&prepared).ok_or("no base fit")?;
     let base_s = start.elapsed().as_secs_f64();
     let chosen = choices(&fit, &data, &prepared);
     let plain = data.with_noise(Noise::white(data.noise.sd_n()));
@@ -93,25 +94,25 @@ fn write_terms(stem: &Path, scenario: &Scenario, evidence: &[Evidence]) -> Resul
 }
 
 /// Effects at the values from which the search begins.
-fn choices(fit: &Fit, data: &Data, prepared: &Prepared) -> Vec<Choice> {
-    let look = Look::new(fit, data);
-    let lines = stylet_diagnose::lines::lines(fit, data);
+fn choices(fit: &Fit, data: &FitData, prepared: &PreparedRecordings) -> Vec<EffectTerm> {
+    let look = ScoreTest::new(fit, data);
+    let lines = stylet_diagnose::tone_detection::detect_tones(fit, data);
     let mut out = Vec::new();
-    for info in library() {
+    for info in general_effects() {
         match info.proposal {
-            Proposal::Columns(groups) => {
-                out.extend(groups.iter().flat_map(|g| g.iter()).map(|v| Choice::new(info, v)));
+            Proposal::LinearColumns(groups) => {
+                out.extend(groups.iter().flat_map(|g| g.iter()).map(|v| EffectTerm::new(info, v)));
             }
-            Proposal::Faces(shift) => {
-                out.extend((1..fit.model.layers()).map(|l| Choice::new(info, &[l as f64, shift])));
+            Proposal::LayerFaces(shift) => {
+                out.extend((1..fit.model.layers()).map(|l| EffectTerm::new(info, &[l as f64, shift])));
             }
             _ => {}
         }
     }
-    let sought = starts(&look, prepared, &lines).into_iter().flatten().map(|s| s.choice);
-    out.extend(
-        sought.filter(|c| matches!(c.info.proposal, Proposal::Breath | Proposal::Line | Proposal::Break)),
-    );
+    let sought = effect_starts(&look, prepared, &lines).into_iter().flatten().map(|s| s.choice);
+    out.extend(sought.filter(|c| {
+        matches!(c.info.proposal, Proposal::TissueMotion | Proposal::SpectralTone | Proposal::MembraneRupture)
+    }));
     out
 }
 
@@ -119,15 +120,15 @@ fn choices(fit: &Fit, data: &Data, prepared: &Prepared) -> Vec<Choice> {
 /// row, those of the rows of ruptures beyond the number of recordings.
 fn table(
     fit: &Fit,
-    data: &Data,
-    choices: &[Choice],
+    data: &FitData,
+    choices: &[EffectTerm],
     path: &Path,
 ) -> Result<(Vec<&'static str>, Vec<usize>), Error> {
-    let look = Look::new(fit, data);
-    let (recordings, shared) = (data.recordings(), look.tangent.shared.len());
+    let look = ScoreTest::new(fit, data);
+    let (recordings, shared) = (data.recording_count(), look.linearization.shared.len());
     let mut names = Vec::new();
-    let mut columns: Vec<Vec<f64>> = vec![rows(&look.tangent.rest, |_| true)];
-    for (k, column) in look.tangent.columns.iter().enumerate() {
+    let mut columns: Vec<Vec<f64>> = vec![rows(&look.linearization.residual, |_| true)];
+    for (k, column) in look.linearization.columns.iter().enumerate() {
         // A recording's own number changes that recording alone.
         for own in 0..if k < shared { 1 } else { recordings } {
             columns.push(rows(column, |r| k < shared || r == own));
@@ -135,25 +136,25 @@ fn table(
         }
     }
     for choice in choices {
-        if let Some(column) = look.column(choice) {
+        if let Some(column) = look.effect_column(choice) {
             columns.push(rows(&column, |_| true));
             names.push(choice.info.id);
         }
     }
-    let rest = &look.tangent.rest;
+    let rest = &look.linearization.residual;
     let of = |parts: &[Vec<f64>], from: usize| -> Vec<usize> {
         parts.iter().enumerate().flat_map(|(r, x)| vec![from + r; x.len()]).collect()
     };
-    let groups = [of(&rest.w, 0), of(&rest.rows, recordings)].concat();
+    let groups = [of(&rest.innovations, 0), of(&rest.rupture_rows, recordings)].concat();
     let bytes: Vec<u8> = columns.into_iter().flatten().flat_map(|x| (x as f32).to_le_bytes()).collect();
     put(path, &bytes)?;
     Ok((names, groups))
 }
 
 /// A column's rows: blocks recording by recording, then ruptures.
-fn rows(column: &Column, which: impl Fn(usize) -> bool) -> Vec<f64> {
+fn rows(column: &JacobianColumn, which: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut out = Vec::new();
-    for parts in [&column.w, &column.rows] {
+    for parts in [&column.innovations, &column.rupture_rows] {
         for (r, part) in parts.iter().enumerate() {
             out.extend(part.iter().map(|x| if which(r) && x.is_finite() { *x } else { 0.0 }));
         }

@@ -19,35 +19,37 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
-mod at_ruptures;
-pub mod base;
-mod check;
-pub mod curves;
+pub mod base_law_fit;
+mod bootstrap_noise;
+pub mod competing_effects;
+pub mod confidence_intervals;
 mod diagnose;
+pub mod diagnosis_json;
+pub mod effect_selection;
+pub mod effect_start_values;
 mod error;
-pub mod geometry;
+pub mod geometry_selection;
 pub mod held_out;
-pub mod intervals;
-pub mod judge;
-pub mod leftover;
-pub mod lines;
+mod identifiability;
+mod input_checks;
+pub mod model_comparison;
+pub mod negligible_effects;
+mod outlier_segment_test;
+pub mod prediction;
+pub mod random_effect_selection;
+pub mod repeated_insertions;
+pub mod report_curves;
+pub mod residual_tests;
+pub mod reweighted_fit;
+mod rupture_start_values;
 #[cfg(test)]
-mod made;
-pub mod otherwise;
-pub mod outcome;
-pub mod predict;
-pub mod propose;
-pub mod rivals;
-pub mod select;
-pub mod set;
-pub mod silent;
-pub mod small;
-mod stretch;
-mod told_again;
-pub mod varied;
-mod visible;
+mod test_fixtures;
+pub mod tone_detection;
+pub mod varying_coefficient_test;
 
-pub use diagnose::{Evidence, Examined, IMITATED, Options, belief, diagnose};
+pub use competing_effects::EQUIVALENCE_NATS;
+pub use diagnose::{
+    DiagnosisResult, NamedRecording, Options, REASON_IMITATES_UNMODELLED, assumptions_of, diagnose,
+};
+pub use diagnosis_json::{Diagnosis, Verdict};
 pub use error::DiagnoseError;
-pub use outcome::{Diagnosis, Verdict};
-pub use rivals::CLASS_NATS;

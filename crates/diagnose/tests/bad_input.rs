@@ -1,7 +1,7 @@
 //! Promise: recordings that cannot belong to the scenario are refused with a message that says what is
 //! wrong and what would be right; a hole in a recording is no reason to refuse it.
 
-use stylet_diagnose::{DiagnoseError, Diagnosis, Evidence, Options, Verdict, diagnose};
+use stylet_diagnose::{DiagnoseError, Diagnosis, NamedRecording, Options, Verdict, diagnose};
 use stylet_own_world::{self as hidden, Drawn, Motions};
 use stylet_record::Recording;
 
@@ -23,7 +23,7 @@ fn with(change: impl Fn(&mut Recording)) -> Result<Diagnosis, DiagnoseError> {
     let case = case();
     let mut recording = case.recordings[0].clone();
     change(&mut recording);
-    let evidence = [Evidence { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
+    let evidence = [NamedRecording { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
     diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis)
 }
 
@@ -112,9 +112,9 @@ fn recordings_at_different_rates_are_fitted_together() {
             keep
         });
     }
-    let evidence: Vec<Evidence> = [("a.csv", one), ("b.csv", half)]
+    let evidence: Vec<NamedRecording> = [("a.csv", one), ("b.csv", half)]
         .into_iter()
-        .map(|(name, recording)| Evidence { name: name.to_owned(), recording, notes: Vec::new() })
+        .map(|(name, recording)| NamedRecording { name: name.to_owned(), recording, notes: Vec::new() })
         .collect();
     let found =
         diagnose(&case.believed, &evidence, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
@@ -124,8 +124,11 @@ fn recordings_at_different_rates_are_fitted_together() {
 #[test]
 fn the_same_bytes_for_any_number_of_threads() {
     let case = case();
-    let evidence =
-        [Evidence { name: "a.csv".to_owned(), recording: case.recordings[0].clone(), notes: Vec::new() }];
+    let evidence = [NamedRecording {
+        name: "a.csv".to_owned(),
+        recording: case.recordings[0].clone(),
+        notes: Vec::new(),
+    }];
     let json = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let found = pool.install(|| {

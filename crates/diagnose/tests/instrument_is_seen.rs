@@ -4,38 +4,38 @@
 mod drawn;
 
 use drawn::{Drawn, believed, drawn};
-use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::instrument::{Checks, Instrument};
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::instrument_faults::{InstrumentReport, ReferenceRecordings};
 use stylet_record::Recording;
 
 /// Insertions whose force an instrument has changed.
-fn with(change: impl Fn(&Recording) -> Vec<f64>) -> Vec<Insertion> {
+fn with(change: impl Fn(&Recording) -> Vec<f64>) -> Vec<SegmentedRecording> {
     drawn(&Drawn { seed: 31, shift_m: 0.0 })
         .into_iter()
         .map(|run| {
             let mut recording = run.recording.clone();
             recording.force_n = change(&run.recording);
-            Insertion::new(run.name, recording, 1)
+            SegmentedRecording::new(run.name, recording, 1)
         })
         .collect()
 }
 
-fn look(runs: &[Insertion]) -> Instrument {
-    let refs: Vec<&Insertion> = runs.iter().collect();
-    Instrument::look(&Checks::default(), &refs, believed().surface_m)
+fn look(runs: &[SegmentedRecording]) -> InstrumentReport {
+    let refs: Vec<&SegmentedRecording> = runs.iter().collect();
+    InstrumentReport::assess(&ReferenceRecordings::default(), &refs, believed().surface_m)
 }
 
-fn shown(instrument: &Instrument) -> Vec<&str> {
-    instrument.shown.iter().map(|s| s.effect.as_str()).collect()
+fn shown(instrument: &InstrumentReport) -> Vec<&str> {
+    instrument.detected.iter().map(|s| s.effect.as_str()).collect()
 }
 
 #[test]
 fn a_good_instrument_shows_nothing_and_changes_nothing() {
     let runs = with(|r| r.force_n.clone());
     let seen = look(&runs);
-    assert!(seen.shown.is_empty(), "{:?}", seen.shown);
-    let undone = seen.undo(&runs.iter().collect::<Vec<_>>());
-    for (a, b) in undone.runs.iter().zip(&runs) {
+    assert!(seen.detected.is_empty(), "{:?}", seen.detected);
+    let undone = seen.calibrate(&runs.iter().collect::<Vec<_>>());
+    for (a, b) in undone.recordings.iter().zip(&runs) {
         assert_eq!(a.recording, b.recording);
     }
 }
@@ -69,7 +69,7 @@ fn a_late_force_is_told_from_a_rounded_one_and_undone() {
 #[test]
 fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
     let biased = with(|r| r.force_n.iter().map(|f| 1.1 * f + 0.3).collect());
-    let refs: Vec<&Insertion> = biased.iter().collect();
+    let refs: Vec<&SegmentedRecording> = biased.iter().collect();
     let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
     let wobble = |k: usize| 1e-3 * ((k * 7919) % 101) as f64 / 101.0;
     let of = |level: f64| {
@@ -77,12 +77,12 @@ fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
         Recording::new(t.clone(), vec![0.0; t.len()], f).expect("clean columns")
     };
     let (air, load) = (of(0.0), of(5.0));
-    let checks = Checks { air: Some(&air), load: Some((&load, 5.0)) };
-    let seen = Instrument::look(&checks, &refs, believed().surface_m);
+    let checks = ReferenceRecordings { air: Some(&air), load: Some((&load, 5.0)) };
+    let seen = InstrumentReport::assess(&checks, &refs, believed().surface_m);
     assert_eq!(shown(&seen), ["force_gain", "force_bias"], "{seen:?}");
     assert!((seen.gain.expect("a gain") - 0.1).abs() < 0.005);
     let clean = with(|r| r.force_n.clone());
-    for (a, b) in seen.undo(&refs).runs.iter().zip(&clean) {
+    for (a, b) in seen.calibrate(&refs).recordings.iter().zip(&clean) {
         for (a, b) in a.recording.force_n.iter().zip(&b.recording.force_n) {
             assert!((a - b).abs() < 0.01 + 0.005 * b.abs(), "{a} is not {b}");
         }
@@ -100,7 +100,7 @@ fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
         t if t < 22.0 => -2e-3,
         _ => 0.0,
     };
-    let runs: Vec<Insertion> = (0..4)
+    let runs: Vec<SegmentedRecording> = (0..4)
         .map(|run| {
             let mut noise = 17 + run;
             let (mut z, mut t, mut out) = (0.0, 0.0, (Vec::new(), Vec::new(), Vec::new()));
@@ -114,10 +114,10 @@ fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
                 t += 0.01;
             }
             let recording = Recording::new(out.0, out.1, out.2).expect("clean columns");
-            Insertion::new(format!("run {run}"), recording, 1)
+            SegmentedRecording::new(format!("run {run}"), recording, 1)
         })
         .collect();
-    assert!(look(&runs).shown.is_empty(), "{:?}", look(&runs).shown);
+    assert!(look(&runs).detected.is_empty(), "{:?}", look(&runs).detected);
 }
 
 /// A zero that runs away by so much a second does so for longer in a long insertion than in a short recording of air; and one that moves by
@@ -135,13 +135,13 @@ fn a_drift_is_undone_by_what_each_insertion_shows_of_it() {
     let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
     let f = (0..t.len()).map(|k| rate_n_per_s * t[k] + 1e-3 * ((k * 7919) % 101) as f64 / 101.0).collect();
     let air = Recording::new(t.clone(), vec![0.0; t.len()], f).expect("clean columns");
-    let checks = Checks { air: Some(&air), load: None };
+    let checks = ReferenceRecordings { air: Some(&air), load: None };
     let clean = with(|r| r.force_n.clone());
     for runs in [by_time, by_recording] {
-        let refs: Vec<&Insertion> = runs.iter().collect();
-        let seen = Instrument::look(&checks, &refs, believed().surface_m);
+        let refs: Vec<&SegmentedRecording> = runs.iter().collect();
+        let seen = InstrumentReport::assess(&checks, &refs, believed().surface_m);
         assert_eq!(shown(&seen), ["force_drift"], "{seen:?}");
-        for (a, b) in seen.undo(&refs).runs.iter().zip(&clean) {
+        for (a, b) in seen.calibrate(&refs).recordings.iter().zip(&clean) {
             for (a, b) in a.recording.force_n.iter().zip(&b.recording.force_n) {
                 assert!((a - b).abs() < 0.03, "{a} is not {b}");
             }

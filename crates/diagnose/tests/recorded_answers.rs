@@ -15,19 +15,19 @@ mod recorded;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use recorded::Told;
-use stylet_diagnose::outcome::Cause;
-use stylet_diagnose::predict::{Refit, predict};
-use stylet_diagnose::{Evidence, Examined, Options, Verdict, diagnose};
+use recorded::AnswerLines;
+use stylet_diagnose::diagnosis_json::Cause;
+use stylet_diagnose::prediction::{Refit, predict};
+use stylet_diagnose::{DiagnosisResult, NamedRecording, Options, Verdict, diagnose};
 use stylet_own_world::{self as hidden, Drawn, Harder, Kind, Motions, Outside};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_tissue::{
     AnyEffect, AsymmetricFriction, BoundaryShift, CoulombFriction, CuttingForce, Effect, ForceBias,
-    ForceDrift, ForceSpikes, HiddenMembrane, IncompleteRelease, Law, LawState, Layer, LowPassLag,
-    Measurement, NeedleCompliance, PeriodicInterference, PositionScale, PowerLawFriction, PronyTerm,
-    Quantisation, RateDependentPuncture, Reading, Respiration, Saturation, SoftBoundary, StressRelaxation,
-    StribeckFriction, TimeDelay, Tissue, ToolInertia,
+    ForceDrift, ForceLaw, ForceLawState, ForceSpikes, HiddenMembrane, IncompleteRelease, Layer, LowPassLag,
+    MeasurementChain, NeedleCompliance, PeriodicInterference, PositionScale, PowerLawFriction, PronyTerm,
+    Quantisation, RateDependentPuncture, Respiration, Saturation, SensorInput, SoftBoundary,
+    StressRelaxation, StribeckFriction, TimeDelay, Tissue, ToolInertia,
 };
 
 const FILE: &str = "recorded_answers.txt";
@@ -167,7 +167,7 @@ impl Case {
         Self { effects: effects.into_iter().collect(), ..Self::default() }
     }
 
-    fn evidence(&self) -> Vec<Evidence> {
+    fn evidence(&self) -> Vec<NamedRecording> {
         const FINE: usize = 5;
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut out = Vec::new();
@@ -177,9 +177,9 @@ impl Case {
             tissue.surface_m += self.moved_m * [1.0, -0.6, 0.3][k % 3];
             let factor = 1.0 + self.scatter * normal();
             tissue.layers[0].puncture_n = tissue.layers[0].puncture_n.map(|f| f * factor);
-            let law = Law::new(&tissue, &self.effects).expect("a law");
-            let chain = Measurement::new(&self.effects);
-            let (mut state, mut measuring) = (LawState::default(), chain.start(HZ * FINE as f64));
+            let law = ForceLaw::new(&tissue, &self.effects).expect("a law");
+            let chain = MeasurementChain::new(&self.effects);
+            let (mut state, mut measuring) = (ForceLawState::default(), chain.start(HZ * FINE as f64));
             let mut outside = self.outside.clone();
             let (keep, mut slow) = (libm::exp(-1.0 / (HZ * self.wander.1)), normal());
             let spike_n = self.effects.iter().find_map(|e| match e {
@@ -208,55 +208,56 @@ impl Case {
                     };
                     noise_n += spike * spike_n;
                 }
-                let reading = Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
+                let reading =
+                    SensorInput { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
                 let f = chain.step(&mut measuring, &reading);
                 if sampled {
-                    columns.iter_mut().zip([t, chain.position(z), f]).for_each(|(c, x)| c.push(x));
+                    columns.iter_mut().zip([t, chain.recorded_position(z), f]).for_each(|(c, x)| c.push(x));
                 }
             }
             let [t, z, f] = columns;
             let recording = Recording::new(t, z, f).expect("clean columns");
-            out.push(Evidence { name: format!("{k}.csv"), recording, notes: Vec::new() });
+            out.push(NamedRecording { name: format!("{k}.csv"), recording, notes: Vec::new() });
         }
         out
     }
 
     /// Diagnoses the case; all that comes out is compared with what is kept under this name.
-    fn examined(&self, name: &str) -> Examined {
+    fn examined(&self, name: &str) -> DiagnosisResult {
         let found =
             diagnose(&self.believed, &self.evidence(), &Options::default(), |_| {}).expect("a diagnosis");
-        let mut told = Told::default();
+        let mut told = AnswerLines::default();
         tell(&mut told, &found);
-        told.hold(FILE, name);
+        told.compare(FILE, name);
         found
     }
 }
 
-fn tell(told: &mut Told, found: &Examined) {
+fn tell(told: &mut AnswerLines, found: &DiagnosisResult) {
     told.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
-    told.value("tissue", &serde_json::to_value(&found.extended.tissue).expect("JSON"));
-    for e in &found.extended.effects {
+    told.value("tissue", &serde_json::to_value(&found.extended_scenario.tissue).expect("JSON"));
+    for e in &found.extended_scenario.effects {
         told.numbers(&format!("extended.{}", e.id()), &e.parameters());
     }
-    for (k, class) in found.classes.iter().enumerate() {
-        class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.behind));
+    for (k, class) in found.competing_effects.iter().enumerate() {
+        class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.nats_behind));
     }
-    for (name, left) in [("before", &found.before), ("after", &found.after)] {
+    for (name, left) in [("before", &found.base_held_out), ("after", &found.extended_held_out)] {
         for (k, l) in left.iter().enumerate() {
             let Some(l) = l else { continue };
-            told.column(&format!("{name}.{k}.e"), &l.e);
-            told.numbers(&format!("{name}.{k}.instants"), &l.instants);
+            told.column(&format!("{name}.{k}.e"), &l.residual_n);
+            told.numbers(&format!("{name}.{k}.instants"), &l.rupture_times_s);
         }
     }
-    for (k, c) in stylet_diagnose::curves::curves(found).iter().enumerate() {
+    for (k, c) in stylet_diagnose::report_curves::recording_curves(found).iter().enumerate() {
         for (name, x) in [
             ("time", &c.time_s),
             ("position", &c.position_m),
             ("velocity", &c.velocity_mps),
             ("force", &c.force_n),
-            ("base", &c.base_n),
-            ("extended", &c.extended_n),
-            ("free", &c.free_n),
+            ("base", &c.base_residual_n),
+            ("extended", &c.extended_residual_n),
+            ("free", &c.free_run_residual_n),
             ("ruptures", &c.ruptures_s),
         ] {
             told.column(&format!("curve.{k}.{name}"), x);
@@ -266,11 +267,11 @@ fn tell(told: &mut Told, found: &Examined) {
     }
 }
 
-fn named(found: &Examined) -> Vec<&str> {
+fn named(found: &DiagnosisResult) -> Vec<&str> {
     found.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect()
 }
 
-fn cause<'a>(found: &'a Examined, effect: &str) -> &'a Cause {
+fn cause<'a>(found: &'a DiagnosisResult, effect: &str) -> &'a Cause {
     let all = named(found);
     let found = found.diagnosis.causes.iter().find(|c| c.effect == effect);
     assert!(found.is_some(), "no {effect}: {all:?}");
@@ -278,7 +279,7 @@ fn cause<'a>(found: &'a Examined, effect: &str) -> &'a Cause {
 }
 
 /// Whether the interval of a cause's number holds the truth.
-fn holds(found: &Examined, effect: &str, path: &str, truth: f64) {
+fn holds(found: &DiagnosisResult, effect: &str, path: &str, truth: f64) {
     let e = cause(found, effect).parameters[path];
     assert!(e.low <= truth && truth <= e.high, "{effect}.{path} is {truth}, said {e:?}");
 }
@@ -417,7 +418,7 @@ fn a_wrong_scale_of_two_thicknesses() {
 fn surfaces_of_their_own() {
     let found = Case { moved_m: 5e-4, ..Case::default() }.examined("surfaces of their own");
     assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", named(&found));
-    let told = found.diagnosis.differences.surface_m;
+    let told = found.diagnosis.random_effect_sd.surface_m;
     assert!((2e-4..7e-4).contains(&told), "{told}");
 }
 
@@ -446,17 +447,17 @@ fn others(which: &[(&str, Vec<AnyEffect>, f64, f64)]) {
             diagnose(&case.believed, &case.evidence(), &Options::default(), |_| {}).expect("a diagnosis");
         // What is hidden is named, but for traces.
         let mut all = named(&found);
-        all.extend(found.diagnosis.traces.iter().map(|t| t.effect.as_str()));
+        all.extend(found.diagnosis.negligible.iter().map(|t| t.effect.as_str()));
         let mut hidden: Vec<&str> = effects.iter().map(Effect::id).collect();
         all.sort_unstable();
         hidden.sort_unstable();
         assert_eq!(all, hidden, "{name}");
-        let mut told = Told::default();
+        let mut told = AnswerLines::default();
         told.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
-        for (k, class) in found.classes.iter().enumerate() {
-            class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.behind));
+        for (k, class) in found.competing_effects.iter().enumerate() {
+            class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.nats_behind));
         }
-        told.hold(FILE, &format!("other: {name}"));
+        told.compare(FILE, &format!("other: {name}"));
     }
 }
 
@@ -553,8 +554,8 @@ fn predictions() {
     case.truth.surface_m = 6e-4;
     case.truth.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= 0.85);
     let evidence = case.evidence();
-    let mut told = Told::default();
-    let (model, d) = (&found.extended, &found.diagnosis);
+    let mut told = AnswerLines::default();
+    let (model, d) = (&found.extended_scenario, &found.diagnosis);
     let base = believed();
     for (name, d, was, refit) in [
         ("as it is", None, None, &[][..]),
@@ -563,13 +564,13 @@ fn predictions() {
     ] {
         let p = predict(model, d, was, refit, &evidence).expect("a prediction");
         told.value(name, &serde_json::to_value(&p.prediction).expect("JSON"));
-        for (k, s) in p.shown.iter().enumerate() {
+        for (k, s) in p.curves.iter().enumerate() {
             let mut column = |what: &str, x: &[f64]| told.column(&format!("{name}.{k}.{what}"), x);
             column("time", &s.time_s);
             column("position", &s.position_m);
             column("measured", &s.measured_n);
             column("predicted", &s.predicted_n);
-            column("believed", s.believed_n.as_deref().unwrap_or(&[]));
+            column("believed", s.assumed_n.as_deref().unwrap_or(&[]));
             column("low", &s.low_n);
             column("high", &s.high_n);
             column("ruptures", &s.ruptures_s);
@@ -579,13 +580,13 @@ fn predictions() {
     let alone = predict(model, Some(d), None, &[Refit::Friction], &evidence[..1]).expect("a prediction");
     assert!(!alone.prediction.held_out);
     told.value("alone", &serde_json::to_value(&alone.prediction).expect("JSON"));
-    told.hold(FILE, "predictions");
+    told.compare(FILE, "predictions");
 }
 
 /// What is drawn for a seed and an index stays the same: older tables were made of it.
 #[test]
 fn sketches_of_the_former_benchmark() {
-    let mut told = Told::default();
+    let mut told = AnswerLines::default();
     for index in 0..70 {
         let s = hidden::sketch(5, index);
         let what = s
@@ -627,13 +628,13 @@ fn sketches_of_the_former_benchmark() {
         told.words(&format!("{harder:?}"), &format!("{:?} {:?}", d.motions, d.outside));
         told.numbers(&format!("{harder:?}"), &[d.ar[0], d.ar[1], d.scatter, d.velocity_noise_mps]);
     }
-    told.hold(FILE, "drawn sketches");
+    told.compare(FILE, "drawn sketches");
 }
 
 /// The same for recordings: each motion, noise of a colour, spikes, a scatter, what the library lacks.
 #[test]
 fn recordings_of_the_former_benchmark() {
-    let mut told = Told::default();
+    let mut told = AnswerLines::default();
     let plain = |seed, motions| Drawn {
         seed,
         effects: Vec::new(),
@@ -697,5 +698,5 @@ fn recordings_of_the_former_benchmark() {
         }
         told.number(&format!("largest.{}", drawn.seed), hidden::largest_force(drawn));
     }
-    told.hold(FILE, "drawn recordings");
+    told.compare(FILE, "drawn recordings");
 }

@@ -6,13 +6,14 @@ mod recorded;
 
 use drawn::{Drawn, drawn, plain};
 use stylet_diagnose::Verdict;
-use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::instrument::Checks;
-use stylet_diagnose::set::study::{Study, study};
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::diagnose_set::{SetDiagnosis, diagnose_set};
+use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings;
 
-fn look(runs: &[Insertion]) -> Study {
-    let refs: Vec<&Insertion> = runs.iter().collect();
-    study("known", &drawn::believed(), &refs, &Checks::default(), |_| {}).expect("a study")
+fn look(runs: &[SegmentedRecording]) -> SetDiagnosis {
+    let refs: Vec<&SegmentedRecording> = runs.iter().collect();
+    diagnose_set("known", &drawn::believed(), &refs, &ReferenceRecordings::default(), |_| {})
+        .expect("a study")
 }
 
 #[test]
@@ -22,19 +23,19 @@ fn the_effects_of_a_known_law_are_found_with_the_scatter_between_runs() {
     let s = look(&runs);
     let d = &s.diagnosis;
     let named: Vec<&str> = d.causes.iter().map(|c| c.effect.as_str()).collect();
-    println!("{named:?} {:?}", s.repeats.mean);
+    println!("{named:?} {:?}", s.report.mean);
     assert_eq!(d.verdict, Verdict::Named);
-    for effect in ["shaft_slip", "let_go"] {
+    for effect in ["shaft_slip", "release_depth"] {
         assert!(named.contains(&effect), "{effect}: {named:?}");
     }
-    assert!(s.repeats.starts.0 >= 8, "{:?}", s.repeats.starts);
+    assert!(s.report.starts.0 >= 8, "{:?}", s.report.starts);
     // A run that took no part is predicted as well as by its fellows, or better.
-    let m = &s.repeats.mean;
-    assert!(m.extended_n <= 1.1 * m.floor_n.expect("four of each speed"), "{m:?}");
-    assert!(m.base_n > 1.5 * m.extended_n, "{m:?}");
-    assert!((0.7..=0.99).contains(&m.covered), "{m:?}");
+    let m = &s.report.mean;
+    assert!(m.with_discrepancy_n <= 1.1 * m.floor_n.expect("four of each speed"), "{m:?}");
+    assert!(m.base_n > 1.5 * m.with_discrepancy_n, "{m:?}");
+    assert!((0.7..=0.99).contains(&m.coverage), "{m:?}");
     // What was drawn is told apart from what is shared: 0.1 mm, 3 %.
-    let p = &s.repeats.population;
+    let p = &s.report.variability;
     assert!((3e-5..3e-4).contains(&p.surface_m), "{p:?}");
     assert!((0.01..0.09).contains(&p.friction), "{p:?}");
 }
@@ -44,25 +45,27 @@ fn where_the_base_law_is_the_truth_nothing_is_named() {
     let runs = plain(11);
     let s = look(&runs);
     let named: Vec<&str> = s.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
-    println!("{named:?} {:?}", s.repeats.mean);
+    println!("{named:?} {:?}", s.report.mean);
     recorded(&s);
     assert_eq!(s.diagnosis.verdict, Verdict::None, "{named:?}");
-    let m = &s.repeats.mean;
-    assert!(m.extended_n <= 1.1 * m.floor_n.expect("four of each speed"), "{m:?}");
+    let m = &s.report.mean;
+    assert!(m.with_discrepancy_n <= 1.1 * m.floor_n.expect("four of each speed"), "{m:?}");
 }
 
 /// All that was said and fitted, compared with `recorded_answers.txt` (see the test of that name).
-fn recorded(s: &Study) {
-    let mut told = recorded::Told::default();
+fn recorded(s: &SetDiagnosis) {
+    let mut told = recorded::AnswerLines::default();
     told.value("diagnosis", &serde_json::to_value(&s.diagnosis).expect("JSON"));
-    told.value("repeats", &serde_json::to_value(&s.repeats).expect("JSON"));
-    told.value("extended", &serde_json::to_value(&s.extended).expect("JSON"));
-    for (name, law) in
-        [("base", Some(&s.laws.base)), ("library", s.laws.library.as_ref()), ("slip", s.laws.slip.as_ref())]
-    {
+    told.value("repeats", &serde_json::to_value(&s.report).expect("JSON"));
+    told.value("extended", &serde_json::to_value(&s.mean_scenario).expect("JSON"));
+    for (name, law) in [
+        ("base", Some(&s.candidates.base)),
+        ("library", s.candidates.library.as_ref()),
+        ("slip", s.candidates.slip.as_ref()),
+    ] {
         let Some(law) = law else { continue };
         told.numbers(&format!("{name}.left out"), &law.errors_n);
-        let model = &law.fitted.fit.model;
+        let model = &law.set_fit.fit.model;
         for (k, e) in model.effects.iter().enumerate() {
             told.numbers(&format!("{name}.{k}.{}", e.info.id), &e.values);
         }
@@ -76,19 +79,26 @@ fn recorded(s: &Study) {
                 layer.puncture_n.unwrap_or(0.0),
             ],
         );
-        told.numbers(&format!("{name}.instants"), &model.instants.concat());
+        told.numbers(&format!("{name}.instants"), &model.rupture_times_s.concat());
         let s = &model.scatter;
         told.numbers(
             &format!("{name}.scatter"),
-            &[s.force, s.place_m, s.surface_m, s.friction, s.day_surface_m, s.day_friction],
+            &[
+                s.rupture_force,
+                s.rupture_depth_m,
+                s.surface_m,
+                s.ln_friction,
+                s.day_surface_m,
+                s.day_ln_friction,
+            ],
         );
     }
-    for (k, out) in s.out.iter().enumerate() {
+    for (k, out) in s.held_out.iter().enumerate() {
         let p = &out.prediction;
-        for (n, x) in [("mean", &p.mean), ("low", &p.low), ("high", &p.high)] {
+        for (n, x) in [("mean", &p.mean_n), ("low", &p.low_n), ("high", &p.high_n)] {
             told.column(&format!("out.{k}.{n}"), x);
         }
-        told.numbers(&format!("out.{k}.parts"), &out.score.parts.map(|p| p.0));
+        told.numbers(&format!("out.{k}.parts"), &out.score.phase_squares.map(|p| p.0));
     }
-    told.hold("recorded_answers.txt", "a set of repeats");
+    told.compare("recorded_answers.txt", "a set of repeats");
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// The joint quantity that left its limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub enum JointQuantity {
     /// Joint angle (rad).
     Position,
     /// Joint rate (rad/s).
@@ -13,7 +13,7 @@ pub enum Quantity {
     Torque,
 }
 
-impl Quantity {
+impl JointQuantity {
     /// The unit in which values of this quantity are given.
     pub fn unit(self) -> &'static str {
         match self {
@@ -44,7 +44,7 @@ pub enum Error {
         /// Counted from 1.
         joint: usize,
         /// Which limit.
-        quantity: Quantity,
+        quantity: JointQuantity,
         /// The offending value.
         value: f64,
         /// Lower limit.

@@ -7,12 +7,12 @@
 //! torque that the observer is told (a motor whose inner loop overcomes its friction, and an observer that
 //! sees the motor's current). The observer's residual is the same for the same motion.
 
-use crate::arm::JointVector;
+use crate::arm_posture::JointVector;
 use crate::error::{Error, check};
 
 /// Coulomb and viscous friction in one direction of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Direction {
+pub struct DirectionalFriction {
     /// Torque at the slightest motion.
     pub coulomb_nm: f64,
     /// Rise with the rate.
@@ -25,9 +25,9 @@ pub enum FrictionLaw {
     /// `sgn(qd) coulomb + viscous qd`, with coefficients of the direction of motion.
     CoulombViscous {
         /// While the joint angle grows.
-        positive: Direction,
+        positive: DirectionalFriction,
         /// While the joint angle falls.
-        negative: Direction,
+        negative: DirectionalFriction,
     },
     /// `k + A/(1 + exp(-a (qd + q0)))`: Coulomb friction of half-amplitude `A/2` with a soft transition (Gaz
     /// et al. 2019; the laboratory software of the paper). Without offset where `k = -A/(1 + exp(-a q0))`.
@@ -52,13 +52,13 @@ impl Default for FrictionLaw {
 impl FrictionLaw {
     /// No friction.
     pub const NONE: Self = Self::CoulombViscous {
-        positive: Direction { coulomb_nm: 0.0, viscous_nms_per_rad: 0.0 },
-        negative: Direction { coulomb_nm: 0.0, viscous_nms_per_rad: 0.0 },
+        positive: DirectionalFriction { coulomb_nm: 0.0, viscous_nms_per_rad: 0.0 },
+        negative: DirectionalFriction { coulomb_nm: 0.0, viscous_nms_per_rad: 0.0 },
     };
 
     /// The same in both directions.
     pub const fn symmetric(coulomb_nm: f64, viscous_nms_per_rad: f64) -> Self {
-        let both = Direction { coulomb_nm, viscous_nms_per_rad };
+        let both = DirectionalFriction { coulomb_nm, viscous_nms_per_rad };
         Self::CoulombViscous { positive: both, negative: both }
     }
 
@@ -70,7 +70,7 @@ impl FrictionLaw {
 
     /// All torques multiplied; for studies of how much friction a method bears.
     pub fn scaled(self, factor: f64) -> Self {
-        let direction = |d: Direction| Direction {
+        let direction = |d: DirectionalFriction| DirectionalFriction {
             coulomb_nm: d.coulomb_nm * factor,
             viscous_nms_per_rad: d.viscous_nms_per_rad * factor,
         };
@@ -91,7 +91,7 @@ impl FrictionLaw {
         match *self {
             Self::CoulombViscous { positive, negative } => {
                 let side = if qd >= 0.0 { positive } else { negative };
-                side.coulomb_nm * sign.of(qd) + side.viscous_nms_per_rad * qd
+                side.coulomb_nm * sign.value(qd) + side.viscous_nms_per_rad * qd
             }
             Self::Sigmoid { offset_nm, amplitude_nm, steepness_s_per_rad, shift_radps } => {
                 offset_nm + amplitude_nm / (1.0 + libm::exp(-steepness_s_per_rad * (qd + shift_radps)))
@@ -155,7 +155,7 @@ impl Default for SmoothSign {
 
 impl SmoothSign {
     /// From -1 to 1.
-    pub fn of(&self, x: f64) -> f64 {
+    pub fn value(&self, x: f64) -> f64 {
         let beyond = x.abs() - self.dead_band_radps;
         if beyond <= 0.0 {
             0.0

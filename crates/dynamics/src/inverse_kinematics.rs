@@ -1,6 +1,6 @@
 //! Joint angles for a pose of the tip, within the joints' limits.
 
-use crate::arm::{Arm, JointVector};
+use crate::arm_posture::{Arm, JointVector};
 use crate::error::{Error, check, check_finite_joints};
 use crate::kinematics::damped_inverse;
 use crate::pose::Pose;
@@ -96,7 +96,7 @@ impl<const N: usize> Arm<N> {
         loop {
             let (tip, jacobian) = self.at(&q).tip_and_jacobian();
             let dx = target.position_m - tip.position_m;
-            let turn = tip.rotation_to(target);
+            let turn = tip.rotation_vector_to(target);
             let (position_error_m, orientation_error_rad) = (dx.norm(), turn.norm());
             let done = position_error_m <= config.position_tolerance_m
                 && orientation_error_rad <= config.orientation_tolerance_rad;

@@ -1,7 +1,7 @@
 //! Where the tip is and how it moves.
 
-use crate::arm::{JointVector, Posture};
-use crate::linear::solve_spd;
+use crate::arm_posture::{JointVector, Posture};
+use crate::cholesky_solve::solve_spd;
 use crate::pose::Pose;
 use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 
@@ -14,7 +14,7 @@ impl<const N: usize> Posture<'_, N> {
         let mut poses = [Pose::IDENTITY; N];
         let mut pose = Pose::IDENTITY;
         for (i, link) in poses.iter_mut().enumerate() {
-            pose = pose.then(&Pose { rotation: self.rotations[i], position_m: *self.origin(i) });
+            pose = pose.compose(&Pose { rotation: self.rotations[i], position_m: *self.origin(i) });
             *link = pose;
         }
         poses
@@ -22,7 +22,7 @@ impl<const N: usize> Posture<'_, N> {
 
     /// The tip's frame in the base.
     pub fn tip(&self) -> Pose {
-        self.link_poses().last().unwrap_or(&Pose::IDENTITY).then(&self.arm.tip)
+        self.link_poses().last().unwrap_or(&Pose::IDENTITY).compose(&self.arm.tip)
     }
 
     /// Geometric Jacobian of the tip's origin.
@@ -33,7 +33,7 @@ impl<const N: usize> Posture<'_, N> {
     /// Both in one pass outwards.
     pub fn tip_and_jacobian(&self) -> (Pose, Jacobian<N>) {
         let links = self.link_poses();
-        let tip = links.last().unwrap_or(&Pose::IDENTITY).then(&self.arm.tip);
+        let tip = links.last().unwrap_or(&Pose::IDENTITY).compose(&self.arm.tip);
         let mut jacobian = Jacobian::<N>::zeros();
         for (i, link) in links.iter().enumerate() {
             let axis: Vector3<f64> = link.rotation.column(2).into();
@@ -60,7 +60,7 @@ impl<const N: usize> Posture<'_, N> {
             dw += axis * qdd_radps2[i] + w.cross(&axis) * qd_radps[i];
             w += axis * qd_radps[i];
         }
-        let tip = links.last().unwrap_or(&Pose::IDENTITY).then(&self.arm.tip);
+        let tip = links.last().unwrap_or(&Pose::IDENTITY).compose(&self.arm.tip);
         move_to(&tip.position_m, &w, &dw);
         Vector6::new(a.x, a.y, a.z, dw.x, dw.y, dw.z)
     }

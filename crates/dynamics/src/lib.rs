@@ -48,35 +48,35 @@
 //! Haddadin, De Luca and Albu-Schaeffer, *Robot collisions: a survey on detection, isolation, and
 //! identification*, IEEE T-RO 2017 (the observer).
 
-mod arm;
-mod body;
+mod arm_model;
+mod arm_posture;
+mod cholesky_solve;
 mod error;
+pub mod feasibility;
 pub mod friction;
+mod generalized_momentum;
 mod inverse_kinematics;
 mod kinematics;
-mod linear;
 mod mass_matrix;
-mod model;
-mod momentum;
-mod observer;
+mod momentum_observer;
 pub mod panda;
 mod pose;
+mod rigid_body;
 mod rnea;
-mod singular;
-mod tip_force;
-pub mod validate;
+mod singular_values;
+mod tip_wrench;
 mod wrench;
 
-pub use arm::{Arm, JointVector, Posture};
-pub use body::RigidBody;
-pub use error::{Error, Quantity};
+pub use arm_model::{ArmModel, JointLimits, Link, Tool};
+pub use arm_posture::{Arm, JointVector, Posture};
+pub use error::{Error, JointQuantity};
+pub use generalized_momentum::MomentumTerms;
 pub use inverse_kinematics::IkConfig;
 pub use kinematics::Jacobian;
-pub use model::{ArmModel, JointLimits, Link, Tool};
-pub use momentum::MomentumTerms;
-pub use observer::{Gain, Observer, ObserverConfig, ObserverState};
+pub use momentum_observer::{JointGain, Observer, ObserverConfig, ObserverState};
 pub use pose::Pose;
-pub use singular::SingularValues;
+pub use rigid_body::RigidBody;
+pub use singular_values::SingularValues;
 pub use wrench::Wrench;
 
 /// Gravity in the base frame of an arm that stands upright (m/s^2).

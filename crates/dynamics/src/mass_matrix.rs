@@ -1,7 +1,7 @@
 //! The joint-space mass matrix, and the motion that torques cause.
 
-use crate::arm::{JointVector, Posture};
-use crate::linear::solve_spd;
+use crate::arm_posture::{JointVector, Posture};
+use crate::cholesky_solve::solve_spd;
 use crate::wrench::Wrench;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 

@@ -8,11 +8,11 @@
 //!
 //! Joint friction: [`MEASURED_FRICTION`].
 
-use crate::arm::JointVector;
-use crate::body::RigidBody;
-use crate::friction::{Direction, FrictionLaw, JointFriction, SmoothSign};
-use crate::model::{ArmModel, JointLimits, Link, Tool};
+use crate::arm_model::{ArmModel, JointLimits, Link, Tool};
+use crate::arm_posture::JointVector;
+use crate::friction::{DirectionalFriction, FrictionLaw, JointFriction, SmoothSign};
 use crate::pose::Pose;
+use crate::rigid_body::RigidBody;
 use nalgebra::{ArrayStorage, Matrix3, Vector3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -44,7 +44,7 @@ pub const SENSOR_RADIUS_M: f64 = 0.0225;
 pub const NEEDLE_RADIUS_M: f64 = 0.003;
 
 /// The arm with a bare flange.
-pub fn bare() -> ArmModel<7> {
+pub fn without_tool() -> ArmModel<7> {
     let large =
         |lower_rad, upper_rad| JointLimits { lower_rad, upper_rad, velocity_radps: 2.175, torque_nm: 87.0 };
     let small =
@@ -52,7 +52,7 @@ pub fn bare() -> ArmModel<7> {
     ArmModel {
         links: [
             Link {
-                placement: Pose::shifted(0.0, 0.0, 0.333),
+                placement: Pose::translation(0.0, 0.0, 0.333),
                 body: body(
                     4.970684,
                     [0.003875, 0.002081, -0.04762],
@@ -115,7 +115,7 @@ pub fn bare() -> ArmModel<7> {
                 limits: small(-2.8973, 2.8973),
             },
         ],
-        flange: Pose::shifted(0.0, 0.0, 0.107),
+        flange: Pose::translation(0.0, 0.0, 0.107),
         tool: Tool::default(),
     }
 }
@@ -136,14 +136,14 @@ pub fn needle_and_sensor() -> Tool {
     );
     Tool {
         mount: Pose::IDENTITY,
-        payload: sensor.joined(&needle),
-        tip: Pose::shifted(0.0, 0.0, SENSOR_HEIGHT_M + NEEDLE_LENGTH_M),
+        payload: sensor.combined(&needle),
+        tip: Pose::translation(0.0, 0.0, SENSOR_HEIGHT_M + NEEDLE_LENGTH_M),
     }
 }
 
 /// [`bare`] with [`needle_and_sensor`].
 pub fn with_needle() -> ArmModel<7> {
-    bare().with_tool(needle_and_sensor())
+    without_tool().with_tool(needle_and_sensor())
 }
 
 /// Coulomb and viscous friction identified on a Panda: viscous (N m s/rad) and Coulomb (N m) symmetric, then
@@ -171,8 +171,8 @@ pub fn symmetric_friction() -> JointFriction<7> {
 /// [`MEASURED_FRICTION`], direction-dependent.
 pub fn directional_friction() -> JointFriction<7> {
     let joints = MEASURED_FRICTION.map(|row| FrictionLaw::CoulombViscous {
-        positive: Direction { coulomb_nm: row[3], viscous_nms_per_rad: row[2] },
-        negative: Direction { coulomb_nm: row[5], viscous_nms_per_rad: row[4] },
+        positive: DirectionalFriction { coulomb_nm: row[3], viscous_nms_per_rad: row[2] },
+        negative: DirectionalFriction { coulomb_nm: row[5], viscous_nms_per_rad: row[4] },
     });
     JointFriction { joints, sign: SmoothSign::default() }
 }

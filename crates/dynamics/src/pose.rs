@@ -26,7 +26,7 @@ impl Pose {
     };
 
     /// Axes parallel to the parent's, origin at `(x, y, z)` metres.
-    pub const fn shifted(x_m: f64, y_m: f64, z_m: f64) -> Self {
+    pub const fn translation(x_m: f64, y_m: f64, z_m: f64) -> Self {
         Self { rotation: Self::IDENTITY.rotation, position_m: Vector3::new(x_m, y_m, z_m) }
     }
 
@@ -43,8 +43,8 @@ impl Pose {
     }
 
     /// The grandchild's pose in this frame's parent.
-    pub fn then(&self, child: &Self) -> Self {
-        Self { rotation: self.rotation * child.rotation, position_m: self.point(&child.position_m) }
+    pub fn compose(&self, child: &Self) -> Self {
+        Self { rotation: self.rotation * child.rotation, position_m: self.transform_point(&child.position_m) }
     }
 
     /// The parent's pose in the child.
@@ -54,13 +54,13 @@ impl Pose {
     }
 
     /// A point given in child coordinates, in parent coordinates.
-    pub fn point(&self, child_m: &Vector3<f64>) -> Vector3<f64> {
+    pub fn transform_point(&self, child_m: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * child_m + self.position_m
     }
 
     /// Turn from this orientation to `target` as a rotation vector in parent coordinates (rad; length 0 to
     /// pi).
-    pub fn rotation_to(&self, target: &Self) -> Vector3<f64> {
+    pub fn rotation_vector_to(&self, target: &Self) -> Vector3<f64> {
         rotation_vector(&(target.rotation * self.rotation.transpose()))
     }
 

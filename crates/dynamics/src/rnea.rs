@@ -1,6 +1,6 @@
 //! Inverse dynamics: the joint torques that a motion takes.
 
-use crate::arm::{JointVector, Posture};
+use crate::arm_posture::{JointVector, Posture};
 use crate::wrench::Wrench;
 use nalgebra::Vector3;
 

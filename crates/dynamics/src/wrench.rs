@@ -19,18 +19,18 @@ impl Wrench {
 
     /// Component of the force along a unit vector (base coordinates). Tissue that resists motion along it
     /// gives a negative number.
-    pub fn along(&self, unit: &Vector3<f64>) -> f64 {
+    pub fn component_along(&self, unit: &Vector3<f64>) -> f64 {
         self.force_n.dot(unit)
     }
 
     /// Force on top of moment, in the order of the Jacobian's rows.
-    pub fn stacked(&self) -> Vector6<f64> {
+    pub fn to_vector(&self) -> Vector6<f64> {
         let (f, m) = (&self.force_n, &self.moment_nm);
         Vector6::new(f.x, f.y, f.z, m.x, m.y, m.z)
     }
 
     /// The reverse of [`Wrench::stacked`].
-    pub fn from_stacked(v: &Vector6<f64>) -> Self {
+    pub fn from_vector(v: &Vector6<f64>) -> Self {
         Self { force_n: Vector3::new(v[0], v[1], v[2]), moment_nm: Vector3::new(v[3], v[4], v[5]) }
     }
 }

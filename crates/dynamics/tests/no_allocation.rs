@@ -5,8 +5,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
 use stylet_dynamics::{
-    Arm, EARTH_GRAVITY_MPS2, IkConfig, JointVector, ObserverConfig, ObserverState, Wrench, panda,
-    validate::{self, LineConfig},
+    Arm, EARTH_GRAVITY_MPS2, IkConfig, JointVector, ObserverConfig, ObserverState, Wrench,
+    feasibility::{self, LineConfig},
+    panda,
 };
 
 thread_local! { static COUNT: Cell<usize> = const { Cell::new(0) }; }
@@ -53,7 +54,8 @@ fn a_step_of_arm_controller_and_virtual_sensor_does_not_allocate() {
     target.position_m.z -= 0.05;
     black_box(arm.inverse_kinematics(&target, &q, &IkConfig::default()).is_ok());
     black_box(
-        validate::line(&arm, &target, &arm.at(&q).tip().position_m, &q, &LineConfig::default()).is_ok(),
+        feasibility::follow_line(&arm, &target, &arm.at(&q).tip().position_m, &q, &LineConfig::default())
+            .is_ok(),
     );
     assert_eq!(COUNT.get(), before);
 }

@@ -142,7 +142,7 @@ Say for every case what is wrong beyond that, with the names in `names.txt`. One
 other members under `equivalent`, at most four names in all). `unknown`: structure that none of the names describes. Everything but
 `verdict` and `effect` may be left out; a case without an answer counts as wrong.
 
-Judged with `stylet benchmark judge FOLDER answers.json` by whoever has the key.
+Judged with `stylet benchmark score FOLDER answers.json` by whoever has the key.
 "
     )
 }

@@ -21,18 +21,18 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
-pub mod assign;
-pub mod blocks;
-pub mod discrepancy;
-pub mod drops;
-pub mod events;
+pub mod block_averages;
+pub mod delay_refinement;
+pub mod discrepancy_noise;
+pub mod evidence_nats;
 pub mod fit;
-pub mod forward;
-pub mod late;
-pub mod look;
+pub mod force_drops;
+pub mod forward_model;
+pub mod insertion_phases;
+pub mod likelihood;
 pub mod model;
-pub mod nats;
 pub mod noise;
-pub mod objective;
-pub mod phases;
-pub mod retime;
+pub mod rupture_assignment;
+pub mod rupture_likelihood;
+pub mod score_test;
+pub mod update_event_times;

@@ -5,12 +5,12 @@ mod common;
 
 use common::one_layer;
 use std::sync::Arc;
-use stylet_identify::blocks::{BLOCK_S, Blocks};
-use stylet_identify::model::{Choice, Model, NEVER};
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::likelihood::{FitData, replay};
+use stylet_identify::model::{EffectTerm, Model, NO_RUPTURE};
 use stylet_identify::noise::Noise;
-use stylet_identify::objective::{Data, replay};
 use stylet_record::Recording;
-use stylet_tissue::info;
+use stylet_tissue::effect_info;
 
 /// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
 const LAYER: (f64, f64) = (60.0, 9000.0);
@@ -50,13 +50,13 @@ fn a_needle_that_gives_is_replayed_in_blocks_as_if_followed_at_every_instant() {
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();
     let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("a recording");
-    let blocks = Blocks::new(&r, &vec![false; t.len()], BLOCK_S);
-    let data = Data::new(Arc::new(vec![blocks.clone()]), Noise::white(0.02), 0.0);
-    let info = info("needle_compliance").expect("in the library");
+    let blocks = BlockAverages::new(&r, &vec![false; t.len()], BLOCK_S);
+    let data = FitData::new(Arc::new(vec![blocks.clone()]), Noise::white(0.02), 0.0);
+    let info = effect_info("needle_compliance").expect("in the library");
     for needle in [5000.0, 20_000.0, 80_000.0] {
-        let mut model = Model::base(Arc::clone(&belief), 1).with(Choice::new(info, &[needle]));
-        model.instants = vec![vec![NEVER]];
-        let predicted = replay(&model, &data, 0).expect("a replay").f;
+        let mut model = Model::base(Arc::clone(&belief), 1).with_effect(EffectTerm::new(info, &[needle]));
+        model.rupture_times_s = vec![vec![NO_RUPTURE]];
+        let predicted = replay(&model, &data, 0).expect("a replay").force_n;
         let force = followed(needle, 14.1);
         let largest = force.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
         assert!(largest > 1.0, "{largest}");
@@ -66,12 +66,13 @@ fn a_needle_that_gives_is_replayed_in_blocks_as_if_followed_at_every_instant() {
 }
 
 /// The largest difference (N) of a block's prediction from the mean of what is sampled in it, and where (s).
-fn worst(blocks: &Blocks, predicted: &[f64], force: &[f64]) -> (f64, f64) {
+fn worst(blocks: &BlockAverages, predicted: &[f64], force: &[f64]) -> (f64, f64) {
     let off = |k: usize| {
-        let samples = |t: &&f64| **t > blocks.from_s[k] && **t < blocks.to_s[k];
-        let sampled = blocks.raw_t.iter().filter(samples).map(|t| force[(t / STEP_S).round() as usize]);
+        let samples = |t: &&f64| **t > blocks.start_s[k] && **t < blocks.end_s[k];
+        let sampled =
+            blocks.sample_time_s.iter().filter(samples).map(|t| force[(t / STEP_S).round() as usize]);
         let (sum, n) = sampled.fold((0.0, 0.0), |(sum, n), f| (sum + f, n + 1.0));
-        ((predicted[k] - sum / n).abs(), blocks.from_s[k])
+        ((predicted[k] - sum / n).abs(), blocks.start_s[k])
     };
     let used = (0..blocks.len()).filter(|k| blocks.used[*k]);
     used.map(off).fold((0.0, 0.0), |most, off| if off.0 > most.0 { off } else { most })
@@ -83,14 +84,14 @@ fn a_sensor_that_lags_is_replayed_in_blocks_as_if_followed_at_every_instant() {
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();
     let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("a recording");
-    let blocks = Blocks::new(&r, &vec![false; t.len()], BLOCK_S);
-    let data = Data::new(Arc::new(vec![blocks.clone()]), Noise::white(0.02), 0.0);
-    let info = info("low_pass_lag").expect("in the library");
+    let blocks = BlockAverages::new(&r, &vec![false; t.len()], BLOCK_S);
+    let data = FitData::new(Arc::new(vec![blocks.clone()]), Noise::white(0.02), 0.0);
+    let info = effect_info("low_pass_lag").expect("in the library");
     let (k, b) = LAYER;
     for lag_s in [0.004, 0.009, 0.021, 0.1] {
-        let mut model = Model::base(Arc::clone(&belief), 1).with(Choice::new(info, &[lag_s]));
-        model.instants = vec![vec![NEVER]];
-        let predicted = replay(&model, &data, 0).expect("a replay").f;
+        let mut model = Model::base(Arc::clone(&belief), 1).with_effect(EffectTerm::new(info, &[lag_s]));
+        model.rupture_times_s = vec![vec![NO_RUPTURE]];
+        let predicted = replay(&model, &data, 0).expect("a replay").force_n;
         let (mut lagged, mut force) = (0.0, vec![0.0]);
         for i in 1..=(14.1 / STEP_S) as usize {
             let z = base(i as f64 * STEP_S);

@@ -5,14 +5,14 @@ mod common;
 
 use common::one_layer;
 use std::sync::Arc;
-use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::delay_refinement::{delay_s, refine_delay};
 use stylet_identify::fit::{Effort, fit};
-use stylet_identify::late::{late_s, placed};
-use stylet_identify::model::{Choice, Model, NEVER};
+use stylet_identify::likelihood::FitData;
+use stylet_identify::model::{EffectTerm, Model, NO_RUPTURE};
 use stylet_identify::noise::Noise;
-use stylet_identify::objective::Data;
 use stylet_record::Recording;
-use stylet_tissue::info;
+use stylet_tissue::effect_info;
 
 /// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
 const LAYER: (f64, f64) = (60.0, 12_000.0);
@@ -51,15 +51,15 @@ fn a_delay_is_found_to_a_fraction_of_a_sampling_step() {
         let f: Vec<f64> =
             t.iter().enumerate().map(|(k, t)| force(t - truth) + 2e-3 * (k as f64 * 2.4).sin()).collect();
         let recording = Recording::new(t, z, f).expect("a recording");
-        let blocks = Blocks::new(&recording, &vec![false; recording.time_s.len()], BLOCK_S);
-        let data = Data::new(Arc::new(vec![blocks]), Noise::white(1e-3), 0.0);
-        let info = info("time_delay").expect("an effect");
-        let mut model = Model::base(Arc::clone(&belief), 1).with(Choice::new(info, &[0.02]));
-        model.instants = vec![vec![NEVER]];
+        let blocks = BlockAverages::new(&recording, &vec![false; recording.time_s.len()], BLOCK_S);
+        let data = FitData::new(Arc::new(vec![blocks]), Noise::white(1e-3), 0.0);
+        let info = effect_info("time_delay").expect("an effect");
+        let mut model = Model::base(Arc::clone(&belief), 1).with_effect(EffectTerm::new(info, &[0.02]));
+        model.rupture_times_s = vec![vec![NO_RUPTURE]];
         let found = fit(&model, &data, Effort::FULL).expect("a fit");
-        worst_at_instants = worst_at_instants.max((late_s(&found.model) - truth).abs());
-        let (found, _) = placed(&found, &data).expect("a late force is better so");
-        worst = worst.max((late_s(&found.model) - truth).abs());
+        worst_at_instants = worst_at_instants.max((delay_s(&found.model) - truth).abs());
+        let (found, _) = refine_delay(&found, &data).expect("a late force is better so");
+        worst = worst.max((delay_s(&found.model) - truth).abs());
     }
     assert!(worst < 0.02 * STEP_S, "{worst} s");
     // What would be left without.

@@ -2,14 +2,14 @@
 //! effect the model has.
 
 use std::sync::Arc;
-use stylet_identify::blocks::{BLOCK_S, Blocks};
-use stylet_identify::model::{Belief, Choice, Model};
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::likelihood::{FitData, ReplayCache, replay};
+use stylet_identify::model::{Assumptions, EffectTerm, Model};
 use stylet_identify::noise::Noise;
-use stylet_identify::objective::{Data, Trail, replay};
 use stylet_record::Recording;
-use stylet_tissue::{Layer, Tissue, library};
+use stylet_tissue::{Layer, Tissue, general_effects};
 
-fn belief() -> Belief {
+fn belief() -> Assumptions {
     let layer = |k: f64, b: f64, f: Option<f64>, d: f64| Layer {
         thickness_m: d,
         stiffness_n_per_m: k,
@@ -17,7 +17,7 @@ fn belief() -> Belief {
         puncture_n: f,
         name: String::new(),
     };
-    Belief {
+    Assumptions {
         tissue: Tissue {
             surface_m: 0.002,
             layers: vec![
@@ -26,7 +26,7 @@ fn belief() -> Belief {
                 layer(60.0, 6000.0, Some(1.1), 0.03),
             ],
         },
-        given: Vec::new(),
+        known_effects: Vec::new(),
         tolerance: vec![0.3; 3],
         thickness_tolerance: vec![0.1; 3],
         surface_tolerance_m: 0.002,
@@ -56,18 +56,18 @@ fn recording() -> Recording {
 fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
     let belief = Arc::new(belief());
     let r = recording();
-    let blocks = vec![Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)];
-    let data = Data::new(Arc::new(blocks), Noise::white(0.02), 0.0);
+    let blocks = vec![BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S)];
+    let data = FitData::new(Arc::new(blocks), Noise::white(0.02), 0.0);
     let mut models = vec![("none", Model::base(Arc::clone(&belief), 1))];
-    for info in library() {
+    for info in general_effects() {
         let values: Vec<f64> = info
             .parameters
             .iter()
-            .map(|p| if p.whole { 1.0 } else { 0.5 * (p.search.0 + p.search.1) })
+            .map(|p| if p.integer { 1.0 } else { 0.5 * (p.search.0 + p.search.1) })
             .collect();
-        let choice = Choice::new(info, &values);
+        let choice = EffectTerm::new(info, &values);
         if choice.effect().is_some() {
-            models.push((info.id, models[0].1.with(choice)));
+            models.push((info.id, models[0].1.with_effect(choice)));
         }
     }
     assert!(models.len() > 20, "{}", models.len());
@@ -76,12 +76,12 @@ fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
     let instants = (0..24)
         .map(|k| vec![2.1 + 0.02 * f64::from(k), 4.6 + 0.03 * f64::from(k), 9.7 + 0.07 * f64::from(k)]);
     for ((name, mut model), instants) in models.into_iter().zip(instants.cycle()) {
-        model.instants = vec![instants];
-        model.free.own_surface = true;
-        model.free.own_friction = true;
-        let Some(trail) = Trail::new(&model, &data, 0) else { continue };
-        for n in model.shared().iter().chain(&model.own_numbers()) {
-            if matches!(n.role, stylet_identify::model::Role::Effect { .. }) {
+        model.rupture_times_s = vec![instants];
+        model.free.recording_surface = true;
+        model.free.recording_friction = true;
+        let Some(trail) = ReplayCache::new(&model, &data, 0) else { continue };
+        for n in model.shared_parameters().iter().chain(&model.recording_parameters()) {
+            if matches!(n.role, stylet_identify::model::ParameterRole::Effect { .. }) {
                 continue;
             }
             let mut moved = model.clone();
@@ -89,9 +89,16 @@ fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
             let (Some(whole), Some(part)) = (replay(&moved, &data, 0), trail.replay(&moved, &data, 0)) else {
                 continue;
             };
-            let differ = whole.f.iter().zip(&part.f).position(|(a, b)| a.to_bits() != b.to_bits());
-            assert_eq!(differ, None, "{name}, {:?}: {:?}", n.role, differ.map(|k| (whole.f[k], part.f[k])));
-            assert_eq!(whole.events, part.events, "{name}, {:?}", n.role);
+            let differ =
+                whole.force_n.iter().zip(&part.force_n).position(|(a, b)| a.to_bits() != b.to_bits());
+            assert_eq!(
+                differ,
+                None,
+                "{name}, {:?}: {:?}",
+                n.role,
+                differ.map(|k| (whole.force_n[k], part.force_n[k]))
+            );
+            assert_eq!(whole.ruptures, part.ruptures, "{name}, {:?}", n.role);
             compared += 1;
         }
     }

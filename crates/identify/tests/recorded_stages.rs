@@ -10,25 +10,30 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
-use stylet_identify::assign::assign_all;
-use stylet_identify::blocks::{BLOCK_S, Blocks};
-use stylet_identify::discrepancy::discrepancy;
-use stylet_identify::drops::drops;
-use stylet_identify::events::{judge, scatter_of, spreads};
-use stylet_identify::fit::{Column, Effort, Fit, Tangent, fit, fit_below, fit_sharp};
-use stylet_identify::late::{late_s, placed};
-use stylet_identify::look::{Look, scaled};
-use stylet_identify::model::{Belief, Choice, Day, Model, NEVER, Role};
-use stylet_identify::noise::{From, Noise};
-use stylet_identify::objective::{Data, Trail, event_nats, prior_nats, replay, residuals};
-use stylet_identify::phases;
-use stylet_identify::retime::retime;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::delay_refinement::{delay_s, refine_delay};
+use stylet_identify::discrepancy_noise::discrepancy_noise;
+use stylet_identify::fit::{
+    Effort, Fit, JacobianColumn, Linearization, fit, fit_from_zero_scatter, fit_if_below,
+};
+use stylet_identify::force_drops::detect_force_drops;
+use stylet_identify::insertion_phases;
+use stylet_identify::likelihood::{FitData, ReplayCache, prior_nats, replay, residuals, rupture_nats};
+use stylet_identify::model::{Assumptions, DayParameters, EffectTerm, Model, NO_RUPTURE, ParameterRole};
+use stylet_identify::noise::{Noise, NoiseSource};
+use stylet_identify::rupture_assignment::assign_ruptures;
+use stylet_identify::rupture_likelihood::{estimate_rupture_scatter, evaluate_rupture, rupture_sds};
+use stylet_identify::score_test::{ScoreTest, scale_strengths};
+use stylet_identify::update_event_times::update_event_times;
 use stylet_record::Recording;
-use stylet_record::motion::settle;
-use stylet_record::motion::{Kink, velocity};
-use stylet_record::motion::{Motion, Piece};
+use stylet_record::motion::smooth_positions;
+use stylet_record::motion::{Motion, MotionPiece};
+use stylet_record::motion::{VelocityJump, estimate_velocity};
 use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
-use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissue, info, library};
+use stylet_tissue::{
+    AnyEffect, ForceLaw, ForceLawState, Layer, MeasurementChain, SensorInput, Tissue, effect_info,
+    general_effects,
+};
 
 // ---- What is written down ----
 
@@ -63,33 +68,43 @@ impl Said {
         self.column(name, &x.iter().map(|x| f64::from(u8::from(*x))).collect::<Vec<f64>>());
     }
 
-    fn kinks(&mut self, name: &str, kinks: &[Kink]) {
+    fn kinks(&mut self, name: &str, kinks: &[VelocityJump]) {
         self.count(&format!("{name} jumps"), kinks.len());
         for (i, k) in kinks.iter().enumerate().take(6) {
-            self.numbers(&format!("{name} jump {i}"), &[k.sample as f64, k.t, k.z, k.v[0], k.v[1], k.sd_m]);
+            self.numbers(
+                &format!("{name} jump {i}"),
+                &[
+                    k.next_sample as f64,
+                    k.time_s,
+                    k.position_m,
+                    k.velocity_mps[0],
+                    k.velocity_mps[1],
+                    k.position_sd_m,
+                ],
+            );
         }
     }
 
-    fn pieces(&mut self, name: &str, p: &[Piece]) {
-        let column = |f: fn(&Piece) -> f64| -> Vec<f64> { p.iter().map(f).collect() };
+    fn pieces(&mut self, name: &str, p: &[MotionPiece]) {
+        let column = |f: fn(&MotionPiece) -> f64| -> Vec<f64> { p.iter().map(f).collect() };
         self.count(&format!("{name} pieces"), p.len());
         self.column(&format!("{name} pieces block"), &column(|p| f64::from(p.block)));
-        self.column(&format!("{name} pieces length_s"), &column(|p| p.to_s - p.from_s));
-        self.column(&format!("{name} pieces place_m"), &column(|p| p.z_m));
-        self.column(&format!("{name} pieces velocity_mps"), &column(|p| p.v_mps));
-        self.column(&format!("{name} pieces acceleration_mps2"), &column(|p| p.a_mps2));
+        self.column(&format!("{name} pieces length_s"), &column(|p| p.end_s - p.start_s));
+        self.column(&format!("{name} pieces place_m"), &column(|p| p.position_m));
+        self.column(&format!("{name} pieces velocity_mps"), &column(|p| p.velocity_mps));
+        self.column(&format!("{name} pieces acceleration_mps2"), &column(|p| p.acceleration_mps2));
     }
 
-    fn blocks(&mut self, name: &str, b: &Blocks) {
+    fn blocks(&mut self, name: &str, b: &BlockAverages) {
         self.count(&format!("{name} blocks"), b.len());
         self.numbers(&format!("{name} span_s"), &[b.span_s().0, b.span_s().1]);
-        let lengths: Vec<f64> = b.from_s.iter().zip(&b.to_s).map(|(a, b)| b - a).collect();
+        let lengths: Vec<f64> = b.start_s.iter().zip(&b.end_s).map(|(a, b)| b - a).collect();
         self.column(&format!("{name} lengths_s"), &lengths);
-        self.column(&format!("{name} force_n"), &b.f);
+        self.column(&format!("{name} force_n"), &b.force_n);
         self.flags(&format!("{name} compared"), &b.used);
-        self.flags(&format!("{name} restart"), &b.restart);
-        self.column(&format!("{name} size_n"), &b.size_n);
-        self.column(&format!("{name} doubt_n"), &b.doubt_n);
+        self.flags(&format!("{name} restart"), &b.memory_reset);
+        self.column(&format!("{name} size_n"), &b.abs_force_n);
+        self.column(&format!("{name} doubt_n"), &b.extra_sd_n);
         self.pieces(name, &b.pieces);
     }
 
@@ -98,46 +113,48 @@ impl Said {
         self.number(&format!("{name} sd_n"), noise.sd_n());
         for (k, bin) in noise.bins.iter().enumerate() {
             let of = |what: &str| format!("{name} range {k} {what}");
-            self.numbers(&of("coefficients"), &bin.a);
-            self.numbers(&of("slow"), &bin.slow);
-            self.numbers(&of("sizes_n"), &[bin.innovation_n, bin.sd_n]);
-            if noise.lasting {
-                let first: Vec<f64> = bin.first.iter().flat_map(|f| f.a.into_iter().chain(f.slow)).collect();
+            self.numbers(&of("coefficients"), &bin.ar);
+            self.numbers(&of("slow"), &bin.long_memory);
+            self.numbers(&of("sizes_n"), &[bin.innovation_sd_n, bin.sd_n]);
+            if noise.long_memory {
+                let first: Vec<f64> =
+                    bin.after_break.iter().flat_map(|f| f.ar.into_iter().chain(f.long_memory)).collect();
                 self.numbers(&of("first"), &first);
-                self.numbers(&of("first_n"), &bin.first.map(|f| f.sd_n));
+                self.numbers(&of("first_n"), &bin.after_break.map(|f| f.sd_n));
             }
         }
     }
 
     fn instants(&mut self, name: &str, instants: &[f64]) {
-        let told: Vec<f64> = instants.iter().map(|t| if *t < NEVER { *t } else { -1.0 }).collect();
+        let told: Vec<f64> = instants.iter().map(|t| if *t < NO_RUPTURE { *t } else { -1.0 }).collect();
         self.numbers(name, &told);
     }
 
     /// Estimates: shared numbers, each recording's own, scatter, instants; and what they leave.
-    fn fit(&mut self, name: &str, f: &Fit, data: &Data) {
+    fn fit(&mut self, name: &str, f: &Fit, data: &FitData) {
         let m = &f.model;
-        let nats = [f.nats(), event_nats(m, &f.residuals), prior_nats(m)];
+        let nats = [f.nats(), rupture_nats(m, &f.residuals), prior_nats(m)];
         self.numbers(
             &format!("{name} nats, of ruptures, of priors; rms_n"),
             &[&nats[..], &[f.rms_n(data)]].concat(),
         );
-        let (shared, own) = (m.shared(), m.own_numbers());
+        let (shared, own) = (m.shared_parameters(), m.recording_parameters());
         self.numbers(
             &format!("{name} shared"),
             &shared.iter().map(|n| m.get(n.role, 0)).collect::<Vec<f64>>(),
         );
-        for r in 0..data.recordings() {
+        for r in 0..data.recording_count() {
             let told: Vec<f64> = own.iter().map(|n| m.get(n.role, r)).collect();
             self.instants(&format!("{name} own of {r}"), &told);
         }
         let s = &m.scatter;
-        let scatter = [s.force, s.place_m, s.surface_m, s.friction, s.differing[0], s.differing[1]];
+        let scatter =
+            [s.rupture_force, s.rupture_depth_m, s.surface_m, s.ln_friction, s.varying[0], s.varying[1]];
         self.numbers(&format!("{name} scatter"), &scatter);
     }
 
-    fn of_column(&mut self, name: &str, c: &Column) {
-        for (r, (w, rows)) in c.w.iter().zip(&c.rows).enumerate().take(2) {
+    fn of_column(&mut self, name: &str, c: &JacobianColumn) {
+        for (r, (w, rows)) in c.innovations.iter().zip(&c.rupture_rows).enumerate().take(2) {
             self.column(&format!("{name} of {r} force"), w);
             self.column(&format!("{name} of {r} ruptures"), rows);
         }
@@ -242,9 +259,9 @@ struct Insertion {
 impl Insertion {
     /// The recording and the instants (s) of the true ruptures.
     fn recorded(&self) -> (Recording, Vec<f64>) {
-        let law = Law::new(&self.tissue, &self.effects).expect("few effects");
-        let chain = Measurement::new(&self.effects);
-        let (mut state, mut sensor) = (LawState::default(), chain.start(self.rate_hz));
+        let law = ForceLaw::new(&self.tissue, &self.effects).expect("few effects");
+        let chain = MeasurementChain::new(&self.effects);
+        let (mut state, mut sensor) = (ForceLawState::default(), chain.start(self.rate_hz));
         let (mut t, mut z, mut f, mut ruptures) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut normal = Normal(self.seed);
         let mut slow = 0.0;
@@ -256,13 +273,14 @@ impl Insertion {
                 law.step(&mut state, at, true_m, velocity_mps, |r| ruptures.push(r.time_s)).total_n;
             slow = self.memory * slow + (1.0 - self.memory * self.memory).sqrt() * normal.draw();
             let noise_n = slow * (self.noise.0 + self.noise.1 * tissue_n.abs());
-            let reading = Reading { time_s: at, velocity_mps, tissue_n, noise_n, ..Reading::default() };
+            let reading =
+                SensorInput { time_s: at, velocity_mps, tissue_n, noise_n, ..SensorInput::default() };
             let force_n = chain.step(&mut sensor, &reading);
             if at > self.gap_s.0 && at < self.gap_s.1 {
                 continue;
             }
             t.push(at);
-            let told = chain.position(true_m);
+            let told = chain.recorded_position(true_m);
             z.push(if self.step_m > 0.0 { libm::round(told / self.step_m) * self.step_m } else { told });
             f.push(force_n);
         }
@@ -283,8 +301,8 @@ fn tissue(surface_m: f64, layers: &[(f64, f64, f64, Option<f64>)]) -> Tissue {
 }
 
 /// What is believed of all of them.
-fn belief() -> Belief {
-    Belief {
+fn belief() -> Assumptions {
+    Assumptions {
         tissue: tissue(
             0.002,
             &[
@@ -293,7 +311,7 @@ fn belief() -> Belief {
                 (0.03, 70.0, 6100.0, None),
             ],
         ),
-        given: Vec::new(),
+        known_effects: Vec::new(),
         tolerance: vec![0.3, 0.25, 0.35],
         thickness_tolerance: vec![0.1, 0.12, 0.08],
         surface_tolerance_m: 0.001,
@@ -316,8 +334,8 @@ fn effect(id: &str, values: &[f64]) -> AnyEffect {
     AnyEffect::from_parameters(id, values).expect("in the library")
 }
 
-fn choice(id: &str, values: &[f64]) -> Choice {
-    Choice::new(info(id).expect("in the library"), values)
+fn choice(id: &str, values: &[f64]) -> EffectTerm {
+    EffectTerm::new(effect_info(id).expect("in the library"), values)
 }
 
 /// In at an even speed and out again.
@@ -432,7 +450,7 @@ fn repeated(k: usize) -> Insertion {
             (5.0, -0.006, 0.0, 0.0),
         ],
         tissue: there,
-        effects: vec![effect("let_go", &[2.0, 3.1e-3 + 4e-4 * k as f64])],
+        effects: vec![effect("release_depth", &[2.0, 3.1e-3 + 4e-4 * k as f64])],
         noise: (0.01, 0.0),
         memory: 0.3,
         seed: 17 + k as u64,
@@ -445,37 +463,37 @@ fn repeated(k: usize) -> Insertion {
 /// What the motion and the raw force say by themselves.
 fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
     let (t, z) = (&r.time_s, &r.position_m);
-    let told = velocity(t, z);
-    said.column("velocity mps", &told.v);
-    said.number("velocity noise_mps", told.noise_mps);
-    said.kinks("velocity", &told.kinks);
-    let calm = settle(t, z);
-    said.column("settled place_m", &calm.z);
-    said.column("settled mps", &calm.v);
+    let told = estimate_velocity(t, z);
+    said.column("velocity mps", &told.velocity_mps);
+    said.number("velocity noise_mps", told.sd_mps);
+    said.kinks("velocity", &told.jumps);
+    let calm = smooth_positions(t, z);
+    said.column("settled place_m", &calm.position_m);
+    said.column("settled mps", &calm.velocity_mps);
     said.number("settled sd_mps", calm.sd_mps);
-    said.kinks("settled", &calm.kinks);
-    let motion = Motion::of(r, SGN_DEAD_BAND_MPS);
+    said.kinks("settled", &calm.jumps);
+    let motion = Motion::from_recording(r, SGN_DEAD_BAND_MPS);
     said.numbers("motion noise", &[motion.velocity_sd_mps, motion.noise_m * 100.0]);
     for (i, j) in motion.jumps.iter().enumerate().take(6) {
-        said.numbers(&format!("motion jump {i} instants_s"), &[j.at_s, j.between_s, j.doubt_s]);
-        said.number(&format!("motion jump {i} place_m"), j.z_m);
-        said.numbers(&format!("motion jump {i} mps"), &j.v_mps);
+        said.numbers(&format!("motion jump {i} instants_s"), &[j.time_s, j.sample_mid_s, j.time_sd_s]);
+        said.number(&format!("motion jump {i} place_m"), j.position_m);
+        said.numbers(&format!("motion jump {i} mps"), &j.velocity_mps);
     }
     let end = t[t.len() - 1];
     let between: Vec<(f64, f64)> = (0..400).map(|k| motion.at(end * (f64::from(k) - 3.0) / 390.0)).collect();
     said.column("motion place_m", &between.iter().map(|m| m.0).collect::<Vec<f64>>());
     said.column("motion mps", &between.iter().map(|m| m.1).collect::<Vec<f64>>());
-    let p = phases::phases(r);
-    said.numbers("phases", &[p.start as f64, p.deepest as f64, p.back as f64]);
-    said.number("phases noise_n", phases::noise_n(&r.force_n));
-    said.number("phases contact_m", phases::contact_m(r, &p));
-    let falls = phases::drops(r, &p);
-    said.numbers("phases drops", &falls.iter().map(|d| d.at as f64).collect::<Vec<f64>>());
+    let p = insertion_phases::detect_phases(r);
+    said.numbers("phases", &[p.start as f64, p.deepest as f64, p.retraction as f64]);
+    said.number("phases noise_n", insertion_phases::noise_n(&r.force_n));
+    said.number("phases contact_m", insertion_phases::contact_m(r, &p));
+    let falls = insertion_phases::abrupt_drops(r, &p);
+    said.numbers("phases drops", &falls.iter().map(|d| d.sample as f64).collect::<Vec<f64>>());
     said.numbers("phases drops_n", &falls.iter().map(|d| d.size_n).collect::<Vec<f64>>());
-    let of = phases::ruptures(&falls, layers);
+    let of = insertion_phases::rupture_samples(&falls, layers);
     said.numbers("phases ruptures", &of.iter().map(|d| d.map_or(-1.0, |d| d as f64)).collect::<Vec<f64>>());
     for few in 1..=layers {
-        let released = phases::releases(r, &p, few);
+        let released = insertion_phases::releases(r, &p, few);
         said.numbers(
             &format!("phases {few} releases"),
             &released.iter().flat_map(|r| [r.position_m, 0.1 * r.size_n]).collect::<Vec<f64>>(),
@@ -484,22 +502,22 @@ fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
 }
 
 /// Blocks as they are, late, coarser.
-fn block_stages(said: &mut Said, b: &Blocks) {
+fn block_stages(said: &mut Said, b: &BlockAverages) {
     said.blocks("blocks", b);
-    said.blocks("coarse", &b.coarser(3));
+    said.blocks("coarse", &b.coarsened(3));
     for (name, smeared, late_s, placed_s) in [
         ("smeared", true, 0.0, None),
         ("late", false, 0.0137, None),
         ("late and smeared", true, 0.0137, Some(0.02)),
         ("placed", false, 0.0437, Some(0.0391)),
     ] {
-        said.pieces(name, &b.pieces_seen(smeared, late_s, placed_s));
+        said.pieces(name, &b.motion_pieces(smeared, late_s, placed_s));
     }
-    said.column("late doubt_n", &b.seen_late(0.0437).doubt_n);
+    said.column("late doubt_n", &b.with_delayed_jump_uncertainty(0.0437).extra_sd_n);
     let e: Vec<f64> = (0..b.len()).map(|k| 0.05 * libm::sin(0.3 * k as f64)).collect();
-    said.column("raw residual_n", &b.raw_residual(&e));
-    said.number("within_n", b.within_n());
-    let found = drops(b);
+    said.column("raw residual_n", &b.sample_residuals(&e));
+    said.number("within_n", b.within_block_sd_n());
+    let found = detect_force_drops(b);
     said.numbers("drops at_s", &found.iter().map(|d| d.time_s).collect::<Vec<f64>>());
     said.numbers("drops place_m", &found.iter().map(|d| d.position_m).collect::<Vec<f64>>());
     said.numbers("drops size_n", &found.iter().map(|d| d.size_n).collect::<Vec<f64>>());
@@ -507,29 +525,33 @@ fn block_stages(said: &mut Said, b: &Blocks) {
 }
 
 /// Standard deviation in N of blocks about their neighbours.
-fn roughness(blocks: &[Blocks]) -> f64 {
+fn roughness(blocks: &[BlockAverages]) -> f64 {
     let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
-    let mut all: Vec<f64> = blocks.iter().flat_map(|b| b.f.windows(4).map(third)).collect();
-    (stylet_stats::order::median(&mut all) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()).max(1e-6)
+    let mut all: Vec<f64> = blocks.iter().flat_map(|b| b.force_n.windows(4).map(third)).collect();
+    (stylet_stats::order_statistics::median(&mut all) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()).max(1e-6)
 }
 
 /// The base law fitted as a diagnosis does: drops given to layers, numbers and instants in turn.
-fn base_stages(said: &mut Said, belief: &Arc<Belief>, blocks: &Arc<Vec<Blocks>>) -> (Fit, Data) {
-    let found: Vec<_> = blocks.iter().map(drops).collect();
+fn base_stages(
+    said: &mut Said,
+    belief: &Arc<Assumptions>,
+    blocks: &Arc<Vec<BlockAverages>>,
+) -> (Fit, FitData) {
+    let found: Vec<_> = blocks.iter().map(detect_force_drops).collect();
     let times: Vec<Vec<f64>> = found.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect();
     let rough_n = roughness(blocks);
-    let largest = blocks.iter().flat_map(|b| &b.size_n).fold(1e-9_f64, |m, f| m.max(*f));
-    let mut data = Data::new(Arc::clone(blocks), Noise::white(rough_n.max(0.03 * largest)), 1e-4);
+    let largest = blocks.iter().flat_map(|b| &b.abs_force_n).fold(1e-9_f64, |m, f| m.max(*f));
+    let mut data = FitData::new(Arc::clone(blocks), Noise::white(rough_n.max(0.03 * largest)), 1e-4);
     let model = Model::base(Arc::clone(belief), blocks.len());
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model).clone();
-        let instants = assign_all(&from, blocks, &found, trust, rough_n);
+        let instants = assign_ruptures(&from, blocks, &found, trust, rough_n);
         for (r, i) in instants.iter().enumerate() {
             said.instants(&format!("assigned with {trust} of {r} instants_s"), i);
         }
-        let next = Model { instants, ..from };
-        let new = fit(&next, &data, Effort { turns: 4, enough: 0.3 }).expect("a fit");
+        let next = Model { rupture_times_s: instants, ..from };
+        let new = fit(&next, &data, Effort { max_iterations: 4, min_gain_nats: 0.3 }).expect("a fit");
         said.fit(&format!("first fit with {trust}"), &new, &data);
         if best.as_ref().is_none_or(|b| new.nats() < b.nats()) {
             best = Some(new);
@@ -537,141 +559,153 @@ fn base_stages(said: &mut Said, belief: &Arc<Belief>, blocks: &Arc<Vec<Blocks>>)
     }
     let mut best = best.expect("a fit");
     for round in 0..2 {
-        data = data.judged_by(&best.residuals.e, From::Calm);
+        data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
         said.noise(&format!("calm noise {round}"), &data.noise);
         let mut model = best.model.clone();
-        let moved = retime(&mut model, &data, &times);
+        let moved = update_event_times(&mut model, &data, &times);
         said.flags(&format!("round {round} moved"), &[moved]);
-        for (r, i) in model.instants.iter().enumerate() {
+        for (r, i) in model.rupture_times_s.iter().enumerate() {
             said.instants(&format!("round {round} of {r} instants_s"), i);
         }
-        best = fit(&model, &data, Effort { turns: 5, enough: 0.3 }).expect("a fit");
+        best = fit(&model, &data, Effort { max_iterations: 5, min_gain_nats: 0.3 }).expect("a fit");
         said.fit(&format!("round {round}"), &best, &data);
     }
-    data = data.judged_by(&best.residuals.e, From::Calm);
-    best = fit_sharp(&best.model, &data, Effort::FULL).expect("a fit");
+    data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
+    best = fit_from_zero_scatter(&best.model, &data, Effort::FULL).expect("a fit");
     said.fit("base", &best, &data);
     (best, data)
 }
 
 /// Noise of every kind that residuals tell, and what it makes of them.
-fn noise_stages(said: &mut Said, found: &Fit, data: &Data) {
-    let e = &found.residuals.e;
-    for from in [From::Whole, From::Lasting, From::Drawn, From::Calm] {
+fn noise_stages(said: &mut Said, found: &Fit, data: &FitData) {
+    let e = &found.residuals.residual_n;
+    for from in
+        [NoiseSource::Residual, NoiseSource::LongMemory, NoiseSource::Bootstrap, NoiseSource::Detrended]
+    {
         let name = format!("noise {from:?}");
-        let own = data.judged_by(e, from);
+        let own = data.with_estimated_noise(e, from);
         said.noise(&name, &own.noise);
-        said.number(&format!("{name} ln sizes"), own.noise.ln_sizes(&data.blocks));
+        said.number(&format!("{name} ln sizes"), own.noise.sum_ln_sd(&data.recordings));
         let w = own.whiten(0, &e[0]);
         said.column(&format!("{name} innovations"), &w);
-        said.column(&format!("{name} coloured_n"), &own.colour(0, &w));
+        said.column(&format!("{name} coloured_n"), &own.unwhiten(0, &w));
         let nats = residuals(&found.model, &own).expect("a replay").nats;
         said.number(&format!("{name} nats"), nats);
     }
-    said.number("discrepancy_n", discrepancy(&data.blocks, e, 1e-4).sd_n());
-    said.count("compared", data.compared());
+    said.number("discrepancy_n", discrepancy_noise(&data.recordings, e, 1e-4).sd_n());
+    said.count("compared", data.compared_block_count());
 }
 
 /// The linear picture: columns, standard deviations, evidence; and what effects would gain.
-fn picture_stages(said: &mut Said, found: &Fit, data: &Data) {
-    let tangent = Tangent::new(&found.model, data, &found.residuals);
+fn picture_stages(said: &mut Said, found: &Fit, data: &FitData) {
+    let tangent = Linearization::new(&found.model, data, &found.residuals);
     let factor = tangent.factor();
-    said.column("slope", &tangent.slope);
+    said.column("slope", &tangent.neg_gradient);
     let sds: Vec<f64> = factor.inverse_diagonal().iter().map(|v| v.sqrt()).collect();
     said.numbers("sds", &sds);
     said.number("ln determinant", factor.log_determinant());
-    let numbers = tangent.shared.iter().chain(&tangent.own);
+    let numbers = tangent.shared.iter().chain(&tangent.per_recording);
     for (n, c) in numbers.zip(&tangent.columns) {
         said.of_column(&format!("column {:?}", n.role), c);
     }
-    let step = |n: &stylet_identify::model::Number| match n.role {
-        Role::Surface | Role::Thickness(_) => Some(2e-4),
+    let step = |n: &stylet_identify::model::Parameter| match n.role {
+        ParameterRole::Surface | ParameterRole::Thickness(_) => Some(2e-4),
         _ => None,
     };
-    let wide = Tangent::new(&found.model, data, &found.residuals);
-    let wide = wide.widened(&found.model, data, &found.residuals, &step);
-    said.column("wide slope", &wide.slope);
+    let wide = Linearization::new(&found.model, data, &found.residuals);
+    let wide = wide.with_wide_differences(&found.model, data, &found.residuals, &step);
+    said.column("wide slope", &wide.neg_gradient);
     said.number("wide ln determinant", wide.factor().log_determinant());
-    let look = Look::new(found, data);
-    for effect in library() {
+    let look = ScoreTest::new(found, data);
+    for effect in general_effects() {
         let values: Vec<f64> = effect
             .parameters
             .iter()
-            .map(|p| if p.whole { 1.0 } else { 0.7 * p.search.0 + 0.3 * p.search.1 })
+            .map(|p| if p.integer { 1.0 } else { 0.7 * p.search.0 + 0.3 * p.search.1 })
             .collect();
-        let one = Choice::new(effect, &values);
-        let Some(c) = one.effect().and_then(|_| look.column(&one)) else { continue };
+        let one = EffectTerm::new(effect, &values);
+        let Some(c) = one.effect().and_then(|_| look.effect_column(&one)) else { continue };
         let gain = look.gain(std::slice::from_ref(&c));
         let name = format!("look {}", effect.id);
-        said.numbers(&name, &[gain.nats, gain.visible, gain.left, gain.coefficients[0]]);
+        said.numbers(&name, &[gain.nats, gain.detectable_nats, gain.unexplained_share, gain.coefficients[0]]);
         if effect.parameters.len() < 4 {
-            said.numbers(&format!("{name} scaled"), &scaled(effect, &[&values], &gain.coefficients));
+            said.numbers(&format!("{name} scaled"), &scale_strengths(effect, &[&values], &gain.coefficients));
         }
     }
     let (one, two) = (choice("coulomb_friction", &[2.0]), choice("stress_relaxation", &[0.2, 1.1]));
     let force: Vec<Vec<f64>> =
-        data.blocks.iter().map(|b| b.from_s.iter().map(|t| 0.01 * t).collect()).collect();
-    let columns =
-        [look.column(&one), look.column(&two), Some(look.of_force(&force))].map(|c| c.expect("a column"));
+        data.recordings.iter().map(|b| b.start_s.iter().map(|t| 0.01 * t).collect()).collect();
+    let columns = [look.effect_column(&one), look.effect_column(&two), Some(look.force_column(&force))]
+        .map(|c| c.expect("a column"));
     let gain = look.gain(&columns);
-    said.numbers("look three", &[&[gain.nats, gain.visible, gain.left][..], &gain.coefficients].concat());
+    said.numbers(
+        "look three",
+        &[&[gain.nats, gain.detectable_nats, gain.unexplained_share][..], &gain.coefficients].concat(),
+    );
     let mut other = found.model.clone();
     other.tissue.layers[0].friction_ns_per_m2 *= 1.03;
-    said.of_column("look change", &look.change(&other).expect("a column"));
-    for (l, e) in found.residuals.events.iter().flatten().enumerate().take(4) {
+    said.of_column("look change", &look.model_change_column(&other).expect("a column"));
+    for (l, e) in found.residuals.ruptures.iter().flatten().enumerate().take(4) {
         let s = found.model.scatter;
-        let (a, b) = spreads(e, &s);
-        said.numbers(&format!("rupture {l} force"), &[e.force, a, e.force_rate, e.elastic_n]);
-        said.numbers(&format!("rupture {l} place_m"), &[e.place_m, b, e.place_rate]);
-        said.numbers(&format!("rupture {l} judged"), &judge(e, &s).rows);
-        said.number(&format!("rupture {l} nats"), judge(e, &s).nats);
+        let (a, b) = rupture_sds(e, &s);
+        said.numbers(&format!("rupture {l} force"), &[e.force_excess, a, e.force_excess_rate, e.elastic_n]);
+        said.numbers(&format!("rupture {l} place_m"), &[e.depth_excess_m, b, e.depth_rate_mps]);
+        said.numbers(&format!("rupture {l} judged"), &evaluate_rupture(e, &s).rows);
+        said.number(&format!("rupture {l} nats"), evaluate_rupture(e, &s).nats);
     }
-    let all: Vec<_> = found.residuals.events.iter().flatten().copied().collect();
-    let s = scatter_of(&all, &found.model.scatter);
-    said.numbers("scatter told", &[s.force, s.place_m]);
+    let all: Vec<_> = found.residuals.ruptures.iter().flatten().copied().collect();
+    let s = estimate_rupture_scatter(&all, &found.model.scatter);
+    said.numbers("scatter told", &[s.rupture_force, s.rupture_depth_m]);
 }
 
 /// Every effect of the library replayed beside the law, with the law's own ruptures.
-fn library_stages(said: &mut Said, found: &Fit, data: &Data) {
-    for effect in library() {
+fn library_stages(said: &mut Said, found: &Fit, data: &FitData) {
+    for effect in general_effects() {
         let values: Vec<f64> = effect
             .parameters
             .iter()
-            .map(|p| if p.whole { 1.0 } else { 0.6 * p.search.0 + 0.4 * p.search.1 })
+            .map(|p| if p.integer { 1.0 } else { 0.6 * p.search.0 + 0.4 * p.search.1 })
             .collect();
-        let model = found.model.with(Choice::new(effect, &values));
-        let Some(trail) = Trail::new(&model, data, 0) else { continue };
-        let instants = trail.own_instants();
-        let there = Model { instants: vec![instants.clone()], ..model.clone() };
+        let model = found.model.with_effect(EffectTerm::new(effect, &values));
+        let Some(trail) = ReplayCache::new(&model, data, 0) else { continue };
+        let instants = trail.free_rupture_times();
+        let there = Model { rupture_times_s: vec![instants.clone()], ..model.clone() };
         let Some(out) = replay(&there, data, 0) else { continue };
         said.instants(&format!("replay {} instants_s", effect.id), &instants);
-        said.column(&format!("replay {} force_n", effect.id), &out.f);
-        let told = |e: &stylet_identify::events::Event| {
-            [e.force, e.force_rate, e.elastic_n, e.place_m, e.place_rate, f64::from(u8::from(e.ruptured))]
+        said.column(&format!("replay {} force_n", effect.id), &out.force_n);
+        let told = |e: &stylet_identify::rupture_likelihood::RuptureEvent| {
+            [
+                e.force_excess,
+                e.force_excess_rate,
+                e.elastic_n,
+                e.depth_excess_m,
+                e.depth_rate_mps,
+                f64::from(u8::from(e.ruptured)),
+            ]
         };
-        let told: Vec<f64> = out.events.iter().flat_map(told).collect();
+        let told: Vec<f64> = out.ruptures.iter().flat_map(told).collect();
         said.numbers(&format!("replay {} ruptures", effect.id), &told);
-        let nats = trail.nats_at(&model, data, 0, &instants);
-        said.number(&format!("replay {} nats", effect.id), if nats < NEVER { nats } else { -1.0 });
+        let nats = trail.nats_with_ruptures(&model, data, 0, &instants);
+        said.number(&format!("replay {} nats", effect.id), if nats < NO_RUPTURE { nats } else { -1.0 });
     }
 }
 
 /// A trial of an effect: retimed, fitted, judged by what it leaves.
-fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &Data, with: Choice) -> Fit {
-    let mut model = found.model.with(with);
+fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &FitData, with: EffectTerm) -> Fit {
+    let mut model = found.model.with_effect(with);
     let times: Vec<Vec<f64>> =
-        data.blocks.iter().map(|b| drops(b).iter().map(|d| d.time_s).collect()).collect();
+        data.recordings.iter().map(|b| detect_force_drops(b).iter().map(|d| d.time_s).collect()).collect();
     let short = fit(&model, data, Effort::SHORT).expect("a fit");
     said.number(&format!("{name} in short nats"), short.nats());
-    let hopeless = fit_below(&model, data, Effort::FULL, 0.5 * short.nats()).expect("a fit");
+    let hopeless = fit_if_below(&model, data, Effort::FULL, 0.5 * short.nats()).expect("a fit");
     said.number(&format!("{name} given up nats"), hopeless.nats());
     model = short.model;
-    retime(&mut model, data, &times);
+    update_event_times(&mut model, data, &times);
     let whole = fit(&model, data, Effort::FULL).expect("a fit");
-    let own = data.judged_by(&whole.residuals.e, From::Whole);
-    let best = fit_sharp(&whole.model, &own, Effort::FULL).expect("a fit");
+    let own = data.with_estimated_noise(&whole.residuals.residual_n, NoiseSource::Residual);
+    let best = fit_from_zero_scatter(&whole.model, &own, Effort::FULL).expect("a fit");
     said.fit(name, &best, &own);
-    let tangent = Tangent::new(&best.model, &own, &best.residuals);
+    let tangent = Linearization::new(&best.model, &own, &best.residuals);
     let sds = tangent.factor().inverse_diagonal();
     said.numbers(
         &format!("{name} sds"),
@@ -682,12 +716,12 @@ fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &Data, with: Cho
 }
 
 /// All that is said of a single insertion, but for trials of effects.
-fn one(said: &mut Said, of: &Insertion) -> (Fit, Data, Vec<f64>) {
+fn one(said: &mut Said, of: &Insertion) -> (Fit, FitData, Vec<f64>) {
     let (recording, ruptures) = of.recorded();
     let belief = Arc::new(belief());
     raw_stages(said, &recording, 3);
     let exclude: Vec<bool> = recording.time_s.iter().map(|t| (*t - 1.3).abs() < 0.031).collect();
-    let blocks = Blocks::new(&recording, &exclude, BLOCK_S);
+    let blocks = BlockAverages::new(&recording, &exclude, BLOCK_S);
     block_stages(said, &blocks);
     let (found, data) = base_stages(said, &belief, &Arc::new(vec![blocks]));
     noise_stages(said, &found, &data);
@@ -696,7 +730,7 @@ fn one(said: &mut Said, of: &Insertion) -> (Fit, Data, Vec<f64>) {
 
 /// The instants found are the true ones to within so many s.
 fn near(found: &Fit, ruptures: &[f64], within_s: f64) {
-    let told = &found.model.instants[0];
+    let told = &found.model.rupture_times_s[0];
     for (t, truth) in told.iter().zip(ruptures) {
         assert!((t - truth).abs() < within_s, "{told:?} for {ruptures:?}");
     }
@@ -759,9 +793,9 @@ fn slow_stages() -> Said {
     let mut said = Said::default();
     let (found, data, _) = one(&mut said, &slow());
     let best = trial_stages(&mut said, "late", &found, &data, choice("time_delay", &[0.03]));
-    let (to_the_step, seen) = placed(&best, &data).expect("a late force is better so");
+    let (to_the_step, seen) = refine_delay(&best, &data).expect("a late force is better so");
     said.fit("placed", &to_the_step, &seen);
-    close("delay", late_s(&to_the_step.model), 0.0437, 0.05);
+    close("delay", delay_s(&to_the_step.model), 0.0437, 0.05);
     lies_at(&to_the_step, &truth());
     trial_stages(&mut said, "smeared", &found, &data, choice("low_pass_lag", &[0.03]));
     said
@@ -795,39 +829,39 @@ fn shifted_stages() -> Said {
 fn several_stages() -> Said {
     let mut said = Said::default();
     let belief = Arc::new(belief());
-    let blocks: Vec<Blocks> = (0..3)
+    let blocks: Vec<BlockAverages> = (0..3)
         .map(|k| {
             let (r, _) = repeated(k).recorded();
-            Blocks::new(&r, &vec![false; r.time_s.len()], BLOCK_S)
+            BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S)
         })
         .collect();
     let (found, data) = base_stages(&mut said, &belief, &Arc::new(blocks));
     noise_stages(&mut said, &found, &data);
     let mut own = found.model.clone();
-    (own.free.own_surface, own.free.own_friction) = (true, true);
+    (own.free.recording_surface, own.free.recording_friction) = (true, true);
     let own = fit(&own, &data, Effort::FULL).expect("a fit");
     said.fit("own", &own, &data);
     for (k, wanted) in [0.11, -0.07, -0.02].iter().enumerate() {
-        let mean = own.model.own.iter().map(|o| o.friction).sum::<f64>() / 3.0;
-        let told = own.model.own[k].friction - mean;
+        let mean = own.model.per_recording.iter().map(|o| o.ln_friction).sum::<f64>() / 3.0;
+        let told = own.model.per_recording[k].ln_friction - mean;
         assert!((told - (wanted - 0.0067)).abs() < 0.03, "friction of {k}: {told}");
     }
     picture_stages(&mut said, &own, &data);
-    let mut lets_go = own.model.with(choice("let_go", &[2.0, 3e-3]));
-    lets_go.free.own_effects = true;
+    let mut lets_go = own.model.with_effect(choice("release_depth", &[2.0, 3e-3]));
+    lets_go.free.recording_effects = true;
     let lets_go = fit(&lets_go, &data, Effort::FULL).expect("a fit");
     said.fit("lets go", &lets_go, &data);
-    let tangent = Tangent::new(&lets_go.model, &data, &lets_go.residuals);
+    let tangent = Linearization::new(&lets_go.model, &data, &lets_go.residuals);
     said.number("lets go ln determinant", tangent.factor().log_determinant());
-    said.column("lets go slope", &tangent.slope);
+    said.column("lets go slope", &tangent.neg_gradient);
     let mut days = found.model.clone();
-    (days.days, days.day_of) = (vec![Day::default(); 2], vec![0, 1, 0]);
+    (days.days, days.day_of) = (vec![DayParameters::default(); 2], vec![0, 1, 0]);
     (days.free.day_surface, days.free.day_friction) = (true, true);
-    days.steady = true;
+    days.fixed_scatter = true;
     let days = fit(&days, &data, Effort::FULL).expect("a fit");
     said.fit("days", &days, &data);
-    let two = data.only(&[2, 0]);
-    let fewer = fit(&days.model.only(&[2, 0]), &two, Effort::SHORT).expect("a fit");
+    let two = data.subset(&[2, 0]);
+    let fewer = fit(&days.model.subset(&[2, 0]), &two, Effort::SHORT).expect("a fit");
     said.fit("two of them", &fewer, &two);
     said
 }

@@ -5,14 +5,14 @@
 //! reader that is slow loses the oldest lines of its own ring, and nothing else: the core never waits for it.
 #![forbid(unsafe_code)]
 
-mod input;
-mod page;
-mod ring;
-mod session;
-mod velocity;
+mod broadcast;
+mod http_page;
+mod sample_parser;
+mod stream_session;
+mod velocity_from_positions;
 
-pub use input::{BadLine, Given, parse};
-pub use page::serve;
-pub use ring::{Hub, Reader};
-pub use session::{Counts, Session, said};
-pub use velocity::Slope;
+pub use broadcast::{Broadcast, Subscriber};
+pub use http_page::serve_page;
+pub use sample_parser::{InvalidLine, StreamSample, parse_line};
+pub use stream_session::{Session, StreamCounts, output_json};
+pub use velocity_from_positions::VelocityEstimator;

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
-use stylet_tissue::{AnyEffect, Law, LawState, Layer, Measurement, Reading, Tissue};
+use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState, Layer, MeasurementChain, SensorInput, Tissue};
 
 /// Samples per second of the recordings.
 pub const SAMPLE_HZ: f64 = STEP_HZ / STEPS as f64;
@@ -55,7 +55,7 @@ pub struct Case {
 /// The ids that can be hidden.
 #[must_use]
 pub fn library_ids() -> Vec<&'static str> {
-    stylet_tissue::library().map(|i| i.id).collect()
+    stylet_tissue::general_effects().map(|i| i.id).collect()
 }
 
 /// What the simulation believes.
@@ -137,10 +137,10 @@ fn simulate(
     let layers = tissue.layers.len();
     let mut out = [const { Vec::new() }; 4];
     let mut ruptures = vec![f64::INFINITY; layers];
-    let Ok(law) = Law::new(tissue, &drawn.effects) else { return (out, ruptures) };
-    let chain = Measurement::new(&drawn.effects);
+    let Ok(law) = ForceLaw::new(tissue, &drawn.effects) else { return (out, ruptures) };
+    let chain = MeasurementChain::new(&drawn.effects);
     let mut measuring = chain.start(STEP_HZ);
-    let mut state = LawState::default();
+    let mut state = ForceLawState::default();
     let mut outside = drawn.outside.clone();
     if let Some(o) = &mut outside {
         o.restart();
@@ -162,12 +162,12 @@ fn simulate(
         }
         let sampled = k % steps == 0;
         let noise_n = if sampled { noise() } else { 0.0 };
-        let reading = Reading { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
+        let reading = SensorInput { time_s: t, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
         let recorded = chain.step(&mut measuring, &reading);
         if sampled {
             out[0].push(t);
-            out[1].push(chain.position(z));
-            out[2].push(chain.position(v));
+            out[1].push(chain.recorded_position(z));
+            out[2].push(chain.recorded_position(v));
             out[3].push(recorded);
         }
     }
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn every_effect_of_the_library_can_be_hidden() {
         let ids = library_ids();
-        assert_eq!(ids.len(), stylet_tissue::library().count());
+        assert_eq!(ids.len(), stylet_tissue::general_effects().count());
         assert!(ids.contains(&"force_spikes") && ids.contains(&"coulomb_friction"));
     }
 }

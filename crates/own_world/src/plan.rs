@@ -102,7 +102,7 @@ pub fn sketch_of(seed: u64, index: u64, kind: Kind, turn: u64) -> Sketch {
         scatter: 0.0,
         velocity_noise_mps: 0.0,
     };
-    let entries: Vec<&'static EffectInfo> = stylet_tissue::library().collect();
+    let entries: Vec<&'static EffectInfo> = stylet_tissue::general_effects().collect();
     let fitted: Vec<&'static EffectInfo> =
         entries.iter().copied().filter(|i| i.id != ForceGain::ID).collect();
     match kind {

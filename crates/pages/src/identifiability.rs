@@ -1,6 +1,6 @@
 //! The page of what an experiment can show.
 
-use crate::words::{numbers, spaced};
+use crate::formatting::{effect_label, strength_parameters};
 use stylet_plan::identifiability::Identifiability;
 use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
 use stylet_report::{Cell, Page, Section, Status, Table, significant};
@@ -8,9 +8,9 @@ use stylet_scenario::Scenario;
 
 /// The matrix of what an experiment can tell apart.
 #[must_use]
-pub fn matrix(scenario: &Scenario, shown: &Identifiability) -> String {
-    let visible: Vec<usize> = (0..shown.effects.len()).filter(|k| shown.effects[*k].visible).collect();
-    let names: Vec<String> = visible.iter().map(|k| spaced(&shown.effects[*k].effect)).collect();
+pub fn correlation_map(scenario: &Scenario, shown: &Identifiability) -> String {
+    let visible: Vec<usize> = (0..shown.effects.len()).filter(|k| shown.effects[*k].identifiable).collect();
+    let names: Vec<String> = visible.iter().map(|k| effect_label(&shown.effects[*k].effect)).collect();
     let map = HeatMap {
         row_label: String::new(),
         column_label: "absolute correlation in per cent, the base law's numbers taken out".to_owned(),
@@ -25,7 +25,7 @@ pub fn matrix(scenario: &Scenario, shown: &Identifiability) -> String {
                     .collect()
             })
             .collect(),
-        shares: true,
+        values_are_fractions: true,
     };
     let options = FigureOptions {
         title: "What this experiment can tell apart".to_owned(),
@@ -43,19 +43,22 @@ pub fn page(scenario: &Scenario, shown: &Identifiability) -> Page {
         .effects
         .iter()
         .map(|e| {
-            let status = if e.visible { Status::Good } else { Status::Warn };
+            let status = if e.identifiable { Status::Good } else { Status::Warn };
             vec![
-                Cell::text(spaced(&e.effect)),
-                Cell::text(numbers(&e.effect, &e.typical)),
+                Cell::text(effect_label(&e.effect)),
+                Cell::text(strength_parameters(&e.effect, &e.typical)),
                 Cell::number(significant(e.nats, 3)).status(status),
                 Cell::text(
-                    e.smallest
-                        .as_ref()
-                        .map_or_else(|| "no plausible size".to_owned(), |s| numbers(&e.effect, s)),
+                    e.smallest_detectable.as_ref().map_or_else(
+                        || "no plausible size".to_owned(),
+                        |s| strength_parameters(&e.effect, s),
+                    ),
                 ),
-                Cell::text(e.like.iter().map(|l| spaced(l)).collect::<Vec<_>>().join(", ")),
+                Cell::text(
+                    e.indistinguishable_from.iter().map(|l| effect_label(l)).collect::<Vec<_>>().join(", "),
+                ),
                 Cell::text(e.nearest.as_ref().map_or_else(String::new, |(n, nats)| {
-                    format!("{} ({} nats)", spaced(n), significant(*nats, 2))
+                    format!("{} ({} nats)", effect_label(n), significant(*nats, 2))
                 })),
             ]
         })
@@ -70,12 +73,12 @@ pub fn page(scenario: &Scenario, shown: &Identifiability) -> Page {
          Ten nats are seen; effects within three nats of one another form a class.",
         significant(shown.noise_n, 2)
     ));
-    if !shown.invisible.is_empty() {
-        let names: Vec<String> = shown.invisible.iter().map(|n| spaced(n)).collect();
+    if !shown.not_identifiable.is_empty() {
+        let names: Vec<String> = shown.not_identifiable.iter().map(|n| effect_label(n)).collect();
         summary = summary.text(format!("Invisible: {}.", names.join(", ")));
     }
     for c in &shown.classes {
-        let names: Vec<String> = c.iter().map(|n| spaced(n)).collect();
+        let names: Vec<String> = c.iter().map(|n| effect_label(n)).collect();
         summary = summary.text(format!("Cannot be told apart: {}.", names.join(", ")));
     }
     Page::new(format!("What can be identified: {}", scenario.name))
@@ -84,6 +87,6 @@ pub fn page(scenario: &Scenario, shown: &Identifiability) -> Page {
         .section(summary.table(table))
         .section(Section::new("Which resemble one another").picture(
             "Absolute correlation of effects after projecting out the base law",
-            matrix(scenario, shown),
+            correlation_map(scenario, shown),
         ))
 }

@@ -4,13 +4,13 @@
 //! Nothing is computed here that a file of results would not hold.
 #![forbid(unsafe_code)]
 
-pub mod benchmark;
-pub mod compare;
+pub mod algorithm_comparison;
 pub mod diagnosis;
+pub mod examination;
+pub mod experiment_plan;
+pub mod formatting;
 pub mod identifiability;
-pub mod plan;
+pub mod indented_specimens;
 pub mod prediction;
-pub mod repeats;
-pub mod specimens;
+pub mod repeated_insertions;
 pub mod sweep;
-pub mod words;

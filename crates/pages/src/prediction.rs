@@ -1,7 +1,7 @@
 //! The page of a prediction.
 
-use crate::words::{or_dash, shown};
-use stylet_diagnose::predict::{Foretold, Predicted, Prediction, Shown};
+use crate::formatting::{or_dash, significant_or_dash};
+use stylet_diagnose::prediction::{Prediction, PredictionCurves, PredictionResult, RecordingPrediction};
 use stylet_report::{
     Cell, Chart, Colour, Level, LineStyle, MarkerSet, Page, Section, Series, Side, Status, Table, Tile,
     significant,
@@ -13,15 +13,15 @@ const DRAWN: usize = 12;
 
 /// The page of what `model`, which was read from `file`, predicts.
 #[must_use]
-pub fn page(model: &Scenario, file: &str, found: &Foretold) -> Page {
+pub fn page(model: &Scenario, file: &str, found: &PredictionResult) -> Page {
     let p = &found.prediction;
     let mut page = Page::new(format!("Prediction: {}", model.name))
-        .subtitle(sentence(p))
+        .subtitle(summary_sentence(p))
         .fact("model", file)
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(overview(found));
     let mut section = Section::new("Predicted and measured");
-    for (r, shown) in p.recordings.iter().zip(&found.shown).take(DRAWN) {
+    for (r, shown) in p.recordings.iter().zip(&found.curves).take(DRAWN) {
         section = section.chart(force(r, shown)).chart(residual(r, shown, p.floor_n));
     }
     if p.recordings.len() > DRAWN {
@@ -33,7 +33,7 @@ pub fn page(model: &Scenario, file: &str, found: &Foretold) -> Page {
 
 /// How good a prediction is, in a sentence.
 #[must_use]
-pub fn sentence(p: &Prediction) -> String {
+pub fn summary_sentence(p: &Prediction) -> String {
     let ratio = p.rmse_n / p.floor_n.max(1e-300);
     let within = format!(
         "{} N rms are left, {} times the noise; the 90 % band holds {:.0} %",
@@ -51,7 +51,7 @@ pub fn sentence(p: &Prediction) -> String {
     format!("{how}: {within}.")
 }
 
-fn overview(found: &Foretold) -> Section {
+fn overview(found: &PredictionResult) -> Section {
     let p = &found.prediction;
     let mut tiles = vec![
         Tile::new(
@@ -63,11 +63,11 @@ fn overview(found: &Foretold) -> Section {
         Tile::new(
             "In the band",
             format!("{:.0} %", 100.0 * p.band_coverage),
-            format!("90 % would be right; it holds {}", p.band_holds.join(", ")),
+            format!("90 % would be right; it holds {}", p.band_includes.join(", ")),
         )
         .status(Status::at_most((p.band_coverage - 0.9).abs(), 0.06, 0.15)),
     ];
-    if let Some(before) = p.believed_rmse_n {
+    if let Some(before) = p.assumed_rmse_n {
         tiles.push(Tile::new(
             "Believed before",
             format!("{} N", significant(before, 3)),
@@ -85,11 +85,11 @@ fn overview(found: &Foretold) -> Section {
                     1.2 * p.floor_n,
                     2.0 * p.floor_n,
                 )),
-                Cell::number(shown(r.believed_rmse_n, 1.0, 3)),
+                Cell::number(significant_or_dash(r.assumed_rmse_n, 1.0, 3)),
                 Cell::number(format!("{:.0} %", 100.0 * r.band_coverage)),
                 Cell::number(significant(r.peak_error_n, 2)),
                 Cell::number(or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m)))),
-                Cell::number(shown(r.friction_factor, 1.0, 3)),
+                Cell::number(significant_or_dash(r.friction_factor, 1.0, 3)),
             ]
         })
         .collect();
@@ -114,7 +114,7 @@ fn overview(found: &Foretold) -> Section {
     section
 }
 
-fn force(r: &Predicted, s: &Shown) -> Chart {
+fn force(r: &RecordingPrediction, s: &PredictionCurves) -> Chart {
     let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, s.time_s.clone(), y.to_vec());
     let ruptures = MarkerSet {
         name: "predicted ruptures".to_owned(),
@@ -132,7 +132,7 @@ fn force(r: &Predicted, s: &Shown) -> Chart {
         .group(r.name.clone())
         .height(320)
         .with_series(line("measured", Colour::Grey, &s.measured_n).width(3.0));
-    if let Some(before) = &s.believed_n {
+    if let Some(before) = &s.assumed_n {
         chart = chart.with_series(line("believed before", Colour::Vermillion, before).width(1.0));
     }
     chart
@@ -142,7 +142,7 @@ fn force(r: &Predicted, s: &Shown) -> Chart {
         .with_markers(ruptures)
 }
 
-fn residual(r: &Predicted, s: &Shown, floor_n: f64) -> Chart {
+fn residual(r: &RecordingPrediction, s: &PredictionCurves, floor_n: f64) -> Chart {
     let left: Vec<f64> = s.measured_n.iter().zip(&s.predicted_n).map(|(y, f)| y - f).collect();
     Chart::new(format!("{}: what is left", r.name), "Time (s)", "Left (N)")
         .group(r.name.clone())

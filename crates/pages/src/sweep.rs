@@ -1,10 +1,13 @@
 //! The page of a sweep: the summary, and the robustness map as a picture.
 
-use crate::words::shown;
+use crate::formatting::significant_or_dash;
 use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
 use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, percent, significant};
 use stylet_stats::Interval;
-use stylet_sweep::{BINS, Bin, Columns, MapRow, Outcome, Summary, Sweep, Trials, bins, value};
+use stylet_sweep::{
+    BIN_COUNT, Columns, FailureMapRow, FailureRateBin, OutcomeSensitivity, Summary, Sweep, TrialTable,
+    failure_rate_bins, score_value,
+};
 
 fn between(i: &Interval) -> String {
     format!("95 % interval {} to {}", percent(i.low), percent(i.high))
@@ -14,7 +17,7 @@ fn between(i: &Interval) -> String {
 ///
 /// # Errors
 /// When the rows cannot be read.
-pub fn page<T: Trials + ?Sized>(
+pub fn page<T: TrialTable + ?Sized>(
     sweep: &Sweep,
     columns: &Columns,
     rows: &T,
@@ -96,7 +99,7 @@ fn worst(s: &Summary) -> Section {
     Section::new("Worst trials").table(Table { headers, rows, ..Table::default() })
 }
 
-fn explained(outcomes: &[Outcome]) -> Section {
+fn explained(outcomes: &[OutcomeSensitivity]) -> Section {
     let mut section = Section::new("What explains the outcomes");
     if outcomes.is_empty() {
         return section;
@@ -120,8 +123,8 @@ fn explained(outcomes: &[Outcome]) -> Section {
     section
 }
 
-fn table(outcome: &Outcome) -> Table {
-    let number = |x: Option<f64>| shown(x, 1.0, 3);
+fn table(outcome: &OutcomeSensitivity) -> Table {
+    let number = |x: Option<f64>| significant_or_dash(x, 1.0, 3);
     Table::new(
         outcome.outcome.clone(),
         &["quantity", "first-order index", "rank correlation", "p-value"],
@@ -169,15 +172,15 @@ fn scores(s: &Summary) -> Table {
 }
 
 /// The share of failed insertions against every quantity that explains something.
-fn against<T: Trials + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -> Result<Section, T::Error> {
+fn against<T: TrialTable + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -> Result<Section, T::Error> {
     let mut section = Section::new("Failures and errors along the drawn quantities");
     for (index, quantity) in columns.drawn.iter().take(sweep.fields.len()).enumerate().take(12) {
-        let bins = bins(sweep, columns, rows, index)?;
+        let bins = failure_rate_bins(sweep, columns, rows, index)?;
         if bins.len() < 2 {
             continue;
         }
         let x: Vec<f64> = bins.iter().map(|b| b.middle).collect();
-        let line = |f: fn(&Bin) -> f64| bins.iter().map(f).map(|y| 100.0 * y).collect::<Vec<_>>();
+        let line = |f: fn(&FailureRateBin) -> f64| bins.iter().map(f).map(|y| 100.0 * y).collect::<Vec<_>>();
         let mut chart = Chart::new(
             format!("Insertions with an error, along {quantity}"),
             quantity.clone(),
@@ -193,7 +196,7 @@ fn against<T: Trials + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -> Re
         let mut pairs: Vec<(f64, f64)> = Vec::new();
         for place in 0..rows.count().min(2000) {
             let row = rows.row(place)?;
-            pairs.push((row.values[0], value(columns, &row, "enhancement.rms_relative")));
+            pairs.push((row.values[0], score_value(columns, &row, "enhancement.rms_relative")));
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let (x, y) = pairs.into_iter().unzip();
@@ -208,14 +211,14 @@ fn against<T: Trials + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -> Re
 
 /// The robustness map as SVG.
 #[must_use]
-pub fn map_svg(rows: &[MapRow]) -> String {
+pub fn failure_map_svg(rows: &[FailureMapRow]) -> String {
     let map = HeatMap {
         row_label: String::new(),
         column_label: "tenth of the drawn values, from the smallest to the largest".to_owned(),
         rows: rows.iter().map(|r| r.name.clone()).collect(),
-        columns: (1..=BINS).map(|i| i.to_string()).collect(),
+        columns: (1..=BIN_COUNT).map(|i| i.to_string()).collect(),
         values: rows.iter().map(|r| r.failed_percent.clone()).collect(),
-        shares: false,
+        values_are_fractions: false,
     };
     heat_map(
         &map,

@@ -15,7 +15,7 @@ pub enum PlanError {
     },
     /// No motion keeps the limits.
     #[error("no insertion keeps these limits: {why}; {remedy}")]
-    Impossible {
+    Infeasible {
         /// The limit that cannot be kept.
         why: String,
         /// What would help.

@@ -1,28 +1,28 @@
 //! What an experiment can show: which effects, from which strength on, and which it cannot tell apart.
 
-use crate::candidate::{NONE, stronger};
-use crate::ground::Ground;
-use crate::search::TELLING_NATS;
+use crate::candidate::{NONE, scaled_values};
+use crate::information_state::InformationState;
+use crate::motion_search::DISTINGUISHABLE_NATS;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use stylet_diagnose::CLASS_NATS;
-use stylet_identify::model::Choice;
+use stylet_diagnose::EQUIVALENCE_NATS;
+use stylet_identify::model::EffectTerm;
 
 /// One effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Seen {
+pub struct EffectIdentifiability {
     /// Effect, by its id.
     pub effect: String,
     /// Nats that it would show at its typical size, everything that is fitted taken out.
     pub nats: f64,
     /// Whether that is enough to see it.
-    pub visible: bool,
+    pub identifiable: bool,
     /// Its numbers at the typical size.
     pub typical: BTreeMap<String, f64>,
     /// Its numbers at the smallest size that can be seen; none when no plausible size can.
-    pub smallest: Option<BTreeMap<String, f64>>,
+    pub smallest_detectable: Option<BTreeMap<String, f64>>,
     /// Effects that would explain it as well, to within a class's width, at the typical size.
-    pub like: Vec<String>,
+    pub indistinguishable_from: Vec<String>,
     /// The effect that is nearest, and the nats by which it stays behind.
     pub nearest: Option<(String, f64)>,
 }
@@ -31,9 +31,9 @@ pub struct Seen {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
     /// Effects in the order of the library.
-    pub effects: Vec<Seen>,
+    pub effects: Vec<EffectIdentifiability>,
     /// Effects that cannot be seen at their typical size.
-    pub invisible: Vec<String>,
+    pub not_identifiable: Vec<String>,
     /// Effects that cannot be told apart at their typical sizes, each class by itself.
     pub classes: Vec<Vec<String>>,
     /// Correlations of the effects' columns, the base law's numbers taken out, in the order of `effects`.
@@ -45,24 +45,26 @@ pub struct Identifiability {
 }
 
 /// An effect must be at most so many times its typical size to be seen at all: beyond, it is not plausible.
-const PLAUSIBLE: f64 = 30.0;
+const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
 
 /// Whether the library admits these numbers.
-fn valid(choice: &Choice, values: &[f64]) -> bool {
-    Choice::new(choice.info, values).effect().is_some_and(|e| e.check().is_ok())
+fn valid(choice: &EffectTerm, values: &[f64]) -> bool {
+    EffectTerm::new(choice.info, values).effect().is_some_and(|e| e.check().is_ok())
 }
 
 /// What the experiment behind a ground can show.
 #[must_use]
-pub fn identifiability(ground: &Ground) -> Identifiability {
-    let shown = ground.known();
+pub fn identifiability(ground: &InformationState) -> Identifiability {
+    let shown = ground.current();
     let of: Vec<usize> =
-        (0..ground.candidates.len()).filter(|k| !ground.candidates[*k].choices.is_empty()).collect();
+        (0..ground.candidates.len()).filter(|k| !ground.candidates[*k].effects.is_empty()).collect();
     let null = ground.candidates.iter().position(|c| c.name == NONE);
     let nats: Vec<Vec<f64>> = of
         .iter()
         .map(|i| {
-            of.iter().map(|j| if i == j { 0.0 } else { ground.nats(&shown, *i.min(j), *i.max(j)) }).collect()
+            of.iter()
+                .map(|j| if i == j { 0.0 } else { ground.separation_nats(&shown, *i.min(j), *i.max(j)) })
+                .collect()
         })
         .collect();
     let correlation =
@@ -70,21 +72,21 @@ pub fn identifiability(ground: &Ground) -> Identifiability {
     let mut effects = Vec::new();
     for (row, k) in of.iter().enumerate() {
         let c = &ground.candidates[*k];
-        let Some(choice) = c.choices.last() else { continue };
-        let seen = null.map_or(0.0, |n| ground.nats(&shown, n.min(*k), n.max(*k)));
+        let Some(choice) = c.effects.last() else { continue };
+        let seen = null.map_or(0.0, |n| ground.separation_nats(&shown, n.min(*k), n.max(*k)));
         let named = |values: &[f64]| -> BTreeMap<String, f64> {
             choice.info.parameters.iter().zip(values).map(|(p, x)| (p.path.to_owned(), *x)).collect()
         };
-        let times = (TELLING_NATS / seen.max(1e-12)).sqrt();
-        effects.push(Seen {
+        let times = (DISTINGUISHABLE_NATS / seen.max(1e-12)).sqrt();
+        effects.push(EffectIdentifiability {
             effect: c.name.clone(),
             nats: seen,
-            visible: seen >= TELLING_NATS,
+            identifiable: seen >= DISTINGUISHABLE_NATS,
             typical: named(&choice.values),
-            smallest: Some(stronger(choice, times))
-                .filter(|x| times <= PLAUSIBLE && valid(choice, x))
+            smallest_detectable: Some(scaled_values(choice, times))
+                .filter(|x| times <= MAX_PLAUSIBLE_FACTOR && valid(choice, x))
                 .map(|x| named(&x)),
-            like: Vec::new(),
+            indistinguishable_from: Vec::new(),
             nearest: of
                 .iter()
                 .enumerate()
@@ -93,11 +95,12 @@ pub fn identifiability(ground: &Ground) -> Identifiability {
                 .min_by(|a, b| a.1.total_cmp(&b.1)),
         });
     }
-    let visible: Vec<bool> = effects.iter().map(|e| e.visible).collect();
-    let like = |i: usize, j: usize| i != j && visible[i] && visible[j] && nats[i][j] < CLASS_NATS;
+    let visible: Vec<bool> = effects.iter().map(|e| e.identifiable).collect();
+    let like = |i: usize, j: usize| i != j && visible[i] && visible[j] && nats[i][j] < EQUIVALENCE_NATS;
     let names: Vec<String> = effects.iter().map(|e| e.effect.clone()).collect();
     for (i, effect) in effects.iter_mut().enumerate() {
-        effect.like = (0..names.len()).filter(|j| like(i, *j)).map(|j| names[j].clone()).collect();
+        effect.indistinguishable_from =
+            (0..names.len()).filter(|j| like(i, *j)).map(|j| names[j].clone()).collect();
     }
     // Classes: what a chain of likenesses joins.
     let mut class: Vec<usize> = (0..names.len()).collect();
@@ -114,7 +117,7 @@ pub fn identifiability(ground: &Ground) -> Identifiability {
         .filter(|c| c.len() > 1)
         .collect();
     Identifiability {
-        invisible: effects.iter().filter(|e| !e.visible).map(|e| e.effect.clone()).collect(),
+        not_identifiable: effects.iter().filter(|e| !e.identifiable).map(|e| e.effect.clone()).collect(),
         effects,
         classes,
         correlation,

@@ -17,22 +17,22 @@
 #![forbid(unsafe_code)]
 
 pub mod candidate;
-pub mod check;
-pub mod draw;
 mod error;
-pub mod gram;
-pub mod ground;
+pub mod gram_matrix;
 pub mod identifiability;
+pub mod information_state;
+pub mod insertion_plan;
 pub mod limits;
-pub mod plan;
+pub mod motion_programs;
+pub mod motion_search;
 pub mod repeats;
-pub mod search;
-pub mod start;
+pub mod simulation_check;
+pub mod starting_information;
 
-pub use check::check;
 pub use error::PlanError;
-pub use ground::Ground;
 pub use identifiability::identifiability;
+pub use information_state::InformationState;
+pub use insertion_plan::{Plan, plan};
 pub use limits::Limits;
-pub use plan::{Plan, plan};
-pub use start::{from_diagnosis, from_scenario};
+pub use simulation_check::check_by_simulation;
+pub use starting_information::{from_diagnosis, from_scenario};

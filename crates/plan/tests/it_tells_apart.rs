@@ -1,7 +1,7 @@
 //! A planned insertion tells apart what one at constant speed leaves open, and the diagnosis of both together names it.
 
-use stylet_diagnose::{Evidence, Options, Verdict, diagnose};
-use stylet_plan::{Limits, check, from_diagnosis, from_scenario, identifiability, plan};
+use stylet_diagnose::{NamedRecording, Options, Verdict, diagnose};
+use stylet_plan::{Limits, check_by_simulation, from_diagnosis, from_scenario, identifiability, plan};
 use stylet_scenario::{Motion, Scenario};
 
 const LIMITS: Limits =
@@ -18,7 +18,7 @@ fn believed() -> Scenario {
     .expect("a scenario")
 }
 
-fn measured(motion: &Motion, seed: u64) -> Evidence {
+fn measured(motion: &Motion, seed: u64) -> NamedRecording {
     let mut there = believed();
     there
         .effects
@@ -26,7 +26,7 @@ fn measured(motion: &Motion, seed: u64) -> Evidence {
     there.tissue.layers[0].friction_ns_per_m2 *= 0.95;
     there.motion = motion.clone();
     let recording = stylet_testbed::simulate(&there, seed).expect("simulated").recording;
-    Evidence { name: format!("{seed}.csv"), recording, notes: Vec::new() }
+    NamedRecording { name: format!("{seed}.csv"), recording, notes: Vec::new() }
 }
 
 #[test]
@@ -36,20 +36,21 @@ fn constant_speed_hides_friction_laws_and_a_planned_motion_shows_them() {
     let seen = identifiability(&before);
     for hidden in ["coulomb_friction", "stribeck_friction", "force_gain"] {
         assert!(
-            seen.invisible.iter().any(|i| i == hidden),
+            seen.not_identifiable.iter().any(|i| i == hidden),
             "{hidden} at one constant speed: {:?}",
-            seen.invisible
+            seen.not_identifiable
         );
     }
-    assert!(!seen.invisible.iter().any(|i| i == "periodic_interference"));
+    assert!(!seen.not_identifiable.iter().any(|i| i == "periodic_interference"));
     let planned = plan(&before, &LIMITS, &begin).expect("a plan").0;
     let after = identifiability(&from_scenario(&scenario, Some(&planned.motion)).expect("a ground").0);
     for shown in ["coulomb_friction", "stribeck_friction"] {
-        assert!(!after.invisible.iter().any(|i| i == shown), "{shown}: {:?}", after.invisible);
+        assert!(!after.not_identifiable.iter().any(|i| i == shown), "{shown}: {:?}", after.not_identifiable);
     }
     // What no motion can show stays so.
     assert!(
-        after.invisible.iter().any(|i| i == "force_gain") && planned.never.iter().any(|n| n == "force_gain")
+        after.not_identifiable.iter().any(|i| i == "force_gain")
+            && planned.never_detectable.iter().any(|n| n == "force_gain")
     );
 }
 
@@ -60,7 +61,7 @@ fn the_planned_insertion_leads_to_the_right_single_cause() {
     let blind =
         diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
     assert_eq!(blind.diagnosis.verdict, Verdict::None);
-    assert!(blind.diagnosis.invisible.iter().any(|i| i == "coulomb_friction"));
+    assert!(blind.diagnosis.not_identifiable.iter().any(|i| i == "coulomb_friction"));
     let (ground, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
     let planned = plan(&ground, &LIMITS, &begin).expect("a plan").0;
     assert!(planned.probability_decided > planned.probability_now + 0.3);
@@ -93,18 +94,19 @@ fn the_best_motions_are_set_against_each_other_and_other_insertions_judge_the_wi
     let (by_gaps, mut found) = plan(&ground, &LIMITS, &begin).expect("a plan");
     found.best.truncate(2);
     let mut told = Vec::new();
-    let checked = check(&found, &LIMITS, &scenario, &ground, std::slice::from_ref(&first), |what| {
-        told.push(what.to_owned());
-    })
-    .expect("a plan");
-    assert_eq!(checked.probability_from, "simulated");
+    let checked =
+        check_by_simulation(&found, &LIMITS, &scenario, &ground, std::slice::from_ref(&first), |what| {
+            told.push(what.to_owned());
+        })
+        .expect("a plan");
+    assert_eq!(checked.probability_source, "simulated");
     assert!(found.best.iter().any(|f| f.motion == checked.motion));
     // The other motion was simulated as well, and was not better.
     let other = &checked.alternatives[0];
-    assert!(other.simulated > 0 && other.decided <= other.simulated);
-    assert!(checked.simulated.iter().all(|t| t.of > 0 && t.decided <= t.of));
+    assert!(other.simulated > 0 && other.correct <= other.simulated);
+    assert!(checked.simulated.iter().all(|t| t.trials > 0 && t.correct <= t.trials));
     // Most simulated insertions decide, and the probability printed is no other than they say.
-    let (of, decided) = checked.simulated.iter().fold((0, 0), |(n, d), t| (n + t.of, d + t.decided));
+    let (of, decided) = checked.simulated.iter().fold((0, 0), |(n, d), t| (n + t.trials, d + t.correct));
     assert!(2 * decided > of, "{:?}", checked.simulated);
     assert!((checked.probability_decided - decided as f64 / of as f64).abs() < 0.25);
     assert!(checked.probability_decided > by_gaps.probability_now);

@@ -3,7 +3,9 @@
 //! Speed and acceleration are taken here from positions at 20 000 instants, not from the segments.
 
 use proptest::prelude::*;
-use stylet_plan::draw::{Begin, even, impossible, motion, respects};
+use stylet_plan::motion_programs::{
+    StartConditions, infeasibility, low_discrepancy_point, motion_from_point, within_limits,
+};
 use stylet_plan::{Limits, PlanError, from_scenario, plan};
 use stylet_scenario::{Motion, Scenario};
 
@@ -19,8 +21,8 @@ fn limits() -> impl Strategy<Value = Limits> {
     )
 }
 
-fn begin() -> Begin {
-    Begin { start_m: -0.005, surface_m: 0.0, end_m: 0.1, sample_hz: 200.0 }
+fn begin() -> StartConditions {
+    StartConditions { start_m: -0.005, surface_m: 0.0, max_depth_m: 0.1, sample_hz: 200.0 }
 }
 
 /// Depth, speed, acceleration and duration of a motion, seen from outside, rest before and after included.
@@ -45,8 +47,8 @@ proptest! {
     fn every_motion_keeps_its_limits(limits in limits(), first in 0..100_000_usize) {
         let begin = begin();
         for k in first..first + 8 {
-            let Some(motion) = motion(&even(k), &limits, &begin) else { continue };
-            prop_assert!(respects(&motion, &limits));
+            let Some(motion) = motion_from_point(&low_discrepancy_point(k), &limits, &begin) else { continue };
+            prop_assert!(within_limits(&motion, &limits));
             let (depth, speed, acceleration, duration) = seen(&motion);
             // Differences of positions round at 1e-17 m.
             let rounding = 1e-15 / (duration / 20_000.0).powi(2);
@@ -64,16 +66,18 @@ proptest! {
 fn a_motion_that_breaks_one_limit_is_refused() {
     let wide =
         Limits { depth_m: 0.1, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
-    let motion = (0..50).find_map(|k| motion(&even(k), &wide, &begin())).expect("one keeps wide limits");
+    let motion = (0..50)
+        .find_map(|k| motion_from_point(&low_discrepancy_point(k), &wide, &begin()))
+        .expect("one keeps wide limits");
     let (depth, speed, acceleration, duration) = seen(&motion);
-    assert!(respects(&motion, &wide));
+    assert!(within_limits(&motion, &wide));
     for narrow in [
         Limits { depth_m: 0.99 * depth, ..wide },
         Limits { speed_mps: 0.98 * speed, ..wide },
         Limits { acceleration_mps2: 0.5 * acceleration, ..wide },
         Limits { duration_s: 0.99 * duration, ..wide },
     ] {
-        assert!(!respects(&motion, &narrow), "{narrow:?}");
+        assert!(!within_limits(&motion, &narrow), "{narrow:?}");
     }
 }
 
@@ -100,7 +104,7 @@ fn impossible_limits_are_said_to_be_impossible_and_why() {
         (Limits { speed_mps: 1e-5, ..wide }, "duration_s"),
         (Limits { force_n: 0.05, ..wide }, "force_n"),
     ] {
-        let Err(PlanError::Impossible { why, remedy }) = plan(&ground, &limits, &begin) else {
+        let Err(PlanError::Infeasible { why, remedy }) = plan(&ground, &limits, &begin) else {
             unreachable!("{limits:?} cannot be kept")
         };
         assert!(why.contains(word) && !remedy.is_empty(), "{why}");
@@ -110,7 +114,7 @@ fn impossible_limits_are_said_to_be_impossible_and_why() {
         unreachable!("not a number")
     };
     assert_eq!(field, "speed_mps");
-    assert!(impossible(&wide, &begin).is_none());
+    assert!(infeasibility(&wide, &begin).is_none());
 }
 
 #[test]
@@ -121,7 +125,7 @@ fn the_expected_force_stays_below_its_limit_under_every_candidate() {
     let strong = plan(&ground, &free, &begin).expect("a plan").0;
     let gentle =
         plan(&ground, &Limits { force_n: 0.8 * strong.force_n, ..free }, &begin).expect("a gentler plan").0;
-    let largest = ground.expected(&gentle.motion).expect("forces").force_n;
+    let largest = ground.expected_forces(&gentle.motion).expect("forces").force_n;
     let most = largest.iter().flatten().fold(0.0, |m: f64, f| m.max(f.abs()));
     assert!(most <= 0.8 * strong.force_n && gentle.force_n <= 0.8 * strong.force_n, "{most}");
     assert_ne!(strong.motion, gentle.motion);

@@ -8,9 +8,9 @@ HERE = Path(__file__).parent
 FIRST = [
     ("md", "# Your first diagnosis\nA simulation believes in layers and their friction. Reality has something more. What is it?"),
     ("py", "import stylet\n\nbelieved = '''Scenario(\n    name: \"two gels\",\n    tissue: (layers: [\n        (thickness_m: 0.01, stiffness_n_per_m: 50.0, friction_ns_per_m2: 9000.0, puncture_n: 0.4),\n        (thickness_m: 0.02, stiffness_n_per_m: 90.0, friction_ns_per_m2: 14000.0),\n    ]),\n    motion: Program(start_m: -0.005, segments: [\n        Move(velocity_mps: 0.003, duration_s: 5.0), Hold(duration_s: 1.0),\n        Ripple(velocity_mps: 0.003, amplitude_mps: 0.001, frequency_hz: 0.5, duration_s: 4.0),\n        Move(velocity_mps: -0.004, duration_s: 3.0)]),\n    robot: Replay,\n    sensor: ForceTorque(noise_n: 0.01, ar1: 0.3),\n)'''"),
-    ("md", "Three \"measured\" insertions: here they are simulated with dry friction, which `believed` knows nothing of. Yours are data frames with `time_s`, `position_m`, `force_n`, or CSV files."),
-    ("py", "reality = believed.replace('robot: Replay', 'effects: [CoulombFriction(c_n_per_m: 12.0)], robot: Replay')\nmeasured = [stylet.simulate(reality, seed=s).to_pandas()[['time_s', 'position_m', 'force_n']] for s in (1, 2, 3)]\nmeasured[0].head()"),
-    ("py", "found = stylet.diagnose(believed, measured)\nfound"),
+    ("md", "Three \"measured\" insertions: here they are simulated with dry friction, which `assumed` knows nothing of. Yours are data frames with `time_s`, `position_m`, `force_n`, or CSV files."),
+    ("py", "reality = assumed.replace('robot: Replay', 'effects: [CoulombFriction(c_n_per_m: 12.0)], robot: Replay')\nmeasured = [stylet.simulate(reality, seed=s).to_pandas()[['time_s', 'position_m', 'force_n']] for s in (1, 2, 3)]\nmeasured[0].head()"),
+    ("py", "found = stylet.diagnose(assumed, measured)\nfound"),
     ("md", "The cause, its parameters, and how sure they are:"),
     ("py", "found.causes"),
     ("md", "Measured force, what the extended scenario predicts, and what is left:"),

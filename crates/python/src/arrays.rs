@@ -22,7 +22,11 @@ pub fn recording(
 }
 
 /// Columns into a dict of arrays.
-pub fn put<'py>(py: Python<'py>, dict: &Bound<'py, PyDict>, columns: &[(&str, &[f64])]) -> PyResult<()> {
+pub fn insert_columns<'py>(
+    py: Python<'py>,
+    dict: &Bound<'py, PyDict>,
+    columns: &[(&str, &[f64])],
+) -> PyResult<()> {
     for (name, column) in columns {
         dict.set_item(name, PyArray1::from_slice(py, column))?;
     }

@@ -3,12 +3,12 @@
 use crate::arrays::{Column, recording};
 use crate::failure;
 use crate::run::parse;
-use crate::work::beside;
+use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use stylet::record::read_csv_with_holes;
-use stylet::{Diagnosed, Evidence, ReadOptions, Scenario};
+use stylet::record::read_csv_skip_nonfinite;
+use stylet::{DiagnosisReport, NamedRecording, ReadOptions, Scenario};
 
 /// One recording: a file, or a name with time, position, force and velocity (or none).
 #[derive(FromPyObject)]
@@ -23,7 +23,7 @@ pub enum Measured<'py> {
 #[pyclass(frozen)]
 pub struct Diagnosis {
     found: Parts,
-    believed: String,
+    assumed: String,
 }
 
 /// What is kept of it; the engine's own state stays on the thread that made it.
@@ -47,14 +47,14 @@ pub fn diagnose(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Diagnosis> {
     let scenario = parse(kind, source)?;
-    let evidence = evidence(&measured, columns, repair)?;
-    let believed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
-    let named = believed.clone();
-    let found = beside(py, progress, move |told| {
+    let evidence = to_recordings(&measured, columns, repair)?;
+    let assumed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
+    let named = assumed.clone();
+    let found = run_in_background(py, progress, move |told| {
         let mut done = 0;
-        let found: Result<Diagnosed, stylet::Error> = stylet::diagnose(&scenario, &evidence, |what| {
+        let found: Result<DiagnosisReport, stylet::Error> = stylet::diagnose(&scenario, &evidence, |what| {
             done += 1;
-            told.tell_or_leave(what, done);
+            told.report_or_stop(what, done);
         });
         found.and_then(|found| {
             let (json, ron) = (found.json()?, found.extended_ron(&named)?);
@@ -62,15 +62,15 @@ pub fn diagnose(
             Ok(Parts { json, ron, html, extended: found.extended })
         })
     })?;
-    Ok(Diagnosis { found: found.map_err(failure)?, believed })
+    Ok(Diagnosis { found: found.map_err(failure)?, assumed })
 }
 
 /// Recordings as the engine takes them.
-pub fn evidence(
+pub fn to_recordings(
     measured: &[Measured<'_>],
     columns: Option<PathBuf>,
     repair: bool,
-) -> PyResult<Vec<Evidence>> {
+) -> PyResult<Vec<NamedRecording>> {
     let columns = columns.map(|c| stylet::scenario::load(&c)).transpose().map_err(failure)?;
     let options = ReadOptions { columns, repair };
     let files: Vec<PathBuf> = measured
@@ -84,10 +84,10 @@ pub fn evidence(
     for one in measured {
         evidence.push(match one {
             Measured::File(path) => {
-                let (recording, notes) = read_csv_with_holes(path, &options).map_err(failure)?;
-                Evidence { name: stylet::name_of(path, &files), recording, notes }
+                let (recording, notes) = read_csv_skip_nonfinite(path, &options).map_err(failure)?;
+                NamedRecording { name: stylet::recording_name(path, &files), recording, notes }
             }
-            Measured::Columns(name, time_s, position_m, force_n, velocity_mps) => Evidence {
+            Measured::Columns(name, time_s, position_m, force_n, velocity_mps) => NamedRecording {
                 name: name.clone(),
                 recording: recording(time_s, position_m, force_n, velocity_mps.as_ref())?,
                 notes: Vec::new(),
@@ -114,10 +114,10 @@ impl Diagnosis {
         &self.found.html
     }
 
-    /// The scenario that was believed.
+    /// The scenario that was assumed.
     #[getter]
-    fn believed(&self) -> &str {
-        &self.believed
+    fn assumed(&self) -> &str {
+        &self.assumed
     }
 
     /// The force (N) that the extended scenario predicts along a recorded motion.
@@ -130,7 +130,7 @@ impl Diagnosis {
         velocity_mps: Option<Column<'py>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let motion = recording(&time_s, &position_m, &time_s, velocity_mps.as_ref())?;
-        let force_n = stylet::predict(&self.found.extended, &motion).map_err(failure)?;
+        let force_n = stylet::force_along_motion(&self.found.extended, &motion).map_err(failure)?;
         Ok(PyArray1::from_vec(py, force_n))
     }
 }

@@ -1,28 +1,28 @@
 //! The online core, sample by sample or over arrays.
 
-use crate::arrays::{Column, put, recording};
+use crate::arrays::{Column, insert_columns, recording};
 use crate::failure;
-use crate::run::put_trace;
+use crate::run::insert_trace;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 use stylet::core::{Enhancer as Core, Output as CoreOutput, Sample};
-use stylet::heard::{Heard, Source, hear};
-use stylet::{EnhanceFile, record::differentiate};
+use stylet::enhancement::{EnhancementResult, ResultSource, enhance_recording};
+use stylet::{EnhancerConfigFile, record::differentiate};
 
 /// A configuration from a file (`"path"`), RON text (`"ron"`) or the defaults (empty text).
-fn parse(kind: &str, source: &str) -> PyResult<EnhanceFile> {
+fn parse(kind: &str, source: &str) -> PyResult<EnhancerConfigFile> {
     match kind {
-        "path" => EnhanceFile::load(Path::new(source)).map_err(failure),
+        "path" => EnhancerConfigFile::load(Path::new(source)).map_err(failure),
         "json" => {
-            let text = serde_json::from_str::<EnhanceFile>(source)
+            let text = serde_json::from_str::<EnhancerConfigFile>(source)
                 .map_err(|e| failure(format!("config: {e}")))
                 .map(|file| stylet::scenario::ron_options().to_string(&file))?;
-            EnhanceFile::parse("config", &text.map_err(failure)?).map_err(failure)
+            EnhancerConfigFile::parse("config", &text.map_err(failure)?).map_err(failure)
         }
-        _ if source.trim().is_empty() => Ok(EnhanceFile::default()),
-        _ => EnhanceFile::parse("config", source).map_err(failure),
+        _ if source.trim().is_empty() => Ok(EnhancerConfigFile::default()),
+        _ => EnhancerConfigFile::parse("config", source).map_err(failure),
     }
 }
 
@@ -114,7 +114,7 @@ impl Output {
 #[pyclass]
 pub struct Enhancer {
     core: Core<Vec<Sample>>,
-    config: EnhanceFile,
+    config: EnhancerConfigFile,
     storage: usize,
 }
 
@@ -213,7 +213,7 @@ impl Enhancer {
 /// What the core made of a recording.
 #[pyclass(frozen)]
 pub struct Enhanced {
-    heard: Heard,
+    heard: EnhancementResult,
     json: Vec<u8>,
     html: String,
 }
@@ -234,9 +234,9 @@ pub fn enhance(
     let recording = recording(&time_s, &position_m, &force_n, velocity_mps.as_ref())?;
     let model = config.enhance.model;
     py.detach(|| {
-        let heard = hear(recording, Vec::new(), config, &[model], None)?;
+        let heard = enhance_recording(recording, Vec::new(), config, &[model], None)?;
         let named =
-            Source { data: Path::new("recording"), config: None, command: "stylet.enhance".to_owned() };
+            ResultSource { data: Path::new("recording"), config: None, command: "stylet.enhance".to_owned() };
         let (json, html) = (heard.json("recording")?, heard.report(&named)?.to_html());
         Ok(Enhanced { heard, json, html })
     })
@@ -264,10 +264,10 @@ impl Enhanced {
             ("velocity_mps", &recording.velocity_mps),
             ("force_n", &recording.force_n),
         ];
-        put(py, &dict, &measured)?;
-        if let Some(ran) = self.heard.ran.first() {
-            put(py, &dict, &[("low_n", &ran.trace.low_n), ("high_n", &ran.trace.high_n)])?;
-            put_trace(py, &dict, &ran.trace)?;
+        insert_columns(py, &dict, &measured)?;
+        if let Some(ran) = self.heard.algorithm_runs.first() {
+            insert_columns(py, &dict, &[("low_n", &ran.trace.low_n), ("high_n", &ran.trace.high_n)])?;
+            insert_trace(py, &dict, &ran.trace)?;
         }
         Ok(dict)
     }

@@ -1,9 +1,9 @@
 //! Which insertion to make next.
 
-use crate::diagnosis::{Measured, evidence};
+use crate::diagnosis::{Measured, to_recordings};
 use crate::failure;
 use crate::run::parse;
-use crate::work::beside;
+use crate::work::run_in_background;
 use pyo3::prelude::*;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
@@ -41,18 +41,18 @@ pub fn plan(
     simulated: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Plan> {
-    let believed = parse(&scenario.0, &scenario.1)?;
+    let assumed = parse(&scenario.0, &scenario.1)?;
     let limits = limits(&within.0, &within.1)?;
-    let evidence = evidence(&measured, read.0, read.1)?;
+    let evidence = to_recordings(&measured, read.0, read.1)?;
     let name = if scenario.0 == "path" { scenario.1 } else { "scenario".to_owned() };
-    let planned = beside(py, progress, move |told| {
+    let planned = run_in_background(py, progress, move |told| {
         let done = Cell::new(0);
         let tell = |what: &str| {
             done.set(done.get() + 1);
-            told.tell_or_leave(what, done.get());
+            told.report_or_stop(what, done.get());
         };
         let at = [Path::new(&name), Path::new("limits")];
-        let planned = stylet::plan_after(believed, &evidence, &limits, simulated, at, &tell)?;
+        let planned = stylet::plan_after_recordings(assumed, &evidence, &limits, simulated, at, &tell)?;
         Ok(Plan { json: planned.json()?, motion: planned.motion_ron()?, html: planned.html() })
     })?;
     planned.map_err(|e: stylet::Error| failure(e))

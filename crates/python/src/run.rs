@@ -1,8 +1,8 @@
 //! Simulated insertions and recordings read from files.
 
-use crate::arrays::put;
+use crate::arrays::insert_columns;
 use crate::failure;
-use crate::work::beside;
+use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -22,7 +22,7 @@ pub fn parse(kind: &str, source: &str) -> PyResult<Scenario> {
                 let what = text.split(" at line ").next().unwrap_or(&text).to_owned();
                 failure(format!("scenario: {what}"))
             })?;
-            scenario.check().map_err(|p| failure(format!("scenario: {}: {}", p.path, p.what)))?;
+            scenario.check().map_err(|p| failure(format!("scenario: {}: {}", p.path, p.message)))?;
             Ok(scenario)
         }
         _ => Scenario::parse("scenario", source).map_err(failure),
@@ -54,7 +54,7 @@ pub fn read_csv<'py>(
     let options = stylet::ReadOptions { columns, repair };
     let (recording, notes) = stylet::record::read_csv(&path, &options).map_err(failure)?;
     let dict = PyDict::new(py);
-    put(
+    insert_columns(
         py,
         &dict,
         &[
@@ -85,13 +85,13 @@ pub fn simulate(py: Python<'_>, kind: &str, source: &str, seed: Option<u64>, com
     }
     let file = if kind == "path" { source.to_owned() } else { "scenario.ron".to_owned() };
     let named = file.clone();
-    let run = beside(py, None, move |_| stylet::simulate_from(&scenario, &named))?;
+    let run = run_in_background(py, None, move |_| stylet::simulate_from(&scenario, &named))?;
     Ok(Run { run: run.map_err(failure)?, file })
 }
 
 /// The core's outputs as columns, and its estimates, into a dict.
-pub fn put_trace(py: Python<'_>, dict: &Bound<'_, PyDict>, trace: &Trace) -> PyResult<()> {
-    put(
+pub fn insert_trace(py: Python<'_>, dict: &Bound<'_, PyDict>, trace: &Trace) -> PyResult<()> {
+    insert_columns(
         py,
         dict,
         &[
@@ -126,7 +126,7 @@ impl Run {
     /// Combinations of algorithm, model and sensor, such as `paper/ml/force_torque`.
     #[getter]
     fn combinations(&self) -> Vec<String> {
-        self.run.ran.iter().map(|r| r.name.clone()).collect()
+        self.run.algorithm_runs.iter().map(|r| r.name.clone()).collect()
     }
 
     /// Recording, truth and the outputs of one combination (the first), one value per sample.
@@ -134,7 +134,7 @@ impl Run {
     fn columns<'py>(&self, py: Python<'py>, combination: usize) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         let (recording, truth) = (&self.run.simulation.recording, &self.run.simulation.truth);
-        put(
+        insert_columns(
             py,
             &dict,
             &[
@@ -149,8 +149,12 @@ impl Run {
         )?;
         let active: Vec<u32> = truth.active_layer.iter().map(|l| *l as u32).collect();
         dict.set_item("true_active_layer", PyArray1::from_vec(py, active))?;
-        let ran = self.run.ran.get(combination).ok_or_else(|| failure("there is no such combination"))?;
-        put_trace(py, &dict, &ran.trace)?;
+        let ran = self
+            .run
+            .algorithm_runs
+            .get(combination)
+            .ok_or_else(|| failure("there is no such combination"))?;
+        insert_trace(py, &dict, &ran.trace)?;
         Ok(dict)
     }
 
@@ -163,7 +167,7 @@ impl Run {
     #[pyo3(signature = (combination=0))]
     fn ruptures_s(&self, combination: usize) -> Vec<f64> {
         self.run
-            .ran
+            .algorithm_runs
             .get(combination)
             .map_or(Vec::new(), |r| r.trace.detections.iter().map(|d| d.time_s).collect())
     }

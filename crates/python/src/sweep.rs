@@ -2,17 +2,17 @@
 
 use crate::failure;
 use crate::run::parse;
-use crate::work::beside;
+use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use stylet::{Swept, sweep::inputs};
+use stylet::{SweepResult, sweep::input_files};
 
 /// The rows and the summary of a sweep.
 #[pyclass(frozen)]
 pub struct Sweep {
-    swept: Swept,
+    swept: SweepResult,
     sweep: stylet::Sweep,
 }
 
@@ -41,12 +41,12 @@ pub fn sweep(
             file.seed = seed.unwrap_or(file.seed);
             let scenario = parse(kind, source)?;
             stylet::Sweep::new("sweep".to_owned(), file, scenario)
-                .map_err(|p| failure(format!("sweep: {}: {}", p.path, p.what)))?
+                .map_err(|p| failure(format!("sweep: {}: {}", p.path, p.message)))?
         }
         _ => return Err(failure("a sweep is either a file or a dict")),
     };
-    let ran = beside(py, progress, move |told| {
-        let swept = stylet::sweep(&sweep, |done| told.tell("trials", done));
+    let ran = run_in_background(py, progress, move |told| {
+        let swept = stylet::sweep(&sweep, |done| told.report("trials", done));
         (sweep, swept)
     })?;
     let (sweep, swept) = ran;
@@ -82,7 +82,7 @@ impl Sweep {
 
     /// `sweep.ron` and `scenario.ron`: what repeats it.
     fn inputs(&self) -> PyResult<Vec<(String, String)>> {
-        let output = inputs(&self.sweep).map_err(failure)?;
+        let output = input_files(&self.sweep).map_err(failure)?;
         Ok(output.files().map(|(n, c)| (n.to_owned(), String::from_utf8_lossy(c).into_owned())).collect())
     }
 }

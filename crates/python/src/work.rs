@@ -13,22 +13,22 @@ const LOOK_AT_SIGNALS: Duration = Duration::from_millis(50);
 struct Stopped;
 
 /// What the work is given: it tells how far it is, and ends when nobody wants it any more.
-pub struct Told {
+pub struct ProgressCallback {
     sender: Sender<(String, u64)>,
     stop: std::sync::Arc<AtomicBool>,
 }
 
-impl Told {
+impl ProgressCallback {
     /// Tells what is done now, and how many parts are done. `false` when the work should end.
-    pub fn tell(&self, what: &str, done: u64) -> bool {
+    pub fn report(&self, what: &str, done: u64) -> bool {
         // Nobody listening is no reason to fail.
         let _ = self.sender.send((what.to_owned(), done));
         !self.stop.load(Ordering::Relaxed)
     }
 
     /// Tells, and leaves the work at once when it should end: for work that asks nobody.
-    pub fn tell_or_leave(&self, what: &str, done: u64) {
-        if !self.tell(what, done) {
+    pub fn report_or_stop(&self, what: &str, done: u64) {
+        if !self.report(what, done) {
             std::panic::resume_unwind(Box::new(Stopped));
         }
     }
@@ -36,15 +36,15 @@ impl Told {
 
 /// Does `work` on another thread while the interpreter is free; `progress` (a callable or none) is called with a text and a
 /// count. On Ctrl-C, or when `progress` raises, the work ends at its next word and the exception is raised.
-pub fn beside<T: Send + 'static>(
+pub fn run_in_background<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
-    work: impl FnOnce(&Told) -> T + Send + 'static,
+    work: impl FnOnce(&ProgressCallback) -> T + Send + 'static,
 ) -> PyResult<T> {
     let (sender, words) = channel();
     let words = Mutex::new(words);
     let stop = std::sync::Arc::new(AtomicBool::new(false));
-    let told = Told { sender, stop: stop.clone() };
+    let told = ProgressCallback { sender, stop: stop.clone() };
     let thread = std::thread::spawn(move || work(&told));
     let outcome = loop {
         // Nobody else locks it; the lock is what lets it leave the interpreter's thread.

@@ -15,14 +15,14 @@ def test_simulate_gives_the_files_of_run(command, scenarios, tmp_path, two_gels)
 
 
 def test_diagnose_gives_the_files_of_diagnose(command, tmp_path, two_gels):
-    believed = two_gels
-    real = believed.replace("robot: Replay", "effects: [CoulombFriction(c_n_per_m: 12.0)], robot: Replay")
-    (tmp_path / "believed.ron").write_text(believed)
+    assumed = two_gels
+    real = assumed.replace("robot: Replay", "effects: [CoulombFriction(c_n_per_m: 12.0)], robot: Replay")
+    (tmp_path / "assumed.ron").write_text(assumed)
     for seed in (1, 2):
         (tmp_path / f"{seed}.csv").write_bytes(stylet.simulate(real, seed=seed).recording_csv())
     files = [tmp_path / "1.csv", tmp_path / "2.csv"]
-    command("diagnose", "believed.ron", "--data", *files, "--out", "there", "--quiet", cwd=tmp_path)
-    found = stylet.diagnose(tmp_path / "believed.ron", files, progress=False)
+    command("diagnose", "assumed.ron", "--data", *files, "--out", "there", "--quiet", cwd=tmp_path)
+    found = stylet.diagnose(tmp_path / "assumed.ron", files, progress=False)
     assert found.json() == (tmp_path / "there" / "diagnosis.json").read_bytes()
     said, ours = (tmp_path / "there" / "extended.ron").read_text(), found.extended_ron()
     # The first line names the file as it was given.

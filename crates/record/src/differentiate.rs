@@ -39,18 +39,18 @@ const RIM: f64 = 1e-6;
 /// give zeros. Takes time proportional to the number of samples, whatever the width.
 pub fn differentiate(time_s: &[f64], position_m: &[f64], half_width_s: f64) -> Vec<f64> {
     let mut velocity_mps = Vec::with_capacity(time_s.len().min(position_m.len()));
-    let mut slopes = Slopes::new(half_width_s);
+    let mut slopes = SlopeFilter::new(half_width_s);
     for (time_s, position_m) in time_s.iter().zip(position_m) {
-        slopes.take(*time_s, *position_m, |v| velocity_mps.push(v));
+        slopes.push(*time_s, *position_m, |v| velocity_mps.push(v));
     }
-    slopes.end(|v| velocity_mps.push(v));
+    slopes.finish(|v| velocity_mps.push(v));
     velocity_mps
 }
 
 /// [`differentiate`] for samples that come one by one; remembers one window. The slope at a sample is told as soon as a sample
 /// behind its window has come.
 #[derive(Debug, Clone)]
-pub(crate) struct Slopes {
+pub(crate) struct SlopeFilter {
     reach_s: f64,
     /// Samples from the window's first, or the one before its centre, to the newest.
     at_hand: VecDeque<(f64, f64)>,
@@ -64,7 +64,7 @@ pub(crate) struct Slopes {
     steps_since_anchor: usize,
 }
 
-impl Slopes {
+impl SlopeFilter {
     pub(crate) fn new(half_width_s: f64) -> Self {
         Self {
             reach_s: half_width_s * (1.0 + RIM),
@@ -80,7 +80,7 @@ impl Slopes {
 
     /// Takes the next sample; `tell` gets the slopes that are certain now.
     #[inline]
-    pub(crate) fn take(&mut self, time_s: f64, position_m: f64, mut tell: impl FnMut(f64)) {
+    pub(crate) fn push(&mut self, time_s: f64, position_m: f64, mut tell: impl FnMut(f64)) {
         if self.end == 0 {
             self.sums = Sums::anchored_at(time_s, position_m);
         }
@@ -93,7 +93,7 @@ impl Slopes {
     }
 
     /// No more samples: the slopes that are left.
-    pub(crate) fn end(mut self, mut tell: impl FnMut(f64)) {
+    pub(crate) fn finish(mut self, mut tell: impl FnMut(f64)) {
         if self.end == 1 {
             return tell(0.0);
         }

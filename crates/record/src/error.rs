@@ -90,7 +90,7 @@ pub enum RecordError {
         "{}: line {line}: the velocity, which is the slope of the position, is no finite number here: positions are too large or time stamps too close; correct the row, or the scales of time and position in the column map",
         path.display()
     )]
-    NoSlope { path: PathBuf, line: u64 },
+    VelocityNotFinite { path: PathBuf, line: u64 },
 
     /// Time runs backward.
     #[error(
@@ -163,7 +163,7 @@ pub enum RecordError {
          sample, or name a folder on another disk with --out",
         path.display()
     )]
-    Scratch { path: PathBuf, source: io::Error },
+    TemporaryFile { path: PathBuf, source: io::Error },
 
     /// Time stamps out of order over more rows than can be sorted out at once.
     #[error(

@@ -33,32 +33,34 @@
 //! | [`motion`] | the motion between samples, with the instants at which the speed jumps, from exact and from noisy positions |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 
-mod along;
-pub mod columns;
+pub mod column_map;
+mod csv_header;
+pub mod csv_reader;
+pub mod csv_writer;
 pub mod differentiate;
+pub mod disk_table;
+pub mod downsample;
 pub mod error;
-pub mod foreign;
-pub mod holes;
-mod layout;
-pub mod long;
+pub mod file_formats;
+pub mod ground_truth;
+pub mod long_recording;
 pub mod motion;
+pub mod nonfinite_rows;
 mod quality;
-pub mod read;
 pub mod recording;
-mod repair;
-pub mod scratch;
-pub mod thin;
-pub mod truth;
-pub mod write;
+mod sample_stream;
+mod timestamp_repair;
 
-pub use columns::{Column, ColumnMap};
+pub use column_map::{Column, ColumnMap};
+pub use csv_reader::{ReadOptions, read_csv, read_csv_bytes};
+pub use csv_writer::{RowWriter, write_csv};
 pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
+pub use downsample::downsample;
 pub use error::RecordError;
-pub use holes::read_csv_with_holes;
-pub use long::{LongRecording, read_long_csv};
-pub use quality::{LEAST_SAMPLES, QualityKind, QualityNote, assess, raw, unlike_the_others, usable};
-pub use read::{ReadOptions, read_csv, read_csv_bytes};
+pub use ground_truth::{LayerTruth, TrueRupture, Truth};
+pub use long_recording::{LongRecording, read_long_csv};
+pub use nonfinite_rows::read_csv_skip_nonfinite;
+pub use quality::{
+    MIN_SAMPLES, QualityKind, QualityNote, assess, check_usable, find_outlier_recordings, sensor_artefacts,
+};
 pub use recording::{JOINTS, Recording, Sample};
-pub use thin::thin;
-pub use truth::{LayerTruth, TrueRupture, Truth};
-pub use write::{RowWriter, write_csv};

@@ -4,24 +4,24 @@
 //! recording is used as it is, nothing is corrected. But from a recording with a *grave* note ([`QualityNote::grave`]) no cause may be
 //! named; [`usable`] turns it into an error that says what to do. The thresholds stand in [`QualityKind`].
 
-mod likeness;
-pub mod raw;
-mod runs;
-mod sense;
-mod timing;
-mod units;
+mod constant_runs;
+mod outlier_recordings;
+mod plausibility;
+pub mod sensor_artefacts;
+mod timestamps;
+mod unit_mismatch;
 mod values;
 
-pub use likeness::unlike_the_others;
-pub use sense::LEAST_SAMPLES;
+pub use outlier_recordings::find_outlier_recordings;
+pub use plausibility::MIN_SAMPLES;
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::along::{Along, Quantity};
 use crate::error::RecordError;
 use crate::recording::Recording;
+use crate::sample_stream::{Quantity, SampleStream};
 
 /// What a [`QualityNote`] is about, most consequential first. Serialises in snake case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -42,7 +42,7 @@ pub enum QualityKind {
     Stuck,
     /// Among repeats: the force over depth is over 5 robust standard deviations (root mean square over 24 depths) from the others'.
     /// Numbers: `distance`, `typical_n`, `others_n`.
-    NotLikeTheOthers,
+    OutlierRecording,
     /// Rows were dropped because their time stamps ran backward or repeated.
     /// Numbers: `dropped`, `kept`; `lines` names them.
     RepairedRows,
@@ -68,7 +68,7 @@ pub enum QualityKind {
     /// values are multiples of the smallest one. Numbers: `smallest_step` (SI unit), `distinct`, `distinct_ratio`.
     Quantisation,
     /// A recording was thinned before it was used ([`mod@crate::thin`]). Numbers: `from`, `to`, `together`.
-    Thinned,
+    Downsampled,
 }
 
 /// One remark on the quality of a recording.
@@ -85,7 +85,7 @@ pub struct QualityNote {
     pub lines: Vec<u64>,
     /// No cause may be named from such a recording.
     #[serde(default, skip_serializing_if = "is_false")]
-    pub grave: bool,
+    pub blocking: bool,
 }
 
 fn is_false(b: &bool) -> bool {
@@ -94,13 +94,13 @@ fn is_false(b: &bool) -> bool {
 
 impl QualityNote {
     /// A remark that forbids conclusions.
-    fn forbidding<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
-        Self { grave: true, ..Self::new(kind, message, numbers) }
+    fn blocking_note<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
+        Self { blocking: true, ..Self::new(kind, message, numbers) }
     }
 
     pub(crate) fn new<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
         let numbers = numbers.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-        Self { kind, message, numbers, lines: Vec::new(), grave: false }
+        Self { kind, message, numbers, lines: Vec::new(), blocking: false }
     }
 }
 
@@ -108,12 +108,12 @@ impl QualityNote {
 ///
 /// Expects what [`Recording::check`] promises; takes `O(n log n)`.
 pub fn assess(recording: &Recording) -> Vec<QualityNote> {
-    let Ok(notes) = look_over(recording);
+    let Ok(notes) = assess_stream(recording);
     notes
 }
 
 /// What several checks ask for.
-struct Facts {
+struct Extent {
     force_n: (f64, f64),
     position_m: (f64, f64),
     median_interval_s: f64,
@@ -123,38 +123,38 @@ struct Facts {
 ///
 /// # Errors
 /// When the samples cannot be gone through.
-pub(crate) fn look_over<A: Along>(recording: &A) -> Result<Vec<QualityNote>, A::Error> {
-    let mut notes: Vec<QualityNote> = sense::too_short(recording.len()).into_iter().collect();
+pub(crate) fn assess_stream<A: SampleStream>(recording: &A) -> Result<Vec<QualityNote>, A::Error> {
+    let mut notes: Vec<QualityNote> = plausibility::too_short(recording.len()).into_iter().collect();
     if recording.len() < 2 {
         return Ok(notes);
     }
-    if let Some(note) = sense::unmeasurable(recording)? {
+    if let Some(note) = plausibility::implausible_value(recording)? {
         // Nothing else can be computed from it.
         notes.push(note);
         return Ok(notes);
     }
-    let facts = Facts {
+    let facts = Extent {
         force_n: recording.extremes(Quantity::Force)?,
         position_m: recording.extremes(Quantity::Position)?,
         median_interval_s: recording.median_interval_s()?,
     };
-    notes.extend(units::unit_mix_ups(recording, &facts)?);
-    let dead = sense::dead(recording.len(), &facts);
+    notes.extend(unit_mismatch::unit_mix_ups(recording, &facts)?);
+    let dead = plausibility::dead_sensor(recording.len(), &facts);
     if dead.is_none() && notes.is_empty() {
-        notes.extend(sense::reversed(recording)?);
-        notes.extend(sense::in_air(recording, &facts)?);
+        notes.extend(plausibility::reversed_force(recording)?);
+        notes.extend(plausibility::only_in_air(recording, &facts)?);
     }
     notes.extend(dead);
-    notes.extend(sense::still(&facts));
-    notes.extend(timing::gaps(recording, &facts)?);
-    notes.extend(timing::jitter(recording, &facts)?);
+    notes.extend(plausibility::no_motion(&facts));
+    notes.extend(timestamps::gaps(recording, &facts)?);
+    notes.extend(timestamps::jitter(recording, &facts)?);
     notes.extend(values::saturation(recording, &facts)?);
     for (what, unit, which) in [("force_n", "N", Quantity::Force), ("position_m", "m", Quantity::Position)] {
         notes.extend(values::spikes(recording, what, unit, which)?);
-        let sorted = recording.keep_sorted(|keep| recording.values(which, keep))?;
+        let sorted = recording.sorted_values(|keep| recording.for_each_value(which, keep))?;
         notes.extend(values::quantisation(&sorted, what, unit)?);
         if which == Quantity::Force {
-            notes.extend(sense::stuck(recording, &sorted, &facts)?);
+            notes.extend(plausibility::stuck_force(recording, &sorted, &facts)?);
         }
     }
     notes.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| a.message.cmp(&b.message)));
@@ -165,13 +165,13 @@ pub(crate) fn look_over<A: Along>(recording: &A) -> Result<Vec<QualityNote>, A::
 ///
 /// # Errors
 /// [`RecordError::Unusable`] with every recording that has a grave note, what is wrong with it and what to do.
-pub fn usable<'a>(
+pub fn check_usable<'a>(
     recordings: impl IntoIterator<Item = (&'a str, &'a [QualityNote])>,
 ) -> Result<(), RecordError> {
     let (mut of, mut wrong) = (0, Vec::new());
     for (name, notes) in recordings {
         of += 1;
-        if let Some(note) = notes.iter().find(|note| note.grave) {
+        if let Some(note) = notes.iter().find(|note| note.blocking) {
             wrong.push(format!("{name}: {}", note.message));
         }
     }

@@ -2,7 +2,7 @@
 #![cfg(feature = "formats")]
 
 use std::path::{Path, PathBuf};
-use stylet_record::foreign::{to_mcap, to_parquet};
+use stylet_record::file_formats::{to_mcap, to_parquet};
 use stylet_record::{Column, ColumnMap, ReadOptions, RecordError, Recording, read_csv, read_csv_bytes};
 
 fn file(name: &str) -> PathBuf {

@@ -81,9 +81,9 @@ fn piece_by_piece(path: &Path, options: &ReadOptions, folder: &Path) -> Option<R
         Ok(read) => read?,
         Err(error) => return Some(Err(error.to_string())),
     };
-    let mut table = recording.names().join(",") + "\n";
+    let mut table = recording.column_names().join(",") + "\n";
     let mut samples = Vec::new();
-    let gone_through = recording.each(|s, row| -> Result<(), RecordError> {
+    let gone_through = recording.for_each_sample(|s, row| -> Result<(), RecordError> {
         samples.push([s.time_s, s.position_m, s.velocity_mps, s.force_n].map(f64::to_bits));
         table.push_str(&row.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(","));
         table.push('\n');

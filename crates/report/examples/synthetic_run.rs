@@ -60,7 +60,7 @@ fn confusion() -> String {
         rows: names.clone(),
         columns: names,
         values: values.collect(),
-        shares: false,
+        values_are_fractions: false,
     };
     heat_map(
         &map,

@@ -18,20 +18,20 @@
 //! assert!(html.starts_with("<!DOCTYPE html>"));
 //! ```
 
-mod chart;
+mod chart_json;
+mod chart_model;
 mod decimate;
-mod html;
-pub mod live;
-mod number;
-mod page;
+mod escaping;
+mod html_renderer;
+pub mod insertion_report;
+pub mod live_page;
+mod number_format;
+mod page_model;
 mod palette;
-mod payload;
-pub mod run;
 pub mod svg;
-mod text;
 
-pub use chart::{Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span};
-pub use number::{chance, percent, plus_minus, significant};
-pub use page::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text, Tile};
+pub use chart_model::{Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span};
+pub use insertion_report::RunReport;
+pub use number_format::{p_value, percent, plus_minus, significant};
+pub use page_model::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text, Tile};
 pub use palette::Colour;
-pub use run::RunReport;

@@ -41,7 +41,7 @@ fn setting(base: &Scenario, scale: f64, zero: ZeroWindow, label: &str) -> Settin
 /// Simulates one seed and scores both sensors.
 fn one(scenario: &Scenario, seed: u64) -> Result<(Vec<Scored>, f64), Failure> {
     let simulation = simulate(scenario, seed)?;
-    let layers = simulation.layers();
+    let layers = simulation.true_layers();
     let scores = simulation.readings.iter().map(|reading| {
         let config = match reading.sensor {
             "virtual" => scenario.enhance_for_virtual(),
@@ -50,7 +50,7 @@ fn one(scenario: &Scenario, seed: u64) -> Result<(Vec<Scored>, f64), Failure> {
         let (recording, truth) = (&simulation.recording, &simulation.truth);
         (reading.sensor, score_run(recording, &reading.force_n, truth, &layers, config).1)
     });
-    Ok((scores.collect(), simulation.virtual_error.map_or(f64::NAN, |e| e.beside_lag_rms_n)))
+    Ok((scores.collect(), simulation.virtual_sensor_accuracy.map_or(f64::NAN, |e| e.lag_corrected_rms_n)))
 }
 
 /// A rate's 95 % interval in per cent.

@@ -229,7 +229,7 @@ mod tests {
                 if change.number != Number::GelContrast {
                     assert_ne!(changed, plain, "{case:?} {}", change.words());
                 }
-                let checked = changed.check().map_err(|p| p.what);
+                let checked = changed.check().map_err(|p| p.message);
                 assert_eq!(checked, Ok(()), "{case:?} {}", change.words());
             }
         }

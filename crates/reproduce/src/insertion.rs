@@ -6,7 +6,7 @@ use crate::variant::{Sensor, Variant};
 use stylet_core::Sample;
 use stylet_scenario::Scenario;
 use stylet_score::{LayerTruth, Trace, score_run};
-use stylet_testbed::{InsertionSample, Measuring, SimulateError, Simulation, simulate};
+use stylet_testbed::{ForceSensor, InsertionSample, SimulateError, Simulation, simulate};
 use stylet_tissue::TissueForce;
 
 /// A scenario, simulated, with its layers.
@@ -47,7 +47,7 @@ impl Insertion {
         let Some(sensor) = self.scenario.sensor.force_torque() else { return Vec::new() };
         let mut sensor = sensor.clone();
         sensor.noise_n = f64::from(noise_mn) * 1e-3;
-        let mut measuring = Measuring::new(&self.scenario.effects, &sensor, seed, self.scenario.sample_hz);
+        let mut measuring = ForceSensor::new(&self.scenario.effects, &sensor, seed, self.scenario.sample_hz);
         let Simulation { recording, truth, .. } = &self.simulation;
         let samples = recording.samples().zip(&truth.tissue_force_n);
         samples

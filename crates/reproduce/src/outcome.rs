@@ -2,7 +2,9 @@
 
 use crate::insertion::Insertion;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use stylet_score::{Heard, LayerSample, Moment, OfflineEstimate, Score, Scorer, offline};
+use stylet_score::{
+    EnhancedSample, LayerSample, OfflineEstimate, Score, Scorer, TrueSample, fit_layer_offline,
+};
 
 /// One run of the algorithm on one recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +38,7 @@ impl Outcome {
         let truth = &insertion.simulation.truth;
         let mut scorer = Scorer::new(insertion.layers.clone(), config.model);
         for rupture in &truth.ruptures {
-            scorer.rupture(*rupture);
+            scorer.add_rupture(*rupture);
         }
         let contact_s = truth.surface_contact_s.unwrap_or(f64::INFINITY);
         let last_rupture_s = truth.ruptures.last().map_or(f64::INFINITY, |r| r.time_s);
@@ -53,11 +55,11 @@ impl Outcome {
         core.run(samples, |out| {
             let Sample { time_s, position_m, force_n, .. } = samples[i];
             if out.detection.is_some() || out.estimate.is_some() {
-                scorer.event(out);
+                scorer.add_event(out);
             }
             let (tip_n, total_n) = (truth.tip_force_n[i], truth.tissue_force_n[i]);
-            let moment = Moment { position_m, force_n, tip_n, total_n };
-            scorer.sample(&moment, &Heard::from(out));
+            let moment = TrueSample { position_m, force_n, tip_n, total_n };
+            scorer.add_sample(&moment, &EnhancedSample::from(out));
             if let Some(estimate) = out.estimate {
                 found = (found + estimate.added_friction_ns_per_m).max(0.0);
                 estimates.push(estimate);
@@ -163,7 +165,7 @@ impl Offline {
                     velocity_mps,
                     force_n: f - cumulative * velocity_mps,
                 });
-                offline(layer, ((1.0 - share) / share).sqrt() * ratio)
+                fit_layer_offline(layer, ((1.0 - share) / share).sqrt() * ratio)
             };
             let depth_m = rupture.position_m - layer.front_m;
             let plain = fit(without, 0.5);

@@ -11,7 +11,7 @@ use crate::view::{SENSITIVITY_SEEDS_ARM, View};
 use stylet_report::Colour;
 use stylet_report::svg::{FigureOptions, Strip, StripChart, StripGroup, strip_chart};
 use stylet_report::{Block, Cell, Section, Status, SvgImage, Table, percent, significant};
-use stylet_score::Compared;
+use stylet_score::EstimateError;
 
 type Row = (String, Case, u32, Sensor, Setup);
 
@@ -40,7 +40,7 @@ fn runs(
 
 fn error(outcome: &Outcome, layer: usize, friction: bool) -> Option<f64> {
     let layer = outcome.score.layers.get(layer)?;
-    let compared: Compared = if friction { layer.friction_ns_per_m2 } else { layer.stiffness_n_per_m };
+    let compared: EstimateError = if friction { layer.friction_ns_per_m2 } else { layer.stiffness_n_per_m };
     compared.relative_error
 }
 

@@ -1,13 +1,13 @@
 //! Motions of the needle as a scenario writes them.
 
-use crate::plan::MotionPlan;
+use crate::motion_plan::MotionPlan;
 use serde::{Deserialize, Serialize};
 
 /// Default phase of a sinusoid in radians: -90 degrees, from rest.
-pub const FROM_REST_RAD: f64 = -core::f64::consts::FRAC_PI_2;
+pub const PHASE_FROM_REST_RAD: f64 = -core::f64::consts::FRAC_PI_2;
 
 fn from_rest() -> f64 {
-    FROM_REST_RAD
+    PHASE_FROM_REST_RAD
 }
 
 /// A motion along the insertion axis (SPEC sections 3 and 8).

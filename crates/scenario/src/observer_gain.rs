@@ -3,14 +3,14 @@
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
-use stylet_dynamics::Gain;
+use stylet_dynamics::JointGain;
 
 /// Gain of the momentum observer in 1/s: `5.0`, or `[5.0, 5.0, 5.0, 5.0, 8.0, 8.0, 8.0]` from the base
 /// outwards. The residual follows an external torque with the time constant `1/gain`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ObserverGain {
     /// All joints alike.
-    Same(f64),
+    Uniform(f64),
     /// From the base outwards.
     PerJoint([f64; 7]),
 }
@@ -20,7 +20,7 @@ impl ObserverGain {
     #[must_use]
     pub fn per_joint(&self) -> [f64; 7] {
         match *self {
-            Self::Same(gain) => [gain; 7],
+            Self::Uniform(gain) => [gain; 7],
             Self::PerJoint(gains) => gains,
         }
     }
@@ -32,11 +32,11 @@ impl ObserverGain {
     }
 }
 
-impl From<ObserverGain> for Gain<7> {
+impl From<ObserverGain> for JointGain<7> {
     fn from(gain: ObserverGain) -> Self {
         match gain {
-            ObserverGain::Same(gain) => Gain::Same(gain),
-            ObserverGain::PerJoint(gains) => Gain::PerJoint(gains),
+            ObserverGain::Uniform(gain) => JointGain::Uniform(gain),
+            ObserverGain::PerJoint(gains) => JointGain::PerJoint(gains),
         }
     }
 }
@@ -44,7 +44,7 @@ impl From<ObserverGain> for Gain<7> {
 impl Serialize for ObserverGain {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Same(gain) => serializer.serialize_f64(*gain),
+            Self::Uniform(gain) => serializer.serialize_f64(*gain),
             Self::PerJoint(gains) => gains.as_slice().serialize(serializer),
         }
     }
@@ -66,15 +66,15 @@ impl<'de> Visitor<'de> for OneOrSeven {
     }
 
     fn visit_f64<E: Error>(self, gain: f64) -> Result<ObserverGain, E> {
-        Ok(ObserverGain::Same(gain))
+        Ok(ObserverGain::Uniform(gain))
     }
 
     fn visit_i64<E: Error>(self, gain: i64) -> Result<ObserverGain, E> {
-        Ok(ObserverGain::Same(gain as f64))
+        Ok(ObserverGain::Uniform(gain as f64))
     }
 
     fn visit_u64<E: Error>(self, gain: u64) -> Result<ObserverGain, E> {
-        Ok(ObserverGain::Same(gain as f64))
+        Ok(ObserverGain::Uniform(gain as f64))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<ObserverGain, A::Error> {
@@ -92,13 +92,13 @@ impl<'de> Visitor<'de> for OneOrSeven {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::load::ron_options;
+    use crate::load_ron::ron_options;
 
     #[test]
     fn a_number_or_seven_are_read_and_written_back_alike() {
         for (text, gain) in [
-            ("5.0", ObserverGain::Same(5.0)),
-            ("50", ObserverGain::Same(50.0)),
+            ("5.0", ObserverGain::Uniform(5.0)),
+            ("50", ObserverGain::Uniform(50.0)),
             ("[1.0,2.0,3.0,4.0,5.0,6.0,7.0]", ObserverGain::PerJoint([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])),
         ] {
             let read: ObserverGain = ron_options().from_str(text).expect("valid");

@@ -1,11 +1,11 @@
 //! The scenario as one value.
 
-use crate::error::InputError;
-use crate::load::{Problem, parse, read_text};
+use crate::input_error::InputError;
+use crate::load_ron::{FieldError, parse, read_text};
 use crate::motion::Motion;
-use crate::robot::Robot;
-use crate::sensor::Sensor;
-use crate::validate;
+use crate::robot_config::Robot;
+use crate::sensor_config::Sensor;
+use crate::validate_scenario;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_core::EnhanceConfig;
@@ -127,8 +127,8 @@ impl Scenario {
     ///
     /// # Errors
     /// The first [`Problem`], with the field's path.
-    pub fn check(&self) -> Result<(), Problem> {
-        validate::scenario(self)
+    pub fn check(&self) -> Result<(), FieldError> {
+        validate_scenario::scenario(self)
     }
 
     /// The scenario with every default written out.
@@ -137,7 +137,7 @@ impl Scenario {
     /// When a value cannot be written as RON, which no checked scenario holds.
     pub fn to_ron(&self) -> Result<String, ron::Error> {
         let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(8);
-        let body = crate::load::ron_options().to_string_pretty(self, pretty)?;
+        let body = crate::load_ron::ron_options().to_string_pretty(self, pretty)?;
         Ok(format!("Scenario{body}\n"))
     }
 }

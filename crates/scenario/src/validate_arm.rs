@@ -1,22 +1,22 @@
 //! Ranges of the arm and of the virtual sensor; the arm's way is tried out.
 
-use crate::joint_friction::ArmFriction;
-use crate::load::Problem;
-use crate::robot::{ArmConfig, Robot};
+use crate::arm_joint_friction::ArmFriction;
+use crate::load_ron::FieldError;
+use crate::robot_config::{ArmConfig, Robot};
 use crate::scenario::Scenario;
-use crate::sensor::{VirtualSensor, ZeroWindow};
-use crate::validate::{Checked, check, finite, not_negative, positive};
+use crate::sensor_config::{VirtualSensor, ZeroWindow};
+use crate::validate_scenario::{CheckResult, check, finite, not_negative, positive};
 
 /// Slowest observer in 1/s: it settles within a minute.
 const SLOWEST_PER_S: f64 = 0.1;
 
 /// Checks robot and virtual sensor together; the tissue and the motion have been checked before.
-pub(crate) fn robot(s: &Scenario) -> Checked {
+pub(crate) fn robot(s: &Scenario) -> CheckResult {
     let sensor = s.sensor.virtual_sensor();
     let Robot::Arm(arm) = &s.robot else {
         return match sensor {
             None => Ok(()),
-            Some(_) => Err(Problem::new(
+            Some(_) => Err(FieldError::new(
                 "sensor",
                 "is a virtual sensor, which listens to joint torques, and the robot has no joints; \
                  write robot: Arm(), or sensor: ForceTorque(...)",
@@ -25,12 +25,12 @@ pub(crate) fn robot(s: &Scenario) -> Checked {
     };
     ranges(arm, s.physics_hz)?;
     if let Some(plan) = s.motion.plan() {
-        arm.line(&plan, s.tissue.surface_m, s.sample_hz, sensor)?;
+        arm.insertion_line(&plan, s.tissue.surface_m, s.sample_hz, sensor)?;
     }
     Ok(())
 }
 
-fn ranges(arm: &ArmConfig, physics_hz: f64) -> Checked {
+fn ranges(arm: &ArmConfig, physics_hz: f64) -> CheckResult {
     for (i, q) in arm.start_rad.iter().enumerate() {
         finite(format!("robot.start_rad[{i}]"), *q, "radians")?;
     }
@@ -70,7 +70,7 @@ fn ranges(arm: &ArmConfig, physics_hz: f64) -> Checked {
     )
 }
 
-fn friction(friction: &ArmFriction) -> Checked {
+fn friction(friction: &ArmFriction) -> CheckResult {
     let at = |i: usize, field: &str| format!("robot.joint_friction.joints[{i}].{field}");
     let opposing = |path: String, value: f64, unit: &str| {
         check(
@@ -96,12 +96,15 @@ fn friction(friction: &ArmFriction) -> Checked {
             }
         }
     }
-    friction.laws(1.0).validate().map_err(|error| Problem::new("robot.joint_friction", error.to_string()))
+    friction
+        .friction_models(1.0)
+        .validate()
+        .map_err(|error| FieldError::new("robot.joint_friction", error.to_string()))
 }
 
 /// Checks a virtual sensor whose fields stand at `at`.
-pub(crate) fn virtual_sensor(at: &str, c: &VirtualSensor, physics_hz: f64) -> Checked {
-    let same = matches!(c.gain_per_s, crate::ObserverGain::Same(_));
+pub(crate) fn virtual_sensor(at: &str, c: &VirtualSensor, physics_hz: f64) -> CheckResult {
+    let same = matches!(c.gain_per_s, crate::ObserverGain::Uniform(_));
     for (i, gain) in c.gain_per_s.per_joint().into_iter().enumerate() {
         let path = if same { format!("{at}.gain_per_s") } else { format!("{at}.gain_per_s[{i}]") };
         check(

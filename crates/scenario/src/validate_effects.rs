@@ -1,12 +1,12 @@
 //! Ranges of the effects' parameters, as the library of effects states them.
 
-use crate::load::Problem;
+use crate::load_ron::FieldError;
 use crate::scenario::Scenario;
-use crate::validate::Checked;
-use stylet_tissue::{AnyEffect, Effect, Law, ParameterError};
+use crate::validate_scenario::CheckResult;
+use stylet_tissue::{AnyEffect, Effect, ForceLaw, ParameterError};
 
 /// Checks the effects of a scenario.
-pub(crate) fn effects(s: &Scenario) -> Checked {
+pub(crate) fn effects(s: &Scenario) -> CheckResult {
     for (i, effect) in s.effects.iter().enumerate() {
         let at = format!("effects[{i}]");
         finite(&at, effect)?;
@@ -25,12 +25,12 @@ pub(crate) fn effects(s: &Scenario) -> Checked {
                     layers - 1
                 )
             };
-            return Err(Problem::new(format!("{at}.layer"), what));
+            return Err(FieldError::new(format!("{at}.layer"), what));
         }
     }
-    Law::new(&s.tissue, &s.effects)
+    ForceLaw::new(&s.tissue, &s.effects)
         .map(drop)
-        .map_err(|e| Problem::new("effects", format!("{e}; leave some out")))
+        .map_err(|e| FieldError::new("effects", format!("{e}; leave some out")))
 }
 
 /// The library's `terms.0.fraction` as it stands in the file: `terms[0].fraction`.
@@ -53,17 +53,17 @@ fn unit(effect: &AnyEffect, parameter: &str) -> String {
 }
 
 /// Ranges that are open to above let infinity pass.
-fn finite(at: &str, effect: &AnyEffect) -> Checked {
+fn finite(at: &str, effect: &AnyEffect) -> CheckResult {
     for (parameter, value) in effect.info().parameters.iter().zip(effect.parameters()) {
         if !value.is_finite() {
             let what = format!("is {value}; it must be a finite number, for example {}", parameter.start);
-            return Err(Problem::new(path(at, parameter.path), what));
+            return Err(FieldError::new(path(at, parameter.path), what));
         }
     }
     Ok(())
 }
 
-fn problem(at: &str, effect: &AnyEffect, error: &ParameterError) -> Problem {
+fn problem(at: &str, effect: &AnyEffect, error: &ParameterError) -> FieldError {
     let ParameterError { path: parameter, value, allowed: (low, high), .. } = error;
     let what = if *parameter == "terms" {
         format!("has {value} terms; give one or two, `(fraction: 0.3, time_constant_s: 2.7)`")
@@ -75,5 +75,5 @@ fn problem(at: &str, effect: &AnyEffect, error: &ParameterError) -> Problem {
             format!("is {value}; it must lie between {low} and {high}{unit}")
         }
     };
-    Problem::new(path(at, parameter), what)
+    FieldError::new(path(at, parameter), what)
 }

@@ -1,9 +1,9 @@
 //! Ranges of a motion, and whether it comes to the tissue.
 
-use crate::load::Problem;
+use crate::load_ron::FieldError;
 use crate::motion::{Motion, Segment};
 use crate::scenario::Scenario;
-use crate::validate::{Checked, check, finite, positive};
+use crate::validate_scenario::{CheckResult, check, finite, positive};
 
 /// More samples, or a thousand times more physics steps, are refused: a mistyped rate or duration.
 const MOST_SAMPLES: f64 = 5e7;
@@ -14,7 +14,7 @@ const FASTEST_PHYSICS_HZ: f64 = 1e5;
 /// Speeds above this, in m/s, are taken for mm/s.
 const FASTEST_MPS: f64 = 1.0;
 
-pub(crate) fn motion(s: &Scenario) -> Checked {
+pub(crate) fn motion(s: &Scenario) -> CheckResult {
     match &s.motion {
         Motion::Constant { start_m, velocity_mps, duration_s } => {
             finite("motion.start_m", *start_m, "metres")?;
@@ -33,7 +33,7 @@ pub(crate) fn motion(s: &Scenario) -> Checked {
                     "is {amplitude_m}, which at {frequency_hz} Hz makes {fastest_mps:.3} m/s; speeds are at most \
                      {FASTEST_MPS} m/s; is this in millimetres?"
                 );
-                return Err(Problem::new("motion.amplitude_m", what));
+                return Err(FieldError::new("motion.amplitude_m", what));
             }
         }
         Motion::Program { start_m, segments } => {
@@ -41,7 +41,7 @@ pub(crate) fn motion(s: &Scenario) -> Checked {
             if segments.is_empty() {
                 let what =
                     "is empty; give at least one, for example `Move(velocity_mps: 0.0023, duration_s: 20.0)`";
-                return Err(Problem::new("motion.segments", what));
+                return Err(FieldError::new("motion.segments", what));
             }
             for (i, segment) in segments.iter().enumerate() {
                 one_segment(&format!("motion.segments[{i}]"), segment, s.sample_hz)?;
@@ -52,7 +52,7 @@ pub(crate) fn motion(s: &Scenario) -> Checked {
     reaches(s)
 }
 
-fn one_segment(at: &str, segment: &Segment, sample_hz: f64) -> Checked {
+fn one_segment(at: &str, segment: &Segment, sample_hz: f64) -> CheckResult {
     positive(format!("{at}.duration_s"), segment.duration_s(), "seconds")?;
     match *segment {
         Segment::Move { velocity_mps, .. } => speed(format!("{at}.velocity_mps"), velocity_mps),
@@ -65,18 +65,18 @@ fn one_segment(at: &str, segment: &Segment, sample_hz: f64) -> Checked {
     }
 }
 
-fn speed(path: impl Into<String>, value: f64) -> Checked {
+fn speed(path: impl Into<String>, value: f64) -> CheckResult {
     let right = format!("speeds are at most {FASTEST_MPS} m/s; is this in mm/s?");
     check(path, value, value.abs() <= FASTEST_MPS, &right)
 }
 
-fn frequency(path: String, value: f64, sample_hz: f64) -> Checked {
+fn frequency(path: String, value: f64, sample_hz: f64) -> CheckResult {
     let right = format!("it must lie between 0 and half of sample_hz, {} Hz", sample_hz / 2.0);
     check(path, value, value > 0.0 && value < sample_hz / 2.0, &right)
 }
 
 /// The motion must be short enough to store and must come to the tissue.
-fn reaches(s: &Scenario) -> Checked {
+fn reaches(s: &Scenario) -> CheckResult {
     let Some(plan) = s.motion.plan() else {
         return Ok(());
     };
@@ -87,11 +87,11 @@ fn reaches(s: &Scenario) -> Checked {
              shorten it or lower sample_hz",
             s.sample_hz
         );
-        return Err(Problem::new("motion", what));
+        return Err(FieldError::new("motion", what));
     }
     if samples < 2.0 {
         let what = format!("lasts {seconds} s, less than two samples at {} Hz; make it longer", s.sample_hz);
-        return Err(Problem::new("motion", what));
+        return Err(FieldError::new("motion", what));
     }
     if seconds * s.physics_hz > MOST_STEPS {
         let what = format!(
@@ -99,7 +99,7 @@ fn reaches(s: &Scenario) -> Checked {
             s.physics_hz,
             seconds * s.physics_hz
         );
-        return Err(Problem::new("physics_hz", what));
+        return Err(FieldError::new("physics_hz", what));
     }
     check(
         "physics_hz",
@@ -118,5 +118,5 @@ fn reaches(s: &Scenario) -> Checked {
         "never reaches the tissue: the tip comes to {furthest_m:.4} m and the surface lies at {surface_m} m, \
          {missing_mm:.3} mm further; start nearer, move longer, or move the other way"
     );
-    Err(Problem::new("motion", what))
+    Err(FieldError::new("motion", what))
 }

@@ -116,7 +116,7 @@ fn main() {
         algorithm: if paper { Algorithm::Paper } else { Algorithm::Stylet },
         ..EnhanceConfig::default()
     };
-    config.stylet.track_way_back = !args.iter().any(|a| a == "--taught");
+    config.stylet.track_retraction = !args.iter().any(|a| a == "--taught");
     let (mut n_falls, mut found, mut big, mut big_found, mut lesser, mut groundless, mut back) =
         (0, 0, 0, 0, 0, 0, 0);
     let mut delays = vec![];
@@ -160,7 +160,7 @@ fn main() {
             *f += noise * w;
         }
         let mut sigma = vec![];
-        let trace = Trace::record(&noisy, &noisy.force_n, &config, 0.0, |_, o| {
+        let trace = Trace::run(&noisy, &noisy.force_n, &config, 0.0, |_, o| {
             sigma.push(o.band_n.map_or(f64::NAN, |b| (b[1] - b[0]) / 3.92))
         });
         let mut taken = vec![false; trace.detections.len()];
@@ -273,7 +273,7 @@ fn main() {
                 }
                 let heard = |add: &dyn Fn(f64) -> f64| {
                     let f: Vec<f64> = (0..r.len()).map(|i| noisy.force_n[i] + add(x(i))).collect();
-                    Trace::record(&noisy, &f, &config, 0.0, |_, _| {}).enhanced_n
+                    Trace::run(&noisy, &f, &config, 0.0, |_, _| {}).enhanced_n
                 };
                 let pulsed = heard(&|x| {
                     if x > at && x < at + 0.002 {

@@ -1,21 +1,21 @@
 //! Scores: what the online algorithm found against what the simulation knows (SPEC section 10).
 #![forbid(unsafe_code)]
 
-mod detection;
-mod hearing;
-mod offline;
-mod online;
+mod enhancement_trace;
+mod enhancer_with_model;
+mod measured_score;
+mod model_friction_score;
+mod offline_least_squares;
+mod rupture_matching;
 mod score;
 mod scorer;
-mod trace;
-mod with_law;
 
-pub use detection::{EARLIEST_S, LATEST_S, RuptureScore, match_ruptures};
-pub use hearing::{Hearing, STORAGE_SAMPLES, core_for};
-pub use offline::{LayerSample, OfflineEstimate, offline};
-pub use online::{Measured, Online};
-pub use score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
-pub use scorer::{Heard, Moment, Scorer};
+pub use enhancement_trace::{Trace, algorithm_name, coefficients, model_name, score_run};
+pub use enhancer_with_model::{EnhancerWithModel, MAX_STORED_SAMPLES, enhancer_for};
+pub use measured_score::{MeasuredRecording, MeasuredScore};
+pub use model_friction_score::ModelFrictionScore;
+pub use offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
+pub use rupture_matching::{MATCH_EARLIEST_S, MATCH_LATEST_S, RuptureScore, match_ruptures};
+pub use score::{Coverage, EnhancementScore, EstimateError, LayerScore, Score};
+pub use scorer::{EnhancedSample, Scorer, TrueSample};
 pub use stylet_record::LayerTruth;
-pub use trace::{Trace, algorithm_name, coefficients, model_name, score_run};
-pub use with_law::WithLaw;

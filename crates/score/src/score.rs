@@ -1,11 +1,11 @@
 //! The score of one run: plain numbers that serialise (SPEC sections 7 and 10).
 
-use crate::detection::RuptureScore;
+use crate::rupture_matching::RuptureScore;
 use serde::{Deserialize, Serialize};
 
 /// An estimate beside its true value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Compared {
+pub struct EstimateError {
     /// True value.
     #[serde(rename = "true")]
     pub truth: f64,
@@ -15,7 +15,7 @@ pub struct Compared {
     pub relative_error: Option<f64>,
 }
 
-impl Compared {
+impl EstimateError {
     /// Compares; a true value of zero has no relative error.
     #[must_use]
     pub fn new(truth: f64, estimated: Option<f64>) -> Self {
@@ -30,13 +30,13 @@ pub struct LayerScore {
     /// Layer, 1-based.
     pub layer: usize,
     /// Stiffness `K_i` in N/m.
-    pub stiffness_n_per_m: Compared,
+    pub stiffness_n_per_m: EstimateError,
     /// Friction `b_i` in N s/m²; a Kelvin-Voigt estimate (N s/m) is divided by the thickness.
-    pub friction_ns_per_m2: Compared,
+    pub friction_ns_per_m2: EstimateError,
     /// Thickness `d_i` in m. A layer that punctures before its far face is found thinner.
-    pub thickness_m: Compared,
+    pub thickness_m: EstimateError,
     /// Cumulative friction in N s/m after this layer, against the true `sum b_j l_j` at its rupture.
-    pub cumulative_friction_ns_per_m: Compared,
+    pub cumulative_friction_ns_per_m: EstimateError,
     /// Offline least squares over the whole layer, stiffness in N/m.
     pub offline_stiffness_n_per_m: Option<f64>,
     /// Offline least squares over the whole layer, friction in N s/m².
@@ -76,9 +76,9 @@ pub struct Score {
     /// Every layer that has ruptured.
     pub layers: Vec<LayerScore>,
     /// Cumulative friction `D` in N s/m at the last true rupture.
-    pub cumulative_friction_ns_per_m: Compared,
+    pub cumulative_friction_ns_per_m: EstimateError,
     /// True and found position of the first contact in m; `relative_error` is not defined.
-    pub contact_m: Compared,
+    pub contact_m: EstimateError,
     /// Enhanced force against the tip force.
     pub enhancement: EnhancementScore,
     /// RMS of the innovation `e` in N, from first contact to the deepest point.
@@ -121,6 +121,6 @@ impl Score {
     }
 }
 
-fn worst(values: impl Iterator<Item = Compared>) -> Option<f64> {
+fn worst(values: impl Iterator<Item = EstimateError>) -> Option<f64> {
     values.filter_map(|c| c.relative_error).max_by(f64::total_cmp)
 }

@@ -1,14 +1,14 @@
 //! Scoring as the samples come, so that a sweep needs no copy of the run.
 
-use crate::detection::match_ruptures;
-use crate::score::{Compared, Coverage, EnhancementScore, LayerScore, Score};
+use crate::rupture_matching::match_ruptures;
+use crate::score::{Coverage, EnhancementScore, EstimateError, LayerScore, Score};
 use stylet_core::config::Model;
 use stylet_core::{Detection, LayerEstimate, Output};
 use stylet_record::{LayerTruth, TrueRupture};
 
 /// One sample of truth, beside what the core made of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct TrueSample {
     /// True tip position in m.
     pub position_m: f64,
     /// Measured force in N.
@@ -21,7 +21,7 @@ pub struct Moment {
 
 /// What the core made of a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Heard {
+pub struct EnhancedSample {
     /// Enhanced force in N.
     pub enhanced_n: f64,
     /// Innovation in N.
@@ -30,7 +30,7 @@ pub struct Heard {
     pub band_n: Option<[f64; 2]>,
 }
 
-impl From<&Output> for Heard {
+impl From<&Output> for EnhancedSample {
     #[inline]
     fn from(output: &Output) -> Self {
         Self { enhanced_n: output.enhanced_n, error_n: output.error_n, band_n: output.band_n }
@@ -91,12 +91,12 @@ impl Scorer {
     }
 
     /// A true rupture.
-    pub fn rupture(&mut self, rupture: TrueRupture) {
+    pub fn add_rupture(&mut self, rupture: TrueRupture) {
         self.ruptures.push(rupture);
     }
 
     /// What happened at a sample: a detection, a layer's estimate. Samples where nothing did may be left out.
-    pub fn event(&mut self, output: &Output) {
+    pub fn add_event(&mut self, output: &Output) {
         self.detections.extend(output.detection);
         if let Some(estimate) = output.estimate {
             // A later word on a layer replaces an earlier one.
@@ -106,13 +106,13 @@ impl Scorer {
     }
 
     /// The position in m at which the core has found contact, if it has.
-    pub fn contact(&mut self, contact_m: Option<f64>) {
+    pub fn set_contact(&mut self, contact_m: Option<f64>) {
         self.contact_m = contact_m;
     }
 
     /// One sample and what the core made of it.
     #[inline]
-    pub fn sample(&mut self, moment: &Moment, output: &Heard) {
+    pub fn add_sample(&mut self, moment: &TrueSample, output: &EnhancedSample) {
         let z = moment.position_m;
         if z < self.front_m {
             return;
@@ -162,7 +162,8 @@ impl Scorer {
             self.detections.iter().zip(&is_false).filter(|(_, f)| **f).map(|(d, _)| d.time_s).collect();
         let layers: Vec<LayerScore> =
             ruptures.iter().filter_map(|r| self.layer(r.layer, r.true_m, r.detection)).collect();
-        let cumulative = layers.last().map_or(Compared::new(0.0, None), |l| l.cumulative_friction_ns_per_m);
+        let cumulative =
+            layers.last().map_or(EstimateError::new(0.0, None), |l| l.cumulative_friction_ns_per_m);
         let sums = self.at_deepest.unwrap_or(self.sums);
         let ratio = |over: f64, under: f64| (under > 0.0).then(|| (over / under).sqrt());
         let missed = ruptures.iter().filter(|r| r.detected_s.is_none()).count();
@@ -173,7 +174,7 @@ impl Scorer {
             false_s,
             layers,
             cumulative_friction_ns_per_m: cumulative,
-            contact_m: Compared {
+            contact_m: EstimateError {
                 truth: self.layers.first().map_or(0.0, |l| l.front_m),
                 estimated: self.contact_m,
                 relative_error: None,
@@ -191,7 +192,7 @@ impl Scorer {
     }
 
     /// How many of the true values lie in the intervals that the core gives.
-    fn coverage(&self, ruptures: &[crate::detection::RuptureScore], sums: &Sums) -> Coverage {
+    fn coverage(&self, ruptures: &[crate::rupture_matching::RuptureScore], sums: &Sums) -> Coverage {
         let mut coverage = Coverage { band: [sums.in_band, sums.banded], ..Coverage::default() };
         for rupture in ruptures {
             let Some(truth) = rupture.layer.checked_sub(1).and_then(|i| self.layers.get(i)) else { continue };
@@ -202,7 +203,8 @@ impl Scorer {
                 continue;
             }
             let along = self.layers.iter().take(rupture.layer);
-            let cumulative: f64 = along.map(|l| l.friction_ns_per_m2 * l.inside_m(rupture.true_m)).sum();
+            let cumulative: f64 =
+                along.map(|l| l.friction_ns_per_m2 * l.length_inside_m(rupture.true_m)).sum();
             for (count, off, sd) in [
                 (&mut coverage.stiffness, e.stiffness_n_per_m - truth.stiffness_n_per_m, e.stiffness_sd),
                 (&mut coverage.friction, e.friction - truth.friction_ns_per_m2, e.friction_sd),
@@ -224,17 +226,24 @@ impl Scorer {
             Model::MultiLayer => e.friction,
             Model::KelvinVoigt => e.friction / e.thickness_m,
         });
-        let true_cumulative: f64 =
-            self.layers.iter().take(number).map(|l| l.friction_ns_per_m2 * l.inside_m(rupture_m)).sum();
+        let true_cumulative: f64 = self
+            .layers
+            .iter()
+            .take(number)
+            .map(|l| l.friction_ns_per_m2 * l.length_inside_m(rupture_m))
+            .sum();
         let cumulative = estimate.map(|upto| {
             self.estimates.iter().filter(|e| e.layer <= upto.layer).map(|e| e.added_friction_ns_per_m).sum()
         });
         Some(LayerScore {
             layer: number,
-            stiffness_n_per_m: Compared::new(truth.stiffness_n_per_m, estimate.map(|e| e.stiffness_n_per_m)),
-            friction_ns_per_m2: Compared::new(truth.friction_ns_per_m2, friction),
-            thickness_m: Compared::new(truth.thickness_m, estimate.map(|e| e.thickness_m)),
-            cumulative_friction_ns_per_m: Compared::new(true_cumulative, cumulative),
+            stiffness_n_per_m: EstimateError::new(
+                truth.stiffness_n_per_m,
+                estimate.map(|e| e.stiffness_n_per_m),
+            ),
+            friction_ns_per_m2: EstimateError::new(truth.friction_ns_per_m2, friction),
+            thickness_m: EstimateError::new(truth.thickness_m, estimate.map(|e| e.thickness_m)),
+            cumulative_friction_ns_per_m: EstimateError::new(true_cumulative, cumulative),
             offline_stiffness_n_per_m: None,
             offline_friction_ns_per_m2: None,
             offline_separable: None,

@@ -19,32 +19,32 @@
 //!
 //! Undefined results are `NaN` (as in NumPy): the median of nothing, a quantile at a probability outside 0 to 1.
 
-pub mod ar;
-pub mod curve;
-pub mod foretell;
-pub mod interval;
-pub mod linear;
+pub mod autoregressive;
+pub mod confidence_interval;
+pub mod interpolation;
+pub mod linear_algebra;
 pub mod moments;
 pub mod normal;
-pub mod order;
-pub mod rank;
-pub mod robust;
-pub mod select;
+pub mod order_statistics;
+pub mod rank_correlation;
+pub mod robust_linear_prediction;
+pub mod robust_loss;
+pub mod special_functions;
 pub mod spectrum;
-pub mod student;
-pub mod tails;
+pub mod streaming_quantiles;
+pub mod student_t;
 
-pub use ar::{Ar, Criterion};
-pub use curve::interpolate;
-pub use interval::{Interval, mean_interval, wilson, wilson_at};
+pub use autoregressive::{Ar, Criterion};
+pub use confidence_interval::{Interval, mean_interval, wilson, wilson_at};
+pub use interpolation::interpolate;
 pub use moments::{Moments, Sum, mean, rms, sd, variance};
-pub use order::{
+pub use order_statistics::{
     MAD_TO_SD, extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of,
-    quantile_of_sorted, roughness, sorted,
+    quantile_of_sorted, sorted, third_difference_sd,
 };
-pub use rank::spearman;
-pub use robust::Loss;
-pub use select::quantiles_along;
+pub use rank_correlation::spearman;
+pub use robust_loss::Loss;
+pub use streaming_quantiles::quantiles_of_stream;
 
 /// Standard deviation of a number spread evenly over one, to three digits.
 pub const UNIFORM_SD: f64 = 0.289;

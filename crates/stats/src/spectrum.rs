@@ -1,7 +1,7 @@
 //! The spectrum of columns that were sampled evenly, with samples missing, and its lines.
 
-use crate::linear::Symmetric;
-use crate::order::median;
+use crate::linear_algebra::SymmetricMatrix;
+use crate::order_statistics::median;
 use core::f64::consts::TAU;
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex;
@@ -19,18 +19,18 @@ const LEAST_HZ: f64 = 0.3;
 
 /// A column that was sampled every `step_s`, with samples missing.
 #[derive(Clone, Debug)]
-pub struct Column<'a> {
+pub struct SampledSignal<'a> {
     /// Instants in s.
-    pub t: &'a [f64],
+    pub time_s: &'a [f64],
     /// What was sampled.
-    pub x: Vec<f64>,
+    pub values: Vec<f64>,
     /// Sampling step in s.
     pub step_s: f64,
 }
 
 /// Power over frequency, mean of several columns.
 #[derive(Clone, Debug)]
-pub struct Power {
+pub struct PowerSpectrum {
     /// Width of a bin in Hz.
     pub bin_hz: f64,
     /// One-sided density per Hz, bin by bin from zero on.
@@ -38,14 +38,14 @@ pub struct Power {
     padding: usize,
 }
 
-impl Power {
+impl PowerSpectrum {
     /// The power of columns of the first one's rate; what lies beyond six times the median of the sizes is cut off there.
     #[must_use]
-    pub fn of(columns: &[Column], padding: usize) -> Self {
-        let samples = |c: &Column| {
-            let span_s = c.t.last().zip(c.t.first()).map_or(0.0, |(b, a)| b - a);
+    pub fn estimate(columns: &[SampledSignal], padding: usize) -> Self {
+        let samples = |c: &SampledSignal| {
+            let span_s = c.time_s.last().zip(c.time_s.first()).map_or(0.0, |(b, a)| b - a);
             // Long gaps are cut short: no line is worth so much memory.
-            ((span_s / c.step_s) as usize + 1).min(2 * c.t.len() + 1)
+            ((span_s / c.step_s) as usize + 1).min(2 * c.time_s.len() + 1)
         };
         let longest = columns.iter().map(samples).max().unwrap_or(0);
         let size = (longest * padding).next_power_of_two();
@@ -55,18 +55,18 @@ impl Power {
         let step_s = columns.first().map_or(1.0, |c| c.step_s);
         let mut count = 0.0;
         for c in columns {
-            if c.x.is_empty() || (c.step_s / step_s - 1.0).abs() > 0.01 {
+            if c.values.is_empty() || (c.step_s / step_s - 1.0).abs() > 0.01 {
                 continue;
             }
-            let mut sizes: Vec<f64> = c.x.iter().map(|x| x.abs()).collect();
+            let mut sizes: Vec<f64> = c.values.iter().map(|x| x.abs()).collect();
             let limit = 6.0 * median(&mut sizes).max(1e-9);
             // On a regular grid: a sample that is missing tells nothing.
-            let first = c.t.first().copied().unwrap_or(0.0);
-            let place = |k: usize| ((c.t[k] - first) / c.step_s).round() as usize;
-            let n = c.x.len() as f64;
-            let long = (place(c.x.len() - 1) + 1).min(size) as f64;
+            let first = c.time_s.first().copied().unwrap_or(0.0);
+            let place = |k: usize| ((c.time_s[k] - first) / c.step_s).round() as usize;
+            let n = c.values.len() as f64;
+            let long = (place(c.values.len() - 1) + 1).min(size) as f64;
             let mut buffer = vec![Complex::new(0.0, 0.0); size];
-            for (k, x) in c.x.iter().enumerate() {
+            for (k, x) in c.values.iter().enumerate() {
                 if let Some(slot) = buffer.get_mut(place(k)) {
                     let taper = 0.5 - 0.5 * libm::cos(TAU * (place(k) as f64 + 0.5) / long);
                     *slot = Complex::new(taper * x.clamp(-limit, limit), 0.0);
@@ -84,7 +84,7 @@ impl Power {
 
     /// For drawing: frequencies in Hz, and amplitudes per root of a Hz, smoothed to some hundred points.
     #[must_use]
-    pub fn drawn(&self) -> (Vec<f64>, Vec<f64>) {
+    pub fn for_plot(&self) -> (Vec<f64>, Vec<f64>) {
         const POINTS: usize = 400;
         let wide = (self.density.len() / POINTS).max(1);
         self.density
@@ -99,7 +99,7 @@ impl Power {
 
     /// Frequencies (Hz) of its lines, strongest first.
     #[must_use]
-    pub fn lines(&self) -> Vec<f64> {
+    pub fn detect_tones(&self) -> Vec<f64> {
         let (bin_hz, power) = (self.bin_hz, &self.density);
         let around = AROUND * self.padding;
         let first = ((LEAST_HZ / bin_hz) as usize).max(1);
@@ -131,9 +131,9 @@ impl Power {
 }
 
 /// Takes the sinusoid of this frequency (Hz) that fits best away from numbers `x` at instants `t` (s), of which those `used` tell it.
-pub fn take_away(x: &mut [f64], t: impl Fn(usize) -> f64, used: impl Fn(usize) -> bool, hz: f64) {
+pub fn subtract_sinusoid(x: &mut [f64], t: impl Fn(usize) -> f64, used: impl Fn(usize) -> bool, hz: f64) {
     let wave: Vec<(f64, f64)> = (0..x.len()).map(|k| libm::sincos(TAU * hz * t(k))).collect();
-    let (mut h, mut g) = (Symmetric::zeros(2), [0.0; 2]);
+    let (mut h, mut g) = (SymmetricMatrix::zeros(2), [0.0; 2]);
     for (k, (s, c)) in wave.iter().enumerate().filter(|(k, _)| used(*k)) {
         h.add(0, 0, s * s);
         h.add(1, 0, s * c);
@@ -141,7 +141,7 @@ pub fn take_away(x: &mut [f64], t: impl Fn(usize) -> f64, used: impl Fn(usize) -
         g[0] += s * x[k];
         g[1] += c * x[k];
     }
-    let of = h.factor().solve(&g);
+    let of = h.cholesky().solve(&g);
     x.iter_mut().zip(&wave).for_each(|(x, (s, c))| *x -= of[0] * s + of[1] * c);
 }
 
@@ -156,11 +156,13 @@ mod tests {
         of: &[&dyn Fn(f64) -> f64],
         seconds: f64,
         keep: impl Fn(usize) -> bool,
-    ) -> Vec<Column<'static>> {
+    ) -> Vec<SampledSignal<'static>> {
         let kept: Vec<f64> =
             (0..(seconds * HZ) as usize).filter(|k| keep(*k)).map(|k| 7.0 + k as f64 / HZ).collect();
         let t: &'static [f64] = kept.leak();
-        of.iter().map(|f| Column { t, x: t.iter().map(|t| f(*t)).collect(), step_s: 1.0 / HZ }).collect()
+        of.iter()
+            .map(|f| SampledSignal { time_s: t, values: t.iter().map(|t| f(*t)).collect(), step_s: 1.0 / HZ })
+            .collect()
     }
 
     fn wave(a: f64, hz: f64, phase: f64) -> impl Fn(f64) -> f64 {
@@ -184,7 +186,7 @@ mod tests {
     fn of_four(f: &dyn Fn(f64) -> f64) -> Vec<f64> {
         let [a, b, c, d] = [0, 1, 2, 3].map(|r| move |t: f64| nth(r, t) + f(t));
         let data = in_air(&[&a, &b, &c, &d], 20.0, |_| true);
-        Power::of(&data, PADDING).lines()
+        PowerSpectrum::estimate(&data, PADDING).detect_tones()
     }
 
     /// Parseval: the one-sided density over all frequencies is the mean square, for a tone and for noise, also where the mean is over
@@ -197,7 +199,7 @@ mod tests {
         };
         let total = |forces: &[&dyn Fn(f64) -> f64], padding: usize| {
             let data = in_air(forces, 20.0, |_| true);
-            let Power { bin_hz, density: p, .. } = Power::of(&data, padding);
+            let PowerSpectrum { bin_hz, density: p, .. } = PowerSpectrum::estimate(&data, padding);
             assert_eq!(p.len(), 1024 * padding);
             assert!((bin_hz * (2048 * padding) as f64 / HZ - 1.0).abs() < 1e-9);
             p.iter().sum::<f64>() * bin_hz
@@ -209,7 +211,7 @@ mod tests {
         }
         // A tone of which every fifth sample is missing has less, and a recording of another rate does not count.
         let data = in_air(&[&tone], 20.0, |k| k % 5 != 0);
-        let Power { bin_hz, density: p, .. } = Power::of(&data, 1);
+        let PowerSpectrum { bin_hz, density: p, .. } = PowerSpectrum::estimate(&data, 1);
         let peak = (0..p.len()).max_by(|a, b| p[*a].total_cmp(&p[*b])).expect("a peak");
         assert!((peak as f64 * bin_hz - 11.3).abs() < bin_hz, "{}", peak as f64 * bin_hz);
     }
@@ -220,7 +222,7 @@ mod tests {
         let tone = wave(0.3, 11.3, 0.4);
         let bins = |seconds: f64, keep: &dyn Fn(usize) -> bool| {
             let data = in_air(&[&tone], seconds, keep);
-            Power::of(&data, 1).density.len()
+            PowerSpectrum::estimate(&data, 1).density.len()
         };
         assert_eq!((bins(10.23, &|_| true), bins(10.26, &|_| true)), (512, 1024));
         // 512 samples beside a gap of a minute: 1025 places; 511 have 1023.
@@ -233,11 +235,11 @@ mod tests {
         let (tone, other) = (wave(0.3, 11.3, 0.4), wave(0.9, 31.0, 0.4));
         let data = in_air(&[&tone, &other], 20.0, |_| true);
         let alone_data = in_air(&[&tone], 20.0, |_| true);
-        let one = Power::of(&alone_data, 1).density;
+        let one = PowerSpectrum::estimate(&alone_data, 1).density;
         for (by, counts) in [(1.009, true), (1.011, false)] {
             let mut columns = data.clone();
             columns[1].step_s *= by;
-            let p = Power::of(&columns, 1).density;
+            let p = PowerSpectrum::estimate(&columns, 1).density;
             let same = p.iter().zip(&one).all(|(p, one)| (p - one).abs() <= 1e-9 * one);
             assert_eq!(!same, counts, "{by}");
         }
@@ -247,7 +249,7 @@ mod tests {
     fn outlying_samples_are_cut_at_six_times_the_median() {
         let spike = |t: f64| if (t - 12.0).abs() < 0.004 { 900.0 } else { wave(0.3, 11.3, 0.4)(t) };
         let data = in_air(&[&spike], 20.0, |_| true);
-        let Power { bin_hz, density: p, .. } = Power::of(&data, 1);
+        let PowerSpectrum { bin_hz, density: p, .. } = PowerSpectrum::estimate(&data, 1);
         let total = p.iter().sum::<f64>() * bin_hz;
         // One of 2000 samples of at most 6 * 0.22 adds little to a mean square of 0.045.
         assert!(total > 0.044 && total < 0.05, "{total}");
@@ -257,8 +259,8 @@ mod tests {
     fn the_spectrum_that_is_drawn_is_the_root_of_means_over_bins() {
         let tone = wave(0.3, 11.3, 0.4);
         let data = in_air(&[&tone], 20.0, |_| true);
-        let Power { bin_hz, density: p, .. } = Power::of(&data, 1);
-        let (hz, amplitude) = Power::of(&data, 1).drawn();
+        let PowerSpectrum { bin_hz, density: p, .. } = PowerSpectrum::estimate(&data, 1);
+        let (hz, amplitude) = PowerSpectrum::estimate(&data, 1).for_plot();
         // 1024 bins, two by two.
         assert_eq!(hz.len(), 512);
         for k in [0, 1, 57, 115, 116, 511] {
@@ -267,7 +269,7 @@ mod tests {
         }
         // A short one is drawn bin by bin.
         let data = in_air(&[&tone], 4.0, |_| true);
-        assert_eq!(Power::of(&data, 1).drawn().0.len(), 256);
+        assert_eq!(PowerSpectrum::estimate(&data, 1).for_plot().0.len(), 256);
     }
 
     #[test]
@@ -297,7 +299,7 @@ mod tests {
         let used = |k: usize| !(40..90).contains(&k);
         let whole: Vec<f64> = (0..300).map(|k| wave(0.3, 5.1, 0.4)(t(k)) + noise(t(k))).collect();
         let mut x = whole.clone();
-        take_away(&mut x, t, used, 5.1);
+        subtract_sinusoid(&mut x, t, used, 5.1);
         assert!(x.iter().all(|x| x.abs() < 0.013));
         for phase in [0.0, 0.5 * std::f64::consts::PI] {
             let dot: f64 =

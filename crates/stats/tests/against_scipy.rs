@@ -3,7 +3,7 @@
 #![allow(clippy::panic, reason = "a test may")]
 
 use std::collections::BTreeMap;
-use stylet_stats::{Ar, normal, quantile_of, spearman, student, tails, wilson_at};
+use stylet_stats::{Ar, normal, quantile_of, spearman, special_functions, student_t, wilson_at};
 
 /// Largest relative error against SciPy, per function (absolute where the reference is below one, for those named).
 fn allowed(name: &str) -> f64 {
@@ -22,12 +22,12 @@ fn ours(name: &str, x: &[f64]) -> f64 {
         "normal_sf" => normal::sf(x[0]),
         "normal_ln_pdf" => normal::ln_pdf(x[0]),
         "normal_quantile" => normal::quantile(x[0]),
-        "student_quantile" => student::quantile(x[0], x[1]),
-        "student_sf" => student::sf(x[0], x[1]),
-        "student_ln_pdf" => student::ln_pdf(x[0], x[1]),
-        "chi_square_quantile" => tails::chi_square_quantile(x[0], x[1]),
-        "chi_square_sf" => tails::chi_square_sf(x[0], x[1]),
-        "f_sf" => tails::f_sf(x[0], x[1], x[2]),
+        "student_quantile" => student_t::quantile(x[0], x[1]),
+        "student_sf" => student_t::sf(x[0], x[1]),
+        "student_ln_pdf" => student_t::ln_pdf(x[0], x[1]),
+        "chi_square_quantile" => special_functions::chi_square_quantile(x[0], x[1]),
+        "chi_square_sf" => special_functions::chi_square_sf(x[0], x[1]),
+        "f_sf" => special_functions::f_sf(x[0], x[1], x[2]),
         "wilson_low" => wilson_at(x[0], x[1], x[2]).low,
         "wilson_high" => wilson_at(x[0], x[1], x[2]).high,
         "quantile" => quantile_of(x[1..].iter().copied(), x[0]),

@@ -2,7 +2,7 @@
 //! plain random, Latin hypercube and Sobol points serve alike.
 
 use serde::{Deserialize, Serialize};
-use stylet_scenario::Problem;
+use stylet_scenario::FieldError;
 
 /// A distribution in the unit of the field that it is drawn for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,8 +44,8 @@ impl Distribution {
     ///
     /// # Errors
     /// [`Problem`] with what would be right.
-    pub fn check(&self, path: &str) -> Result<(), Problem> {
-        let fail = |what: String| Err(Problem::new(path, what));
+    pub fn check(&self, path: &str) -> Result<(), FieldError> {
+        let fail = |what: String| Err(FieldError::new(path, what));
         let numbers: Vec<f64> = match self {
             Self::Uniform(a, b) | Self::LogUniform(a, b) => vec![*a, *b],
             Self::Normal { mean, sd } => vec![*mean, *sd],

@@ -5,33 +5,36 @@
 //! The same inputs give the same bytes for any number of threads and any split into shards.
 #![forbid(unsafe_code)]
 
-mod along;
-pub mod compare;
-mod design;
+pub mod algorithm_comparison;
 mod distribution;
-mod draw;
-mod field;
-pub mod gate;
+mod draw_trial;
+mod failure_rate_bins;
+mod parallel_trials;
 #[cfg(feature = "parquet")]
 mod parquet;
-mod row;
-mod run;
+mod sampling_design;
+mod scenario_field;
+pub mod score_gate;
 pub mod sensitivity;
 pub mod shard;
 mod summary;
-mod sweep;
-pub mod trial;
-mod trials;
+mod sweep_file;
+mod trial_row;
+pub mod trial_simulation;
+mod trial_table;
 
-pub use along::{BINS, Bin, MapRow, bins, map_rows};
-pub use design::{Design, SOBOL_DIMENSIONS, Sampling, trial_seed};
 pub use distribution::Distribution;
-pub use draw::{DrawError, Drawer, Drawn};
-pub use field::Field;
+pub use draw_trial::{DrawError, DrawnTrial, TrialSampler};
+pub use failure_rate_bins::{BIN_COUNT, FailureMapRow, FailureRateBin, failure_map_rows, failure_rate_bins};
+pub use parallel_trials::{TrialError, run_trials, run_trials_with_threads};
 #[cfg(feature = "parquet")]
-pub use parquet::parquet;
-pub use row::{Columns, Row, csv};
-pub use run::{TrialError, rows, rows_with};
-pub use summary::{Explained, Outcome, ScoreSummary, Summary, WorstTrial, failed, summarise, value};
-pub use sweep::{Overrides, RandomEffect, Sweep, SweepFile, Vary};
-pub use trials::{Trials, TrialsOnDisk, TrialsWriter};
+pub use parquet::write_parquet;
+pub use sampling_design::{MAX_SOBOL_DIMENSIONS, Sampling, SamplingDesign, trial_seed};
+pub use scenario_field::ScenarioField;
+pub use summary::{
+    OutcomeSensitivity, QuantitySensitivity, ScoreSummary, Summary, WorstTrial, failed, score_value,
+    summarise,
+};
+pub use sweep_file::{Overrides, RandomEffect, Sweep, SweepFile, VariedField};
+pub use trial_row::{Columns, TrialRow, write_csv};
+pub use trial_table::{DiskTrialTable, TrialTable, TrialTableWriter};

@@ -1,7 +1,7 @@
 //! `trials.parquet`: the same table as `trials.csv`, one column per name, nulls for what does not exist.
 
-use crate::row::Columns;
-use crate::trials::Trials;
+use crate::trial_row::Columns;
+use crate::trial_table::TrialTable;
 use parquet::basic::Repetition;
 use parquet::basic::Type as Physical;
 use parquet::column::writer::ColumnWriter;
@@ -17,7 +17,11 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// What the destination or the rows say; no table of a sweep makes the Parquet library say anything.
-pub fn parquet<T: Trials + ?Sized>(columns: &Columns, rows: &T, output: impl Write + Send) -> io::Result<()> {
+pub fn write_parquet<T: TrialTable + ?Sized>(
+    columns: &Columns,
+    rows: &T,
+    output: impl Write + Send,
+) -> io::Result<()> {
     written(columns, rows, output).map_err(|why| match why {
         ParquetError::External(why) => match why.downcast::<io::Error>() {
             Ok(why) => *why,
@@ -27,7 +31,7 @@ pub fn parquet<T: Trials + ?Sized>(columns: &Columns, rows: &T, output: impl Wri
     })
 }
 
-fn written<T: Trials + ?Sized>(
+fn written<T: TrialTable + ?Sized>(
     columns: &Columns,
     rows: &T,
     output: impl Write + Send,
@@ -45,7 +49,7 @@ fn written<T: Trials + ?Sized>(
     }
     let schema = Arc::new(Type::group_type_builder("trials").with_fields(fields).build()?);
     let properties = Arc::new(WriterProperties::builder().set_created_by("stylet".to_owned()).build());
-    let read = |why: T::Error| ParquetError::from(T::told(why));
+    let read = |why: T::Error| ParquetError::from(T::into_io_error(why));
     let mut writer = SerializedFileWriter::new(output, schema, properties)?;
     let mut group = writer.next_row_group()?;
     let mut index = 0;
@@ -53,7 +57,7 @@ fn written<T: Trials + ?Sized>(
         if index < 3 {
             // Seeds keep their 64 bits: those beyond the signed range come out negative.
             let mut whole: Vec<i64> = Vec::with_capacity(rows.count());
-            rows.each(|r| whole.push([r.trial, r.seed, r.redrawn][index] as i64)).map_err(read)?;
+            rows.for_each_row(|r| whole.push([r.trial, r.seed, r.redrawn][index] as i64)).map_err(read)?;
             column.typed::<Int64Type>().write_batch(&whole, None, None)?;
         } else if let ColumnWriter::DoubleColumnWriter(typed) = column.untyped() {
             let mut values = rows.column(index - 3).map_err(read)?;
@@ -72,7 +76,7 @@ fn written<T: Trials + ?Sized>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Overrides, Sweep, rows_with};
+    use crate::{Overrides, Sweep, run_trials_with_threads};
     use parquet::file::reader::SerializedFileReader;
     use parquet::record::Field;
     use std::path::Path;
@@ -84,10 +88,10 @@ mod tests {
         let sweep =
             Sweep::load(&file, Overrides { trials: Some(12), seed: None }).expect("the shipped sweep");
         let columns = Columns::new(&sweep);
-        let rows = rows_with(&sweep, &columns, 0..12, 1, &|_| {}).expect("it runs");
+        let rows = run_trials_with_threads(&sweep, &columns, 0..12, 1, &|_| {}).expect("it runs");
         let written = || {
             let mut bytes = Vec::new();
-            parquet(&columns, &rows[..], &mut bytes).expect("it is written");
+            write_parquet(&columns, &rows[..], &mut bytes).expect("it is written");
             bytes
         };
         let bytes = written();

@@ -41,12 +41,12 @@ pub fn first_order(x: &[f64], y: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::{Design, Sampling};
+    use crate::sampling_design::{Sampling, SamplingDesign};
 
     #[test]
     fn the_median_lies_in_its_interval_and_the_interval_covers() {
         let mut covered = 0;
-        let design = Design::new(Sampling::Random, 3, 1, 101);
+        let design = SamplingDesign::new(Sampling::Random, 3, 1, 101);
         let mut point = vec![0.0; 101];
         for k in 0..1000 {
             design.point(k, 0, &mut point);
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn sensitivity_of_a_known_function_is_found() {
         // y = a + 2 b + noise-free interaction-free: indices 1/5 and 4/5, and an idle third quantity.
-        let design = Design::new(Sampling::Random, 5, 1, 3);
+        let design = SamplingDesign::new(Sampling::Random, 5, 1, 3);
         let mut point = [0.0; 3];
         let (mut x, mut y) = (vec![Vec::new(); 3], Vec::new());
         for k in 0..4000 {

@@ -3,8 +3,8 @@
 //!
 //! A file is one line of JSON (the header), then the rows as little-endian 64-bit numbers.
 
-use crate::row::{Columns, Row};
-use crate::sweep::{Sweep, hex};
+use crate::sweep_file::{Sweep, hex};
+use crate::trial_row::{Columns, TrialRow};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Folder of the shards within a sweep's output.
-pub const FOLDER: &str = "shards";
+pub const SHARD_FOLDER: &str = "shards";
 
 /// What a shard says of itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,7 +123,7 @@ impl ShardNumber {
     /// Where the shard lies in a sweep's output folder.
     #[must_use]
     pub fn path(&self, out: &Path) -> PathBuf {
-        out.join(FOLDER).join(format!("{:06}-of-{:06}.shard", self.shard, self.of))
+        out.join(SHARD_FOLDER).join(format!("{:06}-of-{:06}.shard", self.shard, self.of))
     }
 }
 
@@ -153,7 +153,7 @@ pub fn write(
     sweep: &Sweep,
     columns: &Columns,
     number: ShardNumber,
-    rows: &[Row],
+    rows: &[TrialRow],
     out: &Path,
 ) -> Result<(), ShardError> {
     let mut body = Vec::with_capacity(rows.len() * (columns.width() + 3) * 8);
@@ -170,7 +170,7 @@ pub fn write(
     let path = number.path(out);
     let part = path.with_extension(format!("{}.part", std::process::id()));
     let failed = |why| ShardError::Write { path: path.display().to_string(), why };
-    let folder = out.join(FOLDER);
+    let folder = out.join(SHARD_FOLDER);
     fs::create_dir_all(&folder).map_err(failed)?;
     let written = fs::File::create(&part).and_then(|mut file| {
         file.write_all(&bytes)?;
@@ -195,7 +195,7 @@ pub fn read(
     columns: &Columns,
     number: ShardNumber,
     out: &Path,
-) -> Result<Vec<Row>, ShardError> {
+) -> Result<Vec<TrialRow>, ShardError> {
     let path = number.path(out);
     let shown = path.display().to_string();
     let damaged = |why: &str| ShardError::Damaged { path: shown.clone(), why: why.to_owned() };
@@ -244,7 +244,7 @@ pub fn read(
             let mut words = record.chunks_exact(8).map(eight);
             let mut whole = || words.next().map_or(0, u64::from_le_bytes);
             let (trial, seed, redrawn) = (whole(), whole(), whole());
-            Row { trial, seed, redrawn, values: words.map(f64::from_le_bytes).collect() }
+            TrialRow { trial, seed, redrawn, values: words.map(f64::from_le_bytes).collect() }
         })
         .collect())
 }
@@ -254,8 +254,8 @@ pub fn read(
 /// # Errors
 /// [`ShardError::None`] without shards, [`ShardError::Foreign`] when files of different splits lie
 /// together.
-pub fn split_of(out: &Path) -> Result<u64, ShardError> {
-    let folder = out.join(FOLDER);
+pub fn shard_count(out: &Path) -> Result<u64, ShardError> {
+    let folder = out.join(SHARD_FOLDER);
     let mut found: Vec<(u64, String)> = fs::read_dir(&folder)
         .into_iter()
         .flatten()

@@ -1,10 +1,10 @@
 //! What the rows say together: rates, medians, the worst trials, and which drawn quantity explains
 //! the failures.
 
-use crate::row::{Columns, Row};
 use crate::sensitivity::first_order;
-use crate::sweep::Sweep;
-use crate::trials::Trials;
+use crate::sweep_file::Sweep;
+use crate::trial_row::{Columns, TrialRow};
+use crate::trial_table::TrialTable;
 use serde::{Deserialize, Serialize};
 use stylet_stats::{Interval, quantile_interval, sorted, spearman, wilson};
 
@@ -48,7 +48,7 @@ pub struct WorstTrial {
 
 /// How much of an outcome one drawn quantity explains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Explained {
+pub struct QuantitySensitivity {
     /// The quantity.
     pub quantity: String,
     /// Spearman's rank correlation; none when either does not vary.
@@ -61,11 +61,11 @@ pub struct Explained {
 
 /// An outcome and what explains it, the strongest first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct OutcomeSensitivity {
     /// The outcome.
     pub outcome: String,
     /// The quantities.
-    pub by: Vec<Explained>,
+    pub by: Vec<QuantitySensitivity>,
 }
 
 /// `summary.json`.
@@ -105,18 +105,18 @@ pub struct Summary {
     /// The worst trials first.
     pub worst: Vec<WorstTrial>,
     /// What explains the outcomes.
-    pub explained: Vec<Outcome>,
+    pub explained: Vec<OutcomeSensitivity>,
 }
 
 /// Whether the trial missed a rupture or alarmed falsely.
 #[must_use]
-pub fn failed(columns: &Columns, row: &Row) -> bool {
-    ["missed", "false"].iter().any(|s| value(columns, row, s) > 0.0)
+pub fn failed(columns: &Columns, row: &TrialRow) -> bool {
+    ["missed", "false"].iter().any(|s| score_value(columns, row, s) > 0.0)
 }
 
 /// A score of a row; not a number when it has none.
 #[must_use]
-pub fn value(columns: &Columns, row: &Row, score: &str) -> f64 {
+pub fn score_value(columns: &Columns, row: &TrialRow, score: &str) -> f64 {
     columns.score(score).and_then(|i| row.values.get(i)).copied().unwrap_or(f64::NAN)
 }
 
@@ -126,7 +126,7 @@ fn is_signed(score: &str) -> bool {
 }
 
 /// A score of all rows; not numbers when they have none.
-pub(crate) fn score<T: Trials + ?Sized>(
+pub(crate) fn score_column<T: TrialTable + ?Sized>(
     columns: &Columns,
     rows: &T,
     score: &str,
@@ -138,25 +138,25 @@ pub(crate) fn score<T: Trials + ?Sized>(
 ///
 /// # Errors
 /// When the rows cannot be read.
-pub fn summarise<T: Trials + ?Sized>(
+pub fn summarise<T: TrialTable + ?Sized>(
     sweep: &Sweep,
     columns: &Columns,
     rows: &T,
     replay: &str,
 ) -> Result<Summary, T::Error> {
-    let sum = |name: &str| Ok::<f64, T::Error>(score(columns, rows, name)?.iter().sum::<f64>());
+    let sum = |name: &str| Ok::<f64, T::Error>(score_column(columns, rows, name)?.iter().sum::<f64>());
     let trials = rows.count();
     let counted = ["ruptures", "missed", "false", "hits_are_chance"];
     let mut scores = Vec::new();
     for name in columns.scores.iter().filter(|s| !counted.contains(&s.as_str())) {
-        scores.extend(summary_of(name, score(columns, rows, name)?));
+        scores.extend(summary_of(name, score_column(columns, rows, name)?));
     }
     let (mut redrawn, mut failures) = (0, 0);
-    rows.each(|row| {
+    rows.for_each_row(|row| {
         redrawn += usize::from(row.redrawn > 0);
         failures += usize::from(failed(columns, row));
     })?;
-    let with_false = score(columns, rows, "false")?.iter().filter(|count| **count > 0.0).count();
+    let with_false = score_column(columns, rows, "false")?.iter().filter(|count| **count > 0.0).count();
     Ok(Summary {
         sweep: sweep.name.clone(),
         scenario: sweep.template.name.clone(),
@@ -201,10 +201,14 @@ fn summary_of(name: &str, mut values: Vec<f64>) -> Option<ScoreSummary> {
     })
 }
 
-fn worst<T: Trials + ?Sized>(columns: &Columns, rows: &T, replay: &str) -> Result<Vec<WorstTrial>, T::Error> {
-    let mut errors = score(columns, rows, "missed")?;
-    errors.iter_mut().zip(score(columns, rows, "false")?).for_each(|(errors, more)| *errors += more);
-    let off: Vec<f64> = score(columns, rows, "enhancement.rms_relative")?;
+fn worst<T: TrialTable + ?Sized>(
+    columns: &Columns,
+    rows: &T,
+    replay: &str,
+) -> Result<Vec<WorstTrial>, T::Error> {
+    let mut errors = score_column(columns, rows, "missed")?;
+    errors.iter_mut().zip(score_column(columns, rows, "false")?).for_each(|(errors, more)| *errors += more);
+    let off: Vec<f64> = score_column(columns, rows, "enhancement.rms_relative")?;
     let off = |place: usize| if off[place].is_nan() { f64::INFINITY } else { off[place] };
     let mut order: Vec<usize> = (0..rows.count()).collect();
     order.sort_by(|&a, &b| errors[b].total_cmp(&errors[a]).then(off(b).total_cmp(&off(a))).then(a.cmp(&b)));
@@ -214,9 +218,9 @@ fn worst<T: Trials + ?Sized>(columns: &Columns, rows: &T, replay: &str) -> Resul
         let r = rows.row(place)?;
         worst.push(WorstTrial {
             trial: r.trial,
-            missed: value(columns, &r, "missed") as u64,
-            false_alarms: value(columns, &r, "false") as u64,
-            enhancement: Some(value(columns, &r, "enhancement.rms_relative")).filter(|x| !x.is_nan()),
+            missed: score_value(columns, &r, "missed") as u64,
+            false_alarms: score_value(columns, &r, "false") as u64,
+            enhancement: Some(score_value(columns, &r, "enhancement.rms_relative")).filter(|x| !x.is_nan()),
             drawn: r.values[..columns.drawn.len()].to_vec(),
             replay: format!("stylet replay {replay} {}", r.trial),
         });
@@ -232,13 +236,16 @@ const OUTCOMES: [(&str, &[&str]); 4] = [
     ("enhancement error", &["enhancement.rms_relative"]),
 ];
 
-fn explained<T: Trials + ?Sized>(columns: &Columns, rows: &T) -> Result<Vec<Outcome>, T::Error> {
+fn explained<T: TrialTable + ?Sized>(
+    columns: &Columns,
+    rows: &T,
+) -> Result<Vec<OutcomeSensitivity>, T::Error> {
     let mut found = Vec::new();
     for (outcome, scores) in OUTCOMES {
         // Minus zero is what adds nothing.
         let mut y = vec![-0.0; rows.count()];
         for name in scores {
-            y.iter_mut().zip(score(columns, rows, name)?).for_each(|(sum, x)| *sum += x);
+            y.iter_mut().zip(score_column(columns, rows, name)?).for_each(|(sum, x)| *sum += x);
         }
         let there: Vec<bool> = y.iter().map(|y| !y.is_nan()).collect();
         y.retain(|y| !y.is_nan());
@@ -248,7 +255,7 @@ fn explained<T: Trials + ?Sized>(columns: &Columns, rows: &T) -> Result<Vec<Outc
             let mut kept = there.iter();
             x.retain(|_| kept.next().is_some_and(|there| *there));
             let rank = spearman(&x, &y);
-            by.push(Explained {
+            by.push(QuantitySensitivity {
                 quantity: quantity.clone(),
                 rank_correlation: rank.map(|r| r.0),
                 p_value: rank.map(|r| r.1),
@@ -256,11 +263,11 @@ fn explained<T: Trials + ?Sized>(columns: &Columns, rows: &T) -> Result<Vec<Outc
             });
         }
         by.sort_by(|a, b| {
-            let key = |e: &Explained| e.first_order.unwrap_or(-1.0);
+            let key = |e: &QuantitySensitivity| e.first_order.unwrap_or(-1.0);
             key(b).total_cmp(&key(a)).then(a.quantity.cmp(&b.quantity))
         });
         if by.iter().any(|e| e.first_order.is_some() || e.rank_correlation.is_some()) {
-            found.push(Outcome { outcome: outcome.to_owned(), by });
+            found.push(OutcomeSensitivity { outcome: outcome.to_owned(), by });
         }
     }
     Ok(found)

@@ -2,12 +2,12 @@
 //! Latin hypercube and Sobol points alike, and never leaves its range.
 
 use proptest::prelude::*;
-use stylet_sweep::{Design, Distribution, Sampling};
+use stylet_sweep::{Distribution, Sampling, SamplingDesign};
 
 /// Mean and standard deviation of 8192 draws.
 fn moments(with: &Distribution, sampling: Sampling) -> (f64, f64) {
     let n = 8192;
-    let design = Design::new(sampling, 11, n, 1);
+    let design = SamplingDesign::new(sampling, 11, n, 1);
     let mut point = [0.0];
     let draws: Vec<f64> = (0..n)
         .map(|k| {

@@ -4,7 +4,10 @@
 use std::path::Path;
 use stylet_scenario::{Motion, Robot, Scenario, Sensor};
 use stylet_score::score_run;
-use stylet_sweep::{Columns, Distribution, Drawer, Sampling, Sweep, SweepFile, Vary, rows_with, trial};
+use stylet_sweep::{
+    Columns, Distribution, Sampling, Sweep, SweepFile, TrialSampler, VariedField, run_trials_with_threads,
+    trial_simulation,
+};
 use stylet_testbed::simulate;
 
 fn scenario() -> Scenario {
@@ -13,8 +16,10 @@ fn scenario() -> Scenario {
 }
 
 fn sweep(paths: &[(&str, Distribution)], trials: u64) -> Sweep {
-    let vary =
-        paths.iter().map(|(path, with)| Vary { path: (*path).to_owned(), with: with.clone() }).collect();
+    let vary = paths
+        .iter()
+        .map(|(path, with)| VariedField { path: (*path).to_owned(), with: with.clone() })
+        .collect();
     let file = SweepFile {
         scenario: "x.ron".into(),
         trials,
@@ -44,7 +49,7 @@ fn paths_set_the_field_that_they_name_and_no_other() {
     ];
     let all: Vec<(&str, Distribution)> = paths.iter().map(|(p, x)| (*p, exact(*x))).collect();
     let sweep = sweep(&all, 1);
-    let drawn = Drawer::new(&sweep).draw(0).expect("a valid draw");
+    let drawn = TrialSampler::new(&sweep).draw(0).expect("a valid draw");
     let mut expected = scenario();
     expected.robot = Robot::Replay;
     expected.seed = drawn.seed;
@@ -71,10 +76,10 @@ fn paths_set_the_field_that_they_name_and_no_other() {
 fn a_trial_does_not_depend_on_the_others_nor_on_how_they_are_split() {
     let sweep = sweep(&[("sensor.noise_n", Distribution::LogUniform(0.005, 0.1))], 40);
     let columns = Columns::new(&sweep);
-    let all = rows_with(&sweep, &columns, 0..40, 2, &|_| {}).expect("it runs");
+    let all = run_trials_with_threads(&sweep, &columns, 0..40, 2, &|_| {}).expect("it runs");
     let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(x, y)| x.to_bits() == y.to_bits());
     for range in [0..1, 7..8, 13..40, 39..40] {
-        let part = rows_with(&sweep, &columns, range.clone(), 1, &|_| {}).expect("it runs");
+        let part = run_trials_with_threads(&sweep, &columns, range.clone(), 1, &|_| {}).expect("it runs");
         for (row, whole) in part.iter().zip(&all[range.start as usize..range.end as usize]) {
             assert_eq!((row.trial, row.seed), (whole.trial, whole.seed));
             assert!(same(&row.values, &whole.values));
@@ -89,13 +94,13 @@ fn a_trial_does_not_depend_on_the_others_nor_on_how_they_are_split() {
 #[test]
 fn a_trial_has_the_scores_of_the_ordinary_run() {
     let sweep = sweep(&[("sensor.noise_n", Distribution::Uniform(0.0, 0.05))], 4);
-    let drawer = Drawer::new(&sweep);
-    let mut workspace = trial::Workspace::default();
+    let drawer = TrialSampler::new(&sweep);
+    let mut workspace = trial_simulation::Workspace::default();
     for k in 0..4 {
         let scenario = drawer.draw(k).expect("a valid draw").scenario;
-        let ours = trial::run(&scenario, &mut workspace).expect("it runs");
+        let ours = trial_simulation::run(&scenario, &mut workspace).expect("it runs");
         let run = simulate(&scenario, scenario.seed).expect("it runs");
-        let layers = run.layers();
+        let layers = run.true_layers();
         let (_, mut score) =
             score_run(&run.recording, &run.recording.force_n, &run.truth, &layers, &scenario.enhance);
         for layer in &mut score.layers {
@@ -111,10 +116,11 @@ fn a_trial_has_the_scores_of_the_ordinary_run() {
 #[test]
 fn an_insertion_whose_first_sample_is_late_has_its_ruptures_elsewhere_between_two_samples() {
     let sweep = sweep(&[("sensor.noise_n", Distribution::Uniform(0.0, 0.001))], 1);
-    let scenario = Drawer::new(&sweep).draw(0).expect("a valid draw").scenario;
-    let mut workspace = trial::Workspace::default();
+    let scenario = TrialSampler::new(&sweep).draw(0).expect("a valid draw").scenario;
+    let mut workspace = trial_simulation::Workspace::default();
     let mut delay_steps = |late: f64| {
-        let score = trial::run_late(&scenario, late, &mut workspace).expect("it runs");
+        let score =
+            trial_simulation::run_with_sampling_phase(&scenario, late, &mut workspace).expect("it runs");
         let delay_s = score.ruptures.first().and_then(|r| r.delay_s).expect("a rupture that is found");
         delay_s * scenario.sample_hz
     };

@@ -1,10 +1,10 @@
 //! An insertion carried out by the arm.
 
-use crate::arm_rig::{ArmError, ArmRig};
-use crate::insertion::{InsertionSample, Rates};
+use crate::arm_simulation::{ArmError, ArmSimulation};
+use crate::slide_insertion::{InsertionSample, SampleRates};
 use stylet_dynamics::{Error, JointVector};
-use stylet_scenario::{ArmConfig, ArmLine, MotionPlan, VirtualSensor};
-use stylet_tissue::{Law, LawState, Rupture};
+use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPlan, VirtualSensor};
+use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 
 /// Arm, line and virtual sensor of an insertion.
 #[derive(Clone, Copy, Debug)]
@@ -12,7 +12,7 @@ pub struct ArmSetup<'a> {
     /// The arm.
     pub config: &'a ArmConfig,
     /// Its way, as [`ArmConfig::line`] found it.
-    pub line: &'a ArmLine,
+    pub line: &'a ArmInsertionLine,
     /// The virtual sensor, if it records.
     pub sensor: Option<&'a VirtualSensor>,
     /// Seed of the joint torques' noise.
@@ -21,15 +21,15 @@ pub struct ArmSetup<'a> {
 
 /// What the arm recorded, one value per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ArmRecord {
+pub struct ArmRecording {
     /// Measured joint torques, N m.
     pub joint_torque_nm: Vec<[f64; 7]>,
     /// Axial force of the virtual sensor, N; empty without one.
-    pub virtual_n: Vec<f64>,
+    pub virtual_force_n: Vec<f64>,
     /// From when on the virtual sensor is zeroed, s: an online algorithm listens from then on.
     pub zeroed_s: f64,
     /// Largest distance of the tip from the line, m.
-    pub off_line_m: f64,
+    pub lateral_deviation_m: f64,
 }
 
 /// The arm: rapier carries it, the law is stepped with every physics step on the tip's actual position
@@ -38,33 +38,33 @@ pub struct ArmRecord {
 ///
 /// # Errors
 /// [`ArmError`] when the arm leaves its limits.
-pub fn on_arm(
+pub fn simulate_on_arm(
     plan: &MotionPlan,
-    law: &Law,
-    rates: &Rates,
+    law: &ForceLaw,
+    rates: &SampleRates,
     setup: &ArmSetup<'_>,
     mut on_rupture: impl FnMut(Rupture),
     mut sink: impl FnMut(&InsertionSample),
-) -> Result<ArmRecord, ArmError> {
+) -> Result<ArmRecording, ArmError> {
     let ArmSetup { config, line, sensor, seed } = *setup;
     let steps = rates.steps_per_sample.max(1) as i64;
     let physics_hz = rates.sample_hz * steps as f64;
     let before = (line.approach.duration_s * physics_hz).ceil() as i64;
     let start_m = plan.at(0.0).position_m;
-    let first = line.plan_at(plan, -(before as f64) / physics_hz);
-    let mut rig = ArmRig::new(config, sensor, line, &first, start_m, 1.0 / physics_hz, seed)?;
+    let first = line.commanded_at(plan, -(before as f64) / physics_hz);
+    let mut rig = ArmSimulation::new(config, sensor, line, &first, start_m, 1.0 / physics_hz, seed)?;
 
-    let mut zero = Zeroing::new(line.zero_s, physics_hz);
-    let mut record = ArmRecord { zeroed_s: zero.until_s(physics_hz), ..ArmRecord::default() };
-    let mut state = LawState::default();
+    let mut zero = Zeroing::new(line.zero_window_s, physics_hz);
+    let mut record = ArmRecording { zeroed_s: zero.until_s(physics_hz), ..ArmRecording::default() };
+    let mut state = ForceLawState::default();
     let mut before_mps = first.velocity_mps;
     for k in -before..rates.samples as i64 * steps {
         let time_s = k as f64 / physics_hz;
-        let on_the_way = |reason: Error| ArmError::OnTheWay { time_s, reason };
+        let on_the_way = |reason: Error| ArmError::DuringMotion { time_s, reason };
         let sampled = k >= 0 && k % steps == 0;
         let mut force = None;
         let moment = rig
-            .step(&line.plan_at(plan, time_s), sampled, |position_m, velocity_mps| {
+            .step(&line.commanded_at(plan, time_s), sampled, |position_m, velocity_mps| {
                 if k < 0 {
                     return 0.0;
                 }
@@ -75,8 +75,8 @@ pub fn on_arm(
             .map_err(on_the_way)?;
         if let (true, Some(force)) = (sampled, force) {
             record.joint_torque_nm.push(moment.joint_torque_nm.into());
-            record.virtual_n.extend(moment.virtual_n);
-            record.off_line_m = record.off_line_m.max(moment.off_line_m);
+            record.virtual_force_n.extend(moment.virtual_force_n);
+            record.lateral_deviation_m = record.lateral_deviation_m.max(moment.lateral_deviation_m);
             zero.keep(&moment.q_rad);
             sink(&InsertionSample {
                 time_s: (k / steps) as f64 / rates.sample_hz,
@@ -87,7 +87,7 @@ pub fn on_arm(
             });
         }
         before_mps = moment.velocity_mps;
-        zero.step(k, &mut rig, &mut record.virtual_n).map_err(on_the_way)?;
+        zero.step(k, &mut rig, &mut record.virtual_force_n).map_err(on_the_way)?;
     }
     Ok(record)
 }
@@ -118,18 +118,18 @@ impl Zeroing {
     }
 
     /// After step `k`.
-    fn step(&mut self, k: i64, rig: &mut ArmRig, recorded_n: &mut [f64]) -> Result<(), Error> {
+    fn step(&mut self, k: i64, rig: &mut ArmSimulation, recorded_n: &mut [f64]) -> Result<(), Error> {
         let Some((from, until)) = self.window else { return Ok(()) };
         if k == from
             && let Some(observer) = rig.observer_mut()
         {
-            observer.begin_zero();
+            observer.begin_zeroing();
         }
         if k == until {
             self.window = None;
-            let zero = rig.observer_mut().map(|observer| observer.finish_zero()).transpose()?;
+            let zero = rig.observer_mut().map(|observer| observer.finish_zeroing()).transpose()?;
             for (value, q) in recorded_n.iter_mut().zip(self.waiting.drain(..)) {
-                *value -= zero.map_or(0.0, |zero| rig.axial_of(&q, &zero));
+                *value -= zero.map_or(0.0, |zero| rig.axial_force_n(&q, &zero));
             }
         }
         Ok(())

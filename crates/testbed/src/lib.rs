@@ -5,24 +5,24 @@
 //! needle's base or a virtual sensor on the arm's joint torques ([`AxialObserver`]) records it.
 #![forbid(unsafe_code)]
 
-mod arm;
 mod arm_insertion;
-mod arm_rig;
-mod control;
-mod insertion;
-mod sensor;
+mod arm_simulation;
+mod computed_torque_control;
+mod force_sensor;
+mod rapier_arm;
+mod rapier_slide;
 mod simulate;
-mod slide;
-mod virtual_error;
+mod slide_insertion;
 mod virtual_sensor;
+mod virtual_sensor_accuracy;
 
-pub use arm::{NotAChain, RapierArm};
-pub use arm_insertion::{ArmRecord, ArmSetup, on_arm};
-pub use arm_rig::{ArmError, ArmMoment, ArmRig};
-pub use control::LineControl;
-pub use insertion::{InsertionSample, Rates, on_slide, replayed};
-pub use sensor::{Measuring, Noise};
-pub use simulate::{Reading, SimulateError, Simulation, layers, rates, simulate};
-pub use slide::{NEEDLE_LENGTH_M, NEEDLE_MASS_KG, Slide};
-pub use virtual_error::VirtualError;
-pub use virtual_sensor::{AxialObserver, TorqueSensors};
+pub use arm_insertion::{ArmRecording, ArmSetup, simulate_on_arm};
+pub use arm_simulation::{ArmError, ArmSimulation, ArmStep};
+pub use computed_torque_control::LineController;
+pub use force_sensor::{ForceSensor, SensorNoise};
+pub use rapier_arm::{ArmChainError, RapierArm};
+pub use rapier_slide::{NEEDLE_LENGTH_M, NEEDLE_MASS_KG, Slide};
+pub use simulate::{SensorReadings, SimulateError, Simulation, sample_rates, simulate, true_layers};
+pub use slide_insertion::{InsertionSample, SampleRates, simulate_on_slide, simulate_replay};
+pub use virtual_sensor::{AxialForceObserver, JointTorqueSensors};
+pub use virtual_sensor_accuracy::VirtualSensorAccuracy;

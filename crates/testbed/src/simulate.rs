@@ -1,13 +1,13 @@
 //! A whole scenario: motion, robot, tissue and sensors make a recording with its ground truth.
 
-use crate::arm_insertion::{ArmRecord, ArmSetup, on_arm};
-use crate::arm_rig::ArmError;
-use crate::insertion::{InsertionSample, Rates, on_slide, replayed};
-use crate::sensor::Measuring;
-use crate::virtual_error::VirtualError;
+use crate::arm_insertion::{ArmRecording, ArmSetup, simulate_on_arm};
+use crate::arm_simulation::ArmError;
+use crate::force_sensor::ForceSensor;
+use crate::slide_insertion::{InsertionSample, SampleRates, simulate_on_slide, simulate_replay};
+use crate::virtual_sensor_accuracy::VirtualSensorAccuracy;
 use stylet_record::{LayerTruth, Recording, TrueRupture, Truth};
-use stylet_scenario::{ForceTorque, MotionPoint, Problem, Robot, Scenario, Sensor};
-use stylet_tissue::{AnyEffect, Effect, Law, Place, Rupture, Slab, TooManyEffects};
+use stylet_scenario::{FieldError, ForceTorque, MotionPoint, Robot, Scenario, Sensor};
+use stylet_tissue::{AnyEffect, ChainStage, Effect, ForceLaw, Rupture, Slab, TooManyEffects};
 
 /// Why a scenario cannot be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -21,8 +21,8 @@ pub enum SimulateError {
     #[error(transparent)]
     Effects(#[from] TooManyEffects),
     /// The scenario's numbers do not fit; a checked scenario has none of these.
-    #[error("{}: {}", .0.path, .0.what)]
-    Problem(Problem),
+    #[error("{}: {}", .0.path, .0.message)]
+    InvalidScenario(FieldError),
     /// The arm cannot carry the needle.
     #[error(transparent)]
     Arm(#[from] ArmError),
@@ -46,9 +46,9 @@ pub struct Simulation {
     /// The layers as the law placed them.
     pub slabs: Vec<Slab>,
     /// The sensors that recorded, force/torque first.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<SensorReadings>,
     /// How far the virtual sensor is off, and how late.
-    pub virtual_error: Option<VirtualError>,
+    pub virtual_sensor_accuracy: Option<VirtualSensorAccuracy>,
     /// How the needle really moved, one row per sample of the recording.
     pub motion: Vec<MotionPoint>,
     /// Effects, sensor and sampling rate (Hz) of the force/torque sensor.
@@ -58,14 +58,14 @@ pub struct Simulation {
 impl Simulation {
     /// The layers as the law placed them, as the scores want them.
     #[must_use]
-    pub fn layers(&self) -> Vec<LayerTruth> {
-        layers(&self.slabs)
+    pub fn true_layers(&self) -> Vec<LayerTruth> {
+        true_layers(&self.slabs)
     }
 
     /// The same insertion as the force/torque sensor records it with the noise of another seed (N, one value per sample):
     /// its noise moves nothing, so that the motion need not be simulated again. `None` without such a sensor.
     #[must_use]
-    pub fn remeasured(&self, seed: u64) -> Option<Vec<f64>> {
+    pub fn measured_with_seed(&self, seed: u64) -> Option<Vec<f64>> {
         let (effects, sensor, sample_hz) = self.sensor.as_ref()?;
         Some(self.measured_by(effects, sensor, *sample_hz, seed))
     }
@@ -79,7 +79,7 @@ impl Simulation {
         sample_hz: f64,
         seed: u64,
     ) -> Vec<f64> {
-        let mut measuring = Measuring::new(effects, sensor, seed, sample_hz);
+        let mut measuring = ForceSensor::new(effects, sensor, seed, sample_hz);
         let moments = self.recording.time_s.iter().zip(&self.motion).zip(&self.truth.tissue_force_n);
         moments.map(|((time_s, at), tissue_n)| measuring.measure_force(*time_s, at, *tissue_n)).collect()
     }
@@ -87,7 +87,7 @@ impl Simulation {
 
 /// What is true of layers that the law placed.
 #[must_use]
-pub fn layers(slabs: &[Slab]) -> Vec<LayerTruth> {
+pub fn true_layers(slabs: &[Slab]) -> Vec<LayerTruth> {
     let truth = |slab: &Slab| LayerTruth {
         front_m: slab.front_m,
         thickness_m: slab.thickness_m,
@@ -99,7 +99,7 @@ pub fn layers(slabs: &[Slab]) -> Vec<LayerTruth> {
 
 /// The force of one sensor, as an online algorithm hears it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct SensorReadings {
     /// `force_torque` or `virtual`.
     pub sensor: &'static str,
     /// Axial force in N, one value per sample; not a number as long as the sensor is not zeroed.
@@ -108,8 +108,8 @@ pub struct Reading {
 
 /// How a scenario is sampled.
 #[must_use]
-pub fn rates(scenario: &Scenario, duration_s: f64) -> Rates {
-    Rates {
+pub fn sample_rates(scenario: &Scenario, duration_s: f64) -> SampleRates {
+    SampleRates {
         sample_hz: scenario.sample_hz,
         steps_per_sample: (scenario.physics_hz / scenario.sample_hz - 1e-9).ceil().max(1.0) as usize,
         samples: (duration_s * scenario.sample_hz).round().max(2.0) as usize,
@@ -122,12 +122,13 @@ pub fn rates(scenario: &Scenario, duration_s: f64) -> Rates {
 /// [`SimulateError`] when the scenario has no motion of its own or asks for what cannot be simulated.
 pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
-    let law = Law::new(&scenario.tissue, &scenario.effects)?;
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;
     let without = ForceTorque { noise_n: 0.0, ..ForceTorque::default() };
     let sensor = match scenario.sensor.force_torque() {
         Some(sensor) => sensor,
         None => {
-            let beside = |e: &AnyEffect| matches!(e.place(), Place::Tool | Place::Sensor) && !e.is_neutral();
+            let beside =
+                |e: &AnyEffect| matches!(e.place(), ChainStage::Tool | ChainStage::Sensor) && !e.is_neutral();
             if scenario.effects.iter().any(beside) {
                 return Err(SimulateError::NotSupported {
                     what: "an effect of tool or force/torque sensor with `sensor: Virtual`",
@@ -137,8 +138,8 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
             &without
         }
     };
-    let mut measuring = Measuring::new(&scenario.effects, sensor, seed, scenario.sample_hz);
-    let rates = rates(scenario, plan.duration_s());
+    let mut measuring = ForceSensor::new(&scenario.effects, sensor, seed, scenario.sample_hz);
+    let rates = sample_rates(scenario, plan.duration_s());
     let mut ruptures = Vec::new();
     let mut columns = Columns::with_capacity(rates.samples, scenario.tissue.surface_m);
     let on_rupture = |r: Rupture| {
@@ -155,10 +156,10 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         Robot::Arm(config) => {
             let sensor = scenario.sensor.virtual_sensor();
             let line = config
-                .line(&plan, scenario.tissue.surface_m, scenario.sample_hz, sensor)
-                .map_err(SimulateError::Problem)?;
+                .insertion_line(&plan, scenario.tissue.surface_m, scenario.sample_hz, sensor)
+                .map_err(SimulateError::InvalidScenario)?;
             let setup = ArmSetup { config, line: &line, sensor, seed };
-            arm = Some(on_arm(&plan, &law, &rates, &setup, on_rupture, sink)?);
+            arm = Some(simulate_on_arm(&plan, &law, &rates, &setup, on_rupture, sink)?);
         }
         _ if scenario.sensor.virtual_sensor().is_some() => {
             return Err(SimulateError::NotSupported {
@@ -166,8 +167,8 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
                 remedy: "use robot: Arm()",
             });
         }
-        Robot::Slide => on_slide(&plan, &law, &rates, on_rupture, sink),
-        Robot::Replay => replayed(&plan, &law, &rates, on_rupture, sink),
+        Robot::Slide => simulate_on_slide(&plan, &law, &rates, on_rupture, sink),
+        Robot::Replay => simulate_replay(&plan, &law, &rates, on_rupture, sink),
     }
     // Where the needle was recorded at that instant: the law's own position is relative to the tissue.
     for rupture in &mut ruptures {
@@ -177,7 +178,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     let mut recording = columns.recording;
     let zeroed_s = arm.as_ref().map_or(0.0, |arm| arm.zeroed_s);
     let readings = readings(&mut recording, arm, &scenario.sensor);
-    let virtual_error = VirtualError::of(&recording, &columns.truth, zeroed_s);
+    let virtual_error = VirtualSensorAccuracy::compare(&recording, &columns.truth, zeroed_s);
     let slabs = law.slabs().to_vec();
     let sensor = scenario.sensor.force_torque().cloned();
     Ok(Simulation {
@@ -185,28 +186,28 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         truth: columns.truth,
         slabs,
         readings,
-        virtual_error,
+        virtual_sensor_accuracy: virtual_error,
         motion: columns.motion,
         sensor: sensor.map(|sensor| (scenario.effects.clone(), sensor, scenario.sample_hz)),
     })
 }
 
 /// Puts what the arm recorded into the recording, and lists what the sensors say.
-fn readings(recording: &mut Recording, arm: Option<ArmRecord>, sensor: &Sensor) -> Vec<Reading> {
+fn readings(recording: &mut Recording, arm: Option<ArmRecording>, sensor: &Sensor) -> Vec<SensorReadings> {
     let mut readings = Vec::new();
     if sensor.force_torque().is_some() {
-        readings.push(Reading { sensor: "force_torque", force_n: recording.force_n.clone() });
+        readings.push(SensorReadings { sensor: "force_torque", force_n: recording.force_n.clone() });
     }
     let Some(arm) = arm else { return readings };
     recording.joint_torque_nm = arm.joint_torque_nm;
     if sensor.virtual_sensor().is_some() {
-        let heard = recording.time_s.iter().zip(&arm.virtual_n);
+        let heard = recording.time_s.iter().zip(&arm.virtual_force_n);
         let force_n = heard.map(|(t, f)| if *t < arm.zeroed_s - 1e-9 { f64::NAN } else { *f }).collect();
-        readings.push(Reading { sensor: "virtual", force_n });
+        readings.push(SensorReadings { sensor: "virtual", force_n });
         if sensor.force_torque().is_none() {
-            recording.force_n.clone_from(&arm.virtual_n);
+            recording.force_n.clone_from(&arm.virtual_force_n);
         }
-        recording.force_virtual_n = Some(arm.virtual_n);
+        recording.force_virtual_n = Some(arm.virtual_force_n);
     }
     readings
 }
@@ -245,7 +246,7 @@ impl Columns {
         Some(z0 + (z1 - z0) * (time_s - t0) / (t1 - t0))
     }
 
-    fn push(&mut self, s: &InsertionSample, measuring: &mut Measuring) {
+    fn push(&mut self, s: &InsertionSample, measuring: &mut ForceSensor) {
         self.recording.time_s.push(s.time_s);
         self.recording.position_m.push(measuring.position(s.position_m));
         self.recording.velocity_mps.push(measuring.position(s.velocity_mps));

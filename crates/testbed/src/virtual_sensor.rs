@@ -9,7 +9,7 @@ use stylet_dynamics::{
     Arm, EARTH_GRAVITY_MPS2, Error, JointVector, MomentumTerms, Observer, ObserverConfig, ObserverState,
     Posture,
 };
-use stylet_scenario::{ArmConfig, VirtualSensor, WrenchFrom};
+use stylet_scenario::{ArmConfig, VirtualSensor, WrenchEstimate};
 
 /// Stream of the generator from which the joint torques' noise is drawn.
 const NOISE_STREAM: u64 = 2;
@@ -24,19 +24,19 @@ const DAMPING: f64 = 1e-3;
 /// motors gave the commanded torque; but friction applied to the links at 1 kHz is stiff (see
 /// `stylet_dynamics::friction::SmoothSign::width_radps`).
 #[derive(Debug)]
-pub struct TorqueSensors {
+pub struct JointTorqueSensors {
     friction: JointFriction<7>,
     noise_nm: f64,
     generator: ChaCha8Rng,
 }
 
-impl TorqueSensors {
+impl JointTorqueSensors {
     /// Sensors with the arm's friction and white noise of standard deviation `noise_nm` from `seed`.
     #[must_use]
     pub fn new(arm: &ArmConfig, noise_nm: f64, seed: u64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(NOISE_STREAM);
-        Self { friction: arm.joint_friction.laws(arm.friction_scale), noise_nm, generator }
+        Self { friction: arm.joint_friction.friction_models(arm.friction_scale), noise_nm, generator }
     }
 
     /// What they read (N m) while `driving_nm` drives the links at joint rates `qd_radps`.
@@ -58,15 +58,15 @@ impl TorqueSensors {
 /// `r = G (p - p(0) - int(tau + C^T qd - g + r) ds)` once per physics step; wrench `= pinv(J^T) r`, less
 /// the value of `r` in the air; axial force `f = -F . u` (SPEC section 4; `stylet_dynamics::Observer`).
 #[derive(Debug)]
-pub struct AxialObserver {
+pub struct AxialForceObserver {
     /// When it differs from the arm as it is.
     believed: Option<Arm<7>>,
     observer: Observer<7>,
     state: ObserverState<7>,
-    wrench: WrenchFrom,
+    wrench: WrenchEstimate,
 }
 
-impl AxialObserver {
+impl AxialForceObserver {
     /// An observer for an arm.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ impl AxialObserver {
     pub fn new(arm: &ArmConfig, sensor: &VirtualSensor) -> Result<Self, Error> {
         let wrong = arm.payload_error_kg != 0.0 || arm.link_mass_error != 0.0;
         Ok(Self {
-            believed: if wrong { Some(Arm::new(&arm.believed_model())?) } else { None },
+            believed: if wrong { Some(Arm::new(&arm.assumed_model())?) } else { None },
             observer: ObserverConfig { gain_per_s: sensor.gain_per_s.into() }.build()?,
             state: ObserverState::default(),
             wrench: sensor.wrench,
@@ -103,7 +103,7 @@ impl AxialObserver {
     }
 
     /// From now on the residual is averaged...
-    pub fn begin_zero(&mut self) {
+    pub fn begin_zeroing(&mut self) {
         self.state.begin_offset();
     }
 
@@ -111,22 +111,27 @@ impl AxialObserver {
     ///
     /// # Errors
     /// When nothing was averaged.
-    pub fn finish_zero(&mut self) -> Result<JointVector<7>, Error> {
+    pub fn finish_zeroing(&mut self) -> Result<JointVector<7>, Error> {
         self.state.finish_offset()
     }
 
     /// Axial force (N) along `direction`, positive when it resists the insertion, of the residual.
     #[must_use]
-    pub fn axial_n(&self, at: &Posture<'_, 7>, direction: &Vector3<f64>) -> f64 {
-        self.axial_of(at, direction, &self.state.residual_nm())
+    pub fn axial_force_n(&self, at: &Posture<'_, 7>, direction: &Vector3<f64>) -> f64 {
+        self.axial_force_of_torques_n(at, direction, &self.state.residual_nm())
     }
 
     /// The same of given external joint torques (N m).
     #[must_use]
-    pub fn axial_of(&self, at: &Posture<'_, 7>, direction: &Vector3<f64>, torque_nm: &JointVector<7>) -> f64 {
+    pub fn axial_force_of_torques_n(
+        &self,
+        at: &Posture<'_, 7>,
+        direction: &Vector3<f64>,
+        torque_nm: &JointVector<7>,
+    ) -> f64 {
         match self.wrench {
-            WrenchFrom::Full => -at.tip_wrench(torque_nm, DAMPING).along(direction),
-            WrenchFrom::Point => -at.tip_point_force(torque_nm, DAMPING).dot(direction),
+            WrenchEstimate::Full => -at.tip_wrench(torque_nm, DAMPING).component_along(direction),
+            WrenchEstimate::Point => -at.tip_point_force(torque_nm, DAMPING).dot(direction),
         }
     }
 }

@@ -36,7 +36,7 @@ fn fastest(mut run: impl FnMut(&[(f64, f64, f64)]) -> f64) -> f64 {
 }
 
 fn law_ns(effects: &[AnyEffect]) -> Result<f64, TooManyEffects> {
-    let law = Law::new(&Tissue::three_gels(), effects)?;
+    let law = ForceLaw::new(&Tissue::three_gels(), effects)?;
     Ok(fastest(|motion| {
         let mut sum = 0.0;
         replay(&law, motion.iter().copied(), |_| {}, |force| sum += force.total_n);
@@ -45,12 +45,12 @@ fn law_ns(effects: &[AnyEffect]) -> Result<f64, TooManyEffects> {
 }
 
 fn chain_ns(effects: &[AnyEffect]) -> f64 {
-    let chain = Measurement::new(effects);
+    let chain = MeasurementChain::new(effects);
     fastest(|motion| {
         let mut state = chain.start(200.0);
         let mut sum = 0.0;
         for &(time_s, z, velocity_mps) in motion {
-            let reading = Reading { time_s, velocity_mps, tissue_n: 30.0 * z, ..Reading::default() };
+            let reading = SensorInput { time_s, velocity_mps, tissue_n: 30.0 * z, ..SensorInput::default() };
             sum += chain.step(&mut state, &reading);
         }
         sum
@@ -60,22 +60,22 @@ fn chain_ns(effects: &[AnyEffect]) -> f64 {
 fn main() -> Result<(), TooManyEffects> {
     println!("{:<36} {:>8}", "", "ns/sample");
     println!("{:<36} {:>8.1}", "base law", law_ns(&[])?);
-    for entry in library() {
+    for entry in general_effects() {
         let mut variant = Some(entry);
         while let Some(info) = variant {
             let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
             let effect = AnyEffect::from_parameters(info.id, &start);
             let effects = effect.as_slice();
-            let ns = if info.place < Place::Tool { law_ns(effects)? } else { chain_ns(effects) };
-            let where_ = if info.place < Place::Tool { "" } else { " (chain alone)" };
+            let ns = if info.stage < ChainStage::Tool { law_ns(effects)? } else { chain_ns(effects) };
+            let where_ = if info.stage < ChainStage::Tool { "" } else { " (chain alone)" };
             println!("{:<36} {ns:>8.1}", format!("{} x{}{where_}", info.id, info.parameters.len()));
-            variant = info.larger;
+            variant = info.extended;
         }
     }
     let three = ["stress_relaxation", "coulomb_friction", "incomplete_release"];
     let three: Vec<AnyEffect> = three
         .iter()
-        .filter_map(|id| info(id))
+        .filter_map(|id| effect_info(id))
         .filter_map(|info| {
             let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
             AnyEffect::from_parameters(info.id, &start)

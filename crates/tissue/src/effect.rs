@@ -4,8 +4,8 @@
 //! [`Memory`] that the law keeps for it, so that a law can be shared and its state copied.
 //! Every hook has a pass-through default: an effect implements the one of its [`Place`].
 
-use crate::info::EffectInfo;
-use crate::slab::Slab;
+use crate::effect_info::EffectInfo;
+use crate::layer_geometry::Slab;
 
 /// Velocity below which `sgn` is zero, in m/s (SPEC section 6: 0.01 mm/s everywhere).
 pub const SGN_DEAD_BAND_MPS: f64 = 1e-5;
@@ -24,14 +24,14 @@ pub fn sgn(v_mps: f64) -> f64 {
 }
 
 /// What an effect remembers between samples. Zero at the start of an insertion.
-pub type Memory = [f64; 8];
+pub type EffectState = [f64; 8];
 
 /// Where in the chain of SPEC section 6 an effect acts. The order of the variants is the order
 /// of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Place {
+pub enum ChainStage {
     /// Changes the layers before the insertion starts.
     Geometry,
     /// Changes depth and velocity of the tip relative to the tissue.
@@ -59,7 +59,7 @@ pub enum Place {
 /// What an effect may look at in one sample. Positions and velocities are the tip's, relative to
 /// the tissue, after all kinematic effects.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct TipState {
     /// Time in seconds.
     pub time_s: f64,
     /// Time since the previous sample in seconds; zero at the first.
@@ -89,8 +89,8 @@ pub trait Effect {
     }
 
     /// Place in the chain.
-    fn place(&self) -> Place {
-        self.info().place
+    fn place(&self) -> ChainStage {
+        self.info().stage
     }
 
     /// True when the parameters make the effect vanish: it is then bypassed altogether, so that
@@ -118,7 +118,7 @@ pub trait Effect {
 
     /// [`Place::Relaxation`]: the force that is left of the elastic force `elastic_n` given its
     /// history. Called once per sample and active layer.
-    fn relax(&self, _dt_s: f64, elastic_n: f64, _memory: &mut Memory) -> f64 {
+    fn relax(&self, _dt_s: f64, elastic_n: f64, _memory: &mut EffectState) -> f64 {
         elastic_n
     }
 
@@ -135,7 +135,7 @@ pub trait Effect {
         _dt_s: f64,
         _elastic_n: f64,
         threshold_n: f64,
-        _memory: &mut Memory,
+        _memory: &mut EffectState,
     ) -> f64 {
         threshold_n
     }
@@ -148,7 +148,7 @@ pub trait Effect {
 
     /// Told of every rupture, with the elastic force that was released (N) and the position of
     /// the rupture (m). Effects with memory of the layer forget it here.
-    fn on_rupture(&self, _released_n: f64, _z_m: f64, _memory: &mut Memory) {}
+    fn on_rupture(&self, _released_n: f64, _z_m: f64, _memory: &mut EffectState) {}
 
     /// [`Place::Friction`]: the velocity that the viscous friction feels, in m/s.
     fn friction_velocity(&self, v_mps: f64) -> f64 {
@@ -162,16 +162,16 @@ pub trait Effect {
 
     /// [`Place::Friction`]: a force in N added to the shaft friction, `inside_m` being the total
     /// length of needle inside the tissue.
-    fn shaft_force(&self, _moment: &Moment, _inside_m: f64, _memory: &mut Memory) -> f64 {
+    fn shaft_force(&self, _moment: &TipState, _inside_m: f64, _memory: &mut EffectState) -> f64 {
         0.0
     }
 
     /// [`Place::Friction`]: told of every rupture, with the layer (1-based) and the elastic force in N
     /// that the release effects did not keep back.
-    fn on_layer_rupture(&self, _layer: usize, _released_n: f64, _memory: &mut Memory) {}
+    fn on_layer_rupture(&self, _layer: usize, _released_n: f64, _memory: &mut EffectState) {}
 
     /// [`Place::Friction`]: the force in N that is left of the elastic force of layer `layer` (1-based) while it is pressed.
-    fn press(&self, _layer: usize, _dt_s: f64, elastic_n: f64, _memory: &mut Memory) -> f64 {
+    fn press(&self, _layer: usize, _dt_s: f64, elastic_n: f64, _memory: &mut EffectState) -> f64 {
         elastic_n
     }
 
@@ -183,18 +183,18 @@ pub trait Effect {
 
     /// [`Place::Friction`]: a force in N with which a punctured layer holds the shaft. `sliding_mps` is
     /// the velocity that friction feels at this tip velocity, all factors included.
-    fn grip(&self, _moment: &Moment, _slabs: &[Slab], _sliding_mps: f64, _memory: &mut Memory) -> f64 {
+    fn grip(&self, _moment: &TipState, _slabs: &[Slab], _sliding_mps: f64, _memory: &mut EffectState) -> f64 {
         0.0
     }
 
     /// [`Place::Tip`]: true when something of the effect's own breaks with the tip at `z_m`; told to
     /// the memory, once, before the forces are summed up.
-    fn breaks(&self, _z_m: f64, _slabs: &[Slab], _memory: &mut Memory) -> bool {
+    fn breaks(&self, _z_m: f64, _slabs: &[Slab], _memory: &mut EffectState) -> bool {
         false
     }
 
     /// [`Place::Release`] and [`Place::Tip`]: a force in N added at the tip.
-    fn tip_force(&self, _moment: &Moment, _slabs: &[Slab], _memory: &mut Memory) -> f64 {
+    fn tip_force(&self, _moment: &TipState, _slabs: &[Slab], _memory: &mut EffectState) -> f64 {
         0.0
     }
 
@@ -206,19 +206,26 @@ pub trait Effect {
 
     /// [`Place::Sensor`]: what the sensor makes of a force in N at `time_s`, `dt_s` after the sample
     /// before (zero at the first).
-    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         force_n
     }
 
     /// [`Place::Sensor`]: the mean of what the sensor makes of a force over a span: `force_n` is the mean of what comes
     /// in over `span_s` seconds around `time_s`, in which the sensor takes `samples` samples.
-    fn sense_mean(&self, time_s: f64, span_s: f64, _samples: f64, force_n: f64, memory: &mut Memory) -> f64 {
+    fn sense_mean(
+        &self,
+        time_s: f64,
+        span_s: f64,
+        _samples: f64,
+        force_n: f64,
+        memory: &mut EffectState,
+    ) -> f64 {
         self.sense(time_s, span_s, force_n, memory)
     }
 
     /// [`Place::Sensor`]: what the sensor makes of a force at the end of a span: `force_n` is the mean of what comes in over the
     /// `span_s` seconds before `time_s`.
-    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut Memory) -> f64 {
+    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut EffectState) -> f64 {
         self.sense(time_s, span_s, force_n, memory)
     }
 
@@ -271,7 +278,7 @@ mod tests {
 
     impl Effect for Nothing {
         fn info(&self) -> &'static EffectInfo {
-            crate::info("cutting_force").expect("in the library")
+            crate::effect_info("cutting_force").expect("in the library")
         }
         fn is_neutral(&self) -> bool {
             true
@@ -281,8 +288,8 @@ mod tests {
     #[test]
     fn a_hook_that_an_effect_does_not_answer_passes_the_value_through() {
         let (none, mut memory) = (Nothing, [0.25; 8]);
-        let moment = Moment { time_s: 1.0, dt_s: 0.1, z_m: 0.02, dz_m: 0.001, v_mps: 0.01, ruptured: 1 };
-        assert_eq!((none.id(), none.place(), none.remembers()), ("cutting_force", Place::Tip, false));
+        let moment = TipState { time_s: 1.0, dt_s: 0.1, z_m: 0.02, dz_m: 0.001, v_mps: 0.01, ruptured: 1 };
+        assert_eq!((none.id(), none.place(), none.remembers()), ("cutting_force", ChainStage::Tip, false));
         assert_eq!(none.relative(1.0, 0.02, 0.03), (0.02, 0.03));
         assert_eq!(none.elastic(50.0, 0.02, 0.7), 0.7);
         assert_eq!(none.relax(0.1, 0.7, &mut memory), 0.7);

@@ -22,7 +22,7 @@ pub struct TissueForce {
 
 impl TissueForce {
     /// The force of a sample that is not finite.
-    pub(crate) fn unknown(active_layer: usize) -> Self {
+    pub(crate) fn not_finite(active_layer: usize) -> Self {
         let nan = f64::NAN;
         Self {
             total_n: nan,

@@ -25,29 +25,32 @@
 
 extern crate alloc;
 
-mod bending;
-mod breaking;
+mod compliant_needle;
 pub mod effect;
+mod effect_info;
 mod effects;
 mod force;
-mod info;
-mod law;
+mod force_law;
+mod force_law_state;
 mod layer;
-mod measurement;
+mod layer_geometry;
+mod measurement_chain;
 mod replay;
-mod shaft;
-mod slab;
-mod state;
+mod rupture_policy;
+mod shaft_friction;
 
-pub use breaking::Strain;
-pub use effect::{Effect, Place};
+pub use effect::{ChainStage, Effect};
+pub use effect_info::{
+    EffectInfo, FitScale, ParameterError, ParameterInfo, Proposal, effect_info, general_effects,
+    per_layer_effects,
+};
 pub use effects::*;
 pub use force::{Rupture, TissueForce};
-pub use info::{EffectInfo, FitScale, ParameterError, ParameterInfo, Proposal, info, library, per_layer};
-pub use law::{Law, MAX_EFFECTS, TooManyEffects};
+pub use force_law::{ForceLaw, MAX_EFFECTS, TooManyEffects};
+pub use force_law_state::ForceLawState;
 pub use layer::{Layer, Tissue};
-pub use measurement::{Cell, Measurement, MeasurementState, Reading};
+pub use layer_geometry::Slab;
+pub use measurement_chain::{AveragingInterval, MeasurementChain, MeasurementState, SensorInput};
 pub use replay::replay;
-pub use shaft::ShaftFriction;
-pub use slab::Slab;
-pub use state::LawState;
+pub use rupture_policy::RuptureCriterion;
+pub use shaft_friction::ShaftFriction;

@@ -35,7 +35,7 @@ fn motion() -> Vec<(f64, f64, f64)> {
 }
 
 fn forces(effects: &[AnyEffect]) -> Vec<f64> {
-    let law = Law::new(&tissue(), effects).expect("few effects");
+    let law = ForceLaw::new(&tissue(), effects).expect("few effects");
     let mut out = Vec::new();
     replay(&law, motion(), |_| {}, |f| out.push(f.total_n));
     out
@@ -99,8 +99,8 @@ fn relaxation_follows_the_prony_series_while_the_needle_is_held() {
         }],
     };
     let effect = StressRelaxation { terms: vec![PronyTerm { fraction: 0.4, time_constant_s: 2.0 }] };
-    let law = Law::new(&tissue, &[effect.into()]).expect("one effect");
-    let mut state = LawState::default();
+    let law = ForceLaw::new(&tissue, &[effect.into()]).expect("one effect");
+    let mut state = ForceLawState::default();
     // A step to 10 mm, then a hold: E = 1 N.
     law.step(&mut state, 0.0, 0.01, 0.0, |_| {});
     for k in 1..=1000 {
@@ -114,6 +114,6 @@ fn relaxation_follows_the_prony_series_while_the_needle_is_held() {
 #[test]
 fn too_many_effects_are_refused() {
     let one: AnyEffect = CoulombFriction { c_n_per_m: 1.0 }.into();
-    let error = Law::new(&tissue(), &vec![one; MAX_EFFECTS + 1]).expect_err("too many");
+    let error = ForceLaw::new(&tissue(), &vec![one; MAX_EFFECTS + 1]).expect_err("too many");
     assert!(error.to_string().contains("at most 16"), "{error}");
 }

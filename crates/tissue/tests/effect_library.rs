@@ -38,19 +38,19 @@ const SPEC_SECTION_6: [&str; 27] = [
 
 #[test]
 fn the_library_holds_every_row_of_the_specification_once_in_the_order_of_the_chain() {
-    let mut ids: Vec<&str> = library().map(|info| info.id).collect();
-    let places: Vec<Place> = library().map(|info| info.place).collect();
+    let mut ids: Vec<&str> = general_effects().map(|info| info.id).collect();
+    let places: Vec<ChainStage> = general_effects().map(|info| info.stage).collect();
     assert!(places.is_sorted(), "{places:?}");
     let mut spec = SPEC_SECTION_6;
     ids.sort_unstable();
     spec.sort_unstable();
     assert_eq!(ids, spec);
-    assert!(info("coulomb_friction").is_some() && info("magic").is_none());
+    assert!(effect_info("coulomb_friction").is_some() && effect_info("magic").is_none());
 }
 
 #[test]
 fn parameters_of_further_terms_are_known_by_their_path() {
-    let relaxation = info("stress_relaxation").expect("an effect");
+    let relaxation = effect_info("stress_relaxation").expect("an effect");
     for path in ["terms.0.time_constant_s", "terms.1.time_constant_s"] {
         assert_eq!(relaxation.parameter(path).map(|p| p.unit), Some("s"), "{path}");
     }
@@ -71,7 +71,7 @@ fn every_parameter_has_a_typical_value_inside_its_search_range_inside_its_allowe
             let name = format!("{}.{}", info.id, p.path);
             assert!(p.low <= low && low < high && high <= p.high, "{name}: {p:?}");
             assert!(low <= p.start && p.start <= high, "{name}: {p:?}");
-            assert!(p.low <= p.neutral && p.neutral <= p.high, "{name}: {p:?}");
+            assert!(p.low <= p.inactive && p.inactive <= p.high, "{name}: {p:?}");
             assert!(!p.log || low > 0.0, "{name}: logarithm of {low}");
         }
     }
@@ -82,7 +82,7 @@ fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
     for effect in typical_effects() {
         let info = effect.info();
         assert_eq!(effect.id(), info.id);
-        assert_eq!(effect.place(), info.place);
+        assert_eq!(effect.place(), info.stage);
         assert!(!effect.is_neutral(), "{effect:?}");
         effect.check().expect("typical values are allowed");
         let values = effect.parameters();
@@ -91,8 +91,8 @@ fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
         assert_eq!(AnyEffect::from_parameters(info.id, &[0.1; 9]), None);
         // The strengths alone make it vanish, whatever the shape.
         let strengths_off: Vec<f64> =
-            info.parameters.iter().map(|p| if p.strength { p.neutral } else { p.start }).collect();
-        let all_off: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
+            info.parameters.iter().map(|p| if p.strength { p.inactive } else { p.start }).collect();
+        let all_off: Vec<f64> = info.parameters.iter().map(|p| p.inactive).collect();
         for values in [strengths_off, all_off] {
             let neutral = AnyEffect::from_parameters(info.id, &values).expect("right number");
             assert!(neutral.is_neutral(), "{neutral:?}");
@@ -125,7 +125,7 @@ fn neutral_effects() -> Vec<AnyEffect> {
     let off = |effect: AnyEffect| {
         let info = effect.info();
         let values: Vec<f64> =
-            info.parameters.iter().map(|p| if p.strength { p.neutral } else { p.start }).collect();
+            info.parameters.iter().map(|p| if p.strength { p.inactive } else { p.start }).collect();
         AnyEffect::from_parameters(info.id, &values).expect("right number")
     };
     typical_effects().into_iter().map(off).collect()
@@ -158,14 +158,14 @@ proptest! {
             prop_assert!(base == with, "{:?}", effect);
         }
         prop_assert_eq!(&base, &bits(&run(&three_gels(), &neutral_effects(), &motion).0));
-        let chain = Measurement::new(&neutral_effects());
+        let chain = MeasurementChain::new(&neutral_effects());
         prop_assert!(chain.is_plain());
         let mut state = chain.start(200.0);
         for (k, &(time_s, z, velocity_mps)) in motion.iter().enumerate() {
             let tissue_n = f64::from_bits(base[3 * k]);
-            let reading = Reading { time_s, velocity_mps, acceleration_mps2: 1.0, tissue_n, noise_n: 0.0 };
+            let reading = SensorInput { time_s, velocity_mps, acceleration_mps2: 1.0, tissue_n, noise_n: 0.0 };
             prop_assert_eq!(chain.step(&mut state, &reading).to_bits(), base[3 * k]);
-            prop_assert_eq!(chain.position(z).to_bits(), z.to_bits());
+            prop_assert_eq!(chain.recorded_position(z).to_bits(), z.to_bits());
         }
     }
 
@@ -175,12 +175,12 @@ proptest! {
         motion in any_motion(), shares in proptest::collection::vec(0.0f64..1.0, 80), turn in 0usize..20,
     ) {
         let mut shares = shares.into_iter();
-        let mut effects: Vec<AnyEffect> = library()
+        let mut effects: Vec<AnyEffect> = general_effects()
             .map(|info| {
                 let values: Vec<f64> = info.parameters.iter().map(|p| {
                     let share = shares.next().unwrap_or(0.5);
                     let (low, high) = p.search;
-                    if p.whole { 1.0 } else if p.log { low * (high / low).powf(share) } else { low + share * (high - low) }
+                    if p.integer { 1.0 } else if p.log { low * (high / low).powf(share) } else { low + share * (high - low) }
                 }).collect();
                 AnyEffect::from_parameters(info.id, &values).expect("right number")
             })
@@ -202,7 +202,7 @@ proptest! {
 #[test]
 fn every_typical_effect_of_the_tissue_changes_the_force() {
     let base = forces(&three_gels(), &[], &usual_motion());
-    for effect in typical_effects().into_iter().filter(|e| e.place() < Place::Tool) {
+    for effect in typical_effects().into_iter().filter(|e| e.place() < ChainStage::Tool) {
         let changed = forces(&three_gels(), std::slice::from_ref(&effect), &usual_motion());
         assert!(worst(&base, &changed) > 0.02, "{effect:?} changes the force by {}", worst(&base, &changed));
     }
@@ -212,8 +212,8 @@ fn every_typical_effect_of_the_tissue_changes_the_force() {
 fn a_sample_that_is_not_a_number_has_no_force_and_leaves_no_trace() {
     let effects: Vec<AnyEffect> =
         typical_effects().into_iter().filter(|e| e.id() != "stress_relaxation").collect();
-    let law = Law::new(&three_gels(), &effects).expect("few effects");
-    let mut state = LawState::default();
+    let law = ForceLaw::new(&three_gels(), &effects).expect("few effects");
+    let mut state = ForceLawState::default();
     for (k, (t, z, v)) in usual_motion().into_iter().enumerate() {
         if k % 100 == 50 {
             let before = state;
@@ -245,7 +245,7 @@ fn whatever_coordinates_a_fit_tries_the_effect_is_allowed() {
 
 #[test]
 fn coordinates_lead_back_to_the_effect() {
-    for info in library().chain(per_layer()) {
+    for info in general_effects().chain(per_layer_effects()) {
         let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
         let effect = AnyEffect::from_parameters(info.id, &start).expect("its own parameters");
         let coordinates = effect.coordinates();
@@ -265,7 +265,8 @@ fn coordinates_lead_back_to_the_effect() {
 
 #[test]
 fn a_parameter_enters_a_fit_as_it_is_sought() {
-    let scale = |id: &str, path: &str| info(id).and_then(|i| i.parameter(path)).expect("known").fit_scale();
+    let scale =
+        |id: &str, path: &str| effect_info(id).and_then(|i| i.parameter(path)).expect("known").fit_scale();
     assert_eq!(scale("coulomb_friction", "c_n_per_m"), FitScale::Linear);
     // A strength stays linear although its search goes in the logarithm: it may shrink to nothing.
     assert_eq!(scale("low_pass_lag", "time_constant_s"), FitScale::Linear);
@@ -277,19 +278,23 @@ fn a_parameter_enters_a_fit_as_it_is_sought() {
 
 #[test]
 fn the_description_of_a_parameter_is_the_one_of_its_file() {
-    let lag = info("low_pass_lag").and_then(|i| i.parameter("time_constant_s")).expect("known");
-    assert!(lag.strength && !lag.whole && lag.low == 0.0 && lag.neutral == 0.0, "{lag:?}");
-    let phase = info("respiration").and_then(|i| i.parameter("phase_rad")).expect("known");
+    let lag = effect_info("low_pass_lag").and_then(|i| i.parameter("time_constant_s")).expect("known");
+    assert!(lag.strength && !lag.integer && lag.low == 0.0 && lag.inactive == 0.0, "{lag:?}");
+    let phase = effect_info("respiration").and_then(|i| i.parameter("phase_rad")).expect("known");
     assert!(!phase.strength, "{phase:?}");
-    let layer = info("boundary_shift").and_then(|i| i.parameter("layer")).expect("known");
-    assert!(layer.whole && !layer.strength && !layer.log, "{layer:?}");
-    let exponent = info("power_law_friction").and_then(|i| i.parameter("exponent")).expect("known");
-    assert_eq!((exponent.low, exponent.high, exponent.neutral), (-0.9, 3.0, 1.0));
+    let layer = effect_info("boundary_shift").and_then(|i| i.parameter("layer")).expect("known");
+    assert!(layer.integer && !layer.strength && !layer.log, "{layer:?}");
+    let exponent = effect_info("power_law_friction").and_then(|i| i.parameter("exponent")).expect("known");
+    assert_eq!((exponent.low, exponent.high, exponent.inactive), (-0.9, 3.0, 1.0));
     assert_eq!((exponent.start, exponent.search), (0.7, (0.1, 2.0)));
     // Where a layer lets go is another depth in every insertion; a law's number is not.
-    let let_go = info("let_go").and_then(|i| i.parameters.iter().find(|p| p.differs > 0.0));
-    assert_eq!((let_go.map(|p| p.differs), exponent.differs), (Some(5e-4), 0.0));
-    assert_eq!(per_layer().count(), 7);
+    let release_depth = effect_info("release_depth")
+        .and_then(|i| i.parameters.iter().find(|p| p.between_recordings_sd > 0.0));
+    assert_eq!(
+        (release_depth.map(|p| p.between_recordings_sd), exponent.between_recordings_sd),
+        (Some(5e-4), 0.0)
+    );
+    assert_eq!(per_layer_effects().count(), 7);
 }
 
 #[test]
@@ -303,10 +308,10 @@ fn a_bound_without_an_upper_end_is_told_as_one() {
 #[test]
 fn sixteen_effects_act_at_once_and_no_more() {
     let one: AnyEffect = CoulombFriction { c_n_per_m: 1.0 }.into();
-    let many = |n: usize| Law::new(&three_gels(), &vec![one.clone(); n]);
+    let many = |n: usize| ForceLaw::new(&three_gels(), &vec![one.clone(); n]);
     let law = many(MAX_EFFECTS).expect("as many as can");
     near(
-        law.step(&mut LawState::default(), 0.0, 0.01, 1e-4, |_| {}).friction_n,
+        law.step(&mut ForceLawState::default(), 0.0, 0.01, 1e-4, |_| {}).friction_n,
         16.0 * 0.01 + 9000.0 * 0.01 * 1e-4,
         1e-12,
     );
@@ -314,5 +319,5 @@ fn sixteen_effects_act_at_once_and_no_more() {
     // Effects of the sensor and a needle that gives do not count.
     let mut more = vec![one.clone(); MAX_EFFECTS];
     more.extend([ForceBias { force_n: 1.0 }.into(), NeedleCompliance { stiffness_n_per_m: 500.0 }.into()]);
-    assert!(Law::new(&three_gels(), &more).is_ok());
+    assert!(ForceLaw::new(&three_gels(), &more).is_ok());
 }

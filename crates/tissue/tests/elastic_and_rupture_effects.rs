@@ -207,11 +207,14 @@ fn membrane_at(depth_m: f64) -> AnyEffect {
 
 #[test]
 fn boundary_shift_moves_one_face_and_leaves_the_others() {
-    let law =
-        |layer, shift_m| Law::new(&three_gels(), &[BoundaryShift { layer, shift_m }.into()]).expect("one");
-    let faces = |law: &Law| law.slabs().iter().flat_map(|s| [s.front_m, s.far_m()]).collect::<Vec<f64>>();
-    let expect =
-        |law: &Law, expected: [f64; 6]| assert!(worst(&faces(law), &expected) < 1e-15, "{:?}", faces(law));
+    let law = |layer, shift_m| {
+        ForceLaw::new(&three_gels(), &[BoundaryShift { layer, shift_m }.into()]).expect("one")
+    };
+    let faces =
+        |law: &ForceLaw| law.slabs().iter().flat_map(|s| [s.front_m, s.far_m()]).collect::<Vec<f64>>();
+    let expect = |law: &ForceLaw, expected: [f64; 6]| {
+        assert!(worst(&faces(law), &expected) < 1e-15, "{:?}", faces(law))
+    };
     expect(&law(1, 0.003), [0.0, 0.023, 0.023, 0.05, 0.05, 0.07]);
     expect(&law(2, -0.004), [0.0, 0.02, 0.02, 0.046, 0.046, 0.07]);
     expect(&law(1, 0.9), [0.0, 0.05, 0.05, 0.05, 0.05, 0.07]);

@@ -8,12 +8,12 @@ use stylet_tissue::*;
 
 /// Records a force given as a function of time, sampled at `times`.
 fn record(effects: &[AnyEffect], times: &[f64], force: impl Fn(f64) -> f64) -> Vec<f64> {
-    let chain = Measurement::new(effects);
+    let chain = MeasurementChain::new(effects);
     let mut state = chain.start(times.len() as f64 / (times[times.len() - 1] - times[0]));
     times
         .iter()
         .map(|&time_s| {
-            chain.step(&mut state, &Reading { time_s, tissue_n: force(time_s), ..Reading::default() })
+            chain.step(&mut state, &SensorInput { time_s, tissue_n: force(time_s), ..SensorInput::default() })
         })
         .collect()
 }
@@ -25,10 +25,10 @@ fn regular(rate: f64, seconds: f64) -> Vec<f64> {
 #[test]
 fn tool_effects_follow_the_bases_motion_in_air_too() {
     let chain =
-        Measurement::new(&[ToolInertia { mass_kg: 0.3 }.into(), DriveFriction { force_n: 0.5 }.into()]);
+        MeasurementChain::new(&[ToolInertia { mass_kg: 0.3 }.into(), DriveFriction { force_n: 0.5 }.into()]);
     let mut state = chain.start(200.0);
     for (v, a, expected) in [(0.002, 1.0, 0.8), (-0.002, -1.0, -0.8), (0.0, 2.0, 0.6), (1e-5, 0.0, 0.0)] {
-        let reading = Reading { velocity_mps: v, acceleration_mps2: a, ..Reading::default() };
+        let reading = SensorInput { velocity_mps: v, acceleration_mps2: a, ..SensorInput::default() };
         near(chain.step(&mut state, &reading), expected, 1e-15);
     }
 }
@@ -88,11 +88,11 @@ fn a_delay_is_exact_for_a_force_that_is_linear_between_samples() {
     let two = [TimeDelay { delay_s: 0.02 }.into(), TimeDelay { delay_s: 0.0137 }.into()];
     let mut times = regular(100.0, 1.0);
     times.iter_mut().enumerate().for_each(|(k, t)| *t += 0.004 * (k as f64 * 1.7).sin());
-    let chain = Measurement::new(&two);
+    let chain = MeasurementChain::new(&two);
     let mut state = chain.start(200.0);
     let mut short = chain.start(1.0);
     for (k, &t) in times.iter().enumerate() {
-        let reading = Reading { time_s: t, tissue_n: t, ..Reading::default() };
+        let reading = SensorInput { time_s: t, tissue_n: t, ..SensorInput::default() };
         near(chain.step(&mut state, &reading), (t - 0.0337).max(times[0]), 1e-12);
         near(chain.step(&mut short, &reading), (t - 0.0337).max(times[k.saturating_sub(3)]), 1e-12);
     }
@@ -110,10 +110,13 @@ fn the_order_is_the_specifications_whatever_the_order_of_the_list() {
     ];
     for _ in 0..effects.len() {
         effects.rotate_left(1);
-        let chain = Measurement::new(&effects);
+        let chain = MeasurementChain::new(&effects);
         let mut state = chain.start(200.0);
         let mut at = |tissue_n, acceleration_mps2, noise_n| {
-            chain.step(&mut state, &Reading { tissue_n, acceleration_mps2, noise_n, ..Reading::default() })
+            chain.step(
+                &mut state,
+                &SensorInput { tissue_n, acceleration_mps2, noise_n, ..SensorInput::default() },
+            )
         };
         near(at(1.0, 0.1, 0.0), 3.0, 1e-12); // (1 + 0.1) 2 + 1 = 3.2 -> 3.0
         near(at(1.0, 0.1, 0.2), 3.5, 1e-12); // the noise is rounded as well
@@ -123,9 +126,9 @@ fn the_order_is_the_specifications_whatever_the_order_of_the_list() {
 
 #[test]
 fn recorded_positions_are_scaled_and_can_be_scaled_back() {
-    let chain = Measurement::new(&[PositionScale { eps: -0.02 }.into()]);
-    near(chain.position(0.1), 0.098, 1e-15);
-    near(chain.true_position(chain.position(0.0437)), 0.0437, 1e-15);
+    let chain = MeasurementChain::new(&[PositionScale { eps: -0.02 }.into()]);
+    near(chain.recorded_position(0.1), 0.098, 1e-15);
+    near(chain.true_position(chain.recorded_position(0.0437)), 0.0437, 1e-15);
     assert!(chain.is_plain(), "positions do not touch the force");
 }
 
@@ -135,12 +138,12 @@ proptest! {
     fn lag_and_delay_never_leave_the_range_of_the_force(
         steps in proptest::collection::vec((0.0f64..0.05, -5.0f64..5.0), 2..300), tau in 0.0f64..1.0, delay in 0.0f64..0.3,
     ) {
-        let chain = Measurement::new(&[LowPassLag { time_constant_s: tau }.into(), TimeDelay { delay_s: delay }.into()]);
+        let chain = MeasurementChain::new(&[LowPassLag { time_constant_s: tau }.into(), TimeDelay { delay_s: delay }.into()]);
         let mut state = chain.start(200.0);
         let mut time_s = 0.0;
         for (dt, tissue_n) in steps {
             time_s += dt;
-            let f = chain.step(&mut state, &Reading { time_s, tissue_n, ..Reading::default() });
+            let f = chain.step(&mut state, &SensorInput { time_s, tissue_n, ..SensorInput::default() });
             prop_assert!(f.abs() <= 5.0 + 1e-12);
         }
     }
@@ -157,7 +160,7 @@ fn the_mean_over_spans_is_that_of_many_readings() {
         ForceDrift { rate_n_per_s: 0.05 }.into(),
         PeriodicInterference { amplitude_n: 0.3, frequency_hz: 7.0, phase_rad: 0.5 }.into(),
     ];
-    let chain = Measurement::new(&effects);
+    let chain = MeasurementChain::new(&effects);
     let (mut fine, mut coarse) = (chain.start(1e5), chain.start(50.0));
     // Spans of 20 ms in which the force stays what it is; many readings in each.
     let (span_s, readings) = (0.02, 4000);
@@ -168,10 +171,10 @@ fn the_mean_over_spans_is_that_of_many_readings() {
             let time_s = span_s * (f64::from(k) + (f64::from(i) + 0.5) / f64::from(readings));
             sum += chain.step(
                 &mut fine,
-                &Reading { time_s, velocity_mps: 0.01, acceleration_mps2, tissue_n, noise_n: 0.0 },
+                &SensorInput { time_s, velocity_mps: 0.01, acceleration_mps2, tissue_n, noise_n: 0.0 },
             );
         }
-        let cell = Cell {
+        let cell = AveragingInterval {
             time_s: span_s * (f64::from(k) + 0.5),
             span_s,
             samples: f64::from(readings),
@@ -179,18 +182,20 @@ fn the_mean_over_spans_is_that_of_many_readings() {
             acceleration_mps2,
             tissue_n,
         };
-        near(chain.mean(&mut coarse, &cell), sum / f64::from(readings), 5e-4);
+        near(chain.mean_force(&mut coarse, &cell), sum / f64::from(readings), 5e-4);
     }
 }
 
 #[test]
 fn a_chain_says_how_late_it_is_and_whether_it_smears_a_jump() {
-    let two = Measurement::new(&[TimeDelay { delay_s: 0.02 }.into(), TimeDelay { delay_s: 0.0137 }.into()]);
+    let two =
+        MeasurementChain::new(&[TimeDelay { delay_s: 0.02 }.into(), TimeDelay { delay_s: 0.0137 }.into()]);
     near(two.delay_s(), 0.0337, 1e-17);
-    assert!(!two.smears() && !two.is_plain());
-    let lag = Measurement::new(&[LowPassLag { time_constant_s: 0.1 }.into(), ForceGain { eps: 0.1 }.into()]);
-    assert!(lag.smears() && lag.delay_s() == 0.0);
-    assert!(!Measurement::new(&[ForceGain { eps: 0.1 }.into()]).smears());
+    assert!(!two.has_lag() && !two.is_plain());
+    let lag =
+        MeasurementChain::new(&[LowPassLag { time_constant_s: 0.1 }.into(), ForceGain { eps: 0.1 }.into()]);
+    assert!(lag.has_lag() && lag.delay_s() == 0.0);
+    assert!(!MeasurementChain::new(&[ForceGain { eps: 0.1 }.into()]).has_lag());
     for effect in [
         AnyEffect::from(ToolInertia { mass_kg: 0.3 }),
         ForceGain { eps: 0.1 }.into(),
@@ -198,10 +203,10 @@ fn a_chain_says_how_late_it_is_and_whether_it_smears_a_jump() {
         ForceBias { force_n: 0.1 }.into(),
         Saturation { limit_n: 5.0 }.into(),
     ] {
-        assert!(!Measurement::new(&[effect]).is_plain());
+        assert!(!MeasurementChain::new(&[effect]).is_plain());
     }
     assert!(
-        Measurement::new(&[CoulombFriction { c_n_per_m: 5.0 }.into()]).is_plain(),
+        MeasurementChain::new(&[CoulombFriction { c_n_per_m: 5.0 }.into()]).is_plain(),
         "that acts in the tissue"
     );
 }
@@ -216,8 +221,9 @@ fn a_delay_remembers_as_much_as_its_sampling_asks_for_and_a_repeated_time_is_no_
         assert_eq!(late.iter().filter(|f| **f == 1.0).count(), times.len() - at, "{delay_s}");
         near(late[60], if delay_s > 0.1 { 0.5 } else { 1.0 }, 1e-9);
     }
-    let lag = Measurement::new(&[LowPassLag { time_constant_s: 0.1 }.into()]);
+    let lag = MeasurementChain::new(&[LowPassLag { time_constant_s: 0.1 }.into()]);
     let mut state = lag.start(100.0);
-    let mut at = |time_s, tissue_n| lag.step(&mut state, &Reading { time_s, tissue_n, ..Reading::default() });
+    let mut at =
+        |time_s, tissue_n| lag.step(&mut state, &SensorInput { time_s, tissue_n, ..SensorInput::default() });
     assert_eq!([at(5.0, 1.0), at(5.0, 9.0), at(4.0, 9.0)], [1.0; 3]);
 }

@@ -20,8 +20,8 @@ fn bend(
     effects: &[AnyEffect],
     motion: &[Sample],
 ) -> (Vec<TissueForce>, Vec<f64>, Vec<Rupture>) {
-    let law = Law::new(tissue, effects).expect("few effects");
-    let (mut state, mut forces, mut tips, mut ruptures) = (LawState::default(), vec![], vec![], vec![]);
+    let law = ForceLaw::new(tissue, effects).expect("few effects");
+    let (mut state, mut forces, mut tips, mut ruptures) = (ForceLawState::default(), vec![], vec![], vec![]);
     for &(t, z, v) in motion {
         forces.push(law.step(&mut state, t, z, v, |r| ruptures.push(r)));
         tips.push(state.tip_m());
@@ -142,8 +142,9 @@ fn a_base_that_accelerates_as_it_says_is_followed_exactly_however_long_the_steps
     let (ks, d, a) = (500.0, 20.0, 0.02);
     let tau = d / ks;
     for step_s in [0.01, 0.05, 0.3] {
-        let law = Law::new(&tissue(&[layer(0.01, 0.0, d / 0.01, None)]), &[spring(ks)]).expect("few effects");
-        let mut state = LawState::default();
+        let law =
+            ForceLaw::new(&tissue(&[layer(0.01, 0.0, d / 0.01, None)]), &[spring(ks)]).expect("few effects");
+        let mut state = ForceLawState::default();
         for k in 0..10 {
             state.set_base_acceleration(a);
             let t = step_s * f64::from(k);
@@ -299,13 +300,13 @@ fn a_tip_that_sticks_under_a_cutting_force_bears_it_at_the_tip() {
 fn the_balance_holds_with_every_effect_of_the_tissue() {
     let motion = ripple_hold_retract(-0.002, 0.005, 0.004, 0.4, 100.0);
     let ks = 900.0;
-    let per_layer = per_layer().map(|info| {
+    let per_layer = per_layer_effects().map(|info| {
         let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
         AnyEffect::from_parameters(info.id, &start).expect("its own parameters")
     });
     let bends = |e: &AnyEffect| e.id() == "needle_compliance";
     // What moves the tissue or shakes it moves the base with it.
-    let moves = |e: &AnyEffect| e.place() == Place::Kinematics || e.place() >= Place::Tool;
+    let moves = |e: &AnyEffect| e.place() == ChainStage::Kinematics || e.place() >= ChainStage::Tool;
     for effect in typical_effects().into_iter().chain(per_layer).filter(|e| !moves(e) && !bends(e)) {
         let (f, tips, _) = bend(&three_gels(), &[effect.clone(), spring(ks)], &motion);
         for (k, (&(_, z, _), (force, tip))) in motion.iter().zip(f.iter().zip(&tips)).enumerate() {

@@ -11,7 +11,8 @@ fn skin() -> Tissue {
 }
 
 fn holds(share: f64, delta_m: f64, time_constant_s: f64) -> AnyEffect {
-    ViscoelasticPresliding { layer: 1, share, delta_m, time_constant_s, kept: 1.0, release_m: 0.0 }.into()
+    ViscoelasticPresliding { layer: 1, share, delta_m, time_constant_s, retained_share: 1.0, release_m: 0.0 }
+        .into()
 }
 
 /// In to 20 mm at 2 mm/s, held for 5 s, back out at 2 mm/s.
@@ -29,12 +30,12 @@ fn in_hold_out() -> Vec<Sample> {
 #[test]
 fn neutral_effects_leave_the_base_law_bit_for_bit() {
     let neutral: [AnyEffect; 9] = [
-        ShaftSlip { exponent: 3.0, curve_n_per_m2: 1e5, fractions: [0.5, 0.1], ..ShaftSlip::default() }
+        ShaftSlip { exponent: 3.0, curvature_n_per_m2: 1e5, fractions: [0.5, 0.1], ..ShaftSlip::default() }
             .into(),
         ShaftSlip { layer: 9, push_n: 2.0, pull_n: 1.0, ..ShaftSlip::default() }.into(), // there is no such layer
         DelayedPuncture { layer: 2, force_n: f64::INFINITY, exponent: 3.0 }.into(),
         LayerCoupling { layer: 1, compliance_m_per_n: 0.0 }.into(),
-        LetGo { layer: 1, depth_m: 0.0 }.into(),
+        ReleaseDepth { layer: 1, depth_m: 0.0 }.into(),
         DeepIndentation { reach_m: 0.0 }.into(),
         LayerStiffening { layer: 2, kappa_per_m: 0.0 }.into(),
         holds(0.0, 0.005, 2.0),
@@ -42,13 +43,13 @@ fn neutral_effects_leave_the_base_law_bit_for_bit() {
     ];
     let base = run(&three_gels(), &[], &usual_motion());
     assert_eq!(run(&three_gels(), &neutral, &usual_motion()), base);
-    for info in per_layer() {
-        let values: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
+    for info in per_layer_effects() {
+        let values: Vec<f64> = info.parameters.iter().map(|p| p.inactive).collect();
         let effect = AnyEffect::from_parameters(info.id, &values).expect("its own parameters");
         assert!(effect.is_neutral() && effect.check().is_ok(), "{}", info.id);
         assert_eq!(effect.parameters(), values);
-        assert!(library().all(|general| general.id != info.id));
-        assert_eq!(stylet_tissue::info(info.id), Some(info));
+        assert!(general_effects().all(|general| general.id != info.id));
+        assert_eq!(stylet_tissue::effect_info(info.id), Some(info));
     }
 }
 
@@ -158,8 +159,8 @@ fn damage_grows_with_the_mean_power_of_the_force_whatever_the_step() {
         let seconds = (exponent + 1.0) / 2.0_f64.powf(exponent);
         for steps in [3, 400] {
             let effect = AnyEffect::from(DelayedPuncture { layer: 1, force_n: 0.5, exponent });
-            let law = Law::new(&layer, &[effect]).expect("one effect");
-            let (mut state, mut broke) = (LawState::default(), None);
+            let law = ForceLaw::new(&layer, &[effect]).expect("one effect");
+            let (mut state, mut broke) = (ForceLawState::default(), None);
             for k in 0..=steps + 1 {
                 // 1 N, which is 2 F_1, at 10 mm.
                 let share = 1.000_001 * f64::from(k) / f64::from(steps);
@@ -181,8 +182,14 @@ fn a_puncture_passes_the_share_that_is_kept_into_the_branch_s_hold() {
         .collect();
     for (share, kept) in [(0.5, 0.5), (1.0, 0.25), (0.8, 1.0)] {
         let delta_m = 0.05;
-        let creeps =
-            ViscoelasticPresliding { layer: 1, share, delta_m, time_constant_s: 2.0, kept, release_m: 0.0 };
+        let creeps = ViscoelasticPresliding {
+            layer: 1,
+            share,
+            delta_m,
+            time_constant_s: 2.0,
+            retained_share: kept,
+            release_m: 0.0,
+        };
         let f = run(&skin(), &[creeps.into()], &motion).0;
         // Two steps of creep take 5 ms/2 s each, a little travel adds less.
         near(f[801].friction_n, share * kept * 0.8, 0.005);
@@ -196,8 +203,8 @@ fn a_hold_follows_travel_to_first_order_however_small() {
     for steps in [10, 10_000, 1_000_000] {
         let way = 0.001;
         let effect = holds(1.0, 0.004, 1e6);
-        let law = Law::new(&skin(), &[effect]).expect("one effect");
-        let mut state = LawState::default();
+        let law = ForceLaw::new(&skin(), &[effect]).expect("one effect");
+        let mut state = ForceLawState::default();
         let mut at = |t: f64, z: f64, v: f64| law.step(&mut state, t, z, v, |_| {});
         // Slid in at 2 mm/s until it holds 1 N; then on at 1 mm/s, at which it slides at 0.5 N.
         for k in 0..=2000 {

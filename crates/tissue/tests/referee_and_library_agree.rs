@@ -7,7 +7,7 @@ use stylet_examine::reality::motion::{Path, Piece};
 use stylet_examine::reality::plain::Plain;
 use stylet_examine::reality::sensor::Instrument;
 use stylet_examine::reality::tissue::{Layer, Tissue};
-use stylet_tissue::{AnyEffect, Law, LawState, Measurement, Reading};
+use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState, MeasurementChain, SensorInput};
 
 /// Steps of both laws in s.
 const STEP_S: f64 = 1e-4;
@@ -101,9 +101,9 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
             AnyEffect::from_parameters(e.id(), &values).expect("an effect of the library")
         })
         .collect();
-    let law = Law::new(&stack, &made).expect("a law");
-    let chain = Measurement::new(&made);
-    let (mut state, mut measuring) = (LawState::default(), chain.start(1.0 / STEP_S));
+    let law = ForceLaw::new(&stack, &made).expect("a law");
+    let chain = MeasurementChain::new(&made);
+    let (mut state, mut measuring) = (ForceLawState::default(), chain.start(1.0 / STEP_S));
     let (path, mut piece, mut out) = (path(), 0, Vec::new());
     let n = (path.duration_s() / STEP_S) as usize;
     for k in 0..n {
@@ -113,7 +113,8 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
         }
         let p = path.at(piece, time_s);
         let tissue_n = law.step(&mut state, time_s, p.z, p.v, |_| {}).total_n;
-        let reading = Reading { time_s, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
+        let reading =
+            SensorInput { time_s, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
         let force = chain.step(&mut measuring, &reading);
         if k % 50 == 0 {
             out.push(force);

@@ -1,6 +1,6 @@
 //! Promise: a layer that clings to the shaft (`shaft_slip`) is presliding far below its hold, steady sliding by a power of the speed at
 //! it, creep in a hold and dry friction for a large exponent; the answer does not depend on the step. A layer that waits
-//! (`delayed_puncture`), one that presses into the next (`layer_coupling`) and one that lets go (`let_go`) are their equations.
+//! (`delayed_puncture`), one that presses into the next (`layer_coupling`) and one that lets go (`release_depth`) are their equations.
 
 mod common;
 use common::*;
@@ -17,9 +17,9 @@ fn slip(exponent: f64) -> ShaftSlip {
         layer: 1,
         push_n: 1.0,
         pull_n: 0.6,
-        kept: 0.7,
+        retained_share: 0.7,
         exponent,
-        curve_n_per_m2: 2e4,
+        curvature_n_per_m2: 2e4,
         ..ShaftSlip::default()
     }
 }
@@ -54,7 +54,7 @@ fn steady_sliding_takes_the_hold_times_the_root_of_the_speed() {
 #[test]
 fn far_below_its_hold_a_layer_is_a_spring() {
     // After a reversal the force follows the travel with the spring's stiffness, nearly without slip.
-    let effect = ShaftSlip { curve_n_per_m2: 0.0, ..slip(20.0) };
+    let effect = ShaftSlip { curvature_n_per_m2: 0.0, ..slip(20.0) };
     let motion = in_hold_out(0.05, 2e-3, 200.0);
     let f = forces(&skin(), &[effect.into()], &motion);
     let turn = (30.3 * 200.0) as usize;
@@ -67,7 +67,7 @@ fn far_below_its_hold_a_layer_is_a_spring() {
 fn in_a_hold_the_force_creeps_as_the_power_law_says() {
     // F' = -K v0 (F/L)^m: F^(1-m) grows with the time, linearly.
     let (k, m) = (300.0, 6.0);
-    let effect = ShaftSlip { curve_n_per_m2: 0.0, ..slip(m) };
+    let effect = ShaftSlip { curvature_n_per_m2: 0.0, ..slip(m) };
     let motion = in_hold_out(0.05, 2e-3, 2000.0);
     let f = forces(&skin(), &[effect.into()], &motion);
     let stop = (25.0 * 2000.0) as usize;
@@ -82,7 +82,7 @@ fn in_a_hold_the_force_creeps_as_the_power_law_says() {
 
 #[test]
 fn a_large_exponent_is_dry_friction() {
-    let effect = ShaftSlip { kept: 1.0, ..slip(200.0) };
+    let effect = ShaftSlip { retained_share: 1.0, ..slip(200.0) };
     let f = |speed| forces(&skin(), &[effect.clone().into()], &in_hold_out(0.05, speed, 100.0));
     let (slow, fast) = (f(1e-3), f(5e-3));
     // Five times the speed, the same force; in the hold it stays.
@@ -94,8 +94,8 @@ fn a_large_exponent_is_dry_friction() {
 #[test]
 fn the_rupture_falls_back_to_the_share_that_is_kept_and_wear_lowers_the_plateau() {
     let motion = in_hold_out(0.05, 2e-3, 1000.0);
-    let law = Law::new(&skin(), &[slip(10.0).into()]).expect("one effect");
-    let (mut state, mut before, mut pair) = (LawState::default(), 0.0, None);
+    let law = ForceLaw::new(&skin(), &[slip(10.0).into()]).expect("one effect");
+    let (mut state, mut before, mut pair) = (ForceLawState::default(), 0.0, None);
     for (t, z, v) in &motion {
         let mut broke = false;
         let f = law.step(&mut state, *t, *z, *v, |_| broke = true).total_n;
@@ -142,7 +142,7 @@ proptest! {
         fraction in 0.0..0.5_f64,
         curve in 0.0..1e5_f64,
     ) {
-        let effect = ShaftSlip { wear_per_m: wear, fractions: [fraction, 0.3], curve_n_per_m2: curve, ..slip(exponent) };
+        let effect = ShaftSlip { wear_per_m: wear, fractions: [fraction, 0.3], curvature_n_per_m2: curve, ..slip(exponent) };
         let at = |rate: f64| {
             let all = forces(&skin(), &[effect.clone().into()], &in_hold_out(0.04, speed, rate));
             // A sample every fifth of a second, away from the rupture, the stop, the reversal and the end.
@@ -171,7 +171,7 @@ proptest! {
         curve in 0.0..1e9_f64,
     ) {
         let effect = ShaftSlip {
-            push_n: push, pull_n: pull, kept, exponent, wear_per_m: wear, curve_n_per_m2: curve,
+            push_n: push, pull_n: pull, retained_share: kept, exponent, wear_per_m: wear, curvature_n_per_m2: curve,
             fractions: [0.5, 0.5], time_constants_s: [1e-3, 1e4], ..ShaftSlip::default()
         };
         for rate in [10.0, 300.0] {
@@ -205,9 +205,9 @@ fn a_layer_that_waits_breaks_in_a_hold_when_its_damage_is_full() {
 #[test]
 fn a_layer_on_soft_ground_is_indented_by_less_than_the_tip_travels() {
     let motion = in_hold_out(0.004, 2e-3, 100.0);
-    let stiffness = |compliance_m_per_n, curve_n_per_m2| {
+    let stiffness = |compliance_m_per_n, curvature_n_per_m2| {
         let soft = LayerCoupling { layer: 1, compliance_m_per_n };
-        let effects = [soft.into(), ShaftSlip { curve_n_per_m2, ..slip(10.0) }.into()];
+        let effects = [soft.into(), ShaftSlip { curvature_n_per_m2, ..slip(10.0) }.into()];
         forces(&skin(), &effects, &motion)[200] / 0.004
     };
     near(stiffness(0.0, 0.0), 300.0, 1e-9);
@@ -223,7 +223,7 @@ fn a_layer_lets_go_where_it_says_on_the_way_back_only() {
     let motion = in_hold_out(0.03, 2e-3, 500.0);
     for (effects, within) in [(vec![], 1e-9), (vec![AnyEffect::from(slip(10.0))], 2e-4)] {
         let mut all = effects;
-        all.push(LetGo { layer: 1, depth_m: 0.006 }.into());
+        all.push(ReleaseDepth { layer: 1, depth_m: 0.006 }.into());
         let with = forces(&skin(), &all, &motion);
         all.pop();
         let without = forces(&skin(), &all, &motion);

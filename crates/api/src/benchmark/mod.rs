@@ -1,16 +1,16 @@
 //! Examinations at scale: the referee's cases handed to the engine, and what comes of it.
 
-mod again;
-mod engine;
-mod examine;
-mod journal;
+mod answer_question;
+mod case_journal;
+mod diagnosis;
 #[cfg(feature = "own_world")]
 pub mod own;
+mod planning;
 
-pub use again::Planning;
-pub use examine::{Asked, Examination};
+pub use diagnosis::{CaseSelection, DiagnosisBenchmark};
 #[cfg(feature = "own_world")]
 pub use own::own;
+pub use planning::PlanningBenchmark;
 
 use crate::error::Error;
 
@@ -18,7 +18,7 @@ use crate::error::Error;
 ///
 /// # Errors
 /// [`Error::Request`] for a word that there is not, with those that there are; `what` is the argument.
-pub(crate) fn word<T: Copy>(
+pub(crate) fn parse_word<T: Copy>(
     what: &str,
     given: &str,
     all: &[T],
@@ -35,6 +35,6 @@ pub(crate) fn word<T: Copy>(
 ///
 /// # Errors
 /// [`Error::Internal`] when the threads cannot be had.
-pub(crate) fn pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
+pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Error::internal)
 }

@@ -1,6 +1,6 @@
 //! `stylet benchmark export` and `judge`: a challenge that others can enter.
 
-use crate::args::{BenchmarkExportArgs, BenchmarkJudgeArgs};
+use crate::args::{BenchmarkExportArgs, BenchmarkScoreArgs};
 use crate::exit::Failure;
 use stylet_examine::{challenge, table};
 
@@ -9,9 +9,9 @@ use stylet_examine::{challenge, table};
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
-    let plan = args.cases.asked().plan()?;
+    let plan = args.cases.selection().plan()?;
     let written = challenge::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
-    crate::terminal::say(&format!(
+    crate::terminal::print(&format!(
         "{written} cases in {}\nThe key, for the judge alone: {}\n",
         args.out.display(),
         challenge::key_path(&args.out).display()
@@ -22,8 +22,8 @@ pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
-pub fn judge(args: &BenchmarkJudgeArgs) -> Result<(), Failure> {
+pub fn score(args: &BenchmarkScoreArgs) -> Result<(), Failure> {
     let outcomes =
         challenge::judge(&args.folder, &args.answers).map_err(|e| Failure::Check(e.to_string()))?;
-    crate::terminal::say(&table::text(&outcomes))
+    crate::terminal::print(&table::text(&outcomes))
 }

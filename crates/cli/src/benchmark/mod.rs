@@ -5,7 +5,7 @@ mod examine;
 mod own;
 mod plan;
 
-use crate::args::{BenchmarkArgs, BenchmarkWhat};
+use crate::args::{BenchmarkArgs, BenchmarkCommand};
 use crate::exit::Failure;
 
 /// The command.
@@ -13,11 +13,11 @@ use crate::exit::Failure;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
-    match &args.what {
-        BenchmarkWhat::Diagnose(args) if args.cases.world == "own" => own::diagnose(args),
-        BenchmarkWhat::Diagnose(args) => examine::diagnose(args),
-        BenchmarkWhat::Export(args) => challenge::export(args),
-        BenchmarkWhat::Judge(args) => challenge::judge(args),
-        BenchmarkWhat::Plan(args) => plan::plan(args),
+    match &args.command {
+        BenchmarkCommand::Diagnose(args) if args.cases.world == "own" => own::diagnose(args),
+        BenchmarkCommand::Diagnose(args) => examine::diagnose(args),
+        BenchmarkCommand::Export(args) => challenge::export(args),
+        BenchmarkCommand::Score(args) => challenge::score(args),
+        BenchmarkCommand::Plan(args) => plan::plan(args),
     }
 }

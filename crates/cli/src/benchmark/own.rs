@@ -2,7 +2,7 @@
 
 use crate::args::BenchmarkDiagnoseArgs;
 use crate::exit::Failure;
-use crate::terminal::{say, tell};
+use crate::terminal::{print, print_error};
 use std::path::PathBuf;
 
 /// The command in this world.
@@ -23,8 +23,8 @@ pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
         .unwrap_or_else(|| PathBuf::from("stylet-out").join(format!("benchmark-diagnose-own-{seed}")));
     let text = stylet_api::benchmark::own(&folder, seed, cases, &|done| {
         if done.is_multiple_of(20) {
-            tell(&format!("  {done} of {cases} cases\n"));
+            print_error(&format!("  {done} of {cases} cases\n"));
         }
     })?;
-    say(&format!("{text}\nCases: {}\n", folder.join("cases.jsonl").display()))
+    print(&format!("{text}\nCases: {}\n", folder.join("cases.jsonl").display()))
 }

@@ -1,7 +1,7 @@
 //! Arguments of `stylet sweep`, `stylet replay` and `stylet gate`.
 
-use crate::args::Results;
-use crate::limits::Limits;
+use crate::args::OutputArgs;
+use crate::limits::ResourceLimits;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use stylet_sweep::Overrides;
@@ -9,7 +9,7 @@ use stylet_sweep::shard::ShardNumber;
 
 /// How much is drawn, and from which seed.
 #[derive(Clone, Copy, Debug, Args)]
-pub struct Draws {
+pub struct SweepOverrides {
     /// Number of trials, in place of the file's.
     #[arg(long, value_name = "N")]
     pub trials: Option<u64>,
@@ -18,8 +18,8 @@ pub struct Draws {
     pub seed: Option<u64>,
 }
 
-impl From<Draws> for Overrides {
-    fn from(draws: Draws) -> Self {
+impl From<SweepOverrides> for Overrides {
+    fn from(draws: SweepOverrides) -> Self {
         Self { trials: draws.trials, seed: draws.seed }
     }
 }
@@ -45,19 +45,19 @@ pub struct SweepArgs {
     pub sweep: Option<PathBuf>,
     /// What is drawn.
     #[command(flatten)]
-    pub draws: Draws,
+    pub overrides: SweepOverrides,
     /// Threads [default: one per core].
-    #[arg(long, value_name = "T", value_parser = crate::limits::threads)]
+    #[arg(long, value_name = "T", value_parser = crate::limits::parse_threads)]
     pub threads: Option<usize>,
     /// Go on where an interrupted sweep stopped.
     #[arg(long)]
     pub resume: bool,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
     /// How much it may take.
     #[command(flatten)]
-    pub limits: Limits,
+    pub limits: ResourceLimits,
 }
 
 /// The parts of a sweep that is spread over machines.
@@ -75,12 +75,12 @@ pub enum SweepCommand {
 
 /// Which sweep.
 #[derive(Debug, Args)]
-pub struct Which {
+pub struct SweepSelection {
     /// Sweep file (RON).
     pub sweep: PathBuf,
     /// What is drawn.
     #[command(flatten)]
-    pub draws: Draws,
+    pub overrides: SweepOverrides,
 }
 
 /// Arguments of `stylet sweep plan`.
@@ -88,7 +88,7 @@ pub struct Which {
 pub struct PlanArgs {
     /// Which sweep.
     #[command(flatten)]
-    pub which: Which,
+    pub selection: SweepSelection,
     /// Number of shards.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=999_999))]
     pub shards: u64,
@@ -102,9 +102,9 @@ pub struct RunShardArgs {
     pub shard: ShardNumber,
     /// Which sweep.
     #[command(flatten)]
-    pub which: Which,
+    pub selection: SweepSelection,
     /// Threads [default: one per core].
-    #[arg(long, value_name = "T", value_parser = crate::limits::threads)]
+    #[arg(long, value_name = "T", value_parser = crate::limits::parse_threads)]
     pub threads: Option<usize>,
     /// Folder for the results [default: stylet-out/<sweep>].
     #[arg(long, value_name = "DIR")]
@@ -119,10 +119,10 @@ pub struct RunShardArgs {
 pub struct MergeArgs {
     /// Which sweep.
     #[command(flatten)]
-    pub which: Which,
+    pub selection: SweepSelection,
     /// Where the shards are and the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
 }
 
 /// Arguments of `stylet sweep map`.
@@ -153,7 +153,7 @@ pub struct ReplayArgs {
     pub trial: u64,
     /// Where the results go.
     #[command(flatten)]
-    pub results: Results,
+    pub results: OutputArgs,
 }
 
 /// Arguments of `stylet gate`.
@@ -177,7 +177,7 @@ pub struct GateArgs {
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
     /// Threads [default: one per core].
-    #[arg(long, value_name = "T", value_parser = crate::limits::threads)]
+    #[arg(long, value_name = "T", value_parser = crate::limits::parse_threads)]
     pub threads: Option<usize>,
     /// Write the results as JUnit XML.
     #[arg(long, value_name = "FILE")]

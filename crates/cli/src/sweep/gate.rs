@@ -4,12 +4,14 @@ use super::args::GateArgs;
 use super::with_threads;
 use crate::exit::Failure;
 use crate::progress::Progress;
-use crate::terminal::say;
+use crate::terminal::print;
 use std::fmt::Write as _;
 use std::path::Path;
-use stylet_api::folder::write_file;
-use stylet_api::output::json;
-use stylet_sweep::gate::{Baseline, Judged, baseline, changes, describe, junit, load};
+use stylet_api::output_files::to_json_bytes;
+use stylet_api::output_folder::write_file_atomically;
+use stylet_sweep::score_gate::{
+    Baseline, GateResult, baseline, baseline_changes, describe_result, junit_xml, load,
+};
 
 /// The command.
 ///
@@ -20,9 +22,9 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let at = args.baseline.clone().unwrap_or_else(|| args.gates.with_extension("baseline.json"));
     let old = read(&at)?;
     let progress = Progress::new(gates.iter().map(|g| g.trials()).sum(), "trials", args.quiet);
-    let judged: Vec<Judged> = with_threads(args.threads.unwrap_or(0), || {
-        let all: Result<Vec<Vec<Judged>>, _> =
-            gates.iter().map(|gate| gate.judge(&|n| progress.advance(n))).collect();
+    let judged: Vec<GateResult> = with_threads(args.threads.unwrap_or(0), || {
+        let all: Result<Vec<Vec<GateResult>>, _> =
+            gates.iter().map(|gate| gate.run(&|n| progress.advance(n))).collect();
         all.map(|all| all.concat())
     })??;
     progress.finish();
@@ -33,22 +35,22 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
             heading.clone_from(&j.gate);
             let _ = writeln!(text, "{heading}");
         }
-        let _ = writeln!(text, "  {} {}", if j.passed { "pass" } else { "FAIL" }, describe(j));
+        let _ = writeln!(text, "  {} {}", if j.passed { "pass" } else { "FAIL" }, describe_result(j));
     }
     let new = baseline(&judged);
     if args.update {
-        write_file(&at, &json(&new)?)?;
+        write_file_atomically(&at, &to_json_bytes(&new)?)?;
     }
     if !args.quiet {
         text.push_str(&against(old.as_ref(), &new, &at, args.update));
     }
     if let Some(path) = &args.junit {
-        write_file(path, junit(&judged).as_bytes())?;
+        write_file_atomically(path, junit_xml(&judged).as_bytes())?;
     }
     if let Some(path) = &args.json {
-        write_file(path, &json(&judged)?)?;
+        write_file_atomically(path, &to_json_bytes(&judged)?)?;
     }
-    let said = if text.is_empty() { Ok(()) } else { say(&text) };
+    let said = if text.is_empty() { Ok(()) } else { print(&text) };
     let failed = judged.iter().filter(|j| !j.passed).count();
     // A verdict outweighs that nobody could be told of it.
     if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { said }
@@ -59,7 +61,7 @@ fn against(old: Option<&Baseline>, new: &Baseline, at: &Path, updated: bool) -> 
     let at = at.display();
     let mut text = String::new();
     if let Some(old) = old {
-        let changes = changes(old, new);
+        let changes = baseline_changes(old, new);
         if changes.is_empty() {
             let _ = writeln!(text, "No number differs from {at}.");
         } else {

@@ -5,8 +5,8 @@ use super::with_threads;
 use crate::exit::Failure;
 use crate::progress::Progress;
 use std::fmt::Write as _;
-use stylet_pages::sweep::map_svg;
-use stylet_sweep::{Columns, MapRow, Overrides, Sweep, map_rows, rows};
+use stylet_pages::sweep::failure_map_svg;
+use stylet_sweep::{Columns, FailureMapRow, Overrides, Sweep, failure_map_rows, run_trials};
 
 /// The command.
 pub fn map(args: &MapArgs) -> Result<(), Failure> {
@@ -17,8 +17,9 @@ pub fn map(args: &MapArgs) -> Result<(), Failure> {
     let mut map = Vec::new();
     for sweep in &sweeps {
         let columns = Columns::new(sweep);
-        let rows = with_threads(0, || rows(sweep, &columns, 0..sweep.trials(), &|n| progress.advance(n)))??;
-        map.push((sweep.name.clone(), map_rows(sweep, &columns, &rows)));
+        let rows =
+            with_threads(0, || run_trials(sweep, &columns, 0..sweep.trials(), &|n| progress.advance(n)))??;
+        map.push((sweep.name.clone(), failure_map_rows(sweep, &columns, &rows)));
     }
     progress.finish();
     let mut text = String::new();
@@ -29,7 +30,7 @@ pub fn map(args: &MapArgs) -> Result<(), Failure> {
             let _ = writeln!(text, "  {:<62}{cells} %", row.name);
         }
     }
-    let map: Vec<MapRow> = map.into_iter().flat_map(|(_, rows)| rows).collect();
-    stylet_api::folder::write_file(&args.svg, map_svg(&map).as_bytes())?;
-    crate::terminal::say(&format!("{text}{}\n", args.svg.display()))
+    let map: Vec<FailureMapRow> = map.into_iter().flat_map(|(_, rows)| rows).collect();
+    stylet_api::output_folder::write_file_atomically(&args.svg, failure_map_svg(&map).as_bytes())?;
+    crate::terminal::print(&format!("{text}{}\n", args.svg.display()))
 }

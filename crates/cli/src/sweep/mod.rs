@@ -14,11 +14,11 @@ use crate::progress::Progress;
 use args::{SweepArgs, SweepCommand};
 use std::fmt::Write as _;
 use std::path::Path;
-use stylet_api::sweep_folder::{SHARD_TRIALS, all_shards, begin, conclude};
-use stylet_api::{Claim, need};
-use stylet_pages::words::shown;
+use stylet_api::sweep_folder::{SHARD_TRIALS, check_unfinished, run_all_shards, write_results};
+use stylet_api::{OutputLock, resource_estimate};
+use stylet_pages::formatting::significant_or_dash;
 use stylet_report::{percent, significant};
-use stylet_sweep::{Columns, Summary, Sweep, TrialsOnDisk};
+use stylet_sweep::{Columns, DiskTrialTable, Summary, Sweep};
 
 /// The command.
 ///
@@ -46,18 +46,18 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
             "no sweep file is given; try stylet sweep scenarios/sweeps/noise.ron".into(),
         ));
     };
-    let sweep = Sweep::load(file, args.draws.into())?;
+    let sweep = Sweep::load(file, args.overrides.into())?;
     let columns = Columns::new(&sweep);
     let threads = args.threads.unwrap_or(0);
-    args.limits.allow(file, &need::of_sweep(&sweep, threads), args.results.quiet)?;
-    let out = args.results.folder(file, "");
+    args.limits.check(file, &resource_estimate::estimate_sweep(&sweep, threads), args.results.quiet)?;
+    let out = args.results.output_folder(file, "");
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     // Nobody else writes there until the set is whole: the shards, the tables and `sweep.ron` are of one draw.
-    let claim = Claim::new(&out)?;
-    begin(&sweep, &columns, &out, of, args.resume)?;
+    let claim = OutputLock::new(&out)?;
+    check_unfinished(&sweep, &columns, &out, of, args.resume)?;
     let progress = Progress::new(sweep.trials(), "trials", args.results.quiet);
     let (there, done) = (|n| progress.skip(n), |n| progress.advance(n));
-    let rows = with_threads(threads, || all_shards(&sweep, &columns, &out, of, &there, &done))??;
+    let rows = with_threads(threads, || run_all_shards(&sweep, &columns, &out, of, &there, &done))??;
     progress.finish();
     written(&sweep, &columns, &rows, (&claim, &out), args.results.quiet)
 }
@@ -66,12 +66,12 @@ fn whole(args: &SweepArgs) -> Result<(), Failure> {
 fn written(
     sweep: &Sweep,
     columns: &Columns,
-    rows: &TrialsOnDisk,
-    (claim, out): (&Claim, &Path),
+    rows: &DiskTrialTable,
+    (claim, out): (&OutputLock, &Path),
     quiet: bool,
 ) -> Result<(), Failure> {
-    let summary = conclude(sweep, columns, rows, (claim, out))?;
-    if quiet { Ok(()) } else { crate::terminal::say(&terminal(&summary, out)) }
+    let summary = write_results(sweep, columns, rows, (claim, out))?;
+    if quiet { Ok(()) } else { crate::terminal::print(&terminal(&summary, out)) }
 }
 
 fn terminal(s: &Summary, out: &Path) -> String {
@@ -106,8 +106,8 @@ fn terminal(s: &Summary, out: &Path) -> String {
                 text,
                 "    {:<44} {:>6}  {:>6}",
                 e.quantity,
-                shown(e.first_order, 1.0, 2),
-                shown(e.rank_correlation, 1.0, 2)
+                significant_or_dash(e.first_order, 1.0, 2),
+                significant_or_dash(e.rank_correlation, 1.0, 2)
             );
         }
     }

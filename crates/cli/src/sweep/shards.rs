@@ -1,26 +1,26 @@
 //! `stylet sweep plan | run-shard | merge`: a sweep spread over machines.
 
-use super::args::{MergeArgs, PlanArgs, RunShardArgs, Which};
+use super::args::{MergeArgs, PlanArgs, RunShardArgs, SweepSelection};
 use super::{with_threads, written};
 use crate::exit::Failure;
 use crate::results::default_folder;
 use std::fmt::Write as _;
-use stylet_api::Claim;
-use stylet_api::sweep_folder::{merged, one_shard, trial_s};
+use stylet_api::OutputLock;
+use stylet_api::sweep_folder::{measure_trial_s, read_all_shards, run_shard as write_shard};
 use stylet_report::significant;
 use stylet_sweep::shard::ShardNumber;
 use stylet_sweep::{Columns, Sweep};
 
-fn load(which: &Which) -> Result<(Sweep, Columns), Failure> {
-    let sweep = Sweep::load(&which.sweep, which.draws.into())?;
+fn load(which: &SweepSelection) -> Result<(Sweep, Columns), Failure> {
+    let sweep = Sweep::load(&which.sweep, which.overrides.into())?;
     let columns = Columns::new(&sweep);
     Ok((sweep, columns))
 }
 
 /// `stylet sweep plan`.
 pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
-    let (sweep, columns) = load(&args.which)?;
-    let per_trial = with_threads(1, || trial_s(&sweep, &columns))??;
+    let (sweep, columns) = load(&args.selection)?;
+    let per_trial = with_threads(1, || measure_trial_s(&sweep, &columns))??;
     let mut text = format!(
         "{}: {} trials in {} shards, identity {}\n",
         sweep.name,
@@ -39,22 +39,22 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
         significant(per_trial * 1e3, 2),
         significant(seconds, 2)
     );
-    crate::terminal::say(&text)
+    crate::terminal::print(&text)
 }
 
 /// `stylet sweep run-shard`.
 pub fn run_shard(args: &RunShardArgs) -> Result<(), Failure> {
-    let (sweep, columns) = load(&args.which)?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.which.sweep, ""));
-    let work = || one_shard(&sweep, &columns, args.shard, &out, args.resume);
+    let (sweep, columns) = load(&args.selection)?;
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.selection.sweep, ""));
+    let work = || write_shard(&sweep, &columns, args.shard, &out, args.resume);
     Ok(with_threads(args.threads.unwrap_or(0), work)??)
 }
 
 /// `stylet sweep merge`.
 pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
-    let (sweep, columns) = load(&args.which)?;
-    let out = args.results.folder(&args.which.sweep, "");
-    let claim = Claim::new(&out)?;
-    let rows = merged(&sweep, &columns, &out)?;
+    let (sweep, columns) = load(&args.selection)?;
+    let out = args.results.output_folder(&args.selection.sweep, "");
+    let claim = OutputLock::new(&out)?;
+    let rows = read_all_shards(&sweep, &columns, &out)?;
     written(&sweep, &columns, &rows, (&claim, &out), args.results.quiet)
 }

@@ -63,7 +63,7 @@ impl<const N: usize> Gaussian<N> {
 
     /// Takes the measurement: `x += P h e/s`, `P -= (P h)(P h)'/s`.
     #[inline(always)]
-    pub(crate) fn take(&mut self, innovation: &Innovation<N>) {
+    pub(crate) fn update(&mut self, innovation: &Innovation<N>) {
         let Innovation { e, s, ph } = innovation;
         let gain = 1.0 / s;
         for i in 0..N {
@@ -79,7 +79,7 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// Forgets what is known of one unknown: a new variance, no correlation with the others.
-    pub(crate) fn renew(&mut self, i: usize, mean: f64, variance: f64) {
+    pub(crate) fn reset_component(&mut self, i: usize, mean: f64, variance: f64) {
         for j in 0..N {
             self.p[i][j] = 0.0;
             self.p[j][i] = 0.0;
@@ -89,7 +89,7 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// The belief about `map x`.
-    pub(crate) fn mapped(&self, map: &[[f64; N]; N]) -> Self {
+    pub(crate) fn transformed(&self, map: &[[f64; N]; N]) -> Self {
         let mut out = Self { x: [0.0; N], p: [[0.0; N]; N] };
         let mut half = [[0.0; N]; N];
         for i in 0..N {
@@ -113,7 +113,7 @@ impl<const N: usize> Gaussian<N> {
 
     /// `x_i += by x_j`, with the covariance.
     #[inline(always)]
-    pub(crate) fn shear(&mut self, i: usize, j: usize, by: f64) {
+    pub(crate) fn add_multiple(&mut self, i: usize, j: usize, by: f64) {
         self.x[i] += by * self.x[j];
         self.p[i][i] += by * (2.0 * self.cov(i, j) + by * self.p[j][j]);
         for k in 0..N {
@@ -130,7 +130,7 @@ impl<const N: usize> Gaussian<N> {
 
     /// True while all entries are numbers and the covariance is positive definite: its Cholesky factor, of the matrix scaled to
     /// a unit diagonal, exists up to rounding.
-    pub(crate) fn is_sound(&self) -> bool {
+    pub(crate) fn is_positive_definite(&self) -> bool {
         let mut l = [[0.0; N]; N];
         for i in 0..N {
             for j in 0..=i {
@@ -155,7 +155,7 @@ impl<const N: usize> Gaussian<N> {
     /// Variances and means are numbers: cheap enough for every sample. A variance that is a number is positive, because
     /// [`Gaussian::take`] sees to it.
     #[inline(always)]
-    pub(crate) fn is_usable(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         (0..N).map(|i| self.p[i][i] + self.x[i]).sum::<f64>().is_finite()
     }
 }
@@ -174,7 +174,7 @@ pub(crate) fn at_most(bound: f64, x: f64) -> f64 {
 
 /// Largest variance of a force that a prior may state, in units of the noise's: wide enough to be no prior at all, and far enough from
 /// what 16 digits can tell apart from the noise.
-pub(crate) const WIDEST: f64 = 1e8;
+pub(crate) const MAX_VARIANCE_RATIO: f64 = 1e8;
 /// What rounding may take from a pivot of a correlation matrix.
 const ROUNDING: f64 = 1e-6;
 /// Least variance kept, in units of the noise variance and the unknown's own unit squared.
@@ -192,7 +192,7 @@ mod tests {
     const MEAN: [f64; 3] = [1.0, -2.0, 0.5];
 
     fn belief() -> Gaussian<3> {
-        Gaussian::new(MEAN, DIAGONAL).mapped(&MAP)
+        Gaussian::new(MEAN, DIAGONAL).transformed(&MAP)
     }
 
     fn full(g: &Gaussian<3>) -> Matrix {
@@ -227,7 +227,7 @@ mod tests {
             assert!((g.x[i] - mean).abs() < 1e-12);
         }
         // And once more, now that the unknowns hang together.
-        let twice = g.mapped(&MAP);
+        let twice = g.transformed(&MAP);
         let expected: Matrix = core::array::from_fn(|i| {
             core::array::from_fn(|j| {
                 (0..9).map(|n| MAP[i][n / 3] * expected[n / 3][n % 3] * MAP[j][n % 3]).sum()
@@ -245,7 +245,7 @@ mod tests {
         let spread: f64 = (0..9).map(|n| h[n / 3] * before.cov(n / 3, n % 3) * h[n % 3]).sum();
         assert!((innovation.s - (spread + r)).abs() < 1e-12);
         let mut after = before;
-        after.take(&innovation);
+        after.update(&innovation);
         let information = inverse(&full(&before));
         let grown: Matrix =
             core::array::from_fn(|i| core::array::from_fn(|j| information[i][j] + h[i] * h[j] / r));
@@ -261,11 +261,11 @@ mod tests {
     fn a_shear_is_the_linear_map_that_adds_a_share_of_one_unknown_to_another() {
         for (i, j) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
             let mut sheared = belief();
-            sheared.shear(i, j, 0.8);
+            sheared.add_multiple(i, j, 0.8);
             let mut map: Matrix =
                 core::array::from_fn(|a| core::array::from_fn(|b| f64::from(u8::from(a == b))));
             map[i][j] = 0.8;
-            let expected = belief().mapped(&map);
+            let expected = belief().transformed(&map);
             assert_near(&full(&sheared), &full(&expected));
             assert!(sheared.x.iter().zip(expected.x).all(|(a, b)| (a - b).abs() < 1e-12));
         }
@@ -274,7 +274,7 @@ mod tests {
     #[test]
     fn what_is_known_anew_of_one_unknown_leaves_the_others_as_they_were() {
         let mut g = belief();
-        g.renew(1, 7.0, 9.0);
+        g.reset_component(1, 7.0, 9.0);
         let expected = full(&belief());
         let (x, was) = (g.x, belief().x);
         assert_eq!((x[0], x[1], x[2]), (was[0], 7.0, was[2]));
@@ -292,28 +292,28 @@ mod tests {
 
     #[test]
     fn a_covariance_that_none_can_be_is_not_sound() {
-        assert!(belief().is_sound() && belief().is_usable());
+        assert!(belief().is_positive_definite() && belief().is_finite());
         // Correlations above one; those of which any two could be but not all three; a variance below zero; what is no number.
         let mut g = Gaussian::new([0.0; 3], [1.0, 4.0, 9.0]);
         g.p[1][0] = 1.9;
-        assert!(g.is_sound(), "a correlation of 0.95");
+        assert!(g.is_positive_definite(), "a correlation of 0.95");
         g.p[1][0] = -2.1;
-        assert!(!g.is_sound(), "a correlation of -1.05");
+        assert!(!g.is_positive_definite(), "a correlation of -1.05");
         let mut g = Gaussian::new([0.0; 3], [1.0; 3]);
         (g.p[1][0], g.p[2][0], g.p[2][1]) = (0.9, 0.9, 0.9);
-        assert!(g.is_sound());
+        assert!(g.is_positive_definite());
         g.p[2][1] = -0.9;
-        assert!(!g.is_sound());
+        assert!(!g.is_positive_definite());
         let mut g = belief();
         g.p[2][2] = -1.0;
-        assert!(!g.is_sound());
+        assert!(!g.is_positive_definite());
         for spoil in [f64::NAN, f64::INFINITY] {
             let mut g = belief();
             g.x[1] = spoil;
-            assert!(!g.is_sound() && !g.is_usable());
+            assert!(!g.is_positive_definite() && !g.is_finite());
             let mut g = belief();
             g.p[1][1] = spoil;
-            assert!(!g.is_sound() && !g.is_usable());
+            assert!(!g.is_positive_definite() && !g.is_finite());
         }
     }
 
@@ -334,24 +334,24 @@ mod tests {
         let mut g = Gaussian::new([1.0, 2.0, 3.0], [0.0, 4.0, 9.0]);
         assert_eq!(g.p[0][0], 1e-15);
         let known = g.innovation([1], [1.0], 5.0, 1e-30);
-        g.take(&known);
+        g.update(&known);
         assert_eq!((g.p[1][1], g.x[1]), (1e-15, 5.0));
-        g.renew(2, 7.0, -1.0);
+        g.reset_component(2, 7.0, -1.0);
         assert_eq!((g.p[2][2], g.x[2]), (1e-15, 7.0));
     }
 
     #[test]
     fn large_numbers_are_numbers_and_a_variance_of_none_is_not_sound() {
         let large = Gaussian::new([1e200; 3], [1e200; 3]);
-        assert!(large.is_usable() && large.is_sound());
+        assert!(large.is_finite() && large.is_positive_definite());
         let mut g = belief();
         (g.p[1][0], g.p[1][1], g.p[2][1]) = (0.0, 0.0, 0.0);
-        assert!(!g.is_sound());
+        assert!(!g.is_positive_definite());
         // A correlation of one up to rounding is one.
         let mut g = Gaussian::new([0.0; 3], [4.0, 9.0, 1.0]);
         g.p[1][0] = 6.0 * (1.0 + 4e-7);
-        assert!(g.is_sound());
+        assert!(g.is_positive_definite());
         g.p[1][0] = 6.0 * (1.0 + 6e-7);
-        assert!(!g.is_sound());
+        assert!(!g.is_positive_definite());
     }
 }

@@ -1,57 +1,72 @@
 //! How the needle moves, and what drives the friction along its shaft.
 
 use super::gaussian::at_least;
-use super::going::{DEAD_MPS, LEARNED_S};
-use super::{Step, Stylet, shaft};
+use super::velocity_estimator::{DISAGREEMENT_MEMORY_S, REST_SPEED_MPS};
+use super::{MotionStep, Stylet, shaft_friction};
 use crate::config::{EnhanceConfig, FrictionLaw};
 use crate::sample::Sample;
 
 /// Smoothing of the speed that stands for the motion, in s.
-pub(super) const SPEED_S: f64 = 0.2;
+pub(super) const SPEED_TIME_CONSTANT_S: f64 = 0.2;
 
 impl Stylet {
     /// The drive of friction, by the law in force.
     #[inline(always)]
-    pub(super) fn drive_friction(&mut self, config: &EnhanceConfig, step: &Step, sample: &Sample) {
+    pub(super) fn update_friction_drive(
+        &mut self,
+        config: &EnhanceConfig,
+        step: &MotionStep,
+        sample: &Sample,
+    ) {
         let v = sample.velocity_mps;
-        let (dry_mps, travel_m) = match config.stylet.law {
+        let (dry_mps, travel_m) = match config.stylet.friction_law {
             FrictionLaw::Auto | FrictionLaw::Viscous => {
-                self.drive = v;
-                self.steady = step.speed_mps;
+                self.friction_drive_mps = v;
+                self.steady_drive_mps = step.speed_mps;
                 return;
             }
             FrictionLaw::CoulombViscous { dry_mps } => (dry_mps, 0.0),
             FrictionLaw::Presliding { dry_mps, travel_m } => (dry_mps, travel_m),
         };
-        let sign = if v > DEAD_MPS {
+        let sign = if v > REST_SPEED_MPS {
             1.0
-        } else if v < -DEAD_MPS {
+        } else if v < -REST_SPEED_MPS {
             -1.0
         } else {
             0.0
         };
-        self.xi = if travel_m > 0.0 {
+        self.presliding_state = if travel_m > 0.0 {
             // Builds up while any shaft is inside; a hold leaves it as it is.
             let travel = step.dz_m.abs();
             let inside = self.in_tissue && sign != 0.0 && travel > 0.0;
-            if inside { sign + (self.xi - sign) * libm::exp(-travel / travel_m) } else { self.xi }
+            if inside {
+                sign + (self.presliding_state - sign) * libm::exp(-travel / travel_m)
+            } else {
+                self.presliding_state
+            }
         } else {
             sign
         };
-        self.drive = v + dry_mps * self.xi;
-        self.steady = step.speed_mps + dry_mps;
+        self.friction_drive_mps = v + dry_mps * self.presliding_state;
+        self.steady_drive_mps = step.speed_mps + dry_mps;
     }
 
     /// A needle that is said to have set off but has not moved yet: a log of exact velocities, or one that was smoothed? The force knows: with
     /// the speed friction is there at once.
     #[inline(always)]
-    pub(super) fn set_off(&self, last: &Sample, sample: &Sample, mps: f64, sudden: bool) -> (f64, bool) {
+    pub(super) fn resolve_motion_start(
+        &self,
+        last: &Sample,
+        sample: &Sample,
+        mps: f64,
+        sudden: bool,
+    ) -> (f64, bool) {
         let said = sample.velocity_mps;
-        if mps != 0.0 || said.abs() <= DEAD_MPS || !self.in_tissue {
+        if mps != 0.0 || said.abs() <= REST_SPEED_MPS || !self.in_tissue {
             return (mps, sudden);
         }
         let (moves, stands) =
-            (self.layers.says(sample.position_m, said), self.layers.says(sample.position_m, 0.0));
+            (self.estimator.predict(sample.position_m, said), self.estimator.predict(sample.position_m, 0.0));
         let jumped = sample.force_n - last.force_n;
         if (jumped > 0.0) == (said > 0.0) && jumped.abs() > 0.5 * (moves - stands).abs() {
             (said, true)
@@ -62,19 +77,24 @@ impl Stylet {
 
     /// How the needle has moved since the last sample.
     #[inline(always)]
-    pub(super) fn motion(
+    pub(super) fn motion_step(
         &mut self,
         config: &EnhanceConfig,
         last: &Sample,
         sample: &Sample,
         sudden: bool,
-    ) -> Step {
+    ) -> MotionStep {
         let dt_s = sample.time_s - last.time_s;
         if dt_s > 0.0 {
-            self.noise.clock(dt_s);
-            if (dt_s - self.shares[0]).abs() > 1e-9 {
+            self.noise.update_interval(dt_s);
+            if (dt_s - self.low_pass_gains[0]).abs() > 1e-9 {
                 let share = |time_s: f64| dt_s / (dt_s + time_s);
-                self.shares = [dt_s, share(SPEED_S), share(shaft::SMOOTH_S), share(LEARNED_S)];
+                self.low_pass_gains = [
+                    dt_s,
+                    share(SPEED_TIME_CONSTANT_S),
+                    share(shaft_friction::FORCE_TIME_CONSTANT_S),
+                    share(DISAGREEMENT_MEMORY_S),
+                ];
             }
         }
         let speed = sample.velocity_mps.abs();
@@ -82,10 +102,10 @@ impl Stylet {
             if self.speed_mps == 0.0 {
                 self.speed_mps = speed;
             } else {
-                self.speed_mps += self.shares[1] * (speed - self.speed_mps);
+                self.speed_mps += self.low_pass_gains[1] * (speed - self.speed_mps);
             }
         }
-        Step {
+        MotionStep {
             dt_s,
             dz_m: sample.position_m - last.position_m,
             dv_mps: sample.velocity_mps - last.velocity_mps,
@@ -106,7 +126,7 @@ mod tests {
     /// The drive of friction after each of these travels at constant speed, 49 samples each; a travel of none is a hold.
     fn drives(law: FrictionLaw, travels_m: &[f64]) -> alloc::vec::Vec<f64> {
         let mut config = EnhanceConfig::default();
-        config.stylet.law = law;
+        config.stylet.friction_law = law;
         let mut stylet = Stylet::new(&config, 0.0);
         stylet.in_tissue = true;
         let mut last = Sample::default();
@@ -120,11 +140,11 @@ mod tests {
                         velocity_mps: if *travel_m == 0.0 { 0.0 } else { SPEED_MPS.copysign(*travel_m) },
                         force_n: 0.0,
                     };
-                    let step = stylet.motion(&config, &last, &sample, false);
-                    stylet.drive_friction(&config, &step, &sample);
+                    let step = stylet.motion_step(&config, &last, &sample, false);
+                    stylet.update_friction_drive(&config, &step, &sample);
                     last = sample;
                 }
-                stylet.drive
+                stylet.friction_drive_mps
             })
             .collect()
     }
@@ -180,13 +200,13 @@ mod tests {
         ] {
             let (last, moved) = (sample(0.01, 1.3), sample(0.01, 1.3 + jump_n));
             let moved = Sample { velocity_mps: said, ..moved };
-            let found = inside().set_off(&last, &moved, 0.0, false);
+            let found = inside().resolve_motion_start(&last, &moved, 0.0, false);
             assert_eq!(found, if sets_off { (said, true) } else { (0.0, false) }, "{said} m/s, {jump_n} N");
             // What moves anyway, or is in the air, is let be.
-            assert_eq!(inside().set_off(&last, &moved, 0.001, false), (0.001, false));
+            assert_eq!(inside().resolve_motion_start(&last, &moved, 0.001, false), (0.001, false));
             let mut air = inside();
             air.in_tissue = false;
-            assert_eq!(air.set_off(&last, &moved, 0.0, true), (0.0, true));
+            assert_eq!(air.resolve_motion_start(&last, &moved, 0.0, true), (0.0, true));
         }
     }
 
@@ -201,7 +221,7 @@ mod tests {
             velocity_mps,
             force_n: 1.4,
         };
-        let step = stylet.motion(&config, &last, &at(0.01, 0.0032), true);
+        let step = stylet.motion_step(&config, &last, &at(0.01, 0.0032), true);
         near(step.dt_s, 0.01);
         near(step.dz_m, 3e-4);
         near(step.dv_mps, 0.0012);
@@ -209,63 +229,69 @@ mod tests {
         // Over 0.2 s; the shaft's force over 50 ms, what is usual over two seconds.
         near(step.speed_mps, 0.002 + 0.0012 * 0.01 / 0.21);
         assert_eq!(step.speed_mps, stylet.speed_mps);
-        for (share, tau_s) in stylet.shares[1..].iter().zip([0.2, 0.05, 2.0]) {
+        for (share, tau_s) in stylet.low_pass_gains[1..].iter().zip([0.2, 0.05, 2.0]) {
             near(*share, 0.01 / (0.01 + tau_s));
         }
-        near(stylet.noise.step_s, 0.0051);
+        near(stylet.noise.interval_s, 0.0051);
         // Backwards is as fast; at a standstill the usual speed stays.
-        let step = stylet.motion(&config, &last, &at(0.01, -0.0032), false);
+        let step = stylet.motion_step(&config, &last, &at(0.01, -0.0032), false);
         assert!(!step.sudden && step.speed_mps > 0.002);
         let before = stylet.speed_mps;
-        stylet.motion(&config, &last, &at(0.01, 4e-5), false);
+        stylet.motion_step(&config, &last, &at(0.01, 4e-5), false);
         assert_eq!(stylet.speed_mps, before);
-        stylet.motion(&config, &last, &at(0.01, 6e-5), false);
+        stylet.motion_step(&config, &last, &at(0.01, 6e-5), false);
         assert!(stylet.speed_mps < before);
         // The first speed is the usual one, and there is always one.
         stylet.speed_mps = 0.0;
-        let step = stylet.motion(&config, &last, &at(0.01, 4e-5), false);
+        let step = stylet.motion_step(&config, &last, &at(0.01, 4e-5), false);
         assert_eq!((stylet.speed_mps, step.speed_mps), (0.0, config.drop.standstill_mps));
-        stylet.motion(&config, &last, &at(0.01, -0.0032), false);
+        stylet.motion_step(&config, &last, &at(0.01, -0.0032), false);
         assert_eq!(stylet.speed_mps, 0.0032);
         // Time stamps that are rounded make no other step; nor is there one between two samples of one instant.
-        let (shares, step_s) = (stylet.shares, stylet.noise.step_s);
-        stylet.motion(&config, &last, &at(0.01 + 5e-10, 0.002), false);
-        assert_eq!(stylet.shares, shares);
-        stylet.motion(&config, &last, &at(0.01 + 3e-9, 0.002), false);
-        assert_ne!(stylet.shares, shares);
-        let (shares, was_s) = (stylet.shares, stylet.noise.step_s);
+        let (shares, step_s) = (stylet.low_pass_gains, stylet.noise.interval_s);
+        stylet.motion_step(&config, &last, &at(0.01 + 5e-10, 0.002), false);
+        assert_eq!(stylet.low_pass_gains, shares);
+        stylet.motion_step(&config, &last, &at(0.01 + 3e-9, 0.002), false);
+        assert_ne!(stylet.low_pass_gains, shares);
+        let (shares, was_s) = (stylet.low_pass_gains, stylet.noise.interval_s);
         assert!(was_s > step_s);
-        let step = stylet.motion(&config, &last, &at(0.0, 0.002), false);
-        assert_eq!((step.dt_s, stylet.shares, stylet.noise.step_s), (0.0, shares, was_s));
+        let step = stylet.motion_step(&config, &last, &at(0.0, 0.002), false);
+        assert_eq!((step.dt_s, stylet.low_pass_gains, stylet.noise.interval_s), (0.0, shares, was_s));
     }
 
     #[test]
     fn noise_fades_over_a_step_as_over_the_usual_one() {
         let mut stylet = inside();
-        stylet.noise = crate::stylet::noise::Noise::known(0.6, 4e-4, 0.0, 400.0);
+        stylet.noise = crate::stylet::noise_estimator::NoiseEstimator::known(0.6, 4e-4, 0.0, 400.0);
         let last = sample(0.01, 1.3);
         let next = Sample { time_s: last.time_s + 0.01, ..last };
-        let step = stylet.motion(&EnhanceConfig::default(), &last, &next, false);
+        let step = stylet.motion_step(&EnhanceConfig::default(), &last, &next, false);
         near(step.rho, stylet.noise.rho_over(0.01));
         assert!(step.rho > 0.4 && step.rho < 0.5);
     }
 
     #[test]
     fn dry_friction_has_the_sign_of_a_motion_that_is_none_below_ten_micrometres_a_second() {
-        let step =
-            |dz_m: f64| Step { dt_s: 0.005, dz_m, dv_mps: 0.0, rho: 0.0, sudden: false, speed_mps: 0.0025 };
+        let step = |dz_m: f64| MotionStep {
+            dt_s: 0.005,
+            dz_m,
+            dv_mps: 0.0,
+            rho: 0.0,
+            sudden: false,
+            speed_mps: 0.0025,
+        };
         let moving = |velocity_mps: f64| Sample { velocity_mps, ..Sample::default() };
         let mut config = EnhanceConfig::default();
-        config.stylet.law = FrictionLaw::CoulombViscous { dry_mps: DRY_MPS };
+        config.stylet.friction_law = FrictionLaw::CoulombViscous { dry_mps: DRY_MPS };
         for (v, xi) in [(1.1e-5, 1.0), (1e-5, 0.0), (9e-6, 0.0), (-9e-6, 0.0), (-1e-5, 0.0), (-1.1e-5, -1.0)]
         {
             let mut stylet = inside();
-            stylet.drive_friction(&config, &step(1e-5), &moving(v));
-            near(stylet.drive, v + DRY_MPS * xi);
-            near(stylet.steady, 0.0125);
+            stylet.update_friction_drive(&config, &step(1e-5), &moving(v));
+            near(stylet.friction_drive_mps, v + DRY_MPS * xi);
+            near(stylet.steady_drive_mps, 0.0125);
         }
         // Presliding: only travel inside builds it up, in the direction of motion.
-        config.stylet.law = FrictionLaw::Presliding { dry_mps: DRY_MPS, travel_m: 2e-5 };
+        config.stylet.friction_law = FrictionLaw::Presliding { dry_mps: DRY_MPS, travel_m: 2e-5 };
         let faded = (-0.5_f64).exp();
         for (v, dz_m, in_tissue, xi) in [
             (0.002, 1e-5, true, 1.0 - 0.7 * faded),
@@ -276,10 +302,10 @@ mod tests {
             (0.002, 1e-5, false, 0.3),
         ] {
             let mut stylet = inside();
-            (stylet.xi, stylet.in_tissue) = (0.3, in_tissue);
-            stylet.drive_friction(&config, &step(dz_m), &moving(v));
-            near(stylet.xi, xi);
-            near(stylet.drive, v + DRY_MPS * xi);
+            (stylet.presliding_state, stylet.in_tissue) = (0.3, in_tissue);
+            stylet.update_friction_drive(&config, &step(dz_m), &moving(v));
+            near(stylet.presliding_state, xi);
+            near(stylet.friction_drive_mps, v + DRY_MPS * xi);
         }
     }
 }

@@ -165,12 +165,12 @@ fn the_way_back_raises_no_alarm_and_takes_the_friction_of_the_passed_layers_away
 /// Dry friction configured: what the hold and the turn do not change is known as friction.
 #[test]
 fn a_configured_friction_law_takes_dry_friction_away_in_a_hold() {
-    let law = stylet_tissue::Law::new(
+    let law = stylet_tissue::ForceLaw::new(
         &gels(),
         &[stylet_tissue::AnyEffect::CoulombFriction(stylet_tissue::CoulombFriction { c_n_per_m: 20.0 })],
     )
     .expect("one effect");
-    let mut state = stylet_tissue::LawState::default();
+    let mut state = stylet_tissue::ForceLawState::default();
     let mut samples = Vec::new();
     let mut tip_n = Vec::new();
     let mut z = -0.005;
@@ -190,7 +190,7 @@ fn a_configured_friction_law_takes_dry_friction_away_in_a_hold() {
     }
     let mut config = stylet();
     let mean_b = (9000.0 * 28.2 + 12000.0 * 37.7 + 16000.0 * 32.2) / 98.1;
-    config.stylet.law = stylet_core::config::FrictionLaw::CoulombViscous { dry_mps: 20.0 / mean_b };
+    config.stylet.friction_law = stylet_core::config::FrictionLaw::CoulombViscous { dry_mps: 20.0 / mean_b };
     let outputs = enhance(&config, &samples);
     let last = 6000..6500;
     let off = last.clone().map(|i| (outputs[i].enhanced_n - tip_n[i]).abs()).sum::<f64>() / 500.0;

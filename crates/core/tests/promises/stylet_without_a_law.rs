@@ -39,9 +39,9 @@ fn rough(texture_n: f64) -> (Vec<Sample>, Vec<f64>) {
     (samples, tips)
 }
 
-fn with_smallest(smallest_drop: f64) -> EnhanceConfig {
+fn with_smallest(min_drop_share: f64) -> EnhanceConfig {
     let mut config = stylet();
-    config.stylet.smallest_drop = smallest_drop;
+    config.stylet.min_drop_share = min_drop_share;
     config
 }
 
@@ -50,13 +50,13 @@ fn places(outputs: &[Output]) -> Vec<f64> {
 }
 
 /// Where the force falls by that share of the largest so far or more, by the definition: tip and friction before the fall.
-fn falls(smallest_drop: f64, texture_n: f64) -> Vec<f64> {
+fn falls(min_drop_share: f64, texture_n: f64) -> Vec<f64> {
     let (mut found, mut peak_n) = (Vec::new(), 0.0_f64);
     for k in 1..=16 {
         let z = 0.004 * f64::from(k);
         let (before, after) = (tip_n(z - 1e-9, texture_n), tip_n(z + 1e-9, texture_n));
         peak_n = peak_n.max(before + friction_n(z));
-        if before - after >= smallest_drop * peak_n && before - after > 0.1 {
+        if before - after >= min_drop_share * peak_n && before - after > 0.1 {
             found.push(z);
         }
     }
@@ -66,11 +66,11 @@ fn falls(smallest_drop: f64, texture_n: f64) -> Vec<f64> {
 #[test]
 fn a_fall_is_a_rupture_from_the_configured_share_of_the_largest_force_on_and_smaller_ones_are_texture() {
     let (samples, _) = rough(0.2);
-    for (smallest_drop, count) in [(0.2, 4), (0.08, 5), (0.02, 12)] {
-        let expected = falls(smallest_drop, 0.2);
-        let found = places(&enhance(&with_smallest(smallest_drop), &samples));
+    for (min_drop_share, count) in [(0.2, 4), (0.08, 5), (0.02, 12)] {
+        let expected = falls(min_drop_share, 0.2);
+        let found = places(&enhance(&with_smallest(min_drop_share), &samples));
         assert_eq!(expected.len(), count, "{expected:?}");
-        assert_eq!(found.len(), count, "from {smallest_drop} on: {found:?} for {expected:?}");
+        assert_eq!(found.len(), count, "from {min_drop_share} on: {found:?} for {expected:?}");
         for (found, true_m) in found.iter().zip(expected) {
             assert!((0.0..5e-5).contains(&(found - true_m)), "{found} m for {true_m} m");
         }
@@ -145,7 +145,7 @@ fn on_the_way_back_the_tip_feels_nothing() {
     let (first, rest) = (worst(turn..turn + 1000), worst(turn + 1000..turn + 3999));
     assert!(first < 0.6 && rest < 0.1, "{first} N in the first centimetre, {rest} N after it");
     let mut config = with_smallest(0.08);
-    config.stylet.track_way_back = false;
+    config.stylet.track_retraction = false;
     let untracked = enhance(&config, &samples);
     let left = untracked[turn + 2000].enhanced_n;
     assert!(left < -0.2, "without a look at the way back the stronger pull is taken for the tip's: {left} N");

@@ -4,9 +4,9 @@ use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
 use std::path::Path;
-use stylet_diagnose::set::Insertion;
-use stylet_diagnose::set::dataset::{Dataset, find};
-use stylet_diagnose::set::population::{Population, drawn, part};
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::dataset::{Dataset, find_files};
+use stylet_diagnose::repeated_insertions::population_prediction::{Population, draw_force, phase_at};
 
 /// Correlation time (s) of what the law leaves.
 const SLOW_S: f64 = 0.5;
@@ -22,7 +22,7 @@ pub struct Asked {
     /// The set.
     pub set: Dataset,
     /// Its insertions.
-    pub measured: Vec<Insertion>,
+    pub measured: Vec<SegmentedRecording>,
     /// How many sets are drawn.
     pub sets: usize,
     /// By which seed.
@@ -38,22 +38,23 @@ pub fn asked(sets: usize, seed: u64) -> Result<Asked, Box<dyn Error>> {
     let set = Dataset::load(Path::new(&file))?;
     let mut files = Vec::new();
     for pattern in &set.recordings {
-        files.extend(find(pattern)?);
+        files.extend(find_files(pattern)?);
     }
-    let measured = set.runs(&files, set.tissue.layers.len())?;
+    let measured = set.load_recordings(&files, set.tissue.layers.len())?;
     Ok(Asked { file, set, measured, sets, seed })
 }
 
 /// A drawn insertion.
 pub fn one(
     population: &Population,
-    run: &Insertion,
+    run: &SegmentedRecording,
     k: usize,
     layers: usize,
     rng: &mut ChaCha8Rng,
-) -> Option<Insertion> {
+) -> Option<SegmentedRecording> {
     let mut recording = run.recording.clone();
-    recording.force_n = drawn(population, run, k, Some(0).filter(|_| !population.law.days.is_empty()))?;
+    recording.force_n =
+        draw_force(population, run, k, Some(0).filter(|_| !population.model.days.is_empty()))?;
     let mut slow: f64 = StandardNormal.sample(rng);
     let first_s = run.ruptures_s.iter().copied().fold(f64::INFINITY, f64::min);
     for i in 0..recording.len() {
@@ -61,9 +62,9 @@ pub fn one(
         let keep = if i > 0 { libm::exp(-(t - recording.time_s[i - 1]) / SLOW_S) } else { 0.0 };
         let (shock, white): (f64, f64) = (StandardNormal.sample(rng), StandardNormal.sample(rng));
         slow = keep * slow + (1.0 - keep * keep).max(0.0).sqrt() * shock;
-        let left_n = population.residual_n[part(run, t, first_s) as usize];
-        let touches = recording.position_m[i] > population.law.tissue.surface_m;
+        let left_n = population.residual_n[phase_at(run, t, first_s) as usize];
+        let touches = recording.position_m[i] > population.model.tissue.surface_m;
         recording.force_n[i] += if touches { left_n * slow } else { 0.0 } + NOISE_N * white;
     }
-    Some(Insertion::new(format!("{} {k}", run.name), recording, layers))
+    Some(SegmentedRecording::new(format!("{} {k}", run.name), recording, layers))
 }

@@ -3,9 +3,11 @@
 
 use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
-use stylet_diagnose::set::Insertion;
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_record::Recording;
-use stylet_tissue::{AnyEffect, DelayedPuncture, Law, LawState, Layer, LetGo, ShaftSlip, Tissue};
+use stylet_tissue::{
+    AnyEffect, DelayedPuncture, ForceLaw, ForceLawState, Layer, ReleaseDepth, ShaftSlip, Tissue,
+};
 
 /// Exponent of the slip in the law that draws.
 pub const EXPONENT: f64 = 9.0;
@@ -38,7 +40,7 @@ pub fn believed() -> Tissue {
 }
 
 /// One insertion by 25 mm, a hold of 5 s, and back.
-fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> Insertion {
+fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> SegmentedRecording {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let (surface, friction, tough) = (1e-4 * normal(), 0.03 * normal(), 0.03 * normal());
     let mut tissue = believed();
@@ -47,9 +49,9 @@ fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> 
         layer: 1,
         push_n: 1.8 * friction.exp(),
         pull_n: 1.1 * friction.exp(),
-        kept: 0.7,
+        retained_share: 0.7,
         exponent: EXPONENT,
-        curve_n_per_m2: 3e4,
+        curvature_n_per_m2: 3e4,
         fractions: [0.15, 0.2],
         time_constants_s: [1.0, 9.0],
         ..ShaftSlip::default()
@@ -58,7 +60,7 @@ fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> 
     let effects: [AnyEffect; 3] = [
         slip.into(),
         DelayedPuncture { layer: 1, force_n: 3.0 * (1.0 + tough), exponent: 12.0 }.into(),
-        LetGo { layer: 1, depth_m: 1e-3 + 2e-4 * normal() }.into(),
+        ReleaseDepth { layer: 1, depth_m: 1e-3 + 2e-4 * normal() }.into(),
     ];
     recorded(name, (0.025, speed_mps, 5.0), &tissue, &effects, rng)
 }
@@ -70,11 +72,11 @@ fn recorded(
     tissue: &Tissue,
     effects: &[AnyEffect],
     rng: &mut impl Rng,
-) -> Insertion {
+) -> SegmentedRecording {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
-    let law = Law::new(tissue, effects).expect("three effects");
+    let law = ForceLaw::new(tissue, effects).expect("three effects");
     let travel_s = stroke_m / speed_mps;
-    let (mut state, mut columns) = (LawState::default(), [vec![], vec![], vec![]]);
+    let (mut state, mut columns) = (ForceLawState::default(), [vec![], vec![], vec![]]);
     for k in 0..((2.0 * travel_s + rest_s + 0.5) * 100.0) as usize {
         let t = k as f64 * 0.01;
         let (z, v) = match t {
@@ -87,11 +89,11 @@ fn recorded(
         columns.iter_mut().zip([t, z, f]).for_each(|(c, x)| c.push(x));
     }
     let [t, z, f] = columns;
-    Insertion::new(name, Recording::new(t, z, f).expect("clean columns"), 1)
+    SegmentedRecording::new(name, Recording::new(t, z, f).expect("clean columns"), 1)
 }
 
 /// Four insertions at each of two speeds with a law whose layer slips.
-pub fn drawn(d: &Drawn) -> Vec<Insertion> {
+pub fn drawn(d: &Drawn) -> Vec<SegmentedRecording> {
     let mut rng = ChaCha8Rng::seed_from_u64(d.seed);
     let mut out = Vec::new();
     for (speed_mps, shift_m) in [(1e-3, 0.0), (3e-3, d.shift_m)] {
@@ -103,7 +105,7 @@ pub fn drawn(d: &Drawn) -> Vec<Insertion> {
 }
 
 /// Four insertions at each of two speeds with the base law alone: spring, viscous friction, a puncture force.
-pub fn plain(seed: u64) -> Vec<Insertion> {
+pub fn plain(seed: u64) -> Vec<SegmentedRecording> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut out = Vec::new();
     for speed_mps in [2.5e-3, 6e-3] {

@@ -18,9 +18,9 @@ static FILE: Mutex<()> = Mutex::new(());
 
 /// Lines of one case: a path and what stands there.
 #[derive(Default)]
-pub struct Told(Vec<String>);
+pub struct AnswerLines(Vec<String>);
 
-impl Told {
+impl AnswerLines {
     /// A number, to eight digits.
     pub fn number(&mut self, path: &str, x: f64) {
         self.0.push(format!("{path} {}", digits(x)));
@@ -74,7 +74,7 @@ impl Told {
     }
 
     /// Compares with what is kept under this name, or keeps it when `STYLET_RECORD` is set.
-    pub fn hold(self, file: &str, name: &str) {
+    pub fn compare(self, file: &str, name: &str) {
         let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests").join(file);
         if std::env::var_os("STYLET_RECORD").is_some() {
             let _one = FILE.lock().unwrap_or_else(|e| e.into_inner());

@@ -45,7 +45,7 @@ fn sigmoid_friction_through_zero_is_coulomb_friction_of_half_its_amplitude() {
 #[test]
 fn a_hard_sign_steps_at_the_dead_band() {
     let sign = SmoothSign { dead_band_radps: 0.01, width_radps: 0.0 };
-    assert_eq!([-0.02, -0.01, 0.0, 0.01, 0.02].map(|x| sign.of(x)), [-1.0, 0.0, 0.0, 0.0, 1.0]);
+    assert_eq!([-0.02, -0.01, 0.0, 0.01, 0.02].map(|x| sign.value(x)), [-1.0, 0.0, 0.0, 0.0, 1.0]);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 use stylet_dynamics::{
-    Arm, EARTH_GRAVITY_MPS2, Error, Gain, JointVector, Observer, ObserverConfig, ObserverState, Wrench,
+    Arm, EARTH_GRAVITY_MPS2, Error, JointGain, JointVector, Observer, ObserverConfig, ObserverState, Wrench,
     friction::JointFriction, panda,
 };
 
@@ -78,7 +78,7 @@ fn push() -> Wrench {
 #[test]
 fn residual_converges_to_the_joint_torques_of_a_tip_wrench_with_time_constant_one_over_gain() {
     for gain in [5.0, 50.0] {
-        let observer = ObserverConfig { gain_per_s: Gain::Same(gain) }.build().expect("valid");
+        let observer = ObserverConfig { gain_per_s: JointGain::Uniform(gain) }.build().expect("valid");
         let mut state = ObserverState::default();
         let mut rig = Rig::new(0.3, JointFriction::default());
         rig.observe(&rig.arm, &observer, &mut state);
@@ -110,7 +110,7 @@ fn residual_converges_to_the_joint_torques_of_a_tip_wrench_with_time_constant_on
 
 #[test]
 fn a_resting_arm_reads_the_tip_wrench_after_the_residual_has_settled() {
-    let observer = ObserverConfig { gain_per_s: Gain::Same(50.0) }.build().expect("valid");
+    let observer = ObserverConfig { gain_per_s: JointGain::Uniform(50.0) }.build().expect("valid");
     let mut state = ObserverState::default();
     let mut rig = Rig::new(0.0, JointFriction::default());
     rig.observe(&rig.arm, &observer, &mut state);
@@ -119,14 +119,14 @@ fn a_resting_arm_reads_the_tip_wrench_after_the_residual_has_settled() {
         rig.observe(&rig.arm, &observer, &mut state);
     }
     let wrench = rig.arm.at(&rig.q).tip_wrench(&state.residual_nm(), 0.0);
-    assert!((wrench.stacked() - push().stacked()).amax() < 1e-6, "{wrench:?}");
-    assert!((wrench.along(&Vector3::z()) - 5.0).abs() < 1e-6);
+    assert!((wrench.to_vector() - push().to_vector()).amax() < 1e-6, "{wrench:?}");
+    assert!((wrench.component_along(&Vector3::z()) - 5.0).abs() < 1e-6);
 }
 
 #[test]
 fn gains_per_joint_give_each_joint_its_own_time_constant() {
     let gains = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0];
-    let observer = ObserverConfig { gain_per_s: Gain::PerJoint(gains) }.build().expect("valid");
+    let observer = ObserverConfig { gain_per_s: JointGain::PerJoint(gains) }.build().expect("valid");
     let arm = Arm::new(&panda::with_needle()).expect("valid");
     let at = arm.at(&panda::READY_RAD);
     let terms = at.momentum_terms(&JointVector::zeros(), &EARTH_GRAVITY_MPS2);
@@ -144,7 +144,7 @@ fn gains_per_joint_give_each_joint_its_own_time_constant() {
 
 #[test]
 fn a_large_gain_and_a_long_sample_stay_stable() {
-    let observer = ObserverConfig { gain_per_s: Gain::Same(1e4) }.build().expect("valid");
+    let observer = ObserverConfig { gain_per_s: JointGain::Uniform(1e4) }.build().expect("valid");
     let arm = Arm::new(&panda::with_needle()).expect("valid");
     let terms = arm.at(&panda::READY_RAD).momentum_terms(&JointVector::zeros(), &EARTH_GRAVITY_MPS2);
     let push = JointVector::<7>::repeat(1.0);
@@ -158,7 +158,7 @@ fn a_large_gain_and_a_long_sample_stay_stable() {
 
 #[test]
 fn friction_shows_as_external_torque_against_the_motion_and_a_heavier_link_as_a_static_one() {
-    let observer = ObserverConfig { gain_per_s: Gain::Same(200.0) }.build().expect("valid");
+    let observer = ObserverConfig { gain_per_s: JointGain::Uniform(200.0) }.build().expect("valid");
     let mut state = ObserverState::default();
     // Soft enough for an explicit simulation at 1 kHz (see `SmoothSign::width_radps`).
     let mut friction = panda::symmetric_friction();
@@ -189,7 +189,7 @@ fn friction_shows_as_external_torque_against_the_motion_and_a_heavier_link_as_a_
 
 #[test]
 fn the_offset_taken_before_contact_removes_a_model_error_and_keeps_the_force() {
-    let observer = ObserverConfig { gain_per_s: Gain::Same(50.0) }.build().expect("valid");
+    let observer = ObserverConfig { gain_per_s: JointGain::Uniform(50.0) }.build().expect("valid");
     let believed = Arm::new(&panda::with_needle().with_link_mass_scaled(0.97)).expect("valid");
     let mut state = ObserverState::default();
     let mut rig = Rig::new(0.0, JointFriction::default());
@@ -209,7 +209,7 @@ fn the_offset_taken_before_contact_removes_a_model_error_and_keeps_the_force() {
     run(&mut rig, &mut state, 2000, &push());
     let wrench = rig.arm.at(&rig.q).tip_wrench(&state.residual_nm(), 0.0);
     // The push moves the arm a little, and with it the gravity error.
-    assert!((wrench.stacked() - push().stacked()).amax() < 0.05, "{wrench:?}");
+    assert!((wrench.to_vector() - push().to_vector()).amax() < 0.05, "{wrench:?}");
     assert!((state.raw_residual_nm() - state.residual_nm() - offset).amax() < 1e-15);
 }
 
@@ -217,13 +217,16 @@ fn the_offset_taken_before_contact_removes_a_model_error_and_keeps_the_force() {
 fn wrong_input_is_named_and_leaves_the_state_alone() {
     let refused = |gain| ObserverConfig::<7> { gain_per_s: gain }.build();
     assert!(matches!(
-        refused(Gain::Same(-1.0)),
+        refused(JointGain::Uniform(-1.0)),
         Err(Error::Parameter { name: "gain_per_s", joint: None, .. })
     ));
-    assert!(matches!(refused(Gain::Same(f64::NAN)), Err(Error::Parameter { name: "gain_per_s", .. })));
+    assert!(matches!(
+        refused(JointGain::Uniform(f64::NAN)),
+        Err(Error::Parameter { name: "gain_per_s", .. })
+    ));
     let mut gains = [5.0; 7];
     gains[2] = 0.0;
-    assert!(matches!(refused(Gain::PerJoint(gains)), Err(Error::Parameter { joint: Some(3), .. })));
+    assert!(matches!(refused(JointGain::PerJoint(gains)), Err(Error::Parameter { joint: Some(3), .. })));
 
     let observer = ObserverConfig::<7>::default().build().expect("valid");
     let arm = Arm::new(&panda::with_needle()).expect("valid");

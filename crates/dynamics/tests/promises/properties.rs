@@ -84,7 +84,7 @@ fn power_into_the_joints_and_the_tip_is_the_change_of_kinetic_and_potential_ener
     for s in states() {
         let at = arm.at(&s.q);
         let tau = at.inverse_dynamics(&s.qd, &s.qdd, &EARTH_GRAVITY_MPS2, &s.wrench);
-        let power = tau.dot(&s.qd) + s.wrench.stacked().dot(&(at.jacobian() * s.qd));
+        let power = tau.dot(&s.qd) + s.wrench.to_vector().dot(&(at.jacobian() * s.qd));
         let m_dot = rate(|t| arm.at(&(s.q + s.qd * t)).mass_matrix());
         let kinetic = s.qd.dot(&(at.mass_matrix() * s.qdd)) + 0.5 * s.qd.dot(&(m_dot * s.qd));
         let potential = rate(|t| {
@@ -99,8 +99,13 @@ fn potential_energy(arm: &Arm<7>, q: &JointVector<7>) -> f64 {
     let at = arm.at(q);
     let poses = at.link_poses();
     let model = arm.model();
-    let links = model.links.iter().zip(&poses).map(|(l, pose)| l.body.mass_kg * pose.point(&l.body.com_m).z);
-    let tool = model.tool.payload.seen_from(&poses[6].then(&model.flange).then(&model.tool.mount));
+    let links = model
+        .links
+        .iter()
+        .zip(&poses)
+        .map(|(l, pose)| l.body.mass_kg * pose.transform_point(&l.body.com_m).z);
+    let tool =
+        model.tool.payload.in_parent_frame(&poses[6].compose(&model.flange).compose(&model.tool.mount));
     9.81 * (links.sum::<f64>() + tool.mass_kg * tool.com_m.z)
 }
 
@@ -137,7 +142,7 @@ fn jacobian_and_tip_acceleration_are_derivatives_of_the_tip_pose() {
         let twist = at.jacobian() * s.qd;
         let velocity = rate(|t| along(t).tip().position_m);
         assert!((velocity - twist.fixed_rows::<3>(0)).amax() < 1e-9);
-        let turning = rate(|t| at.tip().rotation_to(&along(t).tip()));
+        let turning = rate(|t| at.tip().rotation_vector_to(&along(t).tip()));
         assert!((turning - twist.fixed_rows::<3>(3)).amax() < 1e-9);
         let acceleration = rate(|t| along(t).jacobian() * (s.qd + s.qdd * t));
         assert!((acceleration - at.tip_acceleration(&s.qd, &s.qdd)).amax() < 1e-7);
@@ -155,13 +160,14 @@ fn the_wrench_comes_back_from_its_joint_torques() {
         }
         seen += 1;
         let torque = at.joint_torques(&s.wrench);
-        assert!((at.tip_wrench(&torque, 0.0).stacked() - s.wrench.stacked()).amax() < 1e-10);
+        assert!((at.tip_wrench(&torque, 0.0).to_vector() - s.wrench.to_vector()).amax() < 1e-10);
         let force = Wrench::pure_force(s.wrench.force_n);
         let torque = at.joint_torques(&force);
         assert!((at.tip_point_force(&torque, 0.0) - force.force_n).amax() < 1e-10);
         // Damping 1e-3 costs at most (1e-3/sigma)^2.
         assert!(
-            (at.tip_wrench(&torque, 1e-3).stacked() - force.stacked()).norm() < 4.1e-4 * force.force_n.norm()
+            (at.tip_wrench(&torque, 1e-3).to_vector() - force.to_vector()).norm()
+                < 4.1e-4 * force.force_n.norm()
         );
     }
     assert!(seen > 500, "{seen}");
@@ -195,13 +201,13 @@ fn joint_rates_move_the_tip_as_asked() {
 fn a_two_joint_arm_has_the_textbook_mass_matrix() {
     let (l, m) = (0.4, 2.0);
     let link = |x| Link {
-        placement: Pose::shifted(x, 0.0, 0.0),
+        placement: Pose::translation(x, 0.0, 0.0),
         body: RigidBody { mass_kg: m, com_m: Vector3::new(l, 0.0, 0.0), inertia_kgm2: Matrix3::zeros() },
         limits: JointLimits { lower_rad: -3.0, upper_rad: 3.0, velocity_radps: 1.0, torque_nm: 10.0 },
     };
     let model = ArmModel::<2> {
         links: [link(0.0), link(l)],
-        flange: Pose::shifted(l, 0.0, 0.0),
+        flange: Pose::translation(l, 0.0, 0.0),
         tool: Tool::default(),
     };
     let arm = Arm::new(&model).expect("valid");

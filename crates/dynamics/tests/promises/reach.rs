@@ -5,8 +5,9 @@
 use crate::common;
 use nalgebra::Vector3;
 use stylet_dynamics::{
-    Arm, Error, IkConfig, JointVector, Pose, Quantity, panda,
-    validate::{self, LineConfig},
+    Arm, Error, IkConfig, JointQuantity, JointVector, Pose,
+    feasibility::{self, LineConfig},
+    panda,
 };
 
 fn arm() -> Arm<7> {
@@ -24,8 +25,8 @@ fn inverse_kinematics_reaches_every_pose_that_forward_kinematics_gives() {
             Ok(q) => {
                 let tip = arm.at(&q).tip();
                 assert!((tip.position_m - target.position_m).norm() <= config.position_tolerance_m);
-                assert!(tip.rotation_to(&target).norm() <= config.orientation_tolerance_rad);
-                validate::joint_positions(&arm, &q).expect("within limits");
+                assert!(tip.rotation_vector_to(&target).norm() <= config.orientation_tolerance_rad);
+                feasibility::check_joint_positions(&arm, &q).expect("within limits");
             }
             Err(_) => failed += 1,
         }
@@ -60,10 +61,10 @@ fn an_insertion_of_120_mm_straight_down_is_possible_from_the_ready_pose() {
     let from = arm.at(&panda::READY_RAD).tip();
     let to = from.position_m + from.rotation.column(2) * 0.12;
     let config = LineConfig { speed_mps: 0.0126, ..Default::default() };
-    let line = validate::line(&arm, &from, &to, &panda::READY_RAD, &config).expect("possible");
+    let line = feasibility::follow_line(&arm, &from, &to, &panda::READY_RAD, &config).expect("possible");
     assert_eq!(line.start_rad, panda::READY_RAD);
     assert!((arm.at(&line.end_rad).tip().position_m - to).norm() < 1e-9);
-    assert!(line.least_singular_value > 0.05 && line.least_margin_rad > 0.1, "{line:?}");
+    assert!(line.min_singular_value > 0.05 && line.min_margin_rad > 0.1, "{line:?}");
 }
 
 #[test]
@@ -71,15 +72,16 @@ fn a_line_out_of_the_workspace_fails_where_the_arm_is_stretched() {
     let arm = arm();
     let from = arm.at(&panda::READY_RAD).tip();
     let to = from.position_m + Vector3::new(0.8, 0.0, 0.0);
-    let error =
-        validate::line(&arm, &from, &to, &panda::READY_RAD, &LineConfig::default()).expect_err("too long");
+    let error = feasibility::follow_line(&arm, &from, &to, &panda::READY_RAD, &LineConfig::default())
+        .expect_err("too long");
     println!("{error}");
     let Error::Line { distance_m, length_m, reason } = &error else { panic!("{error}") };
     assert!((length_m - 0.8).abs() < 1e-12 && (0.1..0.7).contains(distance_m), "{error}");
     assert!(matches!(**reason, Error::Singular { .. } | Error::Unreachable { .. }), "{error}");
     // Just before that point the same line is possible.
     let to = from.position_m + Vector3::new(distance_m - 0.003, 0.0, 0.0);
-    validate::line(&arm, &from, &to, &panda::READY_RAD, &LineConfig::default()).expect("short enough");
+    feasibility::follow_line(&arm, &from, &to, &panda::READY_RAD, &LineConfig::default())
+        .expect("short enough");
 }
 
 #[test]
@@ -88,19 +90,19 @@ fn a_line_too_fast_for_a_joint_names_the_joint() {
     let from = arm.at(&panda::READY_RAD).tip();
     let to = from.position_m - Vector3::z() * 0.1;
     let config = LineConfig { speed_mps: 5.0, ..Default::default() };
-    let error = validate::line(&arm, &from, &to, &panda::READY_RAD, &config).expect_err("too fast");
+    let error = feasibility::follow_line(&arm, &from, &to, &panda::READY_RAD, &config).expect_err("too fast");
     let Error::Line { reason, .. } = &error else { panic!("{error}") };
-    assert!(matches!(**reason, Error::JointLimit { quantity: Quantity::Velocity, .. }), "{error}");
+    assert!(matches!(**reason, Error::JointLimit { quantity: JointQuantity::Velocity, .. }), "{error}");
 }
 
 #[test]
 fn a_stretched_arm_is_singular_and_the_ready_pose_is_not() {
     let arm = arm();
     let q = JointVector::<7>::zeros();
-    let error = validate::not_singular(&arm.at(&q), 0.02).expect_err("stretched");
+    let error = feasibility::check_not_singular(&arm.at(&q), 0.02).expect_err("stretched");
     println!("{error}");
     assert!(matches!(error, Error::Singular { .. }));
-    assert!(validate::not_singular(&arm.at(&panda::READY_RAD), 0.02).expect("ready") > 0.1);
+    assert!(feasibility::check_not_singular(&arm.at(&panda::READY_RAD), 0.02).expect("ready") > 0.1);
 }
 
 #[test]
@@ -108,19 +110,22 @@ fn joints_outside_their_limits_are_named() {
     let arm = arm();
     let mut q = panda::READY_RAD;
     q[3] = 0.0;
-    let error = validate::joint_positions(&arm, &q).expect_err("elbow");
+    let error = feasibility::check_joint_positions(&arm, &q).expect_err("elbow");
     assert_eq!(error.to_string(), "position of joint 4 is 0.0000 rad: must be from -3.0718 to -0.0698 rad");
     q[3] = f64::NAN;
-    assert!(matches!(validate::joint_positions(&arm, &q), Err(Error::Parameter { joint: Some(4), .. })));
+    assert!(matches!(
+        feasibility::check_joint_positions(&arm, &q),
+        Err(Error::Parameter { joint: Some(4), .. })
+    ));
     let fast = JointVector::<7>::repeat(2.3);
     assert!(matches!(
-        validate::joint_velocities(&arm, &fast),
-        Err(Error::JointLimit { joint: 1, quantity: Quantity::Velocity, .. })
+        feasibility::check_joint_velocities(&arm, &fast),
+        Err(Error::JointLimit { joint: 1, quantity: JointQuantity::Velocity, .. })
     ));
     let strong = JointVector::<7>::repeat(-20.0);
     assert!(matches!(
-        validate::joint_torques(&arm, &strong),
-        Err(Error::JointLimit { joint: 5, quantity: Quantity::Torque, .. })
+        feasibility::check_joint_torques(&arm, &strong),
+        Err(Error::JointLimit { joint: 5, quantity: JointQuantity::Torque, .. })
     ));
 }
 

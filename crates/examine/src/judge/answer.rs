@@ -60,7 +60,7 @@ pub struct Trace {
     pub parameters: BTreeMap<String, Estimate>,
     /// Why it does not matter.
     #[serde(default)]
-    pub why: String,
+    pub reason: String,
 }
 
 /// The verdict.
@@ -90,10 +90,10 @@ pub struct Answer {
     pub base_parameters: Vec<BaseParameter>,
     /// Effects that these recordings cannot show.
     #[serde(default)]
-    pub invisible: Vec<String>,
+    pub not_identifiable: Vec<String>,
     /// Effects too small to matter.
     #[serde(default)]
-    pub traces: Vec<Trace>,
+    pub negligible: Vec<Trace>,
 }
 
 impl Answer {
@@ -104,8 +104,8 @@ impl Answer {
             verdict: Verdict::None,
             causes: Vec::new(),
             base_parameters: Vec::new(),
-            invisible: Vec::new(),
-            traces: Vec::new(),
+            not_identifiable: Vec::new(),
+            negligible: Vec::new(),
         }
     }
 
@@ -129,13 +129,13 @@ mod tests {
                         "parameters": { "c_n_per_m": { "value": 4.1, "low": 3.9, "high": 4.3 } } } ],
           "base_parameters": [ { "layer": 1, "name": "stiffness_n_per_m", "assumed": 40.0, "value": 40.3, "low": 39.9,
                                  "high": 40.7, "changed": false } ],
-          "invisible": ["force_gain"],
-          "traces": [ { "effect": "time_delay", "parameters": { "delay_s": { "value": 0.00015, "low": 0.0001,
-                        "high": 0.0002 } }, "why": "below a twentieth of the sampling step" } ],
-          "leftover": { "p_value": 0.4, "depends_on": [], "share": 0.0 }, "data_quality": [ ] }"#;
+          "not_identifiable": ["force_gain"],
+          "negligible": [ { "effect": "time_delay", "parameters": { "delay_s": { "value": 0.00015, "low": 0.0001,
+                        "high": 0.0002 } }, "reason": "below a twentieth of the sampling step" } ],
+          "residual_structure": { "p_value": 0.4, "depends_on": [], "share": 0.0 }, "data_quality": [ ] }"#;
         let answer = Answer::from_json(text).expect("the example");
         assert_eq!(answer.verdict, Verdict::Named);
         assert_eq!(answer.causes[0].effect, "coulomb_friction");
-        assert_eq!(answer.traces[0].effect, "time_delay");
+        assert_eq!(answer.negligible[0].effect, "time_delay");
     }
 }

@@ -290,7 +290,7 @@ mod tests {
     #[test]
     fn traces_do_not_count() {
         let mut answer = says(Verdict::None, &[]);
-        answer.traces.push(crate::judge::answer::Trace::default());
+        answer.negligible.push(crate::judge::answer::Trace::default());
         assert!(judge(&wants(&[]), &answer).right);
     }
 }

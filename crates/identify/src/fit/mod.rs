@@ -7,22 +7,22 @@
 //! | `kinks` | a fit that a kink of the law does not end |
 //! | `spread` | how much recordings differ, as a fit tells it |
 
-mod column;
-mod kinks;
-mod spread;
-mod step;
-mod tangent;
+mod damped_step;
+mod jacobian_column;
+mod linearization;
+mod nonsmooth;
+mod scatter_update;
 #[cfg(test)]
 mod tests;
 
-pub use column::Column;
-pub use kinks::fit_past_kinks;
-pub use tangent::Tangent;
+pub use jacobian_column::JacobianColumn;
+pub use linearization::Linearization;
+pub use nonsmooth::fit_nonsmooth;
 
+use crate::likelihood::{FitData, Residuals, residuals};
 use crate::model::Model;
-use crate::objective::{Data, Residuals, residuals};
-use spread::rescatter;
-use step::{clamp, further, moved, step};
+use damped_step::{apply_step, clamp_to_bounds, damped_step, extrapolation_factor};
+use scatter_update::update_scatter;
 
 /// A fitted model.
 #[derive(Clone, Debug)]
@@ -42,9 +42,9 @@ impl Fit {
 
     /// Root mean square in N of what is left at the blocks that are compared.
     #[must_use]
-    pub fn rms_n(&self, data: &Data) -> f64 {
+    pub fn rms_n(&self, data: &FitData) -> f64 {
         let (mut sum, mut n) = (0.0, 0.0);
-        for (b, e) in data.blocks.iter().zip(&self.residuals.e) {
+        for (b, e) in data.recordings.iter().zip(&self.residuals.residual_n) {
             for k in (0..b.len()).filter(|k| b.used[*k]) {
                 sum += e[k] * e[k];
                 n += 1.0;
@@ -58,45 +58,45 @@ impl Fit {
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Steps at most.
-    pub turns: usize,
+    pub max_iterations: usize,
     /// It ends when a step gains less than so many nats.
-    pub enough: f64,
+    pub min_gain_nats: f64,
 }
 
 impl Effort {
     /// A short one, to rank.
-    pub const SHORT: Self = Self { turns: 3, enough: 0.3 };
+    pub const SHORT: Self = Self { max_iterations: 3, min_gain_nats: 0.3 };
     /// To the end.
-    pub const FULL: Self = Self { turns: 14, enough: 0.03 };
+    pub const FULL: Self = Self { max_iterations: 14, min_gain_nats: 0.03 };
 }
 
 /// Damping of the first step, and steps that are tried from a tangent.
 const FIRST_DAMPING: f64 = 1e-4;
-const TRIES: usize = 7;
+const MAX_DAMPING_TRIALS: usize = 7;
 
 /// Fits a model from where it stands.
 #[must_use]
-pub fn fit(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
-    fit_below(model, data, effort, f64::INFINITY)
+pub fn fit(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
+    fit_if_below(model, data, effort, f64::INFINITY)
 }
 
 /// As [`fit`], but given up where it would not come below `wanted` nats if every step left gained as much as the last.
 #[must_use]
-pub fn fit_below(model: &Model, data: &Data, effort: Effort, wanted: f64) -> Option<Fit> {
-    descend(model, data, effort, wanted, rescatter)
+pub fn fit_if_below(model: &Model, data: &FitData, effort: Effort, wanted: f64) -> Option<Fit> {
+    descend(model, data, effort, wanted, update_scatter)
 }
 
 /// As [`fit`]; where ruptures scatter, also from numbers under which they do not. Under a wide scatter what is a little off
 /// costs nothing, and stays.
 #[must_use]
-pub fn fit_sharp(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
+pub fn fit_from_zero_scatter(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     let wide = fit(model, data, effort)?;
     let mut none = wide.model.clone();
-    (none.scatter.force, none.scatter.place_m) = (0.0, 0.0);
+    (none.scatter.rupture_force, none.scatter.rupture_depth_m) = (0.0, 0.0);
     if none.scatter == wide.model.scatter {
         return Some(wide);
     }
-    let held = Effort { turns: 2, ..effort };
+    let held = Effort { max_iterations: 2, ..effort };
     let sharp =
         descend(&none, data, held, f64::INFINITY, |_, _| ()).and_then(|f| fit(&f.model, data, effort));
     Some(sharp.filter(|f| f.nats() < wide.nats()).unwrap_or(wide))
@@ -105,30 +105,30 @@ pub fn fit_sharp(model: &Model, data: &Data, effort: Effort) -> Option<Fit> {
 /// Steps downhill; after each the scatter is told by `scatter`.
 fn descend(
     model: &Model,
-    data: &Data,
+    data: &FitData,
     effort: Effort,
     wanted: f64,
     scatter: impl Fn(&mut Model, &mut Residuals),
 ) -> Option<Fit> {
     let mut best = model.clone();
-    clamp(&mut best);
+    clamp_to_bounds(&mut best);
     let mut at = residuals(&best, data)?;
     scatter(&mut best, &mut at);
     let mut damping = FIRST_DAMPING;
-    for turn in 1..=effort.turns {
-        let tangent = Tangent::new(&best, data, &at);
+    for turn in 1..=effort.max_iterations {
+        let tangent = Linearization::new(&best, data, &at);
         let before = at.nats;
         let mut gained = false;
-        for _ in 0..TRIES {
-            let Some(delta) = step(&best, data, &tangent, damping, |_| true) else { break };
-            let next = moved(&best, data, &tangent, &delta, 1.0);
+        for _ in 0..MAX_DAMPING_TRIALS {
+            let Some(delta) = damped_step(&best, data, &tangent, damping, |_| true) else { break };
+            let next = apply_step(&best, data, &tangent, &delta, 1.0);
             let Some(left) = residuals(&next, data) else {
                 damping *= 10.0;
                 continue;
             };
             if left.nats < at.nats {
-                let further = further(&tangent, &delta, at.nats - left.nats)
-                    .map(|share| moved(&best, data, &tangent, &delta, share))
+                let further = extrapolation_factor(&tangent, &delta, at.nats - left.nats)
+                    .map(|share| apply_step(&best, data, &tangent, &delta, share))
                     .and_then(|next| residuals(&next, data).map(|left| (next, left)))
                     .filter(|(_, f)| f.nats < left.nats);
                 (best, at) = further.unwrap_or((next, left));
@@ -140,8 +140,8 @@ fn descend(
             damping = (damping * 8.0).max(1e-6);
         }
         let gain = before - at.nats;
-        let reach = at.nats - gain * (effort.turns - turn) as f64;
-        if !gained || gain < effort.enough || (turn > 1 && reach > wanted) {
+        let reach = at.nats - gain * (effort.max_iterations - turn) as f64;
+        if !gained || gain < effort.min_gain_nats || (turn > 1 && reach > wanted) {
             break;
         }
     }

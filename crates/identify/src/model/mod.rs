@@ -7,87 +7,89 @@
 //! | `number`, `bounds`, `values` | what a number is; how far it may go and what is known of it before; its value |
 //! | `compiled` | the law and the measuring chain for one recording |
 
-mod belief;
-mod bounds;
-mod choice;
-mod compiled;
-mod free;
-mod number;
-mod own;
+mod assumptions;
+mod compiled_model;
+mod effect_term;
+mod free_parameters;
+mod parameter;
+mod parameter_bounds;
+mod parameter_values;
+mod random_effects;
 #[cfg(test)]
 mod tests;
-mod values;
 
-pub use belief::Belief;
-pub use choice::Choice;
-pub use compiled::Compiled;
-pub use free::Free;
-pub use number::{Number, Role};
-pub use own::{Bound, DIFFERING, Day, Own, Scatter};
+pub use assumptions::Assumptions;
+pub use compiled_model::CompiledModel;
+pub use effect_term::EffectTerm;
+pub use free_parameters::FreeParameters;
+pub use parameter::{Parameter, ParameterRole};
+pub use random_effects::{
+    DayParameters, MAX_VARYING_PARAMETERS, RecordingParameters, Scatter, TiedParameter,
+};
 
 use std::sync::Arc;
 use stylet_tissue::Tissue;
 
 /// The instant (s) of a rupture that never was.
-pub const NEVER: f64 = f64::INFINITY;
+pub const NO_RUPTURE: f64 = f64::INFINITY;
 
 /// A law with everything that is fitted.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// What was believed.
-    pub belief: Arc<Belief>,
+    pub assumed: Arc<Assumptions>,
     /// The tissue as fitted.
     pub tissue: Tissue,
     /// The effects under trial.
-    pub effects: Vec<Choice>,
+    pub effects: Vec<EffectTerm>,
     /// Which other numbers are free.
-    pub free: Free,
+    pub free: FreeParameters,
     /// Numbers of each recording's own.
-    pub own: Vec<Own>,
+    pub per_recording: Vec<RecordingParameters>,
     /// Scatter between insertions.
     pub scatter: Scatter,
     /// Instants (s) at which the recorded force shows the rupture of each layer, per recording.
-    pub instants: Vec<Vec<f64>>,
+    pub rupture_times_s: Vec<Vec<f64>>,
     /// Numbers of effects that are not fitted by themselves.
-    pub bound: Vec<Bound>,
+    pub tied: Vec<TiedParameter>,
     /// Per recording the day on which it was made; empty: nobody asks.
     pub day_of: Vec<usize>,
     /// Numbers of each day's own.
-    pub days: Vec<Day>,
+    pub days: Vec<DayParameters>,
     /// Spreads between recordings and days stay as they are in a fit: somebody else tells them.
-    pub steady: bool,
+    pub fixed_scatter: bool,
     /// The delay in s at which the jumps of a late force are put between samples; none: they show at their instants. The likelihood has
     /// steps in it, so that a search begins without.
-    pub placed_s: Option<f64>,
+    pub jump_delay_s: Option<f64>,
 }
 
 impl Model {
     /// The base law with its surface and thicknesses free.
     #[must_use]
-    pub fn base(belief: Arc<Belief>, recordings: usize) -> Self {
+    pub fn base(belief: Arc<Assumptions>, recordings: usize) -> Self {
         let layers = belief.tissue.layers.len();
         Self {
             tissue: belief.tissue.clone(),
             effects: Vec::new(),
-            free: Free { surface: true, thickness: true, ..Free::default() },
-            own: vec![Own::default(); recordings],
+            free: FreeParameters { surface: true, thickness: true, ..FreeParameters::default() },
+            per_recording: vec![RecordingParameters::default(); recordings],
             scatter: Scatter::default(),
-            instants: vec![vec![NEVER; layers]; recordings],
-            bound: Vec::new(),
+            rupture_times_s: vec![vec![NO_RUPTURE; layers]; recordings],
+            tied: Vec::new(),
             day_of: Vec::new(),
             days: Vec::new(),
-            steady: false,
-            placed_s: None,
-            belief,
+            fixed_scatter: false,
+            jump_delay_s: None,
+            assumed: belief,
         }
     }
 
     /// The same law for some of the recordings; days keep their numbers.
     #[must_use]
-    pub fn only(&self, which: &[usize]) -> Self {
+    pub fn subset(&self, which: &[usize]) -> Self {
         let mut model = self.clone();
-        model.own = which.iter().map(|r| self.own[*r]).collect();
-        model.instants = which.iter().map(|r| self.instants[*r].clone()).collect();
+        model.per_recording = which.iter().map(|r| self.per_recording[*r]).collect();
+        model.rupture_times_s = which.iter().map(|r| self.rupture_times_s[*r].clone()).collect();
         if !self.day_of.is_empty() {
             model.day_of = which.iter().map(|r| self.day_of[*r]).collect();
         }
@@ -95,22 +97,23 @@ impl Model {
     }
 
     /// The numbers that differ between insertions as their effects say: effect and parameter.
-    pub fn differing(&self) -> impl Iterator<Item = (usize, usize)> {
+    pub fn varying_parameters(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = self.effects.iter().enumerate().flat_map(|(effect, choice)| {
-            let own = choice.info.parameters.iter().enumerate().filter(|(_, p)| p.differs > 0.0);
+            let own =
+                choice.info.parameters.iter().enumerate().filter(|(_, p)| p.between_recordings_sd > 0.0);
             own.map(move |(parameter, _)| (effect, parameter))
         });
-        all.take(DIFFERING)
+        all.take(MAX_VARYING_PARAMETERS)
     }
 
     /// The day of a recording.
-    fn day(&self, recording: usize) -> Day {
+    fn day_parameters(&self, recording: usize) -> DayParameters {
         self.day_of.get(recording).and_then(|d| self.days.get(*d)).copied().unwrap_or_default()
     }
 
     /// The same with one more effect.
     #[must_use]
-    pub fn with(&self, choice: Choice) -> Self {
+    pub fn with_effect(&self, choice: EffectTerm) -> Self {
         let mut model = self.clone();
         model.effects.push(choice);
         model
@@ -118,14 +121,14 @@ impl Model {
 
     /// The same without one effect.
     #[must_use]
-    pub fn without(&self, effect: usize) -> Self {
+    pub fn without_effect(&self, effect: usize) -> Self {
         let mut model = self.clone();
         model.effects.remove(effect);
-        model.bound.retain(|b| b.effect != effect && b.like != Some(effect));
+        model.tied.retain(|b| b.effect != effect && b.tied_to != Some(effect));
         let down = |e: &mut usize| *e -= usize::from(*e > effect);
-        for b in &mut model.bound {
+        for b in &mut model.tied {
             down(&mut b.effect);
-            b.like.as_mut().map(down);
+            b.tied_to.as_mut().map(down);
         }
         model
     }
@@ -138,7 +141,7 @@ impl Model {
 
     /// How many numbers the effects have, and the free geometry.
     #[must_use]
-    pub fn effect_numbers(&self) -> usize {
-        self.effects.iter().map(|e| e.info.parameters.iter().filter(|p| !p.whole).count()).sum()
+    pub fn effect_parameter_count(&self) -> usize {
+        self.effects.iter().map(|e| e.info.parameters.iter().filter(|p| !p.integer).count()).sum()
     }
 }

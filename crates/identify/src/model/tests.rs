@@ -1,6 +1,6 @@
 use super::*;
 use stylet_tissue::AnyEffect;
-use stylet_tissue::{Layer, info};
+use stylet_tissue::{Layer, effect_info};
 
 fn near(told: f64, wanted: f64) {
     assert!((told - wanted).abs() <= 1e-12 * wanted.abs(), "{told} for {wanted}");
@@ -16,8 +16,8 @@ fn layer(thickness_m: f64, stiffness: f64, friction: f64, puncture_n: Option<f64
     }
 }
 
-fn belief() -> Belief {
-    Belief {
+fn belief() -> Assumptions {
+    Assumptions {
         tissue: Tissue {
             surface_m: 0.002,
             layers: vec![
@@ -26,15 +26,15 @@ fn belief() -> Belief {
                 layer(0.03, 0.0, 6000.0, Some(1.1)),
             ],
         },
-        given: Vec::new(),
+        known_effects: Vec::new(),
         tolerance: vec![0.3, 0.99, 0.25],
         thickness_tolerance: vec![0.1, 0.6, 0.0],
         surface_tolerance_m: 0.0015,
     }
 }
 
-fn choice(id: &str, values: &[f64]) -> Choice {
-    Choice::new(info(id).expect("in the library"), values)
+fn choice(id: &str, values: &[f64]) -> EffectTerm {
+    EffectTerm::new(effect_info(id).expect("in the library"), values)
 }
 
 fn base() -> Model {
@@ -42,15 +42,17 @@ fn base() -> Model {
 }
 
 /// Role, bounds, mean, spread, step.
-type Line = (Role, f64, f64, f64, f64, f64);
+type Line = (ParameterRole, f64, f64, f64, f64, f64);
 
-fn are(told: &[Number], wanted: &[Line]) {
+fn are(told: &[Parameter], wanted: &[Line]) {
     assert_eq!(
         told.iter().map(|n| n.role).collect::<Vec<_>>(),
         wanted.iter().map(|w| w.0).collect::<Vec<_>>()
     );
     for (n, w) in told.iter().zip(wanted) {
-        for (told, wanted) in [(n.low, w.1), (n.high, w.2), (n.mean, w.3), (n.sd, w.4), (n.step, w.5)] {
+        for (told, wanted) in
+            [(n.low, w.1), (n.high, w.2), (n.prior_mean, w.3), (n.prior_sd, w.4), (n.step, w.5)]
+        {
             assert!(
                 told == wanted || (told - wanted).abs() <= 1e-12 * wanted.abs(),
                 "{:?}: {told} for {wanted}",
@@ -65,54 +67,61 @@ const NO: f64 = f64::INFINITY;
 #[test]
 fn numbers_of_the_base_law_go_as_far_as_is_believed() {
     are(
-        &base().shared(),
+        &base().shared_parameters(),
         &[
-            (Role::Stiffness(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
-            (Role::Friction(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
-            (Role::Puncture(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
+            (ParameterRole::Stiffness(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
+            (ParameterRole::Friction(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
+            (ParameterRole::Puncture(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
             // At least a fiftieth is left.
-            (Role::Stiffness(1), 0.02, 1.99, 1.0, 0.99, 1e-5),
-            (Role::Friction(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
-            (Role::Puncture(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
-            (Role::Surface, -0.001, 0.005, 0.002, 0.0015, 1e-7),
-            (Role::Thickness(0), 0.0096, 0.0144, 0.012, 0.0012, 1e-7),
+            (ParameterRole::Stiffness(1), 0.02, 1.99, 1.0, 0.99, 1e-5),
+            (ParameterRole::Friction(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
+            (ParameterRole::Puncture(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
+            (ParameterRole::Surface, -0.001, 0.005, 0.002, 0.0015, 1e-7),
+            (ParameterRole::Thickness(0), 0.0096, 0.0144, 0.012, 0.0012, 1e-7),
             // At least a twentieth is left.
-            (Role::Thickness(1), 0.0005, 0.022, 0.01, 0.006, 1e-7),
+            (ParameterRole::Thickness(1), 0.0005, 0.022, 0.01, 0.006, 1e-7),
         ],
     );
     let mut fixed = base();
-    fixed.free = Free::default();
-    assert_eq!(fixed.shared().len(), 6);
+    fixed.free = FreeParameters::default();
+    assert_eq!(fixed.shared_parameters().len(), 6);
     // Two tolerances, or five.
     let mut far = base();
-    let of = |m: &Model| m.shared().into_iter().find(|n| n.role == Role::Thickness(0)).expect("free");
+    let of = |m: &Model| {
+        m.shared_parameters().into_iter().find(|n| n.role == ParameterRole::Thickness(0)).expect("free")
+    };
     for (is_far, low, high) in [(false, 0.0096, 0.0144), (true, 0.006, 0.018)] {
-        far.free.far = is_far;
+        far.free.wide_thickness = is_far;
         near(of(&far).low, low);
         near(of(&far).high, high);
     }
     for (thickness_m, strained) in [(0.0097, false), (0.0095, true), (0.0143, false), (0.0145, true)] {
         far.tissue.layers[0].thickness_m = thickness_m;
-        assert_eq!(far.is_strained(0), strained, "{thickness_m}");
+        assert_eq!(far.thickness_out_of_tolerance(0), strained, "{thickness_m}");
     }
     let mut sure = belief();
     sure.surface_tolerance_m = 0.0;
-    assert!(!Model::base(Arc::new(sure), 1).shared().iter().any(|n| n.role == Role::Surface));
+    assert!(
+        !Model::base(Arc::new(sure), 1).shared_parameters().iter().any(|n| n.role == ParameterRole::Surface)
+    );
 }
 
 #[test]
 fn numbers_of_effects_go_as_far_as_the_library_searches() {
     let model = base()
-        .with(choice("stress_relaxation", &[0.4, 3.0]))
-        .with(choice("needle_compliance", &[700.0]))
-        .with(choice("rate_dependent_puncture", &[-0.2]))
-        .with(choice("periodic_interference", &[0.02, 4.0, 0.5]))
-        .with(choice("let_go", &[2.0, 1e-3]));
-    let of = |effect: usize, parameter: usize| Role::Effect { effect, parameter };
+        .with_effect(choice("stress_relaxation", &[0.4, 3.0]))
+        .with_effect(choice("needle_compliance", &[700.0]))
+        .with_effect(choice("rate_dependent_puncture", &[-0.2]))
+        .with_effect(choice("periodic_interference", &[0.02, 4.0, 0.5]))
+        .with_effect(choice("release_depth", &[2.0, 1e-3]));
+    let of = |effect: usize, parameter: usize| ParameterRole::Effect { effect, parameter };
     let at = |effect: usize| model.effects[effect].coordinates();
     let ln = libm::log;
-    let told: Vec<Number> =
-        model.shared().into_iter().filter(|n| matches!(n.role, Role::Effect { .. })).collect();
+    let told: Vec<Parameter> = model
+        .shared_parameters()
+        .into_iter()
+        .filter(|n| matches!(n.role, ParameterRole::Effect { .. }))
+        .collect();
     let line = |effect: usize, parameter: usize| {
         let p = &model.effects[effect].info.parameters[parameter];
         let (from, to) = p.search;
@@ -155,13 +164,15 @@ fn numbers_of_effects_go_as_far_as_the_library_searches() {
         ]
         .concat(),
     );
-    assert_eq!(model.effect_numbers(), 2 + 1 + 1 + 3 + 1);
+    assert_eq!(model.effect_parameter_count(), 2 + 1 + 1 + 3 + 1);
     // What is bound is not fitted.
     let mut bound = model.clone();
-    bound.bound =
-        vec![Bound { effect: 0, parameter: 1, like: None }, Bound { effect: 3, parameter: 0, like: Some(0) }];
-    let left: Vec<Role> = bound.shared().iter().map(|n| n.role).collect();
-    assert_eq!(left.len() + 2, model.shared().len());
+    bound.tied = vec![
+        TiedParameter { effect: 0, parameter: 1, tied_to: None },
+        TiedParameter { effect: 3, parameter: 0, tied_to: Some(0) },
+    ];
+    let left: Vec<ParameterRole> = bound.shared_parameters().iter().map(|n| n.role).collect();
+    assert_eq!(left.len() + 2, model.shared_parameters().len());
     assert!(
         left.contains(&of(0, 0))
             && !left.contains(&of(0, 1))
@@ -172,40 +183,46 @@ fn numbers_of_effects_go_as_far_as_the_library_searches() {
 
 #[test]
 fn numbers_of_recordings_and_days_have_the_spreads_between_them() {
-    let mut model = base().with(choice("let_go", &[2.0, 1e-3])).with(choice("let_go", &[1.0, 2e-3]));
-    let instants = |n: usize| (0..n).map(|l| (Role::Instant(l), -NO, NO, 0.0, NO, 1e-5));
-    are(&model.own_numbers(), &instants(3).collect::<Vec<_>>());
+    let mut model = base()
+        .with_effect(choice("release_depth", &[2.0, 1e-3]))
+        .with_effect(choice("release_depth", &[1.0, 2e-3]));
+    let instants = |n: usize| (0..n).map(|l| (ParameterRole::RuptureTime(l), -NO, NO, 0.0, NO, 1e-5));
+    are(&model.recording_parameters(), &instants(3).collect::<Vec<_>>());
     model.scatter = Scatter {
         surface_m: 7e-4,
-        friction: 0.03,
+        ln_friction: 0.03,
         day_surface_m: 1.1e-3,
-        day_friction: 0.07,
+        day_ln_friction: 0.07,
         ..Scatter::default()
     };
-    model.scatter.differing[1] = 3e-4;
-    (model.free.own_surface, model.free.own_friction, model.free.own_effects) = (true, true, true);
+    model.scatter.varying[1] = 3e-4;
+    (model.free.recording_surface, model.free.recording_friction, model.free.recording_effects) =
+        (true, true, true);
     let own = [
-        (Role::OwnSurface, -NO, NO, 0.0, 7e-4, 1e-7),
-        (Role::OwnFriction, -NO, NO, 0.0, 0.03, 1e-5),
+        (ParameterRole::RecordingSurface, -NO, NO, 0.0, 7e-4, 1e-7),
+        (ParameterRole::RecordingFriction, -NO, NO, 0.0, 0.03, 1e-5),
         // As the library says where no spread is known.
-        (Role::OwnEffect(0), -NO, NO, 0.0, 5e-4, 5e-7),
-        (Role::OwnEffect(1), -NO, NO, 0.0, 3e-4, 5e-7),
+        (ParameterRole::RecordingEffect(0), -NO, NO, 0.0, 5e-4, 5e-7),
+        (ParameterRole::RecordingEffect(1), -NO, NO, 0.0, 3e-4, 5e-7),
     ];
-    are(&model.own_numbers(), &own.into_iter().chain(instants(3)).collect::<Vec<_>>());
-    assert_eq!((model.differing_sd(1), model.differing_said(1), model.differing_said(7)), (3e-4, 5e-4, 1.0));
-    assert_eq!(model.differing().collect::<Vec<_>>(), [(0, 1), (1, 1)]);
-    let many = (0..11).fold(base(), |m, _| m.with(choice("let_go", &[2.0, 1e-3])));
-    assert_eq!(many.differing().count(), DIFFERING);
-    model.days = vec![Day::default(); 2];
-    let before = model.shared().len();
+    are(&model.recording_parameters(), &own.into_iter().chain(instants(3)).collect::<Vec<_>>());
+    assert_eq!(
+        (model.varying_sd(1), model.library_varying_sd(1), model.library_varying_sd(7)),
+        (3e-4, 5e-4, 1.0)
+    );
+    assert_eq!(model.varying_parameters().collect::<Vec<_>>(), [(0, 1), (1, 1)]);
+    let many = (0..11).fold(base(), |m, _| m.with_effect(choice("release_depth", &[2.0, 1e-3])));
+    assert_eq!(many.varying_parameters().count(), MAX_VARYING_PARAMETERS);
+    model.days = vec![DayParameters::default(); 2];
+    let before = model.shared_parameters().len();
     (model.free.day_surface, model.free.day_friction) = (true, true);
     are(
-        &model.shared()[before..],
+        &model.shared_parameters()[before..],
         &[
-            (Role::DaySurface(0), -NO, NO, 0.0, 1.1e-3, 1e-7),
-            (Role::DayFriction(0), -NO, NO, 0.0, 0.07, 1e-5),
-            (Role::DaySurface(1), -NO, NO, 0.0, 1.1e-3, 1e-7),
-            (Role::DayFriction(1), -NO, NO, 0.0, 0.07, 1e-5),
+            (ParameterRole::DaySurface(0), -NO, NO, 0.0, 1.1e-3, 1e-7),
+            (ParameterRole::DayFriction(0), -NO, NO, 0.0, 0.07, 1e-5),
+            (ParameterRole::DaySurface(1), -NO, NO, 0.0, 1.1e-3, 1e-7),
+            (ParameterRole::DayFriction(1), -NO, NO, 0.0, 0.07, 1e-5),
         ],
     );
 }
@@ -213,29 +230,30 @@ fn numbers_of_recordings_and_days_have_the_spreads_between_them() {
 #[test]
 fn a_number_that_is_set_is_got_back_and_moves_no_other() {
     let mut model = base()
-        .with(choice("stress_relaxation", &[0.4, 3.0]))
-        .with(choice("needle_compliance", &[700.0]))
-        .with(choice("respiration", &[1e-3, 0.3, 0.7]))
-        .with(choice("let_go", &[2.0, 1e-3]));
-    model.free = Free {
-        own_surface: true,
-        own_friction: true,
-        own_effects: true,
+        .with_effect(choice("stress_relaxation", &[0.4, 3.0]))
+        .with_effect(choice("needle_compliance", &[700.0]))
+        .with_effect(choice("respiration", &[1e-3, 0.3, 0.7]))
+        .with_effect(choice("release_depth", &[2.0, 1e-3]));
+    model.free = FreeParameters {
+        recording_surface: true,
+        recording_friction: true,
+        recording_effects: true,
         day_surface: true,
         day_friction: true,
         ..model.free
     };
-    model.days = vec![Day::default(); 2];
-    model.instants = vec![vec![1.5, 2.5, NEVER]; 3];
-    let numbers: Vec<Number> = model.shared().into_iter().chain(model.own_numbers()).collect();
+    model.days = vec![DayParameters::default(); 2];
+    model.rupture_times_s = vec![vec![1.5, 2.5, NO_RUPTURE]; 3];
+    let numbers: Vec<Parameter> =
+        model.shared_parameters().into_iter().chain(model.recording_parameters()).collect();
     assert_eq!(numbers.len(), 9 + 2 + 1 + 3 + 1 + 4 + 3 + 3);
     for (k, n) in numbers.iter().enumerate() {
         let mut moved = model.clone();
         let x = match n.role {
-            Role::Stiffness(_) | Role::Friction(_) | Role::Puncture(_) => 1.17,
-            Role::Effect { effect: 0, parameter: 1 } => libm::log(1.3),
-            Role::Effect { effect: 1, .. } => 1.0 / 900.0,
-            Role::Effect { .. } => model.get(n.role, 0) * 1.2,
+            ParameterRole::Stiffness(_) | ParameterRole::Friction(_) | ParameterRole::Puncture(_) => 1.17,
+            ParameterRole::Effect { effect: 0, parameter: 1 } => libm::log(1.3),
+            ParameterRole::Effect { effect: 1, .. } => 1.0 / 900.0,
+            ParameterRole::Effect { .. } => model.get(n.role, 0) * 1.2,
             _ => 0.0123,
         };
         moved.set(n.role, 2, x);
@@ -245,35 +263,37 @@ fn a_number_that_is_set_is_got_back_and_moves_no_other() {
             let now = moved.get(o.role, 2);
             assert!(now == was || (now - was).abs() < 1e-12, "{k} moves {other}");
         }
-        assert_eq!(moved.get(n.role, 0) == model.get(n.role, 0), n.role.is_own(), "{:?}", n.role);
+        assert_eq!(moved.get(n.role, 0) == model.get(n.role, 0), n.role.is_per_recording(), "{:?}", n.role);
     }
     // In their own units.
     let mut moved = model.clone();
-    moved.set(Role::Stiffness(1), 0, 1.2);
-    moved.set(Role::Friction(2), 0, 0.9);
-    moved.set(Role::Puncture(2), 0, 1.1);
-    moved.set(Role::Puncture(1), 0, 1.1);
+    moved.set(ParameterRole::Stiffness(1), 0, 1.2);
+    moved.set(ParameterRole::Friction(2), 0, 0.9);
+    moved.set(ParameterRole::Puncture(2), 0, 1.1);
+    moved.set(ParameterRole::Puncture(1), 0, 1.1);
     near(moved.tissue.layers[1].stiffness_n_per_m, 180.0);
     near(moved.tissue.layers[2].friction_ns_per_m2, 5400.0);
     near(moved.tissue.layers[2].puncture_n.expect("a force"), 1.21);
     assert_eq!(moved.tissue.layers[1].puncture_n, None);
-    assert_eq!(model.get(Role::Puncture(1), 0), 1.0);
-    moved.set(Role::Effect { effect: 1, parameter: 0 }, 0, 0.0);
+    assert_eq!(model.get(ParameterRole::Puncture(1), 0), 1.0);
+    moved.set(ParameterRole::Effect { effect: 1, parameter: 0 }, 0, 0.0);
     assert_eq!(moved.effects[1].values, [f64::INFINITY]);
-    assert_eq!(moved.get(Role::Effect { effect: 1, parameter: 0 }, 0), 0.0);
-    moved.set(Role::Effect { effect: 1, parameter: 0 }, 0, -0.1);
+    assert_eq!(moved.get(ParameterRole::Effect { effect: 1, parameter: 0 }, 0), 0.0);
+    moved.set(ParameterRole::Effect { effect: 1, parameter: 0 }, 0, -0.1);
     assert_eq!(moved.effects[1].values, [f64::INFINITY]);
 }
 
 #[test]
 fn a_number_that_is_bound_to_another_goes_with_it() {
     let mut model = base()
-        .with(choice("let_go", &[1.0, 1e-3]))
-        .with(choice("let_go", &[2.0, 2e-3]))
-        .with(choice("let_go", &[3.0, 3e-3]));
-    model.bound =
-        vec![Bound { effect: 2, parameter: 1, like: Some(0) }, Bound { effect: 1, parameter: 1, like: None }];
-    model.set(Role::Effect { effect: 0, parameter: 1 }, 0, 4e-3);
+        .with_effect(choice("release_depth", &[1.0, 1e-3]))
+        .with_effect(choice("release_depth", &[2.0, 2e-3]))
+        .with_effect(choice("release_depth", &[3.0, 3e-3]));
+    model.tied = vec![
+        TiedParameter { effect: 2, parameter: 1, tied_to: Some(0) },
+        TiedParameter { effect: 1, parameter: 1, tied_to: None },
+    ];
+    model.set(ParameterRole::Effect { effect: 0, parameter: 1 }, 0, 4e-3);
     let values: Vec<Vec<f64>> = model.effects.iter().map(|e| e.values.clone()).collect();
     assert_eq!(values, [vec![1.0, 4e-3], vec![2.0, 2e-3], vec![3.0, 4e-3]]);
 }
@@ -282,123 +302,136 @@ fn a_number_that_is_bound_to_another_goes_with_it() {
 fn what_is_bound_stays_bound_to_the_same_effect_when_another_goes() {
     let mut model = base();
     for k in 0..4 {
-        model = model.with(choice("let_go", &[1.0, f64::from(k) * 1e-3]));
+        model = model.with_effect(choice("release_depth", &[1.0, f64::from(k) * 1e-3]));
     }
-    let bound = |effect: usize, like: Option<usize>| Bound { effect, parameter: 1, like };
-    model.bound =
+    let bound = |effect: usize, like: Option<usize>| TiedParameter { effect, parameter: 1, tied_to: like };
+    model.tied =
         vec![bound(0, None), bound(1, Some(2)), bound(2, Some(0)), bound(3, Some(2)), bound(3, Some(1))];
-    let left = model.without(1);
+    let left = model.without_effect(1);
     assert_eq!(left.effects.iter().map(|e| e.values[1]).collect::<Vec<_>>(), [0.0, 2e-3, 3e-3]);
-    assert_eq!(left.bound, [bound(0, None), bound(1, Some(0)), bound(2, Some(1))]);
-    assert_eq!(model.without(0).bound, [bound(0, Some(1)), bound(2, Some(1)), bound(2, Some(0))]);
-    assert_eq!(model.without(2).bound, [bound(0, None), bound(2, Some(1))]);
-    assert_eq!(model.without(3).bound, model.bound[..3]);
+    assert_eq!(left.tied, [bound(0, None), bound(1, Some(0)), bound(2, Some(1))]);
+    assert_eq!(model.without_effect(0).tied, [bound(0, Some(1)), bound(2, Some(1)), bound(2, Some(0))]);
+    assert_eq!(model.without_effect(2).tied, [bound(0, None), bound(2, Some(1))]);
+    assert_eq!(model.without_effect(3).tied, model.tied[..3]);
 }
 
 #[test]
 fn some_of_the_recordings_keep_their_numbers_and_days() {
     let mut model = base();
     for r in 0..3 {
-        model.own[r].surface_m = 1e-3 * r as f64;
-        model.instants[r] = vec![r as f64; 3];
+        model.per_recording[r].surface_m = 1e-3 * r as f64;
+        model.rupture_times_s[r] = vec![r as f64; 3];
     }
-    assert_eq!(model.only(&[2, 0]).day_of, Vec::<usize>::new());
-    (model.day_of, model.days) = (vec![1, 0, 2], vec![Day { surface_m: 0.5, friction: 0.1 }; 2]);
+    assert_eq!(model.subset(&[2, 0]).day_of, Vec::<usize>::new());
+    (model.day_of, model.days) = (vec![1, 0, 2], vec![DayParameters { surface_m: 0.5, ln_friction: 0.1 }; 2]);
     model.days[1].surface_m = 0.7;
-    let two = model.only(&[2, 0]);
-    assert_eq!(two.own.iter().map(|o| o.surface_m).collect::<Vec<_>>(), [2e-3, 0.0]);
-    assert_eq!(two.instants, [vec![2.0; 3], vec![0.0; 3]]);
+    let two = model.subset(&[2, 0]);
+    assert_eq!(two.per_recording.iter().map(|o| o.surface_m).collect::<Vec<_>>(), [2e-3, 0.0]);
+    assert_eq!(two.rupture_times_s, [vec![2.0; 3], vec![0.0; 3]]);
     assert_eq!((two.day_of.clone(), two.days.clone()), (vec![2, 1], model.days.clone()));
     // A day that is not there has nothing of its own.
-    assert_eq!((two.day(0), two.day(1).surface_m, two.day(5)), (Day::default(), 0.7, Day::default()));
+    assert_eq!(
+        (two.day_parameters(0), two.day_parameters(1).surface_m, two.day_parameters(5)),
+        (DayParameters::default(), 0.7, DayParameters::default())
+    );
     assert_eq!(two.layers(), 3);
 }
 
 #[test]
 fn a_law_is_made_with_what_a_recording_and_its_day_have_of_their_own() {
     let mut model = base()
-        .with(choice("let_go", &[1.0, 1e-3]))
-        .with(choice("position_scale", &[0.02]))
-        .with(choice("time_delay", &[0.03]));
+        .with_effect(choice("release_depth", &[1.0, 1e-3]))
+        .with_effect(choice("position_scale", &[0.02]))
+        .with_effect(choice("time_delay", &[0.03]));
     let plain = model.compile(1).expect("a law");
     assert_eq!(plain.law.slabs()[0].front_m, 0.002);
     assert_eq!(plain.puncture_n, [0.6, f64::INFINITY, 1.1]);
-    assert_eq!(plain.stiffness, [90.0, 150.0, 0.0]);
-    assert_eq!((plain.delay_s, plain.measures, plain.smears, plain.placed_s), (0.03, true, false, None));
-    near(plain.to_true, 1.0 / 1.02);
-    assert!(plain.breaks_m.is_empty());
-    model.own[1] = Own { surface_m: 4e-4, friction: 0.2, ..Own::default() };
-    (model.day_of, model.days) = (vec![0; 3], vec![Day { surface_m: -1e-4, friction: 0.1 }]);
-    model.own[1].differing[0] = 5e-4;
+    assert_eq!(plain.stiffness_n_per_m, [90.0, 150.0, 0.0]);
+    assert_eq!(
+        (plain.delay_s, plain.has_measurement_chain, plain.smears_jumps, plain.jump_delay_s),
+        (0.03, true, false, None)
+    );
+    near(plain.true_over_recorded, 1.0 / 1.02);
+    assert!(plain.break_positions_m.is_empty());
+    model.per_recording[1] =
+        RecordingParameters { surface_m: 4e-4, ln_friction: 0.2, ..RecordingParameters::default() };
+    (model.day_of, model.days) = (vec![0; 3], vec![DayParameters { surface_m: -1e-4, ln_friction: 0.1 }]);
+    model.per_recording[1].varying[0] = 5e-4;
     let own = model.compile(1).expect("a law");
     near(own.law.slabs()[0].front_m, 0.0023);
     near(own.law.slabs()[0].friction_ns_per_m2, 4000.0 * libm::exp(0.3));
     assert_eq!(own.law.slabs()[0].release_m, 1e-3);
     near(model.compile(0).expect("a law").law.slabs()[2].friction_ns_per_m2, 6000.0 * libm::exp(0.1));
-    model.free.own_effects = true;
+    model.free.recording_effects = true;
     near(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
     assert_eq!(model.compile(0).expect("a law").law.slabs()[0].release_m, 1e-3);
     // Beside what the simulation has already.
     let mut given = belief();
-    given.given = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
-    model.belief = Arc::new(given);
+    given.known_effects = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
+    model.assumed = Arc::new(given);
     near(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
     // A day alone is enough for a law of its own.
     let mut days = base();
-    (days.day_of, days.days) = (vec![0; 3], vec![Day { surface_m: 1e-4, friction: 0.0 }]);
+    (days.day_of, days.days) = (vec![0; 3], vec![DayParameters { surface_m: 1e-4, ln_friction: 0.0 }]);
     near(days.compile(0).expect("a law").law.slabs()[0].front_m, 0.0021);
 }
 
 #[test]
 fn a_law_breaks_at_membranes_and_where_the_tip_feels_faces() {
-    let mut model = base().with(choice("hidden_membrane", &[0.005, 100.0, 0.2]));
-    model.own[0].surface_m = 1e-3;
+    let mut model = base().with_effect(choice("hidden_membrane", &[0.005, 100.0, 0.2]));
+    model.per_recording[0].surface_m = 1e-3;
     // 0.2 N stretch it by 2 mm; the tip feels every face, too.
-    let breaks = model.compile(0).expect("a law").breaks_m;
+    let breaks = model.compile(0).expect("a law").break_positions_m;
     for (told, wanted) in breaks.iter().zip([0.003 + 0.007, 0.015, 0.025, 0.055]) {
         near(*told, wanted);
     }
     assert_eq!(breaks.len(), 4);
-    let neutral = base().with(choice("hidden_membrane", &[0.005, 0.0, 0.2]));
-    assert!(neutral.compile(0).expect("a law").breaks_m.len() < 4);
-    let smears = |id: &str, x: f64| base().with(choice(id, &[x])).compile(0).expect("a law").smears;
+    let neutral = base().with_effect(choice("hidden_membrane", &[0.005, 0.0, 0.2]));
+    assert!(neutral.compile(0).expect("a law").break_positions_m.len() < 4);
+    let smears =
+        |id: &str, x: f64| base().with_effect(choice(id, &[x])).compile(0).expect("a law").smears_jumps;
     assert!(smears("low_pass_lag", 0.02) && smears("needle_compliance", 900.0) && !smears("force_gain", 1.1));
     assert!(
         !base().has_friction_effects()
-            && base().with(choice("coulomb_friction", &[2.0])).has_friction_effects()
+            && base().with_effect(choice("coulomb_friction", &[2.0])).has_friction_effects()
     );
-    assert!(!base().with(choice("force_gain", &[1.1])).has_friction_effects());
+    assert!(!base().with_effect(choice("force_gain", &[1.1])).has_friction_effects());
     let mut given = belief();
-    given.given = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
+    given.known_effects = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
     assert!(Model::base(Arc::new(given), 1).has_friction_effects());
 }
 
 #[test]
 fn every_recording_has_its_own_of_what_is_its_own() {
-    for role in [Role::OwnSurface, Role::OwnFriction, Role::OwnEffect(3), Role::Instant(1)] {
-        assert!(role.is_own());
+    for role in [
+        ParameterRole::RecordingSurface,
+        ParameterRole::RecordingFriction,
+        ParameterRole::RecordingEffect(3),
+        ParameterRole::RuptureTime(1),
+    ] {
+        assert!(role.is_per_recording());
     }
     for role in [
-        Role::Surface,
-        Role::Stiffness(0),
-        Role::DaySurface(0),
-        Role::DayFriction(1),
-        Role::Effect { effect: 0, parameter: 0 },
+        ParameterRole::Surface,
+        ParameterRole::Stiffness(0),
+        ParameterRole::DaySurface(0),
+        ParameterRole::DayFriction(1),
+        ParameterRole::Effect { effect: 0, parameter: 0 },
     ] {
-        assert!(!role.is_own());
+        assert!(!role.is_per_recording());
     }
 }
 
 /// What was measured elsewhere of a number is its prior; of all others nothing is believed before any data.
 #[test]
 fn what_is_expected_of_a_number_of_an_effect_is_its_prior() {
-    let slips = info("shaft_slip").expect("in the library");
+    let slips = effect_info("shaft_slip").expect("in the library");
     let values: Vec<f64> = slips.parameters.iter().map(|p| p.start).collect();
-    let model = base().with(Choice::new(slips, &values));
-    for n in model.shared() {
-        let Role::Effect { parameter, .. } = n.role else { continue };
+    let model = base().with_effect(EffectTerm::new(slips, &values));
+    for n in model.shared_parameters() {
+        let ParameterRole::Effect { parameter, .. } = n.role else { continue };
         let path = slips.parameters[parameter].path;
         let wanted = if path == "rate" { (-0.1, 0.1) } else { (0.0, f64::INFINITY) };
-        assert_eq!((n.mean, n.sd), wanted, "{path}");
+        assert_eq!((n.prior_mean, n.prior_sd), wanted, "{path}");
     }
 }

@@ -1,28 +1,28 @@
 //! Normalised innovations of residuals, and residuals of innovations.
 
-use super::slow::{SLOW, slow_means, sums};
-use super::{Bin, Noise, ORDER};
-use crate::blocks::Blocks;
+use super::long_memory::{STRETCHES, running_sums, stretch_means};
+use super::{AR_ORDER, ForceBinNoise, Noise};
+use crate::block_averages::BlockAverages;
 
 /// How the blocks of one recording are whitened.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Laid {
-    rows: Vec<Row>,
+pub struct WhiteningPlan {
+    rows: Vec<BlockWhitening>,
     /// Some range has a slow wander.
-    wander: bool,
+    has_long_memory: bool,
     /// Blocks one after the other of one range, all with [`ORDER`] before them and without a wander: first, end, range.
-    even: Vec<(usize, usize, u32)>,
+    plain_runs: Vec<(usize, usize, u32)>,
 }
 
 /// How one block is whitened.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Row {
+struct BlockWhitening {
     /// Range of the force.
     bin: u32,
     /// Blocks that are known before it, without a break.
-    run: u32,
+    blocks_since_break: u32,
     /// Blocks before it to which the memory of a slow wander reaches.
-    reach: u32,
+    memory_blocks: u32,
     /// Standard deviation of its innovation in N; infinite when it is not compared.
     sd_n: f64,
 }
@@ -30,26 +30,36 @@ struct Row {
 impl Noise {
     /// How the blocks of a recording are whitened.
     #[must_use]
-    pub fn laid(&self, b: &Blocks) -> Laid {
+    pub fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
         let mut run = 0;
-        let lasting = self.lasting;
+        let lasting = self.long_memory;
         let rows = (0..b.len()).map(|k| {
-            run = if b.restart[k] { 0 } else { run + 1 };
+            run = if b.memory_reset[k] { 0 } else { run + 1 };
             if !b.used[k] {
-                return Row { bin: 0, run: 0, reach: 0, sd_n: f64::INFINITY };
+                return BlockWhitening {
+                    bin: 0,
+                    blocks_since_break: 0,
+                    memory_blocks: 0,
+                    sd_n: f64::INFINITY,
+                };
             }
-            let bin = self.bin(b.size_n[k]).min(self.bins.len() - 1);
+            let bin = self.bin_index(b.abs_force_n[k]).min(self.bins.len() - 1);
             let of = &self.bins[bin];
-            let sd = of.size_n(run);
-            let sd_n = if b.doubt_n[k] > 0.0 { libm::hypot(sd, b.doubt_n[k]) } else { sd };
-            Row { bin: bin as u32, run: run as u32, reach: if lasting { k as u32 } else { run as u32 }, sd_n }
+            let sd = of.innovation_sd_after_n(run);
+            let sd_n = if b.extra_sd_n[k] > 0.0 { libm::hypot(sd, b.extra_sd_n[k]) } else { sd };
+            BlockWhitening {
+                bin: bin as u32,
+                blocks_since_break: run as u32,
+                memory_blocks: if lasting { k as u32 } else { run as u32 },
+                sd_n,
+            }
         });
-        let rows: Vec<Row> = rows.collect();
+        let rows: Vec<BlockWhitening> = rows.collect();
         let mut even: Vec<(usize, usize, u32)> = Vec::new();
         for (k, row) in rows.iter().enumerate() {
             if row.sd_n == f64::INFINITY
-                || (row.run as usize) < ORDER
-                || self.bins[row.bin as usize].wanders()
+                || (row.blocks_since_break as usize) < AR_ORDER
+                || self.bins[row.bin as usize].has_long_memory()
             {
                 continue;
             }
@@ -58,28 +68,34 @@ impl Noise {
                 _ => even.push((k, k + 1, row.bin)),
             }
         }
-        Laid { rows, wander: self.bins.iter().any(Bin::wanders), even }
+        WhiteningPlan {
+            rows,
+            has_long_memory: self.bins.iter().any(ForceBinNoise::has_long_memory),
+            plain_runs: even,
+        }
     }
 
     /// Normalised innovations of residuals `e` (N) of a recording; blocks that are not compared give zero.
     #[must_use]
-    pub fn whiten(&self, laid: &Laid, e: &[f64]) -> Vec<f64> {
-        let sums = match (laid.wander, self.lasting) {
+    pub fn whiten(&self, laid: &WhiteningPlan, e: &[f64]) -> Vec<f64> {
+        let sums = match (laid.has_long_memory, self.long_memory) {
             (false, _) => Vec::new(),
-            (true, false) => sums(e, |_| true),
-            (true, true) => sums(e, |k| laid.rows[k].sd_n.is_finite()),
+            (true, false) => running_sums(e, |_| true),
+            (true, true) => running_sums(e, |k| laid.rows[k].sd_n.is_finite()),
         };
-        let one = |k: usize, row: &Row| {
+        let one = |k: usize, row: &BlockWhitening| {
             if row.sd_n == f64::INFINITY {
                 return 0.0;
             }
-            let (near, slow) = self.memory(row);
+            let (near, slow) = self.predictor(row);
             let mut w = e[k];
-            for (a, before) in near.iter().zip(e[k - ORDER.min(row.run as usize)..k].iter().rev()) {
+            for (a, before) in
+                near.iter().zip(e[k - AR_ORDER.min(row.blocks_since_break as usize)..k].iter().rev())
+            {
                 w -= a * before;
             }
-            if laid.wander && *slow != [0.0; SLOW.len()] {
-                for (mean, slow) in slow_means(&sums, k, row.reach as usize).iter().zip(slow) {
+            if laid.has_long_memory && *slow != [0.0; STRETCHES.len()] {
+                for (mean, slow) in stretch_means(&sums, k, row.memory_blocks as usize).iter().zip(slow) {
                     w -= slow * mean;
                 }
             }
@@ -87,11 +103,11 @@ impl Noise {
         };
         let mut out = vec![0.0; e.len()];
         // Where there is nothing, and nothing is remembered, nothing comes out.
-        let reach = if laid.wander { SLOW[SLOW.len() - 1].1 } else { ORDER };
+        let reach = if laid.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
         let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
         let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
         let mut at = first;
-        for &(from, to, bin) in laid.even.iter().chain([&(e.len(), e.len(), 0)]) {
+        for &(from, to, bin) in laid.plain_runs.iter().chain([&(e.len(), e.len(), 0)]) {
             let (from, to) = (from.clamp(first, end.max(first)), to.min(end));
             for k in at..from {
                 out[k] = one(k, &laid.rows[k]);
@@ -100,14 +116,14 @@ impl Noise {
                 at = at.max(from);
                 continue;
             }
-            let a = &self.bins[bin as usize].a;
+            let a = &self.bins[bin as usize].ar;
             let rows = &laid.rows[from..to];
             for ((out, row), e) in
-                out[from..to].iter_mut().zip(rows).zip(e[from - ORDER..to].windows(ORDER + 1))
+                out[from..to].iter_mut().zip(rows).zip(e[from - AR_ORDER..to].windows(AR_ORDER + 1))
             {
-                let mut w = e[ORDER];
-                for i in 0..ORDER {
-                    w -= a[i] * e[ORDER - 1 - i];
+                let mut w = e[AR_ORDER];
+                for i in 0..AR_ORDER {
+                    w -= a[i] * e[AR_ORDER - 1 - i];
                 }
                 *out = w / row.sd_n;
             }
@@ -119,19 +135,19 @@ impl Noise {
     /// Residuals (N) of a recording whose normalised innovations are `w`: the inverse of [`whiten`](Self::whiten), nothing where blocks
     /// are not compared.
     #[must_use]
-    pub fn colour(&self, laid: &Laid, w: &[f64]) -> Vec<f64> {
+    pub fn unwhiten(&self, laid: &WhiteningPlan, w: &[f64]) -> Vec<f64> {
         let mut e = vec![0.0; w.len()];
         let mut sums = vec![0.0; w.len() + 1];
         for (k, row) in laid.rows.iter().enumerate() {
             if row.sd_n.is_finite() {
-                let (near, slow) = self.memory(row);
-                let run = ORDER.min(row.run as usize);
+                let (near, slow) = self.predictor(row);
+                let run = AR_ORDER.min(row.blocks_since_break as usize);
                 let mut x = w[k] * row.sd_n;
                 for (a, before) in near.iter().zip(e[k - run..k].iter().rev()) {
                     x += a * before;
                 }
-                if laid.wander {
-                    let means = slow_means(&sums, k, row.reach as usize);
+                if laid.has_long_memory {
+                    let means = stretch_means(&sums, k, row.memory_blocks as usize);
                     x += means.iter().zip(slow).map(|(mean, slow)| slow * mean).sum::<f64>();
                 }
                 e[k] = x;
@@ -142,40 +158,43 @@ impl Noise {
     }
 
     /// How a block is foretold: coefficients of those before it, and of the means of stretches further back.
-    fn memory(&self, row: &Row) -> (&[f64; ORDER], &[f64; SLOW.len()]) {
+    fn predictor(&self, row: &BlockWhitening) -> (&[f64; AR_ORDER], &[f64; STRETCHES.len()]) {
         let bin = &self.bins[row.bin as usize];
-        bin.first.get(row.run as usize).map_or((&bin.a, &bin.slow), |f| (&f.a, &f.slow))
+        bin.after_break
+            .get(row.blocks_since_break as usize)
+            .map_or((&bin.ar, &bin.long_memory), |f| (&f.ar, &f.long_memory))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::First;
+    use super::super::AfterBreak;
     use super::super::tests::{near, normal, still};
     use super::*;
     use stylet_stats::Ar;
-    use stylet_stats::linear::Symmetric;
+    use stylet_stats::linear_algebra::SymmetricMatrix;
 
     /// Bins whose first blocks after a break are foretold as those of an autoregressive process of a known covariance are.
-    fn of_process(ar: &Ar) -> (Bin, Vec<f64>) {
+    fn of_process(ar: &Ar) -> (ForceBinNoise, Vec<f64>) {
         let mut c = vec![0.0; 12];
         ar.autocovariance(&mut c);
-        let mut bin = Bin::white(c[0].sqrt());
-        for run in 0..=ORDER {
-            let mut h = Symmetric::zeros(run);
+        let mut bin = ForceBinNoise::white(c[0].sqrt());
+        for run in 0..=AR_ORDER {
+            let mut h = SymmetricMatrix::zeros(run);
             for i in 0..run {
                 for j in 0..=i {
                     h.add(i, j, c[i - j]);
                 }
             }
-            let a = h.factor().solve(&c[1..=run]);
+            let a = h.cholesky().solve(&c[1..=run]);
             let left = c[0] - a.iter().zip(&c[1..]).map(|(a, c)| a * c).sum::<f64>();
-            let mut padded = [0.0; ORDER];
+            let mut padded = [0.0; AR_ORDER];
             padded[..run].copy_from_slice(&a);
-            if run == ORDER {
-                (bin.a, bin.innovation_n) = (padded, left.sqrt());
+            if run == AR_ORDER {
+                (bin.ar, bin.innovation_sd_n) = (padded, left.sqrt());
             } else {
-                bin.first[run] = First { a: padded, slow: [0.0; SLOW.len()], sd_n: left.sqrt() };
+                bin.after_break[run] =
+                    AfterBreak { ar: padded, long_memory: [0.0; STRETCHES.len()], sd_n: left.sqrt() };
             }
         }
         (bin, c)
@@ -206,62 +225,65 @@ mod tests {
         let mut b = still(12);
         // A block that is not compared ends the memory.
         b.used[7] = false;
-        b.restart[8] = true;
-        let noise = Noise { edges_n: Vec::new(), bins: vec![bin], lasting: false };
+        b.memory_reset[8] = true;
+        let noise = Noise { edges_n: Vec::new(), bins: vec![bin], long_memory: false };
         let e: Vec<f64> = normal(5, 12).into_iter().map(|x| 0.03 * x).collect();
-        let w = noise.whiten(&noise.laid(&b), &e);
+        let w = noise.whiten(&noise.whitening_plan(&b), &e);
         let told: f64 = -w.iter().map(|w| 0.5 * w * w).sum::<f64>()
-            - noise.ln_sizes(std::slice::from_ref(&b))
+            - noise.sum_ln_sd(std::slice::from_ref(&b))
             - 0.5 * 11.0 * libm::log(core::f64::consts::TAU);
         let toeplitz = |i: usize, j: usize| c[i.abs_diff(j)];
         near(told, ln_density(&e[..7], toeplitz) + ln_density(&e[8..], toeplitz));
         assert_eq!(w[7], 0.0);
         // What sampling leaves open of a block is added to its own size alone.
-        b.doubt_n[4] = 0.05;
-        let doubted = noise.whiten(&noise.laid(&b), &e);
-        near(doubted[4], w[4] * bin.innovation_n / (bin.innovation_n * bin.innovation_n + 0.0025).sqrt());
+        b.extra_sd_n[4] = 0.05;
+        let doubted = noise.whiten(&noise.whitening_plan(&b), &e);
+        near(
+            doubted[4],
+            w[4] * bin.innovation_sd_n / (bin.innovation_sd_n * bin.innovation_sd_n + 0.0025).sqrt(),
+        );
         assert_eq!([doubted[3], doubted[5]], [w[3], w[5]]);
     }
 
     /// Two ranges with a slow wander of their own, breaks, and blocks that are not compared.
-    fn wandering(lasting: bool) -> (Noise, Blocks) {
+    fn wandering(lasting: bool) -> (Noise, BlockAverages) {
         let mut b = still(900);
         for k in 0..900 {
-            b.size_n[k] = if k % 7 < 3 { 0.4 } else { 1.1 };
+            b.abs_force_n[k] = if k % 7 < 3 { 0.4 } else { 1.1 };
             b.used[k] = k % 53 != 0;
-            b.restart[k] = k % 53 == 1 || k == 300;
+            b.memory_reset[k] = k % 53 == 1 || k == 300;
         }
         let bin = |x: f64| {
-            let mut bin = Bin::white(0.02 * x);
-            bin.a = [0.3 * x, 0.1, -0.05 * x, 0.02];
-            bin.slow = [0.2, 0.1 * x, 0.15];
-            bin.innovation_n = 0.015 * x;
-            for (k, first) in bin.first.iter_mut().enumerate() {
-                first.a[..k].copy_from_slice(&[0.31 * x, 0.11, 0.05][..k]);
-                first.slow = [0.25, 0.11, 0.05 * x];
+            let mut bin = ForceBinNoise::white(0.02 * x);
+            bin.ar = [0.3 * x, 0.1, -0.05 * x, 0.02];
+            bin.long_memory = [0.2, 0.1 * x, 0.15];
+            bin.innovation_sd_n = 0.015 * x;
+            for (k, first) in bin.after_break.iter_mut().enumerate() {
+                first.ar[..k].copy_from_slice(&[0.31 * x, 0.11, 0.05][..k]);
+                first.long_memory = [0.25, 0.11, 0.05 * x];
                 first.sd_n = 0.03 - 0.002 * k as f64;
             }
             bin
         };
-        (Noise { edges_n: vec![0.9], bins: vec![bin(1.0), bin(1.3)], lasting }, b)
+        (Noise { edges_n: vec![0.9], bins: vec![bin(1.0), bin(1.3)], long_memory: lasting }, b)
     }
 
     /// One block by the definition: those before it since the break, and the means of stretches before those.
-    fn innovation_of(noise: &Noise, b: &Blocks, e: &[f64], k: usize) -> f64 {
-        let since = (0..=k).rev().find(|j| b.restart[*j]).unwrap_or(0);
-        let bin = &noise.bins[usize::from(b.size_n[k] >= 0.9)];
+    fn innovation_of(noise: &Noise, b: &BlockAverages, e: &[f64], k: usize) -> f64 {
+        let since = (0..=k).rev().find(|j| b.memory_reset[*j]).unwrap_or(0);
+        let bin = &noise.bins[usize::from(b.abs_force_n[k] >= 0.9)];
         let run = k - since;
-        let (a, slow, sd) = match bin.first.get(run) {
-            Some(f) => (f.a, f.slow, f.sd_n),
-            None => (bin.a, bin.slow, bin.innovation_n),
+        let (a, slow, sd) = match bin.after_break.get(run) {
+            Some(f) => (f.ar, f.long_memory, f.sd_n),
+            None => (bin.ar, bin.long_memory, bin.innovation_sd_n),
         };
         let mut w = e[k];
         for i in 1..=run.min(4) {
             w -= a[i - 1] * e[k - i];
         }
-        let begin = if noise.lasting { 0 } else { since };
+        let begin = if noise.long_memory { 0 } else { since };
         for (slow, (from, to)) in slow.iter().zip([(4, 24), (24, 124), (124, 624)]) {
-            let counts = |j: &usize| *j >= begin && (!noise.lasting || b.used[*j]);
+            let counts = |j: &usize| *j >= begin && (!noise.long_memory || b.used[*j]);
             let stretch = (k.saturating_sub(to)..k.saturating_sub(from)).filter(counts);
             w -= slow * stretch.map(|j| e[j]).sum::<f64>() / (to - from) as f64;
         }
@@ -275,11 +297,11 @@ mod tests {
         for wanders in [false, true] {
             let (mut noise, b) = wandering(false);
             for bin in noise.bins.iter_mut().filter(|_| !wanders) {
-                bin.slow = [0.0; SLOW.len()];
-                bin.first.iter_mut().for_each(|f| f.slow = bin.slow);
+                bin.long_memory = [0.0; STRETCHES.len()];
+                bin.after_break.iter_mut().for_each(|f| f.long_memory = bin.long_memory);
             }
-            let laid = noise.laid(&b);
-            assert_eq!(laid.even.is_empty(), wanders);
+            let laid = noise.whitening_plan(&b);
+            assert_eq!(laid.plain_runs.is_empty(), wanders);
             for something in [0..900, 0..1, 299..303, 411..640, 898..900, 500..500] {
                 let e: Vec<f64> =
                     (0..900).map(|k| if something.contains(&k) { normals[k] } else { 0.0 }).collect();
@@ -297,24 +319,24 @@ mod tests {
         for lasting in [false, true] {
             let (noise, b) = wandering(lasting);
             let e = normal(7, b.len());
-            let laid = noise.laid(&b);
+            let laid = noise.whitening_plan(&b);
             let w = noise.whiten(&laid, &e);
             for k in 0..b.len() {
                 near(w[k], if b.used[k] { innovation_of(&noise, &b, &e, k) } else { 0.0 });
             }
             let sizes = |k: usize| {
-                let since = (0..=k).rev().find(|j| b.restart[*j]).unwrap_or(0);
-                let bin = &noise.bins[usize::from(b.size_n[k] >= 0.9)];
-                libm::log(bin.first.get(k - since).map_or(bin.innovation_n, |f| f.sd_n))
+                let since = (0..=k).rev().find(|j| b.memory_reset[*j]).unwrap_or(0);
+                let bin = &noise.bins[usize::from(b.abs_force_n[k] >= 0.9)];
+                libm::log(bin.after_break.get(k - since).map_or(bin.innovation_sd_n, |f| f.sd_n))
             };
             near(
-                noise.ln_sizes(&[b.clone(), b.clone()]),
+                noise.sum_ln_sd(&[b.clone(), b.clone()]),
                 2.0 * (0..b.len()).filter(|k| b.used[*k]).map(sizes).sum::<f64>(),
             );
             // Coloured again it is what it was, where it is compared; what is not is nothing.
             let bare: Vec<f64> =
                 e.iter().zip(&b.used).map(|(e, used)| if *used { *e } else { 0.0 }).collect();
-            let again = noise.colour(&laid, &noise.whiten(&laid, &bare));
+            let again = noise.unwhiten(&laid, &noise.whiten(&laid, &bare));
             for (told, wanted) in again.iter().zip(&bare) {
                 assert!((told - wanted).abs() < 1e-9, "{told} for {wanted}");
             }

@@ -1,45 +1,45 @@
 //! The page of a diagnosis: what was measured, what the base law cannot say, why, and what it gains.
 
-mod causes;
-mod evidence;
-mod residual;
-mod words;
+mod causes_tables;
+mod effect_search_steps;
+mod residual_charts;
+mod summary_sentence;
 
-pub use words::{differ, sentence};
+pub use summary_sentence::{recording_differences, summary_sentence};
 
-use crate::words::remarks;
-use causes::{causes, moved, traces, unseen};
-use evidence::evidence;
-use residual::{differs, gain, remains, residual};
+use crate::formatting::data_quality_table;
+use causes_tables::{base_parameters, causes, negligible_effects, not_identifiable};
+use effect_search_steps::search_steps;
+use residual_charts::{assumptions, base_law_residual, before_and_after, remaining_structure};
 use std::fmt::Write as _;
-use stylet_diagnose::Examined;
-use stylet_diagnose::curves::curves;
-use stylet_diagnose::outcome::{Diagnosis, Verdict};
-use stylet_report::{Page, Section, Status, Tile, chance, significant};
+use stylet_diagnose::DiagnosisResult;
+use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
+use stylet_diagnose::report_curves::recording_curves;
+use stylet_report::{Page, Section, Status, Tile, p_value, significant};
 use stylet_scenario::Scenario;
 
 /// The page of a diagnosis of `scenario`, which was read from `file`; `command` repeats it.
 #[must_use]
-pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Examined) -> Page {
+pub fn page(scenario: &Scenario, file: &str, command: String, examined: &DiagnosisResult) -> Page {
     let d = &examined.diagnosis;
-    let all = curves(examined);
+    let all = recording_curves(examined);
     let samples: usize = all.iter().map(|c| c.time_s.len()).sum();
     Page::new(format!("Diagnosis: {}", scenario.name))
-        .subtitle(sentence(d))
+        .subtitle(summary_sentence(d))
         .fact("scenario", file)
         .fact("recordings", d.gain.recordings.join(", "))
         .fact("samples", samples.to_string())
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(verdict(d))
-        .section(differs(scenario, d, &all))
+        .section(assumptions(scenario, d, &all))
         .section(causes(d))
-        .section(moved(scenario, d))
-        .section(traces(d))
-        .section(unseen(d))
-        .section(remains(d, &all))
-        .section(gain(d, &all))
-        .section(residual(d, examined, &all))
-        .section(evidence(d))
+        .section(base_parameters(scenario, d))
+        .section(negligible_effects(d))
+        .section(not_identifiable(d))
+        .section(remaining_structure(d, &all))
+        .section(before_and_after(d, &all))
+        .section(base_law_residual(d, examined, &all))
+        .section(search_steps(d))
         .section(quality(d))
         .section(repeat(command, examined))
 }
@@ -55,7 +55,7 @@ fn verdict(d: &Diagnosis) -> Section {
         Verdict::Ambiguous => "ambiguous",
         Verdict::Unknown => "unknown",
     };
-    let mut tiles = vec![Tile::new("Verdict", word, sentence(d))];
+    let mut tiles = vec![Tile::new("Verdict", word, summary_sentence(d))];
     for c in &d.causes {
         let parameters = c
             .parameters
@@ -76,12 +76,12 @@ fn verdict(d: &Diagnosis) -> Section {
         format!("{} → {} N", significant(g.rmse_before_n, 3), significant(g.rmse_after_n, 3)),
         format!("root mean square on {what}; the noise is {} N", significant(g.floor_n, 3)),
     ));
-    let status = if d.leftover.p_value < 1e-3 { Status::Warn } else { Status::Good };
+    let status = if d.residual_structure.p_value < 1e-3 { Status::Warn } else { Status::Good };
     tiles.push(
         Tile::new(
             "Left over",
-            if d.leftover.p_value < 1e-3 { "structure" } else { "noise" },
-            format!("{} that noise alone leaves as much", chance(d.leftover.p_value)),
+            if d.residual_structure.p_value < 1e-3 { "structure" } else { "noise" },
+            format!("{} that noise alone leaves as much", p_value(d.residual_structure.p_value)),
         )
         .status(status),
     );
@@ -98,11 +98,11 @@ fn quality(d: &Diagnosis) -> Section {
         return section
             .text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
     }
-    section.table(remarks("", &d.data_quality))
+    section.table(data_quality_table("", &d.data_quality))
 }
 
-fn repeat(command: String, examined: &Examined) -> Section {
+fn repeat(command: String, examined: &DiagnosisResult) -> Section {
     Section::new("Repeat")
         .code("command", command)
-        .folded("extended.ron", examined.extended.to_ron().unwrap_or_default())
+        .folded("extended.ron", examined.extended_scenario.to_ron().unwrap_or_default())
 }

@@ -128,17 +128,17 @@ def recordings(measured, names=None) -> tuple[list, list]:
     return given, kept
 
 
-def diagnose(believed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
+def diagnose(assumed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
     """Compares what a scenario believes with measured recordings.
 
-    `believed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
+    `assumed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
     `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on recordings left out.
     `columns`: path of a column map for the files. `progress`: True, False, or a callable `(text, count)`; by default shown
     where tqdm is there. Ctrl-C ends it. The same bytes as `stylet diagnose`."""
     given, kept = recordings(measured, names)
     if not given:
         raise _stylet.StyletError("no recordings: give at least one")
-    kind, text = _data.source(believed)
+    kind, text = _data.source(assumed)
     told = _data.Progress(True if progress is None else progress)
     try:
         inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, told)

@@ -42,11 +42,11 @@ class Plan:
     def plot(self, ax=None):
         """Nats between the candidates before and after the planned insertion. Returns the axes."""
         ax = _data.axes(ax)[0]
-        told = [p for p in self.result["pairs"] if p["told"]]
-        names = [f"{p['a']} | {p['b']}" for p in told]
-        rows = range(len(told))
-        ax.barh([r + 0.2 for r in rows], [p["nats_before"] for p in told], 0.4, color="0.7", label="now")
-        ax.barh([r - 0.2 for r in rows], [p["nats_after"] for p in told], 0.4, color="#0072b2", label="then")
+        distinguishable = [p for p in self.result["pairs"] if p["distinguishable"]]
+        names = [f"{p['a']} | {p['b']}" for p in distinguishable]
+        rows = range(len(distinguishable))
+        ax.barh([r + 0.2 for r in rows], [p["nats_before"] for p in distinguishable], 0.4, color="0.7", label="now")
+        ax.barh([r - 0.2 for r in rows], [p["nats_after"] for p in distinguishable], 0.4, color="#0072b2", label="then")
         ax.set_yticks(list(rows), names)
         ax.set_xscale("symlog", linthresh=1.0)
         ax.set_xlabel("expected gap of the log-likelihoods (nats)")
@@ -64,17 +64,17 @@ class Plan:
         )
 
 
-def plan(believed, measured=(), *, limits, columns=None, repair: bool = False, simulated: bool = True, progress=None) -> Plan:
+def plan(assumed, measured=(), *, limits, columns=None, repair: bool = False, simulated: bool = True, progress=None) -> Plan:
     """Plans the next insertion: after the recordings `measured` (as for `diagnose`), or, without any, before the first.
 
     `limits`: dict, RON text or path: `depth_m`, `speed_mps`, `acceleration_mps2`, `duration_s`, `force_n`. `simulated`: the best
     motions are simulated under the likeliest candidates and diagnosed (up to a minute). The same plan as `stylet plan`."""
     given, _ = recordings(measured)
-    told = _data.Progress(True if progress is None else progress)
+    distinguishable = _data.Progress(True if progress is None else progress)
     try:
         inner = _stylet.plan(
-            _data.source(believed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, told
+            _data.source(assumed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, distinguishable
         )
     finally:
-        told.close()
+        distinguishable.close()
     return Plan(inner)

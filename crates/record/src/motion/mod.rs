@@ -8,33 +8,33 @@
 //! | `knots` | position and velocity between samples |
 //! | `pieces` | means over spans, cut where the speed jumps or turns |
 
-mod course;
-mod knots;
-mod pieces;
-mod ramp;
-mod settle;
-mod velocity;
+mod acceleration_ramp;
+mod interpolant;
+mod motion_pieces;
+mod motion_segment;
+mod smooth_positions;
+mod velocity_estimate;
 
-pub use pieces::{Piece, Shown};
-pub use settle::{Settled, settle};
-pub use velocity::{Kink, LEAST_JUMP_MPS, Velocity, velocity};
+pub use motion_pieces::{JumpAppearance, MotionPiece};
+pub use smooth_positions::{SmoothedMotion, smooth_positions};
+pub use velocity_estimate::{MIN_JUMP_MPS, VelocityEstimate, VelocityJump, estimate_velocity};
 
 use crate::Recording;
-use knots::Knots;
-use velocity::position_noise;
+use interpolant::Interpolant;
+use velocity_estimate::position_noise;
 
 /// The motion of one recording.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     /// With the jumps of the speed at their instants.
-    exact: Knots,
+    exact: Interpolant,
     /// With the jumps half-way between two samples: what a mean over samples sees.
-    sampled: Knots,
+    sampled: Interpolant,
     /// Jumps of the speed.
-    pub jumps: Vec<Jump>,
+    pub jumps: Vec<JumpTiming>,
     /// Instants at which the speed smoothly changes its sign, and the middles between the samples around them, in s: dry
     /// friction jumps there.
-    turns: Vec<(f64, f64)>,
+    reversals_s: Vec<(f64, f64)>,
     /// Standard deviation in m/s of what the positions leave open of the velocity.
     pub velocity_sd_mps: f64,
     /// Standard deviation of the positions' noise in m.
@@ -43,42 +43,44 @@ pub struct Motion {
 
 /// A jump of the speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jump {
+pub struct JumpTiming {
     /// Its instant in s.
-    pub at_s: f64,
+    pub time_s: f64,
     /// The middle between the samples before and after it: what a mean over samples sees.
-    pub between_s: f64,
+    pub sample_mid_s: f64,
     /// How uncertain the instant is, in s.
-    pub doubt_s: f64,
+    pub time_sd_s: f64,
     /// Where it is in m.
-    pub z_m: f64,
+    pub position_m: f64,
     /// Velocity in m/s before and after it.
-    pub v_mps: [f64; 2],
+    pub velocity_mps: [f64; 2],
 }
 
 /// Velocity noise in m/s from which on positions are smoothed over as long as they allow.
-const NOISY_MPS: f64 = 1.2e-5;
+const MAX_EXACT_SD_MPS: f64 = 1.2e-5;
 
 impl Motion {
     /// The motion of a recording whose samples are all finite. A needle slower than `still_mps` (m/s) stands.
     #[must_use]
-    pub fn of(recording: &Recording, still_mps: f64) -> Self {
+    pub fn from_recording(recording: &Recording, still_mps: f64) -> Self {
         let (t, z) = (&recording.time_s, &recording.position_m);
-        let told = velocity(t, z);
-        let recorded_sd = stylet_stats::roughness([recording.velocity_mps.as_slice()]);
+        let told = estimate_velocity(t, z);
+        let recorded_sd = stylet_stats::third_difference_sd([recording.velocity_mps.as_slice()]);
         let mut noise_m = position_noise(t, z);
-        let (z, v, kinks, sd) = if told.noise_mps <= NOISY_MPS {
+        let (z, v, kinks, sd) = if told.sd_mps <= MAX_EXACT_SD_MPS {
             noise_m = noise_m.min(1e-6);
-            (z.clone(), told.v, told.kinks, told.noise_mps)
+            (z.clone(), told.velocity_mps, told.jumps, told.sd_mps)
         } else {
-            let calm = settle(t, z);
-            (calm.z, calm.v, calm.kinks, calm.sd_mps)
+            let calm = smooth_positions(t, z);
+            (calm.position_m, calm.velocity_mps, calm.jumps, calm.sd_mps)
         };
-        if recording.velocity_measured && sd > NOISY_MPS && recorded_sd < sd {
+        if recording.velocity_measured && sd > MAX_EXACT_SD_MPS && recorded_sd < sd {
             let v = &recording.velocity_mps;
-            let sides =
-                |k: &Kink| Kink { v: [v[k.sample.saturating_sub(1)], v[k.sample.min(v.len() - 1)]], ..*k };
-            let kinks: Vec<Kink> = kinks.iter().map(sides).collect();
+            let sides = |k: &VelocityJump| VelocityJump {
+                velocity_mps: [v[k.next_sample.saturating_sub(1)], v[k.next_sample.min(v.len() - 1)]],
+                ..*k
+            };
+            let kinks: Vec<VelocityJump> = kinks.iter().map(sides).collect();
             return Self::from_knots(t, &z, v, &kinks, recorded_sd, noise_m, still_mps);
         }
         Self::from_knots(t, &z, &v, &kinks, sd, noise_m, still_mps)
@@ -88,7 +90,7 @@ impl Motion {
         t: &[f64],
         z: &[f64],
         v: &[f64],
-        kinks: &[Kink],
+        kinks: &[VelocityJump],
         sd: f64,
         noise_m: f64,
         still_mps: f64,
@@ -96,41 +98,48 @@ impl Motion {
         let mut m = Self { velocity_sd_mps: sd, noise_m, ..Self::default() };
         let mut kinks = kinks.iter().peekable();
         for i in 0..t.len() {
-            while let Some(kink) = kinks.next_if(|k| k.sample <= i) {
-                if kink.sample == i && i > 0 {
-                    let at_s = kink.t.clamp(t[i - 1], t[i]);
+            while let Some(kink) = kinks.next_if(|k| k.next_sample <= i) {
+                if kink.next_sample == i && i > 0 {
+                    let at_s = kink.time_s.clamp(t[i - 1], t[i]);
                     let between_s = 0.5 * (t[i - 1] + t[i]);
-                    for side in kink.v {
-                        m.exact.push(at_s, kink.z, side);
-                        m.sampled.push(between_s, kink.z + side * (between_s - at_s), side);
+                    for side in kink.velocity_mps {
+                        m.exact.push(at_s, kink.position_m, side);
+                        m.sampled.push(between_s, kink.position_m + side * (between_s - at_s), side);
                     }
-                    let doubt_s = kink.sd_m / (kink.v[1] - kink.v[0]).abs().max(1e-6);
-                    m.jumps.push(Jump { at_s, between_s, doubt_s, z_m: kink.z, v_mps: kink.v });
+                    let doubt_s =
+                        kink.position_sd_m / (kink.velocity_mps[1] - kink.velocity_mps[0]).abs().max(1e-6);
+                    m.jumps.push(JumpTiming {
+                        time_s: at_s,
+                        sample_mid_s: between_s,
+                        time_sd_s: doubt_s,
+                        position_m: kink.position_m,
+                        velocity_mps: kink.velocity_mps,
+                    });
                 }
             }
             m.exact.push(t[i], z[i], v[i]);
             m.sampled.push(t[i], z[i], v[i]);
         }
         // Noisy positions do not tell a turn from a hold.
-        if sd <= NOISY_MPS {
-            m.find_turns(t, still_mps);
+        if sd <= MAX_EXACT_SD_MPS {
+            m.find_reversals(t, still_mps);
         }
         m
     }
 
     /// Where the sign of the speed changes between two samples without a jump.
-    fn find_turns(&mut self, t: &[f64], still_mps: f64) {
+    fn find_reversals(&mut self, t: &[f64], still_mps: f64) {
         let way = |v: f64| i8::from(v > still_mps) - i8::from(v < -still_mps);
         let mut near = 0;
         let mut before: Option<(f64, f64)> = None;
         for &now in t {
-            let v = self.sampled.speed(now, &mut near);
+            let v = self.sampled.velocity_at(now, &mut near);
             if let Some((then, was)) = before
                 && way(v) != way(was)
-                && !self.jumps.iter().any(|j| j.at_s >= then && j.at_s <= now)
+                && !self.jumps.iter().any(|j| j.time_s >= then && j.time_s <= now)
             {
                 let share = (was / (was - v)).clamp(0.0, 1.0);
-                self.turns.push((then + share * (now - then), 0.5 * (then + now)));
+                self.reversals_s.push((then + share * (now - then), 0.5 * (then + now)));
             }
             before = Some((now, v));
         }
@@ -141,7 +150,7 @@ impl Motion {
     pub fn at(&self, at_s: f64) -> (f64, f64) {
         let k = &self.exact;
         let last = k.t.len() - 1;
-        let i = k.before(at_s);
+        let i = k.index_before(at_s);
         if i == last || at_s <= k.t[i] {
             return (k.z[i], k.v[i]);
         }
@@ -165,7 +174,7 @@ mod tests {
         t: &[f64],
         z: &[f64],
         v: &[f64],
-        kinks: &[Kink],
+        kinks: &[VelocityJump],
         sd: f64,
         noise_m: f64,
     ) -> Motion {
@@ -177,7 +186,13 @@ mod tests {
         let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
         let z: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 * t } else { 1.06 - (t - 0.53) }).collect();
         let v: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 } else { -1.0 }).collect();
-        let kink = Kink { sample: 6, t: 0.53, z: 1.06, v: [2.0, -1.0], sd_m: 0.006 };
+        let kink = VelocityJump {
+            next_sample: 6,
+            time_s: 0.53,
+            position_m: 1.06,
+            velocity_mps: [2.0, -1.0],
+            position_sd_m: 0.006,
+        };
         from_knots(&t, &z, &v, &[kink], 0.0, 0.0)
     }
 
@@ -202,19 +217,28 @@ mod tests {
     #[test]
     fn a_jump_of_the_speed_is_known_as_well_as_the_place_where_both_sides_meet() {
         let told = bent().jumps[0];
-        near(told.at_s, 0.53);
-        near(told.between_s, 0.55);
-        near(told.doubt_s, 0.002);
-        assert_eq!((told.z_m, told.v_mps), (1.06, [2.0, -1.0]));
+        near(told.time_s, 0.53);
+        near(told.sample_mid_s, 0.55);
+        near(told.time_sd_s, 0.002);
+        assert_eq!((told.position_m, told.velocity_mps), (1.06, [2.0, -1.0]));
         // Between its samples, whatever is said of its instant; a change of the speed counts from a micrometre per second on.
-        let kink =
-            |sample: usize, t: f64, after: f64| Kink { sample, t, z: 0.0, v: [1.0, after], sd_m: 3e-6 };
-        let of =
-            |kinks: &[Kink]| from_knots(&[0.0, 1.0, 2.0, 3.0], &[0.0; 4], &[1.0; 4], kinks, 0.0, 0.0).jumps;
+        let kink = |sample: usize, t: f64, after: f64| VelocityJump {
+            next_sample: sample,
+            time_s: t,
+            position_m: 0.0,
+            velocity_mps: [1.0, after],
+            position_sd_m: 3e-6,
+        };
+        let of = |kinks: &[VelocityJump]| {
+            from_knots(&[0.0, 1.0, 2.0, 3.0], &[0.0; 4], &[1.0; 4], kinks, 0.0, 0.0).jumps
+        };
         let told = of(&[kink(0, 0.0, 2.0), kink(1, 1.2, 1.5), kink(3, 1.7, 1.0), kink(4, 3.5, 2.0)]);
-        assert_eq!(told.iter().map(|j| (j.at_s, j.between_s)).collect::<Vec<_>>(), [(1.0, 0.5), (2.0, 2.5)]);
-        near(told[0].doubt_s, 6e-6);
-        near(told[1].doubt_s, 3.0);
+        assert_eq!(
+            told.iter().map(|j| (j.time_s, j.sample_mid_s)).collect::<Vec<_>>(),
+            [(1.0, 0.5), (2.0, 2.5)]
+        );
+        near(told[0].time_sd_s, 6e-6);
+        near(told[1].time_sd_s, 3.0);
     }
 
     #[test]
@@ -222,7 +246,7 @@ mod tests {
         let t: Vec<f64> = (0..8).map(f64::from).collect();
         let v = [0.3, 0.2, 0.1, 0.0, 0.0, -0.2, -0.1, -0.1];
         let m = from_knots(&t, &[0.0; 8], &v, &[], 0.0, 0.0);
-        assert_eq!(m.turns, [(3.0, 2.5), (4.0, 4.5)]);
+        assert_eq!(m.reversals_s, [(3.0, 2.5), (4.0, 4.5)]);
     }
 
     #[test]
@@ -241,18 +265,18 @@ mod tests {
             let mut r =
                 Recording::with_velocity(t.clone(), z.clone(), v, vec![0.0; 600]).expect("a recording");
             r.velocity_measured = measured;
-            Motion::of(&r, STILL_MPS)
+            Motion::from_recording(&r, STILL_MPS)
         };
         let told = of(0.0, true);
         assert_eq!((told.at(1.0).1, told.at(2.5).1), (0.031, 0.0051));
         assert_eq!(told.velocity_sd_mps, 0.0);
         // Where they jump the positions tell.
         assert_eq!(told.jumps.len(), 1);
-        assert!((told.jumps[0].at_s - 1.5).abs() < 0.05, "{:?}", told.jumps);
+        assert!((told.jumps[0].time_s - 1.5).abs() < 0.05, "{:?}", told.jumps);
         // Nobody measured, or too roughly.
         for from_positions in [of(0.0, false), of(0.01, true)] {
             assert!((from_positions.at(1.0).1 - 0.03).abs() < 3e-4, "{}", from_positions.at(1.0).1);
-            assert!(from_positions.velocity_sd_mps > NOISY_MPS);
+            assert!(from_positions.velocity_sd_mps > MAX_EXACT_SD_MPS);
         }
     }
 
@@ -264,7 +288,7 @@ mod tests {
             let true_m = |t: f64| if t < 25.0 { speed_mps * t } else { speed_mps * (50.0 - t) };
             let z: Vec<f64> = t.iter().map(|t| (true_m(*t) / 5e-5).round() * 5e-5).collect();
             let force = vec![0.0; t.len()];
-            let m = Motion::of(&Recording::new(t, z, force).expect("a recording"), STILL_MPS);
+            let m = Motion::from_recording(&Recording::new(t, z, force).expect("a recording"), STILL_MPS);
             for k in 1..240 {
                 let (at, told) = (0.1 * f64::from(k), m.at(0.1 * f64::from(k)).1);
                 assert!((told - speed_mps).abs() < 1e-5, "{speed_mps} m/s: {told} at {at} s");
@@ -279,7 +303,7 @@ mod tests {
         let z: Vec<f64> =
             t.iter().map(|t| 0.003 * if *t < 8.0 { *t } else { 8.0 - (*t - 12.0).max(0.0) }).collect();
         let force = vec![0.0; t.len()];
-        let m = Motion::of(&Recording::new(t, z, force).expect("a recording"), STILL_MPS);
+        let m = Motion::from_recording(&Recording::new(t, z, force).expect("a recording"), STILL_MPS);
         assert!(m.noise_m < 1e-9, "{}", m.noise_m);
         assert_eq!(m.jumps.len(), 2);
     }

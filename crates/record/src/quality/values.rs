@@ -1,9 +1,9 @@
 //! Saturation, spikes and quantisation of the measured values.
 
-use super::runs::runs;
-use super::{Facts, QualityKind, QualityNote};
-use crate::along::{Along, Kept, Quantity};
-use stylet_stats::{MAD_TO_SD, median_of, quantiles_along};
+use super::constant_runs::for_each_constant_run;
+use super::{Extent, QualityKind, QualityNote};
+use crate::sample_stream::{Quantity, SampleStream, SortedValues};
+use stylet_stats::{MAD_TO_SD, median_of, quantiles_of_stream};
 
 /// Shortest run of equal extremes that counts towards saturation.
 const SHORT_RUN: usize = 5;
@@ -12,7 +12,10 @@ const LONG_RUN: usize = 20;
 /// ... while the needle moves by this share of its whole travel.
 const MOVED: f64 = 0.01;
 
-pub(super) fn saturation<A: Along>(recording: &A, facts: &Facts) -> Result<Vec<QualityNote>, A::Error> {
+pub(super) fn saturation<A: SampleStream>(
+    recording: &A,
+    facts: &Extent,
+) -> Result<Vec<QualityNote>, A::Error> {
     let (low, high) = facts.force_n;
     let mut notes = Vec::new();
     if low == high {
@@ -26,16 +29,16 @@ pub(super) fn saturation<A: Along>(recording: &A, facts: &Facts) -> Result<Vec<Q
     Ok(notes)
 }
 
-fn saturated_at<A: Along>(
+fn saturated_at<A: SampleStream>(
     recording: &A,
     which: &str,
     value: f64,
-    facts: &Facts,
+    facts: &Extent,
 ) -> Result<Option<QualityNote>, A::Error> {
     let travel_m = facts.position_m.1 - facts.position_m.0;
     let (mut stretches, mut samples, mut all, mut longest, mut at_s, mut moved) =
         (0_u32, 0, 0, 0, 0.0, false);
-    runs(recording, |run| {
+    for_each_constant_run(recording, |run| {
         if run.force_n != value {
             return;
         }
@@ -45,7 +48,7 @@ fn saturated_at<A: Along>(
             samples += run.samples;
         }
         if run.samples >= LONG_RUN {
-            moved |= run.between_m.1 - run.between_m.0 > MOVED * travel_m;
+            moved |= run.position_range_m.1 - run.position_range_m.0 > MOVED * travel_m;
         }
         if run.samples > longest {
             (longest, at_s) = (run.samples, run.start_s);
@@ -79,7 +82,7 @@ const STEPS: f64 = 4.0;
 /// A longer deviation is a movement, not a spike.
 const LONGEST_SPIKE: usize = 2;
 
-pub(super) fn spikes<A: Along>(
+pub(super) fn spikes<A: SampleStream>(
     recording: &A,
     what: &str,
     unit: &str,
@@ -88,8 +91,9 @@ pub(super) fn spikes<A: Along>(
     if recording.len() < WINDOW {
         return Ok(None);
     }
-    let off = quantiles_along(&[0.5], |take| from_neighbours(recording, which, |_, away| take(away.abs())))?;
-    let ends = quantiles_along(&[0.05, 0.95], |take| recording.values(which, take))?;
+    let off =
+        quantiles_of_stream(&[0.5], |take| from_neighbours(recording, which, |_, away| take(away.abs())))?;
+    let ends = quantiles_of_stream(&[0.05, 0.95], |take| recording.for_each_value(which, take))?;
     let ([off], [low, high]) = (&off[..], &ends[..]) else { return Ok(None) };
     let robust_sd = (off * MAD_TO_SD).max(LEAST_SD * (high - low));
     let limit = SPIKE_SD * robust_sd;
@@ -196,14 +200,14 @@ const WINDOW: usize = 2 * SIDE + 1;
 
 /// Hands over every value with its distance from the median of the eleven samples around it (at the ends: of the eleven nearest the
 /// end).
-fn from_neighbours<A: Along>(
+fn from_neighbours<A: SampleStream>(
     recording: &A,
     which: Quantity,
     mut each: impl FnMut(f64, f64),
 ) -> Result<(), A::Error> {
     // The window in the order of time, from `next` on, and in ascending order.
     let (mut window, mut sorted, mut next, mut filled) = ([0.0_f64; WINDOW], [0.0_f64; WINDOW], 0, 0);
-    recording.values(which, |x| {
+    recording.for_each_value(which, |x| {
         if filled < WINDOW {
             window[filled] = x;
             filled += 1;
@@ -249,7 +253,7 @@ const DISTINCT: f64 = 0.2;
 const ON_GRID: f64 = 0.9;
 
 /// `sorted` are the values in ascending order.
-pub(super) fn quantisation<K: Kept>(
+pub(super) fn quantisation<K: SortedValues>(
     sorted: &K,
     what: &str,
     unit: &str,
@@ -259,14 +263,14 @@ pub(super) fn quantisation<K: Kept>(
         return Ok(None);
     }
     let (mut low, mut high) = (None, f64::NAN);
-    sorted.each(|x| {
+    sorted.for_each(|x| {
         low.get_or_insert(x);
         high = x;
     })?;
     let whole = high - low.unwrap_or(f64::NAN);
     let steps = |each: &mut dyn FnMut(f64)| {
         let mut kept: Option<f64> = None;
-        sorted.each(|x| match kept {
+        sorted.for_each(|x| match kept {
             // Values that rounding alone tells apart are one value.
             Some(before) if x - before <= 1e-9 * whole => {}
             before => {

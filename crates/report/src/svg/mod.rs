@@ -4,18 +4,18 @@
 //! matrix (a confusion matrix, a sweep over two parameters), [`strip_chart`] shows all values of several groups, and
 //! [`state_machine`] boxes and arrows.
 
-mod bars;
-mod canvas;
-mod diagram;
-mod heatmap;
-mod lines;
-mod strips;
+mod bar_chart;
+mod heat_map;
+mod line_figure;
+mod state_diagram;
+mod strip_chart;
+mod svg_canvas;
 
-pub use bars::{Bar, BarChart, bar_chart};
-pub use diagram::{Arrow, Diagram, Node, state_machine};
-pub use heatmap::{HeatMap, heat_map};
-pub use lines::figure;
-pub use strips::{Strip, StripChart, StripGroup, strip_chart};
+pub use bar_chart::{Bar, BarChart, bar_chart};
+pub use heat_map::{HeatMap, heat_map};
+pub use line_figure::figure;
+pub use state_diagram::{Arrow, Diagram, Node, state_machine};
+pub use strip_chart::{Strip, StripChart, StripGroup, strip_chart};
 
 use serde::{Deserialize, Serialize};
 

@@ -85,7 +85,7 @@ pub(super) fn figure() -> Figure {
             .map(|t| Arrow {
                 from: index(t.from),
                 to: index(t.to),
-                lines: t.triggers.iter().map(|trigger| trigger.words().to_owned()).collect(),
+                lines: t.triggers.iter().map(|trigger| trigger.description().to_owned()).collect(),
                 bend_px: bend(t.from, t.to),
                 dashed: !t.in_supplement,
             })
@@ -97,7 +97,7 @@ pub(super) fn figure() -> Figure {
     let rows = TRANSITIONS
         .iter()
         .map(|t| {
-            let words: Vec<&str> = t.triggers.iter().map(|trigger| trigger.words()).collect();
+            let words: Vec<&str> = t.triggers.iter().map(|trigger| trigger.description()).collect();
             vec![
                 Cell::text(t.from.name()),
                 Cell::text(t.to.name()),

@@ -5,7 +5,7 @@
 
 use core::f64::consts::TAU;
 use proptest::prelude::*;
-use stylet_scenario::{FROM_REST_RAD, Motion, MotionPlan, Scenario, Segment};
+use stylet_scenario::{Motion, MotionPlan, PHASE_FROM_REST_RAD, Scenario, Segment};
 
 fn segment() -> impl Strategy<Value = Segment> {
     prop_oneof![
@@ -149,7 +149,7 @@ fn the_default_sinusoid_starts_from_rest_and_goes_the_papers_way() {
     )"#;
     let scenario = Scenario::parse("sinusoid.ron", text).unwrap();
     let Motion::Sinusoidal { phase_rad, .. } = scenario.motion else { panic!("not a sinusoid") };
-    assert_eq!(phase_rad, FROM_REST_RAD);
+    assert_eq!(phase_rad, PHASE_FROM_REST_RAD);
     let plan = scenario.motion.plan().unwrap();
     let first = plan.at(0.0);
     assert_eq!(first.position_m, -0.005);

@@ -12,7 +12,7 @@ use stylet_core::config::{
 use stylet_scenario::{
     ArmConfig, ForceTorque, Motion, ObserverGain, Robot, Scenario, Segment, Sensor, VirtualSensor,
 };
-use stylet_tissue::{AnyEffect, Layer, Tissue, library};
+use stylet_tissue::{AnyEffect, Layer, Tissue, general_effects};
 
 /// Text of any kind: quotes, backslashes, line ends, brackets, other scripts.
 fn text() -> impl Strategy<Value = String> {
@@ -47,7 +47,7 @@ fn tissue() -> impl Strategy<Value = Tissue> {
 
 /// Any effect of the library, its parameters within the range of a fit.
 fn effect() -> impl Strategy<Value = AnyEffect> {
-    let entries: Vec<_> = library().flat_map(|info| [Some(info), info.larger]).flatten().collect();
+    let entries: Vec<_> = general_effects().flat_map(|info| [Some(info), info.extended]).flatten().collect();
     prop::sample::select(entries)
         .prop_flat_map(|info| (Just(info), prop::collection::vec(0.0..1.0f64, info.parameters.len())))
         .prop_filter_map("parameters that do not go together", |(info, shares)| {
@@ -58,7 +58,7 @@ fn effect() -> impl Strategy<Value = AnyEffect> {
                 .map(|(parameter, share)| {
                     let (low, high) = parameter.search;
                     let value = (low + share * (high - low)).clamp(parameter.low, parameter.high);
-                    if parameter.whole { 1.0 } else { value }
+                    if parameter.integer { 1.0 } else { value }
                 })
                 .collect();
             AnyEffect::from_parameters(info.id, &values).filter(|effect| effect.check().is_ok())
@@ -126,7 +126,7 @@ fn robot() -> impl Strategy<Value = Robot> {
 fn robot_and_sensor() -> impl Strategy<Value = (Robot, Sensor)> {
     let virtual_sensor = || {
         (0.5..50.0).prop_map(|gain| VirtualSensor {
-            gain_per_s: ObserverGain::Same(gain),
+            gain_per_s: ObserverGain::Uniform(gain),
             ..VirtualSensor::default()
         })
     };
@@ -168,7 +168,7 @@ fn detection() -> impl Strategy<Value = (CusumConfig, DerivativeConfig, GuardCon
             blind_travel_m,
             acceleration_time_constant_s: time,
             sudden_mps2,
-            old_ground_m: blind_travel_m / 20.0,
+            revisit_margin_m: blind_travel_m / 20.0,
             rest_s,
             slowing_per_s,
         },
@@ -182,14 +182,14 @@ fn drop_config() -> impl Strategy<Value = DropConfig> {
     let switches = (estimator, any::<bool>(), any::<bool>(), any::<bool>());
     (times, switches, 0.001..0.4, 0.5..0.999, 1usize..1000).prop_map(
         |(
-            (travel_m, longest_s, compensation_travel_m, settle_s, standstill_mps),
+            (travel_m, max_duration_s, compensation_travel_m, settle_s, standstill_mps),
             (estimator, reweight, replay, compensate),
             low,
             high,
             replay_per_tick,
         )| DropConfig {
             travel_m,
-            longest_s,
+            max_duration_s: max_duration_s,
             compensation_travel_m,
             settle_s,
             standstill_mps,
@@ -212,15 +212,13 @@ fn enhance() -> impl Strategy<Value = EnhanceConfig> {
     let depths =
         prop_oneof![Just(Depths::Unknown), prop::collection::vec(1e-3..0.1, 1..4).prop_map(Depths::Known),];
     let search = (0.01..0.5, 1.0..10.0, 1usize..50, 1e-5..0.01, 0.0..0.5, 0.0..0.01).prop_map(
-        |(time_constant_s, noise_sds, samples, smallest_noise_n, learn_s, extrapolate_over_m)| {
-            ContactConfig {
-                time_constant_s,
-                noise_sds,
-                samples,
-                smallest_noise_n,
-                learn_s,
-                extrapolate_over_m,
-            }
+        |(time_constant_s, noise_sds, samples, min_noise_n, learn_s, extrapolate_over_m)| ContactConfig {
+            time_constant_s,
+            noise_sds,
+            samples,
+            min_noise_n: min_noise_n,
+            learn_s,
+            extrapolate_over_m,
         },
     );
     let kind = (
@@ -254,7 +252,7 @@ fn enhance() -> impl Strategy<Value = EnhanceConfig> {
                 drop,
                 contact_search,
                 guard,
-                stylet: StyletConfig { smallest_drop: 0.5 * forgetting, ..StyletConfig::default() },
+                stylet: StyletConfig { min_drop_share: 0.5 * forgetting, ..StyletConfig::default() },
             }
         },
     )
@@ -337,11 +335,11 @@ proptest! {
 
 #[test]
 fn every_effect_of_the_library_reads_back_equal() {
-    for info in library().flat_map(|info| [Some(info), info.larger]).flatten() {
+    for info in general_effects().flat_map(|info| [Some(info), info.extended]).flatten() {
         let values: Vec<f64> = info
             .parameters
             .iter()
-            .map(|p| if p.whole { 1.0 } else { p.start.clamp(p.low, p.high) })
+            .map(|p| if p.integer { 1.0 } else { p.start.clamp(p.low, p.high) })
             .collect();
         let effect = AnyEffect::from_parameters(info.id, &values).unwrap_or_else(|| panic!("{}", info.id));
         let text = format!(

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 use stylet_scenario::{Motion, Scenario};
-use stylet_tissue::{Law, LawState, Rupture};
+use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 
 /// File; instant in s of each true rupture and the elastic force in N that it releases; largest force in N.
 type Expected = (&'static str, &'static [(f64, f64)], f64);
@@ -46,9 +46,9 @@ struct Insertion {
 
 /// The insertion without robot and noise: the law along the motion.
 fn insert(s: &Scenario) -> Insertion {
-    let law = Law::new(&s.tissue, &s.effects).unwrap();
+    let law = ForceLaw::new(&s.tissue, &s.effects).unwrap();
     let plan = s.motion.plan().unwrap();
-    let mut state = LawState::default();
+    let mut state = ForceLawState::default();
     let mut result = Insertion::default();
     for k in 0..=(plan.duration_s() * s.sample_hz).round() as usize {
         let t = k as f64 / s.sample_hz;
@@ -202,7 +202,7 @@ fn the_sinusoids_are_the_published_one_from_rest() {
             panic!("{name}")
         };
         assert_eq!((amplitude_m, frequency_hz), (0.12, 0.0167), "{name}");
-        assert_eq!(phase_rad, stylet_scenario::FROM_REST_RAD, "{name}");
+        assert_eq!(phase_rad, stylet_scenario::PHASE_FROM_REST_RAD, "{name}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::{LAYERS, near};
 use stylet_core::config::Model;
-use stylet_score::{Heard, Moment, Score, Scorer};
+use stylet_score::{EnhancedSample, Score, Scorer, TrueSample};
 
 /// A sample: where the tip is, its force, by how much the core misses that, and the sensor's own error.
 struct At {
@@ -24,10 +24,14 @@ fn felt(tip: f64) -> f64 {
 fn scored(samples: &[At], band_n: impl Fn(&At) -> Option<[f64; 2]>) -> Score {
     let mut scorer = Scorer::new(LAYERS.to_vec(), Model::MultiLayer);
     for s in samples {
-        let moment =
-            Moment { position_m: s.z, force_n: felt(s.tip) + s.sensor, tip_n: s.tip, total_n: felt(s.tip) };
-        let heard = Heard { enhanced_n: s.tip + s.miss, error_n: 10.0 * s.miss, band_n: band_n(s) };
-        scorer.sample(&moment, &heard);
+        let moment = TrueSample {
+            position_m: s.z,
+            force_n: felt(s.tip) + s.sensor,
+            tip_n: s.tip,
+            total_n: felt(s.tip),
+        };
+        let heard = EnhancedSample { enhanced_n: s.tip + s.miss, error_n: 10.0 * s.miss, band_n: band_n(s) };
+        scorer.add_sample(&moment, &heard);
     }
     scorer.finish()
 }

@@ -3,7 +3,7 @@
 use crate::support::{LAYERS, declares, detection, knows, near, rupture};
 use stylet_core::LayerEstimate;
 use stylet_core::config::Model;
-use stylet_score::{Compared, Score, Scorer};
+use stylet_score::{EstimateError, Score, Scorer};
 
 const FIRST: LayerEstimate = LayerEstimate {
     layer: 1,
@@ -34,15 +34,15 @@ const SECOND: LayerEstimate = LayerEstimate {
 /// Both layers rupture, the second before its far face; the core declares at `detected` and knows `estimates`.
 fn scored(model: Model, detected: &[f64], estimates: &[LayerEstimate]) -> Score {
     let mut scorer = Scorer::new(LAYERS.to_vec(), model);
-    scorer.rupture(rupture(1, 5.0, 0.020));
-    scorer.rupture(rupture(2, 8.0, 0.024));
+    scorer.add_rupture(rupture(1, 5.0, 0.020));
+    scorer.add_rupture(rupture(2, 8.0, 0.024));
     for (index, time_s) in detected.iter().enumerate() {
-        scorer.event(&declares(detection(index + 1, *time_s)));
+        scorer.add_event(&declares(detection(index + 1, *time_s)));
     }
     for estimate in estimates {
-        scorer.event(&knows(*estimate));
+        scorer.add_event(&knows(*estimate));
     }
-    scorer.contact(Some(0.0103));
+    scorer.set_contact(Some(0.0103));
     scorer.finish()
 }
 
@@ -85,7 +85,7 @@ fn a_layer_is_compared_with_the_estimate_of_its_own_detection() {
     near(score.layers[0].stiffness_n_per_m.estimated, 80.0);
     // What the false layer added is still in the core's friction.
     near(score.layers[0].cumulative_friction_ns_per_m.estimated, 35.0);
-    assert_eq!(score.layers[1].stiffness_n_per_m, Compared::new(100.0, None));
+    assert_eq!(score.layers[1].stiffness_n_per_m, EstimateError::new(100.0, None));
     near(score.worst_stiffness_error(), 1.0);
 }
 
@@ -109,16 +109,16 @@ fn hits_are_chance_with_more_false_alarms_than_ruptures() {
 fn a_run_without_ruptures_or_estimates_has_no_errors_and_no_delay() {
     let mut scorer = Scorer::new(LAYERS.to_vec(), Model::MultiLayer);
     assert!(scorer.detections().is_empty());
-    scorer.event(&declares(detection(1, 3.0)));
+    scorer.add_event(&declares(detection(1, 3.0)));
     assert_eq!(scorer.detections(), [detection(1, 3.0)]);
     let score = scorer.finish();
     assert_eq!((score.median_delay_s(), score.worst_stiffness_error()), (None, None));
     assert_eq!(score.worst_friction_error(), None);
     assert!(score.layers.is_empty() && score.hits_are_chance);
-    assert_eq!(score.cumulative_friction_ns_per_m, Compared::new(0.0, None));
+    assert_eq!(score.cumulative_friction_ns_per_m, EstimateError::new(0.0, None));
     // A truth of zero has no relative error, and an estimate of zero a whole one.
-    assert_eq!(Compared::new(0.0, Some(3.0)).relative_error, None);
-    assert_eq!(Compared::new(-4.0, Some(0.0)).relative_error, Some(1.0));
+    assert_eq!(EstimateError::new(0.0, Some(3.0)).relative_error, None);
+    assert_eq!(EstimateError::new(-4.0, Some(0.0)).relative_error, Some(1.0));
 }
 
 /// The first layer known with standard deviations of 5 N/m, 300 N s/m² and 0.1 N s/m, off by so many of its own units.

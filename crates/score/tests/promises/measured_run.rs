@@ -4,7 +4,7 @@ use crate::support::detection;
 use std::cell::RefCell;
 use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
-use stylet_score::{Measured, Online, Trace, WithLaw};
+use stylet_score::{MeasuredRecording, MeasuredScore, ModelFrictionScore, Trace};
 
 /// One sample per 0.5 s: in until 10 s, held until 12 s, back to the surface at 10 mm and out of it.
 fn run() -> Recording {
@@ -14,7 +14,11 @@ fn run() -> Recording {
     Recording::new(time_s, position_m, force_n).expect("a recording")
 }
 
-fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Online, Vec<(f64, usize)>) {
+fn judged(
+    drops_s: &[f64],
+    detections_s: &[f64],
+    friction: Option<f64>,
+) -> (MeasuredScore, Vec<(f64, usize)>) {
     let recording = run();
     let trace = Trace {
         detections: detections_s.iter().enumerate().map(|(i, t)| detection(i + 1, *t)).collect(),
@@ -22,17 +26,17 @@ fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Onli
         ..Trace::default()
     };
     let drops: Vec<usize> = drops_s.iter().map(|t| (2.0 * t) as usize).collect();
-    let measured = Measured {
+    let measured = MeasuredRecording {
         name: "gel 3",
         recording: &recording,
         drops: &drops,
         deepest: 20,
-        back: 24,
+        retraction: 24,
         contact_m: 0.010,
     };
     let trace_len = recording.len();
     let asked = RefCell::new(Vec::new());
-    let online = Online::of(&measured, &trace, &EnhanceConfig::default(), || {
+    let online = MeasuredScore::evaluate(&measured, &trace, &EnhanceConfig::default(), || {
         let (friction, asked) = (friction?, &asked);
         Some(move |sample: &Sample, ruptured| {
             if asked.borrow().len() < trace_len {
@@ -48,16 +52,16 @@ fn judged(drops_s: &[f64], detections_s: &[f64], friction: Option<f64>) -> (Onli
 fn a_drop_is_found_from_fifty_milliseconds_before_to_one_second_after_it() {
     for (late_s, found) in [(-0.06, 0), (-0.04, 1), (0.3, 1), (0.9, 1), (1.1, 0)] {
         let (online, _) = judged(&[6.0], &[6.0 + late_s], None);
-        assert_eq!((online.drops, online.found, online.false_in), (1, found, 1 - found), "{late_s}");
+        assert_eq!((online.drops, online.found, online.false_insertion), (1, found, 1 - found), "{late_s}");
     }
 }
 
 #[test]
 fn two_drops_cannot_share_a_detection_and_a_second_detection_is_false() {
     let (online, _) = judged(&[6.0, 6.5], &[6.6], None);
-    assert_eq!((online.drops, online.found, online.false_in), (2, 1, 0));
+    assert_eq!((online.drops, online.found, online.false_insertion), (2, 1, 0));
     let (online, _) = judged(&[6.0, 6.5], &[6.1, 6.2, 6.6], None);
-    assert_eq!((online.found, online.false_in), (2, 1));
+    assert_eq!((online.found, online.false_insertion), (2, 1));
 }
 
 #[test]
@@ -65,7 +69,10 @@ fn false_detections_are_counted_where_they_happen() {
     // The deepest sample is the first of the hold, and the turn the first of the way back.
     let (online, asked) =
         judged(&[3.0], &[1.0, 3.1, 9.9, 10.0, 11.0, 11.9, 12.0, 18.0, 19.0, 20.0], Some(0.0));
-    assert_eq!((online.found, online.false_in, online.false_hold, online.false_back), (1, 2, 3, 4));
+    assert_eq!(
+        (online.found, online.false_insertion, online.false_hold, online.false_retraction),
+        (1, 2, 3, 4)
+    );
     // Layers count as punctured from where the core says so, rightly or not.
     assert_eq!(asked.len(), 41);
     for (time_s, ruptured) in asked {
@@ -77,9 +84,12 @@ fn false_detections_are_counted_where_they_happen() {
 #[test]
 fn what_is_left_of_the_way_back_is_measured_inside_the_tissue() {
     let (online, _) = judged(&[], &[], Some(-2.75));
-    assert_eq!(online.run, "gel 3");
-    assert_eq!((online.back_raw_n, online.back_before_n, online.back_after_n), (3.0, 0.5, 0.25));
-    assert!(judged(&[], &[], None).0.back_after_n.is_nan());
+    assert_eq!(online.recording, "gel 3");
+    assert_eq!(
+        (online.retraction_raw_n, online.retraction_enhanced_n, online.retraction_model_n),
+        (3.0, 0.5, 0.25)
+    );
+    assert!(judged(&[], &[], None).0.retraction_model_n.is_nan());
 }
 
 #[test]
@@ -92,11 +102,19 @@ fn the_way_back_ends_where_the_tip_is_at_the_surface() {
         recording.force_n[i] = 100.0;
     }
     let trace = Trace { enhanced_n: recording.force_n.clone(), ..Trace::default() };
-    let measured =
-        Measured { name: "", recording: &recording, drops: &[], deepest: 20, back: 24, contact_m: 0.010 };
+    let measured = MeasuredRecording {
+        name: "",
+        recording: &recording,
+        drops: &[],
+        deepest: 20,
+        retraction: 24,
+        contact_m: 0.010,
+    };
     assert_eq!(
-        Online::of(&measured, &trace, &EnhanceConfig::default(), || None::<fn(&Sample, usize) -> f64>)
-            .back_raw_n,
+        MeasuredScore::evaluate(&measured, &trace, &EnhanceConfig::default(), || None::<
+            fn(&Sample, usize) -> f64,
+        >)
+        .retraction_raw_n,
         3.0
     );
 }
@@ -119,23 +137,31 @@ fn gripped() -> (Recording, Vec<f64>, usize) {
 #[test]
 fn a_law_that_is_off_by_a_fifth_leaves_little_of_the_way_back_and_a_pull_is_kept() {
     let (recording, law, back) = gripped();
-    let measured =
-        Measured { name: "", recording: &recording, drops: &[], deepest: 1250, back, contact_m: 0.001 };
+    let measured = MeasuredRecording {
+        name: "",
+        recording: &recording,
+        drops: &[],
+        deepest: 1250,
+        retraction: back,
+        contact_m: 0.001,
+    };
     let of = |factor: f64| {
         let law = || {
             let mut left = law.iter();
             Some(move |_: &Sample, _| factor * left.next().copied().unwrap_or_default())
         };
-        WithLaw::of(&measured, &EnhanceConfig::default(), law).expect("a law")
+        ModelFrictionScore::evaluate(&measured, &EnhanceConfig::default(), law).expect("a law")
     };
     let (exact, off) = (of(1.0), of(1.2));
-    assert!(exact.left_n < 0.02 && exact.spike_n < 0.1, "{exact:?}");
+    assert!(exact.residual_rms_n < 0.02 && exact.residual_max_n < 0.1, "{exact:?}");
     // Replayed it leaves 0.2 of 1.2 N rms.
-    assert!(off.left_n < 0.12 && off.left_n > exact.left_n, "{off:?}");
+    assert!(off.residual_rms_n < 0.12 && off.residual_rms_n > exact.residual_rms_n, "{off:?}");
     for kept in [exact, off] {
         assert!((0.75..0.9).contains(&kept.pulse_kept), "{kept:?}");
         assert!((0.55..0.75).contains(&kept.step_kept), "{kept:?}");
     }
-    let none = WithLaw::of(&measured, &EnhanceConfig::default(), || None::<fn(&Sample, usize) -> f64>);
+    let none = ModelFrictionScore::evaluate(&measured, &EnhanceConfig::default(), || {
+        None::<fn(&Sample, usize) -> f64>
+    });
     assert_eq!(none, None);
 }

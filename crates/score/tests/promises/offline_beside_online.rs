@@ -34,7 +34,7 @@ fn insertion(velocity_mps: impl Fn(f64) -> f64) -> Insertion {
         let passed: f64 = LAYERS[..active].iter().map(|l| l.friction_ns_per_m2 * l.thickness_m).sum();
         let tip = LAYERS
             .get(active)
-            .map_or(0.0, |l| l.inside_m(z) * (l.stiffness_n_per_m + l.friction_ns_per_m2 * v));
+            .map_or(0.0, |l| l.length_inside_m(z) * (l.stiffness_n_per_m + l.friction_ns_per_m2 * v));
         for (column, value) in columns.iter_mut().zip([time_s, z, v, tip + passed * v]) {
             column.push(value);
         }

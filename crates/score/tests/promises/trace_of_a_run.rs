@@ -4,7 +4,7 @@ use crate::support::{declares, detection, knows};
 use stylet_core::config::{Algorithm, Model};
 use stylet_core::{EnhanceConfig, LayerEstimate, Output, State};
 use stylet_record::Recording;
-use stylet_score::{STORAGE_SAMPLES, Trace, algorithm_name, coefficients, model_name};
+use stylet_score::{MAX_STORED_SAMPLES, Trace, algorithm_name, coefficients, model_name};
 
 #[test]
 fn every_output_is_a_column() {
@@ -54,7 +54,7 @@ fn a_later_word_on_a_layer_replaces_the_earlier_one() {
         |layer, stiffness_n_per_m| LayerEstimate { layer, stiffness_n_per_m, ..LayerEstimate::default() };
     let mut trace = Trace::default();
     for estimate in [of(1, 40.0), of(2, 50.0), of(1, 41.0)] {
-        trace.note(&knows(estimate));
+        trace.record_events(&knows(estimate));
     }
     assert_eq!(trace.estimates, [of(2, 50.0), of(1, 41.0)]);
 }
@@ -62,9 +62,9 @@ fn a_later_word_on_a_layer_replaces_the_earlier_one() {
 #[test]
 fn ruptures_contact_and_samples_passed_over_are_remembered() {
     let mut trace = Trace::default();
-    trace.note(&declares(detection(1, 3.0)));
-    trace.note(&Output { used: false, ..Output::default() });
-    trace.note(&Output { used: false, contact_m: Some(0.01), ..Output::default() });
+    trace.record_events(&declares(detection(1, 3.0)));
+    trace.record_events(&Output { used: false, ..Output::default() });
+    trace.record_events(&Output { used: false, contact_m: Some(0.01), ..Output::default() });
     assert_eq!(trace.detections, [detection(1, 3.0)]);
     assert_eq!((trace.unused, trace.contact_m), (2, Some(0.01)));
 }
@@ -79,7 +79,7 @@ fn contact_happens_when_the_needle_is_first_where_it_was_found() {
         Recording::with_velocity(time_s, position_m, vec![0.0025; 1600], force_n.clone()).expect("columns");
     let mut seen = Vec::new();
     let trace =
-        Trace::record(&run, &force_n, &EnhanceConfig::default(), 0.0, |index, out| seen.push((index, *out)));
+        Trace::run(&run, &force_n, &EnhanceConfig::default(), 0.0, |index, out| seen.push((index, *out)));
     assert!(
         seen.iter().enumerate().all(|(i, (index, out))| i == *index && out.enhanced_n == trace.enhanced_n[i])
     );
@@ -91,7 +91,7 @@ fn contact_happens_when_the_needle_is_first_where_it_was_found() {
 
 #[test]
 fn twenty_one_minutes_at_the_sensor_s_rate_are_kept_whole() {
-    let minutes = [STORAGE_SAMPLES].map(|n| n / (200 * 60));
+    let minutes = [MAX_STORED_SAMPLES].map(|n| n / (200 * 60));
     assert_eq!(minutes, [21]);
 }
 

@@ -2,8 +2,8 @@
 //! velocity, bit for bit: what the arm adds is motion, never force.
 
 use stylet_scenario::{ArmConfig, MotionPlan, Scenario};
-use stylet_testbed::ArmRig;
-use stylet_tissue::{Law, LawState, TissueForce, replay};
+use stylet_testbed::ArmSimulation;
+use stylet_tissue::{ForceLaw, ForceLawState, TissueForce, replay};
 
 #[test]
 fn the_law_replayed_on_the_arms_motion_gives_the_arms_force() {
@@ -18,13 +18,14 @@ fn the_law_replayed_on_the_arms_motion_gives_the_arms_force() {
     )"#;
     let scenario = Scenario::parse("gels.ron", text).expect("valid");
     let plan: MotionPlan = scenario.motion.plan().expect("a motion");
-    let law = Law::new(&scenario.tissue, &scenario.effects).expect("no effects");
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects).expect("no effects");
     let config = ArmConfig::default();
-    let line = config.line(&plan, 0.0, 200.0, None).expect("reachable");
+    let line = config.insertion_line(&plan, 0.0, 200.0, None).expect("reachable");
     let first = plan.at(0.0);
-    let mut rig = ArmRig::new(&config, None, &line, &first, first.position_m, 1e-3, 1).expect("an arm");
+    let mut rig =
+        ArmSimulation::new(&config, None, &line, &first, first.position_m, 1e-3, 1).expect("an arm");
 
-    let (mut state, mut ruptures) = (LawState::default(), 0);
+    let (mut state, mut ruptures) = (ForceLawState::default(), 0);
     let (mut motion, mut forces): (Vec<_>, Vec<TissueForce>) = (Vec::new(), Vec::new());
     for k in 0..4000 {
         let t = f64::from(k) * 1e-3;

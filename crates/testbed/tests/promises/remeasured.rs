@@ -33,7 +33,7 @@ fn another_seed_is_the_same_insertion_measured_again() {
         let (one, two) =
             (simulate(&scenario, 1).expect("simulated"), simulate(&scenario, 2).expect("simulated"));
         assert_ne!(one.recording.force_n, two.recording.force_n);
-        assert_eq!(one.remeasured(2).expect("a sensor"), two.recording.force_n);
+        assert_eq!(one.measured_with_seed(2).expect("a sensor"), two.recording.force_n);
     }
 }
 
@@ -41,8 +41,8 @@ fn another_seed_is_the_same_insertion_measured_again() {
 fn the_inertia_of_the_tool_is_felt_again() {
     let with = simulate(&scenario(Robot::Slide, effects()), 1).expect("simulated");
     let without = simulate(&scenario(Robot::Slide, effects()[1..].to_vec()), 1).expect("simulated");
-    let heavy = with.remeasured(3).expect("a sensor");
-    let light = without.remeasured(3).expect("a sensor");
+    let heavy = with.measured_with_seed(3).expect("a sensor");
+    let light = without.measured_with_seed(3).expect("a sensor");
     for k in 5..heavy.len() {
         let inertia_n = 1.05 * 0.5 * with.motion[k].acceleration_mps2;
         assert!((heavy[k] - light[k] - inertia_n).abs() < 1e-9, "sample {k}");
@@ -53,7 +53,7 @@ fn the_inertia_of_the_tool_is_felt_again() {
 #[test]
 fn the_layers_are_those_of_the_scenario() {
     let scenario = scenario(Robot::Replay, Vec::new());
-    let layers = simulate(&scenario, 1).expect("simulated").layers();
+    let layers = simulate(&scenario, 1).expect("simulated").true_layers();
     assert_eq!(layers.len(), 2);
     for (truth, layer) in layers.iter().zip(&scenario.tissue.layers) {
         assert_eq!(truth.stiffness_n_per_m, layer.stiffness_n_per_m);

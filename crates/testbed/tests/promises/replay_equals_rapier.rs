@@ -2,12 +2,14 @@
 //! and velocity, and the slide follows its command and feels the tissue.
 
 use stylet_scenario::{Motion, Segment};
-use stylet_testbed::{InsertionSample, NEEDLE_MASS_KG, Rates, Slide, on_slide, replayed};
-use stylet_tissue::{Law, LawState, Layer, PronyTerm, StressRelaxation, Tissue, replay};
+use stylet_testbed::{
+    InsertionSample, NEEDLE_MASS_KG, SampleRates, Slide, simulate_on_slide, simulate_replay,
+};
+use stylet_tissue::{ForceLaw, ForceLawState, Layer, PronyTerm, StressRelaxation, Tissue, replay};
 
 const DT_S: f64 = 1e-3;
 
-fn law() -> Law {
+fn law() -> ForceLaw {
     let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
         name: String::new(),
         thickness_m,
@@ -24,7 +26,7 @@ fn law() -> Law {
         ],
     };
     let relaxation = StressRelaxation { terms: vec![PronyTerm { fraction: 0.1, time_constant_s: 3.0 }] };
-    Law::new(&tissue, &[relaxation.into()]).expect("one effect")
+    ForceLaw::new(&tissue, &[relaxation.into()]).expect("one effect")
 }
 
 /// A commanded motion: rippled advance, then a retraction.
@@ -56,10 +58,10 @@ fn replay_and_rapier_give_the_same_force_for_the_same_motion_bit_for_bit() {
     };
     let plan = program.plan().expect("a motion of its own");
     // Every physics step is a sample, so that the replay can be given all that the law was given.
-    let rates = Rates { sample_hz: 1000.0, steps_per_sample: 1, samples: 52_000 };
+    let rates = SampleRates { sample_hz: 1000.0, steps_per_sample: 1, samples: 52_000 };
     let mut ruptures = 0;
     let mut carried: Vec<InsertionSample> = Vec::new();
-    on_slide(&plan, &law, &rates, |_| ruptures += 1, |s| carried.push(*s));
+    simulate_on_slide(&plan, &law, &rates, |_| ruptures += 1, |s| carried.push(*s));
     let mut forces = Vec::new();
     replay(
         &law,
@@ -80,16 +82,16 @@ fn the_kinematic_replay_is_where_the_motion_commands_it_and_close_to_the_slide()
     let plan = Motion::Constant { start_m: -0.005, velocity_mps: 0.0023, duration_s: 46.0 }
         .plan()
         .expect("a motion");
-    let rates = Rates { sample_hz: 200.0, steps_per_sample: 5, samples: 9200 };
+    let rates = SampleRates { sample_hz: 200.0, steps_per_sample: 5, samples: 9200 };
     let (mut ideal, mut carried) = (Vec::new(), Vec::new());
-    replayed(
+    simulate_replay(
         &plan,
         &law,
         &rates,
         |r| ideal.push(r.time_s),
         |s| assert_eq!(s.position_m, plan.at(s.time_s).position_m),
     );
-    on_slide(&plan, &law, &rates, |r| carried.push(r.time_s), |_| {});
+    simulate_on_slide(&plan, &law, &rates, |r| carried.push(r.time_s), |_| {});
     assert_eq!((ideal.len(), carried.len()), (3, 3));
     for (a, b) in ideal.iter().zip(&carried) {
         assert!((a - b).abs() < 0.02, "ruptures by replay {ideal:?}, on the slide {carried:?}");
@@ -99,7 +101,7 @@ fn the_kinematic_replay_is_where_the_motion_commands_it_and_close_to_the_slide()
 #[test]
 fn the_slide_follows_a_smooth_command_within_twenty_micrometres_rms() {
     let law = law();
-    let mut state = LawState::default();
+    let mut state = ForceLawState::default();
     let mut slide = Slide::new(command(0.0).0, command(0.0).1, DT_S);
     let mut sum = 0.0;
     let mut steps = 0.0;

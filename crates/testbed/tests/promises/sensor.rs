@@ -2,13 +2,13 @@
 //! effects of tool, sensor and position act, and the same seed gives the same readings.
 
 use stylet_scenario::ForceTorque;
-use stylet_testbed::{InsertionSample, Measuring};
+use stylet_testbed::{ForceSensor, InsertionSample};
 use stylet_tissue::*;
 
 const HZ: f64 = 200.0;
 
 fn read(effects: &[AnyEffect], sensor: &ForceTorque, seed: u64, force_n: impl Fn(f64) -> f64) -> Vec<f64> {
-    let mut measuring = Measuring::new(effects, sensor, seed, HZ);
+    let mut measuring = ForceSensor::new(effects, sensor, seed, HZ);
     (0..40_000)
         .map(|k| {
             let time_s = f64::from(k) / HZ;
@@ -88,6 +88,6 @@ fn spikes_come_at_their_rate_with_their_size_and_leave_the_noise_alone() {
 
 #[test]
 fn a_wrong_position_scale_stretches_the_recorded_position() {
-    let measuring = Measuring::new(&[PositionScale { eps: 0.02 }.into()], &still(), 1, HZ);
+    let measuring = ForceSensor::new(&[PositionScale { eps: 0.02 }.into()], &still(), 1, HZ);
     assert!((measuring.position(0.05) - 0.051).abs() < 1e-15);
 }

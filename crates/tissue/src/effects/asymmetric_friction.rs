@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, sgn};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Friction that differs between advance and retraction: `b_i -> b_i (1 + eps sgn v)`, in the
 /// cumulative friction `D` as well.
@@ -20,14 +20,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "b_i -> b_i (1 + eps sgn v)",
     source: "Okamura, Simone, O'Leary 2004, table I",
     signature: "Viscous friction has another size in retraction than in advance, in proportion to speed and length.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[ParameterInfo::strength("eps", "", "asymmetry between advance and retraction")
         .allowed(-1.0, 1.0)
         .search(0.2, -0.9, 0.9)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.01]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.01]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for AsymmetricFriction {

@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// A boundary that is not where it was thought to be: the face between layers `i` and `i + 1` is
 /// moved by `delta`; the faces around it stay.
@@ -33,21 +33,21 @@ static INFO: EffectInfo = EffectInfo {
     equation: "face between layers i and i + 1 moved by delta",
     source: "Imaging and registration errors of a few millimetres",
     signature: "A rupture at another depth, with the slopes before and after it unchanged.",
-    place: Place::Geometry,
+    stage: ChainStage::Geometry,
     parameters: &[
         ParameterInfo::shape("layer", "", "layer in front of the face, 1-based")
             .allowed(1.0, 1000.0)
-            .neutral(1.0)
+            .inactive(1.0)
             .search(1.0, 1.0, 10.0)
-            .whole(),
+            .integer(),
         ParameterInfo::strength("shift_m", "m", "shift of the face, positive: deeper")
             .allowed(-1.0, 1.0)
             .search(0.003, -0.015, 0.015),
     ],
-    larger: None,
-    proposal: Proposal::Faces(1e-3),
+    extended: None,
+    proposal: Proposal::LayerFaces(1e-3),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for BoundaryShift {

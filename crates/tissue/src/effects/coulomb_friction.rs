@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction along the shaft: `f_B += c sgn(v) sum l_i`.
 ///
@@ -19,15 +19,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ c sgn(v) sum l_i",
     source: "Okamura, Simone, O'Leary 2004 (Karnopp model, per unit length)",
     signature: "A plateau that does not depend on speed, with a step at reversal, in proportion to the length inside.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside")
         .allowed(0.0, 1e4)
         .search(3.0, 0.05, 100.0)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[1.0]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[1.0]]]),
     nested_in: &["stribeck_friction", "presliding_friction"],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for CoulombFriction {
@@ -47,7 +47,7 @@ impl Effect for CoulombFriction {
     fn is_neutral(&self) -> bool {
         self.c_n_per_m == 0.0
     }
-    fn shaft_force(&self, moment: &Moment, inside_m: f64, _memory: &mut Memory) -> f64 {
+    fn shaft_force(&self, moment: &TipState, inside_m: f64, _memory: &mut EffectState) -> f64 {
         self.c_n_per_m * sgn(moment.v_mps) * inside_m
     }
 }

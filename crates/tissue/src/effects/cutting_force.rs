@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// Force of cutting at the tip: `+ F_c` while advancing (`sgn v > 0`) with the tip inside a layer
 /// that has been punctured (puncture force given) or inside any tissue (puncture force not given).
@@ -21,15 +21,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ F_c while advancing with the tip inside a punctured layer (or any layer without puncture force)",
     source: "Okamura, Simone, O'Leary 2004 (0.94 N in liver)",
     signature: "An offset during advance only: zero in hold and retraction, gone behind the last layer.",
-    place: Place::Tip,
+    stage: ChainStage::Tip,
     parameters: &[ParameterInfo::strength("force_n", "N", "cutting force")
         .allowed(0.0, 100.0)
         .search(0.3, 0.01, 3.0)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.1]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for CuttingForce {
@@ -49,7 +49,7 @@ impl Effect for CuttingForce {
     fn is_neutral(&self) -> bool {
         self.force_n == 0.0
     }
-    fn tip_force(&self, moment: &Moment, slabs: &[Slab], _memory: &mut Memory) -> f64 {
+    fn tip_force(&self, moment: &TipState, slabs: &[Slab], _memory: &mut EffectState) -> f64 {
         if sgn(moment.v_mps) <= 0.0 {
             return 0.0;
         }

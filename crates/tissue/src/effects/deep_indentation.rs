@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// Layers that yield to force and not to the tip's depth: a blunt tip pushes a layer in front of it
 /// beyond its far face, and only its puncture force, or `reach` metres more, ruptures it.
@@ -25,7 +25,7 @@ static INFO: EffectInfo = EffectInfo {
     equation: "rupture at f_K >= F_a, or z >= s_a + d_a + reach",
     source: "Skin on muscle phantoms, indented by 12-13 mm; Okamura, Simone, O'Leary 2004",
     signature: "The force rises through a face without a drop there; the drop comes deeper.",
-    place: Place::Geometry,
+    stage: ChainStage::Geometry,
     parameters: &[ParameterInfo::strength(
         "reach_m",
         "m",
@@ -33,10 +33,10 @@ static INFO: EffectInfo = EffectInfo {
     )
     .allowed(0.0, 1.0)
     .search(0.01, 0.001, 0.05)],
-    larger: None,
+    extended: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for DeepIndentation {

@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// A layer that gives way after having borne a force for a time: damage that adds up.
 ///
@@ -36,27 +36,27 @@ static INFO: EffectInfo = EffectInfo {
     equation: "rupture when the integral of (f_K/F_1)^n dt reaches 1 s",
     source: "Linear damage under a power law of the force (Zhurkov 1965); measured muscle phantom",
     signature: "A rupture in a hold, or under a force that the layer had borne before.",
-    place: Place::Puncture,
+    stage: ChainStage::Puncture,
     parameters: &[
         ParameterInfo::shape("layer", "", "layer, 1-based")
             .allowed(1.0, 1000.0)
-            .neutral(1.0)
+            .inactive(1.0)
             .search(1.0, 1.0, 10.0)
-            .whole(),
+            .integer(),
         ParameterInfo::strength("force_n", "N", "elastic force that the layer bears for one second")
             .allowed(1e-3, f64::INFINITY)
-            .neutral(f64::INFINITY)
+            .inactive(f64::INFINITY)
             .search(3.0, 0.3, 30.0),
         ParameterInfo::shape("exponent", "", "exponent of the force")
             .allowed(1.0, 200.0)
-            .neutral(10.0)
+            .inactive(10.0)
             .search(10.0, 3.0, 40.0)
             .log(),
     ],
-    larger: None,
+    extended: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for DelayedPuncture {
@@ -91,7 +91,14 @@ impl Effect for DelayedPuncture {
         }
     }
     /// Memory: the damage and the force before, relative to `F_1`.
-    fn endure(&self, layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, memory: &mut Memory) -> f64 {
+    fn endure(
+        &self,
+        layer: usize,
+        dt_s: f64,
+        elastic_n: f64,
+        threshold_n: f64,
+        memory: &mut EffectState,
+    ) -> f64 {
         if layer != self.layer {
             return threshold_n;
         }

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, sgn};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction of the drive that the sensor feels: `+ F_j sgn(v)`, in air too (virtual sensor).
 ///
@@ -19,15 +19,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ F_j sgn(v), in air too",
     source: "Joint friction of the KUKA LWR, 0.24-0.68 N m",
     signature: "A step at every reversal, also in air, of the same size at all depths.",
-    place: Place::Tool,
+    stage: ChainStage::Tool,
     parameters: &[ParameterInfo::strength("force_n", "N", "dry friction of the drive")
         .allowed(0.0, 100.0)
         .search(0.2, 0.01, 3.0)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.1]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for DriveFriction {

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// An offset of the sensor: `+ F_0`, in air too.
 ///
@@ -18,14 +18,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ F_0, in air too",
     source: "Taring: 15 mN in the measured recordings",
     signature: "A constant in air before contact.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("force_n", "N", "offset")
         .allowed(-100.0, 100.0)
         .search(0.05, -2.0, 2.0)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.1]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ForceBias {
@@ -45,7 +45,7 @@ impl Effect for ForceBias {
     fn is_neutral(&self) -> bool {
         self.force_n == 0.0
     }
-    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         force_n + self.force_n
     }
 }

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor that drifts: `+ rate t`, `t` being the recording's time.
 ///
@@ -19,14 +19,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ rate t",
     source: "Thermal drift of strain gauges",
     signature: "Slow in time, and the force in air does not return to zero at the end.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("rate_n_per_s", "N/s", "drift")
         .allowed(-10.0, 10.0)
         .search(0.005, -0.1, 0.1)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[1e-3]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[1e-3]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ForceDrift {
@@ -46,7 +46,7 @@ impl Effect for ForceDrift {
     fn is_neutral(&self) -> bool {
         self.rate_n_per_s == 0.0
     }
-    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         force_n + self.rate_n_per_s * time_s
     }
 }

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor that is not calibrated: `f -> (1 + eps) f`.
 ///
@@ -19,14 +19,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "f -> (1 + eps) f",
     source: "Calibration of force sensors",
     signature: "All forces scaled, known loads too; invisible in the shape of an insertion.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("eps", "", "relative error of the force")
         .allowed(-0.99, 10.0)
         .search(0.05, -0.5, 0.5)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.01]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.01]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ForceGain {
@@ -46,7 +46,7 @@ impl Effect for ForceGain {
     fn is_neutral(&self) -> bool {
         self.eps == 0.0
     }
-    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         (1.0 + self.eps) * force_n
     }
 }

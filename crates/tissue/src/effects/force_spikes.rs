@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Isolated outlying samples. Only their parameters live here: the drawing is the sensor's, and the
 /// spikes enter the chain with the noise.
@@ -22,7 +22,7 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ isolated samples of size_n, rate_hz of them per second",
     source: "Lost bits and loose contacts",
     signature: "Single samples far from both neighbours, at any depth and in air.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[
         ParameterInfo::strength("rate_hz", "Hz", "mean number per second")
             .allowed(0.0, 1000.0)
@@ -33,10 +33,10 @@ static INFO: EffectInfo = EffectInfo {
             .search(1.0, 0.1, 20.0)
             .log(),
     ],
-    larger: None,
-    proposal: Proposal::Raw,
+    extended: None,
+    proposal: Proposal::RawSamples,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ForceSpikes {

@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState, TipState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// A membrane that the layers do not know: an elastic element `+ K_m max(0, z - s_1 - z_m)`, gone
 /// when its force reaches `F_m`.
@@ -29,13 +29,13 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ K_m max(0, z - s_1 - z_m) until it reaches F_m, then gone",
     source: "Inner structures: Okamura, Simone, O'Leary 2004, fig. 1",
     signature: "A peak and a drop at a depth where no boundary is, once.",
-    place: Place::Tip,
+    stage: ChainStage::Tip,
     parameters: &[
         ParameterInfo::shape("depth_m", "m", "depth below the surface")
             .allowed(0.0, 1.0)
-            .neutral(0.02)
+            .inactive(0.02)
             .search(0.02, 0.001, 0.2)
-            .shown(0.005),
+            .demonstration(0.005),
         ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness")
             .allowed(0.0, 1e6)
             .search(100.0, 5.0, 5000.0)
@@ -45,10 +45,10 @@ static INFO: EffectInfo = EffectInfo {
             .search(0.5, 0.02, 5.0)
             .log(),
     ],
-    larger: None,
-    proposal: Proposal::Break,
+    extended: None,
+    proposal: Proposal::MembraneRupture,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for HiddenMembrane {
@@ -81,7 +81,7 @@ impl Effect for HiddenMembrane {
         true
     }
     /// Memory: 1 once broken.
-    fn breaks(&self, z_m: f64, slabs: &[Slab], memory: &mut Memory) -> bool {
+    fn breaks(&self, z_m: f64, slabs: &[Slab], memory: &mut EffectState) -> bool {
         if memory[0] != 0.0 || self.force(z_m, slabs) < self.puncture_n {
             return false;
         }
@@ -91,7 +91,7 @@ impl Effect for HiddenMembrane {
     fn break_depth_m(&self) -> Option<f64> {
         Some(self.depth_m + self.stretch_m())
     }
-    fn tip_force(&self, moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64 {
+    fn tip_force(&self, moment: &TipState, slabs: &[Slab], memory: &mut EffectState) -> f64 {
         if memory[0] != 0.0 { 0.0 } else { self.force(moment.z_m, slabs) }
     }
 }

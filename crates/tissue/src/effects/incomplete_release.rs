@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place, SGN_DEAD_BAND_MPS};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState, SGN_DEAD_BAND_MPS, TipState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// A rupture that does not release everything: a share `rho` of `f_K` at rupture stays as a
 /// constant tip force until the next rupture or reversal.
@@ -21,14 +21,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ rho f_K(at rupture), constant until the next rupture or reversal",
     source: "Okamura, Simone, O'Leary 2004 (liver: drop 0.66 N of 2.30 N)",
     signature: "The force does not fall to the friction line after a puncture, and the rest goes at reversal.",
-    place: Place::Release,
+    stage: ChainStage::Release,
     parameters: &[ParameterInfo::strength("fraction", "", "share of the elastic force that stays")
         .allowed(0.0, 1.0)
         .search(0.3, 0.01, 0.99)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.05]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.05]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for IncompleteRelease {
@@ -54,10 +54,10 @@ impl Effect for IncompleteRelease {
     fn withheld(&self, released_n: f64) -> f64 {
         self.fraction * released_n
     }
-    fn on_rupture(&self, released_n: f64, _z_m: f64, memory: &mut Memory) {
+    fn on_rupture(&self, released_n: f64, _z_m: f64, memory: &mut EffectState) {
         memory[0] = self.fraction * released_n;
     }
-    fn tip_force(&self, moment: &Moment, _slabs: &[Slab], memory: &mut Memory) -> f64 {
+    fn tip_force(&self, moment: &TipState, _slabs: &[Slab], memory: &mut EffectState) -> f64 {
         if moment.v_mps < -SGN_DEAD_BAND_MPS {
             memory[0] = 0.0;
         }

@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// A layer that presses into the one beneath: what the tip travels is shared between both.
 ///
@@ -33,21 +33,21 @@ static INFO: EffectInfo = EffectInfo {
     equation: "z - s_i = x + c f_K, f_K = K_i x + b_i x^2",
     source: "Springs in series; skin phantom on muscle phantom",
     signature: "A layer is softer in a stack than alone, and its loading is straighter.",
-    place: Place::Geometry,
+    stage: ChainStage::Geometry,
     parameters: &[
         ParameterInfo::shape("layer", "", "layer, 1-based")
             .allowed(1.0, 1000.0)
-            .neutral(1.0)
+            .inactive(1.0)
             .search(1.0, 1.0, 10.0)
-            .whole(),
+            .integer(),
         ParameterInfo::strength("compliance_m_per_n", "m/N", "compliance of the layer's ground")
             .allowed(0.0, 1.0)
             .search(1e-3, 1e-5, 1e-2),
     ],
-    larger: None,
+    extended: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for LayerCoupling {
@@ -70,7 +70,7 @@ impl Effect for LayerCoupling {
     }
     fn shape(&self, slabs: &mut [Slab]) {
         if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
-            slab.ground_m_per_n += self.compliance_m_per_n;
+            slab.foundation_compliance_m_per_n += self.compliance_m_per_n;
         }
     }
 }

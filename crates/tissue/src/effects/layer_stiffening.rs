@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// One layer that stiffens otherwise than the others: `K_i kappa_i x^2` is added to its elastic force.
 ///
@@ -32,21 +32,21 @@ static INFO: EffectInfo = EffectInfo {
     equation: "f_K = K_i x (1 + (kappa + kappa_i) x) in layer i",
     source: "Skin and muscle phantoms, with loading curves of different shape",
     signature: "The loading slope grows with depth in one layer and not in another.",
-    place: Place::Geometry,
+    stage: ChainStage::Geometry,
     parameters: &[
         ParameterInfo::shape("layer", "", "layer, 1-based")
             .allowed(1.0, 1000.0)
-            .neutral(1.0)
+            .inactive(1.0)
             .search(1.0, 1.0, 10.0)
-            .whole(),
+            .integer(),
         ParameterInfo::strength("kappa_per_m", "1/m", "stiffening of this layer beyond that of all layers")
             .allowed(-2000.0, 1e4)
             .search(10.0, -100.0, 1000.0),
     ],
-    larger: None,
+    extended: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for LayerStiffening {

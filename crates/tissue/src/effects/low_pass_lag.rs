@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place, lag_weights, same_step};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState, lag_weights, same_step};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor or filter that lags: first order, `tau y' = f - y`, at rest at the first sample.
 ///
@@ -22,15 +22,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "tau y' = f - y",
     source: "The laboratory's filter: 0.01 at 200 Hz is 0.5 s",
     signature: "A drop becomes a first-order step, constant in time, not in depth.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("time_constant_s", "s", "time constant")
         .allowed(0.0, 100.0)
         .search(0.05, 0.002, 2.0)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.004]], &[&[0.02]], &[&[0.08]], &[&[0.3]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.004]], &[&[0.02]], &[&[0.08]], &[&[0.3]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for LowPassLag {
@@ -54,7 +54,7 @@ impl Effect for LowPassLag {
         true
     }
     /// Memory: output, input, whether started, step, its two weights.
-    fn sense(&self, _time_s: f64, dt_s: f64, force_n: f64, memory: &mut Memory) -> f64 {
+    fn sense(&self, _time_s: f64, dt_s: f64, force_n: f64, memory: &mut EffectState) -> f64 {
         if memory[2] == 0.0 {
             memory[2] = 1.0;
             memory[0] = force_n;
@@ -71,7 +71,14 @@ impl Effect for LowPassLag {
     }
     /// Memory: span and what of a step is through after it, output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
     /// `y` follows from `tau y' = x - y` integrated over the span.
-    fn sense_mean(&self, _time_s: f64, span_s: f64, _samples: f64, force_n: f64, memory: &mut Memory) -> f64 {
+    fn sense_mean(
+        &self,
+        _time_s: f64,
+        span_s: f64,
+        _samples: f64,
+        force_n: f64,
+        memory: &mut EffectState,
+    ) -> f64 {
         if memory[7] == 0.0 {
             memory[7] = 1.0;
             memory[6] = force_n;
@@ -88,7 +95,7 @@ impl Effect for LowPassLag {
         memory[6] = before + change;
         force_n - change / ratio
     }
-    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut Memory) -> f64 {
+    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut EffectState) -> f64 {
         self.sense_mean(time_s, span_s, 1.0, force_n, memory);
         memory[6]
     }

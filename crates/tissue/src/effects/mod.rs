@@ -3,9 +3,9 @@
 //! [`AnyEffect`] is the closed list that scenarios can name; adding an effect is one file and
 //! two lines here: its module, and its place in the list below, which is the order of the chain.
 
-use crate::effect::{Effect, Memory, Moment};
-use crate::info::{EffectInfo, ParameterError};
-use crate::slab::Slab;
+use crate::effect::{Effect, EffectState, TipState};
+use crate::effect_info::{EffectInfo, ParameterError};
+use crate::layer_geometry::Slab;
 use alloc::vec::Vec;
 
 // Outside the macro, where rustfmt and cargo-mutants see them.
@@ -24,7 +24,6 @@ mod hidden_membrane;
 mod incomplete_release;
 mod layer_coupling;
 mod layer_stiffening;
-mod let_go;
 mod low_pass_lag;
 mod needle_compliance;
 mod nonlinear_elasticity;
@@ -34,6 +33,7 @@ mod power_law_friction;
 mod presliding_friction;
 mod quantisation;
 mod rate_dependent_puncture;
+mod release_depth;
 mod respiration;
 mod saturation;
 mod shaft_slip;
@@ -150,23 +150,23 @@ macro_rules! effects {
             fn shape(slabs: &mut [Slab]) -> ();
             fn relative(time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64);
             fn elastic(k_n_per_m: f64, x_m: f64, force_n: f64) -> f64;
-            fn relax(dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64;
+            fn relax(dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64;
             fn puncture(threshold_n: f64, v_mps: f64) -> f64;
-            fn endure(layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, memory: &mut Memory) -> f64;
+            fn endure(layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, memory: &mut EffectState) -> f64;
             fn withheld(released_n: f64) -> f64;
-            fn on_rupture(released_n: f64, z_m: f64, memory: &mut Memory) -> ();
+            fn on_rupture(released_n: f64, z_m: f64, memory: &mut EffectState) -> ();
             fn friction_velocity(v_mps: f64) -> f64;
             fn friction_factor(v_mps: f64) -> f64;
-            fn shaft_force(moment: &Moment, inside_m: f64, memory: &mut Memory) -> f64;
-            fn on_layer_rupture(layer: usize, released_n: f64, memory: &mut Memory) -> ();
-            fn press(layer: usize, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64;
-            fn grip(moment: &Moment, slabs: &[Slab], sliding_mps: f64, memory: &mut Memory) -> f64;
-            fn breaks(z_m: f64, slabs: &[Slab], memory: &mut Memory) -> bool;
-            fn tip_force(moment: &Moment, slabs: &[Slab], memory: &mut Memory) -> f64;
+            fn shaft_force(moment: &TipState, inside_m: f64, memory: &mut EffectState) -> f64;
+            fn on_layer_rupture(layer: usize, released_n: f64, memory: &mut EffectState) -> ();
+            fn press(layer: usize, dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64;
+            fn grip(moment: &TipState, slabs: &[Slab], sliding_mps: f64, memory: &mut EffectState) -> f64;
+            fn breaks(z_m: f64, slabs: &[Slab], memory: &mut EffectState) -> bool;
+            fn tip_force(moment: &TipState, slabs: &[Slab], memory: &mut EffectState) -> f64;
             fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
-            fn sense(time_s: f64, dt_s: f64, force_n: f64, memory: &mut Memory) -> f64;
-            fn sense_mean(time_s: f64, span_s: f64, samples: f64, force_n: f64, memory: &mut Memory) -> f64;
-            fn sense_after(time_s: f64, span_s: f64, force_n: f64, memory: &mut Memory) -> f64;
+            fn sense(time_s: f64, dt_s: f64, force_n: f64, memory: &mut EffectState) -> f64;
+            fn sense_mean(time_s: f64, span_s: f64, samples: f64, force_n: f64, memory: &mut EffectState) -> f64;
+            fn sense_after(time_s: f64, span_s: f64, force_n: f64, memory: &mut EffectState) -> f64;
             fn delay_s() -> f64;
             fn break_depth_m() -> Option<f64>;
             fn position_factor() -> f64;
@@ -201,7 +201,7 @@ effects! {
     deep_indentation::DeepIndentation,
     layer_coupling::LayerCoupling,
     layer_stiffening::LayerStiffening,
-    let_go::LetGo,
+    release_depth::ReleaseDepth,
     respiration::Respiration,
     needle_compliance::NeedleCompliance,
     nonlinear_elasticity::NonlinearElasticity,

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A needle or holder that gives: `z_tip = z - f/k_s`, implicit; `z` and `v` in the law are the
 /// tip's, and `v_tip = (z_tip - z_tip_before)/dt`.
@@ -28,16 +28,16 @@ static INFO: EffectInfo = EffectInfo {
     equation: "z_tip = z - f/k_s (implicit); z and v in the law are the tip's",
     source: "Series spring of needle and holder",
     signature: "Apparent stiffness k k_s/(k + k_s); the tip lags in proportion to the force and jumps at a rupture although the base does not.",
-    place: Place::Kinematics,
+    stage: ChainStage::Kinematics,
     parameters: &[ParameterInfo::strength("stiffness_n_per_m", "N/m", "stiffness of needle and holder")
         .allowed(1.0, f64::INFINITY)
-        .neutral(f64::INFINITY)
+        .inactive(f64::INFINITY)
         .search(1000.0, 50.0, 1e5)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[8000.0]], &[&[1500.0]], &[&[300.0]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[8000.0]], &[&[1500.0]], &[&[300.0]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for NeedleCompliance {

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Tissue that stiffens with indentation: `f_K = K x (1 + kappa x)`.
 ///
@@ -19,14 +19,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "f_K = K x (1 + kappa x)",
     source: "Okamura, Simone, O'Leary 2004",
     signature: "The loading slope grows with depth before each rupture, the same at all speeds.",
-    place: Place::Elastic,
+    stage: ChainStage::Elastic,
     parameters: &[ParameterInfo::strength("kappa_per_m", "1/m", "stiffening with indentation")
         .allowed(-100.0, 1000.0)
         .search(10.0, -5.0, 100.0)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[1.0]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[1.0]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for NonlinearElasticity {

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A tone in the force: `+ A sin(2 pi f t + phase)`, in air too.
 ///
@@ -23,7 +23,7 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ A sin(2 pi f t + phase), in air too",
     source: "Mains, drives, stage vibration",
     signature: "A narrow line in time, the same in air, in holds and at every depth.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[
         ParameterInfo::strength("amplitude_n", "N", "amplitude")
             .allowed(0.0, 100.0)
@@ -31,7 +31,7 @@ static INFO: EffectInfo = EffectInfo {
             .log(),
         ParameterInfo::shape("frequency_hz", "Hz", "frequency")
             .allowed(0.0, 1e5)
-            .neutral(5.0)
+            .inactive(5.0)
             .search(5.0, 0.05, 100.0)
             .log(),
         ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(
@@ -40,10 +40,10 @@ static INFO: EffectInfo = EffectInfo {
             core::f64::consts::PI,
         ),
     ],
-    larger: None,
-    proposal: Proposal::Line,
+    extended: None,
+    proposal: Proposal::SpectralTone,
     nested_in: &[],
-    imitates: true,
+    absorbs_unmodelled: true,
 };
 
 impl Described for PeriodicInterference {
@@ -63,12 +63,19 @@ impl Effect for PeriodicInterference {
     fn is_neutral(&self) -> bool {
         self.amplitude_n == 0.0
     }
-    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         let angle = core::f64::consts::TAU * self.frequency_hz * time_s + self.phase_rad;
         force_n + self.amplitude_n * libm::sin(angle)
     }
     /// The mean of a line over evenly spaced samples (Dirichlet's kernel).
-    fn sense_mean(&self, time_s: f64, span_s: f64, samples: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense_mean(
+        &self,
+        time_s: f64,
+        span_s: f64,
+        samples: f64,
+        force_n: f64,
+        _memory: &mut EffectState,
+    ) -> f64 {
         let half = core::f64::consts::PI * self.frequency_hz * span_s / samples.max(1.0);
         let (below, above) = (libm::sin(half), libm::sin(samples * half));
         let share = if below.abs() < 1e-9 { 1.0 } else { above / (samples * below) };

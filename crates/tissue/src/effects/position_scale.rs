@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A recorded position that is `(1 + eps)` times the true one; the recorded velocity as well.
 ///
@@ -19,14 +19,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "recorded z = (1 + eps) z",
     source: "Following errors of 0.6-2.9 % in the measured recordings",
     signature: "All boundaries come at depths that are off in proportion to depth.",
-    place: Place::Position,
+    stage: ChainStage::Position,
     parameters: &[ParameterInfo::strength("eps", "", "relative error of the recorded position")
         .allowed(-0.5, 1.0)
         .search(0.02, -0.2, 0.2)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.01]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.01]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for PositionScale {

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, sgn};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Friction that is not linear in speed: `v -> sgn(v) v0 (abs(v)/v0)^n` in the viscous friction,
 /// `v0 = 1 mm/s`.
@@ -28,15 +28,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "v -> sgn(v) v0 (|v|/v0)^n in the friction, v0 = 1 mm/s",
     source: "Rate dependence of phantoms and liver: van Gerwen et al. 2012",
     signature: "Friction against speed is a curve, not a line; no offset between speeds near 1 mm/s.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[ParameterInfo::strength("exponent", "", "exponent of speed in the friction")
         .allowed(-0.9, 3.0)
-        .neutral(1.0)
+        .inactive(1.0)
         .search(0.7, 0.1, 2.0)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[1.02]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[1.02]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for PowerLawFriction {

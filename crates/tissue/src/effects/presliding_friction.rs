@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction that builds up with travel (Dahl): `f_B += c xi sum l_i`,
 /// `xi' = (v/delta)(1 - xi sgn v)` while any shaft is inside.
@@ -34,7 +34,7 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ c xi sum l_i, xi' = (v/delta)(1 - xi sgn v) while any shaft is inside",
     source: "Dahl 1968; LuGre model",
     signature: "After each reversal the force follows travel over a finite distance, whatever the speed, and it stays in holds.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[
         ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside once sliding")
             .allowed(0.0, 1e4)
@@ -42,14 +42,19 @@ static INFO: EffectInfo = EffectInfo {
             .log(),
         ParameterInfo::shape("delta_m", "m", "travel over which the friction builds up")
             .allowed(1e-7, 0.1)
-            .neutral(5e-4)
+            .inactive(5e-4)
             .search(5e-4, 1e-5, 2e-2)
             .log(),
     ],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[1.0, 6e-5]], &[&[1.0, 2.5e-4]], &[&[1.0, 1e-3]], &[&[1.0, 4e-3]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[
+        &[&[1.0, 6e-5]],
+        &[&[1.0, 2.5e-4]],
+        &[&[1.0, 1e-3]],
+        &[&[1.0, 4e-3]],
+    ]),
     nested_in: &[],
-    imitates: true,
+    absorbs_unmodelled: true,
 };
 
 impl Described for PreslidingFriction {
@@ -73,7 +78,7 @@ impl Effect for PreslidingFriction {
         true
     }
     /// Memory: `xi`.
-    fn shaft_force(&self, moment: &Moment, inside_m: f64, memory: &mut Memory) -> f64 {
+    fn shaft_force(&self, moment: &TipState, inside_m: f64, memory: &mut EffectState) -> f64 {
         if inside_m > 0.0 {
             // On entry only the travel inside the tissue counts.
             let dz = moment.dz_m.min(inside_m);

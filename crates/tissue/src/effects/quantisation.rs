@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor with a coarse step: round to a multiple of `q` (halves away from zero).
 ///
@@ -19,15 +19,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "round to a multiple of q",
     source: "Sensor resolutions: 1/320 N (Nano17) to 1/16 N (Mini45)",
     signature: "Stairs: few distinct values, equal smallest differences.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("step_n", "N", "step")
         .allowed(0.0, 100.0)
         .search(0.05, 0.0005, 1.0)
         .log()],
-    larger: None,
-    proposal: Proposal::Raw,
+    extended: None,
+    proposal: Proposal::RawSamples,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for Quantisation {
@@ -47,7 +47,7 @@ impl Effect for Quantisation {
     fn is_neutral(&self) -> bool {
         self.step_n <= 0.0
     }
-    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         libm::round(force_n / self.step_n) * self.step_n
     }
 }

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Puncture force that depends on speed: `F_i -> F_i max(0.1, 1 + alpha ln(abs(v)/v0))`,
 /// `v0 = 1 mm/s`, `abs(v)` at least 0.1 mm/s.
@@ -20,14 +20,14 @@ static INFO: EffectInfo = EffectInfo {
     equation: "F_i -> F_i max(0.1, 1 + alpha ln(|v|/v0)), v0 = 1 mm/s, |v| at least 0.1 mm/s",
     source: "van Gerwen, Dankelman, van den Dobbelsteen 2012",
     signature: "The peak before a puncture changes with speed while the loading curve does not.",
-    place: Place::Puncture,
+    stage: ChainStage::Puncture,
     parameters: &[ParameterInfo::strength("alpha", "", "change of the puncture force per factor e in speed")
         .allowed(-2.0, 2.0)
         .search(0.1, -0.5, 0.5)],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.02]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.02]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for RateDependentPuncture {

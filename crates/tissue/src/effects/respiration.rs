@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Tissue that moves with the breath: `s_i -> s_i + A sin(2 pi f t + phase)`; depth and velocity
 /// in the law become relative to it.
@@ -24,7 +24,7 @@ static INFO: EffectInfo = EffectInfo {
     equation: "s_i -> s_i + A sin(2 pi f t + phase); z and v in the law are relative to the tissue",
     source: "Respiratory motion of abdominal organs, 0.2-0.4 Hz",
     signature: "Periodic in time, also while the needle is held.",
-    place: Place::Kinematics,
+    stage: ChainStage::Kinematics,
     parameters: &[
         ParameterInfo::strength("amplitude_m", "m", "amplitude of the tissue's motion")
             .allowed(0.0, 0.1)
@@ -32,7 +32,7 @@ static INFO: EffectInfo = EffectInfo {
             .log(),
         ParameterInfo::shape("frequency_hz", "Hz", "frequency of the breath")
             .allowed(0.0, 20.0)
-            .neutral(0.25)
+            .inactive(0.25)
             .search(0.25, 0.05, 2.0)
             .log(),
         ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(
@@ -41,10 +41,10 @@ static INFO: EffectInfo = EffectInfo {
             core::f64::consts::PI,
         ),
     ],
-    larger: None,
-    proposal: Proposal::Breath,
+    extended: None,
+    proposal: Proposal::TissueMotion,
     nested_in: &[],
-    imitates: true,
+    absorbs_unmodelled: true,
 };
 
 impl Described for Respiration {

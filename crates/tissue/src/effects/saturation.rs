@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A sensor at the end of its range: `clamp(f, -L, L)`.
 ///
@@ -25,17 +25,17 @@ static INFO: EffectInfo = EffectInfo {
     equation: "clamp(f, -L, L)",
     source: "Sensor ranges",
     signature: "A flat top: many equal maxima.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("limit_n", "N", "range of the sensor")
         .allowed(0.0, f64::INFINITY)
-        .neutral(f64::INFINITY)
+        .inactive(f64::INFINITY)
         .search(4.0, 0.2, 50.0)
-        .shown(1.6)
+        .demonstration(1.6)
         .log()],
-    larger: None,
-    proposal: Proposal::Raw,
+    extended: None,
+    proposal: Proposal::RawSamples,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for Saturation {
@@ -55,7 +55,7 @@ impl Effect for Saturation {
     fn is_neutral(&self) -> bool {
         self.limit_n == f64::INFINITY
     }
-    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut Memory) -> f64 {
+    fn sense(&self, _time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
         if force_n > self.limit_n {
             self.limit_n
         } else if force_n < -self.limit_n {

@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place, lag_weights, sgn};
-use crate::info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState, TipState, lag_weights, sgn};
+use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// Reference speed `v0` of the slip in m/s (1 mm/s).
 const V0_MPS: f64 = 1e-3;
@@ -37,7 +37,7 @@ const TURNS: usize = 80;
 ///
 /// Far below `L` nothing slips, which is presliding; steady sliding at speed `v` takes `F = L (v/v0)^(1/m)`: a large `m` is
 /// dry friction, `m` = 1 viscous; the net exponent of the plateau is `a + 1/m`. In a hold, `F` creeps down by slip and by relaxation. When the tip comes back to where the layer
-/// lets go (its front face, or as `let_go` says), `F` ends within 0.2 mm. The layer's viscous friction `b_i l_i v` is replaced.
+/// lets go (its front face, or as `release_depth` says), `F` ends within 0.2 mm. The layer's viscous friction `b_i l_i v` is replaced.
 ///
 /// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation; the error falls with the step
 /// (`crates/tissue/tests/shaft_slip.rs`). `m`, `b`, `g_j`, `tau_j` have no effect without `C` and `S`.
@@ -56,7 +56,7 @@ pub struct ShaftSlip {
     /// Hold `S` in N when pulled at 1 mm/s, zero or positive.
     pub pull_n: f64,
     /// Share `r` of `push_n` that the layer holds right after its rupture, 0 to 2.
-    pub kept: f64,
+    pub retained_share: f64,
     /// Exponent `m` of the slip, 1 (viscous) to 200 (dry).
     pub exponent: f64,
     /// Loss `d` of hold per metre of slip, 0 to 1e4 1/m.
@@ -64,7 +64,7 @@ pub struct ShaftSlip {
     /// Exponent `a` of the speed in the holds, -2 to 2: below zero it weakens with speed.
     pub rate: f64,
     /// Curvature `b` of the spring in N/m², 0 to 1e9.
-    pub curve_n_per_m2: f64,
+    pub curvature_n_per_m2: f64,
     /// Shares `g_j` of the spring's force that relax, each 0 to 1, together at most 1.
     pub fractions: [f64; 2],
     /// Their time constants `tau_j` in s, 0.001 to 10 000.
@@ -78,11 +78,11 @@ impl Default for ShaftSlip {
             layer: 1,
             push_n: 0.0,
             pull_n: 0.0,
-            kept: 1.0,
+            retained_share: 1.0,
             exponent: 10.0,
             wear_per_m: 0.0,
             rate: 0.0,
-            curve_n_per_m2: 0.0,
+            curvature_n_per_m2: 0.0,
             fractions: [0.0; 2],
             time_constants_s: [1.0, 10.0],
         }
@@ -91,9 +91,9 @@ impl Default for ShaftSlip {
 
 const LAYER: ParameterInfo = ParameterInfo::shape("layer", "", "layer, 1-based")
     .allowed(1.0, 1000.0)
-    .neutral(1.0)
+    .inactive(1.0)
     .search(1.0, 1.0, 10.0)
-    .whole();
+    .integer();
 const FRACTION: ParameterInfo = ParameterInfo::shape("fractions.0", "", "share of the force that relaxes")
     .allowed(0.0, 1.0)
     .search(0.2, 0.0, 0.9);
@@ -103,7 +103,7 @@ const RATE: (f64, f64) = (-0.1, 0.1);
 const SECOND: usize = 9;
 const TIME: ParameterInfo = ParameterInfo::shape("time_constants_s.0", "s", "its time constant")
     .allowed(1e-3, 1e4)
-    .neutral(1.0)
+    .inactive(1.0)
     .search(1.0, 0.1, 6.0)
     .log();
 
@@ -112,18 +112,18 @@ static INFO: EffectInfo = EffectInfo {
     equation: "F = E - q1 - q2, E = K w + b w|w|, w' = z' - v0 sgn(F) (|F|/L)^m once broken, w = z - s_i before; F = r C at the rupture",
     source: "Power-law creep of dragged contacts (Persson 2000) with Maxwell relaxation; measured skin and muscle phantoms",
     signature: "A flat hold after a fast first fall, a reversal that takes millimetres, a plateau that hardly knows the speed.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[
         LAYER,
         ParameterInfo::strength("push_n", "N", "hold when pushed at 1 mm/s").search(2.0, 0.05, 8.0),
         ParameterInfo::strength("pull_n", "N", "hold when pulled at 1 mm/s").search(1.0, 0.05, 8.0),
-        ParameterInfo::shape("kept", "", "share of that hold right after the rupture")
+        ParameterInfo::shape("retained_share", "", "share of that hold right after the rupture")
             .allowed(0.0, 2.0)
-            .neutral(1.0)
+            .inactive(1.0)
             .search(0.8, 0.0, 1.5),
         ParameterInfo::shape("exponent", "", "exponent of the slip in the force")
             .allowed(1.0, 200.0)
-            .neutral(10.0)
+            .inactive(10.0)
             .search(10.0, 2.0, 30.0)
             .log(),
         ParameterInfo::shape("wear_per_m", "1/m", "loss of hold per metre of slip")
@@ -132,19 +132,19 @@ static INFO: EffectInfo = EffectInfo {
         ParameterInfo::shape("rate", "", "exponent of the speed in the holds")
             .allowed(-2.0, 2.0)
             .search(0.0, -0.5, 0.5)
-            .expected(RATE.0, RATE.1),
-        ParameterInfo::shape("curve_n_per_m2", "N/m2", "curvature of the spring")
+            .measured_prior(RATE.0, RATE.1),
+        ParameterInfo::shape("curvature_n_per_m2", "N/m2", "curvature of the spring")
             .allowed(0.0, 1e9)
             .search(3e4, 0.0, 3e5),
         FRACTION,
         ParameterInfo { path: "fractions.1", ..FRACTION },
         TIME,
-        ParameterInfo { path: "time_constants_s.1", ..TIME }.neutral(10.0).search(10.0, 5.0, 60.0),
+        ParameterInfo { path: "time_constants_s.1", ..TIME }.inactive(10.0).search(10.0, 5.0, 60.0),
     ],
-    larger: None,
+    extended: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ShaftSlip {
@@ -154,11 +154,11 @@ impl Described for ShaftSlip {
             self.layer as f64,
             self.push_n,
             self.pull_n,
-            self.kept,
+            self.retained_share,
             self.exponent,
             self.wear_per_m,
             self.rate,
-            self.curve_n_per_m2,
+            self.curvature_n_per_m2,
             g1,
             g2,
             t1,
@@ -166,8 +166,20 @@ impl Described for ShaftSlip {
         ]
     }
     fn from_values(values: &[f64]) -> Option<Self> {
-        let [layer, push_n, pull_n, kept, exponent, wear_per_m, rate, curve_n_per_m2, g1, g2, t1, t2] =
-            *values
+        let [
+            layer,
+            push_n,
+            pull_n,
+            retained_share,
+            exponent,
+            wear_per_m,
+            rate,
+            curvature_n_per_m2,
+            g1,
+            g2,
+            t1,
+            t2,
+        ] = *values
         else {
             return None;
         };
@@ -177,11 +189,11 @@ impl Described for ShaftSlip {
             layer,
             push_n,
             pull_n,
-            kept,
+            retained_share: retained_share,
             exponent,
             wear_per_m,
             rate,
-            curve_n_per_m2,
+            curvature_n_per_m2,
             fractions,
             time_constants_s,
         })
@@ -212,7 +224,7 @@ impl Described for ShaftSlip {
 const SPEED: usize = 7;
 
 /// The speed that the contact knows follows the tip's over the travel in which the contact renews itself.
-fn renew(known_mps: &mut f64, moment: &Moment) {
+fn renew(known_mps: &mut f64, moment: &TipState) {
     let now = moment.v_mps.abs();
     if *known_mps <= 0.0 {
         *known_mps = now;
@@ -242,14 +254,14 @@ struct Contact {
 }
 
 impl Contact {
-    fn of(memory: &Memory) -> Self {
+    fn of(memory: &EffectState) -> Self {
         let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, speed_mps] = *memory;
         Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, broke: broke != 0.0, speed_mps }
     }
-    fn keep(self, memory: &mut Memory) {
+    fn keep(self, memory: &mut EffectState) {
         *memory = self.memory();
     }
-    fn memory(self) -> Memory {
+    fn memory(self) -> EffectState {
         let broke = if self.broke { 1.0 } else { 0.0 };
         let [q1, q2] = self.q_n;
         [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, broke, self.speed_mps]
@@ -308,7 +320,7 @@ impl ShaftSlip {
         let at_rest = self.relaxed(c.q_n, weights, c.spring_n, 0.0);
         let rest = at_rest[0] + at_rest[1];
         // q_j at the end is linear in the spring's force there.
-        let kept = 1.0 - weights[0].1 * self.fractions[0] - weights[1].1 * self.fractions[1];
+        let retained_share = 1.0 - weights[0].1 * self.fractions[0] - weights[1].1 * self.fractions[1];
         // Slip in the step and its derivative by the force.
         let slip = |force: f64| {
             let hold = if force >= 0.0 { push } else { pull };
@@ -325,11 +337,11 @@ impl ShaftSlip {
         let mut w = c.w_m;
         let mut slipped = 0.0;
         for _ in 0..TURNS {
-            let force = spring.force(w) * kept - rest;
+            let force = spring.force(w) * retained_share - rest;
             let (s, ds) = slip(force);
             let surplus = w - goal + s;
             slipped = s;
-            let change = surplus / (1.0 + ds * spring.slope(w) * kept);
+            let change = surplus / (1.0 + ds * spring.slope(w) * retained_share);
             if change.abs() <= 1e-15 + 1e-13 * w.abs() {
                 break;
             }
@@ -362,12 +374,12 @@ impl Effect for ShaftSlip {
     }
     fn shape(&self, slabs: &mut [Slab]) {
         if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
-            slab.gripped = 1.0;
-            slab.curve_n_per_m2 += self.curve_n_per_m2;
+            slab.replaced_friction_share = 1.0;
+            slab.curvature_n_per_m2 += self.curvature_n_per_m2;
         }
     }
     /// Pressed, the layer relaxes as it will when it is dragged.
-    fn press(&self, layer: usize, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64 {
+    fn press(&self, layer: usize, dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64 {
         if layer != self.layer {
             return elastic_n;
         }
@@ -379,20 +391,20 @@ impl Effect for ShaftSlip {
         c.keep(memory);
         elastic_n - c.q_n[0] - c.q_n[1]
     }
-    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut Memory) {
+    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut EffectState) {
         if layer == self.layer {
             let c = Contact::of(memory);
-            let fall_n = released_n.min(self.kept * self.push_n * self.fast(c.speed_mps));
+            let fall_n = released_n.min(self.retained_share * self.push_n * self.fast(c.speed_mps));
             Contact { fall_n, broke: true, slipped_m: 0.0, ..c }.keep(memory);
         }
     }
-    fn grip(&self, moment: &Moment, slabs: &[Slab], _sliding_mps: f64, memory: &mut Memory) -> f64 {
+    fn grip(&self, moment: &TipState, slabs: &[Slab], _sliding_mps: f64, memory: &mut EffectState) -> f64 {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
         renew(&mut memory[SPEED], moment);
         if moment.ruptured < self.layer {
             return 0.0;
         }
-        let spring = Spring { k_n_per_m: slab.stiffness_n_per_m, b_n_per_m2: slab.curve_n_per_m2 };
+        let spring = Spring { k_n_per_m: slab.stiffness_n_per_m, b_n_per_m2: slab.curvature_n_per_m2 };
         let end_m = if moment.v_mps < 0.0 { slab.release_m } else { slab.release_m.min(0.0) };
         let held = ((moment.z_m - slab.front_m - end_m) / EDGE_M).clamp(0.0, 1.0);
         if held == 0.0 {

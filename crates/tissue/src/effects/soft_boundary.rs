@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState, TipState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// A boundary that gives way gradually: the elastic release of a rupture is spread over travel `w`,
 /// linear in the deepest travel since; what is released stays released.
@@ -24,15 +24,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ R max(0, 1 - (deepest - z_r)/w) after a rupture at z_r that released R",
     source: "Tilted or blunt interfaces: NeedleInsertionDataAnalysis tables",
     signature: "Force drops are smeared over a travel, the same at all speeds.",
-    place: Place::Release,
+    stage: ChainStage::Release,
     parameters: &[ParameterInfo::strength("width_m", "m", "travel over which a rupture releases its force")
         .allowed(0.0, 0.1)
         .search(0.003, 1e-4, 0.02)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[3e-4]], &[&[1e-3]], &[&[3e-3]], &[&[8e-3]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[3e-4]], &[&[1e-3]], &[&[3e-3]], &[&[8e-3]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for SoftBoundary {
@@ -56,7 +56,7 @@ impl Effect for SoftBoundary {
         true
     }
     /// Memory: the deepest position, then up to three releases under way as (force, position).
-    fn on_rupture(&self, released_n: f64, z_m: f64, memory: &mut Memory) {
+    fn on_rupture(&self, released_n: f64, z_m: f64, memory: &mut EffectState) {
         // The newest release goes first; a fourth one under way, with three layers inside one
         // width, takes over what is left of the oldest.
         let deepest = memory[0].max(z_m);
@@ -67,7 +67,7 @@ impl Effect for SoftBoundary {
         memory[1] = released_n + oldest;
         memory[2] = z_m;
     }
-    fn tip_force(&self, moment: &Moment, _slabs: &[Slab], memory: &mut Memory) -> f64 {
+    fn tip_force(&self, moment: &TipState, _slabs: &[Slab], memory: &mut EffectState) -> f64 {
         if memory[7] == 0.0 {
             return 0.0;
         }

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Place, lag_weights, same_step};
-use crate::info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState, lag_weights, same_step};
+use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 use alloc::vec::Vec;
 
 /// One term of the Prony series.
@@ -36,7 +36,7 @@ const FRACTION: ParameterInfo =
         .search(0.3, 0.01, 0.95);
 const TIME: ParameterInfo = ParameterInfo::shape("terms.0.time_constant_s", "s", "time constant")
     .allowed(1e-3, 1e4)
-    .neutral(2.0)
+    .inactive(2.0)
     .search(2.0, 0.05, 60.0)
     .log();
 
@@ -45,10 +45,10 @@ const ONE: EffectInfo = EffectInfo {
     equation: "f_K = E - sum_j q_j, q_j' = (g_j E - q_j)/tau_j, q_j = 0 at rupture",
     source: "Prony series; phantoms measured with 0.3 s and 2.7 s",
     signature: "Decay at v = 0, exponential in time and not in depth, independent of the last speed.",
-    place: Place::Relaxation,
+    stage: ChainStage::Relaxation,
     parameters: &[FRACTION, TIME],
-    larger: None,
-    proposal: Proposal::Columns(&[
+    extended: None,
+    proposal: Proposal::LinearColumns(&[
         &[&[0.05, 0.06]],
         &[&[0.05, 0.2]],
         &[&[0.05, 0.5]],
@@ -58,7 +58,7 @@ const ONE: EffectInfo = EffectInfo {
         &[&[0.05, 25.0]],
     ]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 static TWO_TERMS: EffectInfo = EffectInfo {
@@ -69,7 +69,7 @@ static TWO_TERMS: EffectInfo = EffectInfo {
         ParameterInfo { path: "terms.1.time_constant_s", ..TIME }.search(3.0, 0.2, 120.0),
     ],
     // What one term stands for may be two of its strength on both sides of its time, or a weak one far from it.
-    proposal: Proposal::Split(&[
+    proposal: Proposal::SplitTerm(&[
         &[0.5, 0.1, 0.5, 1.5],
         &[0.5, 0.3, 0.5, 3.0],
         &[0.2, 0.05, 0.8, 1.2],
@@ -78,7 +78,7 @@ static TWO_TERMS: EffectInfo = EffectInfo {
     ..ONE
 };
 
-static ONE_TERM: EffectInfo = EffectInfo { larger: Some(&TWO_TERMS), ..ONE };
+static ONE_TERM: EffectInfo = EffectInfo { extended: Some(&TWO_TERMS), ..ONE };
 
 /// Place of the second share among the numbers.
 const SECOND: usize = 2;
@@ -136,7 +136,7 @@ impl Effect for StressRelaxation {
         true
     }
     /// Memory: `q_1`, `q_2`, the `E` before, the time step, and two weights per term for it.
-    fn relax(&self, dt_s: f64, elastic_n: f64, memory: &mut Memory) -> f64 {
+    fn relax(&self, dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64 {
         let [q1, q2, before, ..] = *memory;
         memory[2] = elastic_n;
         if dt_s <= 0.0 || (elastic_n == 0.0 && before == 0.0 && q1 == 0.0 && q2 == 0.0) {
@@ -157,7 +157,7 @@ impl Effect for StressRelaxation {
         }
         force
     }
-    fn on_rupture(&self, _released_n: f64, _z_m: f64, memory: &mut Memory) {
+    fn on_rupture(&self, _released_n: f64, _z_m: f64, memory: &mut EffectState) {
         memory[..3].fill(0.0);
     }
 }

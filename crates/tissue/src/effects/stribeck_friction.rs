@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place, sgn};
-use crate::info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 
 /// Dry friction that is larger at low speed:
 /// `f_B += sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)^2))`, `c_s >= c`.
@@ -31,7 +31,7 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)^2)), c_s >= c",
     source: "Stribeck curve, as in the LuGre model",
     signature: "Force higher at lower speed, and a break-away peak after each stop.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[
         ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside at high speed")
             .allowed(0.0, 1e4)
@@ -47,19 +47,19 @@ static INFO: EffectInfo = EffectInfo {
         .log(),
         ParameterInfo::shape("v_stribeck_mps", "m/s", "speed at which static friction fades")
             .allowed(1e-6, 1.0)
-            .neutral(2e-3)
+            .inactive(2e-3)
             .search(2e-3, 1e-4, 2e-2)
             .log(),
     ],
-    larger: None,
-    proposal: Proposal::Columns(&[
+    extended: None,
+    proposal: Proposal::LinearColumns(&[
         &[&[1.0, 1.0, 3e-4], &[0.0, 1.0, 3e-4]],
         &[&[1.0, 1.0, 8e-4], &[0.0, 1.0, 8e-4]],
         &[&[1.0, 1.0, 2e-3], &[0.0, 1.0, 2e-3]],
         &[&[1.0, 1.0, 5e-3], &[0.0, 1.0, 5e-3]],
     ]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for StribeckFriction {
@@ -98,7 +98,7 @@ impl Effect for StribeckFriction {
     fn is_neutral(&self) -> bool {
         self.c_n_per_m == 0.0 && self.c_static_n_per_m == 0.0
     }
-    fn shaft_force(&self, moment: &Moment, inside_m: f64, _memory: &mut Memory) -> f64 {
+    fn shaft_force(&self, moment: &TipState, inside_m: f64, _memory: &mut EffectState) -> f64 {
         let sign = sgn(moment.v_mps);
         if sign == 0.0 || inside_m == 0.0 {
             return 0.0;

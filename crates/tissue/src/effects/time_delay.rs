@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A force that arrives late against the position: `f(t) -> f(t - tau)`, linear between samples.
 ///
@@ -20,15 +20,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "f(t) -> f(t - tau)",
     source: "Latency and misaligned clocks",
     signature: "Starts, stops and drops come late by the same time at every depth and speed.",
-    place: Place::Sensor,
+    stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("delay_s", "s", "delay of the force")
         .allowed(0.0, 10.0)
         .search(0.03, 0.001, 0.5)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.003]], &[&[0.012]], &[&[0.05]], &[&[0.15]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.003]], &[&[0.012]], &[&[0.05]], &[&[0.15]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for TimeDelay {

@@ -1,6 +1,6 @@
 use super::Described;
-use crate::effect::{Effect, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
+use crate::effect::{ChainStage, Effect};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Mass of the tool beyond the sensor: `+ m a`.
 ///
@@ -19,15 +19,15 @@ static INFO: EffectInfo = EffectInfo {
     equation: "+ m a",
     source: "Needle 0.068 kg, sensor 0.236 kg: the laboratory's software",
     signature: "Spikes at start and stop, also in air, in proportion to the acceleration.",
-    place: Place::Tool,
+    stage: ChainStage::Tool,
     parameters: &[ParameterInfo::strength("mass_kg", "kg", "mass beyond the sensor")
         .allowed(0.0, 100.0)
         .search(0.1, 0.005, 5.0)
         .log()],
-    larger: None,
-    proposal: Proposal::Columns(&[&[&[0.1]]]),
+    extended: None,
+    proposal: Proposal::LinearColumns(&[&[&[0.1]]]),
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ToolInertia {

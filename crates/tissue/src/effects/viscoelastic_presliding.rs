@@ -1,7 +1,7 @@
 use super::Described;
-use crate::effect::{Effect, Memory, Moment, Place};
-use crate::info::{EffectInfo, ParameterInfo, Proposal};
-use crate::slab::Slab;
+use crate::effect::{ChainStage, Effect, EffectState, TipState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use crate::layer_geometry::Slab;
 
 /// Speed in m/s below which a layer holds with the friction of the last motion (0.1 mm/s).
 const REST_MPS: f64 = 1e-4;
@@ -12,11 +12,11 @@ const REST_MPS: f64 = 1e-4;
 /// With `S_i = b_i d_i abs(phi(v))` the sliding friction of the whole layer (`phi(v)` is `v`, or what
 /// `power_law_friction` and `asymmetric_friction` make of it), the branch holds the needle with
 ///
-/// `w' = (share S_i/delta) v - w/tau`, kept within `-share S_i` and `share S_i`,
+/// `w' = (share S_i/delta) v - w/tau`, retained_share within `-share S_i` and `share S_i`,
 ///
 /// from the puncture of the layer on: before it the shaft does not touch the layer. At the puncture
-/// `w` starts from `share kept f_K`, so that the layer releases no more than what friction cannot hold
-/// (`kept` 1) or than tears (`kept` below 1). When the speed changes, `S_i` follows over the travel
+/// `w` starts from `share retained_share f_K`, so that the layer releases no more than what friction cannot hold
+/// (`retained_share` 1) or than tears (`retained_share` below 1). When the speed changes, `S_i` follows over the travel
 /// `delta` in which the contact renews itself, and not at all below 0.1 mm/s. When the tip comes back to `release_m` beyond the layer's front face the layer lets go: `w = 0`.
 ///
 /// Branches of one layer add up; the shares of a layer that are left to no branch remain the base law's
@@ -37,7 +37,7 @@ pub struct ViscoelasticPresliding {
     /// Travel `delta` in metres over which friction builds up from zero to sliding, 1e-6 to 0.1.
     pub delta_m: f64,
     /// Share of the elastic force at the puncture that passes into the branch, 0 to 1.
-    pub kept: f64,
+    pub retained_share: f64,
     /// Time constant `tau` of the creep in seconds, 0.001 to 1e6; the longest stands for none.
     pub time_constant_s: f64,
     /// Where the layer lets go of the tip on the way back, in metres beyond its front face, -0.1 to 0.1.
@@ -47,7 +47,14 @@ pub struct ViscoelasticPresliding {
 impl Default for ViscoelasticPresliding {
     /// The neutral effect.
     fn default() -> Self {
-        Self { layer: 1, share: 0.0, delta_m: 5e-3, kept: 1.0, time_constant_s: 1e6, release_m: 0.0 }
+        Self {
+            layer: 1,
+            share: 0.0,
+            delta_m: 5e-3,
+            retained_share: 1.0,
+            time_constant_s: 1e6,
+            release_m: 0.0,
+        }
     }
 }
 
@@ -66,32 +73,32 @@ static INFO: EffectInfo = EffectInfo {
     equation: "w' = (share S_i/delta) v - w/tau, abs(w) <= share S_i = share b_i d_i abs(phi(v)), from puncture to release",
     source: "Maxwell-slip friction (Al-Bender, Lampaert, Swevers 2005) with creep; measured skin and muscle phantoms",
     signature: "After a reversal the force follows travel over millimetres, part of it fades in a hold, and on the way back it ends in a step.",
-    place: Place::Friction,
+    stage: ChainStage::Friction,
     parameters: &[
         ParameterInfo::shape("layer", "", "layer, 1-based")
             .allowed(1.0, 1000.0)
-            .neutral(1.0)
+            .inactive(1.0)
             .search(1.0, 1.0, 10.0)
-            .whole(),
+            .integer(),
         ParameterInfo::strength("share", "", "share of the layer's friction that this branch carries")
             .allowed(0.0, 1.0)
             .search(1.0, 0.01, 1.0),
         ParameterInfo::shape("delta_m", "m", "travel over which friction builds up to sliding")
             .allowed(1e-6, 0.1)
-            .neutral(5e-3)
+            .inactive(5e-3)
             .search(5e-3, 2e-4, 0.05)
             .log(),
         ParameterInfo::shape(
-            "kept",
+            "retained_share",
             "",
             "share of the elastic force at the puncture that passes into friction",
         )
         .allowed(0.0, 1.0)
-        .neutral(1.0)
+        .inactive(1.0)
         .search(1.0, 0.0, 1.0),
         ParameterInfo::shape("time_constant_s", "s", "time constant of the creep")
             .allowed(1e-3, 1e6)
-            .neutral(1e6)
+            .inactive(1e6)
             .search(3.0, 0.1, 60.0)
             .log(),
         ParameterInfo::shape(
@@ -102,10 +109,10 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(-0.1, 0.1)
         .search(0.0, -0.01, 0.01),
     ],
-    larger: None,
+    extended: None,
     proposal: Proposal::PerLayer,
     nested_in: &[],
-    imitates: false,
+    absorbs_unmodelled: false,
 };
 
 impl Described for ViscoelasticPresliding {
@@ -114,15 +121,17 @@ impl Described for ViscoelasticPresliding {
             self.layer as f64,
             self.share,
             self.delta_m,
-            self.kept,
+            self.retained_share,
             self.time_constant_s,
             self.release_m
         ]
     }
     fn from_values(values: &[f64]) -> Option<Self> {
-        let [layer, share, delta_m, kept, time_constant_s, release_m] = *values else { return None };
+        let [layer, share, delta_m, retained_share, time_constant_s, release_m] = *values else {
+            return None;
+        };
         let layer = libm::round(layer) as usize; // saturates, and NaN is zero, which is no layer
-        Some(Self { layer, share, delta_m, kept, time_constant_s, release_m })
+        Some(Self { layer, share, delta_m, retained_share: retained_share, time_constant_s, release_m })
     }
 }
 
@@ -138,16 +147,16 @@ impl Effect for ViscoelasticPresliding {
     }
     fn shape(&self, slabs: &mut [Slab]) {
         if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
-            slab.gripped = (slab.gripped + self.share).min(1.0);
+            slab.replaced_friction_share = (slab.replaced_friction_share + self.share).min(1.0);
         }
     }
-    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut Memory) {
+    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut EffectState) {
         if layer == self.layer {
-            memory[0] = self.share * self.kept * released_n;
+            memory[0] = self.share * self.retained_share * released_n;
         }
     }
     /// Memory: `w`, the limit `share S_i`, and the time step with its weights.
-    fn grip(&self, moment: &Moment, slabs: &[Slab], sliding_mps: f64, memory: &mut Memory) -> f64 {
+    fn grip(&self, moment: &TipState, slabs: &[Slab], sliding_mps: f64, memory: &mut EffectState) -> f64 {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
         let [mut w, mut limit, step, keep, ramp, ..] = *memory;
         if limit == 0.0 || moment.v_mps.abs() >= REST_MPS {

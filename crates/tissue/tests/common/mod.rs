@@ -67,7 +67,7 @@ pub fn usual_motion() -> Vec<Sample> {
 }
 
 pub fn run(tissue: &Tissue, effects: &[AnyEffect], motion: &[Sample]) -> (Vec<TissueForce>, Vec<Rupture>) {
-    let law = Law::new(tissue, effects).expect("few effects");
+    let law = ForceLaw::new(tissue, effects).expect("few effects");
     let (mut forces, mut ruptures) = (Vec::new(), Vec::new());
     replay(&law, motion.iter().copied(), |r| ruptures.push(r), |f| forces.push(f));
     (forces, ruptures)
@@ -91,12 +91,12 @@ pub fn worst(a: &[f64], b: &[f64]) -> f64 {
 /// Every effect of the library at its typical values, larger variants too.
 pub fn typical_effects() -> Vec<AnyEffect> {
     let mut out = Vec::new();
-    for entry in library() {
+    for entry in general_effects() {
         let mut next = Some(entry);
         while let Some(info) = next {
             let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
             out.push(AnyEffect::from_parameters(info.id, &start).expect("the library knows its own"));
-            next = info.larger;
+            next = info.extended;
         }
     }
     out

@@ -4,10 +4,10 @@ use super::strength::{aim, size_of};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
-use stylet_diagnose::held_out::{by_its_own, rms};
-use stylet_diagnose::outcome::Estimate;
-use stylet_diagnose::{Evidence, Options, Verdict, belief, diagnose};
-use stylet_identify::model::{Choice, Model};
+use stylet_diagnose::diagnosis_json::Estimate;
+use stylet_diagnose::held_out::{pooled_rms, predict_free_run};
+use stylet_diagnose::{NamedRecording, Options, Verdict, assumptions_of, diagnose};
+use stylet_identify::model::{EffectTerm, Model};
 use stylet_own_world::{Drawn, Kind, Size, Sketch};
 use stylet_tissue::{AnyEffect, Effect, ForceGain};
 
@@ -66,11 +66,11 @@ pub fn run(index: u64, sketch: &Sketch) -> Option<Case> {
 #[must_use]
 pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Case> {
     let case = stylet_own_world::case(drawn);
-    let evidence: Vec<Evidence> = case
+    let evidence: Vec<NamedRecording> = case
         .recordings
         .iter()
         .enumerate()
-        .map(|(k, r)| Evidence { name: format!("{k}.csv"), recording: r.clone(), notes: Vec::new() })
+        .map(|(k, r)| NamedRecording { name: format!("{k}.csv"), recording: r.clone(), notes: Vec::new() })
         .collect();
     let start = Instant::now();
     let examined = diagnose(&case.believed, &evidence, &Options::default(), |_| {}).ok()?;
@@ -87,11 +87,11 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Case> {
         Kind::Clean => d.verdict == Verdict::None,
         Kind::Outside => d.verdict == Verdict::Unknown,
         _ if hidden_ids == [ForceGain::ID] => {
-            d.invisible.contains(&hidden_ids[0]) && d.verdict == Verdict::None
+            d.not_identifiable.contains(&hidden_ids[0]) && d.verdict == Verdict::None
         }
         // What a single recording cannot show has to be listed as invisible.
         _ if drawn.motions == stylet_own_world::Motions::One && d.verdict == Verdict::None => {
-            hidden_ids.iter().all(|h| d.invisible.contains(h))
+            hidden_ids.iter().all(|h| d.not_identifiable.contains(h))
         }
         _ => {
             named.len() == hidden_ids.len()
@@ -103,7 +103,7 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Case> {
         let Some(cause) = d.causes.iter().find(|c| c.effect == effect.id()) else { continue };
         for (p, truth) in effect.info().parameters.iter().zip(effect.parameters()) {
             let Some(found) = cause.parameters.get(p.path) else { continue };
-            if p.whole {
+            if p.integer {
                 continue;
             }
             let (error, held) = error(p.unit, found, truth);
@@ -111,12 +111,14 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Case> {
         }
     }
     // What the truth would leave.
-    let choices: Vec<Choice> = drawn.effects.iter().map(|e| Choice::new(e.info(), &e.parameters())).collect();
-    let mut truth = Model::base(Arc::new(belief(&case.believed)), case.recordings.len());
+    let choices: Vec<EffectTerm> =
+        drawn.effects.iter().map(|e| EffectTerm::new(e.info(), &e.parameters())).collect();
+    let mut truth = Model::base(Arc::new(assumptions_of(&case.believed)), case.recordings.len());
     truth.tissue = case.truth.clone();
     truth.effects = choices;
-    let left: Vec<_> = (0..case.recordings.len()).map(|r| by_its_own(&truth, &search.data, r)).collect();
-    let after_true = rms(&left, &search.data);
+    let left: Vec<_> =
+        (0..case.recordings.len()).map(|r| predict_free_run(&truth, &search.data, r)).collect();
+    let after_true = pooled_rms(&left, &search.data);
     let (before, after) = (d.gain.rmse_before_n, d.gain.rmse_after_n);
     let gain = (before - after_true > 0.03 * before).then(|| (before - after) / (before - after_true));
     Some(Case {
@@ -134,13 +136,13 @@ pub fn examine(index: u64, kind: Kind, drawn: &Drawn) -> Option<Case> {
         verdict: d.verdict,
         named,
         confidence: d.causes.iter().map(|c| c.confidence).collect(),
-        invisible: d.invisible.clone(),
+        invisible: d.not_identifiable.clone(),
         right,
         truth_nats: None,
         errors,
         gain,
         rms_n: [before, after, after_true],
-        leftover: (d.leftover.p_value, d.leftover.nats),
+        leftover: (d.residual_structure.p_value, d.residual_structure.nats),
         explained: search.base.nats() - search.best.nats(),
         seconds,
         samples: case.recordings.iter().map(stylet_record::Recording::len).sum(),

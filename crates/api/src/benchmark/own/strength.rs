@@ -1,44 +1,46 @@
 //! How strong what is hidden is, and drawn to be.
 
 use std::sync::Arc;
-use stylet_diagnose::base::{Prepared, base};
-use stylet_diagnose::belief;
-use stylet_diagnose::held_out::by_its_own;
-use stylet_identify::blocks::{BLOCK_S, Blocks};
+use stylet_diagnose::assumptions_of;
+use stylet_diagnose::base_law_fit::{PreparedRecordings, fit_base_law};
+use stylet_diagnose::held_out::predict_free_run;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::fit::Fit;
-use stylet_identify::objective::Data;
+use stylet_identify::likelihood::FitData;
 use stylet_own_world::{Drawn, Sketch};
 use stylet_tissue::{AnyEffect, Effect, ForceGain};
 
 /// Strength of what is hidden after re-fitting the base law.
 fn strength(drawn: &Drawn) -> Option<f64> {
     let case = stylet_own_world::case(drawn);
-    let blocks = case.recordings.iter().map(|r| Blocks::new(r, &[], BLOCK_S)).collect();
-    let (fit, data) = base(&Prepared::new(Arc::new(belief(&case.believed)), blocks, 0.0))?;
+    let blocks = case.recordings.iter().map(|r| BlockAverages::new(r, &[], BLOCK_S)).collect();
+    let (fit, data) =
+        fit_base_law(&PreparedRecordings::new(Arc::new(assumptions_of(&case.believed)), blocks, 0.0))?;
     Some(size_of(&fit, &data, drawn))
 }
 
 /// Root mean square of what the fitted base law leaves of the force without noise, in standard deviations of the noise.
-pub(super) fn size_of(fit: &Fit, data: &Data, drawn: &Drawn) -> f64 {
+pub(super) fn size_of(fit: &Fit, data: &FitData, drawn: &Drawn) -> f64 {
     let mut clean = data.clone();
-    let mut blocks = clean.blocks.to_vec();
+    let mut blocks = clean.recordings.to_vec();
     for (b, f) in blocks.iter_mut().zip(&stylet_own_world::clean_force(drawn)) {
         let mut sums = vec![(0.0, 0.0); b.len()];
-        for (f, k) in f.iter().zip(b.raw_block.iter()) {
+        for (f, k) in f.iter().zip(b.sample_block.iter()) {
             sums[*k as usize].0 += f;
             sums[*k as usize].1 += 1.0;
         }
-        b.f = sums.iter().map(|(s, n)| s / f64::max(*n, 1.0)).collect();
+        b.force_n = sums.iter().map(|(s, n)| s / f64::max(*n, 1.0)).collect();
     }
-    clean.blocks = Arc::new(blocks);
+    clean.recordings = Arc::new(blocks);
     let (mut square, mut n) = (0.0, 0.0);
-    for r in 0..clean.recordings() {
-        let Some(left) = by_its_own(&fit.model, &clean, r) else { continue };
-        let b = &clean.blocks[r];
+    for r in 0..clean.recording_count() {
+        let Some(left) = predict_free_run(&fit.model, &clean, r) else { continue };
+        let b = &clean.recordings[r];
         // A rupture early or late by a part of a sample says nothing of an effect.
-        let near = |k: usize| left.instants.iter().any(|t| t.is_finite() && b.at(*t).abs_diff(k) <= 1);
+        let near =
+            |k: usize| left.rupture_times_s.iter().any(|t| t.is_finite() && b.block_at(*t).abs_diff(k) <= 1);
         for k in (0..b.len()).filter(|k| b.used[*k] && !near(*k)) {
-            square += left.e[k] * left.e[k];
+            square += left.residual_n[k] * left.residual_n[k];
             n += 1.0;
         }
     }

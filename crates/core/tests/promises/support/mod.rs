@@ -6,7 +6,7 @@ use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample};
-use stylet_tissue::{Law, LawState, Rupture, Tissue, TissueForce};
+use stylet_tissue::{ForceLaw, ForceLawState, Rupture, Tissue, TissueForce};
 
 /// Samples of an insertion, with the true force and ruptures.
 pub struct Insertion {
@@ -25,8 +25,8 @@ pub fn insertion(
     seed: u64,
     velocity_mps: impl Fn(f64) -> f64,
 ) -> Insertion {
-    let law = Law::base(tissue);
-    let mut state = LawState::default();
+    let law = ForceLaw::base(tissue);
+    let mut state = ForceLawState::default();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut out = Insertion { samples: Vec::new(), truth: Vec::new(), ruptures: Vec::new() };
     let mut z = start_m;

@@ -20,7 +20,7 @@ pub fn with_arm(file: &str, arm: ArmConfig, sensor: VirtualSensor) -> Scenario {
 /// An observer without noise.
 pub fn noiseless(gain_per_s: f64) -> VirtualSensor {
     VirtualSensor {
-        gain_per_s: ObserverGain::Same(gain_per_s),
+        gain_per_s: ObserverGain::Uniform(gain_per_s),
         torque_noise_nm: 0.0,
         ..VirtualSensor::default()
     }

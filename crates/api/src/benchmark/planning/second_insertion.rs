@@ -1,0 +1,138 @@
+//! One reality: diagnosed after one insertion, and, where that leaves the cause open, after a second one.
+
+use crate::benchmark::answer_question::{answer_question, scenario_and_recordings};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+use stylet_diagnose::Options;
+use stylet_examine::reality::motion::{Path, Piece};
+use stylet_examine::{Again, Answer, CaseId};
+use stylet_plan::Limits;
+use stylet_scenario::{Motion, Segment};
+use stylet_tissue::ForceGain;
+
+/// One case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct PlanningCase {
+    pub id: CaseId,
+    pub hidden: String,
+    /// How the first diagnosis leaves the cause open: `class`, `invisible`, or not at all.
+    pub open_because: Option<String>,
+    /// Predicted probability that the diagnosis decides after the planned insertion.
+    pub predicted_probability: f64,
+    pub planned: Option<SecondDiagnosis>,
+    pub sinusoid: Option<SecondDiagnosis>,
+    pub plan_s: f64,
+    pub seconds: f64,
+    pub error: Option<String>,
+}
+
+/// What was said after a second insertion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct SecondDiagnosis {
+    /// Causes, each with its class.
+    pub causes: Vec<Vec<String>>,
+    /// The right single cause by the referee's rules, no class.
+    pub correct: bool,
+    /// The hidden effect itself is named (the rules let some pass unsaid).
+    pub hidden_effect_named: bool,
+    pub unknown: bool,
+}
+
+/// Goes through a case; why it could not be is noted in it.
+pub(super) fn run_case(id: &CaseId) -> PlanningCase {
+    let begun = Instant::now();
+    let mut case = PlanningCase {
+        id: *id,
+        hidden: String::new(),
+        open_because: None,
+        predicted_probability: 0.0,
+        planned: None,
+        sinusoid: None,
+        plan_s: 0.0,
+        seconds: 0.0,
+        error: None,
+    };
+    if let Err(why) = go_through(id, &mut case) {
+        case.error = Some(why);
+    }
+    case.seconds = begun.elapsed().as_secs_f64();
+    case
+}
+
+fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
+    let text = |e: &dyn std::fmt::Display| e.to_string();
+    let mut first = Again::new(id);
+    case.hidden = first.hidden().join("+");
+    // A gain cannot be seen in any motion.
+    if case.hidden == ForceGain::ID {
+        return Ok(());
+    }
+    first.insert(first.constant()).map_err(|e| text(&e))?;
+    let (scenario, evidence) = scenario_and_recordings(&first.question())?;
+    let examined =
+        stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {}).map_err(|e| text(&e))?;
+    let d = &examined.diagnosis;
+    let in_class = d.causes.iter().any(|c| {
+        !c.equivalent.is_empty() && (c.effect == case.hidden || c.equivalent.contains(&case.hidden))
+    });
+    case.open_because = if in_class {
+        Some("class".to_owned())
+    } else {
+        d.not_identifiable.contains(&case.hidden).then(|| "invisible".to_owned())
+    };
+    if case.open_because.is_none() {
+        return Ok(());
+    }
+    let begun = Instant::now();
+    let limits = Limits {
+        depth_m: first.depth_m(),
+        speed_mps: 0.008,
+        acceleration_mps2: 0.1,
+        duration_s: 90.0,
+        force_n: 30.0,
+    };
+    let (ground, begin) = stylet_plan::from_diagnosis(&scenario, &examined).map_err(|e| text(&e))?;
+    let (plan, _) = stylet_plan::plan(&ground, &limits, &begin).map_err(|e| text(&e))?;
+    case.plan_s = begun.elapsed().as_secs_f64();
+    case.predicted_probability = plan.probability_decided;
+    let second = |path: Path| -> Result<SecondDiagnosis, String> {
+        let mut reality = first.clone();
+        reality.insert(path).map_err(|e| e.to_string())?;
+        let answer = answer_question(&reality.question())?;
+        Ok(said(&reality, &answer, &case.hidden))
+    };
+    let path = path_of(&plan.motion).ok_or_else(|| "the plan is no program".to_owned())?;
+    let (planned, sinusoid) = rayon::join(|| second(path), || second(first.sinusoid()));
+    (case.planned, case.sinusoid) = (Some(planned?), Some(sinusoid?));
+    Ok(())
+}
+
+fn said(reality: &Again, answer: &Answer, hidden: &str) -> SecondDiagnosis {
+    let worth = reality.judge(answer);
+    SecondDiagnosis {
+        causes: answer
+            .causes
+            .iter()
+            .map(|c| std::iter::once(&c.effect).chain(&c.equivalent).cloned().collect())
+            .collect(),
+        correct: worth.right && answer.causes.iter().all(|c| c.equivalent.is_empty()),
+        hidden_effect_named: answer.causes.iter().any(|c| c.effect == hidden && c.equivalent.is_empty()),
+        unknown: answer.verdict == stylet_examine::Verdict::Unknown,
+    }
+}
+
+/// A program as the referee's path: both have the same segments.
+fn path_of(motion: &Motion) -> Option<Path> {
+    let Motion::Program { start_m, segments } = motion else { return None };
+    let piece = |s: &Segment| match *s {
+        Segment::Move { velocity_mps, duration_s } => Piece::steady(velocity_mps, duration_s),
+        Segment::Hold { duration_s } => Piece::steady(0.0, duration_s),
+        Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s } => Piece::Move {
+            speed_mps: velocity_mps,
+            ripple_mps: amplitude_mps,
+            ripple_hz: frequency_hz,
+            duration_s,
+        },
+    };
+    Some(Path::new(*start_m, segments.iter().map(piece).collect()))
+}

@@ -1,0 +1,220 @@
+//! Repeated insertions: a data set, or a scenario and recordings that repeat one insertion.
+
+use crate::diagnosis_inputs::DiagnosisInputs;
+use crate::error::Error;
+use crate::output_files::OutputFiles;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use stylet_core::EnhanceConfig;
+use stylet_core::Sample;
+use stylet_diagnose::Diagnosis;
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::dataset::{Dataset, DatasetError, find_files, is_dataset};
+use stylet_diagnose::repeated_insertions::diagnose_set::{SetDiagnosis, diagnose_set};
+use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings;
+use stylet_diagnose::repeated_insertions::layer_composition::compose_layers;
+use stylet_diagnose::repeated_insertions::population_prediction::friction_model;
+use stylet_diagnose::repeated_insertions::repeatability_report::{CompositionReport, RepeatabilityReport};
+use stylet_pages::repeated_insertions::{ablation_figure, page};
+use stylet_record::{Recording, read_csv};
+use stylet_scenario::Scenario;
+use stylet_score::{MeasuredRecording, MeasuredScore, Trace};
+use stylet_tissue::Effect as _;
+
+/// Fewest recordings that can be told from a law.
+const FEWEST: usize = 3;
+
+/// What a study of repeated insertions gives.
+pub struct RepeatsReport {
+    /// Laws, verdict, what varies from run to run, predictions of runs left out.
+    pub study: SetDiagnosis,
+    /// What the online core hears in each run.
+    pub online: Vec<MeasuredScore>,
+}
+
+/// `diagnosis.json`.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    repeats: &'a RepeatabilityReport,
+    online: &'a [MeasuredScore],
+}
+
+/// The data set that the inputs name; of a scenario one that believes in its tissue.
+///
+/// # Errors
+/// [`Error::Input`] when a file is wrong, [`Error::Request`] when the scenario believes in effects.
+pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
+    let mut set = if is_dataset(&inputs.scenario)? {
+        Dataset::load(&inputs.scenario)?
+    } else {
+        let scenario = Scenario::load(&inputs.scenario)?;
+        if !scenario.effects.is_empty() {
+            let names: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
+            return Err(Error::Request(format!(
+                "{}: believes in {}, and repeats are held against the base law alone: take `effects` out of the scenario, or diagnose \
+                 the recordings without --repeats",
+                inputs.scenario.display(),
+                names.join(", ")
+            )));
+        }
+        Dataset {
+            name: scenario.name,
+            source: scenario.source,
+            columns: None,
+            tissue: scenario.tissue,
+            recordings: Vec::new(),
+            split_by: Vec::new(),
+            air: None,
+            load: None,
+            parts: Vec::new(),
+            repair: false,
+        }
+    };
+    set.repair = inputs.repair;
+    if let Some(path) = &inputs.columns {
+        set.columns = Some(stylet_scenario::load(path)?);
+    }
+    Ok(set)
+}
+
+/// The recordings that are given, else those that the data set names.
+///
+/// # Errors
+/// [`Error::Request`] when there are none, [`Error::Dataset`] when a file is not there.
+pub fn recording_files(set: &Dataset, given: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    if !given.is_empty() {
+        return Ok(given.to_vec());
+    }
+    if set.recordings.is_empty() {
+        return Err(Error::Request(
+            "no recordings: name them with --data A.csv B.csv, or in the data set's `recordings`".to_owned(),
+        ));
+    }
+    let mut out = Vec::new();
+    for pattern in &set.recordings {
+        out.extend(find_files(pattern)?);
+    }
+    Ok(out)
+}
+
+/// Studies the runs of a data set; `progress` is told what is being done. With recordings `given` by hand, others that the set names
+/// (checks in air and under a load, single layers) may be missing.
+///
+/// # Errors
+/// [`Error::Dataset`] when there is too little, [`Error::Recording`] when a recording is wrong.
+pub fn diagnose_repeats(
+    set: &Dataset,
+    runs: &[SegmentedRecording],
+    given: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<RepeatsReport, Error> {
+    if runs.len() < FEWEST {
+        return Err(DatasetError::TooLittle(format!(
+            "{} recording(s): repeats are told from the law with {FEWEST} or more; without --repeats single recordings are diagnosed",
+            runs.len()
+        ))
+        .into());
+    }
+    let air = optional(set, set.air.as_deref(), given)?;
+    let load = optional(set, set.load.as_ref().map(|l| l.file.as_str()), given)?;
+    let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));
+    let refs: Vec<&SegmentedRecording> = runs.iter().collect();
+    let checks = ReferenceRecordings { air: air.as_ref(), load: known };
+    let mut study = diagnose_set(&set.name, &set.tissue, &refs, &checks, &mut *progress)
+        .ok_or_else(|| Error::internal("no law could be fitted to these recordings"))?;
+    progress("the law chosen without parts of the set");
+    study.run_nested_cross_validation();
+    if !set.parts.is_empty() {
+        progress("layers measured alone, put together");
+        study.report.composition = parts(set, &study, given)?;
+    }
+    let online = study.recordings.iter().enumerate().map(|(i, run)| listen(run, &study, i)).collect();
+    Ok(RepeatsReport { study, online })
+}
+
+impl RepeatsReport {
+    /// All files that `stylet diagnose` writes for repeats.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a value cannot be written.
+    pub fn output(&self, set: &Dataset, inputs: &DiagnosisInputs) -> Result<OutputFiles, Error> {
+        let Self { study, online } = self;
+        let file = inputs.scenario.display();
+        let ron = format!(
+            "// {file}: the law that stylet diagnose {} found, with the mean of what varies from run to run.\n{}",
+            env!("CARGO_PKG_VERSION"),
+            study.mean_scenario.to_ron().map_err(Error::internal)?
+        );
+        let mut commands = format!("stylet diagnose {file}");
+        if !inputs.data.is_empty() {
+            let _ = write!(commands, " --data ...  # {} recordings", study.recordings.len());
+        }
+        commands.push_str("\nstylet run extended.ron  # the mean insertion, simulated");
+        let mut output = OutputFiles::default();
+        output.add("report.html", page(set, &file.to_string(), commands, study, online).to_html());
+        output.add_json(
+            "diagnosis.json",
+            &Written { diagnosis: &study.diagnosis, repeats: &study.report, online },
+        )?;
+        output.add("extended.ron", ron);
+        output.add("gain.svg", ablation_figure(study));
+        Ok(output)
+    }
+}
+
+/// What the online core hears in run `i`, and what it leaves of the way back with the friction of a law fitted to the other runs.
+fn listen(run: &SegmentedRecording, study: &SetDiagnosis, i: usize) -> MeasuredScore {
+    let r = &run.recording;
+    let config = EnhanceConfig::default();
+    let trace = Trace::run(r, &r.force_n, &config, 0.0, |_, _| {});
+    let drops: Vec<usize> = run.drops().iter().map(|drop| drop.sample).collect();
+    let measured = MeasuredRecording {
+        name: &run.name,
+        recording: r,
+        drops: &drops,
+        deepest: run.phases.deepest,
+        retraction: run.phases.retraction,
+        contact_m: run.contact_m,
+    };
+    let population = study.held_out.get(i).and_then(|o| o.population.as_ref());
+    MeasuredScore::evaluate(&measured, &trace, &config, || {
+        let mut shaft = friction_model(population?, r)?;
+        Some(move |s: &Sample, ruptured| shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptured))
+    })
+}
+
+/// A recording that a data set names; with recordings given by hand it may be missing.
+fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Recording>, Error> {
+    let Some(file) = file else { return Ok(None) };
+    let found = match find_files(file) {
+        Ok(found) => found,
+        Err(DatasetError::NoFile { .. }) if given => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    let first: &Path = &found[0];
+    Ok(Some(read_csv(first, &set.options())?.0))
+}
+
+/// Laws of layers that were measured alone, put together.
+fn parts(set: &Dataset, study: &SetDiagnosis, given: bool) -> Result<Option<CompositionReport>, Error> {
+    let mut alone: Vec<(String, Vec<SegmentedRecording>)> = Vec::new();
+    for layer in 1..=set.tissue.layers.len() {
+        let Some(part) = set.parts.iter().find(|p| p.layer == layer) else { return Ok(None) };
+        let mut files = Vec::new();
+        for pattern in &part.recordings {
+            match find_files(pattern) {
+                Ok(found) => files.extend(found),
+                Err(DatasetError::NoFile { .. }) if given => return Ok(None),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        let runs = set.load_recordings(&files, 1)?;
+        let undone = study.report.instrument.calibrate(&runs.iter().collect::<Vec<_>>());
+        alone.push((part.name.clone(), undone.recordings));
+    }
+    let whole: Vec<&SegmentedRecording> = study.recordings.iter().collect();
+    Ok(compose_layers(study.candidates.best.family, &set.tissue, &alone, &whole))
+}

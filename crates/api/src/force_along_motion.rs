@@ -1,0 +1,38 @@
+//! What a scenario says about a motion that was recorded.
+
+use crate::error::Error;
+use stylet_record::Recording;
+use stylet_scenario::{ForceTorque, MotionPoint, Scenario};
+use stylet_testbed::{ForceSensor, SimulateError};
+use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState};
+
+/// The force (N, one value per sample) that a scenario's tissue, effects and noise-free sensor give along the motion of a
+/// recording: the law is stepped once per sample on the recorded position and velocity. The scenario's own motion, robot
+/// and noise play no part; neither does the recording's force.
+///
+/// # Errors
+/// [`Error::Simulate`] when the scenario has more effects than the law takes.
+pub fn force_along_motion(scenario: &Scenario, motion: &Recording) -> Result<Vec<f64>, Error> {
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects)
+        .map_err(|why| Error::Simulate { file: scenario.name.clone(), why: SimulateError::Effects(why) })?;
+    let silent = ForceTorque { noise_n: 0.0, ..scenario.sensor.force_torque().cloned().unwrap_or_default() };
+    let mut measuring = ForceSensor::new(&scenario.effects, &silent, 0, motion.sample_hz());
+    // What was recorded is the true position times the scale.
+    let scale: f64 = scenario
+        .effects
+        .iter()
+        .map(|e| if let AnyEffect::PositionScale(scale) = e { 1.0 + scale.eps } else { 1.0 })
+        .product();
+    let mut state = ForceLawState::default();
+    let mut before: Option<(f64, f64)> = None;
+    let mut force_n = Vec::with_capacity(motion.len());
+    for s in motion.samples() {
+        let (position_m, velocity_mps) = (s.position_m / scale, s.velocity_mps / scale);
+        let acceleration_mps2 = before.map_or(0.0, |(t, v)| (velocity_mps - v) / (s.time_s - t));
+        before = Some((s.time_s, velocity_mps));
+        let force = law.step(&mut state, s.time_s, position_m, velocity_mps, &mut |_| {});
+        let at = MotionPoint { position_m, velocity_mps, acceleration_mps2 };
+        force_n.push(measuring.measure_force(s.time_s, &at, force.total_n));
+    }
+    Ok(force_n)
+}

@@ -1,0 +1,57 @@
+//! A model against recordings that took no part in making it.
+
+use crate::diagnosis_inputs::DiagnosisInputs;
+use crate::error::Error;
+use crate::output_files::OutputFiles;
+use std::path::Path;
+use stylet_diagnose::Diagnosis;
+use stylet_diagnose::prediction::PredictionResult;
+use stylet_scenario::Scenario;
+
+/// Where a model came from, as the folder in which it lies tells.
+#[derive(Clone, Debug, Default)]
+pub struct ModelOrigin {
+    /// The diagnosis that made it.
+    pub diagnosis: Option<Diagnosis>,
+    /// What was believed before.
+    pub assumed: Option<Scenario>,
+}
+
+impl ModelOrigin {
+    /// What lies beside a model; `believed` is what was believed before, where the folder is not to tell. A scenario that is gone since
+    /// the diagnosis is nobody's error.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `believed` is wrong.
+    pub fn of_model_file(model: &Path, believed: Option<&Path>) -> Result<Self, Error> {
+        let beside = model.parent().unwrap_or(Path::new("."));
+        let diagnosis = diagnosis(&beside.join("diagnosis.json"))?;
+        let believed = match believed {
+            Some(path) => Some(Scenario::load(path)?),
+            None => DiagnosisInputs::from_folder(beside)
+                .ok()
+                .and_then(|inputs| Scenario::load(&inputs.scenario).ok()),
+        };
+        Ok(Self { diagnosis, assumed: believed })
+    }
+}
+
+/// The diagnosis that a model came from, if it lies beside it.
+fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
+    let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
+    serde_json::from_str(&text)
+        .map(Some)
+        .map_err(|e| Error::Request(format!("{}: {e}; make the diagnosis anew", path.display())))
+}
+
+/// All files that `stylet predict` writes; `model` was read from `file`.
+///
+/// # Errors
+/// [`Error::Internal`] when a value cannot be written.
+pub fn output_files(model: &Scenario, file: &Path, found: &PredictionResult) -> Result<OutputFiles, Error> {
+    let mut output = OutputFiles::default();
+    let page = stylet_pages::prediction::page(model, &file.display().to_string(), found);
+    output.add("report.html", page.to_html());
+    output.add_json("predict.json", &found.prediction)?;
+    Ok(output)
+}

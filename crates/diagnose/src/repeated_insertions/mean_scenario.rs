@@ -1,0 +1,137 @@
+//! The mean insertion of a set as a scenario that can be simulated.
+
+use crate::repeated_insertions::instrument_faults::InstrumentReport;
+use crate::repeated_insertions::start_values::SegmentedRecording;
+use stylet_identify::model::{EffectTerm, Model};
+use stylet_scenario::{ForceTorque, Motion, Robot, Scenario, Segment, Sensor};
+
+/// Shortest hold of the scenario in s.
+const LEAST_HOLD_S: f64 = 0.1;
+/// Noise of the sensor in N where no recording in air tells it.
+const UNTOLD_NOISE_N: f64 = 0.01;
+
+/// The law with the mean of what varies, moved as the middle run was.
+#[must_use]
+pub fn mean_scenario(
+    name: &str,
+    model: &Model,
+    runs: &[&SegmentedRecording],
+    instrument: &InstrumentReport,
+) -> Scenario {
+    let run = runs[runs.len() / 2];
+    let r = &run.recording;
+    let (start, deepest) = (r.position_m[0], r.position_m[run.phases.deepest]);
+    let speed = run.speed_mps.max(1e-5);
+    let t = |i: usize| r.time_s.get(i).copied().unwrap_or(r.time_s[r.len() - 1]);
+    let hold = (t(run.phases.retraction) - t(run.phases.deepest)).max(LEAST_HOLD_S);
+    let mut segments = vec![
+        Segment::Move { velocity_mps: speed, duration_s: (deepest - start) / speed },
+        Segment::Hold { duration_s: hold },
+    ];
+    if run.phases.retraction < r.len() {
+        segments.push(Segment::Move { velocity_mps: -speed, duration_s: (deepest - start) / speed });
+    }
+    Scenario {
+        name: format!("{name}, as measured: the mean insertion"),
+        source: "fitted to measured insertions by stylet diagnose".to_owned(),
+        tissue: model.tissue.clone(),
+        effects: model
+            .effects
+            .iter()
+            .filter_map(EffectTerm::effect)
+            .chain(instrument.correctable_effects())
+            .collect(),
+        motion: Motion::Program { start_m: start, segments },
+        robot: Robot::Replay,
+        sensor: Sensor::ForceTorque(ForceTorque {
+            noise_n: instrument.noise_n.unwrap_or(UNTOLD_NOISE_N),
+            ar1: instrument.ar1.unwrap_or(0.0).clamp(-0.99, 0.99),
+            ..ForceTorque::default()
+        }),
+        enhance: Default::default(),
+        enhance_virtual: None,
+        compare: Vec::new(),
+        sample_hz: 100.0,
+        physics_hz: 1000.0,
+        tolerance: 0.3,
+        thickness_tolerance: 0.1,
+        surface_tolerance_m: 0.002,
+        seed: 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mean_scenario;
+    use crate::repeated_insertions::SegmentedRecording;
+    use crate::repeated_insertions::instrument_faults::InstrumentReport;
+    use crate::test_fixtures::assumed_layers;
+    use stylet_identify::model::{EffectTerm, Model};
+    use stylet_record::Recording;
+    use stylet_scenario::{Motion, Segment, Sensor};
+    use stylet_tissue::{CoulombFriction, Effect};
+
+    /// From 3 mm on in at a speed for 4 s, a rest, and back or not.
+    fn run(speed: f64, rest_s: f64, back: bool) -> SegmentedRecording {
+        let n = ((4.0 + rest_s + if back { 4.0 } else { 0.0 }) * 50.0) as usize;
+        let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
+        let z = t.iter().map(|t| {
+            0.003
+                + if *t < 4.0 {
+                    speed * t
+                } else if *t < 4.0 + rest_s {
+                    4.0 * speed
+                } else {
+                    4.0 * speed - speed * (t - 4.0 - rest_s)
+                }
+        });
+        let z = z.collect();
+        SegmentedRecording::new("a".to_owned(), Recording::new(t, z, vec![0.0; n]).expect("clean columns"), 1)
+    }
+
+    #[test]
+    fn the_mean_insertion_moves_as_the_middle_run_did() {
+        let belief = assumed_layers(&[[0.05, 100.0, 1000.0]]);
+        let mut model = Model::base(belief, 3);
+        model.effects = vec![EffectTerm::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
+        let (a, b, c) = (run(0.002, 1.0, true), run(0.004, 2.0, true), run(0.009, 1.0, false));
+        let s = mean_scenario(
+            "gel",
+            &model,
+            &[&a, &b, &c],
+            &InstrumentReport { noise_n: Some(0.03), ar1: Some(2.0), ..InstrumentReport::default() },
+        );
+        let Motion::Program { start_m, segments } = &s.motion else { unreachable!("a program") };
+        let r = &b.recording;
+        let (deepest, back) = (b.phases.deepest, b.phases.retraction);
+        assert_eq!(*start_m, 0.003);
+        let way = r.position_m[deepest] - 0.003;
+        let wanted = [
+            Segment::Move { velocity_mps: b.speed_mps, duration_s: way / b.speed_mps },
+            Segment::Hold { duration_s: r.time_s[back] - r.time_s[deepest] },
+            Segment::Move { velocity_mps: -b.speed_mps, duration_s: way / b.speed_mps },
+        ];
+        assert_eq!(segments.as_slice(), wanted);
+        assert!((b.speed_mps - 0.004).abs() < 1e-6 && (way - 0.016).abs() < 2e-4);
+        assert_eq!(s.effects.len(), 1);
+        assert_eq!(s.name, "gel, as measured: the mean insertion");
+        let Sensor::ForceTorque(f) = &s.sensor else { unreachable!("a force sensor") };
+        assert_eq!((f.noise_n, f.ar1), (0.03, 0.99));
+        // A run that never comes back: it rests until its end, a tenth of a second at least.
+        let s = mean_scenario(
+            "gel",
+            &model,
+            &[&c],
+            &InstrumentReport { ar1: Some(-2.0), ..InstrumentReport::default() },
+        );
+        let Motion::Program { segments, .. } = &s.motion else { unreachable!("a program") };
+        let end = c.recording.time_s[c.recording.len() - 1] - c.recording.time_s[c.phases.deepest];
+        assert_eq!(segments[1..], [Segment::Hold { duration_s: end }]);
+        let short = run(0.004, 0.0, false);
+        let s = mean_scenario("gel", &model, &[&short], &InstrumentReport::default());
+        let Motion::Program { segments, .. } = &s.motion else { unreachable!("a program") };
+        assert_eq!(segments[1], Segment::Hold { duration_s: 0.1 });
+        let Sensor::ForceTorque(f) = &s.sensor else { unreachable!("a force sensor") };
+        assert_eq!((f.noise_n, f.ar1), (0.01, 0.0));
+    }
+}

@@ -1,0 +1,75 @@
+//! A checked arm, and the arm in one posture: the starting point of every algorithm here.
+
+use crate::arm_model::{ArmModel, JointLimits};
+use crate::error::Error;
+use crate::pose::Pose;
+use crate::rigid_body::RigidBody;
+use nalgebra::{Matrix3, SVector};
+
+/// One number per joint.
+pub type JointVector<const N: usize> = SVector<f64, N>;
+
+/// A checked arm, with the tool's payload merged into the last link.
+#[derive(Debug, Clone)]
+pub struct Arm<const N: usize> {
+    model: ArmModel<N>,
+    pub(crate) bodies: [RigidBody; N],
+    /// Tip in the last link's frame.
+    pub(crate) tip: Pose,
+}
+
+impl<const N: usize> Arm<N> {
+    /// Checks the model, see [`ArmModel::validate`].
+    pub fn new(model: &ArmModel<N>) -> Result<Self, Error> {
+        model.validate()?;
+        let mut bodies = model.links.map(|link| link.body);
+        let tool = model.flange.compose(&model.tool.mount);
+        if let Some(last) = bodies.last_mut() {
+            *last = last.combined(&model.tool.payload.in_parent_frame(&tool));
+        }
+        Ok(Self { model: *model, bodies, tip: tool.compose(&model.tool.tip) })
+    }
+
+    /// The data this arm was built from.
+    pub fn model(&self) -> &ArmModel<N> {
+        &self.model
+    }
+
+    /// The joints' ranges.
+    pub fn limits(&self) -> [JointLimits; N] {
+        self.model.links.map(|link| link.limits)
+    }
+
+    /// The arm at joint angles `q_rad`: computes the joints' sines and cosines once for all that is asked of
+    /// it.
+    pub fn at(&self, q_rad: &JointVector<N>) -> Posture<'_, N> {
+        let mut rotations = [Matrix3::zeros(); N];
+        for (i, rotation) in rotations.iter_mut().enumerate() {
+            let (s, c) = libm::sincos(q_rad[i]);
+            let fixed = &self.model.links[i].placement.rotation;
+            let (x, y, z) = (fixed.column(0), fixed.column(1), fixed.column(2));
+            *rotation = Matrix3::from_columns(&[x * c + y * s, y * c - x * s, z.into_owned()]);
+        }
+        Posture { arm: self, rotations }
+    }
+}
+
+/// An [`Arm`] at given joint angles. Angles that are not finite give results that are not finite.
+#[derive(Debug, Clone)]
+pub struct Posture<'a, const N: usize> {
+    pub(crate) arm: &'a Arm<N>,
+    /// Link `i`'s orientation in link `i - 1`.
+    pub(crate) rotations: [Matrix3<f64>; N],
+}
+
+impl<const N: usize> Posture<'_, N> {
+    /// The arm in this posture.
+    pub fn arm(&self) -> &Arm<N> {
+        self.arm
+    }
+
+    /// Origin of link `i`'s frame in link `i - 1`'s.
+    pub(crate) fn origin(&self, i: usize) -> &nalgebra::Vector3<f64> {
+        &self.arm.model.links[i].placement.position_m
+    }
+}

@@ -1,0 +1,85 @@
+//! The noise of a law that is not finished: what it leaves, taken as coloured noise of one size.
+//!
+//! Measured insertions differ from any law by fifty times the sensor's noise, for a second at a time. Judged by the sensor's noise, a
+//! fit would follow the first detail that it meets; judged by what is left, every independent stretch counts once. With residuals `e` of
+//! standard deviation `s` and integrated autocorrelation time `c` blocks, `n` blocks hold `n/c` independent ones, which is white noise of
+//! `s sqrt(c)` on every block. It shrinks as the law grows.
+
+use crate::block_averages::BlockAverages;
+use crate::noise::Noise;
+
+/// Correlations are added up to this many seconds at most.
+const MAX_LAG_S: f64 = 4.0;
+/// and end where they first fall below this.
+const MIN_CORRELATION: f64 = 0.05;
+/// Residuals count up to so many times their median size: windows of ruptures are nobody's noise.
+const CLIP_SDS: f64 = 4.0;
+
+/// White noise that stands for residuals `e` (N), one column per recording; nowhere less than `floor_n`.
+#[must_use]
+pub fn discrepancy_noise(blocks: &[BlockAverages], e: &[Vec<f64>], floor_n: f64) -> Noise {
+    let mut sizes: Vec<f64> = Vec::new();
+    for (b, e) in blocks.iter().zip(e) {
+        sizes.extend(e.iter().zip(&b.used).filter(|(e, u)| **u && e.is_finite()).map(|(e, _)| e.abs()));
+    }
+    let limit = CLIP_SDS
+        * stylet_stats::MAD_TO_SD
+        * stylet_stats::order_statistics::median(&mut sizes).max(floor_n).max(1e-9);
+    let cut = |e: f64| e.clamp(-limit, limit);
+    let (mut square, mut n) = (0.0, 0.0);
+    for (b, e) in blocks.iter().zip(e) {
+        for k in (0..b.len()).filter(|k| b.used[*k]) {
+            square += cut(e[k]).powi(2);
+            n += 1.0;
+        }
+    }
+    let variance = square / f64::max(n, 1.0);
+    let block_s = blocks.first().map_or(1.0, |b| b.sample_step_s * b.samples_per_block as f64).max(1e-6);
+    let mut time = 1.0;
+    for lag in 1..((MAX_LAG_S / block_s) as usize).max(2) {
+        let (mut sum, mut pairs) = (0.0, 0.0);
+        for (b, e) in blocks.iter().zip(e) {
+            for k in (lag..b.len()).filter(|k| b.used[*k] && b.used[*k - lag]) {
+                sum += cut(e[k]) * cut(e[k - lag]);
+                pairs += 1.0;
+            }
+        }
+        let correlation = sum / f64::max(pairs, 1.0) / variance.max(1e-300);
+        if correlation < MIN_CORRELATION {
+            break;
+        }
+        time += 2.0 * correlation;
+    }
+    Noise::white((variance * time).sqrt().max(floor_n).max(1e-6))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::block_averages::BLOCK_S;
+    use stylet_record::Recording;
+
+    fn blocks() -> BlockAverages {
+        let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * 0.01).collect();
+        let z: Vec<f64> = t.iter().map(|t| 1e-3 * t).collect();
+        let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("clean columns");
+        BlockAverages::new(&r, &vec![false; t.len()], BLOCK_S)
+    }
+
+    #[test]
+    fn white_residuals_count_one_by_one_and_slow_ones_by_their_stretches() {
+        let b = blocks();
+        let mut x = 1u64;
+        let mut draw = || {
+            x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (x >> 40) as f64 / f64::from(1u32 << 24) - 0.5
+        };
+        let white: Vec<f64> = (0..b.len()).map(|_| draw()).collect();
+        let sd = (1.0_f64 / 12.0).sqrt();
+        let of = |e: Vec<f64>| discrepancy_noise(std::slice::from_ref(&b), &[e], 0.0).sd_n();
+        assert!((of(white.clone()) / sd - 1.0).abs() < 0.2);
+        // Ten blocks alike: the triangle of their correlation adds up to ten.
+        let slow: Vec<f64> = (0..b.len()).map(|k| white[k / 10]).collect();
+        assert!((of(slow) / sd / 10.0_f64.sqrt() - 1.0).abs() < 0.25);
+    }
+}

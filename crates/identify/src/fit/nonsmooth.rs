@@ -1,0 +1,65 @@
+//! Fits past kinks of the law.
+
+use super::damped_step::{apply_step, damped_step};
+use super::{Effort, FIRST_DAMPING, Fit, Linearization, MAX_DAMPING_TRIALS, fit};
+use crate::likelihood::{FitData, residuals};
+use crate::model::Model;
+use rayon::prelude::*;
+use stylet_stats::linear_algebra::dot;
+
+/// A tangent that promises less than so many nats where no step gains is as good as level.
+const MIN_PREDICTED_GAIN_NATS: f64 = 1.0;
+/// A fit is freed of kinks at most so often.
+const MAX_RESTARTS: usize = 3;
+
+/// As [`fit`], but not ended by a kink: where the tangent promises a gain and no step along it keeps that, those numbers go on alone whose
+/// own steps gain. Laws that cling and slip have kinks: a derivative across one tells of neither side.
+#[must_use]
+pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
+    let mut best = fit(model, data, effort)?;
+    for _ in 0..MAX_RESTARTS {
+        let Some(freed) = escape_kink(&best, data).and_then(|model| fit(&model, data, effort)) else { break };
+        let gain = best.nats() - freed.nats();
+        if gain > 0.0 {
+            best = freed;
+        }
+        if gain < effort.min_gain_nats {
+            break;
+        }
+    }
+    Some(best)
+}
+
+/// A likelier model near one from which no step along the whole tangent gains what it promises.
+pub(super) fn escape_kink(at: &Fit, data: &FitData) -> Option<Model> {
+    let tangent = Linearization::new(&at.model, data, &at.residuals);
+    let whole = damped_step(&at.model, data, &tangent, FIRST_DAMPING, |_| true)?;
+    (0.5 * dot(&tangent.neg_gradient, &whole) >= MIN_PREDICTED_GAIN_NATS)
+        .then(|| step_of_improving_parameters(at, data, &tangent))?
+}
+
+/// A likelier model by a step of those numbers that gain by a step of their own.
+pub(super) fn step_of_improving_parameters(
+    at: &Fit,
+    data: &FitData,
+    tangent: &Linearization,
+) -> Option<Model> {
+    let gains = |delta: &[f64]| {
+        let next = apply_step(&at.model, data, tangent, delta, 1.0);
+        residuals(&next, data).filter(|left| left.nats < at.nats()).map(|_| next)
+    };
+    let (ns, no) = (tangent.shared.len(), tangent.per_recording.len());
+    let kind = |i: usize| if i < ns { i } else { ns + (i - ns) % no };
+    let alone = |k: usize| damped_step(&at.model, data, tangent, FIRST_DAMPING, |i| kind(i) == k);
+    let trusted: Vec<bool> =
+        (0..ns + no).into_par_iter().map(|k| alone(k).and_then(|d| gains(&d)).is_some()).collect();
+    let mut damping = FIRST_DAMPING;
+    for _ in 0..MAX_DAMPING_TRIALS {
+        let delta = damped_step(&at.model, data, tangent, damping, |i| trusted[kind(i)])?;
+        if let Some(next) = gains(&delta) {
+            return Some(next);
+        }
+        damping *= 8.0;
+    }
+    None
+}

@@ -1,0 +1,59 @@
+use super::time_stepper::TimeStepper;
+use crate::rupture_likelihood::RuptureEvent;
+use stylet_tissue::{ForceLawState, MeasurementState};
+
+/// All that a replay remembers before a piece.
+#[derive(Clone, Debug)]
+pub(super) struct Checkpoint {
+    pub(super) piece: usize,
+    pub(super) state: ForceLawState,
+    pub(super) chain: Option<MeasurementState>,
+    pub(super) ruptured_layers: usize,
+    pub(super) threshold_n: f64,
+    pub(super) transient_until_s: f64,
+    pub(super) broken: Vec<bool>,
+    pub(super) block: u32,
+    pub(super) force_integral: f64,
+    pub(super) ruptures: Vec<RuptureEvent>,
+}
+
+/// Where a replay stands before a piece.
+pub(super) struct CheckpointView<'a, 'b> {
+    pub(super) piece: usize,
+    pub(super) stepper: &'a TimeStepper<'b>,
+    pub(super) broken: &'a [bool],
+    pub(super) block: u32,
+    pub(super) force_integral: f64,
+}
+
+impl CheckpointView<'_, '_> {
+    pub(super) fn to_checkpoint(&self) -> Checkpoint {
+        Checkpoint {
+            piece: self.piece,
+            state: self.stepper.state,
+            chain: self.stepper.chain.clone(),
+            ruptured_layers: self.stepper.ruptured_layers,
+            threshold_n: self.stepper.threshold_n,
+            transient_until_s: self.stepper.transient_until_s,
+            broken: self.broken.to_vec(),
+            block: self.block,
+            force_integral: self.force_integral,
+            ruptures: self.stepper.ruptures.clone(),
+        }
+    }
+
+    /// Whether everything from here on is the same.
+    pub(super) fn same_future_as(&self, other: &Checkpoint) -> bool {
+        let walk = self.stepper;
+        self.piece == other.piece
+            && walk.ruptured_layers == other.ruptured_layers
+            && self.block == other.block
+            && self.force_integral == other.force_integral
+            && walk.threshold_n == other.threshold_n
+            && walk.transient_until_s == other.transient_until_s
+            && walk.state == other.state
+            && walk.chain == other.chain
+            && self.broken == other.broken
+            && walk.ruptures.get(walk.ruptured_layers..) == other.ruptures.get(other.ruptured_layers..)
+    }
+}

@@ -1,0 +1,138 @@
+//! A replay whose neighbours need only the part that differs.
+
+use super::checkpoint::Checkpoint;
+use super::{ReplayResult, advance, initial_checkpoint, replay_with_ruptures};
+use crate::block_averages::BlockAverages;
+use crate::model::{CompiledModel, NO_RUPTURE};
+use stylet_record::motion::MotionPiece;
+
+/// A replay with what it remembered on the way: neighbours of its model need only the part that differs.
+#[derive(Clone, Debug, Default)]
+pub struct IncrementalReplay {
+    pub(super) result: ReplayResult,
+    pub(super) checkpoints: Vec<Checkpoint>,
+    pub(super) rupture_times_s: Vec<f64>,
+}
+
+impl IncrementalReplay {
+    /// Replays a law and remembers.
+    #[must_use]
+    pub fn new(
+        model: &CompiledModel,
+        blocks: &BlockAverages,
+        pieces: &[MotionPiece],
+        instants: &[f64],
+    ) -> Self {
+        let mut track = Self { rupture_times_s: instants.to_vec(), ..Self::default() };
+        let first = initial_checkpoint(model, blocks, &mut track.result);
+        let saved = &mut track.checkpoints;
+        advance(model, blocks, pieces, instants, first, &mut track.result, &mut |here| {
+            saved.push(here.to_checkpoint());
+            true
+        });
+        track
+    }
+
+    /// What [`imposed`] gives for a neighbour: the same effects and pieces, another number of the base law or instant. `was` is
+    /// the model of the track. The part before a difference can show is taken over, and the part after both are the same again.
+    #[must_use]
+    pub fn replay_neighbour(
+        &self,
+        was: &CompiledModel,
+        now: &CompiledModel,
+        blocks: &BlockAverages,
+        pieces: &[MotionPiece],
+        instants: &[f64],
+    ) -> ReplayResult {
+        let first = self.first_difference(was, now, pieces, instants);
+        let at = self.checkpoints.partition_point(|s| s.piece <= first).saturating_sub(1);
+        let mut out = self.result.clone();
+        let Some(start) = self.checkpoints.get(at) else {
+            replay_with_ruptures(now, blocks, pieces, instants, &mut out);
+            return out;
+        };
+        out.ruptures.clone_from(&start.ruptures);
+        let done_with = ruptures_until_equal(was, now);
+        // Before both instants have passed nothing has happened yet.
+        let moved = self.rupture_times_s.iter().zip(instants).filter(|(a, b)| a != b);
+        let passed_s = moved.map(|(a, b)| a.max(*b)).fold(f64::NEG_INFINITY, f64::max);
+        let mut same: Option<(usize, usize)> = None;
+        let mut next = at;
+        advance(now, blocks, pieces, instants, start.clone(), &mut out, &mut |s| {
+            let known = self.checkpoints.get(next);
+            next += 1;
+            // The first one is the start itself: nothing has happened yet.
+            let passed = pieces.get(s.piece).is_some_and(|p| p.start_s > passed_s);
+            if passed
+                && next > at + 1
+                && s.stepper.ruptured_layers >= done_with
+                && known.is_some_and(|k| s.same_future_as(k))
+            {
+                same = Some((s.block as usize, s.stepper.ruptured_layers));
+                return false;
+            }
+            true
+        });
+        if let Some((block, done)) = same {
+            out.force_n[block..].copy_from_slice(&self.result.force_n[block..]);
+            if let (Some(to), Some(from)) = (out.ruptures.get_mut(done..), self.result.ruptures.get(done..)) {
+                to.copy_from_slice(from);
+            }
+        }
+        out
+    }
+
+    /// The piece from which on a difference can show.
+    pub(super) fn first_difference(
+        &self,
+        was: &CompiledModel,
+        now: &CompiledModel,
+        pieces: &[MotionPiece],
+        instants: &[f64],
+    ) -> usize {
+        let mut first = pieces.len();
+        let of = |t: f64| pieces.partition_point(|p| p.end_s < t).saturating_sub(1);
+        for (a, b) in self.rupture_times_s.iter().zip(instants).filter(|(a, b)| a != b) {
+            first = first.min(of(a.min(*b)));
+        }
+        let differs = was.law.slabs().iter().zip(now.law.slabs()).position(|(a, b)| a != b);
+        if let Some(l) = differs {
+            if !now.law.tip_follows_base() || was.true_over_recorded != now.true_over_recorded {
+                return 0;
+            }
+            let front = was.law.slabs()[l].front_m.min(now.law.slabs()[l].front_m) - CONTACT_MARGIN_M;
+            let reached = |p: &MotionPiece| {
+                let half = 0.5 * (p.end_s - p.start_s);
+                (p.position_m + p.velocity_mps.abs() * half + p.acceleration_mps2.abs() * half * half)
+                    * now.true_over_recorded
+                    >= front
+            };
+            first = first.min(pieces.iter().position(reached).unwrap_or(pieces.len()));
+            // A layer is strained, if only by nothing, from the rupture of the one before.
+            if let Some(before) =
+                l.checked_sub(1).and_then(|k| self.rupture_times_s.get(k)).filter(|t| **t < NO_RUPTURE)
+            {
+                first = first.min(of(*before));
+            }
+        }
+        first
+    }
+}
+
+/// After so many ruptures two laws are the same: stiffness and puncture force of a layer that has given way are of the past.
+pub(super) fn ruptures_until_equal(was: &CompiledModel, now: &CompiledModel) -> usize {
+    let pairs = || was.law.slabs().iter().zip(now.law.slabs());
+    let Some(last) = pairs().rposition(|(a, b)| a != b) else { return 0 };
+    let lasting = pairs().any(|(a, b)| {
+        a.front_m != b.front_m
+            || a.thickness_m != b.thickness_m
+            || a.friction_ns_per_m2 != b.friction_ns_per_m2
+            || a.replaced_friction_share != b.replaced_friction_share
+            // What clings to the shaft is dragged by the layer's own spring.
+            || (a.replaced_friction_share > 0.0 && a != b)
+    });
+    if lasting || !now.law.tip_follows_base() { usize::MAX } else { last + 1 }
+}
+
+/// A layer is felt at most so far in m before its front.
+const CONTACT_MARGIN_M: f64 = 1e-5;

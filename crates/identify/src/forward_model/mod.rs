@@ -1,0 +1,209 @@
+//! The forward model: the law replayed over the blocks of a recording with its ruptures at given instants.
+//!
+//! | module | what |
+//! |---|---|
+//! | `walk` | law and chain over spans of smooth motion, jumps and ruptures |
+//! | `saved`, `track` | a replay that remembers, so that neighbours of its model need only what differs |
+
+mod checkpoint;
+mod incremental_replay;
+#[cfg(test)]
+mod tests;
+mod time_stepper;
+
+pub use incremental_replay::IncrementalReplay;
+
+use crate::block_averages::BlockAverages;
+use crate::model::{CompiledModel, NO_RUPTURE};
+use crate::rupture_likelihood::RuptureEvent;
+use checkpoint::{Checkpoint, CheckpointView};
+use stylet_record::motion::MotionPiece;
+use stylet_tissue::ForceLawState;
+use time_stepper::{BlockSamples, TimeStepper, local_acceleration_mps2};
+
+/// Buffers of a replay.
+#[derive(Clone, Debug, Default)]
+pub struct ReplayResult {
+    /// Predicted mean force of every block in N.
+    pub force_n: Vec<f64>,
+    /// One event per layer.
+    pub ruptures: Vec<RuptureEvent>,
+}
+
+/// Pieces from one saved state to the next.
+const CHECKPOINT_PIECES: usize = 24;
+
+/// Replays a law with the ruptures at `instants` (s; [`NEVER`] for those that never were).
+pub fn replay_with_ruptures(
+    model: &CompiledModel,
+    blocks: &BlockAverages,
+    pieces: &[MotionPiece],
+    instants: &[f64],
+    out: &mut ReplayResult,
+) {
+    let first = initial_checkpoint(model, blocks, out);
+    advance(model, blocks, pieces, instants, first, out, &mut |_| true);
+}
+
+/// Room for a replay, and where it begins.
+fn initial_checkpoint(model: &CompiledModel, blocks: &BlockAverages, out: &mut ReplayResult) -> Checkpoint {
+    out.force_n.clear();
+    out.force_n.resize(blocks.len(), 0.0);
+    out.ruptures.clear();
+    out.ruptures.resize(
+        model.puncture_n.len(),
+        RuptureEvent { sample_step_s: blocks.sample_step_s, ..RuptureEvent::INITIAL },
+    );
+    Checkpoint {
+        piece: 0,
+        state: ForceLawState::default(),
+        chain: model.has_measurement_chain.then(|| model.chain.start(0.0)),
+        ruptured_layers: 0,
+        threshold_n: f64::INFINITY,
+        transient_until_s: f64::NEG_INFINITY,
+        broken: vec![false; model.break_positions_m.len()],
+        block: 0,
+        force_integral: 0.0,
+        ruptures: out.ruptures.clone(),
+    }
+}
+
+/// Goes on from a saved state; `visit` is called every [`EVERY`] pieces and ends it by `false`.
+fn advance(
+    model: &CompiledModel,
+    blocks: &BlockAverages,
+    pieces: &[MotionPiece],
+    instants: &[f64],
+    from: Checkpoint,
+    out: &mut ReplayResult,
+    visit: &mut impl FnMut(&CheckpointView) -> bool,
+) {
+    let Checkpoint {
+        piece: first,
+        state,
+        chain,
+        ruptured_layers: done,
+        threshold_n,
+        transient_until_s: restless_s,
+        mut broken,
+        mut block,
+        force_integral: mut sum,
+        ruptures: events,
+    } = from;
+    out.ruptures = events;
+    let mut walk = TimeStepper {
+        model,
+        state,
+        chain,
+        ruptured_layers: done,
+        ruptures: &mut out.ruptures,
+        sample_step_s: blocks.sample_step_s,
+        threshold_n,
+        transient_until_s: restless_s,
+        samples: BlockSamples::default(),
+    };
+    let end_s = pieces.last().map_or(0.0, |p| p.end_s);
+    for (index, piece) in pieces.iter().enumerate().skip(first) {
+        if index % CHECKPOINT_PIECES == 0 {
+            let here =
+                CheckpointView { piece: index, stepper: &walk, broken: &broken, block, force_integral: sum };
+            if !visit(&here) {
+                return;
+            }
+        }
+        if piece.block != block {
+            let k = block as usize;
+            out.force_n[k] = sum / (blocks.end_s[k] - blocks.start_s[k]);
+            (block, sum) = (piece.block, 0.0);
+        }
+        if model.smears_jumps {
+            walk.samples = BlockSamples::new(blocks, block as usize);
+        }
+        if let Some(before) = index.checked_sub(1).and_then(|k| pieces.get(k)) {
+            walk.cross_piece_boundary(before, piece);
+        }
+        let mut at = piece.start_s;
+        loop {
+            let rupture = instants.get(walk.ruptured_layers).copied().unwrap_or(NO_RUPTURE);
+            let breaks = next_break(model, piece, at, &mut broken);
+            let next = rupture.min(breaks);
+            if next < piece.end_s || (rupture <= piece.end_s && piece.end_s >= end_s && rupture < NO_RUPTURE)
+            {
+                let next = next.max(at).min(piece.end_s);
+                if next > at {
+                    sum += walk.force_integral(piece, at, next);
+                    at = next;
+                }
+                if breaks <= rupture {
+                    walk.mark_jump(at);
+                }
+                if rupture <= breaks {
+                    walk.rupture(piece, pieces.get(index + 1), at, local_acceleration_mps2(pieces, index));
+                }
+                continue;
+            }
+            if piece.end_s > at {
+                sum += walk.force_integral(piece, at, piece.end_s);
+            }
+            break;
+        }
+    }
+    if let Some(k) = Some(block as usize).filter(|k| *k < out.force_n.len()) {
+        out.force_n[k] = sum / (blocks.end_s[k] - blocks.start_s[k]);
+    }
+}
+
+/// When in a piece something of an effect's own breaks, from `at_s` on; it is then marked as broken.
+fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mut [bool]) -> f64 {
+    let mut first = (NO_RUPTURE, usize::MAX);
+    for (k, place) in model.break_positions_m.iter().enumerate().filter(|(k, _)| !broken[*k]) {
+        let (z0, z1) =
+            (piece.at(at_s).0 * model.true_over_recorded, piece.at(piece.end_s).0 * model.true_over_recorded);
+        if z1 >= *place {
+            let share = if z1 > z0 { ((place - z0) / (z1 - z0)).clamp(0.0, 1.0) } else { 0.0 };
+            let at = at_s + share * (piece.end_s - at_s);
+            if at < first.0 {
+                first = (at, k);
+            }
+        }
+    }
+    if first.1 < broken.len() {
+        broken[first.1] = true;
+    }
+    // Only an instant inside the piece cuts it.
+    if first.0 < piece.end_s { first.0 } else { NO_RUPTURE }
+}
+
+/// The instants (s) at which something of an effect's own breaks, one after the other.
+pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
+    let mut broken = vec![false; model.break_positions_m.len()];
+    let mut instants = Vec::new();
+    for piece in pieces {
+        let mut at = piece.start_s;
+        loop {
+            at = next_break(model, piece, at, &mut broken);
+            if at == NO_RUPTURE {
+                break;
+            }
+            instants.push(at);
+        }
+    }
+    instants
+}
+
+/// Replays with the law's own ruptures; returns the instants (s) at which they show in the recorded force.
+pub fn free_rupture_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
+    let mut state = ForceLawState::default();
+    let mut instants = vec![NO_RUPTURE; model.puncture_n.len()];
+    for piece in pieces {
+        for t in [0.75 * piece.start_s + 0.25 * piece.end_s, 0.25 * piece.start_s + 0.75 * piece.end_s] {
+            let (z, v) = piece.at(t);
+            model.law.step(&mut state, t, z * model.true_over_recorded, v * model.true_over_recorded, |r| {
+                if let Some(instant) = instants.get_mut(r.layer - 1) {
+                    *instant = r.time_s;
+                }
+            });
+        }
+    }
+    instants
+}

@@ -1,0 +1,249 @@
+//! Law and chain along the motion.
+
+use crate::block_averages::BlockAverages;
+use crate::model::CompiledModel;
+use crate::rupture_likelihood::RuptureEvent;
+use stylet_record::motion::{MIN_JUMP_MPS, MotionPiece};
+use stylet_tissue::{AveragingInterval, ForceLawState, MeasurementState, RuptureCriterion};
+
+/// What is remembered on the way.
+pub(super) struct TimeStepper<'a> {
+    pub(super) model: &'a CompiledModel,
+    pub(super) state: ForceLawState,
+    pub(super) chain: Option<MeasurementState>,
+    pub(super) ruptured_layers: usize,
+    pub(super) ruptures: &'a mut Vec<RuptureEvent>,
+    pub(super) sample_step_s: f64,
+    /// Puncture force in N of the active layer at the span before.
+    pub(super) threshold_n: f64,
+    /// Until then (s) the tip of a needle that gives, or a sensor that lags, is still on its way to where a jump sends it.
+    pub(super) transient_until_s: f64,
+    /// Where the samples of the block lie, if it may matter.
+    pub(super) samples: BlockSamples<'a>,
+}
+
+/// Where the samples of a block lie.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BlockSamples<'a> {
+    from_s: f64,
+    to_s: f64,
+    /// Their instants in s.
+    time_s: &'a [f64],
+}
+
+impl<'a> BlockSamples<'a> {
+    pub(super) fn new(blocks: &'a BlockAverages, k: usize) -> Self {
+        let (from_s, to_s) = (blocks.start_s[k], blocks.end_s[k]);
+        Self { from_s, to_s, time_s: between(&blocks.sample_time_s, from_s, to_s) }
+    }
+
+    fn covered_by(&self, from_s: f64, to_s: f64) -> bool {
+        from_s <= self.from_s && to_s >= self.to_s
+    }
+
+    /// A sample's share of the block, in s.
+    fn share_s(&self) -> f64 {
+        (self.to_s - self.from_s) / self.time_s.len() as f64
+    }
+}
+
+/// Those of some instants that lie from one on to before another.
+fn between(instants: &[f64], from_s: f64, to_s: f64) -> &[f64] {
+    let first = instants.partition_point(|t| *t < from_s);
+    let count = instants[first..].iter().take_while(|t| **t < to_s).count();
+    &instants[first..first + count]
+}
+
+/// So long in s after a jump of the speed or a rupture the force of a needle that gives, or of a sensor that lags, changes within a block as well.
+const TRANSIENT_S: f64 = 0.3;
+/// Neighbours whose speeds differ by less than this share are of one motion; a jump of the speed is more.
+const SAME_MOTION_SHARE: f64 = 0.3;
+/// A threshold that changes by this share from one span to the next has jumped.
+const THRESHOLD_JUMP_SHARE: f64 = 0.01;
+
+impl TimeStepper<'_> {
+    /// Law and chain over a span of smooth motion: mean force times the span.
+    pub(super) fn force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
+        let fast = from_s < self.transient_until_s || !self.samples.covered_by(from_s, to_s);
+        if fast && !self.samples.time_s.is_empty() {
+            return self.sampled_force_integral(piece, from_s, to_s);
+        }
+        let t = 0.5 * (from_s + to_s);
+        let total_n = self.law_force(piece, t);
+        let span_s = to_s - from_s;
+        let Some(chain) = &mut self.chain else { return total_n * span_s };
+        let cell = AveragingInterval {
+            time_s: t,
+            span_s,
+            samples: span_s / self.sample_step_s,
+            velocity_mps: piece.at(t).1 * self.model.true_over_recorded,
+            acceleration_mps2: piece.acceleration_mps2 * self.model.true_over_recorded,
+            tissue_n: total_n,
+        };
+        self.model.chain.mean_force(chain, &cell) * span_s
+    }
+
+    /// Law and chain over a span in which the force changes from sample to sample: the sum of the samples, each times its share of the block.
+    fn sampled_force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
+        let (mut at_s, mut sum) = (from_s, 0.0);
+        let grid = self.samples;
+        for sample_s in between(grid.time_s, from_s, to_s) {
+            sum += self.force_at_sample(piece, at_s, *sample_s);
+            at_s = *sample_s;
+        }
+        self.force_at_sample(piece, at_s, to_s);
+        sum * grid.share_s()
+    }
+
+    /// Law and chain from one instant to another: the force at that one.
+    fn force_at_sample(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
+        // What a lag makes of a force goes by its mean.
+        let lags = self.model.chain.has_lag();
+        let total_n = self.law_force(piece, if lags { 0.5 * (from_s + to_s) } else { to_s });
+        let Some(chain) = &mut self.chain else { return total_n };
+        let cell = AveragingInterval {
+            time_s: to_s,
+            span_s: to_s - from_s,
+            samples: 1.0,
+            velocity_mps: piece.at(to_s).1 * self.model.true_over_recorded,
+            acceleration_mps2: piece.acceleration_mps2 * self.model.true_over_recorded,
+            tissue_n: total_n,
+        };
+        self.model.chain.force_at_end(chain, &cell)
+    }
+
+    /// The law at an instant of a piece: its force in N.
+    fn law_force(&mut self, piece: &MotionPiece, at_s: f64) -> f64 {
+        let (z, v) = piece.at(at_s);
+        let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
+        let events = &mut self.ruptures[..];
+        let threshold = &mut self.threshold_n;
+        let note = |s: RuptureCriterion| {
+            record_strain(events, &s);
+            *threshold = s.puncture_n;
+        };
+        self.state.set_base_acceleration(piece.acceleration_mps2 * self.model.true_over_recorded);
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, note).total_n
+    }
+
+    /// From one piece of smooth motion to the next: a needle that gives begins to follow another speed at that instant, and what friction remembers of
+    /// the way turns there, not in the middle between the blocks.
+    pub(super) fn cross_piece_boundary(&mut self, before: &MotionPiece, next: &MotionPiece) {
+        let jump_mps = (next.at(next.start_s).1 - before.at(before.end_s).1).abs();
+        if jump_mps <= MIN_JUMP_MPS {
+            return;
+        }
+        if self.model.law.has_compliant_needle() || before.velocity_mps * next.velocity_mps < 0.0 {
+            self.law_force(before, before.end_s);
+        }
+        self.mark_jump(before.end_s);
+    }
+
+    /// The force jumps, or would if nothing smeared it.
+    pub(super) fn mark_jump(&mut self, at_s: f64) {
+        if self.model.smears_jumps {
+            self.transient_until_s = at_s + TRANSIENT_S;
+        }
+    }
+
+    /// The rupture of the active layer at an instant.
+    pub(super) fn rupture(
+        &mut self,
+        piece: &MotionPiece,
+        after: Option<&MotionPiece>,
+        at_s: f64,
+        gathers_mps2: f64,
+    ) {
+        let (z, v) = piece.at(at_s);
+        let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
+        let layer = self.ruptured_layers;
+        let (mut strained, mut tip_v) = (None, v);
+        // The force just before.
+        let most = self.ruptures.get(layer).map_or(f64::NEG_INFINITY, |e| e.force_excess);
+        let before = &mut self.ruptures[..];
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
+            record_strain(before, &s);
+            if s.layer == layer + 1 {
+                strained = Some(s);
+            }
+        });
+        let (law, state) = (&self.model.law, self.state);
+        let threshold_n = |v_mps: f64| {
+            let mut then = f64::INFINITY;
+            law.step_imposed(&mut { state }, at_s, z, v_mps, layer, |s| then = s.puncture_n);
+            then
+        };
+        // Where the threshold itself has jumped, with the speed, it passed the force on the way.
+        if let (Some(s), Some(event)) = (strained, self.ruptures.get_mut(layer))
+            && s.puncture_n.is_finite()
+        {
+            let jumped = |to: f64, from: f64| (to / from - 1.0).abs() > THRESHOLD_JUMP_SHARE;
+            if jumped(s.puncture_n, self.threshold_n) && most < 0.0 && event.force_excess > 0.0 {
+                event.force_excess = 0.0;
+            } else if let Some(next) =
+                after.filter(|_| event.force_excess < 0.0 && piece.end_s - at_s < self.sample_step_s)
+            {
+                // The speed jumps within a sample of here: so may the threshold.
+                let then = threshold_n(next.velocity_mps * self.model.true_over_recorded);
+                if jumped(then, s.puncture_n) && s.elastic_n > then {
+                    event.force_excess = 0.0;
+                }
+            }
+        }
+        if self.state.tip_velocity_mps().is_finite() {
+            tip_v = self.state.tip_velocity_mps();
+        }
+        if let (Some(s), Some(event)) = (strained, self.ruptures.get_mut(layer)) {
+            event.ruptured = true;
+            event.elastic_n = s.elastic_n;
+            event.depth_rate_mps = tip_v.max(0.0);
+            let stiffness = self.model.stiffness_n_per_m.get(layer).copied().unwrap_or(0.0);
+            // As the force rises and the threshold falls.
+            event.force_excess_rate = if s.puncture_n.is_finite() {
+                let ahead_s = self.sample_step_s;
+                let (now, then) =
+                    (threshold_n(v), threshold_n(v + gathers_mps2 * self.model.true_over_recorded * ahead_s));
+                // Where it is no force any more, it does not tell.
+                let falls = Some((now - then) / ahead_s).filter(|f| f.is_finite()).unwrap_or(0.0);
+                (stiffness * tip_v.max(0.0) + falls).max(0.0) / s.puncture_n
+            } else {
+                0.0
+            };
+        }
+        self.ruptured_layers += 1;
+        self.mark_jump(at_s);
+        // And just after: what the layer lets go.
+        let after = &mut self.ruptures[..];
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, |s| {
+            if s.layer > layer + 1 {
+                record_strain(after, &s);
+            }
+        });
+    }
+}
+
+/// How fast the base gathers speed around a piece: by the pieces beside it, where they are about as fast.
+pub(super) fn local_acceleration_mps2(pieces: &[MotionPiece], index: usize) -> f64 {
+    let Some(here) = pieces.get(index) else { return 0.0 };
+    let alike = |p: &&MotionPiece| {
+        (p.velocity_mps - here.velocity_mps).abs() < SAME_MOTION_SHARE * here.velocity_mps.abs()
+    };
+    let before = index.checked_sub(1).and_then(|k| pieces.get(k)).filter(alike).unwrap_or(here);
+    let after = pieces.get(index + 1).filter(alike).unwrap_or(here);
+    let middle_s = |p: &MotionPiece| 0.5 * (p.start_s + p.end_s);
+    let between_s = middle_s(after) - middle_s(before);
+    if between_s > 0.0 {
+        (after.velocity_mps - before.velocity_mps) / between_s
+    } else {
+        here.acceleration_mps2
+    }
+}
+
+/// Keeps the largest strain of every layer while it is active.
+pub(super) fn record_strain(events: &mut [RuptureEvent], s: &RuptureCriterion) {
+    let Some(event) = events.get_mut(s.layer - 1) else { return };
+    if s.puncture_n.is_finite() && s.puncture_n > 0.0 {
+        event.force_excess = event.force_excess.max(s.elastic_n / s.puncture_n - 1.0);
+    }
+    event.depth_excess_m = event.depth_excess_m.max(s.tip_m - s.far_m);
+}

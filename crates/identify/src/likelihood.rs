@@ -1,0 +1,417 @@
+//! The likelihood of a model: whitened residuals, ruptures, priors.
+
+use crate::block_averages::BlockAverages;
+use crate::forward_model::{
+    IncrementalReplay, ReplayResult, break_times, free_rupture_times, replay_with_ruptures,
+};
+use crate::model::{CompiledModel, Model, NO_RUPTURE, Parameter};
+use crate::noise::{HUBER_LOSS, Noise, NoiseSource, WhiteningPlan};
+use crate::rupture_likelihood::{RuptureEvent, evaluate_rupture};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+use stylet_record::motion::MotionPiece;
+
+/// Recordings in blocks and the noise by which they are judged.
+#[derive(Clone, Debug)]
+pub struct FitData {
+    /// The recordings.
+    pub recordings: Arc<Vec<BlockAverages>>,
+    /// The noise.
+    pub noise: Arc<Noise>,
+    /// The noise is nowhere less, in N: what the recorded force is rounded to leaves open.
+    pub floor_n: f64,
+    /// How each recording is whitened.
+    plans: Arc<OnceLock<Vec<WhiteningPlan>>>,
+    replayed: Arc<AtomicU64>,
+}
+
+impl FitData {
+    /// Recordings judged by a noise that is nowhere less than `floor_n`.
+    #[must_use]
+    pub fn new(blocks: Arc<Vec<BlockAverages>>, noise: Noise, floor_n: f64) -> Self {
+        Self {
+            recordings: blocks,
+            noise: Arc::new(noise),
+            floor_n,
+            plans: Arc::default(),
+            replayed: Arc::default(),
+        }
+    }
+
+    /// Normalised innovations of residuals `e` (N) of recording `r`; blocks that are not compared give zero.
+    #[must_use]
+    pub fn whiten(&self, r: usize, e: &[f64]) -> Vec<f64> {
+        self.noise.whiten(&self.whitening_plans()[r], e)
+    }
+
+    /// Residuals (N) of recording `r` whose normalised innovations are `w`.
+    #[must_use]
+    pub fn unwhiten(&self, r: usize, w: &[f64]) -> Vec<f64> {
+        self.noise.unwhiten(&self.whitening_plans()[r], w)
+    }
+
+    fn whitening_plans(&self) -> &[WhiteningPlan] {
+        self.plans.get_or_init(|| self.recordings.iter().map(|b| self.noise.whitening_plan(b)).collect())
+    }
+
+    /// The same recordings judged by another noise.
+    #[must_use]
+    pub fn with_noise(&self, noise: Noise) -> Self {
+        Self { noise: Arc::new(noise), plans: Arc::default(), ..self.clone() }
+    }
+
+    /// Blocks replayed so far for these recordings, under whatever noise: what a diagnosis costs, the same on every machine.
+    #[must_use]
+    pub fn blocks_replayed(&self) -> u64 {
+        self.replayed.load(Ordering::Relaxed)
+    }
+
+    /// So many more blocks were replayed.
+    pub fn count_replayed(&self, blocks: u64) {
+        self.replayed.fetch_add(blocks, Ordering::Relaxed);
+    }
+
+    /// The same recordings judged by the noise that residuals tell.
+    #[must_use]
+    pub fn with_estimated_noise(&self, e: &[Vec<f64>], from: NoiseSource) -> Self {
+        self.with_noise(Noise::estimate(&self.recordings, e, from, self.floor_n))
+    }
+
+    /// Some of the recordings.
+    #[must_use]
+    pub fn subset(&self, which: &[usize]) -> Self {
+        self.with_recordings(which.iter().map(|k| self.recordings[*k].clone()).collect())
+    }
+
+    /// Other recordings judged by the same noise.
+    #[must_use]
+    pub fn with_recordings(&self, blocks: Vec<BlockAverages>) -> Self {
+        Self { recordings: Arc::new(blocks), plans: Arc::default(), ..self.clone() }
+    }
+
+    /// Number of blocks compared.
+    #[must_use]
+    pub fn compared_block_count(&self) -> usize {
+        self.recordings.iter().map(|b| b.used.iter().filter(|u| **u).count()).sum()
+    }
+
+    /// Number of recordings.
+    #[must_use]
+    pub fn recording_count(&self) -> usize {
+        self.recordings.len()
+    }
+}
+
+/// What a model leaves.
+#[derive(Clone, Debug, Default)]
+pub struct Residuals {
+    /// Recorded less predicted force in N, per recording.
+    pub residual_n: Vec<Vec<f64>>,
+    /// Normalised innovations.
+    pub innovations: Vec<Vec<f64>>,
+    /// Events, per recording and layer.
+    pub ruptures: Vec<Vec<RuptureEvent>>,
+    /// Negative logarithmic likelihood with priors, in nats, but for the noise's own normalisation.
+    pub nats: f64,
+}
+
+/// The pieces of smooth motion that a model sees.
+#[must_use]
+pub fn motion_pieces(model: &CompiledModel, blocks: &BlockAverages) -> Arc<Vec<MotionPiece>> {
+    blocks.motion_pieces(model.smears_jumps, model.delay_s, model.jump_delay_s)
+}
+
+/// Replays one recording.
+#[must_use]
+pub fn replay(model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
+    let compiled = model.compile(r)?;
+    let mut out = ReplayResult::default();
+    let blocks = &data.recordings[r];
+    replay_with_ruptures(
+        &compiled,
+        blocks,
+        &motion_pieces(&compiled, blocks),
+        &model.rupture_times_s[r],
+        &mut out,
+    );
+    data.count_replayed(blocks.len() as u64);
+    out.force_n.iter().all(|f| f.is_finite()).then_some(out)
+}
+
+/// The data with what sampling leaves open where something of a model's effects breaks: between two samples, and a depth that all
+/// recordings share puts it anywhere between them.
+#[must_use]
+pub fn with_break_uncertainty(model: &Model, data: &FitData) -> FitData {
+    let falling = |(r, b): (usize, &BlockAverages)| {
+        let falls = model.compile(r).map_or_else(Vec::new, |c| break_times(&c, &motion_pieces(&c, b)));
+        b.clone().with_break_times(falls)
+    };
+    let blocks: Vec<BlockAverages> = data.recordings.par_iter().enumerate().map(falling).collect();
+    let same = blocks.iter().zip(data.recordings.iter()).all(|(a, b)| a.extra_sd_n == b.extra_sd_n);
+    if same { data.clone() } else { data.with_recordings(blocks) }
+}
+
+/// A replay of a model with what it remembered, per recording: what neighbours of the model are computed from.
+pub struct ReplayCache {
+    compiled: CompiledModel,
+    pieces: Arc<Vec<MotionPiece>>,
+    incremental: IncrementalReplay,
+}
+
+impl ReplayCache {
+    /// The trail of one recording.
+    #[must_use]
+    pub fn new(model: &Model, data: &FitData, r: usize) -> Option<Self> {
+        let compiled = model.compile(r)?;
+        let blocks = &data.recordings[r];
+        let seen = motion_pieces(&compiled, blocks);
+        let track = IncrementalReplay::new(&compiled, blocks, &seen, &model.rupture_times_s[r]);
+        data.count_replayed(blocks.len() as u64);
+        Some(Self { compiled, pieces: seen, incremental: track })
+    }
+
+    /// As [`replay`], of a model that differs in a number of the base law, of its geometry, or in an instant.
+    #[must_use]
+    pub fn replay(&self, model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
+        let compiled = model.compile(r)?;
+        // On average from the middle on.
+        data.count_replayed(data.recordings[r].len() as u64 / 2);
+        let out = self.incremental.replay_neighbour(
+            &self.compiled,
+            &compiled,
+            &data.recordings[r],
+            &self.pieces,
+            &model.rupture_times_s[r],
+        );
+        out.force_n.iter().all(|f| f.is_finite()).then_some(out)
+    }
+
+    /// The instants (s) at which the law itself ruptures.
+    #[must_use]
+    pub fn free_rupture_times(&self) -> Vec<f64> {
+        free_rupture_times(&self.compiled, &self.pieces)
+    }
+
+    /// Nats of the recording with its ruptures at other instants: residuals and events, with the noise as it is.
+    #[must_use]
+    pub fn nats_with_ruptures(&self, model: &Model, data: &FitData, r: usize, instants: &[f64]) -> f64 {
+        let b = &data.recordings[r];
+        data.count_replayed(b.len() as u64 / 2);
+        let now =
+            self.incremental.replay_neighbour(&self.compiled, &self.compiled, b, &self.pieces, instants);
+        let e: Vec<f64> = b.force_n.iter().zip(&now.force_n).map(|(y, f)| y - f).collect();
+        let w = data.whiten(r, &e);
+        let events: f64 = now.ruptures.iter().map(|e| evaluate_rupture(e, &model.scatter).nats).sum();
+        let sum = w.iter().map(|w| HUBER_LOSS.value(*w)).sum::<f64>() + events;
+        if sum.is_finite() { sum } else { NO_RUPTURE }
+    }
+
+    /// Goes on from other instants.
+    pub fn rebase(&mut self, data: &FitData, r: usize, instants: &[f64]) {
+        self.incremental =
+            IncrementalReplay::new(&self.compiled, &data.recordings[r], &self.pieces, instants);
+    }
+}
+
+/// What a model leaves of all recordings; `None` when it cannot be replayed.
+#[must_use]
+pub fn residuals(model: &Model, data: &FitData) -> Option<Residuals> {
+    let mut all = Residuals::default();
+    let one = |(r, b): (usize, &BlockAverages)| {
+        let replayed = replay(model, data, r)?;
+        let e: Vec<f64> = b.force_n.iter().zip(&replayed.force_n).map(|(y, f)| y - f).collect();
+        let w = data.whiten(r, &e);
+        Some((e, w, replayed.ruptures))
+    };
+    let each: Vec<Option<_>> = data.recordings.par_iter().enumerate().map(one).collect();
+    for left in each {
+        let (e, w, events) = left?;
+        all.residual_n.push(e);
+        all.innovations.push(w);
+        all.ruptures.push(events);
+    }
+    all.nats = neg_log_posterior(model, &all);
+    Some(all)
+}
+
+/// Nats of residuals that are at hand.
+#[must_use]
+pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
+    let mut sum: f64 =
+        r.innovations.iter().map(|w| w.iter().map(|w| HUBER_LOSS.value(*w)).sum::<f64>()).sum();
+    sum += rupture_nats(model, r);
+    sum + prior_nats(model)
+}
+
+/// Nats of the events alone.
+#[must_use]
+pub fn rupture_nats(model: &Model, r: &Residuals) -> f64 {
+    r.ruptures.iter().flatten().map(|e| evaluate_rupture(e, &model.scatter).nats).sum()
+}
+
+/// Nats of the priors.
+#[must_use]
+pub fn prior_nats(model: &Model) -> f64 {
+    let of = |n: &Parameter, x: f64| {
+        if n.prior_sd.is_finite() { 0.5 * ((x - n.prior_mean) / n.prior_sd).powi(2) } else { 0.0 }
+    };
+    let shared: f64 = model.shared_parameters().iter().map(|n| of(n, model.get(n.role, 0))).sum();
+    let own: f64 = model
+        .recording_parameters()
+        .iter()
+        .filter(|n| n.prior_sd.is_finite())
+        .map(|n| (0..model.per_recording.len()).map(|r| of(n, model.get(n.role, r))).sum::<f64>())
+        .sum();
+    shared + own
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::block_averages::BLOCK_S;
+    use crate::model::{Assumptions, RecordingParameters};
+    use stylet_record::Recording;
+    use stylet_tissue::{Layer, Tissue};
+
+    fn near(told: f64, wanted: f64) {
+        assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
+    }
+
+    /// A layer that gives way by its force after 5 mm, at 9 mm; two recordings of different lengths at 4 mm/s.
+    fn given() -> (Model, FitData) {
+        let layer = Layer {
+            thickness_m: 0.02,
+            stiffness_n_per_m: 200.0,
+            friction_ns_per_m2: 3000.0,
+            puncture_n: Some(1.0),
+            name: String::new(),
+        };
+        let belief = Assumptions {
+            tissue: Tissue { surface_m: 0.004, layers: vec![layer] },
+            known_effects: Vec::new(),
+            tolerance: vec![0.3],
+            thickness_tolerance: vec![0.1],
+            surface_tolerance_m: 0.002,
+        };
+        let mut model = Model::base(Arc::new(belief), 2);
+        model.free.recording_surface = true;
+        model.rupture_times_s = vec![vec![2.2], vec![2.3]];
+        model.scatter.rupture_force = 0.05;
+        let recorded = |n: usize| {
+            let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.005).collect();
+            let z = t.iter().map(|t| 0.004 * t).collect();
+            let f = t.iter().map(|t| 0.9 * (t - 1.0).max(0.0) + 0.01 * (90.0 * t).sin()).collect();
+            let exclude: Vec<bool> = (0..n).map(|k| (40..52).contains(&k)).collect();
+            BlockAverages::new(&Recording::new(t, z, f).expect("a recording"), &exclude, BLOCK_S)
+        };
+        (model, FitData::new(Arc::new(vec![recorded(800), recorded(600)]), Noise::white(0.05), 0.0))
+    }
+
+    #[test]
+    fn recordings_are_counted_chosen_and_judged_by_their_noise() {
+        let (_, d) = given();
+        assert_eq!((d.recording_count(), d.compared_block_count()), (2, 200 + 150 - 2 * 3));
+        let second = d.subset(&[1]);
+        assert_eq!(
+            (second.recording_count(), second.recordings[0].len(), second.compared_block_count()),
+            (1, 150, 147)
+        );
+        let e = vec![0.1; 150];
+        let w = d.whiten(1, &e);
+        for (k, w) in w.iter().enumerate() {
+            near(*w, if (10..13).contains(&k) { 0.0 } else { 2.0 });
+        }
+        assert_eq!(second.whiten(0, &e), w);
+        let coloured = d.unwhiten(1, &w);
+        assert!(
+            coloured
+                .iter()
+                .enumerate()
+                .all(|(k, e)| (e - if (10..13).contains(&k) { 0.0 } else { 0.1 }).abs() < 1e-12)
+        );
+        near(d.with_noise(Noise::white(0.2)).whiten(1, &e)[0], 0.5);
+        // The noise that residuals tell is nowhere less than the floor.
+        let told = FitData { floor_n: 0.3, ..d.clone() }
+            .with_estimated_noise(&[vec![0.01; 200], vec![0.01; 150]], NoiseSource::Residual);
+        assert_eq!(told.noise.bins.iter().map(|b| b.sd_n).fold(1.0, f64::min), 0.3);
+        assert_eq!(told.floor_n, 0.3);
+    }
+
+    #[test]
+    fn work_is_counted_in_blocks_that_are_replayed() {
+        let (m, d) = given();
+        let cost = |of: &dyn Fn()| {
+            let before = d.blocks_replayed();
+            of();
+            d.blocks_replayed() - before
+        };
+        assert_eq!(cost(&|| assert!(replay(&m, &d, 0).is_some())), 200);
+        assert_eq!(cost(&|| assert!(residuals(&m, &d).is_some())), 350);
+        assert_eq!(cost(&|| d.count_replayed(7)), 7);
+        let trail = ReplayCache::new(&m, &d, 1).expect("a trail");
+        assert_eq!(cost(&|| assert!(ReplayCache::new(&m, &d, 1).is_some())), 150);
+        assert_eq!(cost(&|| assert!(trail.replay(&m, &d, 1).is_some())), 75);
+        assert_eq!(cost(&|| assert!(trail.nats_with_ruptures(&m, &d, 1, &[2.0]).is_finite())), 75);
+        // Under another noise it is the same account.
+        let other = d.with_noise(Noise::white(1.0));
+        other.count_replayed(5);
+        assert_eq!(other.blocks_replayed(), d.blocks_replayed());
+    }
+
+    #[test]
+    fn nats_are_those_of_residuals_of_ruptures_and_of_priors() {
+        let (mut m, d) = given();
+        m.per_recording = [1e-4, -3e-4]
+            .map(|surface_m| RecordingParameters { surface_m, ..RecordingParameters::default() })
+            .to_vec();
+        m.tissue.layers[0].stiffness_n_per_m = 230.0;
+        m.tissue.surface_m = 0.005;
+        let left = residuals(&m, &d).expect("a replay");
+        // A tenth and a half of the stiffness, half of what the surface is uncertain by, and two of the spread between recordings.
+        let stiffness = 0.5 * (0.15_f64 / 0.3).powi(2);
+        let surface = 0.5 * 0.5_f64.powi(2);
+        let own: f64 = [1e-4, 3e-4].iter().map(|x| 0.5 * (x / m.scatter.surface_m).powi(2)).sum();
+        near(prior_nats(&m), stiffness + surface + own);
+        let events: f64 = (0..2).map(|r| evaluate_rupture(&left.ruptures[r][0], &m.scatter).nats).sum();
+        near(rupture_nats(&m, &left), events);
+        let mut sum = 0.0;
+        for r in 0..2 {
+            let f = replay(&m, &d, r).expect("a replay").force_n;
+            for k in 0..d.recordings[r].len() {
+                near(left.residual_n[r][k], d.recordings[r].force_n[k] - f[k]);
+                if d.recordings[r].used[k] {
+                    let w: f64 = (left.residual_n[r][k] / 0.05).abs();
+                    sum += if w < 2.5 { 0.5 * w * w } else { 2.5 * (w - 1.25) };
+                }
+            }
+        }
+        near(left.nats, sum + events + stiffness + surface + own);
+        near(neg_log_posterior(&m, &left), left.nats);
+    }
+
+    #[test]
+    fn nats_at_other_instants_are_those_of_the_model_that_has_them() {
+        let (m, d) = given();
+        let d = d.subset(&[0]);
+        let m = m.subset(&[0]);
+        let mut trail = ReplayCache::new(&m, &d, 0).expect("a trail");
+        let at = |t: f64| {
+            let there = Model { rupture_times_s: vec![vec![t]], ..m.clone() };
+            residuals(&there, &d).expect("a replay").nats - prior_nats(&there)
+        };
+        for stand in [2.2, 3.0] {
+            trail.rebase(&d, 0, &[stand]);
+            for t in [1.5, 2.2, 2.21, 3.4, NO_RUPTURE] {
+                near(trail.nats_with_ruptures(&m, &d, 0, &[t]), at(t));
+            }
+        }
+        // One newton at 200 N/m, 9 mm at 4 mm/s.
+        assert!((trail.free_rupture_times()[0] - 2.25).abs() < 1e-6);
+        let moved = Model { rupture_times_s: vec![vec![2.5]], ..m.clone() };
+        assert_eq!(
+            trail.replay(&moved, &d, 0).expect("a replay").force_n,
+            replay(&moved, &d, 0).expect("a replay").force_n
+        );
+    }
+}

@@ -1,0 +1,88 @@
+use super::{DayParameters, EffectTerm, Model, RecordingParameters};
+use stylet_tissue::{ChainStage, Effect, ForceLaw, MeasurementChain};
+
+/// A model ready to be replayed over one recording.
+pub struct CompiledModel {
+    /// The law.
+    pub law: ForceLaw,
+    /// The measuring chain.
+    pub chain: MeasurementChain,
+    /// Whether the chain changes the force.
+    pub has_measurement_chain: bool,
+    /// True position over recorded one.
+    pub true_over_recorded: f64,
+    /// Delay in s.
+    pub delay_s: f64,
+    /// A jump of the speed is smeared before it is sampled.
+    pub smears_jumps: bool,
+    /// As in [`Model::placed_s`].
+    pub jump_delay_s: Option<f64>,
+    /// Positions (m) at which a force at the tip may jump: faces, and where something of an effect's own breaks.
+    pub break_positions_m: Vec<f64>,
+    /// Own puncture force of every layer in N, infinite when only its far face ruptures it.
+    pub puncture_n: Vec<f64>,
+    /// Stiffness of every layer in N/m.
+    pub stiffness_n_per_m: Vec<f64>,
+}
+
+impl Model {
+    /// Law and chain for a recording; `None` when the library refuses the values.
+    #[must_use]
+    pub fn compile(&self, recording: usize) -> Option<CompiledModel> {
+        let mut effects = self.assumed.known_effects.clone();
+        let own = self.per_recording.get(recording).copied().unwrap_or_default();
+        let day = self.day_parameters(recording);
+        for choice in &self.effects {
+            effects.push(choice.effect()?);
+        }
+        if self.free.recording_effects {
+            let given = self.assumed.known_effects.len();
+            for ((effect, parameter), beyond) in self.varying_parameters().zip(own.varying) {
+                let mut choice = self.effects[effect].clone();
+                choice.values[parameter] += beyond;
+                effects[given + effect] = choice.effect()?;
+            }
+        }
+        let law = if own == RecordingParameters::default() && day == DayParameters::default() {
+            ForceLaw::new(&self.tissue, &effects).ok()?
+        } else {
+            let mut tissue = self.tissue.clone();
+            tissue.surface_m += own.surface_m + day.surface_m;
+            let factor = libm::exp(own.ln_friction + day.ln_friction);
+            effects.iter_mut().for_each(|e| e.rubbed(factor));
+            tissue.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= factor);
+            ForceLaw::new(&tissue, &effects).ok()?
+        };
+        let chain = MeasurementChain::new(&effects);
+        let surface = law.slabs().first().map_or(0.0, |s| s.front_m);
+        Some(CompiledModel {
+            true_over_recorded: chain.true_position(1.0),
+            delay_s: chain.delay_s(),
+            smears_jumps: chain.has_lag() || law.has_compliant_needle(),
+            jump_delay_s: self.jump_delay_s,
+            has_measurement_chain: !chain.is_plain(),
+            break_positions_m: {
+                let mut places: Vec<f64> =
+                    effects.iter().filter_map(Effect::break_depth_m).map(|d| surface + d).collect();
+                if effects.iter().any(|e| e.place() == ChainStage::Tip && !e.is_neutral()) {
+                    places.extend(law.slabs().iter().map(stylet_tissue::Slab::far_m));
+                }
+                places
+            },
+            puncture_n: law.slabs().iter().map(|s| s.puncture_n).collect(),
+            stiffness_n_per_m: law.slabs().iter().map(|s| s.stiffness_n_per_m).collect(),
+            law,
+            chain,
+        })
+    }
+
+    /// Whether some effect acts along the shaft.
+    #[must_use]
+    pub fn has_friction_effects(&self) -> bool {
+        self.effects
+            .iter()
+            .filter_map(EffectTerm::effect)
+            .chain(self.assumed.known_effects.iter().cloned())
+            .any(|e| e.place() == ChainStage::Friction)
+    }
+}

@@ -1,0 +1,158 @@
+//! How far every number may go, and what is known of it before any measurement.
+
+use super::{Model, Parameter, ParameterRole};
+use stylet_tissue::{FitScale, Proposal};
+
+/// Smallest share of what is believed that a stiffness, friction or puncture force may have.
+const MIN_SHARE_OF_ASSUMED: f64 = 0.02;
+/// By how many of its tolerances a surface or a thickness may be off.
+const MAX_TOLERANCES: f64 = 2.0;
+/// By how many of them one may be off while faces are looked for that only an effect can have moved.
+const MAX_TOLERANCES_WIDE: f64 = 5.0;
+
+impl Model {
+    /// Whether a thickness is further from what is believed than its tolerance allows.
+    #[must_use]
+    pub fn thickness_out_of_tolerance(&self, layer: usize) -> bool {
+        let b = &self.assumed;
+        let believed = b.tissue.layers[layer].thickness_m;
+        let off = (self.tissue.layers[layer].thickness_m - believed).abs();
+        off > MAX_TOLERANCES * b.thickness_tolerance[layer] * believed
+    }
+
+    /// The numbers that every recording shares.
+    #[must_use]
+    pub fn shared_parameters(&self) -> Vec<Parameter> {
+        let mut out = Vec::new();
+        let b = &self.assumed;
+        for (layer, l) in b.tissue.layers.iter().enumerate() {
+            let tolerance = b.tolerance[layer];
+            let mut relative = |role, size: f64| {
+                if size > 0.0 {
+                    let (low, high) = ((1.0 - tolerance).max(MIN_SHARE_OF_ASSUMED), 1.0 + tolerance);
+                    out.push(Parameter { role, low, high, prior_mean: 1.0, prior_sd: tolerance, step: 1e-5 });
+                }
+            };
+            relative(ParameterRole::Stiffness(layer), l.stiffness_n_per_m);
+            relative(ParameterRole::Friction(layer), l.friction_ns_per_m2);
+            relative(ParameterRole::Puncture(layer), l.puncture_n.unwrap_or(0.0));
+        }
+        if self.free.surface && b.surface_tolerance_m > 0.0 {
+            let (at, sd) = (b.tissue.surface_m, b.surface_tolerance_m);
+            let (low, high) = (at - MAX_TOLERANCES * sd, at + MAX_TOLERANCES * sd);
+            out.push(Parameter {
+                role: ParameterRole::Surface,
+                low,
+                high,
+                prior_mean: at,
+                prior_sd: sd,
+                step: 1e-7,
+            });
+        }
+        if self.free.thickness {
+            for (layer, l) in b.tissue.layers.iter().enumerate() {
+                let (d, sd) = (l.thickness_m, b.thickness_tolerance[layer] * l.thickness_m);
+                if sd > 0.0 {
+                    let most =
+                        if self.free.wide_thickness { MAX_TOLERANCES_WIDE } else { MAX_TOLERANCES } * sd;
+                    let (low, high) = ((d - most).max(0.05 * d), d + most);
+                    out.push(Parameter {
+                        role: ParameterRole::Thickness(layer),
+                        low,
+                        high,
+                        prior_mean: d,
+                        prior_sd: sd,
+                        step: 1e-7,
+                    });
+                }
+            }
+        }
+        for (effect, choice) in self.effects.iter().enumerate() {
+            let at = choice.coordinates();
+            for (parameter, p) in choice.info.parameters.iter().enumerate().filter(|(_, p)| !p.integer) {
+                if self.tied.iter().any(|b| b.effect == effect && b.parameter == parameter) {
+                    continue;
+                }
+                let role = ParameterRole::Effect { effect, parameter };
+                let (from, to) = p.search;
+                let (low, high, step) = match p.fit_scale() {
+                    FitScale::Log => {
+                        let (low, high) = ((from / 10.0).max(p.low), (to * 10.0).min(p.high));
+                        // A frequency is told by the phase at the end of a recording.
+                        let step = if p.unit == "Hz" { 1e-6 / at[parameter].max(1e-3) } else { 1e-4 };
+                        (libm::log(low.max(1e-12)), libm::log(high), step)
+                    }
+                    FitScale::Reciprocal => (0.0, 10.0 / from, 1e-4 / p.start),
+                    FitScale::Linear => {
+                        let wide = to - from;
+                        let low = if p.low == 0.0 { 0.0 } else { (from - wide).max(p.low) };
+                        let high = (to + 3.0 * wide).min(p.high);
+                        // What moves with a face has to move as finely.
+                        let fine = 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4);
+                        let bends = p.unit == "m" && choice.info.proposal == Proposal::MembraneRupture;
+                        (low, high, if bends { 1e-7 } else { fine })
+                    }
+                };
+                let (mean, sd) = p.measured_prior.unwrap_or((0.0, f64::INFINITY));
+                out.push(Parameter { role, low, high, prior_mean: mean, prior_sd: sd, step });
+            }
+        }
+        let mut of_day = |role, sd, step| {
+            let infinity = f64::INFINITY;
+            out.push(Parameter { role, low: -infinity, high: infinity, prior_mean: 0.0, prior_sd: sd, step });
+        };
+        for day in 0..self.days.len() {
+            if self.free.day_surface {
+                of_day(ParameterRole::DaySurface(day), self.scatter.day_surface_m, 1e-7);
+            }
+            if self.free.day_friction {
+                of_day(ParameterRole::DayFriction(day), self.scatter.day_ln_friction, 1e-5);
+            }
+        }
+        out
+    }
+
+    /// Standard deviation of the `k`-th number that differs between insertions.
+    #[must_use]
+    pub fn varying_sd(&self, k: usize) -> f64 {
+        let known = self.scatter.varying.get(k).copied().unwrap_or(0.0);
+        if known > 0.0 { known } else { self.library_varying_sd(k) }
+    }
+
+    /// The same as the library has it, before any data.
+    #[must_use]
+    pub fn library_varying_sd(&self, k: usize) -> f64 {
+        self.varying_parameters()
+            .nth(k)
+            .map_or(1.0, |(e, p)| self.effects[e].info.parameters[p].between_recordings_sd)
+    }
+
+    /// The numbers that each recording has of its own.
+    #[must_use]
+    pub fn recording_parameters(&self) -> Vec<Parameter> {
+        let infinity = f64::INFINITY;
+        let number = |role, sd, step| Parameter {
+            role,
+            low: -infinity,
+            high: infinity,
+            prior_mean: 0.0,
+            prior_sd: sd,
+            step,
+        };
+        let mut out = Vec::new();
+        if self.free.recording_surface {
+            out.push(number(ParameterRole::RecordingSurface, self.scatter.surface_m, 1e-7));
+        }
+        if self.free.recording_friction {
+            out.push(number(ParameterRole::RecordingFriction, self.scatter.ln_friction, 1e-5));
+        }
+        if self.free.recording_effects {
+            for (k, (e, p)) in self.varying_parameters().enumerate() {
+                let step = 1e-3 * self.effects[e].info.parameters[p].between_recordings_sd;
+                out.push(number(ParameterRole::RecordingEffect(k), self.varying_sd(k), step));
+            }
+        }
+        out.extend((0..self.layers()).map(|layer| number(ParameterRole::RuptureTime(layer), infinity, 1e-5)));
+        out
+    }
+}

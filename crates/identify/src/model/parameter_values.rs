@@ -1,0 +1,86 @@
+//! The value of every number.
+
+use super::{Model, ParameterRole};
+use stylet_tissue::{AnyEffect, FitScale};
+
+impl Model {
+    /// A number's value, of recording `r` if it is its own.
+    #[must_use]
+    pub fn get(&self, role: ParameterRole, r: usize) -> f64 {
+        let assumed = &self.assumed.tissue;
+        match role {
+            ParameterRole::Stiffness(l) => {
+                self.tissue.layers[l].stiffness_n_per_m / assumed.layers[l].stiffness_n_per_m
+            }
+            ParameterRole::Friction(l) => {
+                self.tissue.layers[l].friction_ns_per_m2 / assumed.layers[l].friction_ns_per_m2
+            }
+            ParameterRole::Puncture(l) => {
+                self.tissue.layers[l].puncture_n.unwrap_or(1.0) / assumed.layers[l].puncture_n.unwrap_or(1.0)
+            }
+            ParameterRole::Surface => self.tissue.surface_m,
+            ParameterRole::Thickness(l) => self.tissue.layers[l].thickness_m,
+            ParameterRole::Effect { effect, parameter } => {
+                let choice = &self.effects[effect];
+                let x = choice.coordinates()[parameter];
+                match choice.info.parameters[parameter].fit_scale() {
+                    FitScale::Linear => x,
+                    FitScale::Log => libm::log(x.max(1e-300)),
+                    FitScale::Reciprocal => 1.0 / x,
+                }
+            }
+            ParameterRole::RecordingSurface => self.per_recording[r].surface_m,
+            ParameterRole::RecordingFriction => self.per_recording[r].ln_friction,
+            ParameterRole::RecordingEffect(k) => self.per_recording[r].varying[k],
+            ParameterRole::DaySurface(d) => self.days[d].surface_m,
+            ParameterRole::DayFriction(d) => self.days[d].ln_friction,
+            ParameterRole::RuptureTime(l) => self.rupture_times_s[r][l],
+        }
+    }
+
+    /// Sets a number, of recording `r` if it is its own.
+    pub fn set(&mut self, role: ParameterRole, r: usize, x: f64) {
+        let assumed = &self.assumed.tissue;
+        match role {
+            ParameterRole::Stiffness(l) => {
+                self.tissue.layers[l].stiffness_n_per_m = x * assumed.layers[l].stiffness_n_per_m;
+            }
+            ParameterRole::Friction(l) => {
+                self.tissue.layers[l].friction_ns_per_m2 = x * assumed.layers[l].friction_ns_per_m2;
+            }
+            ParameterRole::Puncture(l) => {
+                self.tissue.layers[l].puncture_n = assumed.layers[l].puncture_n.map(|f| f * x);
+            }
+            ParameterRole::Surface => self.tissue.surface_m = x,
+            ParameterRole::Thickness(l) => self.tissue.layers[l].thickness_m = x,
+            ParameterRole::Effect { effect, parameter } => {
+                let choice = &mut self.effects[effect];
+                let mut at = choice.coordinates();
+                at[parameter] = match choice.info.parameters[parameter].fit_scale() {
+                    FitScale::Linear => x,
+                    FitScale::Log => libm::exp(x),
+                    FitScale::Reciprocal => {
+                        if x > 0.0 {
+                            1.0 / x
+                        } else {
+                            f64::INFINITY
+                        }
+                    }
+                };
+                if let Some(effect) = AnyEffect::from_coordinates(choice.info.id, &at) {
+                    choice.values = effect.parameters();
+                }
+                let values = choice.values.clone();
+                for b in self.tied.iter().filter(|b| b.tied_to == Some(effect)) {
+                    self.effects[b.effect].values[b.parameter] = values[b.parameter];
+                }
+            }
+            ParameterRole::RecordingSurface => self.per_recording[r].surface_m = x,
+            ParameterRole::RecordingFriction => self.per_recording[r].ln_friction = x,
+            ParameterRole::RecordingEffect(k) => self.per_recording[r].varying[k] = x,
+            ParameterRole::DaySurface(d) => self.days[d].surface_m = x,
+            ParameterRole::DayFriction(d) => self.days[d].ln_friction = x,
+            ParameterRole::RuptureTime(l) => self.rupture_times_s[r][l] = x,
+        }
+    }
+}

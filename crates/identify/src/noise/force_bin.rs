@@ -1,0 +1,231 @@
+//! Noise in one range of the force.
+
+use super::long_memory::{ROW_LEN, SEARCH_STRETCHES, STRETCHES, regression_row, running_sums};
+use super::{HUBER_K, HUBER_LOSS, Noise, NoiseSource};
+use crate::block_averages::BlockAverages;
+use stylet_stats::autoregressive::stationary;
+use stylet_stats::order_statistics::median;
+use stylet_stats::robust_linear_prediction::{prediction_residual, robust_linear_prediction};
+
+/// Highest order.
+pub const AR_ORDER: usize = 4;
+/// Turns of robust least squares.
+const IRLS_ITERATIONS: usize = 4;
+
+/// Noise in one range of the force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceBinNoise {
+    /// Coefficients, newest first.
+    pub ar: [f64; AR_ORDER],
+    /// Coefficients of the means of stretches further back.
+    pub long_memory: [f64; STRETCHES.len()],
+    /// Standard deviation of the innovations in N.
+    pub innovation_sd_n: f64,
+    /// Standard deviation in N.
+    pub sd_n: f64,
+    /// How a block is foretold that has fewer than [`ORDER`] before it since a break: none, one ...
+    pub after_break: [AfterBreak; AR_ORDER],
+}
+
+/// How a block is foretold soon after a break.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AfterBreak {
+    /// Coefficients, newest first; as many as there are blocks since the break.
+    pub ar: [f64; AR_ORDER],
+    /// Coefficients of the means of stretches further back.
+    pub long_memory: [f64; STRETCHES.len()],
+    /// Standard deviation in N of what is not foretold.
+    pub sd_n: f64,
+}
+
+impl AfterBreak {
+    /// Nothing is known of what was before.
+    pub(super) fn without_history(sd_n: f64) -> Self {
+        Self { ar: [0.0; AR_ORDER], long_memory: [0.0; STRETCHES.len()], sd_n }
+    }
+}
+
+impl ForceBinNoise {
+    /// Independent noise of one size.
+    pub(super) fn white(sd_n: f64) -> Self {
+        let none = AfterBreak::without_history(sd_n);
+        Self {
+            ar: none.ar,
+            long_memory: none.long_memory,
+            innovation_sd_n: sd_n,
+            sd_n,
+            after_break: [none; AR_ORDER],
+        }
+    }
+
+    /// Whether it has a slow wander.
+    pub(super) fn has_long_memory(&self) -> bool {
+        let none = [0.0; STRETCHES.len()];
+        self.long_memory != none || self.after_break.iter().any(|f| f.long_memory != none)
+    }
+
+    /// Standard deviation in N of what is not foretold of a block with so many before it since a break.
+    pub(super) fn innovation_sd_after_n(&self, run: usize) -> f64 {
+        self.after_break.get(run).map_or(self.innovation_sd_n, |f| f.sd_n)
+    }
+}
+
+impl Noise {
+    /// Robust least squares of one range.
+    pub(super) fn fit_bin(
+        &self,
+        blocks: &[BlockAverages],
+        columns: &[Vec<f64>],
+        bin: usize,
+        from: NoiseSource,
+        floor_n: f64,
+    ) -> ForceBinNoise {
+        let mut rows: Vec<[f64; ROW_LEN]> = Vec::new();
+        let mut all: Vec<f64> = Vec::new();
+        for (b, e) in blocks.iter().zip(columns) {
+            let sums =
+                if self.long_memory { running_sums(e, |k| b.used[k]) } else { running_sums(e, |_| true) };
+            let mut run = 0;
+            for k in 0..b.len() {
+                run = if b.memory_reset[k] { 0 } else { run + 1 };
+                if !b.used[k] || !e[k].is_finite() || self.bin_index(b.abs_force_n[k]) != bin {
+                    continue;
+                }
+                all.push(e[k].abs());
+                if run >= AR_ORDER && (1..=AR_ORDER).all(|i| e[k - i].is_finite()) {
+                    rows.push(regression_row(e, &sums, k, if self.long_memory { k } else { run }));
+                }
+            }
+        }
+        let sd_n = (median(&mut all) * stylet_stats::MAD_TO_SD).max(floor_n);
+        if rows.len() < 40 {
+            return ForceBinNoise::white(sd_n);
+        }
+        let n = rows.len() as f64;
+        let mut best: Option<(f64, ForceBinNoise)> = None;
+        // Residuals without their smooth course have no slow wander.
+        let most = match from {
+            NoiseSource::Detrended => AR_ORDER,
+            NoiseSource::Residual => AR_ORDER + SEARCH_STRETCHES,
+            NoiseSource::LongMemory | NoiseSource::Bootstrap => AR_ORDER + STRETCHES.len(),
+        };
+        // An interval reckons with a wander that cannot be excluded: there it is the largest order that holds.
+        let largest = from.has_long_memory();
+        let turns = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
+        for order in (0..=most).map(|k| if largest { most - k } else { k }) {
+            let columns: Vec<usize> = (1..=order).collect();
+            let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
+            let (near, slow) = a[1..].split_at(AR_ORDER);
+            if !stationary(near) || (order > AR_ORDER && a[1..].iter().sum::<f64>() > 0.999) {
+                continue;
+            }
+            let near: [f64; AR_ORDER] = core::array::from_fn(|i| near[i]);
+            let slow: [f64; STRETCHES.len()] = core::array::from_fn(|i| slow[i]);
+            let loss: f64 =
+                rows.iter().map(|row| HUBER_LOSS.value(prediction_residual(row, &a) / s)).sum::<f64>()
+                    + n * libm::log(s);
+            let cost = loss + 0.5 * order as f64 * libm::log(n);
+            if best.is_none_or(|b| cost < b.0) {
+                let first = [AfterBreak::without_history(sd_n.max(s)); AR_ORDER];
+                best = Some((
+                    cost,
+                    ForceBinNoise {
+                        ar: near,
+                        long_memory: slow,
+                        innovation_sd_n: s,
+                        sd_n,
+                        after_break: first,
+                    },
+                ));
+            }
+            if largest {
+                break;
+            }
+        }
+        let mut best = best.map_or_else(|| ForceBinNoise::white(sd_n), |b| b.1);
+        if from.has_long_memory() {
+            // The first blocks after a break go on where those before it ended, and with one another.
+            for (run, first) in best.after_break.iter_mut().enumerate() {
+                let columns: Vec<usize> = (1..=run).chain(AR_ORDER + 1..ROW_LEN).collect();
+                let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
+                let (near, slow) = a[1..].split_at(AR_ORDER);
+                *first = AfterBreak {
+                    ar: core::array::from_fn(|i| near[i]),
+                    long_memory: core::array::from_fn(|i| slow[i]),
+                    sd_n: s.max(best.innovation_sd_n),
+                };
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{near, normal, still};
+    use super::*;
+
+    /// Noise that grows with the force and remembers is found as it was drawn.
+    #[test]
+    fn noise_is_estimated_as_it_was_drawn() {
+        let n = 16_000;
+        let mut b = still(n);
+        let draw = normal(9, n);
+        let mut e = vec![0.0; n];
+        for k in 0..n {
+            // Stretches of one size each.
+            let range = k / 800 % 2;
+            b.abs_force_n[k] = [0.3, 1.7][range];
+            let a = [[0.5, -0.2], [0.3, 0.25]][range];
+            let before = |i: usize| if k >= i { e[k - i] } else { 0.0 };
+            e[k] = a[0] * before(1) + a[1] * before(2) + [0.01, 0.04][range] * draw[k];
+        }
+        for from in [NoiseSource::Residual, NoiseSource::LongMemory, NoiseSource::Bootstrap] {
+            let mut noise =
+                Noise { edges_n: vec![1.0], bins: Vec::new(), long_memory: from.has_long_memory() };
+            for range in 0..2 {
+                noise.bins.push(noise.fit_bin(
+                    std::slice::from_ref(&b),
+                    std::slice::from_ref(&e),
+                    range,
+                    from,
+                    1e-6,
+                ));
+            }
+            for (bin, (a, sd)) in noise.bins.iter().zip([([0.5, -0.2], 0.01), ([0.3, 0.25], 0.04)]) {
+                let whole: Vec<f64> = bin.ar.iter().chain(&bin.long_memory).copied().collect();
+                assert!(
+                    (whole[0] - a[0]).abs() < 0.04 && (whole[1] - a[1]).abs() < 0.04,
+                    "{from:?}: {whole:?}"
+                );
+                assert!((bin.innovation_sd_n / sd - 1.0).abs() < 0.03, "{from:?}: {}", bin.innovation_sd_n);
+                // The process has a larger size than its innovations: c0 = s^2 (1 - a2) / ((1 + a2) ((1 - a2)^2 - a1^2)).
+                let ratio = (1.0 - a[1]) / ((1.0 + a[1]) * ((1.0 - a[1]).powi(2) - a[0] * a[0]));
+                assert!((bin.sd_n / (sd * ratio.sqrt()) - 1.0).abs() < 0.05, "{from:?}: {}", bin.sd_n);
+            }
+        }
+    }
+
+    #[test]
+    fn fewer_than_forty_blocks_tell_a_size_and_no_more() {
+        let told = |blocks: usize| {
+            let b = still(blocks);
+            let e: Vec<f64> = (0..blocks).map(|k| libm::sin(0.3 * k as f64)).collect();
+            let noise = Noise::estimate(&[b], std::slice::from_ref(&e), NoiseSource::Residual, 0.0);
+            let mut sizes: Vec<f64> = e.iter().map(|e| e.abs()).collect();
+            (noise.bins[0], median(&mut sizes) * stylet_stats::MAD_TO_SD)
+        };
+        // The first four have not four before them.
+        let (few, sd) = told(43);
+        assert_eq!(few, ForceBinNoise::white(sd));
+        let (many, sd) = told(44);
+        near(many.sd_n, sd);
+        assert!(many.ar != [0.0; AR_ORDER] && many.innovation_sd_n < 0.25 * sd, "{many:?}");
+        let none = Noise::estimate(&[still(10)], &[vec![f64::NAN; 10]], NoiseSource::Residual, 0.0);
+        assert_eq!(none.bins[0], ForceBinNoise::white(1e-6));
+        let floor = Noise::estimate(&[still(60)], &[vec![0.0; 60]], NoiseSource::Residual, 0.02);
+        assert_eq!((floor.bins[0].sd_n, floor.bins[0].innovation_sd_n), (0.02, 0.02));
+        let least = Noise::estimate(&[still(60)], &[vec![0.0; 60]], NoiseSource::Residual, 0.0);
+        assert_eq!(least.bins[0].sd_n, 1e-6);
+    }
+}

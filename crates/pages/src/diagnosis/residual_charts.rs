@@ -1,0 +1,282 @@
+//! Residuals: what the base law leaves, what the extended model leaves, before and after.
+
+use super::recording_differences;
+use stylet_diagnose::DiagnosisResult;
+use stylet_diagnose::diagnosis_json::Diagnosis;
+use stylet_diagnose::report_curves::{
+    RecordingCurves, binned_means, correlations, reported_fit, rms_by_layer_and_phase,
+};
+use stylet_diagnose::tone_detection::residual_spectrum;
+use stylet_report::{
+    Cell, Chart, Colour, Level, LineStyle, MarkerSet, Scale, Section, Series, Side, Status, Table, p_value,
+    significant,
+};
+use stylet_scenario::Scenario;
+use stylet_tissue::Slab;
+
+/// What was believed, and what of it the measured force contradicts: the recording that the base law predicts worst.
+pub(super) fn assumptions(scenario: &Scenario, d: &Diagnosis, all: &[RecordingCurves]) -> Section {
+    let percent = |share: f64| significant(100.0 * share, 2);
+    let beliefs = format!(
+        "Believed: {} layer{}, stiffness, friction and puncture force to {} %, thickness to {} %, the surface to {} mm{}. Within that the base law was fitted.",
+        scenario.tissue.layers.len(),
+        if scenario.tissue.layers.len() == 1 { "" } else { "s" },
+        percent(scenario.tolerance),
+        percent(scenario.thickness_tolerance),
+        significant(1e3 * scenario.surface_tolerance_m, 2),
+        match scenario.effects.len() {
+            0 => String::new(),
+            n => format!(", {n} effect{} beyond the base law", if n == 1 { "" } else { "s" }),
+        }
+    );
+    let section = Section::new("What was believed, and what differs").text(beliefs);
+    let square = |c: &RecordingCurves| {
+        c.base_residual_n.iter().zip(&c.used).filter(|(_, u)| **u).map(|(e, _)| e * e).sum::<f64>()
+            / c.used.iter().filter(|u| **u).count().max(1) as f64
+    };
+    let worst = all.iter().zip(&d.gain.recordings).max_by(|a, b| square(a.0).total_cmp(&square(b.0)));
+    let Some((c, name)) = worst else { return section };
+    let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, c.time_s.clone(), y.to_vec());
+    section.chart(
+        Chart::new(format!("{name}: measured less predicted"), "Time (s)", "Residual (N)")
+            .caption("The recording that the base law fits worst: what it leaves, and what the extended model leaves.")
+            .group(name.clone())
+            .height(260)
+            .with_series(line("base law, re-fitted", Colour::Vermillion, &c.base_residual_n).width(1.2))
+            .with_series(line("extended model", Colour::Blue, &c.extended_residual_n).width(1.0))
+            .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise"))
+            .with_level(Level::dotted(-2.0 * d.noise.sd_n, "")),
+    )
+}
+
+pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Section {
+    let g = &d.gain;
+    let rows = g
+        .recordings
+        .iter()
+        .zip(&g.per_recording_n)
+        .map(|(name, (before, after))| {
+            vec![
+                Cell::text(name.clone()),
+                Cell::number(significant(*before, 3)),
+                Cell::number(significant(*after, 3)).status(Status::at_most(
+                    *after,
+                    1.15 * g.floor_n,
+                    2.0 * g.floor_n,
+                )),
+                Cell::number(significant(g.floor_n, 3)),
+            ]
+        })
+        .collect();
+    let title = if g.held_out {
+        "Each recording predicted by models fitted to the others, with the law's own ruptures (N)"
+    } else {
+        "The one recording, which was also fitted, with the law's own ruptures (N)"
+    };
+    let mut section = Section::new("Before and after").table(Table::new(
+        title.to_owned(),
+        &["", "base law, re-fitted", "extended model", "noise"],
+        rows,
+    ));
+    for (c, name) in all.iter().zip(&g.recordings).take(8) {
+        let ruptures = MarkerSet {
+            name: "ruptures in the data".to_owned(),
+            colour: Colour::Grey,
+            style: LineStyle::Dashed,
+            side: Side::Right,
+            marks: c.ruptures_s.iter().enumerate().map(|(k, t)| (*t, format!("layer {}", k + 1))).collect(),
+        };
+        let minus = |e: &[f64]| c.force_n.iter().zip(e).map(|(f, e)| f - e).collect::<Vec<_>>();
+        section = section.chart(
+            Chart::new(name.clone(), "Time (s)", "Force (N)")
+                .caption("Measured, and as base law and extended model have it.")
+                .group(name.clone())
+                .height(300)
+                .with_series(
+                    Series::line("measured", Colour::Grey, c.time_s.clone(), c.force_n.clone()).width(3.0),
+                )
+                .with_series(
+                    Series::line("base law", Colour::Vermillion, c.time_s.clone(), minus(&c.base_residual_n))
+                        .width(1.1),
+                )
+                .with_series(
+                    Series::line(
+                        "extended model",
+                        Colour::Blue,
+                        c.time_s.clone(),
+                        minus(&c.extended_residual_n),
+                    )
+                    .width(1.3),
+                )
+                .with_markers(ruptures),
+        );
+    }
+    section
+}
+
+pub(super) fn base_law_residual(
+    d: &Diagnosis,
+    examined: &DiagnosisResult,
+    all: &[RecordingCurves],
+) -> Section {
+    let mut section = Section::new("What the base law cannot say").text(
+        "The residual of the re-fitted base law: measured less predicted force, ruptures taken where the data show them. These pictures \
+         propose causes; the likelihood below decides.",
+    );
+    let names = &d.gain.recordings;
+    let mut time =
+        Chart::new("Residual against time", "Time (s)", "Residual (N)").height(260).with_level(Level::zero());
+    let mut depth = Chart::new("Residual against depth", "Depth (mm)", "Residual (N)")
+        .caption("Means over 60 bins of depth, advance and retraction apart (retraction dotted).")
+        .height(260)
+        .with_level(Level::zero());
+    let mut velocity = Chart::new("Residual against velocity", "Velocity (mm/s)", "Residual (N)")
+        .caption("Means over 60 bins of velocity, with the needle in the tissue.")
+        .height(260)
+        .with_level(Level::zero());
+    for (k, (c, name)) in all.iter().zip(names).enumerate() {
+        let colour = Colour::nth(k);
+        time = time.with_series(
+            Series::line(name.clone(), colour, c.time_s.clone(), c.base_residual_n.clone()).width(1.0),
+        );
+        let pick = |keep: &dyn Fn(usize) -> bool| -> Vec<bool> {
+            (0..c.used.len()).map(|i| c.used[i] && keep(i)).collect()
+        };
+        let mm: Vec<f64> = c.position_m.iter().map(|z| z * 1e3).collect();
+        let mmps: Vec<f64> = c.velocity_mps.iter().map(|v| v * 1e3).collect();
+        let (x, y) = binned_means(&mm, &c.base_residual_n, &pick(&|i| c.velocity_mps[i] >= -1e-5), 60);
+        depth = depth.with_series(Series::line(name.clone(), colour, x, y));
+        let (x, y) = binned_means(&mm, &c.base_residual_n, &pick(&|i| c.velocity_mps[i] < -1e-5), 60);
+        if !x.is_empty() {
+            depth = depth
+                .with_series(Series::line(format!("{name}, back"), colour, x, y).styled(LineStyle::Dotted));
+        }
+        let (x, y) = binned_means(&mmps, &c.base_residual_n, &pick(&|i| c.position_m[i] > 0.0), 60);
+        velocity = velocity.with_series(Series::points(name.clone(), colour, x, y));
+    }
+    section = section.chart(time).chart(depth).chart(velocity);
+    let layers = examined.search.base.model.layers();
+    let (before, after) = (
+        rms_by_layer_and_phase(all, |c| &c.base_residual_n, layers),
+        rms_by_layer_and_phase(all, |c| &c.extended_residual_n, layers),
+    );
+    let rows = before
+        .iter()
+        .zip(&after)
+        .enumerate()
+        .map(|(k, (b, a))| {
+            let name = match k {
+                0 => "in air".to_owned(),
+                k if k > layers => "behind the last layer".to_owned(),
+                k => format!("layer {k}"),
+            };
+            let mut row = vec![Cell::text(name)];
+            for (b, a) in b.iter().zip(a) {
+                row.push(Cell::number(significant(*b, 3)).status(Status::at_most(
+                    *b,
+                    1.3 * d.noise.sd_n,
+                    3.0 * d.noise.sd_n,
+                )));
+                row.push(Cell::number(significant(*a, 3)));
+            }
+            row
+        })
+        .collect();
+    section = section.table(
+        Table::new(
+            "Root mean square by layer and phase (N): base law, extended model",
+            &["", "base", "extended", "base", "extended", "base", "extended"],
+            rows,
+        )
+        .with_column_groups(&[("", 1), ("advance", 2), ("hold", 2), ("retraction", 2)]),
+    );
+    let slabs = Slab::stack(&examined.search.base.model.tissue);
+    let (cb, ca) = (
+        correlations(all, |c| &c.base_residual_n, &slabs),
+        correlations(all, |c| &c.extended_residual_n, &slabs),
+    );
+    section = section.table(Table::new(
+        "Correlation of the residual with what was done",
+        &["", "base law", "extended model"],
+        cb.iter()
+            .zip(&ca)
+            .map(|((name, b), (_, a))| {
+                vec![Cell::text(*name), Cell::number(format!("{b:+.3}")), Cell::number(format!("{a:+.3}"))]
+            })
+            .collect(),
+    ));
+    let search = &examined.search;
+    let (f, base) = residual_spectrum(&search.base, &search.data);
+    let best = reported_fit(examined);
+    let (_, after) = residual_spectrum(best, &search.data);
+    let keep: Vec<usize> = thin(&f, &base);
+    let pick = |x: &[f64]| keep.iter().map(|k| x[*k]).collect::<Vec<_>>();
+    let chart = Chart::new("Spectrum of the residual", "log10 of frequency (Hz)", "N/sqrt(Hz)")
+        .caption("Amplitude of the residual at the recordings' own rate, mean over recordings; the highest of each fiftieth of a decade is drawn.")
+        .height(240);
+    let log: Vec<f64> = pick(&f).iter().map(|f| f.log10()).collect();
+    section.chart(Chart {
+        scale: Scale::Log,
+        ..chart
+            .with_series(Series::line("base law", Colour::Vermillion, log.clone(), pick(&base)))
+            .with_series(Series::line("extended model", Colour::Blue, log, pick(&after)))
+    })
+}
+
+/// The highest value of each fiftieth of a decade.
+fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
+    let mut kept: Vec<(i64, usize)> = Vec::new();
+    for (k, f) in f.iter().enumerate().filter(|(_, f)| **f > 0.01) {
+        let bin = (f.log10() * 50.0).floor() as i64;
+        match kept.last_mut() {
+            Some((last, best)) if *last == bin => {
+                if value[k] > value[*best] {
+                    *best = k;
+                }
+            }
+            _ => kept.push((bin, k)),
+        }
+    }
+    kept.into_iter().map(|k| k.1).collect()
+}
+
+pub(super) fn remaining_structure(d: &Diagnosis, all: &[RecordingCurves]) -> Section {
+    let text = if d.residual_structure.p_value < 1e-3 {
+        format!(
+            "The residual of the extended model is still predictable: it depends on {} ({}{}).",
+            d.residual_structure.depends_on.join(", "),
+            p_value(d.residual_structure.p_value),
+            if d.residual_structure.nats > 0.0 {
+                format!("; {} nats", significant(d.residual_structure.nats, 3))
+            } else {
+                String::new()
+            }
+        )
+    } else {
+        format!(
+            "Nothing that is the same in several recordings remains ({}). The noise: {} N, autoregressive coefficients {} and {} per sample, {}.",
+            p_value(d.residual_structure.p_value),
+            significant(d.noise.sd_n, 3),
+            significant(d.noise.ar[0], 3),
+            significant(d.noise.ar[1], 3),
+            if d.noise.from_air { "checked in air" } else { "without air to check it in" }
+        )
+    };
+    let mut chart = Chart::new("What the extended model leaves", "Depth (mm)", "Residual (N)")
+        .caption("Means over 60 bins of depth.")
+        .height(240)
+        .with_level(Level::zero());
+    for (k, (c, name)) in all.iter().zip(&d.gain.recordings).enumerate() {
+        let mm: Vec<f64> = c.position_m.iter().map(|z| z * 1e3).collect();
+        let (x, y) = binned_means(&mm, &c.extended_residual_n, &c.used, 60);
+        chart = chart.with_series(Series::line(name.clone(), Colour::nth(k), x, y));
+    }
+    let section = Section::new("What remains").text(text);
+    let section = match recording_differences(d) {
+        Some(differ) => section.text(format!(
+            "Fitted, and no cause: {differ}. A simulation that does not know them misses the next insertion by as much."
+        )),
+        None => section,
+    };
+    section.chart(chart)
+}

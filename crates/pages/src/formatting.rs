@@ -1,0 +1,49 @@
+//! Words and numbers that several pages and the terminal share.
+
+use std::collections::BTreeMap;
+use stylet_diagnose::diagnosis_json::DataQualityNote;
+use stylet_report::{Cell, Table, significant};
+
+/// The base law in the notation of SPEC section 1.
+pub(crate) const BASE_LAW_EQUATIONS: &str = "f   = f_K + f_B            until layer a = r + 1 ruptures: f_K >= F_a, or z >= s_a + d_a\nf_K = K_a max(0, z - s_a)\nf_B = v sum_i b_i l_i,      l_i = clamp(z - s_i, 0, d_i)\n";
+
+/// What there is, or a dash.
+#[must_use]
+pub fn or_dash(value: Option<String>) -> String {
+    value.unwrap_or_else(|| "-".to_owned())
+}
+
+/// Three decimals, or a dash.
+#[must_use]
+pub fn three_decimals(x: Option<f64>) -> String {
+    or_dash(x.filter(|x| x.is_finite()).map(|x| format!("{x:.3}")))
+}
+
+/// An effect's name as words.
+pub(crate) fn effect_label(id: &str) -> String {
+    id.replace('_', " ")
+}
+
+/// An effect's numbers with their units.
+#[must_use]
+pub fn strength_parameters(effect: &str, values: &BTreeMap<String, f64>) -> String {
+    let known = |path: &str| stylet_tissue::effect_info(effect).and_then(|i| i.parameter(path));
+    let unit = |path: &str| known(path).map_or("", |p| p.unit);
+    let one = |(path, x): (&String, &f64)| {
+        format!("{path} = {} {}", significant(*x, 2), unit(path)).trim_end().to_owned()
+    };
+    let strength = |path: &str| known(path).is_some_and(|p| p.strength);
+    values.iter().filter(|(p, _)| strength(p)).map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// A number in another unit (`unit` of them make one), with so many digits; a dash for nothing.
+#[must_use]
+pub fn significant_or_dash(value: Option<f64>, unit: f64, digits: usize) -> String {
+    or_dash(value.map(|x| significant(x * unit, digits)))
+}
+
+/// What is remarkable about recordings.
+pub(crate) fn data_quality_table(title: &str, quality: &[DataQualityNote]) -> Table {
+    let row = |q: &DataQualityNote| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())];
+    Table::new(title, &["recording", "remark"], quality.iter().map(row).collect())
+}

@@ -1,0 +1,81 @@
+//! The page of many specimens, each indented once and held.
+
+use stylet_diagnose::Diagnosis;
+use stylet_diagnose::repeated_insertions::dataset::Dataset;
+use stylet_diagnose::repeated_insertions::indentation_relaxation::SpecimenReport;
+use stylet_report::svg::{Bar, BarChart, FigureOptions, bar_chart};
+use stylet_report::{Cell, Colour, Page, Section, Table, Tile, significant};
+
+/// The page of the specimens of the data set `set`, which was read from `file`.
+#[must_use]
+pub fn page(set: &Dataset, file: &str, found: &SpecimenReport, d: &Diagnosis) -> Page {
+    let tile = |label: &str, value: String, detail: &str| Tile::new(label, value, detail);
+    let tiles = vec![
+        tile("Specimens", found.used.to_string(), "indented once and held, each a material of its own"),
+        tile("Punctures", found.punctured.len().to_string(), "specimens whose force drops"),
+        tile(
+            "The rest of the hold",
+            format!("{:.1} → {:.1} mN", 1e3 * d.gain.rmse_before_n, 1e3 * d.gain.rmse_after_n),
+            "median error before and after, on the last two fifths of the hold, which took no part in the fit",
+        ),
+    ];
+    let bars = found
+        .candidates
+        .iter()
+        .map(|r| Bar {
+            name: r.step.clone(),
+            value: 1e3 * r.held_out_n,
+            interval: None,
+            colour: if r.kept { Colour::Blue } else { Colour::Grey },
+        })
+        .collect();
+    let options = FigureOptions {
+        title: "What each cause buys".to_owned(),
+        subtitle: "median error on the rest of the hold; grey: not kept".to_owned(),
+        width_px: 860.0,
+        ..FigureOptions::default()
+    };
+    let markup = bar_chart(&BarChart { label: "mN rms".to_owned(), bars }, &options);
+    let rows = found
+        .parameters
+        .iter()
+        .map(|n| {
+            vec![
+                Cell::text(n.name.clone()),
+                Cell::number(significant(n.mean, 3)),
+                Cell::number(format!("{} to {}", significant(n.low, 3), significant(n.high, 3))),
+                Cell::number(format!("{} to {}", significant(n.range_90.0, 2), significant(n.range_90.1, 2))),
+            ]
+        })
+        .collect();
+    let unused = found.unused.iter().map(|(name, why)| format!("Not used: {name}: {why}.")).collect();
+    Page::new(format!("Diagnosis: {}", set.name))
+        .subtitle(summary_sentence(found))
+        .fact("data set", file)
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(Section::new("Verdict").tiles(tiles))
+        .section(Section::new("What each cause buys").picture("Error on the rest of the hold", markup))
+        .section(
+            Section::new("Numbers over the specimens")
+                .table(Table::new(
+                    "Mean with its 95 % interval, and the scatter",
+                    &["", "mean", "95 % interval", "nine of ten specimens"],
+                    rows,
+                ))
+                .texts(unused),
+        )
+}
+
+/// What was found, in a sentence.
+#[must_use]
+pub fn summary_sentence(found: &SpecimenReport) -> String {
+    let names: Vec<&str> = found.kept_effects().collect();
+    let puncture = match found.punctured.len() {
+        0 => "no specimen is punctured".to_owned(),
+        n => format!("{n} specimen(s) show a drop as at a puncture"),
+    };
+    if names.is_empty() {
+        return format!("The base law says what {} specimens do; {puncture}.", found.used);
+    }
+    format!("The simulation lacks {} in {} specimens; {puncture}.", names.join(" and "), found.used)
+}

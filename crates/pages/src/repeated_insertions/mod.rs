@@ -1,0 +1,107 @@
+//! The page of repeated insertions: what the base law cannot say, the causes in the order of what each
+//! buys, the extended law, and how well it predicts runs that took no part.
+
+mod fitted_law;
+mod held_out_prediction;
+pub mod online_enhancement;
+mod recording_variation;
+
+pub use fitted_law::ablation_figure;
+
+use crate::formatting::{data_quality_table, three_decimals};
+use fitted_law::{causes, extended_law};
+use held_out_prediction::{held_out_predictions, residual_charts};
+use recording_variation::{between_recordings, measurement_chain};
+use stylet_diagnose::diagnosis_json::Verdict;
+use stylet_diagnose::repeated_insertions::SegmentedRecording;
+use stylet_diagnose::repeated_insertions::dataset::Dataset;
+use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
+use stylet_report::{Page, Section, Status, Tile};
+use stylet_score::MeasuredScore;
+
+/// The page of a study of the data set `set`, which was read from `file`, with what the online core heard in its runs; `commands`
+/// repeat it.
+#[must_use]
+pub fn page(
+    set: &Dataset,
+    file: &str,
+    commands: String,
+    study: &SetDiagnosis,
+    heard: &[MeasuredScore],
+) -> Page {
+    let runs: Vec<&SegmentedRecording> = study.recordings.iter().collect();
+    let runs = runs.as_slice();
+    let samples: usize = runs.iter().map(|r| r.recording.len()).sum();
+    Page::new(format!("Diagnosis: {}", set.name))
+        .subtitle(summary_sentence(study))
+        .fact("data set", file)
+        .fact("recordings", runs.len().to_string())
+        .fact("samples", samples.to_string())
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(verdict(study))
+        .section(held_out_predictions(runs, study))
+        .section(causes(study))
+        .section(extended_law(study))
+        .section(residual_charts(runs, study))
+        .section(between_recordings(study))
+        .section(online_enhancement::section(heard))
+        .section(measurement_chain(study))
+        .section(quality(study))
+        .section(Section::new("To repeat").code("commands", commands))
+}
+
+/// The verdict in a sentence.
+#[must_use]
+pub fn summary_sentence(study: &SetDiagnosis) -> String {
+    let d = &study.diagnosis;
+    let names: Vec<&str> = d.causes.iter().map(|c| c.effect.as_str()).collect();
+    match (d.verdict, names.is_empty()) {
+        (Verdict::Unknown, true) => {
+            "The insertions hold structure that no effect of the library explains.".to_owned()
+        }
+        (Verdict::Unknown, false) => format!(
+            "The insertions hold structure that no effect of the library explains; beside it the simulation lacks {}.",
+            names.join(", ")
+        ),
+        (_, true) => "The base law predicts new insertions as well as any extension of it.".to_owned(),
+        (_, false) => format!("The simulation lacks {}.", names.join(", ")),
+    }
+}
+
+fn verdict(study: &SetDiagnosis) -> Section {
+    let m = &study.report.mean;
+    let floor = m.floor_n;
+    let tiles = vec![
+        Tile::new(
+            "A run that took no part",
+            format!("{:.3} → {:.3} N", m.base_n, m.with_discrepancy_n),
+            format!(
+                "base law → extended law ({:.3} N) with what it leaves alike of the other runs, root mean square; another real insertion: {} N",
+                m.model_n,
+                three_decimals(floor)
+            ),
+        )
+        .status(floor.map_or(Status::Plain, |f| Status::at_most(m.with_discrepancy_n, 1.2 * f, 1.5 * f))),
+        Tile::new(
+            "A speed that took no part",
+            format!("{} → {} N", three_decimals(m.base_held_out_speed_n), three_decimals(m.held_out_speed_n)),
+            "all runs of one speed predicted from the other speeds".to_owned(),
+        ),
+        Tile::new(
+            "90 % band",
+            format!("{:.1} %", 100.0 * m.coverage),
+            "of the samples of runs that took no part lie within it".to_owned(),
+        )
+        .status(if (0.8..=0.97).contains(&m.coverage) { Status::Good } else { Status::Warn }),
+        Tile::new("Causes", study.diagnosis.causes.len().to_string(), summary_sentence(study)),
+    ];
+    Section::new("Verdict").tiles(tiles)
+}
+
+fn quality(study: &SetDiagnosis) -> Section {
+    let title = match study.report.instrument.detected.is_empty() {
+        true => "Remarks; nothing was corrected or resampled",
+        false => "Remarks; but for what the instrument shows nothing was corrected or resampled",
+    };
+    Section::new("Data quality").table(data_quality_table(title, &study.diagnosis.data_quality))
+}

@@ -1,0 +1,425 @@
+//! What is known before the next insertion, and what an insertion would add to it.
+//!
+//! All candidates share a stem: the base law with what is settled. What a candidate adds to the force, and what its numbers
+//! change, are columns over the recordings at hand and over a motion that may come, whitened by the noise and beside the law's
+//! own condition for every rupture, whose spread is the scatter between insertions. Everything is the likelihood of
+//! `stylet-identify`; nothing here has a law of its own.
+
+use crate::candidate::Candidate;
+use crate::gram_matrix::{add, gram_matrix, schur_complement};
+use rayon::prelude::*;
+use std::sync::Arc;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::fit::{JacobianColumn, Linearization};
+use stylet_identify::forward_model::{ReplayResult, free_rupture_times, replay_with_ruptures};
+use stylet_identify::likelihood::{FitData, motion_pieces, replay, residuals};
+use stylet_identify::model::{Model, NO_RUPTURE, ParameterRole, RecordingParameters};
+use stylet_identify::noise::Noise;
+use stylet_record::Recording;
+use stylet_scenario::Motion;
+use stylet_stats::linear_algebra::SymmetricMatrix;
+
+/// Motions are compared over blocks of so many s ...
+const COARSE_S: f64 = 0.06;
+/// ... or of a share of their duration, so that a long one costs no more.
+const MAX_BLOCKS: f64 = 800.0;
+/// A planned motion is known exactly: so many samples per second are enough to see it.
+const MAX_SAMPLE_HZ: f64 = 50.0;
+/// What a slow autoregression leaves of one at least: beyond, its sum is not known.
+const MIN_ONE_MINUS_AR_SUM: f64 = 0.1;
+/// Insertions scatter at least so much, relative, until three have shown how much they do.
+const DEFAULT_FORCE_SCATTER: f64 = 0.01;
+/// The same of a far face in m.
+const DEFAULT_DEPTH_SCATTER_M: f64 = 5e-5;
+/// Recordings that show scatter.
+const MIN_RECORDINGS_FOR_SCATTER: usize = 3;
+/// Wavelength in m of the pattern along the depth that stands for what the library lacks.
+const UNMODELLED_WAVELENGTH_M: f64 = 0.008;
+
+/// What is known, and what may be the case.
+pub struct InformationState {
+    /// What all candidates share.
+    pub base: Model,
+    /// What may be the case; the first is believed most.
+    pub candidates: Vec<Candidate>,
+    /// Size in N of something that the library lacks, when that is among what may be the case.
+    pub unmodelled_n: Option<f64>,
+    /// The noise of blocks of [`BLOCK_S`].
+    pub noise: Noise,
+    /// Samples per second of what is planned.
+    pub sample_hz: f64,
+    /// The candidates' models, the law's numbers re-fitted to the recordings at hand.
+    models: Vec<Model>,
+    /// Products over the recordings at hand, priors included.
+    prior_information: SymmetricMatrix,
+    /// Number of shared numbers.
+    shared_count: usize,
+    /// Whether the scatter between insertions is assumed: too few have been made to show it.
+    pub scatter_assumed: bool,
+}
+
+/// What a motion would show.
+#[derive(Clone, Debug)]
+pub struct Information {
+    /// Products over all columns.
+    all: SymmetricMatrix,
+    /// With what is fitted taken out.
+    schur: SymmetricMatrix,
+    shared_count: usize,
+}
+
+impl InformationState {
+    /// From the recordings at hand (their forces play no part: where the stem stands has been fitted to them) and the model's
+    /// instants in them.
+    #[must_use]
+    pub fn new(
+        stem: Model,
+        candidates: Vec<Candidate>,
+        unknown_n: Option<f64>,
+        old: &[BlockAverages],
+        noise: Noise,
+        sample_hz: f64,
+    ) -> Option<Self> {
+        let mut stem = stem;
+        let scatter_assumed =
+            old.len() < MIN_RECORDINGS_FOR_SCATTER && stem.scatter.rupture_force <= DEFAULT_FORCE_SCATTER;
+        if old.len() < MIN_RECORDINGS_FOR_SCATTER {
+            stem.scatter.rupture_force = stem.scatter.rupture_force.max(DEFAULT_FORCE_SCATTER);
+            stem.scatter.rupture_depth_m = stem.scatter.rupture_depth_m.max(DEFAULT_DEPTH_SCATTER_M);
+        }
+        let numbers = stem.shared_parameters();
+        let mut ground = Self {
+            shared_count: numbers.len(),
+            base: stem,
+            candidates,
+            unmodelled_n: unknown_n,
+            noise,
+            sample_hz,
+            models: Vec::new(),
+            scatter_assumed,
+            prior_information: SymmetricMatrix::zeros(0),
+        };
+        let mut before = SymmetricMatrix::zeros(ground.shared_count + ground.extra_columns());
+        for (i, n) in numbers.iter().enumerate().filter(|(_, n)| n.prior_sd.is_finite() && n.prior_sd > 0.0) {
+            before.add(i, i, 1.0 / (n.prior_sd * n.prior_sd));
+        }
+        if !old.is_empty() {
+            let data = FitData::new(Arc::new(old.to_vec()), ground.noise.clone(), 0.0);
+            before = add(&before, &ground.information_of(&ground.base, data)?);
+        }
+        ground.prior_information = before;
+        ground.models = (0..ground.candidates.len()).map(|k| ground.refitted_model(k)).collect();
+        Some(ground)
+    }
+
+    /// A candidate's model with the law's numbers where, to first order, the recordings at hand have them beside it: what a
+    /// candidate adds was imitated by these numbers when the stem was fitted.
+    fn refitted_model(&self, which: usize) -> Model {
+        let mut model = self.candidates[which].build_model(&self.base);
+        let Some((at, _)) = self.columns_of(which) else { return model };
+        let rows: Vec<usize> = (0..self.shared_count).collect();
+        let with: Vec<f64> =
+            rows.iter().map(|k| -self.prior_information.at(*k, self.shared_count + at)).collect();
+        let moves = self.prior_information.submatrix(&rows).cholesky().solve(&with);
+        for (n, by) in self.base.shared_parameters().iter().zip(moves).filter(|(_, by)| by.is_finite()) {
+            let x = self.base.get(n.role, 0) + by;
+            model.set(n.role, 0, x.clamp(n.low, n.high));
+        }
+        model
+    }
+
+    /// The model of a candidate, the law's numbers re-fitted beside it; the stem for what the library lacks.
+    #[must_use]
+    pub fn candidate_model(&self, which: usize) -> &Model {
+        self.models.get(which).unwrap_or(&self.base)
+    }
+
+    /// Columns beside those of the shared numbers.
+    fn extra_columns(&self) -> usize {
+        let own = |c: &Candidate| if c.effects.is_empty() { 0 } else { 1 + effect_parameter_count(c) };
+        self.candidates.iter().map(own).sum::<usize>() + usize::from(self.unmodelled_n.is_some())
+    }
+
+    /// Where a candidate's column stands, and those of its numbers; none for the stem alone.
+    fn columns_of(&self, which: usize) -> Option<(usize, std::ops::Range<usize>)> {
+        let mut at = 0;
+        for (k, c) in self.candidates.iter().enumerate() {
+            if c.effects.is_empty() {
+                if k == which {
+                    return None;
+                }
+                continue;
+            }
+            let n = effect_parameter_count(c);
+            if k == which {
+                return Some((at, at + 1..at + 1 + n));
+            }
+            at += 1 + n;
+        }
+        None
+    }
+
+    /// Products over recordings as the stem would have them.
+    fn information_of(&self, stem: &Model, mut data: FitData) -> Option<SymmetricMatrix> {
+        let mut blocks = (*data.recordings).clone();
+        for (r, b) in blocks.iter_mut().enumerate() {
+            b.force_n = replay(stem, &data, r)?.force_n;
+        }
+        data = FitData::new(Arc::new(blocks), (*data.noise).clone(), 0.0);
+        let at = residuals(stem, &data)?;
+        let tangent = Linearization::new(stem, &data, &at);
+        let change = |model: &Model| tangent.difference(stem, &data, &at, model);
+        let first = stem.effects.len();
+        let of: Vec<Option<Vec<JacobianColumn>>> = self
+            .candidates
+            .par_iter()
+            .filter(|c| !c.effects.is_empty())
+            .map(|c| {
+                let model = c.build_model(stem);
+                let whole = change(&model)?;
+                let mut columns = vec![whole.clone()];
+                for n in model.shared_parameters() {
+                    let ParameterRole::Effect { effect, .. } = n.role else { continue };
+                    if effect < first {
+                        continue;
+                    }
+                    let mut moved = model.clone();
+                    let x = model.get(n.role, 0);
+                    let h = if x + n.step > n.high { -n.step } else { n.step };
+                    moved.set(n.role, 0, x + h);
+                    let mut column = change(&moved)?;
+                    for (now, was) in column
+                        .innovations
+                        .iter_mut()
+                        .zip(&whole.innovations)
+                        .chain(column.rupture_rows.iter_mut().zip(&whole.rupture_rows))
+                    {
+                        now.iter_mut().zip(was).for_each(|(now, was)| *now = (*now - was) / h);
+                    }
+                    columns.push(column);
+                }
+                Some(columns)
+            })
+            .collect();
+        let mut more: Vec<JacobianColumn> =
+            of.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect();
+        if let Some(size_n) = self.unmodelled_n {
+            let mut column = JacobianColumn::default();
+            for (r, b) in data.recordings.iter().enumerate() {
+                let mut f = vec![0.0; b.len()];
+                for p in b.pieces.iter().filter(|p| p.position_m > stem.tissue.surface_m) {
+                    let turn = core::f64::consts::TAU * (p.position_m - stem.tissue.surface_m)
+                        / UNMODELLED_WAVELENGTH_M;
+                    f[p.block as usize] = size_n * core::f64::consts::SQRT_2 * libm::sin(turn);
+                }
+                column.innovations.push(data.whiten(r, &f));
+                column.rupture_rows.push(vec![0.0; 4 * at.ruptures[r].len()]);
+            }
+            more.push(column);
+        }
+        Some(gram_matrix(&tangent, &data, &more))
+    }
+
+    /// What is known before.
+    #[must_use]
+    pub fn current(&self) -> Information {
+        self.to_information(self.prior_information.clone())
+    }
+
+    fn to_information(&self, all: SymmetricMatrix) -> Information {
+        Information { schur: schur_complement(&all, self.shared_count), all, shared_count: self.shared_count }
+    }
+
+    /// What is known once a motion has been made as well; none when the law cannot be replayed along it.
+    #[must_use]
+    pub fn after_motion(&self, motion: &Motion) -> Option<Information> {
+        self.after_blocks(&self.motion_blocks(motion)?)
+    }
+
+    /// The same of a motion in blocks.
+    #[must_use]
+    pub fn after_blocks(&self, blocks: &BlockAverages) -> Option<Information> {
+        let (blocks, data) = self.with_expected_forces(blocks)?;
+        let leader = single_recording_model(self.candidate_model(0), Vec::new());
+        let instants = free_rupture_times(&leader.compile(0)?, &blocks.pieces);
+        let stem = single_recording_model(&self.base, instants);
+        Some(self.to_information(add(&self.prior_information, &self.information_of(&stem, data)?)))
+    }
+
+    /// A motion in blocks, without forces; none for one that is recorded.
+    #[must_use]
+    pub fn motion_blocks(&self, motion: &Motion) -> Option<BlockAverages> {
+        let recording = motion_to_recording(motion, self.sample_hz.min(MAX_SAMPLE_HZ))?;
+        Some(BlockAverages::new(&recording, &[], COARSE_S.max(recording.duration_s() / MAX_BLOCKS)))
+    }
+
+    /// Blocks with the forces of the likeliest candidate, judged by the noise of their length.
+    fn with_expected_forces(&self, blocks: &BlockAverages) -> Option<(BlockAverages, FitData)> {
+        let mut blocks = blocks.clone();
+        let (f, _) = predict_forces(self.candidate_model(0), &blocks)?;
+        blocks.abs_force_n.clone_from(&f.iter().map(|f| f.abs()).collect());
+        blocks.force_n = f;
+        let times = blocks.sample_step_s * blocks.samples_per_block as f64 / BLOCK_S;
+        let data = FitData::new(Arc::new(vec![blocks.clone()]), average_noise(&self.noise, times), 0.0);
+        Some((blocks, data))
+    }
+
+    /// Largest force in N along a motion in blocks under every candidate, in their order.
+    #[must_use]
+    pub fn peak_forces_n(&self, blocks: &BlockAverages) -> Option<Vec<f64>> {
+        let largest = |f: &[f64]| f.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
+        self.models.iter().map(|m| Some(largest(&predict_forces(m, blocks)?.0))).collect()
+    }
+
+    /// Forces in N along a motion under every candidate, with the times (s) and positions (m) of the blocks.
+    #[must_use]
+    pub fn expected_forces(&self, motion: &Motion) -> Option<ExpectedForces> {
+        let blocks = self.motion_blocks(motion)?;
+        let time_s: Vec<f64> = blocks.start_s.iter().zip(&blocks.end_s).map(|(a, b)| 0.5 * (a + b)).collect();
+        let position_m = time_s.iter().map(|t| blocks.motion.at(*t).0).collect();
+        let force_n =
+            self.models.iter().map(|m| Some(predict_forces(m, &blocks)?.0)).collect::<Option<_>>()?;
+        Some(ExpectedForces { time_s, position_m, force_n })
+    }
+
+    /// Pairs of candidates, each once.
+    #[must_use]
+    pub fn pairs(&self) -> Vec<(usize, usize)> {
+        let n = self.candidates.len() + usize::from(self.unmodelled_n.is_some());
+        (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).collect()
+    }
+
+    /// The name of a candidate, or of what the library lacks.
+    #[must_use]
+    pub fn name(&self, which: usize) -> &str {
+        self.candidates.get(which).map_or(crate::candidate::UNKNOWN, |c| &c.name)
+    }
+
+    /// Nats by which two candidates are expected to differ: the truth's advantage over the other re-fitted. Of a special case
+    /// and what holds it, the special case is tried against the truth of the other; else the harder way round counts.
+    #[must_use]
+    pub fn separation_nats(&self, shown: &Information, a: usize, b: usize) -> f64 {
+        let n = self.candidates.len();
+        if b >= n {
+            return self.one_way_separation_nats(shown, b, a);
+        }
+        let (i, j) = (&self.candidates[a], &self.candidates[b]);
+        if i.is_special_case_of(j) {
+            self.one_way_separation_nats(shown, b, a)
+        } else if j.is_special_case_of(i) {
+            self.one_way_separation_nats(shown, a, b)
+        } else {
+            self.one_way_separation_nats(shown, a, b).min(self.one_way_separation_nats(shown, b, a))
+        }
+    }
+
+    /// Nats that are left when `truth` holds and `other` is re-fitted: `min 1/2 |whitened(f_truth - f_other)|^2` over all
+    /// numbers of the law and of the other, to first order.
+    #[must_use]
+    pub fn one_way_separation_nats(&self, shown: &Information, truth: usize, other: usize) -> f64 {
+        let at = |k: usize| -> Option<usize> {
+            if k >= self.candidates.len() {
+                Some(shown.schur.size.saturating_sub(1))
+            } else {
+                self.columns_of(k).map(|p| p.0)
+            }
+        };
+        let mut x: Vec<(usize, f64)> = Vec::new();
+        x.extend(at(truth).map(|k| (k, 1.0)));
+        x.extend(at(other).map(|k| (k, -1.0)));
+        let g = &shown.schur;
+        let all: f64 = x.iter().flat_map(|(i, a)| x.iter().map(move |(j, b)| a * b * g.at(*i, *j))).sum();
+        let numbers: Vec<usize> = self.columns_of(other).map_or_else(Vec::new, |p| p.1.collect());
+        let cross: Vec<f64> = numbers.iter().map(|e| x.iter().map(|(i, a)| a * g.at(*i, *e)).sum()).collect();
+        let half = g.submatrix(&numbers).cholesky().forward_substitute(&cross);
+        (0.5 * (all - half.iter().map(|h| h * h).sum::<f64>())).max(0.0)
+    }
+
+    /// Correlation of two candidates' columns, everything that is fitted taken out; 0 where one of them is not seen at all.
+    #[must_use]
+    pub fn correlation(&self, shown: &Information, a: usize, b: usize) -> f64 {
+        let (Some((i, _)), Some((j, _))) = (self.columns_of(a), self.columns_of(b)) else { return 0.0 };
+        let g = &shown.schur;
+        let size = (g.at(i, i) * g.at(j, j)).sqrt();
+        let whole = (shown.all.at(shown.shared_count + i, shown.shared_count + i)
+            * shown.all.at(shown.shared_count + j, shown.shared_count + j))
+        .sqrt();
+        if size > 1e-8 * whole && size > 0.0 { (g.at(i, j) / size).clamp(-1.0, 1.0) } else { 0.0 }
+    }
+}
+
+/// Forces along a motion.
+#[derive(Clone, Debug)]
+pub struct ExpectedForces {
+    /// Times in s.
+    pub time_s: Vec<f64>,
+    /// Positions in m.
+    pub position_m: Vec<f64>,
+    /// Forces in N, per candidate.
+    pub force_n: Vec<Vec<f64>>,
+}
+
+impl Information {
+    /// Standard deviations of the shared numbers, in the scale of the fit; infinite where nothing tells one.
+    #[must_use]
+    pub fn sds(&self) -> Vec<f64> {
+        let rows: Vec<usize> = (0..self.shared_count).collect();
+        self.all.submatrix(&rows).cholesky().inverse_diagonal().iter().map(|v| v.sqrt()).collect()
+    }
+
+    /// Half the logarithm of the determinant of the shared numbers' information: nats of knowledge about them.
+    #[must_use]
+    pub fn half_log_det(&self) -> f64 {
+        let rows: Vec<usize> = (0..self.shared_count).collect();
+        0.5 * self.all.submatrix(&rows).cholesky().log_determinant()
+    }
+}
+
+fn effect_parameter_count(c: &Candidate) -> usize {
+    c.effects.iter().map(|c| c.info.parameters.iter().filter(|p| !p.integer).count()).sum()
+}
+
+/// The model for one recording that nobody has made yet.
+fn single_recording_model(model: &Model, instants: Vec<f64>) -> Model {
+    let mut model = model.clone();
+    model.per_recording = vec![RecordingParameters::default()];
+    let layers = model.layers();
+    model.rupture_times_s = vec![if instants.len() == layers { instants } else { vec![NO_RUPTURE; layers] }];
+    model
+}
+
+/// Forces (N) of a model along blocks with its own ruptures, and their instants (s).
+fn predict_forces(model: &Model, blocks: &BlockAverages) -> Option<(Vec<f64>, Vec<f64>)> {
+    let compiled = single_recording_model(model, Vec::new()).compile(0)?;
+    let course = motion_pieces(&compiled, blocks);
+    let instants = free_rupture_times(&compiled, &course);
+    let mut out = ReplayResult::default();
+    replay_with_ruptures(&compiled, blocks, &course, &instants, &mut out);
+    out.force_n.iter().all(|f| f.is_finite()).then_some((out.force_n, instants))
+}
+
+/// A motion as a recording without forces; none for one that is recorded.
+#[must_use]
+pub fn motion_to_recording(motion: &Motion, sample_hz: f64) -> Option<Recording> {
+    let plan = motion.plan()?;
+    let n = (plan.duration_s() * sample_hz).floor() as usize + 1;
+    let time_s: Vec<f64> = (0..n).map(|k| k as f64 / sample_hz).collect();
+    let points: Vec<_> = time_s.iter().map(|t| plan.at(*t)).collect();
+    let position = points.iter().map(|p| p.position_m).collect();
+    let velocity = points.iter().map(|p| p.velocity_mps).collect();
+    Recording::with_velocity(time_s, position, velocity, vec![0.0; n]).ok()
+}
+
+/// The noise of means over `times` blocks: what an autoregression adds up to in the long run, as white noise.
+fn average_noise(noise: &Noise, times: f64) -> Noise {
+    let mut noise = noise.clone();
+    for bin in &mut noise.bins {
+        let left = 1.0 - bin.ar.iter().chain(&bin.long_memory).sum::<f64>();
+        let sd_n = (bin.innovation_sd_n / left.clamp(MIN_ONE_MINUS_AR_SUM, 4.0)).max(0.3 * bin.sd_n)
+            / times.max(1.0).sqrt();
+        (bin.innovation_sd_n, bin.sd_n) = (sd_n, sd_n);
+        bin.ar.fill(0.0);
+        bin.long_memory.fill(0.0);
+    }
+    noise
+}

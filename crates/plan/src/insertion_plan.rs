@@ -1,0 +1,271 @@
+//! The plan: `plan.json`.
+
+use crate::error::PlanError;
+use crate::information_state::{Information, InformationState};
+use crate::limits::Limits;
+use crate::motion_programs::StartConditions;
+use crate::motion_search::{EvaluatedMotion, MotionSearchResult, search_motions};
+use crate::repeats::{Repeats, plan_repeats};
+use serde::Serialize;
+use stylet_diagnose::EQUIVALENCE_NATS;
+use stylet_identify::model::ParameterRole;
+use stylet_scenario::Motion;
+
+/// Two candidates, and how far apart they are.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pair {
+    /// One.
+    pub a: String,
+    /// The other.
+    pub b: String,
+    /// Expected gap of the log-likelihoods from what is at hand, in nats.
+    pub nats_before: f64,
+    /// The same once the planned insertion has been made as well.
+    pub nats_after: f64,
+    /// Probability that the truth among the two is the one named, before: one half when nothing tells them apart.
+    pub p_correct_before: f64,
+    /// The same after.
+    pub p_correct_after: f64,
+    /// Whether a motion within the limits tells them apart at all.
+    pub distinguishable: bool,
+}
+
+/// A number of the law and how surely it is known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct IntervalChange {
+    /// Such as `layer 1 stiffness_n_per_m`.
+    pub name: String,
+    /// Half width of the 95 % interval before, relative to what is assumed, or in m for a place.
+    pub half_width_before: f64,
+    /// The same once the planned insertion has been made as well.
+    pub half_width_after: f64,
+}
+
+/// Another motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Alternative {
+    /// The motion.
+    pub motion: Motion,
+    /// Nats of the worst pair that can be told apart.
+    pub worst_pair_nats: f64,
+    /// Probability that the next diagnosis decides, after the gaps.
+    pub probability_decided: f64,
+    /// Largest force expected in N.
+    pub force_n: f64,
+    /// Duration in s.
+    pub duration_s: f64,
+    /// Insertions simulated and diagnosed when the best motions were set against each other.
+    pub simulated: usize,
+    /// Those after which the diagnosis was right and alone.
+    pub correct: usize,
+}
+
+/// One candidate's simulated insertions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CandidateTrials {
+    /// The candidate.
+    pub candidate: String,
+    /// Insertions simulated and diagnosed.
+    pub trials: usize,
+    /// Those after which the diagnosis names it alone.
+    pub correct: usize,
+}
+
+/// The plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// Pairs of candidates.
+    pub pairs: Vec<Pair>,
+    /// Probability that the next diagnosis names the right single cause.
+    pub probability_decided: f64,
+    /// The same before the insertion.
+    pub probability_now: f64,
+    /// Where that number comes from: `gaps` (the expected gaps and how often the diagnosis is right when everything can be
+    /// seen) or `simulated` (insertions simulated and diagnosed).
+    pub probability_source: String,
+    /// Simulated insertions, none of which helped to choose the motion.
+    pub simulated: Vec<CandidateTrials>,
+    /// Candidates with their probabilities before.
+    pub candidates: Vec<(String, f64)>,
+    /// The motion.
+    pub motion: Motion,
+    /// Its duration in s.
+    pub duration_s: f64,
+    /// Its deepest position in m.
+    pub depth_m: f64,
+    /// Largest force in N that is expected under any candidate, three standard deviations of the noise included.
+    pub force_n: f64,
+    /// The limits that it keeps.
+    pub limits: Limits,
+    /// The next best motions.
+    pub alternatives: Vec<Alternative>,
+    /// Effects that no motion within the limits shows at their typical size.
+    pub never_detectable: Vec<String>,
+    /// Numbers of the law, how surely they are known before and after.
+    pub intervals: Vec<IntervalChange>,
+    /// How many insertions at which speeds, when forces at rupture scatter.
+    pub repeats: Option<Repeats>,
+    /// Motions looked at.
+    pub motions_evaluated: usize,
+}
+
+/// How often the diagnosis names one strong effect right and alone when everything can be seen: 129 of 138 in
+/// `docs/diagnosis.md`, "The present engine". No plan is surer than that.
+pub const P_CORRECT_WHEN_DETECTABLE: f64 = 0.93;
+
+/// Probability that a gap expected to be `nats` comes out above a class's width: it scatters by `sqrt(2 nats)`.
+#[must_use]
+pub fn p_separated(nats: f64) -> f64 {
+    if nats <= 0.0 { 0.0 } else { stylet_stats::normal::cdf((nats - EQUIVALENCE_NATS) / (2.0 * nats).sqrt()) }
+}
+
+/// Probability that the diagnosis names what is the case and nothing else, whatever that is among what motions within the limits
+/// can tell (`told`: pairs).
+#[must_use]
+pub fn p_decided(ground: &InformationState, shown: &Information, told: &[(usize, usize)]) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (i, c) in ground.candidates.iter().enumerate() {
+        let of: Vec<f64> = told
+            .iter()
+            .filter(|(a, b)| *a == i || *b == i)
+            .map(|(a, b)| p_separated(ground.separation_nats(shown, *a, *b)))
+            .collect();
+        if of.is_empty() {
+            continue;
+        }
+        sum += c.probability * of.into_iter().fold(1.0, f64::min);
+        weights += c.probability;
+    }
+    if weights > 0.0 { P_CORRECT_WHEN_DETECTABLE * sum / weights } else { P_CORRECT_WHEN_DETECTABLE }
+}
+
+/// Plans the next insertion.
+///
+/// # Errors
+/// [`PlanError`] when limits cannot be kept or the law cannot be replayed.
+pub fn plan(
+    ground: &InformationState,
+    limits: &Limits,
+    begin: &StartConditions,
+) -> Result<(Plan, MotionSearchResult), PlanError> {
+    let found = search_motions(ground, limits, begin)?;
+    let plan = plan_with_motion(ground, limits, &found, 0)?;
+    Ok((plan, found))
+}
+
+/// The plan with one of the motions that were found.
+///
+/// # Errors
+/// [`PlanError::NoForce`] when there is no such motion.
+pub(crate) fn plan_with_motion(
+    ground: &InformationState,
+    limits: &Limits,
+    found: &MotionSearchResult,
+    which: usize,
+) -> Result<Plan, PlanError> {
+    let Some(best) = found.best.get(which) else {
+        return Err(PlanError::NoForce("no motion can be compared".to_owned()));
+    };
+    let known = ground.current();
+    let pairs: Vec<Pair> = ground
+        .pairs()
+        .into_iter()
+        .map(|(a, b)| {
+            let (before, after) =
+                (ground.separation_nats(&known, a, b), ground.separation_nats(&best.information, a, b));
+            let even = |nats: f64| 0.5 + 0.5 * p_separated(nats);
+            Pair {
+                a: ground.name(a).to_owned(),
+                b: ground.name(b).to_owned(),
+                nats_before: before,
+                nats_after: after,
+                p_correct_before: even(before),
+                p_correct_after: even(after),
+                distinguishable: found.distinguishable.contains(&(a, b)),
+            }
+        })
+        .collect();
+    let worst = |f: &EvaluatedMotion| {
+        found
+            .distinguishable
+            .iter()
+            .map(|(a, b)| ground.separation_nats(&f.information, *a, *b))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let alternatives = found
+        .best
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| *k != which)
+        .map(|(_, f)| Alternative {
+            worst_pair_nats: if found.distinguishable.is_empty() { 0.0 } else { worst(f) },
+            probability_decided: p_decided(ground, &f.information, &found.distinguishable),
+            force_n: f.force_n,
+            duration_s: f.motion.plan().map_or(0.0, |p| p.duration_s()),
+            motion: f.motion.clone(),
+            simulated: 0,
+            correct: 0,
+        })
+        .collect();
+    let first = |a: usize, b: usize| if ground.name(a) == crate::candidate::NONE { Some(b) } else { None };
+    let never = found
+        .indistinguishable
+        .iter()
+        .filter_map(|(a, b)| first(*a, *b))
+        .map(|k| ground.name(k).to_owned())
+        .collect();
+    let course = best.motion.plan();
+    Ok(Plan {
+        pairs,
+        probability_decided: p_decided(ground, &best.information, &found.distinguishable),
+        probability_now: p_decided(ground, &known, &found.distinguishable),
+        probability_source: "gaps".to_owned(),
+        simulated: Vec::new(),
+        candidates: ground.candidates.iter().map(|c| (c.name.clone(), c.probability)).collect(),
+        motion: best.motion.clone(),
+        duration_s: course.as_ref().map_or(0.0, |p| p.duration_s()),
+        depth_m: course.as_ref().map_or(0.0, |p| p.deepest_m()),
+        force_n: best.force_n,
+        limits: *limits,
+        alternatives,
+        never_detectable: never,
+        intervals: interval_changes(ground, &known, &best.information),
+        repeats: if ground.scatter_assumed { None } else { plan_repeats(&ground.base, limits) },
+        motions_evaluated: found.motions_evaluated,
+    })
+}
+
+fn interval_changes(
+    ground: &InformationState,
+    before: &Information,
+    after: &Information,
+) -> Vec<IntervalChange> {
+    let numbers = ground.base.shared_parameters();
+    numbers
+        .iter()
+        .zip(before.sds())
+        .zip(after.sds())
+        .map(|((n, before), after)| IntervalChange {
+            name: match n.role {
+                ParameterRole::Stiffness(l) => format!("layer {} stiffness_n_per_m", l + 1),
+                ParameterRole::Friction(l) => format!("layer {} friction_ns_per_m2", l + 1),
+                ParameterRole::Puncture(l) => format!("layer {} puncture_n", l + 1),
+                ParameterRole::Thickness(l) => format!("layer {} thickness_m", l + 1),
+                ParameterRole::Surface => "surface_m".to_owned(),
+                ParameterRole::Effect { effect, parameter } => {
+                    ground.base.effects.get(effect).map_or_else(String::new, |e| {
+                        format!("{}.{}", e.info.id, e.info.parameters.get(parameter).map_or("", |p| p.path))
+                    })
+                }
+                ParameterRole::DaySurface(day) => format!("day {} surface_m", day + 1),
+                ParameterRole::DayFriction(day) => format!("day {} friction", day + 1),
+                ParameterRole::RecordingSurface
+                | ParameterRole::RecordingFriction
+                | ParameterRole::RecordingEffect(_)
+                | ParameterRole::RuptureTime(_) => String::new(),
+            },
+            half_width_before: stylet_stats::Z95 * before,
+            half_width_after: stylet_stats::Z95 * after,
+        })
+        .collect()
+}

@@ -1,0 +1,197 @@
+//! The motion under which what may be the case differs most: drawn evenly, then refined.
+
+use crate::error::PlanError;
+use crate::information_state::{Information, InformationState};
+use crate::limits::Limits;
+use crate::motion_programs::{
+    DIMENSIONS, StartConditions, infeasibility, low_discrepancy_point, motion_from_point,
+};
+use rayon::prelude::*;
+use stylet_identify::block_averages::BlockAverages;
+use stylet_scenario::Motion;
+
+/// Motions drawn.
+const SAMPLED_MOTIONS: usize = 200;
+/// The best that are refined, and steps of the refinement; every step tries some neighbours at once.
+const REFINED_MOTIONS: usize = 2;
+const REFINEMENT_STEPS: usize = 4;
+const NEIGHBOURS_PER_STEP: usize = 8;
+/// A pair is asked for when some motion tells it apart by so many nats.
+pub const DISTINGUISHABLE_NATS: f64 = 10.0;
+/// More nats than this between two candidates add nothing to a verdict.
+const MAX_USEFUL_NATS: f64 = 400.0;
+/// What a nat of the mean over all pairs counts beside one of the worst.
+const MEAN_PAIR_WEIGHT: f64 = 0.02;
+
+/// A motion that was found.
+#[derive(Clone, Debug)]
+pub struct EvaluatedMotion {
+    /// The motion.
+    pub motion: Motion,
+    /// What it shows together with what is known.
+    pub information: Information,
+    /// How good it is: nats of the worst pair, or of knowledge when there is no pair.
+    pub score: f64,
+    /// Largest force in N expected under any candidate.
+    pub force_n: f64,
+    point: Vec<f64>,
+}
+
+/// What a search gives.
+pub struct MotionSearchResult {
+    /// The best motion first, then the next best that differ from it.
+    pub best: Vec<EvaluatedMotion>,
+    /// Pairs that some motion within the limits tells apart.
+    pub distinguishable: Vec<(usize, usize)>,
+    /// Pairs that none does.
+    pub indistinguishable: Vec<(usize, usize)>,
+    /// Motions that were looked at.
+    pub motions_evaluated: usize,
+}
+
+/// How good a motion is.
+fn score(ground: &InformationState, shown: &Information, pairs: &[(usize, usize)], known: f64) -> f64 {
+    if pairs.is_empty() {
+        return shown.half_log_det() - known;
+    }
+    let (mut worst, mut sum) = (f64::INFINITY, 0.0);
+    for (a, b) in pairs {
+        let weight = |k: usize| ground.candidates.get(k).map_or(0.05, |c| c.probability).max(1e-3);
+        // Odds before the insertion count as nats of the gap.
+        let nats = ground.separation_nats(shown, *a, *b).min(MAX_USEFUL_NATS);
+        worst = worst.min(nats - libm::log(weight(*a) * weight(*b)));
+        sum += nats;
+    }
+    worst + MEAN_PAIR_WEIGHT * sum / pairs.len() as f64
+}
+
+/// Searches for the best motions within limits.
+///
+/// # Errors
+/// [`PlanError::Impossible`] when no motion keeps the limits, [`PlanError::NoForce`] when none can be replayed.
+pub fn search_motions(
+    ground: &InformationState,
+    limits: &Limits,
+    begin: &StartConditions,
+) -> Result<MotionSearchResult, PlanError> {
+    limits.check()?;
+    if let Some((why, remedy)) = infeasibility(limits, begin) {
+        return Err(PlanError::Infeasible { why, remedy });
+    }
+    let points: Vec<Vec<f64>> = (0..SAMPLED_MOTIONS).map(low_discrepancy_point).collect();
+    let drawn: Vec<(Vec<f64>, Motion)> =
+        points.into_iter().filter_map(|p| motion_from_point(&p, limits, begin).map(|m| (p, m))).collect();
+    if drawn.is_empty() {
+        return Err(PlanError::Infeasible {
+            why: format!(
+                "none of {SAMPLED_MOTIONS} programs of two to six parts gets to {:.1} mm and back to rest in {} s",
+                1e3 * limits.depth_m.min(begin.max_depth_m),
+                limits.duration_s
+            ),
+            remedy: "give it more time, or allow a higher speed or acceleration".to_owned(),
+        });
+    }
+    let seen: Vec<Option<BlockAverages>> = drawn.par_iter().map(|(_, m)| ground.motion_blocks(m)).collect();
+    let forces: Vec<Option<f64>> =
+        seen.par_iter().map(|b| b.as_ref().and_then(|b| expected_peak_force_n(ground, b))).collect();
+    if forces.iter().all(Option::is_none) {
+        return Err(PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()));
+    }
+    let weakest = forces.iter().flatten().fold(f64::INFINITY, |m: f64, f| m.min(*f));
+    let safe: Vec<((Vec<f64>, Motion), BlockAverages, f64)> = drawn
+        .into_iter()
+        .zip(seen)
+        .zip(forces)
+        .filter_map(|((d, b), f)| Some((d, b?, f.filter(|f| *f <= limits.force_n)?)))
+        .collect();
+    if safe.is_empty() {
+        return Err(PlanError::Infeasible {
+            why: format!(
+                "force_n is {} N, and the gentlest of the motions to {:.1} mm is expected to need {weakest:.2} N",
+                limits.force_n,
+                1e3 * limits.depth_m.min(begin.max_depth_m)
+            ),
+            remedy: "allow more force, less depth (depth_m) or a lower speed (speed_mps)".to_owned(),
+        });
+    }
+    let shown: Vec<_> = safe
+        .into_par_iter()
+        .filter_map(|((point, motion), blocks, force_n)| {
+            let shown = ground.after_blocks(&blocks)?;
+            Some(EvaluatedMotion { motion, information: shown, score: 0.0, force_n, point })
+        })
+        .collect();
+    let (told, never): (Vec<_>, Vec<_>) = ground.pairs().into_iter().partition(|(a, b)| {
+        shown.iter().any(|f| ground.separation_nats(&f.information, *a, *b) >= DISTINGUISHABLE_NATS)
+    });
+    let known = ground.current().half_log_det();
+    let mut all: Vec<EvaluatedMotion> = shown
+        .into_par_iter()
+        .map(|f| EvaluatedMotion { score: score(ground, &f.information, &told, known), ..f })
+        .collect();
+    if all.is_empty() {
+        return Err(PlanError::NoForce("no motion can be compared".to_owned()));
+    }
+    let mut looked_at = all.len();
+    all.sort_by(|a, b| b.score.total_cmp(&a.score));
+    for k in 0..REFINED_MOTIONS.min(all.len()) {
+        let (better, tried) = refine_motion(ground, limits, begin, &all[k], &told, known, k);
+        looked_at += tried;
+        all[k] = better;
+    }
+    all.sort_by(|a, b| b.score.total_cmp(&a.score));
+    all.truncate(5);
+    Ok(MotionSearchResult {
+        best: all,
+        distinguishable: told,
+        indistinguishable: never,
+        motions_evaluated: looked_at,
+    })
+}
+
+/// Largest force in N expected under any candidate, three standard deviations of the noise included.
+fn expected_peak_force_n(ground: &InformationState, blocks: &BlockAverages) -> Option<f64> {
+    let most = ground.peak_forces_n(blocks)?.into_iter().fold(0.0, f64::max);
+    Some(most + 3.0 * ground.noise.sd_n())
+}
+
+/// Goes uphill from a motion: neighbours from the same even sequence, nearer with every step.
+fn refine_motion(
+    ground: &InformationState,
+    limits: &Limits,
+    begin: &StartConditions,
+    from: &EvaluatedMotion,
+    told: &[(usize, usize)],
+    known: f64,
+    which: usize,
+) -> (EvaluatedMotion, usize) {
+    let mut best = from.clone();
+    let mut tried = 0;
+    for step in 0..REFINEMENT_STEPS {
+        let reach = 0.25 * libm::pow(0.65, step as f64);
+        let near: Vec<EvaluatedMotion> = (0..NEIGHBOURS_PER_STEP)
+            .into_par_iter()
+            .filter_map(|k| {
+                let u = low_discrepancy_point(
+                    SAMPLED_MOTIONS + (which * REFINEMENT_STEPS + step) * NEIGHBOURS_PER_STEP + k,
+                );
+                let point: Vec<f64> = (0..DIMENSIONS)
+                    .map(|i| (best.point[i] + reach * (2.0 * u[i] - 1.0)).clamp(0.0, 1.0))
+                    .collect();
+                let motion = motion_from_point(&point, limits, begin)?;
+                let blocks = ground.motion_blocks(&motion)?;
+                let force_n = expected_peak_force_n(ground, &blocks).filter(|f| *f <= limits.force_n)?;
+                let shown = ground.after_blocks(&blocks)?;
+                let score = score(ground, &shown, told, known);
+                Some(EvaluatedMotion { motion, information: shown, score, force_n, point })
+            })
+            .collect();
+        tried += near.len();
+        if let Some(better) = near.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
+            && better.score > best.score
+        {
+            best = better;
+        }
+    }
+    (best, tried)
+}

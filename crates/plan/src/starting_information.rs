@@ -1,0 +1,181 @@
+//! Where planning starts: from a diagnosis, or from a scenario that nothing has been compared with.
+
+use crate::candidate::{Candidate, typical_effect};
+use crate::error::PlanError;
+use crate::information_state::{InformationState, motion_to_recording};
+use crate::motion_programs::StartConditions;
+use std::sync::Arc;
+use stylet_diagnose::{DiagnosisResult, EQUIVALENCE_NATS, Verdict, assumptions_of};
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::forward_model::free_rupture_times;
+use stylet_identify::likelihood::motion_pieces;
+use stylet_identify::model::{EffectTerm, Model};
+use stylet_identify::noise::Noise;
+use stylet_scenario::{Motion, Scenario};
+use stylet_tissue::{AnyEffect, Effect, general_effects};
+
+/// What may be the case beside what was named has this probability in all.
+const OTHER_EFFECTS_PROBABILITY: f64 = 0.5;
+/// The needle starts this far in m before the surface when no recording says otherwise.
+const START_ABOVE_SURFACE_M: f64 = 0.005;
+/// No motion goes further than this in m beyond the tissue.
+const BEYOND_TISSUE_M: f64 = 0.003;
+/// Noise in N where the scenario's sensor does not state one.
+const DEFAULT_NOISE_N: f64 = 0.05;
+
+/// Where an insertion may start.
+#[must_use]
+pub fn start_conditions(scenario: &Scenario, start_m: Option<f64>) -> StartConditions {
+    let surface_m = scenario.tissue.surface_m;
+    let depth_m: f64 = scenario.tissue.layers.iter().map(|l| l.thickness_m).sum();
+    StartConditions {
+        start_m: start_m.unwrap_or(surface_m - START_ABOVE_SURFACE_M).min(surface_m - 0.001),
+        surface_m,
+        max_depth_m: surface_m + depth_m + BEYOND_TISSUE_M,
+        sample_hz: scenario.sample_hz,
+    }
+}
+
+/// What is known and what may be the case after a diagnosis: the class that it could not split, or, when there is none, what it
+/// could not see. Gains are left out: a gain of the sensor is other coefficients, whatever the motion.
+///
+/// # Errors
+/// [`PlanError::NoForce`] when the model cannot be replayed.
+pub fn from_diagnosis(
+    scenario: &Scenario,
+    examined: &DiagnosisResult,
+) -> Result<(InformationState, StartConditions), PlanError> {
+    let d = &examined.diagnosis;
+    let search = &examined.search;
+    let best = &search.best.model;
+    let ambiguous = d
+        .causes
+        .iter()
+        .filter(|c| !c.equivalent.is_empty())
+        .find_map(|c| best.effects.iter().position(|e| e.info.id == c.effect));
+    let mut candidates = Vec::new();
+    let mut stem = best.clone();
+    if let Some(k) = ambiguous {
+        stem = best.without_effect(k);
+        candidates.push(Candidate::with_effect(best.effects[k].clone(), 1.0));
+        for rival in examined
+            .competing_effects
+            .get(k)
+            .into_iter()
+            .flatten()
+            .filter(|r| r.nats_behind < EQUIVALENCE_NATS)
+        {
+            candidates
+                .push(Candidate::with_effect(rival.choice.clone(), libm::exp(-rival.nats_behind.max(-3.0))));
+        }
+    } else {
+        candidates.push(Candidate::without_effect(1.0));
+    }
+    let sum: f64 = candidates.iter().map(|c| c.probability).sum();
+    let named: Vec<&str> = stem.effects.iter().map(|e| e.info.id).collect();
+    let hidden: Vec<EffectTerm> = general_effects()
+        .filter(|i| d.not_identifiable.iter().any(|n| n == i.id) && !named.contains(&i.id))
+        .filter(|i| candidates.iter().all(|c| c.name != i.id))
+        .filter_map(typical_effect)
+        .collect();
+    let unseen = if hidden.is_empty() {
+        0.0
+    } else if ambiguous.is_some() {
+        0.5 * OTHER_EFFECTS_PROBABILITY
+    } else {
+        OTHER_EFFECTS_PROBABILITY
+    };
+    candidates.iter_mut().for_each(|c| c.probability *= (1.0 - unseen) / sum);
+    let each = unseen / hidden.len().max(1) as f64;
+    candidates.extend(hidden.into_iter().map(|c| Candidate::with_effect(c, each)));
+    let unknown = (d.verdict == Verdict::Unknown).then_some(d.gain.rmse_after_n.max(d.noise.sd_n));
+    let first = |b: &BlockAverages| b.sample_time_s.first().map(|t| b.motion.at(*t).0);
+    let start = search.data.recordings.iter().filter_map(first).fold(f64::INFINITY, f64::min);
+    let ground = InformationState::new(
+        stem,
+        candidates,
+        unknown.filter(|n| n.is_finite()),
+        &search.data.recordings,
+        (*search.data.noise).clone(),
+        scenario.sample_hz,
+    )
+    .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))?;
+    Ok((ground, start_conditions(scenario, start.is_finite().then_some(start))))
+}
+
+/// Every effect of the library at its typical size beside what a diagnosis settled, over the recordings at hand: what they can show.
+///
+/// # Errors
+/// [`PlanError::NoForce`] when the model cannot be replayed.
+pub fn from_recordings(
+    scenario: &Scenario,
+    examined: &DiagnosisResult,
+) -> Result<InformationState, PlanError> {
+    let search = &examined.search;
+    let stem = search.best.model.clone();
+    let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
+    let found = |id: &str| stem.effects.iter().any(|e| e.info.id == id);
+    candidates.extend(
+        general_effects()
+            .filter(|i| !found(i.id))
+            .filter_map(typical_effect)
+            .map(|c| Candidate::with_effect(c, 0.02)),
+    );
+    let noise = (*search.data.noise).clone();
+    InformationState::new(stem, candidates, None, &search.data.recordings, noise, scenario.sample_hz)
+        .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))
+}
+
+/// What may be the case before any measurement: nothing, or any one effect of the library at its typical size. The scenario's own
+/// motion, or the one given, counts as made.
+///
+/// # Errors
+/// [`PlanError::NoForce`] when the law cannot be replayed along the motion.
+pub fn from_scenario(
+    scenario: &Scenario,
+    made: Option<&Motion>,
+) -> Result<(InformationState, StartConditions), PlanError> {
+    let made = made.unwrap_or(&scenario.motion);
+    let recording = motion_to_recording(made, scenario.sample_hz);
+    let start = recording.as_ref().and_then(|r| r.position_m.first().copied());
+    let old: Vec<BlockAverages> = recording.iter().map(|r| BlockAverages::new(r, &[], BLOCK_S)).collect();
+    let mut stem = Model::base(Arc::new(assumptions_of(scenario)), old.len().max(1));
+    let failed = || PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned());
+    for (r, b) in old.iter().enumerate() {
+        let compiled = stem.compile(r).ok_or_else(failed)?;
+        stem.rupture_times_s[r] = free_rupture_times(&compiled, &motion_pieces(&compiled, b));
+    }
+    let given: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
+    let choices: Vec<EffectTerm> =
+        general_effects().filter(|i| !given.contains(&i.id)).filter_map(typical_effect).collect();
+    let each = OTHER_EFFECTS_PROBABILITY / choices.len().max(1) as f64;
+    let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
+    candidates.extend(choices.into_iter().map(|c| Candidate::with_effect(c, each)));
+    let ground =
+        InformationState::new(stem, candidates, None, &old, sensor_noise(scenario), scenario.sample_hz)
+            .ok_or_else(failed)?;
+    Ok((ground, start_conditions(scenario, start)))
+}
+
+/// The noise of blocks that a scenario's sensor makes: an autoregression of first order is white over a block, and as large as it
+/// adds up to.
+fn sensor_noise(scenario: &Scenario) -> Noise {
+    let (sd_n, pole) = scenario.sensor.force_torque().map_or((DEFAULT_NOISE_N, 0.0), |s| (s.noise_n, s.ar1));
+    let samples = (BLOCK_S * scenario.sample_hz).round().max(1.0);
+    let pole = pole.clamp(-0.95, 0.95);
+    Noise::white((sd_n.max(1e-4) * ((1.0 + pole) / (1.0 - pole)).sqrt() / samples.sqrt()).max(1e-5))
+}
+
+/// A candidate as a scenario that can be simulated.
+#[must_use]
+pub fn candidate_scenario(
+    believed: &Scenario,
+    ground: &InformationState,
+    which: usize,
+    motion: &Motion,
+) -> Scenario {
+    let model = ground.candidate_model(which);
+    let mut effects: Vec<AnyEffect> = believed.effects.clone();
+    effects.extend(model.effects.iter().filter_map(EffectTerm::effect));
+    Scenario { tissue: model.tissue.clone(), effects, motion: motion.clone(), ..believed.clone() }
+}

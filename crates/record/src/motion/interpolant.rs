@@ -1,0 +1,80 @@
+//! Position and velocity between samples, and their integrals.
+
+use super::JumpTiming;
+
+/// Position and velocity, linear between knots.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Interpolant {
+    /// Time in s, never falling; twice the same at a jump of the speed.
+    pub(super) t: Vec<f64>,
+    /// Position in m.
+    pub(super) z: Vec<f64>,
+    /// Velocity in m/s.
+    pub(super) v: Vec<f64>,
+    /// Integral of the position in m s up to each knot.
+    sum_z: Vec<f64>,
+    /// Integral of the velocity in m.
+    sum_v: Vec<f64>,
+}
+
+impl Interpolant {
+    pub(super) fn push(&mut self, t: f64, z: f64, v: f64) {
+        let (mut sum_z, mut sum_v) = (0.0, 0.0);
+        if let (Some(t0), Some(z0), Some(v0)) = (self.t.last(), self.z.last(), self.v.last()) {
+            let dt = t - t0;
+            sum_z = self.sum_z.last().unwrap_or(&0.0) + 0.5 * dt * (z0 + z);
+            sum_v = self.sum_v.last().unwrap_or(&0.0) + 0.5 * dt * (v0 + v);
+        }
+        self.t.push(t);
+        self.z.push(z);
+        self.v.push(v);
+        self.sum_z.push(sum_z);
+        self.sum_v.push(sum_v);
+    }
+
+    /// Velocity in m/s at a knot, searched from knot `near` on.
+    pub(super) fn velocity_at(&self, at_s: f64, near: &mut usize) -> f64 {
+        while self.t.get(*near + 1).is_some_and(|t| *t <= at_s) {
+            *near += 1;
+        }
+        self.v.get(*near).copied().unwrap_or(0.0)
+    }
+
+    /// The last knot at or before `at_s`; the first one when there is none.
+    pub(super) fn index_before(&self, at_s: f64) -> usize {
+        self.t.partition_point(|t| *t <= at_s).saturating_sub(1)
+    }
+
+    /// [`sums`](Self::sums) as if the speed of one side of a jump lasted beyond it.
+    pub(super) fn integrals_beyond_jump(
+        &self,
+        jump: &JumpTiming,
+        side: usize,
+        at_s: f64,
+        near: &mut usize,
+    ) -> (f64, f64) {
+        let (z, v) = self.integrals(jump.time_s, near);
+        let (dt, speed) = (at_s - jump.time_s, jump.velocity_mps[side]);
+        (z + dt * (jump.position_m + 0.5 * dt * speed), v + dt * speed)
+    }
+
+    /// Integrals of position and velocity up to an instant, searched from knot `near` on.
+    pub(super) fn integrals(&self, at_s: f64, near: &mut usize) -> (f64, f64) {
+        let last = self.t.len() - 1;
+        let mut k = (*near).min(last);
+        if self.t[k] > at_s {
+            k = self.index_before(at_s);
+        }
+        while k < last && self.t[k + 1] <= at_s {
+            k += 1;
+        }
+        *near = k;
+        let dt = at_s - self.t[k];
+        if k == last || dt <= 0.0 {
+            return (self.sum_z[k] + dt * self.z[k], self.sum_v[k] + dt * self.v[k]);
+        }
+        let share = dt / (self.t[k + 1] - self.t[k]);
+        let mix = |x: &[f64]| x[k] + 0.5 * share * (x[k + 1] - x[k]);
+        (self.sum_z[k] + dt * mix(&self.z), self.sum_v[k] + dt * mix(&self.v))
+    }
+}

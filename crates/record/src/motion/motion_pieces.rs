@@ -1,0 +1,286 @@
+//! Means of the motion over spans of time, cut where the speed jumps or turns, as samples or a late force show it.
+
+use super::Motion;
+
+/// How jumps of the speed show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JumpAppearance {
+    /// A force that follows the speed at once is sampled before or after a jump.
+    BetweenSamples,
+    /// A force that is late by so many s, or smeared, shows the instants.
+    Delayed(f64),
+    /// A force that follows the speed at once, and is late, is sampled before or after a jump.
+    DelayedBetweenSamples {
+        /// By so many s.
+        delay_s: f64,
+        /// The jumps show between the samples around where they are if it is late by so many s.
+        jump_delay_s: f64,
+    },
+}
+
+/// A span of time in which the motion is smooth: its mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionPiece {
+    /// The block that it belongs to.
+    pub block: u32,
+    /// Begin in s.
+    pub start_s: f64,
+    /// End in s.
+    pub end_s: f64,
+    /// Mean recorded position in m.
+    pub position_m: f64,
+    /// Mean velocity in m/s.
+    pub velocity_mps: f64,
+    /// Acceleration in m/s².
+    pub acceleration_mps2: f64,
+}
+
+impl MotionPiece {
+    /// Position and velocity at an instant within.
+    #[must_use]
+    pub fn at(&self, t: f64) -> (f64, f64) {
+        let s = t - 0.5 * (self.start_s + self.end_s);
+        (self.position_m + self.velocity_mps * s, self.velocity_mps + self.acceleration_mps2 * s)
+    }
+}
+
+impl Motion {
+    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece. `between` is the
+    /// middle between the samples around an instant of the recording.
+    #[must_use]
+    pub fn pieces(
+        &self,
+        spans: impl Iterator<Item = (f64, f64)>,
+        shown: JumpAppearance,
+        between: impl Fn(f64) -> f64,
+    ) -> Vec<MotionPiece> {
+        let (knots, late_s) = match shown {
+            JumpAppearance::BetweenSamples => (&self.sampled, 0.0),
+            JumpAppearance::Delayed(late_s)
+            | JumpAppearance::DelayedBetweenSamples { delay_s: late_s, .. } => (&self.exact, late_s),
+        };
+        let seen = |at_s: f64, between_s: f64| match shown {
+            JumpAppearance::BetweenSamples => between_s,
+            JumpAppearance::Delayed(late_s) => at_s + late_s,
+            JumpAppearance::DelayedBetweenSamples { jump_delay_s: placed_s, .. } => between(at_s + placed_s),
+        };
+        let jumps: Vec<f64> = self.jumps.iter().map(|j| seen(j.time_s, j.sample_mid_s)).collect();
+        let turns: Vec<f64> = self.reversals_s.iter().map(|t| seen(t.0, t.1)).collect();
+        let mut out = Vec::new();
+        let mut near = 0;
+        let (mut jump, mut turn) = (0, 0);
+        for (block, (from, to)) in spans.enumerate() {
+            let mut at = from;
+            let whole = to - from;
+            loop {
+                while jumps.get(jump).is_some_and(|j| *j <= at + 1e-6 * whole) {
+                    jump += 1;
+                }
+                while turns.get(turn).is_some_and(|t| *t <= at + 1e-6 * whole) {
+                    turn += 1;
+                }
+                let cut = |next: Option<&f64>| next.copied().filter(|j| *j < to - 1e-6 * whole).unwrap_or(to);
+                let end = cut(jumps.get(jump)).min(cut(turns.get(turn)));
+                // A jump that shows between samples: until there, and from there on, the motion is that of its own side.
+                let (before, next) = match shown {
+                    JumpAppearance::DelayedBetweenSamples { .. } => {
+                        (jump.checked_sub(1).and_then(|k| self.jumps.get(k)), self.jumps.get(jump))
+                    }
+                    _ => (None, None),
+                };
+                let mut sums = |at_s: f64| match (before, next) {
+                    (Some(j), _) if at_s < j.time_s => knots.integrals_beyond_jump(j, 1, at_s, &mut near),
+                    (_, Some(j)) if at_s > j.time_s => knots.integrals_beyond_jump(j, 0, at_s, &mut near),
+                    _ => knots.integrals(at_s, &mut near),
+                };
+                // Slope of the velocity from means over both halves.
+                let (z0, v0) = sums(at - late_s);
+                let (_, vm) = sums(0.5 * (at + end) - late_s);
+                let (z1, v1) = sums(end - late_s);
+                let dt = (end - at).max(1e-12);
+                let a = ((v1 - vm) - (vm - v0)) / (0.25 * dt * dt);
+                out.push(MotionPiece {
+                    block: block as u32,
+                    start_s: at,
+                    end_s: end,
+                    position_m: (z1 - z0) / dt,
+                    velocity_mps: (v1 - v0) / dt,
+                    acceleration_mps2: a,
+                });
+                if end >= to {
+                    break;
+                }
+                at = end;
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{bent, from_knots, near};
+    use super::super::{MAX_EXACT_SD_MPS, VelocityJump};
+    use super::*;
+
+    /// A piece by its block, borders, mean position and velocity.
+    fn is(piece: &MotionPiece, block: u32, (from_s, to_s): (f64, f64), z_m: f64, v_mps: f64) {
+        assert_eq!(piece.block, block);
+        near(piece.start_s, from_s);
+        near(piece.end_s, to_s);
+        near(piece.position_m, z_m);
+        near(piece.velocity_mps, v_mps);
+        assert!(piece.acceleration_mps2.abs() < 1e-9, "{piece:?}");
+    }
+
+    fn pieces(m: &Motion, spans: &[(f64, f64)], shown: JumpAppearance) -> Vec<MotionPiece> {
+        // Between samples every 0.1 s.
+        m.pieces(spans.iter().copied(), shown, |t| 0.1 * (10.0 * t).floor() + 0.05)
+    }
+
+    #[test]
+    fn pieces_are_means_of_the_motion_as_samples_show_it() {
+        let m = bent();
+        let spans = [(-0.1, 0.1), (0.3, 0.5), (0.5, 0.7), (0.7, 0.77), (1.15, 1.25)];
+        let told = pieces(&m, &spans, JumpAppearance::BetweenSamples);
+        assert_eq!(told.len(), 6);
+        // Before the first sample it is where it is then, and as fast.
+        is(&told[0], 0, (-0.1, 0.1), 0.25 * 0.2, 2.0);
+        is(&told[1], 1, (0.3, 0.5), 0.8, 2.0);
+        // The jump shows in the middle between its samples, each side as it went.
+        is(&told[2], 2, (0.5, 0.55), 1.05, 2.0);
+        is(&told[3], 2, (0.55, 0.7), 0.965, -1.0);
+        is(&told[4], 3, (0.7, 0.77), 0.855, -1.0);
+        is(&told[5], 4, (1.15, 1.25), 0.5 * (0.415 + 0.39), -1.0);
+        // A border at a jump cuts nothing.
+        let told = pieces(&m, &[(0.4, 0.55), (0.55, 0.6)], JumpAppearance::BetweenSamples);
+        assert_eq!(told.len(), 2);
+        is(&told[1], 1, (0.55, 0.6), 1.015, -1.0);
+        // Nor does one nearer to it than a millionth of the span, on either side; a turn neither.
+        let cuts = |m: &Motion, from_s: f64, to_s: f64| {
+            pieces(m, &[(from_s, to_s)], JumpAppearance::BetweenSamples).len() - 1
+        };
+        let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
+        let v: Vec<f64> = t.iter().map(|t| 1.0 - 1.8 * t).collect();
+        let turn = from_knots(&t, &[0.0; 13], &v, &[], 0.0, 0.0);
+        for m in [&m, &turn] {
+            for (share, wanted) in [(3e-7, 0), (3e-6, 1)] {
+                assert_eq!(cuts(m, 0.55 - 0.2 * share, 0.75), wanted);
+                assert_eq!(cuts(m, 0.35, 0.55 + 0.2 * share), wanted);
+                assert_eq!(cuts(m, 0.55 - 0.02 * share, 0.57), wanted);
+            }
+        }
+    }
+
+    #[test]
+    fn a_late_force_shows_the_motion_of_before() {
+        let m = bent();
+        let told = pieces(&m, &[(0.3, 0.5), (0.5, 0.7), (0.7, 0.9)], JumpAppearance::Delayed(0.04));
+        assert_eq!(told.len(), 4);
+        is(&told[0], 0, (0.3, 0.5), 0.72, 2.0);
+        is(&told[1], 1, (0.5, 0.57), 2.0 * 0.495, 2.0);
+        is(&told[2], 1, (0.57, 0.7), 1.06 - 0.065, -1.0);
+        is(&told[3], 2, (0.7, 0.9), 1.06 - 0.23, -1.0);
+        // Without a delay it shows the instant.
+        let told = pieces(&m, &[(0.5, 0.7)], JumpAppearance::Delayed(0.0));
+        is(&told[0], 0, (0.5, 0.53), 1.03, 2.0);
+        is(&told[1], 0, (0.53, 0.7), 1.06 - 0.085, -1.0);
+    }
+
+    #[test]
+    fn a_late_force_that_is_sampled_shows_each_side_up_to_the_middle_between_samples() {
+        let m = bent();
+        let spans = [(0.3, 0.5), (0.5, 0.7), (0.7, 0.9)];
+        let placed = |late_s: f64, placed_s: f64| {
+            pieces(
+                &m,
+                &spans,
+                JumpAppearance::DelayedBetweenSamples { delay_s: late_s, jump_delay_s: placed_s },
+            )
+        };
+        // It jumps at 0.57 s and shows so at 0.55 s: the way back lasts longer than it did.
+        let told = placed(0.04, 0.04);
+        assert_eq!(told.len(), 4);
+        is(&told[0], 0, (0.3, 0.5), 0.72, 2.0);
+        is(&told[1], 1, (0.5, 0.55), 2.0 * 0.485, 2.0);
+        is(&told[2], 1, (0.55, 0.7), 1.06 - (0.625 - 0.57), -1.0);
+        is(&told[3], 2, (0.7, 0.9), 1.06 - (0.8 - 0.57), -1.0);
+        // It jumps at 0.54 s: the way in does.
+        let told = placed(0.01, 0.01);
+        is(&told[1], 1, (0.5, 0.55), 2.0 * 0.515, 2.0);
+        is(&told[2], 1, (0.55, 0.7), 1.06 - (0.625 - 0.54), -1.0);
+        // Where it is placed need not be where it is late to.
+        let told = placed(0.01, 0.08);
+        assert_eq!(told.len(), 4);
+        is(&told[1], 1, (0.5, 0.65), 2.0 * 0.565, 2.0);
+        is(&told[2], 1, (0.65, 0.7), 1.06 - (0.675 - 0.54), -1.0);
+    }
+
+    #[test]
+    fn a_piece_knows_how_the_speed_grows() {
+        // v = 1 + 3 t at the samples, and between them on lines: so it is anywhere.
+        let t: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();
+        let v: Vec<f64> = t.iter().map(|t| 1.0 + 3.0 * t).collect();
+        let m = from_knots(&t, &[0.25; 20], &v, &[], 0.0, 0.0);
+        for p in pieces(&m, &[(0.23, 0.61), (0.61, 0.75), (1.0, 1.1)], JumpAppearance::BetweenSamples) {
+            assert!((p.acceleration_mps2 - 3.0).abs() < 1e-9, "{p:?}");
+            near(p.velocity_mps, 1.0 + 1.5 * (p.start_s + p.end_s));
+            near(p.position_m, 0.25);
+            near(p.at(p.start_s).1, 1.0 + 3.0 * p.start_s);
+            near(p.at(p.end_s).0, 0.25 + p.velocity_mps * 0.5 * (p.end_s - p.start_s));
+        }
+    }
+
+    #[test]
+    fn dry_friction_jumps_where_the_speed_smoothly_turns() {
+        let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
+        let of = |v: &dyn Fn(f64) -> f64, sd: f64| {
+            let v: Vec<f64> = t.iter().map(|t| v(*t)).collect();
+            from_knots(&t, &[0.0; 13], &v, &[], sd, 0.0)
+        };
+        // 1 m/s at first, through zero at 5/11 s.
+        let slowing = of(&|t| 1.0 - 2.2 * t, 0.0);
+        assert_eq!(slowing.reversals_s.len(), 1);
+        near(slowing.reversals_s[0].0, 1.0 / 2.2);
+        near(slowing.reversals_s[0].1, 0.45);
+        // Samples show it in their middle, a late force when it gets there.
+        let cut = |shown: JumpAppearance| {
+            let told = pieces(&slowing, &[(0.3, 0.4), (0.4, 0.6)], shown);
+            assert_eq!(told.iter().map(|p| p.block).collect::<Vec<_>>(), [0, 1, 1]);
+            told[1].end_s
+        };
+        near(cut(JumpAppearance::BetweenSamples), 0.45);
+        near(cut(JumpAppearance::Delayed(0.02)), 1.0 / 2.2 + 0.02);
+        near(cut(JumpAppearance::DelayedBetweenSamples { delay_s: 0.02, jump_delay_s: 0.06 }), 0.55);
+        // There and back: one turn each.
+        let swinging = of(&|t| (core::f64::consts::TAU * (t + 0.03)).cos(), 0.0);
+        let middles: Vec<f64> = swinging.reversals_s.iter().map(|t| t.1).collect();
+        assert_eq!(middles.len(), 2);
+        near(middles[0], 0.25);
+        near(middles[1], 0.75);
+        // None without a change of the sign, in a hold, or where the speed jumps; noisy positions tell none.
+        assert!(of(&|t| 1.0 - 0.8 * t, 0.0).reversals_s.is_empty());
+        assert!(of(&|_| 0.0, 0.0).reversals_s.is_empty());
+        assert!(bent().reversals_s.is_empty());
+        assert_eq!(of(&|t| 1.0 - 2.2 * t, MAX_EXACT_SD_MPS).reversals_s.len(), 1);
+        assert!(of(&|t| 1.0 - 2.2 * t, 1.01 * MAX_EXACT_SD_MPS).reversals_s.is_empty());
+        // A jump elsewhere is not this turn.
+        let kink = |sample: usize| VelocityJump {
+            next_sample: sample,
+            time_s: 0.1 * sample as f64 - 0.05,
+            position_m: 0.0,
+            velocity_mps: [1.0, 0.9],
+            position_sd_m: 0.0,
+        };
+        let both = |sample: usize| {
+            let v: Vec<f64> = t.iter().map(|t| 1.0 - 2.2 * t).collect();
+            from_knots(&t, &[0.0; 13], &v, &[kink(sample)], 0.0, 0.0)
+        };
+        assert_eq!([4, 5, 6].map(|sample| both(sample).reversals_s.len()), [1, 0, 1]);
+        // What comes after a span does not cut it, a jump at 0.35 s and a turn at 0.45 s.
+        let told = pieces(&both(4), &[(0.0, 0.3), (0.3, 0.5)], JumpAppearance::BetweenSamples);
+        let ends: Vec<f64> = told.iter().map(|p| p.end_s).collect();
+        assert_eq!(ends.len(), 4);
+        ends.iter().zip([0.3, 0.35, 0.45, 0.5]).for_each(|(told, wanted)| near(*told, wanted));
+    }
+}

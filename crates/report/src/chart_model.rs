@@ -1,0 +1,313 @@
+//! What a chart holds: curves, marked instants, bands, thresholds, lanes. Plain data; drawing happens elsewhere.
+
+use crate::palette::Colour;
+use serde::{Deserialize, Serialize};
+
+/// How a curve or a marker line is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LineStyle {
+    /// Unbroken line.
+    #[default]
+    Solid,
+    /// Dashes.
+    Dashed,
+    /// Dots.
+    Dotted,
+    /// Constant until the next value: truths that change by steps. For markers the same as `Solid`.
+    Step,
+    /// Separate points. For markers the same as `Solid`.
+    Points,
+}
+
+/// The vertical axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// Proportional.
+    #[default]
+    Linear,
+    /// Logarithmic; values of zero and below are left out.
+    Log,
+    /// Proportional up to the given value, logarithmic beyond, with sign: for a statistic with a threshold.
+    Asinh(f64),
+}
+
+/// One curve; every curve brings its own abscissae, equal columns are stored once in the page.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Line, dashes, steps or points.
+    pub style: LineStyle,
+    /// Line width or half the point size, in pixels.
+    pub width_px: f64,
+    /// Abscissae, not decreasing unless the chart is parametric.
+    pub x: Vec<f64>,
+    /// Ordinates; what is not finite leaves a gap.
+    pub y: Vec<f64>,
+    /// Not drawn until the reader switches it on.
+    pub hidden: bool,
+}
+
+impl Series {
+    /// A solid line.
+    #[must_use]
+    pub fn line(name: impl Into<String>, colour: Colour, x: Vec<f64>, y: Vec<f64>) -> Self {
+        Self { name: name.into(), colour, style: LineStyle::Solid, width_px: 1.5, x, y, hidden: false }
+    }
+
+    /// Steps: `y[i]` holds from `x[i]` to `x[i + 1]`.
+    #[must_use]
+    pub fn step(name: impl Into<String>, colour: Colour, x: Vec<f64>, y: Vec<f64>) -> Self {
+        Self { style: LineStyle::Step, ..Self::line(name, colour, x, y) }
+    }
+
+    /// Separate points.
+    #[must_use]
+    pub fn points(name: impl Into<String>, colour: Colour, x: Vec<f64>, y: Vec<f64>) -> Self {
+        Self { style: LineStyle::Points, width_px: 4.5, ..Self::line(name, colour, x, y) }
+    }
+
+    /// The same curve in another style.
+    #[must_use]
+    pub fn styled(mut self, style: LineStyle) -> Self {
+        self.style = style;
+        self
+    }
+
+    /// The same curve with another line width.
+    #[must_use]
+    pub fn width(mut self, width_px: f64) -> Self {
+        self.width_px = width_px;
+        self
+    }
+
+    /// The same curve, switched off (`true`) until the reader asks for it.
+    #[must_use]
+    pub fn hidden(mut self, hidden: bool) -> Self {
+        self.hidden = hidden;
+        self
+    }
+}
+
+/// On which side of its line a marker's label stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// To the left of the line.
+    Left,
+    /// To the right of the line.
+    #[default]
+    Right,
+}
+
+/// Vertical lines of one kind: true ruptures, detections, compensation times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MarkerSet {
+    /// Name of the kind in the legend.
+    pub name: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Solid, dashed or dotted.
+    pub style: LineStyle,
+    /// Side of the labels.
+    pub side: Side,
+    /// Abscissa and label (may be empty) of each line.
+    pub marks: Vec<(f64, String)>,
+}
+
+/// A shaded interval of the abscissa over the chart's full height.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Band {
+    /// Where it begins.
+    pub from: f64,
+    /// Where it ends.
+    pub to: f64,
+    /// Name written at its top.
+    pub label: String,
+    /// Colour, drawn faint.
+    pub colour: Colour,
+}
+
+/// A horizontal line: a threshold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Ordinate.
+    pub y: f64,
+    /// Name written at its right end.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+    /// Solid, dashed or dotted.
+    pub style: LineStyle,
+}
+
+impl Level {
+    /// A grey line at zero, without a name.
+    #[must_use]
+    pub fn zero() -> Self {
+        Self { y: 0.0, label: String::new(), colour: Colour::Grey, style: LineStyle::Solid }
+    }
+
+    /// A dotted grey line.
+    #[must_use]
+    pub fn dotted(y: f64, label: impl Into<String>) -> Self {
+        Self { y, label: label.into(), colour: Colour::Grey, style: LineStyle::Dotted }
+    }
+}
+
+/// One row of coloured spans: the states of a state machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lane {
+    /// Name of the row.
+    pub name: String,
+    /// Its spans; one label has one colour.
+    pub spans: Vec<Span>,
+}
+
+/// A span of a [`Lane`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Span {
+    /// Where it begins.
+    pub from: f64,
+    /// Where it ends.
+    pub to: f64,
+    /// Name of the state.
+    pub label: String,
+    /// Colour.
+    pub colour: Colour,
+}
+
+/// One chart. Charts with the same `group` share zoom, pan and cursor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chart {
+    /// Heading.
+    pub title: String,
+    /// One sentence under the heading; may be empty.
+    pub caption: String,
+    /// Name and unit of the abscissa.
+    pub x_label: String,
+    /// Name and unit of the ordinate.
+    pub y_label: String,
+    /// Charts of one group move together.
+    pub group: Option<String>,
+    /// Height of the drawing in pixels.
+    pub height_px: u32,
+    /// Vertical scale.
+    pub scale: Scale,
+    /// Fixed vertical range instead of the data's.
+    pub y_range: Option<(f64, f64)>,
+    /// The abscissa may go back and forth (force against depth): drawn in the order given, nothing is sorted.
+    pub parametric: bool,
+    /// Curves.
+    pub series: Vec<Series>,
+    /// Vertical lines.
+    pub markers: Vec<MarkerSet>,
+    /// Shaded intervals.
+    pub bands: Vec<Band>,
+    /// Horizontal lines.
+    pub levels: Vec<Level>,
+    /// Rows of spans; a chart with lanes shows no curves.
+    pub lanes: Vec<Lane>,
+}
+
+impl Chart {
+    /// An empty chart.
+    #[must_use]
+    pub fn new(title: impl Into<String>, x_label: impl Into<String>, y_label: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            caption: String::new(),
+            x_label: x_label.into(),
+            y_label: y_label.into(),
+            group: None,
+            height_px: 260,
+            scale: Scale::Linear,
+            y_range: None,
+            parametric: false,
+            series: Vec::new(),
+            markers: Vec::new(),
+            bands: Vec::new(),
+            levels: Vec::new(),
+            lanes: Vec::new(),
+        }
+    }
+
+    /// Adds a curve.
+    #[must_use]
+    pub fn with_series(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Adds vertical lines, unless there are none.
+    #[must_use]
+    pub fn with_markers(mut self, markers: MarkerSet) -> Self {
+        if !markers.marks.is_empty() {
+            self.markers.push(markers);
+        }
+        self
+    }
+
+    /// Adds shaded intervals.
+    #[must_use]
+    pub fn with_bands(mut self, bands: Vec<Band>) -> Self {
+        self.bands.extend(bands);
+        self
+    }
+
+    /// Adds a threshold.
+    #[must_use]
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.levels.push(level);
+        self
+    }
+
+    /// Sets the sentence under the heading.
+    #[must_use]
+    pub fn caption(mut self, caption: impl Into<String>) -> Self {
+        self.caption = caption.into();
+        self
+    }
+
+    /// Sets the group that moves together.
+    #[must_use]
+    pub fn group(mut self, group: impl Into<String>) -> Self {
+        self.group = Some(group.into());
+        self
+    }
+
+    /// Sets the height in pixels.
+    #[must_use]
+    pub fn height(mut self, height_px: u32) -> Self {
+        self.height_px = height_px;
+        self
+    }
+
+    /// Whether there is nothing to draw.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let curve =
+            self.series.iter().any(|s| s.x.iter().zip(&s.y).any(|(x, y)| x.is_finite() && y.is_finite()));
+        !curve && self.lanes.iter().all(|lane| lane.spans.is_empty())
+    }
+
+    /// Smallest and largest finite abscissa of curves and lanes.
+    #[must_use]
+    pub fn x_extent(&self) -> Option<(f64, f64)> {
+        let curves = self.series.iter().flat_map(|s| s.x.iter().copied());
+        let lanes = self.lanes.iter().flat_map(|l| l.spans.iter().flat_map(|s| [s.from, s.to]));
+        finite_extent(curves.chain(lanes))
+    }
+}
+
+/// Smallest and largest finite value, if there is one.
+pub(crate) fn finite_extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.filter(|v| v.is_finite()).fold(None, |range, v| match range {
+        None => Some((v, v)),
+        Some((low, high)) => Some((f64::min(low, v), f64::max(high, v))),
+    })
+}

@@ -1,0 +1,342 @@
+//! Force, detection and motion over time, and force over depth.
+
+use super::{Combination, RunReport};
+use crate::chart_model::{
+    Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span, finite_extent,
+};
+use crate::number_format::significant;
+use crate::page_model::Section;
+use crate::palette::Colour;
+
+/// Charts over time move together under this name.
+pub(super) const TIME: &str = "time";
+pub(super) const TIME_LABEL: &str = "Time (s)";
+/// The state in which the tip feels nothing.
+const FREE: &str = "FreeTip";
+const BENT: &str = "Proportional up to the threshold, logarithmic beyond.";
+
+pub(super) fn force_section(report: &RunReport) -> Section {
+    Section::new("Force").chart(force_chart(report))
+}
+
+/// Measured, reconstructed, enhanced and true tip force with everything that happened.
+pub(super) fn force_chart(report: &RunReport) -> Chart {
+    let mut chart = Chart::new("Force at the needle", TIME_LABEL, "Force (N)").group(TIME).height(430);
+    let single = report.combinations.len() <= 1;
+    for (index, trace) in report.forces.iter().enumerate() {
+        let name = if report.forces.len() > 1 {
+            format!("measured · {}", trace.sensor)
+        } else {
+            "measured".to_owned()
+        };
+        let colour = if index == 0 { Colour::Grey } else { Colour::SkyBlue };
+        chart = chart
+            .with_series(Series::line(name, colour, report.time_s.clone(), trace.force_n.clone()).width(3.0));
+    }
+    for (index, combination) in report.combinations.iter().enumerate() {
+        let force = combination.reconstructed_force_n.clone();
+        let colour = if single { Colour::Orange } else { Colour::nth(index) };
+        let name = report.label(combination, "reconstructed");
+        let series = Series::line(name, colour, report.time_s.clone(), force).width(1.1).hidden(!single);
+        chart = chart.with_series(if single { series } else { series.styled(LineStyle::Dashed) });
+    }
+    for (index, combination) in report.combinations.iter().enumerate() {
+        let force = combination.enhanced_force_n.clone();
+        let name = report.label(combination, "enhanced");
+        let series = Series::line(name, Colour::nth(index), report.time_s.clone(), force).width(1.8);
+        chart = chart.with_series(report.visible_below(series, index));
+        if single {
+            // Where the tip's force lies with 95 % probability.
+            for (name, edge_n) in
+                [("2.5 %", &combination.tip_force_low_n), ("97.5 %", &combination.tip_force_high_n)]
+            {
+                let edge = Series::line(name, Colour::SkyBlue, report.time_s.clone(), edge_n.clone());
+                chart = chart.with_series(edge.width(0.8).styled(LineStyle::Dashed));
+            }
+        }
+    }
+    if let Some(truth) = &report.truth {
+        let tip =
+            Series::line("true tip force", Colour::Ink, report.time_s.clone(), truth.tip_force_n.clone());
+        chart = chart.with_series(tip.styled(LineStyle::Dashed).width(1.6));
+    }
+    chart.series.retain(|series| series.y.iter().any(|y| y.is_finite()));
+    if report.truth.is_none() {
+        chart.caption = "No truth is known; shaded: the layers as found.".to_owned();
+    }
+    with_events(chart.with_bands(layer_bands(report)), report, true)
+}
+
+/// True ruptures, detections and compensations as vertical lines. Of several combinations only the labelled chart shows
+/// the detections, lest the lines hide the curves.
+pub(super) fn with_events(chart: Chart, report: &RunReport, labels: bool) -> Chart {
+    let text = |label: String| if labels { label } else { String::new() };
+    let marks = report.truth.iter().flat_map(|truth| &truth.ruptures);
+    let mut chart = chart.with_markers(MarkerSet {
+        name: "true rupture".to_owned(),
+        colour: Colour::Ink,
+        style: LineStyle::Solid,
+        side: Side::Left,
+        marks: marks.map(|r| (r.time_s, text(format!("rupture {}: {}", r.layer, r.cause)))).collect(),
+    });
+    let many = report.combinations.len() > 1;
+    if many && !labels {
+        return chart;
+    }
+    for (index, combination) in report.combinations.iter().enumerate() {
+        let colour = if many { Colour::nth(index) } else { Colour::Vermillion };
+        let detections = combination.detections.iter();
+        chart = chart.with_markers(MarkerSet {
+            name: report.label(combination, "detected"),
+            colour,
+            style: LineStyle::Dashed,
+            side: Side::Right,
+            marks: detections.map(|d| (d.time_s, text(detection_label(report, combination, d)))).collect(),
+        });
+        if !many {
+            chart = chart.with_markers(MarkerSet {
+                name: "compensated".to_owned(),
+                colour: Colour::Purple,
+                style: LineStyle::Dotted,
+                side: Side::Right,
+                marks: combination.compensations_s.iter().map(|t| (*t, String::new())).collect(),
+            });
+        }
+    }
+    chart
+}
+
+fn detection_label(report: &RunReport, combination: &Combination, detection: &super::Detection) -> String {
+    let delay = combination.score.as_ref().and_then(|score| {
+        let rupture = score.ruptures.iter().find(|r| Some(r.layer) == detection.matched_layer)?;
+        rupture.delay_s
+    });
+    match delay {
+        Some(delay_s) => {
+            let sign = if delay_s >= 0.0 { "+" } else { "−" };
+            format!("found {sign}{} ms", significant(delay_s.abs() * 1e3, 2))
+        }
+        None if report.truth.is_some() => "false".to_owned(),
+        None => format!("{} s", significant(detection.time_s, 4)),
+    }
+}
+
+/// The layers along time: true ones, or what lies between contact and the detections of the first combination.
+pub(super) fn layer_bands(report: &RunReport) -> Vec<Band> {
+    let end = report.end_s();
+    let band = |(index, (from, to, label)): (usize, (f64, f64, String))| Band {
+        from,
+        to,
+        label,
+        colour: Colour::area(index),
+    };
+    if let Some(truth) = &report.truth {
+        let entered = truth.layers.iter().filter_map(|layer| {
+            let from = layer.entered_s?;
+            Some((from, layer.ruptured_s.unwrap_or(end), layer.name.clone()))
+        });
+        return entered.enumerate().map(band).collect();
+    }
+    let Some(combination) = report.combinations.first() else { return Vec::new() };
+    let Some(contact) = combination.contact_s else { return Vec::new() };
+    let mut faces = vec![contact];
+    faces.extend(combination.detections.iter().map(|d| d.time_s));
+    faces.push(end);
+    // In a gap, and behind the last layer, there is no layer.
+    let free = |from: f64, to: f64| {
+        combination.states.iter().find(move |s| s.state == FREE && s.from_s >= from && s.from_s < to)
+    };
+    let spans = faces.windows(2).enumerate().map(|(i, pair)| {
+        let from = free(pair[0], pair[1]).map_or(pair[0], |s| s.to_s.min(pair[1]));
+        (from, pair[1], format!("layer {}", i + 1))
+    });
+    spans.enumerate().map(band).filter(|b| b.to > b.from).collect()
+}
+
+/// Nothing to draw.
+static NONE: Vec<f64> = Vec::new();
+
+pub(super) fn detection_section(report: &RunReport) -> Section {
+    let statistic = |share: bool, chart: Chart| {
+        let column = |c: &Combination| c.cusum_is_normalised == share;
+        with_curves(
+            chart.caption(BENT),
+            report,
+            |c| if column(c) { &c.cusum_n2 } else { &NONE },
+            |c| vec![(c.cusum_threshold_n2.filter(|_| column(c)), "alarm")],
+        )
+    };
+    let derivative = with_curves(
+        Chart::new("Force derivative", TIME_LABEL, "df/dt (N/s)").caption(BENT),
+        report,
+        |c| &c.force_derivative_n_per_s,
+        |c| vec![(c.derivative_on_n_per_s, "on"), (c.derivative_off_n_per_s, "off")],
+    );
+    let bent = |chart: Chart| {
+        let linear_below = chart.levels.iter().map(|level| level.y).find(|y| *y > 0.0);
+        Chart { scale: linear_below.map_or(Scale::Linear, Scale::Asinh), ..chart }
+    };
+    let mut section = Section::new("Detection").chart(state_chart(report));
+    if report.combinations.iter().any(|c| c.cusum_is_normalised) {
+        let chart = Chart::new("Alarm: the largest CUSUM as a share of its threshold", TIME_LABEL, "g");
+        section = section.chart(with_events(bent(statistic(true, chart)), report, false));
+    }
+    if report.combinations.iter().all(|c| c.cusum_is_normalised) && !report.combinations.is_empty() {
+        return section;
+    }
+    let chart = Chart::new("CUSUM of the reconstruction error", TIME_LABEL, "g (N²)");
+    section.chart(with_events(bent(statistic(false, chart)), report, false)).chart(with_events(
+        bent(derivative),
+        report,
+        false,
+    ))
+}
+
+/// One curve per combination and each distinct threshold once.
+fn with_curves(
+    chart: Chart,
+    report: &RunReport,
+    column: impl Fn(&Combination) -> &Vec<f64>,
+    levels: impl Fn(&Combination) -> Vec<(Option<f64>, &'static str)>,
+) -> Chart {
+    let mut chart = chart.group(TIME).height(210).with_bands(unlabelled(layer_bands(report)));
+    for (index, combination) in report.combinations.iter().enumerate() {
+        let name = chart.y_label.split(" (").next().unwrap_or_default().to_owned();
+        let values = column(combination).clone();
+        if !values.is_empty() {
+            let name = report.label(combination, &name);
+            let series = Series::line(name, Colour::nth(index), report.time_s.clone(), values);
+            chart = chart.with_series(report.visible_below(series, index));
+        }
+        for (level, label) in levels(combination) {
+            let Some(y) = level else { continue };
+            if chart.levels.iter().all(|known| known.y.to_bits() != y.to_bits()) {
+                let label = format!("{label} {}", significant(y, 3));
+                chart = chart.with_level(Level {
+                    y,
+                    label,
+                    colour: Colour::Vermillion,
+                    style: LineStyle::Dashed,
+                });
+            }
+        }
+    }
+    chart
+}
+
+pub(super) fn unlabelled(bands: Vec<Band>) -> Vec<Band> {
+    bands.into_iter().map(|band| Band { label: String::new(), ..band }).collect()
+}
+
+/// The state machine as coloured rows, one per combination.
+pub(super) fn state_chart(report: &RunReport) -> Chart {
+    let many = report.combinations.len() > 1;
+    let lanes: Vec<Lane> = report
+        .combinations
+        .iter()
+        .filter(|combination| !combination.states.is_empty())
+        .map(|combination| Lane {
+            name: if many { combination.name.clone() } else { String::new() },
+            spans: combination
+                .states
+                .iter()
+                .map(|s| Span {
+                    from: s.from_s,
+                    to: s.to_s,
+                    label: s.state.clone(),
+                    colour: state_colour(&s.state),
+                })
+                .collect(),
+        })
+        .collect();
+    let row: u32 = if many { 52 } else { 34 };
+    let height = 48 + row * u32::try_from(lanes.len()).unwrap_or(1);
+    Chart { lanes, ..Chart::new("State of the detection", TIME_LABEL, "State").group(TIME).height(height) }
+}
+
+fn state_colour(state: &str) -> Colour {
+    match state {
+        "NoRupture" => Colour::Grey,
+        "ExpectedRupture" => Colour::Yellow,
+        "DetectedRupture" => Colour::Vermillion,
+        "ForceDropMeasuring" => Colour::Orange,
+        "ForceCompensation" => Colour::Purple,
+        _ => Colour::SkyBlue,
+    }
+}
+
+pub(super) fn motion_section(report: &RunReport) -> Section {
+    let millimetres: Vec<f64> = report.position_m.iter().map(|z| z * 1e3).collect();
+    let speeds: Vec<f64> = report.velocity_mps.iter().map(|v| v * 1e3).collect();
+    let time = |title: &str, axis: &str, name: &str, values: Vec<f64>| {
+        let chart = Chart::new(title, TIME_LABEL, axis).group(TIME).height(180);
+        let chart = chart.with_bands(unlabelled(layer_bands(report)));
+        chart.with_series(Series::line(name, Colour::Blue, report.time_s.clone(), values))
+    };
+    Section::new("Motion and depth")
+        .chart(time("Position", "z (mm)", "tip position", millimetres.clone()))
+        .chart(Chart { y_range: with_zero(&speeds), ..time("Velocity", "v (mm/s)", "tip velocity", speeds) })
+        .chart(depth_chart(report, millimetres))
+}
+
+/// The range of the values with zero in it, so that noise on a constant does not fill the chart.
+fn with_zero(values: &[f64]) -> Option<(f64, f64)> {
+    finite_extent(values.iter().copied().chain([0.0])).filter(|(low, high)| low < high)
+}
+
+fn depth_chart(report: &RunReport, depth_mm: Vec<f64>) -> Chart {
+    let mut chart = Chart::new("Force against depth", "Depth of the tip (mm)", "Force (N)").height(380);
+    chart.parametric = true;
+    for (index, trace) in report.forces.iter().enumerate() {
+        let name = if report.forces.len() > 1 {
+            format!("measured · {}", trace.sensor)
+        } else {
+            "measured".to_owned()
+        };
+        let colour = if index == 0 { Colour::Grey } else { Colour::SkyBlue };
+        chart =
+            chart.with_series(Series::line(name, colour, depth_mm.clone(), trace.force_n.clone()).width(1.2));
+    }
+    for (index, combination) in report.combinations.iter().enumerate() {
+        let name = report.label(combination, "enhanced");
+        let force = combination.enhanced_force_n.clone();
+        let series = Series::line(name, Colour::nth(index), depth_mm.clone(), force).width(1.8);
+        chart = chart.with_series(report.visible_below(series, index));
+    }
+    if let Some(truth) = &report.truth {
+        let tip = Series::line("true tip force", Colour::Ink, depth_mm, truth.tip_force_n.clone());
+        chart = chart.with_series(tip.styled(LineStyle::Dashed).width(1.6));
+        chart.bands = truth
+            .layers
+            .iter()
+            .enumerate()
+            .map(|(index, layer)| Band {
+                from: layer.front_m * 1e3,
+                to: (layer.front_m + layer.thickness_m) * 1e3,
+                label: layer.name.clone(),
+                colour: Colour::area(index),
+            })
+            .collect();
+        let marks =
+            truth.ruptures.iter().map(|r| (r.depth_m * 1e3, format!("rupture {}", r.layer))).collect();
+        chart = chart.with_markers(MarkerSet {
+            name: "true rupture".to_owned(),
+            colour: Colour::Ink,
+            style: LineStyle::Solid,
+            side: Side::Left,
+            marks,
+        });
+    }
+    for (index, combination) in report.combinations.iter().enumerate() {
+        let colour = if report.combinations.len() > 1 { Colour::nth(index) } else { Colour::Vermillion };
+        chart = chart.with_markers(MarkerSet {
+            name: report.label(combination, "detected"),
+            colour,
+            style: LineStyle::Dashed,
+            side: Side::Right,
+            marks: combination.detections.iter().map(|d| (d.depth_m * 1e3, String::new())).collect(),
+        });
+    }
+    chart.series.retain(|series| !series.y.is_empty());
+    chart
+}

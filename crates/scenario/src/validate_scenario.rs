@@ -1,0 +1,106 @@
+//! Ranges: what a scenario must satisfy beyond its syntax. RON reads `NaN`, `-inf` and turns `1e400`
+//! into infinity, so every number is checked.
+
+use crate::load_ron::FieldError;
+use crate::scenario::Scenario;
+use crate::sensor_config::{ForceTorque, Sensor};
+use crate::validate_arm;
+use crate::validate_effects::effects;
+use crate::validate_enhancer::enhance;
+use crate::validate_motion::motion;
+
+pub(crate) type CheckResult = Result<(), FieldError>;
+
+pub(crate) fn check(path: impl Into<String>, value: f64, ok: bool, right: &str) -> CheckResult {
+    if ok && value.is_finite() { Ok(()) } else { Err(FieldError::new(path, format!("is {value}; {right}"))) }
+}
+
+pub(crate) fn positive(path: impl Into<String>, value: f64, unit: &str) -> CheckResult {
+    check(path, value, value > 0.0, &format!("it must be a positive number of {unit}"))
+}
+
+pub(crate) fn not_negative(path: impl Into<String>, value: f64, unit: &str) -> CheckResult {
+    check(path, value, value >= 0.0, &format!("it must be zero or a positive number of {unit}"))
+}
+
+pub(crate) fn finite(path: impl Into<String>, value: f64, unit: &str) -> CheckResult {
+    check(path, value, true, &format!("it must be a finite number of {unit}"))
+}
+
+/// Checks a scenario; the first problem found.
+pub(crate) fn scenario(s: &Scenario) -> CheckResult {
+    if s.name.trim().is_empty() {
+        return Err(FieldError::new("name", "is empty; say what the scenario is"));
+    }
+    tissue(s)?;
+    effects(s)?;
+    check("sample_hz", s.sample_hz, s.sample_hz > 0.0, "it must be positive, for example 200.0")?;
+    check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
+    check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance < 1.0, "it must lie between 0 and 1")?;
+    let within = |x: f64| (0.0..1.0).contains(&x);
+    check(
+        "thickness_tolerance",
+        s.thickness_tolerance,
+        within(s.thickness_tolerance),
+        "it must be zero or positive and below 1",
+    )?;
+    check(
+        "surface_tolerance_m",
+        s.surface_tolerance_m,
+        within(s.surface_tolerance_m),
+        "it must be zero or positive and below 1 m",
+    )?;
+    motion(s)?;
+    sensors(&s.sensor, s.physics_hz)?;
+    validate_arm::robot(s)?;
+    if let Some(config) = &s.enhance_virtual {
+        enhance("enhance_virtual", config)?;
+    }
+    enhance("enhance", &s.enhance)
+}
+
+fn tissue(s: &Scenario) -> CheckResult {
+    finite("tissue.surface_m", s.tissue.surface_m, "metres")?;
+    if s.tissue.layers.is_empty() {
+        return Err(FieldError::new("tissue.layers", "has no layer; give at least one"));
+    }
+    for (i, layer) in s.tissue.layers.iter().enumerate() {
+        let at = |field: &str| format!("tissue.layers[{i}].{field}");
+        positive(at("thickness_m"), layer.thickness_m, "metres")?;
+        check(
+            at("thickness_m"),
+            layer.thickness_m,
+            layer.thickness_m <= 1.0,
+            "a layer is at most 1 m thick; is this in millimetres?",
+        )?;
+        not_negative(at("stiffness_n_per_m"), layer.stiffness_n_per_m, "N/m")?;
+        not_negative(at("friction_ns_per_m2"), layer.friction_ns_per_m2, "N s/m²")?;
+        if let Some(force) = layer.puncture_n {
+            positive(at("puncture_n"), force, "N")?;
+        }
+    }
+    Ok(())
+}
+
+fn sensors(sensor: &Sensor, physics_hz: f64) -> CheckResult {
+    match sensor {
+        Sensor::ForceTorque(config) => force_torque("sensor", config),
+        Sensor::Virtual(config) => validate_arm::virtual_sensor("sensor", config, physics_hz),
+        Sensor::Both { force_torque: config, virtual_sensor } => {
+            force_torque("sensor.force_torque", config)?;
+            validate_arm::virtual_sensor("sensor.virtual_sensor", virtual_sensor, physics_hz)
+        }
+    }
+}
+
+fn force_torque(at: &str, c: &ForceTorque) -> CheckResult {
+    not_negative(format!("{at}.noise_n"), c.noise_n, "N")?;
+    check(format!("{at}.ar1"), c.ar1, c.ar1 > -1.0 && c.ar1 < 1.0, "it must lie between -1 and 1")?;
+    finite(format!("{at}.bias_n"), c.bias_n, "N")?;
+    finite(format!("{at}.drift_n_per_s"), c.drift_n_per_s, "N/s")?;
+    not_negative(format!("{at}.quantisation_n"), c.quantisation_n, "N")?;
+    match c.range_n {
+        Some(range) => positive(format!("{at}.range_n"), range, "N"),
+        None => Ok(()),
+    }
+}

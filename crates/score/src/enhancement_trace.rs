@@ -1,0 +1,233 @@
+//! What the online core made of a recording: every output as a column, and the offline estimate
+//! beside it.
+
+use crate::enhancer_with_model::{EnhancerWithModel, enhancer_for};
+use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
+use crate::score::Score;
+use crate::scorer::{Scorer, TrueSample};
+use stylet_core::config::{Algorithm, EnhanceConfig, Model};
+use stylet_core::{Detection, LayerEstimate, Sample, State};
+use stylet_record::LayerTruth;
+use stylet_record::{Recording, Truth};
+
+/// The core's outputs over a recording, one value per sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Enhanced force in N.
+    pub enhanced_n: Vec<f64>,
+    /// Lower and upper end of the 95 % band on the tip's force in N; not a number when the algorithm gives none.
+    pub low_n: Vec<f64>,
+    /// See `low_n`.
+    pub high_n: Vec<f64>,
+    /// Reconstructed force in N.
+    pub reconstructed_n: Vec<f64>,
+    /// Innovation in N.
+    pub error_n: Vec<f64>,
+    /// Stiffness estimate in N/m; not a number before contact.
+    pub stiffness_n_per_m: Vec<f64>,
+    /// Friction estimate in the model's unit; not a number before contact.
+    pub friction: Vec<f64>,
+    /// Cumulative friction in N s/m.
+    pub cumulative_friction_ns_per_m: Vec<f64>,
+    /// CUSUM in N².
+    pub cusum_n2: Vec<f64>,
+    /// Force derivative in N/s.
+    pub derivative_n_per_s: Vec<f64>,
+    /// State.
+    pub state: Vec<State>,
+    /// Declared ruptures.
+    pub detections: Vec<Detection>,
+    /// Estimates of the traversed layers.
+    pub estimates: Vec<LayerEstimate>,
+    /// Position of the first contact in m.
+    pub contact_m: Option<f64>,
+    /// Time at which the needle was first at that position, in s.
+    pub contact_s: Option<f64>,
+    /// Samples that the core passed over.
+    pub unused: usize,
+}
+
+impl Trace {
+    /// Runs a core over the columns of a recording; `force_n` is the sensor's column. `each` sees
+    /// every sample with the core's output.
+    #[must_use]
+    pub fn run(
+        recording: &Recording,
+        force_n: &[f64],
+        config: &EnhanceConfig,
+        surface_m: f64,
+        each: impl FnMut(usize, &stylet_core::Output),
+    ) -> Self {
+        let core = enhancer_for(recording.len(), config, surface_m);
+        Self::hear(recording, force_n, EnhancerWithModel::new(core, None::<fn(&Sample, usize) -> f64>), each)
+    }
+
+    /// [`Trace::record`] with the friction that a law fitted elsewhere says, which has its place in [`Hearing`].
+    #[must_use]
+    pub fn run_with_model(
+        recording: &Recording,
+        force_n: &[f64],
+        config: &EnhanceConfig,
+        surface_m: f64,
+        law: impl FnMut(&Sample, usize) -> f64,
+    ) -> Self {
+        let core = enhancer_for(recording.len(), config, surface_m);
+        Self::hear(recording, force_n, EnhancerWithModel::new(core, Some(law)), |_, _| {})
+    }
+
+    fn hear<L: FnMut(&Sample, usize) -> f64>(
+        recording: &Recording,
+        force_n: &[f64],
+        mut hearing: EnhancerWithModel<L>,
+        mut each: impl FnMut(usize, &stylet_core::Output),
+    ) -> Self {
+        let mut trace = Trace::default();
+        for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
+            let out = hearing.step(Sample {
+                time_s: s.time_s,
+                position_m: s.position_m,
+                velocity_mps: s.velocity_mps,
+                force_n,
+            });
+            each(index, &out);
+            trace.push(&out);
+            trace.record_events(&out);
+        }
+        trace.contact_s =
+            trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
+        trace
+    }
+
+    /// Adds what the core says of a sample to the columns.
+    pub fn push(&mut self, out: &stylet_core::Output) {
+        let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
+        let [stiffness, friction] = coefficients(out);
+        self.enhanced_n.push(out.enhanced_n);
+        self.low_n.push(low);
+        self.high_n.push(high);
+        self.reconstructed_n.push(out.reconstructed_n);
+        self.error_n.push(out.error_n);
+        self.stiffness_n_per_m.push(stiffness);
+        self.friction.push(friction);
+        self.cumulative_friction_ns_per_m.push(out.cumulative_friction_ns_per_m);
+        self.cusum_n2.push(out.cusum_n2);
+        self.derivative_n_per_s.push(out.derivative_n_per_s);
+        self.state.push(out.state);
+    }
+
+    /// Remembers what happened at a sample: ruptures, estimates, contact.
+    pub fn record_events(&mut self, out: &stylet_core::Output) {
+        self.detections.extend(out.detection);
+        if let Some(estimate) = out.estimate {
+            // A later word on a layer replaces an earlier one; it is among the last.
+            if let Some(earlier) = self.estimates.iter().rposition(|e| e.layer == estimate.layer) {
+                self.estimates.remove(earlier);
+            }
+            self.estimates.push(estimate);
+        }
+        self.contact_m = out.contact_m;
+        self.unused += usize::from(!out.used);
+    }
+
+    /// Offline estimate of the layer between `start_m` and `end_m`, whose samples are those before
+    /// `until_s`, given the cumulative friction of the layers before and the elastic share and mean
+    /// speed that decide the split when the data do not.
+    fn offline(
+        recording: &Recording,
+        force_n: &[f64],
+        span: (f64, f64, f64),
+        cumulative_ns_per_m: f64,
+        estimate: Option<&LayerEstimate>,
+    ) -> Option<OfflineEstimate> {
+        let (start_m, end_m, until_s) = span;
+        let inside = || {
+            recording.samples().zip(force_n).filter(move |(s, _)| {
+                s.position_m > start_m && s.position_m < end_m && s.time_s < until_s && s.velocity_mps > 0.0
+            })
+        };
+        let (count, speeds) = inside().fold((0.0, 0.0), |(n, sum), (s, _)| (n + 1.0, sum + s.velocity_mps));
+        let speed_mps: f64 = speeds / count;
+        let share = estimate.map_or(0.5, |e| e.elastic_share);
+        let ratio = ((1.0 - share) / share).sqrt() / speed_mps;
+        let found = fit_layer_offline(
+            inside().map(|(s, f)| LayerSample {
+                depth_m: s.position_m - start_m,
+                velocity_mps: s.velocity_mps,
+                force_n: f - cumulative_ns_per_m * s.velocity_mps,
+            }),
+            ratio,
+        );
+        // Without a measured drop nothing can split what the data do not separate.
+        found.filter(|f| f.separable || estimate.is_some())
+    }
+}
+
+/// Stiffness in N/m and friction in the model's unit; not numbers before contact.
+#[must_use]
+pub fn coefficients(out: &stylet_core::Output) -> [f64; 2] {
+    if out.theta == [0.0, 0.0] { [f64::NAN; 2] } else { out.theta }
+}
+
+/// Runs the core over a simulated recording and scores it against the truth.
+#[must_use]
+pub fn score_run(
+    recording: &Recording,
+    force_n: &[f64],
+    truth: &Truth,
+    layers: &[LayerTruth],
+    config: &EnhanceConfig,
+) -> (Trace, Score) {
+    let mut scorer = Scorer::new(layers.to_vec(), config.model);
+    for rupture in &truth.ruptures {
+        scorer.add_rupture(*rupture);
+    }
+    let surface_m = layers.first().map_or(0.0, |l| l.front_m);
+    let trace = Trace::run(recording, force_n, config, surface_m, |index, out| {
+        scorer.add_event(out);
+        scorer.set_contact(out.contact_m);
+        scorer.add_sample(
+            &TrueSample {
+                position_m: recording.position_m[index],
+                force_n: force_n[index],
+                tip_n: truth.tip_force_n[index],
+                total_n: truth.tissue_force_n[index],
+            },
+            &out.into(),
+        );
+    });
+    let mut score = scorer.finish();
+    let mut cumulative = 0.0;
+    for index in 0..score.layers.len() {
+        let rupture = score.ruptures[index];
+        let Some(layer) = layers.get(rupture.layer - 1) else { continue };
+        let estimate = rupture.detection.and_then(|d| trace.estimates.iter().find(|e| e.layer == d));
+        let span = (layer.front_m, rupture.true_m, rupture.true_s);
+        if let Some(found) = Trace::offline(recording, force_n, span, cumulative, estimate) {
+            cumulative += found.friction_ns_per_m2.max(0.0) * (rupture.true_m - layer.front_m);
+            let slot = &mut score.layers[index];
+            slot.offline_stiffness_n_per_m = Some(found.stiffness_n_per_m);
+            slot.offline_friction_ns_per_m2 = Some(found.friction_ns_per_m2);
+            slot.offline_separable = Some(found.separable);
+        }
+    }
+    (trace, score)
+}
+
+/// Short name of an algorithm, as in `paper/ml/force_torque`.
+#[must_use]
+pub fn algorithm_name(algorithm: Algorithm) -> &'static str {
+    match algorithm {
+        Algorithm::Paper => "paper",
+        Algorithm::Literal => "literal",
+        Algorithm::Stylet => "stylet",
+    }
+}
+
+/// Short name of a model, as in `paper/ml/force_torque`.
+#[must_use]
+pub fn model_name(model: Model) -> &'static str {
+    match model {
+        Model::KelvinVoigt => "kv",
+        Model::MultiLayer => "ml",
+    }
+}

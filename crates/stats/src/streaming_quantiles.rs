@@ -1,0 +1,210 @@
+//! Quantiles of more numbers than memory holds: exact, by going through them a few times.
+
+use crate::order_statistics::{interpolate_between, interpolation_position, quantile};
+
+/// Numbers that are kept at hand; among so many the quantile is looked up as in [`crate::order`].
+const AT_HAND: usize = 1 << 19;
+/// Leading bits that one pass tells apart.
+const BITS: u32 = 18;
+
+/// The quantiles at each of `qs` (0 to 1), bit for bit those of [`crate::quantile`], of numbers that are not kept. `NaN` of
+/// nothing.
+///
+/// `pass` hands all numbers to what it is given; it is called one to five times and has to give the same numbers every time. Takes
+/// some ten megabytes, whatever their count.
+///
+/// # Errors
+/// What `pass` says.
+pub fn quantiles_of_stream<E>(
+    qs: &[f64],
+    mut pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>,
+) -> Result<Vec<f64>, E> {
+    let (mut count, mut few, mut first) = (0_usize, Vec::new(), Histogram::default());
+    pass(&mut |x| {
+        count += 1;
+        if count <= AT_HAND {
+            few.push(x);
+            return;
+        }
+        if count == AT_HAND + 1 {
+            few.iter().for_each(|x| first.add(key(*x), 0));
+            few = Vec::new();
+        }
+        first.add(key(x), 0);
+    })?;
+    if count <= AT_HAND {
+        return Ok(qs.iter().map(|q| quantile(&mut few, *q)).collect());
+    }
+    let places: Vec<_> = qs.iter().map(|q| interpolation_position(count, *q)).collect();
+    let ranks = places.iter().flatten().flat_map(|(below, share)| {
+        [Some(*below as u64), (*share > 0.0).then_some(*below as u64 + 1)].into_iter().flatten()
+    });
+    let mut sought = Sought::default();
+    ranks.for_each(|rank| sought.narrow(&first, 0, 0, rank, rank));
+    drop(first);
+    while !sought.open.is_empty() {
+        let mut open = std::mem::take(&mut sought.open);
+        pass(&mut |x| open.iter_mut().for_each(|range| range.take(key(x))))?;
+        for range in open {
+            range.close(&mut sought);
+        }
+    }
+    let at = |rank: usize| {
+        let found = sought.found.iter().find(|(of, _)| *of == rank as u64);
+        found.map_or(f64::NAN, |(_, key)| number(*key))
+    };
+    let value = |place: &Option<(usize, f64)>| match *place {
+        None => f64::NAN,
+        Some((below, share)) if share > 0.0 => interpolate_between(at(below), at(below + 1), share),
+        Some((below, _)) => at(below),
+    };
+    Ok(places.iter().map(value).collect())
+}
+
+/// An integer whose order is that of [`f64::total_cmp`].
+fn key(x: f64) -> u64 {
+    let bits = x.to_bits();
+    if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
+}
+
+/// The number of a key.
+fn number(key: u64) -> f64 {
+    f64::from_bits(if key >> 63 == 1 { key & !(1 << 63) } else { !key })
+}
+
+/// How many keys there are for each value of the next bits.
+#[derive(Default)]
+struct Histogram(Vec<u64>);
+
+impl Histogram {
+    /// Counts a key by the bits behind its first `known` ones.
+    #[inline]
+    fn add(&mut self, key: u64, known: u32) {
+        if self.0.is_empty() {
+            self.0 = vec![0; 1 << BITS];
+        }
+        // The last bits are fewer; the zeros that move in say nothing.
+        self.0[((key << known) >> (64 - BITS)) as usize] += 1;
+    }
+}
+
+/// Keys with the same first bits, among which ranks are sought.
+struct Range {
+    first: u64,
+    known: u32,
+    /// The rank among all, and among these.
+    ranks: Vec<(u64, u64)>,
+    within: Within,
+}
+
+enum Within {
+    Many(Histogram),
+    Few(Vec<u64>),
+}
+
+impl Range {
+    #[inline]
+    fn take(&mut self, key: u64) {
+        if (key ^ self.first) >> (64 - self.known) == 0 {
+            match &mut self.within {
+                Within::Many(histogram) => histogram.add(key, self.known),
+                Within::Few(keys) => keys.push(key),
+            }
+        }
+    }
+
+    fn close(self, sought: &mut Sought) {
+        match self.within {
+            Within::Many(histogram) => {
+                for (rank, here) in self.ranks {
+                    sought.narrow(&histogram, self.first, self.known, rank, here);
+                }
+            }
+            Within::Few(mut keys) => {
+                keys.sort_unstable();
+                let here = |at: u64| keys.get(at as usize).copied().unwrap_or_default();
+                sought.found.extend(self.ranks.iter().map(|(rank, at)| (*rank, here(*at))));
+            }
+        }
+    }
+}
+
+#[derive(Default)]
+struct Sought {
+    open: Vec<Range>,
+    /// Ranks and their keys.
+    found: Vec<(u64, u64)>,
+}
+
+impl Sought {
+    /// Goes on in that part of a range that holds the rank, which is number `here` within it.
+    fn narrow(&mut self, histogram: &Histogram, first: u64, known: u32, rank: u64, mut here: u64) {
+        for (bin, count) in histogram.0.iter().enumerate() {
+            if here >= *count {
+                here -= count;
+                continue;
+            }
+            let first = first | ((bin as u64) << (64 - BITS)) >> known;
+            let known = known + BITS;
+            if known >= 64 {
+                self.found.push((rank, first));
+            } else if let Some(range) = self.open.iter_mut().find(|r| r.known == known && r.first == first) {
+                range.ranks.push((rank, here));
+            } else {
+                let few = *count <= AT_HAND as u64 / 2;
+                let within = if few { Within::Few(Vec::new()) } else { Within::Many(Histogram::default()) };
+                self.open.push(Range { first, known, ranks: vec![(rank, here)], within });
+            }
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::order_statistics::quantile_of;
+    use std::convert::Infallible;
+
+    fn held_against_order(values: &[f64]) {
+        let qs = [0.0, 0.02, 0.05, 0.5, 0.731, 0.95, 0.99, 1.0, 1.5];
+        let found = quantiles_of_stream(&qs, |take| -> Result<(), Infallible> {
+            values.iter().for_each(|x| take(*x));
+            Ok(())
+        });
+        let Ok(found) = found;
+        for (q, found) in qs.iter().zip(found) {
+            let expected = quantile_of(values.iter().copied(), *q);
+            assert_eq!(
+                found.to_bits(),
+                expected.to_bits(),
+                "{} values at {q}: {found} {expected}",
+                values.len()
+            );
+        }
+    }
+
+    /// Numbers in -0.5 to 0.5, the same every time.
+    fn scatter(count: usize) -> Vec<f64> {
+        let mut state: u64 = 7;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn quantiles_of_many_numbers_are_those_of_all_at_once_to_the_bit() {
+        let many = AT_HAND + 70_001;
+        held_against_order(&[]);
+        held_against_order(&scatter(101));
+        held_against_order(&scatter(many));
+        // Nearly all in one bin of the first pass, and of the second: intervals of an even clock.
+        held_against_order(&scatter(many).iter().map(|x| 0.005 + 1e-9 * x).collect::<Vec<_>>());
+        held_against_order(&scatter(many).iter().map(|x| 0.005 + 1e-17 * x).collect::<Vec<_>>());
+        // Few values, both zeros, both signs, huge ones.
+        held_against_order(&scatter(many).iter().map(|x| (4.0 * x).round() * 1e300).collect::<Vec<_>>());
+        held_against_order(&vec![-0.0; many]);
+    }
+}

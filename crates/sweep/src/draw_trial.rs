@@ -1,0 +1,103 @@
+//! From the number of a trial to its scenario.
+
+use crate::sampling_design::{SamplingDesign, trial_seed};
+use crate::scenario_field;
+use crate::sweep_file::Sweep;
+use stylet_scenario::Scenario;
+
+/// Draws in a row that no scenario allows before the sweep gives up.
+pub const MAX_DRAW_ATTEMPTS: u32 = 100;
+
+/// A trial that is ready to run.
+#[derive(Clone, Debug)]
+pub struct DrawnTrial {
+    /// Number of the trial, from 0.
+    pub trial: u64,
+    /// Seed of its noise.
+    pub seed: u64,
+    /// Draws that were thrown away because no scenario allows them.
+    pub redrawn: u32,
+    /// Values of `vary`, then 1 or 0 for each effect of the sweep.
+    pub values: Vec<f64>,
+    /// The scenario.
+    pub scenario: Scenario,
+}
+
+/// Every draw of a trial was out of range.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error(
+    "trial {trial}: {MAX_DRAW_ATTEMPTS} draws in a row make no scenario; the last: {why}; narrow the distributions"
+)]
+pub struct DrawError {
+    /// Number of the trial.
+    pub trial: u64,
+    /// What was wrong with the last draw.
+    pub why: String,
+}
+
+/// Draws the trials of a sweep.
+#[derive(Clone, Debug)]
+pub struct TrialSampler<'a> {
+    sweep: &'a Sweep,
+    design: SamplingDesign,
+}
+
+impl<'a> TrialSampler<'a> {
+    /// For a sweep.
+    #[must_use]
+    pub fn new(sweep: &'a Sweep) -> Self {
+        let file = &sweep.file;
+        Self { sweep, design: SamplingDesign::new(file.sampling, file.seed, file.trials, sweep.dimensions()) }
+    }
+
+    /// Trial `trial`: a function of scenario, sweep, seed and its number alone.
+    ///
+    /// # Errors
+    /// [`DrawError`] when no draw is one that a scenario allows.
+    pub fn draw(&self, trial: u64) -> Result<DrawnTrial, DrawError> {
+        let mut point = vec![0.0; self.sweep.dimensions()];
+        let mut why = String::new();
+        for redrawn in 0..MAX_DRAW_ATTEMPTS {
+            self.design.point(trial, redrawn, &mut point);
+            let (values, scenario) = self.scenario(trial, &point);
+            match scenario {
+                Ok(scenario) => {
+                    return Ok(DrawnTrial { trial, seed: scenario.seed, redrawn, values, scenario });
+                }
+                Err(problem) => why = problem,
+            }
+        }
+        Err(DrawError { trial, why })
+    }
+
+    fn scenario(&self, trial: u64, point: &[f64]) -> (Vec<f64>, Result<Scenario, String>) {
+        let sweep = self.sweep;
+        let (drawn, switches) = point.split_at(sweep.fields.len());
+        let mut values: Vec<f64> = sweep
+            .fields
+            .iter()
+            .zip(&sweep.file.vary)
+            .zip(drawn)
+            .map(|((field, vary), u)| field.round_to_type(vary.with.quantile(*u)))
+            .collect();
+        let on: Vec<bool> =
+            sweep.file.effects.iter().zip(switches).map(|(e, u)| *u < e.probability).collect();
+        let mut scenario = sweep.template.clone();
+        scenario.seed = trial_seed(sweep.file.seed, trial);
+        let set = scenario_field::set_fields(&mut scenario, &sweep.fields, &values);
+        let mut index = 0;
+        scenario.effects.retain(|_| {
+            index += 1;
+            index <= sweep.scenario_effects
+                || on.get(index - 1 - sweep.scenario_effects).copied().unwrap_or(false)
+        });
+        if !sweep.fields.iter().any(|f| f.path() == "physics_hz") {
+            // The replay takes no physics steps; the scenario stays one that the slide can run.
+            let steps = libm::rint(sweep.template.physics_hz / scenario.sample_hz).max(1.0);
+            scenario.physics_hz = steps * scenario.sample_hz;
+        }
+        values.extend(on.iter().map(|on| f64::from(u8::from(*on))));
+        let checked = set.and_then(|()| scenario.check().map_err(|p| p.to_string())).map(|()| scenario);
+        (values, checked)
+    }
+}

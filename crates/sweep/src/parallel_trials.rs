@@ -1,0 +1,87 @@
+//! Trials in parallel: the rows of a range, in order, the same bits for any number of threads.
+
+use crate::draw_trial::{DrawError, TrialSampler};
+use crate::sweep_file::Sweep;
+use crate::trial_row::{Columns, TrialRow};
+use crate::trial_simulation::{self, Workspace};
+use rayon::prelude::*;
+use std::ops::Range;
+use stylet_testbed::SimulateError;
+
+/// Why a trial gives no row.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// No draw was valid.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The scenario cannot be replayed.
+    #[error("trial {trial}: {why}")]
+    Simulate {
+        /// Number of the trial.
+        trial: u64,
+        /// Reason and remedy.
+        why: SimulateError,
+    },
+}
+
+/// Trials that a thread takes at once.
+const CHUNK: u64 = 16;
+
+/// Runs the trials of `range` in the present thread pool; `done` is told of finished trials.
+///
+/// # Errors
+/// The [`TrialError`] of the first trial that gives no row.
+pub fn run_trials(
+    sweep: &Sweep,
+    columns: &Columns,
+    range: Range<u64>,
+    done: &(dyn Fn(u64) + Sync),
+) -> Result<Vec<TrialRow>, TrialError> {
+    let drawer = TrialSampler::new(sweep);
+    let chunks = (range.end - range.start).div_ceil(CHUNK);
+    let chunks: Vec<Result<Vec<TrialRow>, TrialError>> = (0..chunks)
+        .into_par_iter()
+        .map_init(Workspace::default, |workspace, chunk| {
+            let first = range.start + chunk * CHUNK;
+            let chunk = first..(first + CHUNK).min(range.end);
+            let count = chunk.end - chunk.start;
+            let rows = chunk.map(|trial| one(&drawer, columns, trial, workspace)).collect();
+            done(count);
+            rows
+        })
+        .collect();
+    let mut rows = Vec::with_capacity((range.end - range.start) as usize);
+    for chunk in chunks {
+        rows.extend(chunk?);
+    }
+    Ok(rows)
+}
+
+fn one(
+    drawer: &TrialSampler<'_>,
+    columns: &Columns,
+    trial: u64,
+    workspace: &mut Workspace,
+) -> Result<TrialRow, TrialError> {
+    let drawn = drawer.draw(trial)?;
+    let score = trial_simulation::run(&drawn.scenario, workspace)
+        .map_err(|why| TrialError::Simulate { trial, why })?;
+    Ok(columns.row(&drawn, &score))
+}
+
+/// As [`rows`] in a pool of its own with `threads` threads; 0 is one per core.
+///
+/// # Errors
+/// As [`rows`]; a pool that cannot be made falls back to the present one.
+pub fn run_trials_with_threads(
+    sweep: &Sweep,
+    columns: &Columns,
+    range: Range<u64>,
+    threads: usize,
+    done: &(dyn Fn(u64) + Sync),
+) -> Result<Vec<TrialRow>, TrialError> {
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| run_trials(sweep, columns, range, done)),
+        Err(_) => run_trials(sweep, columns, range, done),
+    }
+}

@@ -1,0 +1,305 @@
+//! A field of the scenario by its path: found against the schema, set per trial.
+//!
+//! The scenario's own types say which fields there are: the scenario is written as a tree of values,
+//! the path is followed in it, and a field that is not there (an option left out) is tried by reading
+//! the tree back. A trial reads back only the section that the field is in.
+
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use stylet_scenario::{Scenario, closest_name};
+
+/// One step of a path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Step {
+    Name(String),
+    Index(usize),
+}
+
+/// What a field holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Number,
+    Whole,
+    Switch,
+}
+
+/// Sections of a scenario that a field may be in.
+const SECTIONS: [&str; 8] =
+    ["tissue", "effects", "motion", "sensor", "enhance", "sample_hz", "physics_hz", "tolerance"];
+
+/// A numeric field of a scenario.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenarioField {
+    path: String,
+    steps: Vec<Step>,
+    kind: Kind,
+}
+
+impl ScenarioField {
+    /// Finds a field; the error says what there is instead.
+    ///
+    /// # Errors
+    /// A sentence with the closest spelling and the fields that exist at that level.
+    pub fn find(scenario: &Scenario, path: &str) -> Result<Self, String> {
+        let steps = split(path)?;
+        let mut tree = serde_json::to_value(scenario).map_err(|e| e.to_string())?;
+        match steps.first() {
+            Some(Step::Name(first)) if SECTIONS.contains(&first.as_str()) => {}
+            Some(Step::Name(first)) if first == "seed" => {
+                return Err("`seed` is not drawn: every trial has a seed of its own".to_owned());
+            }
+            first => {
+                let found = match first {
+                    Some(Step::Name(name)) => name.as_str(),
+                    _ => "",
+                };
+                return Err(unknown(found, "", &SECTIONS.map(str::to_owned)));
+            }
+        }
+        let mut so_far = String::new();
+        let mut place = &mut tree;
+        for (depth, step) in steps.iter().enumerate() {
+            place = inner(place);
+            match step {
+                Step::Index(index) => {
+                    let Value::Array(items) = place else {
+                        return Err(format!("`{so_far}` is not a list, so `[{index}]` has no meaning there"));
+                    };
+                    let count = items.len();
+                    place = items.get_mut(*index).ok_or_else(|| match count {
+                        0 => format!("`{so_far}` is empty; there is no entry [{index}]"),
+                        _ => format!(
+                            "`{so_far}` has {count} entries, [0] to [{}]; there is no [{index}]",
+                            count - 1
+                        ),
+                    })?;
+                    so_far.push_str(&format!("[{index}]"));
+                }
+                Step::Name(name) => {
+                    let last = depth + 1 == steps.len();
+                    let Value::Object(fields) = place else {
+                        return Err(no_fields(place, &so_far, name));
+                    };
+                    if !fields.contains_key(name) {
+                        let mut known: Vec<String> = fields.keys().cloned().collect();
+                        let optional = known_here(scenario, &steps[..depth]);
+                        known.extend(
+                            optional.iter().filter(|k| !fields.contains_key(*k)).cloned().collect::<Vec<_>>(),
+                        );
+                        if !(last && optional.contains(name)) {
+                            return Err(unknown(name, &so_far, &known));
+                        }
+                        fields.insert(name.clone(), Value::from(1.0));
+                    }
+                    if !so_far.is_empty() {
+                        so_far.push('.');
+                    }
+                    so_far.push_str(name);
+                    place = fields.get_mut(name).ok_or_else(|| unknown(name, &so_far, &[]))?;
+                }
+            }
+        }
+        let kind = match place {
+            Value::Number(n) if n.is_f64() => Kind::Number,
+            Value::Number(_) => Kind::Whole,
+            Value::Bool(_) => Kind::Switch,
+            Value::Object(fields) => {
+                let names: Vec<String> = content(fields).keys().cloned().collect();
+                return Err(format!(
+                    "`{path}` is not a number but holds fields: {}; name one of them",
+                    list(&names)
+                ));
+            }
+            Value::Array(items) => {
+                return Err(format!("`{path}` is a list of {}; name an entry, `{path}[0]`", items.len()));
+            }
+            Value::String(text) => {
+                return Err(format!("`{path}` is `{text}`, a name; only numbers can be drawn"));
+            }
+            Value::Null => return Err(format!("`{path}` has no value that could be drawn")),
+        };
+        let field = Self { path: path.to_owned(), steps, kind };
+        // An option that was left out must be one that the schema has.
+        serde_json::from_value::<Scenario>(tree).map_err(|e| format!("`{path}`: {e}"))?;
+        Ok(field)
+    }
+
+    /// The path as written.
+    #[must_use]
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// The value as the field can hold it: whole numbers are rounded, switches are 0 or 1.
+    #[must_use]
+    pub fn round_to_type(&self, value: f64) -> f64 {
+        match self.kind {
+            Kind::Number => value,
+            Kind::Whole => libm::rint(value).max(0.0),
+            Kind::Switch => f64::from(value >= 0.5),
+        }
+    }
+
+    fn value(&self, value: f64) -> Value {
+        match self.kind {
+            Kind::Number => Value::from(value),
+            Kind::Whole => Value::from(self.round_to_type(value) as u64),
+            Kind::Switch => Value::from(value >= 0.5),
+        }
+    }
+
+    /// Index of the effect that the field belongs to, if it does.
+    #[must_use]
+    pub fn effect_index(&self) -> Option<usize> {
+        match self.steps.as_slice() {
+            [Step::Name(section), Step::Index(index), ..] if section == "effects" => Some(*index),
+            _ => None,
+        }
+    }
+}
+
+/// Sets fields of a scenario, section by section.
+///
+/// # Errors
+/// A sentence when a value does not fit; fields that were found do not fail.
+pub fn set_fields(scenario: &mut Scenario, fields: &[ScenarioField], values: &[f64]) -> Result<(), String> {
+    for section in SECTIONS {
+        let mine: Vec<(&ScenarioField, f64)> = fields
+            .iter()
+            .zip(values)
+            .filter(|(f, _)| matches!(f.steps.first(), Some(Step::Name(name)) if name == section))
+            .map(|(f, v)| (f, *v))
+            .collect();
+        let Some((_, first)) = mine.first() else { continue };
+        match section {
+            "tissue" => scenario.tissue = changed(&scenario.tissue, &mine)?,
+            "effects" => scenario.effects = changed(&scenario.effects, &mine)?,
+            "motion" => scenario.motion = changed(&scenario.motion, &mine)?,
+            "sensor" => scenario.sensor = changed(&scenario.sensor, &mine)?,
+            "enhance" => scenario.enhance = changed(&scenario.enhance, &mine)?,
+            "sample_hz" => scenario.sample_hz = *first,
+            "physics_hz" => scenario.physics_hz = *first,
+            _ => scenario.tolerance = *first,
+        }
+    }
+    Ok(())
+}
+
+fn changed<T: serde::Serialize + DeserializeOwned>(
+    section: &T,
+    fields: &[(&ScenarioField, f64)],
+) -> Result<T, String> {
+    let mut tree = serde_json::to_value(section).map_err(|e| e.to_string())?;
+    for (field, value) in fields {
+        let mut place = &mut tree;
+        let last = field.steps.len() - 1;
+        for (depth, step) in field.steps.iter().enumerate().skip(1) {
+            place = inner(place);
+            place = match (step, place) {
+                (Step::Index(index), Value::Array(items)) => items.get_mut(*index),
+                (Step::Name(name), Value::Object(fields)) => {
+                    if depth == last && !fields.contains_key(name) {
+                        fields.insert(name.clone(), Value::Null);
+                    }
+                    fields.get_mut(name)
+                }
+                _ => None,
+            }
+            .ok_or_else(|| format!("`{}` does not exist in this trial", field.path))?;
+        }
+        *place = field.value(*value);
+    }
+    serde_json::from_value(tree).map_err(|e| e.to_string())
+}
+
+/// `tissue.layers[1].stiffness_n_per_m` in steps.
+fn split(path: &str) -> Result<Vec<Step>, String> {
+    let wrong = || format!("`{path}` is not a path; write one like `tissue.layers[1].stiffness_n_per_m`");
+    let mut steps = Vec::new();
+    for part in path.split('.') {
+        let (name, indices) = part.split_at(part.find('[').unwrap_or(part.len()));
+        if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || c == '_') {
+            return Err(wrong());
+        }
+        steps.push(Step::Name(name.to_owned()));
+        let mut rest = indices;
+        while !rest.is_empty() {
+            let inside = rest.strip_prefix('[').and_then(|r| r.split_once(']')).ok_or_else(wrong)?;
+            steps.push(Step::Index(inside.0.trim().parse().map_err(|_| wrong())?));
+            rest = inside.1;
+        }
+    }
+    Ok(steps)
+}
+
+fn is_variant(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_uppercase())
+}
+
+/// Past the name of a variant: a path does not write it.
+fn inner(place: &mut Value) -> &mut Value {
+    let variant = match &*place {
+        Value::Object(fields) if fields.len() == 1 => fields.keys().next().filter(|k| is_variant(k)).cloned(),
+        _ => None,
+    };
+    match variant {
+        Some(name) => &mut place[name.as_str()],
+        None => place,
+    }
+}
+
+fn content(fields: &Map<String, Value>) -> &Map<String, Value> {
+    match fields.iter().next() {
+        Some((name, Value::Object(inside))) if fields.len() == 1 && is_variant(name) => inside,
+        _ => fields,
+    }
+}
+
+/// All fields that the schema has at a level, options left out included: reading a field that no type
+/// has makes the schema list its own.
+fn known_here(scenario: &Scenario, steps: &[Step]) -> Vec<String> {
+    let Ok(mut tree) = serde_json::to_value(scenario) else { return Vec::new() };
+    let mut place = &mut tree;
+    for step in steps {
+        place = inner(place);
+        let next = match (step, place) {
+            (Step::Index(index), Value::Array(items)) => items.get_mut(*index),
+            (Step::Name(name), Value::Object(fields)) => fields.get_mut(name),
+            _ => None,
+        };
+        let Some(next) = next else { return Vec::new() };
+        place = next;
+    }
+    if let Value::Object(fields) = inner(place) {
+        fields.insert("?".to_owned(), Value::Null);
+    }
+    match serde_json::from_value::<Scenario>(tree) {
+        Ok(_) => Vec::new(),
+        Err(error) => {
+            let text = error.to_string();
+            let names = text.split("expected").nth(1).unwrap_or_default();
+            names.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+        }
+    }
+}
+
+fn list(names: &[String]) -> String {
+    names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+}
+
+fn unknown(found: &str, so_far: &str, known: &[String]) -> String {
+    let names: Vec<&str> = known.iter().map(String::as_str).collect();
+    let within = if so_far.is_empty() { "the scenario".to_owned() } else { format!("`{so_far}`") };
+    let near = closest_name(found, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    format!("{within} has no field `{found}`{near} Known: {}", list(known)).replace("` Known", "`; known")
+}
+
+fn no_fields(place: &Value, so_far: &str, name: &str) -> String {
+    match place {
+        Value::Array(items) => {
+            format!("`{so_far}` is a list of {}; name an entry first, `{so_far}[0].{name}`", items.len())
+        }
+        Value::String(text) => format!("`{so_far}` is `{text}`, which has no field `{name}`"),
+        _ => format!("`{so_far}` is a number; it has no field `{name}`"),
+    }
+}

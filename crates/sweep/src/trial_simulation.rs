@@ -1,0 +1,184 @@
+//! One trial: law, sensor, core and score, a block of samples at a time; nothing is stored but the ring
+//! of raw samples that the core asks for, and nothing is allocated per sample.
+//!
+//! A block goes through each of the four before the next block begins: four short loops, each with its
+//! own recursion, cost a processor less than one long loop that runs all of them.
+
+use stylet_core::{Enhancer, Sample};
+use stylet_record::TrueRupture;
+use stylet_scenario::{MotionPlan, MotionPoint, Scenario, Sensor};
+use stylet_score::{EnhancedSample, MAX_STORED_SAMPLES, Score, Scorer, TrueSample};
+use stylet_testbed::{ForceSensor, SampleRates, SimulateError, sample_rates};
+use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
+
+/// Samples in a block: few enough to stay in the fastest memory.
+const BLOCK: usize = 64;
+
+/// A block of samples on its way from motion to score. Its steps are kept apart by the compiler, too: each
+/// has the processor's registers for itself.
+struct Block {
+    count: usize,
+    points: [MotionPoint; BLOCK],
+    total_n: [f64; BLOCK],
+    tip_n: [f64; BLOCK],
+    samples: [Sample; BLOCK],
+    heard: [EnhancedSample; BLOCK],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            points: [MotionPoint::default(); BLOCK],
+            total_n: [0.0; BLOCK],
+            tip_n: [0.0; BLOCK],
+            samples: [Sample::default(); BLOCK],
+            heard: [EnhancedSample::default(); BLOCK],
+        }
+    }
+}
+
+impl Block {
+    /// Where the needle is, and where it is recorded to be, from sample number `first` on.
+    #[inline(never)]
+    fn place(
+        &mut self,
+        plan: &MotionPlan,
+        measuring: &ForceSensor,
+        rates: &SampleRates,
+        first: usize,
+        late_s: f64,
+    ) {
+        self.count = BLOCK.min(rates.samples - first);
+        for (k, (point, sample)) in (first..rates.samples).zip(self.points.iter_mut().zip(&mut self.samples))
+        {
+            // Signed, because that is one instruction: a number of samples never needs the last bit.
+            let time_s = late_s + k as i64 as f64 / rates.sample_hz;
+            *point = plan.at(time_s);
+            sample.time_s = time_s;
+            sample.position_m = measuring.position(point.position_m);
+            sample.velocity_mps = measuring.position(point.velocity_mps);
+        }
+    }
+
+    /// The tissue's force.
+    #[inline(never)]
+    fn load(&mut self, law: &ForceLaw, state: &mut ForceLawState, on_rupture: impl FnMut(Rupture)) {
+        let moments = self.samples.iter().zip(&self.points).take(self.count);
+        let moments = moments.map(|(s, at)| [s.time_s, at.position_m, at.velocity_mps]);
+        let mut forces = self.total_n.iter_mut().zip(&mut self.tip_n);
+        law.run(state, moments, on_rupture, |force| {
+            if let Some((total_n, tip_n)) = forces.next() {
+                (*total_n, *tip_n) = (force.total_n, force.tip_n);
+            }
+        });
+    }
+
+    /// The sensor's reading.
+    #[inline(never)]
+    fn measure(&mut self, measuring: &mut ForceSensor) {
+        let truth = self.points.iter().zip(&self.total_n);
+        for (sample, (at, total_n)) in self.samples.iter_mut().zip(truth).take(self.count) {
+            sample.force_n = measuring.measure_force(sample.time_s, at, *total_n);
+        }
+    }
+
+    /// What the core makes of it.
+    #[inline(never)]
+    fn enhance(&mut self, core: &mut Enhancer<&mut [Sample]>, scorer: &mut Scorer) {
+        let mut heard = self.heard.iter_mut();
+        let out = core.run(self.samples.get(..self.count).unwrap_or(&[]), |out| {
+            if let Some(heard) = heard.next() {
+                *heard = out.into();
+            }
+            if out.detection.is_some() || out.estimate.is_some() {
+                scorer.add_event(out);
+            }
+        });
+        scorer.set_contact(out.contact_m);
+    }
+
+    /// How far that is from the truth.
+    #[inline(never)]
+    fn score(&self, scorer: &mut Scorer) {
+        let truth = self.points.iter().zip(self.tip_n.iter().zip(&self.total_n));
+        for ((sample, heard), (at, (tip_n, total_n))) in
+            self.samples.iter().zip(&self.heard).zip(truth).take(self.count)
+        {
+            let moment = TrueSample {
+                position_m: at.position_m,
+                force_n: sample.force_n,
+                tip_n: *tip_n,
+                total_n: *total_n,
+            };
+            scorer.add_sample(&moment, heard);
+        }
+    }
+}
+
+/// What a thread keeps from trial to trial.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    storage: Vec<Sample>,
+}
+
+/// Runs a scenario through the kinematic replay and scores it: the same bits as
+/// [`stylet_testbed::simulate`] with `robot: Replay` and [`stylet_score::score_run`], without the
+/// columns and the offline estimates.
+///
+/// # Errors
+/// [`SimulateError`] when the scenario cannot be replayed.
+pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, SimulateError> {
+    run_with_sampling_phase(scenario, 0.0, workspace)
+}
+
+/// The same, the first sample being taken so much later than the motion begins, as a share of a sampling step: a robot does not start
+/// with the sensor's clock.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with_sampling_phase(
+    scenario: &Scenario,
+    late: f64,
+    workspace: &mut Workspace,
+) -> Result<Score, SimulateError> {
+    let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;
+    let Sensor::ForceTorque(sensor) = &scenario.sensor else {
+        return Err(SimulateError::NotSupported {
+            what: "a virtual sensor in a sweep",
+            remedy: "use sensor: ForceTorque(...)",
+        });
+    };
+    let rates = sample_rates(scenario, plan.duration_s());
+    let late_s = late / rates.sample_hz;
+    let mut measuring = ForceSensor::new(&scenario.effects, sensor, scenario.seed, scenario.sample_hz);
+    let layers = stylet_testbed::true_layers(law.slabs());
+    let surface_m = layers.first().map_or(0.0, |l| l.front_m);
+    let held = rates.samples.min(MAX_STORED_SAMPLES);
+    if workspace.storage.len() < held {
+        workspace.storage.resize(held, Sample::default());
+    }
+    let storage = workspace.storage.get_mut(..held).unwrap_or_default();
+    let mut core = Enhancer::new(scenario.enhance.clone(), surface_m, storage);
+    let mut scorer = Scorer::new(layers, scenario.enhance.model);
+    let mut ruptures: Vec<Rupture> = Vec::with_capacity(law.slabs().len());
+    let mut state = ForceLawState::default();
+    let mut block = Block::default();
+    for first in (0..rates.samples).step_by(BLOCK) {
+        block.place(&plan, &measuring, &rates, first, late_s);
+        block.load(&law, &mut state, |r| ruptures.push(r));
+        block.measure(&mut measuring);
+        block.enhance(&mut core, &mut scorer);
+        block.score(&mut scorer);
+    }
+    for r in ruptures {
+        scorer.add_rupture(TrueRupture {
+            layer: r.layer,
+            time_s: r.time_s,
+            position_m: r.position_m,
+            by_force: r.by_force,
+        });
+    }
+    Ok(scorer.finish())
+}

@@ -1,0 +1,157 @@
+//! Arm, control and virtual sensor stepped together.
+
+use crate::computed_torque_control::LineController;
+use crate::rapier_arm::{ArmChainError, RapierArm};
+use crate::virtual_sensor::{AxialForceObserver, JointTorqueSensors};
+use nalgebra::Vector3;
+use stylet_dynamics::feasibility;
+use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, Error, JointVector};
+use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPoint, VirtualSensor};
+
+/// Why the arm cannot go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArmError {
+    /// The arm cannot be set up.
+    #[error("the arm cannot be set up: {0}")]
+    Setup(#[from] Error),
+    /// The arm is not a chain for rapier.
+    #[error(transparent)]
+    Chain(#[from] ArmChainError),
+    /// Something went wrong on the way: limits left, numbers not finite.
+    #[error("the arm stops at {time_s:.3} s: {reason}")]
+    DuringMotion {
+        /// When.
+        time_s: f64,
+        /// Why.
+        reason: Error,
+    },
+}
+
+/// The arm at one physics step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmStep {
+    /// Joint angles, rad.
+    pub q_rad: JointVector<7>,
+    /// Tip along the insertion axis, m.
+    pub position_m: f64,
+    /// Its velocity, m/s.
+    pub velocity_mps: f64,
+    /// Distance of the tip from the line, m.
+    pub lateral_deviation_m: f64,
+    /// Joint torques as measured over the step that begins here, N m.
+    pub joint_torque_nm: JointVector<7>,
+    /// Axial force of the virtual sensor, N; when asked for.
+    pub virtual_force_n: Option<f64>,
+}
+
+/// The arm on its line.
+pub struct ArmSimulation {
+    arm: Arm<7>,
+    body: RapierArm,
+    control: LineController,
+    sensors: JointTorqueSensors,
+    observer: Option<AxialForceObserver>,
+    /// What has driven the links in the last step, and what the sensors have read.
+    last: (JointVector<7>, JointVector<7>),
+    dt_s: f64,
+}
+
+impl ArmSimulation {
+    /// The arm at the beginning of its approach, moving. `first` is where the plan has the tip then,
+    /// `start_m` the position of the line's start along the insertion axis.
+    ///
+    /// # Errors
+    /// [`ArmError`] when something is out of range that a checked scenario does not hold.
+    pub fn new(
+        config: &ArmConfig,
+        sensor: Option<&VirtualSensor>,
+        line: &ArmInsertionLine,
+        first: &MotionPoint,
+        start_m: f64,
+        dt_s: f64,
+        seed: u64,
+    ) -> Result<Self, ArmError> {
+        let arm = Arm::new(&config.model())?;
+        let control = LineController::new(&config.controller, line, start_m)?;
+        let mut tip = line.start;
+        tip.position_m += line.direction * (first.position_m - start_m);
+        let q = arm.inverse_kinematics(
+            &tip,
+            &line.start_rad,
+            &stylet_dynamics::IkConfig { restarts: 0, ..Default::default() },
+        )?;
+        let qd = control.start_rates(&arm, &q, first.velocity_mps);
+        let body = RapierArm::new(&arm, &q, &qd, dt_s)?;
+        let noise_nm = sensor.map_or(0.0, |s| s.torque_noise_nm);
+        let observer = sensor.map(|s| AxialForceObserver::new(config, s)).transpose()?;
+        let still = JointVector::zeros();
+        Ok(Self {
+            arm,
+            body,
+            control,
+            sensors: JointTorqueSensors::new(config, noise_nm, seed),
+            observer,
+            last: (still, still),
+            dt_s,
+        })
+    }
+
+    /// One physics step. `tissue` is asked for the force (N) that resists at a position (m) and velocity
+    /// (m/s) of the tip; `sense` asks for the virtual sensor's force.
+    ///
+    /// # Errors
+    /// When a joint leaves its range of angles or torques, or a number is not finite.
+    pub fn step(
+        &mut self,
+        plan: &MotionPoint,
+        sense: bool,
+        tissue: impl FnOnce(f64, f64) -> f64,
+    ) -> Result<ArmStep, Error> {
+        let (q, qd) = self.body.joints();
+        feasibility::check_joint_positions(&self.arm, &q)?;
+        let at = self.arm.at(&q);
+        let (tip, jacobian) = at.tip_and_jacobian();
+        let twist = jacobian * qd;
+        let direction = self.control.direction();
+        let velocity: Vector3<f64> = twist.fixed_rows::<3>(0).into_owned();
+        let position_m = self.control.axial_position_m(&tip);
+        let velocity_mps = direction.dot(&velocity);
+        let resistance_n = tissue(position_m, velocity_mps);
+
+        let terms = at.momentum_terms(&qd, &EARTH_GRAVITY_MPS2);
+        let mut virtual_n = None;
+        if let Some(observer) = &mut self.observer {
+            observer.step((&q, &qd), &terms, &self.last.1, self.dt_s)?;
+            if sense {
+                virtual_n = Some(observer.axial_force_n(&at, &direction));
+            }
+        }
+        let driving =
+            self.control.torque_nm(&at, &qd, &tip, &twist, &terms, plan, (&self.last.0, self.dt_s))?;
+        feasibility::check_joint_torques(&self.arm, &driving)?;
+        let reading = self.sensors.read(&driving, &qd);
+        self.body.step(&at.link_poses(), &driving, &tip.position_m, &(direction * -resistance_n));
+        self.last = (driving, reading);
+        Ok(ArmStep {
+            q_rad: q,
+            position_m,
+            velocity_mps,
+            lateral_deviation_m: self.control.lateral_deviation_m(&tip),
+            joint_torque_nm: reading,
+            virtual_force_n: virtual_n,
+        })
+    }
+
+    /// The virtual sensor.
+    pub fn observer_mut(&mut self) -> Option<&mut AxialForceObserver> {
+        self.observer.as_mut()
+    }
+
+    /// What external joint torques (N m) at joint angles `q_rad` mean as axial force (N).
+    #[must_use]
+    pub fn axial_force_n(&self, q_rad: &JointVector<7>, torque_nm: &JointVector<7>) -> f64 {
+        self.observer.as_ref().map_or(0.0, |observer| {
+            observer.axial_force_of_torques_n(&self.arm.at(q_rad), &self.control.direction(), torque_nm)
+        })
+    }
+}
