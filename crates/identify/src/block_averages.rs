@@ -1,31 +1,31 @@
-//! A recording as means over short blocks of time, ready for thousands of replays.
+//! A recording as means over short blocks of time.
 //!
-//! The mean over a block in which a layer ruptures lies between the force before and after, so that a predicted mean is
-//! continuous in the instant of the rupture; and a recording at 1 kHz costs as much as one at 200 Hz.
+//! The mean over the block in which a layer ruptures lies between the forces before and after, so a predicted
+//! mean is continuous in the rupture time; and a recording at 1 kHz costs no more than one at 200 Hz.
 
+use crate::motion::{JumpAppearance, Motion, MotionPiece};
 use std::sync::{Arc, OnceLock};
 use stylet_record::Recording;
-use stylet_record::motion::{JumpAppearance, Motion, MotionPiece};
 use stylet_stats::UNIFORM_SD;
 use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 
-/// Length of a block in s: short against layers, relaxation and ripple, long against samples at 200 Hz and more.
+/// Block length in s: short compared with layers, relaxation and ripple, several samples at 200 Hz and more.
 pub const BLOCK_S: f64 = 0.02;
-/// A time step of more than so many sampling steps is a gap.
+/// A time step longer than this many sampling intervals is a gap.
 const GAP_STEPS: f64 = 1.8;
-/// Samples missing between two that are compared in one block with them: a gap of no more than so many blocks.
+/// A gap of at most this many blocks stays within a block; its other samples are compared.
 const MAX_MISSING_BLOCKS: f64 = 1.0;
-/// A longer gap, in s, is left open.
+/// Longer gaps, in s, are not filled with blocks.
 const MAX_BRIDGED_S: f64 = 2.0;
-/// A sample so near (share of a step) to a jump of the speed may have either speed.
+/// A sample this close (share of a sampling interval) to a velocity jump may have either velocity.
 const JUMP_MARGIN_STEPS: f64 = 0.03;
-/// Seconds over which the size of the force is smoothed.
+/// Window in s over which the force magnitude is smoothed.
 const FORCE_SMOOTHING_S: f64 = 0.1;
 
 /// One recording in blocks.
 #[derive(Clone, Debug)]
 pub struct BlockAverages {
-    /// Begin of every block in s.
+    /// Start of every block in s.
     pub start_s: Vec<f64>,
     /// End of every block in s.
     pub end_s: Vec<f64>,
@@ -33,36 +33,36 @@ pub struct BlockAverages {
     pub force_n: Vec<f64>,
     /// Whether the block is compared.
     pub used: Vec<bool>,
-    /// Whether the noise's memory begins anew: what came before is not known.
+    /// Whether the noise memory restarts here because the preceding block is unknown.
     pub memory_reset: Vec<bool>,
-    /// Size of the recorded force around the block in N.
+    /// Magnitude of the smoothed recorded force in N.
     pub abs_force_n: Vec<f64>,
-    /// Standard deviation in N of what sampling leaves open of the block's mean where the speed jumps or something gives way.
+    /// Additional standard deviation in N of the block mean, from jumps between samples and unmodelled force.
     pub extra_sd_n: Vec<f64>,
-    /// Instants in s at which something gives way.
+    /// Times in s at which the force drops because something breaks.
     break_times_s: Vec<f64>,
-    /// Standard deviation in N of what no law explains around every block; empty where nothing is unexplained.
+    /// Standard deviation in N of unmodelled force around every block; empty for none.
     unmodelled_sd_n: Vec<f64>,
-    /// Times in s as they were recorded.
+    /// Recorded times in s.
     pub sample_time_s: Arc<Vec<f64>>,
-    /// Forces in N as they were recorded.
+    /// Recorded forces in N.
     pub sample_force_n: Arc<Vec<f64>>,
-    /// The block of every recorded force.
+    /// Block index of every recorded sample.
     pub sample_block: Arc<Vec<u32>>,
-    /// Samples in a block.
+    /// Samples per block.
     pub samples_per_block: usize,
-    /// Time between samples in s.
+    /// Sampling interval in s.
     pub sample_step_s: f64,
-    /// The motion.
+    /// Base motion.
     pub motion: Arc<Motion>,
-    /// Pieces of smooth motion, no delay.
+    /// Smooth motion pieces without delay, jumps between samples.
     pub pieces: Arc<Vec<MotionPiece>>,
-    /// Those of a force that shows the instants of the speed's jumps, no delay.
+    /// Smooth motion pieces without delay, jumps at their exact times; computed on first use.
     exact_pieces: Arc<OnceLock<Arc<Vec<MotionPiece>>>>,
 }
 
-/// Mean of forces over a stretch of time. Where samples are missing of it each of the others stands for the time that is nearest to it: what
-/// rises or jumps meanwhile has the mean that it would have with them.
+/// Mean force over a time span. With missing samples each remaining one represents the times nearest to it, so
+/// that a ramp or a step keeps its mean.
 fn time_weighted_mean(
     (from_s, to_s): (f64, f64),
     samples: impl Iterator<Item = (f64, f64)>,
@@ -83,7 +83,7 @@ fn time_weighted_mean(
 }
 
 impl BlockAverages {
-    /// The blocks of a recording, about `length_s` long; samples marked in `exclude` are not compared.
+    /// Blocks of a recording, about `length_s` long; samples marked in `exclude` are not compared.
     #[must_use]
     pub fn new(recording: &Recording, exclude: &[bool], length_s: f64) -> Self {
         let steps = recording.time_s.windows(2).map(|w| w[1] - w[0]);
@@ -114,7 +114,7 @@ impl BlockAverages {
         let mut i = 0;
         let mut raw_block = Vec::with_capacity(n);
         while i < n {
-            // Where a block began with samples missing, they count as places of it.
+            // Missing samples after the start of a block occupy places in it.
             let spans = |k: usize| {
                 let gap = t[k] - t[k - 1];
                 let missing = gap > GAP_STEPS * step_s
@@ -165,8 +165,8 @@ impl BlockAverages {
         b
     }
 
-    /// Blocks that are not compared from the end so far to `to_s` (s): a law goes on where nothing was recorded, and may
-    /// rupture there.
+    /// Fills a gap up to `to_s` (s) with blocks that are not compared: the model continues there and may
+    /// rupture.
     fn bridge_gap(&mut self, to_s: f64, length_s: f64) {
         let (Some(&end), Some(&force)) = (self.end_s.last(), self.force_n.last()) else { return };
         let gap_s = to_s - end;
@@ -182,7 +182,8 @@ impl BlockAverages {
         }
     }
 
-    /// A sample at the very instant of a jump of the speed has either; so have all within the doubt about the instant.
+    /// Excludes blocks with a sample at a velocity jump, or within its timing uncertainty: it may have either
+    /// velocity.
     fn exclude_jump_blocks(&mut self, t: &[f64]) {
         let motion = Arc::clone(&self.motion);
         for jump in &motion.jumps {
@@ -233,7 +234,7 @@ impl BlockAverages {
         b
     }
 
-    /// What follows from the columns.
+    /// Computes the derived columns.
     fn derive_columns(&mut self) {
         let n = self.len();
         self.memory_reset = (0..n)
@@ -251,8 +252,8 @@ impl BlockAverages {
         self.pieces = Arc::new(self.cut_motion(JumpAppearance::BetweenSamples));
     }
 
-    /// The same blocks with instants (s) at which the force falls because something gives way: it does so between two samples, and a law
-    /// that says where knows it within a sample only.
+    /// The same blocks with times (s) at which the force drops because something breaks: the break lies between
+    /// two samples, and its time is known to within a sampling interval.
     #[must_use]
     pub fn with_break_times(mut self, falls_s: Vec<f64>) -> Self {
         self.break_times_s = falls_s;
@@ -260,7 +261,7 @@ impl BlockAverages {
         self
     }
 
-    /// The same blocks where around each of them so much (N, standard deviation) is left that no law explains: it is in doubt by that.
+    /// The same blocks with an unmodelled force of the given standard deviation (N) around each.
     #[must_use]
     pub fn with_unmodelled_sd(mut self, sd_n: Vec<f64>) -> Self {
         self.unmodelled_sd_n = sd_n;
@@ -278,7 +279,8 @@ impl BlockAverages {
         self.break_times_s = falls;
     }
 
-    /// A force that jumps with the speed jumps between two samples: its mean is known to what lies between them.
+    /// A jump lies between two samples: the mean of its block is uncertain by the jump times one sampling
+    /// interval.
     fn add_jump_uncertainty(&mut self, at_s: f64) {
         let k = self.block_at(at_s);
         if k > 0 && k + 1 < self.len() {
@@ -292,8 +294,8 @@ impl BlockAverages {
         }
     }
 
-    /// The same for a force that is late by so many s: its jumps are between other samples, and where noisy positions leave open
-    /// between which, the mean of their block is uncertain.
+    /// The same blocks for a force delayed by `late_s`: its jumps lie between other samples, and where position
+    /// noise leaves open between which, the block mean is uncertain.
     #[must_use]
     pub fn with_delayed_jump_uncertainty(&self, late_s: f64) -> Self {
         let mut b = self.clone();
@@ -310,7 +312,7 @@ impl BlockAverages {
         b
     }
 
-    /// The middle between the samples around an instant.
+    /// Midpoint of the two samples around a time.
     fn sample_midpoint_s(&self, at_s: f64) -> f64 {
         let k = self.sample_time_s.partition_point(|t| *t <= at_s);
         match (k.checked_sub(1).and_then(|k| self.sample_time_s.get(k)), self.sample_time_s.get(k)) {
@@ -324,9 +326,9 @@ impl BlockAverages {
         }
     }
 
-    /// Pieces of smooth motion as a force sees them that is late by so many s and, if it is `smeared` or late, shows the
-    /// instants at which the speed jumps; if it is not smeared and its jumps are `placed` where they are when it is late by so many s, the
-    /// middles between the samples around them.
+    /// Smooth motion pieces for a force delayed by `late_s`. Jumps are placed at their exact times if the force
+    /// is low-pass filtered (`smeared`) or delayed; if it is delayed, not filtered, and `placed` is given, at
+    /// the sample midpoints for that delay.
     #[must_use]
     pub fn motion_pieces(&self, smeared: bool, late_s: f64, placed: Option<f64>) -> Arc<Vec<MotionPiece>> {
         if let Some(placed_s) = placed.filter(|_| late_s > 0.0 && !smeared) {
@@ -350,8 +352,8 @@ impl BlockAverages {
         self.motion.pieces(spans, shown, |t| self.sample_midpoint_s(t))
     }
 
-    /// Residuals (N) of the recorded forces for those of the blocks: what a block leaves, and what a sample differs from
-    /// the course of the blocks' means.
+    /// Residuals (N) of the samples for block residuals `e`: the block residual plus the sample's deviation
+    /// from the course of the block means.
     #[must_use]
     pub fn sample_residuals(&self, e: &[f64]) -> Vec<f64> {
         let n = self.len();
@@ -364,7 +366,7 @@ impl BlockAverages {
                 before = block;
                 let k = block as usize;
                 let (lo, hi) = (k.saturating_sub(1), (k + 1).min(n - 1));
-                // Predicted means have the slope of their neighbours.
+                // Predicted means are interpolated with the slope of their neighbours.
                 let predicted = |k: usize| self.force_n[k] - e[k];
                 let slope =
                     (predicted(hi) - predicted(lo)) / ((hi - lo).max(1) * self.samples_per_block) as f64;
@@ -374,7 +376,8 @@ impl BlockAverages {
             .collect()
     }
 
-    /// Standard deviation in N of recorded forces about the course of their blocks' means: what a force changes by within a block is no noise.
+    /// Standard deviation in N of samples about the course of the block means; a force trend within a block is
+    /// not noise.
     #[must_use]
     pub fn within_block_sd_n(&self) -> f64 {
         if self.samples_per_block < 2 {
@@ -388,7 +391,7 @@ impl BlockAverages {
         let mut variances: Vec<f64> =
             sums.iter().filter(|s| s.0 >= 2.0).map(|(n, square)| square / n).collect();
         variances.sort_unstable_by(f64::total_cmp);
-        // A mean without the roughest tenth, which ruptures and jumps make.
+        // Mean without the largest tenth, which contains ruptures and jumps.
         let kept = variances.len() * 9 / 10;
         (variances[..kept].iter().sum::<f64>() / kept.max(1) as f64).sqrt()
     }
@@ -405,13 +408,13 @@ impl BlockAverages {
         self.start_s.is_empty()
     }
 
-    /// The block in which an instant lies, or the next one.
+    /// Index of the block that contains a time, or of the next one.
     #[must_use]
     pub fn block_at(&self, time_s: f64) -> usize {
         self.end_s.partition_point(|t| *t <= time_s)
     }
 
-    /// First and last instant in s.
+    /// Start and end in s.
     #[must_use]
     pub fn span_s(&self) -> (f64, f64) {
         (self.start_s.first().copied().unwrap_or(0.0), self.end_s.last().copied().unwrap_or(0.0))
@@ -421,7 +424,7 @@ impl BlockAverages {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stylet_record::motion::JumpTiming;
+    use crate::motion::JumpTiming;
 
     fn near(told: f64, wanted: f64) {
         assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-3), "{told} for {wanted}");
@@ -433,7 +436,7 @@ mod tests {
         told.iter().zip(wanted).for_each(|(told, wanted)| near(*told, wanted));
     }
 
-    /// A needle that goes evenly; the force at these instants (s).
+    /// Constant velocity; the force at these times (s).
     fn recorded(t: Vec<f64>, force: impl Fn(f64) -> f64) -> Recording {
         let z = t.iter().map(|t| 0.002 * t).collect();
         let f = t.iter().map(|t| force(*t)).collect();
@@ -449,7 +452,7 @@ mod tests {
         BlockAverages::new(&recorded(t, force), &[], BLOCK_S)
     }
 
-    /// The same with one jump of the speed.
+    /// The same with one velocity jump.
     fn with_jump(b: &BlockAverages, at_s: f64, between_s: f64, doubt_s: f64) -> BlockAverages {
         let jump = JumpTiming {
             time_s: at_s,
@@ -464,8 +467,8 @@ mod tests {
     }
 
     #[test]
-    fn a_block_is_the_mean_of_its_samples_and_ends_half_way_to_the_next() {
-        // Instants that lie up to a millisecond off the even ones, mostly none.
+    fn a_block_is_the_mean_of_its_samples_and_ends_midway_to_the_next() {
+        // Sample times up to a millisecond off the regular ones.
         let off = [0.0, 0.0, 0.0, 0.001, -0.001, 0.0, 0.0];
         let t: Vec<f64> = even(43).iter().enumerate().map(|(k, t)| t + off[k % 7]).collect();
         let force = |t: f64| 1.0 + (40.0 * t).sin();
@@ -486,7 +489,7 @@ mod tests {
             (b.block_at(-1.0), b.block_at(ends[4]), b.block_at(ends[4] - 1e-6), b.block_at(9.0)),
             (0, 5, 4, 11)
         );
-        // Two samples of four are not, and a block of one sample is one.
+        // Two of four samples are not; a block of one sample is used.
         assert_eq!(of(even(42), force).used[10..], [false]);
         let single = BlockAverages::new(&recorded(even(20), force), &[], 0.001);
         assert_eq!((single.samples_per_block, single.len()), (1, 20));
@@ -496,22 +499,22 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_are_excluded_do_not_count_and_half_a_block_of_them_is_none() {
+    fn excluded_samples_do_not_count_and_disable_a_block_from_one_half_on() {
         let excluded = [1, 8, 9, 12, 13, 14, 15, 40];
         let exclude: Vec<bool> = (0..43).map(|k| excluded.contains(&k)).collect();
         let b = BlockAverages::new(&recorded(even(43), |t| 200.0 * t), &exclude, BLOCK_S);
         let used: Vec<usize> = (0..b.len()).filter(|k| b.used[*k]).collect();
-        // Of the last three samples two are left, more than half of them.
+        // Two of the last three samples remain, more than half.
         assert_eq!(used, [0, 1, 4, 5, 6, 7, 8, 9, 10]);
         are(&b.force_n[..5], [1.5, 5.5, 10.25, 0.0, 17.5]);
-        // Sample 41 stands for the one before it, too.
+        // Sample 41 represents the excluded one before it.
         near(b.force_n[10], 124.0 / 3.0);
         let restart: Vec<usize> = (0..b.len()).filter(|k| b.memory_reset[*k]).collect();
         assert_eq!(restart, [0, 3, 4]);
     }
 
     #[test]
-    fn a_gap_is_bridged_by_blocks_that_are_not_compared_unless_it_is_long() {
+    fn short_gaps_are_filled_with_blocks_that_are_not_compared() {
         let t = |gap_s: f64| -> Vec<f64> {
             even(40).iter().enumerate().map(|(k, t)| if k < 19 { *t } else { t + gap_s - 0.005 }).collect()
         };
@@ -529,35 +532,36 @@ mod tests {
         assert_eq!(restart, [0, 6, 7, 8, 9, 10]);
         near(b.start_s[10], 0.1875);
         assert_eq!((b.sample_block[18], b.sample_block[19], b.sample_block[23]), (4, 10, 11));
-        // Up to two seconds, the half steps beside them not counted.
+        // Up to two seconds, without the half intervals at either end.
         assert_eq!(of(t(2.004), |t| t).len(), 11 + 100);
         let open = of(t(2.006), |t| t);
         assert_eq!(open.len(), 11);
         assert_eq!((0..11).filter(|k| open.memory_reset[*k]).collect::<Vec<_>>(), [0, 5]);
-        // Less than 1.8 steps is no gap.
+        // Less than 1.8 intervals is not a gap.
         assert_eq!(of(t(0.0089), |t| t).len(), 10);
-        // Samples that miss for longer than a block leave a gap.
+        // Samples missing for longer than a block leave a gap.
         assert_eq!(of(t(0.0239), |t| t).len(), 11);
         assert_eq!(of(t(0.0241), |t| t).len(), 11 + 1);
     }
 
-    /// Where samples are missing the others lie in the blocks in which they would lie without, and the noise's memory goes on.
+    /// The remaining samples stay in the blocks they would otherwise be in, and the noise memory continues.
     #[test]
-    fn a_few_missing_samples_leave_the_blocks_as_they_are() {
+    fn a_few_missing_samples_do_not_move_the_blocks() {
         let missing = [5, 11, 12, 19, 20, 21, 30, 39];
         let t = even(43).into_iter().enumerate().filter(|(k, _)| !missing.contains(k)).map(|(_, t)| t);
         let (b, whole) = (of(t.collect(), |t| 200.0 * t), of(even(43), |t| 200.0 * t));
         are(&b.start_s, whole.start_s.iter().copied());
         are(&b.end_s, whole.end_s.iter().copied());
-        // A straight force has its mean where samples are missing within, and half as far off as theirs where they miss at an end.
+        // A linear force keeps its mean when samples are missing inside, and half of the error when they are
+        // missing at an end.
         are(&b.force_n[1..6], [5.5, 9.25, 13.75, 17.25, 22.25]);
         assert_eq!((0..11).filter(|k| !b.used[*k]).collect::<Vec<_>>(), [5]);
         assert_eq!((0..11).filter(|k| b.memory_reset[*k]).collect::<Vec<_>>(), [0, 6]);
     }
 
-    /// So near to a jump that it may have either speed, or that the instant is not known better.
+    /// Within a margin of the jump, or within its timing uncertainty.
     #[test]
-    fn a_block_is_left_out_when_a_sample_of_it_is_at_a_jump_of_the_speed() {
+    fn a_block_with_a_sample_at_a_velocity_jump_is_excluded() {
         let t = even(40);
         let b = of(t.clone(), |t| t);
         let left_out = |at_s: f64, doubt_s: f64| -> Vec<usize> {
@@ -565,7 +569,7 @@ mod tests {
             b.exclude_jump_blocks(&t);
             (0..b.len()).filter(|k| !b.used[*k]).collect()
         };
-        // Sample 18 at 0.09 s is in block 4, which lies from 0.0775 to 0.0975 s.
+        // Sample 18 at 0.09 s is in block 4, which spans 0.0775 to 0.0975 s.
         assert_eq!(left_out(0.09, 0.0), [4]);
         assert_eq!(left_out(0.09 + 0.00014, 0.0), [4]);
         assert_eq!(left_out(0.09 - 0.00014, 0.0), [4]);
@@ -573,11 +577,11 @@ mod tests {
         assert_eq!(left_out(0.09 - 0.00016, 0.0), [0_usize; 0]);
         assert_eq!(left_out(0.0925, 0.0024), [0_usize; 0]);
         assert_eq!(left_out(0.0925, 0.0026), [4]);
-        // All blocks within the doubt, as far as there are any.
+        // All existing blocks within the uncertainty.
         assert_eq!(left_out(0.0775, 0.003), [3, 4]);
         assert_eq!(left_out(0.0775, 0.021), [2, 3, 4, 5]);
         assert_eq!(left_out(0.19, 0.03), [8, 9]);
-        // Of a recording, too: the needle stops at its sample 60, in block 15.
+        // In a recording: the needle stops at sample 60, in block 15.
         let t = even(400);
         let z: Vec<f64> = t.iter().map(|t| 0.002 * t.min(0.3)).collect();
         let b = BlockAverages::new(&Recording::new(t, z, vec![0.0; 400]).expect("a recording"), &[], BLOCK_S);
@@ -585,8 +589,8 @@ mod tests {
     }
 
     #[test]
-    fn coarser_blocks_are_means_of_whole_groups_and_none_reaches_across_what_is_open() {
-        // 36 samples, nothing for three seconds, 32 samples: nine blocks and eight.
+    fn coarsened_blocks_average_whole_groups_and_do_not_span_gaps() {
+        // 36 samples, three seconds of nothing, 32 samples: nine blocks and eight.
         let t: Vec<f64> =
             even(68).iter().enumerate().map(|(k, t)| if k < 36 { *t } else { t + 3.0 }).collect();
         let exclude: Vec<bool> = (0..68).map(|k| (12..16).contains(&k)).collect();
@@ -599,11 +603,11 @@ mod tests {
         are(&c.start_s, groups.map(|g| b.start_s[g.0]));
         are(&c.end_s, groups.map(|g| b.end_s[g.1 - 1]));
         are(&c.force_n, groups.map(|g| b.force_n[g.0..g.1].iter().sum::<f64>() / (g.1 - g.0) as f64));
-        // The first one holds a block that is not compared, the third is not whole.
+        // The first group contains a block that is not compared, the third is incomplete.
         assert_eq!(c.used, [false, true, false, true, true]);
         assert_eq!(c.memory_reset, [true, true, false, true, false]);
         assert_eq!((c.abs_force_n.len(), c.extra_sd_n.len()), (5, 5));
-        // Pieces are those of the coarser blocks, however they are shown.
+        // Motion pieces follow the coarser blocks.
         for pieces in [c.motion_pieces(false, 0.0, None), c.motion_pieces(true, 0.0, None)] {
             assert_eq!(pieces.iter().map(|p| p.block).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
             are(&pieces.iter().map(|p| p.end_s).collect::<Vec<_>>(), c.end_s.iter().copied());
@@ -612,7 +616,7 @@ mod tests {
     }
 
     #[test]
-    fn the_size_of_the_force_is_that_of_its_mean_over_a_tenth_of_a_second() {
+    fn force_magnitude_is_smoothed_over_a_tenth_of_a_second() {
         // Blocks of 30 ms: two on each side.
         let b = BlockAverages::new(&recorded(even(66), |t| (20.0 * t).sin()), &[], 0.03);
         assert_eq!((b.len(), b.samples_per_block), (11, 6));
@@ -620,13 +624,13 @@ mod tests {
             (0..11).filter(|i: &usize| i.abs_diff(k) <= 2).map(|i| b.force_n[i]).collect()
         };
         are(&b.abs_force_n, (0..11).map(|k| (around(k).iter().sum::<f64>() / around(k).len() as f64).abs()));
-        // However long the blocks are, one on each side.
+        // At least one block on each side.
         let long = BlockAverages::new(&recorded(even(200), |t| t), &[], 0.2);
         are(&long.abs_force_n[..2], [0.5 * (long.force_n[0] + long.force_n[1]), long.force_n[1]]);
     }
 
     #[test]
-    fn a_mean_is_uncertain_by_a_sample_where_the_speed_jumps() {
+    fn a_block_mean_with_a_velocity_jump_is_uncertain_by_one_sampling_interval() {
         let force = |t: f64| if t < 0.096 { 1.0 } else { 3.0 };
         let b = of(even(40), force);
         let doubts = |at_s: f64, between_s: f64| {
@@ -634,21 +638,21 @@ mod tests {
             b.derive_columns();
             b.extra_sd_n
         };
-        // A quarter of two newtons, spread evenly; block 4 ends at 0.0975 s.
+        // A quarter of 2 N, uniformly distributed; block 4 ends at 0.0975 s.
         let at = |block: usize| (0..10).map(move |k| if k == block { 0.5 * 0.289 } else { 0.0 });
         are(&doubts(0.0, 0.096), at(4));
         are(&doubts(0.096, 0.098), at(5));
-        // At either end nobody knows what it jumps to.
+        // At either end the jump height is unknown.
         for between_s in [0.0, 0.19, 0.5] {
             are(&doubts(0.096, between_s), [0.0; 10]);
         }
-        // As much where something gives way, and on blocks averaged further as long as a sample is.
+        // The same at a break; in coarser blocks still one sampling interval.
         let fell = of(even(40), force).with_break_times(vec![0.09]);
         are(&fell.extra_sd_n, at(4));
         are(&fell.with_delayed_jump_uncertainty(0.01).extra_sd_n, at(4));
         let coarse = of(even(80), force).with_break_times(vec![0.09]).coarsened(3);
         near(coarse.extra_sd_n[1], 2.0 / 12.0 * 0.289);
-        // As large as the largest of two jumps.
+        // The larger of two jumps counts.
         let mut two = with_jump(&b, 0.0, 0.09, 0.0);
         two.add_jump_uncertainty(0.09);
         two.extra_sd_n[4] *= 3.0;
@@ -657,12 +661,12 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_is_in_doubt_by_what_no_law_explains_around_it() {
+    fn unmodelled_force_adds_to_the_uncertainty_of_a_block_mean() {
         let force = |t: f64| if t < 0.09 { 1.0 } else { 3.0 };
         let left: Vec<f64> = (0..10).map(|k| 0.1 * f64::from(k)).collect();
         let b = of(even(40), force).with_unmodelled_sd(left.clone());
         are(&b.extra_sd_n, left.clone());
-        // Where something gives way by what is more, and white means of three are as sure as their number tells.
+        // The larger of both at a break; the unmodelled part averages as independent noise.
         let fell = b.clone().with_break_times(vec![0.09]);
         are(&fell.extra_sd_n, left.iter().map(|l| l.max(if *l == 0.4 { 0.5 * 0.289 } else { 0.0 })));
         near(b.coarsened(2).extra_sd_n[1], (0.04_f64 + 0.09).sqrt() / 2.0);
@@ -670,7 +674,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_force_is_uncertain_also_where_nobody_knows_between_which_samples_it_jumps() {
+    fn a_delayed_force_is_uncertain_where_jump_and_sample_coincide() {
         let b = of(even(60), |t| 100.0 * t * t);
         let size = |k: usize| (b.force_n[k + 1] - b.force_n[k - 1]).abs() / 4.0 * 0.289;
         let late = |doubt_s: f64, late_s: f64| -> Vec<usize> {
@@ -679,12 +683,13 @@ mod tests {
             told.iter().for_each(|k| near(seen.extra_sd_n[*k], size(*k)));
             told
         };
-        // Between samples it is in block 3, as it would be without a delay.
+        // Between samples it is in block 3, as without a delay.
         assert_eq!(late(0.0, 0.0772), [3]);
-        // Around 0.1375 s, between samples at 0.135 and 0.14, the end of block 6: known until the doubt holds a sample.
+        // Around 0.1375 s, between samples at 0.135 and 0.14, the end of block 6: certain until the uncertainty
+        // reaches a sample.
         assert_eq!(late(0.0024, 0.0775), [3]);
         assert_eq!(late(0.0026, 0.0775), [3, 6, 7]);
-        // A sample nearer than three hundredths of a step has either speed.
+        // A sample closer than 3 % of an interval may have either velocity.
         assert_eq!(late(0.0, 0.08 + 0.00014), [3, 7]);
         assert_eq!(late(0.0, 0.08 - 0.00014), [3, 7]);
         assert_eq!(late(0.0, 0.08 + 0.00016), [3]);
@@ -692,13 +697,13 @@ mod tests {
     }
 
     #[test]
-    fn an_instant_lies_in_the_middle_between_the_samples_around_it() {
+    fn sample_midpoints_exclude_gaps_and_ends() {
         let t: Vec<f64> = even(20).iter().map(|t| if *t < 0.048 { *t } else { t + 0.1 }).collect();
         let b = of(t, |t| t);
         near(b.sample_midpoint_s(0.0131), 0.0125);
         near(b.sample_midpoint_s(0.0149), 0.0125);
         near(b.sample_midpoint_s(0.0151), 0.0175);
-        // In a gap, and outside, the samples say nothing.
+        // In a gap and outside of the recording the time itself is used.
         for at_s in [0.0799, -0.003, 0.2] {
             near(b.sample_midpoint_s(at_s), at_s);
         }
@@ -706,7 +711,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_is_cut_where_a_force_shows_the_jumps_of_the_speed() {
+    fn motion_is_cut_where_jumps_appear_in_the_force() {
         let t = even(120);
         let z: Vec<f64> = t.iter().map(|t| 0.002 * t.min(0.3013)).collect();
         let b = BlockAverages::new(&Recording::new(t, z, vec![0.0; 120]).expect("a recording"), &[], BLOCK_S);
@@ -733,19 +738,19 @@ mod tests {
     }
 
     #[test]
-    fn residuals_of_samples_follow_a_straight_course_of_those_of_the_blocks() {
+    fn sample_residuals_interpolate_block_residuals_linearly() {
         let b = of(even(48), |t| 2.0 - 30.0 * t);
         let e: Vec<f64> = (0..12).map(|k| 0.3 + 0.01 * f64::from(k)).collect();
         // The middle of block k is at sample 4 k + 1.5.
         are(&b.sample_residuals(&e), (0..48).map(|i| 0.3 + 0.01 * (f64::from(i) - 1.5) / 4.0));
-        // What a sample has beside that course is its own.
+        // A sample's own deviation is added.
         let mut raw = (*b.sample_force_n).clone();
         raw[21] += 0.7;
         let spiked = BlockAverages { sample_force_n: Arc::new(raw), ..b.clone() };
         let told: Vec<f64> =
             spiked.sample_residuals(&e).iter().zip(b.sample_residuals(&e)).map(|(a, b)| a - b).collect();
         are(&told, (0..48).map(|i| if i == 21 { 0.7 } else { 0.0 }));
-        // Of curved means the slope is that from neighbour to neighbour.
+        // The slope is the one between the neighbouring means.
         let mut bent = e.clone();
         bent[5] += 0.4;
         let told = b.sample_residuals(&bent);
@@ -756,8 +761,8 @@ mod tests {
     }
 
     #[test]
-    fn what_samples_differ_within_a_block_is_told_without_the_roughest_tenth() {
-        // In block k samples lie k + 1 millinewtons above and below, in two of twenty a hundred times as much.
+    fn within_block_deviation_excludes_the_largest_tenth() {
+        // In block k samples alternate by k + 1 mN, in two of twenty blocks by a hundred times as much.
         let size = |k: usize| 0.001 * (k + 1) as f64 * if k == 3 || k == 11 { 100.0 } else { 1.0 };
         let force = |t: f64| {
             let i = (t / 0.005).round() as usize;
@@ -766,11 +771,12 @@ mod tests {
         let b = of(even(80), force);
         let calm: f64 = (0..20).filter(|k| *k != 3 && *k != 11).map(|k| size(k) * size(k)).sum();
         assert!((b.within_block_sd_n() - (calm / 18.0).sqrt()).abs() < 1e-9, "{}", b.within_block_sd_n());
-        // One sample more is a block without a spread; one that lies as the others do bends no course.
+        // One more sample is a block without a spread; one that follows the course of the means changes
+        // nothing.
         let more = of(even(81), |t| if t > 0.398 { 0.5 } else { force(t) });
         assert!((more.within_block_sd_n() - b.within_block_sd_n()).abs() < 1e-9);
         assert_eq!(BlockAverages::new(&recorded(even(80), force), &[], 0.001).within_block_sd_n(), 0.0);
-        // A force that rises by 20 N/s changes by 0.3 N within a block, and is no noisier for it.
+        // A force that rises by 20 N/s changes by 0.3 N within a block without adding noise.
         let rising = of(even(80), |t| force(t) + 20.0 * t);
         assert!(
             (rising.within_block_sd_n() - b.within_block_sd_n()).abs() < 1e-9,

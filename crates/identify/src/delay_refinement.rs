@@ -1,9 +1,9 @@
-//! A delay to a fraction of a sampling step.
+//! Estimates a force delay to a fraction of the sampling interval.
 //!
-//! Where the speed jumps, so does the friction. A sample lies before such a jump or after it: a delay moves samples across one by one, and
-//! the likelihood has a step for each. Derivatives do not see steps. A delay found with the jumps at their instants, which no sampled force shows,
-//! is therefore looked for once more on a grid; what the smooth parts of the force say is fitted with the jumps between the samples where they
-//! are by then.
+//! Friction jumps with the velocity, and each sample lies before or after a jump. A delay moves samples across
+//! jumps one by one, so the likelihood has a step for each, which derivatives do not see. The delay found with
+//! jumps at their exact times is therefore refined on a grid: jumps are placed between the samples given by a
+//! grid delay, and the smooth part of the force is fitted again.
 
 use crate::fit::{Effort, Fit, fit};
 use crate::likelihood::{FitData, residuals};
@@ -11,25 +11,25 @@ use crate::model::{EffectTerm, Model};
 use rayon::prelude::*;
 use stylet_tissue::Effect;
 
-/// Spacings of the grids, as shares of a sampling step.
+/// Grid spacings as shares of the sampling interval.
 const GRID_SPACINGS: [f64; 2] = [0.1, 0.03];
-/// Grid points to either side.
+/// Grid points on either side.
 const GRID_HALF_POINTS: i32 = 12;
 
-/// The effect that makes the force late, if it is in the search and has the delay as its only number.
+/// Index of the model's delay effect, if it has the delay as its only parameter.
 fn delay_effect_index(model: &Model) -> Option<usize> {
     let late = |c: &EffectTerm| c.effect().is_some_and(|e| e.delay_s() > 0.0);
     model.effects.iter().position(|c| c.info.parameters.len() == 1 && late(c))
 }
 
-/// By how much a model's force is late, in s.
+/// Delay of the force in s.
 #[must_use]
 pub fn delay_s(model: &Model) -> f64 {
     model.compile(0).map_or(0.0, |c| c.delay_s)
 }
 
-/// A fit whose force is late, with its jumps between the samples that show them, and the data with what that leaves open; `None` when its
-/// force is not late, or is no better so.
+/// The fit with jumps of the delayed force placed between samples, and the data with the remaining timing
+/// uncertainty; `None` when the force is not delayed or the fit does not improve.
 #[must_use]
 pub fn refine_delay(found: &Fit, data: &FitData) -> Option<(Fit, FitData)> {
     let step_s = data.recordings.iter().map(|b| b.sample_step_s).fold(f64::INFINITY, f64::min);
@@ -39,7 +39,7 @@ pub fn refine_delay(found: &Fit, data: &FitData) -> Option<(Fit, FitData)> {
     );
     let was = residuals(&found.model, &seen)?;
     let mut best: Option<Fit> = None;
-    // Fine steps about what the coarse ones led to.
+    // The finer grid is centred on the result of the coarser one.
     for spacing_s in GRID_SPACINGS.map(|share| share * step_s) {
         let about = best.as_ref().unwrap_or(found).model.clone();
         let from_s = delay_s(&about);

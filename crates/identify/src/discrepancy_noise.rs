@@ -1,21 +1,22 @@
-//! The noise of a law that is not finished: what it leaves, taken as coloured noise of one size.
+//! White noise equivalent to the residuals of an incomplete model.
 //!
-//! Measured insertions differ from any law by fifty times the sensor's noise, for a second at a time. Judged by the sensor's noise, a
-//! fit would follow the first detail that it meets; judged by what is left, every independent stretch counts once. With residuals `e` of
-//! standard deviation `s` and integrated autocorrelation time `c` blocks, `n` blocks hold `n/c` independent ones, which is white noise of
-//! `s sqrt(c)` on every block. It shrinks as the law grows.
+//! Measured insertions differ from any model by up to fifty times the sensor noise, correlated over about a
+//! second. Under sensor noise a fit would follow the first unmodelled detail; here every independent stretch
+//! counts once. Residuals `e` with standard deviation `s` and integrated autocorrelation time `c` (in blocks)
+//! hold `n/c` independent values in `n` blocks, which is white noise of standard deviation `s sqrt(c)`. It
+//! decreases as the model improves.
 
 use crate::block_averages::BlockAverages;
 use crate::noise::Noise;
 
-/// Correlations are added up to this many seconds at most.
+/// Largest lag in s of the autocorrelation sum.
 const MAX_LAG_S: f64 = 4.0;
-/// and end where they first fall below this.
+/// The sum ends at the first autocorrelation below this.
 const MIN_CORRELATION: f64 = 0.05;
-/// Residuals count up to so many times their median size: windows of ruptures are nobody's noise.
+/// Residuals are clipped at this many robust standard deviations: rupture windows are not noise.
 const CLIP_SDS: f64 = 4.0;
 
-/// White noise that stands for residuals `e` (N), one column per recording; nowhere less than `floor_n`.
+/// White noise equivalent to residuals `e` (N), one column per recording, with a lower bound of `floor_n`.
 #[must_use]
 pub fn discrepancy_noise(blocks: &[BlockAverages], e: &[Vec<f64>], floor_n: f64) -> Noise {
     let mut sizes: Vec<f64> = Vec::new();
@@ -67,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn white_residuals_count_one_by_one_and_slow_ones_by_their_stretches() {
+    fn correlated_residuals_count_once_per_correlation_time() {
         let b = blocks();
         let mut x = 1u64;
         let mut draw = || {
@@ -78,7 +79,7 @@ mod tests {
         let sd = (1.0_f64 / 12.0).sqrt();
         let of = |e: Vec<f64>| discrepancy_noise(std::slice::from_ref(&b), &[e], 0.0).sd_n();
         assert!((of(white.clone()) / sd - 1.0).abs() < 0.2);
-        // Ten blocks alike: the triangle of their correlation adds up to ten.
+        // Ten equal blocks: the triangular autocorrelation sums to ten.
         let slow: Vec<f64> = (0..b.len()).map(|k| white[k / 10]).collect();
         assert!((of(slow) / sd / 10.0_f64.sqrt() - 1.0).abs() < 0.25);
     }

@@ -1,40 +1,41 @@
-//! Nats that say by what they were reckoned, so that two currencies cannot be compared.
+//! Evidence differences in nats, typed by the noise model they were computed with.
 //!
-//! A log-likelihood means nothing beside another one under other noise: what a model gains is large under the noise that the smaller
-//! model leaves in quiet stretches, and small under all that the larger one leaves.
+//! Log-likelihoods are comparable under the same noise only: the gain of a model is large under the small noise
+//! estimated in quiet stretches, and small under the residual noise of the larger model.
 
 use core::cmp::Ordering;
 use core::marker::PhantomData;
 use core::ops::{Neg, Sub};
 
-/// Nats of a basis `B`.
+/// A value in nats on the basis `B`.
 #[derive(Debug)]
 pub struct Nats<B>(f64, PhantomData<B>);
 
-/// A gain under the noise that the larger of two models leaves, priors and ruptures of both included.
+/// Gain under the residual noise of the larger of two models, priors and ruptures of both included.
 #[derive(Clone, Copy, Debug)]
 pub struct UnderLargerModelNoise;
 
 impl<B> Nats<B> {
-    /// So many.
+    /// A value in nats.
     #[must_use]
     pub const fn new(nats: f64) -> Self {
         Self(nats, PhantomData)
     }
 
-    /// Their number, for writing down.
+    /// The value in nats.
     #[must_use]
     pub const fn value(self) -> f64 {
         self.0
     }
 
-    /// Whether this gain is more than `price` nats: what fitted numbers cost is the same on every basis.
+    /// Whether the gain exceeds a penalty in nats; the penalty of fitted parameters does not depend on the
+    /// basis.
     #[must_use]
     pub fn exceeds(self, price: f64) -> bool {
         self.0 > price
     }
 
-    /// The order of their numbers.
+    /// Total order of the values.
     #[must_use]
     pub fn total_cmp(&self, other: &Self) -> Ordering {
         self.0.total_cmp(&other.0)
@@ -68,7 +69,7 @@ impl<B> Neg for Nats<B> {
     }
 }
 
-/// Less a price, which is the same on every basis.
+/// Subtracts a penalty, which does not depend on the basis.
 impl<B> Sub<f64> for Nats<B> {
     type Output = Self;
     fn sub(self, price: f64) -> Self {
@@ -81,7 +82,7 @@ mod tests {
     use super::{Nats, UnderLargerModelNoise};
 
     #[test]
-    fn nats_of_one_basis_are_ordered_and_pay_a_price_below_them() {
+    fn nats_are_ordered_and_compared_with_a_penalty() {
         let of = Nats::<UnderLargerModelNoise>::new;
         assert!(of(5.0) > of(4.0) && -of(5.0) < of(-4.0));
         assert!(of(5.0).exceeds(4.9) && !of(5.0).exceeds(5.0) && !of(f64::NEG_INFINITY).exceeds(-1e9));

@@ -1,36 +1,36 @@
-//! Drops of the measured force: local regressions with a step.
+//! Detects drops of the measured force by local regressions with a step.
 //!
-//! Around every block the force is regressed on `1, t, t after, v, sgn v` and a step, over 0.2 s and over 0.7 s on each
-//! side, the block itself left out (a step inside it is blended). What friction and stiffness do is smooth or follows the
-//! speed; what remains as a fall is a rupture, of a layer or of something that the layers do not know.
+//! Around every block the force is regressed on `1, t, t after, v, sgn v` and a step, over 0.2 s and over 0.7 s
+//! on each side; the block itself is excluded because a step inside it is averaged. Friction and stiffness are
+//! smooth or follow the velocity; a remaining drop is a rupture of a layer or of an unmodelled structure.
 
 use crate::block_averages::BlockAverages;
 use stylet_stats::linear_algebra::SymmetricMatrix;
 use stylet_stats::order_statistics::median;
 
-/// One drop.
+/// A force drop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceDrop {
-    /// Instant in s.
+    /// Time in s.
     pub time_s: f64,
     /// Recorded position in m.
     pub position_m: f64,
-    /// By how much the force falls, in N.
+    /// Size in N.
     pub size_n: f64,
-    /// The same in standard deviations.
+    /// Size in standard deviations.
     pub score: f64,
 }
 
-/// Half widths in s.
+/// Half widths of the regression window in s.
 const WINDOWS_S: [f64; 2] = [0.2, 0.7];
-/// A drop has at least this many standard deviations.
+/// Smallest score of a drop.
 const MIN_SCORE: f64 = 5.0;
-/// Two drops nearer than this are one.
+/// Drops closer than this in s are one.
 const MIN_SEPARATION_S: f64 = 0.12;
-/// Regressors.
+/// Number of regressors.
 const REGRESSORS: usize = 6;
 
-/// The drops of a recording, in order of time.
+/// Force drops of a recording, in order of time.
 #[must_use]
 pub fn detect_force_drops(b: &BlockAverages) -> Vec<ForceDrop> {
     let length_s = b.sample_step_s * b.samples_per_block as f64;
@@ -83,7 +83,7 @@ fn score_peaks(b: &BlockAverages, motion: &[(f64, f64)], half: usize) -> Vec<For
         .collect()
 }
 
-/// Step at block `k`: its size, its standard deviation for unit noise, the noise.
+/// Step at block `k`: size, standard deviation for unit noise, noise.
 fn fit_step(b: &BlockAverages, motion: &[(f64, f64)], k: usize, half: usize) -> (f64, f64, f64) {
     let (from, to) = (k - half, k + half + 1);
     let v0 = motion[k].1;
@@ -113,7 +113,7 @@ fn fit_step(b: &BlockAverages, motion: &[(f64, f64)], k: usize, half: usize) -> 
     if sides[0] < 4 || sides[1] < 4 {
         return (0.0, f64::INFINITY, f64::INFINITY);
     }
-    // Friction that hardly changes is not sought for.
+    // Regularises friction that hardly changes.
     h.add(3, 3, 1e-3 * count);
     h.add(4, 4, 1e-3 * count);
     let factor = h.cholesky();
@@ -133,7 +133,7 @@ mod tests {
         assert!((told - wanted).abs() <= 1e-6 * wanted.abs().max(1e-6), "{told} for {wanted}");
     }
 
-    /// Blocks of one sample each, every 20 ms; the needle goes by 3 mm/s up to `stop_s` and rests then.
+    /// Blocks of one sample each, every 20 ms; insertion at 3 mm/s up to `stop_s`, then a hold.
     fn blocks(n: usize, stop_s: f64, force: impl Fn(usize) -> f64) -> BlockAverages {
         let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.02).collect();
         let z = t.iter().map(|t| 0.003 * t.min(stop_s)).collect();
@@ -145,12 +145,13 @@ mod tests {
         (0..b.len()).map(|k| b.motion.at(0.5 * (b.start_s[k] + b.end_s[k]))).collect()
     }
 
-    /// A fixed sequence about zero without a trend.
+    /// A fixed zero-mean sequence without trend.
     fn rough(k: usize) -> f64 {
         (1.7 * (k * k % 101) as f64).sin()
     }
 
-    /// Least-squares line through the values at -1, -2, ... or 1, 2, ...: its value at zero, and the sum of squares that it leaves.
+    /// Least-squares line through values at -1, -2, ... or 1, 2, ...: its value at zero and the residual sum of
+    /// squares.
     fn line(x: &[f64]) -> (f64, f64) {
         let n = x.len() as f64;
         let (mt, mx) = (0.5 * (n + 1.0), x.iter().sum::<f64>() / n);
@@ -161,7 +162,7 @@ mod tests {
         (mx - slope * mt, with_t(&|t, x| (x - slope * t).powi(2)))
     }
 
-    /// At an even speed, two straight lines.
+    /// At constant velocity: two straight lines.
     #[test]
     fn a_step_is_the_distance_of_the_lines_on_both_sides() {
         let b = blocks(60, 99.0, |k| 0.02 * k as f64 - if k > 30 { 0.5 } else { 0.0 } + 0.01 * rough(k));
@@ -171,7 +172,7 @@ mod tests {
             let right: Vec<f64> = (1..=half).map(|i| b.force_n[k + i]).collect();
             let ((at_left, off_left), (at_right, off_right)) = (line(&left), line(&right));
             near(size, at_right - at_left);
-            // The value of a line one step outside n points.
+            // Prediction of a line one step beyond n points.
             let n = half as f64;
             near(sd, (2.0 * 2.0 * (2.0 * n + 1.0) / (n * (n - 1.0))).sqrt());
             near(noise, ((off_left + off_right) / (2.0 * n - 6.0)).sqrt());
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_are_not_compared_tell_no_step_and_four_on_each_side_are_needed() {
+    fn a_step_needs_four_compared_blocks_on_each_side() {
         let mut b = blocks(40, 99.0, |k| if k > 20 { 1.0 } else { 2.0 });
         for k in [13, 16, 24, 26] {
             b.used[k] = false;
@@ -197,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_block_with_the_step_in_it_does_not_count() {
+    fn the_block_that_contains_the_step_is_excluded() {
         let told = |blended: f64| {
             let force = |k: usize| {
                 if k == 20 {
@@ -215,9 +216,9 @@ mod tests {
         assert_eq!(told(55.0), told(1.5));
     }
 
-    /// Two oscillations a second of the speed: friction that follows them is no step.
+    /// The velocity oscillates twice per second; friction that follows it is not a step.
     #[test]
-    fn what_follows_the_speed_is_no_drop() {
+    fn velocity_dependent_friction_is_not_a_drop() {
         let t: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.02).collect();
         let w = core::f64::consts::TAU * 2.0;
         let course = |t: f64| (0.003 * t - 0.002 / w * (w * t).cos(), 0.003 + 0.002 * (w * t).sin());
@@ -233,7 +234,7 @@ mod tests {
         let told = motion(&rubbed);
         let size = |k: usize| fit_step(&rubbed, &told, k, 25).0.abs();
         let most = (25..275).map(size).fold(0.0, f64::max);
-        // A tenth of what the friction itself goes up and down by.
+        // A tenth of the friction's own variation.
         assert!(most < 0.08, "{most} N");
         let fallen = of(&|t| 200.0 * course(t).1 - if t > 2.01 { 0.5 } else { 0.0 });
         let size = fit_step(&fallen, &told, 100, 25).0;
@@ -241,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_is_found_where_it_is_with_its_size_and_standard_deviations() {
+    fn a_drop_is_detected_with_its_time_size_and_score() {
         // Half of it in block 150.
         let force = |k: usize| {
             let fallen = if k > 150 {
@@ -258,16 +259,16 @@ mod tests {
         assert_eq!(told.len(), 1, "{told:?}");
         near(told[0].time_s, 3.0);
         near(told[0].position_m, 0.009);
-        // As the window of 0.2 s says it, ten blocks on each side.
+        // From the window of 0.2 s, ten blocks on each side.
         let (size, sd, noise) = fit_step(&b, &motion(&b), 150, 10);
         near(told[0].size_n, -size);
-        // No place is quieter than seven tenths of the typical one.
+        // No place is quieter than 0.7 times the median.
         let mut all: Vec<f64> = (10..290).map(|k| fit_step(&b, &motion(&b), k, 10).2).collect();
         let least = 0.7 * median(&mut all);
         near(told[0].score, -size / (sd * noise.max(least)));
-        // What rises is no drop.
+        // A rise is not a drop.
         assert_eq!(detect_force_drops(&blocks(300, 99.0, |k| -force(k))), []);
-        // Nor is there one in half a window beside the ends, or in a recording without room.
+        // Nor is one within half a window of the ends, or in a recording without room.
         assert_eq!(
             detect_force_drops(&blocks(21, 99.0, |k| if k > 10 { 0.0 } else { 1.0 } + 0.01 * rough(k))),
             []
@@ -279,13 +280,13 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_has_five_standard_deviations() {
+    fn a_drop_needs_five_standard_deviations() {
         let b =
             |size_n: f64| blocks(300, 99.0, move |k| 0.01 * rough(k) - if k > 150 { size_n } else { 0.0 });
-        // The score grows with the size and not with the noise.
+        // The score grows with the size.
         let (large, small) = (detect_force_drops(&b(0.4))[0].score, detect_force_drops(&b(0.2))[0].score);
         assert!(large > small && small > 5.0, "{large}, {small}");
-        // Smaller ones the wider window sees alone.
+        // Smaller drops are detected by the wider window only.
         let weak = detect_force_drops(&b(0.03));
         assert_eq!(weak.len(), 1, "{weak:?}");
         let (size, sd, noise) = fit_step(&b(0.03), &motion(&b(0.03)), 150, 10);
@@ -295,14 +296,14 @@ mod tests {
     }
 
     #[test]
-    fn drops_nearer_than_a_window_lets_tell_are_one_and_all_are_in_order_of_time() {
+    fn drops_closer_than_the_window_are_merged_and_sorted_by_time() {
         let at = |second: usize| {
             let force = move |k: usize| {
                 0.005 * rough(k) - if k >= 150 { 0.5 } else { 0.0 } - if k >= second { 0.8 } else { 0.0 }
             };
             detect_force_drops(&blocks(400, 99.0, force)).iter().map(|d| d.time_s).collect::<Vec<_>>()
         };
-        // Within a tenth of a second the larger one.
+        // Within a tenth of a second only the larger one counts.
         assert_eq!(at(154).len(), 1, "{:?}", at(154));
         for apart in [25, 60, 150] {
             let told = at(150 + apart);
@@ -315,14 +316,14 @@ mod tests {
     }
 
     #[test]
-    fn no_drop_is_told_across_a_gap() {
-        // Nothing for three seconds after sample 150; lower then.
+    fn no_drop_is_detected_across_a_gap() {
+        // Nothing for three seconds after sample 150; a lower force then.
         let t: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.02 + if k > 150 { 3.0 } else { 0.0 }).collect();
         let z = t.iter().map(|t| 0.003 * t).collect();
         let f = (0..300).map(|k| if k > 150 { 0.0 } else { 1.0 } + 0.01 * rough(k)).collect();
         let b = BlockAverages::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S);
         assert_eq!(detect_force_drops(&b), []);
-        // Where one block is not compared, a drop is seen all the same.
+        // Across a single block that is not compared a drop is detected.
         let mut b = blocks(300, 99.0, |k| if k > 150 { 0.0 } else { 1.0 } + 0.01 * rough(k));
         b.used[145] = false;
         b.memory_reset[146] = true;

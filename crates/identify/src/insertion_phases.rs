@@ -1,54 +1,55 @@
-//! What happens at an instant, read off the raw force: drops on the way in, releases on the way back.
+//! Phases of the motion and abrupt force changes, from raw samples: drops during insertion, releases during
+//! retraction.
 //!
-//! Nothing here knows a law. Thresholds are shares of the largest force and multiples of the noise.
+//! Model-free; thresholds are shares of the largest force and multiples of the noise.
 
 use stylet_record::Recording;
 
-/// Shortest window in which a drop happens (s).
+/// Shortest window in s in which a drop happens.
 const DROP_WINDOW_S: f64 = 0.06;
-/// A drop or release is at least this share of the largest force,
+/// Smallest drop or release, as a share of the largest force.
 const MIN_SHARE_OF_MAX_FORCE: f64 = 0.06;
-/// and this many standard deviations of the noise.
+/// Smallest drop or release, in standard deviations of the noise.
 const MIN_NOISE_SDS: f64 = 12.0;
-/// Share of a drop that two neighbouring intervals hold.
+/// Smallest share of a drop within two neighbouring intervals.
 const ABRUPT_SHARE: f64 = 0.7;
-/// A fall that goes on by this share in as much time again is no drop.
+/// A fall that continues by this share over the same time again is not a drop.
 const MAX_CONTINUED_SHARE: f64 = 0.2;
-/// The first layer's drop is at least this share of the largest one: what comes before is a crackle.
+/// Smallest drop of the first layer, as a share of the largest one; smaller ones before it are ignored.
 const MIN_FIRST_RUPTURE_SHARE: f64 = 0.4;
-/// Travel (m) within which steps on the way back belong to one release.
+/// Steps within this travel (m) during retraction belong to one release.
 const MERGE_RELEASES_M: f64 = 2.5e-3;
 
-/// When the needle moves where.
+/// Phases of the motion, as sample indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InsertionPhases {
     /// First sample of the motion.
     pub start: usize,
-    /// Last sample of the advance.
+    /// Last sample of the insertion.
     pub deepest: usize,
-    /// First sample of the way back; the number of samples when there is none.
+    /// First sample of the retraction; the number of samples without one.
     pub retraction: usize,
 }
 
-/// A sudden fall of the force.
+/// An abrupt drop of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AbruptDrop {
-    /// First sample after it.
+    /// First sample after the drop.
     pub sample: usize,
-    /// Its size in N.
+    /// Size in N.
     pub size_n: f64,
 }
 
-/// A layer that lets go of the needle.
+/// Release of a layer during retraction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Release {
     /// Position of the tip in m.
     pub position_m: f64,
-    /// Size of the step in N.
+    /// Size of the force step in N.
     pub size_n: f64,
 }
 
-/// Standard deviation of the noise from differences of neighbours, which a slow force hardly changes.
+/// Standard deviation of the noise from differences of neighbouring samples, which a slow force hardly changes.
 #[must_use]
 pub fn noise_n(force_n: &[f64]) -> f64 {
     let mut steps: Vec<f64> = force_n.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
@@ -60,7 +61,7 @@ pub fn noise_n(force_n: &[f64]) -> f64 {
     steps[middle] / (0.6745 * std::f64::consts::SQRT_2)
 }
 
-/// Finds start, end of the advance and beginning of the way back.
+/// Detects the start and end of the insertion and the start of the retraction.
 #[must_use]
 pub fn detect_phases(recording: &Recording) -> InsertionPhases {
     let z = &recording.position_m;
@@ -78,7 +79,7 @@ fn min_drop_n(recording: &Recording) -> f64 {
     (MIN_SHARE_OF_MAX_FORCE * largest).max(MIN_NOISE_SDS * noise_n(&recording.force_n))
 }
 
-/// The window that begins at sample `i`: as long as [`WINDOW_S`] and at least five samples.
+/// End of the window that begins at sample `i`: [`DROP_WINDOW_S`] long, at least five samples.
 fn window_end(t: &[f64], i: usize) -> usize {
     let mut j = i + 5;
     while j < t.len() && t[j] - t[i] < DROP_WINDOW_S {
@@ -87,15 +88,15 @@ fn window_end(t: &[f64], i: usize) -> usize {
     j
 }
 
-/// Whether most of a fall happens between three neighbouring samples and it is over then (`after` is what falls in
-/// as much time again). Relaxation after a stop falls fast too, but goes on.
+/// Whether most of a fall happens within three neighbouring samples and then ends (`after`: the fall over the
+/// same time again). Relaxation after a stop is fast but continues.
 fn is_abrupt(f: &[f64], after: f64) -> bool {
     let fall = f[0] - f[f.len() - 1];
     after < MAX_CONTINUED_SHARE * fall
         && f.windows(3).map(|w| w[0] - w[2]).fold(0.0, f64::max) > ABRUPT_SHARE * fall
 }
 
-/// Sudden falls of the force until the way back begins.
+/// Abrupt force drops until the retraction.
 #[must_use]
 pub fn abrupt_drops(recording: &Recording, phases: &InsertionPhases) -> Vec<AbruptDrop> {
     let (t, f) = (&recording.time_s, &recording.force_n);
@@ -120,8 +121,7 @@ pub fn abrupt_drops(recording: &Recording, phases: &InsertionPhases) -> Vec<Abru
     }
 }
 
-/// Which drop is whose rupture: per layer the first sample after it. A layer whose rupture leaves no
-/// drop has none.
+/// First sample after the rupture of each layer; `None` for a layer without a drop.
 #[must_use]
 pub fn rupture_samples(drops: &[AbruptDrop], layers: usize) -> Vec<Option<usize>> {
     let largest = drops.iter().map(|d| d.size_n).fold(0.0, f64::max);
@@ -129,7 +129,7 @@ pub fn rupture_samples(drops: &[AbruptDrop], layers: usize) -> Vec<Option<usize>
     (0..layers).map(|_| of.next()).collect()
 }
 
-/// Releases on the way back, the largest `layers` of them, shallowest first.
+/// The `layers` largest releases during retraction, shallowest first.
 #[must_use]
 pub fn releases(recording: &Recording, phases: &InsertionPhases, layers: usize) -> Vec<Release> {
     let (t, z, f) = (&recording.time_s, &recording.position_m, &recording.force_n);
@@ -171,7 +171,7 @@ pub fn releases(recording: &Recording, phases: &InsertionPhases, layers: usize) 
     out
 }
 
-/// Position at which the force first leaves zero for good, less a little: where the surface may be.
+/// Position at which the force finally leaves zero: an estimate of the surface.
 #[must_use]
 pub fn contact_m(recording: &Recording, phases: &InsertionPhases) -> f64 {
     let f = &recording.force_n;
@@ -190,7 +190,8 @@ mod tests {
         assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
     }
 
-    /// Samples every 10.1 ms, a needle that goes by `step_m` each, in and (from sample `back` on) out.
+    /// Samples every 10.1 ms; the needle moves by `step_m` per sample, forward and, from sample `back` on,
+    /// backward.
     fn recording(force_n: &[f64], step_m: f64, back: usize) -> Recording {
         let t = (0..force_n.len()).map(|k| 0.0101 * k as f64).collect();
         let z = (0..force_n.len())
@@ -198,31 +199,31 @@ mod tests {
         Recording::new(t, z.collect(), force_n.to_vec()).expect("a recording")
     }
 
-    /// All that there is, as one advance.
+    /// The whole recording as one insertion.
     fn whole(r: &Recording) -> InsertionPhases {
         InsertionPhases { start: 0, deepest: r.len() - 1, retraction: r.len() }
     }
 
     #[test]
-    fn noise_is_told_by_the_middle_difference_of_neighbours() {
+    fn noise_is_estimated_from_the_median_difference() {
         assert_eq!(noise_n(&[]), 0.0);
         assert_eq!(noise_n(&[3.0]), 0.0);
-        // Differences of 0.1, 0.7, 0.2, 0.4: the upper of the two middle ones is 0.4.
+        // Differences of 0.1, 0.7, 0.2, 0.4: the upper median is 0.4.
         near(noise_n(&[1.0, 1.1, 0.4, 0.6, 0.2]), 0.4 / (0.6745 * 2.0_f64.sqrt()));
         near(noise_n(&[1.0, 1.1, 0.4, 0.6]), 0.2 / (0.6745 * 2.0_f64.sqrt()));
     }
 
     #[test]
-    fn a_threshold_is_a_share_of_the_largest_force_or_so_much_noise() {
+    fn the_drop_threshold_is_a_share_of_the_force_or_a_multiple_of_the_noise() {
         let quiet: Vec<f64> = (0..50).map(|k| if k < 30 { 0.0 } else { -2.5 }).collect();
         near(min_drop_n(&recording(&quiet, 1e-4, 99)), 0.06 * 2.5);
         let rough: Vec<f64> = (0..50).map(|k| if k % 2 == 0 { 0.0 } else { 0.3 }).collect();
         near(min_drop_n(&recording(&rough, 1e-4, 99)), 12.0 * 0.3 / (0.6745 * 2.0_f64.sqrt()));
     }
 
-    /// A plan of a rest, an advance, a hold, a way back: borders are where it has them.
+    /// A rest, an insertion, a hold, a retraction.
     #[test]
-    fn phases_are_those_of_the_plan() {
+    fn phases_agree_with_the_commanded_motion() {
         let plan = |k: usize, out: f64| match k {
             0..=20 => 0.001,
             21..=120 => 0.001 + 3e-4 * (k - 20) as f64,
@@ -234,19 +235,20 @@ mod tests {
             let t: Vec<f64> = (0..n).map(|k| 0.01 * k as f64).collect();
             detect_phases(&Recording::new(t, z, vec![0.0; n]).expect("a recording"))
         };
-        // In from sample 21 on, at the bottom at 120, away from it by more than 0.1 mm at 151.
+        // Insertion from sample 21, deepest at 120, further back by more than 0.1 mm at 151.
         assert_eq!(of(220, 4e-4), InsertionPhases { start: 21, deepest: 120, retraction: 151 });
-        // Slowly it is away from the bottom by 0.1 mm a sample later; by 3 mm of 30 it has come back.
+        // A slow retraction passes 0.1 mm a sample later; 3 mm of 30 count as retraction.
         assert_eq!(of(220, 5.5e-5).retraction, 152);
         assert_eq!((of(220, 4.4e-5).retraction, of(220, 4.3e-5).retraction), (153, 220));
-        // Back by less than a tenth of the way it has not come back.
+        // Less than a tenth of the travel is not a retraction.
         assert_eq!(of(150 + 8, 4e-4).retraction, 158);
         assert_eq!(of(150 + 9, 4e-4).retraction, 151);
-        // A short way: near the bottom is a two-hundredth of it.
+        // Short travel: the tolerance at the deepest point is 1/200 of it.
         let z: Vec<f64> = (0..=200).map(|k| 1e-5 * f64::from(k)).collect();
         let t: Vec<f64> = (0..=200).map(|k| 0.01 * f64::from(k)).collect();
         let short = detect_phases(&Recording::new(t, z, vec![0.0; 201]).expect("a recording"));
-        // 0.01 mm: half of it is passed at the first step, the bottom is nearer than that only at the last.
+        // 0.01 mm: half of it is passed at the first step; the deepest point is within it at the last sample
+        // only.
         assert_eq!(short, InsertionPhases { start: 1, deepest: 200, retraction: 201 });
     }
 
@@ -261,23 +263,23 @@ mod tests {
     }
 
     #[test]
-    fn a_fall_is_sudden_when_three_samples_hold_most_of_it_and_it_is_over() {
+    fn a_fall_is_abrupt_when_three_samples_contain_most_of_it() {
         assert!(is_abrupt(&[1.0, 1.0, 0.2, 0.1, 0.0, 0.0], 0.0));
-        // Exactly seven tenths are not more than seven tenths.
+        // Exactly 70 % is not more than 70 %.
         assert!(!is_abrupt(&[10.0, 10.0, 7.0, 3.0, 0.0], 0.0));
         assert!(is_abrupt(&[10.0, 10.0, 7.0, 2.9, 0.0], 0.0));
         assert!(!is_abrupt(&[1.0, 0.8, 0.6, 0.4, 0.2, 0.0], 0.0));
-        // Goes on by a fifth as much.
+        // Continues by a fifth.
         assert!(is_abrupt(&[1.0, 1.0, 0.2, 0.1, 0.0, 0.0], 0.19));
         assert!(!is_abrupt(&[1.0, 1.0, 0.2, 0.1, 0.0, 0.0], 0.2));
-        // From another level.
+        // Independent of the force level.
         assert!(
             is_abrupt(&[4.0, 4.0, 3.2, 3.1, 3.0, 3.0], 0.19)
                 && !is_abrupt(&[4.0, 4.0, 3.2, 3.1, 3.0, 3.0], 0.21)
         );
     }
 
-    /// A force that rises evenly and falls at two samples.
+    /// A force that rises at a constant rate and falls at two samples.
     fn falls() -> Vec<f64> {
         let (mut f, mut x) = (Vec::new(), 0.0);
         for k in 0..200 {
@@ -293,32 +295,32 @@ mod tests {
     }
 
     #[test]
-    fn drops_are_where_the_force_falls_and_as_large_as_it_falls() {
+    fn drops_have_the_time_and_size_of_the_fall() {
         let r = recording(&falls(), 1e-4, 999);
         let told = abrupt_drops(&r, &whole(&r));
         assert_eq!(told.iter().map(|d| d.sample).collect::<Vec<_>>(), [60, 130]);
-        // From four samples before to five after: what falls less what rises meanwhile.
+        // From four samples before to five after: the drop minus the rise in between.
         near(told[0].size_n, falls()[56] - falls()[65]);
         near(told[0].size_n, 0.6 - 0.07);
         near(told[1].size_n, 0.9 - 0.08);
-        // None on the way back, nor before the motion.
+        // None during retraction, nor before the motion.
         let until = |back: usize, start: usize| {
             abrupt_drops(&r, &InsertionPhases { start, deepest: back, retraction: back })
         };
         assert_eq!(until(100, 0).len(), 1);
         assert_eq!(until(200, 61).len(), 1);
         assert_eq!(until(40, 0).len(), 0);
-        // The window that holds it begins six samples before.
+        // The window that contains it begins six samples before.
         assert_eq!(until(55, 0).len(), 1);
         assert_eq!(until(54, 0).len(), 0);
-        // Turned over it rises.
+        // A rise is not a drop.
         let up: Vec<f64> = falls().iter().map(|f| -f).collect();
         assert_eq!(abrupt_drops(&recording(&up, 1e-4, 999), &whole(&r)).len(), 0);
     }
 
-    /// Two falls nearer than the windows of one are one.
+    /// A fall that continues is not a drop.
     #[test]
-    fn a_fall_that_goes_on_is_no_drop() {
+    fn a_continued_fall_is_not_a_drop() {
         let relaxing: Vec<f64> = (0..200)
             .map(|k| if k < 60 { 0.02 * f64::from(k) } else { 1.18 * libm::exp(-0.1 * f64::from(k - 59)) })
             .collect();
@@ -331,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_rupture_is_no_crackle() {
+    fn small_drops_before_the_first_rupture_are_ignored() {
         let drop = |at: usize, size_n: f64| AbruptDrop { sample: at, size_n };
         let all = [drop(5, 0.3), drop(9, 0.4), drop(20, 0.1), drop(40, 1.0)];
         assert_eq!(rupture_samples(&all, 2), [Some(9), Some(20)]);
@@ -340,7 +342,7 @@ mod tests {
         assert_eq!(rupture_samples(&[], 1), [None]);
     }
 
-    /// A force below zero that steps towards zero three times on the way back, the second time in two steps.
+    /// A force below zero that steps towards zero three times during retraction, the second time in two steps.
     fn released() -> (Recording, InsertionPhases) {
         let (mut f, mut x) = (Vec::new(), -3.0);
         for k in 0..300 {
@@ -353,7 +355,7 @@ mod tests {
             };
             f.push(x);
         }
-        // 0.1 mm a sample: the two steps in the middle are 1.2 mm apart.
+        // 0.1 mm per sample: the two steps in the middle are 1.2 mm apart.
         (recording(&f, 1e-4, 100), InsertionPhases { start: 0, deepest: 99, retraction: 100 })
     }
 
@@ -365,7 +367,7 @@ mod tests {
         assert_eq!(told.len(), 3);
         near(told[0].position_m, z(250));
         near(told[0].size_n, 0.3);
-        // Two steps within 2.5 mm are one release, in their middle by size.
+        // Two steps within 2.5 mm are one release at their weighted mean position.
         near(told[1].position_m, 0.6 * z(180) + 0.4 * z(192));
         near(told[1].size_n, 1.0);
         near(told[2].position_m, z(120));
@@ -373,14 +375,14 @@ mod tests {
         let two = releases(&r, &p, 2);
         assert_eq!(two, told[1..]);
         assert_eq!(releases(&r, &p, 1), told[2..]);
-        // Not before the way back, and not where the force pushes.
+        // Not before the retraction, and not where the force pushes.
         assert_eq!(releases(&r, &InsertionPhases { retraction: 200, ..p }, 5), told[..1]);
         let pushes: Vec<f64> = r.force_n.iter().map(|f| f + 3.0).collect();
         assert_eq!(releases(&recording(&pushes, 1e-4, 100), &p, 5), []);
     }
 
     #[test]
-    fn steps_further_apart_are_releases_of_their_own() {
+    fn distant_steps_are_separate_releases() {
         let of = |apart: usize, step_m: f64| {
             let f: Vec<f64> = (0..300)
                 .map(|k| -3.0 + if k >= 120 { 1.0 } else { 0.0 } + if k >= 120 + apart { 0.7 } else { 0.0 })
@@ -395,7 +397,7 @@ mod tests {
         assert_eq!(of(24, 1e-4), 1);
         assert_eq!(of(26, 1e-4), 2);
         assert_eq!(of(20, 2e-4), 2);
-        // At the very end as much counts as there is.
+        // At the very end the available samples count.
         let f: Vec<f64> = (0..303).map(|k| if k < 300 { -3.0 } else { -2.0 }).collect();
         let last = releases(
             &recording(&f, 1e-4, 100),
@@ -403,7 +405,7 @@ mod tests {
             5,
         );
         assert_eq!(last.iter().map(|r| r.size_n).collect::<Vec<_>>(), [1.0]);
-        // Eight tenths of what makes a drop.
+        // 80 % of the threshold of a drop.
         let small = |size: f64| {
             let f: Vec<f64> = (0..300).map(|k| -2.0 + if k >= 150 { size } else { 0.0 }).collect();
             releases(
@@ -417,8 +419,8 @@ mod tests {
     }
 
     #[test]
-    fn contact_is_where_the_force_leaves_zero_for_good() {
-        // A touch at sample 30, back to zero, then for good from 60 on, by 0.02 N a sample up to 2 N.
+    fn contact_is_where_the_force_finally_leaves_zero() {
+        // A touch at sample 30, back to zero, then contact from 60 on, by 0.02 N per sample up to 2 N.
         let f: Vec<f64> = (0..400)
             .map(|k| match k {
                 30..=33 => 0.05,
@@ -429,9 +431,9 @@ mod tests {
             .collect();
         let r = recording(&f, 1e-4, 370);
         let p = InsertionPhases { start: 0, deepest: 365, retraction: 370 };
-        // Below a hundredth of the largest force, 0.02 N, for the last time at 60: 61 has a hundredth exactly.
+        // Below 1 % of the largest force, 0.02 N, for the last time at 60; 61 has exactly 1 %.
         near(contact_m(&r, &p), 1e-4 * 60.0);
-        // Under noise, below five standard deviations of it.
+        // With noise: below five standard deviations.
         let rough: Vec<f64> =
             f.iter().enumerate().map(|(k, f)| f + 0.03 * f64::from((k % 2) as u8)).collect();
         let least = 5.0 * noise_n(&rough);
@@ -439,7 +441,7 @@ mod tests {
         let last = (0..72).rposition(|k| rough[k] < least).expect("quiet");
         near(contact_m(&recording(&rough, 1e-4, 370), &p), 1e-4 * last as f64);
         assert!(last > 61);
-        // Nothing before the deepest point counts that comes after it.
+        // Samples after the deepest point are not used.
         near(contact_m(&r, &InsertionPhases { deepest: 163, ..p }), 1e-4 * 60.0);
         assert_eq!(
             contact_m(

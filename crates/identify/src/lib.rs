@@ -1,23 +1,25 @@
-//! One likelihood for measured force.
+//! The likelihood of measured needle forces and its optimisation.
 //!
-//! Unknowns are the base parameters `K_i, b_i, F_i`, the geometry (surface, thicknesses), the numbers of effects, numbers
-//! of each recording's own, and the instant of every rupture in every recording. With the instants given, the force is a
-//! smooth function of everything else; the law's own condition for a rupture enters as a datum.
+//! Unknowns are the base parameters `K_i, b_i, F_i`, the geometry (surface position, layer thicknesses), effect
+//! parameters, per-recording parameters (random effects), and the time of every rupture in every recording.
+//! With the rupture times given, the predicted force is a smooth function of all other parameters; the law's
+//! own rupture condition enters as an observation (`docs/reference/model.md`, base law).
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! |---|---|
-//! | [`blocks`] | a recording as means over blocks of 20 ms |
-//! | [`model`] | what is fitted: numbers with their priors and bounds |
-//! | [`forward`] | the law replayed with imposed ruptures, or its own |
-//! | [`events`] | the likelihood of a rupture: by force or by place |
+//! | [`motion`] | base motion between samples: position, velocity, velocity jumps |
+//! | [`block_averages`] | a recording as means over blocks of 20 ms |
+//! | [`insertion_phases`], [`force_drops`] | motion phases and abrupt force changes; force drops by local regression |
+//! | [`rupture_assignment`] | which force drop belongs to which layer |
+//! | [`model`] | the fitted model: parameters with priors and bounds |
+//! | [`forward_model`] | force prediction with imposed rupture times or the law's own |
+//! | [`rupture_likelihood`] | likelihood of a rupture by force or by depth |
 //! | [`noise`] | autoregressive noise per range of the force, whitening |
-//! | [`discrepancy`](mod@discrepancy) | what an unfinished law leaves, as noise |
-//! | [`objective`], [`fit`], [`retime`] | the likelihood, its optimum, instants moved |
-//! | [`nats`] | nats that say by what they were reckoned |
-//! | [`late`] | a delay to a fraction of a sampling step |
-//! | [`phases`] | advance, hold and way back; sudden falls and releases in the raw force |
-//! | [`drops`], [`assign`] | drops of the force, and which layer each belongs to |
-//! | [`look`] | what every effect would gain, to first order |
+//! | [`discrepancy_noise`] | white noise equivalent to the residuals of an incomplete model |
+//! | [`likelihood`], [`fit`], [`update_event_times`] | log posterior, damped least squares, search over rupture times |
+//! | [`delay_refinement`] | a force delay to a fraction of the sampling interval |
+//! | [`score_test`] | first-order gain of additional effects |
+//! | [`evidence_nats`] | evidence differences typed by the noise they were computed with |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
@@ -31,6 +33,7 @@ pub mod forward_model;
 pub mod insertion_phases;
 pub mod likelihood;
 pub mod model;
+pub mod motion;
 pub mod noise;
 pub mod rupture_assignment;
 pub mod rupture_likelihood;

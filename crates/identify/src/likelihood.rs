@@ -1,33 +1,33 @@
-//! The likelihood of a model: whitened residuals, ruptures, priors.
+//! The log posterior of a model: whitened residuals, rupture terms, priors.
 
 use crate::block_averages::BlockAverages;
 use crate::forward_model::{
     IncrementalReplay, ReplayResult, break_times, free_rupture_times, replay_with_ruptures,
 };
 use crate::model::{CompiledModel, Model, NO_RUPTURE, Parameter};
+use crate::motion::MotionPiece;
 use crate::noise::{HUBER_LOSS, Noise, NoiseSource, WhiteningPlan};
 use crate::rupture_likelihood::{RuptureEvent, evaluate_rupture};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use stylet_record::motion::MotionPiece;
 
-/// Recordings in blocks and the noise by which they are judged.
+/// Recordings in blocks with their noise model.
 #[derive(Clone, Debug)]
 pub struct FitData {
     /// The recordings.
     pub recordings: Arc<Vec<BlockAverages>>,
-    /// The noise.
+    /// The noise model.
     pub noise: Arc<Noise>,
-    /// The noise is nowhere less, in N: what the recorded force is rounded to leaves open.
+    /// Lower bound of the noise in N, from the rounding of the recorded force.
     pub floor_n: f64,
-    /// How each recording is whitened.
+    /// Whitening plan of each recording, computed on first use.
     plans: Arc<OnceLock<Vec<WhiteningPlan>>>,
     replayed: Arc<AtomicU64>,
 }
 
 impl FitData {
-    /// Recordings judged by a noise that is nowhere less than `floor_n`.
+    /// Recordings with a noise model and the lower bound of its standard deviation.
     #[must_use]
     pub fn new(blocks: Arc<Vec<BlockAverages>>, noise: Noise, floor_n: f64) -> Self {
         Self {
@@ -39,13 +39,13 @@ impl FitData {
         }
     }
 
-    /// Normalised innovations of residuals `e` (N) of recording `r`; blocks that are not compared give zero.
+    /// Normalised innovations of residuals `e` (N) of recording `r`; zero in blocks that are not compared.
     #[must_use]
     pub fn whiten(&self, r: usize, e: &[f64]) -> Vec<f64> {
         self.noise.whiten(&self.whitening_plans()[r], e)
     }
 
-    /// Residuals (N) of recording `r` whose normalised innovations are `w`.
+    /// Residuals (N) of recording `r` with normalised innovations `w`.
     #[must_use]
     pub fn unwhiten(&self, r: usize, w: &[f64]) -> Vec<f64> {
         self.noise.unwhiten(&self.whitening_plans()[r], w)
@@ -55,42 +55,42 @@ impl FitData {
         self.plans.get_or_init(|| self.recordings.iter().map(|b| self.noise.whitening_plan(b)).collect())
     }
 
-    /// The same recordings judged by another noise.
+    /// The same recordings with another noise model.
     #[must_use]
     pub fn with_noise(&self, noise: Noise) -> Self {
         Self { noise: Arc::new(noise), plans: Arc::default(), ..self.clone() }
     }
 
-    /// Blocks replayed so far for these recordings, under whatever noise: what a diagnosis costs, the same on every machine.
+    /// Number of blocks replayed so far for these recordings: a machine-independent measure of cost.
     #[must_use]
     pub fn blocks_replayed(&self) -> u64 {
         self.replayed.load(Ordering::Relaxed)
     }
 
-    /// So many more blocks were replayed.
+    /// Adds to the count of replayed blocks.
     pub fn count_replayed(&self, blocks: u64) {
         self.replayed.fetch_add(blocks, Ordering::Relaxed);
     }
 
-    /// The same recordings judged by the noise that residuals tell.
+    /// The same recordings with the noise estimated from residuals.
     #[must_use]
     pub fn with_estimated_noise(&self, e: &[Vec<f64>], from: NoiseSource) -> Self {
         self.with_noise(Noise::estimate(&self.recordings, e, from, self.floor_n))
     }
 
-    /// Some of the recordings.
+    /// A subset of the recordings.
     #[must_use]
     pub fn subset(&self, which: &[usize]) -> Self {
         self.with_recordings(which.iter().map(|k| self.recordings[*k].clone()).collect())
     }
 
-    /// Other recordings judged by the same noise.
+    /// Other recordings with the same noise model.
     #[must_use]
     pub fn with_recordings(&self, blocks: Vec<BlockAverages>) -> Self {
         Self { recordings: Arc::new(blocks), plans: Arc::default(), ..self.clone() }
     }
 
-    /// Number of blocks compared.
+    /// Number of compared blocks.
     #[must_use]
     pub fn compared_block_count(&self) -> usize {
         self.recordings.iter().map(|b| b.used.iter().filter(|u| **u).count()).sum()
@@ -103,26 +103,26 @@ impl FitData {
     }
 }
 
-/// What a model leaves.
+/// Residuals of a model.
 #[derive(Clone, Debug, Default)]
 pub struct Residuals {
-    /// Recorded less predicted force in N, per recording.
+    /// Recorded minus predicted force in N, per recording.
     pub residual_n: Vec<Vec<f64>>,
-    /// Normalised innovations.
+    /// Normalised innovations, per recording.
     pub innovations: Vec<Vec<f64>>,
-    /// Events, per recording and layer.
+    /// Ruptures, per recording and layer.
     pub ruptures: Vec<Vec<RuptureEvent>>,
-    /// Negative logarithmic likelihood with priors, in nats, but for the noise's own normalisation.
+    /// Negative log posterior in nats, without the noise's normalisation.
     pub nats: f64,
 }
 
-/// The pieces of smooth motion that a model sees.
+/// Motion pieces for a model's jump timing.
 #[must_use]
 pub fn motion_pieces(model: &CompiledModel, blocks: &BlockAverages) -> Arc<Vec<MotionPiece>> {
     blocks.motion_pieces(model.smears_jumps, model.delay_s, model.jump_delay_s)
 }
 
-/// Replays one recording.
+/// Predicts the force of one recording.
 #[must_use]
 pub fn replay(model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
     let compiled = model.compile(r)?;
@@ -139,8 +139,8 @@ pub fn replay(model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
     out.force_n.iter().all(|f| f.is_finite()).then_some(out)
 }
 
-/// The data with what sampling leaves open where something of a model's effects breaks: between two samples, and a depth that all
-/// recordings share puts it anywhere between them.
+/// Adds the timing uncertainty of break points of the model's effects: a break lies between two samples, and a
+/// depth shared by all recordings places it anywhere between them.
 #[must_use]
 pub fn with_break_uncertainty(model: &Model, data: &FitData) -> FitData {
     let falling = |(r, b): (usize, &BlockAverages)| {
@@ -152,7 +152,7 @@ pub fn with_break_uncertainty(model: &Model, data: &FitData) -> FitData {
     if same { data.clone() } else { data.with_recordings(blocks) }
 }
 
-/// A replay of a model with what it remembered, per recording: what neighbours of the model are computed from.
+/// A replay with its checkpoints, from which predictions of similar models are computed.
 pub struct ReplayCache {
     compiled: CompiledModel,
     pieces: Arc<Vec<MotionPiece>>,
@@ -160,7 +160,7 @@ pub struct ReplayCache {
 }
 
 impl ReplayCache {
-    /// The trail of one recording.
+    /// The cache of one recording.
     #[must_use]
     pub fn new(model: &Model, data: &FitData, r: usize) -> Option<Self> {
         let compiled = model.compile(r)?;
@@ -171,11 +171,11 @@ impl ReplayCache {
         Some(Self { compiled, pieces: seen, incremental: track })
     }
 
-    /// As [`replay`], of a model that differs in a number of the base law, of its geometry, or in an instant.
+    /// As [`replay`], for a model that differs in base parameters, geometry or a rupture time only.
     #[must_use]
     pub fn replay(&self, model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
         let compiled = model.compile(r)?;
-        // On average from the middle on.
+        // On average half of the recording is replayed.
         data.count_replayed(data.recordings[r].len() as u64 / 2);
         let out = self.incremental.replay_neighbour(
             &self.compiled,
@@ -187,13 +187,13 @@ impl ReplayCache {
         out.force_n.iter().all(|f| f.is_finite()).then_some(out)
     }
 
-    /// The instants (s) at which the law itself ruptures.
+    /// Rupture times (s) of the law itself.
     #[must_use]
     pub fn free_rupture_times(&self) -> Vec<f64> {
         free_rupture_times(&self.compiled, &self.pieces)
     }
 
-    /// Nats of the recording with its ruptures at other instants: residuals and events, with the noise as it is.
+    /// Nats of the recording with other rupture times: residuals and rupture terms under the current noise.
     #[must_use]
     pub fn nats_with_ruptures(&self, model: &Model, data: &FitData, r: usize, instants: &[f64]) -> f64 {
         let b = &data.recordings[r];
@@ -207,14 +207,14 @@ impl ReplayCache {
         if sum.is_finite() { sum } else { NO_RUPTURE }
     }
 
-    /// Goes on from other instants.
+    /// Rebuilds the cache at other rupture times.
     pub fn rebase(&mut self, data: &FitData, r: usize, instants: &[f64]) {
         self.incremental =
             IncrementalReplay::new(&self.compiled, &data.recordings[r], &self.pieces, instants);
     }
 }
 
-/// What a model leaves of all recordings; `None` when it cannot be replayed.
+/// Residuals over all recordings; `None` when the model cannot be replayed.
 #[must_use]
 pub fn residuals(model: &Model, data: &FitData) -> Option<Residuals> {
     let mut all = Residuals::default();
@@ -235,7 +235,7 @@ pub fn residuals(model: &Model, data: &FitData) -> Option<Residuals> {
     Some(all)
 }
 
-/// Nats of residuals that are at hand.
+/// Negative log posterior of given residuals in nats.
 #[must_use]
 pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
     let mut sum: f64 =
@@ -244,13 +244,13 @@ pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
     sum + prior_nats(model)
 }
 
-/// Nats of the events alone.
+/// The rupture terms alone, in nats.
 #[must_use]
 pub fn rupture_nats(model: &Model, r: &Residuals) -> f64 {
     r.ruptures.iter().flatten().map(|e| evaluate_rupture(e, &model.scatter).nats).sum()
 }
 
-/// Nats of the priors.
+/// The prior terms alone, in nats.
 #[must_use]
 pub fn prior_nats(model: &Model) -> f64 {
     let of = |n: &Parameter, x: f64| {
@@ -278,7 +278,7 @@ mod tests {
         assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
     }
 
-    /// A layer that gives way by its force after 5 mm, at 9 mm; two recordings of different lengths at 4 mm/s.
+    /// A layer that ruptures by force after 5 mm, at 9 mm; two recordings of different lengths at 4 mm/s.
     fn given() -> (Model, FitData) {
         let layer = Layer {
             thickness_m: 0.02,
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn recordings_are_counted_chosen_and_judged_by_their_noise() {
+    fn subsets_and_noise_models_of_recordings() {
         let (_, d) = given();
         assert_eq!((d.recording_count(), d.compared_block_count()), (2, 200 + 150 - 2 * 3));
         let second = d.subset(&[1]);
@@ -331,7 +331,7 @@ mod tests {
                 .all(|(k, e)| (e - if (10..13).contains(&k) { 0.0 } else { 0.1 }).abs() < 1e-12)
         );
         near(d.with_noise(Noise::white(0.2)).whiten(1, &e)[0], 0.5);
-        // The noise that residuals tell is nowhere less than the floor.
+        // The estimated noise is bounded below.
         let told = FitData { floor_n: 0.3, ..d.clone() }
             .with_estimated_noise(&[vec![0.01; 200], vec![0.01; 150]], NoiseSource::Residual);
         assert_eq!(told.noise.bins.iter().map(|b| b.sd_n).fold(1.0, f64::min), 0.3);
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn work_is_counted_in_blocks_that_are_replayed() {
+    fn cost_is_counted_in_replayed_blocks() {
         let (m, d) = given();
         let cost = |of: &dyn Fn()| {
             let before = d.blocks_replayed();
@@ -353,14 +353,14 @@ mod tests {
         assert_eq!(cost(&|| assert!(ReplayCache::new(&m, &d, 1).is_some())), 150);
         assert_eq!(cost(&|| assert!(trail.replay(&m, &d, 1).is_some())), 75);
         assert_eq!(cost(&|| assert!(trail.nats_with_ruptures(&m, &d, 1, &[2.0]).is_finite())), 75);
-        // Under another noise it is the same account.
+        // Under another noise the counter is shared.
         let other = d.with_noise(Noise::white(1.0));
         other.count_replayed(5);
         assert_eq!(other.blocks_replayed(), d.blocks_replayed());
     }
 
     #[test]
-    fn nats_are_those_of_residuals_of_ruptures_and_of_priors() {
+    fn the_log_posterior_sums_residuals_ruptures_and_priors() {
         let (mut m, d) = given();
         m.per_recording = [1e-4, -3e-4]
             .map(|surface_m| RecordingParameters { surface_m, ..RecordingParameters::default() })
@@ -368,7 +368,8 @@ mod tests {
         m.tissue.layers[0].stiffness_n_per_m = 230.0;
         m.tissue.surface_m = 0.005;
         let left = residuals(&m, &d).expect("a replay");
-        // A tenth and a half of the stiffness, half of what the surface is uncertain by, and two of the spread between recordings.
+        // Stiffness off by 15 % of 30 %, surface by half of its tolerance, two surface offsets between
+        // recordings.
         let stiffness = 0.5 * (0.15_f64 / 0.3).powi(2);
         let surface = 0.5 * 0.5_f64.powi(2);
         let own: f64 = [1e-4, 3e-4].iter().map(|x| 0.5 * (x / m.scatter.surface_m).powi(2)).sum();
@@ -391,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn nats_at_other_instants_are_those_of_the_model_that_has_them() {
+    fn nats_at_other_rupture_times_agree_with_a_full_replay() {
         let (m, d) = given();
         let d = d.subset(&[0]);
         let m = m.subset(&[0]);
@@ -406,7 +407,7 @@ mod tests {
                 near(trail.nats_with_ruptures(&m, &d, 0, &[t]), at(t));
             }
         }
-        // One newton at 200 N/m, 9 mm at 4 mm/s.
+        // 1 N at 200 N/m: 9 mm at 4 mm/s.
         assert!((trail.free_rupture_times()[0] - 2.25).abs() < 1e-6);
         let moved = Model { rupture_times_s: vec![vec![2.5]], ..m.clone() };
         assert_eq!(

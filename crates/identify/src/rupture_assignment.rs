@@ -1,26 +1,27 @@
-//! Which drop belongs to which layer: the cheapest assignment in the order of the layers.
+//! Assigns force drops to layers: the cheapest assignment in layer order, by dynamic programming.
 //!
-//! A layer is expected to give way where its force or its far face says, to within what is believed; where the force shows
-//! no drop, the law's own place is taken at the price of the drop that should have been seen.
+//! A layer is expected to rupture where its force or its far interface says, within the assumed tolerances.
+//! Without a drop, the law's own rupture position is used at the cost of the drop that should have been
+//! visible.
 
 use crate::block_averages::BlockAverages;
 use crate::force_drops::ForceDrop;
 use crate::model::{Model, NO_RUPTURE};
 
-/// A drop that no layer takes costs this share of its nats, up to [`MOST`].
+/// Cost of an unassigned drop as a share of its nats, up to [`MAX_PENALTY_NATS`].
 const UNASSIGNED_SHARE: f64 = 0.15;
-/// Most nats that a drop without layer, or a layer without drop, may cost.
+/// Largest cost in nats of a drop without a layer, or of a layer without a drop.
 const MAX_PENALTY_NATS: f64 = 12.0;
 /// Standard deviation of the logarithm of a drop's size.
 const LN_SIZE_SD: f64 = 0.6;
-/// A layer that the needle has passed by so many standard deviations must have given way.
+/// A layer passed by this many standard deviations must have ruptured.
 const PASSED_SD: f64 = 2.5;
 
-/// Recordings agree where a layer gives way when they are no further apart than this (m).
+/// Recordings agree on a rupture position within this distance (m).
 const AGREEMENT_M: f64 = 1e-3;
-/// No layer gives way where the needle is further back than it has been, by so much (m).
+/// No layer ruptures where the needle is further back than it has been by this distance (m).
 const RETRACED_M: f64 = 1e-3;
-/// What is expected of a layer.
+/// Expected rupture of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ExpectedRupture {
     front_m: f64,
@@ -29,7 +30,7 @@ struct ExpectedRupture {
     stiffness_n_per_m: f64,
 }
 
-/// Where layers are expected to give way; `trust` scales what is believed to be uncertain.
+/// Expected ruptures; `trust` scales the assumed tolerances.
 fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
     let b = &model.assumed;
     let mut front = model.tissue.surface_m;
@@ -44,7 +45,7 @@ fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
         let (place_m, sd) = if front + stretch < by_face {
             (front + stretch, (variance + stretch_sd * stretch_sd).sqrt())
         } else if stretch.is_finite() {
-            // Either may come first.
+            // Either condition may come first.
             (by_face, face_sd.hypot(0.3 * stretch_sd))
         } else {
             (by_face, face_sd)
@@ -61,8 +62,8 @@ fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
     out
 }
 
-/// The instants (s) of all layers of several recordings. Where most recordings agree on where a layer gives way, it does so in the others,
-/// whether they show a drop there or not.
+/// Rupture times (s) of all layers in several recordings. Where most recordings agree on a layer's rupture
+/// position, it ruptures there in the others too, with or without a visible drop.
 #[must_use]
 pub fn assign_ruptures(
     model: &Model,
@@ -93,7 +94,7 @@ pub fn assign_ruptures(
     if agreed == layers { first } else { given(&agreed) }
 }
 
-/// The instants (s) of all layers of one recording.
+/// Rupture times (s) of all layers in one recording.
 fn assign_one_recording(
     layers: &[ExpectedRupture],
     b: &BlockAverages,
@@ -116,7 +117,7 @@ fn assign_one_recording(
     let new_ground =
         |d: &&ForceDrop| reached.get(b.block_at(d.time_s)).is_none_or(|r| d.position_m > r - RETRACED_M);
     let drops: Vec<ForceDrop> = drops.iter().filter(new_ground).copied().collect();
-    // Candidates of every layer: instant and cost; taking a drop saves what it costs spare.
+    // Candidates per layer: time and cost; assigning a drop saves its cost as unassigned.
     let spare = |d: &ForceDrop| (UNASSIGNED_SHARE * 0.5 * d.score * d.score).min(MAX_PENALTY_NATS);
     let candidates: Vec<Vec<(f64, f64)>> = layers
         .iter()
@@ -140,7 +141,7 @@ fn assign_one_recording(
             c
         })
         .collect();
-    // Cheapest chain of instants that never fall.
+    // Cheapest sequence of increasing times.
     let mut cost: Vec<Vec<(f64, usize)>> = Vec::new();
     for (l, own) in candidates.iter().enumerate() {
         let row = own
@@ -183,7 +184,8 @@ mod tests {
     use stylet_record::Recording;
     use stylet_tissue::{Layer, Tissue};
 
-    /// Layers by thickness (mm), stiffness (N/m), puncture force (N), from 10 mm on; tolerances of a fifth and a tenth.
+    /// Layers by thickness (mm), stiffness (N/m) and puncture force (N), starting at 10 mm; tolerances of a
+    /// fifth and a tenth.
     fn model(layers: &[(f64, f64, Option<f64>)]) -> Model {
         let layer = |&(thick_mm, stiffness_n_per_m, puncture_n): &(f64, f64, Option<f64>)| Layer {
             thickness_m: thick_mm * 1e-3,
@@ -202,7 +204,7 @@ mod tests {
         Model::base(Arc::new(belief), 1)
     }
 
-    /// A needle that goes in evenly from 0.1 mm on, at 10 mm/s, as far as so many mm.
+    /// Insertion at 10 mm/s from 0.1 mm to `to_mm`.
     fn blocks(to_mm: f64) -> BlockAverages {
         let n = (to_mm / 10.0 * 200.0).round() as usize + 1;
         let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.005).collect();
@@ -210,12 +212,12 @@ mod tests {
         BlockAverages::new(&Recording::new(t, z, vec![0.0; n]).expect("a recording"), &[], BLOCK_S)
     }
 
-    /// A drop at a position (mm) of a size (N).
+    /// A drop at a position (mm) with a size (N).
     fn drop(at_mm: f64, size_n: f64, score: f64) -> ForceDrop {
         ForceDrop { time_s: (at_mm - 0.1) / 10.0, position_m: at_mm * 1e-3, size_n, score }
     }
 
-    /// Where each layer is said to give way, in mm.
+    /// Assigned rupture positions in mm.
     fn places(model: &Model, to_mm: f64, drops: &[ForceDrop]) -> Vec<f64> {
         assign_one_recording(&expected_ruptures(model, 1.0), &blocks(to_mm), drops, 0.01)
             .iter()
@@ -229,16 +231,16 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_is_expected_to_give_way_at_its_force_or_at_its_far_face() {
+    fn expected_rupture_is_by_force_or_at_the_far_interface() {
         let m = model(&[(20.0, 200.0, Some(2.0)), (10.0, 100.0, Some(3.0)), (30.0, 50.0, None)]);
         let told = expected_ruptures(&m, 0.5);
-        // Six tenths of what is believed to be uncertain, in mm: the surface, each thickness.
+        // 0.6 times the assumed tolerances in mm: the surface, each thickness.
         let (surface, first, second, third) = (0.6 * 2.0_f64, 0.6 * 2.0_f64, 0.6 * 1.0_f64, 0.6 * 3.0_f64);
         let own = |sd_mm: f64, thick_mm: f64| 1e-3 * (0.5 * sd_mm).hypot(0.2 + 0.01 * thick_mm);
         let wanted = [
-            // 2 N at 200 N/m are 10 mm, known to 17 percent.
+            // 2 N at 200 N/m are 10 mm, known to 17 %.
             (10.0, 20.0, own(surface.hypot(0.17 * 10.0), 20.0), 200.0),
-            // 3 N at 100 N/m are 30 mm: the face comes before, or not.
+            // 3 N at 100 N/m are 30 mm: the interface may come first.
             (30.0, 40.0, own(surface.hypot(first).hypot(second).hypot(0.3 * 0.17 * 30.0), 10.0), 100.0),
             (40.0, 70.0, own(surface.hypot(first).hypot(second).hypot(third), 30.0), 50.0),
         ];
@@ -251,9 +253,9 @@ mod tests {
     }
 
     #[test]
-    fn without_a_drop_a_layer_gives_way_where_it_is_expected_to_if_the_needle_gets_there() {
+    fn without_a_drop_a_layer_ruptures_where_expected() {
         let m = model(&[(20.0, 20.0, Some(0.2)), (20.0, 2.0, None)]);
-        // At 20 and at 50 mm: in the middle of the first block whose middle is there, of 0.2 mm each.
+        // At 20 and 50 mm: in the middle of the first block beyond, of 0.2 mm each.
         let first = |mm: f64| {
             let b = blocks(60.0);
             let middle = |k: usize| 0.1 + 10.0 * 0.5 * (b.start_s[k] + b.end_s[k]);
@@ -265,15 +267,16 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_that_gives_way_shows_a_drop_unless_it_is_too_weak() {
-        // At 20 mm, with 10 mm of stiffness over noise of 0.01 N: what is missed costs a fiftieth of that squared, 12 nats at most.
-        // Not to give way is free until it is passed by two and a half standard deviations.
+    fn a_rupture_without_a_drop_costs_the_drop_that_should_be_visible() {
+        // At 20 mm, with 10 mm of stretch over 0.01 N of noise: a missing drop costs a fiftieth of its squared
+        // score, at most 12 nats. Not to rupture is free until the layer is passed by two and a half standard
+        // deviations.
         let of = |stiffness: f64, to_mm: f64| {
             let m = model(&[(20.0, stiffness, Some(stiffness * 0.01))]);
             places(&m, to_mm, &[])[0].is_finite()
         };
         let sd_mm = 1.2_f64.hypot(1.7).hypot(0.4);
-        // `beyond` standard deviations further: half of its square and two nats.
+        // `beyond` standard deviations further: half of the square, and two nats.
         let to = |beyond: f64| 20.0 + sd_mm * (2.5 + beyond);
         let price = |stiffness: f64| (0.02 * (stiffness * 0.01 / 0.01).powi(2)).min(12.0);
         for stiffness in [12.0, 20.0, 80.0] {
@@ -281,20 +284,21 @@ mod tests {
             assert!(!of(stiffness, to(even - 0.1)), "{stiffness}");
             assert!(of(stiffness, to(even + 0.1)), "{stiffness}");
         }
-        // Price nearly nothing: yet only where it is passed.
+        // Nearly free, but only where the layer is passed.
         assert!(!of(1.0, to(-2.4)) && !of(9.0, to(-0.1)) && of(9.0, to(0.1)));
     }
 
     #[test]
-    fn a_drop_is_taken_by_a_layer_when_that_costs_less_than_to_leave_it() {
-        // Expected at 20 mm; the needle ends there, so that nothing else would cost anything.
+    fn a_drop_is_assigned_when_that_costs_less_than_leaving_it_unassigned() {
+        // Expected at 20 mm; the insertion ends there, so that nothing else costs anything.
         let m = model(&[(20.0, 200.0, Some(2.0))]);
         let sd_mm = 1.2_f64.hypot(1.7).hypot(0.4);
         let taken = |at_mm: f64, size_n: f64, score: f64| {
             let told = places(&m, 19.9, &[drop(at_mm, size_n, score)]);
             told[0].is_finite().then(|| are(&told, &[at_mm])).is_some()
         };
-        // A drop as large as the layer's force there, `off` standard deviations before: half of its square against 0.075 of the score's.
+        // A drop as large as the layer's force there, `off` standard deviations before: half of its square
+        // against 0.075 of the squared score.
         for score in [5.0, 8.0, 12.0] {
             let off = (2.0 * (0.075_f64 * score * score).min(12.0)).sqrt();
             for side in [-1.0, 1.0] {
@@ -304,9 +308,9 @@ mod tests {
                 assert!(!taken(at(off + 0.01), whole(at(off + 0.01)), score), "{score}");
             }
         }
-        // Never more than 12 nats.
+        // At most 12 nats.
         assert!(!taken(20.0 - 5.0 * sd_mm, 0.2, 100.0));
-        // Larger or smaller by a factor: its logarithm in units of 0.6, four nats at most.
+        // Larger or smaller by a factor: its logarithm in units of 0.6, at most four nats.
         for score in [5.0, 7.0] {
             let ratio = (0.6 * (0.15_f64 * score * score).sqrt()).exp();
             for (factor, within) in [(ratio * 0.99, true), (ratio * 1.01, false)] {
@@ -318,8 +322,8 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_before_a_layer_is_not_its_own() {
-        // Expected right behind its front at 10 mm: two standard deviations before the front is as early as it may be.
+    fn a_drop_before_the_front_of_a_layer_is_not_assigned_to_it() {
+        // Expected right behind its front at 10 mm: two standard deviations before the front is the earliest.
         let m = model(&[(20.0, 200.0, Some(0.02))]);
         let sd_mm = 1.2_f64.hypot(0.017).hypot(0.4);
         let taken = |at_mm: f64| places(&m, 10.05, &[drop(at_mm, 0.02, 9.0)])[0].is_finite();
@@ -327,26 +331,26 @@ mod tests {
     }
 
     #[test]
-    fn layers_give_way_in_their_order() {
+    fn layers_rupture_in_order() {
         let m = model(&[(20.0, 200.0, Some(2.0)), (20.0, 200.0, Some(2.0))]);
         // At 20 and 40 mm.
         let (one, two) = (drop(20.4, 2.0, 15.0), drop(39.0, 2.0, 15.0));
         are(&places(&m, 60.0, &[one, two]), &[20.4, 39.0]);
-        // The other way round they are told all the same.
+        // The order of the input does not matter.
         are(&places(&m, 60.0, &[two, one]), &[20.4, 39.0]);
-        // One drop is of one layer: the nearer one; the other gives way where it is expected to.
+        // A single drop belongs to the nearer layer; the other one ruptures where expected.
         let told = places(&m, 60.0, &[drop(37.0, 2.0, 15.0)]);
         assert!((told[0] - 20.0).abs() < 0.25 && told[1] == 37.0, "{told:?}");
-        // One that is expected before another does not give way after it.
+        // A layer does not rupture after the one behind it.
         let near = model(&[(20.0, 200.0, Some(3.0)), (20.0, 200.0, Some(0.2))]);
-        // At 25 and at 31 mm; drops at 30 and at 28 mm, of whatever size.
+        // Expected at 25 and 31 mm; drops at 30 and 28 mm of any size.
         let told = places(&near, 60.0, &[drop(28.0, 2.0, 30.0), drop(30.0, 2.0, 30.0)]);
         are(&told, &[28.0, 30.0]);
-        // What lies behind a layer that never gave way did not either.
+        // Behind a layer that did not rupture none does.
         are(&places(&m, 19.0, &[drop(18.9, 1e-6, 0.1)]), &[NO_RUPTURE, NO_RUPTURE]);
     }
 
-    /// A needle that goes in at 10 mm/s as far as `to_mm`, rests there, and goes back after 5 s.
+    /// Insertion at 10 mm/s to `to_mm`, a hold, retraction after 5 s.
     fn there_and_back(to_mm: f64) -> BlockAverages {
         let there_s = (to_mm - 0.1) / 10.0;
         let t: Vec<f64> = (0..1800).map(|k| f64::from(k) * 0.005).collect();
@@ -355,12 +359,12 @@ mod tests {
     }
 
     #[test]
-    fn no_layer_gives_way_on_old_ground() {
+    fn no_layer_ruptures_while_depths_are_revisited() {
         let m = model(&[(20.0, 200.0, Some(4.0))]);
         let of = |d: ForceDrop| {
             assign_one_recording(&expected_ruptures(&m, 1.0), &there_and_back(33.0), &[d], 0.01)[0]
         };
-        // The layer is expected at its face, 30 mm deep.
+        // Expected at its far interface, 30 mm deep.
         let there = drop(29.0, 2.0, 30.0);
         let back = ForceDrop { time_s: 5.0 + 0.4, ..there };
         assert_eq!(of(there), there.time_s);
@@ -368,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn where_most_recordings_agree_the_others_give_way_too() {
+    fn a_majority_of_recordings_determines_the_rupture_depth_of_the_others() {
         let m = model(&[(20.0, 200.0, Some(2.0))]);
         let all = [blocks(60.0), blocks(60.0), blocks(60.0)];
         let told = |drops: [&[ForceDrop]; 3]| -> Vec<f64> {
@@ -378,12 +382,12 @@ mod tests {
         let (at, far) = (drop(22.5, 2.0, 30.0), drop(26.0, 2.0, 30.0));
         let near = |told: f64| (told - 22.5).abs() < 0.2;
         assert!(near(told([&[at], &[at], &[]])[2]));
-        // Half is not most.
+        // Half is not a majority.
         assert!(told([&[at], &[far], &[]])[1] == 26.0);
     }
 
     #[test]
-    fn a_tissue_without_layers_has_no_instants() {
+    fn a_tissue_without_layers_has_no_rupture_times() {
         are(&places(&model(&[]), 30.0, &[drop(20.0, 1.0, 9.0)]), &[]);
     }
 }

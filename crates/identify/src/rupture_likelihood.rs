@@ -1,35 +1,36 @@
-//! What a rupture says of the law: the law's own condition for it, as a datum.
+//! Likelihood of a rupture time from the law's own rupture condition.
 //!
-//! A layer gives way when its elastic force reaches the puncture force `F (1 + s_F n)` or the tip its far face displaced by
-//! `s_z n'`, whichever comes first, `n, n'` standard normal: two competing risks. The density of the instant `tau` is
-//! `phi(u_F) u_F' Q(u_z) + phi(u_z) u_z' Q(u_F)` with `u_F = (f_K(tau)/F - 1)/s_F`, `u_z = (z(tau) - far)/s_z` and `Q` the
-//! upper tail of the normal distribution. It is smooth where the maximum of both is not. `s_F^2 = sigma_F^2 +
-//! (f_K' h/F)^2/12` and `s_z^2 = sigma_z^2 + (v h)^2/12` hold the scatter between insertions and what a sampling step `h`
-//! leaves open.
+//! A layer ruptures when its elastic force reaches the puncture force `F (1 + s_F n)` or the tip reaches the
+//! far interface displaced by
+//! `s_z n'`, whichever comes first, with `n, n'` standard normal: two competing risks. The density of the rupture time `tau` is
+//! `phi(u_F) u_F' Q(u_z) + phi(u_z) u_z' Q(u_F)` with `u_F = (f_K(tau)/F - 1)/s_F`, `u_z = (z(tau) - far)/s_z` and the normal upper tail
+//! `Q`; unlike the maximum of both risks it is smooth. `s_F^2 = sigma_F^2 + (f_K' h/F)^2/12` and `s_z^2 = sigma_z^2 + (v h)^2/12`
+//! combine the scatter between recordings with the uniform timing error of a sampling interval `h`.
 
 use crate::model::Scatter;
 
-/// A layer and one recording: how near it was to giving way.
+/// State of a layer in one recording, relative to its rupture conditions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RuptureEvent {
-    /// Force beyond the puncture force at the instant, relative to it; minus infinity without a puncture force.
+    /// Elastic force over the puncture force, minus one, at the rupture time; minus infinity without a puncture
+    /// force.
     pub force_excess: f64,
-    /// Position beyond the far face in m.
+    /// Position beyond the far interface in m.
     pub depth_excess_m: f64,
-    /// Change of `force` per s.
+    /// Rate of `force_excess` in 1/s.
     pub force_excess_rate: f64,
-    /// Change of `place_m` per s.
+    /// Rate of `depth_excess_m` in m/s.
     pub depth_rate_mps: f64,
     /// Elastic force in N.
     pub elastic_n: f64,
     /// Whether the layer ruptured.
     pub ruptured: bool,
-    /// Time between samples in s.
+    /// Sampling interval in s.
     pub sample_step_s: f64,
 }
 
 impl RuptureEvent {
-    /// Before any sample.
+    /// State before the first sample.
     pub const INITIAL: Self = Self {
         force_excess: f64::NEG_INFINITY,
         depth_excess_m: f64::NEG_INFINITY,
@@ -40,31 +41,31 @@ impl RuptureEvent {
         sample_step_s: 0.0,
     };
 
-    /// Whether a puncture force is known.
+    /// Whether the layer has a puncture force.
     fn has_puncture_force(&self) -> bool {
         self.force_excess.is_finite()
     }
 }
 
-/// Relative error of a force at rupture that no sampling explains: rounding and interpolation of the motion.
+/// Relative error of a force at rupture from rounding and interpolation of the motion.
 const MIN_FORCE_SD: f64 = 1e-4;
-/// The same of a position, in m.
+/// The same for a position, in m.
 const MIN_DEPTH_SD_M: f64 = 1.5e-6;
-/// Slowest speed in m/s at which an instant tells a place.
+/// Lowest velocity in m/s at which a rupture time determines a depth.
 const MIN_RATE_MPS: f64 = 2e-5;
 
-/// Rows of a least-squares problem that stand for one event, and its negative logarithmic likelihood.
+/// Likelihood of one rupture, also as rows of a least-squares problem.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RuptureLikelihood {
-    /// Residuals: by force, by place, not yet by place, not yet by force.
+    /// Residuals: by force, by depth, not yet by depth, not yet by force.
     pub rows: [f64; 4],
-    /// Nats.
+    /// Negative log likelihood in nats.
     pub nats: f64,
-    /// Square roots of the shares of force and place.
+    /// Square roots of the shares of force and depth.
     pub shares: [f64; 2],
 }
 
-/// `-ln Q(u)`, `Q` the upper tail of the normal distribution.
+/// `-ln Q(u)` with the upper tail `Q` of the normal distribution.
 fn neg_ln_survival(u: f64) -> f64 {
     if u < -8.0 {
         return 0.0;
@@ -80,12 +81,12 @@ fn ln_phi(u: f64) -> f64 {
     -0.5 * u * u - 0.918_938_533_204_672_7
 }
 
-/// `-ln Q` as a residual: its square is twice the nats.
+/// Converts nats to a residual whose square is twice the nats.
 fn deviance_residual(nats: f64) -> f64 {
     (2.0 * nats.max(0.0)).sqrt()
 }
 
-/// Standard deviations of force (relative) and place (m).
+/// Standard deviations of force (relative) and depth (m) at rupture.
 #[must_use]
 pub fn rupture_sds(event: &RuptureEvent, scatter: &Scatter) -> (f64, f64) {
     const TWELFTH: f64 = 1.0 / 12.0;
@@ -97,7 +98,7 @@ pub fn rupture_sds(event: &RuptureEvent, scatter: &Scatter) -> (f64, f64) {
     )
 }
 
-/// Judges an event.
+/// Evaluates the likelihood of a rupture, or of its absence.
 #[must_use]
 pub fn evaluate_rupture(event: &RuptureEvent, scatter: &Scatter) -> RuptureLikelihood {
     let (s_f, s_z) = rupture_sds(event, scatter);
@@ -125,7 +126,7 @@ pub fn evaluate_rupture(event: &RuptureEvent, scatter: &Scatter) -> RuptureLikel
     RuptureLikelihood { rows: rows(u_f, u_z, shares, true), nats: -total, shares }
 }
 
-/// Rows of an event with the shares of the two risks and the spreads as `at` has them: for derivatives.
+/// Residual rows of `event` with the risk shares and standard deviations of `at`: for derivatives.
 #[must_use]
 pub fn rupture_rows_at(event: &RuptureEvent, scatter: &Scatter, at: &RuptureEvent) -> [f64; 4] {
     let (s_f, s_z) = rupture_sds(at, scatter);
@@ -157,7 +158,7 @@ fn rows(u_f: f64, u_z: f64, [w_f, w_z]: [f64; 2], has_force: bool) -> [f64; 4] {
     }
 }
 
-/// The scatter of force and place under which events are likeliest, by golden section in each, in turn.
+/// Most likely scatter of force and depth, by alternating grid searches.
 #[must_use]
 pub fn estimate_rupture_scatter(events: &[RuptureEvent], start: &Scatter) -> Scatter {
     let mut best = *start;
@@ -176,14 +177,14 @@ pub fn estimate_rupture_scatter(events: &[RuptureEvent], start: &Scatter) -> Sca
     best
 }
 
-/// Scatter has to be asked for: half a nat per factor e above the smallest.
+/// Prior on the scatter: half a nat per factor e above the smallest.
 #[must_use]
 pub fn scatter_prior_nats(s: &Scatter) -> f64 {
     let of = |ratio: f64| 0.25 * libm::log(1.0 + ratio * ratio);
     of(s.rupture_force / 5e-4) + of(s.rupture_depth_m / 5e-6)
 }
 
-/// Scatters of the force (relative) that are tried.
+/// Trial scatters of the force (relative).
 pub const FORCE_SCATTER_GRID: [f64; 13] =
     [0.0, 5e-4, 1e-3, 2e-3, 4e-3, 7e-3, 0.012, 0.02, 0.033, 0.055, 0.09, 0.15, 0.3];
 const DEPTH_SCATTER_GRID_M: [f64; 12] =
@@ -213,7 +214,7 @@ mod tests {
         Scatter { rupture_force: force, rupture_depth_m: place_m, ..Scatter::default() }
     }
 
-    /// A layer that has given way, its force by 3 % beyond the threshold, its place 0.4 mm before the far face.
+    /// A ruptured layer with its force 3 % above the threshold, 0.4 mm before the far interface.
     const BOTH: RuptureEvent = RuptureEvent {
         force_excess: 0.03,
         depth_excess_m: -4e-4,
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn spreads_hold_the_scatter_the_sampling_and_what_rounding_leaves() {
+    fn rupture_sds_combine_scatter_sampling_and_rounding() {
         let (force, place) = rupture_sds(&BOTH, &scatter(0.02, 3e-5));
         near(force, (0.02_f64 * 0.02 + 0.0035 * 0.0035 / 12.0 + 1e-8).sqrt());
         near(place, (3e-5_f64 * 3e-5 + 2.5e-5 * 2.5e-5 / 12.0 + 2.25e-12).sqrt());
@@ -239,12 +240,13 @@ mod tests {
     }
 
     #[test]
-    fn what_survives_is_the_upper_tail_of_the_normal_distribution() {
+    fn survival_is_the_upper_tail_of_the_normal_distribution() {
         for u in [-8.0, -7.5, -3.1, -0.2, 0.0, 0.7, 2.4, 8.3, 19.7, 25.0] {
             near(neg_ln_survival(u), -libm::log(normal::sf(u)));
         }
         assert_eq!(neg_ln_survival(-8.1), 0.0);
-        // Beyond, by the first term of its asymptotic series, of which the second is smaller by the square of the deviate.
+        // Beyond by the first term of the asymptotic series; the second is smaller by the square of the
+        // deviate.
         for u in [25.1, 27.3, 31.0] {
             near(neg_ln_survival(u), 0.5 * u * u + libm::log(u * core::f64::consts::TAU.sqrt()));
             assert!((neg_ln_survival(u) + libm::log(normal::sf(u))).abs() < 1.1 / (u * u), "{u}");
@@ -253,11 +255,11 @@ mod tests {
         near(ln_phi(0.0), -0.5 * libm::log(core::f64::consts::TAU));
     }
 
-    /// The probabilities of all instants, and of none, add up to one.
+    /// The probabilities of all rupture times and of no rupture sum to one.
     #[test]
-    fn two_competing_risks_are_a_distribution_of_the_instant() {
+    fn competing_risks_form_a_probability_distribution_of_the_rupture_time() {
         let s = scatter(0.06, 4e-4);
-        // The tip reaches the far face 0.06 s after the force has reached its threshold.
+        // The tip reaches the far interface 0.06 s after the force reaches its threshold.
         let (place_rate, force_rate) = (0.005, 0.8);
         let at = |t: f64, ruptured: bool| RuptureEvent {
             force_excess: force_rate * t,
@@ -278,7 +280,7 @@ mod tests {
             let later = libm::exp(-evaluate_rupture(&at(-0.8 + steps as f64 * dt, false), &s).nats);
             assert!((until + later - 1.0).abs() < 1e-6, "{until} and {later} until {end}");
         }
-        // Without a puncture force by the far face alone.
+        // Without a puncture force: by the far interface only.
         let alone =
             |t: f64, ruptured: bool| RuptureEvent { force_excess: f64::NEG_INFINITY, ..at(t, ruptured) };
         let steps = 8600;
@@ -291,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_deviates_under_the_shares_of_both_risks() {
+    fn residual_rows_are_deviates_weighted_by_risk_shares() {
         let s = scatter(0.02, 3e-4);
         let told = evaluate_rupture(&BOTH, &s);
         let (s_f, s_z) = rupture_sds(&BOTH, &s);
@@ -313,7 +315,7 @@ mod tests {
             near(row, wanted);
         }
         assert_eq!(rupture_rows_at(&BOTH, &s, &BOTH), told.rows);
-        // A layer that holds: neither by force nor by place, yet.
+        // A layer that holds: neither by force nor by depth so far.
         let holds = RuptureEvent { ruptured: false, ..BOTH };
         let told = evaluate_rupture(&holds, &s);
         near(told.nats, -libm::log(normal::sf(u_f)) - libm::log(normal::sf(u_z)));
@@ -321,7 +323,7 @@ mod tests {
         near(told.rows[2], tail(u_z));
         near(told.rows[3], tail(u_f));
         assert_eq!(rupture_rows_at(&holds, &s, &holds), told.rows);
-        // Without a puncture force only the place tells.
+        // Without a puncture force only the depth counts.
         let plain = RuptureEvent { force_excess: f64::NEG_INFINITY, ..BOTH };
         let told = evaluate_rupture(&plain, &s);
         assert_eq!((told.shares, told.rows[0], told.rows[2], told.rows[3]), ([0.0, 1.0], 0.0, 0.0, 0.0));
@@ -334,9 +336,9 @@ mod tests {
         assert_eq!(rupture_rows_at(&plain, &s, &plain), evaluate_rupture(&plain, &s).rows);
     }
 
-    /// For a derivative the shares and the spreads stay as they were, and only the deviates move.
+    /// For derivatives the shares and standard deviations stay fixed.
     #[test]
-    fn rows_like_those_of_another_event_have_its_shares_and_spreads() {
+    fn rows_for_derivatives_keep_shares_and_standard_deviations() {
         let s = scatter(0.02, 3e-4);
         let (s_f, s_z) = rupture_sds(&BOTH, &s);
         let shares = evaluate_rupture(&BOTH, &s).shares;
@@ -360,9 +362,9 @@ mod tests {
         );
     }
 
-    /// An instant told by a needle that hardly moves, or goes back, says no more than one told at the slowest speed.
+    /// A needle that hardly moves or retracts carries no more information than at the lowest velocity.
     #[test]
-    fn the_slowest_needle_tells_as_if_it_went_at_a_fiftieth_of_a_millimetre_per_second() {
+    fn rates_are_bounded_below_at_20_um_per_second() {
         let s = scatter(0.02, 3e-4);
         let rates = |force_rate: f64, place_rate: f64| {
             evaluate_rupture(
@@ -378,7 +380,7 @@ mod tests {
         };
         near(rates(0.0, 0.0), rates(2e-3, 2e-5));
         assert!(rates(2.1e-3, 2e-5) < rates(2e-3, 2e-5) && rates(2e-3, 2.1e-5) < rates(2e-3, 2e-5));
-        // A sampling step of nothing counts as a microsecond.
+        // A zero sampling interval counts as a microsecond.
         near(
             rates(2e-3, 2e-5),
             evaluate_rupture(
@@ -390,16 +392,16 @@ mod tests {
     }
 
     #[test]
-    fn a_scatter_is_asked_for_by_half_a_nat_per_factor_e() {
+    fn the_scatter_prior_is_half_a_nat_per_factor_e() {
         near(scatter_prior_nats(&scatter(5e-4, 0.0)), 0.25 * libm::log(2.0));
         near(scatter_prior_nats(&scatter(0.0, 1.5e-5)), 0.25 * libm::log(10.0));
         let e = |x: f64| scatter_prior_nats(&scatter(x * 1.0, 0.0));
         assert!((e(core::f64::consts::E) - e(1.0) - 0.5).abs() < 1e-6);
     }
 
-    /// Ruptures told by deviates of a known size: the scatter found is that of the grid which is nearest.
+    /// Ruptures with deviates of known size: the estimate is the nearest grid value.
     #[test]
-    fn a_scatter_is_found_as_the_ruptures_have_it() {
+    fn the_estimated_scatter_is_the_nearest_grid_value() {
         let deviates = [-1.6, -1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0, 1.6];
         for sd in [0.004, 0.02, 0.09] {
             let of = |u: f64| RuptureEvent {
@@ -423,12 +425,12 @@ mod tests {
             let told = estimate_rupture_scatter(&events, &scatter(0.3, 1e-3));
             assert_eq!((told.rupture_force, told.rupture_depth_m), (0.0, sd), "{sd}");
         }
-        // Without any, as it was.
+        // Unchanged without ruptures.
         assert_eq!(estimate_rupture_scatter(&[], &scatter(0.3, 1e-3)), scatter(0.3, 1e-3));
     }
 
     #[test]
-    fn of_values_alike_the_first_is_taken() {
+    fn of_equal_minima_the_first_is_taken() {
         let grid = [0.0, 1.0, 2.0, 3.0, 4.0];
         assert_eq!(grid_minimizer(|x| (x - 2.2).powi(2), &grid), 2.0);
         assert_eq!(grid_minimizer(|x| if x < 1.5 { 1.0 } else { 1.0 - 5e-10 }, &grid), 0.0);

@@ -1,4 +1,4 @@
-//! What every effect would gain, to first order: columns projected out of everything that is fitted already.
+//! Score test: first-order gain of additional columns, projected onto the complement of all fitted parameters.
 
 use crate::fit::{Fit, JacobianColumn, Linearization};
 use crate::likelihood::FitData;
@@ -7,33 +7,33 @@ use crate::noise::HUBER_LOSS;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 use stylet_tissue::{EffectInfo, FitScale};
 
-/// The linear picture of a fit, ready for columns.
+/// Linearization of a fit, ready to test columns.
 pub struct ScoreTest<'a> {
     /// The fit.
     pub fit: &'a Fit,
     /// The data.
     pub data: &'a FitData,
-    /// Its linear picture.
+    /// Linearization of the fit.
     pub linearization: Linearization,
     factor: CholeskyFactor,
     half_neg_gradient: Vec<f64>,
 }
 
-/// What columns would gain.
+/// Result of testing columns.
 #[derive(Clone, Debug, Default)]
 pub struct ScoreTestResult {
-    /// Nats.
+    /// Gain in nats.
     pub nats: f64,
-    /// The coefficient of every column.
+    /// Coefficient of every column.
     pub coefficients: Vec<f64>,
-    /// Nats that the columns would show at coefficients of one, after everything fitted has imitated them.
+    /// Nats that the columns would contribute with unit coefficients, after projection.
     pub detectable_nats: f64,
-    /// Share of the columns' size that is left after that.
+    /// Share of the columns' squared norm that remains after projection.
     pub unexplained_share: f64,
 }
 
 impl<'a> ScoreTest<'a> {
-    /// The picture around a fit.
+    /// Linearization around a fit.
     #[must_use]
     pub fn new(fit: &'a Fit, data: &'a FitData) -> Self {
         let tangent = Linearization::new(&fit.model, data, &fit.residuals);
@@ -42,7 +42,7 @@ impl<'a> ScoreTest<'a> {
         Self { fit, data, linearization: tangent, factor, half_neg_gradient: slope }
     }
 
-    /// What columns would gain together.
+    /// Joint gain of columns.
     #[must_use]
     pub fn gain(&self, columns: &[JacobianColumn]) -> ScoreTestResult {
         let recordings = self.data.recording_count();
@@ -76,20 +76,20 @@ impl<'a> ScoreTest<'a> {
         }
     }
 
-    /// The column of an effect with these values, beside the fitted model.
+    /// Column of an effect with these values, added to the fitted model.
     #[must_use]
     pub fn effect_column(&self, choice: &EffectTerm) -> Option<JacobianColumn> {
         let model = self.fit.model.with_effect(choice.clone());
         self.linearization.difference(&self.fit.model, self.data, &self.fit.residuals, &model)
     }
 
-    /// The column of a change of another model.
+    /// Column of the difference to another model.
     #[must_use]
     pub fn model_change_column(&self, other: &Model) -> Option<JacobianColumn> {
         self.linearization.difference(&self.fit.model, self.data, &self.fit.residuals, other)
     }
 
-    /// The column of a predicted force given block by block (N), one vector per recording.
+    /// Column of a force given per block (N), one vector per recording.
     #[must_use]
     pub fn force_column(&self, force: &[Vec<f64>]) -> JacobianColumn {
         let mut column = JacobianColumn::default();
@@ -105,7 +105,7 @@ impl<'a> ScoreTest<'a> {
     }
 }
 
-/// The values at which columns with these coefficients stand: strengths scaled, shapes as they are.
+/// Effect values for these coefficients: strengths are scaled, shape parameters keep their values.
 #[must_use]
 pub fn scale_strengths(info: &EffectInfo, group: &[&[f64]], coefficients: &[f64]) -> Vec<f64> {
     info.parameters
@@ -122,7 +122,7 @@ pub fn scale_strengths(info: &EffectInfo, group: &[&[f64]], coefficients: &[f64]
             let value = neutral + sum;
             let (from, to) = p.search;
             if scale == FitScale::Reciprocal {
-                // No softer than a fit may go.
+                // Not more compliant than a fit may go.
                 1.0 / value.clamp(1e-12, 10.0 / from)
             } else {
                 value.clamp(p.low.max(from - (to - from)), p.high.min(to + 3.0 * (to - from)))
@@ -146,7 +146,7 @@ mod tests {
         assert!((told - wanted).abs() <= 1e-6 * wanted.abs().max(1e-9), "{told} for {wanted}");
     }
 
-    /// Two recordings of a layer that does not give way, and a law that is a little off.
+    /// Two recordings of a layer that does not rupture, and a model that is slightly off.
     fn given() -> (Fit, FitData) {
         let layer = Layer {
             thickness_m: 0.03,
@@ -179,7 +179,7 @@ mod tests {
         (Fit { model, residuals }, data)
     }
 
-    /// Gauss's elimination with pivots.
+    /// Gaussian elimination with pivoting.
     fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
         let n = b.len();
         for i in 0..n {
@@ -206,11 +206,11 @@ mod tests {
     }
 
     #[test]
-    fn columns_gain_what_they_would_in_one_system_with_all_that_is_fitted() {
+    fn the_score_test_agrees_with_the_joint_system() {
         let (fit, data) = given();
         let look = ScoreTest::new(&fit, &data);
         let n = look.linearization.normal_matrix.size;
-        // Surface, stiffness, friction, thickness; a surface of each recording's own, and an instant that never was.
+        // Surface, stiffness, friction, thickness; a surface offset per recording, and a layer without rupture.
         assert_eq!(n, 8);
         let force = |f: &dyn Fn(usize, f64) -> f64| -> Vec<Vec<f64>> {
             let one = |r: usize| data.recordings[r].start_s.iter().map(|t| f(r, *t)).collect();
@@ -221,7 +221,7 @@ mod tests {
             look.force_column(&force(&|r, t| if r == 1 { 0.3 * t * t } else { 0.1 })),
         ];
         let told = look.gain(&columns);
-        // Everything at once.
+        // All columns in one system.
         let against: Vec<Vec<f64>> = columns.iter().map(|c| look.linearization.products_with(c, 2)).collect();
         let mut whole = vec![vec![0.0; n + 2]; n + 2];
         let mut slope = look.linearization.neg_gradient.clone();
@@ -251,7 +251,7 @@ mod tests {
         for (told, wanted) in told.coefficients.iter().zip(&x[n..]) {
             near(*told, *wanted);
         }
-        // What is left of both columns together when all others have imitated them.
+        // Remainder of both columns after projection.
         let both: Vec<f64> = (0..n).map(|i| against[0][i] + against[1][i]).collect();
         let size: f64 =
             (0..2).flat_map(|c| (0..2).map(move |d| (c, d))).map(|(c, d)| whole[n + c][n + d]).sum();
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn an_effect_has_the_column_of_its_force() {
+    fn an_effect_column_is_that_of_its_force() {
         let (fit, data) = given();
         let look = ScoreTest::new(&fit, &data);
         let bias = EffectTerm::new(effect_info("force_bias").expect("in the library"), &[0.03]);
@@ -280,7 +280,7 @@ mod tests {
                 assert!((told - wanted).abs() < 1e-9 && told == changed, "{told} for {wanted}");
             }
         }
-        // Rough residuals weigh less: a force beyond two and a half standard deviations by the root of its excess.
+        // Large residuals have less weight: the square root of their excess over 2.5 standard deviations.
         let mut rough = fit.clone();
         rough.residuals.innovations[0][7] = -10.0;
         let weighed = ScoreTest::new(&rough, &data).force_column(&force);
@@ -289,22 +289,22 @@ mod tests {
     }
 
     #[test]
-    fn strengths_are_scaled_within_a_wider_range_than_is_searched() {
+    fn strengths_are_scaled_within_an_extended_search_range() {
         let of = |id: &str, group: &[&[f64]], coefficients: &[f64]| {
             scale_strengths(effect_info(id).expect("in the library"), group, coefficients)
         };
         near(of("force_bias", &[&[0.1]], &[7.0])[0], 0.7);
-        // Searched from -2 to 2 N: once that further down, three times further up.
+        // Searched from -2 to 2 N: the range once below, three times above.
         assert_eq!(of("force_bias", &[&[0.1]], &[1e3]), [14.0]);
         assert_eq!(of("force_bias", &[&[0.1]], &[-1e3]), [-6.0]);
-        // As far as the library allows.
+        // Within the library's limits.
         assert_eq!(of("rate_dependent_puncture", &[&[0.02]], &[1e3]), [2.0]);
         assert_eq!(of("coulomb_friction", &[&[1.0]], &[-3.0]), [0.0]);
         near(of("coulomb_friction", &[&[1.0]], &[1e4])[0], 100.0 + 3.0 * 99.95);
-        // Two columns: strengths add up, the speed stays.
+        // Two columns: strengths add, the Stribeck velocity stays.
         let told = of("stribeck_friction", &[&[1.0, 1.0, 3e-4], &[0.0, 1.0, 3e-4]], &[2.0, 0.5]);
         assert_eq!(told, [2.0, 2.5, 3e-4]);
-        // Softness adds up, down to a tenth of the softest that is searched.
+        // Compliances add, up to ten times the largest one searched.
         near(of("needle_compliance", &[&[1500.0]], &[2.0])[0], 750.0);
         near(of("needle_compliance", &[&[1500.0]], &[1e4])[0], 5.0);
         near(of("needle_compliance", &[&[1500.0]], &[-1.0])[0], 1e12);

@@ -1,16 +1,16 @@
-//! Ruptures moved to where a model wants them: a derivative sees only the block in which an instant lies.
+//! Moves rupture times by direct search: a derivative sees only the block in which a time lies.
 
 use crate::likelihood::{FitData, ReplayCache};
 use crate::model::{Model, NO_RUPTURE};
 use rayon::prelude::*;
 
-/// Moves in blocks that are tried in either direction.
+/// Trial moves in blocks, in either direction.
 const MOVES_BLOCKS: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 9.0, 20.0];
-/// A gain in nats that is worth a move.
+/// Smallest gain in nats for which a time is moved.
 const MIN_GAIN_NATS: f64 = 1e-6;
 
-/// Moves every instant to the best of its neighbourhood, of the law's own rupture and of the drops given (s, per
-/// recording). True when one moved.
+/// Moves every rupture time to the best of its neighbourhood, of the law's own rupture time and of the given
+/// force drops (s, per recording). Returns true when one moved.
 pub fn update_event_times(model: &mut Model, data: &FitData, drops: &[Vec<f64>]) -> bool {
     let fixed = model.clone();
     let moved: Vec<(Vec<f64>, bool)> = (0..data.recording_count())
@@ -34,7 +34,7 @@ fn update_one_recording(model: &Model, data: &FitData, r: usize, drops: &[f64]) 
     let own = trail.free_rupture_times();
     let mut best = trail.nats_with_ruptures(model, data, r, &instants);
     let mut moved = false;
-    // The law's own ruptures all at once: an earlier one carries the later ones along.
+    // All rupture times of the law at once: an earlier one shifts the later ones.
     if own.iter().zip(&instants).any(|(a, b)| a != b) {
         let value = trail.nats_with_ruptures(model, data, r, &own);
         if value < best - MIN_GAIN_NATS {
@@ -86,7 +86,7 @@ mod tests {
     use stylet_record::Recording;
     use stylet_tissue::{Layer, Tissue};
 
-    /// Three layers of 15 mm, 100 N/m each; the needle goes in by 5 mm/s.
+    /// Three layers of 15 mm, 100 N/m each; insertion at 5 mm/s.
     fn model(puncture: [f64; 3]) -> Model {
         let layer = |k: usize| Layer {
             thickness_m: 0.015,
@@ -105,7 +105,7 @@ mod tests {
         Model::base(Arc::new(belief), 1)
     }
 
-    /// The force that a model gives with ruptures at these instants, up to so many s.
+    /// Data simulated with ruptures at these times, up to `to_s` seconds.
     fn data(model: &Model, instants: &[f64], to_s: f64) -> FitData {
         let n = (to_s * 200.0).round() as usize;
         let t: Vec<f64> = (0..n).map(|k| k as f64 * 0.005).collect();
@@ -118,10 +118,10 @@ mod tests {
         FitData::new(Arc::new(vec![blocks]), Noise::white(0.01), 0.0)
     }
 
-    /// Where `retime` moves ruptures to in data of ruptures at `truth`, and whether it says so.
+    /// Rupture times after the update for data with ruptures at `truth`, and whether any moved.
     fn moved(model: &Model, truth: &[f64], from: &[f64], drops: &[f64], to_s: f64) -> (Vec<f64>, bool) {
         let mut model = model.clone();
-        // A wide scatter: the force itself tells.
+        // Wide scatter: the force residuals decide.
         model.scatter.rupture_force = 0.3;
         model.scatter.rupture_depth_m = 5e-3;
         model.rupture_times_s = vec![from.to_vec()];
@@ -131,10 +131,10 @@ mod tests {
     }
 
     #[test]
-    fn instants_move_by_blocks_to_where_the_force_falls() {
+    fn rupture_times_move_to_the_force_drops() {
         let m = model([1.3; 3]);
         let truth = [3.013, 6.017, 8.551];
-        // Moves by half a block, one, two, four, nine, twenty, and what they add up to.
+        // Moves of half a block, one, two, four, nine, twenty, and sums of them.
         for blocks in [0.5, 1.0, 2.0, 4.0, 9.0, 20.0] {
             for side in [-1.0, 1.0] {
                 for layer in 0..3 {
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_far_away_is_tried_too() {
+    fn a_distant_drop_is_tried() {
         let m = model([1.3; 3]);
         let truth = [3.013, 6.017, 8.551];
         let from = [3.013, 4.4, 8.551];
@@ -162,8 +162,8 @@ mod tests {
     }
 
     #[test]
-    fn the_laws_own_ruptures_are_tried_all_at_once() {
-        // By its force each layer gives way 10 mm behind its front: an earlier rupture makes those after it late.
+    fn all_ruptures_of_the_law_are_tried_together() {
+        // By force each layer ruptures 10 mm behind its front: an earlier rupture delays the later ones.
         let m = model([1.0; 3]);
         let own = {
             let silent = data(&m, &[NO_RUPTURE; 3], 11.0);
@@ -176,17 +176,17 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_that_never_gave_way_may_have_and_the_other_way_round() {
+    fn ruptures_can_appear_and_disappear() {
         let m = model([1.3, 1.3, 100.0]);
-        // The last one: by a drop where the force has one.
+        // The last layer: at a force drop.
         let truth = [3.013, 6.017, 8.551];
         let (told, any) = moved(&m, &truth, &[3.013, 6.017, NO_RUPTURE], &[8.551], 9.5);
         assert!(any && told == truth, "{told:?}");
-        // Nothing fell: it never did.
+        // Without a drop it did not rupture.
         let never = [3.013, 6.017, NO_RUPTURE];
         let (told, any) = moved(&m, &never, &[3.013, 6.017, 9.1], &[], 9.5);
         assert!(any && told == never, "{told:?}");
-        // One that another came after gave way.
+        // A layer before a ruptured one has ruptured.
         let (told, _) = moved(&m, &never, &[3.1, NO_RUPTURE, NO_RUPTURE], &[6.017, 3.013], 9.5);
         assert_eq!(told, never);
         let (told, _) = moved(&m, &[NO_RUPTURE; 3], &[NO_RUPTURE; 3], &[], 2.5);
@@ -194,10 +194,10 @@ mod tests {
     }
 
     #[test]
-    fn instants_stay_in_their_order_and_inside_the_recording() {
+    fn rupture_times_stay_ordered_and_inside_the_recording() {
         let m = model([1.3; 3]);
         let truth = [3.013, 6.017, 8.551];
-        // Drops that are tried for every layer, most of them out of order, some outside.
+        // Drops tried for every layer, most out of order, some outside the recording.
         let drops: Vec<f64> = (-10..=130).map(|k| 0.1 * f64::from(k)).collect();
         for from in [[5.0, 5.01, 5.02], [1.0, 9.0, 9.1], [0.1, 0.2, 10.0], [3.0, 3.0, 3.0]] {
             let (told, _) = moved(&m, &truth, &from, &drops, 11.0);
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn every_recording_has_drops_of_its_own() {
+    fn each_recording_uses_its_own_drops() {
         let mut m = model([1.3; 3]);
         m.scatter.rupture_force = 0.3;
         m.scatter.rupture_depth_m = 5e-3;
@@ -220,7 +220,7 @@ mod tests {
         let first = m.clone();
         assert!(update_event_times(&mut m, &both, &[vec![6.017], vec![6.317]]));
         assert_eq!(m.rupture_times_s, [one, two]);
-        // A recording that nobody gave drops of is tried all the same.
+        // A recording without given drops is updated as well.
         let mut m = first;
         assert!(update_event_times(&mut m, &both, &[vec![6.017]]));
         assert_eq!(m.rupture_times_s[0], one);

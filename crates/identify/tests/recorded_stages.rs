@@ -1,10 +1,10 @@
-//! No stage of the identification changes unnoticed.
+//! Regression test of every stage of the identification.
 //!
-//! Seven small synthetic insertions, each of its own character, go through velocity, motion, phases, blocks, drops, assignment, fit, noise,
-//! trials of effects and intervals. What each stage says is compared with `recorded_stages.txt`: a name, and one number or several, ten
-//! digits of them. The search for a model has many branches that no formula tells; where one is known, the other tests of this crate hold it.
-//! Whoever changes a stage on purpose records anew (`STYLET_RECORD=1 cargo test -p stylet-identify --test recorded_stages`) and explains
-//! the difference. Where the truth is known, what is said is near it, whatever is recorded.
+//! Seven small synthetic insertions go through velocity, motion, phases, blocks, drops, assignment, fit, noise,
+//! effect trials and intervals. The results of each stage are compared with `recorded_stages.txt`: a name and
+//! one or several numbers with ten digits. This covers branches of the model search that no closed form
+//! describes. After an intended change record again (`STYLET_RECORD=1 cargo test -p stylet-identify --test
+//! recorded_stages`) and explain the difference. Where the truth is known, estimates are also compared with it.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -20,24 +20,24 @@ use stylet_identify::force_drops::detect_force_drops;
 use stylet_identify::insertion_phases;
 use stylet_identify::likelihood::{FitData, ReplayCache, prior_nats, replay, residuals, rupture_nats};
 use stylet_identify::model::{Assumptions, DayParameters, EffectTerm, Model, NO_RUPTURE, ParameterRole};
+use stylet_identify::motion::smooth_positions;
+use stylet_identify::motion::{Motion, MotionPiece};
+use stylet_identify::motion::{VelocityJump, estimate_velocity};
 use stylet_identify::noise::{Noise, NoiseSource};
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::rupture_likelihood::{estimate_rupture_scatter, evaluate_rupture, rupture_sds};
 use stylet_identify::score_test::{ScoreTest, scale_strengths};
 use stylet_identify::update_event_times::update_event_times;
 use stylet_record::Recording;
-use stylet_record::motion::smooth_positions;
-use stylet_record::motion::{Motion, MotionPiece};
-use stylet_record::motion::{VelocityJump, estimate_velocity};
 use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 use stylet_tissue::{
     AnyEffect, ForceLaw, ForceLawState, Layer, MeasurementChain, SensorInput, Tissue, effect_info,
     general_effects,
 };
 
-// ---- What is written down ----
+// ---- Recorded values ----
 
-/// What the stages say of one insertion, or of several: names and numbers in their order.
+/// Results of all stages for one insertion or several: names and numbers in order.
 #[derive(Default)]
 struct Said(Vec<(String, Vec<f64>)>);
 
@@ -54,7 +54,8 @@ impl Said {
         self.number(name, count as f64);
     }
 
-    /// A column by its mean, its root mean square, that of its differences, and its mean under weights that no two elements share.
+    /// Summary of a column: mean, root mean square, that of its differences, and a weighted mean with distinct
+    /// weights.
     fn column(&mut self, name: &str, x: &[f64]) {
         let n = x.len().max(1) as f64;
         let mean = |f: &dyn Fn(usize) -> f64| (0..x.len()).map(f).sum::<f64>() / n;
@@ -130,7 +131,7 @@ impl Said {
         self.numbers(name, &told);
     }
 
-    /// Estimates: shared numbers, each recording's own, scatter, instants; and what they leave.
+    /// Estimates: shared and per-recording parameters, scatter, rupture times, residuals.
     fn fit(&mut self, name: &str, f: &Fit, data: &FitData) {
         let m = &f.model;
         let nats = [f.nats(), rupture_nats(m, &f.residuals), prior_nats(m)];
@@ -161,7 +162,7 @@ impl Said {
     }
 }
 
-/// Numbers are compared to this share of themselves, or to [`NOTHING`] of the largest in their line.
+/// Relative tolerance, and absolute tolerance relative to the largest number of the line.
 const ALIKE: f64 = 1e-7;
 const NOTHING: f64 = 1e-10;
 
@@ -195,7 +196,7 @@ fn parsed(text: &str) -> BTreeMap<&str, Vec<f64>> {
     text.lines().filter_map(|l| line(l).map(|(at, x)| (&l[..at], x))).collect()
 }
 
-/// Whether two lines of numbers are the same.
+/// Whether two lines of numbers agree.
 fn alike(a: &[f64], b: &[f64]) -> bool {
     let size = a.iter().filter(|x| x.is_finite()).fold(1e-15_f64, |m, x| m.max(x.abs()));
     let same = |(a, b): (&f64, &f64)| {
@@ -206,10 +207,11 @@ fn alike(a: &[f64], b: &[f64]) -> bool {
 
 // ---- Insertions ----
 
-/// A leg of a motion: how long in s, speed in m/s, amplitude of a ripple of the speed in m/s and its frequency in Hz.
+/// A leg of a motion: duration in s, velocity in m/s, amplitude of a velocity ripple in m/s and its frequency
+/// in Hz.
 type Leg = (f64, f64, f64, f64);
 
-/// Position (m) and velocity (m/s) of a motion that begins 3 mm above where the surface is believed to be.
+/// Position (m) and velocity (m/s) of a motion that starts 3 mm above the assumed surface.
 fn moved(legs: &[Leg], t: f64) -> (f64, f64) {
     let (mut z, mut from) = (-0.003, 0.0);
     for (k, (lasts, speed, ripple, hz)) in legs.iter().enumerate() {
@@ -225,7 +227,8 @@ fn moved(legs: &[Leg], t: f64) -> (f64, f64) {
     (z, 0.0)
 }
 
-/// Normal numbers, the same on every machine: twelve even ones of a linear congruence (Knuth's MMIX).
+/// Reproducible normal numbers: sums of twelve uniform ones from a linear congruential generator (Knuth's
+/// MMIX).
 struct Normal(u64);
 
 impl Normal {
@@ -239,7 +242,7 @@ impl Normal {
     }
 }
 
-/// An insertion as it really is, and how it is recorded.
+/// True properties of an insertion, and how it is recorded.
 struct Insertion {
     legs: Vec<Leg>,
     tissue: Tissue,
@@ -247,17 +250,17 @@ struct Insertion {
     rate_hz: f64,
     /// Noise of the force in N, and its growth with the force.
     noise: (f64, f64),
-    /// Memory of the noise from one sample to the next.
+    /// Autocorrelation of the noise at one sample.
     memory: f64,
-    /// Step in m to which positions are rounded.
+    /// Quantisation of positions in m.
     step_m: f64,
-    /// Nothing is recorded from here to there, in s.
+    /// Interval in s without samples.
     gap_s: (f64, f64),
     seed: u64,
 }
 
 impl Insertion {
-    /// The recording and the instants (s) of the true ruptures.
+    /// The recording and the true rupture times (s).
     fn recorded(&self) -> (Recording, Vec<f64>) {
         let law = ForceLaw::new(&self.tissue, &self.effects).expect("few effects");
         let chain = MeasurementChain::new(&self.effects);
@@ -300,7 +303,7 @@ fn tissue(surface_m: f64, layers: &[(f64, f64, f64, Option<f64>)]) -> Tissue {
     Tissue { surface_m, layers: layers.iter().map(layer).collect() }
 }
 
-/// What is believed of all of them.
+/// Assumptions of all insertions.
 fn belief() -> Assumptions {
     Assumptions {
         tissue: tissue(
@@ -318,7 +321,7 @@ fn belief() -> Assumptions {
     }
 }
 
-/// What is true of most of them.
+/// True tissue of most insertions.
 fn truth() -> Tissue {
     tissue(
         0.0024,
@@ -338,7 +341,7 @@ fn choice(id: &str, values: &[f64]) -> EffectTerm {
     EffectTerm::new(effect_info(id).expect("in the library"), values)
 }
 
-/// In at an even speed and out again.
+/// Insertion and retraction at constant velocity.
 fn even() -> Insertion {
     Insertion {
         legs: vec![(8.2131, 0.005, 0.0, 0.0), (5.4, -0.0065, 0.0, 0.0)],
@@ -353,7 +356,7 @@ fn even() -> Insertion {
     }
 }
 
-/// In with a ripple of the speed, which a coarse encoder tells.
+/// A velocity ripple and a coarse encoder.
 fn rippled() -> Insertion {
     Insertion {
         legs: vec![(1.5137, 0.0, 0.0, 0.0), (7.1071, 0.005, 0.002, 0.7), (3.3, -0.006, 0.0, 0.0)],
@@ -364,7 +367,7 @@ fn rippled() -> Insertion {
     }
 }
 
-/// In, held in the middle and at the end, and out; a stretch was not recorded.
+/// Insertion, holds in the middle and at the end, retraction; a stretch was not recorded.
 fn held() -> Insertion {
     Insertion {
         legs: vec![
@@ -383,7 +386,7 @@ fn held() -> Insertion {
     }
 }
 
-/// Sampled at 50 Hz by a sensor that is late.
+/// Sampled at 50 Hz with a delayed force.
 fn slow() -> Insertion {
     Insertion {
         legs: vec![
@@ -402,7 +405,7 @@ fn slow() -> Insertion {
     }
 }
 
-/// Drops that hardly show, under a noise with memory, and something that breaks on the way.
+/// Small drops under autocorrelated noise, and a membrane on the way.
 fn small() -> Insertion {
     Insertion {
         legs: vec![(9.7131, 0.0041, 0.0008, 0.31), (4.0, -0.0075, 0.0, 0.0)],
@@ -422,7 +425,7 @@ fn small() -> Insertion {
     }
 }
 
-/// The surface is deeper than believed, and the noise grows with the force.
+/// A deeper surface than assumed, and noise that grows with the force.
 fn shifted() -> Insertion {
     let mut there = truth();
     there.surface_m = 0.0037;
@@ -436,7 +439,7 @@ fn shifted() -> Insertion {
     }
 }
 
-/// One of several whose surface and friction differ.
+/// One of several insertions with different surface and friction.
 fn repeated(k: usize) -> Insertion {
     let mut there = truth();
     there.surface_m += [3e-4, -5e-4, 7e-4][k];
@@ -460,7 +463,7 @@ fn repeated(k: usize) -> Insertion {
 
 // ---- Stages ----
 
-/// What the motion and the raw force say by themselves.
+/// Motion and raw force.
 fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
     let (t, z) = (&r.time_s, &r.position_m);
     let told = estimate_velocity(t, z);
@@ -501,7 +504,7 @@ fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
     }
 }
 
-/// Blocks as they are, late, coarser.
+/// Blocks: plain, delayed, coarser.
 fn block_stages(said: &mut Said, b: &BlockAverages) {
     said.blocks("blocks", b);
     said.blocks("coarse", &b.coarsened(3));
@@ -531,7 +534,7 @@ fn roughness(blocks: &[BlockAverages]) -> f64 {
     (stylet_stats::order_statistics::median(&mut all) * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt()).max(1e-6)
 }
 
-/// The base law fitted as a diagnosis does: drops given to layers, numbers and instants in turn.
+/// The base model fitted as in a diagnosis: drops assigned to layers, parameters and rupture times in turn.
 fn base_stages(
     said: &mut Said,
     belief: &Arc<Assumptions>,
@@ -576,7 +579,7 @@ fn base_stages(
     (best, data)
 }
 
-/// Noise of every kind that residuals tell, and what it makes of them.
+/// Noise from every source, and its effect on the residuals.
 fn noise_stages(said: &mut Said, found: &Fit, data: &FitData) {
     let e = &found.residuals.residual_n;
     for from in
@@ -596,7 +599,7 @@ fn noise_stages(said: &mut Said, found: &Fit, data: &FitData) {
     said.count("compared", data.compared_block_count());
 }
 
-/// The linear picture: columns, standard deviations, evidence; and what effects would gain.
+/// Linearization: columns, standard deviations, evidence; score tests of effects.
 fn picture_stages(said: &mut Said, found: &Fit, data: &FitData) {
     let tangent = Linearization::new(&found.model, data, &found.residuals);
     let factor = tangent.factor();
@@ -658,7 +661,7 @@ fn picture_stages(said: &mut Said, found: &Fit, data: &FitData) {
     said.numbers("scatter told", &[s.rupture_force, s.rupture_depth_m]);
 }
 
-/// Every effect of the library replayed beside the law, with the law's own ruptures.
+/// Every effect of the library replayed with the law's own ruptures.
 fn library_stages(said: &mut Said, found: &Fit, data: &FitData) {
     for effect in general_effects() {
         let values: Vec<f64> = effect
@@ -690,7 +693,7 @@ fn library_stages(said: &mut Said, found: &Fit, data: &FitData) {
     }
 }
 
-/// A trial of an effect: retimed, fitted, judged by what it leaves.
+/// Trial of an effect: rupture times updated, fitted, noise re-estimated.
 fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &FitData, with: EffectTerm) -> Fit {
     let mut model = found.model.with_effect(with);
     let times: Vec<Vec<f64>> =
@@ -715,7 +718,7 @@ fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &FitData, with: 
     best
 }
 
-/// All that is said of a single insertion, but for trials of effects.
+/// All stages of a single insertion except effect trials.
 fn one(said: &mut Said, of: &Insertion) -> (Fit, FitData, Vec<f64>) {
     let (recording, ruptures) = of.recorded();
     let belief = Arc::new(belief());
@@ -728,7 +731,7 @@ fn one(said: &mut Said, of: &Insertion) -> (Fit, FitData, Vec<f64>) {
     (found, data, ruptures)
 }
 
-/// The instants found are the true ones to within so many s.
+/// Rupture times agree with the true ones to `within_s`.
 fn near(found: &Fit, ruptures: &[f64], within_s: f64) {
     let told = &found.model.rupture_times_s[0];
     for (t, truth) in told.iter().zip(ruptures) {
@@ -736,7 +739,7 @@ fn near(found: &Fit, ruptures: &[f64], within_s: f64) {
     }
 }
 
-/// The numbers of the first two layers are the true ones.
+/// Parameters of the first two layers agree with the true ones.
 fn lies_at(found: &Fit, truth: &Tissue) {
     let told = &found.model.tissue;
     assert!((told.surface_m - truth.surface_m).abs() < 1e-4, "{}", told.surface_m);
@@ -867,7 +870,7 @@ fn several_stages() -> Said {
 }
 
 #[test]
-fn every_stage_says_what_was_recorded_of_it() {
+fn every_stage_agrees_with_the_recorded_values() {
     type Stages = fn() -> Said;
     let insertions: [(&str, Stages); 7] = [
         ("even", even_stages),

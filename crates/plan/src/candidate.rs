@@ -1,32 +1,32 @@
-//! What may be the case: the model that stands, and what may be true beside it.
+//! Candidate models: effects that may be present in addition to the base model.
 
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_tissue::{EffectInfo, FitScale, Proposal};
 
-/// Something that may be the case: effects beside the stem that all candidates share.
+/// Effects that may be present in addition to the base model of all candidates.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// Name for people: an effect's id, `none`, `unknown`.
+    /// Name: an effect's id, `none`, `unknown`.
     pub name: String,
-    /// Effects beside the stem; the one that gives the name is the last.
+    /// Additional effects; the last one gives the name.
     pub effects: Vec<EffectTerm>,
     /// Probability before the next insertion.
     pub probability: f64,
 }
 
-/// The name of "nothing beside the law".
+/// Name of the candidate without an additional effect.
 pub const NONE: &str = "none";
-/// The name of "something that the library lacks".
+/// Name of the candidate for an effect outside the library.
 pub const UNKNOWN: &str = "unknown";
 
 impl Candidate {
-    /// Nothing beside the stem.
+    /// No additional effect.
     #[must_use]
     pub fn without_effect(weight: f64) -> Self {
         Self { name: NONE.to_owned(), effects: Vec::new(), probability: weight }
     }
 
-    /// One effect beside the stem.
+    /// One additional effect.
     #[must_use]
     pub fn with_effect(choice: EffectTerm, weight: f64) -> Self {
         Self { name: choice.info.id.to_owned(), effects: vec![choice], probability: weight }
@@ -40,7 +40,7 @@ impl Candidate {
         model
     }
 
-    /// Whether this is a special case of another candidate.
+    /// Whether this candidate is a special case of another one.
     #[must_use]
     pub fn is_special_case_of(&self, other: &Self) -> bool {
         let last = |c: &Self| c.effects.last().map(|c| c.info);
@@ -52,14 +52,14 @@ impl Candidate {
     }
 }
 
-/// The effect at the size that the library calls typical; none for what is read off the raw samples or belongs to one layer.
+/// The effect at the library's typical size; `None` for effects read off the raw samples or tied to one layer.
 #[must_use]
 pub fn typical_effect(info: &'static EffectInfo) -> Option<EffectTerm> {
     if matches!(info.proposal, Proposal::RawSamples | Proposal::PerLayer) {
         return None;
     }
     let shape = match info.proposal {
-        // The shape in the middle of those that a search begins from.
+        // The middle one of the shapes that a search starts from.
         Proposal::LinearColumns(groups) => groups.get((groups.len().max(1) - 1) / 2).and_then(|g| g.first()),
         _ => None,
     };
@@ -77,7 +77,7 @@ pub fn typical_effect(info: &'static EffectInfo) -> Option<EffectTerm> {
     Some(choice)
 }
 
-/// The same effect `times` as strong.
+/// Parameter values of the effect at `times` its strength.
 #[must_use]
 pub fn scaled_values(choice: &EffectTerm, times: f64) -> Vec<f64> {
     choice

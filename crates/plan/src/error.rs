@@ -1,27 +1,27 @@
-//! Why there is no plan.
+//! Errors of planning.
 
-/// What is wrong, and what would be right.
+/// Why there is no plan, and what would help.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// A limit is no positive number.
+    /// A limit is not a positive number.
     #[error("{field}: is {value}; it must be {right}")]
     Limit {
         /// Field of the limits.
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What would be right.
+        /// An admissible value.
         right: &'static str,
     },
-    /// No motion keeps the limits.
+    /// No motion satisfies the limits.
     #[error("no insertion keeps these limits: {why}; {remedy}")]
     Infeasible {
-        /// The limit that cannot be kept.
+        /// The limit that cannot be satisfied.
         why: String,
         /// What would help.
         remedy: String,
     },
-    /// The law cannot be replayed.
+    /// The model does not give a finite force.
     #[error("the law gives no finite force along a motion: {0}")]
     NoForce(String),
     /// A diagnosis failed.

@@ -1,11 +1,12 @@
-//! Scalar products of columns with everything that is fitted beside them taken out.
+//! Gram matrices of Jacobian columns with nuisance parameters eliminated.
 
 use stylet_identify::fit::{JacobianColumn, Linearization};
 use stylet_identify::likelihood::FitData;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 
-/// Products of the shared numbers' columns and of further ones, the numbers of each recording's own (instants of ruptures
-/// among them) eliminated; no priors of shared numbers. In squares of whitened residuals: half of a product is nats.
+/// Gram matrix of the columns of the shared parameters and of further ones; per-recording parameters (rupture
+/// times among them) are eliminated. Priors of shared parameters are not included. In squares of whitened
+/// residuals: half of an entry is in nats.
 #[must_use]
 pub fn gram_matrix(tangent: &Linearization, data: &FitData, more: &[JacobianColumn]) -> SymmetricMatrix {
     let ns = tangent.shared.len();
@@ -38,7 +39,7 @@ pub fn gram_matrix(tangent: &Linearization, data: &FitData, more: &[JacobianColu
     out
 }
 
-/// The sum of two matrices of one size.
+/// Sum of two matrices of equal size.
 #[must_use]
 pub fn add(a: &SymmetricMatrix, b: &SymmetricMatrix) -> SymmetricMatrix {
     let mut out = a.clone();
@@ -50,10 +51,10 @@ pub fn add(a: &SymmetricMatrix, b: &SymmetricMatrix) -> SymmetricMatrix {
     out
 }
 
-/// What is left of a column whose size is this share of what it was, is rounding.
+/// A diagonal entry reduced to less than this share is rounding.
 const ROUNDING_SHARE: f64 = 1e-9;
 
-/// The last rows of a matrix with its first `first` eliminated.
+/// Schur complement: the last rows of a matrix with the first `first` eliminated.
 #[must_use]
 pub fn schur_complement(m: &SymmetricMatrix, first: usize) -> SymmetricMatrix {
     let rows: Vec<usize> = (0..first).collect();
@@ -78,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_eliminated_explains_its_own_multiples_completely() {
+    fn eliminated_columns_explain_their_multiples_completely() {
         let mut m = SymmetricMatrix::zeros(2);
         m.add(0, 0, 4.0);
         m.add(0, 1, 6.0);

@@ -1,4 +1,5 @@
-//! What an experiment can show: which effects, from which strength on, and which it cannot tell apart.
+//! Identifiability: which effects an experiment can show, from which strength on, and which it cannot
+//! distinguish.
 
 use crate::candidate::{NONE, scaled_values};
 use crate::information_state::InformationState;
@@ -8,51 +9,51 @@ use std::collections::BTreeMap;
 use stylet_diagnose::EQUIVALENCE_NATS;
 use stylet_identify::model::EffectTerm;
 
-/// One effect.
+/// Identifiability of one effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectIdentifiability {
-    /// Effect, by its id.
+    /// Effect id.
     pub effect: String,
-    /// Nats that it would show at its typical size, everything that is fitted taken out.
+    /// Nats at its typical size, with all fitted parameters eliminated.
     pub nats: f64,
-    /// Whether that is enough to see it.
+    /// Whether that suffices to identify it.
     pub identifiable: bool,
-    /// Its numbers at the typical size.
+    /// Typical parameter values.
     pub typical: BTreeMap<String, f64>,
-    /// Its numbers at the smallest size that can be seen; none when no plausible size can.
+    /// Parameter values at the smallest identifiable size; `None` when no plausible size is identifiable.
     pub smallest_detectable: Option<BTreeMap<String, f64>>,
-    /// Effects that would explain it as well, to within a class's width, at the typical size.
+    /// Effects that explain the typical force equally well, to within the width of a class.
     pub indistinguishable_from: Vec<String>,
-    /// The effect that is nearest, and the nats by which it stays behind.
+    /// The nearest other effect and its distance in nats.
     pub nearest: Option<(String, f64)>,
 }
 
-/// What an experiment can show: `identifiability.json`.
+/// Identifiability of all effects: `identifiability.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
     /// Effects in the order of the library.
     pub effects: Vec<EffectIdentifiability>,
-    /// Effects that cannot be seen at their typical size.
+    /// Effects that are not identifiable at their typical size.
     pub not_identifiable: Vec<String>,
-    /// Effects that cannot be told apart at their typical sizes, each class by itself.
+    /// Classes of effects that cannot be distinguished at their typical sizes.
     pub classes: Vec<Vec<String>>,
-    /// Correlations of the effects' columns, the base law's numbers taken out, in the order of `effects`.
+    /// Correlations of the effects' columns with the base parameters eliminated, in the order of `effects`.
     pub correlation: Vec<Vec<f64>>,
-    /// Nats by which the effects of a row and a column differ, in the order of `effects`.
+    /// Pairwise separation in nats, in the order of `effects`.
     pub nats: Vec<Vec<f64>>,
-    /// Standard deviation of the noise of a block of 20 ms, in N.
+    /// Standard deviation of the noise of a block of 20 ms in N.
     pub noise_n: f64,
 }
 
-/// An effect must be at most so many times its typical size to be seen at all: beyond, it is not plausible.
+/// Largest plausible multiple of the typical size.
 const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
 
-/// Whether the library admits these numbers.
+/// Whether the library accepts these parameter values.
 fn valid(choice: &EffectTerm, values: &[f64]) -> bool {
     EffectTerm::new(choice.info, values).effect().is_some_and(|e| e.check().is_ok())
 }
 
-/// What the experiment behind a ground can show.
+/// Identifiability from the available information.
 #[must_use]
 pub fn identifiability(ground: &InformationState) -> Identifiability {
     let shown = ground.current();
@@ -102,7 +103,7 @@ pub fn identifiability(ground: &InformationState) -> Identifiability {
         effect.indistinguishable_from =
             (0..names.len()).filter(|j| like(i, *j)).map(|j| names[j].clone()).collect();
     }
-    // Classes: what a chain of likenesses joins.
+    // Classes are the connected components of the similarity graph.
     let mut class: Vec<usize> = (0..names.len()).collect();
     for i in 0..names.len() {
         for j in 0..i {

@@ -1,9 +1,9 @@
-//! What is known before the next insertion, and what an insertion would add to it.
+//! Information before the next insertion, and the information that a motion would add.
 //!
-//! All candidates share a stem: the base law with what is settled. What a candidate adds to the force, and what its numbers
-//! change, are columns over the recordings at hand and over a motion that may come, whitened by the noise and beside the law's
-//! own condition for every rupture, whose spread is the scatter between insertions. Everything is the likelihood of
-//! `stylet-identify`; nothing here has a law of its own.
+//! All candidates share a base model: the law with the effects already established. What a candidate adds to
+//! the force, and the derivatives by its parameters, are columns over the available recordings and over a
+//! possible motion, whitened by the noise and extended by the rupture residuals, whose variance is the scatter
+//! between insertions. The likelihood is that of `stylet_identify`.
 
 use crate::candidate::Candidate;
 use crate::gram_matrix::{add, gram_matrix, schur_complement};
@@ -19,58 +19,58 @@ use stylet_record::Recording;
 use stylet_scenario::Motion;
 use stylet_stats::linear_algebra::SymmetricMatrix;
 
-/// Motions are compared over blocks of so many s ...
+/// Motions are compared over blocks of this length in s ...
 const COARSE_S: f64 = 0.06;
-/// ... or of a share of their duration, so that a long one costs no more.
+/// ... or longer ones, so that a motion has at most this many blocks.
 const MAX_BLOCKS: f64 = 800.0;
-/// A planned motion is known exactly: so many samples per second are enough to see it.
+/// Sampling rate in Hz that suffices for a planned motion, which is known exactly.
 const MAX_SAMPLE_HZ: f64 = 50.0;
-/// What a slow autoregression leaves of one at least: beyond, its sum is not known.
+/// Lower bound of one minus the sum of autoregressive coefficients, which is uncertain near zero.
 const MIN_ONE_MINUS_AR_SUM: f64 = 0.1;
-/// Insertions scatter at least so much, relative, until three have shown how much they do.
+/// Relative scatter of rupture forces assumed for fewer than three recordings.
 const DEFAULT_FORCE_SCATTER: f64 = 0.01;
-/// The same of a far face in m.
+/// The same for the depth of an interface in m.
 const DEFAULT_DEPTH_SCATTER_M: f64 = 5e-5;
-/// Recordings that show scatter.
+/// Number of recordings from which the scatter is estimated.
 const MIN_RECORDINGS_FOR_SCATTER: usize = 3;
-/// Wavelength in m of the pattern along the depth that stands for what the library lacks.
+/// Wavelength in m of the depth-dependent force that represents an effect outside the library.
 const UNMODELLED_WAVELENGTH_M: f64 = 0.008;
 
-/// What is known, and what may be the case.
+/// Available information and the candidates.
 pub struct InformationState {
-    /// What all candidates share.
+    /// The model that all candidates share.
     pub base: Model,
-    /// What may be the case; the first is believed most.
+    /// Candidates, the most probable first.
     pub candidates: Vec<Candidate>,
-    /// Size in N of something that the library lacks, when that is among what may be the case.
+    /// Standard deviation in N of an effect outside the library, if that is a candidate.
     pub unmodelled_n: Option<f64>,
-    /// The noise of blocks of [`BLOCK_S`].
+    /// Noise of blocks of [`BLOCK_S`].
     pub noise: Noise,
-    /// Samples per second of what is planned.
+    /// Sampling rate of the planned insertion in Hz.
     pub sample_hz: f64,
-    /// The candidates' models, the law's numbers re-fitted to the recordings at hand.
+    /// The candidates' models, re-fitted to the available recordings.
     models: Vec<Model>,
-    /// Products over the recordings at hand, priors included.
+    /// Information matrix of the available recordings, priors included.
     prior_information: SymmetricMatrix,
-    /// Number of shared numbers.
+    /// Number of shared parameters.
     shared_count: usize,
-    /// Whether the scatter between insertions is assumed: too few have been made to show it.
+    /// Whether the scatter between insertions is assumed because there are too few recordings.
     pub scatter_assumed: bool,
 }
 
-/// What a motion would show.
+/// Information with a motion included.
 #[derive(Clone, Debug)]
 pub struct Information {
-    /// Products over all columns.
+    /// Information matrix over all columns.
     all: SymmetricMatrix,
-    /// With what is fitted taken out.
+    /// With the shared parameters eliminated.
     schur: SymmetricMatrix,
     shared_count: usize,
 }
 
 impl InformationState {
-    /// From the recordings at hand (their forces play no part: where the stem stands has been fitted to them) and the model's
-    /// instants in them.
+    /// From the available recordings and the model's rupture times in them. Their forces are not used: the base
+    /// model has been fitted to them.
     #[must_use]
     pub fn new(
         stem: Model,
@@ -112,8 +112,8 @@ impl InformationState {
         Some(ground)
     }
 
-    /// A candidate's model with the law's numbers where, to first order, the recordings at hand have them beside it: what a
-    /// candidate adds was imitated by these numbers when the stem was fitted.
+    /// A candidate's model with the base parameters re-fitted to first order: they had absorbed the candidate's
+    /// contribution when the base model was fitted.
     fn refitted_model(&self, which: usize) -> Model {
         let mut model = self.candidates[which].build_model(&self.base);
         let Some((at, _)) = self.columns_of(which) else { return model };
@@ -128,19 +128,19 @@ impl InformationState {
         model
     }
 
-    /// The model of a candidate, the law's numbers re-fitted beside it; the stem for what the library lacks.
+    /// Model of a candidate, re-fitted; the base model for an effect outside the library.
     #[must_use]
     pub fn candidate_model(&self, which: usize) -> &Model {
         self.models.get(which).unwrap_or(&self.base)
     }
 
-    /// Columns beside those of the shared numbers.
+    /// Number of columns in addition to those of the shared parameters.
     fn extra_columns(&self) -> usize {
         let own = |c: &Candidate| if c.effects.is_empty() { 0 } else { 1 + effect_parameter_count(c) };
         self.candidates.iter().map(own).sum::<usize>() + usize::from(self.unmodelled_n.is_some())
     }
 
-    /// Where a candidate's column stands, and those of its numbers; none for the stem alone.
+    /// Column index of a candidate and of its parameters; `None` for the base model.
     fn columns_of(&self, which: usize) -> Option<(usize, std::ops::Range<usize>)> {
         let mut at = 0;
         for (k, c) in self.candidates.iter().enumerate() {
@@ -159,7 +159,7 @@ impl InformationState {
         None
     }
 
-    /// Products over recordings as the stem would have them.
+    /// Information matrix of recordings simulated with the base model.
     fn information_of(&self, stem: &Model, mut data: FitData) -> Option<SymmetricMatrix> {
         let mut blocks = (*data.recordings).clone();
         for (r, b) in blocks.iter_mut().enumerate() {
@@ -220,7 +220,7 @@ impl InformationState {
         Some(gram_matrix(&tangent, &data, &more))
     }
 
-    /// What is known before.
+    /// The information before any further insertion.
     #[must_use]
     pub fn current(&self) -> Information {
         self.to_information(self.prior_information.clone())
@@ -230,13 +230,13 @@ impl InformationState {
         Information { schur: schur_complement(&all, self.shared_count), all, shared_count: self.shared_count }
     }
 
-    /// What is known once a motion has been made as well; none when the law cannot be replayed along it.
+    /// The information after a motion; `None` when the model cannot be replayed along it.
     #[must_use]
     pub fn after_motion(&self, motion: &Motion) -> Option<Information> {
         self.after_blocks(&self.motion_blocks(motion)?)
     }
 
-    /// The same of a motion in blocks.
+    /// The same for a motion in blocks.
     #[must_use]
     pub fn after_blocks(&self, blocks: &BlockAverages) -> Option<Information> {
         let (blocks, data) = self.with_expected_forces(blocks)?;
@@ -246,14 +246,14 @@ impl InformationState {
         Some(self.to_information(add(&self.prior_information, &self.information_of(&stem, data)?)))
     }
 
-    /// A motion in blocks, without forces; none for one that is recorded.
+    /// A motion in blocks without forces; `None` for a recorded motion.
     #[must_use]
     pub fn motion_blocks(&self, motion: &Motion) -> Option<BlockAverages> {
         let recording = motion_to_recording(motion, self.sample_hz.min(MAX_SAMPLE_HZ))?;
         Some(BlockAverages::new(&recording, &[], COARSE_S.max(recording.duration_s() / MAX_BLOCKS)))
     }
 
-    /// Blocks with the forces of the likeliest candidate, judged by the noise of their length.
+    /// Blocks with the forces of the most probable candidate and the noise of their length.
     fn with_expected_forces(&self, blocks: &BlockAverages) -> Option<(BlockAverages, FitData)> {
         let mut blocks = blocks.clone();
         let (f, _) = predict_forces(self.candidate_model(0), &blocks)?;
@@ -264,14 +264,14 @@ impl InformationState {
         Some((blocks, data))
     }
 
-    /// Largest force in N along a motion in blocks under every candidate, in their order.
+    /// Largest force in N along a motion under every candidate.
     #[must_use]
     pub fn peak_forces_n(&self, blocks: &BlockAverages) -> Option<Vec<f64>> {
         let largest = |f: &[f64]| f.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
         self.models.iter().map(|m| Some(largest(&predict_forces(m, blocks)?.0))).collect()
     }
 
-    /// Forces in N along a motion under every candidate, with the times (s) and positions (m) of the blocks.
+    /// Forces in N along a motion under every candidate, with times (s) and positions (m) of the blocks.
     #[must_use]
     pub fn expected_forces(&self, motion: &Motion) -> Option<ExpectedForces> {
         let blocks = self.motion_blocks(motion)?;
@@ -282,21 +282,22 @@ impl InformationState {
         Some(ExpectedForces { time_s, position_m, force_n })
     }
 
-    /// Pairs of candidates, each once.
+    /// All pairs of candidates.
     #[must_use]
     pub fn pairs(&self) -> Vec<(usize, usize)> {
         let n = self.candidates.len() + usize::from(self.unmodelled_n.is_some());
         (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).collect()
     }
 
-    /// The name of a candidate, or of what the library lacks.
+    /// Name of a candidate.
     #[must_use]
     pub fn name(&self, which: usize) -> &str {
         self.candidates.get(which).map_or(crate::candidate::UNKNOWN, |c| &c.name)
     }
 
-    /// Nats by which two candidates are expected to differ: the truth's advantage over the other re-fitted. Of a special case
-    /// and what holds it, the special case is tried against the truth of the other; else the harder way round counts.
+    /// Expected difference of two candidates in nats: the log-likelihood gap of the true one to the re-fitted
+    /// other one. For nested candidates the special case is tested against the general one; otherwise the
+    /// smaller of both directions.
     #[must_use]
     pub fn separation_nats(&self, shown: &Information, a: usize, b: usize) -> f64 {
         let n = self.candidates.len();
@@ -313,8 +314,8 @@ impl InformationState {
         }
     }
 
-    /// Nats that are left when `truth` holds and `other` is re-fitted: `min 1/2 |whitened(f_truth - f_other)|^2` over all
-    /// numbers of the law and of the other, to first order.
+    /// Remaining nats when `truth` holds and `other` is re-fitted: `min 1/2 |whitened(f_truth - f_other)|^2`
+    /// over all parameters of the base model and of `other`, to first order.
     #[must_use]
     pub fn one_way_separation_nats(&self, shown: &Information, truth: usize, other: usize) -> f64 {
         let at = |k: usize| -> Option<usize> {
@@ -335,7 +336,8 @@ impl InformationState {
         (0.5 * (all - half.iter().map(|h| h * h).sum::<f64>())).max(0.0)
     }
 
-    /// Correlation of two candidates' columns, everything that is fitted taken out; 0 where one of them is not seen at all.
+    /// Correlation of two candidates' columns with the shared parameters eliminated; 0 where one of them is not
+    /// identifiable at all.
     #[must_use]
     pub fn correlation(&self, shown: &Information, a: usize, b: usize) -> f64 {
         let (Some((i, _)), Some((j, _))) = (self.columns_of(a), self.columns_of(b)) else { return 0.0 };
@@ -348,7 +350,7 @@ impl InformationState {
     }
 }
 
-/// Forces along a motion.
+/// Predicted forces along a motion.
 #[derive(Clone, Debug)]
 pub struct ExpectedForces {
     /// Times in s.
@@ -360,14 +362,14 @@ pub struct ExpectedForces {
 }
 
 impl Information {
-    /// Standard deviations of the shared numbers, in the scale of the fit; infinite where nothing tells one.
+    /// Standard deviations of the shared parameters on the fit scale; infinite where not identifiable.
     #[must_use]
     pub fn sds(&self) -> Vec<f64> {
         let rows: Vec<usize> = (0..self.shared_count).collect();
         self.all.submatrix(&rows).cholesky().inverse_diagonal().iter().map(|v| v.sqrt()).collect()
     }
 
-    /// Half the logarithm of the determinant of the shared numbers' information: nats of knowledge about them.
+    /// Half the log determinant of the shared parameters' information, in nats.
     #[must_use]
     pub fn half_log_det(&self) -> f64 {
         let rows: Vec<usize> = (0..self.shared_count).collect();
@@ -379,7 +381,7 @@ fn effect_parameter_count(c: &Candidate) -> usize {
     c.effects.iter().map(|c| c.info.parameters.iter().filter(|p| !p.integer).count()).sum()
 }
 
-/// The model for one recording that nobody has made yet.
+/// The model for one future recording.
 fn single_recording_model(model: &Model, instants: Vec<f64>) -> Model {
     let mut model = model.clone();
     model.per_recording = vec![RecordingParameters::default()];
@@ -388,7 +390,7 @@ fn single_recording_model(model: &Model, instants: Vec<f64>) -> Model {
     model
 }
 
-/// Forces (N) of a model along blocks with its own ruptures, and their instants (s).
+/// Forces (N) of a model along blocks with its own ruptures, and their times (s).
 fn predict_forces(model: &Model, blocks: &BlockAverages) -> Option<(Vec<f64>, Vec<f64>)> {
     let compiled = single_recording_model(model, Vec::new()).compile(0)?;
     let course = motion_pieces(&compiled, blocks);
@@ -398,7 +400,7 @@ fn predict_forces(model: &Model, blocks: &BlockAverages) -> Option<(Vec<f64>, Ve
     out.force_n.iter().all(|f| f.is_finite()).then_some((out.force_n, instants))
 }
 
-/// A motion as a recording without forces; none for one that is recorded.
+/// A motion as a recording without forces; `None` for a recorded motion.
 #[must_use]
 pub fn motion_to_recording(motion: &Motion, sample_hz: f64) -> Option<Recording> {
     let plan = motion.plan()?;
@@ -410,7 +412,7 @@ pub fn motion_to_recording(motion: &Motion, sample_hz: f64) -> Option<Recording>
     Recording::with_velocity(time_s, position, velocity, vec![0.0; n]).ok()
 }
 
-/// The noise of means over `times` blocks: what an autoregression adds up to in the long run, as white noise.
+/// Noise of means over `times` blocks: the long-run variance of the autoregression as white noise.
 fn average_noise(noise: &Noise, times: f64) -> Noise {
     let mut noise = noise.clone();
     for bin in &mut noise.bins {

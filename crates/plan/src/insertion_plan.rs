@@ -1,4 +1,4 @@
-//! The plan: `plan.json`.
+//! The plan of the next insertion: `plan.json`.
 
 use crate::error::PlanError;
 use crate::information_state::{Information, InformationState};
@@ -11,33 +11,34 @@ use stylet_diagnose::EQUIVALENCE_NATS;
 use stylet_identify::model::ParameterRole;
 use stylet_scenario::Motion;
 
-/// Two candidates, and how far apart they are.
+/// Two candidates and their separation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Pair {
-    /// One.
+    /// One candidate.
     pub a: String,
-    /// The other.
+    /// The other candidate.
     pub b: String,
-    /// Expected gap of the log-likelihoods from what is at hand, in nats.
+    /// Expected gap of the log-likelihoods from the available recordings in nats.
     pub nats_before: f64,
-    /// The same once the planned insertion has been made as well.
+    /// The same with the planned insertion included.
     pub nats_after: f64,
-    /// Probability that the truth among the two is the one named, before: one half when nothing tells them apart.
+    /// Probability that the diagnosis names the true one of the two, before: one half when they are not
+    /// distinguishable.
     pub p_correct_before: f64,
     /// The same after.
     pub p_correct_after: f64,
-    /// Whether a motion within the limits tells them apart at all.
+    /// Whether some motion within the limits distinguishes them.
     pub distinguishable: bool,
 }
 
-/// A number of the law and how surely it is known.
+/// Interval of a parameter before and after the planned insertion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntervalChange {
-    /// Such as `layer 1 stiffness_n_per_m`.
+    /// Parameter, such as `layer 1 stiffness_n_per_m`.
     pub name: String,
-    /// Half width of the 95 % interval before, relative to what is assumed, or in m for a place.
+    /// Half width of the 95 % interval before, relative to the assumed value, or in m for a position.
     pub half_width_before: f64,
-    /// The same once the planned insertion has been made as well.
+    /// The same with the planned insertion included.
     pub half_width_after: f64,
 }
 
@@ -46,28 +47,28 @@ pub struct IntervalChange {
 pub struct Alternative {
     /// The motion.
     pub motion: Motion,
-    /// Nats of the worst pair that can be told apart.
+    /// Nats of the worst distinguishable pair.
     pub worst_pair_nats: f64,
-    /// Probability that the next diagnosis decides, after the gaps.
+    /// Probability that the next diagnosis decides, from the expected gaps.
     pub probability_decided: f64,
-    /// Largest force expected in N.
+    /// Largest expected force in N.
     pub force_n: f64,
     /// Duration in s.
     pub duration_s: f64,
-    /// Insertions simulated and diagnosed when the best motions were set against each other.
+    /// Insertions simulated for the selection.
     pub simulated: usize,
-    /// Those after which the diagnosis was right and alone.
+    /// Those with a correct and unique diagnosis.
     pub correct: usize,
 }
 
-/// One candidate's simulated insertions.
+/// Simulated insertions of one candidate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateTrials {
     /// The candidate.
     pub candidate: String,
     /// Insertions simulated and diagnosed.
     pub trials: usize,
-    /// Those after which the diagnosis names it alone.
+    /// Those with a correct and unique diagnosis.
     pub correct: usize,
 }
 
@@ -76,16 +77,16 @@ pub struct CandidateTrials {
 pub struct Plan {
     /// Pairs of candidates.
     pub pairs: Vec<Pair>,
-    /// Probability that the next diagnosis names the right single cause.
+    /// Probability that the next diagnosis names the correct single effect.
     pub probability_decided: f64,
     /// The same before the insertion.
     pub probability_now: f64,
-    /// Where that number comes from: `gaps` (the expected gaps and how often the diagnosis is right when everything can be
-    /// seen) or `simulated` (insertions simulated and diagnosed).
+    /// Source of the probability: `gaps` (expected gaps and the share of correct diagnoses when everything is
+    /// identifiable) or `simulated` (insertions simulated and diagnosed).
     pub probability_source: String,
-    /// Simulated insertions, none of which helped to choose the motion.
+    /// Simulated insertions not used to select the motion.
     pub simulated: Vec<CandidateTrials>,
-    /// Candidates with their probabilities before.
+    /// Candidates with their prior probabilities.
     pub candidates: Vec<(String, f64)>,
     /// The motion.
     pub motion: Motion,
@@ -93,34 +94,35 @@ pub struct Plan {
     pub duration_s: f64,
     /// Its deepest position in m.
     pub depth_m: f64,
-    /// Largest force in N that is expected under any candidate, three standard deviations of the noise included.
+    /// Largest force in N expected under any candidate, plus three standard deviations of the noise.
     pub force_n: f64,
-    /// The limits that it keeps.
+    /// The limits that it satisfies.
     pub limits: Limits,
     /// The next best motions.
     pub alternatives: Vec<Alternative>,
     /// Effects that no motion within the limits shows at their typical size.
     pub never_detectable: Vec<String>,
-    /// Numbers of the law, how surely they are known before and after.
+    /// Intervals of the base parameters before and after.
     pub intervals: Vec<IntervalChange>,
-    /// How many insertions at which speeds, when forces at rupture scatter.
+    /// Repeated insertions and their speeds, when rupture forces scatter.
     pub repeats: Option<Repeats>,
-    /// Motions looked at.
+    /// Number of evaluated motions.
     pub motions_evaluated: usize,
 }
 
-/// How often the diagnosis names one strong effect right and alone when everything can be seen: 129 of 138 in
-/// `docs/diagnosis.md`, "The present engine". No plan is surer than that.
+/// Share of correct unique diagnoses of one strong effect when everything is identifiable: 129 of 138 in
+/// `docs/diagnosis.md`, "The present engine". An upper bound on the probability of every plan.
 pub const P_CORRECT_WHEN_DETECTABLE: f64 = 0.93;
 
-/// Probability that a gap expected to be `nats` comes out above a class's width: it scatters by `sqrt(2 nats)`.
+/// Probability that a gap with expectation `nats` exceeds the width of a class: its standard deviation is
+/// `sqrt(2 nats)`.
 #[must_use]
 pub fn p_separated(nats: f64) -> f64 {
     if nats <= 0.0 { 0.0 } else { stylet_stats::normal::cdf((nats - EQUIVALENCE_NATS) / (2.0 * nats).sqrt()) }
 }
 
-/// Probability that the diagnosis names what is the case and nothing else, whatever that is among what motions within the limits
-/// can tell (`told`: pairs).
+/// Probability that the diagnosis names the true effect and nothing else, over the candidates in `told`, the
+/// pairs that motions within the limits can distinguish.
 #[must_use]
 pub fn p_decided(ground: &InformationState, shown: &Information, told: &[(usize, usize)]) -> f64 {
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -141,8 +143,7 @@ pub fn p_decided(ground: &InformationState, shown: &Information, told: &[(usize,
 
 /// Plans the next insertion.
 ///
-/// # Errors
-/// [`PlanError`] when limits cannot be kept or the law cannot be replayed.
+/// # Errors [`PlanError`] when the limits cannot be satisfied or the model cannot be replayed.
 pub fn plan(
     ground: &InformationState,
     limits: &Limits,
@@ -153,10 +154,9 @@ pub fn plan(
     Ok((plan, found))
 }
 
-/// The plan with one of the motions that were found.
+/// The plan with one of the motions found.
 ///
-/// # Errors
-/// [`PlanError::NoForce`] when there is no such motion.
+/// # Errors [`PlanError::NoForce`] when there is no such motion.
 pub(crate) fn plan_with_motion(
     ground: &InformationState,
     limits: &Limits,

@@ -1,19 +1,21 @@
-//! Which insertion to make next: what an experiment can show, and the safe motion that tells remaining causes apart.
+//! Experiment design: what an experiment can identify, and which safe motion best discriminates the remaining
+//! candidate effects.
 //!
-//! Candidates are what a diagnosis left open, or, without one, every effect of the library at its typical size. Two of them
-//! are as far apart as the truth's advantage over the other re-fitted, `min 1/2 |whitened(f_i - f_j)|^2` (T-optimality: Atkinson and
-//! Fedorov 1975), linear in the columns that the fit has, with the scatter of ruptures between insertions as their variance. The plan
-//! maximises the worst pair over motions within limits: an evenly filling sequence of programs, then refinement.
+//! Candidates are the effects that a diagnosis could not decide between, or, without a diagnosis, every effect
+//! of the library at its typical size. The separation of two candidates is `min 1/2 |whitened(f_i - f_j)|^2`
+//! over the re-fitted parameters of the wrong one (T-optimality: Atkinson and Fedorov 1975), to first order and
+//! with the scatter of ruptures between insertions as their variance. The plan maximises the smallest
+//! separation over motions within limits: low-discrepancy sampling of motion programs, then refinement.
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! |---|---|
-//! | [`limits`], [`draw`] | what a motion may do; programs within these limits |
-//! | [`candidate`], [`start`] | what may be the case, after a diagnosis or before any |
-//! | [`ground`], [`gram`] | what is known, what a motion would show, and how far candidates are apart |
-//! | [`search`](mod@search), [`plan`](mod@plan) | the best motions; the plan with its probabilities |
-//! | [`check`](mod@check) | the plan simulated and diagnosed |
-//! | [`repeats`](mod@repeats) | how many insertions when ruptures scatter |
-//! | [`identifiability`](mod@identifiability) | what an experiment can show |
+//! | [`limits`], [`motion_programs`] | limits of a motion; motion programs within these limits |
+//! | [`candidate`], [`starting_information`] | candidate effects; candidates and information from a diagnosis or a scenario |
+//! | [`information_state`], [`gram_matrix`] | information so far and after a motion, and the separation of candidates |
+//! | [`motion_search`], [`insertion_plan`] | the best motions; the plan with its probabilities |
+//! | [`simulation_check`] | simulates the planned motions and diagnoses the results |
+//! | [`repeats`](mod@repeats) | number of repeated insertions when rupture forces scatter |
+//! | [`identifiability`](mod@identifiability) | which effects an experiment can identify |
 #![forbid(unsafe_code)]
 
 pub mod candidate;

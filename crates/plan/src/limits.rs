@@ -1,31 +1,32 @@
-//! What a planned insertion may do.
+//! Limits of a planned insertion.
 
 use crate::error::PlanError;
 use serde::{Deserialize, Serialize};
 
-/// Limits of a planned insertion (SPEC section 8), kept at every instant of the motion.
+/// Limits of a planned insertion, satisfied at every time of the motion.
 ///
-/// Written in RON: `Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)`.
+/// Written in RON: `Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n:
+/// 6.0)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// Deepest position of the tip in m, on the axis of the recordings (the surface lies at the scenario's `surface_m`).
+    /// Deepest position of the tip in m, on the axis of the recordings (the surface is at the scenario's
+    /// `surface_m`).
     pub depth_m: f64,
-    /// Largest speed in m/s, either way.
+    /// Largest speed in m/s in either direction.
     pub speed_mps: f64,
-    /// Largest acceleration in m/s²; changes of speed take as long as it asks for.
+    /// Largest acceleration in m/s².
     pub acceleration_mps2: f64,
     /// Longest duration in s.
     pub duration_s: f64,
-    /// Largest force in N that is expected under any of the candidates, three standard deviations of the noise included.
+    /// Largest force in N expected under any candidate, plus three standard deviations of the noise.
     pub force_n: f64,
 }
 
 impl Limits {
-    /// Whether all of them are positive numbers.
+    /// Checks that all limits are positive numbers.
     ///
-    /// # Errors
-    /// [`PlanError::Limit`] with the field and what would be right.
+    /// # Errors [`PlanError::Limit`] with the field and an admissible value.
     pub fn check(&self) -> Result<(), PlanError> {
         let all = [
             ("speed_mps", self.speed_mps, "a positive speed in m/s, such as 0.008"),

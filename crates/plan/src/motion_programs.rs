@@ -1,44 +1,45 @@
-//! Motions within limits: points of a unit cube turned into programs of 2 to 6 parts that start and end at rest.
+//! Motion programs within limits: points of the unit cube mapped to programs of 2 to 6 parts that start and end
+//! at rest.
 //!
-//! A part is a move, a hold, a ripple or a way back. Every change of speed takes a quarter of a sine, so that the acceleration
-//! stays within its limit: in a program that is a [`Segment::Ripple`] of a quarter of a period.
+//! A part is a move, a hold, a ripple or a retraction. Every change of velocity follows a quarter sine, so that
+//! the acceleration stays within its limit; in a program it is a [`Segment::Ripple`] of a quarter period.
 
 use crate::limits::Limits;
 use core::f64::consts::{FRAC_PI_2, TAU};
 use stylet_scenario::{Motion, Segment};
 
-/// Most parts of a program.
+/// Largest number of parts of a program.
 pub const MAX_PARTS: usize = 6;
-/// Numbers per part: kind, speed, length, ripple, frequency.
+/// Coordinates per part: kind, speed, length, ripple amplitude, frequency.
 const COORDINATES_PER_PART: usize = 5;
-/// Numbers that make a motion: how many parts, how deep, and the parts.
+/// Dimension of the unit cube: number of parts, depth, and the parts.
 pub const DIMENSIONS: usize = 2 + MAX_PARTS * COORDINATES_PER_PART;
 
-/// Share of a limit that is used: rounding stays below it.
+/// Share of a limit that is used, so that rounding stays below it.
 const LIMIT_SHARE: f64 = 0.999;
-/// Shortest change of speed in s, and in samples: shorter ones lie between two samples.
+/// Shortest change of velocity in s; it also lasts at least one sampling interval.
 const MIN_RAMP_S: f64 = 0.02;
-/// Slowest mean speed as a share of the limit.
+/// Lowest mean speed as a share of the limit.
 const MIN_SPEED_SHARE: f64 = 0.12;
-/// Ripples in Hz: slower ones are not one period long, faster ones beyond a robot's loop.
+/// Ripple frequencies in Hz: slower ones are shorter than one period, faster ones exceed a robot's bandwidth.
 const RIPPLE_HZ: (f64, f64) = (0.2, 2.0);
-/// Holds in s: relaxation takes some seconds.
+/// Durations of holds in s: relaxation takes some seconds.
 const HOLD_S: (f64, f64) = (1.0, 8.0);
 
-/// A place from which an insertion starts and how it is sampled.
+/// Initial position and sampling of an insertion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartConditions {
     /// Position of the tip at time zero in m.
     pub start_m: f64,
-    /// The surface in m.
+    /// Position of the surface in m.
     pub surface_m: f64,
-    /// No deeper than this in m, whatever the limit: a little beyond the tissue.
+    /// Largest position in m whatever the limit: slightly beyond the tissue.
     pub max_depth_m: f64,
-    /// Samples per second.
+    /// Sampling rate in Hz.
     pub sample_hz: f64,
 }
 
-/// Builds a program: keeps the speed at which the last segment ends.
+/// Builds a program and tracks the velocity at the end of its last segment.
 struct ProgramBuilder<'a> {
     limits: &'a Limits,
     sample_hz: f64,
@@ -47,13 +48,13 @@ struct ProgramBuilder<'a> {
 }
 
 impl ProgramBuilder<'_> {
-    /// Seconds that a change of speed (m/s) takes.
+    /// Duration in s of a change of velocity (m/s).
     fn ramp_s(&self, change_mps: f64) -> f64 {
         let least = MIN_RAMP_S.max(1.0 / self.sample_hz);
         (change_mps.abs() * FRAC_PI_2 / (LIMIT_SHARE * self.limits.acceleration_mps2)).max(least)
     }
 
-    /// Goes over to another speed.
+    /// Changes to another velocity.
     fn change_speed(&mut self, speed_mps: f64) {
         let change = speed_mps - self.speed_mps;
         if change == 0.0 {
@@ -69,7 +70,7 @@ impl ProgramBuilder<'_> {
         self.speed_mps = speed_mps;
     }
 
-    /// A way (m, towards the speed's sign) at a speed.
+    /// Travels a distance (m, in the direction of the velocity).
     fn travel(&mut self, speed_mps: f64, way_m: f64) {
         self.change_speed(speed_mps);
         self.segments.push(Segment::Move { velocity_mps: speed_mps, duration_s: way_m / speed_mps.abs() });
@@ -80,7 +81,7 @@ impl ProgramBuilder<'_> {
         self.segments.push(Segment::Hold { duration_s });
     }
 
-    /// A way at a rippled speed; whole periods, so that it ends at the mean speed.
+    /// Travels a distance at a rippled velocity over whole periods, so that it ends at the mean velocity.
     fn ripple(&mut self, speed_mps: f64, amplitude_mps: f64, frequency_hz: f64, way_m: f64) {
         self.change_speed(speed_mps);
         let periods = (way_m / speed_mps * frequency_hz).round().max(1.0);
@@ -102,14 +103,14 @@ fn log_between(u: f64, (low, high): (f64, f64)) -> f64 {
     low * libm::pow(high / low, u)
 }
 
-/// The motion of a point of the unit cube; `None` when it does not keep the limits.
+/// The motion of a point of the unit cube; `None` when it violates the limits.
 #[must_use]
 pub fn motion_from_point(point: &[f64], limits: &Limits, begin: &StartConditions) -> Option<Motion> {
     let at = |k: usize| point.get(k).copied().unwrap_or(0.5).clamp(0.0, 1.0);
     let parts = 2 + ((at(0) * (MAX_PARTS - 1) as f64) as usize).min(MAX_PARTS - 2);
     let deepest = LIMIT_SHARE * (limits.depth_m.min(begin.max_depth_m) - begin.start_m);
     let aim_m = deepest * between(at(1), (0.75, 1.0));
-    // A slower program that takes too long is made faster, as far as the limit of the speed allows.
+    // A program that takes too long is made faster within the speed limit.
     (0..4).find_map(|turn| {
         let least = MIN_SPEED_SHARE + (0.75 - MIN_SPEED_SHARE) * f64::from(turn) / 3.0;
         let motion = build_program(parts, aim_m, least, &at, limits, begin);
@@ -128,14 +129,15 @@ fn build_program(
     let most_mps = LIMIT_SHARE * limits.speed_mps;
     let mut b = ProgramBuilder { limits, sample_hz: begin.sample_hz, segments: Vec::new(), speed_mps: 0.0 };
     let number = |part: usize, which: usize| at(2 + part * COORDINATES_PER_PART + which);
-    // The last part is a way back for most points: it tells friction from what does not turn with the speed.
+    // For most points the last part is a retraction, which separates friction from effects independent of the
+    // direction.
     let back_last = number(parts - 1, 0) < 0.85;
     let forward = |part: usize| {
         let last = part + 1 == parts;
         !(last && back_last) && (part == 0 || number(part, 0) >= 0.25)
     };
     let ways: f64 = (0..parts).filter(|p| forward(*p)).map(|p| 0.2 + number(p, 2)).sum();
-    // Ways back in between are gone again: the same place is seen twice.
+    // Retractions in between are travelled again: the same depth is passed twice.
     let backs: f64 = (0..parts)
         .filter(|p| !forward(*p) && *p + 1 < parts && number(*p, 0) < 0.1)
         .map(|p| 0.05 + 0.1 * number(p, 2))
@@ -149,7 +151,8 @@ fn build_program(
         } else if forward(part) {
             let way_m = aim_m * (1.0 + backs) * share / ways;
             let hz = log_between(number(part, 4), RIPPLE_HZ);
-            // Both the speed and the acceleration bound the amplitude; whole periods change the frequency by half of one.
+            // Speed and acceleration limit the amplitude; whole periods change the frequency by up to half a
+            // period.
             let periods = way_m / speed * hz;
             let most = (most_mps - speed)
                 .min(LIMIT_SHARE * limits.acceleration_mps2 / (TAU * hz * (1.0 + 0.5 / periods.max(0.5))));
@@ -170,7 +173,8 @@ fn build_program(
     Motion::Program { start_m: begin.start_m, segments: b.segments }
 }
 
-/// Largest speed (m/s) and acceleration (m/s²) of a program, in closed form, changes of speed at once counted as infinite.
+/// Largest speed (m/s) and acceleration (m/s²) of a program in closed form; velocity steps count as infinite
+/// acceleration.
 fn extremes(segments: &[Segment]) -> (f64, f64) {
     let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
     let mut last = 0.0;
@@ -202,7 +206,7 @@ fn extremes(segments: &[Segment]) -> (f64, f64) {
     (speed, acceleration)
 }
 
-/// Whether a motion keeps the limits of depth, speed, acceleration and duration, from rest to rest.
+/// Whether a motion satisfies the limits of depth, speed, acceleration and duration, from rest to rest.
 #[must_use]
 pub fn within_limits(motion: &Motion, limits: &Limits) -> bool {
     let Motion::Program { segments, .. } = motion else { return false };
@@ -214,7 +218,7 @@ pub fn within_limits(motion: &Motion, limits: &Limits) -> bool {
         && acceleration <= limits.acceleration_mps2
 }
 
-/// Why no motion can keep the limits, before any is drawn; `None` when one may.
+/// Why no motion can satisfy the limits, and what would help; `None` when one may.
 #[must_use]
 pub fn infeasibility(limits: &Limits, begin: &StartConditions) -> Option<(String, String)> {
     let into_m = limits.depth_m - begin.surface_m;
@@ -231,7 +235,7 @@ pub fn infeasibility(limits: &Limits, begin: &StartConditions) -> Option<(String
     }
     let way_m = begin.surface_m + MIN_DEPTH_M - begin.start_m;
     let fastest_s = way_m / limits.speed_mps + FRAC_PI_2 * limits.speed_mps / limits.acceleration_mps2;
-    // Where the speed cannot be reached, half of the way is gone faster and faster.
+    // Without reaching the speed, half of the distance is travelled at constant acceleration.
     let by_acceleration_s = 2.0 * (way_m / limits.acceleration_mps2).sqrt();
     let least_s = fastest_s.min(by_acceleration_s.max(way_m / limits.speed_mps));
     if limits.duration_s < least_s {
@@ -250,10 +254,10 @@ pub fn infeasibility(limits: &Limits, begin: &StartConditions) -> Option<(String
     None
 }
 
-/// An insertion that tells anything goes at least so deep into the tissue, in m.
+/// Smallest useful depth of an insertion into the tissue in m.
 pub const MIN_DEPTH_M: f64 = 0.002;
 
-/// Point `k` of an additive recurrence that fills the cube evenly (Roberts 2018: powers of the root of `x^(d+1) = x + 1`).
+/// Point `k` of an additive low-discrepancy sequence (Roberts 2018: powers of the root of `x^(d+1) = x + 1`).
 #[must_use]
 pub fn low_discrepancy_point(k: usize) -> Vec<f64> {
     let d = DIMENSIONS as i32;

@@ -1,4 +1,4 @@
-//! The motion under which what may be the case differs most: drawn evenly, then refined.
+//! Searches the motion that best separates the candidates: low-discrepancy sampling, then refinement.
 
 use crate::error::PlanError;
 use crate::information_state::{Information, InformationState};
@@ -10,46 +10,46 @@ use rayon::prelude::*;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_scenario::Motion;
 
-/// Motions drawn.
+/// Number of sampled motions.
 const SAMPLED_MOTIONS: usize = 200;
-/// The best that are refined, and steps of the refinement; every step tries some neighbours at once.
+/// Number of motions that are refined, steps of the refinement, and trials per step.
 const REFINED_MOTIONS: usize = 2;
 const REFINEMENT_STEPS: usize = 4;
 const NEIGHBOURS_PER_STEP: usize = 8;
-/// A pair is asked for when some motion tells it apart by so many nats.
+/// Nats from which on a pair counts as distinguishable.
 pub const DISTINGUISHABLE_NATS: f64 = 10.0;
-/// More nats than this between two candidates add nothing to a verdict.
+/// Nats beyond which a larger separation does not change a diagnosis.
 const MAX_USEFUL_NATS: f64 = 400.0;
-/// What a nat of the mean over all pairs counts beside one of the worst.
+/// Weight of the mean over all pairs relative to the worst pair.
 const MEAN_PAIR_WEIGHT: f64 = 0.02;
 
-/// A motion that was found.
+/// A motion with its information.
 #[derive(Clone, Debug)]
 pub struct EvaluatedMotion {
     /// The motion.
     pub motion: Motion,
-    /// What it shows together with what is known.
+    /// Information after the motion.
     pub information: Information,
-    /// How good it is: nats of the worst pair, or of knowledge when there is no pair.
+    /// Objective: nats of the worst pair, or the gain of information without a pair.
     pub score: f64,
     /// Largest force in N expected under any candidate.
     pub force_n: f64,
     point: Vec<f64>,
 }
 
-/// What a search gives.
+/// Result of a search.
 pub struct MotionSearchResult {
-    /// The best motion first, then the next best that differ from it.
+    /// The best motion first, then the next best ones.
     pub best: Vec<EvaluatedMotion>,
-    /// Pairs that some motion within the limits tells apart.
+    /// Pairs that some motion within the limits distinguishes.
     pub distinguishable: Vec<(usize, usize)>,
-    /// Pairs that none does.
+    /// Pairs that no motion distinguishes.
     pub indistinguishable: Vec<(usize, usize)>,
-    /// Motions that were looked at.
+    /// Number of evaluated motions.
     pub motions_evaluated: usize,
 }
 
-/// How good a motion is.
+/// Objective of a motion.
 fn score(ground: &InformationState, shown: &Information, pairs: &[(usize, usize)], known: f64) -> f64 {
     if pairs.is_empty() {
         return shown.half_log_det() - known;
@@ -57,7 +57,7 @@ fn score(ground: &InformationState, shown: &Information, pairs: &[(usize, usize)
     let (mut worst, mut sum) = (f64::INFINITY, 0.0);
     for (a, b) in pairs {
         let weight = |k: usize| ground.candidates.get(k).map_or(0.05, |c| c.probability).max(1e-3);
-        // Odds before the insertion count as nats of the gap.
+        // Prior odds count as nats of the gap.
         let nats = ground.separation_nats(shown, *a, *b).min(MAX_USEFUL_NATS);
         worst = worst.min(nats - libm::log(weight(*a) * weight(*b)));
         sum += nats;
@@ -65,10 +65,10 @@ fn score(ground: &InformationState, shown: &Information, pairs: &[(usize, usize)
     worst + MEAN_PAIR_WEIGHT * sum / pairs.len() as f64
 }
 
-/// Searches for the best motions within limits.
+/// Searches the best motions within limits.
 ///
-/// # Errors
-/// [`PlanError::Impossible`] when no motion keeps the limits, [`PlanError::NoForce`] when none can be replayed.
+/// # Errors [`PlanError::Infeasible`] when no motion satisfies the limits, [`PlanError::NoForce`] when none can
+/// be replayed.
 pub fn search_motions(
     ground: &InformationState,
     limits: &Limits,
@@ -149,13 +149,13 @@ pub fn search_motions(
     })
 }
 
-/// Largest force in N expected under any candidate, three standard deviations of the noise included.
+/// Largest force in N expected under any candidate, plus three standard deviations of the noise.
 fn expected_peak_force_n(ground: &InformationState, blocks: &BlockAverages) -> Option<f64> {
     let most = ground.peak_forces_n(blocks)?.into_iter().fold(0.0, f64::max);
     Some(most + 3.0 * ground.noise.sd_n())
 }
 
-/// Goes uphill from a motion: neighbours from the same even sequence, nearer with every step.
+/// Improves a motion by trials from the same low-discrepancy sequence in a shrinking neighbourhood.
 fn refine_motion(
     ground: &InformationState,
     limits: &Limits,

@@ -1,5 +1,6 @@
-//! The honest probability: the best motions simulated under every candidate and diagnosed together with what is at hand. The one after
-//! which the diagnosis is right most often is taken; insertions that had no part in that choice say how often it decides.
+//! Estimates the probability of a correct diagnosis by simulation: the best motions are simulated under every
+//! candidate and diagnosed together with the available recordings. The motion with the most correct diagnoses
+//! is selected; separate simulations, not used for the selection, estimate its probability.
 
 use crate::candidate::NONE;
 use crate::error::PlanError;
@@ -12,21 +13,22 @@ use rayon::prelude::*;
 use stylet_diagnose::{Diagnosis, NamedRecording, Options, Verdict, diagnose};
 use stylet_scenario::{ForceTorque, Motion, Robot, Scenario, Sensor};
 
-/// Candidates under which the best motions are set against each other, likeliest first.
+/// Number of candidates under which the best motions are compared, most probable first.
 const COMPARED_CANDIDATES: usize = 4;
-/// Candidates under which the chosen motion is tried, and how often each.
+/// Number of candidates under which the selected motion is tested, and tests per candidate.
 const TESTED_CANDIDATES: usize = 6;
 const TEST_ROUNDS: u64 = 2;
-/// Blocks that are replayed in all ([`Data::work`](stylet_identify::objective::Data::work)): some 40 s of two cores. Where diagnoses cost
-/// more, fewer motions are raced and fewer insertions judge.
+/// Total number of replayed blocks
+/// ([`FitData::blocks_replayed`](stylet_identify::likelihood::FitData::blocks_replayed)), about 40 s on two
+/// cores. If diagnoses cost more, fewer motions and insertions are simulated.
 const MAX_REPLAYED_BLOCKS: u64 = 1_200_000_000;
-/// What the expected gaps count for, in simulated insertions.
+/// Weight of the probability from expected gaps, in simulated insertions.
 const EXPECTED_GAP_WEIGHT: f64 = 6.0;
-/// Seeds of the insertions that choose, and of those that judge.
+/// Seeds of the simulations for selection and for the test.
 const SELECTION_SEED: u64 = 1000;
 const TEST_SEED: u64 = 2000;
 
-/// What is at hand when a motion is simulated.
+/// Inputs shared by all simulations.
 struct SimulationCheck<'a> {
     assumed: &'a Scenario,
     information: &'a InformationState,
@@ -34,13 +36,13 @@ struct SimulationCheck<'a> {
     noise_n: f64,
 }
 
-/// Simulates the best motions of a search under the likeliest candidates, diagnoses each with the recordings at hand (without any the
-/// scenario's own motion is simulated first), and gives the plan with the motion after which most are right; ties go to the better
-/// score. `simulated` and the probability come from insertions that were not used to choose. `progress` is told what is being done.
-/// The same inputs give the same plan, whatever the machine's speed.
+/// Simulates the best motions of a search under the most probable candidates and diagnoses each with the
+/// available recordings (without any, the scenario's own motion is simulated first). Returns the plan with the
+/// motion after which most diagnoses are correct; ties go to the better score. `simulated` and the probability
+/// come from insertions not used for the selection. `progress` receives a message per step. The plan does not
+/// depend on the machine's speed.
 ///
-/// # Errors
-/// [`PlanError`] when a planned insertion can be neither simulated nor diagnosed.
+/// # Errors [`PlanError`] when a planned insertion can be neither simulated nor diagnosed.
 pub fn check_by_simulation(
     found: &MotionSearchResult,
     limits: &Limits,
@@ -62,7 +64,7 @@ pub fn check_by_simulation(
     let mut outcomes: Vec<Vec<bool>> = Vec::new();
     let mut spent = 0;
     for (k, motion) in found.best.iter().enumerate() {
-        // As dear as those before, and the chosen motion's own insertions have to be affordable, too.
+        // Assumes equal cost per motion and leaves work for the test of the selected one.
         let each = spent / (k * raced.len()).max(1) as u64;
         if k > 0 && spent + each * (raced.len() + order.len()) as u64 > MAX_REPLAYED_BLOCKS {
             break;
@@ -73,7 +75,7 @@ pub fn check_by_simulation(
         outcomes.push(bench.diagnose_all(&motion.motion, &jobs, &mut spent)?);
     }
     let each = spent / (outcomes.len() * raced.len()).max(1) as u64;
-    // Weighed by how likely each candidate is; the first of equals.
+    // Weighted by the candidates' probabilities; the first of equals.
     let worth = |of: &[bool]| -> f64 {
         raced
             .iter()
@@ -103,7 +105,7 @@ pub fn check_by_simulation(
         .collect();
     let mut judged = false;
     if let [only] = outcomes.as_slice() {
-        // Nothing was chosen by them.
+        // With a single motion nothing was selected, so its simulations count as a test.
         judged = spent + each * order.len() as u64 > MAX_REPLAYED_BLOCKS;
         for (tried, right) in tried.iter_mut().zip(only) {
             tried.trials += 1;
@@ -125,7 +127,7 @@ pub fn check_by_simulation(
     let weights: Vec<f64> = order.iter().map(|c| ground.candidates[*c].probability).collect();
     let sum: f64 = weights.iter().sum();
     if sum > 0.0 {
-        // One success and one failure beforehand (Laplace): a few insertions make nobody sure.
+        // One success and one failure added (Laplace).
         let share = |t: &CandidateTrials| (t.correct as f64 + 1.0) / (t.trials as f64 + 2.0);
         let seen = tried.iter().zip(&weights).map(|(t, w)| w * share(t)).sum::<f64>() / sum;
         let n = tried.iter().map(|t| t.trials).sum::<usize>() as f64;
@@ -138,7 +140,7 @@ pub fn check_by_simulation(
 }
 
 impl SimulationCheck<'_> {
-    /// Whether the diagnosis is right after one insertion, per candidate and seed; what it costs goes to `spent`.
+    /// Whether the diagnosis is correct after one insertion, per candidate and seed; adds the cost to `spent`.
     fn diagnose_all(
         &self,
         motion: &Motion,
@@ -151,7 +153,7 @@ impl SimulationCheck<'_> {
         Ok(said.into_iter().map(|s| s.0).collect())
     }
 
-    /// Whether the diagnosis is right, and what it cost.
+    /// Whether the diagnosis is correct, and its cost in replayed blocks.
     fn diagnose_one(&self, motion: &Motion, candidate: usize, seed: u64) -> Result<(bool, u64), PlanError> {
         let mut evidence = self.recordings.to_vec();
         if evidence.is_empty() && self.assumed.motion.plan().is_some() {
@@ -175,7 +177,7 @@ impl SimulationCheck<'_> {
     }
 }
 
-/// Standard deviation of a sample's noise in N.
+/// Standard deviation of the noise of a sample in N.
 fn sensor_noise(ground: &InformationState, believed: &Scenario) -> f64 {
     let samples = (stylet_identify::block_averages::BLOCK_S * ground.sample_hz).round().max(1.0);
     believed
@@ -186,7 +188,7 @@ fn sensor_noise(ground: &InformationState, believed: &Scenario) -> f64 {
         .max(1e-4)
 }
 
-/// Whether a diagnosis names the candidate, and beside it only what the stem has.
+/// Whether a diagnosis names the candidate, and besides it only effects of the base model.
 fn is_correct(said: &Diagnosis, ground: &InformationState, which: usize) -> bool {
     let Some(candidate) = ground.candidates.get(which) else { return false };
     let stem: Vec<&str> = ground.base.effects.iter().map(|e| e.info.id).collect();

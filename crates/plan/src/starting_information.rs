@@ -1,4 +1,5 @@
-//! Where planning starts: from a diagnosis, or from a scenario that nothing has been compared with.
+//! Candidates and information from which planning starts: from a diagnosis, or from a scenario without
+//! measurements.
 
 use crate::candidate::{Candidate, typical_effect};
 use crate::error::PlanError;
@@ -14,16 +15,16 @@ use stylet_identify::noise::Noise;
 use stylet_scenario::{Motion, Scenario};
 use stylet_tissue::{AnyEffect, Effect, general_effects};
 
-/// What may be the case beside what was named has this probability in all.
+/// Total probability of effects that were not detected.
 const OTHER_EFFECTS_PROBABILITY: f64 = 0.5;
-/// The needle starts this far in m before the surface when no recording says otherwise.
+/// Start in m above the surface without a recording.
 const START_ABOVE_SURFACE_M: f64 = 0.005;
-/// No motion goes further than this in m beyond the tissue.
+/// Largest travel in m beyond the tissue.
 const BEYOND_TISSUE_M: f64 = 0.003;
-/// Noise in N where the scenario's sensor does not state one.
+/// Noise in N if the scenario's sensor states none.
 const DEFAULT_NOISE_N: f64 = 0.05;
 
-/// Where an insertion may start.
+/// Initial position and sampling of the next insertion.
 #[must_use]
 pub fn start_conditions(scenario: &Scenario, start_m: Option<f64>) -> StartConditions {
     let surface_m = scenario.tissue.surface_m;
@@ -36,11 +37,10 @@ pub fn start_conditions(scenario: &Scenario, start_m: Option<f64>) -> StartCondi
     }
 }
 
-/// What is known and what may be the case after a diagnosis: the class that it could not split, or, when there is none, what it
-/// could not see. Gains are left out: a gain of the sensor is other coefficients, whatever the motion.
+/// Information and candidates after a diagnosis: the class that it could not resolve, or else the effects that
+/// were not identifiable.
 ///
-/// # Errors
-/// [`PlanError::NoForce`] when the model cannot be replayed.
+/// # Errors [`PlanError::NoForce`] when the model cannot be replayed.
 pub fn from_diagnosis(
     scenario: &Scenario,
     examined: &DiagnosisResult,
@@ -103,10 +103,10 @@ pub fn from_diagnosis(
     Ok((ground, start_conditions(scenario, start.is_finite().then_some(start))))
 }
 
-/// Every effect of the library at its typical size beside what a diagnosis settled, over the recordings at hand: what they can show.
+/// Every effect of the library at its typical size in addition to the diagnosed model, over the available
+/// recordings.
 ///
-/// # Errors
-/// [`PlanError::NoForce`] when the model cannot be replayed.
+/// # Errors [`PlanError::NoForce`] when the model cannot be replayed.
 pub fn from_recordings(
     scenario: &Scenario,
     examined: &DiagnosisResult,
@@ -126,11 +126,10 @@ pub fn from_recordings(
         .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))
 }
 
-/// What may be the case before any measurement: nothing, or any one effect of the library at its typical size. The scenario's own
-/// motion, or the one given, counts as made.
+/// Candidates before any measurement: no effect, or any one effect of the library at its typical size. The
+/// scenario's own motion, or the given one, counts as executed.
 ///
-/// # Errors
-/// [`PlanError::NoForce`] when the law cannot be replayed along the motion.
+/// # Errors [`PlanError::NoForce`] when the model cannot be replayed along the motion.
 pub fn from_scenario(
     scenario: &Scenario,
     made: Option<&Motion>,
@@ -157,8 +156,8 @@ pub fn from_scenario(
     Ok((ground, start_conditions(scenario, start)))
 }
 
-/// The noise of blocks that a scenario's sensor makes: an autoregression of first order is white over a block, and as large as it
-/// adds up to.
+/// Noise of blocks for a scenario's sensor: first-order autoregressive noise is white over a block, with its
+/// long-run variance.
 fn sensor_noise(scenario: &Scenario) -> Noise {
     let (sd_n, pole) = scenario.sensor.force_torque().map_or((DEFAULT_NOISE_N, 0.0), |s| (s.noise_n, s.ar1));
     let samples = (BLOCK_S * scenario.sample_hz).round().max(1.0);

@@ -30,7 +30,6 @@
 //! | [`scratch`] | columns of numbers on disk |
 //! | [`thin`](mod@thin) | recordings of hours, thinned |
 //! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
-//! | [`motion`] | the motion between samples, with the instants at which the speed jumps, from exact and from noisy positions |
 //! | [`error`] | [`RecordError`]: what, where, and what would be right |
 
 pub mod column_map;
@@ -44,7 +43,6 @@ pub mod error;
 pub mod file_formats;
 pub mod ground_truth;
 pub mod long_recording;
-pub mod motion;
 pub mod nonfinite_rows;
 mod quality;
 pub mod recording;

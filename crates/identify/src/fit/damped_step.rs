@@ -5,15 +5,15 @@ use crate::likelihood::FitData;
 use crate::model::{Model, NO_RUPTURE, Parameter, ParameterRole};
 use stylet_stats::linear_algebra::dot;
 
-/// Longest move of an instant in one step, in blocks: beyond, a derivative says nothing.
+/// Largest change of a rupture time in one step, in blocks; the derivative is not valid beyond.
 const MAX_RUPTURE_STEP_BLOCKS: f64 = 1.5;
 
-/// A step is tried further when the lowest place along it seems to be beyond this share of it, up to ...
+/// A step is extrapolated when the estimated minimum along it lies beyond this factor.
 const MIN_EXTRAPOLATION: f64 = 1.3;
-/// ... this one.
+/// Largest extrapolation factor.
 const MAX_EXTRAPOLATION: f64 = 4.0;
 
-/// Brings every number within its bounds.
+/// Clamps every shared parameter to its bounds.
 pub(super) fn clamp_to_bounds(model: &mut Model) {
     for n in model.shared_parameters() {
         let x = model.get(n.role, 0);
@@ -23,17 +23,18 @@ pub(super) fn clamp_to_bounds(model: &mut Model) {
     }
 }
 
-/// How much further than `delta` it goes down along it: the lowest place of the parabola that falls as the tangent says and has gained
-/// `gained` so far. Residuals far off weigh more in the tangent than they do when they become smaller or larger (their loss is a
-/// straight line), so that its steps are too short by the same factor again and again. `None` where it is hardly further.
+/// Extrapolation factor of `delta`: the minimum of the parabola with the slope of the linearization that has
+/// fallen by `gained` at one. Outliers have more weight in the linearization than under the Huber loss, so
+/// plain steps are too short by about the same factor again and again. `None` when extrapolation would not
+/// help.
 pub(super) fn extrapolation_factor(t: &Linearization, delta: &[f64], gained: f64) -> Option<f64> {
     let falls = dot(&t.neg_gradient, delta);
     let share = if gained < falls { falls / (2.0 * (falls - gained)) } else { MAX_EXTRAPOLATION };
     (share > MIN_EXTRAPOLATION).then_some(share.min(MAX_EXTRAPOLATION))
 }
 
-/// One damped step that stays within bounds: a change of every number `among` those wanted, as they stand in the matrix; `None` when nothing
-/// can move.
+/// One damped step within bounds over the parameters selected by `among`, in the order of the normal matrix;
+/// `None` when nothing can move.
 pub(super) fn damped_step(
     model: &Model,
     data: &FitData,
@@ -56,7 +57,7 @@ pub(super) fn damped_step(
     };
     let mut free: Vec<usize> = (0..size).filter(|i| among(*i) && t.normal_matrix.at(*i, *i) > 0.0).collect();
     let mut delta = vec![0.0; size];
-    // Numbers that run against a bound stay there; the others are solved for again.
+    // Parameters that hit a bound stay there; the others are solved for again.
     for _ in 0..6 {
         let rhs: Vec<f64> = free
             .iter()
@@ -103,7 +104,7 @@ pub(super) fn damped_step(
     Some(delta)
 }
 
-/// A model some way along a step.
+/// The model after a share of a step.
 pub(super) fn apply_step(
     model: &Model,
     data: &FitData,
@@ -129,7 +130,7 @@ pub(super) fn apply_step(
     next
 }
 
-/// Instants stay inside the recording and in their order.
+/// Keeps rupture times inside the recording and in order.
 pub(super) fn order_rupture_times(instants: &mut [f64], (first, last): (f64, f64)) {
     let mut before = first;
     for t in instants.iter_mut().filter(|t| **t < NO_RUPTURE) {

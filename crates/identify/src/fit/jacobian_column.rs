@@ -1,12 +1,12 @@
 use core::ops::Range;
 use stylet_stats::linear_algebra::dot;
 
-/// A change of all residuals with a number.
+/// One column of the Jacobian of all residuals.
 #[derive(Clone, Debug, Default)]
 pub struct JacobianColumn {
-    /// Weighted, whitened change of the prediction, per recording.
+    /// Change of the predicted force, whitened and weighted, per recording.
     pub innovations: Vec<Vec<f64>>,
-    /// Change of the rows of every event, per recording.
+    /// Change of the rupture residuals, per recording.
     pub rupture_rows: Vec<Vec<f64>>,
 }
 
@@ -28,7 +28,7 @@ impl JacobianColumn {
     }
 }
 
-/// The blocks of every recording from the first to the last at which a column is something: many numbers change a short stretch alone.
+/// Range of blocks with non-zero entries in every recording: many parameters change a short stretch only.
 pub(super) fn support(column: &JacobianColumn) -> Vec<Range<usize>> {
     let of = |w: &Vec<f64>| {
         let first = w.iter().position(|w| *w != 0.0).unwrap_or(w.len());

@@ -1,4 +1,4 @@
-//! The linear picture of a model: how the residuals change with every number.
+//! Linearization of a model: derivatives of all residuals and the normal equations.
 
 use super::jacobian_column::{JacobianColumn, support};
 use crate::forward_model::ReplayResult;
@@ -10,33 +10,33 @@ use core::ops::Range;
 use rayon::prelude::*;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix, dot};
 
-/// The linear picture of a model around where it stands.
+/// Linearization of a model at its current parameters.
 pub struct Linearization {
-    /// Numbers that all recordings share.
+    /// Parameters shared by all recordings.
     pub shared: Vec<Parameter>,
-    /// Numbers of each recording's own.
+    /// Per-recording parameters.
     pub per_recording: Vec<Parameter>,
-    /// Their columns, `shared` first.
+    /// Jacobian columns, `shared` first.
     pub columns: Vec<JacobianColumn>,
-    /// The residuals as a column, weighted.
+    /// Weighted residuals as a column.
     pub residual: JacobianColumn,
-    /// Normal matrix with priors: `shared`, then the own ones recording by recording.
+    /// Normal matrix with priors: `shared`, then the per-recording parameters, recording by recording.
     pub normal_matrix: SymmetricMatrix,
-    /// Downhill direction: minus the gradient of the nats.
+    /// Negative gradient of the objective in nats.
     pub neg_gradient: Vec<f64>,
     pub(super) sqrt_weights: Vec<Vec<f64>>,
-    /// Where each column is something.
+    /// Range of blocks with non-zero entries, per column and recording.
     pub(super) supports: Vec<Vec<Range<usize>>>,
 }
 
 impl Linearization {
-    /// Where an own number stands in the matrix.
+    /// Index of a per-recording parameter in the normal matrix.
     #[must_use]
     pub fn index_of(&self, own: usize, r: usize) -> usize {
         self.shared.len() + r * self.per_recording.len() + own
     }
 
-    /// The linear picture of `model` whose residuals are `at`.
+    /// Linearization of `model` with residuals `at`.
     #[must_use]
     pub fn new(model: &Model, data: &FitData, at: &Residuals) -> Self {
         let (shared, own) = (model.shared_parameters(), model.recording_parameters());
@@ -62,9 +62,9 @@ impl Linearization {
         t
     }
 
-    /// The same with some numbers' changes over steps as wide as `step` says (both ways, per unit) in place of derivatives. A force
-    /// that bends at a face moves by a jump to first order; moved by as much as the face is uncertain it goes up a ramp, which a slow
-    /// noise hides far better.
+    /// Replaces derivatives by symmetric differences over the widths that `step` returns (per unit). To first
+    /// order an interface that moves shifts a force jump; over its actual uncertainty it is a ramp, which slow
+    /// noise masks far better.
     #[must_use]
     pub fn with_wide_differences(
         mut self,
@@ -100,7 +100,7 @@ impl Linearization {
         self
     }
 
-    /// The column of a number by a forward difference.
+    /// Jacobian column of a parameter by a forward difference.
     fn derivative(
         &self,
         model: &Model,
@@ -138,7 +138,8 @@ impl Linearization {
         column
     }
 
-    /// What changes between `model` and another one, as a column: predicted force weighted and whitened, rows of events.
+    /// Difference between `model` and another model as a column: predicted force, whitened and weighted, and
+    /// rupture residuals.
     #[must_use]
     pub fn difference(
         &self,
@@ -150,7 +151,7 @@ impl Linearization {
         self.column_of_change(model, data, at, |r| replay(other, data, r))
     }
 
-    /// The same with the other model's replays.
+    /// The same from the other model's predictions.
     fn column_of_change(
         &self,
         model: &Model,
@@ -161,7 +162,7 @@ impl Linearization {
         let mut column = JacobianColumn::default();
         for (r, b) in data.recordings.iter().enumerate() {
             let replayed = other(r)?;
-            // Predicted now less predicted before = residual before less residual now.
+            // Change of the prediction = residual before - residual now.
             let change: Vec<f64> = replayed
                 .force_n
                 .iter()
@@ -196,7 +197,8 @@ impl Linearization {
             g[i] = row[i + 1];
             row[..=i].iter().enumerate().for_each(|(j, x)| h.add(i, j, *x));
         }
-        // By recording and own number: with the shared ones, with the own ones before it and itself, and with the rest.
+        // Products of each per-recording parameter with the shared ones, with the preceding ones of its
+        // recording, and with the residual.
         let row = |k: usize| {
             let (r, i) = (k / no, ns + k % no);
             t.columns[..=i].iter().chain([&t.residual]).map(|c| t.recording_product(i, c, r)).collect()
@@ -227,7 +229,7 @@ impl Linearization {
         (self.normal_matrix, self.neg_gradient) = (h, g);
     }
 
-    /// As [`Column::dot`] of one of the columns with another one, over the blocks where the first is something.
+    /// As [`JacobianColumn::dot`] of a Jacobian column with another one, over the support of the first.
     fn recording_product(&self, i: usize, c: &JacobianColumn, r: usize) -> f64 {
         let own = &self.columns[i];
         let blocks = match (self.supports[i].get(r), own.innovations.get(r), c.innovations.get(r)) {
@@ -241,7 +243,7 @@ impl Linearization {
         blocks + own.rupture_rows.get(r).zip(c.rupture_rows.get(r)).map_or(0.0, |(a, b)| dot(a, b))
     }
 
-    /// Scalar products of a column with all of the tangent's.
+    /// Scalar products of a column with all Jacobian columns, in the order of the normal matrix.
     #[must_use]
     pub fn products_with(&self, c: &JacobianColumn, recordings: usize) -> Vec<f64> {
         let ns = self.shared.len();
@@ -251,14 +253,14 @@ impl Linearization {
         (0..ns).map(all).chain(own).collect()
     }
 
-    /// Factor of the normal matrix.
+    /// Cholesky factor of the normal matrix.
     #[must_use]
     pub fn factor(&self) -> CholeskyFactor {
         self.normal_matrix.cholesky()
     }
 }
 
-/// The trails of all recordings.
+/// Replay caches of all recordings.
 fn replay_caches(model: &Model, data: &FitData) -> Vec<Option<ReplayCache>> {
     (0..data.recording_count()).into_par_iter().map(|r| ReplayCache::new(model, data, r)).collect()
 }
@@ -267,7 +269,7 @@ fn weighted(w: &[Vec<f64>], roots: &[Vec<f64>]) -> Vec<Vec<f64>> {
     w.iter().zip(roots).map(|(w, r)| w.iter().zip(r).map(|(w, r)| w * r).collect()).collect()
 }
 
-/// Rows of the events as residuals: what they are less what they should be, zero.
+/// Rupture residuals; their observed value is zero.
 fn event_rows(model: &Model, now: &Residuals, at: &Residuals) -> Vec<Vec<f64>> {
     now.ruptures
         .iter()

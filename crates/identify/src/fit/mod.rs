@@ -1,11 +1,11 @@
-//! Bounded, damped least squares of all numbers of a model, the instants of its ruptures included.
+//! Bounded, damped least squares (Levenberg-Marquardt) over all parameters, rupture times included.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | `column`, `tangent` | how the residuals change with every number; the linear picture of a model |
-//! | `step` | one damped step within bounds, and how far along it |
-//! | `kinks` | a fit that a kink of the law does not end |
-//! | `spread` | how much recordings differ, as a fit tells it |
+//! | `jacobian_column`, `linearization` | derivative of the residuals by each parameter; normal equations |
+//! | `damped_step` | one damped step within bounds and its extrapolation |
+//! | `nonsmooth` | continues past kinks of the objective |
+//! | `scatter_update` | standard deviations of random effects |
 
 mod damped_step;
 mod jacobian_column;
@@ -29,18 +29,18 @@ use scatter_update::update_scatter;
 pub struct Fit {
     /// The model.
     pub model: Model,
-    /// What it leaves.
+    /// Its residuals.
     pub residuals: Residuals,
 }
 
 impl Fit {
-    /// Nats, with the noise of the data as it is.
+    /// Negative log posterior in nats under the noise of the data.
     #[must_use]
     pub fn nats(&self) -> f64 {
         self.residuals.nats
     }
 
-    /// Root mean square in N of what is left at the blocks that are compared.
+    /// Root mean square residual in N over the compared blocks.
     #[must_use]
     pub fn rms_n(&self, data: &FitData) -> f64 {
         let (mut sum, mut n) = (0.0, 0.0);
@@ -54,40 +54,41 @@ impl Fit {
     }
 }
 
-/// How long a fit goes on.
+/// Stopping criteria of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Steps at most.
+    /// Largest number of steps.
     pub max_iterations: usize,
-    /// It ends when a step gains less than so many nats.
+    /// A fit stops when a step gains less than this many nats.
     pub min_gain_nats: f64,
 }
 
 impl Effort {
-    /// A short one, to rank.
+    /// A short fit for ranking candidates.
     pub const SHORT: Self = Self { max_iterations: 3, min_gain_nats: 0.3 };
-    /// To the end.
+    /// A fit to convergence.
     pub const FULL: Self = Self { max_iterations: 14, min_gain_nats: 0.03 };
 }
 
-/// Damping of the first step, and steps that are tried from a tangent.
+/// Damping of the first step, and damping values tried per linearization.
 const FIRST_DAMPING: f64 = 1e-4;
 const MAX_DAMPING_TRIALS: usize = 7;
 
-/// Fits a model from where it stands.
+/// Fits a model from its current parameters.
 #[must_use]
 pub fn fit(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     fit_if_below(model, data, effort, f64::INFINITY)
 }
 
-/// As [`fit`], but given up where it would not come below `wanted` nats if every step left gained as much as the last.
+/// As [`fit`], but stops when the objective would not fall below `wanted` nats even if every remaining step
+/// gained as much as the last one.
 #[must_use]
 pub fn fit_if_below(model: &Model, data: &FitData, effort: Effort, wanted: f64) -> Option<Fit> {
     descend(model, data, effort, wanted, update_scatter)
 }
 
-/// As [`fit`]; where ruptures scatter, also from numbers under which they do not. Under a wide scatter what is a little off
-/// costs nothing, and stays.
+/// As [`fit`]; where ruptures scatter, also starts from zero scatter and keeps the better result. Under a wide
+/// scatter a small offset costs nothing and stays.
 #[must_use]
 pub fn fit_from_zero_scatter(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     let wide = fit(model, data, effort)?;
@@ -102,7 +103,7 @@ pub fn fit_from_zero_scatter(model: &Model, data: &FitData, effort: Effort) -> O
     Some(sharp.filter(|f| f.nats() < wide.nats()).unwrap_or(wide))
 }
 
-/// Steps downhill; after each the scatter is told by `scatter`.
+/// Descends from `model`; `scatter` re-estimates the random-effect scatter after each step.
 fn descend(
     model: &Model,
     data: &FitData,

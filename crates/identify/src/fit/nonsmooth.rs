@@ -1,4 +1,4 @@
-//! Fits past kinks of the law.
+//! Fits past kinks of the objective.
 
 use super::damped_step::{apply_step, damped_step};
 use super::{Effort, FIRST_DAMPING, Fit, Linearization, MAX_DAMPING_TRIALS, fit};
@@ -7,13 +7,14 @@ use crate::model::Model;
 use rayon::prelude::*;
 use stylet_stats::linear_algebra::dot;
 
-/// A tangent that promises less than so many nats where no step gains is as good as level.
+/// Predicted gain in nats below which a point without a descending step counts as a minimum.
 const MIN_PREDICTED_GAIN_NATS: f64 = 1.0;
-/// A fit is freed of kinks at most so often.
+/// Largest number of restarts.
 const MAX_RESTARTS: usize = 3;
 
-/// As [`fit`], but not ended by a kink: where the tangent promises a gain and no step along it keeps that, those numbers go on alone whose
-/// own steps gain. Laws that cling and slip have kinks: a derivative across one tells of neither side.
+/// As [`fit`], but continues where the linearization predicts a gain that no step along it achieves: then only
+/// those parameters move that improve the objective by a step of their own. Stick-slip and presliding laws have
+/// kinks, and a derivative across a kink holds on neither side.
 #[must_use]
 pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     let mut best = fit(model, data, effort)?;
@@ -30,7 +31,7 @@ pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fi
     Some(best)
 }
 
-/// A likelier model near one from which no step along the whole tangent gains what it promises.
+/// A better model near a point at which no step along the full linearization achieves the predicted gain.
 pub(super) fn escape_kink(at: &Fit, data: &FitData) -> Option<Model> {
     let tangent = Linearization::new(&at.model, data, &at.residuals);
     let whole = damped_step(&at.model, data, &tangent, FIRST_DAMPING, |_| true)?;
@@ -38,7 +39,7 @@ pub(super) fn escape_kink(at: &Fit, data: &FitData) -> Option<Model> {
         .then(|| step_of_improving_parameters(at, data, &tangent))?
 }
 
-/// A likelier model by a step of those numbers that gain by a step of their own.
+/// A better model by a joint step of the parameters whose individual steps improve the objective.
 pub(super) fn step_of_improving_parameters(
     at: &Fit,
     data: &FitData,

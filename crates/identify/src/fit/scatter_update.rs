@@ -1,14 +1,16 @@
-//! How much recordings differ from one another, as a fit tells it.
+//! Updates standard deviations of random effects during a fit.
 
 use crate::likelihood::{Residuals, neg_log_posterior};
 use crate::model::{Model, Scatter};
 use crate::rupture_likelihood::{RuptureEvent, estimate_rupture_scatter};
 
-/// A spread between insertions is at least this share of the typical one: it is not known to be nothing.
+/// Lower bound of a standard deviation between recordings, as a share of the library's value: a small sample
+/// does not show that it is zero.
 const MIN_SHARE_OF_LIBRARY_SD: f64 = 0.1;
 
-/// How ruptures scatter. In sets, as those of the layer do that scatter most: an instant that no drop of the force shows goes where the law
-/// expects it, and would say that none scatters.
+/// Scatter of rupture forces and depths. With fixed random-effect scatter it is that of the layer with the
+/// largest one: a rupture time without a visible force drop is set to where the law expects it and would
+/// suggest zero scatter.
 fn rupture_scatter(model: &Model, events: &[Vec<RuptureEvent>]) -> Scatter {
     let of = |layer: &dyn Fn(usize) -> bool| -> Scatter {
         let chosen = events.iter().flat_map(|e| e.iter().enumerate()).filter(|e| layer(e.0)).map(|e| *e.1);
@@ -26,7 +28,7 @@ fn rupture_scatter(model: &Model, events: &[Vec<RuptureEvent>]) -> Scatter {
     .unwrap_or(model.scatter)
 }
 
-/// Scatter between insertions as the events tell it.
+/// Re-estimates the scatter between recordings.
 pub(super) fn update_scatter(model: &mut Model, at: &mut Residuals) {
     model.scatter = rupture_scatter(model, &at.ruptures);
     let spread = |x: &dyn Fn(usize) -> f64, least: f64| {

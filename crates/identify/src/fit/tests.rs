@@ -15,7 +15,7 @@ fn near(told: f64, wanted: f64) {
     assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
 }
 
-/// Two layers from 4 mm on, the first of which gives way by its force after 5 mm of 12 mm.
+/// Two layers from 4 mm on, the first of which ruptures by force after 5 mm of 12 mm.
 fn model(recordings: usize) -> Model {
     let layer = |thickness_m: f64, k: f64, puncture_n: Option<f64>| Layer {
         thickness_m,
@@ -40,7 +40,7 @@ fn model(recordings: usize) -> Model {
     model
 }
 
-/// What a model gives for a needle that goes in by 4 mm/s and a ripple, with a little of something else.
+/// Data of a model for an insertion at 4 mm/s with a ripple, plus a small unmodelled force.
 fn data(truth: &Model, rough_n: f64) -> FitData {
     let recorded = |r: usize| {
         let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.005).collect();
@@ -66,14 +66,14 @@ fn column(w: &[&[f64]], rows: &[&[f64]]) -> JacobianColumn {
 }
 
 #[test]
-fn columns_are_multiplied_recording_by_recording() {
+fn column_products_are_per_recording() {
     let a = column(&[&[1.0, 2.0], &[3.0]], &[&[0.5], &[4.0, 1.0]]);
     let b = column(&[&[2.0, -1.0], &[5.0]], &[&[4.0], &[1.0, 2.0]]);
     assert_eq!((a.dot(&b, 0), a.dot(&b, 1), a.dot(&b, 2), a.dot_all(&b)), (2.0, 21.0, 0.0, 23.0));
 }
 
 #[test]
-fn what_is_left_is_measured_at_the_blocks_that_are_compared() {
+fn rms_uses_compared_blocks_only() {
     let (m, d) = (model(1), data(&model(1), 0.0));
     let mut blocks = (*d.recordings).clone();
     blocks[0].used = (0..blocks[0].len()).map(|k| k < 2).collect();
@@ -84,7 +84,7 @@ fn what_is_left_is_measured_at_the_blocks_that_are_compared() {
 }
 
 #[test]
-fn instants_are_put_in_order_inside_the_recording() {
+fn rupture_times_are_ordered_and_inside_the_recording() {
     let of = |mut instants: Vec<f64>| {
         order_rupture_times(&mut instants, (1.0, 9.0));
         instants
@@ -94,7 +94,7 @@ fn instants_are_put_in_order_inside_the_recording() {
 }
 
 #[test]
-fn numbers_are_brought_within_what_is_believed() {
+fn parameters_are_clamped_to_the_assumed_tolerances() {
     let mut m = model(1);
     m.tissue.layers[0].stiffness_n_per_m = 500.0;
     m.tissue.layers[1].stiffness_n_per_m = 10.0;
@@ -105,14 +105,14 @@ fn numbers_are_brought_within_what_is_believed() {
     near(m.tissue.surface_m, 0.0045);
 }
 
-/// No layer gave way: all is smooth.
+/// Without ruptures the objective is smooth.
 fn smooth() -> (Model, FitData) {
     let mut m = model(2);
     m.rupture_times_s = vec![vec![NO_RUPTURE; 2]; 2];
     m.scatter.rupture_force = 0.1;
     m.scatter.rupture_depth_m = 2e-3;
     let d = data(&m, 0.02);
-    // A law that is off, each recording by something of its own.
+    // The model is off, and each recording has its own parameters.
     m.tissue.layers[0].stiffness_n_per_m = 196.0;
     m.per_recording = [2e-4, -1e-4]
         .map(|surface_m| RecordingParameters {
@@ -125,10 +125,10 @@ fn smooth() -> (Model, FitData) {
 }
 
 #[test]
-fn downhill_is_where_the_nats_fall() {
+fn the_gradient_agrees_with_finite_differences() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
-    // Some residuals are beyond what counts as a square, some are not.
+    // Some residuals are beyond the Huber threshold, some are not.
     let rough = at.innovations.iter().flatten().filter(|w| w.abs() > 2.5).count();
     assert!(rough > 5 && rough < 400, "{rough}");
     let t = Linearization::new(&m, &d, &at);
@@ -161,12 +161,12 @@ fn downhill_is_where_the_nats_fall() {
 }
 
 #[test]
-fn the_normal_matrix_is_that_of_all_columns_and_priors() {
+fn the_normal_matrix_contains_all_columns_and_priors() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
     let t = Linearization::new(&m, &d, &at);
     let (ns, no) = (t.shared.len(), t.per_recording.len());
-    // The number at a place of the matrix, and the recording whose own it is.
+    // The parameter at an index of the matrix, and its recording.
     let number = |i: usize| if i < ns { (i, None) } else { (ns + (i - ns) % no, Some((i - ns) / no)) };
     for i in 0..ns + 2 * no {
         for j in 0..=i {
@@ -204,7 +204,7 @@ fn a_derivative_costs_half_a_replay() {
 }
 
 #[test]
-fn a_wide_step_is_half_of_what_it_changes_both_ways() {
+fn a_wide_difference_is_symmetric() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
     let surface = |n: &Parameter| (n.role == ParameterRole::Surface).then_some(1e-3);
@@ -236,7 +236,7 @@ fn a_wide_step_is_half_of_what_it_changes_both_ways() {
 }
 
 #[test]
-fn a_fit_finds_the_law_that_gave_the_force() {
+fn a_fit_recovers_the_simulated_parameters() {
     let mut truth = model(2);
     truth.tissue.layers[0].stiffness_n_per_m = 215.0;
     truth.tissue.layers[1].friction_ns_per_m2 = 2700.0;
@@ -244,7 +244,7 @@ fn a_fit_finds_the_law_that_gave_the_force() {
     truth.per_recording = [4e-4, -4e-4]
         .map(|surface_m| RecordingParameters { surface_m, ..RecordingParameters::default() })
         .to_vec();
-    // Where the law itself has them.
+    // At the law's own rupture times.
     truth.rupture_times_s = vec![vec![NO_RUPTURE; 2]; 2];
     let own =
         |r: usize| ReplayCache::new(&truth, &data(&truth, 0.0), r).expect("a trail").free_rupture_times();
@@ -265,19 +265,19 @@ fn a_fit_finds_the_law_that_gave_the_force() {
         assert_eq!(found.model.rupture_times_s[r][1], NO_RUPTURE);
     }
     assert!(found.rms_n(&d) < 0.003, "{}", found.rms_n(&d));
-    // Given up where it gains too little for what is wanted; never worse than where it began.
+    // Stopped early where the gain is too small; never worse than the start.
     let least = fit_if_below(&m, &d, Effort::FULL, -1e9).expect("a fit").nats();
     assert!(least >= found.nats() && least < residuals(&m, &d).expect("a replay").nats);
-    // Beyond what is believed a number stays at the bound.
+    // A parameter outside its bounds stays at the bound.
     let mut far = truth.clone();
     far.tissue.layers[0].stiffness_n_per_m = 300.0;
     let bound = fit(&m, &data(&far, 0.002), Effort::FULL).expect("a fit");
     near(bound.model.tissue.layers[0].stiffness_n_per_m, 260.0);
 }
 
-/// A number whose neighbour cannot be replayed.
+/// A parameter whose perturbed model cannot be replayed.
 #[test]
-fn a_column_that_is_not_there_is_nothing() {
+fn a_missing_column_counts_as_zero() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
     let mut t = Linearization::new(&m, &d, &at);
@@ -291,11 +291,11 @@ fn a_column_that_is_not_there_is_nothing() {
 }
 
 #[test]
-fn a_step_goes_on_to_where_the_parabola_of_its_gain_is_lowest() {
+fn a_step_is_extrapolated_to_the_minimum_of_the_parabola() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
     let t = Linearization { neg_gradient: vec![2.0, 4.0], ..Linearization::new(&m, &d, &at) };
-    // It falls by ten; a step that stands at the lowest place has gained half of that.
+    // It falls by ten; a step to the minimum has gained half of that.
     let share = |gained: f64| extrapolation_factor(&t, &[1.0, 2.0], gained);
     assert_eq!(share(5.0), None);
     assert_eq!(share(6.1), None);
@@ -304,10 +304,9 @@ fn a_step_goes_on_to_where_the_parabola_of_its_gain_is_lowest() {
     assert_eq!([share(9.0), share(10.0), share(12.0)], [Some(4.0); 3]);
 }
 
-/// A law that lacks something leaves blocks far off by the thousand. Each counts by a straight line, and the tangent takes
-/// it for a square.
+/// Unmodelled effects make most blocks outliers, which count linearly but enter the linearization as squares.
 #[test]
-fn a_fit_among_blocks_far_off_is_at_its_end_after_a_few_steps() {
+fn a_fit_with_many_outliers_converges_in_a_few_steps() {
     let (mut m, _) = smooth();
     m.per_recording = vec![RecordingParameters::default(); 2];
     let d = data(&m, 0.15);
@@ -320,9 +319,9 @@ fn a_fit_among_blocks_far_off_is_at_its_end_after_a_few_steps() {
     assert!(few - end < 1.0 && to(1) - end > 100.0, "{few} {end} {}", to(1));
 }
 
-/// A tangent that was taken across a kink tells the wrong way of one number; the others go on.
+/// A linearization across a kink has the wrong sign for one parameter; the others continue.
 #[test]
-fn numbers_whose_own_steps_gain_go_on_without_one_whose_tangent_lies() {
+fn parameters_with_valid_derivatives_move_without_one_at_a_kink() {
     let (mut m, d) = smooth();
     m.tissue.layers[0].stiffness_n_per_m = 190.0;
     m.tissue.layers[0].friction_ns_per_m2 = 3300.0;
@@ -337,7 +336,7 @@ fn numbers_whose_own_steps_gain_go_on_without_one_whose_tangent_lies() {
     assert_eq!(next.tissue.layers[0].stiffness_n_per_m, 190.0);
     assert!(next.tissue.layers[0].friction_ns_per_m2 != 3300.0);
     assert!(residuals(&next, &d).expect("a replay").nats < at.nats() - 1.0);
-    // Where it is level nothing is freed, and the fit is the plain one.
+    // At the minimum nothing changes.
     let plain = fit(&m, &d, Effort::FULL).expect("a fit");
     assert!(escape_kink(&plain, &d).is_none());
     let past = fit_nonsmooth(&m, &d, Effort::FULL).expect("a fit");
@@ -345,7 +344,7 @@ fn numbers_whose_own_steps_gain_go_on_without_one_whose_tangent_lies() {
 }
 
 #[test]
-fn an_instant_moves_by_a_block_and_a_half_at_most() {
+fn a_rupture_time_moves_by_at_most_a_block_and_a_half() {
     let mut truth = model(1);
     truth.rupture_times_s = vec![vec![2.513, NO_RUPTURE]];
     let d = data(&truth, 0.0);
@@ -357,7 +356,7 @@ fn an_instant_moves_by_a_block_and_a_half_at_most() {
     let next = apply_step(&m, &d, &t, &damped_step(&m, &d, &t, 1e-4, |_| true).expect("a step"), 1.0);
     let by = next.rupture_times_s[0][0] - 2.39;
     assert!(by.abs() <= 0.03 + 1e-12, "{by}");
-    // Nothing moves where nothing says so.
+    // Nothing moves without a gradient.
     assert!(
         damped_step(
             &m,
@@ -374,7 +373,7 @@ fn an_instant_moves_by_a_block_and_a_half_at_most() {
 }
 
 #[test]
-fn spreads_are_those_of_the_recordings_own_numbers() {
+fn scatter_is_the_rms_of_the_per_recording_parameters() {
     let (mut m, d) = smooth();
     m.per_recording = [(3e-4, 0.03), (-4e-4, 0.04)]
         .map(|(surface_m, friction)| RecordingParameters {
@@ -389,7 +388,7 @@ fn spreads_are_those_of_the_recordings_own_numbers() {
     near(told.scatter.surface_m, (0.5_f64 * 25e-8).sqrt());
     near(told.scatter.ln_friction, (0.5_f64 * 25e-4).sqrt());
     near(at.nats, neg_log_posterior(&told, &at));
-    // Never nothing; as they are where somebody else tells them, or where nobody asks.
+    // Bounded below; unchanged when they are given or the random effects are not free.
     let mut alike = m.clone();
     alike.per_recording = vec![RecordingParameters::default(); 2];
     update_scatter(&mut alike, &mut at);
@@ -411,9 +410,9 @@ fn spreads_are_those_of_the_recordings_own_numbers() {
     );
 }
 
-/// Two layers in four recordings: the force shows where the first gives way, nothing shows where the second does.
+/// Two layers in four recordings: the force shows the rupture of the first, nothing shows that of the second.
 #[test]
-fn a_layer_whose_ruptures_nothing_shows_does_not_say_that_none_scatters() {
+fn a_layer_without_visible_ruptures_does_not_reduce_the_scatter() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
     let event = |force: f64| RuptureEvent {

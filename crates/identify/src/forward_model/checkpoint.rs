@@ -2,7 +2,7 @@ use super::time_stepper::TimeStepper;
 use crate::rupture_likelihood::RuptureEvent;
 use stylet_tissue::{ForceLawState, MeasurementState};
 
-/// All that a replay remembers before a piece.
+/// Complete state of a replay before a piece.
 #[derive(Clone, Debug)]
 pub(super) struct Checkpoint {
     pub(super) piece: usize,
@@ -17,7 +17,7 @@ pub(super) struct Checkpoint {
     pub(super) ruptures: Vec<RuptureEvent>,
 }
 
-/// Where a replay stands before a piece.
+/// Current state of a replay before a piece.
 pub(super) struct CheckpointView<'a, 'b> {
     pub(super) piece: usize,
     pub(super) stepper: &'a TimeStepper<'b>,
@@ -42,7 +42,7 @@ impl CheckpointView<'_, '_> {
         }
     }
 
-    /// Whether everything from here on is the same.
+    /// Whether the remaining replay is the same as from `other`.
     pub(super) fn same_future_as(&self, other: &Checkpoint) -> bool {
         let walk = self.stepper;
         self.piece == other.piece

@@ -1,12 +1,12 @@
-//! A replay whose neighbours need only the part that differs.
+//! A replay from which similar models are replayed in part.
 
 use super::checkpoint::Checkpoint;
 use super::{ReplayResult, advance, initial_checkpoint, replay_with_ruptures};
 use crate::block_averages::BlockAverages;
 use crate::model::{CompiledModel, NO_RUPTURE};
-use stylet_record::motion::MotionPiece;
+use crate::motion::MotionPiece;
 
-/// A replay with what it remembered on the way: neighbours of its model need only the part that differs.
+/// A replay with its checkpoints: a similar model needs only the part that differs.
 #[derive(Clone, Debug, Default)]
 pub struct IncrementalReplay {
     pub(super) result: ReplayResult,
@@ -15,7 +15,7 @@ pub struct IncrementalReplay {
 }
 
 impl IncrementalReplay {
-    /// Replays a law and remembers.
+    /// Replays a law and stores checkpoints.
     #[must_use]
     pub fn new(
         model: &CompiledModel,
@@ -33,8 +33,9 @@ impl IncrementalReplay {
         track
     }
 
-    /// What [`imposed`] gives for a neighbour: the same effects and pieces, another number of the base law or instant. `was` is
-    /// the model of the track. The part before a difference can show is taken over, and the part after both are the same again.
+    /// The result of [`replay_with_ruptures`] for a similar model: the same effects and pieces, another base
+    /// parameter or rupture time. `was` is the model of this replay. The part before the first possible
+    /// difference and the part after both states agree again are reused.
     #[must_use]
     pub fn replay_neighbour(
         &self,
@@ -53,7 +54,7 @@ impl IncrementalReplay {
         };
         out.ruptures.clone_from(&start.ruptures);
         let done_with = ruptures_until_equal(was, now);
-        // Before both instants have passed nothing has happened yet.
+        // Before both rupture times have passed the states cannot agree again.
         let moved = self.rupture_times_s.iter().zip(instants).filter(|(a, b)| a != b);
         let passed_s = moved.map(|(a, b)| a.max(*b)).fold(f64::NEG_INFINITY, f64::max);
         let mut same: Option<(usize, usize)> = None;
@@ -61,7 +62,7 @@ impl IncrementalReplay {
         advance(now, blocks, pieces, instants, start.clone(), &mut out, &mut |s| {
             let known = self.checkpoints.get(next);
             next += 1;
-            // The first one is the start itself: nothing has happened yet.
+            // The first visit is the start itself.
             let passed = pieces.get(s.piece).is_some_and(|p| p.start_s > passed_s);
             if passed
                 && next > at + 1
@@ -82,7 +83,7 @@ impl IncrementalReplay {
         out
     }
 
-    /// The piece from which on a difference can show.
+    /// First piece in which a difference can appear.
     pub(super) fn first_difference(
         &self,
         was: &CompiledModel,
@@ -108,7 +109,7 @@ impl IncrementalReplay {
                     >= front
             };
             first = first.min(pieces.iter().position(reached).unwrap_or(pieces.len()));
-            // A layer is strained, if only by nothing, from the rupture of the one before.
+            // A layer is strained from the rupture of the previous one on.
             if let Some(before) =
                 l.checked_sub(1).and_then(|k| self.rupture_times_s.get(k)).filter(|t| **t < NO_RUPTURE)
             {
@@ -119,7 +120,8 @@ impl IncrementalReplay {
     }
 }
 
-/// After so many ruptures two laws are the same: stiffness and puncture force of a layer that has given way are of the past.
+/// Number of ruptures after which two laws are equal: stiffness and puncture force of a ruptured layer no
+/// longer matter.
 pub(super) fn ruptures_until_equal(was: &CompiledModel, now: &CompiledModel) -> usize {
     let pairs = || was.law.slabs().iter().zip(now.law.slabs());
     let Some(last) = pairs().rposition(|(a, b)| a != b) else { return 0 };
@@ -128,11 +130,11 @@ pub(super) fn ruptures_until_equal(was: &CompiledModel, now: &CompiledModel) -> 
             || a.thickness_m != b.thickness_m
             || a.friction_ns_per_m2 != b.friction_ns_per_m2
             || a.replaced_friction_share != b.replaced_friction_share
-            // What clings to the shaft is dragged by the layer's own spring.
+            // Tissue that sticks to the shaft is dragged by the layer's spring.
             || (a.replaced_friction_share > 0.0 && a != b)
     });
     if lasting || !now.law.tip_follows_base() { usize::MAX } else { last + 1 }
 }
 
-/// A layer is felt at most so far in m before its front.
+/// Margin in m before the front of a layer within which it may already act.
 const CONTACT_MARGIN_M: f64 = 1e-5;

@@ -1,9 +1,9 @@
-//! The forward model: the law replayed over the blocks of a recording with its ruptures at given instants.
+//! The forward model: the law replayed over the blocks of a recording with imposed rupture times.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | `walk` | law and chain over spans of smooth motion, jumps and ruptures |
-//! | `saved`, `track` | a replay that remembers, so that neighbours of its model need only what differs |
+//! | `time_stepper` | law and measurement chain over spans of smooth motion, jumps and ruptures |
+//! | `checkpoint`, `incremental_replay` | a replay with saved states, from which similar models are replayed in part |
 
 mod checkpoint;
 mod incremental_replay;
@@ -15,25 +15,25 @@ pub use incremental_replay::IncrementalReplay;
 
 use crate::block_averages::BlockAverages;
 use crate::model::{CompiledModel, NO_RUPTURE};
+use crate::motion::MotionPiece;
 use crate::rupture_likelihood::RuptureEvent;
 use checkpoint::{Checkpoint, CheckpointView};
-use stylet_record::motion::MotionPiece;
 use stylet_tissue::ForceLawState;
 use time_stepper::{BlockSamples, TimeStepper, local_acceleration_mps2};
 
-/// Buffers of a replay.
+/// Predicted forces and rupture states of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct ReplayResult {
     /// Predicted mean force of every block in N.
     pub force_n: Vec<f64>,
-    /// One event per layer.
+    /// One entry per layer.
     pub ruptures: Vec<RuptureEvent>,
 }
 
-/// Pieces from one saved state to the next.
+/// Pieces between two checkpoints.
 const CHECKPOINT_PIECES: usize = 24;
 
-/// Replays a law with the ruptures at `instants` (s; [`NEVER`] for those that never were).
+/// Replays a law with ruptures at `instants` (s; [`NO_RUPTURE`] for layers that do not rupture).
 pub fn replay_with_ruptures(
     model: &CompiledModel,
     blocks: &BlockAverages,
@@ -45,7 +45,7 @@ pub fn replay_with_ruptures(
     advance(model, blocks, pieces, instants, first, out, &mut |_| true);
 }
 
-/// Room for a replay, and where it begins.
+/// Prepares a replay and its initial state.
 fn initial_checkpoint(model: &CompiledModel, blocks: &BlockAverages, out: &mut ReplayResult) -> Checkpoint {
     out.force_n.clear();
     out.force_n.resize(blocks.len(), 0.0);
@@ -68,7 +68,8 @@ fn initial_checkpoint(model: &CompiledModel, blocks: &BlockAverages, out: &mut R
     }
 }
 
-/// Goes on from a saved state; `visit` is called every [`EVERY`] pieces and ends it by `false`.
+/// Continues from a checkpoint; `visit` is called every [`CHECKPOINT_PIECES`] pieces and ends the replay by
+/// returning `false`.
 fn advance(
     model: &CompiledModel,
     blocks: &BlockAverages,
@@ -153,7 +154,8 @@ fn advance(
     }
 }
 
-/// When in a piece something of an effect's own breaks, from `at_s` on; it is then marked as broken.
+/// First time in a piece, from `at_s` on, at which the tip reaches an unbroken break position, which is then
+/// marked as broken.
 fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mut [bool]) -> f64 {
     let mut first = (NO_RUPTURE, usize::MAX);
     for (k, place) in model.break_positions_m.iter().enumerate().filter(|(k, _)| !broken[*k]) {
@@ -170,11 +172,11 @@ fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mu
     if first.1 < broken.len() {
         broken[first.1] = true;
     }
-    // Only an instant inside the piece cuts it.
+    // Only a time inside the piece cuts it.
     if first.0 < piece.end_s { first.0 } else { NO_RUPTURE }
 }
 
-/// The instants (s) at which something of an effect's own breaks, one after the other.
+/// Times (s) at which the tip reaches the break positions.
 pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     let mut broken = vec![false; model.break_positions_m.len()];
     let mut instants = Vec::new();
@@ -191,7 +193,7 @@ pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     instants
 }
 
-/// Replays with the law's own ruptures; returns the instants (s) at which they show in the recorded force.
+/// Times (s) at which the law itself ruptures, as they appear in the recorded force.
 pub fn free_rupture_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     let mut state = ForceLawState::default();
     let mut instants = vec![NO_RUPTURE; model.puncture_n.len()];

@@ -3,9 +3,9 @@ use super::time_stepper::record_strain;
 use super::*;
 use crate::block_averages::BLOCK_S;
 use crate::model::{Assumptions, EffectTerm, Model};
+use crate::motion::JumpAppearance;
 use std::sync::Arc;
 use stylet_record::Recording;
-use stylet_record::motion::JumpAppearance;
 use stylet_tissue::RuptureCriterion;
 use stylet_tissue::{Layer, Tissue, effect_info};
 
@@ -13,7 +13,8 @@ fn near(told: f64, wanted: f64) {
     assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1.0), "{told} for {wanted}");
 }
 
-/// From 5 mm on: 10 mm of 200 N/m that give way at 1.2 N, 20 mm of 100 N/m that have no such force, 30 mm that give way at 0.5 N.
+/// From 5 mm on: 10 mm of 200 N/m that rupture at 1.2 N, 20 mm of 100 N/m without a puncture force, 30 mm that
+/// rupture at 0.5 N.
 fn model() -> Model {
     let layer = |thickness_m: f64, k: f64, b: f64, f: Option<f64>| Layer {
         thickness_m,
@@ -56,9 +57,9 @@ fn replayed(instants: &[f64]) -> ReplayResult {
     out
 }
 
-/// Ruptures at 2.003, 9.011 and 11.307 s: spring and friction of the layers by hand.
+/// Ruptures at 2.003, 9.011 and 11.307 s: spring and friction forces in closed form.
 #[test]
-fn the_force_of_an_even_advance_is_that_of_springs_until_they_break_and_of_rubbed_lengths() {
+fn the_force_at_constant_velocity_agrees_with_the_closed_form() {
     let instants = [2.003, 9.011, 11.307];
     let told = replayed(&instants);
     let b = blocks();
@@ -80,7 +81,7 @@ fn the_force_of_an_even_advance_is_that_of_springs_until_they_break_and_of_rubbe
         let mean = (0..n)
             .map(|i| force(b.start_s[k] + (b.end_s[k] - b.start_s[k]) * (f64::from(i) + 0.5) / f64::from(n)));
         let mean = mean.sum::<f64>() / f64::from(n);
-        // Where a layer begins the middle of the block stands for it.
+        // Where a layer begins, the middle of the block represents it.
         let bends = [0.005, 0.015, 0.035].iter().any(|z| b.block_at(z / 0.004) == k);
         assert!(
             (told.force_n[k] - mean).abs() < if bends { 2e-3 } else { 3e-4 },
@@ -89,7 +90,7 @@ fn the_force_of_an_even_advance_is_that_of_springs_until_they_break_and_of_rubbe
         );
     }
     let [one, two, three] = [told.ruptures[0], told.ruptures[1], told.ruptures[2]];
-    // 3.012 mm of 200 N/m, against 1.2 N and 10 mm; 4 mm/s of it.
+    // 3.012 mm of 200 N/m, against 1.2 N and 10 mm, at 4 mm/s.
     near(one.elastic_n, 200.0 * 0.003012);
     near(one.force_excess, 200.0 * 0.003012 / 1.2 - 1.0);
     near(one.depth_excess_m, 0.008012 - 0.015);
@@ -102,8 +103,9 @@ fn the_force_of_an_even_advance_is_that_of_springs_until_they_break_and_of_rubbe
 }
 
 #[test]
-fn friction_that_builds_up_turns_where_the_needle_does() {
-    // In at 4 mm/s to 11.27 mm, which is in the middle of a block, and back at 8 mm/s; the friction is 40 N/m over 0.3 mm.
+fn presliding_friction_reverses_with_the_needle() {
+    // Insertion at 4 mm/s to 11.27 mm, in the middle of a block, and retraction at 8 mm/s; the friction is 40
+    // N/m over 0.3 mm.
     let (turn_s, c, delta_m) = (2.817, 40.0, 3e-4);
     let z = |t: f64| 0.004 * t.min(turn_s) - 0.008 * (t - turn_s).max(0.0);
     let t: Vec<f64> = (0..640).map(|k| f64::from(k) * 0.005).collect();
@@ -126,18 +128,18 @@ fn friction_that_builds_up_turns_where_the_needle_does() {
         let (depth, v) = (z(t) - 0.005, -0.008);
         let bristle = -1.0 + 2.0 * (-back / delta_m).exp();
         let wanted = 200.0 * depth + 4000.0 * depth * v + c * bristle * depth;
-        // What friction does over a block of 0.16 mm is not quite what it does in its middle: a part in a hundred.
+        // The mean friction over a block of 0.16 mm deviates from that in its middle by about a hundredth.
         let close = 0.02 * (1.0 + bristle) * c * depth + 5e-4;
         assert!((out.force_n[k] - wanted).abs() < close, "{} for {wanted} N at {t} s", out.force_n[k]);
     }
 }
 
 #[test]
-fn a_layer_that_did_not_give_way_was_strained_as_far_as_the_needle_came() {
+fn an_intact_layer_keeps_its_largest_strain() {
     let told = replayed(&[2.003, NO_RUPTURE, NO_RUPTURE]);
     let [one, two, three] = [told.ruptures[0], told.ruptures[1], told.ruptures[2]];
     assert!(one.ruptured && !two.ruptured && !three.ruptured);
-    // To the middle of the last block, at 11.9875 s; after its last sample nothing is known of the needle.
+    // To the middle of the last block, at 11.9875 s; the motion is unknown after the last sample.
     assert!((two.depth_excess_m - (0.004 * 11.9875 - 0.035)).abs() < 1e-6);
     assert_eq!((two.depth_rate_mps, two.elastic_n), (0.0, 0.0));
     assert_eq!(
@@ -149,7 +151,7 @@ fn a_layer_that_did_not_give_way_was_strained_as_far_as_the_needle_came() {
 }
 
 #[test]
-fn ruptures_at_one_instant_or_at_the_very_end_are_ruptures() {
+fn simultaneous_and_final_ruptures_are_applied() {
     let told = replayed(&[9.2, 9.2, 9.2]);
     assert!(told.ruptures.iter().all(|e| e.ruptured));
     near(told.ruptures[2].depth_excess_m, 0.004 * 9.2 - 0.065);
@@ -159,21 +161,21 @@ fn ruptures_at_one_instant_or_at_the_very_end_are_ruptures() {
     assert!((told.ruptures[2].depth_excess_m - (0.004 * end_s - 0.065)).abs() < 1e-5);
     let late = replayed(&[2.003, 9.011, end_s + 0.001]);
     assert!(!late.ruptures[2].ruptured);
-    // Before the recording began it shows at once.
+    // A rupture before the recording appears at once.
     let early = replayed(&[-1.0, 9.011, NO_RUPTURE]);
     assert!(early.ruptures[0].ruptured);
     assert!((early.ruptures[0].depth_excess_m - (0.004 * -0.0025 - 0.015)).abs() < 1e-6);
 }
 
 #[test]
-fn the_law_itself_ruptures_where_a_force_or_a_face_is_passed() {
+fn the_free_law_ruptures_by_force_or_at_the_interface() {
     let b = blocks();
     let told = free_rupture_times(&compiled(|_| ()), &b.motion_pieces(false, 0.0, None));
-    // 1.2 N at 200 N/m are 6 mm; the second layer has its face at 35 mm, the third 0.5 N at 10 mm.
+    // 1.2 N at 200 N/m are 6 mm; the second layer has its far interface at 35 mm, the third 0.5 N at 10 mm.
     for (told, place) in told.iter().zip([0.011, 0.035, 0.045]) {
         assert!((told - place / 0.004).abs() < 1e-6, "{told}");
     }
-    // At an uneven speed, too.
+    // At a varying velocity.
     let course = |t: f64| 0.004 * t + 0.0015 * (2.0 * t).sin();
     let t: Vec<f64> = (0..2400).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| course(*t)).collect();
@@ -201,14 +203,14 @@ fn the_largest_strain_of_a_layer_is_kept() {
     near(told[1].1, 0.01);
     assert_eq!(seen(2, 0.3, 1.2, 0.01), told);
     near(seen(2, 1.5, 1.2, 0.01)[1].0, 0.25);
-    // Without a puncture force the place alone counts; of a layer that nobody knows nothing does.
+    // Without a puncture force only the depth counts; unknown layers are ignored.
     near(seen(1, 9.0, f64::INFINITY, 0.021)[0].1, 0.001);
     assert_eq!(seen(1, 9.0, 0.0, 0.021)[0].0, f64::NEG_INFINITY);
     let before = seen(1, 0.0, f64::INFINITY, 0.0);
     assert_eq!(seen(3, 9.0, 1.0, 9.0), before);
 }
 
-/// Pieces of a second, 2 mm/s; in the fifth one it goes on faster and faster, then back.
+/// Pieces of one second at 2 mm/s; acceleration in the fifth one, retraction at the end.
 fn by_seconds() -> Vec<MotionPiece> {
     let piece = |k: u32, z_m: f64, v_mps: f64, a_mps2: f64| {
         let from_s = f64::from(k);
@@ -231,7 +233,7 @@ fn by_seconds() -> Vec<MotionPiece> {
 }
 
 #[test]
-fn a_difference_shows_from_where_the_needle_first_reaches_what_differs() {
+fn a_difference_appears_where_the_needle_first_reaches_it() {
     let pieces = by_seconds();
     let first = |was: &CompiledModel, now: &CompiledModel, instants: [&[f64]; 2]| {
         let track =
@@ -241,7 +243,7 @@ fn a_difference_shows_from_where_the_needle_first_reaches_what_differs() {
     let plain = compiled(|_| ());
     let never: [&[f64]; 2] = [&[NO_RUPTURE; 3]; 2];
     assert_eq!(first(&plain, &plain, never), 10);
-    // Surfaces at so many mm, of two laws: the nearer one counts, less 0.01 mm.
+    // Surfaces (mm) of two laws: the nearer one counts, minus 0.01 mm.
     let at = |mm: f64| compiled(|m| m.tissue.surface_m = mm * 1e-3);
     let reached = |mm: f64| {
         let told = [first(&at(mm), &at(mm + 0.5), never), first(&at(mm + 0.5), &at(mm), never)];
@@ -249,20 +251,20 @@ fn a_difference_shows_from_where_the_needle_first_reaches_what_differs() {
         told[0]
     };
     assert_eq!((reached(3.9), reached(4.009), reached(4.011)), (1, 1, 2));
-    // The fifth comes 1 mm beyond its middle by its speed and 2 mm by its acceleration.
+    // The fifth piece extends 1 mm beyond its middle by its velocity and 2 mm by its acceleration.
     assert_eq!((reached(8.02), reached(12.009), reached(12.011)), (4, 4, 6));
-    // What goes back began further in.
+    // A retraction begins further in.
     assert_eq!((reached(16.1), reached(23.0), reached(23.02)), (8, 8, 10));
-    // A stiffness behind a front, and from the rupture of the layer before on.
+    // A stiffness: behind its front, and from the rupture of the previous layer on.
     let stiffer = compiled(|m| m.tissue.layers[1].stiffness_n_per_m = 111.0);
     assert_eq!(first(&plain, &stiffer, never), 7);
     let instants: [&[f64]; 2] = [&[2.5, NO_RUPTURE, NO_RUPTURE]; 2];
     assert_eq!(first(&plain, &stiffer, instants), 1);
     assert_eq!(first(&plain, &compiled(|m| m.tissue.layers[0].stiffness_n_per_m = 111.0), instants), 2);
-    // An instant that moved: from the piece before the earlier one.
+    // A rupture time that moved: from the piece before the earlier one.
     let moved = |a: f64, b: f64| first(&plain, &plain, [&[a, 9.5, NO_RUPTURE], &[b, 9.5, NO_RUPTURE]]);
     assert_eq!([moved(3.4, 6.2), moved(6.2, 3.4), moved(6.2, NO_RUPTURE), moved(0.3, 0.4)], [2, 2, 5, 0]);
-    // Effects that move the tip, or the scale of positions, differ from the beginning on.
+    // Effects that move the tip, or the position scale: from the start.
     let soft = compiled(|m| m.effects.push(bending()));
     let soft_too = compiled(|m| {
         m.effects.push(bending());
@@ -278,7 +280,7 @@ fn bending() -> EffectTerm {
 }
 
 #[test]
-fn two_laws_are_the_same_after_the_last_layer_in_which_they_differ_unless_its_friction_does() {
+fn laws_are_equal_after_the_last_ruptured_layer_that_differs() {
     let plain = compiled(|_| ());
     let with = |change: &dyn Fn(&mut Model)| ruptures_until_equal(&plain, &compiled(change));
     assert_eq!(with(&|_| ()), 0);
@@ -299,7 +301,7 @@ fn two_laws_are_the_same_after_the_last_layer_in_which_they_differ_unless_its_fr
 }
 
 #[test]
-fn what_breaks_in_a_piece_cuts_it_where_the_tip_gets_there() {
+fn a_break_cuts_a_piece_where_the_tip_reaches_it() {
     let mut m = compiled(|_| ());
     m.break_positions_m = vec![0.0055, 0.0042, 0.006, 0.02];
     let piece = MotionPiece {
@@ -326,14 +328,14 @@ fn what_breaks_in_a_piece_cuts_it_where_the_tip_gets_there() {
     assert_eq!(next_break(&m, &piece, 2.25, &mut [false]), 2.25);
     let back = MotionPiece { velocity_mps: -0.002, ..piece };
     assert_eq!(next_break(&m, &back, 2.25, &mut [false]), 2.25);
-    // In true positions, where recorded ones are others.
+    // In true positions, where recorded ones differ.
     m.break_positions_m = vec![0.0045];
     m.true_over_recorded = 0.9;
     near(next_break(&m, &piece, 2.0, &mut [false]), 2.5);
 }
 
 #[test]
-fn everything_that_breaks_breaks_once_in_the_order_in_which_the_tip_gets_there() {
+fn breaks_happen_once_and_in_order() {
     let mut m = compiled(|_| ());
     m.break_positions_m = vec![0.0055, 0.0042, 0.02];
     let piece = |from_s: f64, z_m: f64, v_mps: f64| MotionPiece {
@@ -352,9 +354,9 @@ fn everything_that_breaks_breaks_once_in_the_order_in_which_the_tip_gets_there()
     near(told[1], 4.75);
 }
 
-/// With pieces of 20 ms a replay remembers every 0.48 s: instants at those borders, beside them, and between.
+/// With pieces of 20 ms there is a checkpoint every 0.48 s: rupture times at, next to and between them.
 #[test]
-fn a_neighbour_whose_instants_moved_is_what_a_whole_replay_is() {
+fn incremental_replay_with_moved_ruptures_equals_a_full_replay() {
     let b = blocks();
     let pieces = b.motion_pieces(false, 0.0, None);
     let law = compiled(|_| ());
@@ -382,11 +384,11 @@ fn a_neighbour_whose_instants_moved_is_what_a_whole_replay_is() {
     }
 }
 
-/// A threshold that grows with the speed: where the needle slows down it falls below the force, and the layer gives way at that
-/// force exactly.
+/// A threshold that grows with the velocity: where the needle slows down it falls below the force, and the
+/// layer ruptures at exactly that force.
 #[test]
-fn a_layer_gives_way_where_its_threshold_falls_below_the_force() {
-    // By a tenth per factor e in speed: 1.2 N at 1 mm/s, a good 1.36 N at 4 mm/s.
+fn a_layer_ruptures_where_its_threshold_falls_below_the_force() {
+    // A tenth per factor e in velocity: 1.2 N at 1 mm/s, about 1.36 N at 4 mm/s.
     let faster = EffectTerm::new(effect_info("rate_dependent_puncture").expect("in the library"), &[0.1]);
     let law = compiled(|m| m.effects.push(faster.clone()));
     // At 4 mm/s into the first layer until its spring holds a force between both thresholds; then at 1 mm/s.
@@ -412,7 +414,7 @@ fn a_layer_gives_way_where_its_threshold_falls_below_the_force() {
     let jump_s = b.motion.jumps[0].time_s;
     assert!((jump_s - slow_s).abs() < 1e-6);
     assert_eq!(event(jump_s).force_excess, 0.0);
-    // Within a sample before the jump as well, but not further away.
+    // Also within a sampling interval before the jump, but not further away.
     assert_eq!(event(slow_s - 0.002).force_excess, 0.0);
     assert!(event(slow_s - 0.012).force_excess < -0.01 && event(slow_s + 0.3).force_excess > 0.01);
 }

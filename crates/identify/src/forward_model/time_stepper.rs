@@ -1,12 +1,12 @@
-//! Law and chain along the motion.
+//! Steps law and measurement chain along the motion.
 
 use crate::block_averages::BlockAverages;
 use crate::model::CompiledModel;
+use crate::motion::{MIN_JUMP_MPS, MotionPiece};
 use crate::rupture_likelihood::RuptureEvent;
-use stylet_record::motion::{MIN_JUMP_MPS, MotionPiece};
 use stylet_tissue::{AveragingInterval, ForceLawState, MeasurementState, RuptureCriterion};
 
-/// What is remembered on the way.
+/// State of a replay.
 pub(super) struct TimeStepper<'a> {
     pub(super) model: &'a CompiledModel,
     pub(super) state: ForceLawState,
@@ -14,20 +14,20 @@ pub(super) struct TimeStepper<'a> {
     pub(super) ruptured_layers: usize,
     pub(super) ruptures: &'a mut Vec<RuptureEvent>,
     pub(super) sample_step_s: f64,
-    /// Puncture force in N of the active layer at the span before.
+    /// Puncture force in N of the active layer in the previous span.
     pub(super) threshold_n: f64,
-    /// Until then (s) the tip of a needle that gives, or a sensor that lags, is still on its way to where a jump sends it.
+    /// Until this time (s) a compliant needle or a lagging sensor is still in transient after a jump.
     pub(super) transient_until_s: f64,
-    /// Where the samples of the block lie, if it may matter.
+    /// Sample times of the block, if they matter.
     pub(super) samples: BlockSamples<'a>,
 }
 
-/// Where the samples of a block lie.
+/// Sample times of a block.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BlockSamples<'a> {
     from_s: f64,
     to_s: f64,
-    /// Their instants in s.
+    /// Sample times in s.
     time_s: &'a [f64],
 }
 
@@ -41,28 +41,30 @@ impl<'a> BlockSamples<'a> {
         from_s <= self.from_s && to_s >= self.to_s
     }
 
-    /// A sample's share of the block, in s.
+    /// Share of the block per sample, in s.
     fn share_s(&self) -> f64 {
         (self.to_s - self.from_s) / self.time_s.len() as f64
     }
 }
 
-/// Those of some instants that lie from one on to before another.
+/// The times within `[from_s, to_s)`.
 fn between(instants: &[f64], from_s: f64, to_s: f64) -> &[f64] {
     let first = instants.partition_point(|t| *t < from_s);
     let count = instants[first..].iter().take_while(|t| **t < to_s).count();
     &instants[first..first + count]
 }
 
-/// So long in s after a jump of the speed or a rupture the force of a needle that gives, or of a sensor that lags, changes within a block as well.
+/// Duration in s of the transient after a velocity jump or rupture, during which the force of a compliant
+/// needle or a lagging sensor is evaluated at every sample.
 const TRANSIENT_S: f64 = 0.3;
-/// Neighbours whose speeds differ by less than this share are of one motion; a jump of the speed is more.
+/// Neighbouring pieces whose velocities differ by less than this share belong to one motion; a velocity jump is
+/// larger.
 const SAME_MOTION_SHARE: f64 = 0.3;
-/// A threshold that changes by this share from one span to the next has jumped.
+/// Relative change of the puncture threshold between spans that counts as a jump.
 const THRESHOLD_JUMP_SHARE: f64 = 0.01;
 
 impl TimeStepper<'_> {
-    /// Law and chain over a span of smooth motion: mean force times the span.
+    /// Law and measurement chain over a span of smooth motion: mean force times duration.
     pub(super) fn force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
         let fast = from_s < self.transient_until_s || !self.samples.covered_by(from_s, to_s);
         if fast && !self.samples.time_s.is_empty() {
@@ -83,7 +85,7 @@ impl TimeStepper<'_> {
         self.model.chain.mean_force(chain, &cell) * span_s
     }
 
-    /// Law and chain over a span in which the force changes from sample to sample: the sum of the samples, each times its share of the block.
+    /// The same for a span with a transient: sum over samples, each times its share of the block.
     fn sampled_force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
         let (mut at_s, mut sum) = (from_s, 0.0);
         let grid = self.samples;
@@ -95,9 +97,9 @@ impl TimeStepper<'_> {
         sum * grid.share_s()
     }
 
-    /// Law and chain from one instant to another: the force at that one.
+    /// Law and measurement chain from one time to another: force at the latter.
     fn force_at_sample(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
-        // What a lag makes of a force goes by its mean.
+        // A lag responds to the mean force.
         let lags = self.model.chain.has_lag();
         let total_n = self.law_force(piece, if lags { 0.5 * (from_s + to_s) } else { to_s });
         let Some(chain) = &mut self.chain else { return total_n };
@@ -112,7 +114,7 @@ impl TimeStepper<'_> {
         self.model.chain.force_at_end(chain, &cell)
     }
 
-    /// The law at an instant of a piece: its force in N.
+    /// Law at a time of a piece: tissue force in N.
     fn law_force(&mut self, piece: &MotionPiece, at_s: f64) -> f64 {
         let (z, v) = piece.at(at_s);
         let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
@@ -126,8 +128,8 @@ impl TimeStepper<'_> {
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, note).total_n
     }
 
-    /// From one piece of smooth motion to the next: a needle that gives begins to follow another speed at that instant, and what friction remembers of
-    /// the way turns there, not in the middle between the blocks.
+    /// Crosses the border between two pieces: a compliant needle starts to follow another velocity, and
+    /// path-dependent friction reverses exactly there.
     pub(super) fn cross_piece_boundary(&mut self, before: &MotionPiece, next: &MotionPiece) {
         let jump_mps = (next.at(next.start_s).1 - before.at(before.end_s).1).abs();
         if jump_mps <= MIN_JUMP_MPS {
@@ -139,14 +141,14 @@ impl TimeStepper<'_> {
         self.mark_jump(before.end_s);
     }
 
-    /// The force jumps, or would if nothing smeared it.
+    /// Marks the start of a transient if the force is low-pass filtered.
     pub(super) fn mark_jump(&mut self, at_s: f64) {
         if self.model.smears_jumps {
             self.transient_until_s = at_s + TRANSIENT_S;
         }
     }
 
-    /// The rupture of the active layer at an instant.
+    /// Rupture of the active layer.
     pub(super) fn rupture(
         &mut self,
         piece: &MotionPiece,
@@ -158,7 +160,7 @@ impl TimeStepper<'_> {
         let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
         let layer = self.ruptured_layers;
         let (mut strained, mut tip_v) = (None, v);
-        // The force just before.
+        // Force just before.
         let most = self.ruptures.get(layer).map_or(f64::NEG_INFINITY, |e| e.force_excess);
         let before = &mut self.ruptures[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
@@ -173,7 +175,7 @@ impl TimeStepper<'_> {
             law.step_imposed(&mut { state }, at_s, z, v_mps, layer, |s| then = s.puncture_n);
             then
         };
-        // Where the threshold itself has jumped, with the speed, it passed the force on the way.
+        // A threshold that jumped with the velocity passed the force on the way.
         if let (Some(s), Some(event)) = (strained, self.ruptures.get_mut(layer))
             && s.puncture_n.is_finite()
         {
@@ -183,7 +185,7 @@ impl TimeStepper<'_> {
             } else if let Some(next) =
                 after.filter(|_| event.force_excess < 0.0 && piece.end_s - at_s < self.sample_step_s)
             {
-                // The speed jumps within a sample of here: so may the threshold.
+                // The velocity, and with it the threshold, jumps within a sampling interval.
                 let then = threshold_n(next.velocity_mps * self.model.true_over_recorded);
                 if jumped(then, s.puncture_n) && s.elastic_n > then {
                     event.force_excess = 0.0;
@@ -198,12 +200,12 @@ impl TimeStepper<'_> {
             event.elastic_n = s.elastic_n;
             event.depth_rate_mps = tip_v.max(0.0);
             let stiffness = self.model.stiffness_n_per_m.get(layer).copied().unwrap_or(0.0);
-            // As the force rises and the threshold falls.
+            // The rate of the force minus that of the threshold.
             event.force_excess_rate = if s.puncture_n.is_finite() {
                 let ahead_s = self.sample_step_s;
                 let (now, then) =
                     (threshold_n(v), threshold_n(v + gathers_mps2 * self.model.true_over_recorded * ahead_s));
-                // Where it is no force any more, it does not tell.
+                // An undefined threshold carries no information.
                 let falls = Some((now - then) / ahead_s).filter(|f| f.is_finite()).unwrap_or(0.0);
                 (stiffness * tip_v.max(0.0) + falls).max(0.0) / s.puncture_n
             } else {
@@ -212,7 +214,7 @@ impl TimeStepper<'_> {
         }
         self.ruptured_layers += 1;
         self.mark_jump(at_s);
-        // And just after: what the layer lets go.
+        // State just after: the released force.
         let after = &mut self.ruptures[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, |s| {
             if s.layer > layer + 1 {
@@ -222,7 +224,7 @@ impl TimeStepper<'_> {
     }
 }
 
-/// How fast the base gathers speed around a piece: by the pieces beside it, where they are about as fast.
+/// Acceleration of the base around a piece from its neighbours of similar velocity.
 pub(super) fn local_acceleration_mps2(pieces: &[MotionPiece], index: usize) -> f64 {
     let Some(here) = pieces.get(index) else { return 0.0 };
     let alike = |p: &&MotionPiece| {

@@ -1,16 +1,16 @@
 use stylet_tissue::{AnyEffect, Tissue};
 
-/// What is believed before any measurement, and how surely.
+/// Assumed tissue before any measurement, with tolerances that define priors and bounds.
 #[derive(Clone, Debug)]
 pub struct Assumptions {
-    /// The tissue.
+    /// Assumed tissue.
     pub tissue: Tissue,
-    /// Effects that the simulation has already.
+    /// Effects that the assumed model already contains.
     pub known_effects: Vec<AnyEffect>,
-    /// How far stiffness, friction and puncture force may be off, relative, per layer.
+    /// Relative tolerance of stiffness, friction and puncture force, per layer.
     pub tolerance: Vec<f64>,
-    /// The same for thicknesses.
+    /// Relative tolerance of the thickness, per layer.
     pub thickness_tolerance: Vec<f64>,
-    /// And for the position of the surface, in m.
+    /// Tolerance of the surface position in m.
     pub surface_tolerance_m: f64,
 }

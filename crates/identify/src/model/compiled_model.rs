@@ -5,28 +5,28 @@ use stylet_tissue::{ChainStage, Effect, ForceLaw, MeasurementChain};
 pub struct CompiledModel {
     /// The law.
     pub law: ForceLaw,
-    /// The measuring chain.
+    /// The measurement chain.
     pub chain: MeasurementChain,
-    /// Whether the chain changes the force.
+    /// Whether the measurement chain changes the force.
     pub has_measurement_chain: bool,
-    /// True position over recorded one.
+    /// True position over recorded position.
     pub true_over_recorded: f64,
-    /// Delay in s.
+    /// Delay of the force in s.
     pub delay_s: f64,
-    /// A jump of the speed is smeared before it is sampled.
+    /// A velocity jump is low-pass filtered before it is sampled.
     pub smears_jumps: bool,
-    /// As in [`Model::placed_s`].
+    /// As in [`Model::jump_delay_s`].
     pub jump_delay_s: Option<f64>,
-    /// Positions (m) at which a force at the tip may jump: faces, and where something of an effect's own breaks.
+    /// Positions (m) at which a tip force may jump: interfaces, and break depths of effects.
     pub break_positions_m: Vec<f64>,
-    /// Own puncture force of every layer in N, infinite when only its far face ruptures it.
+    /// Puncture force of every layer in N; infinite when the layer ruptures at its far interface only.
     pub puncture_n: Vec<f64>,
     /// Stiffness of every layer in N/m.
     pub stiffness_n_per_m: Vec<f64>,
 }
 
 impl Model {
-    /// Law and chain for a recording; `None` when the library refuses the values.
+    /// Law and measurement chain of a recording; `None` when the values are invalid.
     #[must_use]
     pub fn compile(&self, recording: usize) -> Option<CompiledModel> {
         let mut effects = self.assumed.known_effects.clone();

@@ -1,11 +1,11 @@
 use stylet_tissue::{AnyEffect, EffectInfo};
 
-/// One effect under trial: the library's entry and its values in the library's order.
+/// An effect of the model: library entry and parameter values in the library's order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectTerm {
-    /// The library's entry.
+    /// Library entry.
     pub info: &'static EffectInfo,
-    /// Values.
+    /// Parameter values.
     pub values: Vec<f64>,
 }
 
@@ -16,7 +16,7 @@ impl EffectTerm {
         Self { info, values: values.to_vec() }
     }
 
-    /// The effect as the law takes it.
+    /// The effect in the form that the law takes; `None` when the values are invalid.
     #[must_use]
     pub fn effect(&self) -> Option<AnyEffect> {
         AnyEffect::from_parameters(self.info.id, &self.values)

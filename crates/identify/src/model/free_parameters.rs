@@ -1,20 +1,20 @@
-/// Which numbers beside `K, b, F` and the effects' are free.
+/// Which parameters are free besides `K, b, F` and those of effects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FreeParameters {
-    /// The position of the surface.
+    /// Position of the surface.
     pub surface: bool,
-    /// The thicknesses.
+    /// Layer thicknesses.
     pub thickness: bool,
-    /// They may be off by more than their tolerances.
+    /// Thickness bounds are widened beyond the assumed tolerances.
     pub wide_thickness: bool,
-    /// A surface of each recording's own.
+    /// Surface offset per recording.
     pub recording_surface: bool,
-    /// Friction of each recording's own.
+    /// Friction factor per recording.
     pub recording_friction: bool,
-    /// Of each recording's own what effects say differs between insertions ([`stylet_tissue::ParameterInfo::differs`]).
+    /// Per-recording deviations of varying effect parameters ([`stylet_tissue::ParameterInfo::differs`]).
     pub recording_effects: bool,
-    /// A surface of each day's own.
+    /// Surface offset per day.
     pub day_surface: bool,
-    /// Friction of each day's own.
+    /// Friction factor per day.
     pub day_friction: bool,
 }

@@ -1,11 +1,11 @@
-//! What is fitted: base parameters, geometry, effects, numbers of each recording's own, instants of ruptures.
+//! The fitted model: base parameters, geometry, effects, per-recording parameters, rupture times.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | `belief`, `choice` | what is believed, and how surely; an effect under trial |
-//! | `free`, `own` | which numbers are free; those of a recording's or a day's own, and how they scatter |
-//! | `number`, `bounds`, `values` | what a number is; how far it may go and what is known of it before; its value |
-//! | `compiled` | the law and the measuring chain for one recording |
+//! | `assumptions`, `effect_term` | assumed tissue with tolerances; an effect with its parameter values |
+//! | `free_parameters`, `random_effects` | which parameters are free; parameters of recordings and days and their scatter |
+//! | `parameter`, `parameter_bounds`, `parameter_values` | what a parameter stands for; bounds and prior; its value |
+//! | `compiled_model` | law and measurement chain of one recording |
 
 mod assumptions;
 mod compiled_model;
@@ -30,41 +30,41 @@ pub use random_effects::{
 use std::sync::Arc;
 use stylet_tissue::Tissue;
 
-/// The instant (s) of a rupture that never was.
+/// Rupture time (s) of a layer that does not rupture.
 pub const NO_RUPTURE: f64 = f64::INFINITY;
 
-/// A law with everything that is fitted.
+/// A model with all parameter values.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// What was believed.
+    /// Assumed tissue, known effects and tolerances.
     pub assumed: Arc<Assumptions>,
-    /// The tissue as fitted.
+    /// Tissue with the fitted parameters.
     pub tissue: Tissue,
-    /// The effects under trial.
+    /// Effects that are part of the model.
     pub effects: Vec<EffectTerm>,
-    /// Which other numbers are free.
+    /// Which further parameters are free.
     pub free: FreeParameters,
-    /// Numbers of each recording's own.
+    /// Parameters of each recording.
     pub per_recording: Vec<RecordingParameters>,
-    /// Scatter between insertions.
+    /// Scatter between recordings.
     pub scatter: Scatter,
-    /// Instants (s) at which the recorded force shows the rupture of each layer, per recording.
+    /// Times (s) at which the recorded force shows the rupture of each layer, per recording.
     pub rupture_times_s: Vec<Vec<f64>>,
-    /// Numbers of effects that are not fitted by themselves.
+    /// Effect parameters that are not fitted by themselves.
     pub tied: Vec<TiedParameter>,
-    /// Per recording the day on which it was made; empty: nobody asks.
+    /// Day of each recording; empty when days are not modelled.
     pub day_of: Vec<usize>,
-    /// Numbers of each day's own.
+    /// Parameters of each day.
     pub days: Vec<DayParameters>,
-    /// Spreads between recordings and days stay as they are in a fit: somebody else tells them.
+    /// Standard deviations of random effects are given by the caller and not updated by a fit.
     pub fixed_scatter: bool,
-    /// The delay in s at which the jumps of a late force are put between samples; none: they show at their instants. The likelihood has
-    /// steps in it, so that a search begins without.
+    /// Delay in s that fixes between which samples the jumps of a delayed force lie; `None`: at their true
+    /// times. The likelihood is a step function of this delay, so a search starts without it.
     pub jump_delay_s: Option<f64>,
 }
 
 impl Model {
-    /// The base law with its surface and thicknesses free.
+    /// The base law with free surface and thicknesses.
     #[must_use]
     pub fn base(belief: Arc<Assumptions>, recordings: usize) -> Self {
         let layers = belief.tissue.layers.len();
@@ -84,7 +84,7 @@ impl Model {
         }
     }
 
-    /// The same law for some of the recordings; days keep their numbers.
+    /// The model of some of the recordings; days are kept.
     #[must_use]
     pub fn subset(&self, which: &[usize]) -> Self {
         let mut model = self.clone();
@@ -96,7 +96,7 @@ impl Model {
         model
     }
 
-    /// The numbers that differ between insertions as their effects say: effect and parameter.
+    /// Effect parameters that vary between recordings: (effect, parameter) indices.
     pub fn varying_parameters(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = self.effects.iter().enumerate().flat_map(|(effect, choice)| {
             let own =
@@ -106,12 +106,12 @@ impl Model {
         all.take(MAX_VARYING_PARAMETERS)
     }
 
-    /// The day of a recording.
+    /// Parameters of the day of a recording.
     fn day_parameters(&self, recording: usize) -> DayParameters {
         self.day_of.get(recording).and_then(|d| self.days.get(*d)).copied().unwrap_or_default()
     }
 
-    /// The same with one more effect.
+    /// The model with one more effect.
     #[must_use]
     pub fn with_effect(&self, choice: EffectTerm) -> Self {
         let mut model = self.clone();
@@ -119,7 +119,7 @@ impl Model {
         model
     }
 
-    /// The same without one effect.
+    /// The model without one effect.
     #[must_use]
     pub fn without_effect(&self, effect: usize) -> Self {
         let mut model = self.clone();
@@ -139,7 +139,7 @@ impl Model {
         self.tissue.layers.len()
     }
 
-    /// How many numbers the effects have, and the free geometry.
+    /// Number of fitted parameters of all effects.
     #[must_use]
     pub fn effect_parameter_count(&self) -> usize {
         self.effects.iter().map(|e| e.info.parameters.iter().filter(|p| !p.integer).count()).sum()

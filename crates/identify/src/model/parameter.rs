@@ -1,39 +1,40 @@
-/// What a number is.
+/// What a parameter stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterRole {
-    /// Stiffness of a layer (0-based).
+    /// Stiffness of a layer (0-based), relative to the assumed one.
     Stiffness(usize),
-    /// Friction of a layer.
+    /// Friction of a layer, relative to the assumed one.
     Friction(usize),
-    /// Puncture force of a layer.
+    /// Puncture force of a layer, relative to the assumed one.
     Puncture(usize),
-    /// Position of the surface.
+    /// Position of the surface in m.
     Surface,
-    /// Thickness of a layer.
+    /// Thickness of a layer in m.
     Thickness(usize),
-    /// A parameter of an effect.
+    /// A parameter of an effect, on its fit scale.
     Effect {
-        /// Which effect of the model.
+        /// Index of the effect in the model.
         effect: usize,
-        /// Which of its parameters.
+        /// Index of the parameter in the effect.
         parameter: usize,
     },
-    /// Surface of each recording's own: as many numbers as recordings.
+    /// Surface offset of each recording: one value per recording.
     RecordingSurface,
-    /// Friction of each recording's own.
+    /// Log friction factor of each recording.
     RecordingFriction,
-    /// One of the numbers that differ between insertions ([`Model::differing`](super::Model::differing)).
+    /// Deviation of a varying effect parameter
+    /// ([`Model::varying_parameters`](super::Model::varying_parameters)) in each recording.
     RecordingEffect(usize),
-    /// Surface of a day.
+    /// Surface offset of a day.
     DaySurface(usize),
-    /// Friction of a day.
+    /// Log friction factor of a day.
     DayFriction(usize),
-    /// The instant of a layer's rupture (0-based), one number per recording.
+    /// Rupture time of a layer (0-based) in each recording, in s.
     RuptureTime(usize),
 }
 
 impl ParameterRole {
-    /// Whether every recording has such a number of its own.
+    /// Whether every recording has its own value.
     #[must_use]
     pub fn is_per_recording(self) -> bool {
         matches!(
@@ -46,19 +47,19 @@ impl ParameterRole {
     }
 }
 
-/// A number of the fit.
+/// A free parameter of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// What it is.
+    /// What it stands for.
     pub role: ParameterRole,
-    /// Smallest value.
+    /// Lower bound.
     pub low: f64,
-    /// Largest value.
+    /// Upper bound.
     pub high: f64,
-    /// Middle of the prior.
+    /// Prior mean.
     pub prior_mean: f64,
-    /// Standard deviation of the prior; infinite for none.
+    /// Prior standard deviation; infinite for a flat prior.
     pub prior_sd: f64,
-    /// Step of the numeric derivative.
+    /// Step of the finite difference.
     pub step: f64,
 }

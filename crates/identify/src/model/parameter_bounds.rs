@@ -1,17 +1,17 @@
-//! How far every number may go, and what is known of it before any measurement.
+//! Bounds and priors of all parameters.
 
 use super::{Model, Parameter, ParameterRole};
 use stylet_tissue::{FitScale, Proposal};
 
-/// Smallest share of what is believed that a stiffness, friction or puncture force may have.
+/// Lower bound of stiffness, friction and puncture force, as a share of the assumed value.
 const MIN_SHARE_OF_ASSUMED: f64 = 0.02;
-/// By how many of its tolerances a surface or a thickness may be off.
+/// Bounds of surface and thicknesses, in tolerances.
 const MAX_TOLERANCES: f64 = 2.0;
-/// By how many of them one may be off while faces are looked for that only an effect can have moved.
+/// Bounds of thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
 const MAX_TOLERANCES_WIDE: f64 = 5.0;
 
 impl Model {
-    /// Whether a thickness is further from what is believed than its tolerance allows.
+    /// Whether a thickness deviates from the assumed value by more than its tolerance allows.
     #[must_use]
     pub fn thickness_out_of_tolerance(&self, layer: usize) -> bool {
         let b = &self.assumed;
@@ -20,7 +20,7 @@ impl Model {
         off > MAX_TOLERANCES * b.thickness_tolerance[layer] * believed
     }
 
-    /// The numbers that every recording shares.
+    /// Parameters that all recordings share.
     #[must_use]
     pub fn shared_parameters(&self) -> Vec<Parameter> {
         let mut out = Vec::new();
@@ -78,7 +78,7 @@ impl Model {
                 let (low, high, step) = match p.fit_scale() {
                     FitScale::Log => {
                         let (low, high) = ((from / 10.0).max(p.low), (to * 10.0).min(p.high));
-                        // A frequency is told by the phase at the end of a recording.
+                        // Frequencies are determined by the phase at the end of a recording.
                         let step = if p.unit == "Hz" { 1e-6 / at[parameter].max(1e-3) } else { 1e-4 };
                         (libm::log(low.max(1e-12)), libm::log(high), step)
                     }
@@ -87,7 +87,7 @@ impl Model {
                         let wide = to - from;
                         let low = if p.low == 0.0 { 0.0 } else { (from - wide).max(p.low) };
                         let high = (to + 3.0 * wide).min(p.high);
-                        // What moves with a face has to move as finely.
+                        // A parameter that moves an interface needs as fine a step as the interfaces have.
                         let fine = 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4);
                         let bends = p.unit == "m" && choice.info.proposal == Proposal::MembraneRupture;
                         (low, high, if bends { 1e-7 } else { fine })
@@ -112,14 +112,14 @@ impl Model {
         out
     }
 
-    /// Standard deviation of the `k`-th number that differs between insertions.
+    /// Standard deviation of the `k`-th varying parameter between recordings.
     #[must_use]
     pub fn varying_sd(&self, k: usize) -> f64 {
         let known = self.scatter.varying.get(k).copied().unwrap_or(0.0);
         if known > 0.0 { known } else { self.library_varying_sd(k) }
     }
 
-    /// The same as the library has it, before any data.
+    /// The same as given by the effect library.
     #[must_use]
     pub fn library_varying_sd(&self, k: usize) -> f64 {
         self.varying_parameters()
@@ -127,7 +127,7 @@ impl Model {
             .map_or(1.0, |(e, p)| self.effects[e].info.parameters[p].between_recordings_sd)
     }
 
-    /// The numbers that each recording has of its own.
+    /// Per-recording parameters.
     #[must_use]
     pub fn recording_parameters(&self) -> Vec<Parameter> {
         let infinity = f64::INFINITY;

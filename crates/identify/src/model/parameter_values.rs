@@ -1,10 +1,10 @@
-//! The value of every number.
+//! Reading and writing parameter values.
 
 use super::{Model, ParameterRole};
 use stylet_tissue::{AnyEffect, FitScale};
 
 impl Model {
-    /// A number's value, of recording `r` if it is its own.
+    /// Value of a parameter, in recording `r` if it is per-recording.
     #[must_use]
     pub fn get(&self, role: ParameterRole, r: usize) -> f64 {
         let assumed = &self.assumed.tissue;
@@ -38,7 +38,7 @@ impl Model {
         }
     }
 
-    /// Sets a number, of recording `r` if it is its own.
+    /// Sets a parameter, in recording `r` if it is per-recording.
     pub fn set(&mut self, role: ParameterRole, r: usize, x: f64) {
         let assumed = &self.assumed.tissue;
         match role {

@@ -1,60 +1,62 @@
-//! Numbers of a recording's or a day's own.
+//! Random effects: parameters of recordings and days, and their scatter.
 
-/// Most numbers of effects that differ between insertions in one model.
+/// Largest number of varying effect parameters in one model.
 pub const MAX_VARYING_PARAMETERS: usize = 8;
 
-/// Numbers of one recording's own.
+/// Parameters of one recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RecordingParameters {
-    /// Position of the surface beyond the common one, in m.
+    /// Surface offset from the shared position, in m.
     pub surface_m: f64,
-    /// Natural logarithm of the factor on friction.
+    /// Natural logarithm of the friction factor.
     pub ln_friction: f64,
-    /// What effects say differs between insertions, beyond the common value, in the order of [`Model::differing`](super::Model::differing).
+    /// Deviations of varying effect parameters, in the order of
+    /// [`Model::varying_parameters`](super::Model::varying_parameters).
     pub varying: [f64; 8],
 }
 
-/// Numbers of one day's own: of recordings that were made with one set-up.
+/// Parameters of one day, shared by the recordings made with one set-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DayParameters {
-    /// Position of the surface beyond the common one, in m.
+    /// Surface offset from the shared position, in m.
     pub surface_m: f64,
-    /// Natural logarithm of the factor on friction.
+    /// Natural logarithm of the friction factor.
     pub ln_friction: f64,
 }
 
-/// A number of an effect that is not fitted by itself.
+/// An effect parameter that is not fitted by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TiedParameter {
-    /// Which effect of the model.
+    /// Index of the effect in the model.
     pub effect: usize,
-    /// Which of its parameters.
+    /// Index of the parameter in the effect.
     pub parameter: usize,
-    /// The effect whose same parameter it always equals; none: it stays as it is.
+    /// The effect whose parameter of the same index it equals; `None` keeps it constant.
     pub tied_to: Option<usize>,
 }
 
-/// How much insertions differ from one another, beyond the law: estimated with each model.
+/// Standard deviations between recordings and days, estimated with each model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatter {
-    /// Standard deviation of the force at a rupture, relative.
+    /// Relative standard deviation of the force at rupture.
     pub rupture_force: f64,
-    /// Standard deviation of the position of a face at which a layer gives way, in m.
+    /// Standard deviation of the depth of an interface at rupture, in m.
     pub rupture_depth_m: f64,
-    /// Standard deviation of the surface in m.
+    /// Standard deviation of the surface position in m.
     pub surface_m: f64,
     /// Standard deviation of the logarithm of friction.
     pub ln_friction: f64,
-    /// Standard deviations of what differs by effects, in the order of [`Model::differing`](super::Model::differing); zero: as the library says.
+    /// Standard deviations of varying effect parameters, in the order of
+    /// [`Model::varying_parameters`](super::Model::varying_parameters); zero: the library's value.
     pub varying: [f64; 8],
-    /// Standard deviation of the surface between days, in m.
+    /// Standard deviation of the surface position between days, in m.
     pub day_surface_m: f64,
     /// Standard deviation of the logarithm of friction between days.
     pub day_ln_friction: f64,
 }
 
 impl Default for Scatter {
-    /// None, and for the numbers of a recording's or day's own wide first guesses.
+    /// No rupture scatter; wide initial values for the other standard deviations.
     fn default() -> Self {
         Self {
             rupture_force: 0.0,

@@ -41,7 +41,7 @@ fn base() -> Model {
     Model::base(Arc::new(belief()), 3)
 }
 
-/// Role, bounds, mean, spread, step.
+/// Role, bounds, prior mean, prior standard deviation, step.
 type Line = (ParameterRole, f64, f64, f64, f64, f64);
 
 fn are(told: &[Parameter], wanted: &[Line]) {
@@ -65,20 +65,20 @@ fn are(told: &[Parameter], wanted: &[Line]) {
 const NO: f64 = f64::INFINITY;
 
 #[test]
-fn numbers_of_the_base_law_go_as_far_as_is_believed() {
+fn base_parameters_are_bounded_by_the_assumed_tolerances() {
     are(
         &base().shared_parameters(),
         &[
             (ParameterRole::Stiffness(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
             (ParameterRole::Friction(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
             (ParameterRole::Puncture(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
-            // At least a fiftieth is left.
+            // At least a fiftieth.
             (ParameterRole::Stiffness(1), 0.02, 1.99, 1.0, 0.99, 1e-5),
             (ParameterRole::Friction(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
             (ParameterRole::Puncture(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
             (ParameterRole::Surface, -0.001, 0.005, 0.002, 0.0015, 1e-7),
             (ParameterRole::Thickness(0), 0.0096, 0.0144, 0.012, 0.0012, 1e-7),
-            // At least a twentieth is left.
+            // At least a twentieth.
             (ParameterRole::Thickness(1), 0.0005, 0.022, 0.01, 0.006, 1e-7),
         ],
     );
@@ -107,7 +107,7 @@ fn numbers_of_the_base_law_go_as_far_as_is_believed() {
 }
 
 #[test]
-fn numbers_of_effects_go_as_far_as_the_library_searches() {
+fn effect_parameters_are_bounded_by_the_search_range() {
     let model = base()
         .with_effect(choice("stress_relaxation", &[0.4, 3.0]))
         .with_effect(choice("needle_compliance", &[700.0]))
@@ -159,13 +159,14 @@ fn numbers_of_effects_go_as_far_as_the_library_searches() {
                 (of(2, 0), -1.5, 2.0, 0.0, NO, 2e-5),
             ][..],
             &interference,
-            // A layer is no number of a fit; where it lets go is sought from 25 mm before what is searched to 75 mm beyond.
+            // The layer index is not fitted; the release depth may range from 25 mm below the search range to
+            // 75 mm above.
             &[(of(4, 1), -0.03, 0.095, 0.0, NO, 2e-7)],
         ]
         .concat(),
     );
     assert_eq!(model.effect_parameter_count(), 2 + 1 + 1 + 3 + 1);
-    // What is bound is not fitted.
+    // Tied parameters are not fitted.
     let mut bound = model.clone();
     bound.tied = vec![
         TiedParameter { effect: 0, parameter: 1, tied_to: None },
@@ -182,7 +183,7 @@ fn numbers_of_effects_go_as_far_as_the_library_searches() {
 }
 
 #[test]
-fn numbers_of_recordings_and_days_have_the_spreads_between_them() {
+fn random_effects_have_the_scatter_as_prior() {
     let mut model = base()
         .with_effect(choice("release_depth", &[2.0, 1e-3]))
         .with_effect(choice("release_depth", &[1.0, 2e-3]));
@@ -201,7 +202,7 @@ fn numbers_of_recordings_and_days_have_the_spreads_between_them() {
     let own = [
         (ParameterRole::RecordingSurface, -NO, NO, 0.0, 7e-4, 1e-7),
         (ParameterRole::RecordingFriction, -NO, NO, 0.0, 0.03, 1e-5),
-        // As the library says where no spread is known.
+        // The library's value without an estimate.
         (ParameterRole::RecordingEffect(0), -NO, NO, 0.0, 5e-4, 5e-7),
         (ParameterRole::RecordingEffect(1), -NO, NO, 0.0, 3e-4, 5e-7),
     ];
@@ -228,7 +229,7 @@ fn numbers_of_recordings_and_days_have_the_spreads_between_them() {
 }
 
 #[test]
-fn a_number_that_is_set_is_got_back_and_moves_no_other() {
+fn setting_a_parameter_changes_no_other() {
     let mut model = base()
         .with_effect(choice("stress_relaxation", &[0.4, 3.0]))
         .with_effect(choice("needle_compliance", &[700.0]))
@@ -284,7 +285,7 @@ fn a_number_that_is_set_is_got_back_and_moves_no_other() {
 }
 
 #[test]
-fn a_number_that_is_bound_to_another_goes_with_it() {
+fn a_tied_parameter_follows_the_other_one() {
     let mut model = base()
         .with_effect(choice("release_depth", &[1.0, 1e-3]))
         .with_effect(choice("release_depth", &[2.0, 2e-3]))
@@ -299,7 +300,7 @@ fn a_number_that_is_bound_to_another_goes_with_it() {
 }
 
 #[test]
-fn what_is_bound_stays_bound_to_the_same_effect_when_another_goes() {
+fn ties_survive_the_removal_of_another_effect() {
     let mut model = base();
     for k in 0..4 {
         model = model.with_effect(choice("release_depth", &[1.0, f64::from(k) * 1e-3]));
@@ -316,7 +317,7 @@ fn what_is_bound_stays_bound_to_the_same_effect_when_another_goes() {
 }
 
 #[test]
-fn some_of_the_recordings_keep_their_numbers_and_days() {
+fn a_subset_keeps_parameters_and_days() {
     let mut model = base();
     for r in 0..3 {
         model.per_recording[r].surface_m = 1e-3 * r as f64;
@@ -329,7 +330,7 @@ fn some_of_the_recordings_keep_their_numbers_and_days() {
     assert_eq!(two.per_recording.iter().map(|o| o.surface_m).collect::<Vec<_>>(), [2e-3, 0.0]);
     assert_eq!(two.rupture_times_s, [vec![2.0; 3], vec![0.0; 3]]);
     assert_eq!((two.day_of.clone(), two.days.clone()), (vec![2, 1], model.days.clone()));
-    // A day that is not there has nothing of its own.
+    // A missing day has no parameters.
     assert_eq!(
         (two.day_parameters(0), two.day_parameters(1).surface_m, two.day_parameters(5)),
         (DayParameters::default(), 0.7, DayParameters::default())
@@ -338,7 +339,7 @@ fn some_of_the_recordings_keep_their_numbers_and_days() {
 }
 
 #[test]
-fn a_law_is_made_with_what_a_recording_and_its_day_have_of_their_own() {
+fn a_compiled_law_contains_recording_and_day_parameters() {
     let mut model = base()
         .with_effect(choice("release_depth", &[1.0, 1e-3]))
         .with_effect(choice("position_scale", &[0.02]))
@@ -365,22 +366,22 @@ fn a_law_is_made_with_what_a_recording_and_its_day_have_of_their_own() {
     model.free.recording_effects = true;
     near(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
     assert_eq!(model.compile(0).expect("a law").law.slabs()[0].release_m, 1e-3);
-    // Beside what the simulation has already.
+    // In addition to known effects.
     let mut given = belief();
     given.known_effects = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
     model.assumed = Arc::new(given);
     near(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
-    // A day alone is enough for a law of its own.
+    // A day alone changes the law as well.
     let mut days = base();
     (days.day_of, days.days) = (vec![0; 3], vec![DayParameters { surface_m: 1e-4, ln_friction: 0.0 }]);
     near(days.compile(0).expect("a law").law.slabs()[0].front_m, 0.0021);
 }
 
 #[test]
-fn a_law_breaks_at_membranes_and_where_the_tip_feels_faces() {
+fn break_positions_are_membranes_and_interfaces_of_tip_effects() {
     let mut model = base().with_effect(choice("hidden_membrane", &[0.005, 100.0, 0.2]));
     model.per_recording[0].surface_m = 1e-3;
-    // 0.2 N stretch it by 2 mm; the tip feels every face, too.
+    // 0.2 N stretch it by 2 mm; tip forces change at every interface, too.
     let breaks = model.compile(0).expect("a law").break_positions_m;
     for (told, wanted) in breaks.iter().zip([0.003 + 0.007, 0.015, 0.025, 0.055]) {
         near(*told, wanted);
@@ -402,7 +403,7 @@ fn a_law_breaks_at_membranes_and_where_the_tip_feels_faces() {
 }
 
 #[test]
-fn every_recording_has_its_own_of_what_is_its_own() {
+fn per_recording_roles_are_distinguished() {
     for role in [
         ParameterRole::RecordingSurface,
         ParameterRole::RecordingFriction,
@@ -422,9 +423,9 @@ fn every_recording_has_its_own_of_what_is_its_own() {
     }
 }
 
-/// What was measured elsewhere of a number is its prior; of all others nothing is believed before any data.
+/// Library values with a known distribution are priors; all others are flat.
 #[test]
-fn what_is_expected_of_a_number_of_an_effect_is_its_prior() {
+fn library_expectations_are_priors() {
     let slips = effect_info("shaft_slip").expect("in the library");
     let values: Vec<f64> = slips.parameters.iter().map(|p| p.start).collect();
     let model = base().with_effect(EffectTerm::new(slips, &values));

@@ -1,14 +1,14 @@
-//! Residuals without their smooth course: structure that a law lacks is no noise.
+//! Detrended residuals: unmodelled smooth structure is not noise.
 
 use crate::block_averages::BlockAverages;
 use stylet_stats::linear_algebra::SymmetricMatrix;
 use stylet_stats::order_statistics::median;
 
-/// Seconds of the windows in which a residual's smooth course is taken away.
+/// Length in s of the windows in which a parabola is removed.
 const DETREND_WINDOW_S: f64 = 1.0;
 
-/// Residuals less a parabola in windows of about a second; the rougher half of the windows of each half minute is left
-/// out as not a number.
+/// Residuals minus a least-squares parabola in windows of about one second. Windows whose variance exceeds 2.5
+/// times the median over the eight windows on either side are set to NaN.
 pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
     let length =
         (DETREND_WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round().max(8.0) as usize;
@@ -38,14 +38,14 @@ pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
                 out[k] = e[k] - c[0] - x(k) * (c[1] + x(k) * c[2]);
                 square += out[k] * out[k];
             }
-            // Three numbers were fitted.
+            // Three parameters were fitted.
             let lost = (m as f64 / (m as f64 - 3.0)).sqrt();
             out[from..to].iter_mut().for_each(|o| *o *= lost);
             windows.push((from, to, square / m as f64));
         }
         from = to;
     }
-    // Rougher than four times the median of the neighbours' variance: not calm.
+    // Exclude windows that are rough compared with their neighbours.
     let variances: Vec<f64> = windows.iter().map(|w| w.2).collect();
     for (k, (from, to, variance)) in windows.iter().enumerate() {
         let (lo, hi) = (k.saturating_sub(8), (k + 9).min(windows.len()));
@@ -62,9 +62,9 @@ mod tests {
     use super::super::tests::{normal, still};
     use super::*;
 
-    /// What is smooth over a second is no noise, and a window that is rougher than its neighbours is left out.
+    /// A trend smooth over one second is removed, and a window rougher than its neighbours is excluded.
     #[test]
-    fn calm_residuals_are_without_their_smooth_course_and_without_rough_windows() {
+    fn detrending_removes_parabolas_and_rough_windows() {
         let mut b = still(1020);
         b.used[130] = false;
         let draw = normal(6, 1020);
@@ -75,7 +75,7 @@ mod tests {
         let rough = |k: usize| if k / 50 == 7 { 1.9 } else { 1.0 };
         let e: Vec<f64> = (0..1020).map(|k| bent(k) + 0.01 * rough(k) * draw[k]).collect();
         let told = detrended_residuals(&b, &e);
-        // Three numbers by naive normal equations (Cramer) in every second.
+        // Parabola by naive normal equations (Cramer's rule) in every second.
         for window in 0..20 {
             let (from, to) = (50 * window, 50 * window + 50);
             let inside: Vec<usize> = (from..to).filter(|k| b.used[*k]).collect();

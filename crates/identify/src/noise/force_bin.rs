@@ -1,4 +1,4 @@
-//! Noise in one range of the force.
+//! Autoregressive noise in one range of the force.
 
 use super::long_memory::{ROW_LEN, SEARCH_STRETCHES, STRETCHES, regression_row, running_sums};
 use super::{HUBER_K, HUBER_LOSS, Noise, NoiseSource};
@@ -7,46 +7,46 @@ use stylet_stats::autoregressive::stationary;
 use stylet_stats::order_statistics::median;
 use stylet_stats::robust_linear_prediction::{prediction_residual, robust_linear_prediction};
 
-/// Highest order.
+/// Largest autoregressive order.
 pub const AR_ORDER: usize = 4;
-/// Turns of robust least squares.
+/// Iterations of robust least squares.
 const IRLS_ITERATIONS: usize = 4;
 
 /// Noise in one range of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceBinNoise {
-    /// Coefficients, newest first.
+    /// Autoregressive coefficients, newest first.
     pub ar: [f64; AR_ORDER],
-    /// Coefficients of the means of stretches further back.
+    /// Coefficients of the means over stretches further back.
     pub long_memory: [f64; STRETCHES.len()],
     /// Standard deviation of the innovations in N.
     pub innovation_sd_n: f64,
-    /// Standard deviation in N.
+    /// Marginal standard deviation in N.
     pub sd_n: f64,
-    /// How a block is foretold that has fewer than [`ORDER`] before it since a break: none, one ...
+    /// Predictors of blocks with fewer than [`AR_ORDER`] predecessors since a break: none, one, ...
     pub after_break: [AfterBreak; AR_ORDER],
 }
 
-/// How a block is foretold soon after a break.
+/// Predictor of a block shortly after a break.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AfterBreak {
-    /// Coefficients, newest first; as many as there are blocks since the break.
+    /// Autoregressive coefficients, newest first; as many as there are blocks since the break.
     pub ar: [f64; AR_ORDER],
-    /// Coefficients of the means of stretches further back.
+    /// Coefficients of the means over stretches further back.
     pub long_memory: [f64; STRETCHES.len()],
-    /// Standard deviation in N of what is not foretold.
+    /// Standard deviation of the prediction error in N.
     pub sd_n: f64,
 }
 
 impl AfterBreak {
-    /// Nothing is known of what was before.
+    /// No information about earlier blocks.
     pub(super) fn without_history(sd_n: f64) -> Self {
         Self { ar: [0.0; AR_ORDER], long_memory: [0.0; STRETCHES.len()], sd_n }
     }
 }
 
 impl ForceBinNoise {
-    /// Independent noise of one size.
+    /// Independent noise.
     pub(super) fn white(sd_n: f64) -> Self {
         let none = AfterBreak::without_history(sd_n);
         Self {
@@ -58,20 +58,20 @@ impl ForceBinNoise {
         }
     }
 
-    /// Whether it has a slow wander.
+    /// Whether it has a long memory.
     pub(super) fn has_long_memory(&self) -> bool {
         let none = [0.0; STRETCHES.len()];
         self.long_memory != none || self.after_break.iter().any(|f| f.long_memory != none)
     }
 
-    /// Standard deviation in N of what is not foretold of a block with so many before it since a break.
+    /// Standard deviation (N) of the prediction error of a block with `run` predecessors since a break.
     pub(super) fn innovation_sd_after_n(&self, run: usize) -> f64 {
         self.after_break.get(run).map_or(self.innovation_sd_n, |f| f.sd_n)
     }
 }
 
 impl Noise {
-    /// Robust least squares of one range.
+    /// Fits one range by robust least squares; the order minimises the Bayesian information criterion.
     pub(super) fn fit_bin(
         &self,
         blocks: &[BlockAverages],
@@ -103,13 +103,13 @@ impl Noise {
         }
         let n = rows.len() as f64;
         let mut best: Option<(f64, ForceBinNoise)> = None;
-        // Residuals without their smooth course have no slow wander.
+        // Detrended residuals have no long memory.
         let most = match from {
             NoiseSource::Detrended => AR_ORDER,
             NoiseSource::Residual => AR_ORDER + SEARCH_STRETCHES,
             NoiseSource::LongMemory | NoiseSource::Bootstrap => AR_ORDER + STRETCHES.len(),
         };
-        // An interval reckons with a wander that cannot be excluded: there it is the largest order that holds.
+        // Intervals must account for a drift that cannot be excluded: the largest stationary order is used.
         let largest = from.has_long_memory();
         let turns = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
@@ -144,7 +144,7 @@ impl Noise {
         }
         let mut best = best.map_or_else(|| ForceBinNoise::white(sd_n), |b| b.1);
         if from.has_long_memory() {
-            // The first blocks after a break go on where those before it ended, and with one another.
+            // The first blocks after a break depend on those before it and on each other.
             for (run, first) in best.after_break.iter_mut().enumerate() {
                 let columns: Vec<usize> = (1..=run).chain(AR_ORDER + 1..ROW_LEN).collect();
                 let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
@@ -165,15 +165,15 @@ mod tests {
     use super::super::tests::{near, normal, still};
     use super::*;
 
-    /// Noise that grows with the force and remembers is found as it was drawn.
+    /// Coefficients and standard deviations of force-dependent autoregressive noise are recovered.
     #[test]
-    fn noise_is_estimated_as_it_was_drawn() {
+    fn simulated_noise_is_recovered() {
         let n = 16_000;
         let mut b = still(n);
         let draw = normal(9, n);
         let mut e = vec![0.0; n];
         for k in 0..n {
-            // Stretches of one size each.
+            // Alternating stretches of constant force.
             let range = k / 800 % 2;
             b.abs_force_n[k] = [0.3, 1.7][range];
             let a = [[0.5, -0.2], [0.3, 0.25]][range];
@@ -199,7 +199,7 @@ mod tests {
                     "{from:?}: {whole:?}"
                 );
                 assert!((bin.innovation_sd_n / sd - 1.0).abs() < 0.03, "{from:?}: {}", bin.innovation_sd_n);
-                // The process has a larger size than its innovations: c0 = s^2 (1 - a2) / ((1 + a2) ((1 - a2)^2 - a1^2)).
+                // Marginal variance: c0 = s^2 (1 - a2) / ((1 + a2) ((1 - a2)^2 - a1^2)).
                 let ratio = (1.0 - a[1]) / ((1.0 + a[1]) * ((1.0 - a[1]).powi(2) - a[0] * a[0]));
                 assert!((bin.sd_n / (sd * ratio.sqrt()) - 1.0).abs() < 0.05, "{from:?}: {}", bin.sd_n);
             }
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn fewer_than_forty_blocks_tell_a_size_and_no_more() {
+    fn fewer_than_forty_blocks_give_white_noise() {
         let told = |blocks: usize| {
             let b = still(blocks);
             let e: Vec<f64> = (0..blocks).map(|k| libm::sin(0.3 * k as f64)).collect();
@@ -215,7 +215,7 @@ mod tests {
             let mut sizes: Vec<f64> = e.iter().map(|e| e.abs()).collect();
             (noise.bins[0], median(&mut sizes) * stylet_stats::MAD_TO_SD)
         };
-        // The first four have not four before them.
+        // The first four blocks have fewer than four predecessors.
         let (few, sd) = told(43);
         assert_eq!(few, ForceBinNoise::white(sd));
         let (many, sd) = told(44);

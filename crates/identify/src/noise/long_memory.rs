@@ -1,16 +1,18 @@
-//! The memory of a slow wander: means of stretches further back than an autoregression reaches.
+//! Long memory of slow drift: means over stretches further back than the autoregression (heterogeneous
+//! autoregression: Corsi 2009).
 
 use super::AR_ORDER;
 
-/// Stretches of blocks before those of the autoregression whose means a slow wander is told by: some tenths of a second,
-/// some seconds, ten seconds (a heterogeneous autoregression: Corsi 2009).
+/// Stretches of preceding blocks whose means are regressors: some tenths of a second, some seconds, ten
+/// seconds.
 pub(super) const STRETCHES: [(usize, usize); 3] = [(AR_ORDER, 24), (24, 124), (124, 624)];
-/// So many of them hold what a search calls noise; a law that moves over tens of seconds would be lost in the others.
+/// Number of stretches used during a model search; longer ones would absorb effects that evolve over tens of
+/// seconds.
 pub(super) const SEARCH_STRETCHES: usize = 2;
-/// Numbers of a row: the residual, those before it, the means.
+/// Length of a regression row: the residual, its predecessors, the means.
 pub(super) const ROW_LEN: usize = 1 + AR_ORDER + STRETCHES.len();
 
-/// Running sums of a column; what is not finite or not used counts as nothing.
+/// Running sums of a column; values that are not finite or not used count as zero.
 pub(super) fn running_sums(e: &[f64], used: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut out = Vec::with_capacity(e.len() + 1);
     let mut sum = 0.0;
@@ -22,7 +24,7 @@ pub(super) fn running_sums(e: &[f64], used: impl Fn(usize) -> bool) -> Vec<f64> 
     out
 }
 
-/// Means of the slow stretches before block `k`, as far as a memory of `reach` blocks goes.
+/// Means over the stretches before block `k`, limited to the last `reach` blocks.
 pub(super) fn stretch_means(sums: &[f64], k: usize, reach: usize) -> [f64; STRETCHES.len()] {
     core::array::from_fn(|i| {
         let (from, to) = STRETCHES[i];
@@ -31,7 +33,7 @@ pub(super) fn stretch_means(sums: &[f64], k: usize, reach: usize) -> [f64; STRET
     })
 }
 
-/// Block `k`, those before it, and the means before those.
+/// Block `k`, its predecessors, and the stretch means.
 pub(super) fn regression_row(e: &[f64], sums: &[f64], k: usize, reach: usize) -> [f64; ROW_LEN] {
     let slow = stretch_means(sums, k, reach);
     core::array::from_fn(|i| if i <= AR_ORDER { e[k - i] } else { slow[i - AR_ORDER - 1] })
@@ -43,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn running_sums_and_means_of_stretches_are_naive_ones() {
+    fn running_sums_and_stretch_means_agree_with_naive_ones() {
         let mut e = normal(2, 700);
         e[13] = f64::NAN;
         let of = running_sums(&e, |k| k % 5 != 2);

@@ -1,13 +1,15 @@
-//! The noise of measured force: autoregressive, one set of coefficients and one size per range of the force.
+//! Noise of measured force: autoregressive, with one set of coefficients and one variance per range of the
+//! force.
 //!
-//! Growth with the force, tails and missing air need no special case then. Residuals are means over blocks.
+//! This covers noise that grows with the force and quiet stretches in air without special cases. Residuals are
+//! block means.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | `bin` | noise in one range of the force, and how it is estimated |
-//! | `slow` | the memory of a slow wander |
-//! | `whiten` | normalised innovations of residuals, and back |
-//! | `calm` | residuals without their smooth course |
+//! | `force_bin` | noise in one range of the force and its estimation |
+//! | `long_memory` | regressors of slow drift |
+//! | `whiten` | normalised innovations of residuals and the inverse |
+//! | `detrend` | residuals without their smooth trend |
 
 mod detrend;
 mod force_bin;
@@ -23,56 +25,56 @@ use rayon::prelude::*;
 use stylet_stats::Loss;
 use stylet_stats::order_statistics::quantile_of_sorted;
 
-/// Most ranges of the force.
+/// Largest number of force ranges.
 const MAX_FORCE_BINS: usize = 5;
-/// Fewest blocks of a range: a size is then known to a twentieth.
+/// Smallest number of blocks per range: its standard deviation is then known to 5 %.
 const MIN_BLOCKS_PER_BIN: usize = 220;
-/// Beyond so many standard deviations a residual counts linearly (Huber).
+/// Threshold in standard deviations beyond which a residual counts linearly (Huber).
 pub const HUBER_K: f64 = 2.5;
-/// What a normalised residual costs, in nats.
+/// Loss of a normalised residual in nats.
 pub const HUBER_LOSS: Loss = Loss::Huber { k: HUBER_K };
 /// Smallest noise in N: rounding of numbers in files.
 const MIN_NOISE_N: f64 = 1e-6;
 
-/// The noise of a set of recordings.
+/// Noise model of a set of recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    /// Upper edges in N of all ranges but the last.
+    /// Upper edges in N of all force ranges except the last.
     pub edges_n: Vec<f64>,
-    /// The ranges.
+    /// Noise per force range.
     pub bins: Vec<ForceBinNoise>,
-    /// The memory of a slow wander reaches through breaks of the recording, such as jumps of the speed.
+    /// The long memory extends across breaks of a recording, such as velocity jumps.
     pub long_memory: bool,
 }
 
-/// How residuals are looked at when the noise is estimated.
+/// Which residuals the noise is estimated from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseSource {
-    /// As they are: everything that is left is noise.
+    /// Residuals as they are: all of them is noise.
     Residual,
-    /// As they are, and however slow: what intervals have to reckon with.
+    /// Residuals as they are, with long memory: for intervals.
     LongMemory,
-    /// The same of noise that was drawn: it is normal, so that plain least squares do.
+    /// As `LongMemory`, for simulated (bootstrap) residuals: they are normal, so plain least squares suffice.
     Bootstrap,
-    /// Less what is smooth over a second, in the calmer windows: structure that a law lacks is no noise.
+    /// Residuals minus their trend over one second, in the quieter windows: unmodelled structure is not noise.
     Detrended,
 }
 
 impl NoiseSource {
-    /// Whether a wander's memory reaches through breaks of the recording.
+    /// Whether the memory extends across breaks of a recording.
     fn has_long_memory(self) -> bool {
         matches!(self, Self::LongMemory | Self::Bootstrap)
     }
 }
 
 impl Noise {
-    /// Independent noise of one size.
+    /// Independent noise of one standard deviation.
     #[must_use]
     pub fn white(sd_n: f64) -> Self {
         Self { edges_n: Vec::new(), bins: vec![ForceBinNoise::white(sd_n)], long_memory: false }
     }
 
-    /// The noise of residuals `e` (N), one column per recording; nowhere less than `floor_n`.
+    /// Noise of residuals `e` (N), one column per recording, with a lower bound of `floor_n`.
     #[must_use]
     pub fn estimate(blocks: &[BlockAverages], e: &[Vec<f64>], from: NoiseSource, floor_n: f64) -> Self {
         let columns: Vec<Vec<f64>> = match from {
@@ -97,19 +99,19 @@ impl Noise {
         noise
     }
 
-    /// The range in which a size of the force lies.
+    /// Index of the range in which a force magnitude lies.
     #[must_use]
     pub fn bin_index(&self, size_n: f64) -> usize {
         self.edges_n.iter().take_while(|e| **e <= size_n).count()
     }
 
-    /// The noise of a block of a size of the force.
+    /// Noise at a force magnitude.
     #[must_use]
     pub fn bin_at(&self, size_n: f64) -> &ForceBinNoise {
         &self.bins[self.bin_index(size_n).min(self.bins.len() - 1)]
     }
 
-    /// Sum of the logarithms of the innovations' standard deviations, `ln(s/N)`, over the blocks compared.
+    /// Sum of `ln(s/N)` of the innovations' standard deviations `s` over the compared blocks.
     #[must_use]
     pub fn sum_ln_sd(&self, blocks: &[BlockAverages]) -> f64 {
         let mut sum = 0.0;
@@ -125,7 +127,7 @@ impl Noise {
         sum
     }
 
-    /// Standard deviation in N over all ranges, root mean square.
+    /// Root mean square of the standard deviations of all ranges, in N.
     #[must_use]
     pub fn sd_n(&self) -> f64 {
         let n = self.bins.len().max(1) as f64;
@@ -139,7 +141,7 @@ mod tests {
     use crate::block_averages::BLOCK_S;
     use stylet_record::Recording;
 
-    /// Blocks of a needle at rest; of none is anything known but its time.
+    /// Blocks of a needle at rest.
     pub(in crate::noise) fn still(blocks: usize) -> BlockAverages {
         let t: Vec<f64> = (0..4 * blocks).map(|k| k as f64 / 200.0).collect();
         let zero = vec![0.0; t.len()];
@@ -149,7 +151,7 @@ mod tests {
         b
     }
 
-    /// Normal numbers: twelve even ones of a linear congruence (Knuth's MMIX) each.
+    /// Normal numbers: sums of twelve uniform ones from a linear congruential generator (Knuth's MMIX).
     pub(in crate::noise) fn normal(seed: u64, n: usize) -> Vec<f64> {
         let mut state = seed;
         let mut even = move || {
@@ -164,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_size_of_the_force_lies_in_the_range_that_begins_there() {
+    fn lower_edges_belong_to_their_range() {
         let mut noise = Noise::white(0.3);
         assert_eq!((noise.bin_index(0.0), noise.bin_index(9.0)), (0, 0));
         near(noise.sd_n(), 0.3);
@@ -189,9 +191,9 @@ mod tests {
         assert!(first.has_long_memory());
     }
 
-    /// Ranges have the same number of blocks, of which a size needs 220; no more than five ranges.
+    /// Ranges hold equally many blocks, at least 220; there are at most five.
     #[test]
-    fn ranges_hold_as_many_blocks_each_as_a_size_needs() {
+    fn force_ranges_hold_enough_blocks() {
         for (blocks, ranges) in [(219, 1), (439, 1), (440, 2), (659, 2), (660, 3), (1100, 5), (1500, 5)] {
             let mut b = still(blocks + 1);
             b.used[0] = false;
@@ -208,10 +210,10 @@ mod tests {
         }
     }
 
-    /// A wander that lasts some seconds goes on after a break: what is left of the first blocks there is small, and those of one
-    /// break know nothing of one another. As if they began anew they would count as many times what they tell.
+    /// Drift over some seconds continues after a break. Treated as independent after each break, the first
+    /// blocks would count as several independent observations.
     #[test]
-    fn a_slow_wander_lasts_through_a_break() {
+    fn slow_drift_continues_through_a_break() {
         let n = 12_000;
         let t: Vec<f64> = (0..4 * n).map(|k| f64::from(k) / 200.0).collect();
         let zero = vec![0.0; t.len()];
@@ -221,7 +223,7 @@ mod tests {
             b.used[k] = false;
             b.memory_reset[k + 1] = true;
         }
-        // Twelve even numbers of a linear congruence (Knuth's MMIX) make a normal one.
+        // Normal numbers: sums of twelve uniform ones from a linear congruential generator (Knuth's MMIX).
         let mut state = 11_u64;
         let mut even = move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

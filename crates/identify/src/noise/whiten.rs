@@ -1,34 +1,34 @@
-//! Normalised innovations of residuals, and residuals of innovations.
+//! Normalised innovations of residuals, and the inverse.
 
 use super::long_memory::{STRETCHES, running_sums, stretch_means};
 use super::{AR_ORDER, ForceBinNoise, Noise};
 use crate::block_averages::BlockAverages;
 
-/// How the blocks of one recording are whitened.
+/// Precomputed whitening of one recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WhiteningPlan {
     rows: Vec<BlockWhitening>,
-    /// Some range has a slow wander.
+    /// Some range has a long memory.
     has_long_memory: bool,
-    /// Blocks one after the other of one range, all with [`ORDER`] before them and without a wander: first, end, range.
+    /// Consecutive blocks of one range with [`AR_ORDER`] predecessors and no long memory: first, end, range.
     plain_runs: Vec<(usize, usize, u32)>,
 }
 
-/// How one block is whitened.
+/// Whitening of one block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct BlockWhitening {
-    /// Range of the force.
+    /// Index of the force range.
     bin: u32,
-    /// Blocks that are known before it, without a break.
+    /// Number of predecessors since the last break.
     blocks_since_break: u32,
-    /// Blocks before it to which the memory of a slow wander reaches.
+    /// Number of preceding blocks in the long memory.
     memory_blocks: u32,
-    /// Standard deviation of its innovation in N; infinite when it is not compared.
+    /// Standard deviation of the innovation in N; infinite when the block is not compared.
     sd_n: f64,
 }
 
 impl Noise {
-    /// How the blocks of a recording are whitened.
+    /// Computes how the blocks of a recording are whitened.
     #[must_use]
     pub fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
         let mut run = 0;
@@ -75,7 +75,7 @@ impl Noise {
         }
     }
 
-    /// Normalised innovations of residuals `e` (N) of a recording; blocks that are not compared give zero.
+    /// Normalised innovations of residuals `e` (N) of a recording; zero in blocks that are not compared.
     #[must_use]
     pub fn whiten(&self, laid: &WhiteningPlan, e: &[f64]) -> Vec<f64> {
         let sums = match (laid.has_long_memory, self.long_memory) {
@@ -102,7 +102,7 @@ impl Noise {
             w / row.sd_n
         };
         let mut out = vec![0.0; e.len()];
-        // Where there is nothing, and nothing is remembered, nothing comes out.
+        // Leading and trailing zeros stay zero beyond the memory.
         let reach = if laid.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
         let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
         let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
@@ -132,8 +132,8 @@ impl Noise {
         out
     }
 
-    /// Residuals (N) of a recording whose normalised innovations are `w`: the inverse of [`whiten`](Self::whiten), nothing where blocks
-    /// are not compared.
+    /// Residuals (N) of a recording with normalised innovations `w`: the inverse of [`whiten`](Self::whiten),
+    /// zero in blocks that are not compared.
     #[must_use]
     pub fn unwhiten(&self, laid: &WhiteningPlan, w: &[f64]) -> Vec<f64> {
         let mut e = vec![0.0; w.len()];
@@ -157,7 +157,7 @@ impl Noise {
         e
     }
 
-    /// How a block is foretold: coefficients of those before it, and of the means of stretches further back.
+    /// Predictor of a block: coefficients of its predecessors and of the stretch means.
     fn predictor(&self, row: &BlockWhitening) -> (&[f64; AR_ORDER], &[f64; STRETCHES.len()]) {
         let bin = &self.bins[row.bin as usize];
         bin.after_break
@@ -174,7 +174,7 @@ mod tests {
     use stylet_stats::Ar;
     use stylet_stats::linear_algebra::SymmetricMatrix;
 
-    /// Bins whose first blocks after a break are foretold as those of an autoregressive process of a known covariance are.
+    /// Noise with the exact predictors of an autoregressive process, and its autocovariance.
     fn of_process(ar: &Ar) -> (ForceBinNoise, Vec<f64>) {
         let mut c = vec![0.0; 12];
         ar.autocovariance(&mut c);
@@ -200,7 +200,7 @@ mod tests {
         (bin, c)
     }
 
-    /// The logarithm of the density of a normal vector with this covariance, by a naive factor.
+    /// Log density of a normal vector with this covariance, by a naive Cholesky factorisation.
     fn ln_density(e: &[f64], covariance: impl Fn(usize, usize) -> f64) -> f64 {
         let n = e.len();
         let mut l = vec![vec![0.0; n]; n];
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn whitened_noise_has_the_likelihood_of_the_dense_covariance() {
+    fn whitening_gives_the_likelihood_of_the_dense_covariance() {
         let ar = Ar::from_reflection(&[0.6, -0.35, 0.2, 0.1], 0.03);
         let (bin, c) = of_process(&ar);
         let mut b = still(12);
@@ -235,7 +235,7 @@ mod tests {
         let toeplitz = |i: usize, j: usize| c[i.abs_diff(j)];
         near(told, ln_density(&e[..7], toeplitz) + ln_density(&e[8..], toeplitz));
         assert_eq!(w[7], 0.0);
-        // What sampling leaves open of a block is added to its own size alone.
+        // Timing uncertainty adds to the block's own innovation only.
         b.extra_sd_n[4] = 0.05;
         let doubted = noise.whiten(&noise.whitening_plan(&b), &e);
         near(
@@ -245,7 +245,7 @@ mod tests {
         assert_eq!([doubted[3], doubted[5]], [w[3], w[5]]);
     }
 
-    /// Two ranges with a slow wander of their own, breaks, and blocks that are not compared.
+    /// Two ranges with long memory, breaks, and blocks that are not compared.
     fn wandering(lasting: bool) -> (Noise, BlockAverages) {
         let mut b = still(900);
         for k in 0..900 {
@@ -268,7 +268,7 @@ mod tests {
         (Noise { edges_n: vec![0.9], bins: vec![bin(1.0), bin(1.3)], long_memory: lasting }, b)
     }
 
-    /// One block by the definition: those before it since the break, and the means of stretches before those.
+    /// Innovation of one block by the definition.
     fn innovation_of(noise: &Noise, b: &BlockAverages, e: &[f64], k: usize) -> f64 {
         let since = (0..=k).rev().find(|j| b.memory_reset[*j]).unwrap_or(0);
         let bin = &noise.bins[usize::from(b.abs_force_n[k] >= 0.9)];
@@ -290,9 +290,9 @@ mod tests {
         w / sd
     }
 
-    /// By the definition, wherever they begin and end.
+    /// By the definition, for residuals with leading and trailing zeros.
     #[test]
-    fn residuals_that_are_nothing_at_their_ends_leave_nothing_beyond_their_memory() {
+    fn zero_residuals_have_zero_innovations_beyond_the_memory() {
         let normals = normal(9, 900);
         for wanders in [false, true] {
             let (mut noise, b) = wandering(false);
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_wander_is_foretold_from_the_means_of_stretches_before() {
+    fn slow_drift_is_predicted_from_stretch_means() {
         for lasting in [false, true] {
             let (noise, b) = wandering(lasting);
             let e = normal(7, b.len());
@@ -333,7 +333,7 @@ mod tests {
                 noise.sum_ln_sd(&[b.clone(), b.clone()]),
                 2.0 * (0..b.len()).filter(|k| b.used[*k]).map(sizes).sum::<f64>(),
             );
-            // Coloured again it is what it was, where it is compared; what is not is nothing.
+            // Unwhitening the innovations gives the residuals back; zero where not compared.
             let bare: Vec<f64> =
                 e.iter().zip(&b.used).map(|(e, used)| if *used { *e } else { 0.0 }).collect();
             let again = noise.unwhiten(&laid, &noise.whiten(&laid, &bare));

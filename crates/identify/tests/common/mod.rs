@@ -1,10 +1,11 @@
-//! What several of these tests believe in.
+//! Fixtures shared by several tests.
 
 use std::sync::Arc;
 use stylet_identify::model::Assumptions;
 use stylet_tissue::{Layer, Tissue};
 
-/// One layer that begins at zero, so many m thick, of this stiffness (N/m) and friction (Ns/m²), without a puncture force.
+/// One layer from zero to `thickness_m` with this stiffness (N/m) and friction (Ns/m²), without a puncture
+/// force.
 pub fn one_layer(thickness_m: f64, (stiffness_n_per_m, friction_ns_per_m2): (f64, f64)) -> Arc<Assumptions> {
     let layer =
         Layer { thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n: None, name: String::new() };

@@ -1,5 +1,5 @@
-//! A force that comes late is late by a fraction of a sampling step: the jumps of the friction say it only by the samples that they lie
-//! between.
+//! A force delay is identified to a fraction of the sampling interval, although friction jumps only show
+//! between which samples they lie.
 
 mod common;
 
@@ -14,12 +14,12 @@ use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 use stylet_tissue::effect_info;
 
-/// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
+/// Stiffness (N/m) and friction (Ns/m²) of the only layer, which starts at zero.
 const LAYER: (f64, f64) = (60.0, 12_000.0);
-/// Time between samples in s.
+/// Sampling interval in s.
 const STEP_S: f64 = 0.005;
 
-/// Position (m) and velocity (m/s) of a base that goes to and fro at changing speeds.
+/// Position (m) and velocity (m/s) of a base that moves back and forth at changing speeds.
 fn base(t: f64) -> (f64, f64) {
     const SPEEDS: [f64; 8] = [0.003, 0.006, -0.002, 0.005, 0.0, 0.004, -0.004, 0.003];
     const LASTS_S: f64 = 1.7317;
@@ -41,13 +41,13 @@ fn force(t: f64) -> f64 {
 }
 
 #[test]
-fn a_delay_is_found_to_a_fraction_of_a_sampling_step() {
+fn a_delay_is_estimated_to_a_fraction_of_the_sampling_interval() {
     let belief = one_layer(0.08, LAYER);
     let (mut worst, mut worst_at_instants) = (0.0_f64, 0.0_f64);
     for truth in [0.0117, 0.0234, 0.0301, 0.0468] {
         let t: Vec<f64> = (0..2700).map(|k| f64::from(k) * STEP_S).collect();
         let z: Vec<f64> = t.iter().map(|t| base(*t).0).collect();
-        // A little that no law explains, the same for every delay.
+        // A small unmodelled force, the same for every delay.
         let f: Vec<f64> =
             t.iter().enumerate().map(|(k, t)| force(t - truth) + 2e-3 * (k as f64 * 2.4).sin()).collect();
         let recording = Recording::new(t, z, f).expect("a recording");
@@ -62,6 +62,6 @@ fn a_delay_is_found_to_a_fraction_of_a_sampling_step() {
         worst = worst.max((delay_s(&found.model) - truth).abs());
     }
     assert!(worst < 0.02 * STEP_S, "{worst} s");
-    // What would be left without.
+    // The error without the refinement.
     assert!(worst_at_instants > 0.1 * STEP_S, "{worst_at_instants} s");
 }

@@ -1,5 +1,5 @@
-//! A needle that gives, or a sensor that lags, is replayed in blocks of 20 ms as if it had been followed at every instant and sampled every
-//! 5 ms: through stops and starts, whose effect fades within a few samples, and through ripples, which both follow late.
+//! Replay in blocks of 20 ms with a compliant needle or a lagging sensor agrees with a fine integration sampled
+//! every 5 ms: through stops and starts, whose transients decay within a few samples, and through ripples.
 
 mod common;
 
@@ -12,13 +12,13 @@ use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 use stylet_tissue::effect_info;
 
-/// Stiffness (N/m) and friction (Ns/m²) of the only layer, which begins at zero.
+/// Stiffness (N/m) and friction (Ns/m²) of the only layer, which starts at zero.
 const LAYER: (f64, f64) = (60.0, 9000.0);
 
-/// Step of the reference in s.
+/// Time step of the reference in s.
 const STEP_S: f64 = 2e-5;
 
-/// Position (m) of the base: a ripple, a stop, a start, a retraction, none of them where a block ends.
+/// Position (m) of the base: a ripple, a stop, a start, a retraction, none of them at a block border.
 fn base(t: f64) -> f64 {
     let rippled = |t: f64| 0.004 * t + 0.003 / 9.0 * (1.0 - (9.0 * t).cos());
     let z = match t {
@@ -30,7 +30,7 @@ fn base(t: f64) -> f64 {
     z - 0.002
 }
 
-/// Force (N) every 20 us by the balance `k_s (z - z_tip) = K z_tip + b z_tip v_tip`, implicit Euler.
+/// Force (N) every 20 µs from the balance `k_s (z - z_tip) = K z_tip + b z_tip v_tip`, implicit Euler.
 fn followed(needle: f64, end_s: f64) -> Vec<f64> {
     let (k, b) = LAYER;
     let dt = STEP_S;
@@ -45,7 +45,7 @@ fn followed(needle: f64, end_s: f64) -> Vec<f64> {
 }
 
 #[test]
-fn a_needle_that_gives_is_replayed_in_blocks_as_if_followed_at_every_instant() {
+fn a_compliant_needle_agrees_with_fine_integration() {
     let belief = one_layer(0.06, LAYER);
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();
@@ -65,7 +65,7 @@ fn a_needle_that_gives_is_replayed_in_blocks_as_if_followed_at_every_instant() {
     }
 }
 
-/// The largest difference (N) of a block's prediction from the mean of what is sampled in it, and where (s).
+/// Largest difference (N) of a block's prediction from the mean of its samples, and where (s).
 fn worst(blocks: &BlockAverages, predicted: &[f64], force: &[f64]) -> (f64, f64) {
     let off = |k: usize| {
         let samples = |t: &&f64| **t > blocks.start_s[k] && **t < blocks.end_s[k];
@@ -79,7 +79,7 @@ fn worst(blocks: &BlockAverages, predicted: &[f64], force: &[f64]) -> (f64, f64)
 }
 
 #[test]
-fn a_sensor_that_lags_is_replayed_in_blocks_as_if_followed_at_every_instant() {
+fn a_lagging_sensor_agrees_with_fine_integration() {
     let belief = one_layer(0.06, LAYER);
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();

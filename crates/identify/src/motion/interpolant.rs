@@ -5,7 +5,7 @@ use super::JumpTiming;
 /// Position and velocity, linear between knots.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interpolant {
-    /// Time in s, never falling; twice the same at a jump of the speed.
+    /// Time in s, non-decreasing; repeated at a velocity jump.
     pub(super) t: Vec<f64>,
     /// Position in m.
     pub(super) z: Vec<f64>,
@@ -13,7 +13,7 @@ pub(super) struct Interpolant {
     pub(super) v: Vec<f64>,
     /// Integral of the position in m s up to each knot.
     sum_z: Vec<f64>,
-    /// Integral of the velocity in m.
+    /// Integral of the velocity in m up to each knot.
     sum_v: Vec<f64>,
 }
 
@@ -32,7 +32,7 @@ impl Interpolant {
         self.sum_v.push(sum_v);
     }
 
-    /// Velocity in m/s at a knot, searched from knot `near` on.
+    /// Velocity in m/s at a knot; the search starts at knot `near`.
     pub(super) fn velocity_at(&self, at_s: f64, near: &mut usize) -> f64 {
         while self.t.get(*near + 1).is_some_and(|t| *t <= at_s) {
             *near += 1;
@@ -40,12 +40,12 @@ impl Interpolant {
         self.v.get(*near).copied().unwrap_or(0.0)
     }
 
-    /// The last knot at or before `at_s`; the first one when there is none.
+    /// Last knot at or before `at_s`, or the first one.
     pub(super) fn index_before(&self, at_s: f64) -> usize {
         self.t.partition_point(|t| *t <= at_s).saturating_sub(1)
     }
 
-    /// [`sums`](Self::sums) as if the speed of one side of a jump lasted beyond it.
+    /// [`integrals`](Self::integrals), with the velocity on one side of a jump continued beyond it.
     pub(super) fn integrals_beyond_jump(
         &self,
         jump: &JumpTiming,
@@ -58,7 +58,7 @@ impl Interpolant {
         (z + dt * (jump.position_m + 0.5 * dt * speed), v + dt * speed)
     }
 
-    /// Integrals of position and velocity up to an instant, searched from knot `near` on.
+    /// Integrals of position and velocity up to a time; the search starts at knot `near`.
     pub(super) fn integrals(&self, at_s: f64, near: &mut usize) -> (f64, f64) {
         let last = self.t.len() - 1;
         let mut k = (*near).min(last);

@@ -1,12 +1,12 @@
-//! What the needle's base did, as a function of time: position and velocity between samples, jumps of the speed at
-//! their instants, means over any span.
+//! Motion of the needle base as a function of time: position and velocity between samples, velocity jumps at
+//! their times, means over any span.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | `velocity` | velocity and its jumps from exact positions |
-//! | `settle`, `course`, `ramp` | from noisy ones: stretches of what robots are told to do, and how they go from one to the next |
-//! | `knots` | position and velocity between samples |
-//! | `pieces` | means over spans, cut where the speed jumps or turns |
+//! | `velocity_estimate` | velocity and its jumps from exact positions |
+//! | `smooth_positions`, `motion_segment`, `acceleration_ramp` | from noisy positions: segments of commanded motion and the transitions between them |
+//! | `interpolant` | position and velocity between samples |
+//! | `motion_pieces` | means over spans, cut at velocity jumps and reversals |
 
 mod acceleration_ramp;
 mod interpolant;
@@ -19,48 +19,49 @@ pub use motion_pieces::{JumpAppearance, MotionPiece};
 pub use smooth_positions::{SmoothedMotion, smooth_positions};
 pub use velocity_estimate::{MIN_JUMP_MPS, VelocityEstimate, VelocityJump, estimate_velocity};
 
-use crate::Recording;
 use interpolant::Interpolant;
+use stylet_record::Recording;
 use velocity_estimate::position_noise;
 
-/// The motion of one recording.
+/// Motion of one recording.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// With the jumps of the speed at their instants.
+    /// Interpolant with jumps at their exact times.
     exact: Interpolant,
-    /// With the jumps half-way between two samples: what a mean over samples sees.
+    /// Interpolant with jumps midway between two samples, as a mean over samples sees them.
     sampled: Interpolant,
-    /// Jumps of the speed.
+    /// Velocity jumps.
     pub jumps: Vec<JumpTiming>,
-    /// Instants at which the speed smoothly changes its sign, and the middles between the samples around them, in s: dry
-    /// friction jumps there.
+    /// Times in s at which the velocity smoothly changes sign, and the midpoints of the samples around them:
+    /// Coulomb friction jumps there.
     reversals_s: Vec<(f64, f64)>,
-    /// Standard deviation in m/s of what the positions leave open of the velocity.
+    /// Standard deviation of the velocity in m/s.
     pub velocity_sd_mps: f64,
-    /// Standard deviation of the positions' noise in m.
+    /// Standard deviation of the position noise in m.
     pub noise_m: f64,
 }
 
-/// A jump of the speed.
+/// A velocity jump with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JumpTiming {
-    /// Its instant in s.
+    /// Time in s.
     pub time_s: f64,
-    /// The middle between the samples before and after it: what a mean over samples sees.
+    /// Midpoint of the samples before and after it, in s.
     pub sample_mid_s: f64,
-    /// How uncertain the instant is, in s.
+    /// Standard deviation of the time in s.
     pub time_sd_s: f64,
-    /// Where it is in m.
+    /// Position in m.
     pub position_m: f64,
-    /// Velocity in m/s before and after it.
+    /// Velocity in m/s before and after.
     pub velocity_mps: [f64; 2],
 }
 
-/// Velocity noise in m/s from which on positions are smoothed over as long as they allow.
+/// Velocity noise in m/s above which positions are smoothed.
 const MAX_EXACT_SD_MPS: f64 = 1.2e-5;
 
 impl Motion {
-    /// The motion of a recording whose samples are all finite. A needle slower than `still_mps` (m/s) stands.
+    /// Motion of a recording whose samples are all finite. Below `still_mps` (m/s) the needle counts as at
+    /// rest.
     #[must_use]
     pub fn from_recording(recording: &Recording, still_mps: f64) -> Self {
         let (t, z) = (&recording.time_s, &recording.position_m);
@@ -120,14 +121,14 @@ impl Motion {
             m.exact.push(t[i], z[i], v[i]);
             m.sampled.push(t[i], z[i], v[i]);
         }
-        // Noisy positions do not tell a turn from a hold.
+        // Noisy positions do not distinguish a reversal from a hold.
         if sd <= MAX_EXACT_SD_MPS {
             m.find_reversals(t, still_mps);
         }
         m
     }
 
-    /// Where the sign of the speed changes between two samples without a jump.
+    /// Finds sign changes of the velocity between two samples without a jump.
     fn find_reversals(&mut self, t: &[f64], still_mps: f64) {
         let way = |v: f64| i8::from(v > still_mps) - i8::from(v < -still_mps);
         let mut near = 0;
@@ -145,7 +146,7 @@ impl Motion {
         }
     }
 
-    /// Position in m and velocity in m/s at an instant.
+    /// Position in m and velocity in m/s at a time.
     #[must_use]
     pub fn at(&self, at_s: f64) -> (f64, f64) {
         let k = &self.exact;
@@ -167,7 +168,7 @@ mod tests {
         assert!((told - wanted).abs() <= 1e-9, "{told} for {wanted}");
     }
 
-    /// Slower than this a needle stands, in m/s.
+    /// Velocity in m/s below which the needle counts as at rest.
     const STILL_MPS: f64 = 1e-5;
 
     pub(in crate::motion) fn from_knots(
@@ -181,7 +182,7 @@ mod tests {
         Motion::from_knots(t, z, v, kinks, sd, noise_m, STILL_MPS)
     }
 
-    /// At 2 m/s, from 0.53 s on back at 1 m/s, sampled every 0.1 s up to 1.2 s.
+    /// 2 m/s, from 0.53 s on back at 1 m/s, sampled every 0.1 s up to 1.2 s.
     pub(in crate::motion) fn bent() -> Motion {
         let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
         let z: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 * t } else { 1.06 - (t - 0.53) }).collect();
@@ -197,17 +198,17 @@ mod tests {
     }
 
     #[test]
-    fn position_and_velocity_lie_on_lines_between_samples_and_jumps() {
+    fn position_and_velocity_are_linear_between_samples_and_jumps() {
         let m = bent();
         for (at_s, z, v) in [(0.0, 0.0, 2.0), (0.34, 0.68, 2.0), (0.52, 1.04, 2.0), (0.54, 1.05, -1.0)] {
             near(m.at(at_s).0, z);
             near(m.at(at_s).1, v);
         }
         near(m.at(0.97).0, 0.62);
-        // Outside it is at the first and last sample.
+        // Outside of the recording: the first and last sample.
         assert_eq!(m.at(-0.4), (0.0, 2.0));
         near(m.at(7.0).0, 0.39);
-        // A speed that changes between samples.
+        // A velocity that changes between samples.
         let slowing = from_knots(&[1.0, 1.5, 3.0], &[0.0, 1.0, 4.0], &[3.0, 1.0, 7.0], &[], 0.0, 0.0);
         near(slowing.at(1.125).1, 2.5);
         near(slowing.at(2.0).0, 2.0);
@@ -215,13 +216,13 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_speed_is_known_as_well_as_the_place_where_both_sides_meet() {
+    fn jump_timing_uncertainty_follows_from_the_position_uncertainty() {
         let told = bent().jumps[0];
         near(told.time_s, 0.53);
         near(told.sample_mid_s, 0.55);
         near(told.time_sd_s, 0.002);
         assert_eq!((told.position_m, told.velocity_mps), (1.06, [2.0, -1.0]));
-        // Between its samples, whatever is said of its instant; a change of the speed counts from a micrometre per second on.
+        // Clamped to the sampling interval; the smallest velocity change is 1 µm/s.
         let kink = |sample: usize, t: f64, after: f64| VelocityJump {
             next_sample: sample,
             time_s: t,
@@ -242,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_comes_to_rest_smoothly_turns_where_it_does() {
+    fn a_smooth_stop_is_a_reversal() {
         let t: Vec<f64> = (0..8).map(f64::from).collect();
         let v = [0.3, 0.2, 0.1, 0.0, 0.0, -0.2, -0.1, -0.1];
         let m = from_knots(&t, &[0.0; 8], &v, &[], 0.0, 0.0);
@@ -250,9 +251,9 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_velocity_is_taken_when_it_is_better_than_what_positions_tell() {
+    fn a_measured_velocity_is_used_when_it_is_more_accurate() {
         let t: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.005).collect();
-        // Rough positions; slower from a second and a half on.
+        // Noisy positions; slower from 1.5 s on.
         let z: Vec<f64> = t
             .iter()
             .enumerate()
@@ -270,19 +271,20 @@ mod tests {
         let told = of(0.0, true);
         assert_eq!((told.at(1.0).1, told.at(2.5).1), (0.031, 0.0051));
         assert_eq!(told.velocity_sd_mps, 0.0);
-        // Where they jump the positions tell.
+        // Jumps come from positions.
         assert_eq!(told.jumps.len(), 1);
         assert!((told.jumps[0].time_s - 1.5).abs() < 0.05, "{:?}", told.jumps);
-        // Nobody measured, or too roughly.
+        // Not measured, or too noisy.
         for from_positions in [of(0.0, false), of(0.01, true)] {
             assert!((from_positions.at(1.0).1 - 0.03).abs() < 3e-4, "{}", from_positions.at(1.0).1);
             assert!(from_positions.velocity_sd_mps > MAX_EXACT_SD_MPS);
         }
     }
 
-    /// At 1.1 mm/s an encoder of 50 um stands still in eight samples of nine, at 0.2 mm/s in forty-nine of fifty.
+    /// At 1.1 mm/s an encoder with 50 µm resolution stands still in eight samples of nine, at 0.2 mm/s in 49 of
+    /// 50.
     #[test]
-    fn a_needle_slower_than_a_step_per_sample_goes_evenly() {
+    fn a_needle_slower_than_one_encoder_step_per_sample_has_constant_velocity() {
         for speed_mps in [0.0011, 0.0002, 0.006] {
             let t: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.005).collect();
             let true_m = |t: f64| if t < 25.0 { speed_mps * t } else { speed_mps * (50.0 - t) };
@@ -296,9 +298,9 @@ mod tests {
         }
     }
 
-    /// A needle that goes evenly, rests and goes back has equal differences, too; its positions are exact.
+    /// Constant velocity with holds and a retraction also has equal differences, but exact positions.
     #[test]
-    fn even_motion_with_rests_is_not_rounded() {
+    fn constant_velocity_with_rests_is_not_quantised() {
         let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * 0.005).collect();
         let z: Vec<f64> =
             t.iter().map(|t| 0.003 * if *t < 8.0 { *t } else { 8.0 - (*t - 12.0).max(0.0) }).collect();

@@ -1,9 +1,10 @@
-//! Position and velocity from noisy or coarsely rounded positions: as wide a window as the course allows.
+//! Position and velocity from noisy or coarsely quantised positions.
 //!
-//! Samples are averaged in cells of about 20 ms. Jumps of the speed are where parabolas on both sides of a gap between
-//! cells meet with clearly different slopes. A stretch between two jumps is what a robot was told to do (`course`)
-//! when that leaves white noise. Else every cell takes the widest of a ladder of windows whose
-//! local parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski 1997).
+//! Samples are averaged in cells of about 20 ms. Velocity jumps are where parabolas on both sides of a gap
+//! between cells meet with clearly different slopes. The interval between two jumps is a parametric
+//! `motion_segment` when that leaves white residuals. Otherwise every cell takes the widest window whose local
+//! parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski
+//! 1997).
 
 use super::acceleration_ramp::AccelerationRamp;
 use super::motion_segment::{MIN_CELLS, MotionSegment, cheaper};
@@ -18,27 +19,28 @@ const CELL_S: f64 = 0.02;
 const JUMP_SIDE_CELLS: usize = 15;
 /// Half windows in cells.
 const HALF_WINDOWS: [usize; 8] = [3, 5, 8, 12, 18, 27, 40, 60];
-/// Width of the confidence intervals in standard deviations.
+/// Half width of the confidence intervals in standard deviations.
 const INTERVAL_SDS: f64 = 2.2;
-/// What leaves so many times the positions' noise is no form.
+/// A segment must not leave more than this multiple of the position noise.
 const MAX_NOISE_RATIO: f64 = 2.0;
-/// A frequency (1/s) for a union of stretches of which none has one: too slow to matter.
+/// Placeholder frequency (1/s) for the union of intervals without any: too low to matter.
 const NO_FREQUENCY_HINT: f64 = 1e-3;
-/// Cells within which the instant of a jump is moved to where both sides meet.
+/// Cells within which a jump is moved to the intersection of both sides.
 const JUMP_REACH_CELLS: usize = 25;
-/// Cells left out at either end of an even stretch: a drive takes up to half a second from one speed to the next.
+/// Cells excluded at either end of a constant-velocity interval: a drive needs up to half a second for a
+/// velocity change.
 const RAMP_CELLS: [usize; 4] = [1, 3, 6, 12];
-/// Nats that a ramp costs per cell: most drives reach their speed within a few.
+/// Cost of a ramp in nats per cell: most drives reach their velocity within a few cells.
 const RAMP_NATS_PER_CELL: f64 = 0.5;
 
-/// A smoothed course at the times of the samples.
+/// Smoothed motion at the sample times.
 #[derive(Clone, Debug, Default)]
 pub struct SmoothedMotion {
     /// Position in m.
     pub position_m: Vec<f64>,
     /// Velocity in m/s.
     pub velocity_mps: Vec<f64>,
-    /// Jumps of the speed.
+    /// Velocity jumps.
     pub jumps: Vec<VelocityJump>,
     /// Typical standard deviation of the velocity in m/s.
     pub sd_mps: f64,
@@ -56,7 +58,7 @@ pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
     let (tc, zc) = (mean(&t[..n]), mean(&z[..n]));
     let cells = tc.len();
     if cells < 2 * JUMP_SIDE_CELLS + 2 {
-        let v = crate::differentiate(t, z, 0.1);
+        let v = stylet_record::differentiate(t, z, 0.1);
         return SmoothedMotion {
             position_m: z.to_vec(),
             velocity_mps: v,
@@ -67,7 +69,8 @@ pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
     let step_m = encoder_step(z);
     let noise_m = position_noise(t, z) / (q as f64).sqrt();
     let dt = step * q as f64;
-    // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference of two.
+    // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference
+    // of two.
     let doubt = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (JUMP_SIDE_CELLS as f64).powf(1.5));
     let found = slope_breaks(&tc, &zc, JUMP_SIDE_CELLS, (1.8 * dt, 1.8 * dt), doubt);
     let mut edges: Vec<usize> = found.iter().map(|b| b.0).collect();
@@ -102,8 +105,8 @@ pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
     SmoothedMotion { position_m: z, velocity_mps: v, jumps: kinks, sd_mps: median(&mut sds).max(1e-9) }
 }
 
-/// Means of samples: middle (s), position (m), length (s), standard deviation of the noise (m), amplitude of the first harmonic of what
-/// rounding does at an even speed (m).
+/// Cell means: middle (s), position (m), length (s), standard deviation of the noise (m), amplitude of the
+/// first harmonic of the quantisation at constant velocity (m).
 #[derive(Clone, Copy)]
 pub(super) struct Cells<'a> {
     pub t: &'a [f64],
@@ -113,24 +116,24 @@ pub(super) struct Cells<'a> {
     rounded_m: f64,
 }
 
-/// What happens between two jumps of the speed.
+/// Motion between two velocity jumps.
 pub(super) struct SmoothInterval {
     pub from: usize,
     pub to: usize,
-    /// A form that leaves white noise.
+    /// A parametric segment with white residuals.
     pub segment: Option<MotionSegment>,
-    /// Else position and velocity per cell.
+    /// Otherwise position and velocity per cell.
     local: Vec<(f64, f64)>,
     /// Standard deviation of the velocity in m/s per cell.
     sds: Vec<f64>,
-    /// Nats of the residual and of the numbers spent; infinite without a form.
+    /// Nats of residuals and parameters; infinite without a segment.
     cost: f64,
 }
 
 impl SmoothInterval {
     fn new(cells: &Cells, (from, to): (usize, usize), hints: &[f64]) -> Self {
         let Cells { t: tc, z: zc, dt, noise_m, rounded_m } = *cells;
-        // A cell beside a jump has both speeds.
+        // Cells next to a jump have both velocities.
         let (lo, hi) = trimmed((from, to), 1, tc.len());
         let course = if hi > lo + MIN_CELLS {
             MotionSegment::fit_best(&tc[lo..hi], &zc[lo..hi], dt, hints, rounded_m)
@@ -144,7 +147,7 @@ impl SmoothInterval {
         };
         if let Some(course) = course {
             let cells = (hi - lo) as f64;
-            // Slope of a line, doubled for a curved one.
+            // Slope of a line, doubled for a curved segment.
             let slope = 2.0 * course.sd_m * (12.0 / cells).sqrt() / (cells * dt);
             let sd = if course.is_at_rest() { 0.0 } else { slope };
             let cost = course.cost;
@@ -166,7 +169,7 @@ impl SmoothInterval {
         Self { from, to, segment: None, local, sds, cost: f64::INFINITY }
     }
 
-    /// A rest or a line between two ramps of the speed, at most a third of it.
+    /// A rest or a line between two velocity ramps of at most a third of the interval.
     fn even(cells: &Cells, (from, to): (usize, usize)) -> Option<MotionSegment> {
         let mut best = None;
         for cut in RAMP_CELLS {
@@ -177,7 +180,8 @@ impl SmoothInterval {
             let course = MotionSegment::fit_constant_velocity(&cells.t[lo..hi], &cells.z[lo..hi], cells.dt);
             let mut course = course.filter(|c| c.white && c.sd_m < MAX_NOISE_RATIO * cells.noise_m);
             if let Some(c) = course.as_mut() {
-                // The ramps are as well described as the rest, by a number more, and are the less likely the longer they are.
+                // The ramps are described as well as the rest, with one more parameter, and are less likely the
+                // longer they are.
                 let (all, n) = ((to - from) as f64, (hi - lo) as f64);
                 c.cost += (all - n) * libm::log(c.sd_m);
                 if cut > 1 {
@@ -189,12 +193,12 @@ impl SmoothInterval {
         best
     }
 
-    /// Angular frequencies of its form in 1/s.
+    /// Angular frequencies of the segment in 1/s.
     fn frequencies(&self) -> Vec<f64> {
         self.segment.iter().flat_map(MotionSegment::frequencies).collect()
     }
 
-    /// Position and velocity at an instant within.
+    /// Position and velocity at a time within.
     fn at(&self, tc: &[f64], t: f64) -> (f64, f64) {
         if let Some(course) = &self.segment {
             return course.at(t);
@@ -212,12 +216,12 @@ impl SmoothInterval {
     }
 }
 
-/// A stretch without so many cells at borders that are not those of the recording.
+/// An interval without `cut` cells at borders inside the recording.
 fn trimmed((from, to): (usize, usize), cut: usize, cells: usize) -> (usize, usize) {
     (if from > 0 { from + cut } else { 0 }, if to < cells { to.saturating_sub(cut) } else { to })
 }
 
-/// The cheaper of what there is.
+/// The cheaper of the available segments.
 fn cheaper_of(a: Option<MotionSegment>, b: Option<MotionSegment>) -> Option<MotionSegment> {
     match a {
         Some(a) => Some(cheaper(a, b)),
@@ -225,7 +229,7 @@ fn cheaper_of(a: Option<MotionSegment>, b: Option<MotionSegment>) -> Option<Moti
     }
 }
 
-/// Neighbours that are one form together were no neighbours: a fast ripple looks like a chain of jumps.
+/// Merges neighbours that are one segment together: a fast ripple looks like a chain of jumps.
 fn merge_neighbours(cells: &Cells, mut stretches: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     loop {
         let before = stretches.len();
@@ -249,7 +253,8 @@ fn merge_neighbours(cells: &Cells, mut stretches: Vec<SmoothInterval>) -> Vec<Sm
     }
 }
 
-/// Cuts what is no form where its beginning ceases to be one: a small jump of the speed is not seen in a short window.
+/// Splits an interval without a segment where its beginning ceases to be one: a small velocity jump is not
+/// visible in a short window.
 fn split_unfitted(cells: &Cells, stretches: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     let mut out = Vec::new();
     let mut todo: Vec<SmoothInterval> = stretches.into_iter().rev().collect();
@@ -265,7 +270,7 @@ fn split_unfitted(cells: &Cells, stretches: Vec<SmoothInterval>) -> Vec<SmoothIn
             let middle = usize::midpoint(good, bad);
             if part(middle).segment.is_some() { good = middle } else { bad = middle }
         }
-        // A form goes some way beyond its end before noise shows that it has ceased to be one, and bends on the way.
+        // A segment extends beyond its true end before noise shows the misfit, and bends on the way.
         let until = |beyond: usize| (good + beyond).min(to);
         let within = (from + MIN_CELLS, good.min(to - MIN_CELLS));
         let end = [2 * JUMP_REACH_CELLS, 2 * MIN_CELLS]
@@ -281,7 +286,8 @@ fn split_unfitted(cells: &Cells, stretches: Vec<SmoothInterval>) -> Vec<SmoothIn
     out
 }
 
-/// The border between `low` and `high` at which what lies before and after it costs least together; none where they never are two forms.
+/// The border between `low` and `high` with the lowest total cost on both sides; `None` where they are never
+/// two segments.
 fn best_border(cells: &Cells, (from, to): (usize, usize), (low, high): (usize, usize)) -> Option<usize> {
     let cost = |at: usize| {
         SmoothInterval::new(cells, (from, at), &[]).cost + SmoothInterval::new(cells, (at, to), &[]).cost
@@ -304,8 +310,8 @@ fn best_border(cells: &Cells, (from, to): (usize, usize), (low, high): (usize, u
     }
 }
 
-/// Moves borders beside what is bent or no form at all to where both sides cost least: a jump that was found a few tenths of a second
-/// early or late leaves an end of one form in the other, which bends for it.
+/// Moves borders next to curved or missing segments to the lowest total cost: a jump found a few tenths of a
+/// second early or late leaves an end of one segment in the other.
 fn refit_borders(cells: &Cells, mut stretches: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     for k in 1..stretches.len() {
         let (left, right) = (&stretches[k - 1], &stretches[k]);
@@ -330,7 +336,7 @@ fn refit_borders(cells: &Cells, mut stretches: Vec<SmoothInterval>) -> Vec<Smoot
     stretches
 }
 
-/// Moves borders to where both forms meet.
+/// Moves borders to the intersections of both segments.
 fn move_borders_to_intersections(cells: &Cells, mut stretches: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     for _ in 0..2 {
         for k in 1..stretches.len() {
@@ -352,8 +358,8 @@ fn move_borders_to_intersections(cells: &Cells, mut stretches: Vec<SmoothInterva
     stretches
 }
 
-/// The instant near their border at which two forms agree about the position; of several (a ripple comes back to a line) the one under
-/// which the cells around are followed best, the one form before it and the other after.
+/// Time near their border at which two segments intersect; of several intersections (a ripple crosses a line
+/// repeatedly) the one with the smallest misfit of the surrounding cells.
 fn intersection_time(left: &SmoothInterval, right: &SmoothInterval, cells: &Cells) -> Option<f64> {
     let (Some(a), Some(b)) = (&left.segment, &right.segment) else { return None };
     let near = cells.t[right.from] - 0.5 * cells.dt;
@@ -384,7 +390,7 @@ fn intersection_time(left: &SmoothInterval, right: &SmoothInterval, cells: &Cell
     told.min_by(|x, y| x.0.total_cmp(&y.0)).map(|t| t.1)
 }
 
-/// The jump of the speed between two stretches.
+/// The velocity jump between two intervals.
 fn jump_between(
     left: &SmoothInterval,
     right: &SmoothInterval,
@@ -399,7 +405,7 @@ fn jump_between(
     if let (Some(a), Some(b), Some(at)) =
         (&left.segment, &right.segment, intersection_time(left, right, cells))
     {
-        // A value at the end of a curved form, over that many cells.
+        // Standard error at the end of a curved segment over that many cells.
         let end = |s: &SmoothInterval, c: &MotionSegment| 3.0 * c.sd_m / ((s.to - s.from) as f64).sqrt();
         let sd_m = end(left, a).hypot(end(right, b));
         return kink(at, 0.5 * (a.at(at).0 + b.at(at).0), [a.at(at).1, b.at(at).1], sd_m);
@@ -414,7 +420,8 @@ fn jump_between(
     }
 }
 
-/// Position, velocity and its standard deviation at cell `i` from the widest window that agrees with all narrower ones.
+/// Position, velocity and its standard deviation at cell `i` from the widest window that agrees with all
+/// narrower ones.
 fn adaptive_window_fit(
     t: &[f64],
     z: &[f64],
@@ -431,7 +438,7 @@ fn adaptive_window_fit(
             continue;
         }
         let span = (t[hi - 1] - t[lo]).max(1e-9);
-        // Slope of a parabola over n cells: in the middle as of a line, at the end four times as uncertain.
+        // Slope of a parabola over n cells: in the middle as for a line, at the end four times as uncertain.
         let off = ((2.0 * t[i] - t[lo] - t[hi - 1]) / span).abs().min(1.0);
         let sd = noise_m * (12.0 / n as f64).sqrt() / span * (1.0 + 15.0 * off * off).sqrt();
         let [value, slope, _] = fit_parabola(&t[lo..hi], &z[lo..hi], t[i]).0;
@@ -452,7 +459,7 @@ fn adaptive_window_fit(
 mod tests {
     use super::*;
 
-    /// Cells every 20 ms with 10 um of noise.
+    /// Cells every 20 ms with 10 µm of noise.
     struct Given {
         t: Vec<f64>,
         z: Vec<f64>,
@@ -478,12 +485,12 @@ mod tests {
         stretches.iter().map(|s| (s.from, s.to)).collect()
     }
 
-    /// A line that bends at an instant.
+    /// A line with a bend.
     fn bent(at_s: f64, before: f64, after: f64) -> impl Fn(f64) -> f64 {
         move |t| if t < at_s { before * (t - at_s) } else { after * (t - at_s) }
     }
 
-    /// Samples every 5 ms with so much noise (m) of the positions of a needle that goes at speeds of time.
+    /// Samples every 5 ms of positions with noise (m) for a given velocity.
     fn driven(
         speed: impl Fn(f64) -> f64,
         lasts_s: f64,
@@ -505,9 +512,10 @@ mod tests {
         (t, told)
     }
 
-    /// 20 um of noise hide jumps of 1 mm/s from a window of 0.3 s, and half a second of a wave passes for a rest with the start of a move.
+    /// 20 µm of noise hide jumps of 1 mm/s from a window of 0.3 s, and half a second of a sinusoid resembles a
+    /// rest with the start of a move.
     #[test]
-    fn a_needle_rests_where_it_rests_however_slow_it_goes_on() {
+    fn a_hold_is_recognised_before_slow_motion() {
         for ([before, after], rest_s) in [
             ([5.27e-3, 0.98e-3], 0.95),
             ([5.27e-3, 0.98e-3], 0.6),
@@ -534,9 +542,10 @@ mod tests {
         }
     }
 
-    /// 5 mm/s from 1 s on, a rest from 6 s, 1 mm/s from 7.5 s, a rest from 12 s, back at 3 mm/s from 13 s; every change takes a while.
+    /// 5 mm/s from 1 s, rest from 6 s, 1 mm/s from 7.5 s, rest from 12 s, back at 3 mm/s from 13 s; every
+    /// change has a finite duration.
     #[test]
-    fn a_drive_takes_its_time_from_one_speed_to_the_next() {
+    fn finite_accelerations_are_recovered() {
         for (ramp_s, noise_m, all_mps) in
             [(0.05, 5e-6, 5e-5), (0.1, 2e-5, 1e-4), (0.2, 2e-5, 1e-4), (0.3, 2e-5, 1e-4)]
         {
@@ -557,9 +566,9 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_is_one_form_of_the_cells_that_lie_beside_no_jump() {
+    fn an_interval_is_fitted_without_cells_next_to_jumps() {
         let mut given = Given::new(100, |t| 0.003 * t);
-        // Cells beside jumps have both speeds.
+        // Cells next to jumps have both velocities.
         for k in [20, 79] {
             given.z[k] += 0.01;
         }
@@ -567,7 +576,7 @@ mod tests {
         let course = s.segment.as_ref().expect("a form");
         assert!((s.at(&given.t, 1.0).1 - 0.003).abs() < 1e-5 && s.local.is_empty());
         assert_eq!(s.cost, course.cost);
-        // The slope of a line over 58 cells of 20 ms, doubled.
+        // Slope of a line over 58 cells of 20 ms, doubled.
         let sd = 2.0 * course.sd_m * (12.0 / 58.0_f64).sqrt() / (58.0 * 0.02);
         assert_eq!(s.sds.len(), 60);
         assert!(s.sds.iter().all(|x| (x / sd - 1.0).abs() < 1e-12));
@@ -580,15 +589,15 @@ mod tests {
         let form =
             |from: usize, to: usize| SmoothInterval::new(&given.cells(), (from, to), &[]).segment.is_some();
         assert!(form(20, 80) && !form(0, 80) && !form(20, 100));
-        // Of a rest the velocity is known.
+        // At rest the velocity is known.
         let rest = Given::new(100, |_| 0.07);
         assert_eq!(SmoothInterval::new(&rest.cells(), (0, 100), &[]).sds, [0.0; 100]);
-        // Twice the positions' noise is too much of a residual.
+        // Twice the position noise is too large a residual.
         let course = SmoothInterval::new(&rest.cells(), (0, 100), &[]).segment.expect("a form");
         let quieter = |share: f64| Cells { noise_m: course.sd_m * share, ..rest.cells() };
         assert!(SmoothInterval::new(&quieter(0.51), (0, 100), &[]).segment.is_some());
         assert!(SmoothInterval::new(&quieter(0.49), (0, 100), &[]).segment.is_none());
-        // Thirteen cells between jumps, or beside one, or all there are.
+        // Thirteen cells between jumps, next to one, or in all.
         let few =
             |from: usize, to: usize| SmoothInterval::new(&rest.cells(), (from, to), &[]).segment.is_some();
         assert!(few(20, 35) && !few(20, 34));
@@ -599,7 +608,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_form_positions_and_velocities_go_on_lines_from_cell_to_cell() {
+    fn without_a_segment_motion_is_interpolated_between_cells() {
         let s = SmoothInterval {
             from: 2,
             to: 5,
@@ -624,7 +633,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_one_form_is_joined_and_what_bends_is_not() {
+    fn intervals_of_one_segment_are_merged() {
         let line = Given::new(200, |t| 0.003 * t);
         assert_eq!(borders(&merge_neighbours(&line.cells(), line.stretches(&[0, 60, 110, 200]))), [(0, 200)]);
         let bend = Given::new(200, bent(2.2, 0.003, 0.004));
@@ -632,7 +641,7 @@ mod tests {
             borders(&merge_neighbours(&bend.cells(), bend.stretches(&[0, 60, 110, 200]))),
             [(0, 110), (110, 200)]
         );
-        // Parts of a ripple pass for cubics; together they are a wave.
+        // Parts of a ripple resemble cubics; together they are a sinusoid.
         let ripple = Given::new(200, |t| 0.003 * t + 4e-4 * (3.0 * t).sin());
         let told = merge_neighbours(&ripple.cells(), ripple.stretches(&[0, 35, 70, 105, 200]));
         assert_eq!(borders(&told), [(0, 200)]);
@@ -641,7 +650,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_that_is_no_form_is_cut_where_it_ceases_to_be_one() {
+    fn an_interval_without_a_segment_is_split() {
         for bend in [60_usize, 130, 170] {
             let given = Given::new(260, bent(0.02 * bend as f64, 0.003, 0.009));
             let told = split_unfitted(&given.cells(), given.stretches(&[0, 260]));
@@ -650,7 +659,7 @@ mod tests {
             assert!(told[1].from.abs_diff(bend) <= 16, "{:?}", borders(&told));
             assert!(told[0].segment.is_some() && told[1].segment.is_some());
         }
-        // Two bends, and a stretch that is one form and stays so.
+        // Two bends, and an interval that remains one segment.
         let given = Given::new(400, |t| {
             if t < 2.0 {
                 0.003 * t
@@ -665,7 +674,7 @@ mod tests {
         assert_eq!(b.len(), 4, "{b:?}");
         assert!(b.windows(2).all(|p| p[0].1 == p[1].0) && b[3] == (300, 400), "{b:?}");
         assert!(b[0].1.abs_diff(100) <= 12 && b[1].1.abs_diff(200) <= 12, "{b:?}");
-        // Where not even the beginning is one, or there is no room for two, it is left whole.
+        // Left whole where not even the beginning is a segment, or there is no room for two.
         let wild = Given {
             t: given.t.clone(),
             z: (0..400).map(|k| 1e-3 * (0.9 * f64::from(k * k)).sin() * f64::from(k)).collect(),
@@ -679,7 +688,7 @@ mod tests {
     }
 
     #[test]
-    fn borders_move_to_where_both_forms_meet() {
+    fn borders_move_to_intersections() {
         let given = Given::new(240, bent(2.4, 0.002, 0.006));
         let lines = [0.002, 0.006].map(|v| Given::new(240, move |t| v * (t - 2.4)));
         for border in [100, 110, 119, 120, 121, 132, 140] {
@@ -692,33 +701,33 @@ mod tests {
                 assert!((s.at(&given.t, 2.4).1 - v).abs() < 2e-5);
             }
         }
-        // Not so far that one side is left without cells.
+        // At least the minimum number of cells stays on either side.
         let short = Given::new(240, bent(0.2, 0.002, 0.006));
         let mut both = short.stretches(&[0, 14, 240]);
         both[0] = SmoothInterval::new(&Given::new(240, |t| 0.002 * (t - 0.2)).cells(), (0, 14), &[]);
         assert_eq!(borders(&move_borders_to_intersections(&short.cells(), both)), [(0, 14), (14, 240)]);
-        // Where a side has no form nothing moves.
+        // Nothing moves without a segment on both sides.
         let mut half = given.stretches(&[0, 110, 240]);
         half[1].segment = None;
         assert_eq!(borders(&move_borders_to_intersections(&given.cells(), half)), [(0, 110), (110, 240)]);
     }
 
     #[test]
-    fn two_forms_meet_at_one_instant_near_their_border() {
-        // Lines of 2 and 6 mm/s, that meet at 2.4 s; the border is at cell 114, half a cell before 2.28 s.
+    fn the_intersection_is_near_the_border() {
+        // Lines of 2 and 6 mm/s that intersect at 2.4 s; the border is at cell 114, half a cell before 2.28 s.
         let (one, two) = (Given::new(240, |t| 0.002 * (t - 2.4)), Given::new(240, |t| 0.006 * (t - 2.4)));
         let of = |given: &Given, from: usize, to: usize| SmoothInterval::new(&given.cells(), (from, to), &[]);
         let whole = Given::new(240, bent(2.4, 0.002, 0.006));
         let at =
             intersection_time(&of(&one, 0, 114), &of(&two, 114, 240), &whole.cells()).expect("an instant");
         assert!((at - 2.4).abs() < 2e-3, "{at}");
-        // Further than half a second from the border nobody looks.
+        // The search is limited to half a second around the border.
         let at = intersection_time(&of(&one, 0, 60), &of(&two, 60, 240), &whole.cells()).expect("an instant");
         assert!((at - (1.19 + 0.5)).abs() < 1e-9, "{at}");
         let at =
             intersection_time(&of(&one, 0, 180), &of(&two, 180, 240), &whole.cells()).expect("an instant");
         assert!((at - (3.59 - 0.5)).abs() < 1e-9, "{at}");
-        // Forms side by side meet at their border.
+        // Parallel segments meet at their border.
         let beside = Given::new(240, |t| 0.002 * (t - 2.4) + 1e-4);
         let mut pair = [of(&one, 0, 100), of(&beside, 100, 240)];
         pair[1].segment = pair[0].segment.clone();
@@ -729,7 +738,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_speed_is_where_forms_meet_or_as_it_was_found_or_at_the_border() {
+    fn a_jump_is_at_the_intersection_the_break_or_the_border() {
         let given = Given::new(240, bent(2.4, 0.002, 0.006));
         let samples: Vec<f64> = (0..960).map(|k| 0.005 * f64::from(k)).collect();
         let mut both = given.stretches(&[0, 120, 240]);
@@ -745,7 +754,7 @@ mod tests {
         assert!(samples[kink.next_sample] >= kink.time_s && samples[kink.next_sample - 1] < kink.time_s);
         let sd = |s: &SmoothInterval| s.segment.as_ref().map_or(0.0, |c| 3.0 * c.sd_m / 120.0_f64.sqrt());
         assert!((kink.position_sd_m - sd(&both[0]).hypot(sd(&both[1]))).abs() < 1e-12);
-        // Without a form, as it was found at that cell.
+        // Without a segment: the break found at that cell.
         both[0].segment = None;
         both[0].local = (0..120).map(|k| (given.z[k], 0.002)).collect();
         let found = [(90, (1.7, 5.0, 6.0), 7.0), (120, (2.3931, 0.1, 0.2), 0.3)];
@@ -755,7 +764,7 @@ mod tests {
             (2.3931, 0.1, [0.2, 0.3], 1e-5)
         );
         assert_eq!(kink.next_sample, 479);
-        // Or half a cell before the border, half-way between both sides.
+        // Or half a cell before the border, midway between both sides.
         let kink = of(&both, &found[..1]);
         assert!((kink.time_s - 2.39).abs() < 1e-12);
         let sides = [both[0].at(&given.t, kink.time_s), both[1].at(&given.t, kink.time_s)];
@@ -764,15 +773,16 @@ mod tests {
     }
 
     #[test]
-    fn the_widest_window_that_agrees_with_all_narrower_ones_tells_the_velocity() {
-        // A parabola is one whatever the window.
+    fn the_widest_consistent_window_is_used() {
+        // A parabola fits at any window.
         let t: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
         let z: Vec<f64> = t.iter().map(|t| 0.01 + 0.003 * t + 0.002 * t * t).collect();
-        // Slope of a line over n cells: sd = noise sqrt(12/n) over the span; at the end of a parabola four times that.
+        // Slope of a line over n cells: sd = noise sqrt(12/n) over the span; at the end of a parabola four
+        // times that.
         let sd = |n: f64, off: f64| {
             1e-5 * (12.0 / n).sqrt() / (0.02 * (n - 1.0)) * (1.0 + 15.0 * off * off).sqrt()
         };
-        // By cell, borders, and how many cells the widest window has, off its middle by what share of its half.
+        // Cell, limits, number of cells of the widest window, relative offset from its middle.
         let cases = [
             (100, (0, 200), 121.0, 0.0),
             (80, (0, 200), 121.0, 0.0),
@@ -790,23 +800,23 @@ mod tests {
             );
             assert!((told.2 / sd(n, off) - 1.0).abs() < 1e-9, "{told:?} at {i}: {}", sd(n, off));
         }
-        // Where the speed changes within twelve cells the window ends before.
+        // Near a velocity change within twelve cells the window is narrower.
         let kink: Vec<f64> =
             t.iter().map(|t| 0.003 * t + if *t > 2.2 { 0.02 * (t - 2.2) } else { 0.0 }).collect();
         let told = adaptive_window_fit(&t, &kink, 100, (0, 200), 1e-5);
         assert!((told.1 - 0.003).abs() < 1e-5, "{told:?}");
         assert!(told.2 >= sd(25.0, 0.0) * 0.999 && told.2 < sd(7.0, 0.0), "{told:?}");
-        // Three cells tell a position and no velocity.
+        // Three cells give a position and no velocity.
         assert_eq!(adaptive_window_fit(&t, &z, 100, (99, 102), 1e-5), (z[100], 0.0, f64::INFINITY));
         assert!(adaptive_window_fit(&t, &z, 100, (99, 103), 1e-5).2.is_finite());
     }
 
     #[test]
-    fn a_recording_without_room_for_a_search_is_differentiated() {
+    fn a_short_recording_is_differentiated() {
         let of = |n: usize| {
             let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
             let z: Vec<f64> = t.iter().enumerate().map(|(k, t)| 0.003 * t + 1e-5 * rough(k)).collect();
-            (smooth_positions(&t, &z), crate::differentiate(&t, &z, 0.1), z)
+            (smooth_positions(&t, &z), stylet_record::differentiate(&t, &z, 0.1), z)
         };
         let (told, v, z) = of(31);
         assert_eq!((told.position_m, told.velocity_mps, told.sd_mps), (z, v, f64::INFINITY));
@@ -815,7 +825,7 @@ mod tests {
         assert!(told.sd_mps < 1e-3 && told.velocity_mps.iter().all(|v| (v - 0.003).abs() < 1e-4));
     }
 
-    /// Advance with ripple, a hold, a retraction.
+    /// Insertion with ripple, a hold, a retraction.
     fn course(t: f64) -> (f64, f64) {
         let w = core::f64::consts::TAU * 0.4;
         let a = 0.001;
@@ -839,7 +849,7 @@ mod tests {
         (off[off.len() * 9 / 10], found.jumps.len())
     }
 
-    /// A fixed sequence that looks like noise of unit variance.
+    /// A fixed sequence that resembles noise of unit variance.
     fn rough(k: usize) -> f64 {
         let mut h = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let mut sum = 0.0;
@@ -852,22 +862,23 @@ mod tests {
     }
 
     #[test]
-    fn positions_with_20_um_of_noise_give_the_velocity_to_a_hundredth_of_a_millimetre_per_second() {
+    fn noise_of_20_um_gives_velocity_to_10_um_per_second() {
         let (off, kinks) = error(course, |k| 2e-5 * rough(k), 0.0);
         assert!(off < 1e-5, "{off}");
         assert_eq!(kinks, 2);
     }
 
     #[test]
-    fn so_do_positions_in_steps_of_50_um() {
+    fn quantisation_of_50_um_gives_velocity_to_10_um_per_second() {
         let (off, kinks) = error(course, |_| 0.0, 5e-5);
         assert!(off < 1e-5, "{off}");
         assert_eq!(kinks, 2);
     }
 
-    /// 4.93 mm/s are 98.6 steps of 50 um in a second, nearly one in two samples at 200 Hz: a beat of 3 Hz, a tenth of a millimetre per second.
+    /// 4.93 mm/s are 98.6 quantisation steps of 50 µm per second, nearly one in two samples at 200 Hz: a beat
+    /// of 3 Hz and 0.1 mm/s.
     #[test]
-    fn steps_that_beat_with_the_sampling_are_no_ripple() {
+    fn quantisation_beating_with_the_sampling_is_not_a_ripple() {
         for speed_mps in [0.00493, 0.00494, 0.00495, 0.00506, 0.00507] {
             let line = |t: f64| if t < 2.0 { (0.0, 0.0) } else { (speed_mps * (t - 2.0), speed_mps) };
             let (off, kinks) = error(line, |_| 0.0, 5e-5);
@@ -877,7 +888,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_ripple_is_no_chain_of_jumps() {
+    fn a_fast_ripple_is_not_a_chain_of_jumps() {
         let w = core::f64::consts::TAU * 1.4;
         let rippled = move |t: f64| {
             let s = (t - 5.0).max(0.0);
@@ -889,7 +900,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_a_third_of_a_millimetre_per_second_is_found() {
+    fn a_jump_of_300_um_per_second_is_detected() {
         let bent = |t: f64| {
             if t < 6.0 { (0.003 * t, 0.003) } else { (0.018 + 0.0033 * (t - 6.0), 0.0033) }
         };
@@ -898,9 +909,9 @@ mod tests {
         assert_eq!(kinks, 1);
     }
 
-    /// A ripple that begins at a line comes back to it: the two meet more than once.
+    /// A ripple that starts at a line returns to it: they intersect more than once.
     #[test]
-    fn a_line_goes_over_into_a_strong_ripple_where_it_does_and_not_where_they_would_meet_too() {
+    fn of_several_intersections_the_best_fitting_one_is_used() {
         let w = core::f64::consts::TAU * 1.22;
         let ripple =
             move |s: f64| (0.0069 * s + 0.0055 / w * (1.0 - (w * s).cos()), 0.0069 + 0.0055 * (w * s).sin());
@@ -930,8 +941,8 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_of_no_known_form_is_followed_by_windows() {
-        // A ripple that gets faster and faster: no polynomial of low degree and no sinusoid.
+    fn a_chirp_is_followed_by_local_windows() {
+        // A chirp: neither a low-order polynomial nor a sinusoid.
         let drawn = |t: f64| {
             (0.002 * t + 4e-4 * (1.0 + (0.3 * t * t).sin()), 0.002 + 2.4e-4 * t * (0.3 * t * t).cos())
         };

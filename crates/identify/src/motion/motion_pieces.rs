@@ -1,29 +1,29 @@
-//! Means of the motion over spans of time, cut where the speed jumps or turns, as samples or a late force show it.
+//! Mean motion over time spans, cut at velocity jumps and reversals.
 
 use super::Motion;
 
-/// How jumps of the speed show.
+/// Where velocity jumps appear in the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JumpAppearance {
-    /// A force that follows the speed at once is sampled before or after a jump.
+    /// In a force without delay: between the samples before and after the jump.
     BetweenSamples,
-    /// A force that is late by so many s, or smeared, shows the instants.
+    /// In a force delayed by this many s, or low-pass filtered: at the exact times.
     Delayed(f64),
-    /// A force that follows the speed at once, and is late, is sampled before or after a jump.
+    /// In a delayed force without low-pass filter: between samples.
     DelayedBetweenSamples {
-        /// By so many s.
+        /// Delay in s.
         delay_s: f64,
-        /// The jumps show between the samples around where they are if it is late by so many s.
+        /// Delay in s that determines between which samples the jumps lie.
         jump_delay_s: f64,
     },
 }
 
-/// A span of time in which the motion is smooth: its mean.
+/// A time span with smooth motion, represented by its means.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionPiece {
-    /// The block that it belongs to.
+    /// Index of the block it belongs to.
     pub block: u32,
-    /// Begin in s.
+    /// Start in s.
     pub start_s: f64,
     /// End in s.
     pub end_s: f64,
@@ -36,7 +36,7 @@ pub struct MotionPiece {
 }
 
 impl MotionPiece {
-    /// Position and velocity at an instant within.
+    /// Position and velocity at a time within the span.
     #[must_use]
     pub fn at(&self, t: f64) -> (f64, f64) {
         let s = t - 0.5 * (self.start_s + self.end_s);
@@ -45,8 +45,8 @@ impl MotionPiece {
 }
 
 impl Motion {
-    /// Cuts spans `(from, to)` in s, in their order, at the jumps of the speed, and gives the mean motion of every piece. `between` is the
-    /// middle between the samples around an instant of the recording.
+    /// Cuts consecutive spans `(start, end)` in s at velocity jumps and returns the mean motion of every piece.
+    /// `between` gives the midpoint of the samples around a time.
     #[must_use]
     pub fn pieces(
         &self,
@@ -81,7 +81,8 @@ impl Motion {
                 }
                 let cut = |next: Option<&f64>| next.copied().filter(|j| *j < to - 1e-6 * whole).unwrap_or(to);
                 let end = cut(jumps.get(jump)).min(cut(turns.get(turn)));
-                // A jump that shows between samples: until there, and from there on, the motion is that of its own side.
+                // A jump placed between samples: on either side the motion continues with the velocity of that
+                // side.
                 let (before, next) = match shown {
                     JumpAppearance::DelayedBetweenSamples { .. } => {
                         (jump.checked_sub(1).and_then(|k| self.jumps.get(k)), self.jumps.get(jump))
@@ -93,7 +94,7 @@ impl Motion {
                     (_, Some(j)) if at_s > j.time_s => knots.integrals_beyond_jump(j, 0, at_s, &mut near),
                     _ => knots.integrals(at_s, &mut near),
                 };
-                // Slope of the velocity from means over both halves.
+                // Slope of the velocity from the means over both halves.
                 let (z0, v0) = sums(at - late_s);
                 let (_, vm) = sums(0.5 * (at + end) - late_s);
                 let (z1, v1) = sums(end - late_s);
@@ -123,7 +124,7 @@ mod tests {
     use super::super::{MAX_EXACT_SD_MPS, VelocityJump};
     use super::*;
 
-    /// A piece by its block, borders, mean position and velocity.
+    /// A piece with its block, limits, mean position and velocity.
     fn is(piece: &MotionPiece, block: u32, (from_s, to_s): (f64, f64), z_m: f64, v_mps: f64) {
         assert_eq!(piece.block, block);
         near(piece.start_s, from_s);
@@ -134,29 +135,29 @@ mod tests {
     }
 
     fn pieces(m: &Motion, spans: &[(f64, f64)], shown: JumpAppearance) -> Vec<MotionPiece> {
-        // Between samples every 0.1 s.
+        // Sample midpoints every 0.1 s.
         m.pieces(spans.iter().copied(), shown, |t| 0.1 * (10.0 * t).floor() + 0.05)
     }
 
     #[test]
-    fn pieces_are_means_of_the_motion_as_samples_show_it() {
+    fn pieces_without_delay_cut_jumps_between_samples() {
         let m = bent();
         let spans = [(-0.1, 0.1), (0.3, 0.5), (0.5, 0.7), (0.7, 0.77), (1.15, 1.25)];
         let told = pieces(&m, &spans, JumpAppearance::BetweenSamples);
         assert_eq!(told.len(), 6);
-        // Before the first sample it is where it is then, and as fast.
+        // Before the first sample position and velocity are those of the first one.
         is(&told[0], 0, (-0.1, 0.1), 0.25 * 0.2, 2.0);
         is(&told[1], 1, (0.3, 0.5), 0.8, 2.0);
-        // The jump shows in the middle between its samples, each side as it went.
+        // The jump appears midway between its samples.
         is(&told[2], 2, (0.5, 0.55), 1.05, 2.0);
         is(&told[3], 2, (0.55, 0.7), 0.965, -1.0);
         is(&told[4], 3, (0.7, 0.77), 0.855, -1.0);
         is(&told[5], 4, (1.15, 1.25), 0.5 * (0.415 + 0.39), -1.0);
-        // A border at a jump cuts nothing.
+        // A span that ends at a jump is not cut.
         let told = pieces(&m, &[(0.4, 0.55), (0.55, 0.6)], JumpAppearance::BetweenSamples);
         assert_eq!(told.len(), 2);
         is(&told[1], 1, (0.55, 0.6), 1.015, -1.0);
-        // Nor does one nearer to it than a millionth of the span, on either side; a turn neither.
+        // Nor is one that ends within a millionth of its length; the same for reversals.
         let cuts = |m: &Motion, from_s: f64, to_s: f64| {
             pieces(m, &[(from_s, to_s)], JumpAppearance::BetweenSamples).len() - 1
         };
@@ -173,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_force_shows_the_motion_of_before() {
+    fn pieces_with_delay_show_the_earlier_motion() {
         let m = bent();
         let told = pieces(&m, &[(0.3, 0.5), (0.5, 0.7), (0.7, 0.9)], JumpAppearance::Delayed(0.04));
         assert_eq!(told.len(), 4);
@@ -181,14 +182,14 @@ mod tests {
         is(&told[1], 1, (0.5, 0.57), 2.0 * 0.495, 2.0);
         is(&told[2], 1, (0.57, 0.7), 1.06 - 0.065, -1.0);
         is(&told[3], 2, (0.7, 0.9), 1.06 - 0.23, -1.0);
-        // Without a delay it shows the instant.
+        // Without a delay the exact time appears.
         let told = pieces(&m, &[(0.5, 0.7)], JumpAppearance::Delayed(0.0));
         is(&told[0], 0, (0.5, 0.53), 1.03, 2.0);
         is(&told[1], 0, (0.53, 0.7), 1.06 - 0.085, -1.0);
     }
 
     #[test]
-    fn a_late_force_that_is_sampled_shows_each_side_up_to_the_middle_between_samples() {
+    fn delayed_jumps_between_samples_extend_either_side() {
         let m = bent();
         let spans = [(0.3, 0.5), (0.5, 0.7), (0.7, 0.9)];
         let placed = |late_s: f64, placed_s: f64| {
@@ -198,18 +199,18 @@ mod tests {
                 JumpAppearance::DelayedBetweenSamples { delay_s: late_s, jump_delay_s: placed_s },
             )
         };
-        // It jumps at 0.57 s and shows so at 0.55 s: the way back lasts longer than it did.
+        // It jumps at 0.57 s, which appears at 0.55 s: the retraction is longer than in fact.
         let told = placed(0.04, 0.04);
         assert_eq!(told.len(), 4);
         is(&told[0], 0, (0.3, 0.5), 0.72, 2.0);
         is(&told[1], 1, (0.5, 0.55), 2.0 * 0.485, 2.0);
         is(&told[2], 1, (0.55, 0.7), 1.06 - (0.625 - 0.57), -1.0);
         is(&told[3], 2, (0.7, 0.9), 1.06 - (0.8 - 0.57), -1.0);
-        // It jumps at 0.54 s: the way in does.
+        // It jumps at 0.54 s: the insertion is longer.
         let told = placed(0.01, 0.01);
         is(&told[1], 1, (0.5, 0.55), 2.0 * 0.515, 2.0);
         is(&told[2], 1, (0.55, 0.7), 1.06 - (0.625 - 0.54), -1.0);
-        // Where it is placed need not be where it is late to.
+        // The placement may use another delay.
         let told = placed(0.01, 0.08);
         assert_eq!(told.len(), 4);
         is(&told[1], 1, (0.5, 0.65), 2.0 * 0.565, 2.0);
@@ -217,8 +218,8 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_knows_how_the_speed_grows() {
-        // v = 1 + 3 t at the samples, and between them on lines: so it is anywhere.
+    fn a_piece_has_the_acceleration() {
+        // v = 1 + 3 t, linear everywhere.
         let t: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();
         let v: Vec<f64> = t.iter().map(|t| 1.0 + 3.0 * t).collect();
         let m = from_knots(&t, &[0.25; 20], &v, &[], 0.0, 0.0);
@@ -232,18 +233,18 @@ mod tests {
     }
 
     #[test]
-    fn dry_friction_jumps_where_the_speed_smoothly_turns() {
+    fn reversals_cut_pieces() {
         let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
         let of = |v: &dyn Fn(f64) -> f64, sd: f64| {
             let v: Vec<f64> = t.iter().map(|t| v(*t)).collect();
             from_knots(&t, &[0.0; 13], &v, &[], sd, 0.0)
         };
-        // 1 m/s at first, through zero at 5/11 s.
+        // 1 m/s at first, zero at 5/11 s.
         let slowing = of(&|t| 1.0 - 2.2 * t, 0.0);
         assert_eq!(slowing.reversals_s.len(), 1);
         near(slowing.reversals_s[0].0, 1.0 / 2.2);
         near(slowing.reversals_s[0].1, 0.45);
-        // Samples show it in their middle, a late force when it gets there.
+        // Sampled in the middle, delayed at the exact time.
         let cut = |shown: JumpAppearance| {
             let told = pieces(&slowing, &[(0.3, 0.4), (0.4, 0.6)], shown);
             assert_eq!(told.iter().map(|p| p.block).collect::<Vec<_>>(), [0, 1, 1]);
@@ -252,19 +253,19 @@ mod tests {
         near(cut(JumpAppearance::BetweenSamples), 0.45);
         near(cut(JumpAppearance::Delayed(0.02)), 1.0 / 2.2 + 0.02);
         near(cut(JumpAppearance::DelayedBetweenSamples { delay_s: 0.02, jump_delay_s: 0.06 }), 0.55);
-        // There and back: one turn each.
+        // One reversal each way.
         let swinging = of(&|t| (core::f64::consts::TAU * (t + 0.03)).cos(), 0.0);
         let middles: Vec<f64> = swinging.reversals_s.iter().map(|t| t.1).collect();
         assert_eq!(middles.len(), 2);
         near(middles[0], 0.25);
         near(middles[1], 0.75);
-        // None without a change of the sign, in a hold, or where the speed jumps; noisy positions tell none.
+        // None without a sign change, in a hold, or at a jump; none from noisy positions.
         assert!(of(&|t| 1.0 - 0.8 * t, 0.0).reversals_s.is_empty());
         assert!(of(&|_| 0.0, 0.0).reversals_s.is_empty());
         assert!(bent().reversals_s.is_empty());
         assert_eq!(of(&|t| 1.0 - 2.2 * t, MAX_EXACT_SD_MPS).reversals_s.len(), 1);
         assert!(of(&|t| 1.0 - 2.2 * t, 1.01 * MAX_EXACT_SD_MPS).reversals_s.is_empty());
-        // A jump elsewhere is not this turn.
+        // A jump elsewhere does not hide it.
         let kink = |sample: usize| VelocityJump {
             next_sample: sample,
             time_s: 0.1 * sample as f64 - 0.05,
@@ -277,7 +278,7 @@ mod tests {
             from_knots(&t, &[0.0; 13], &v, &[kink(sample)], 0.0, 0.0)
         };
         assert_eq!([4, 5, 6].map(|sample| both(sample).reversals_s.len()), [1, 0, 1]);
-        // What comes after a span does not cut it, a jump at 0.35 s and a turn at 0.45 s.
+        // What lies after a span does not cut it: a jump at 0.35 s and a reversal at 0.45 s.
         let told = pieces(&both(4), &[(0.0, 0.3), (0.3, 0.5)], JumpAppearance::BetweenSamples);
         let ends: Vec<f64> = told.iter().map(|p| p.end_s).collect();
         assert_eq!(ends.len(), 4);

@@ -1,49 +1,49 @@
-//! A stretch of motion as what robots are told to do: a rest, a straight line, a parabola or cubic, a line with one or
-//! two sinusoids on it.
+//! Parametric segments of commanded motion: a rest, a line, a parabola or cubic, a line with one or two
+//! sinusoids.
 //!
-//! A window that is narrow enough for a ripple of 1 Hz leaves a tenth of a millimetre per second of encoder noise in the
-//! velocity, and friction makes that the force's largest error. When a whole stretch is one of these forms, a handful of
-//! numbers are estimated from all its samples, and the velocity is known a hundred times better. A stretch
-//! that is none of them (its residual is coloured) is left to local windows (`settle`).
+//! A local window narrow enough for a ripple of 1 Hz leaves 0.1 mm/s of encoder noise in the velocity, which
+//! friction turns into the largest force error. When a whole interval has one of these forms, a few parameters
+//! are estimated from all its samples and the velocity is a hundred times more accurate. An interval with
+//! coloured residuals under every form is left to local windows (`smooth_positions`).
 
 use core::f64::consts::{PI, TAU};
 use stylet_stats::linear_algebra::SymmetricMatrix;
 
-/// Highest frequency in Hz that is looked for.
+/// Highest frequency in Hz that is searched.
 const HIGHEST_HZ: f64 = 3.0;
-/// Length in s of the means that frequencies are looked for with.
+/// Length in s of the means used in the frequency search.
 const SEARCH_MEAN_S: f64 = 0.1;
-/// ... and how many of them there are at least and at most.
+/// Smallest and largest number of these means.
 const MIN_SEARCH_MEANS: f64 = 24.0;
 const MAX_SEARCH_MEANS: f64 = 400.0;
-/// A stretch shorter than this, in s, is searched for any frequency, hints or not.
+/// Intervals shorter than this in s are searched over all frequencies, with or without hints.
 const SHORT_SEGMENT_S: f64 = 6.0;
-/// Cells in a mean by which the residual's colour is judged.
+/// Cells per mean in the whiteness test.
 const WHITENESS_CELLS: usize = 8;
-/// Most numbers: a line and two sinusoids.
+/// Largest number of coefficients: a line and two sinusoids.
 const MAX_COEFFICIENTS: usize = 6;
-/// Fewest cells of a stretch.
+/// Smallest number of cells of a segment.
 pub(super) const MIN_CELLS: usize = 12;
 
-/// A form with its numbers.
+/// A segment with its coefficients.
 #[derive(Clone, Debug)]
 pub(super) struct MotionSegment {
     middle: f64,
     half: f64,
     /// Coefficients of `1, s, s², s³` with `s = (t - middle) / half`.
     poly: [f64; 4],
-    /// Angular frequency (1/s), coefficients of cosine and sine of `w (t - middle)`.
+    /// Angular frequency (1/s) and coefficients of cosine and sine of `w (t - middle)`.
     sinusoids: Vec<[f64; 3]>,
     /// Standard deviation of the residual per cell in m.
     pub sd_m: f64,
-    /// Nats of the residual and of the numbers spent.
+    /// Nats of residuals and parameters.
     pub cost: f64,
-    /// Whether the residual is as white as noise is.
+    /// Whether the residual is white.
     pub white: bool,
 }
 
 impl MotionSegment {
-    /// Position in m and velocity in m/s at an instant.
+    /// Position in m and velocity in m/s at a time.
     pub fn at(&self, t: f64) -> (f64, f64) {
         let s = (t - self.middle) / self.half;
         let [a, b, c, d] = self.poly;
@@ -57,17 +57,17 @@ impl MotionSegment {
         (z, v)
     }
 
-    /// Whether it stands still.
+    /// Whether the segment is a rest.
     pub fn is_at_rest(&self) -> bool {
         self.sinusoids.is_empty() && self.poly[1..].iter().all(|c| *c == 0.0)
     }
 
-    /// Whether it stands or goes at one speed.
+    /// Whether the velocity is constant.
     pub fn is_constant_velocity(&self) -> bool {
         self.sinusoids.is_empty() && self.poly[2..].iter().all(|c| *c == 0.0)
     }
 
-    /// Whether all its waves are larger than so many m.
+    /// Whether all amplitudes exceed `amplitude_m`.
     fn sinusoids_exceed(&self, amplitude_m: f64) -> bool {
         self.sinusoids.iter().all(|[_, x, y]| libm::hypot(*x, *y) > amplitude_m)
     }
@@ -77,9 +77,10 @@ impl MotionSegment {
         self.sinusoids.iter().map(|w| w[0])
     }
 
-    /// The best form of cells at `t` (s, middle of each, `cell_s` apart) with mean positions `z` (m). Angular frequencies in
-    /// `hints` (1/s) are all that a long stretch is tried with, when there are any. A wave smaller than `rounded_m` may be what rounding
-    /// makes of a line: steps at an even speed beat with the sampling. It is none, and a line is white that leaves nothing else.
+    /// The best segment for cells at `t` (s, midpoints, `cell_s` apart) with mean positions `z` (m). A long
+    /// interval is tried only with the angular frequencies in `hints` (1/s), if there are any. A sinusoid
+    /// smaller than `rounded_m` may be an artefact of quantisation at constant velocity, which beats with the
+    /// sampling; it is discarded, and the line counts as white if nothing else remains.
     pub fn fit_best(t: &[f64], z: &[f64], cell_s: f64, hints: &[f64], rounded_m: f64) -> Option<Self> {
         let n = t.len();
         if n < MIN_CELLS {
@@ -90,7 +91,7 @@ impl MotionSegment {
         for degree in 1..=3 {
             best = cheaper(best, frame.fit(degree, &[]));
         }
-        // A union of stretches may be a wave although, being short, it passes for a cubic.
+        // A union of intervals may be a sinusoid although, being short, it resembles a cubic.
         let union = !hints.is_empty();
         if !best.white || union {
             let narrow = 0.3 / (2.0 * frame.half);
@@ -128,7 +129,7 @@ pub(super) fn cheaper(a: MotionSegment, b: Option<MotionSegment>) -> MotionSegme
     }
 }
 
-/// A stretch under examination.
+/// Least-squares problem of one interval.
 struct SegmentFit<'a> {
     middle: f64,
     half: f64,
@@ -143,7 +144,7 @@ impl<'a> SegmentFit<'a> {
         Some(Self { middle: 0.5 * (first + last), half: (0.5 * (last - first)).max(1e-9), cell_s, t, z })
     }
 
-    /// Least squares of a polynomial of a degree and waves of given frequencies.
+    /// Least squares of a polynomial and sinusoids with given frequencies.
     fn fit(&self, degree: usize, waves: &[f64]) -> Option<MotionSegment> {
         let rows =
             |row: &mut [f64; MAX_COEFFICIENTS], t: f64| self.design_row(row, t, degree, waves, self.cell_s);
@@ -179,7 +180,7 @@ impl<'a> SegmentFit<'a> {
         Some(course)
     }
 
-    /// Values of the form's columns, as means over a cell.
+    /// Row of the design matrix, as means over a cell.
     fn design_row(
         &self,
         row: &mut [f64; MAX_COEFFICIENTS],
@@ -203,7 +204,7 @@ impl<'a> SegmentFit<'a> {
         }
     }
 
-    /// A line with one more wave than those of the given frequencies.
+    /// A line with one sinusoid in addition to those of the given frequencies.
     fn add_sinusoid(&self, others: &[f64]) -> Option<MotionSegment> {
         let group_s =
             SEARCH_MEAN_S.min(2.0 * self.half / MIN_SEARCH_MEANS).max(2.0 * self.half / MAX_SEARCH_MEANS);
@@ -229,7 +230,7 @@ impl<'a> SegmentFit<'a> {
         self.refine_frequency(others, coarse, step_hz)
     }
 
-    /// A line with waves of the given frequencies and one near `hz`, by golden section on all cells.
+    /// A line with sinusoids of the given frequencies and one near `hz`, by golden section on all cells.
     fn refine_frequency(&self, others: &[f64], hz: f64, within_hz: f64) -> Option<MotionSegment> {
         let (mut lo, mut hi) = ((hz - within_hz).max(1e-4), hz + within_hz);
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
@@ -252,7 +253,7 @@ impl<'a> SegmentFit<'a> {
         self.fit(1, &waves)
     }
 
-    /// Sum of squares that a line with waves of the given frequencies and one of `hz` leaves.
+    /// Residual sum of squares of a line with sinusoids of the given frequencies and one of `hz`.
     fn sum_of_squares(&self, others: &[f64], hz: f64, t: &[f64], z: &[f64], cell_s: f64) -> f64 {
         let mut waves = [0.0; 2];
         waves[..others.len()].copy_from_slice(others);
@@ -262,7 +263,7 @@ impl<'a> SegmentFit<'a> {
         least_squares(t, z, 2 + 2 * waves.len(), &rows).map_or(f64::INFINITY, |s| s.1)
     }
 
-    /// Whether means over several cells vary no more than white noise lets them.
+    /// Whether means over several cells vary no more than white noise allows.
     fn is_white(&self, course: &MotionSegment) -> bool {
         let waves: Vec<f64> = course.sinusoids.iter().map(|w| w[0]).collect();
         let mut off = Vec::with_capacity(self.t.len());
@@ -287,7 +288,7 @@ impl<'a> SegmentFit<'a> {
     }
 }
 
-/// Least squares with rows from a function: coefficients, and the sum of squares that they leave.
+/// Least squares with rows from a function: coefficients and residual sum of squares.
 fn least_squares(
     t: &[f64],
     z: &[f64],
@@ -322,7 +323,7 @@ fn least_squares(
     let mut x = [0.0; MAX_COEFFICIENTS];
     x[..count].copy_from_slice(&solved);
     x[0] += base;
-    // By the residual itself: what the normal equations say of it drowns in rounding.
+    // From the residuals themselves: the normal equations lose it to rounding.
     let mut left = 0.0;
     for (t, z) in t.iter().zip(z) {
         rows(&mut row, *t);
@@ -340,7 +341,7 @@ mod tests {
         assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-6), "{told} for {wanted}");
     }
 
-    /// Normal numbers: twelve even ones of a linear congruence (Knuth's MMIX) each.
+    /// Normal numbers: sums of twelve uniform ones from a linear congruential generator (Knuth's MMIX).
     fn normal(n: usize) -> Vec<f64> {
         let mut state = 11_u64;
         let mut even = move || {
@@ -352,12 +353,12 @@ mod tests {
 
     const CELL_S: f64 = 0.02;
 
-    /// Middles of cells from 3 s on.
+    /// Cell midpoints from 3 s on.
     fn cells(n: usize) -> Vec<f64> {
         (0..n).map(|k| 3.0 + CELL_S * k as f64).collect()
     }
 
-    /// Positions with 10 um of noise.
+    /// Positions with 10 µm of noise.
     fn noisy(t: &[f64], course: impl Fn(f64) -> f64) -> Vec<f64> {
         t.iter().zip(normal(t.len())).map(|(t, n)| course(*t) + 1e-5 * n).collect()
     }
@@ -379,14 +380,14 @@ mod tests {
     }
 
     #[test]
-    fn a_course_is_a_cubic_and_waves_with_their_slopes() {
+    fn a_segment_is_a_cubic_plus_sinusoids() {
         let c = plain([0.3, 0.5, -0.7, 0.11], &[[5.0, 0.2, -0.4], [9.0, 0.05, 0.01]], 1.0);
         for t in [2.0_f64, 3.1, 4.0, 5.7] {
             let s = (t - 4.0) / 2.0;
             let cubic = 0.3 + 0.5 * s - 0.7 * s.powi(2) + 0.11 * s.powi(3);
             let wave = |w: f64, x: f64, y: f64| x * (w * (t - 4.0)).cos() + y * (w * (t - 4.0)).sin();
             near(c.at(t).0, cubic + wave(5.0, 0.2, -0.4) + wave(9.0, 0.05, 0.01));
-            // The slope of a wave is one a quarter further, as large as it is fast.
+            // The derivative of a sinusoid leads by a quarter period, scaled by its frequency.
             let slope = 0.5 - 1.4 * s + 0.33 * s.powi(2);
             near(c.at(t).1, slope / 2.0 + wave(5.0, 5.0 * -0.4, -5.0 * 0.2) + wave(9.0, 0.09, -0.45));
         }
@@ -394,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_neither_slope_nor_wave_rests() {
+    fn a_rest_has_neither_slope_nor_sinusoid() {
         assert!(plain([0.3, 0.0, 0.0, 0.0], &[], 1.0).is_at_rest());
         for k in 1..4 {
             let mut poly = [0.3, 0.0, 0.0, 0.0];
@@ -405,14 +406,14 @@ mod tests {
     }
 
     #[test]
-    fn waves_are_as_large_as_both_their_parts_together() {
+    fn amplitudes_combine_cosine_and_sine() {
         let c = plain([0.0; 4], &[[1.0, 0.3, -0.4], [2.0, 5.0, 12.0]], 1.0);
         assert!(c.sinusoids_exceed(0.499) && !c.sinusoids_exceed(0.501));
         assert!(plain([0.0; 4], &[], 1.0).sinusoids_exceed(9.0));
     }
 
     #[test]
-    fn columns_are_means_over_a_cell() {
+    fn design_columns_are_cell_means() {
         let t = cells(50);
         let f = frame(&t, &t);
         for (w, cell_s) in [(3.0, 0.3), (40.0, 0.05), (1e-5, 0.02)] {
@@ -446,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_is_found_as_it_is() {
+    fn every_form_is_recovered() {
         let t = cells(400);
         let wave = |t: f64, hz: f64, a: f64| a * (TAU * hz * t + 0.4).sin();
         type Form<'a> = (&'a dyn Fn(f64) -> f64, usize, &'a [f64]);
@@ -469,7 +470,7 @@ mod tests {
                 assert!((told / TAU - hz).abs() < 2e-3, "{} for {hz}", told / TAU);
             }
             assert!((c.sd_m / 1e-5 - 1.0).abs() < 0.1, "{}", c.sd_m);
-            // Means over 20 ms make the waves hardly smaller.
+            // Means over 20 ms hardly attenuate the sinusoids.
             for t in &t[20..380] {
                 let (z, v) = c.at(*t);
                 let slope = (form(t + 1e-5) - form(t - 1e-5)) / 2e-5;
@@ -479,13 +480,13 @@ mod tests {
     }
 
     #[test]
-    fn a_form_costs_what_it_leaves_and_its_numbers() {
+    fn the_cost_of_a_segment_is_residual_plus_parameters() {
         let t = cells(60);
         let z = noisy(&t, |t| 0.002 * t + 0.0004 * (TAU * 0.9 * t).sin());
         let f = frame(&t, &z);
         for (degree, waves) in [(0, &[][..]), (1, &[]), (3, &[]), (1, &[5.0]), (0, &[5.0, 9.0])] {
             let c = f.fit(degree, waves).expect("a form");
-            // A frequency is a number, too.
+            // A frequency is a parameter, too.
             let numbers = (degree + 1 + 3 * waves.len()) as f64;
             let mut x = [0.0; MAX_COEFFICIENTS];
             let count = degree + 1 + 2 * waves.len();
@@ -503,7 +504,7 @@ mod tests {
             let variance = squares / (60.0 - numbers);
             near(c.sd_m, variance.sqrt());
             near(c.cost, 30.0 * variance.ln() + numbers * 60.0_f64.ln());
-            // Nothing that the columns hold is left.
+            // The residual is orthogonal to the columns.
             for k in 0..count {
                 let with = |t: f64| {
                     let mut row = [0.0; MAX_COEFFICIENTS];
@@ -517,13 +518,13 @@ mod tests {
                 near(f.sum_of_squares(&[], 5.0 / TAU, &t, &z, CELL_S), squares);
             }
         }
-        // Of the same cells in another unit the choice is the same: cost differs by a constant.
+        // The choice does not depend on the unit: costs differ by a constant.
         let exact: Vec<f64> = t.iter().map(|t| 0.002 * t).collect();
         near(frame(&t, &exact).fit(1, &[]).expect("a form").sd_m, 1e-10);
     }
 
     #[test]
-    fn four_cells_more_than_numbers_tell_a_form() {
+    fn a_segment_needs_four_more_cells_than_parameters() {
         let f = |n: usize, degree: usize, waves: &[f64]| {
             let (t, z) = (cells(n), normal(n));
             frame(&t, &z).fit(degree, waves).is_some()
@@ -537,15 +538,15 @@ mod tests {
     }
 
     #[test]
-    fn a_residual_is_white_when_its_means_vary_as_single_cells_say() {
-        // Eight cells off alike: their mean squared is eight times what white noise of that size gives.
+    fn the_whiteness_test_compares_group_means_with_single_cells() {
+        // Eight cells with a common offset: their squared mean is eight times that of white noise of this size.
         let white = |n: usize, off: f64, sd_m: f64| {
             let t = cells(n);
             let (poly, waves) = ([0.2, 0.1, -0.3, 0.05], [[6.0, 0.01, 0.02]]);
             let mut c = plain(poly, &waves, sd_m);
             let f = frame(&t, &t);
             (c.middle, c.half) = (f.middle, f.half);
-            // Every other group on the other side.
+            // Alternating groups.
             let z: Vec<f64> = t
                 .iter()
                 .enumerate()
@@ -555,7 +556,7 @@ mod tests {
                     let smooth = MotionSegment { middle: f.middle, half: f.half, ..cubic }.at(*t).0;
                     let wave = 0.01 * (6.0 * (t - f.middle)).cos() + 0.02 * (6.0 * (t - f.middle)).sin();
                     let group = if k / 8 % 2 == 0 { off } else { -off };
-                    // What is left over after the last whole group does not count.
+                    // Cells after the last whole group do not count.
                     smooth + mean * wave + if k >= n / 8 * 8 { 9.0 } else { group }
                 })
                 .collect();
@@ -573,7 +574,7 @@ mod tests {
     }
 
     #[test]
-    fn least_squares_need_more_cells_than_numbers_and_room_for_them() {
+    fn least_squares_needs_more_cells_than_coefficients() {
         let row =
             |row: &mut [f64; MAX_COEFFICIENTS], t: f64| *row = core::array::from_fn(|k| t.powi(k as i32));
         let t = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
@@ -583,7 +584,7 @@ mod tests {
             assert!((told - wanted).abs() < 1e-9, "{x:?}");
         }
         assert!(left < 1e-20);
-        // A mean leaves what the values differ from it.
+        // A mean leaves the deviations.
         let (x, left) = least_squares(&t[..4], &[1.0, 2.0, 3.0, 6.0], 1, &row).expect("a solution");
         near(x[0], 3.0);
         near(left, 14.0);
@@ -603,7 +604,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frequency_is_found_to_a_thousandth_of_what_the_stretch_resolves() {
+    fn a_frequency_is_estimated_to_a_thousandth_of_the_resolution() {
         for (n, hz) in [(300, 0.31), (300, 2.9), (1500, 1.37), (60, 1.1)] {
             let t = cells(n);
             let z: Vec<f64> = t.iter().map(|t| 0.003 * t + 3e-4 * (TAU * hz * t + 1.0).sin()).collect();
@@ -611,7 +612,7 @@ mod tests {
             let resolved = 1.0 / (2.0 * f.half);
             let told = f.add_sinusoid(&[]).expect("a wave").sinusoids[0][0] / TAU;
             assert!((told - hz).abs() < 1e-3 * resolved, "{told} for {hz}");
-            // From somewhere near.
+            // From a nearby frequency.
             for off in [-0.19, 0.12] {
                 let told =
                     f.refine_frequency(&[], hz + off * resolved, 0.2 * resolved).expect("a wave").sinusoids
@@ -619,13 +620,13 @@ mod tests {
                         / TAU;
                 assert!((told - hz).abs() < 1e-3 * resolved, "{told} for {hz}");
             }
-            // Not further than it is looked for.
+            // Not outside of the search interval.
             let told =
                 f.refine_frequency(&[], hz - 0.5 * resolved, 0.2 * resolved).expect("a wave").sinusoids[0][0]
                     / TAU;
             assert!((told - (hz - 0.3 * resolved)).abs() < 0.01 * resolved, "{told} for {hz}");
         }
-        // Faster than three oscillations a second, or than cells tell, none is looked for.
+        // Frequencies above 3 Hz, or above the resolution of the cells, are not searched.
         let at_most = |n: usize, hz: f64| {
             let t = cells(n);
             let z: Vec<f64> = t.iter().map(|t| 3e-4 * (TAU * hz * t).sin()).collect();
@@ -635,16 +636,16 @@ mod tests {
     }
 
     #[test]
-    fn a_second_wave_is_another_one() {
+    fn a_second_sinusoid_has_another_frequency() {
         let t = cells(500);
         let z: Vec<f64> =
             t.iter().map(|t| 4e-4 * (TAU * 0.8 * t).sin() + 1e-4 * (TAU * 1.9 * t).cos()).collect();
         let f = frame(&t, &z);
-        // The same one would not be found again: the nearer one is known.
+        // A known frequency is not found again.
         let told = f.add_sinusoid(&[TAU * 0.8]).expect("two waves");
         assert_eq!(told.sinusoids[0][0], TAU * 0.8);
         assert!((told.sinusoids[1][0] / TAU - 1.9).abs() < 1e-3);
-        // Cells are taken for means, which are smaller than the wave.
+        // Cells are means, which attenuates the sinusoid.
         for (wave, size) in told.sinusoids.iter().zip([4e-4, 1e-4]) {
             let mean = (0.5 * CELL_S * wave[0]).sin() / (0.5 * CELL_S * wave[0]);
             assert!((wave[1].hypot(wave[2]) * mean / size - 1.0).abs() < 1e-5, "{wave:?}");
@@ -653,7 +654,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_union_is_tried_with_the_waves_of_its_parts_alone() {
+    fn long_intervals_use_frequency_hints_only() {
         let (long, short) = (cells(400), cells(290));
         let of = |t: &[f64], hints: &[f64]| {
             let z = noisy(t, |t| 0.003 * t + 4e-4 * (TAU * 0.8 * t).sin());
@@ -662,12 +663,12 @@ mod tests {
         assert!(of(&long, &[TAU * 0.81]).white);
         assert_eq!(of(&long, &[TAU * 0.81]).sinusoids.len(), 1);
         assert!(!of(&long, &[TAU * 1.6]).white);
-        // Near what is hinted at it is looked for, by a third of what the stretch resolves.
+        // Near a hint the search covers a third of the resolution.
         assert!(of(&long, &[TAU * (0.8 + 0.28 / 8.0)]).white);
         assert!(!of(&long, &[TAU * (0.8 + 0.45 / 8.0)]).white);
-        // Shorter than six seconds it is looked for anywhere.
+        // Below six seconds all frequencies are searched.
         assert!(of(&short, &[TAU * 1.6]).white);
-        // A short one may pass for a cubic, and is a wave all the same.
+        // A short one resembles a cubic and is a sinusoid all the same.
         let t = cells(120);
         let z = noisy(&t, |t| 0.003 * t + 4e-4 * (TAU * 0.3 * t).sin());
         let cubic = MotionSegment::fit_best(&t, &z, CELL_S, &[], 0.0).expect("a form");
@@ -676,7 +677,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_that_rounding_makes_is_none() {
+    fn a_quantisation_artefact_is_not_a_sinusoid() {
         let t = cells(400);
         let z = noisy(&t, |t| 0.003 * t + 2e-5 * (TAU * 0.8 * t).sin());
         let of = |rounded_m: f64| MotionSegment::fit_best(&t, &z, CELL_S, &[], rounded_m).expect("a form");

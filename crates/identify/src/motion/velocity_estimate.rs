@@ -1,28 +1,29 @@
-//! Velocity from recorded positions, as exactly as they allow, and where it jumps.
+//! Velocity and its jumps from recorded positions with little noise.
 //!
-//! Friction turns an error of the velocity into one of the force (0.01 mm/s are 5 mN at 500 Ns/m), so the wide
-//! windows that suit noisy positions (`crate::differentiate`) would leave structure at every ripple and
-//! every stop. Here the window is the narrowest that the positions' own noise allows, and none reaches across a
-//! jump of the velocity, of which the positions tell the instant: where the parabolas on both sides meet.
+//! Friction turns a velocity error into a force error (0.01 mm/s are 5 mN at 500 Ns/m), so wide windows
+//! (`stylet_record::differentiate`) would leave structure at every ripple and stop. Here the window is the
+//! narrowest that the position noise allows, and none extends across a velocity jump, whose time is the
+//! intersection of the parabolas on both sides.
 
 use stylet_stats::linear_algebra::SymmetricMatrix;
 use stylet_stats::order_statistics::median;
 
-/// Noise of the velocity in m/s that is asked for.
+/// Target standard deviation of the velocity in m/s.
 const TARGET_SD_MPS: f64 = 5e-6;
-/// Widest half window in samples.
+/// Largest half window in samples.
 const MAX_HALF_WINDOW: usize = 12;
-/// No window reaches across a gap of more than so many steps.
+/// No window extends across a gap of more than this many sampling intervals.
 const MAX_GAP_STEPS: f64 = 5.5;
-/// In a gap of no more than so many seconds a drive changes its speed once at most: a jump is where both sides meet.
+/// Within a gap of at most this many s the velocity changes at most once: a jump is at the intersection of both
+/// sides.
 const MAX_JUMP_GAP_S: f64 = 0.1;
-/// Smallest jump of the velocity in m/s that is looked for.
+/// Smallest velocity jump in m/s.
 pub const MIN_JUMP_MPS: f64 = 2e-5;
 
-/// A jump of the velocity between two samples; where, the positions tell.
+/// A velocity jump between two samples, located by the positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityJump {
-    /// The sample after it.
+    /// Index of the sample after it.
     pub next_sample: usize,
     /// Time in s.
     pub time_s: f64,
@@ -30,22 +31,22 @@ pub struct VelocityJump {
     pub position_m: f64,
     /// Velocities in m/s before and after.
     pub velocity_mps: [f64; 2],
-    /// Standard deviation of the position at which both sides meet, in m.
+    /// Standard deviation of the intersection position in m.
     pub position_sd_m: f64,
 }
 
-/// Velocities, their noise, and their jumps.
+/// Velocities, their noise and jumps.
 #[derive(Clone, Debug, Default)]
 pub struct VelocityEstimate {
     /// Velocity in m/s at every sample.
     pub velocity_mps: Vec<f64>,
-    /// Standard deviation in m/s that the noise of the positions leaves.
+    /// Standard deviation in m/s due to position noise.
     pub sd_mps: f64,
-    /// Jumps.
+    /// Velocity jumps.
     pub jumps: Vec<VelocityJump>,
 }
 
-/// The velocity of positions `z` (m) at times `t` (s).
+/// Estimates the velocity from positions `z` (m) at times `t` (s).
 #[must_use]
 pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let n = t.len().min(z.len());
@@ -55,7 +56,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
     let noise_m = position_noise(t, z);
-    // Slope of a straight line over 2 m + 1 samples: sd = noise / (step sqrt(m (m+1) (2m+1) / 3)).
+    // Slope of a line over 2 m + 1 samples: sd = noise / (step sqrt(m (m+1) (2m+1) / 3)).
     let gain = |m: usize| 1.0 / (step * ((m * (m + 1) * (2 * m + 1)) as f64 / 3.0).sqrt());
     let half = (1..MAX_HALF_WINDOW).find(|m| noise_m * gain(*m) <= TARGET_SD_MPS).unwrap_or(MAX_HALF_WINDOW);
     let side = (2 * half + 2).max(6);
@@ -88,7 +89,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
             let (lo, hi) = if reach == half {
                 (i - half, i + half + 1)
             } else {
-                // Beside an edge: one-sided, wider.
+                // Next to an edge: one-sided, wider.
                 let lo = i.saturating_sub(half.max(2)).max(from);
                 let hi = (i + half.max(2) + 1).min(to);
                 if hi - lo >= 3 { (lo, hi) } else { (from, to.min(from + 3)) }
@@ -99,8 +100,8 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     VelocityEstimate { velocity_mps: v, sd_mps: noise_m * gain(half), jumps: kinks }
 }
 
-/// Standard deviation of positions about a smooth course, by their third divided differences: irregular instants are no
-/// noise.
+/// Standard deviation of position noise from third divided differences, which are insensitive to irregular
+/// sampling.
 pub(super) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
     let mut d: Vec<f64> = t
         .windows(4)
@@ -115,22 +116,23 @@ pub(super) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
             sum.abs() / squares.sqrt()
         })
         .collect();
-    // Rounded positions of a needle at rest do not differ at all.
+    // Quantised positions of a needle at rest do not differ at all.
     d.retain(|d| *d > 0.0);
     (median(&mut d) * stylet_stats::MAD_TO_SD).max(encoder_step(z) / 12.0_f64.sqrt())
 }
 
-/// A smaller step in m is none of an encoder: numbers in memory are no further apart.
+/// Smallest plausible encoder step in m; smaller differences are floating-point rounding.
 const MIN_ENCODER_STEP_M: f64 = 1e-9;
-/// Positions are rounded when their differences are whole numbers of steps, to this share ...
+/// Positions are quantised when their differences are whole numbers of steps to within this share ...
 const MAX_FRACTIONAL_STEP: f64 = 0.02;
-/// ... and change at least in this share of the samples: a needle that goes evenly, and rests, has steps, too.
+/// ... and the differences change in at least this share of the samples: constant velocity with rests has equal
+/// differences, too.
 const MIN_CHANGED_SHARE: f64 = 0.005;
 
-/// The step in m to which positions are rounded, zero where they are not.
+/// Encoder step in m to which positions are quantised; zero where they are not.
 ///
-/// A needle that needs several samples for a step rests in most of them, and moves by a whole step in the others: no difference tells
-/// the noise then.
+/// A needle slower than one step per sample rests in most samples and moves by a whole step in the others, so
+/// differences do not show the noise.
 pub(super) fn encoder_step(z: &[f64]) -> f64 {
     let moves = || z.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite());
     let mut sizes: Vec<f64> = moves().map(f64::abs).filter(|d| *d > MIN_ENCODER_STEP_M).collect();
@@ -148,11 +150,11 @@ pub(super) fn encoder_step(z: &[f64]) -> f64 {
     if uneven as f64 > MIN_CHANGED_SHARE * z.len() as f64 { step } else { 0.0 }
 }
 
-/// A break of the slope: the sample after it, the instant with position and slope before, the slope after.
+/// Slope break: the sample after it, (time, position, slope before), slope after.
 pub(super) type SlopeBreak = (usize, (f64, f64, f64), f64);
 
-/// Where parabolas on both sides of a gap between two samples meet with different slopes. Neither reaches across a gap longer than the first
-/// of `gaps_s` (s); none longer than the second is bridged.
+/// Finds where parabolas on both sides of a gap between two samples intersect with different slopes. Windows do
+/// not extend across gaps longer than `gap_s`; gaps longer than `longest_s` are not bridged.
 pub(super) fn slope_breaks(
     t: &[f64],
     z: &[f64],
@@ -172,23 +174,23 @@ pub(super) fn slope_breaks(
         let (left, off_left) = fit_parabola(&t[i - side..i], &z[i - side..i], t[i - 1]);
         let (right, off_right) = fit_parabola(&t[i..i + side], &z[i..i + side], t[i]);
         let dt = t[i] - t[i - 1];
-        // Slopes carried to the middle of the gap.
+        // Slopes extrapolated to the middle of the gap.
         let (vl, vr) = (left[1] + left[2] * dt, right[1] - right[2] * dt);
         let jump = (vr - vl).abs();
         let curved = (left[2].abs() + right[2].abs()) * dt;
         if jump < MIN_JUMP_MPS + doubt_mps || jump < 2.0 * curved {
             continue;
         }
-        // Where z_left + v_left s = z_right - v_right (dt - s).
+        // Solves z_left + v_left s = z_right - v_right (dt - s).
         let s = (right[0] - right[1] * dt - left[0]) / (left[1] - right[1]);
-        // In a long gap they may have done what neither side shows.
+        // In a long gap the motion may have been more complex.
         if dt > gap_s && !(0.0..=dt).contains(&s) {
             continue;
         }
         let s = s.clamp(0.0, dt);
         found.push((off_left + off_right, (i, (t[i - 1] + s, left[0] + left[1] * s, left[1]), right[1])));
     }
-    // Of neighbours the one that leaves least.
+    // Of neighbouring candidates the one with the smallest residual.
     let mut out: Vec<SlopeBreak> = Vec::new();
     let mut last = 0.0;
     for (off, at) in found {
@@ -208,7 +210,7 @@ pub(super) fn slope_breaks(
     out
 }
 
-/// Least-squares parabola `a + b s + c s^2`, `s = t - at`, and the sum of squares that it leaves.
+/// Least-squares parabola `a + b s + c s^2`, `s = t - at`, and its residual sum of squares.
 pub(super) fn fit_parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
     let span = t.last().zip(t.first()).map_or(1.0, |(b, a)| (b - a).max(1e-12));
     let base = z.first().copied().unwrap_or(0.0);
@@ -237,7 +239,7 @@ pub(super) fn fit_parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
     ([x[0] + base, x[1] / span, x[2] / (span * span)], off)
 }
 
-/// Slope at `at`: of a parabola, of a straight line with two samples.
+/// Slope at `at`: of a parabola, or of a line through two samples.
 fn slope_at(t: &[f64], z: &[f64], at: f64) -> f64 {
     match (t, z) {
         ([], _) | (_, []) | ([_], _) => 0.0,
@@ -259,13 +261,14 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_is_the_one_of_least_squares() {
+    fn the_parabola_is_the_least_squares_fit() {
         let t = [1.0, 1.2, 1.3, 1.9, 2.4];
         let exact = t.map(|t: f64| 4.0 - 3.0 * (t - 1.5) + 7.0 * (t - 1.5).powi(2));
         let (told, off) = fit_parabola(&t, &exact, 1.5);
         [4.0, -3.0, 7.0].iter().zip(told).for_each(|(wanted, told)| near(told, *wanted));
         assert!(off < 1e-20);
-        // What no parabola holds is left: the third difference of five even values, (1, -2, 0, 2, -1).
+        // A residual pattern that no parabola contains: the third difference of five regular values, (1, -2, 0,
+        // 2, -1).
         let five = [0.0, 1.0, 2.0, 3.0, 4.0];
         let added = [1.0, -2.0, 0.0, 2.0, -1.0];
         let z: Vec<f64> = five.iter().zip(added).map(|(t, a)| 2.0 + 0.5 * t - t * t + 0.3 * a).collect();
@@ -282,15 +285,15 @@ mod tests {
     }
 
     #[test]
-    fn rounded_positions_tell_their_step_unless_the_needle_goes_evenly() {
+    fn the_encoder_step_is_detected_unless_velocity_is_constant() {
         let rounded = |n: usize, speed: f64, step: f64| -> Vec<f64> {
             even(n).iter().map(|t| (speed * t / step).round() * step).collect()
         };
         near(encoder_step(&rounded(1000, 0.003, 5e-5)), 5e-5);
         near(encoder_step(&rounded(1000, 0.013, 5e-5)), 5e-5);
-        // A step a sample, always: even motion.
+        // One step per sample throughout: constant velocity.
         assert_eq!(encoder_step(&rounded(1000, 0.01, 5e-5)), 0.0);
-        // Up to one change of the pace in 200 samples is even motion.
+        // One velocity change in 200 samples still counts as constant velocity.
         let paced = |changes: usize| -> Vec<f64> {
             let mut z = 0.0;
             (0..1000)
@@ -302,7 +305,7 @@ mod tests {
         };
         assert_eq!(encoder_step(&paced(5)), 0.0);
         near(encoder_step(&paced(7)), 1e-4);
-        // One difference in a hundred may be no whole number of steps.
+        // One difference in a hundred may be fractional.
         let broken = |count: usize| {
             let mut z = rounded(1000, 0.013, 5e-5);
             (0..count).for_each(|k| z[50 * k + 7..].iter_mut().for_each(|z| *z += 2e-5));
@@ -310,7 +313,7 @@ mod tests {
         };
         near(broken(10), 5e-5);
         assert_eq!(broken(11), 0.0);
-        // By two hundredths a difference is still whole.
+        // Two hundredths of a step still count as a whole step.
         let off = |share: f64| {
             let bent = |(k, z): (usize, &f64)| z + if k % 3 == 0 { share * 5e-5 } else { 0.0 };
             let z: Vec<f64> = rounded(1000, 0.013, 5e-5).iter().enumerate().map(bent).collect();
@@ -318,27 +321,27 @@ mod tests {
         };
         assert!(off(0.005) > 0.0 && off(0.03) == 0.0);
         assert_eq!((encoder_step(&[]), encoder_step(&[1.0]), encoder_step(&[0.4; 50])), (0.0, 0.0, 0.0));
-        // Steps below a nanometre are those of the numbers.
+        // Steps below a nanometre are floating-point rounding.
         assert_eq!(encoder_step(&rounded(1000, 0.003, 5e-10)), 0.0);
     }
 
     #[test]
-    fn noise_of_positions_is_told_by_third_differences_however_irregular_the_instants() {
-        // A parabola has none, at any instants.
+    fn position_noise_is_estimated_from_third_divided_differences() {
+        // Zero for a parabola at any times.
         let t: Vec<f64> = (0..200).map(|k| 0.005 * (f64::from(k) + 0.3 * f64::from(k % 3))).collect();
         let z: Vec<f64> = t.iter().map(|t| 0.003 * t + 0.02 * t * t).collect();
         assert!(position_noise(&t, &z) < 1e-14);
-        // Alternating by one to either side: third differences of eight, over the root of 1 + 9 + 9 + 1.
+        // Alternating by one: third differences of eight, over the root of 1 + 9 + 9 + 1.
         let rough = |a: f64, k: usize| a * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let z: Vec<f64> = (0..200).map(|k| 1e-3 * k as f64 + rough(1e-6, k)).collect();
         let told = position_noise(&even(200), &z);
         assert!((told / (8e-6 * 1.4826 / 20.0_f64.sqrt()) - 1.0).abs() < 1e-4, "{told}");
-        // A rest does not count; rounding leaves at least its own.
+        // A rest does not count; at least the quantisation noise.
         let rests: Vec<f64> = (0..200).map(|k| if k < 40 { rough(1e-6, k) } else { 1e-6 }).collect();
         assert!((position_noise(&even(200), &rests) / told - 1.0).abs() < 1e-3);
         let z: Vec<f64> = even(2000).iter().map(|t| (0.0011 * t / 5e-5).round() * 5e-5).collect();
         assert!(position_noise(&even(2000), &z) >= 0.999 * 5e-5 / 12.0_f64.sqrt());
-        // By the instants: a spacing in which one sample is ten times further away.
+        // With irregular sampling: one sample ten times further away.
         let (t, z) = ([0.0, 1.0, 2.0, 12.0], [0.0, 0.0, 1.0, 0.0]);
         // Newton: weights 1/prod(t_i - t_j) are -1/24, 1/11, -1/20, 1/1320.
         let weights = [-1.0 / 24.0, 1.0 / 11.0, -1.0 / 20.0, 1.0 / 1320.0_f64];
@@ -347,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn a_break_is_where_both_parabolas_meet() {
+    fn a_slope_break_is_where_both_parabolas_intersect() {
         let t = even(200);
         let bent = |at_s: f64, change: f64| -> Vec<f64> {
             t.iter().map(|t| 0.003 * t + 0.01 * t * t + change * (t - at_s).max(0.0)).collect()
@@ -361,25 +364,25 @@ mod tests {
         let (sample, (at, z, before), after) = found[0];
         assert_eq!(sample, 101);
         assert!((at - 0.5031).abs() < 2e-5 && (z - 0.003 * at - 0.01 * at * at).abs() < 2e-7, "{found:?}");
-        // Slopes beside it: of the sample before, and of the one after.
+        // Slopes at the sample before and the one after.
         assert!(
             (before - 0.003 - 0.02 * 0.5).abs() < 1e-8 && (after - 0.003 - 0.02 * 0.505 + 0.004).abs() < 1e-8
         );
-        // A smaller one than is looked for, or than the noise lets tell, is none.
+        // Not below the smallest jump, or the noise.
         assert_eq!(one(0.5031, 0.0, 0.01, 0.0), []);
         let straight = |change: f64| {
             let z: Vec<f64> = t.iter().map(|t| change * (t - 0.5031).max(0.0)).collect();
             slope_breaks(&t, &z, 8, (0.01, 0.01), 0.0).len()
         };
         assert_eq!((straight(1.9e-5), straight(2.1e-5)), (0, 1));
-        // Nor is one of less than twice what the curvature changes from sample to sample, here by 0.2 mm/s.
+        // Nor below twice the change of the slope due to curvature between samples, here 0.2 mm/s.
         assert_eq!((one(0.5031, 1.5e-4, 0.01, 0.0).len(), one(0.5031, 6e-4, 0.01, 0.0).len()), (0, 1));
         assert_eq!(one(0.5031, 0.004, 0.01, 0.0038).len(), 1);
         assert_eq!(one(0.5031, 0.004, 0.01, 0.0041), []);
-        // One across a gap is none.
+        // Not across a gap.
         assert_eq!(one(0.5031, 0.004, 0.0049, 0.0), []);
         assert_eq!(one(0.0381, 0.004, 0.01, 0.0).len(), 1);
-        // Two that are further apart than a side are two.
+        // Two breaks further apart than a side are separate.
         let two = |apart: f64| {
             let z: Vec<f64> = t
                 .iter()
@@ -399,8 +402,8 @@ mod tests {
     }
 
     #[test]
-    fn no_window_reaches_across_a_gap_and_a_jump_in_a_short_one_is_where_both_sides_meet() {
-        // So many steps are missing after sample 200; from then on it goes back.
+    fn windows_do_not_span_gaps_and_jumps_in_short_gaps_are_located() {
+        // Samples are missing after sample 200; retraction from then on.
         let of = |steps: f64, turns_s: f64| {
             let t: Vec<f64> =
                 even(400).iter().map(|t| if *t < 1.0025 { *t } else { t + 0.005 * (steps - 1.0) }).collect();
@@ -429,13 +432,13 @@ mod tests {
             );
             assert!(told[0].position_sd_m <= 1e-6);
         }
-        // In a longer one it may have rested, too, and where both sides meet outside it did.
+        // In a longer gap the needle may have rested; an intersection outside of the gap shows that it did.
         assert_eq!(of(21.0, 1.01), []);
         assert_eq!(of(19.0, 1.11), []);
     }
 
     #[test]
-    fn a_window_is_as_wide_as_the_noise_asks_for_and_no_wider_than_twelve() {
+    fn window_width_follows_the_noise_up_to_twelve_samples() {
         // A line over 2 m + 1 samples has sd = noise / (step sqrt(m (m + 1) (2 m + 1) / 3)).
         let gain = |m: f64| 200.0 / (m * (m + 1.0) * (2.0 * m + 1.0) / 3.0).sqrt();
         let t = even(600);
@@ -447,7 +450,7 @@ mod tests {
                 .collect();
             (estimate_velocity(&t, &z).sd_mps, position_noise(&t, &z))
         };
-        // The noise that makes `m` enough.
+        // The noise for which `m` suffices.
         for m in [1.0, 2.0, 5.0, 11.0, 12.0, 13.0_f64] {
             let unit = of(1e-9).1 / 1e-9;
             let (told, noise_m) = of(0.999 * 5e-6 / gain(m) / unit);
@@ -458,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn beside_an_edge_a_window_is_one_sided_and_exact_for_a_parabola() {
+    fn windows_at_edges_are_exact_for_a_parabola() {
         let z: Vec<f64> = even(9).iter().map(|t| 0.003 * t + 0.5 * t * t).collect();
         for (v, t) in estimate_velocity(&even(9), &z).velocity_mps.iter().zip(even(9)) {
             assert!((v - 0.003 - t).abs() < 1e-9, "{v} at {t}");
@@ -482,7 +485,7 @@ mod tests {
     }
 
     #[test]
-    fn the_velocity_of_exact_positions_is_exact_and_its_jumps_have_their_instants() {
+    fn exact_positions_give_exact_velocity_and_jump_times() {
         let t: Vec<f64> = (0..1600).map(|k| f64::from(k) / 200.0).collect();
         let z: Vec<f64> = t.iter().map(|t| course(*t).0).collect();
         let found = estimate_velocity(&t, &z);
@@ -490,14 +493,14 @@ mod tests {
         assert_eq!(instants.len(), 2, "{instants:?}");
         assert!((instants[0] - 4.0013).abs() < 1e-4, "{instants:?}");
         assert!((instants[1] - 6.0).abs() < 1e-4, "{instants:?}");
-        // At six seconds sharp the velocity is either.
+        // At exactly six seconds the velocity is either.
         for (v, t) in found.velocity_mps.iter().zip(&t).filter(|(_, t)| **t != 6.0) {
             assert!((v - course(*t).1).abs() < 4e-6, "{v} at {t}");
         }
     }
 
     #[test]
-    fn positions_rounded_to_a_micrometre_give_the_velocity_to_a_hundredth_of_a_millimetre_per_second() {
+    fn quantisation_of_1_um_gives_velocity_to_10_um_per_second() {
         let t: Vec<f64> = (0..1600).map(|k| f64::from(k) / 200.0).collect();
         let z: Vec<f64> = t.iter().map(|t| (course(*t).0 * 1e6).round() / 1e6).collect();
         let found = estimate_velocity(&t, &z);

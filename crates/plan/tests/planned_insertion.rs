@@ -1,4 +1,5 @@
-//! A planned insertion tells apart what one at constant speed leaves open, and the diagnosis of both together names it.
+//! A planned insertion distinguishes effects that one at constant speed leaves open, and the diagnosis of both
+//! recordings names the true one.
 
 use stylet_diagnose::{NamedRecording, Options, Verdict, diagnose};
 use stylet_plan::{Limits, check_by_simulation, from_diagnosis, from_scenario, identifiability, plan};
@@ -30,7 +31,7 @@ fn measured(motion: &Motion, seed: u64) -> NamedRecording {
 }
 
 #[test]
-fn constant_speed_hides_friction_laws_and_a_planned_motion_shows_them() {
+fn a_planned_motion_identifies_friction_laws_hidden_at_constant_speed() {
     let scenario = believed();
     let (before, begin) = from_scenario(&scenario, None).expect("a ground");
     let seen = identifiability(&before);
@@ -47,7 +48,7 @@ fn constant_speed_hides_friction_laws_and_a_planned_motion_shows_them() {
     for shown in ["coulomb_friction", "stribeck_friction"] {
         assert!(!after.not_identifiable.iter().any(|i| i == shown), "{shown}: {:?}", after.not_identifiable);
     }
-    // What no motion can show stays so.
+    // An unidentifiable effect stays so under any motion.
     assert!(
         after.not_identifiable.iter().any(|i| i == "force_gain")
             && planned.never_detectable.iter().any(|n| n == "force_gain")
@@ -55,7 +56,7 @@ fn constant_speed_hides_friction_laws_and_a_planned_motion_shows_them() {
 }
 
 #[test]
-fn the_planned_insertion_leads_to_the_right_single_cause() {
+fn the_planned_insertion_leads_to_the_correct_single_effect() {
     let scenario = believed();
     let first = measured(&scenario.motion, 1);
     let blind =
@@ -65,7 +66,7 @@ fn the_planned_insertion_leads_to_the_right_single_cause() {
     let (ground, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
     let planned = plan(&ground, &LIMITS, &begin).expect("a plan").0;
     assert!(planned.probability_decided > planned.probability_now + 0.3);
-    // Old and new recordings have different motions.
+    // The recordings have different motions.
     let both = [first, measured(&planned.motion, 2)];
     let told = diagnose(&scenario, &both, &Options { brief: true }, |_| {}).expect("a diagnosis").diagnosis;
     assert_eq!(told.verdict, Verdict::Named, "{:?}", told.causes);
@@ -85,7 +86,7 @@ fn the_plan_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn the_best_motions_are_set_against_each_other_and_other_insertions_judge_the_winner() {
+fn the_selected_motion_is_tested_on_separate_simulations() {
     let scenario = believed();
     let first = measured(&scenario.motion, 1);
     let blind =
@@ -101,11 +102,11 @@ fn the_best_motions_are_set_against_each_other_and_other_insertions_judge_the_wi
         .expect("a plan");
     assert_eq!(checked.probability_source, "simulated");
     assert!(found.best.iter().any(|f| f.motion == checked.motion));
-    // The other motion was simulated as well, and was not better.
+    // The other motion was simulated as well and was not better.
     let other = &checked.alternatives[0];
     assert!(other.simulated > 0 && other.correct <= other.simulated);
     assert!(checked.simulated.iter().all(|t| t.trials > 0 && t.correct <= t.trials));
-    // Most simulated insertions decide, and the probability printed is no other than they say.
+    // Most simulated insertions decide, and the reported probability agrees with them.
     let (of, decided) = checked.simulated.iter().fold((0, 0), |(n, d), t| (n + t.trials, d + t.correct));
     assert!(2 * decided > of, "{:?}", checked.simulated);
     assert!((checked.probability_decided - decided as f64 / of as f64).abs() < 0.25);

@@ -1,5 +1,5 @@
-//! A column of the fit is computed from what a replay remembered: it must be that of a whole replay, bit for bit, whatever
-//! effect the model has.
+//! Jacobian columns are computed by incremental replay, which must equal a full replay bit for bit, whatever
+//! effects the model has.
 
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
@@ -33,7 +33,7 @@ fn belief() -> Assumptions {
     }
 }
 
-/// In with a ripple, a hold, in again, out.
+/// Insertion with a ripple, a hold, insertion, retraction.
 fn recording() -> Recording {
     let (mut t, mut z, mut at) = (Vec::new(), Vec::new(), -0.002);
     for k in 0..4000 {
@@ -53,7 +53,7 @@ fn recording() -> Recording {
 }
 
 #[test]
-fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
+fn incremental_replay_equals_a_full_replay_for_every_effect() {
     let belief = Arc::new(belief());
     let r = recording();
     let blocks = vec![BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S)];
@@ -72,7 +72,7 @@ fn what_a_neighbour_shares_with_a_replay_is_what_it_would_have_had() {
     }
     assert!(models.len() > 20, "{}", models.len());
     let mut compared = 0;
-    // Instants anywhere between two saved states.
+    // Rupture times anywhere between two checkpoints.
     let instants = (0..24)
         .map(|k| vec![2.1 + 0.02 * f64::from(k), 4.6 + 0.03 * f64::from(k), 9.7 + 0.07 * f64::from(k)]);
     for ((name, mut model), instants) in models.into_iter().zip(instants.cycle()) {

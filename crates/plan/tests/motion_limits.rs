@@ -1,6 +1,6 @@
-//! Every motion that is proposed keeps its limits, whatever they are, and limits that nobody can keep are said to be impossible.
+//! Every proposed motion satisfies its limits, and limits that no motion can satisfy are reported.
 //!
-//! Speed and acceleration are taken here from positions at 20 000 instants, not from the segments.
+//! Speed and acceleration are computed here from positions at 20 000 times, not from the segments.
 
 use proptest::prelude::*;
 use stylet_plan::motion_programs::{
@@ -25,7 +25,7 @@ fn begin() -> StartConditions {
     StartConditions { start_m: -0.005, surface_m: 0.0, max_depth_m: 0.1, sample_hz: 200.0 }
 }
 
-/// Depth, speed, acceleration and duration of a motion, seen from outside, rest before and after included.
+/// Depth, speed, acceleration and duration of a motion from sampled positions, rest before and after included.
 fn seen(motion: &Motion) -> (f64, f64, f64, f64) {
     let plan = motion.plan().expect("a program");
     let n = 20_000;
@@ -44,7 +44,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn every_motion_keeps_its_limits(limits in limits(), first in 0..100_000_usize) {
+    fn every_motion_satisfies_its_limits(limits in limits(), first in 0..100_000_usize) {
         let begin = begin();
         for k in first..first + 8 {
             let Some(motion) = motion_from_point(&low_discrepancy_point(k), &limits, &begin) else { continue };
@@ -63,7 +63,7 @@ proptest! {
 }
 
 #[test]
-fn a_motion_that_breaks_one_limit_is_refused() {
+fn a_motion_that_violates_one_limit_is_rejected() {
     let wide =
         Limits { depth_m: 0.1, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
     let motion = (0..50)
@@ -93,7 +93,7 @@ fn scenario() -> Scenario {
 }
 
 #[test]
-fn impossible_limits_are_said_to_be_impossible_and_why() {
+fn infeasible_limits_are_reported_with_a_reason() {
     let scenario = scenario();
     let (ground, begin) = from_scenario(&scenario, None).expect("a ground");
     let wide =

@@ -1,18 +1,19 @@
-//! From one speed to the next in a while: what a drive does where a jump of the speed was commanded.
+//! Finite acceleration where a velocity jump was commanded.
 //!
-//! Where two even stretches meet, the position of a drive with one acceleration departs from both by `dv (a/2 - |t - t0|)^2 / (2 a)`, `a` being the
-//! time it takes and `t0` the instant at which they meet. Under an encoder's noise this is all that is seen of it; a force that is
-//! compared with a jump there has a lag, or inertia, that it does not have.
+//! Where two segments of constant velocity meet, the position of a drive with constant acceleration deviates
+//! from both lines by
+//! `dv (a/2 - |t - t0|)^2 / (2 a)`, with duration `a` and intersection time `t0`. Under encoder noise this is the only visible trace; a force
+//! compared with an instantaneous jump would appear to have a lag or inertia.
 
 use super::smooth_positions::{Cells, SmoothInterval};
 use super::velocity_estimate::VelocityJump;
 
-/// Longest ramp in s that is looked for.
+/// Longest ramp in s.
 const MAX_DURATION_S: f64 = 0.6;
-/// Nats by which the positions must be better described: a number, and that it was looked for.
+/// Smallest improvement in nats: one more parameter, and a search over it.
 const MIN_GAIN_NATS: f64 = 8.0;
 
-/// An even change of the speed.
+/// A constant acceleration between two velocities.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AccelerationRamp {
     mid_s: f64,
@@ -22,7 +23,7 @@ pub(super) struct AccelerationRamp {
 }
 
 impl AccelerationRamp {
-    /// The ramp between two even stretches that meet at a kink, where the positions show one.
+    /// The ramp between two constant-velocity segments that meet at a jump, if the positions show one.
     pub fn between(
         left: &SmoothInterval,
         right: &SmoothInterval,
@@ -63,7 +64,7 @@ impl AccelerationRamp {
         if inside > 0.0 { even + (after - before) * inside * inside / (2.0 * self.duration_s) } else { even }
     }
 
-    /// Position (m) and velocity (m/s) at an instant within.
+    /// Position (m) and velocity (m/s) at a time within the ramp.
     pub fn at(&self, t: f64) -> Option<(f64, f64)> {
         let share = (t - self.mid_s) / self.duration_s + 0.5;
         let [before, after] = self.velocity_mps;
@@ -79,7 +80,7 @@ mod tests {
         AccelerationRamp { mid_s: 2.0, duration_s: 0.4, position_m: 0.01, velocity_mps: [0.005, -0.001] };
 
     #[test]
-    fn a_ramp_leaves_both_lines_smoothly_and_its_speed_is_the_slope_of_its_position() {
+    fn a_ramp_joins_both_lines_smoothly() {
         assert_eq!((RAMP.at(1.79), RAMP.at(2.2)), (None, None));
         for (t, z, v) in [(1.8, 0.009, 0.005), (2.0, 0.01 - 0.006 * 0.4 / 8.0, 0.002)] {
             let told = RAMP.at(t).expect("within");
