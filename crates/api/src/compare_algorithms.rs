@@ -35,7 +35,7 @@ pub fn compare_on_scenario(
 pub fn output_files(rows: &[ComparisonRow], seeds: u64) -> Result<OutputFiles, Error> {
     let mut output = OutputFiles::default();
     output.add_json("compare.json", &rows)?;
-    output.add("report.html", stylet_pages::algorithm_comparison::page(rows, seeds).to_html());
+    output.add("report.html", stylet_report::pages::algorithm_comparison::page(rows, seeds).to_html());
     Ok(output)
 }
 

@@ -42,7 +42,7 @@ impl DiagnosisReport {
     /// The report: `believed` was read from `file`, `command` repeats it.
     #[must_use]
     pub fn html(&self, believed: &Scenario, file: &str, command: String) -> String {
-        stylet_pages::diagnosis::page(believed, file, command, &self.details).to_html()
+        stylet_report::pages::diagnosis::page(believed, file, command, &self.details).to_html()
     }
 
     /// All files that `stylet diagnose` writes for single recordings; `believed` was read from the inputs' scenario.

@@ -16,8 +16,8 @@ use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings
 use stylet_diagnose::repeated_insertions::layer_composition::compose_layers;
 use stylet_diagnose::repeated_insertions::population_prediction::friction_model;
 use stylet_diagnose::repeated_insertions::repeatability_report::{CompositionReport, RepeatabilityReport};
-use stylet_pages::repeated_insertions::{ablation_figure, page};
 use stylet_record::{Recording, read_csv};
+use stylet_report::pages::repeated_insertions::{ablation_figure, page};
 use stylet_scenario::Scenario;
 use stylet_score::{MeasuredRecording, MeasuredScore, Trace};
 use stylet_tissue::Effect as _;

@@ -8,7 +8,7 @@ use stylet_diagnose::Diagnosis;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::{Dataset, DatasetError};
 use stylet_diagnose::repeated_insertions::indentation_relaxation::{SpecimenReport, analyze_specimens};
-use stylet_pages::indented_specimens::page;
+use stylet_report::pages::indented_specimens::page;
 
 /// What a look at specimens gives.
 pub struct SpecimensReport {

@@ -7,9 +7,9 @@ use crate::output_files::{OutputFiles, to_json_bytes};
 use crate::output_folder::write_file_atomically;
 use std::path::Path;
 use stylet_diagnose::NamedRecording;
-use stylet_pages::{diagnosis, experiment_plan as plan_page, identifiability as shown_page};
 use stylet_plan::identifiability::Identifiability;
 use stylet_plan::{InformationState, Limits, Plan};
+use stylet_report::pages::{diagnosis, experiment_plan as plan_page, identifiability as shown_page};
 use stylet_scenario::{Motion, Scenario, motion_to_ron};
 
 /// A planned insertion, and what it was planned on.

@@ -50,7 +50,7 @@ fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
 /// [`Error::Internal`] when a value cannot be written.
 pub fn output_files(model: &Scenario, file: &Path, found: &PredictionResult) -> Result<OutputFiles, Error> {
     let mut output = OutputFiles::default();
-    let page = stylet_pages::prediction::page(model, &file.display().to_string(), found);
+    let page = stylet_report::pages::prediction::page(model, &file.display().to_string(), found);
     output.add("report.html", page.to_html());
     output.add_json("predict.json", &found.prediction)?;
     Ok(output)

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::output_files::OutputFiles;
 use crate::output_folder::OutputLock;
 use std::io;
-use stylet_pages::sweep::page;
+use stylet_report::pages::sweep::page;
 pub use stylet_sweep::Overrides;
 use stylet_sweep::{Columns, DiskTrialTable, Summary, Sweep, TrialRow, run_trials, summarise, write_csv};
 

@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use std::path::Path;
 use stylet_api::compare_algorithms::{case_groups, compare_on_scenario, output_files};
 use stylet_core::config::Algorithm;
-use stylet_pages::formatting::significant_or_dash;
+use stylet_report::pages::formatting::significant_or_dash;
 use stylet_scenario::Scenario;
 use stylet_sweep::algorithm_comparison::ComparisonRow;
 

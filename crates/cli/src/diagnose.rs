@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use stylet_api::output_folder::recover_parent;
 use stylet_api::{DiagnosisInputs, resource_estimate};
 use stylet_diagnose::Diagnosis;
-use stylet_pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 

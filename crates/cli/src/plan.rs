@@ -6,9 +6,9 @@ use crate::results::default_folder;
 use crate::terminal::stage_printer;
 use std::fmt::Write as _;
 use stylet_api::{DiagnosisInputs, resource_estimate};
-use stylet_pages::formatting;
 use stylet_plan::Plan;
 use stylet_plan::identifiability::Identifiability;
+use stylet_report::pages::formatting;
 use stylet_report::significant;
 use stylet_scenario::Motion;
 

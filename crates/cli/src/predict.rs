@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use stylet_api::output_folder::recover_parent;
 use stylet_api::prediction_files::{ModelOrigin, output_files};
 use stylet_api::{Prediction, Refit, read_options, read_recordings, resource_estimate};
-use stylet_pages::formatting::significant_or_dash;
-use stylet_pages::prediction::summary_sentence;
+use stylet_report::pages::formatting::significant_or_dash;
+use stylet_report::pages::prediction::summary_sentence;
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 

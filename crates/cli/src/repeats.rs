@@ -8,9 +8,9 @@ use stylet_api::diagnose_repeats::{diagnose_repeats, load_data_set, recording_fi
 use stylet_api::diagnose_specimens::{SpecimensReport, diagnose_specimens};
 use stylet_api::resource_estimate;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
-use stylet_pages::formatting::three_decimals;
-use stylet_pages::repeated_insertions::{online_enhancement, summary_sentence};
 use stylet_record::QualityKind;
+use stylet_report::pages::formatting::three_decimals;
+use stylet_report::pages::repeated_insertions::{online_enhancement, summary_sentence};
 use stylet_report::significant;
 
 /// The command.
@@ -161,7 +161,7 @@ fn summary(study: &SetDiagnosis) -> String {
 
 fn indented(SpecimensReport { specimens: found, diagnosis: d }: &SpecimensReport) -> String {
     let mut out = String::new();
-    let _ = writeln!(out, "{}\n", stylet_pages::indented_specimens::summary_sentence(found));
+    let _ = writeln!(out, "{}\n", stylet_report::pages::indented_specimens::summary_sentence(found));
     let _ = writeln!(
         out,
         "    {:<36} {:>10} {:>16} {:>8}",

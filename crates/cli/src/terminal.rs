@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::{IsTerminal as _, Write as _};
 use stylet_api::run_report::layer_name;
 use stylet_api::{Run, settings_note, virtual_note};
-use stylet_pages::formatting::{or_dash, significant_or_dash};
+use stylet_report::pages::formatting::{or_dash, significant_or_dash};
 use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{EstimateError, Score, Trace};

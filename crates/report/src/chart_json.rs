@@ -2,11 +2,11 @@
 
 use crate::chart_model::{Chart, Scale, Series};
 use crate::decimate::{MAX_POINTS, kept_indices, pick};
-use crate::number_format::push_json_array;
 use crate::palette::Colour;
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::HashMap;
+use stylet_stats::number_format::push_rounded;
 
 /// Digits of ordinates, and of abscissae, which must stay apart over long recordings.
 const Y_DIGITS: usize = 6;
@@ -145,9 +145,36 @@ fn same_abscissa(a: &Series, b: &Series) -> bool {
         && a.x.iter().zip(&b.x).all(|(p, q)| p.to_bits() == q.to_bits())
 }
 
+/// Appends a JSON array of numbers rounded to `digits` significant digits; NaN and infinity become `null`.
+fn push_json_array(out: &mut String, values: &[f64], digits: usize) {
+    out.push('[');
+    for (index, &value) in values.iter().enumerate() {
+        if index > 0 {
+            out.push(',');
+        }
+        if value.is_finite() {
+            push_rounded(out, value, digits);
+        } else {
+            out.push_str("null");
+        }
+    }
+    out.push(']');
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn six_digits_are_kept_and_what_is_not_finite_becomes_null() {
+        let mut out = String::new();
+        push_json_array(
+            &mut out,
+            &[1.234_567_89, f64::NAN, -0.0, 1.0e-7, f64::INFINITY, 123_456_789.0, 0.1 + 0.2],
+            6,
+        );
+        assert_eq!(out, "[1.23457,null,0,1e-7,null,123457000,0.3]");
+    }
 
     #[test]
     fn a_column_used_by_several_charts_is_stored_once() {

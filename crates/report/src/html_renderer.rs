@@ -25,8 +25,15 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 const LONG_CELL: usize = 48;
 const DISCLAIMER: &str = "Research software, not a medical device.";
 
-/// The whole file.
-pub(crate) fn render(page: &Page) -> String {
+impl Page {
+    /// The page as one HTML file: scripts, styles and data inside, the same bytes for the same page.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        render(self)
+    }
+}
+
+fn render(page: &Page) -> String {
     let charts: Vec<&Chart> = page
         .sections
         .iter()

@@ -25,13 +25,13 @@ mod escaping;
 mod html_renderer;
 pub mod insertion_report;
 pub mod live_page;
-mod number_format;
 mod page_model;
+pub mod pages;
 mod palette;
 pub mod svg;
 
 pub use chart_model::{Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span};
 pub use insertion_report::RunReport;
-pub use number_format::{p_value, percent, plus_minus, significant};
 pub use page_model::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text, Tile};
 pub use palette::Colour;
+pub use stylet_stats::number_format::{p_value, percent, plus_minus, significant};

@@ -309,10 +309,4 @@ impl Page {
         }
         self
     }
-
-    /// The page as one HTML file: scripts, styles and data inside, the same bytes for the same page.
-    #[must_use]
-    pub fn to_html(&self) -> String {
-        crate::html_renderer::render(self)
-    }
 }

@@ -12,6 +12,7 @@
 //! | [`select`] | quantiles of more numbers than memory holds |
 //! | [`linear`] | small dense matrices: Cholesky, products |
 //! | [`spectrum`] | power of evenly sampled columns, its lines |
+//! | [`number_format`] | numbers as text: significant digits, per cent, p-values |
 //! | [`rank`] | ranks and Spearman's correlation |
 //!
 //! Everything is `f64`, deterministic (`libm`, sums in the order given: the same bits on every machine and for any
@@ -25,6 +26,7 @@ pub mod interpolation;
 pub mod linear_algebra;
 pub mod moments;
 pub mod normal;
+pub mod number_format;
 pub mod order_statistics;
 pub mod rank_correlation;
 pub mod robust_linear_prediction;

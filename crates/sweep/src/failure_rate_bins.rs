@@ -4,7 +4,7 @@ use crate::summary::score_column;
 use crate::sweep_file::Sweep;
 use crate::trial_row::{Columns, TrialRow};
 use crate::trial_table::TrialTable;
-use stylet_report::significant;
+use stylet_stats::number_format::significant;
 use stylet_stats::{Interval, wilson};
 
 /// Bins of a drawn quantity.

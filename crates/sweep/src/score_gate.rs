@@ -253,7 +253,7 @@ pub fn baseline(judged: &[GateResult]) -> Baseline {
 /// What changed against a baseline, one line each; nothing when all numbers are the same.
 #[must_use]
 pub fn baseline_changes(old: &Baseline, new: &Baseline) -> Vec<String> {
-    let show = |i: &Interval| stylet_report::significant(i.value, 4);
+    let show = |i: &Interval| stylet_stats::number_format::significant(i.value, 4);
     let mut lines = Vec::new();
     for (name, now) in new {
         match old.get(name) {
@@ -308,7 +308,7 @@ pub fn junit_xml(judged: &[GateResult]) -> String {
 /// A bound and what was found, in one line.
 #[must_use]
 pub fn describe_result(j: &GateResult) -> String {
-    let number = |x: f64| stylet_report::significant(x, 4);
+    let number = |x: f64| stylet_stats::number_format::significant(x, 4);
     let bound = match (j.at_most, j.at_least) {
         (Some(most), Some(least)) => format!("{} to {}", number(least), number(most)),
         (Some(most), None) => format!("at most {}", number(most)),

@@ -7,7 +7,7 @@ use crate::output_folder::OutputLock;
 use std::path::{Path, PathBuf};
 use stylet_examine::world::hide::{thing, things};
 use stylet_examine::{CaseId, Grade, Hide, Plan, Size, World, Wrong, table};
-use stylet_pages::examination::{accuracy_maps, page};
+use stylet_report::pages::examination::{accuracy_maps, page};
 
 /// Which cases are asked for, in words; `all` stands for all words of a list.
 #[derive(Clone, Debug)]

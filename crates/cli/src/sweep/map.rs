@@ -5,7 +5,7 @@ use super::with_threads;
 use crate::exit::Failure;
 use crate::progress::Progress;
 use std::fmt::Write as _;
-use stylet_pages::sweep::failure_map_svg;
+use stylet_report::pages::sweep::failure_map_svg;
 use stylet_sweep::{Columns, FailureMapRow, Overrides, Sweep, failure_map_rows, run_trials};
 
 /// The command.

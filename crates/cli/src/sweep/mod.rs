@@ -16,7 +16,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use stylet_api::sweep_folder::{SHARD_TRIALS, check_unfinished, run_all_shards, write_results};
 use stylet_api::{OutputLock, resource_estimate};
-use stylet_pages::formatting::significant_or_dash;
+use stylet_report::pages::formatting::significant_or_dash;
 use stylet_report::{percent, significant};
 use stylet_sweep::{Columns, DiskTrialTable, Summary, Sweep};
 

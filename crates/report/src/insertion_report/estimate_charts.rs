@@ -1,7 +1,7 @@
 //! The estimates while they are made: stiffness, friction, cumulative friction against the truth.
 
+use super::model::{Combination, LayerEstimate, RunReport, TrueLayer};
 use super::time_charts::{TIME, TIME_LABEL, layer_bands, unlabelled, with_events};
-use super::{Combination, LayerEstimate, RunReport, TrueLayer};
 use crate::chart_model::{Chart, LineStyle, Series, finite_extent};
 use crate::page_model::Section;
 use crate::palette::Colour;

@@ -1,9 +1,9 @@
 //! The numbers behind the plots, one group of columns per combination.
 
+use super::model::{Combination, LayerEstimate, RunReport, Score};
 use super::scorecard::{delay_status, error_status, millimetres, milliseconds};
-use super::{Combination, LayerEstimate, RunReport, Score};
-use crate::number_format::{percent, plus_minus, significant};
 use crate::page_model::{Cell, Section, Status, Table};
+use stylet_stats::number_format::{percent, plus_minus, significant};
 
 pub(super) fn section(report: &RunReport) -> Section {
     Section::new("Numbers")
@@ -103,7 +103,7 @@ fn detection_table(report: &RunReport) -> Table {
 struct Row {
     name: &'static str,
     scale: f64,
-    truth: fn(&super::TrueLayer) -> f64,
+    truth: fn(&super::model::TrueLayer) -> f64,
     estimate: fn(&LayerEstimate) -> Option<f64>,
     doubt: fn(&LayerEstimate) -> Option<f64>,
     offline: fn(&LayerEstimate) -> Option<f64>,

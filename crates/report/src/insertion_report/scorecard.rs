@@ -1,8 +1,8 @@
 //! The figures that are read first.
 
-use super::{Combination, LayerEstimate, RunReport, Score};
-use crate::number_format::{percent, significant};
-use crate::page_model::{Block, Cell, Scorecard, Section, Status, Table, Tile};
+use super::model::{Combination, LayerEstimate, RunReport, Score};
+use crate::page_model::{Cell, Section, Status, Table, Tile};
+use stylet_stats::number_format::{percent, significant};
 
 /// Relative errors up to 5 % are good, up to 15 % worth a look; the bounds of the enhancement error are its own.
 pub(super) fn error_status(error: f64) -> Status {
@@ -24,10 +24,12 @@ pub(super) fn millimetres(metres: f64) -> String {
 
 pub(super) fn section(report: &RunReport) -> Section {
     let mut section = Section::new("Score");
-    section.blocks.extend(report.notes_block());
+    if !report.notes.is_empty() {
+        section = section.warnings(report.notes.clone());
+    }
     let cards: Vec<Vec<Tile>> = report.combinations.iter().map(tiles).collect();
     if let [only] = cards.as_slice() {
-        return section.block(Block::Scorecard(Scorecard { title: String::new(), tiles: only.clone() }));
+        return section.tiles(only.clone());
     }
     section.table(comparison(report, &cards))
 }

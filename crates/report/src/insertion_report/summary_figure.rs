@@ -1,11 +1,11 @@
 //! The still picture of a run, for README pages and papers.
 
 use super::estimate_charts::stiffness_chart;
+use super::model::{Combination, RunReport};
 use super::time_charts::{force_chart, state_chart};
-use super::{Combination, RunReport};
 use crate::chart_model::Chart;
-use crate::number_format::{percent, significant};
 use crate::svg::{FigureOptions, figure};
+use stylet_stats::number_format::{percent, significant};
 
 impl RunReport {
     /// Force with all events, the states, and the stiffness, one above the other as SVG. An empty title or subtitle in

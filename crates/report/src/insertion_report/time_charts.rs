@@ -1,12 +1,12 @@
 //! Force, detection and motion over time, and force over depth.
 
-use super::{Combination, RunReport};
+use super::model::{Combination, RunReport};
 use crate::chart_model::{
     Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span, finite_extent,
 };
-use crate::number_format::significant;
 use crate::page_model::Section;
 use crate::palette::Colour;
+use stylet_stats::number_format::significant;
 
 /// Charts over time move together under this name.
 pub(super) const TIME: &str = "time";
@@ -106,7 +106,11 @@ pub(super) fn with_events(chart: Chart, report: &RunReport, labels: bool) -> Cha
     chart
 }
 
-fn detection_label(report: &RunReport, combination: &Combination, detection: &super::Detection) -> String {
+fn detection_label(
+    report: &RunReport,
+    combination: &Combination,
+    detection: &super::model::Detection,
+) -> String {
     let delay = combination.score.as_ref().and_then(|score| {
         let rupture = score.ruptures.iter().find(|r| Some(r.layer) == detection.matched_layer)?;
         rupture.delay_s

@@ -1,11 +1,12 @@
 //! Bars with intervals: rates, errors, times side by side.
 
-use super::FigureOptions;
+use super::axis::axis_ticks;
+use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
 use crate::chart_model::finite_extent;
-use crate::number_format::{axis_ticks, significant};
 use crate::palette::Colour;
 use serde::{Deserialize, Serialize};
+use stylet_stats::number_format::significant;
 
 /// One bar.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

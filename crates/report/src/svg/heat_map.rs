@@ -1,10 +1,10 @@
 //! A coloured matrix: confusion of causes, a score over two parameters.
 
-use super::FigureOptions;
+use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
 use crate::chart_model::finite_extent;
-use crate::number_format::significant;
 use serde::{Deserialize, Serialize};
+use stylet_stats::number_format::significant;
 
 /// A matrix with named rows and columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,10 +1,11 @@
 //! Charts stacked over one abscissa.
 
-use super::FigureOptions;
+use super::axis::axis_ticks;
+use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
 use crate::chart_model::{Chart, LineStyle, Scale, Series, Side, finite_extent};
-use crate::number_format::{axis_ticks, significant};
 use crate::palette::Colour;
+use stylet_stats::number_format::significant;
 
 const LEFT: f64 = 66.0;
 const RIGHT: f64 = 18.0;

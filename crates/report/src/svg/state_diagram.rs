@@ -1,6 +1,6 @@
 //! A state machine: boxes and labelled arrows, every box at a place that the caller gives.
 
-use super::FigureOptions;
+use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
 use serde::{Deserialize, Serialize};
 

@@ -1,12 +1,13 @@
 //! Strips: all values of several groups side by side, with median, 5th to 95th percentile and the value
 //! that would be right.
 
-use super::FigureOptions;
+use super::axis::axis_ticks;
+use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas};
 use crate::chart_model::finite_extent;
-use crate::number_format::{axis_ticks, significant};
 use crate::palette::Colour;
 use serde::{Deserialize, Serialize};
+use stylet_stats::number_format::significant;
 
 /// The values of one strip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,8 +1,8 @@
 //! The pen: elements with rounded coordinates and colours by class, so that one file serves light and dark.
 
-use super::{FigureOptions, Theme};
+use super::axis::svg_coordinate;
+use super::figure_options::{FigureOptions, Theme};
 use crate::escaping;
-use crate::number_format::svg_coordinate;
 use crate::palette::Colour;
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! The page of `stylet compare`.
 
-use crate::formatting::significant_or_dash;
-use stylet_report::{Cell, Page, Section, Status, Table};
+use crate::page_model::{Cell, Page, Section, Status, Table};
+use crate::pages::formatting::significant_or_dash;
 use stylet_sweep::algorithm_comparison::ComparisonRow;
 
 fn percent(x: f64) -> String {

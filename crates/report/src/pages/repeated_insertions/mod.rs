@@ -8,7 +8,8 @@ mod recording_variation;
 
 pub use fitted_law::ablation_figure;
 
-use crate::formatting::{data_quality_table, three_decimals};
+use crate::page_model::{Page, Section, Status, Tile};
+use crate::pages::formatting::{data_quality_table, three_decimals};
 use fitted_law::{causes, extended_law};
 use held_out_prediction::{held_out_predictions, residual_charts};
 use recording_variation::{between_recordings, measurement_chain};
@@ -16,7 +17,6 @@ use stylet_diagnose::diagnosis_json::Verdict;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
-use stylet_report::{Page, Section, Status, Tile};
 use stylet_score::MeasuredScore;
 
 /// The page of a study of the data set `set`, which was read from `file`, with what the online core heard in its runs; `commands`

@@ -1,12 +1,12 @@
 //! The page of a prediction.
 
-use crate::formatting::{or_dash, significant_or_dash};
+use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Series, Side};
+use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
+use crate::pages::formatting::{or_dash, significant_or_dash};
+use crate::palette::Colour;
 use stylet_diagnose::prediction::{Prediction, PredictionCurves, PredictionResult, RecordingPrediction};
-use stylet_report::{
-    Cell, Chart, Colour, Level, LineStyle, MarkerSet, Page, Section, Series, Side, Status, Table, Tile,
-    significant,
-};
 use stylet_scenario::Scenario;
+use stylet_stats::number_format::significant;
 
 /// Recordings that are drawn.
 const DRAWN: usize = 12;

@@ -1,7 +1,7 @@
 //! The online core on repeated insertions, in words and as a table.
 
+use crate::page_model::{Cell, Section, Table};
 use std::fmt::Write as _;
-use stylet_report::{Cell, Section, Table};
 use stylet_score::{MeasuredScore, ModelFrictionScore};
 
 fn sums(all: &[MeasuredScore]) -> [usize; 5] {

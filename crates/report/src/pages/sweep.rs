@@ -1,9 +1,12 @@
 //! The page of a sweep: the summary, and the robustness map as a picture.
 
-use crate::formatting::significant_or_dash;
-use stylet_report::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
-use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, percent, significant};
+use crate::chart_model::{Chart, Series};
+use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
+use crate::pages::formatting::significant_or_dash;
+use crate::palette::Colour;
+use crate::svg::{Bar, BarChart, FigureOptions, HeatMap, bar_chart, heat_map};
 use stylet_stats::Interval;
+use stylet_stats::number_format::{percent, significant};
 use stylet_sweep::{
     BIN_COUNT, Columns, FailureMapRow, FailureRateBin, OutcomeSensitivity, Summary, Sweep, TrialTable,
     failure_rate_bins, score_value,
@@ -203,7 +206,7 @@ fn against<T: TrialTable + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -
         let mut chart = Chart::new("Enhancement error", first.clone(), "relative error")
             .caption("Enhanced force against the true tip force, one point per trial, at most 2000.")
             .with_series(Series::points("trials", Colour::Blue, x, y).width(2.0));
-        chart.scale = stylet_report::Scale::Log;
+        chart.scale = crate::chart_model::Scale::Log;
         section = section.chart(chart);
     }
     Ok(section)

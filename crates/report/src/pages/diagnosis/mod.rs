@@ -7,7 +7,8 @@ mod summary_sentence;
 
 pub use summary_sentence::{recording_differences, summary_sentence};
 
-use crate::formatting::data_quality_table;
+use crate::page_model::{Page, Section, Status, Tile};
+use crate::pages::formatting::data_quality_table;
 use causes_tables::{base_parameters, causes, negligible_effects, not_identifiable};
 use effect_search_steps::search_steps;
 use residual_charts::{assumptions, base_law_residual, before_and_after, remaining_structure};
@@ -15,8 +16,8 @@ use std::fmt::Write as _;
 use stylet_diagnose::DiagnosisResult;
 use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
 use stylet_diagnose::report_curves::recording_curves;
-use stylet_report::{Page, Section, Status, Tile, p_value, significant};
 use stylet_scenario::Scenario;
+use stylet_stats::number_format::{p_value, significant};
 
 /// The page of a diagnosis of `scenario`, which was read from `file`; `command` repeats it.
 #[must_use]
@@ -44,10 +45,6 @@ pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Diagnos
         .section(repeat(command, examined))
 }
 
-fn number(x: f64) -> String {
-    significant(x, 4)
-}
-
 fn verdict(d: &Diagnosis) -> Section {
     let word = match d.verdict {
         Verdict::None => "none",
@@ -60,7 +57,7 @@ fn verdict(d: &Diagnosis) -> Section {
         let parameters = c
             .parameters
             .iter()
-            .map(|(p, e)| format!("{p} = {}", number(e.value)))
+            .map(|(p, e)| format!("{p} = {}", significant(e.value, 4)))
             .collect::<Vec<_>>()
             .join(", ");
         let mut detail = format!("{parameters}; confidence {}", significant(c.confidence, 2));

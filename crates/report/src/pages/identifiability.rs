@@ -1,10 +1,11 @@
 //! The page of what an experiment can show.
 
-use crate::formatting::{effect_label, strength_parameters};
+use crate::page_model::{Cell, Page, Section, Status, Table};
+use crate::pages::formatting::{effect_label, strength_parameters};
+use crate::svg::{FigureOptions, HeatMap, heat_map};
 use stylet_plan::identifiability::Identifiability;
-use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
-use stylet_report::{Cell, Page, Section, Status, Table, significant};
 use stylet_scenario::Scenario;
+use stylet_stats::number_format::significant;
 
 /// The matrix of what an experiment can tell apart.
 #[must_use]

@@ -1,8 +1,10 @@
 //! Which effects were tried, and what each would have gained.
 
+use crate::page_model::Section;
+use crate::palette::Colour;
+use crate::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
 use stylet_diagnose::diagnosis_json::Diagnosis;
-use stylet_report::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
-use stylet_report::{Colour, Section, significant};
+use stylet_stats::number_format::significant;
 
 pub(super) fn search_steps(d: &Diagnosis) -> Section {
     let mut section = Section::new("Evidence").text(

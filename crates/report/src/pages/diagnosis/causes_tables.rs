@@ -1,11 +1,11 @@
 //! What the simulation lacks, which numbers moved, what is no cause, what cannot be seen.
 
-use super::number;
-use crate::formatting::BASE_LAW_EQUATIONS;
+use crate::page_model::{Cell, Section, Status, Table};
+use crate::pages::formatting::BASE_LAW_EQUATIONS;
 use std::fmt::Write as _;
 use stylet_diagnose::diagnosis_json::{BaseParameter, Diagnosis, Verdict};
-use stylet_report::{Cell, Section, Status, Table, significant};
 use stylet_scenario::Scenario;
+use stylet_stats::number_format::significant;
 
 /// What the simulation lacks, with the extended law in the notation of SPEC section 1.
 pub(super) fn causes(d: &Diagnosis) -> Section {
@@ -169,4 +169,8 @@ pub(super) fn not_identifiable(d: &Diagnosis) -> Section {
         &["effect", "equation", "how it would show"],
         rows,
     ))
+}
+
+fn number(x: f64) -> String {
+    significant(x, 4)
 }

@@ -1,8 +1,9 @@
 //! Words and numbers that several pages and the terminal share.
 
+use crate::page_model::{Cell, Table};
 use std::collections::BTreeMap;
 use stylet_diagnose::diagnosis_json::DataQualityNote;
-use stylet_report::{Cell, Table, significant};
+use stylet_stats::number_format::significant;
 
 /// The base law in the notation of SPEC section 1.
 pub(crate) const BASE_LAW_EQUATIONS: &str = "f   = f_K + f_B            until layer a = r + 1 ruptures: f_K >= F_a, or z >= s_a + d_a\nf_K = K_a max(0, z - s_a)\nf_B = v sum_i b_i l_i,      l_i = clamp(z - s_i, 0, d_i)\n";

@@ -1,10 +1,12 @@
 //! The law of repeated insertions: its causes, what each buys, its equation and numbers.
 
-use crate::formatting::BASE_LAW_EQUATIONS;
+use crate::page_model::{Cell, Section, Table};
+use crate::pages::formatting::BASE_LAW_EQUATIONS;
+use crate::palette::Colour;
+use crate::svg::{Bar, BarChart, FigureOptions, bar_chart};
 use std::fmt::Write as _;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
-use stylet_report::svg::{Bar, BarChart, FigureOptions, bar_chart};
-use stylet_report::{Cell, Colour, Section, Table, significant};
+use stylet_stats::number_format::significant;
 
 fn bars(study: &SetDiagnosis) -> Vec<Bar> {
     let bar = |name: String, value: f64, colour| Bar { name, value, interval: None, colour };

@@ -1,10 +1,12 @@
 //! The page of many specimens, each indented once and held.
 
+use crate::page_model::{Cell, Page, Section, Table, Tile};
+use crate::palette::Colour;
+use crate::svg::{Bar, BarChart, FigureOptions, bar_chart};
 use stylet_diagnose::Diagnosis;
 use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::indentation_relaxation::SpecimenReport;
-use stylet_report::svg::{Bar, BarChart, FigureOptions, bar_chart};
-use stylet_report::{Cell, Colour, Page, Section, Table, Tile, significant};
+use stylet_stats::number_format::significant;
 
 /// The page of the specimens of the data set `set`, which was read from `file`.
 #[must_use]

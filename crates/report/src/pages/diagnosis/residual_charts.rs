@@ -1,17 +1,17 @@
 //! Residuals: what the base law leaves, what the extended model leaves, before and after.
 
-use super::recording_differences;
+use super::summary_sentence::recording_differences;
+use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Scale, Series, Side};
+use crate::page_model::{Cell, Section, Status, Table};
+use crate::palette::Colour;
 use stylet_diagnose::DiagnosisResult;
 use stylet_diagnose::diagnosis_json::Diagnosis;
 use stylet_diagnose::report_curves::{
     RecordingCurves, binned_means, correlations, reported_fit, rms_by_layer_and_phase,
 };
 use stylet_diagnose::tone_detection::residual_spectrum;
-use stylet_report::{
-    Cell, Chart, Colour, Level, LineStyle, MarkerSet, Scale, Section, Series, Side, Status, Table, p_value,
-    significant,
-};
 use stylet_scenario::Scenario;
+use stylet_stats::number_format::{p_value, significant};
 use stylet_tissue::Slab;
 
 /// What was believed, and what of it the measured force contradicts: the recording that the base law predicts worst.

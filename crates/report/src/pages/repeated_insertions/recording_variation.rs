@@ -1,8 +1,8 @@
 //! What varies from run to run, and what the instrument does by itself.
 
-use crate::formatting::three_decimals;
+use crate::page_model::{Cell, Section, Table};
+use crate::pages::formatting::three_decimals;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
-use stylet_report::{Cell, Section, Table};
 
 pub(super) fn between_recordings(study: &SetDiagnosis) -> Section {
     let r = &study.report;

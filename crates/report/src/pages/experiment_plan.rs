@@ -1,10 +1,13 @@
 //! The page of a plan.
 
-use crate::formatting::effect_label;
+use crate::chart_model::{Chart, Series};
+use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
+use crate::pages::formatting::effect_label;
+use crate::palette::Colour;
 use std::fmt::Write as _;
 use stylet_plan::{InformationState, Plan};
-use stylet_report::{Cell, Chart, Colour, Page, Section, Series, Status, Table, Tile, significant};
 use stylet_scenario::{Motion, Scenario, Segment};
+use stylet_stats::number_format::significant;
 
 /// Candidates whose forces are drawn.
 const DRAWN: usize = 7;

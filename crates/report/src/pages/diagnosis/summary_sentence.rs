@@ -2,7 +2,7 @@
 
 use stylet_diagnose::diagnosis_json::{Cause, Diagnosis, Verdict};
 use stylet_record::QualityKind;
-use stylet_report::significant;
+use stylet_stats::number_format::significant;
 
 /// The verdict in a sentence, and which recordings should be looked at before it is believed.
 #[must_use]

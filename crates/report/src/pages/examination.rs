@@ -1,10 +1,10 @@
 //! The page of an examination: a map of where the engine fails, and the table.
 
+use crate::page_model::{Cell, Page, Section, Status, Table};
+use crate::svg::{FigureOptions, HeatMap, heat_map};
 use std::collections::BTreeSet;
 use stylet_examine::table::Cell as Row;
 use stylet_examine::{Grade, Hide, Plan, Wrong};
-use stylet_report::svg::{FigureOptions, HeatMap, heat_map};
-use stylet_report::{Cell, Page, Section, Status, Table};
 
 /// Columns of a map: nothing wrong, then the grades.
 const COLUMNS: [&str; 4] = ["none", "small", "medium", "large"];

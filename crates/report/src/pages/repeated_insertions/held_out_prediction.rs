@@ -1,10 +1,13 @@
 //! Each run predicted by laws fitted to the others, and what that leaves.
 
-use crate::formatting::three_decimals;
+use crate::chart_model::{Chart, Level, LineStyle, Series};
+use crate::page_model::{Cell, Section, Table};
+use crate::pages::formatting::three_decimals;
+use crate::palette::Colour;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::diagnose_set::{SetDiagnosis, mean_speeds};
 use stylet_diagnose::report_curves::binned_means;
-use stylet_report::{Cell, Chart, Colour, Level, LineStyle, Section, Series, Table, p_value};
+use stylet_stats::number_format::p_value;
 
 pub(super) fn held_out_predictions(runs: &[&SegmentedRecording], study: &SetDiagnosis) -> Section {
     let r = &study.report;

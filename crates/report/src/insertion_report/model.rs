@@ -1,0 +1,272 @@
+//! The columns and numbers of one insertion, as the report needs them.
+
+use crate::chart_model::Series;
+use serde::{Deserialize, Serialize};
+
+/// Where the numbers come from, so that they can be had again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// File name of the scenario or configuration.
+    pub scenario_file: String,
+    /// The resolved scenario, every default written out (RON).
+    pub scenario_text: String,
+    /// Command that repeats the run.
+    pub command: String,
+    /// Seed of the random numbers; `None` for measured data.
+    pub seed: Option<u64>,
+    /// Version of Stylet.
+    pub version: String,
+    /// Hash of the results.
+    pub hash: String,
+}
+
+/// A measured force: one per sensor.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ForceTrace {
+    /// Name of the sensor, such as `force_torque`.
+    pub sensor: String,
+    /// Axial force, positive against the insertion.
+    pub force_n: Vec<f64>,
+}
+
+/// A layer as it truly is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrueLayer {
+    /// Name.
+    pub name: String,
+    /// Depth of the front face.
+    pub front_m: f64,
+    /// Thickness.
+    pub thickness_m: f64,
+    /// Stiffness `K`.
+    pub stiffness_n_per_m: f64,
+    /// Friction `b` per metre of needle inside.
+    pub friction_ns_per_m2: f64,
+    /// When the tip entered it (contact, or the rupture before it); `None` if never.
+    pub entered_s: Option<f64>,
+    /// When it ruptured; `None` if never.
+    pub ruptured_s: Option<f64>,
+}
+
+/// A rupture as it truly happened.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrueRupture {
+    /// Layer, counted from 1.
+    pub layer: usize,
+    /// Instant, interpolated between samples.
+    pub time_s: f64,
+    /// Depth of the tip.
+    pub depth_m: f64,
+    /// Why: `far face`, `puncture force`.
+    pub cause: String,
+}
+
+/// What only a simulation knows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// Tip force `f - D v` with the true `D`, per sample.
+    pub tip_force_n: Vec<f64>,
+    /// True cumulative friction `D` of the ruptured layers, per sample; may be empty.
+    pub cumulative_friction_ns_per_m: Vec<f64>,
+    /// Layers, front to back.
+    pub layers: Vec<TrueLayer>,
+    /// Ruptures in order of time.
+    pub ruptures: Vec<TrueRupture>,
+}
+
+/// A detected rupture.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Detection {
+    /// Instant of the detection.
+    pub time_s: f64,
+    /// Position of the tip then.
+    pub depth_m: f64,
+    /// What raised it: `CUSUM`, `force derivative`.
+    pub trigger: String,
+    /// Layer (from 1) of the true rupture it was matched to; `None` when false or when there is no truth.
+    pub matched_layer: Option<usize>,
+}
+
+/// A stay of the detection's state machine in one state.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StateSpan {
+    /// `NoRupture`, `ExpectedRupture`, `DetectedRupture`, `ForceDropMeasuring`, `ForceCompensation`; others are drawn too.
+    pub state: String,
+    /// Begin.
+    pub from_s: f64,
+    /// End.
+    pub to_s: f64,
+}
+
+/// What the algorithm says about one layer in the end. Relative errors are `(estimate - truth) / truth`, as scored.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LayerEstimate {
+    /// Layer, counted from 1.
+    pub layer: usize,
+    /// When the re-weighted estimate was ready (end of force-drop measuring, or end of the data); shown when the layer's
+    /// own span is not known from contact and detections.
+    pub time_s: f64,
+    /// Re-weighted stiffness.
+    pub stiffness_n_per_m: Option<f64>,
+    /// Half its 95 % interval, where the algorithm tells.
+    #[serde(default)]
+    pub stiffness_half_width: Option<f64>,
+    /// Its relative error.
+    pub stiffness_error: Option<f64>,
+    /// Re-weighted friction per metre of needle (ML model).
+    pub friction_ns_per_m2: Option<f64>,
+    /// Re-weighted friction of the whole layer (KV model).
+    pub friction_ns_per_m: Option<f64>,
+    /// Half the 95 % interval of the friction, where the algorithm tells.
+    #[serde(default)]
+    pub friction_half_width: Option<f64>,
+    /// Relative error of the friction.
+    pub friction_error: Option<f64>,
+    /// Estimated thickness.
+    pub thickness_m: Option<f64>,
+    /// Its relative error.
+    pub thickness_error: Option<f64>,
+    /// Stiffness from the offline least-squares fit over the whole layer.
+    pub offline_stiffness_n_per_m: Option<f64>,
+    /// Friction per metre of needle from the offline fit (ML model).
+    pub offline_friction_ns_per_m2: Option<f64>,
+    /// Friction of the whole layer from the offline fit (KV model).
+    pub offline_friction_ns_per_m: Option<f64>,
+}
+
+/// A true rupture and what became of it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RuptureScore {
+    /// Layer, counted from 1.
+    pub layer: usize,
+    /// Detection minus truth; `None` when missed.
+    pub delay_s: Option<f64>,
+    /// Travel between the two.
+    pub delay_m: Option<f64>,
+    /// Instant of the matched detection.
+    pub detected_s: Option<f64>,
+    /// What raised it.
+    pub trigger: String,
+}
+
+/// The score of a combination against the truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// One per true rupture, in the order of [`Truth::ruptures`].
+    pub ruptures: Vec<RuptureScore>,
+    /// True ruptures without a detection.
+    pub missed: usize,
+    /// Detections without a true rupture.
+    pub false_detections: usize,
+    /// Median delay over the found ruptures.
+    pub median_delay_s: Option<f64>,
+    /// The same in travel.
+    pub median_delay_m: Option<f64>,
+    /// True cumulative friction `D` at the end of the advance.
+    pub true_cumulative_friction_ns_per_m: Option<f64>,
+    /// Estimated `D` then.
+    pub cumulative_friction_ns_per_m: Option<f64>,
+    /// Its relative error.
+    pub cumulative_friction_error: Option<f64>,
+    /// RMS of the enhanced force's error over RMS of the tip force.
+    pub enhancement_rms_relative: Option<f64>,
+    /// After the tip left the last layer: RMS of the enhanced over RMS of the measured force.
+    pub after_exit_relative: Option<f64>,
+}
+
+/// What one combination of algorithm, model and sensor made of the data.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Combination {
+    /// Name, such as `paper/ml/force_torque`.
+    pub name: String,
+    /// Sensor it listened to (see [`ForceTrace::sensor`]).
+    pub sensor: String,
+    /// Instant of the first contact, as known or found.
+    pub contact_s: Option<f64>,
+    /// Reconstructed force: regressor times estimates plus `D v`.
+    pub reconstructed_force_n: Vec<f64>,
+    /// Enhanced force `f - D v`.
+    pub enhanced_force_n: Vec<f64>,
+    /// Where the tip's force lies with 95 % probability; not numbers where the algorithm does not tell.
+    #[serde(default)]
+    pub tip_force_low_n: Vec<f64>,
+    /// See `low_n`.
+    #[serde(default)]
+    pub tip_force_high_n: Vec<f64>,
+    /// Online stiffness.
+    pub stiffness_n_per_m: Vec<f64>,
+    /// Online friction per metre of needle (ML model); empty for KV.
+    pub friction_ns_per_m2: Vec<f64>,
+    /// Online friction of the layer (KV model); empty for ML.
+    pub friction_ns_per_m: Vec<f64>,
+    /// Online cumulative friction `D`.
+    pub cumulative_friction_ns_per_m: Vec<f64>,
+    /// CUSUM statistic `g`.
+    pub cusum_n2: Vec<f64>,
+    /// Its alarm threshold.
+    pub cusum_threshold_n2: Option<f64>,
+    /// The statistic is a share of its threshold, without a unit.
+    #[serde(default)]
+    pub cusum_is_normalised: bool,
+    /// Filtered force derivative.
+    pub force_derivative_n_per_s: Vec<f64>,
+    /// Derivative threshold that expects a rupture.
+    pub derivative_on_n_per_s: Option<f64>,
+    /// Derivative threshold of the trailing edge.
+    pub derivative_off_n_per_s: Option<f64>,
+    /// States of the detection, without gaps.
+    pub states: Vec<StateSpan>,
+    /// Detected ruptures.
+    pub detections: Vec<Detection>,
+    /// Instants at which `D` was raised.
+    pub compensations_s: Vec<f64>,
+    /// Final estimate per layer.
+    pub layers: Vec<LayerEstimate>,
+    /// RMS of the reconstruction error.
+    pub reconstruction_rms_n: Option<f64>,
+    /// Score; `None` without truth.
+    pub score: Option<Score>,
+}
+
+/// Everything shown about one insertion.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunReport {
+    /// Title: the scenario's name.
+    pub title: String,
+    /// The scenario's source: paper and figure.
+    pub source: String,
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// Remarks to be read first: warnings about the data, repairs.
+    pub notes: Vec<String>,
+    /// Sample instants, increasing.
+    pub time_s: Vec<f64>,
+    /// Tip position, positive into the tissue.
+    pub position_m: Vec<f64>,
+    /// Its velocity.
+    pub velocity_mps: Vec<f64>,
+    /// Measured force of every sensor.
+    pub forces: Vec<ForceTrace>,
+    /// Ground truth; `None` for measured data.
+    pub truth: Option<Truth>,
+    /// One or more evaluations of the same data.
+    pub combinations: Vec<Combination>,
+}
+
+impl RunReport {
+    /// Name of a combination where there is more than one to tell apart.
+    pub(super) fn label(&self, combination: &Combination, what: &str) -> String {
+        if self.combinations.len() > 1 { format!("{what} · {}", combination.name) } else { what.to_owned() }
+    }
+
+    /// The curve of the `index`-th combination, wider the more curves will be drawn over it: equal curves show as edges.
+    pub(super) fn visible_below(&self, series: Series, index: usize) -> Series {
+        let above = self.combinations.len().saturating_sub(index + 1);
+        let width_px = series.width_px + 1.6 * above as f64;
+        series.width(width_px)
+    }
+
+    pub(super) fn end_s(&self) -> f64 {
+        self.time_s.last().copied().unwrap_or_default()
+    }
+}

@@ -1,0 +1,15 @@
+//! The pages of results: diagnosis, prediction, plan, identifiability, comparison, examination, sweep.
+//!
+//! One module per page. Each has a function `page` of the results; most have a `summary_sentence` that the terminal prints too. The
+//! pages show what the result files hold and compute nothing else.
+
+pub mod algorithm_comparison;
+pub mod diagnosis;
+pub mod examination;
+pub mod experiment_plan;
+pub mod formatting;
+pub mod identifiability;
+pub mod indented_specimens;
+pub mod prediction;
+pub mod repeated_insertions;
+pub mod sweep;
