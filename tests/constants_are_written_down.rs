@@ -63,7 +63,7 @@ fn in_sources(root: &Path) -> Constants {
         sources(&root.join("crates").join(room).join("src"), &mut all);
         for path in all {
             // What tests share is no part of the engine.
-            if path.ends_with("tests.rs") || path.ends_with("made.rs") {
+            if path.ends_with("tests.rs") || path.ends_with("test_fixtures.rs") {
                 continue;
             }
             let place = path.strip_prefix(root.join("crates")).expect("a room").display().to_string();

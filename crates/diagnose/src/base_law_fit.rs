@@ -1,4 +1,4 @@
-//! The base law fitted: drops of the force given to layers, numbers and instants in turn.
+//! Fit of the base law: force drops are assigned to layers, then parameters and rupture times are fitted in turn.
 
 use crate::random_effect_selection::select_random_effects;
 use rayon::prelude::*;
@@ -12,28 +12,28 @@ use stylet_identify::noise::{Noise, NoiseSource};
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::update_event_times::update_event_times;
 
-/// Recordings made ready, with the drops of their forces.
+/// Recordings in blocks, with the detected drops of their forces.
 #[derive(Clone, Debug)]
 pub struct PreparedRecordings {
-    /// What is believed.
+    /// Assumed tissue with its tolerances.
     pub assumed: Arc<Assumptions>,
-    /// The recordings.
+    /// Blocks of each recording.
     pub blocks: Arc<Vec<BlockAverages>>,
-    /// Drops per recording.
+    /// Force drops of each recording.
     pub drops: Vec<Vec<ForceDrop>>,
-    /// The noise is nowhere less, in N.
+    /// Lower bound of the noise standard deviation, in N.
     pub min_noise_sd_n: f64,
 }
 
 impl PreparedRecordings {
-    /// Finds the drops.
+    /// Detects the force drops.
     #[must_use]
-    pub fn new(belief: Arc<Assumptions>, blocks: Vec<BlockAverages>, floor_n: f64) -> Self {
+    pub fn new(assumed: Arc<Assumptions>, blocks: Vec<BlockAverages>, min_noise_sd_n: f64) -> Self {
         let drops = blocks.par_iter().map(detect_force_drops).collect();
-        Self { assumed: belief, blocks: Arc::new(blocks), drops, min_noise_sd_n: floor_n }
+        Self { assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n }
     }
 
-    /// Instants (s) of the drops.
+    /// Times (s) of the drops of each recording.
     #[must_use]
     pub fn drop_times(&self) -> Vec<Vec<f64>> {
         self.drops.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect()
@@ -46,119 +46,134 @@ impl PreparedRecordings {
     }
 }
 
-/// The first fits see misfits of this share of the largest force as noise: no detail traps them.
-const FIRST_SHARE: f64 = 0.03;
+/// Noise of the first fit as a share of the largest force: large enough that details cannot trap it.
+const FIRST_NOISE_SHARE: f64 = 0.03;
 
-/// What leaves so many times the noise of its calm stretches is no fit.
+/// A fit whose residual exceeds the noise of its calm parts by this factor has unexplained structure.
 pub(crate) const MISFIT_FACTOR: f64 = 1.2;
-/// Blocks of the search are averaged by so many to rank starts.
+/// Blocks averaged into one to rank start values.
 pub(crate) const COARSENING_FACTOR: usize = 3;
-/// The base law is begun anew where a sketch leaves less than this share of the nats.
-const APART: f64 = 0.5;
+/// The base law is refitted with random effects where a coarse refit leaves less than this share of the objective.
+const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 
-/// Standard deviation in N of blocks about their neighbours.
+/// Effort of coarse fits and of the first rounds of a full one.
+const COARSE_EFFORT: Effort = Effort { max_iterations: 5, min_gain_nats: 0.3 };
+
+/// A model with its rupture times updated to the data; `times` are the force drops (s) of each recording.
+pub(crate) fn with_updated_times(mut model: Model, data: &FitData, times: &[Vec<f64>]) -> Model {
+    update_event_times(&mut model, data, times);
+    model
+}
+
+/// The data with the noise estimated from the residual of a model.
+pub(crate) fn with_noise_of(model: &Model, data: &FitData) -> Option<FitData> {
+    Some(data.with_estimated_noise(&residuals(model, data)?.residual_n, NoiseSource::Detrended))
+}
+
+/// Standard deviation in N of the blocks about their neighbours.
 pub(crate) fn roughness(blocks: &[BlockAverages]) -> f64 {
     stylet_stats::third_difference_sd(blocks.iter().map(|b| b.force_n.as_slice())).max(1e-6)
 }
 
-/// Which numbers each recording has of its own: its surface, its friction.
+/// Whether each recording has its own surface position and its own friction factor.
 pub(crate) type RandomEffects = (bool, bool);
 
-/// Those of a model.
+/// Random effects that are free in a model.
 pub(crate) fn random_effects_of(model: &Model) -> RandomEffects {
     (model.free.recording_surface, model.free.recording_friction)
 }
 
-/// Fits the base law; returns it with the noise by which it is judged. `None` when it cannot be replayed.
+/// Fits the base law; returns the fit and the data with the noise estimated from it. `None` when the model cannot be
+/// replayed.
 #[must_use]
 pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
-    from_belief(prepared, &[], (false, false))
+    fit_from_prior(prepared, &[], (false, false))
 }
 
-/// The law with effects, begun anew from what is believed: drops are given to layers by the law that makes them. Where an effect makes
-/// drops of its own, or steps at faces, the base law alone has taken them for ruptures and moved its faces, and nothing that begins there
-/// finds back.
+/// Fits a model with effects from the prior, so that drops are assigned to layers by the model that produces them.
+///
+/// An effect that produces drops of its own, or steps at layer boundaries, makes the base law mistake these for
+/// ruptures and move its layers; a fit that starts from there stays in that local optimum.
 #[must_use]
 pub fn refit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
-    own: RandomEffects,
+    random_effects: RandomEffects,
     data: &FitData,
 ) -> Option<Fit> {
-    let (found, used) = from_belief(prepared, effects, own)?;
+    let (found, used) = fit_from_prior(prepared, effects, random_effects)?;
     data.count_replayed(used.blocks_replayed());
-    let mut model = found.model;
-    update_event_times(&mut model, data, &prepared.drop_times());
-    fit(&model, data, Effort::FULL)
+    fit(&with_updated_times(found.model, data, &prepared.drop_times()), data, Effort::FULL)
 }
 
-/// The same in short, on blocks averaged further (`coarse`): enough to tell whether an effect is worth beginning anew.
+/// Short version of [`refit_from_prior`] on coarser blocks (`coarse`), to decide whether a full refit can help.
 #[must_use]
 pub fn coarse_refit(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
-    own: RandomEffects,
+    random_effects: RandomEffects,
     coarse: &FitData,
 ) -> Option<Fit> {
-    let less = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
-    let (found, used) = given(&less, effects, own)?;
+    let averaged = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
+    let (found, used) = fit_with_assigned_drops(&averaged, effects, random_effects)?;
     coarse.count_replayed(used.blocks_replayed());
     let mut model = found.model;
-    if own != (false, false) {
-        // Beside numbers that are not each recording's own yet, ruptures would go far to make up for them.
-        model = fit(&model, coarse, Effort { max_iterations: 5, min_gain_nats: 0.3 })?.model;
+    if random_effects != (false, false) {
+        // Without fitted random effects the rupture times would move far to compensate for them.
+        model = fit(&model, coarse, COARSE_EFFORT)?.model;
     }
-    update_event_times(&mut model, coarse, &prepared.drop_times());
-    fit(&model, coarse, Effort { max_iterations: 5, min_gain_nats: 0.3 })
+    fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
 }
 
-/// The base law begun anew with a surface and a friction of each recording's own, where that leaves so much less that its ruptures must
-/// have been taken for what differs between the recordings.
+/// Refits the base law with a surface position and a friction factor per recording, where that reduces the objective so
+/// much that the first fit must have mistaken differences between recordings for ruptures.
 #[must_use]
-pub fn refit_with_random_effects(prepared: &PreparedRecordings, found: Fit, data: FitData) -> (Fit, FitData) {
-    let better = || {
-        let calm = data.with_estimated_noise(&found.residuals.residual_n, NoiseSource::Detrended);
-        if data.recording_count() < 2 || found.rms_n(&data) < MISFIT_FACTOR * calm.noise.sd_n() {
+pub fn refit_with_random_effects(
+    prepared: &PreparedRecordings,
+    base_fit: Fit,
+    data: FitData,
+) -> (Fit, FitData) {
+    let refitted = || {
+        let calm_data = data.with_estimated_noise(&base_fit.residuals.residual_n, NoiseSource::Detrended);
+        if data.recording_count() < 2 || base_fit.rms_n(&data) < MISFIT_FACTOR * calm_data.noise.sd_n() {
             return None;
         }
         let coarse = data
             .with_recordings(data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
-        let coarse = coarse
-            .with_estimated_noise(&residuals(&found.model, &coarse)?.residual_n, NoiseSource::Detrended);
-        let stood = residuals(&found.model, &coarse)?.nats;
-        let sketch = coarse_refit(prepared, &[], (true, true), &coarse)?;
-        if sketch.nats() > APART * stood {
+        let coarse = with_noise_of(&base_fit.model, &coarse)?;
+        let current = residuals(&base_fit.model, &coarse)?.nats;
+        let coarse_fit = coarse_refit(prepared, &[], (true, true), &coarse)?;
+        if coarse_fit.nats() > MAX_OBJECTIVE_SHARE * current {
             return None;
         }
-        let mut model = sketch.model;
-        update_event_times(&mut model, &calm, &prepared.drop_times());
-        let whole = fit(&model, &calm, Effort::FULL)?;
-        let data = calm.with_estimated_noise(&whole.residuals.residual_n, NoiseSource::Detrended);
-        let (better, data) =
-            select_random_effects(fit_from_zero_scatter(&whole.model, &data, Effort::FULL)?, data);
-        (better.nats() < residuals(&found.model, &data)?.nats).then_some((better, data))
+        let model = with_updated_times(coarse_fit.model, &calm_data, &prepared.drop_times());
+        let full = fit(&model, &calm_data, Effort::FULL)?;
+        let data = calm_data.with_estimated_noise(&full.residuals.residual_n, NoiseSource::Detrended);
+        let (refitted, data) =
+            select_random_effects(fit_from_zero_scatter(&full.model, &data, Effort::FULL)?, data);
+        (refitted.nats() < residuals(&base_fit.model, &data)?.nats).then_some((refitted, data))
     };
-    better().unwrap_or((found, data))
+    refitted().unwrap_or((base_fit, data))
 }
 
-/// Drops given to layers and numbers fitted, in turn, seen from afar.
-fn given(
+/// Drops assigned to layers and parameters fitted, in turn, under a wide noise.
+fn fit_with_assigned_drops(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
-    own: RandomEffects,
+    random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
     let rough_n = roughness(&prepared.blocks);
-    let wide = Noise::white(rough_n.max(FIRST_SHARE * prepared.largest_force_n()));
-    let data = FitData::new(Arc::clone(&prepared.blocks), wide, prepared.min_noise_sd_n);
+    let wide_noise = Noise::white(rough_n.max(FIRST_NOISE_SHARE * prepared.largest_force_n()));
+    let data = FitData::new(Arc::clone(&prepared.blocks), wide_noise, prepared.min_noise_sd_n);
     let mut start = Model::base(Arc::clone(&prepared.assumed), prepared.blocks.len());
     start.free.wide_thickness = true;
-    (start.free.recording_surface, start.free.recording_friction) = own;
+    (start.free.recording_surface, start.free.recording_friction) = random_effects;
     let model = effects.iter().fold(start, |m, choice| m.with_effect(choice.clone()));
     let mut best: Option<Fit> = None;
-    for trust in [1.0, 0.5] {
+    for strictness in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model);
-        let instants = assign_ruptures(from, &prepared.blocks, &prepared.drops, trust, rough_n);
-        let next = Model { rupture_times_s: instants, ..from.clone() };
+        let rupture_times_s = assign_ruptures(from, &prepared.blocks, &prepared.drops, strictness, rough_n);
+        let next = Model { rupture_times_s, ..from.clone() };
         if let Some(new) = fit(&next, &data, Effort { max_iterations: 4, min_gain_nats: 0.3 })
             && best.as_ref().is_none_or(|b| new.nats() < b.nats())
         {
@@ -168,25 +183,22 @@ fn given(
     Some((best?, data))
 }
 
-fn from_belief(
+/// Fit from the prior: assigned drops, then rounds of noise, rupture times and parameters.
+fn fit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
-    own: RandomEffects,
+    random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
-    let (mut best, mut data) = given(prepared, effects, own)?;
+    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, random_effects)?;
     let times = prepared.drop_times();
     for round in 0..3 {
         data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
         let mut model = best.model.clone();
-        if round == 0 && own != (false, false) {
-            model = fit(&model, &data, Effort { max_iterations: 5, min_gain_nats: 0.3 })?.model;
+        if round == 0 && random_effects != (false, false) {
+            model = fit(&model, &data, COARSE_EFFORT)?.model;
         }
-        update_event_times(&mut model, &data, &times);
-        best = fit(
-            &model,
-            &data,
-            if round == 2 { Effort::FULL } else { Effort { max_iterations: 5, min_gain_nats: 0.3 } },
-        )?;
+        let effort = if round == 2 { Effort::FULL } else { COARSE_EFFORT };
+        best = fit(&with_updated_times(model, &data, &times), &data, effort)?;
     }
     data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
     best = fit_from_zero_scatter(&best.model, &data, Effort::FULL)?;
@@ -194,155 +206,4 @@ fn from_belief(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{
-        FIRST_SHARE, PreparedRecordings, coarse_refit, fit_base_law, given, refit_from_prior,
-        refit_with_random_effects, roughness,
-    };
-    use crate::test_fixtures::{assumed_layers, fit_from_truth, gel_tissue, simulated_recordings};
-    use std::sync::Arc;
-    use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
-    use stylet_identify::fit::{Effort, Fit, fit};
-    use stylet_identify::force_drops::ForceDrop;
-    use stylet_identify::likelihood::{FitData, residuals};
-    use stylet_identify::model::{EffectTerm, Model};
-    use stylet_identify::noise::Noise;
-    use stylet_identify::rupture_assignment::assign_ruptures;
-    use stylet_record::Recording;
-    use stylet_tissue::{CoulombFriction, Effect};
-
-    fn blocks(f: impl Fn(f64) -> f64) -> BlockAverages {
-        let t: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
-        let z = t.iter().map(|t| 1e-3 * t).collect();
-        let f = t.iter().map(|t| f(*t)).collect();
-        BlockAverages::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
-    }
-
-    /// A third difference takes away parabolas; of noise of one sort it has twenty times the variance.
-    #[test]
-    fn blocks_are_as_rough_as_their_third_differences() {
-        let parabola = blocks(|t| 3.0 - 0.4 * t + 0.07 * t * t);
-        assert_eq!(roughness(&[parabola]), 1e-6);
-        // Alternating by 0.02: every third difference is eight times that.
-        let at = |t: f64| if (t / 0.02).round() as i64 % 2 == 0 { 0.02 } else { -0.02 };
-        let wanted = 8.0 * 0.02 * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt();
-        assert!((roughness(&[blocks(at)]) / wanted - 1.0).abs() < 1e-6);
-        // Differences are weighed 1, 3, 3, 1: a step every 20 blocks is not seen, one every second block is.
-        let ragged = blocks(|t| [0.0, 0.3, 0.1, -0.2, 0.05][(t / 0.02).round() as usize % 5]);
-        let x = [0.0, 0.3, 0.1, -0.2, 0.05_f64];
-        let mut all: Vec<f64> = (0..5)
-            .map(|k| (x[(k + 3) % 5] - 3.0 * x[(k + 2) % 5] + 3.0 * x[(k + 1) % 5] - x[k]).abs())
-            .collect();
-        all.sort_by(f64::total_cmp);
-        let wanted = all[2] * stylet_stats::MAD_TO_SD / 20.0_f64.sqrt();
-        assert!((roughness(&[ragged]) / wanted - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn recordings_made_ready_tell_their_drops_and_their_largest_force() {
-        let belief = assumed_layers(&[]);
-        let saw = |t: f64| if t < 4.0 { 0.5 * t } else { 0.5 * t - 1.5 };
-        let (a, b) = (blocks(saw), blocks(|t| 0.6 * t));
-        let largest = b.abs_force_n.iter().copied().fold(0.0, f64::max);
-        let p = PreparedRecordings::new(belief, vec![a, b], 0.01);
-        assert!((p.largest_force_n() - largest).abs() < 1e-12 && largest > 4.0);
-        assert_eq!((p.min_noise_sd_n, p.drops[1].len()), (0.01, 0));
-        let times = p.drop_times();
-        assert_eq!(
-            times,
-            p.drops
-                .iter()
-                .map(|d| d.iter().map(|d: &ForceDrop| d.time_s).collect::<Vec<_>>())
-                .collect::<Vec<_>>()
-        );
-        assert!(times[0].iter().any(|t| (t - 4.0).abs() < 0.05), "{times:?}");
-    }
-
-    /// Insertions into the gel that rub by so much (N/m), made ready, with blocks and noise as a fit from the truth has them.
-    fn gels(c_n_per_m: f64) -> (PreparedRecordings, FitData) {
-        let runs = simulated_recordings(&[CoulombFriction { c_n_per_m }.into()], &[[4e-3, 0.0], [6e-3, 0.0]]);
-        let f = fit_from_truth(&[], &runs.iter().collect::<Vec<_>>());
-        (PreparedRecordings::new(f.fit.model.assumed.clone(), f.data.recordings.to_vec(), 0.0), f.data)
-    }
-
-    /// Nothing of their own.
-    const ALIKE: (bool, bool) = (false, false);
-
-    fn rubs() -> EffectTerm {
-        EffectTerm::new(CoulombFriction::default().info(), &[1.0])
-    }
-
-    #[test]
-    fn the_base_law_is_found_from_what_is_believed() {
-        let (prepared, _) = gels(0.0);
-        let (f, data) = fit_base_law(&prepared).expect("a fit");
-        let (told, there) = (&f.model.tissue.layers[0], &gel_tissue().layers[0]);
-        assert!((told.stiffness_n_per_m / there.stiffness_n_per_m - 1.0).abs() < 0.02, "{told:?}");
-        assert!(f.model.effects.is_empty() && f.model.rupture_times_s.iter().all(|t| t[0].is_finite()));
-        assert!((2e-3..2e-2).contains(&data.noise.sd_n()), "{}", data.noise.sd_n());
-    }
-
-    #[test]
-    fn an_effect_begun_anew_or_sketched_has_its_strength() {
-        let (prepared, data) = gels(60.0);
-        let strength = |f: Option<Fit>| f.expect("a fit").model.effects[0].values[0];
-        let coarse = data.with_recordings(data.recordings.iter().map(|b| b.coarsened(3)).collect());
-        for told in [
-            refit_from_prior(&prepared, &[rubs()], ALIKE, &data),
-            coarse_refit(&prepared, &[rubs()], ALIKE, &coarse),
-        ] {
-            let told = strength(told);
-            assert!((told / 60.0 - 1.0).abs() < 0.2, "{told}");
-        }
-    }
-
-    #[test]
-    fn a_law_whose_ruptures_are_wrong_is_begun_anew_with_numbers_of_each_recordings_own() {
-        let (prepared, _) = gels(0.0);
-        let (found, data) = fit_base_law(&prepared).expect("a fit");
-        let instants = |f: &Fit| f.model.rupture_times_s.iter().map(|t| t[0]).collect::<Vec<_>>();
-        // What leaves noise stays as it is.
-        let (same, _) = refit_with_random_effects(&prepared, found.clone(), data.clone());
-        assert_eq!((same.nats(), instants(&same)), (found.nats(), instants(&found)));
-        let mut wrong = found.clone();
-        wrong.model.rupture_times_s.iter_mut().for_each(|t| t[0] -= 0.8);
-        wrong.residuals = residuals(&wrong.model, &data).expect("a replay");
-        let (told, _) = refit_with_random_effects(&prepared, wrong, data);
-        for (told, there) in instants(&told).iter().zip(instants(&found)) {
-            assert!((told - there).abs() < 0.02, "{told} for {there}");
-        }
-    }
-
-    /// A sketch sees nothing but the blocks that it is given.
-    #[test]
-    fn a_sketch_knows_the_coarse_blocks_alone() {
-        let (prepared, data) = gels(60.0);
-        let coarse = data.with_recordings(data.recordings.iter().map(|b| b.coarsened(3)).collect());
-        let less = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
-        let told = |p: &PreparedRecordings| {
-            let f = coarse_refit(p, &[rubs()], ALIKE, &coarse).expect("a fit");
-            (f.nats(), f.model.tissue.layers[0].stiffness_n_per_m)
-        };
-        assert_eq!(told(&prepared), told(&less));
-    }
-
-    /// Noise as large as a share of the largest force, or as the blocks' own; the better of a trusting and a doubting giving away.
-    #[test]
-    fn drops_are_given_away_from_afar() {
-        let (prepared, _) = gels(60.0);
-        let (told, data) = given(&prepared, &[], ALIKE).expect("a fit");
-        assert!((data.noise.sd_n() / (FIRST_SHARE * prepared.largest_force_n()) - 1.0).abs() < 1e-12);
-        let rough_n = roughness(&prepared.blocks);
-        assert!(rough_n < 0.5 * data.noise.sd_n());
-        let wide = FitData::new(Arc::clone(&prepared.blocks), Noise::white(data.noise.sd_n()), 0.0);
-        let given_by = |from: &Model, trust: f64| {
-            let instants = assign_ruptures(from, &prepared.blocks, &prepared.drops, trust, rough_n);
-            let next = Model { rupture_times_s: instants, ..from.clone() };
-            fit(&next, &wide, Effort { max_iterations: 4, min_gain_nats: 0.3 }).expect("a fit")
-        };
-        let first = given_by(&Model::base(prepared.assumed.clone(), 2), 1.0);
-        let second = given_by(&first.model, 0.5);
-        assert_eq!(told.nats(), first.nats().min(second.nats()));
-        assert!(told.model.rupture_times_s.iter().all(|t| t[0].is_finite()));
-    }
-}
+mod tests;

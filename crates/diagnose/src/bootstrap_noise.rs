@@ -1,8 +1,9 @@
-//! How well the noise is told by what a fit leaves.
+//! Uncertainty of the estimated noise, by a parametric bootstrap.
 //!
-//! The numbers of a fit follow a slow noise as far as they can, and what they followed is missing in the residuals that tell how slow the
-//! noise is; and a wander of ten seconds is told by a few dozen stretches. So noise is drawn as it was estimated, the same numbers are
-//! fitted to it, and the noise is estimated again from what they leave (a parametric bootstrap: Efron and Tibshirani 1993, chapter 6).
+//! Fitted parameters absorb a part of slow noise, so that the residual understates it; and noise with a time constant
+//! of ten seconds is estimated from a few dozen independent segments. Noise is therefore simulated as estimated, the
+//! same parameters are fitted to it, and the noise is estimated again from the residual (Efron and Tibshirani 1993,
+//! chapter 6).
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,11 +13,11 @@ use stylet_identify::likelihood::FitData;
 use stylet_identify::noise::NoiseSource;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 
-/// So many times.
-const TIMES: usize = 8;
+/// Bootstrap replicates.
+const REPLICATES: usize = 8;
 
-/// The normal matrix under another noise.
-fn under(columns: &[One], matrix: &SymmetricMatrix, data: &FitData) -> SymmetricMatrix {
+/// The information matrix under another noise.
+fn under_noise(columns: &[RecordingColumn], matrix: &SymmetricMatrix, data: &FitData) -> SymmetricMatrix {
     let now: Vec<Vec<f64>> = columns.iter().map(|c| data.whiten(c.recording, &c.e)).collect();
     let mut changed = matrix.clone();
     for (i, a) in columns.iter().enumerate() {
@@ -27,7 +28,7 @@ fn under(columns: &[One], matrix: &SymmetricMatrix, data: &FitData) -> Symmetric
     changed
 }
 
-/// The normal matrix under noises estimated again. `matrix` is the one under the noise of `data`, which drew them.
+/// Information matrices under bootstrap estimates of the noise; `matrix` is that under the noise of `data`.
 #[must_use]
 pub fn bootstrap_noise(
     tangent: &Linearization,
@@ -35,9 +36,9 @@ pub fn bootstrap_noise(
     matrix: &SymmetricMatrix,
     rng: &mut impl Rng,
 ) -> Vec<SymmetricMatrix> {
-    let columns = plain(tangent, data);
+    let columns = recording_columns(tangent, data);
     let factor = matrix.cholesky();
-    let drawn: Vec<Vec<Vec<f64>>> = (0..TIMES)
+    let drawn: Vec<Vec<Vec<f64>>> = (0..REPLICATES)
         .map(|_| {
             let mut normal = |n: usize| (0..n).map(|_| StandardNormal.sample(rng)).collect();
             data.recordings.iter().map(|b| normal(b.len())).collect()
@@ -55,24 +56,24 @@ pub fn bootstrap_noise(
                 w[c.recording].iter_mut().zip(&c.w).for_each(|(w, x)| *w -= followed[c.at] * x);
             }
             let e: Vec<Vec<f64>> = w.iter().enumerate().map(|(r, w)| data.unwhiten(r, w)).collect();
-            under(&columns, matrix, &data.with_estimated_noise(&e, NoiseSource::Bootstrap))
+            under_noise(&columns, matrix, &data.with_estimated_noise(&e, NoiseSource::Bootstrap))
         })
         .collect()
 }
 
-/// What a number changes in one recording.
-struct One {
-    /// Where the number stands in the normal matrix.
+/// Derivative of one recording's force with respect to one parameter.
+struct RecordingColumn {
+    /// Index of the parameter in the information matrix.
     at: usize,
     recording: usize,
-    /// Whitened.
+    /// Whitened derivative.
     w: Vec<f64>,
-    /// In N.
+    /// Derivative in N.
     e: Vec<f64>,
 }
 
-/// Columns recording by recording.
-fn plain(tangent: &Linearization, data: &FitData) -> Vec<One> {
+/// Columns of the tangent by recording.
+fn recording_columns(tangent: &Linearization, data: &FitData) -> Vec<RecordingColumn> {
     let shared = tangent.shared.len();
     let mut out = Vec::new();
     for recording in 0..data.recording_count() {
@@ -81,7 +82,7 @@ fn plain(tangent: &Linearization, data: &FitData) -> Vec<One> {
             let Some(w) = column.innovations.get(recording).filter(|w| w.iter().any(|x| *x != 0.0)) else {
                 continue;
             };
-            out.push(One { at, recording, e: data.unwhiten(recording, w), w: w.clone() });
+            out.push(RecordingColumn { at, recording, e: data.unwhiten(recording, w), w: w.clone() });
         }
     }
     out

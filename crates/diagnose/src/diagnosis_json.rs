@@ -1,20 +1,20 @@
-//! What a diagnosis says: `diagnosis.json` (SPEC section 7).
+//! Result of a diagnosis, serialised as `diagnosis.json` (docs/reference/files.md, section "diagnosis.json").
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::QualityNote;
 
-/// The verdict.
+/// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The simulation agrees with the data.
+    /// The data agree with the scenario.
     None,
-    /// One or more causes.
+    /// One or more effects were identified.
     Named,
-    /// One class of effects that these data cannot tell apart.
+    /// Several effects explain the data equally well.
     Ambiguous,
-    /// Structure that no effect of the library explains.
+    /// The residual has structure that no effect of the library explains.
     Unknown,
 }
 
@@ -29,43 +29,43 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// One cause.
+/// An identified effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cause {
-    /// Effect, by its id.
+    /// Identifier of the effect.
     pub effect: String,
-    /// Effects that explain the data as well, to within 3 nats.
+    /// Effects that explain the data equally well, to within 3 nats.
     pub equivalent: Vec<String>,
-    /// Probability that it is this one of the rivals tried.
+    /// Posterior probability of this effect among the candidates tried.
     pub confidence: f64,
-    /// Parameters by their paths.
+    /// Estimates by parameter path.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Nats that it gains.
+    /// Gain in nats.
     pub gain_nats: f64,
-    /// Share of what the base law leaves beyond the noise that is left again without it, 0 to 1.
+    /// Share of the base law's residual variance beyond the noise that returns without this effect, 0 to 1.
     #[serde(default)]
     pub share: f64,
 }
 
-/// An effect that was found and is too small to matter, or that does not pay on recordings left out.
+/// An effect that was found but is negligible, or that does not improve the prediction of held-out recordings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NegligibleEffect {
-    /// Effect, by its id.
+    /// Identifier of the effect.
     pub effect: String,
-    /// Parameters by their paths.
+    /// Estimates by parameter path.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Why it is no cause.
+    /// Why it is not reported as a cause.
     pub reason: String,
 }
 
-/// A base parameter.
+/// A parameter of the base law.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BaseParameter {
-    /// Layer, 1-based; 0 for what belongs to the whole stack.
+    /// Layer, 1-based; 0 for the whole tissue.
     pub layer: usize,
-    /// Field of the layer.
+    /// Name of the parameter.
     pub name: String,
-    /// What the scenario assumed.
+    /// Value in the scenario.
     pub assumed: f64,
     /// Fitted value.
     pub value: f64,
@@ -75,128 +75,128 @@ pub struct BaseParameter {
     pub high: f64,
     /// Whether the assumed value lies outside the interval.
     pub changed: bool,
-    /// Whether the value stands at a bound of the tolerance.
+    /// Whether the estimate lies at a bound of the tolerance.
     pub at_bound: bool,
 }
 
-/// The gain.
+/// Improvement of the prediction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
-    /// Whether the recordings took no part in the fit.
+    /// Whether the errors are those of held-out recordings.
     pub held_out: bool,
-    /// The recordings.
+    /// Names of the recordings.
     pub recordings: Vec<String>,
-    /// Root mean square of the re-fitted base law's residual in N.
+    /// RMS error of the fitted base law in N.
     pub rmse_before_n: f64,
-    /// Of the extended model's.
+    /// RMS error of the extended model in N.
     pub rmse_after_n: f64,
-    /// Standard deviation of the noise.
+    /// Standard deviation of the noise in N.
     pub floor_n: f64,
-    /// Per recording: before and after in N.
+    /// Errors of base law and extended model per recording, in N.
     pub per_recording_n: Vec<(f64, f64)>,
 }
 
-/// What remains.
+/// Structure that remains in the residual.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResidualStructureReport {
-    /// p-value of the strongest structure, corrected for looking at several.
+    /// Smallest p-value of the residual tests, corrected for their number.
     pub p_value: f64,
-    /// What the residual still depends on.
+    /// Features on which the residual still depends.
     pub depends_on: Vec<String>,
     /// Nats that the strongest dependence explains.
     pub nats: f64,
-    /// Share of what the base law leaves beyond the noise that is still left, 0 to 1.
+    /// Share of the base law's residual variance beyond the noise that the extended model does not explain, 0 to 1.
     #[serde(default)]
     pub share: f64,
 }
 
-/// One rival of a step of the search.
+/// A candidate of one step of the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchCandidate {
-    /// Effect.
+    /// Identifier of the effect.
     pub effect: String,
-    /// Nats gained over the model that stood.
+    /// Gain in nats over the model before this step.
     pub gain_nats: f64,
-    /// Numbers fitted.
+    /// Number of fitted parameters.
     pub parameters: usize,
-    /// True when compared on averages only.
+    /// Whether it was compared on averaged data only.
     pub screened_only: bool,
 }
 
-/// One step of the search.
+/// One step of the forward selection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchStep {
-    /// Effects that stood.
+    /// Effects in the model before this step.
     pub included: Vec<String>,
-    /// Rivals, best first.
+    /// Candidates, best first.
     pub candidates: Vec<SearchCandidate>,
-    /// Nats that the best needed.
+    /// Gain in nats that the best candidate needed.
     pub required_nats: f64,
-    /// The effect taken.
+    /// The selected effect.
     pub selected: Option<String>,
 }
 
-/// The noise.
+/// Measurement noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NoiseReport {
     /// Standard deviation in N.
     pub sd_n: f64,
-    /// Autoregressive coefficients per sample.
+    /// First two autoregressive coefficients, per block.
     pub ar: [f64; 2],
-    /// Whether there was enough air before the tissue to tell it from the law's errors.
+    /// Whether the noise was estimated from motion in air before the tissue.
     pub from_air: bool,
 }
 
-/// How insertions differ from one another beyond what the law says: standard deviations.
+/// Standard deviations of the random effects between recordings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RandomEffectSd {
-    /// Of the force at which a layer is punctured, relative.
+    /// Relative standard deviation of the puncture force.
     pub puncture: f64,
-    /// Of the place at which a layer gives way, in m.
+    /// Standard deviation in m of the depth at which a layer ruptures.
     pub rupture_depth_m: f64,
-    /// Of the surface, in m; 0 where one surface does for all.
+    /// Standard deviation in m of the surface position; 0 where it is common to all recordings.
     pub surface_m: f64,
-    /// Of friction, relative; 0 where one does for all.
+    /// Relative standard deviation of friction; 0 where it is common to all recordings.
     pub friction: f64,
 }
 
-/// A remark on the data.
+/// A note on data quality.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DataQualityNote {
-    /// Recording.
+    /// Name of the recording.
     pub recording: String,
-    /// Remark.
+    /// The note.
     #[serde(flatten)]
     pub note: QualityNote,
 }
 
-/// The diagnosis.
+/// Result of a diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Verdict.
     pub verdict: Verdict,
-    /// Causes, strongest first.
+    /// Identified effects, largest gain first.
     pub causes: Vec<Cause>,
-    /// Base parameters as fitted.
+    /// Parameters of the base law as fitted.
     pub base_parameters: Vec<BaseParameter>,
-    /// Effects that this experiment cannot show.
+    /// Effects that are not identifiable from these recordings.
     pub not_identifiable: Vec<String>,
-    /// Gain.
+    /// Improvement of the prediction.
     pub gain: Gain,
-    /// Effects found that are too small to matter.
+    /// Effects that were found but are negligible.
     #[serde(default)]
     pub negligible: Vec<NegligibleEffect>,
-    /// What remains.
+    /// Structure that remains in the residual.
     pub residual_structure: ResidualStructureReport,
-    /// Data quality.
+    /// Notes on data quality.
     pub data_quality: Vec<DataQualityNote>,
-    /// What was tried.
+    /// Steps of the search.
     pub search_steps: Vec<SearchStep>,
-    /// Noise.
+    /// Measurement noise.
     pub noise: NoiseReport,
-    /// What differs from insertion to insertion.
+    /// Standard deviations of the random effects.
     #[serde(default)]
     pub random_effect_sd: RandomEffectSd,
-    /// What would split an ambiguous class or show what is invisible.
+    /// Motions that would separate equivalent effects or show those that are not identifiable.
     pub advice: Vec<String>,
 }

@@ -1,19 +1,19 @@
-//! Why a diagnosis cannot be made.
+//! Errors of a diagnosis.
 
-/// What is wrong with the input, and what would be right.
+/// Why a diagnosis is refused, and how to correct the input.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
     /// No recording.
     #[error("no recording was given; name at least one with --data")]
     NoRecording,
-    /// More layers than a diagnosis tells apart.
+    /// More layers than a diagnosis can distinguish.
     #[error(
-        "the scenario has {layers} layers; a diagnosis tells up to {most} apart: take neighbouring layers of one tissue together"
+        "the scenario has {layers} layers; a diagnosis distinguishes up to {most}: merge neighbouring layers of the same tissue"
     )]
     TooManyLayers {
         /// Layers of the scenario.
         layers: usize,
-        /// Most.
+        /// Upper limit.
         most: usize,
     },
     /// Too few samples.
@@ -23,10 +23,10 @@ pub enum DiagnoseError {
         name: String,
         /// Samples.
         samples: usize,
-        /// Needed.
+        /// Required samples.
         least: usize,
     },
-    /// The needle never gets to the tissue.
+    /// The needle never reaches the tissue.
     #[error(
         "{name}: the needle never reaches the tissue: its largest position is {deepest_m:.6} m, the surface lies at {surface_m:.6} m; \
          {remedy}"
@@ -41,7 +41,7 @@ pub enum DiagnoseError {
         /// What to do.
         remedy: &'static str,
     },
-    /// The needle is behind the tissue from the beginning.
+    /// The needle starts behind the tissue.
     #[error(
         "{name}: the needle begins behind the tissue: its smallest position is {lowest_m:.6} m, the tissue ends at {end_m:.6} m; does \
          position zero mean the same in both? a column map shifts it with position: (name: \"position_m\", offset: {offset_m:.3}), which \
@@ -54,10 +54,10 @@ pub enum DiagnoseError {
         lowest_m: f64,
         /// End of the tissue.
         end_m: f64,
-        /// Offset that puts the first position to the surface.
+        /// Offset that moves the first position to the surface.
         offset_m: f64,
     },
-    /// Position in another unit.
+    /// Positions in another unit.
     #[error(
         "{name}: positions reach {deepest:.4} where the tissue ends at {end_m:.4} m: this looks like {unit}; give a column map \
          with position: (name: \"position_m\", scale: {scale})"
@@ -71,20 +71,20 @@ pub enum DiagnoseError {
         end_m: f64,
         /// Probable unit.
         unit: &'static str,
-        /// Scale that would be right.
+        /// Scale that would correct it.
         scale: f64,
     },
-    /// Force in another unit or sign.
+    /// Force with another unit or sign.
     #[error("{name}: {what}; give a column map with force: (name: \"force_n\", scale: {scale})")]
     Force {
         /// Recording.
         name: String,
         /// What is wrong.
         what: String,
-        /// Scale that would be right.
+        /// Scale that would correct it.
         scale: f64,
     },
-    /// Nothing could be fitted.
+    /// The base law could not be fitted.
     #[error("the base law cannot be fitted to these recordings: a replay gives no finite force")]
     NoFit,
 }

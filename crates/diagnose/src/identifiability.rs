@@ -1,4 +1,4 @@
-//! What an experiment cannot show: effects whose signature everything that is fitted imitates.
+//! Identifiability: effects whose signature is absorbed by the fitted parameters, and motions that would reveal them.
 
 use crate::diagnosis_json::Cause;
 use rayon::prelude::*;
@@ -8,20 +8,20 @@ use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::ScoreTest;
 use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal, general_effects};
 
-/// An effect of plausible size that would gain less than this is invisible (nats).
-const LEAST_NATS: f64 = 10.0;
+/// An effect of typical size that would gain less than this many nats is not identifiable.
+const MIN_DETECTABLE_NATS: f64 = 10.0;
 
-/// Effects that these recordings cannot show, in the order of the library.
+/// Effects that are not identifiable from these recordings, in the order of the library.
 #[must_use]
 pub fn not_identifiable(best: &Fit, data: &FitData) -> Vec<String> {
-    let look = ScoreTest::new(best, data);
+    let score_test = ScoreTest::new(best, data);
     let entries: Vec<&'static EffectInfo> =
         general_effects().filter(|i| best.model.effects.iter().all(|e| e.info.id != i.id)).collect();
-    let shown: Vec<bool> = entries.par_iter().map(|info| shows(info, &look)).collect();
-    entries.iter().zip(shown).filter(|(_, s)| !s).map(|(i, _)| i.id.to_owned()).collect()
+    let identifiable: Vec<bool> = entries.par_iter().map(|info| is_identifiable(info, &score_test)).collect();
+    entries.iter().zip(identifiable).filter(|(_, s)| !s).map(|(i, _)| i.id.to_owned()).collect()
 }
 
-fn shows(info: &'static EffectInfo, look: &ScoreTest) -> bool {
+fn is_identifiable(info: &'static EffectInfo, score_test: &ScoreTest) -> bool {
     let typical = |group: &[&[f64]]| -> Vec<f64> {
         info.parameters
             .iter()
@@ -31,47 +31,48 @@ fn shows(info: &'static EffectInfo, look: &ScoreTest) -> bool {
     };
     match info.proposal {
         Proposal::LinearColumns(groups) => groups.iter().any(|g| {
-            let own = |values: &[f64]| {
-                let column = look.effect_column(&EffectTerm::new(info, values))?;
-                Some(look.gain(&[column]).detectable_nats)
+            let detectable = |values: &[f64]| {
+                let column = score_test.effect_column(&EffectTerm::new(info, values))?;
+                Some(score_test.gain(&[column]).detectable_nats)
             };
-            own(&typical(g)).is_some_and(|nats| nats >= LEAST_NATS)
+            detectable(&typical(g)).is_some_and(|nats| nats >= MIN_DETECTABLE_NATS)
         }),
-        // Free faces imitate a shifted one.
-        Proposal::LayerFaces(_) => !look.fit.model.free.thickness,
+        // Free thicknesses absorb a shifted layer boundary.
+        Proposal::LayerFaces(_) => !score_test.fit.model.free.thickness,
         Proposal::TissueMotion | Proposal::SpectralTone | Proposal::MembraneRupture => {
             let values: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
-            look.effect_column(&EffectTerm::new(info, &values))
-                .is_some_and(|c| look.gain(&[c]).detectable_nats >= LEAST_NATS)
+            score_test
+                .effect_column(&EffectTerm::new(info, &values))
+                .is_some_and(|c| score_test.gain(&[c]).detectable_nats >= MIN_DETECTABLE_NATS)
         }
         Proposal::SplitTerm(_) | Proposal::RawSamples | Proposal::PerLayer => true,
     }
 }
 
-/// Which motion would tell more.
+/// Advice on motions that would separate equivalent effects or reveal hidden ones.
 #[must_use]
-pub fn advice(causes: &[Cause], invisible: &[String]) -> Vec<String> {
+pub fn advice(causes: &[Cause], not_identifiable: &[String]) -> Vec<String> {
     let mut advice = Vec::new();
     for cause in causes.iter().filter(|c| !c.equivalent.is_empty()) {
         advice.push(format!(
             "{} and {} explain these recordings equally well. A motion with a rippled speed, a hold inside every layer and a \
-             retraction tells most of them apart.",
+             retraction separates most of them.",
             cause.effect,
             cause.equivalent.join(", ")
         ));
     }
-    let unseen = |place: ChainStage| {
-        invisible.iter().any(|i| stylet_tissue::effect_info(i).is_some_and(|e| e.stage == place))
+    let hidden = |place: ChainStage| {
+        not_identifiable.iter().any(|i| stylet_tissue::effect_info(i).is_some_and(|e| e.stage == place))
     };
-    if unseen(ChainStage::Friction) {
+    if hidden(ChainStage::Friction) {
         advice.push(
-            "Laws of friction do not show at one constant speed: vary the speed within each layer, and retract."
+            "Friction effects are not identifiable at one constant speed: vary the speed within each layer, and retract."
                 .to_owned(),
         );
     }
-    if unseen(ChainStage::Sensor) {
+    if hidden(ChainStage::Sensor) {
         advice.push(
-            "A wrong gain of the force sensor looks like other stiffness, friction and puncture forces: check it with a known weight."
+            "A wrong gain of the force sensor has the same effect as other stiffness, friction and puncture forces: check it with a known weight."
                 .to_owned(),
         );
     }
@@ -85,7 +86,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn advice_follows_from_what_cannot_be_told_apart_or_seen() {
+    fn advice_follows_from_equivalent_and_hidden_effects() {
         let cause = |effect: &str, equivalent: &[&str]| Cause {
             effect: effect.to_owned(),
             equivalent: equivalent.iter().map(|e| (*e).to_owned()).collect(),
@@ -105,7 +106,7 @@ mod tests {
             "{one:?}"
         );
         let friction = advice(&[], &["coulomb_friction".to_owned()]);
-        assert!(friction.len() == 1 && friction[0].starts_with("Laws of friction"), "{friction:?}");
+        assert!(friction.len() == 1 && friction[0].starts_with("Friction effects"), "{friction:?}");
         let sensor = advice(&[], &["hidden_membrane".to_owned(), "force_gain".to_owned()]);
         assert!(sensor.len() == 1 && sensor[0].starts_with("A wrong gain"), "{sensor:?}");
     }

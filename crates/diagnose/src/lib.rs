@@ -1,21 +1,21 @@
-//! Given measured data: what the simulation gets wrong, why, and how much better it gets.
+//! Diagnosis of measured insertions: which effects a scenario lacks, how strong they are, and how much better it predicts with them.
 //!
-//! [`diagnose()`] takes what a scenario believes and what was measured, and goes the steps of SPEC section 7 on the one
-//! likelihood of `stylet-identify`. The pieces, in the order in which data pass them:
+//! [`diagnose()`] compares recordings with a scenario. The steps, in the order of the data flow:
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! |---|---|
-//! | [`base`] | the base law with its geometry: drops given to layers, numbers and instants in turn |
-//! | [`propose`], [`lines`] | what every effect would gain to first order, and where its fit starts |
-//! | [`select`], [`judge`] | effects enter by what they gain and leave when the others can do without them |
-//! | [`geometry`] | whether the believed geometry stands; a scaled position, a shifted face |
-//! | [`rivals`] | effects that explain the data as well |
-//! | [`intervals`] | intervals of every number |
-//! | [`leftover`] | structure common to several recordings: the verdict `unknown` |
-//! | [`silent`], [`otherwise`] | what is heard where an unknown force is silent, and whether an effect beside it acts by its own law |
-//! | [`held_out`], [`small`] | the gain on recordings left out of the fit; effects too small to matter |
-//! | [`predict`] | a model against recordings that took no part |
-//! | [`outcome`], [`curves`] | `diagnosis.json`, and what the report draws |
+//! | `input_checks` | units, signs and reach of the recordings |
+//! | [`base_law_fit`], [`random_effect_selection`] | fit of the base law and of what differs between recordings |
+//! | [`effect_start_values`], [`tone_detection`] | first-order gain and start values of every effect |
+//! | [`effect_selection`], [`model_comparison`] | forward selection by penalised gain, and pruning |
+//! | [`geometry_selection`] | fixed or free layer boundaries, position scale, shifted boundaries |
+//! | [`reweighted_fit`], [`varying_coefficient_test`] | robustness against unmodelled effects |
+//! | [`competing_effects`] | effects that explain the data equally well |
+//! | [`confidence_intervals`] | intervals of all parameters |
+//! | [`residual_tests`] | structure in the residual: the verdict `unknown` |
+//! | [`held_out`], [`negligible_effects`] | improvement on held-out recordings, and effects too small to matter |
+//! | [`predict`] | predictions of new recordings |
+//! | [`diagnosis_json`], [`report_curves`] | results, and the data for the report |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
@@ -26,13 +26,16 @@ pub mod confidence_intervals;
 mod diagnose;
 pub mod diagnosis_json;
 pub mod effect_selection;
+mod effect_start;
 pub mod effect_start_values;
 mod error;
 pub mod geometry_selection;
 pub mod held_out;
 mod identifiability;
 mod input_checks;
+mod local_minima;
 pub mod model_comparison;
+mod model_pruning;
 pub mod negligible_effects;
 mod outlier_segment_test;
 pub mod prediction;
@@ -42,14 +45,21 @@ pub mod report_curves;
 pub mod residual_tests;
 pub mod reweighted_fit;
 mod rupture_start_values;
+mod selection_restarts;
+mod selection_state;
+mod sensor_artefact_causes;
 #[cfg(test)]
 mod test_fixtures;
 pub mod tone_detection;
 pub mod varying_coefficient_test;
+mod verdict;
 
 pub use competing_effects::EQUIVALENCE_NATS;
-pub use diagnose::{
-    DiagnosisResult, NamedRecording, Options, REASON_IMITATES_UNMODELLED, assumptions_of, diagnose,
-};
+pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumptions_of, diagnose};
 pub use diagnosis_json::{Diagnosis, Verdict};
 pub use error::DiagnoseError;
+pub use input_checks::NamedRecording;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,7 @@
-//! A stretch of a recording in which far more is left than anywhere else.
+//! Outlier segment test: a few seconds of one recording with a residual far above the rest.
 //!
-//! Where only one motion in many asks for what a law lacks (a hold, a way back), what is left is not the same in several recordings, and
-//! its mean square is small. But slow noise is as large in one second as in another.
+//! A motion that only one recording contains (a hold, a retraction) may reveal a missing effect: its residual is not
+//! common to several recordings and its mean square is small, but slow noise would be as large everywhere.
 
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::likelihood::FitData;
@@ -9,16 +9,16 @@ use stylet_stats::order_statistics::median;
 
 /// Length in s of the windows whose means are compared.
 const WINDOW_S: f64 = 1.0;
-/// So many windows one after the other are a stretch: what a misplaced rupture leaves is shorter.
-const WINDOWS: usize = 2;
-/// Their means are so many times the typical one: normal ones are never, however slow.
-const TIMES: f64 = 10.0;
-/// And so many times the noise of a block: what is less is not seen by eye.
-const LEAST: f64 = 3.0;
+/// Consecutive windows of a segment: the residual of a misplaced rupture is shorter.
+const SEGMENT_WINDOWS: usize = 2;
+/// The window means exceed the typical one by this factor: coloured normal noise practically never does.
+const MIN_TYPICAL_RATIO: f64 = 10.0;
+/// The window means of a segment exceed this many standard deviations of the noise of a block.
+const MIN_NOISE_RATIO: f64 = 3.0;
 
-/// The chance of such a stretch in residuals `e` (N), where there is one: windows of a second, one after the other and of one sign, whose
-/// means are ten times the typical one of all windows and three times the noise of a block. The chance is that of one normal mean so large
-/// among as many as there are windows.
+/// p-value of the most extreme segment in residuals `e` (N), if there is one: consecutive windows of one sign whose
+/// means are ten times the typical one and three times the noise of a block. The p-value is that of one normal mean as
+/// large, times the number of windows.
 #[must_use]
 pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let of = |(b, e): (&BlockAverages, &Vec<f64>)| -> Vec<f64> {
@@ -29,7 +29,7 @@ pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
                 sum += e[k] / data.noise.bin_at(b.abs_force_n[k]).sd_n;
                 n += 1;
             }
-            // A gap is no calm.
+            // Windows with gaps do not count.
             if 2 * n >= per { sum / n as f64 } else { f64::NAN }
         };
         (0..b.len()).step_by(per).map(mean).collect()
@@ -37,15 +37,16 @@ pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let means: Vec<Vec<f64>> = data.recordings.iter().zip(e).map(of).collect();
     let mut sizes: Vec<f64> = means.iter().flatten().filter(|m| m.is_finite()).map(|m| m.abs()).collect();
     let count = sizes.len() as f64;
-    let typical = (median(&mut sizes) * stylet_stats::MAD_TO_SD).max(LEAST / TIMES);
-    // The least of the means of a stretch, as many times the typical one.
+    let typical = (median(&mut sizes) * stylet_stats::MAD_TO_SD).max(MIN_NOISE_RATIO / MIN_TYPICAL_RATIO);
+    // Smallest mean of a segment, relative to the typical one.
     let least = |w: &[f64]| {
         let (low, high) =
             w.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, m| (r.0.min(*m), r.1.max(*m)));
         if w.iter().all(|m| m.is_finite()) { low.max(-high) / typical } else { 0.0 }
     };
-    let most = means.iter().flat_map(|m| m.windows(WINDOWS)).map(least).fold(0.0, f64::max);
-    (most > TIMES).then(|| (2.0 * count * stylet_stats::normal::sf(most)).clamp(f64::MIN_POSITIVE, 1.0))
+    let most = means.iter().flat_map(|m| m.windows(SEGMENT_WINDOWS)).map(least).fold(0.0, f64::max);
+    (most > MIN_TYPICAL_RATIO)
+        .then(|| (2.0 * count * stylet_stats::normal::sf(most)).clamp(f64::MIN_POSITIVE, 1.0))
 }
 
 #[cfg(test)]
@@ -69,8 +70,8 @@ mod tests {
         FitData::new(Arc::new(vec![b; 4]), Noise::white(1.0), 0.0)
     }
 
-    /// Noise, and a wander of so many times its size that lasts for seconds.
-    fn noise(data: &FitData, wander: f64, seed: u64) -> Vec<Vec<f64>> {
+    /// White noise plus a slow drift of `drift_sd` times its size.
+    fn noise(data: &FitData, drift_sd: f64, seed: u64) -> Vec<Vec<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = move || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
         let mut one = |n: usize| {
@@ -78,7 +79,7 @@ mod tests {
             (0..n)
                 .map(|_| {
                     slow = keep * slow + (1.0 - keep * keep).sqrt() * normal();
-                    wander * slow + normal()
+                    drift_sd * slow + normal()
                 })
                 .collect()
         };
@@ -86,28 +87,28 @@ mod tests {
     }
 
     #[test]
-    fn some_seconds_of_one_recording_far_off_are_structure() {
+    fn outlier_segment_is_detected() {
         let data = recordings();
-        for wander in [0.0, 1.0] {
-            let mut e = noise(&data, wander, 7);
+        for drift_sd in [0.0, 1.0] {
+            let mut e = noise(&data, drift_sd, 7);
             e[2][900..1110].iter_mut().for_each(|x| *x -= 16.0);
-            assert!(outlier_segment_p_value(&data, &e).is_some_and(|p| p < 1e-12), "{wander}");
+            assert!(outlier_segment_p_value(&data, &e).is_some_and(|p| p < 1e-12), "{drift_sd}");
         }
     }
 
     #[test]
-    fn a_slow_wander_is_none_nor_is_a_rupture_a_tenth_of_a_second_late() {
+    fn drift_and_late_rupture_are_no_outlier_segments() {
         let data = recordings();
         for seed in 0..60 {
-            let wander = f64::from(seed as u32 % 6);
-            let mut e = noise(&data, wander, 100 + seed);
+            let drift_sd = f64::from(seed as u32 % 6);
+            let mut e = noise(&data, drift_sd, 100 + seed);
             assert!(outlier_segment_p_value(&data, &e).is_none(), "seed {seed}");
             e[1][500..505].iter_mut().for_each(|x| *x += 100.0);
             assert!(outlier_segment_p_value(&data, &e).is_none(), "seed {seed}, with a late rupture");
         }
     }
 
-    /// Eight windows of one second, 50 blocks each: alternating means of so many noises, and a stretch of two that stand out.
+    /// Eight windows of one second, 50 blocks each: alternating means, and a segment of two that stand out.
     fn windows(means: &[f64]) -> (FitData, Vec<Vec<f64>>) {
         let t: Vec<f64> = (0..100 * means.len()).map(|k| k as f64 / 100.0).collect();
         let z: Vec<f64> = t.iter().map(|t| 1e-3 * t).collect();
@@ -120,11 +121,11 @@ mod tests {
         (data, vec![e])
     }
 
-    /// The lesser of two neighbouring means of one sign, over 1.4826 times the median of all, is the deviate; twice its tail times the number
-    /// of windows is the chance.
+    /// The deviate is the smaller of two neighbouring means of one sign over 1.4826 times the median of all; the
+    /// p-value is twice its tail times the number of windows.
     #[test]
-    fn the_chance_is_that_of_one_normal_mean_so_large_among_so_many() {
-        let said = |means: &[f64]| {
+    fn p_value_is_that_of_the_largest_of_many_normal_means() {
+        let result = |means: &[f64]| {
             let (data, e) = windows(means);
             outlier_segment_p_value(&data, &e)
         };
@@ -132,27 +133,27 @@ mod tests {
         let with = |a: f64, b: f64| [&calm[..3], &[a, b], &calm[3..]].concat();
         let typical = 0.5 * stylet_stats::MAD_TO_SD;
         for (a, b, least) in [(-9.0, -12.0, 9.0), (8.5, 8.0, 8.0)] {
-            let p = said(&with(a, b)).expect("a stretch");
+            let p = result(&with(a, b)).expect("a stretch");
             let wanted = 2.0 * 9.0 * stylet_stats::normal::sf(least / typical);
             assert!((p / wanted - 1.0).abs() < 1e-6, "{p:e} for {wanted:e}");
         }
-        // Ten times the typical one from both sides.
-        assert!(said(&with(9.0, 10.1 * typical)).is_some());
-        assert_eq!(said(&with(9.0, 9.9 * typical)), None);
-        // Of two signs, or one window alone, it is none.
-        assert_eq!(said(&with(9.0, -9.0)), None);
-        assert_eq!(said(&with(90.0, 0.5)), None);
-        // Calm is never calmer than three tenths of the noise: three times the noise is the least.
+        // Around ten times the typical mean.
+        assert!(result(&with(9.0, 10.1 * typical)).is_some());
+        assert_eq!(result(&with(9.0, 9.9 * typical)), None);
+        // Windows of opposite sign, or a single window, are not a segment.
+        assert_eq!(result(&with(9.0, -9.0)), None);
+        assert_eq!(result(&with(90.0, 0.5)), None);
+        // The typical mean is at least 0.3 of the noise.
         let small: Vec<f64> = with(3.1, 3.1).iter().map(|m| if *m > 3.0 { *m } else { 0.01 * m }).collect();
-        assert!(said(&small).is_some());
+        assert!(result(&small).is_some());
         let less: Vec<f64> = small.iter().map(|m| if *m > 3.0 { 2.9 } else { *m }).collect();
-        assert_eq!(said(&less), None);
-        // No chance is none at all.
-        assert_eq!(said(&with(900.0, 900.0)), Some(f64::MIN_POSITIVE));
+        assert_eq!(result(&less), None);
+        // The p-value is never zero.
+        assert_eq!(result(&with(900.0, 900.0)), Some(f64::MIN_POSITIVE));
     }
 
     #[test]
-    fn a_gap_is_no_calm_and_no_stretch() {
+    fn windows_with_gaps_do_not_count() {
         let means = [0.4, -0.5, 0.6, 9.0, 9.0, -0.5, 0.4, -0.6, 0.5];
         let (data, e) = windows(&means);
         let without = |from: usize, to: usize| {
@@ -163,7 +164,7 @@ mod tests {
         // Half of a window's blocks are enough.
         assert!(without(200, 225).is_some());
         assert_eq!(without(200, 226), None);
-        // Nine windows, two of them lost: a median of seven.
+        // Nine windows, two of them missing: a median of seven.
         let kept: Vec<f64> = [0.4, 0.5, 0.6, 9.0, 9.0, 0.6, 0.5].to_vec();
         let typical = stylet_stats::median_of(kept) * stylet_stats::MAD_TO_SD;
         let p = without(250, 350).expect("a stretch");

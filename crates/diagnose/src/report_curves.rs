@@ -1,4 +1,4 @@
-//! What the report draws: predictions, residuals and how they depend on what was done.
+//! Curves and residual statistics for the report.
 
 use crate::diagnose::DiagnosisResult;
 use crate::diagnosis_json::Verdict;
@@ -7,7 +7,7 @@ use stylet_identify::fit::Fit;
 use stylet_stats::linear_algebra::dot;
 use stylet_tissue::Slab;
 
-/// Curves of one recording.
+/// Curves of one recording, one value per block.
 #[derive(Clone, Debug, Default)]
 pub struct RecordingCurves {
     /// Time in s.
@@ -18,21 +18,21 @@ pub struct RecordingCurves {
     pub velocity_mps: Vec<f64>,
     /// Measured force in N.
     pub force_n: Vec<f64>,
-    /// Residual of the re-fitted base law in N, ruptures where the data show them.
+    /// Residual of the fitted base law in N, with ruptures at the times found in the data.
     pub base_residual_n: Vec<f64>,
-    /// Residual of the extended model in N.
+    /// Residual of the extended model in N, with ruptures at the times found in the data.
     pub extended_residual_n: Vec<f64>,
-    /// Residual of the extended model with its own ruptures in N.
+    /// Residual of the extended model in N, with ruptures where the model itself predicts them.
     pub free_run_residual_n: Vec<f64>,
-    /// Whether the sample was compared.
+    /// Whether the block was compared.
     pub used: Vec<bool>,
-    /// Instants in s at which layers ruptured.
+    /// Times in s at which layers ruptured.
     pub ruptures_s: Vec<f64>,
-    /// Active layer of every sample, 1-based.
+    /// Active layer of every block, 1-based.
     pub layer: Vec<usize>,
 }
 
-/// The fit that the diagnosis stands by.
+/// The fit that the report shows: the base law when the verdict is `unknown` without a cause, else the extended model.
 #[must_use]
 pub fn reported_fit(examined: &DiagnosisResult) -> &Fit {
     let d = &examined.diagnosis;
@@ -73,8 +73,8 @@ pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
         .collect()
 }
 
-/// Root mean square of a residual by layer (rows; the last: behind the last layer) and phase (advance, hold,
-/// retraction), NaN where there are fewer than 20 samples.
+/// RMS of a residual by layer (rows; first: before the surface, last: behind the last layer) and phase (insertion,
+/// hold, retraction); NaN for fewer than 20 blocks.
 #[must_use]
 pub fn rms_by_layer_and_phase(
     curves: &[RecordingCurves],
@@ -94,7 +94,7 @@ pub fn rms_by_layer_and_phase(
     sums.iter().map(|row| row.map(|(s, n)| if n < 20.0 { f64::NAN } else { (s / n).sqrt() })).collect()
 }
 
-/// Mean of a residual in bins of an abscissa: bin middles and means.
+/// Means of a residual in equal bins of `x`: bin centres and means, for bins with at least five values.
 #[must_use]
 pub fn binned_means(x: &[f64], e: &[f64], used: &[bool], bins: usize) -> (Vec<f64>, Vec<f64>) {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -115,7 +115,7 @@ pub fn binned_means(x: &[f64], e: &[f64], used: &[bool], bins: usize) -> (Vec<f6
         .unzip()
 }
 
-/// Correlations of a residual with what was done: name and coefficient.
+/// Pearson correlations of a residual with time, motion and force: name and coefficient.
 #[must_use]
 pub fn correlations(
     curves: &[RecordingCurves],
@@ -165,7 +165,7 @@ mod tests {
     use super::{RecordingCurves, binned_means, correlations, rms_by_layer_and_phase};
     use stylet_tissue::Slab;
 
-    /// What was done, by its name.
+    /// A regressor and its values.
     type Named<'a> = (&'a str, Box<dyn Fn(usize) -> f64 + 'a>);
 
     fn curve(layer: usize, z: f64, v: f64, n: usize, e: f64) -> RecordingCurves {
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_told_by_layer_and_phase_from_twenty_samples_on() {
+    fn rms_by_layer_and_phase_needs_twenty_blocks() {
         let mut all = vec![
             curve(1, 0.01, 0.002, 20, 0.3),
             curve(1, 0.01, 0.0, 19, 0.5),
@@ -192,7 +192,7 @@ mod tests {
             curve(9, 0.09, 2e-5, 22, 1.9),
             curve(2, -0.02, 0.003, 21, 0.2),
         ];
-        // Samples that are not compared do not count.
+        // Blocks that are not compared do not count.
         all[0].base_residual_n.push(99.0);
         all[0].used.push(false);
         let rows = rms_by_layer_and_phase(&all, |c| &c.base_residual_n, 2);
@@ -208,20 +208,21 @@ mod tests {
                 assert!((x - w).abs() < 1e-12 || (x.is_nan() && w.is_nan()), "{rows:?}");
             }
         }
-        // A hundredth of a millimetre a second is a hold, and the surface is in the first layer.
+        // Below 10 µm/s it is a hold; the surface belongs to the first layer.
         let ties = [curve(1, 0.0, 1e-5, 20, 0.4), curve(1, 0.0, -1e-5, 20, 0.4)];
         for tie in ties {
             assert!((rms_by_layer_and_phase(&[tie], |c| &c.base_residual_n, 1)[1][1] - 0.4).abs() < 1e-12);
         }
-        // Different samples together: the root of their mean square.
+        // Two recordings together: the root of their mean square.
         let two = [curve(1, 0.01, 0.002, 10, 0.3), curve(1, 0.01, 0.002, 30, 0.5)];
-        let told = rms_by_layer_and_phase(&two, |c| &c.base_residual_n, 1)[1][0];
-        assert!((told - ((10.0 * 0.09 + 30.0 * 0.25) / 40.0_f64).sqrt()).abs() < 1e-12);
+        let result = rms_by_layer_and_phase(&two, |c| &c.base_residual_n, 1)[1][0];
+        assert!((result - ((10.0 * 0.09 + 30.0 * 0.25) / 40.0_f64).sqrt()).abs() < 1e-12);
     }
 
     #[test]
-    fn bins_have_their_middles_and_means_from_five_samples_on() {
-        // From 2 to 6 in four bins of one: five samples in the first, four in the second, six in the third, the last has the end.
+    fn binned_means_need_five_values() {
+        // From 2 to 6 in four bins of one: five values in the first, four in the second, six in the third, the last
+        // includes the end.
         let mut x = vec![2.0, 2.1, 2.3, 2.5, 2.9];
         x.extend([3.0, 3.2, 3.5, 3.9]);
         x.extend([4.0, 4.1, 4.2, 4.3, 4.4, 4.9]);
@@ -237,7 +238,7 @@ mod tests {
         {
             assert!((m - w).abs() < 1e-12, "{mean:?}");
         }
-        // In bins of a quarter, the same.
+        // The same in bins of a quarter.
         let quarter: Vec<f64> = x.iter().map(|x| 0.25 * x).collect();
         let (at, small) = binned_means(&quarter, &e, &used, 4);
         assert_eq!((at, small), (vec![0.625, 1.125, 1.375], mean));
@@ -246,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn correlations_are_pearsons_with_time_depth_speed_direction_friction_and_force() {
+    fn correlations_are_pearson_coefficients() {
         let n = 40;
         let mut c = curve(1, 0.0, 0.0, n, 0.0);
         for k in 0..n {
@@ -273,7 +274,7 @@ mod tests {
             release_m: 0.0,
         };
         let slabs = [slab(0.005, 0.007), slab(0.012, 0.038)];
-        let told = correlations(&[c.clone()], |c| &c.base_residual_n, &slabs);
+        let result = correlations(&[c.clone()], |c| &c.base_residual_n, &slabs);
         let kept: Vec<usize> = (0..n).filter(|k| *k != 7).collect();
         let inside = |k: usize| (c.position_m[k].clamp(0.005, 0.05) - 0.005).max(0.0);
         let sign = |k: usize| if k == 11 { 0.0 } else { c.velocity_mps[k].signum() };
@@ -286,8 +287,8 @@ mod tests {
             ("length inside x direction", Box::new(|k| inside(k) * sign(k))),
             ("force", Box::new(|k| c.force_n[k])),
         ];
-        assert_eq!(told.len(), of.len());
-        for ((name, r), (wanted, x)) in told.iter().zip(&of) {
+        assert_eq!(result.len(), of.len());
+        for ((name, r), (wanted, x)) in result.iter().zip(&of) {
             assert_eq!(name, wanted);
             let (x, e): (Vec<f64>, Vec<f64>) = kept.iter().map(|k| (x(*k), c.base_residual_n[*k])).unzip();
             let (mx, me) = (stylet_stats::mean(&x), stylet_stats::mean(&e));

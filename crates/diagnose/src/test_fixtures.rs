@@ -1,19 +1,20 @@
-//! What unit tests of several modules make up.
+//! Fixtures shared by unit tests.
 
-use crate::effect_selection::SearchStage;
 use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::cross_validation::PredictionScore;
 use crate::repeated_insertions::model_selection::{ModelFamily, ScoredModel};
 use crate::repeated_insertions::multistart_fit::{SetFit, fit_from};
+use crate::selection_state::{Search, SearchStage};
 use std::sync::Arc;
-use stylet_identify::fit::Fit;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::{FitData, Residuals};
 use stylet_identify::model::{Assumptions, EffectTerm, Model};
 use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 use stylet_tissue::{AnyEffect, Effect, ForceLaw as TissueLaw, ForceLawState, Layer, Tissue};
 
-/// Layers of so much thickness, stiffness and friction, from the origin on, believed to 30 % and their thickness to 10 %.
+/// Prior of layers given by thickness, stiffness and friction, starting at zero; tolerance 30 %, of thicknesses 10 %.
 pub fn assumed_layers(layers: &[[f64; 3]]) -> Arc<Assumptions> {
     let layer = |&[thickness_m, stiffness_n_per_m, friction_ns_per_m2]: &[f64; 3]| Layer {
         name: String::new(),
@@ -31,7 +32,7 @@ pub fn assumed_layers(layers: &[[f64; 3]]) -> Arc<Assumptions> {
     })
 }
 
-/// A law of this kind with these effects, judged by these errors (N) and fitted to so many nats; nothing of it was measured.
+/// A candidate model with these effects, held-out errors (N) and objective (nats), without data.
 pub fn unmeasured_candidate(
     kind: ModelFamily,
     effects: &[AnyEffect],
@@ -55,7 +56,7 @@ pub fn unmeasured_candidate(
     }
 }
 
-/// One layer of gel from 4 mm on that gives way at 2 N.
+/// One layer of gel that starts at 4 mm and ruptures at 2 N.
 pub fn gel_tissue() -> Tissue {
     let layer = Layer {
         name: "gel".to_owned(),
@@ -67,35 +68,37 @@ pub fn gel_tissue() -> Tissue {
     Tissue { surface_m: 0.004, layers: vec![layer] }
 }
 
-/// Noise of the sensor (N) in what follows.
+/// Noise standard deviation of the simulated sensor in N.
 pub const SENSOR_NOISE_SD_N: f64 = 0.01;
 
-/// Insertions into the gel by 16 mm, with a rest of a second, and back, at 50 Hz: each at a speed (m/s), its surface moved by so much (m).
+/// Insertions of 16 mm into the gel with a hold of one second and a retraction, at 50 Hz; one speed (m/s) and surface
+/// shift (m) each.
 pub fn simulated_recordings(effects: &[AnyEffect], all: &[[f64; 2]]) -> Vec<SegmentedRecording> {
     recordings_with_added_force(effects, all, |_| 0.0)
 }
 
-/// The same, read off a sensor that shows so much (N) more at every instant (s).
+/// As [`simulated_recordings`], with a force `added_n(t)` (N) added by the sensor.
 pub fn recordings_with_added_force(
     effects: &[AnyEffect],
     all: &[[f64; 2]],
-    more_n: impl Fn(f64) -> f64,
+    added_n: impl Fn(f64) -> f64,
 ) -> Vec<SegmentedRecording> {
-    all.iter().enumerate().map(|(k, at)| insertion(k, effects, *at, &more_n)).collect()
+    all.iter().enumerate().map(|(k, at)| insertion(k, effects, *at, &added_n)).collect()
 }
 
+/// Insertion number `k`.
 fn insertion(
     k: usize,
     effects: &[AnyEffect],
-    [speed, moved_m]: [f64; 2],
-    more_n: &impl Fn(f64) -> f64,
+    [speed, shift_m]: [f64; 2],
+    added_n: &impl Fn(f64) -> f64,
 ) -> SegmentedRecording {
     let mut tissue = gel_tissue();
-    tissue.surface_m += moved_m;
+    tissue.surface_m += shift_m;
     let law = TissueLaw::new(&tissue, effects).expect("a law");
     let travel_s = 0.016 / speed;
     let (mut state, mut seed) = (ForceLawState::default(), 17 + 1000 * k as u64);
-    // The sum of twelve evenly spread numbers is nearly normal.
+    // The sum of twelve uniform numbers is nearly normal.
     let mut normal = || {
         (0..12).fold(-6.0, |sum, _| {
             seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
@@ -114,22 +117,22 @@ fn insertion(
         t.push(at);
         z.push(place);
         f.push(
-            law.step(&mut state, at, place, v, |_| {}).total_n + more_n(at) + SENSOR_NOISE_SD_N * normal(),
+            law.step(&mut state, at, place, v, |_| {}).total_n + added_n(at) + SENSOR_NOISE_SD_N * normal(),
         );
     }
     SegmentedRecording::new(format!("run {k}"), Recording::new(t, z, f).expect("clean columns"), 1)
 }
 
-/// Insertions fitted with these effects from the truth on; surface and friction are every run's own.
+/// Recordings fitted with these effects, starting at the truth; surface and friction are random effects.
 pub fn fit_from_truth(effects: &[AnyEffect], runs: &[&SegmentedRecording]) -> SetFit {
-    let belief = Assumptions {
+    let assumed = Assumptions {
         tissue: gel_tissue(),
         known_effects: Vec::new(),
         tolerance: vec![4.0],
         thickness_tolerance: vec![0.0],
         surface_tolerance_m: 2e-3,
     };
-    let mut model = Model::base(Arc::new(belief), runs.len());
+    let mut model = Model::base(Arc::new(assumed), runs.len());
     model.effects = effects.iter().map(|e| EffectTerm::new(e.info(), &e.parameters())).collect();
     (model.free.recording_surface, model.free.recording_friction, model.fixed_scatter) = (true, true, true);
     model.scatter.surface_m = 2e-4;
@@ -140,7 +143,29 @@ pub fn fit_from_truth(effects: &[AnyEffect], runs: &[&SegmentedRecording]) -> Se
         .expect("a fit")
 }
 
-/// Numbers spread evenly between nothing and one, the same ones for a seed.
+/// Simulated recordings with the effects `there` and an added sensor force (N), fitted with the effects `fitted`.
+pub fn fit_simulated(
+    fitted: &[AnyEffect],
+    there: &[AnyEffect],
+    at: &[[f64; 2]],
+    added_n: impl Fn(f64) -> f64,
+) -> SetFit {
+    let runs = recordings_with_added_force(there, at, added_n);
+    fit_from_truth(fitted, &runs.iter().collect::<Vec<_>>())
+}
+
+/// Blocks of a recording with these columns.
+pub fn blocks_of(time_s: Vec<f64>, position_m: Vec<f64>, force_n: Vec<f64>) -> BlockAverages {
+    let recording = Recording::new(time_s, position_m, force_n).expect("clean columns");
+    BlockAverages::new(&recording, &[], BLOCK_S)
+}
+
+/// Data of these blocks with white noise.
+pub fn data_of(blocks: Vec<BlockAverages>, noise_sd_n: f64) -> FitData {
+    FitData::new(Arc::new(blocks), Noise::white(noise_sd_n), 0.0)
+}
+
+/// Reproducible uniform numbers in [0, 1).
 pub fn uniform_sequence(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = (seed * 1_103_515_245 + 12_345) % 2_147_483_648;
@@ -148,14 +173,31 @@ pub fn uniform_sequence(mut seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// A stage of a search that took this effect among rivals that gained so many nats.
+/// A search stage that selected `selected` among candidates with these gains (nats).
 pub fn search_stage(
-    taken: Option<(&'static str, f64)>,
-    needed: f64,
-    rivals: &[(AnyEffect, f64)],
+    selected: Option<(&'static str, f64)>,
+    required_nats: f64,
+    candidates: &[(AnyEffect, f64)],
 ) -> SearchStage {
     let choice = |(e, _): &(AnyEffect, f64)| EffectTerm::new(e.info(), &e.parameters());
-    let choices: Vec<EffectTerm> = rivals.iter().map(choice).collect();
-    let gained = choices.iter().zip(rivals).map(|(c, r)| (c.info.id, r.1, c.values.len())).collect();
-    SearchStage { included: Vec::new(), candidates: gained, selected: taken, required_nats: needed, choices }
+    let choices: Vec<EffectTerm> = candidates.iter().map(choice).collect();
+    let gains = choices.iter().zip(candidates).map(|(c, r)| (c.info.id, r.1, c.values.len())).collect();
+    SearchStage { included: Vec::new(), candidates: gains, selected, required_nats, choices }
+}
+
+/// Speed (m/s) and surface shift (m) of four insertions.
+const FOUR_INSERTIONS: [[f64; 2]; 4] = [[3e-3, 3e-4], [4e-3, -3e-4], [5e-3, 0.0], [6e-3, 1e-4]];
+
+/// A search that found these effects in recordings with an added sensor force (N), and a base law fitted to them.
+pub fn search_result(effects: &[AnyEffect], runs: usize, added_n: impl Fn(f64) -> f64) -> Search {
+    let f = fit_simulated(effects, &[], &FOUR_INSERTIONS[..runs], added_n);
+    let mut search = Search::from_fit(f.fit, f.data);
+    search.accept(search.best.clone());
+    search.base = search.best.clone();
+    if !effects.is_empty() {
+        search.base.model.effects.clear();
+        search.base = fit(&search.base.model, &search.data, Effort::FULL).expect("a fit");
+    }
+    search.stages = effects.iter().map(|e| search_stage(Some((e.id(), 50.0)), 48.0, &[])).collect();
+    search
 }

@@ -1,5 +1,5 @@
-//! Promise: recordings that cannot belong to the scenario are refused with a message that says what is
-//! wrong and what would be right; a hole in a recording is no reason to refuse it.
+//! Promise: recordings that cannot belong to the scenario are refused with a message that states the fault and the
+//! remedy; gaps in a recording are tolerated.
 
 use stylet_diagnose::{DiagnoseError, Diagnosis, NamedRecording, Options, Verdict, diagnose};
 use stylet_own_world::{self as hidden, Drawn, Motions};
@@ -23,8 +23,8 @@ fn with(change: impl Fn(&mut Recording)) -> Result<Diagnosis, DiagnoseError> {
     let case = case();
     let mut recording = case.recordings[0].clone();
     change(&mut recording);
-    let evidence = [NamedRecording { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
-    diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis)
+    let recordings = [NamedRecording { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
+    diagnose(&case.believed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
 }
 
 fn message(change: impl Fn(&mut Recording)) -> String {
@@ -32,7 +32,7 @@ fn message(change: impl Fn(&mut Recording)) -> String {
 }
 
 #[test]
-fn a_needle_that_never_reaches_the_tissue_is_refused() {
+fn needle_that_never_reaches_the_tissue_is_refused() {
     let text = message(|r| r.position_m.iter_mut().for_each(|z| *z -= 0.2));
     assert!(text.contains("a.csv") && text.contains("never reaches the tissue"), "{text}");
 }
@@ -72,7 +72,7 @@ fn one_sample_or_none_that_is_a_number_is_too_little() {
 }
 
 #[test]
-fn a_hole_in_a_recording_does_not_break_the_fit() {
+fn gap_in_a_recording_is_tolerated() {
     let found = with(|r| {
         for i in 3000..3100 {
             r.force_n[i] = f64::NAN;
@@ -112,19 +112,19 @@ fn recordings_at_different_rates_are_fitted_together() {
             keep
         });
     }
-    let evidence: Vec<NamedRecording> = [("a.csv", one), ("b.csv", half)]
+    let recordings: Vec<NamedRecording> = [("a.csv", one), ("b.csv", half)]
         .into_iter()
         .map(|(name, recording)| NamedRecording { name: name.to_owned(), recording, notes: Vec::new() })
         .collect();
     let found =
-        diagnose(&case.believed, &evidence, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+        diagnose(&case.believed, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
     assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
 }
 
 #[test]
-fn the_same_bytes_for_any_number_of_threads() {
+fn result_does_not_depend_on_the_number_of_threads() {
     let case = case();
-    let evidence = [NamedRecording {
+    let recordings = [NamedRecording {
         name: "a.csv".to_owned(),
         recording: case.recordings[0].clone(),
         notes: Vec::new(),
@@ -132,7 +132,7 @@ fn the_same_bytes_for_any_number_of_threads() {
     let json = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let found = pool.install(|| {
-            diagnose(&case.believed, &evidence, &Options::default(), |_| {}).map(|e| e.diagnosis)
+            diagnose(&case.believed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
         });
         serde_json::to_string(&found.expect("a diagnosis")).expect("JSON")
     };

@@ -1,13 +1,13 @@
-//! Promise: no answer changes unnoticed. Small drawn cases of different character are diagnosed, and what comes out (verdicts, causes,
-//! numbers, intervals, traces, what is left, the search's steps) is compared with what is kept in `recorded_answers.txt`, to 1e-5 of each
-//! number, so that another machine's mathematics passes. The tests of sets keep theirs in the same file.
+//! Promise: no result changes unnoticed. Small simulated cases are diagnosed, and the results (verdicts, causes, parameters,
+//! intervals, residual statistics, search steps) are compared with `recorded_answers.txt` to a relative 1e-5, which allows for
+//! another platform's mathematics. The tests of repeated insertions use the same file.
 //!
-//! Whoever changes an answer on purpose records anew and explains it:
+//! After an intended change, record the results again and explain it in the commit:
 //!
 //! ```sh
 //! STYLET_RECORD=1 cargo test -p stylet-diagnose --all-features
 //! ```
-//! What is known of a case beforehand (its cause, its numbers) is asserted beside that.
+//! What is known about a case (its effect and parameters) is asserted in addition.
 
 mod drawn;
 mod recorded;
@@ -37,7 +37,7 @@ const NOISE_N: f64 = 0.01;
 const HZ: f64 = 100.0;
 
 /// Two layers in 29 mm.
-fn believed() -> Scenario {
+fn two_layers() -> Scenario {
     let layer = |name: &str, d: f64, k: f64, b: f64, f: Option<f64>| Layer {
         name: name.to_owned(),
         thickness_m: d,
@@ -56,9 +56,9 @@ fn believed() -> Scenario {
     s
 }
 
-/// Three layers, so that two faces are seen.
+/// Three layers with two boundaries.
 fn three() -> Scenario {
-    let mut s = believed();
+    let mut s = two_layers();
     let [first, second] = &s.tissue.layers[..] else { unreachable!("two layers") };
     let mut third = second.clone();
     let (mut first, mut second) = (first.clone(), second.clone());
@@ -69,7 +69,7 @@ fn three() -> Scenario {
     s
 }
 
-/// Four layers, so that three faces are seen.
+/// Four layers with three boundaries.
 fn four() -> Scenario {
     let mut s = three();
     let third = s.tissue.layers[2].clone();
@@ -85,9 +85,9 @@ fn four() -> Scenario {
     s
 }
 
-/// What is there: 8 to 12 % off what is believed.
+/// True tissue, 8 to 12 % off the assumed one.
 fn truth() -> Tissue {
-    let mut t = believed().tissue;
+    let mut t = two_layers().tissue;
     for (layer, [k, b]) in t.layers.iter_mut().zip([[1.1, 0.9], [0.92, 1.12]]) {
         layer.stiffness_n_per_m *= k;
         layer.friction_ns_per_m2 *= b;
@@ -127,20 +127,20 @@ fn motion(k: usize, t: f64) -> [f64; 3] {
     }
 }
 
-/// What is drawn.
+/// A simulated case.
 struct Case {
-    believed: Scenario,
+    assumed: Scenario,
     effects: Vec<AnyEffect>,
     truth: Tissue,
     /// Recordings.
     count: usize,
     noise_n: f64,
-    /// A wander of the zero (N), of so many seconds.
-    wander: (f64, f64),
+    /// Standard deviation (N) and time constant (s) of the sensor drift.
+    drift: (f64, f64),
     outside: Option<Outside>,
-    /// How far the surface of each recording is moved (m).
+    /// Scale of the surface shifts (m).
     moved_m: f64,
-    /// How much puncture forces scatter.
+    /// Relative scatter of the puncture force.
     scatter: f64,
     seed: u64,
 }
@@ -148,12 +148,12 @@ struct Case {
 impl Default for Case {
     fn default() -> Self {
         Self {
-            believed: believed(),
+            assumed: two_layers(),
             effects: Vec::new(),
             truth: truth(),
             count: 3,
             noise_n: NOISE_N,
-            wander: (0.0, 1.0),
+            drift: (0.0, 1.0),
             outside: None,
             moved_m: 0.0,
             scatter: 0.0,
@@ -167,7 +167,7 @@ impl Case {
         Self { effects: effects.into_iter().collect(), ..Self::default() }
     }
 
-    fn evidence(&self) -> Vec<NamedRecording> {
+    fn recordings(&self) -> Vec<NamedRecording> {
         const FINE: usize = 5;
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut out = Vec::new();
@@ -181,7 +181,7 @@ impl Case {
             let chain = MeasurementChain::new(&self.effects);
             let (mut state, mut measuring) = (ForceLawState::default(), chain.start(HZ * FINE as f64));
             let mut outside = self.outside.clone();
-            let (keep, mut slow) = (libm::exp(-1.0 / (HZ * self.wander.1)), normal());
+            let (keep, mut slow) = (libm::exp(-1.0 / (HZ * self.drift.1)), normal());
             let spike_n = self.effects.iter().find_map(|e| match e {
                 AnyEffect::ForceSpikes(s) => Some(s.size_n),
                 _ => None,
@@ -199,8 +199,8 @@ impl Case {
                 let mut noise_n = 0.0;
                 if sampled {
                     slow = keep * slow + (1.0 - keep * keep).sqrt() * normal();
-                    noise_n = self.noise_n * normal() + self.wander.0 * slow;
-                    // Now and then a spike, in and out of either sign.
+                    noise_n = self.noise_n * normal() + self.drift.0 * slow;
+                    // Occasional spikes of both signs.
                     let spike = if (i / FINE + 13 * k) % 97 == 40 {
                         1.0 - 2.0 * ((i / FINE) % 2) as f64
                     } else {
@@ -222,31 +222,31 @@ impl Case {
         out
     }
 
-    /// Diagnoses the case; all that comes out is compared with what is kept under this name.
-    fn examined(&self, name: &str) -> DiagnosisResult {
+    /// Diagnoses the case and compares all results with those recorded under this name.
+    fn diagnosed(&self, name: &str) -> DiagnosisResult {
         let found =
-            diagnose(&self.believed, &self.evidence(), &Options::default(), |_| {}).expect("a diagnosis");
-        let mut told = AnswerLines::default();
-        tell(&mut told, &found);
-        told.compare(FILE, name);
+            diagnose(&self.assumed, &self.recordings(), &Options::default(), |_| {}).expect("a diagnosis");
+        let mut answers = AnswerLines::default();
+        list_results(&mut answers, &found);
+        answers.compare(FILE, name);
         found
     }
 }
 
-fn tell(told: &mut AnswerLines, found: &DiagnosisResult) {
-    told.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
-    told.value("tissue", &serde_json::to_value(&found.extended_scenario.tissue).expect("JSON"));
+fn list_results(answers: &mut AnswerLines, found: &DiagnosisResult) {
+    answers.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
+    answers.value("tissue", &serde_json::to_value(&found.extended_scenario.tissue).expect("JSON"));
     for e in &found.extended_scenario.effects {
-        told.numbers(&format!("extended.{}", e.id()), &e.parameters());
+        answers.numbers(&format!("extended.{}", e.id()), &e.parameters());
     }
     for (k, class) in found.competing_effects.iter().enumerate() {
-        class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.nats_behind));
+        class.iter().for_each(|r| answers.number(&format!("class.{k}.{}", r.name), r.nats_behind));
     }
-    for (name, left) in [("before", &found.base_held_out), ("after", &found.extended_held_out)] {
+    for (name, left) in [("base", &found.base_held_out), ("extended", &found.extended_held_out)] {
         for (k, l) in left.iter().enumerate() {
             let Some(l) = l else { continue };
-            told.column(&format!("{name}.{k}.e"), &l.residual_n);
-            told.numbers(&format!("{name}.{k}.instants"), &l.rupture_times_s);
+            answers.column(&format!("{name}.{k}.e"), &l.residual_n);
+            answers.numbers(&format!("{name}.{k}.instants"), &l.rupture_times_s);
         }
     }
     for (k, c) in stylet_diagnose::report_curves::recording_curves(found).iter().enumerate() {
@@ -260,34 +260,34 @@ fn tell(told: &mut AnswerLines, found: &DiagnosisResult) {
             ("free", &c.free_run_residual_n),
             ("ruptures", &c.ruptures_s),
         ] {
-            told.column(&format!("curve.{k}.{name}"), x);
+            answers.column(&format!("curve.{k}.{name}"), x);
         }
         let layers: Vec<f64> = c.layer.iter().map(|l| *l as f64).collect();
-        told.column(&format!("curve.{k}.layer"), &layers);
+        answers.column(&format!("curve.{k}.layer"), &layers);
     }
 }
 
-fn named(found: &DiagnosisResult) -> Vec<&str> {
+fn effects_of(found: &DiagnosisResult) -> Vec<&str> {
     found.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect()
 }
 
 fn cause<'a>(found: &'a DiagnosisResult, effect: &str) -> &'a Cause {
-    let all = named(found);
+    let all = effects_of(found);
     let found = found.diagnosis.causes.iter().find(|c| c.effect == effect);
     assert!(found.is_some(), "no {effect}: {all:?}");
     found.expect("a cause")
 }
 
-/// Whether the interval of a cause's number holds the truth.
-fn holds(found: &DiagnosisResult, effect: &str, path: &str, truth: f64) {
+/// Asserts that the interval of an effect's parameter includes the truth.
+fn interval_includes(found: &DiagnosisResult, effect: &str, path: &str, truth: f64) {
     let e = cause(found, effect).parameters[path];
     assert!(e.low <= truth && truth <= e.high, "{effect}.{path} is {truth}, said {e:?}");
 }
 
 #[test]
-fn nothing_wrong() {
-    let found = Case::default().examined("nothing wrong");
-    assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", named(&found));
+fn agreement_gives_the_verdict_none() {
+    let found = Case::default().diagnosed("no effect");
+    assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", effects_of(&found));
     let t = truth();
     for (layer, name, x) in [
         (1, "stiffness_n_per_m", t.layers[0].stiffness_n_per_m),
@@ -303,190 +303,195 @@ fn nothing_wrong() {
 }
 
 #[test]
-fn one_strong_cause() {
-    let found = Case::with([CoulombFriction { c_n_per_m: 12.0 }.into()]).examined("one strong cause");
-    assert_eq!(found.diagnosis.verdict, Verdict::Named, "{:?}", named(&found));
-    assert_eq!(named(&found), ["coulomb_friction"]);
-    holds(&found, "coulomb_friction", "c_n_per_m", 12.0);
+fn strong_friction_is_identified() {
+    let found = Case::with([CoulombFriction { c_n_per_m: 12.0 }.into()]).diagnosed("one strong effect");
+    assert_eq!(found.diagnosis.verdict, Verdict::Named, "{:?}", effects_of(&found));
+    assert_eq!(effects_of(&found), ["coulomb_friction"]);
+    interval_includes(&found, "coulomb_friction", "c_n_per_m", 12.0);
 }
 
 #[test]
-fn two_causes() {
+fn two_effects_are_identified() {
     let terms = vec![PronyTerm { fraction: 0.35, time_constant_s: 0.8 }];
     let found = Case::with([
         StressRelaxation { terms }.into(),
         PeriodicInterference { amplitude_n: 0.04, frequency_hz: 6.3, phase_rad: 0.7 }.into(),
     ])
-    .examined("two causes");
-    let mut all = named(&found);
+    .diagnosed("two effects");
+    let mut all = effects_of(&found);
     all.sort_unstable();
     assert_eq!(all, ["periodic_interference", "stress_relaxation"]);
-    holds(&found, "periodic_interference", "amplitude_n", 0.04);
-    holds(&found, "stress_relaxation", "terms.0.fraction", 0.35);
+    interval_includes(&found, "periodic_interference", "amplitude_n", 0.04);
+    interval_includes(&found, "stress_relaxation", "terms.0.fraction", 0.35);
 }
 
 #[test]
-fn a_range_of_the_sensor() {
-    let found = Case::with([Saturation { limit_n: 2.4 }.into()]).examined("saturated");
-    assert_eq!(named(&found), ["saturation"]);
-    holds(&found, "saturation", "limit_n", 2.4);
+fn sensor_saturation_is_identified() {
+    let found = Case::with([Saturation { limit_n: 2.4 }.into()]).diagnosed("saturation");
+    assert_eq!(effects_of(&found), ["saturation"]);
+    interval_includes(&found, "saturation", "limit_n", 2.4);
 }
 
 #[test]
-fn a_late_force() {
-    let found = Case::with([TimeDelay { delay_s: 0.043 }.into()]).examined("late");
-    assert_eq!(named(&found), ["time_delay"]);
-    holds(&found, "time_delay", "delay_s", 0.043);
+fn time_delay_is_identified() {
+    let found = Case::with([TimeDelay { delay_s: 0.043 }.into()]).diagnosed("delay");
+    assert_eq!(effects_of(&found), ["time_delay"]);
+    interval_includes(&found, "time_delay", "delay_s", 0.043);
 }
 
 #[test]
-fn a_face_elsewhere() {
-    let case = Case { believed: three(), truth: three().tissue, ..Case::default() };
+fn boundary_shift_is_identified() {
+    let case = Case { assumed: three(), truth: three().tissue, ..Case::default() };
     let found = Case { effects: vec![BoundaryShift { layer: 1, shift_m: 0.0013 }.into()], ..case }
-        .examined("a wrong thickness");
-    assert_eq!(named(&found), ["boundary_shift"]);
-    holds(&found, "boundary_shift", "shift_m", 0.0013);
+        .diagnosed("boundary shift");
+    assert_eq!(effects_of(&found), ["boundary_shift"]);
+    interval_includes(&found, "boundary_shift", "shift_m", 0.0013);
 }
 
 #[test]
-fn a_wandering_zero() {
-    let found = Case { wander: (0.008, 1.5), ..Case::default() }.examined("a wandering zero");
-    assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", named(&found));
+fn sensor_drift_is_no_effect() {
+    let found = Case { drift: (0.008, 1.5), ..Case::default() }.diagnosed("sensor drift");
+    assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", effects_of(&found));
 }
 
 #[test]
-fn coarse_steps() {
-    let found = Case::with([Quantisation { step_n: 0.05 }.into()]).examined("coarse steps");
-    assert_eq!(named(&found), ["quantisation"]);
-    holds(&found, "quantisation", "step_n", 0.05);
+fn quantisation_is_identified() {
+    let found = Case::with([Quantisation { step_n: 0.05 }.into()]).diagnosed("quantisation");
+    assert_eq!(effects_of(&found), ["quantisation"]);
+    interval_includes(&found, "quantisation", "step_n", 0.05);
 }
 
 #[test]
-fn outside_the_library() {
+fn unmodelled_effect_gives_the_verdict_unknown() {
     let outside = Some(Outside::new(0, [0.1, 0.3, 0.5, 0.7], 0.15));
-    let found = Case { outside, ..Case::default() }.examined("outside the library");
-    assert_eq!(found.diagnosis.verdict, Verdict::Unknown, "{:?}", named(&found));
+    let found = Case { outside, ..Case::default() }.diagnosed("unmodelled effect");
+    assert_eq!(found.diagnosis.verdict, Verdict::Unknown, "{:?}", effects_of(&found));
 }
 
-/// A strong cause stands beside what nobody knows; where one recording is alone, what is unknown has to be far larger.
+/// A strong effect is identified in the presence of an unmodelled one; in a single recording the unmodelled one must be larger.
 #[test]
-fn outside_the_library_beside_a_cause_and_alone() {
+fn unmodelled_effects_are_detected_with_a_cause_and_in_a_single_recording() {
     let outside = |kind, size_n| Some(Outside::new(kind, [0.1, 0.3, 0.5, 0.7], size_n));
     let friction: AnyEffect = CoulombFriction { c_n_per_m: 90.0 }.into();
-    let beside =
-        Case { outside: outside(0, 0.12), ..Case::with([friction]) }.examined("unknown beside a cause");
-    assert_eq!((beside.diagnosis.verdict, named(&beside)), (Verdict::Unknown, vec!["coulomb_friction"]));
-    let alone = Case { outside: outside(0, 0.3), count: 1, ..Case::default() }.examined("unknown, alone");
-    assert_eq!(alone.diagnosis.verdict, Verdict::Unknown, "{:?}", named(&alone));
-    let chirp = Case { outside: outside(3, 0.1), ..Case::default() }.examined("unknown: a chirp");
-    assert_eq!(chirp.diagnosis.verdict, Verdict::Unknown, "{:?}", named(&chirp));
+    let with_cause = Case { outside: outside(0, 0.12), ..Case::with([friction]) }
+        .diagnosed("unmodelled effect and friction");
+    assert_eq!(
+        (with_cause.diagnosis.verdict, effects_of(&with_cause)),
+        (Verdict::Unknown, vec!["coulomb_friction"])
+    );
+    let alone = Case { outside: outside(0, 0.3), count: 1, ..Case::default() }
+        .diagnosed("unmodelled effect in a single recording");
+    assert_eq!(alone.diagnosis.verdict, Verdict::Unknown, "{:?}", effects_of(&alone));
+    let chirp = Case { outside: outside(3, 0.1), ..Case::default() }.diagnosed("unmodelled chirp");
+    assert_eq!(chirp.diagnosis.verdict, Verdict::Unknown, "{:?}", effects_of(&chirp));
 }
 
 #[test]
-fn a_membrane() {
+fn hidden_membrane_is_identified() {
     let effect = HiddenMembrane { depth_m: 0.018, stiffness_n_per_m: 300.0, puncture_n: 0.9 };
-    let found = Case::with([effect.into()]).examined("a membrane");
-    assert!(named(&found).contains(&"hidden_membrane"), "{:?}", named(&found));
+    let found = Case::with([effect.into()]).diagnosed("hidden membrane");
+    assert!(effects_of(&found).contains(&"hidden_membrane"), "{:?}", effects_of(&found));
 }
 
 #[test]
-fn a_breath() {
+fn breathing_is_identified() {
     let effect = Respiration { amplitude_m: 0.001, frequency_hz: 0.33, phase_rad: 1.1 };
-    let found = Case::with([effect.into()]).examined("a breath");
-    assert!(named(&found).contains(&"respiration"), "{:?}", named(&found));
+    let found = Case::with([effect.into()]).diagnosed("breathing");
+    assert!(effects_of(&found).contains(&"respiration"), "{:?}", effects_of(&found));
 }
 
 #[test]
-fn a_wrong_scale() {
-    let case = Case { believed: four(), truth: four().tissue, ..Case::default() };
-    let found = Case { effects: vec![PositionScale { eps: 0.07 }.into()], ..case }.examined("a wrong scale");
-    assert_eq!(named(&found), ["position_scale"]);
-    holds(&found, "position_scale", "eps", 0.07);
+fn position_scale_is_identified() {
+    let case = Case { assumed: four(), truth: four().tissue, ..Case::default() };
+    let found =
+        Case { effects: vec![PositionScale { eps: 0.07 }.into()], ..case }.diagnosed("position scale");
+    assert_eq!(effects_of(&found), ["position_scale"]);
+    interval_includes(&found, "position_scale", "eps", 0.07);
 }
 
-/// Two thicknesses that are off in proportion may be so by chance.
+/// Two thicknesses may be off in proportion by chance.
 #[test]
-fn a_wrong_scale_of_two_thicknesses() {
-    let case = Case { believed: three(), truth: three().tissue, ..Case::default() };
+fn position_scale_of_two_thicknesses_is_not_identifiable() {
+    let case = Case { assumed: three(), truth: three().tissue, ..Case::default() };
     let effects = vec![PositionScale { eps: 0.07 }.into()];
-    let found = Case { effects, ..case }.examined("a wrong scale of two thicknesses");
-    assert!(named(&found).is_empty(), "{:?}", named(&found));
+    let found = Case { effects, ..case }.diagnosed("position scale of two thicknesses");
+    assert!(effects_of(&found).is_empty(), "{:?}", effects_of(&found));
     assert_eq!(found.diagnosis.verdict, Verdict::None);
 }
 
 #[test]
-fn surfaces_of_their_own() {
-    let found = Case { moved_m: 5e-4, ..Case::default() }.examined("surfaces of their own");
-    assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", named(&found));
-    let told = found.diagnosis.random_effect_sd.surface_m;
-    assert!((2e-4..7e-4).contains(&told), "{told}");
+fn different_surfaces_are_a_random_effect() {
+    let found = Case { moved_m: 5e-4, ..Case::default() }.diagnosed("different surfaces");
+    assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", effects_of(&found));
+    let answers = found.diagnosis.random_effect_sd.surface_m;
+    assert!((2e-4..7e-4).contains(&answers), "{answers}");
 }
 
 #[test]
-fn a_puncture_that_depends_on_speed() {
+fn rate_dependent_puncture_is_identified() {
     let case = Case { scatter: 0.02, ..Case::with([RateDependentPuncture { alpha: 0.2 }.into()]) };
-    let found = case.examined("a puncture that depends on speed");
-    assert_eq!(named(&found), ["rate_dependent_puncture"]);
-    holds(&found, "rate_dependent_puncture", "alpha", 0.2);
+    let found = case.diagnosed("rate-dependent puncture");
+    assert_eq!(effects_of(&found), ["rate_dependent_puncture"]);
+    interval_includes(&found, "rate_dependent_puncture", "alpha", 0.2);
 }
 
 #[test]
-fn one_recording_alone() {
+fn stribeck_friction_is_identified_from_a_single_recording() {
     let effect = StribeckFriction { c_n_per_m: 8.0, c_static_n_per_m: 22.0, v_stribeck_mps: 0.002 };
     let case = Case { count: 1, ..Case::with([effect.into()]) };
-    let found = case.examined("one recording alone");
-    assert_eq!(named(&found), ["stribeck_friction"]);
-    holds(&found, "stribeck_friction", "c_n_per_m", 8.0);
+    let found = case.diagnosed("single recording");
+    assert_eq!(effects_of(&found), ["stribeck_friction"]);
+    interval_includes(&found, "stribeck_friction", "c_n_per_m", 8.0);
 }
 
-/// Causes of every other kind, one by one and in pairs, some of them too small to matter: what is said, not what is drawn of it.
-fn others(which: &[(&str, Vec<AnyEffect>, f64, f64)]) {
+/// Diagnoses other effects, single and in pairs, some of them negligible.
+fn check_effects(which: &[(&str, Vec<AnyEffect>, f64, f64)]) {
     for (name, effects, noise_n, scatter) in which {
         let case = Case { noise_n: *noise_n, scatter: *scatter, ..Case::with(effects.iter().cloned()) };
         let found =
-            diagnose(&case.believed, &case.evidence(), &Options::default(), |_| {}).expect("a diagnosis");
-        // What is hidden is named, but for traces.
-        let mut all = named(&found);
+            diagnose(&case.assumed, &case.recordings(), &Options::default(), |_| {}).expect("a diagnosis");
+        // Every simulated effect is identified, if only as negligible.
+        let mut all = effects_of(&found);
         all.extend(found.diagnosis.negligible.iter().map(|t| t.effect.as_str()));
         let mut hidden: Vec<&str> = effects.iter().map(Effect::id).collect();
         all.sort_unstable();
         hidden.sort_unstable();
         assert_eq!(all, hidden, "{name}");
-        let mut told = AnswerLines::default();
-        told.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
+        let mut answers = AnswerLines::default();
+        answers.value("diagnosis", &serde_json::to_value(&found.diagnosis).expect("JSON"));
         for (k, class) in found.competing_effects.iter().enumerate() {
-            class.iter().for_each(|r| told.number(&format!("class.{k}.{}", r.name), r.nats_behind));
+            class.iter().for_each(|r| answers.number(&format!("class.{k}.{}", r.name), r.nats_behind));
         }
-        told.compare(FILE, &format!("other: {name}"));
+        answers.compare(FILE, &format!("effects: {name}"));
     }
 }
 
 #[test]
-fn causes_of_other_kinds() {
+fn mechanical_and_sensor_effects_are_identified() {
     let two =
         [(0.2, 0.3), (0.25, 2.4)].map(|(fraction, time_constant_s)| PronyTerm { fraction, time_constant_s });
-    others(&[
+    check_effects(&[
         ("compliance", vec![NeedleCompliance { stiffness_n_per_m: 700.0 }.into()], NOISE_N, 0.0),
-        ("cutting", vec![CuttingForce { force_n: 0.3 }.into()], NOISE_N, 0.0),
-        ("soft faces", vec![SoftBoundary { width_m: 0.003 }.into()], NOISE_N, 0.0),
-        ("two terms", vec![StressRelaxation { terms: two.to_vec() }.into()], NOISE_N, 0.0),
+        ("cutting force", vec![CuttingForce { force_n: 0.3 }.into()], NOISE_N, 0.0),
+        ("soft boundaries", vec![SoftBoundary { width_m: 0.003 }.into()], NOISE_N, 0.0),
+        ("two relaxation terms", vec![StressRelaxation { terms: two.to_vec() }.into()], NOISE_N, 0.0),
         ("lag", vec![LowPassLag { time_constant_s: 0.05 }.into()], NOISE_N, 0.0),
     ]);
 }
 
 #[test]
-fn causes_of_still_other_kinds() {
-    others(&[
+fn further_effects_are_identified() {
+    check_effects(&[
         (
-            "spikes",
+            "spikes and drift",
             vec![ForceSpikes { rate_hz: 1.0, size_n: 0.8 }.into(), ForceDrift { rate_n_per_s: 0.03 }.into()],
             NOISE_N,
             0.0,
         ),
-        ("release", vec![IncompleteRelease { fraction: 0.4 }.into()], NOISE_N, 0.0),
-        ("exponent", vec![PowerLawFriction { exponent: 0.6 }.into()], NOISE_N, 0.06),
+        ("incomplete release", vec![IncompleteRelease { fraction: 0.4 }.into()], NOISE_N, 0.0),
+        ("friction exponent", vec![PowerLawFriction { exponent: 0.6 }.into()], NOISE_N, 0.06),
         (
-            "asymmetric",
+            "asymmetric friction and bias",
             vec![AsymmetricFriction { eps: 0.3 }.into(), ForceBias { force_n: 0.15 }.into()],
             NOISE_N,
             0.0,
@@ -496,18 +501,18 @@ fn causes_of_still_other_kinds() {
 }
 
 #[test]
-fn causes_too_small_to_matter() {
-    others(&[
-        ("a delay of a part of a sample", vec![TimeDelay { delay_s: 4e-4 }.into()], 5e-4, 0.0),
+fn small_effects_are_identified_or_negligible() {
+    check_effects(&[
+        ("delay of a fraction of a sample", vec![TimeDelay { delay_s: 4e-4 }.into()], 5e-4, 0.0),
         (
-            "a little bias",
+            "small bias",
             vec![ForceBias { force_n: 8e-4 }.into(), CoulombFriction { c_n_per_m: 30.0 }.into()],
             5e-3,
             0.0,
         ),
-        ("a little drift", vec![ForceDrift { rate_n_per_s: 4e-4 }.into()], NOISE_N, 0.0),
+        ("small drift", vec![ForceDrift { rate_n_per_s: 4e-4 }.into()], NOISE_N, 0.0),
         (
-            "a breath of micrometres",
+            "breathing of micrometres",
             vec![Respiration { amplitude_m: 3e-5, frequency_hz: 0.4, phase_rad: 0.3 }.into()],
             1e-3,
             0.0,
@@ -516,10 +521,10 @@ fn causes_too_small_to_matter() {
 }
 
 #[test]
-fn causes_that_go_together() {
-    others(&[
+fn combined_effects_are_identified() {
+    check_effects(&[
         (
-            "late and slow",
+            "delay and lag",
             vec![TimeDelay { delay_s: 0.03 }.into(), LowPassLag { time_constant_s: 0.04 }.into()],
             NOISE_N,
             0.0,
@@ -535,7 +540,7 @@ fn causes_that_go_together() {
             0.0,
         ),
         (
-            "friction of two kinds",
+            "two kinds of friction",
             vec![PowerLawFriction { exponent: 0.7 }.into(), AsymmetricFriction { eps: -0.2 }.into()],
             NOISE_N,
             0.04,
@@ -543,50 +548,50 @@ fn causes_that_go_together() {
     ]);
 }
 
-/// Two days later, the surface moved and the needle more slippery: by the diagnosis, and by the numbers that the others lend.
+/// New recordings with a shifted surface and less friction: predicted with and without the diagnosis, and with refitted parameters.
 #[test]
-fn predictions() {
+fn predictions_are_reproduced() {
     let effect: AnyEffect = CoulombFriction { c_n_per_m: 12.0 }.into();
     let found =
-        diagnose(&believed(), &Case::with([effect.clone()]).evidence(), &Options { brief: true }, |_| {})
+        diagnose(&two_layers(), &Case::with([effect.clone()]).recordings(), &Options { brief: true }, |_| {})
             .expect("a diagnosis");
     let mut case = Case { scatter: 0.05, seed: 23, ..Case::with([effect.clone()]) };
     case.truth.surface_m = 6e-4;
     case.truth.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= 0.85);
-    let evidence = case.evidence();
-    let mut told = AnswerLines::default();
+    let recordings = case.recordings();
+    let mut answers = AnswerLines::default();
     let (model, d) = (&found.extended_scenario, &found.diagnosis);
-    let base = believed();
+    let base = two_layers();
     for (name, d, was, refit) in [
         ("as it is", None, None, &[][..]),
         ("by the diagnosis", Some(d), Some(&base), &[][..]),
         ("by the others", Some(d), None, &[Refit::Surface, Refit::Friction][..]),
     ] {
-        let p = predict(model, d, was, refit, &evidence).expect("a prediction");
-        told.value(name, &serde_json::to_value(&p.prediction).expect("JSON"));
+        let p = predict(model, d, was, refit, &recordings).expect("a prediction");
+        answers.value(name, &serde_json::to_value(&p.prediction).expect("JSON"));
         for (k, s) in p.curves.iter().enumerate() {
-            let mut column = |what: &str, x: &[f64]| told.column(&format!("{name}.{k}.{what}"), x);
+            let mut column = |what: &str, x: &[f64]| answers.column(&format!("{name}.{k}.{what}"), x);
             column("time", &s.time_s);
             column("position", &s.position_m);
             column("measured", &s.measured_n);
             column("predicted", &s.predicted_n);
-            column("believed", s.assumed_n.as_deref().unwrap_or(&[]));
+            column("assumed", s.assumed_n.as_deref().unwrap_or(&[]));
             column("low", &s.low_n);
             column("high", &s.high_n);
             column("ruptures", &s.ruptures_s);
         }
         assert!(refit.is_empty() || p.prediction.rmse_n < 0.2, "{:?}", p.prediction);
     }
-    let alone = predict(model, Some(d), None, &[Refit::Friction], &evidence[..1]).expect("a prediction");
+    let alone = predict(model, Some(d), None, &[Refit::Friction], &recordings[..1]).expect("a prediction");
     assert!(!alone.prediction.held_out);
-    told.value("alone", &serde_json::to_value(&alone.prediction).expect("JSON"));
-    told.compare(FILE, "predictions");
+    answers.value("alone", &serde_json::to_value(&alone.prediction).expect("JSON"));
+    answers.compare(FILE, "predictions");
 }
 
-/// What is drawn for a seed and an index stays the same: older tables were made of it.
+/// Cases are reproducible by seed and index.
 #[test]
-fn sketches_of_the_former_benchmark() {
-    let mut told = AnswerLines::default();
+fn simulated_cases_are_reproducible() {
+    let mut answers = AnswerLines::default();
     for index in 0..70 {
         let s = hidden::sketch(5, index);
         let what = s
@@ -594,47 +599,47 @@ fn sketches_of_the_former_benchmark() {
             .outside
             .as_ref()
             .map_or(String::new(), |o| format!("{} {:?} {:.7e}", o.kind, o.u, o.size_n));
-        told.words(&format!("{index}"), &format!("{:?} {} {what}", s.kind, s.drawn.seed));
-        told.numbers(
+        answers.words(&format!("{index}"), &format!("{:?} {} {what}", s.kind, s.drawn.seed));
+        answers.numbers(
             &format!("{index}.target"),
             &[s.target, s.drawn.ar[0], s.drawn.ar[1], s.drawn.noise_n, s.drawn.off],
         );
         for e in &s.drawn.effects {
-            told.numbers(&format!("{index}.{}", e.id()), &e.parameters());
+            answers.numbers(&format!("{index}.{}", e.id()), &e.parameters());
             for factor in [0.37, 1.9, 55.0] {
                 let more = hidden::scaled(e, factor, 3.7).expect("an effect");
-                told.numbers(&format!("{index}.{} times {factor}", e.id()), &more.parameters());
+                answers.numbers(&format!("{index}.{} times {factor}", e.id()), &more.parameters());
             }
         }
     }
     for turn in 0..60 {
         let s = hidden::sketch_of(9, 3 * turn, Kind::Single, turn);
         for e in &s.drawn.effects {
-            told.numbers(&format!("single {turn}.{}", e.id()), &e.parameters());
+            answers.numbers(&format!("single {turn}.{}", e.id()), &e.parameters());
             for factor in [0.05, 0.6, 2.7, 19.0] {
                 let more = hidden::scaled(e, factor, 3.3).expect("an effect");
-                told.numbers(&format!("single {turn} times {factor}"), &more.parameters());
+                answers.numbers(&format!("single {turn} times {factor}"), &more.parameters());
             }
         }
-        told.number(&format!("single {turn}.target"), s.target);
+        answers.number(&format!("single {turn}.target"), s.target);
         let s = hidden::sketch_of(9, turn, Kind::Two, turn);
         let all: Vec<f64> = s.drawn.effects.iter().flat_map(AnyEffect::parameters).collect();
         let names: Vec<&str> = s.drawn.effects.iter().map(Effect::id).collect();
-        told.words(&format!("two {turn}"), &names.join(" "));
-        told.numbers(&format!("two {turn}.numbers"), &all);
+        answers.words(&format!("two {turn}"), &names.join(" "));
+        answers.numbers(&format!("two {turn}.numbers"), &all);
     }
     for harder in [Harder::Ar2, Harder::Scatter, Harder::Velocity, Harder::AndOutside, Harder::One] {
         let d = harder.make(hidden::sketch(5, 11)).drawn;
-        told.words(&format!("{harder:?}"), &format!("{:?} {:?}", d.motions, d.outside));
-        told.numbers(&format!("{harder:?}"), &[d.ar[0], d.ar[1], d.scatter, d.velocity_noise_mps]);
+        answers.words(&format!("{harder:?}"), &format!("{:?} {:?}", d.motions, d.outside));
+        answers.numbers(&format!("{harder:?}"), &[d.ar[0], d.ar[1], d.scatter, d.velocity_noise_mps]);
     }
-    told.compare(FILE, "drawn sketches");
+    answers.compare(FILE, "simulated cases");
 }
 
-/// The same for recordings: each motion, noise of a colour, spikes, a scatter, what the library lacks.
+/// Recordings are reproducible for every motion, noise and effect.
 #[test]
-fn recordings_of_the_former_benchmark() {
-    let mut told = AnswerLines::default();
+fn simulated_recordings_are_reproducible() {
+    let mut answers = AnswerLines::default();
     let plain = |seed, motions| Drawn {
         seed,
         effects: Vec::new(),
@@ -673,7 +678,7 @@ fn recordings_of_the_former_benchmark() {
             },
         ),
         (
-            "silent",
+            "noise-free",
             Drawn {
                 noise_n: 0.0,
                 outside: Some(Outside::new(4, [0.2, 0.4, 0.6, 0.9], 0.1)),
@@ -683,20 +688,20 @@ fn recordings_of_the_former_benchmark() {
     ];
     for (name, drawn) in &all {
         let case = hidden::case(drawn);
-        told.value(&format!("{name}.truth"), &serde_json::to_value(&case.truth).expect("JSON"));
+        answers.value(&format!("{name}.truth"), &serde_json::to_value(&case.truth).expect("JSON"));
         for (k, (r, ruptures)) in case.recordings.iter().zip(&case.ruptures).enumerate() {
-            told.column(&format!("{name}.{k}.time"), &r.time_s);
-            told.column(&format!("{name}.{k}.position"), &r.position_m);
-            told.column(&format!("{name}.{k}.velocity"), &r.velocity_mps);
-            told.column(&format!("{name}.{k}.force"), &r.force_n);
-            told.numbers(&format!("{name}.{k}.ruptures"), ruptures);
+            answers.column(&format!("{name}.{k}.time"), &r.time_s);
+            answers.column(&format!("{name}.{k}.position"), &r.position_m);
+            answers.column(&format!("{name}.{k}.velocity"), &r.velocity_mps);
+            answers.column(&format!("{name}.{k}.force"), &r.force_n);
+            answers.numbers(&format!("{name}.{k}.ruptures"), ruptures);
         }
     }
     for drawn in [&all[3].1, &all[6].1] {
         for (k, f) in hidden::clean_force(drawn).iter().enumerate() {
-            told.column(&format!("clean.{}.{k}", drawn.seed), f);
+            answers.column(&format!("clean.{}.{k}", drawn.seed), f);
         }
-        told.number(&format!("largest.{}", drawn.seed), hidden::largest_force(drawn));
+        answers.number(&format!("largest.{}", drawn.seed), hidden::largest_force(drawn));
     }
-    told.compare(FILE, "drawn recordings");
+    answers.compare(FILE, "simulated recordings");
 }

@@ -6,10 +6,11 @@
 mod prediction_band;
 mod surface_friction_refit;
 
-use crate::diagnose::{NamedRecording, assumptions_of, clean_recordings};
+use crate::diagnose::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
 use crate::error::DiagnoseError;
 use crate::held_out::predict_free_run;
+use crate::input_checks::{NamedRecording, clean_recordings};
 use prediction_band::{Band, Uncertainty};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -175,7 +175,7 @@ fn diagnosis(
         .collect();
     causes.sort_by(|a, b| b.share.total_cmp(&a.share));
     causes.extend(repeats.instrument.detected.iter().map(|s| s.cause()));
-    causes.extend(crate::diagnose::sensor_artefact_causes(raw, noise));
+    causes.extend(crate::sensor_artefact_causes::sensor_artefact_causes(raw, noise));
     let floor_n = mean.floor_n.unwrap_or(noise);
     let beyond = |e: f64| (e * e - floor_n * floor_n).max(0.0);
     let share = if best.family == ModelFamily::Base {

@@ -1,4 +1,4 @@
-//! Answers kept in a text file, and their comparison with what comes out today.
+//! Results kept in a text file, and their comparison with the current ones.
 
 #![allow(dead_code, reason = "every test uses a part")]
 
@@ -8,15 +8,15 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// Numbers agree to this share: more than another libm changes, less than any change of a rule.
-const SAME: f64 = 1e-5;
-/// And numbers below this one are nothing.
-const NOTHING: f64 = 1e-14;
+/// Relative tolerance: above the differences between platforms, below any change of an algorithm.
+const RELATIVE_TOLERANCE: f64 = 1e-5;
+/// Smaller numbers count as zero.
+const ZERO: f64 = 1e-14;
 
-/// One writes at a time.
+/// Serialises writing.
 static FILE: Mutex<()> = Mutex::new(());
 
-/// Lines of one case: a path and what stands there.
+/// Lines of one case: path and value.
 #[derive(Default)]
 pub struct AnswerLines(Vec<String>);
 
@@ -26,18 +26,18 @@ impl AnswerLines {
         self.0.push(format!("{path} {}", digits(x)));
     }
 
-    /// Words.
+    /// A text.
     pub fn words(&mut self, path: &str, text: &str) {
         self.0.push(format!("{path} {}", text.split_whitespace().collect::<Vec<_>>().join(" ")));
     }
 
-    /// Some numbers on one line.
+    /// Several numbers on one line.
     pub fn numbers(&mut self, path: &str, all: &[f64]) {
         let all: Vec<String> = all.iter().map(|x| digits(*x)).collect();
         self.0.push(format!("{path} {}", all.join(" ")));
     }
 
-    /// A long column: how many, mean, root mean square, a sum in which every place weighs something else, some places.
+    /// Statistics of a long column: length, mean, RMS, a sum with position-dependent weights, and samples.
     pub fn column(&mut self, path: &str, x: &[f64]) {
         let n = x.len() as f64;
         let sum = |w: &dyn Fn(f64) -> f64| {
@@ -45,7 +45,7 @@ impl AnswerLines {
         };
         let square = x.iter().filter(|x| x.is_finite()).map(|x| x * x).sum::<f64>();
         let at = |share: f64| x.get((share * n) as usize).copied().unwrap_or(f64::NAN);
-        let told = [
+        let statistics = [
             n,
             sum(&|_| 1.0) / n,
             (square / n).sqrt(),
@@ -54,10 +54,10 @@ impl AnswerLines {
             at(0.64),
             at(0.93),
         ];
-        self.numbers(path, &told);
+        self.numbers(path, &statistics);
     }
 
-    /// Whatever can be written as JSON, one line per leaf.
+    /// A JSON value, one line per leaf.
     pub fn value(&mut self, path: &str, value: &Value) {
         match value {
             Value::Object(fields) => fields.iter().for_each(|(k, v)| self.value(&format!("{path}.{k}"), v)),
@@ -73,7 +73,7 @@ impl AnswerLines {
         }
     }
 
-    /// Compares with what is kept under this name, or keeps it when `STYLET_RECORD` is set.
+    /// Compares with the recorded section of this name, or records it when `STYLET_RECORD` is set.
     pub fn compare(self, file: &str, name: &str) {
         let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests").join(file);
         if std::env::var_os("STYLET_RECORD").is_some() {
@@ -84,23 +84,23 @@ impl AnswerLines {
             for (name, lines) in kept {
                 let _ = writeln!(text, "[{name}]\n{}\n", lines.join("\n"));
             }
-            std::fs::write(&path, text).expect("the file of answers");
+            std::fs::write(&path, text).expect("the file of recorded answers");
             return;
         }
-        let kept = sections(&std::fs::read_to_string(&path).expect("the file of answers"));
+        let kept = sections(&std::fs::read_to_string(&path).expect("the file of recorded answers"));
         let kept = kept.get(name).expect("recorded under this name");
         let differ: Vec<String> = (0..kept.len().max(self.0.len()))
             .map(|k| (kept.get(k).map_or("", String::as_str), self.0.get(k).map_or("", String::as_str)))
-            .filter(|(was, is)| !alike(was, is))
+            .filter(|(was, is)| !lines_agree(was, is))
             .map(|(was, is)| format!("  was {was}\n  is  {is}"))
             .take(12)
             .collect();
-        assert!(differ.is_empty(), "{name}: answers changed\n{}", differ.join("\n"));
+        assert!(differ.is_empty(), "{name}: results changed\n{}", differ.join("\n"));
     }
 }
 
 fn digits(x: f64) -> String {
-    if x == 0.0 || x.abs() < NOTHING { "0".to_owned() } else { format!("{x:.7e}") }
+    if x == 0.0 || x.abs() < ZERO { "0".to_owned() } else { format!("{x:.7e}") }
 }
 
 fn sections(text: &str) -> BTreeMap<String, Vec<String>> {
@@ -115,13 +115,13 @@ fn sections(text: &str) -> BTreeMap<String, Vec<String>> {
     out
 }
 
-/// Whether two lines say the same, number by number and word by word.
-fn alike(was: &str, is: &str) -> bool {
+/// Whether two lines agree, number by number and word by word.
+fn lines_agree(was: &str, is: &str) -> bool {
     let (was, is): (Vec<&str>, Vec<&str>) = (was.split(' ').collect(), is.split(' ').collect());
     was.len() == is.len()
         && was.iter().zip(&is).all(|(a, b)| match (a.parse::<f64>(), b.parse::<f64>()) {
             (Ok(a), Ok(b)) if a.is_finite() && b.is_finite() => {
-                (a - b).abs() <= SAME * a.abs().max(b.abs()) + NOTHING
+                (a - b).abs() <= RELATIVE_TOLERANCE * a.abs().max(b.abs()) + ZERO
             }
             _ => a == b,
         })

@@ -1,0 +1,85 @@
+use super::{autoregression, errors_per_recording, extended_scenario, random_effect_sd, search_step};
+use crate::diagnosis_json::{Cause, Diagnosis, Verdict};
+use crate::held_out::FreeRunResidual;
+use crate::selection_state::Search;
+use crate::sensor_artefact_causes::sensor_artefact_causes;
+use crate::test_fixtures::{search_result, search_stage};
+use stylet_identify::model::FreeParameters;
+use stylet_identify::noise::Noise;
+use stylet_record::sensor_artefacts::SensorArtefacts;
+use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
+
+fn drift() -> AnyEffect {
+    ForceDrift { rate_n_per_s: 0.02 }.into()
+}
+
+#[test]
+fn recordings_have_their_own_errors_and_the_noise_its_coefficients() {
+    let mut search = search_result(&[drift()], 2, |t| 0.02 * t);
+    let left =
+        |square_n2: f64| Some(FreeRunResidual { mean_square_n2: square_n2, ..FreeRunResidual::default() });
+    let within = search.data.recordings[1].within_block_sd_n();
+    let result = errors_per_recording(&[None, left(0.04)], &[left(0.01), left(0.09)], &search);
+    assert!(result[0].0.is_nan() && within > 1e-3);
+    assert_eq!(result[1], ((0.04 + within * within).sqrt(), (0.09 + within * within).sqrt()));
+    let s = &mut search.best.model;
+    (s.scatter.rupture_force, s.scatter.rupture_depth_m, s.scatter.surface_m, s.scatter.ln_friction) =
+        (0.1, 2e-3, 3e-4, 0.4);
+    for (own_surface, own_friction) in [(true, false), (false, true)] {
+        search.best.model.free = FreeParameters {
+            recording_surface: own_surface,
+            recording_friction: own_friction,
+            ..search.best.model.free
+        };
+        let d = random_effect_sd(&search);
+        assert_eq!((d.puncture, d.rupture_depth_m), (0.1, 2e-3));
+        assert_eq!(d.surface_m, if own_surface { 3e-4 } else { 0.0 });
+        assert_eq!(d.friction, if own_friction { 0.4 } else { 0.0 });
+    }
+    let mut noise = Noise::white(0.5);
+    (noise.bins[0].ar[0], noise.bins[0].ar[1]) = (0.3, -0.2);
+    search.data = search.data.with_noise(noise);
+    assert_eq!(autoregression(&search), [0.3, -0.2]);
+    let result = search_step(&search_stage(Some(("force_drift", 9.0)), 7.0, &[(drift(), 12.0)]));
+    assert_eq!((result.selected.as_deref(), result.required_nats), (Some("force_drift"), 7.0));
+    assert_eq!((result.candidates[0].effect.as_str(), result.candidates[0].gain_nats), ("force_drift", 12.0));
+}
+
+/// A diagnosis with this verdict and these causes.
+fn diagnosis(verdict: Verdict, causes: Vec<Cause>) -> Diagnosis {
+    let none = r#"{"verdict": "none", "causes": [], "base_parameters": [], "not_identifiable": [], "data_quality": [], "search_steps": [],
+        "gain": {"held_out": false, "recordings": [], "rmse_before_n": 0, "rmse_after_n": 0, "floor_n": 0, "per_recording_n": []},
+        "residual_structure": {"p_value": 1, "depends_on": [], "nats": 0}, "noise": {"sd_n": 0, "ar": [0, 0], "from_air": false},
+        "advice": []}"#;
+    Diagnosis { verdict, causes, ..serde_json::from_str(none).expect("a diagnosis") }
+}
+
+#[test]
+fn extended_scenario_has_the_causes_and_the_parameters_of_their_model() {
+    let mut search = search_result(&[drift(), ForceBias { force_n: 0.05 }.into()], 2, |t| 0.02 * t + 0.05);
+    let scenario = stylet_scenario::parse(
+        "a scenario",
+        r#"(name: "a", tissue: (surface_m: 0.0, layers: []), motion: Recorded)"#,
+    );
+    let scenario = scenario.expect("a scenario");
+    let (best, base) = (search.best.model.tissue.clone(), search.base.model.tissue.clone());
+    assert!(best != base);
+    let saturated = || {
+        sensor_artefact_causes(&SensorArtefacts { limit_n: Some(2.5), ..SensorArtefacts::default() }, 0.1)
+            .remove(0)
+    };
+    let drifts = || Cause { effect: "force_drift".to_owned(), ..saturated() };
+    let of = |search: &Search, verdict, causes| {
+        let s = extended_scenario(&scenario, search, &diagnosis(verdict, causes));
+        (s.tissue, s.effects.iter().map(|e| e.id()).collect::<Vec<_>>())
+    };
+    assert_eq!(of(&search, Verdict::Named, vec![drifts()]), (best.clone(), vec!["force_drift"]));
+    // Without a cause the base law is used; sensor artefacts belong to neither model.
+    assert_eq!(of(&search, Verdict::None, vec![]), (base.clone(), vec![]));
+    assert_eq!(of(&search, Verdict::Named, vec![saturated()]), (base.clone(), vec!["saturation"]));
+    let both = vec![drifts(), saturated()];
+    assert_eq!(of(&search, Verdict::Unknown, both).1, ["force_drift", "saturation"]);
+    search.best.model.effects.clear();
+    assert_eq!(of(&search, Verdict::None, vec![]), (best, vec![]));
+    assert_eq!(of(&search, Verdict::Unknown, vec![]), (base, vec![]));
+}

@@ -1,0 +1,114 @@
+//! Escape from local minima of the objective: candidates with a shifted layer boundary or another breaking force.
+
+use crate::base_law_fit::{with_noise_of, with_updated_times};
+use crate::model_comparison::MIN_GAIN_NATS;
+use crate::selection_state::Search;
+use rayon::prelude::*;
+use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
+use stylet_identify::likelihood::{FitData, residuals};
+use stylet_identify::model::{EffectTerm, Model};
+use stylet_tissue::Proposal;
+
+/// Shifts of a layer boundary that are tried, in tolerances of the thickness.
+const BOUNDARY_SHIFTS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
+/// Factor by which the strength of a breaking element is varied up and down.
+const STRENGTH_FACTOR: f64 = 3.0;
+/// Steps of the strength variation with fixed rupture times.
+const FIXED_TIME_STEPS: i32 = 40;
+/// Steps of the strength variation with updated rupture times.
+const UPDATED_TIME_STEPS: i32 = 10;
+/// Local minima of the strength variation from which a fit starts.
+const MAX_MINIMA: usize = 5;
+
+impl Search {
+    /// The leader with one layer boundary moved, when it leaves more than noise and the move is better. A boundary that
+    /// was fitted to the ruptures of an incomplete model does not return by small steps.
+    pub(crate) fn with_boundary_moved(
+        &self,
+        leader: &Fit,
+        coarse: &FitData,
+        times: &[Vec<f64>],
+    ) -> Option<Fit> {
+        if !leader.model.free.thickness || self.leaves_noise(leader) {
+            return None;
+        }
+        let coarse = with_noise_of(&leader.model, coarse)?;
+        let assumed = &leader.model.assumed;
+        let tolerance_m = |l: usize| assumed.thickness_tolerance[l] * assumed.tissue.layers[l].thickness_m;
+        let moved = |l: usize, tolerances: f64| {
+            let shift_m = tolerances * tolerance_m(l).min(tolerance_m(l + 1));
+            let mut model = leader.model.clone();
+            model.tissue.layers[l].thickness_m += shift_m;
+            model.tissue.layers[l + 1].thickness_m -= shift_m;
+            fit(&with_updated_times(model, &coarse, times), &coarse, Effort::SHORT)
+        };
+        let boundaries = 0..leader.model.layers().saturating_sub(1);
+        let tried: Vec<(usize, f64)> = boundaries.flat_map(|l| BOUNDARY_SHIFTS.map(|m| (l, m))).collect();
+        let fits: Vec<Fit> = tried.into_par_iter().filter_map(|(l, m)| moved(l, m)).collect();
+        let likeliest = fits.into_iter().min_by(|a, b| a.nats().total_cmp(&b.nats()))?;
+        self.full_fit_below(likeliest.model, times, leader.nats() - MIN_GAIN_NATS)
+    }
+
+    /// The leader with its breaking element at another strength, when that is better. A reversal before the break and
+    /// one after it give two local minima, and fitted rupture times hold the fit in the wrong one.
+    pub(crate) fn with_other_strength(
+        &self,
+        leader: &Fit,
+        coarse: &FitData,
+        times: &[Vec<f64>],
+    ) -> Option<Fit> {
+        let last = leader.model.effects.last().filter(|e| e.info.proposal == Proposal::MembraneRupture)?;
+        let coarse = with_noise_of(&leader.model, coarse)?;
+        let rest = leader.model.without_effect(leader.model.effects.len() - 1);
+        // All local minima along the strength: finely with fixed rupture times, coarsely with updated ones.
+        let along = |steps: i32, update: bool| -> Vec<(f64, Model)> {
+            let at = |choice: EffectTerm| {
+                let model = rest.with_effect(choice);
+                let model = if update { with_updated_times(model, &coarse, times) } else { model };
+                Some((residuals(&model, &coarse)?.nats, model))
+            };
+            let tried: Vec<(f64, Model)> =
+                breaking_force_variations(last, steps).into_par_iter().filter_map(at).collect();
+            let lowest = |k: usize| {
+                let neighbours = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
+                neighbours.filter_map(|k| tried.get(k)).all(|b| tried[k].0 < b.0)
+            };
+            (0..tried.len()).filter(|k| lowest(*k)).map(|k| tried[k].clone()).collect()
+        };
+        let mut minima = along(FIXED_TIME_STEPS, false);
+        minima.extend(along(UPDATED_TIME_STEPS, true));
+        minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut fits: Vec<Fit> = minima
+            .into_par_iter()
+            .take(MAX_MINIMA)
+            .filter_map(|(_, model)| fit(&with_updated_times(model, &coarse, times), &coarse, Effort::SHORT))
+            .collect();
+        fits.sort_by(|a, b| a.nats().total_cmp(&b.nats()));
+        let wanted = leader.nats() - MIN_GAIN_NATS;
+        let full = |f: &Fit| self.full_fit_below(f.model.clone(), times, wanted);
+        let fitted = fits.par_iter().take(2).filter_map(full).collect::<Vec<Fit>>();
+        fitted.into_iter().min_by(|a, b| a.nats().total_cmp(&b.nats()))
+    }
+
+    /// Full fit with updated rupture times, when its objective falls below `wanted` nats.
+    fn full_fit_below(&self, model: Model, times: &[Vec<f64>], wanted: f64) -> Option<Fit> {
+        let model = with_updated_times(model, &self.data, times);
+        fit_if_below(&model, &self.data, Effort::FULL, wanted).filter(|f| f.nats() < wanted)
+    }
+}
+
+/// Index of the parameter that is the breaking force of an effect.
+fn breaking_force_index(at: &EffectTerm) -> Option<usize> {
+    at.info.parameters.iter().position(|p| p.unit == "N")
+}
+
+/// The effect with lower and higher breaking forces, in order.
+fn breaking_force_variations(at: &EffectTerm, steps: i32) -> Vec<EffectTerm> {
+    let index = breaking_force_index(at);
+    let with = |k: i32| {
+        let mut values = at.values.clone();
+        *values.get_mut(index?)? *= libm::pow(STRENGTH_FACTOR, f64::from(k) / f64::from(steps));
+        Some(EffectTerm::new(at.info, &values))
+    };
+    (-steps..=steps).filter_map(with).collect()
+}

@@ -1,0 +1,126 @@
+//! Simplification and extension of a selected model: superfluous effects, special cases and extended forms.
+
+use crate::base_law_fit::with_updated_times;
+use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
+use crate::selection_state::Search;
+use rayon::prelude::*;
+use stylet_identify::evidence_nats::Nats;
+use stylet_identify::fit::{Effort, Fit, Linearization, fit};
+use stylet_identify::likelihood::FitData;
+use stylet_identify::model::{EffectTerm, ParameterRole};
+use stylet_tissue::{FitScale, Proposal};
+
+/// A strength is determined when it differs from neutral by this many standard deviations.
+const MIN_STRENGTH_SD: f64 = 5.0;
+
+impl Search {
+    /// Replaces effects by their extended form (a second relaxation time constant) where its additional parameters pay.
+    /// The form names no further cause and needs no extra gain.
+    pub(crate) fn use_extended_forms(&mut self, times: &[Vec<f64>]) {
+        for k in 0..self.best.model.effects.len() {
+            let Some(larger) = self.best.model.effects[k].info.extended else { continue };
+            let Proposal::SplitTerm(starts) = larger.proposal else { continue };
+            let coarse = self.coarse();
+            let values = &self.best.model.effects[k].values;
+            let extended = |factors: &&[f64]| {
+                let mut model = self.best.model.clone();
+                let split: Vec<f64> = values.iter().cycle().zip(*factors).map(|(v, f)| v * f).collect();
+                model.effects[k] = EffectTerm::new(larger, &split);
+                fit(&model, &coarse, Effort::SHORT)
+            };
+            let tried: Vec<Fit> = starts.par_iter().filter_map(extended).collect();
+            let likeliest = tried.into_iter().min_by(|a, b| a.nats().total_cmp(&b.nats()));
+            let full = likeliest
+                .and_then(|f| fit(&with_updated_times(f.model, &self.data, times), &self.data, Effort::FULL));
+            if let Some(f) = full
+                && !effect_at_bound(&f, k)
+                && strengths_are_determined(&f, k, &self.data)
+                && likelihood_gain(&self.best, &f, &self.data).exceeds(bic_penalty(
+                    f.model.effect_parameter_count() - self.best.model.effect_parameter_count(),
+                    self.data.compared_block_count(),
+                ))
+            {
+                self.accept(f);
+            }
+        }
+    }
+
+    /// Removes effects whose loss is smaller than their penalty.
+    pub(crate) fn prune(&mut self) {
+        loop {
+            let n = self.best.model.effects.len();
+            if n < 2 {
+                return;
+            }
+            let blocks = self.data.compared_block_count();
+            let reduced: Vec<(usize, Fit)> = (0..n)
+                .into_par_iter()
+                .filter_map(|k| Some((k, fit(&self.best.model.without_effect(k), &self.data, Effort::FULL)?)))
+                .collect();
+            let surplus = |f: &Fit| {
+                let saved = bic_penalty(
+                    self.best.model.effect_parameter_count() - f.model.effect_parameter_count(),
+                    blocks,
+                ) + MIN_GAIN_NATS;
+                likelihood_gain(f, &self.best, &self.data) - saved
+            };
+            let worst = reduced.into_iter().map(|(_, f)| (surplus(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
+            match worst {
+                Some((surplus, f)) if surplus < Nats::new(0.0) => self.accept(f),
+                _ => return,
+            }
+        }
+    }
+}
+
+/// Moves a special case of the leader in front of it, unless the leader's additional parameters pay under its own noise
+/// and none of them stands at a bound.
+pub(crate) fn special_case_first(mut full: Vec<Fit>, data: &FitData) -> Vec<Fit> {
+    let Some(leader) = full.first() else { return full };
+    let id = leader.model.effects.last().map_or("", |e| e.info.id);
+    let special = |f: &Fit| f.model.effects.last().is_some_and(|e| e.info.nested_in.contains(&id));
+    let Some(k) = full.iter().position(special) else { return full };
+    let last = leader.model.effects.len().saturating_sub(1);
+    if effect_at_bound(leader, last)
+        || likelihood_gain(&full[k], leader, data) < Nats::new(required_gain_nats(&full[k], leader, data))
+    {
+        let f = full.remove(k);
+        full.insert(0, f);
+    }
+    full
+}
+
+/// Gain in nats that the additional parameters of `larger` require.
+#[must_use]
+pub fn required_gain_nats(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
+    let more = larger.model.effect_parameter_count().saturating_sub(smaller.model.effect_parameter_count());
+    bic_penalty(more, data.compared_block_count()) + MIN_GAIN_NATS
+}
+
+/// Whether each strength of an effect is determined by itself: two terms that replace one could share its strength
+/// arbitrarily.
+pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) -> bool {
+    let tangent = Linearization::new(&f.model, data, &f.residuals);
+    let variances = tangent.factor().inverse_diagonal();
+    tangent.shared.iter().zip(variances).all(|(n, variance)| match n.role {
+        ParameterRole::Effect { effect, parameter } if effect == which => {
+            let p = &f.model.effects[which].info.parameters[parameter];
+            let off = f.model.effects[which].values[parameter] - p.inactive;
+            !p.strength || p.fit_scale() != FitScale::Linear || off.abs() > MIN_STRENGTH_SD * variance.sqrt()
+        }
+        _ => true,
+    })
+}
+
+/// Whether a parameter of an effect stands at a bound.
+#[must_use]
+pub fn effect_at_bound(f: &Fit, which: usize) -> bool {
+    f.model.shared_parameters().iter().any(|n| match n.role {
+        ParameterRole::Effect { effect, .. } if effect == which => {
+            let x = f.model.get(n.role, 0);
+            let near = 1e-6 * (n.high - n.low);
+            near.is_finite() && (x <= n.low + near || x >= n.high - near)
+        }
+        _ => false,
+    })
+}

@@ -1,0 +1,297 @@
+//! Verdict of a diagnosis: is the residual noise, and are the selected effects causes or imitations of an unmodelled one?
+
+use crate::competing_effects::{CompetingEffect, EQUIVALENCE_NATS};
+use crate::confidence_intervals::{Covariance, release_unreached_punctures};
+use crate::diagnosis_json::{BaseParameter, Cause, NegligibleEffect, ResidualStructureReport};
+use crate::geometry_selection::free_geometry;
+use crate::held_out::JackknifeResult;
+use crate::negligible_effects::Negligible;
+use crate::outlier_segment_test::outlier_segment_p_value;
+use crate::residual_tests::test_residuals;
+use crate::selection_state::Search;
+use crate::tone_detection::{detect_tones, with_noise_without_tones};
+use crate::varying_coefficient_test::{FEATURES, VaryingCoefficient, varying_coefficient_test};
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use std::cell::LazyCell;
+use std::collections::BTreeMap;
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::likelihood::{FitData, residuals};
+use stylet_identify::model::ParameterRole;
+use stylet_identify::noise::NoiseSource;
+use stylet_identify::score_test::ScoreTest;
+use stylet_stats::special_functions::chi_square_sf;
+use stylet_tissue::EffectInfo;
+
+/// Residual structure counts below this p-value: sums over pairs of recordings have longer tails than their skewness
+/// suggests.
+const MAX_STRUCTURE_P_VALUE: f64 = 1e-6;
+/// The verdict is `unknown` when more than this share of the base law's residual variance beyond the noise is
+/// unexplained.
+const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
+/// Excess variance from which the residual counts as unexplained, in units of the noise variance.
+const MIN_EXCESS: f64 = 0.8;
+/// The same for a single recording, where structure and slow noise cannot be separated.
+const MIN_EXCESS_SINGLE: f64 = 3.0;
+/// Excess variance from which a residual is no noise, whatever its autocorrelation: a slow standard deviation of 2.5
+/// times the fast one.
+const MIN_EXCESS_SLOW: f64 = 6.0;
+/// An effect imitates an unmodelled one when its varying-coefficient test gains more than this share of the gain of all
+/// effects.
+const MIN_IMITATION_SHARE: f64 = 0.02;
+/// Smallest gain in nats of the test for imitation: half a nat is chance, and an inexact motion gives some tens.
+const MIN_IMITATION_NATS: f64 = 100.0;
+/// Smallest gain in nats of the test for imitation under slow noise.
+const MIN_IMITATION_SLOW_NATS: f64 = 10.0;
+/// Largest relative jackknife error of a cause that is kept in the presence of an unmodelled effect.
+const MAX_RELATIVE_SE: f64 = 0.1;
+/// Share of the held-out error that a cause must remove in the presence of an unmodelled effect.
+const MIN_HELD_OUT_GAIN: f64 = 0.1;
+/// Largest gain of the varying-coefficient test of such a cause in the reweighted fit, as a share of the loss without
+/// it.
+const MAX_VARYING_SHARE: f64 = 0.001;
+/// Largest gain of the varying-coefficient test of such a cause in the fit with equal weights.
+const MAX_VARYING_SHARE_UNWEIGHTED: f64 = 0.03;
+/// Largest gain of the varying-coefficient test for effects that imitate any force of their kind.
+const MAX_VARYING_SHARE_IMITATING: f64 = 0.0005;
+/// Seed of the bootstrap: equal recordings give equal results.
+const BOOTSTRAP_SEED: u64 = 1;
+
+/// Results that follow from the selection alone.
+pub(crate) struct Assessment {
+    pub causes: Vec<Cause>,
+    /// Nats against zero strength of each effect.
+    pub nats_against_zero: Vec<(String, f64)>,
+    pub base_parameters: Vec<BaseParameter>,
+    pub residual_structure: ResidualStructureReport,
+    pub unknown: bool,
+    /// Whether the residual has tones.
+    pub has_tones: bool,
+}
+
+/// Mean square of a residual beyond the noise, in units of the noise variance, with outliers limited.
+fn excess(data: &FitData, e: &[Vec<f64>]) -> f64 {
+    /// Outliers are limited to this many standard deviations.
+    const OUTLIER_LIMIT_SD: f64 = 6.0;
+    /// Blocks excluded on both sides of a velocity jump of uncertain time.
+    const JUMP_MARGIN_BLOCKS: usize = 4;
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (b, e) in data.recordings.iter().zip(e) {
+        let mut near = vec![false; b.len()];
+        for jump in &b.motion.jumps {
+            let (lo, hi) =
+                (b.block_at(jump.time_s - jump.time_sd_s), b.block_at(jump.time_s + jump.time_sd_s));
+            let (lo, hi) =
+                (lo.saturating_sub(JUMP_MARGIN_BLOCKS), (hi + JUMP_MARGIN_BLOCKS + 1).min(b.len()));
+            near[lo.min(hi)..hi].fill(true);
+        }
+        for k in (0..b.len()).filter(|k| b.used[*k] && !near[*k]) {
+            let sd = data.noise.bin_at(b.abs_force_n[k]).sd_n;
+            sum += (e[k] / sd).powi(2).min(OUTLIER_LIMIT_SD * OUTLIER_LIMIT_SD);
+            n += 1.0;
+        }
+    }
+    sum / f64::max(n, 1.0) - 1.0
+}
+
+/// p-value of a tone with `excess` times the power of all other frequencies together, in white noise (Fisher 1929).
+fn tone_p_value(excess: f64, blocks: usize) -> f64 {
+    let bins = 0.5 * blocks as f64;
+    (bins * (1.0 + excess).powf(1.0 - bins)).clamp(f64::MIN_POSITIVE, 1.0)
+}
+
+/// Assesses the residual and the effects of a finished selection. When the residual has tones, the search continues with
+/// the noise estimated without them.
+pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffect>]) -> Assessment {
+    let tests = test_residuals(&search.best, &search.data);
+    let tones = detect_tones(&search.best, &search.data);
+    let without_tones = if tones.is_empty() {
+        search.data.clone()
+    } else {
+        with_noise_without_tones(&search.best, &search.data, &tones)
+    };
+    let (before, after) = (
+        excess(&without_tones, &search.base.residuals.residual_n),
+        excess(&without_tones, &search.best.residuals.residual_n),
+    );
+    let has_tones = !tones.is_empty() && after > MIN_EXCESS;
+    let share = (after.max(0.0) / before.max(1e-9)).min(1.0);
+    let single = search.data.recording_count() < 2;
+    let significant = if single {
+        after > MIN_EXCESS_SINGLE
+    } else {
+        after > MIN_EXCESS && tests.coloured_noise.p_value < MAX_STRUCTURE_P_VALUE
+    };
+    let beyond_slow_noise = after > MIN_EXCESS_SLOW && tests.white_noise.p_value < MAX_STRUCTURE_P_VALUE;
+    let segment_p = outlier_segment_p_value(&without_tones, &search.best.residuals.residual_n);
+    let without = |k: usize| {
+        fit(
+            &search.best.model.without_effect(k),
+            &search.data,
+            Effort { max_iterations: 3, min_gain_nats: 1.0 },
+        )
+    };
+    let without: Vec<Option<Fit>> = (0..search.best.model.effects.len()).map(without).collect();
+    // Intervals under the noise of the whole residual, structure and slow parts included.
+    let slow_data =
+        search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::LongMemory);
+    let with_slow_noise =
+        fit(&free_geometry(&search.best.model), &slow_data, Effort { max_iterations: 3, min_gain_nats: 0.1 })
+            .unwrap_or_else(|| search.best.clone());
+    let with_slow_noise = release_unreached_punctures(with_slow_noise, &slow_data);
+    let imitation = find_imitation(&search.best, &search.data, &without, (&with_slow_noise, &slow_data));
+    let unknown = imitation.is_some()
+        || (share > MAX_UNEXPLAINED_SHARE
+            && (significant || beyond_slow_noise || has_tones || segment_p.is_some()));
+    let structure = if unknown && !significant { &tests.white_noise } else { &tests.coloured_noise };
+    let covariance =
+        Covariance::new(&with_slow_noise, &slow_data, &mut ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED));
+    let (mut causes, mut nats_against_zero) = (Vec::new(), Vec::new());
+    for (k, choice) in with_slow_noise.model.effects.iter().enumerate() {
+        let none = Vec::new();
+        let competing = competing.get(k).unwrap_or(&none);
+        let mut parameters = BTreeMap::new();
+        for (p, info) in choice.info.parameters.iter().enumerate() {
+            parameters.insert(info.path.to_owned(), covariance.effect_parameter(k, p));
+        }
+        nats_against_zero
+            .extend(covariance.nats_against_zero(k).map(|nats| (choice.info.id.to_owned(), nats)));
+        let stage = search.stages.iter().rev().find(|s| s.selected.is_some_and(|t| t.0 == choice.info.id));
+        let gain_nats = stage.and_then(|s| s.selected).map_or(0.0, |t| t.1);
+        let needed = stage.map_or(0.0, |s| s.required_nats);
+        let weights: f64 = competing.iter().map(|r| libm::exp(-r.nats_behind.max(-3.0))).sum();
+        let returned =
+            without[k].as_ref().map_or(0.0, |f| excess(&without_tones, &f.residuals.residual_n) - after);
+        causes.push(Cause {
+            effect: choice.info.id.to_owned(),
+            equivalent: competing
+                .iter()
+                .filter(|r| r.nats_behind < EQUIVALENCE_NATS)
+                .map(|r| r.name.to_owned())
+                .collect(),
+            confidence: 1.0 / (1.0 + weights + libm::exp(-(gain_nats - needed).clamp(-30.0, 30.0) - 3.0)),
+            parameters,
+            gain_nats,
+            share: (returned / before.max(1e-9)).clamp(0.0, 1.0),
+        });
+    }
+    let base_parameters = base_parameters(search, &covariance);
+    causes.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
+    let mut depends_on: Vec<String> = structure.depends_on.iter().map(|d| d.0.clone()).collect();
+    if has_tones {
+        depends_on.insert(0, "frequency".to_owned());
+    } else if unknown && depends_on.is_empty() {
+        depends_on.push(imitation.map_or("time", |b| b.feature).to_owned());
+    }
+    let imitation_p = imitation
+        .map_or(1.0, |b| (chi_square_sf(2.0 * b.nats, 1.0) * FEATURES.len() as f64).max(f64::MIN_POSITIVE));
+    let tone_p = if has_tones { tone_p_value(after, search.data.compared_block_count()) } else { 1.0 };
+    let residual_structure = ResidualStructureReport {
+        p_value: structure
+            .p_value
+            .min(tone_p)
+            .min(imitation_p)
+            .min(segment_p.filter(|_| unknown).unwrap_or(1.0)),
+        depends_on,
+        nats: structure.nats,
+        share,
+    };
+    if has_tones {
+        // All objectives use the same noise.
+        for fit in [&mut search.base, &mut search.best] {
+            fit.residuals = residuals(&fit.model, &without_tones).unwrap_or_else(|| fit.residuals.clone());
+        }
+        search.data = without_tones;
+    }
+    Assessment { causes, nats_against_zero, base_parameters, residual_structure, unknown, has_tones }
+}
+
+/// Varying-coefficient test of all effects: the effect with the largest gain, if it imitates an unmodelled one.
+/// `without` are the fits without each effect; `slow` is the fit under slow noise, because sensor drift mimics a
+/// dependence on time.
+fn find_imitation(
+    best: &Fit,
+    data: &FitData,
+    without: &[Option<Fit>],
+    slow: (&Fit, &FitData),
+) -> Option<VaryingCoefficient> {
+    if without.is_empty() {
+        return None;
+    }
+    let score_test = ScoreTest::new(best, data);
+    let slow_score_test = LazyCell::new(|| ScoreTest::new(slow.0, slow.1));
+    let loss = |reduced: &Option<Fit>| reduced.as_ref().map_or(0.0, |f| f.nats() - best.nats());
+    let most = without.iter().map(loss).fold(0.0, f64::max);
+    let test = |(k, reduced): (usize, &Option<Fit>)| {
+        let result = varying_coefficient_test(&score_test, k, loss(reduced))?;
+        let is_imitation = result.nats > MIN_IMITATION_NATS.max(MIN_IMITATION_SHARE * most)
+            && varying_coefficient_test(&slow_score_test, k, loss(reduced))?.nats > MIN_IMITATION_SLOW_NATS;
+        is_imitation.then_some(result)
+    };
+    without.iter().enumerate().filter_map(test).max_by(|a, b| a.nats.total_cmp(&b.nats))
+}
+
+/// Whether an effect is kept as a cause in the presence of an unmodelled one, by the reweighted fit (`reweighted`) and, if
+/// it was found there, the fit with equal weights (`unweighted`).
+pub(crate) fn is_kept(
+    info: &EffectInfo,
+    reweighted: &JackknifeResult,
+    unweighted: Option<&JackknifeResult>,
+) -> bool {
+    let most =
+        if info.absorbs_unmodelled { MAX_VARYING_SHARE_IMITATING } else { MAX_VARYING_SHARE_UNWEIGHTED };
+    reweighted.relative_se < MAX_RELATIVE_SE
+        && reweighted.varying_coefficient_share < MAX_VARYING_SHARE.min(most)
+        && unweighted.is_none_or(|l| l.varying_coefficient_share < most)
+        && [Some(reweighted), unweighted].into_iter().flatten().all(|b| b.held_out_gain > MIN_HELD_OUT_GAIN)
+}
+
+/// Moves negligible causes to the list of negligible effects.
+pub(crate) fn move_negligible(assessment: &mut Assessment, small: Vec<Negligible>) -> Vec<NegligibleEffect> {
+    let mut moved = Vec::new();
+    for s in small {
+        if let Some(k) = assessment.causes.iter().position(|c| c.effect == s.effect) {
+            let cause = assessment.causes.remove(k);
+            moved.push(NegligibleEffect {
+                effect: cause.effect,
+                parameters: cause.parameters,
+                reason: s.reason,
+            });
+        }
+    }
+    moved
+}
+
+/// Estimates of the base law's parameters with their intervals.
+fn base_parameters(search: &Search, covariance: &Covariance) -> Vec<BaseParameter> {
+    let mut out = Vec::new();
+    let assumed_tissue = &search.best.model.assumed.tissue;
+    let mut add = |layer: usize, name: &str, role: ParameterRole, assumed: f64, scale: f64| {
+        let Some((x, half)) = covariance.shared_parameter(role) else { return };
+        let (value, low) = (x * scale, (x - half) * scale);
+        let high = covariance.prior_upper_end(role).map_or(x + half, |open| open.max(x + half)) * scale;
+        out.push(BaseParameter {
+            layer,
+            name: name.to_owned(),
+            assumed,
+            value,
+            low,
+            high,
+            changed: assumed < low || assumed > high,
+            at_bound: covariance.at_bound(role),
+        });
+    };
+    for (l, layer) in assumed_tissue.layers.iter().enumerate() {
+        let (k, b) = (layer.stiffness_n_per_m, layer.friction_ns_per_m2);
+        add(l + 1, "stiffness_n_per_m", ParameterRole::Stiffness(l), k, k);
+        add(l + 1, "friction_ns_per_m2", ParameterRole::Friction(l), b, b);
+        if let Some(f) = layer.puncture_n {
+            add(l + 1, "puncture_n", ParameterRole::Puncture(l), f, f);
+        }
+        add(l + 1, "thickness_m", ParameterRole::Thickness(l), layer.thickness_m, 1.0);
+    }
+    add(0, "surface_m", ParameterRole::Surface, assumed_tissue.surface_m, 1.0);
+    out
+}
+
+#[cfg(test)]
+mod tests;
