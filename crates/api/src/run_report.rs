@@ -100,6 +100,7 @@ fn combination(recording: &Recording, ran: &AlgorithmRun) -> report::Combination
         // Ours says the largest of its sums as a share of its threshold, and looks at no derivative.
         cusum_threshold_n2: Some(if ours { 1.0 } else { config.cusum.threshold_n2() }),
         cusum_is_normalised: ours,
+        cusum_drift_n2: (!ours).then(|| config.cusum.drift_n2()),
         force_derivative_n_per_s: of(!ours, &trace.derivative_n_per_s),
         derivative_on_n_per_s: (!ours).then_some(config.derivative.on_n_per_s),
         derivative_off_n_per_s: (!ours).then_some(config.derivative.off_n_per_s),
@@ -176,6 +177,7 @@ fn layers(ran: &AlgorithmRun, multi_layer: bool) -> Vec<report::LayerEstimate> {
                 thickness_error: signed(l.thickness_m.truth, l.thickness_m.estimated),
                 offline_stiffness_n_per_m: l.offline_stiffness_n_per_m,
                 offline_friction_ns_per_m2: l.offline_friction_ns_per_m2,
+                offline_separable: l.offline_separable,
                 ..found.map(|e| estimate(e, l.layer)).unwrap_or_default()
             }
         })

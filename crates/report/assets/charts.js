@@ -1,4 +1,4 @@
-// Builds the charts and lets those of one group zoom, pan and show their cursor together.
+// Builds the charts; those of one group share zoom, pan and cursor.
 const views = [];
 const groups = new Map();
 
@@ -11,14 +11,16 @@ function finiteExtent(values, from, to, accept) {
   return [low, high];
 }
 
-function ownExtent(view) {
+function dataExtent(view) {
   let low = Infinity, high = -Infinity;
   const take = (a, b) => { low = Math.min(low, a); high = Math.max(high, b); };
   for (const c of view.curves) take(...finiteExtent(c.x, 0, c.x.length, isNumber));
   for (const lane of view.spec.lanes) for (const [from, to] of lane.spans) take(from, to);
   if (!(low <= high)) return [0, 1];
   if (low === high) return [low - 0.5, high + 0.5];
-  return [low, high];
+  // Points on the border would be cut in half.
+  const margin = view.curves.length && view.curves.every(c => c.spec.style === "points") ? 0.02 * (high - low) : 0;
+  return [low - margin, high + margin];
 }
 
 // The vertical range that fits what is visible, with room for the labels at the top.
@@ -64,7 +66,7 @@ function onScale(view, key) {
   }
 }
 
-function listen(view) {
+function bindEvents(view) {
   const { over } = view.u;
   over.addEventListener("mousedown", down => {
     if (down.button !== 0 || !down.shiftKey) return;
@@ -123,7 +125,7 @@ function options(view) {
     axes: [axis(spec.x, { size: 30, space: 60 }),
       axis(lanes ? "" : spec.y, { scale: "y", size: 52, space: spec.height < 180 ? 24 : 32, grid: lanes ? { show: false } : axis().grid,
         labelSize: lanes ? 18 : 18, values: lanes ? () => [] : distr === 1 ? undefined : (u, splits) => splits.map(v => v === null ? "" : shortNumber(v)),
-        filter: distr === 4 ? (u, splits) => spaced(u, splits) : undefined })],
+        splits: distr === 4 ? u => asinhSplits(u, spec.linearBelow) : undefined, filter: distr === 4 ? (u, splits) => splits : undefined })],
     hooks: {
       drawClear: [u => { if (spec.bands.length) { u.ctx.save(); clipToPlot(u); drawBands(view); u.ctx.restore(); } }],
       draw: [() => drawAll(view)],
@@ -133,15 +135,21 @@ function options(view) {
   };
 }
 
-// Drops the tick labels that would collide on a bent axis.
-function spaced(u, splits) {
-  let last = -Infinity;
-  return splits.map(v => {
-    const at = -u.valToPos(v, "y");
-    if (at - last < 18) return null;
-    last = at;
-    return v;
-  });
+// Ticks of an axis that is linear up to `unit` and logarithmic beyond: 1 and 3 times powers of ten inside the range, 18 px apart at least.
+function asinhSplits(u, unit) {
+  const { min, max } = u.scales.y, splits = [], candidates = [0];
+  for (let power = Math.floor(Math.log10(unit)); Math.pow(10, power) <= Math.max(-min, max); power++) {
+    for (const m of [1, 3]) {
+      const size = Number(m + "e" + power);
+      if (size > 0.6 * unit) candidates.push(size, -size);
+    }
+  }
+  for (const v of candidates) {
+    if (v < min || v > max) continue;
+    const at = u.valToPos(v, "y");
+    if (splits.every(other => Math.abs(u.valToPos(other, "y") - at) >= 18)) splits.push(v);
+  }
+  return splits.sort((a, b) => a - b);
 }
 
 function build(spec, number) {
@@ -152,8 +160,8 @@ function build(spec, number) {
   if (!groups.has(key)) groups.set(key, { name: spec.group, views: [], extent: [Infinity, -Infinity] });
   view.group = groups.get(key);
   view.group.views.push(view);
-  const own = ownExtent(view);
-  view.group.extent = [Math.min(view.group.extent[0], own[0]), Math.max(view.group.extent[1], own[1])];
+  const extent = dataExtent(view);
+  view.group.extent = [Math.min(view.group.extent[0], extent[0]), Math.max(view.group.extent[1], extent[1])];
   views.push(view);
 }
 
@@ -164,11 +172,11 @@ payload.charts.forEach(build);
 for (const view of views) {
   buildLegend(view);
   view.u = new uPlot(options(view), [view.group.extent.slice()], view.plot);
-  listen(view);
+  bindEvents(view);
 }
 for (const group of groups.values()) reset(group);
 for (const button of document.querySelectorAll("button[data-reset]")) {
-  button.addEventListener("click", () => { const g = groups.get("g" + button.dataset.reset); if (g) reset(g); });
+  button.addEventListener("click", () => groups.forEach(reset));
 }
 const watcher = new ResizeObserver(entries => {
   for (const { target } of entries) {

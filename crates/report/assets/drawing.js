@@ -53,7 +53,7 @@ function drawCurve(view, curve) {
   }
   if (curve.spec.style === "points") {
     ctx.fill();
-    // Few points have a rim of paper; in a crowd it would erase what lies below it.
+    // A rim in the background colour; with many points it would hide the points below.
     if (points > CROWD) return points;
     ctx.strokeStyle = isDark() ? "#12161b" : "#ffffff";
     ctx.lineWidth = 1.2 * ratio;
@@ -64,7 +64,7 @@ function drawCurve(view, curve) {
 
 function clipToPlot(u) { u.ctx.beginPath(); u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height); u.ctx.clip(); }
 
-// A row of labels in which none covers another.
+// Places labels in rows without overlap.
 function Rows(first, height, count) {
   const taken = Array.from({ length: count }, () => []);
   this.place = (left, width) => {
@@ -186,7 +186,7 @@ function drawLanes(view) {
   return spans;
 }
 
-// Everything above the grid; says on the element what was drawn, for readers of the page that are programs.
+// Draws everything above the grid and records on the element what was drawn, for tests.
 function drawAll(view) {
   const { u } = view, { ctx } = u;
   ctx.save();

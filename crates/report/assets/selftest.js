@@ -1,5 +1,5 @@
-// With #selftest in the address the page looks for each visible curve's colour where its samples should be, zooms one
-// chart of each group and checks that the others followed, and says so on the elements.
+// With #selftest in the address the page checks that each visible curve has its colour at its samples, zooms one chart of each
+// group, checks that the others follow, and records the results on the elements.
 function curveSeen(view, curve, image) {
   const { u } = view, want = colour(curve.spec.colour), rgb = [1, 3, 5].map(i => parseInt(want.slice(i, i + 2), 16));
   const [from, to] = visibleRange(view, curve), stride = Math.max(1, Math.floor((to - from) / 400));

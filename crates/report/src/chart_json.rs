@@ -1,4 +1,4 @@
-//! The data that the page's script draws: every column stored once, charts refer to columns by number.
+//! The data for the page's script as JSON: every column stored once, charts refer to columns by index.
 
 use crate::chart_model::{Chart, Scale, Series};
 use crate::decimate::{MAX_POINTS, kept_indices, pick};
@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use stylet_stats::number_format::push_rounded;
 
-/// Digits of ordinates, and of abscissae, which must stay apart over long recordings.
+/// Significant digits of ordinates, and of abscissae, which must stay distinct over long recordings.
 const Y_DIGITS: usize = 6;
 const X_DIGITS: usize = 9;
 

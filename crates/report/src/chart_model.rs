@@ -1,4 +1,4 @@
-//! What a chart holds: curves, marked instants, bands, thresholds, lanes. Plain data; drawing happens elsewhere.
+//! A chart as plain data: curves, marked times, bands, thresholds, lanes. Drawing is done by the page script and by `svg`.
 
 use crate::palette::Colour;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ pub enum LineStyle {
     Dashed,
     /// Dots.
     Dotted,
-    /// Constant until the next value: truths that change by steps. For markers the same as `Solid`.
+    /// Constant until the next value. For markers the same as `Solid`.
     Step,
     /// Separate points. For markers the same as `Solid`.
     Points,
@@ -24,16 +24,16 @@ pub enum LineStyle {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
-    /// Proportional.
+    /// Linear.
     #[default]
     Linear,
-    /// Logarithmic; values of zero and below are left out.
+    /// Logarithmic; values of zero and below are omitted.
     Log,
-    /// Proportional up to the given value, logarithmic beyond, with sign: for a statistic with a threshold.
+    /// Linear up to the given value, logarithmic beyond, with sign: for a statistic with a threshold.
     Asinh(f64),
 }
 
-/// One curve; every curve brings its own abscissae, equal columns are stored once in the page.
+/// One curve with its abscissae; equal columns are stored once in the page.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// Name in the legend.
@@ -46,9 +46,9 @@ pub struct Series {
     pub width_px: f64,
     /// Abscissae, not decreasing unless the chart is parametric.
     pub x: Vec<f64>,
-    /// Ordinates; what is not finite leaves a gap.
+    /// Ordinates; a value that is not finite leaves a gap.
     pub y: Vec<f64>,
-    /// Not drawn until the reader switches it on.
+    /// Hidden until the reader switches it on.
     pub hidden: bool,
 }
 
@@ -85,7 +85,7 @@ impl Series {
         self
     }
 
-    /// The same curve, switched off (`true`) until the reader asks for it.
+    /// The same curve, hidden (`true`) until the reader switches it on.
     #[must_use]
     pub fn hidden(mut self, hidden: bool) -> Self {
         self.hidden = hidden;
@@ -93,7 +93,7 @@ impl Series {
     }
 }
 
-/// On which side of its line a marker's label stands.
+/// Side of the line on which a marker's label is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
@@ -104,10 +104,10 @@ pub enum Side {
     Right,
 }
 
-/// Vertical lines of one kind: true ruptures, detections, compensation times.
+/// Vertical lines with one meaning: true ruptures, detections, compensation times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MarkerSet {
-    /// Name of the kind in the legend.
+    /// Name in the legend.
     pub name: String,
     /// Colour.
     pub colour: Colour,
@@ -192,7 +192,7 @@ pub struct Chart {
     pub x_label: String,
     /// Name and unit of the ordinate.
     pub y_label: String,
-    /// Charts of one group move together.
+    /// Charts of one group share zoom, pan and cursor.
     pub group: Option<String>,
     /// Height of the drawing in pixels.
     pub height_px: u32,
@@ -200,7 +200,7 @@ pub struct Chart {
     pub scale: Scale,
     /// Fixed vertical range instead of the data's.
     pub y_range: Option<(f64, f64)>,
-    /// The abscissa may go back and forth (force against depth): drawn in the order given, nothing is sorted.
+    /// The abscissa need not increase (force against depth): points are connected in the order given.
     pub parametric: bool,
     /// Curves.
     pub series: Vec<Series>,
@@ -273,7 +273,7 @@ impl Chart {
         self
     }
 
-    /// Sets the group that moves together.
+    /// Sets the group that shares zoom, pan and cursor.
     #[must_use]
     pub fn group(mut self, group: impl Into<String>) -> Self {
         self.group = Some(group.into());

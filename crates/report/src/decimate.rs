@@ -1,11 +1,10 @@
-//! Thinning of long curves that keeps every spike: the extremes of each bucket survive.
+//! Thinning of long curves that keeps spikes: the extremes of each bucket are kept.
 
 /// Curves longer than this are thinned; the thinned curve is about as long.
 pub(crate) const MAX_POINTS: usize = 20_000;
 
-/// Indices to keep so that at most about `max_points` remain of curves that share one abscissa: of every bucket the
-/// smallest and the largest value of each curve and, where a curve has a gap, one sample of the gap; and both ends.
-/// `None` when the curves are short enough as they are.
+/// Indices to keep so that about `max_points` remain of curves that share one abscissa: both ends and, in every bucket, the
+/// smallest and largest value of each curve and one sample of each gap. `None` when the curves are short enough.
 pub(crate) fn kept_indices(columns: &[&[f64]], length: usize, max_points: usize) -> Option<Vec<usize>> {
     if length <= max_points || columns.is_empty() || length == 0 {
         return None;

@@ -1,6 +1,6 @@
-//! Text that is safe where it is put: HTML, a script's data, an address.
+//! Escaping of text for HTML, script data and URLs.
 
-/// Escapes text for HTML and SVG, in content and in quoted attributes alike.
+/// Escapes text for HTML and SVG, in content and in quoted attributes.
 pub(crate) fn escape_html(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 8);
     for character in text.chars() {

@@ -1,28 +1,38 @@
-//! Renders a [`Page`] to one HTML file: markup here, behaviour and looks in `assets/`.
+//! Renders a [`Page`] to one HTML file: markup here, scripts and style sheet in `assets/`.
 
+use crate::chart_json;
 use crate::chart_model::Chart;
+use crate::escaping::{escape_html, escape_script_json, percent_encode, slug};
 use crate::page_model::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text};
-use crate::{chart_json, escaping};
 use std::fmt::Write;
 
 const UPLOT_JS: &str = include_str!("../assets/uPlot.iife.min.js");
 const UPLOT_CSS: &str = include_str!("../assets/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("../assets/LICENSE-uPlot");
 const PAGE_CSS: &str = include_str!("../assets/page.css");
-/// In the order of loading: each may use the ones before.
+/// In load order: each may use the ones before.
 const PAGE_JS: [&str; 4] = [
     include_str!("../assets/drawing.js"),
     include_str!("../assets/legend.js"),
     include_str!("../assets/charts.js"),
     include_str!("../assets/selftest.js"),
 ];
-/// Runs before everything else, so that no error goes unseen by the tests.
+/// Runs first, so that the tests see every script error.
 const ERROR_TRAP: &str = "addEventListener('error',function(e){var d=document.documentElement;\
 d.dataset.errors=(d.dataset.errors||'')+e.message+'\\n'});";
-/// Nothing is fetched, whatever the page says.
+/// Forbids all network access.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
-/// A cell with more characters of text is broken into lines.
-const LONG_CELL: usize = 48;
+/// A cell with more characters may wrap at a minimum width of its own; a number is otherwise kept on one line.
+const LONG_TEXT: usize = 48;
+const LONG_NUMBER: usize = 20;
+/// A table with more columns is set smaller.
+const WIDE_TABLE_COLUMNS: usize = 6;
+/// With more sections the links are folded.
+const MAX_SECTION_LINKS: usize = 14;
+/// How to use the charts; once per page.
+const CHART_HINT: &str = "<p class=\"hint\"><b>Drag</b> to zoom, <b>Shift + drag</b> or <b>Shift + wheel</b> to pan, \
+<b>Ctrl + wheel</b> to zoom at the cursor, <b>double-click</b> to reset; charts over the same abscissa move together. \
+Click a name to hide its curve. <button type=\"button\" data-reset>Reset zoom</button></p>\n";
 const DISCLAIMER: &str = "Research software, not a medical device.";
 
 impl Page {
@@ -46,21 +56,20 @@ fn render(page: &Page) -> String {
     masthead(&mut out, page);
     out.push_str("<main>\n");
     let mut chart_number = 0;
-    let mut hinted = Vec::new();
     for (index, section) in page.sections.iter().enumerate() {
-        render_section(&mut out, section, index, &mut chart_number, &mut hinted);
+        render_section(&mut out, section, index, &mut chart_number);
     }
     out.push_str("</main>\n");
     let _ = writeln!(
         out,
         "<footer><p>{DISCLAIMER} Drawn by Stylet with uPlot (MIT licence, © 2022 Leon Sorokin). \
-         This file is complete: it loads nothing from anywhere.</p></footer>"
+         This file is self-contained and loads nothing from the network.</p></footer>"
     );
     if !charts.is_empty() {
         let _ = writeln!(
             out,
             "<script type=\"application/json\" id=\"data\">{}</script>",
-            escaping::escape_script_json(&chart_json::render(&charts))
+            escape_script_json(&chart_json::render(&charts))
         );
         let _ = writeln!(out, "<script>/*\n{}\n*/\n{UPLOT_JS}</script>", UPLOT_LICENCE.trim());
         let _ = writeln!(out, "<script>(function(){{\n\"use strict\";\n{}}})();</script>", PAGE_JS.concat());
@@ -77,7 +86,7 @@ fn head(out: &mut String, page: &Page) {
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <title>{}</title>\n<style>\n{UPLOT_CSS}{PAGE_CSS}</style>\n</head>\n",
-        escaping::escape_html(&page.title)
+        escape_html(&page.title)
     );
 }
 
@@ -85,59 +94,54 @@ fn masthead(out: &mut String, page: &Page) {
     let _ = writeln!(
         out,
         "<header>\n<p class=\"disclaimer\">{DISCLAIMER}</p>\n<h1>{}</h1>",
-        escaping::escape_html(&page.title)
+        escape_html(&page.title)
     );
     if !page.subtitle.is_empty() {
-        let _ = writeln!(out, "<p class=\"subtitle\">{}</p>", escaping::escape_html(&page.subtitle));
+        let _ = writeln!(out, "<p class=\"subtitle\">{}</p>", escape_html(&page.subtitle));
     }
     if !page.facts.is_empty() {
         out.push_str("<dl class=\"facts\">");
         for (name, value) in &page.facts {
-            let _ = write!(
-                out,
-                "<div><dt>{}</dt><dd>{}</dd></div>",
-                escaping::escape_html(name),
-                escaping::escape_html(value)
-            );
+            let _ = write!(out, "<div><dt>{}</dt><dd>{}</dd></div>", escape_html(name), escape_html(value));
         }
         out.push_str("</dl>\n");
     }
-    if page.sections.len() > 2 {
+    let links = page.sections.len();
+    let folded = links > MAX_SECTION_LINKS;
+    if folded {
+        let _ = write!(out, "<details class=\"contents\"><summary>Contents ({links} sections)</summary>");
+    }
+    if links > 2 {
         out.push_str("<nav aria-label=\"Sections\">");
         for (index, section) in page.sections.iter().enumerate() {
-            let _ = write!(
-                out,
-                "<a href=\"#{}\">{}</a>",
-                anchor(section, index),
-                escaping::escape_html(&section.title)
-            );
+            let _ =
+                write!(out, "<a href=\"#{}\">{}</a>", anchor(section, index), escape_html(&section.title));
         }
         out.push_str("</nav>\n");
+    }
+    if folded {
+        out.push_str("</details>\n");
     }
     out.push_str("</header>\n");
 }
 
 fn anchor(section: &Section, index: usize) -> String {
-    format!("{}-{}", escaping::slug(&section.title), index + 1)
+    format!("{}-{}", slug(&section.title), index + 1)
 }
 
-fn render_section(
-    out: &mut String,
-    section: &Section,
-    index: usize,
-    number: &mut usize,
-    hinted: &mut Vec<String>,
-) {
+fn render_section(out: &mut String, section: &Section, index: usize, number: &mut usize) {
     let _ = writeln!(
         out,
         "<section id=\"{}\">\n<h2>{}</h2>",
         anchor(section, index),
-        escaping::escape_html(&section.title)
+        escape_html(&section.title)
     );
     for block in &section.blocks {
         match block {
             Block::Chart(chart) => {
-                hint(out, chart, hinted);
+                if *number == 0 {
+                    out.push_str(CHART_HINT);
+                }
                 render_chart(out, chart, *number);
                 *number += 1;
             }
@@ -151,34 +155,14 @@ fn render_section(
     out.push_str("</section>\n");
 }
 
-/// How to use the charts, once per group of charts.
-fn hint(out: &mut String, chart: &Chart, hinted: &mut Vec<String>) {
-    let Some(group) = &chart.group else { return };
-    if hinted.contains(group) {
-        return;
-    }
-    hinted.push(group.clone());
-    let _ = writeln!(
-        out,
-        "<p class=\"hint\"><b>Drag</b> to zoom, <b>Shift + drag</b> or <b>Shift + wheel</b> to pan, \
-         <b>Ctrl + wheel</b> to zoom at the cursor, <b>double-click</b> to reset; the charts move together. \
-         Click a name to hide its curve. <button type=\"button\" data-reset=\"{}\">Reset zoom</button></p>",
-        escaping::escape_html(group)
-    );
-}
-
 fn render_chart(out: &mut String, chart: &Chart, number: usize) {
     let names: Vec<&str> =
         chart.series.iter().map(|s| &*s.name).chain(chart.lanes.iter().map(|l| &*l.name)).collect();
     let description =
         format!("{}: {} against {}: {}", chart.title, chart.y_label, chart.x_label, names.join(", "));
-    let _ = writeln!(
-        out,
-        "<figure class=\"chart\">\n<figcaption><h3>{}</h3>",
-        escaping::escape_html(&chart.title)
-    );
+    let _ = writeln!(out, "<figure class=\"chart\">\n<figcaption><h3>{}</h3>", escape_html(&chart.title));
     if !chart.caption.is_empty() {
-        let _ = writeln!(out, "<p>{}</p>", escaping::escape_html(&chart.caption));
+        let _ = writeln!(out, "<p>{}</p>", escape_html(&chart.caption));
     }
     let _ = writeln!(
         out,
@@ -186,13 +170,13 @@ fn render_chart(out: &mut String, chart: &Chart, number: usize) {
          <div class=\"plot\" id=\"plot-{number}\" style=\"min-height:{}px\" role=\"img\" tabindex=\"0\" aria-label=\"{}\">\
          <noscript>This chart needs JavaScript.</noscript></div>\n</figure>",
         chart.height_px,
-        escaping::escape_html(&description)
+        escape_html(&description)
     );
 }
 
 fn render_scorecard(out: &mut String, card: &Scorecard) {
     if !card.title.is_empty() {
-        let _ = writeln!(out, "<h3>{}</h3>", escaping::escape_html(&card.title));
+        let _ = writeln!(out, "<h3>{}</h3>", escape_html(&card.title));
     }
     out.push_str("<dl class=\"scorecard\">\n");
     for tile in &card.tiles {
@@ -200,17 +184,19 @@ fn render_scorecard(out: &mut String, card: &Scorecard) {
             out,
             "<div class=\"tile {}\"><dt>{}</dt><dd>{}<small>{}</small></dd></div>",
             tile.status.class(),
-            escaping::escape_html(&tile.label),
-            escaping::escape_html(&tile.value),
-            escaping::escape_html(&tile.detail)
+            escape_html(&tile.label),
+            escape_html(&tile.value),
+            escape_html(&tile.detail)
         );
     }
     out.push_str("</dl>\n");
 }
 
 fn render_table(out: &mut String, table: &Table) {
-    let title = escaping::escape_html(&table.title);
-    let _ = writeln!(out, "<div class=\"table\" tabindex=\"0\" role=\"region\" aria-label=\"{title}\">");
+    let title = escape_html(&table.title);
+    let wide = if table.headers.len() > WIDE_TABLE_COLUMNS { " wide" } else { "" };
+    let _ =
+        writeln!(out, "<div class=\"table{wide}\" tabindex=\"0\" role=\"region\" aria-label=\"{title}\">");
     let _ = writeln!(out, "<table><caption>{title}</caption><thead>");
     if !table.column_groups.is_empty() {
         out.push_str("<tr>");
@@ -218,7 +204,7 @@ fn render_table(out: &mut String, table: &Table) {
             let _ = write!(
                 out,
                 "<th scope=\"colgroup\" colspan=\"{columns}\" class=\"group\">{}</th>",
-                escaping::escape_html(name)
+                escape_html(name)
             );
         }
         out.push_str("</tr>\n");
@@ -227,7 +213,7 @@ fn render_table(out: &mut String, table: &Table) {
     for (column, header) in table.headers.iter().enumerate() {
         let numeric = table.rows.iter().any(|row| row.get(column).is_some_and(|cell| cell.right_aligned));
         let class = if numeric { " class=\"n\"" } else { "" };
-        let _ = write!(out, "<th scope=\"col\"{class}>{}</th>", escaping::escape_html(header));
+        let _ = write!(out, "<th scope=\"col\"{class}>{}</th>", escape_html(header));
     }
     out.push_str("</tr></thead>\n<tbody>\n");
     for row in &table.rows {
@@ -245,20 +231,21 @@ fn render_cell(out: &mut String, cell: &Cell, heading: bool) {
     let mut classes: Vec<&str> = Vec::new();
     if cell.right_aligned {
         classes.push("n");
-    } else if cell.text.chars().count() > LONG_CELL {
+    }
+    if cell.text.chars().count() > if cell.right_aligned { LONG_NUMBER } else { LONG_TEXT } {
         classes.push("long");
     }
     if cell.status != Status::Plain {
         classes.push(cell.status.class());
     }
     let class = if classes.is_empty() { String::new() } else { format!(" class=\"{}\"", classes.join(" ")) };
-    let _ = write!(out, "<{tag}{scope}{class}>{}</{tag}>", escaping::escape_html(&cell.text));
+    let _ = write!(out, "<{tag}{scope}{class}>{}</{tag}>", escape_html(&cell.text));
 }
 
 fn render_text(out: &mut String, words: &Text) {
     let _ = write!(out, "<div class=\"text {}\">", words.status.class());
     for paragraph in &words.paragraphs {
-        let _ = write!(out, "<p>{}</p>", escaping::escape_html(paragraph));
+        let _ = write!(out, "<p>{}</p>", escape_html(paragraph));
     }
     out.push_str("</div>\n");
 }
@@ -267,14 +254,14 @@ fn render_image(out: &mut String, image: &SvgImage) {
     let _ = writeln!(
         out,
         "<p class=\"picture\"><img alt=\"{}\" src=\"data:image/svg+xml;charset=utf-8,{}\"></p>",
-        escaping::escape_html(&image.description),
-        escaping::percent_encode(&image.markup)
+        escape_html(&image.description),
+        percent_encode(&image.markup)
     );
 }
 
 fn render_code(out: &mut String, code: &Code) {
-    let title = escaping::escape_html(&code.title);
-    let body = format!("<pre tabindex=\"0\"><code>{}</code></pre>", escaping::escape_html(&code.text));
+    let title = escape_html(&code.title);
+    let body = format!("<pre tabindex=\"0\"><code>{}</code></pre>", escape_html(&code.text));
     if code.folded {
         let _ = writeln!(out, "<details><summary>{title}</summary>{body}</details>");
     } else {

@@ -1,4 +1,4 @@
-//! The page that `stylet listen` serves: curves that grow while the needle moves. It needs nothing from anywhere else.
+//! The page that `stylet listen` serves: force and stiffness over the last 30 s. Self-contained.
 
 /// The page; it reads `/events`.
 #[must_use]

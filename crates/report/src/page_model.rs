@@ -1,20 +1,20 @@
-//! The page as data: sections of charts, tables, score tiles, text, pictures and code.
+//! A page as data: sections of charts, tables, score tiles, text, pictures and code.
 
 use crate::chart_model::Chart;
 use serde::{Deserialize, Serialize};
 
-/// How a number compares with what was hoped for. Never colour alone: good, warn and bad also differ by sign.
+/// Judgement of a value. Drawn as a colour and a sign, so that it does not depend on colour vision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// Not judged.
     #[default]
     Plain,
-    /// As it should be.
+    /// Within the good range.
     Good,
-    /// Worth a look.
+    /// Acceptable.
     Warn,
-    /// Wrong.
+    /// Out of range.
     Bad,
 }
 
@@ -83,16 +83,16 @@ pub struct Scorecard {
 /// A cell of a table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
-    /// What stands in it.
+    /// Text of the cell.
     pub text: String,
     /// Judgement.
     pub status: Status,
-    /// Set to the right like a number.
+    /// Aligned to the right, as numbers are.
     pub right_aligned: bool,
 }
 
 impl Cell {
-    /// A cell of words.
+    /// A text cell.
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
         Self { text: text.into(), status: Status::Plain, right_aligned: false }
@@ -141,10 +141,10 @@ impl Table {
     }
 }
 
-/// Words.
+/// Paragraphs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Text {
-    /// Paragraphs of plain text; markup in them is shown, not obeyed.
+    /// Paragraphs of plain text; markup in them is escaped.
     pub paragraphs: Vec<String>,
     /// Set apart as a warning when `Warn` or `Bad`.
     pub status: Status,
@@ -153,7 +153,7 @@ pub struct Text {
 /// A still picture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SvgImage {
-    /// What it shows, for those who cannot see it.
+    /// Alternative text.
     pub description: String,
     /// SVG text. It is embedded as an image: scripts in it do not run.
     pub markup: String,
@@ -166,7 +166,7 @@ pub struct Code {
     pub title: String,
     /// The text itself.
     pub text: String,
-    /// Folded until opened.
+    /// Collapsed until opened.
     pub folded: bool,
 }
 
@@ -181,7 +181,7 @@ pub enum Block {
     Table(Table),
     /// Score tiles.
     Scorecard(Scorecard),
-    /// Words.
+    /// Paragraphs.
     Text(Text),
     /// A still picture.
     Svg(SvgImage),
@@ -230,10 +230,14 @@ impl Section {
         self.texts(vec![paragraph.into()])
     }
 
-    /// Adds paragraphs.
+    /// Adds paragraphs unless there are none.
     #[must_use]
     pub fn texts(self, paragraphs: Vec<String>) -> Self {
-        self.block(Block::Text(Text { paragraphs, status: Status::Plain }))
+        if paragraphs.is_empty() {
+            self
+        } else {
+            self.block(Block::Text(Text { paragraphs, status: Status::Plain }))
+        }
     }
 
     /// Adds paragraphs set apart as a warning.
@@ -242,7 +246,7 @@ impl Section {
         self.block(Block::Text(Text { paragraphs, status: Status::Warn }))
     }
 
-    /// Adds a row of tiles without a heading of its own.
+    /// Adds a row of tiles without a heading.
     #[must_use]
     pub fn tiles(self, tiles: Vec<Tile>) -> Self {
         self.block(Block::Scorecard(Scorecard { title: String::new(), tiles }))
@@ -260,14 +264,14 @@ impl Section {
         self.block(Block::Code(Code { title: title.into(), text: text.into(), folded: false }))
     }
 
-    /// Adds text to be copied that is folded until opened.
+    /// Adds text to be copied collapsed until opened.
     #[must_use]
     pub fn folded(self, title: impl Into<String>, text: impl Into<String>) -> Self {
         self.block(Block::Code(Code { title: title.into(), text: text.into(), folded: true }))
     }
 }
 
-/// A page: one HTML file that needs nothing but a browser.
+/// A page, rendered to one self-contained HTML file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Page {
     /// Title.

@@ -1,4 +1,4 @@
-//! Colours that stay apart for colour-blind eyes, on white paper and on a dark screen.
+//! Colours distinguishable with colour vision deficiency, on light and dark backgrounds.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Colour {
     /// The text colour: near black on paper, near white in the dark. Ground truth is drawn in it.
     Ink,
-    /// A quiet grey, for what was merely measured.
+    /// Grey, for measured data.
     Grey,
     /// `#0072B2`
     Blue,
@@ -56,7 +56,7 @@ impl Colour {
         }
     }
 
-    /// The hexadecimal colour on a dark page: blue and vermillion are lifted, the theme's own colours swap.
+    /// The hexadecimal colour on a dark page: blue and vermillion are lifted, `Ink` and `Grey` follow the theme.
     #[must_use]
     pub const fn dark(self) -> &'static str {
         match self {
@@ -98,7 +98,7 @@ impl Colour {
         }
     }
 
-    /// The quiet shade of the `index`-th of several adjoining areas (tissue layers).
+    /// The shade of the `index`-th of several adjoining areas (tissue layers).
     #[must_use]
     pub const fn area(index: usize) -> Self {
         match index % 4 {

@@ -2,7 +2,7 @@
 //!
 //! The page itself looks for its curves' pixels and drags a mouse over its charts when its address ends in `#selftest`
 //! (`assets/selftest.js`); this test reads the verdicts, and counts colours in a screenshot that the page had no part in.
-//! Without a browser it says loudly that it was skipped.
+//! Without a browser the test prints SKIPPED.
 
 #[path = "support/browser.rs"]
 mod browser;
@@ -36,7 +36,7 @@ fn charts(page: &Page) -> Vec<&Chart> {
     blocks.filter_map(|block| if let Block::Chart(chart) = block { Some(chart) } else { None }).collect()
 }
 
-/// Opens the page and checks what it says about itself.
+/// Opens the page and checks the results of its self-test.
 fn check(program: &std::path::Path, scratch: &browser::Scratch, name: &str, page: &Page) {
     let file = scratch.path().join(format!("{name}.html"));
     fs::write(&file, page.to_html()).expect("the page can be written");

@@ -1,4 +1,4 @@
-//! The estimates while they are made: stiffness, friction, cumulative friction against the truth.
+//! Charts of the online estimates against the truth: stiffness, friction, cumulative friction.
 
 use super::model::{Combination, LayerEstimate, RunReport, TrueLayer};
 use super::time_charts::{TIME, TIME_LABEL, layer_bands, unlabelled, with_events};
@@ -6,7 +6,7 @@ use crate::chart_model::{Chart, LineStyle, Series, finite_extent};
 use crate::page_model::Section;
 use crate::palette::Colour;
 
-/// One estimated quantity: where to find it online, in the end, offline, and in truth.
+/// An estimated quantity: accessors for the online, final and true values.
 struct Quantity {
     title: &'static str,
     caption: &'static str,
@@ -19,8 +19,9 @@ struct Quantity {
 
 const STIFFNESS: Quantity = Quantity {
     title: "Stiffness K",
-    caption: "Line: online, restarted at every detection; the jumps after a restart may leave the picture. Points: the layer's final, \
-              re-weighted estimate, drawn in the middle of its layer.",
+    caption: "Line: online estimate, restarted at every detection; the transient after a restart may exceed the axis. Points: final \
+              estimate of the layer, re-weighted after its rupture, drawn at the middle of the layer. Where the velocity is constant, online \
+              K and b are not separable: the line then contains the friction too, until the force drop at the rupture separates them.",
     axis: "K (N/m)",
     symbol: "K",
     online: |c| &c.stiffness_n_per_m,
@@ -29,7 +30,7 @@ const STIFFNESS: Quantity = Quantity {
 };
 const FRICTION_ML: Quantity = Quantity {
     title: "Friction b, multi-layer model",
-    caption: "Per metre of needle inside the layer.",
+    caption: "Per metre of needle inside the layer. Where the velocity is constant it is not separable from K before the rupture.",
     axis: "b (N s/m²)",
     symbol: "b",
     online: |c| &c.friction_ns_per_m2,
@@ -38,7 +39,7 @@ const FRICTION_ML: Quantity = Quantity {
 };
 const FRICTION_KV: Quantity = Quantity {
     title: "Friction b, Kelvin-Voigt model",
-    caption: "Of the layer as a whole; the truth shown is b times thickness.",
+    caption: "Of the whole layer; the truth shown is b times thickness.",
     axis: "b (N s/m)",
     symbol: "b",
     online: |c| &c.friction_ns_per_m,
@@ -92,7 +93,7 @@ fn quantity_chart(report: &RunReport, quantity: &Quantity) -> Chart {
     with_events(chart, report, false)
 }
 
-/// The middle of the time the tip spent in a layer, as far as contact and detections tell.
+/// Middle of the interval in which the tip was in the layer, from contact and detections where known.
 fn middle_s(combination: &Combination, layer: &LayerEstimate) -> f64 {
     let detected = |index: usize| combination.detections.get(index).map(|d| d.time_s);
     let from = if layer.layer < 2 { combination.contact_s } else { detected(layer.layer - 2) };
@@ -114,8 +115,8 @@ fn true_steps(layers: &[TrueLayer], value: fn(&TrueLayer) -> f64, end_s: f64) ->
     (x, y)
 }
 
-/// Right after a restart an estimate jumps wildly: the range shown is that of truth and final values, widened to what the
-/// curve does most of the time (5th to 95th percentile), with zero in it.
+/// The vertical range without the transients after a restart: that of truth and final values, extended to the 5th to 95th
+/// percentile of the curve and to zero.
 fn robust_range(chart: &Chart) -> Option<(f64, f64)> {
     let settled =
         chart.series.iter().filter(|s| s.style != LineStyle::Solid).flat_map(|s| s.y.iter().copied());
@@ -123,7 +124,7 @@ fn robust_range(chart: &Chart) -> Option<(f64, f64)> {
     let (mut low, mut high) = settled.unwrap_or((0.0, 0.0));
     for series in chart.series.iter().filter(|s| s.style == LineStyle::Solid) {
         let values = stylet_stats::sorted(series.y.iter().copied().filter(|v| v.is_finite()));
-        // `min` and `max` take the other number where there is no quantile.
+        // `min` and `max` ignore a NaN quantile.
         low = low.min(stylet_stats::quantile_of_sorted(&values, 0.05));
         high = high.max(stylet_stats::quantile_of_sorted(&values, 0.95));
     }
@@ -137,7 +138,7 @@ fn robust_range(chart: &Chart) -> Option<(f64, f64)> {
 fn cumulative_chart(report: &RunReport) -> Chart {
     let chart = Chart::new("Cumulative friction D", TIME_LABEL, "D (N s/m)");
     let chart = chart
-        .caption("Friction of the layers already ruptured: what enhancement takes away.")
+        .caption("Friction of the ruptured layers, subtracted by the enhancement.")
         .group(TIME)
         .height(210);
     let mut chart = chart.with_bands(unlabelled(layer_bands(report)));

@@ -3,14 +3,14 @@
 use crate::chart_model::Series;
 use serde::{Deserialize, Serialize};
 
-/// Where the numbers come from, so that they can be had again.
+/// Origin of the results, sufficient to reproduce them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// File name of the scenario or configuration.
     pub scenario_file: String,
-    /// The resolved scenario, every default written out (RON).
+    /// The resolved scenario with all defaults (RON).
     pub scenario_text: String,
-    /// Command that repeats the run.
+    /// Command that reproduces the run.
     pub command: String,
     /// Seed of the random numbers; `None` for measured data.
     pub seed: Option<u64>,
@@ -25,11 +25,11 @@ pub struct Provenance {
 pub struct ForceTrace {
     /// Name of the sensor, such as `force_torque`.
     pub sensor: String,
-    /// Axial force, positive against the insertion.
+    /// Axial force in N, positive against the insertion.
     pub force_n: Vec<f64>,
 }
 
-/// A layer as it truly is.
+/// True properties of a layer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueLayer {
     /// Name.
@@ -38,30 +38,30 @@ pub struct TrueLayer {
     pub front_m: f64,
     /// Thickness.
     pub thickness_m: f64,
-    /// Stiffness `K`.
+    /// Stiffness `K` in N/m.
     pub stiffness_n_per_m: f64,
     /// Friction `b` per metre of needle inside.
     pub friction_ns_per_m2: f64,
-    /// When the tip entered it (contact, or the rupture before it); `None` if never.
+    /// Time at which the tip entered it (contact, or the previous rupture); `None` if never.
     pub entered_s: Option<f64>,
-    /// When it ruptured; `None` if never.
+    /// Time of its rupture; `None` if never.
     pub ruptured_s: Option<f64>,
 }
 
-/// A rupture as it truly happened.
+/// A true rupture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueRupture {
     /// Layer, counted from 1.
     pub layer: usize,
-    /// Instant, interpolated between samples.
+    /// Time in s, interpolated between samples.
     pub time_s: f64,
     /// Depth of the tip.
     pub depth_m: f64,
-    /// Why: `far face`, `puncture force`.
+    /// `far face` or `puncture force`.
     pub cause: String,
 }
 
-/// What only a simulation knows.
+/// Ground truth of a simulation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
     /// Tip force `f - D v` with the true `D`, per sample.
@@ -77,17 +77,17 @@ pub struct Truth {
 /// A detected rupture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
-    /// Instant of the detection.
+    /// Time of the detection in s.
     pub time_s: f64,
-    /// Position of the tip then.
+    /// Position of the tip at that time.
     pub depth_m: f64,
-    /// What raised it: `CUSUM`, `force derivative`.
+    /// Detector: `CUSUM`, `force derivative`.
     pub trigger: String,
     /// Layer (from 1) of the true rupture it was matched to; `None` when false or when there is no truth.
     pub matched_layer: Option<usize>,
 }
 
-/// A stay of the detection's state machine in one state.
+/// An interval in which the detection's state machine is in one state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StateSpan {
     /// `NoRupture`, `ExpectedRupture`, `DetectedRupture`, `ForceDropMeasuring`, `ForceCompensation`; others are drawn too.
@@ -98,17 +98,17 @@ pub struct StateSpan {
     pub to_s: f64,
 }
 
-/// What the algorithm says about one layer in the end. Relative errors are `(estimate - truth) / truth`, as scored.
+/// Final estimates of one layer. Relative errors are `(estimate - truth) / truth`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LayerEstimate {
     /// Layer, counted from 1.
     pub layer: usize,
-    /// When the re-weighted estimate was ready (end of force-drop measuring, or end of the data); shown when the layer's
-    /// own span is not known from contact and detections.
+    /// Time at which the re-weighted estimate became available (end of the force-drop measurement, or of the data); its point is drawn
+    /// there when the layer's interval is not known from contact and detections.
     pub time_s: f64,
     /// Re-weighted stiffness.
     pub stiffness_n_per_m: Option<f64>,
-    /// Half its 95 % interval, where the algorithm tells.
+    /// Half its 95 % interval, if the algorithm estimates it.
     #[serde(default)]
     pub stiffness_half_width: Option<f64>,
     /// Its relative error.
@@ -117,7 +117,7 @@ pub struct LayerEstimate {
     pub friction_ns_per_m2: Option<f64>,
     /// Re-weighted friction of the whole layer (KV model).
     pub friction_ns_per_m: Option<f64>,
-    /// Half the 95 % interval of the friction, where the algorithm tells.
+    /// Half the 95 % interval of the friction, if the algorithm estimates it.
     #[serde(default)]
     pub friction_half_width: Option<f64>,
     /// Relative error of the friction.
@@ -132,9 +132,12 @@ pub struct LayerEstimate {
     pub offline_friction_ns_per_m2: Option<f64>,
     /// Friction of the whole layer from the offline fit (KV model).
     pub offline_friction_ns_per_m: Option<f64>,
+    /// Whether the motion within the layer separates stiffness from friction in the offline fit.
+    #[serde(default)]
+    pub offline_separable: Option<bool>,
 }
 
-/// A true rupture and what became of it.
+/// A true rupture and its matched detection.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RuptureScore {
     /// Layer, counted from 1.
@@ -143,9 +146,9 @@ pub struct RuptureScore {
     pub delay_s: Option<f64>,
     /// Travel between the two.
     pub delay_m: Option<f64>,
-    /// Instant of the matched detection.
+    /// Time of the matched detection in s.
     pub detected_s: Option<f64>,
-    /// What raised it.
+    /// Detector that raised it.
     pub trigger: String,
 }
 
@@ -164,7 +167,7 @@ pub struct Score {
     pub median_delay_m: Option<f64>,
     /// True cumulative friction `D` at the end of the advance.
     pub true_cumulative_friction_ns_per_m: Option<f64>,
-    /// Estimated `D` then.
+    /// Estimated `D` at that time.
     pub cumulative_friction_ns_per_m: Option<f64>,
     /// Its relative error.
     pub cumulative_friction_error: Option<f64>,
@@ -174,23 +177,23 @@ pub struct Score {
     pub after_exit_relative: Option<f64>,
 }
 
-/// What one combination of algorithm, model and sensor made of the data.
+/// Results of one combination of algorithm, model and sensor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Combination {
     /// Name, such as `paper/ml/force_torque`.
     pub name: String,
-    /// Sensor it listened to (see [`ForceTrace::sensor`]).
+    /// Sensor it processed (see [`ForceTrace::sensor`]).
     pub sensor: String,
-    /// Instant of the first contact, as known or found.
+    /// Time of first contact in s, known or detected.
     pub contact_s: Option<f64>,
     /// Reconstructed force: regressor times estimates plus `D v`.
     pub reconstructed_force_n: Vec<f64>,
     /// Enhanced force `f - D v`.
     pub enhanced_force_n: Vec<f64>,
-    /// Where the tip's force lies with 95 % probability; not numbers where the algorithm does not tell.
+    /// Lower end of the 95 % interval of the tip force in N; NaN without one.
     #[serde(default)]
     pub tip_force_low_n: Vec<f64>,
-    /// See `low_n`.
+    /// Upper end of the 95 % interval of the tip force in N; NaN without one.
     #[serde(default)]
     pub tip_force_high_n: Vec<f64>,
     /// Online stiffness.
@@ -205,20 +208,24 @@ pub struct Combination {
     pub cusum_n2: Vec<f64>,
     /// Its alarm threshold.
     pub cusum_threshold_n2: Option<f64>,
-    /// The statistic is a share of its threshold, without a unit.
+    /// Whether the statistic is divided by its threshold and has no unit.
     #[serde(default)]
     pub cusum_is_normalised: bool,
+    /// Drift `nu` subtracted from the squared reconstruction error at each sample, in N²; `None` where the statistic is
+    /// normalised.
+    #[serde(default)]
+    pub cusum_drift_n2: Option<f64>,
     /// Filtered force derivative.
     pub force_derivative_n_per_s: Vec<f64>,
-    /// Derivative threshold that expects a rupture.
+    /// Upper threshold of the derivative: a rupture is expected.
     pub derivative_on_n_per_s: Option<f64>,
-    /// Derivative threshold of the trailing edge.
+    /// Lower threshold of the derivative: the trailing edge.
     pub derivative_off_n_per_s: Option<f64>,
-    /// States of the detection, without gaps.
+    /// States of the detection, contiguous.
     pub states: Vec<StateSpan>,
     /// Detected ruptures.
     pub detections: Vec<Detection>,
-    /// Instants at which `D` was raised.
+    /// Times at which `D` was increased, in s.
     pub compensations_s: Vec<f64>,
     /// Final estimate per layer.
     pub layers: Vec<LayerEstimate>,
@@ -228,22 +235,22 @@ pub struct Combination {
     pub score: Option<Score>,
 }
 
-/// Everything shown about one insertion.
+/// All data of the report of one insertion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
     /// Title: the scenario's name.
     pub title: String,
     /// The scenario's source: paper and figure.
     pub source: String,
-    /// Where it comes from.
+    /// Origin of the results.
     pub provenance: Provenance,
-    /// Remarks to be read first: warnings about the data, repairs.
+    /// Warnings about the data and repairs, shown first.
     pub notes: Vec<String>,
-    /// Sample instants, increasing.
+    /// Sample times in s, increasing.
     pub time_s: Vec<f64>,
-    /// Tip position, positive into the tissue.
+    /// Tip position in m, positive into the tissue.
     pub position_m: Vec<f64>,
-    /// Its velocity.
+    /// Tip velocity in m/s.
     pub velocity_mps: Vec<f64>,
     /// Measured force of every sensor.
     pub forces: Vec<ForceTrace>,
@@ -254,12 +261,12 @@ pub struct RunReport {
 }
 
 impl RunReport {
-    /// Name of a combination where there is more than one to tell apart.
+    /// `what`, with the name of the combination if there are several.
     pub(super) fn label(&self, combination: &Combination, what: &str) -> String {
         if self.combinations.len() > 1 { format!("{what} · {}", combination.name) } else { what.to_owned() }
     }
 
-    /// The curve of the `index`-th combination, wider the more curves will be drawn over it: equal curves show as edges.
+    /// The curve of the `index`-th combination, widened by the number of curves drawn over it so that identical curves stay visible.
     pub(super) fn visible_below(&self, series: Series, index: usize) -> Series {
         let above = self.combinations.len().saturating_sub(index + 1);
         let width_px = series.width_px + 1.6 * above as f64;

@@ -1,13 +1,14 @@
-//! The numbers behind the plots, one group of columns per combination.
+//! Tables of ruptures, layers and totals, one group of columns per combination.
 
-use super::model::{Combination, LayerEstimate, RunReport, Score};
+use super::model::{Combination, LayerEstimate, RunReport, Score, Truth};
 use super::scorecard::{delay_status, error_status, millimetres, milliseconds};
 use crate::page_model::{Cell, Section, Status, Table};
 use stylet_stats::number_format::{percent, plus_minus, significant};
 
 pub(super) fn section(report: &RunReport) -> Section {
-    Section::new("Numbers")
+    Section::new("Tables")
         .table(if report.truth.is_some() { rupture_table(report) } else { detection_table(report) })
+        .texts(layer_notes(report))
         .table(layer_table(report))
         .table(overall_table(report))
 }
@@ -17,19 +18,19 @@ fn dash() -> Cell {
 }
 
 fn number(value: Option<f64>, scale: f64) -> Cell {
-    doubted(value, None, scale)
+    with_half_width(value, None, scale)
 }
 
-/// A number with what it may be off by with 95 % probability, where that is known.
-fn doubted(value: Option<f64>, doubt: Option<f64>, scale: f64) -> Cell {
-    value.map_or_else(dash, |v| Cell::number(plus_minus(v * scale, doubt.map(|d| d * scale), 4)))
+/// A number with the half width of its 95 % interval, if known.
+fn with_half_width(value: Option<f64>, half_width: Option<f64>, scale: f64) -> Cell {
+    value.map_or_else(dash, |v| Cell::number(plus_minus(v * scale, half_width.map(|d| d * scale), 4)))
 }
 
 fn error(value: Option<f64>) -> Cell {
     value.map_or_else(dash, |e| Cell::number(percent(e)).status(error_status(e)))
 }
 
-/// Empty heads over the shared columns, then one over each combination's; none when there is only one.
+/// Column groups: an empty one over the shared columns, one per combination; none for a single combination.
 fn groups(report: &RunReport, shared: usize, each: usize) -> Vec<(String, usize)> {
     if report.combinations.len() < 2 {
         return Vec::new();
@@ -45,7 +46,7 @@ fn headers(report: &RunReport, shared: &[&str], each: &[&str]) -> Vec<String> {
 
 fn rupture_table(report: &RunReport) -> Table {
     let shared = ["Rupture", "True (s)", "Depth (mm)", "Cause"];
-    let each = ["Detected (s)", "Delay", "Travel", "Raised by"];
+    let each = ["Detected (s)", "Delay", "Travel", "Detected by"];
     let mut rows = Vec::new();
     for (index, rupture) in report.truth.iter().flat_map(|truth| &truth.ruptures).enumerate() {
         let mut row = vec![
@@ -95,59 +96,94 @@ fn detection_table(report: &RunReport) -> Table {
             ]);
         }
     }
-    let headers = ["Detection", "Time (s)", "Position (mm)", "Raised by"].map(str::to_owned).to_vec();
+    let headers = ["Detection", "Time (s)", "Position (mm)", "Detected by"].map(str::to_owned).to_vec();
     Table { title: "Detected ruptures".to_owned(), column_groups: Vec::new(), headers, rows }
 }
 
-/// One row of the layer table: name, unit scale, truth, and where the estimates stand.
-struct Row {
+/// A quantity of the layer table: name, unit scale, and accessors for truth and estimates.
+struct LayerQuantity {
     name: &'static str,
+    is_thickness: bool,
     scale: f64,
     truth: fn(&super::model::TrueLayer) -> f64,
     estimate: fn(&LayerEstimate) -> Option<f64>,
-    doubt: fn(&LayerEstimate) -> Option<f64>,
+    half_width: fn(&LayerEstimate) -> Option<f64>,
     offline: fn(&LayerEstimate) -> Option<f64>,
     error: fn(&LayerEstimate) -> Option<f64>,
 }
 
-const ROWS: [Row; 4] = [
-    Row {
+const LAYER_QUANTITIES: [LayerQuantity; 4] = [
+    LayerQuantity {
         name: "K (N/m)",
+        is_thickness: false,
         scale: 1.0,
         truth: |l| l.stiffness_n_per_m,
         estimate: |l| l.stiffness_n_per_m,
-        doubt: |l| l.stiffness_half_width,
+        half_width: |l| l.stiffness_half_width,
         offline: |l| l.offline_stiffness_n_per_m,
         error: |l| l.stiffness_error,
     },
-    Row {
+    LayerQuantity {
         name: "b (N s/m²)",
+        is_thickness: false,
         scale: 1.0,
         truth: |l| l.friction_ns_per_m2,
         estimate: |l| l.friction_ns_per_m2,
-        doubt: |l| l.friction_half_width,
+        half_width: |l| l.friction_half_width,
         offline: |l| l.offline_friction_ns_per_m2,
         error: |l| l.friction_error,
     },
-    Row {
+    LayerQuantity {
         name: "b d (N s/m)",
+        is_thickness: false,
         scale: 1.0,
         truth: |l| l.friction_ns_per_m2 * l.thickness_m,
         estimate: |l| l.friction_ns_per_m,
-        doubt: |_| None,
+        half_width: |_| None,
         offline: |l| l.offline_friction_ns_per_m,
         error: |l| l.friction_error,
     },
-    Row {
+    LayerQuantity {
         name: "thickness (mm)",
+        is_thickness: true,
         scale: 1e3,
         truth: |l| l.thickness_m,
         estimate: |l| l.thickness_m,
-        doubt: |_| None,
+        half_width: |_| None,
         offline: |_| None,
         error: |l| l.thickness_error,
     },
 ];
+
+/// The true thickness that the tip traverses: less than the layer's where it ruptured by force before its far face.
+fn traversed_m(truth: &Truth, layer: usize) -> Option<f64> {
+    let front_m = truth.layers.get(layer.checked_sub(1)?)?.front_m;
+    let rupture = truth.ruptures.iter().find(|r| r.layer == layer && r.cause == "puncture force")?;
+    Some(rupture.depth_m - front_m)
+}
+
+/// Explanations that the layer table needs.
+fn layer_notes(report: &RunReport) -> Vec<String> {
+    let mut notes = Vec::new();
+    let layers = || report.combinations.iter().flat_map(|c| &c.layers);
+    if layers().any(|l| l.offline_stiffness_n_per_m.is_some()) {
+        notes.push(
+            "Offline LSQ: unweighted least squares over all samples between the true boundaries of the layer. Where the motion within a \
+             layer does not separate K from b (velocity nearly constant), the two values are marked and only their combined force is \
+             determined."
+                .to_owned(),
+        );
+    }
+    let punctured = |truth: &Truth| (1..=truth.layers.len()).any(|layer| traversed_m(truth, layer).is_some());
+    if report.truth.as_ref().is_some_and(punctured) {
+        notes.push(
+            "A layer that ruptures at its puncture force is left before its far face: the estimated thickness is compared with the \
+             distance traversed up to the rupture."
+                .to_owned(),
+        );
+    }
+    notes
+}
 
 fn layer_table(report: &RunReport) -> Table {
     let known = report.truth.is_some();
@@ -158,7 +194,7 @@ fn layer_table(report: &RunReport) -> Table {
     let mut rows = Vec::new();
     for layer in 1..=estimated {
         let truth = true_layers.get(layer - 1);
-        for quantity in &ROWS {
+        for quantity in &LAYER_QUANTITIES {
             let estimates: Vec<Option<&LayerEstimate>> =
                 report.combinations.iter().map(|c| c.layers.iter().find(|l| l.layer == layer)).collect();
             let has = |e: &Option<&LayerEstimate>| {
@@ -169,16 +205,38 @@ fn layer_table(report: &RunReport) -> Table {
             }
             let name = truth.map_or_else(|| format!("layer {layer}"), |t| format!("{layer} · {}", t.name));
             let mut row = vec![Cell::text(name), Cell::text(quantity.name)];
+            // Only the thickness is compared with the distance traversed.
+            let traversed = if quantity.is_thickness {
+                report.truth.as_ref().and_then(|truth| traversed_m(truth, layer))
+            } else {
+                None
+            };
             if known {
-                row.push(number(truth.map(quantity.truth), quantity.scale));
+                row.push(match (traversed, truth) {
+                    (Some(part_m), Some(t)) => Cell::number(format!(
+                        "{} of {}",
+                        significant(1e3 * part_m, 4),
+                        significant(1e3 * t.thickness_m, 4)
+                    )),
+                    _ => number(truth.map(quantity.truth), quantity.scale),
+                });
             }
             for estimate in estimates {
                 let value = estimate.and_then(quantity.estimate);
-                row.push(doubted(value, estimate.and_then(quantity.doubt), quantity.scale));
+                row.push(with_half_width(value, estimate.and_then(quantity.half_width), quantity.scale));
                 if known {
-                    row.push(error(value.and(estimate.and_then(quantity.error))));
+                    row.push(match traversed {
+                        Some(part_m) => error(value.map(|v| (v - part_m) / part_m)),
+                        None => error(value.and(estimate.and_then(quantity.error))),
+                    });
                 }
-                row.push(number(estimate.and_then(quantity.offline), quantity.scale));
+                let offline = number(estimate.and_then(quantity.offline), quantity.scale);
+                let inseparable = estimate.is_some_and(|e| e.offline_separable == Some(false));
+                row.push(if inseparable && offline.text != "–" {
+                    offline.status(Status::Warn)
+                } else {
+                    offline
+                });
             }
             rows.push(row);
         }
@@ -192,10 +250,10 @@ fn layer_table(report: &RunReport) -> Table {
     }
 }
 
-/// A line of the overall table: name, cell of a combination.
-type Line = (&'static str, fn(&Combination, Option<&Score>) -> Cell);
+/// A row of the table of totals: name, and the cell of a combination.
+type TotalRow = (&'static str, fn(&Combination, Option<&Score>) -> Cell);
 
-const LINES: [Line; 6] = [
+const TOTALS: [TotalRow; 6] = [
     ("cumulative friction D, true (N s/m)", |_, s| {
         number(s.and_then(|s| s.true_cumulative_friction_ns_per_m), 1.0)
     }),
@@ -204,17 +262,17 @@ const LINES: [Line; 6] = [
         number(s.and_then(|s| s.cumulative_friction_ns_per_m).or(last), 1.0)
     }),
     ("error of D", |_, s| error(s.and_then(|s| s.cumulative_friction_error))),
-    ("enhancement error, RMS over RMS of the tip force", |_, s| {
+    ("enhancement error, RMS relative to the tip force", |_, s| {
         s.and_then(|s| s.enhancement_rms_relative).map_or_else(dash, |e| Cell::number(percent(e)))
     }),
-    ("enhanced over measured force after the exit", |_, s| {
+    ("enhanced relative to measured force after the exit, RMS", |_, s| {
         s.and_then(|s| s.after_exit_relative).map_or_else(dash, |e| Cell::number(percent(e)))
     }),
     ("reconstruction error, RMS (N)", |c, _| number(c.reconstruction_rms_n, 1.0)),
 ];
 
 fn overall_table(report: &RunReport) -> Table {
-    let rows = LINES
+    let rows = TOTALS
         .iter()
         .map(|(name, cell)| {
             let cells = report.combinations.iter().map(|c| cell(c, c.score.as_ref()));

@@ -1,15 +1,15 @@
-//! The figures that are read first.
+//! The scores at the top of the report.
 
 use super::model::{Combination, LayerEstimate, RunReport, Score};
 use crate::page_model::{Cell, Section, Status, Table, Tile};
 use stylet_stats::number_format::{percent, significant};
 
-/// Relative errors up to 5 % are good, up to 15 % worth a look; the bounds of the enhancement error are its own.
+/// Relative errors up to 5 % are good, up to 15 % acceptable. The enhancement error has different bounds.
 pub(super) fn error_status(error: f64) -> Status {
     Status::at_most(error.abs(), 0.05, 0.15)
 }
 
-/// Delays up to 10 ms (two samples at 200 Hz) are good, up to 50 ms worth a look.
+/// Delays up to 10 ms (two samples at 200 Hz) are good, up to 50 ms acceptable.
 pub(super) fn delay_status(delay_s: f64) -> Status {
     Status::at_most(delay_s.abs(), 0.010_5, 0.050_5)
 }
@@ -40,12 +40,16 @@ fn tiles(combination: &Combination) -> Vec<Tile> {
         None => unscored(combination),
     };
     if let Some(rms) = combination.reconstruction_rms_n {
-        tiles.push(Tile::new("Reconstruction error", format!("{} N", significant(rms, 3)), "RMS of e"));
+        tiles.push(Tile::new(
+            "Reconstruction error",
+            format!("{} N", significant(rms, 3)),
+            "RMS of the innovation e",
+        ));
     }
     tiles
 }
 
-/// Several combinations: one row each, a column per figure.
+/// Several combinations: one row each, one column per score.
 fn comparison(report: &RunReport, cards: &[Vec<Tile>]) -> Table {
     let mut labels: Vec<&str> = Vec::new();
     for tile in cards.iter().flatten() {
@@ -97,10 +101,12 @@ fn scored(combination: &Combination, score: &Score) -> Vec<Tile> {
     }
     if let Some(error) = score.enhancement_rms_relative {
         let status = Status::at_most(error, 0.2, 0.4);
-        tiles.push(Tile::new("Enhancement error", percent(error), "RMS, of the tip force").status(status));
+        tiles.push(
+            Tile::new("Enhancement error", percent(error), "RMS, relative to the tip force").status(status),
+        );
     }
     if let Some(error) = score.after_exit_relative {
-        tiles.push(Tile::new("After the exit", percent(error), "of the force remains"));
+        tiles.push(Tile::new("After the exit", percent(error), "of the measured force remains (RMS)"));
     }
     tiles
 }
@@ -134,6 +140,6 @@ fn unscored(combination: &Combination) -> Vec<Tile> {
             tiles.push(Tile::new(what, significant(stiffness, 3), "N/m"));
         }
     }
-    tiles.push(Tile::new("Truth", "unknown", "measured data: no scores"));
+    tiles.push(Tile::new("Ground truth", "none", "measured data: no scores"));
     tiles
 }

@@ -1,4 +1,4 @@
-//! The still picture of a run, for README pages and papers.
+//! The report of a run as one SVG figure, for README pages and papers.
 
 use super::estimate_charts::stiffness_chart;
 use super::model::{Combination, RunReport};
@@ -8,8 +8,7 @@ use crate::svg::{FigureOptions, figure};
 use stylet_stats::number_format::{percent, significant};
 
 impl RunReport {
-    /// Force with all events, the states, and the stiffness, one above the other as SVG. An empty title or subtitle in
-    /// the options is filled from the report.
+    /// Force with all events, detection states and stiffness, stacked, as SVG. An empty title or subtitle is filled from the report.
     #[must_use]
     pub fn to_svg(&self, options: &FigureOptions) -> String {
         let force = Chart { height_px: 330, ..force_chart(self) };
@@ -27,12 +26,6 @@ impl RunReport {
             options.subtitle = self.combinations.first().map(summary).unwrap_or_default();
         }
         figure(&charts, &options)
-    }
-
-    /// The force chart alone as SVG.
-    #[must_use]
-    pub fn force_svg(&self, options: &FigureOptions) -> String {
-        figure(&[Chart { height_px: 330, ..force_chart(self) }], options)
     }
 }
 

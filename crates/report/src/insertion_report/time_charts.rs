@@ -1,4 +1,4 @@
-//! Force, detection and motion over time, and force over depth.
+//! Charts of force, detection and motion over time, and of force over depth.
 
 use super::model::{Combination, RunReport};
 use crate::chart_model::{
@@ -8,31 +8,23 @@ use crate::page_model::Section;
 use crate::palette::Colour;
 use stylet_stats::number_format::significant;
 
-/// Charts over time move together under this name.
+/// Group of the charts over time: they share zoom and cursor.
 pub(super) const TIME: &str = "time";
 pub(super) const TIME_LABEL: &str = "Time (s)";
-/// The state in which the tip feels nothing.
-const FREE: &str = "FreeTip";
-const BENT: &str = "Proportional up to the threshold, logarithmic beyond.";
+/// State of the detection in which the tip is unloaded.
+const FREE_TIP: &str = "FreeTip";
+/// Name of the detector whose alarms are drawn on its statistic.
+const CUSUM: &str = "CUSUM";
 
 pub(super) fn force_section(report: &RunReport) -> Section {
     Section::new("Force").chart(force_chart(report))
 }
 
-/// Measured, reconstructed, enhanced and true tip force with everything that happened.
+/// Measured, reconstructed, enhanced and true tip force with layers, ruptures and detections.
 pub(super) fn force_chart(report: &RunReport) -> Chart {
     let mut chart = Chart::new("Force at the needle", TIME_LABEL, "Force (N)").group(TIME).height(430);
     let single = report.combinations.len() <= 1;
-    for (index, trace) in report.forces.iter().enumerate() {
-        let name = if report.forces.len() > 1 {
-            format!("measured · {}", trace.sensor)
-        } else {
-            "measured".to_owned()
-        };
-        let colour = if index == 0 { Colour::Grey } else { Colour::SkyBlue };
-        chart = chart
-            .with_series(Series::line(name, colour, report.time_s.clone(), trace.force_n.clone()).width(3.0));
-    }
+    chart.series.extend(measured_series(report, &report.time_s, 3.0));
     for (index, combination) in report.combinations.iter().enumerate() {
         let force = combination.reconstructed_force_n.clone();
         let colour = if single { Colour::Orange } else { Colour::nth(index) };
@@ -46,7 +38,7 @@ pub(super) fn force_chart(report: &RunReport) -> Chart {
         let series = Series::line(name, Colour::nth(index), report.time_s.clone(), force).width(1.8);
         chart = chart.with_series(report.visible_below(series, index));
         if single {
-            // Where the tip's force lies with 95 % probability.
+            // 95 % interval of the tip force.
             for (name, edge_n) in
                 [("2.5 %", &combination.tip_force_low_n), ("97.5 %", &combination.tip_force_high_n)]
             {
@@ -62,13 +54,24 @@ pub(super) fn force_chart(report: &RunReport) -> Chart {
     }
     chart.series.retain(|series| series.y.iter().any(|y| y.is_finite()));
     if report.truth.is_none() {
-        chart.caption = "No truth is known; shaded: the layers as found.".to_owned();
+        chart.caption = "Shaded: detected layers.".to_owned();
     }
     with_events(chart.with_bands(layer_bands(report)), report, true)
 }
 
-/// True ruptures, detections and compensations as vertical lines. Of several combinations only the labelled chart shows
-/// the detections, lest the lines hide the curves.
+/// The measured force of every sensor over the given abscissa.
+fn measured_series(report: &RunReport, x: &[f64], width_px: f64) -> Vec<Series> {
+    let several = report.forces.len() > 1;
+    let series = report.forces.iter().enumerate().map(|(index, trace)| {
+        let name = if several { format!("measured · {}", trace.sensor) } else { "measured".to_owned() };
+        let colour = if index == 0 { Colour::Grey } else { Colour::SkyBlue };
+        Series::line(name, colour, x.to_vec(), trace.force_n.clone()).width(width_px)
+    });
+    series.collect()
+}
+
+/// True ruptures, detections and compensations as vertical lines. With several combinations only the labelled chart
+/// shows the detections, because the lines would hide the curves.
 pub(super) fn with_events(chart: Chart, report: &RunReport, labels: bool) -> Chart {
     let text = |label: String| if labels { label } else { String::new() };
     let marks = report.truth.iter().flat_map(|truth| &truth.ruptures);
@@ -125,7 +128,7 @@ fn detection_label(
     }
 }
 
-/// The layers along time: true ones, or what lies between contact and the detections of the first combination.
+/// The layers over time: true ones, or the intervals between contact and detections of the first combination.
 pub(super) fn layer_bands(report: &RunReport) -> Vec<Band> {
     let end = report.end_s();
     let band = |(index, (from, to, label)): (usize, (f64, f64, String))| Band {
@@ -146,9 +149,9 @@ pub(super) fn layer_bands(report: &RunReport) -> Vec<Band> {
     let mut faces = vec![contact];
     faces.extend(combination.detections.iter().map(|d| d.time_s));
     faces.push(end);
-    // In a gap, and behind the last layer, there is no layer.
+    // In a gap and beyond the last layer the tip is free.
     let free = |from: f64, to: f64| {
-        combination.states.iter().find(move |s| s.state == FREE && s.from_s >= from && s.from_s < to)
+        combination.states.iter().find(move |s| s.state == FREE_TIP && s.from_s >= from && s.from_s < to)
     };
     let spans = faces.windows(2).enumerate().map(|(i, pair)| {
         let from = free(pair[0], pair[1]).map_or(pair[0], |s| s.to_s.min(pair[1]));
@@ -157,56 +160,90 @@ pub(super) fn layer_bands(report: &RunReport) -> Vec<Band> {
     spans.enumerate().map(band).filter(|b| b.to > b.from).collect()
 }
 
-/// Nothing to draw.
-static NONE: Vec<f64> = Vec::new();
-
+/// Detection states, CUSUM statistic and force derivative. The algorithms differ in the unit of their statistic, so there may be a
+/// chart for each.
 pub(super) fn detection_section(report: &RunReport) -> Section {
-    let statistic = |share: bool, chart: Chart| {
-        let column = |c: &Combination| c.cusum_is_normalised == share;
-        with_curves(
-            chart.caption(BENT),
-            report,
-            |c| if column(c) { &c.cusum_n2 } else { &NONE },
-            |c| vec![(c.cusum_threshold_n2.filter(|_| column(c)), "alarm")],
-        )
-    };
-    let derivative = with_curves(
-        Chart::new("Force derivative", TIME_LABEL, "df/dt (N/s)").caption(BENT),
-        report,
-        |c| &c.force_derivative_n_per_s,
-        |c| vec![(c.derivative_on_n_per_s, "on"), (c.derivative_off_n_per_s, "off")],
-    );
-    let bent = |chart: Chart| {
-        let linear_below = chart.levels.iter().map(|level| level.y).find(|y| *y > 0.0);
-        Chart { scale: linear_below.map_or(Scale::Linear, Scale::Asinh), ..chart }
-    };
+    let has = |normalised: bool| report.combinations.iter().any(|c| c.cusum_is_normalised == normalised);
     let mut section = Section::new("Detection").chart(state_chart(report));
-    if report.combinations.iter().any(|c| c.cusum_is_normalised) {
-        let chart = Chart::new("Alarm: the largest CUSUM as a share of its threshold", TIME_LABEL, "g");
-        section = section.chart(with_events(bent(statistic(true, chart)), report, false));
+    if has(true) {
+        let chart = Chart::new("CUSUM, largest statistic divided by its threshold", TIME_LABEL, "g")
+            .caption("The statistic restarts with each alarm; an alarm is drawn at the threshold. Logarithmic above the threshold.");
+        section = section.chart(cusum_chart(report, chart, true));
     }
-    if report.combinations.iter().all(|c| c.cusum_is_normalised) && !report.combinations.is_empty() {
-        return section;
+    if has(false) || report.combinations.is_empty() {
+        let chart = Chart::new("CUSUM of the reconstruction error", TIME_LABEL, "g (N²)").caption(
+            "The statistic restarts with each alarm; an alarm is drawn at the value that raised it. Logarithmic above the threshold.",
+        );
+        let derivative = with_curves(
+            Chart::new("Force derivative", TIME_LABEL, "df/dt (N/s)")
+                .caption("Logarithmic above the threshold."),
+            report,
+            |c| c.force_derivative_n_per_s.clone(),
+            |c| vec![(c.derivative_on_n_per_s, "on"), (c.derivative_off_n_per_s, "off")],
+        );
+        section = section.chart(cusum_chart(report, chart, false)).chart(with_events(
+            asinh_above_threshold(derivative),
+            report,
+            false,
+        ));
     }
-    let chart = Chart::new("CUSUM of the reconstruction error", TIME_LABEL, "g (N²)");
-    section.chart(with_events(bent(statistic(false, chart)), report, false)).chart(with_events(
-        bent(derivative),
+    section
+}
+
+/// The statistic of the combinations that give it normalised, or of those that give it in N².
+fn cusum_chart(report: &RunReport, chart: Chart, normalised: bool) -> Chart {
+    let selected = |c: &Combination| c.cusum_is_normalised == normalised;
+    let chart = with_curves(
+        chart,
         report,
-        false,
-    ))
+        |c| if selected(c) { cusum_with_alarms(report, c) } else { Vec::new() },
+        |c| vec![(c.cusum_threshold_n2.filter(|_| selected(c)), "alarm")],
+    );
+    with_events(asinh_above_threshold(chart), report, false)
+}
+
+/// The recorded statistic with the value that raised each alarm. The algorithm restarts the sum within the sample of the alarm and
+/// records the restarted value; here `g + e² - nu` is restored from the sample before, the reconstruction error and the drift.
+fn cusum_with_alarms(report: &RunReport, combination: &Combination) -> Vec<f64> {
+    let mut g = combination.cusum_n2.clone();
+    let trace = report.forces.iter().find(|f| f.sensor == combination.sensor).or(report.forces.first());
+    for detection in combination.detections.iter().filter(|d| d.trigger == CUSUM) {
+        let index = report.time_s.partition_point(|t| *t < detection.time_s);
+        if report.time_s.get(index) != Some(&detection.time_s) {
+            continue; // A thinned report does not contain every sample.
+        }
+        let before = index.checked_sub(1).and_then(|i| g.get(i)).copied();
+        let force_n = trace.and_then(|t| t.force_n.get(index));
+        let alarm =
+            match (before, force_n, combination.reconstructed_force_n.get(index), combination.cusum_drift_n2)
+            {
+                (Some(before), Some(f), Some(r), Some(drift_n2)) => before + (f - r) * (f - r) - drift_n2,
+                _ => f64::NAN,
+            };
+        if let (Some(value), Some(threshold)) = (g.get_mut(index), combination.cusum_threshold_n2) {
+            *value = value.max(alarm).max(threshold);
+        }
+    }
+    g
+}
+
+/// Linear up to the smallest positive threshold, logarithmic above.
+fn asinh_above_threshold(chart: Chart) -> Chart {
+    let threshold = chart.levels.iter().map(|level| level.y).find(|y| *y > 0.0);
+    Chart { scale: threshold.map_or(Scale::Linear, Scale::Asinh), ..chart }
 }
 
 /// One curve per combination and each distinct threshold once.
 fn with_curves(
     chart: Chart,
     report: &RunReport,
-    column: impl Fn(&Combination) -> &Vec<f64>,
+    column: impl Fn(&Combination) -> Vec<f64>,
     levels: impl Fn(&Combination) -> Vec<(Option<f64>, &'static str)>,
 ) -> Chart {
     let mut chart = chart.group(TIME).height(210).with_bands(unlabelled(layer_bands(report)));
     for (index, combination) in report.combinations.iter().enumerate() {
         let name = chart.y_label.split(" (").next().unwrap_or_default().to_owned();
-        let values = column(combination).clone();
+        let values = column(combination);
         if !values.is_empty() {
             let name = report.label(combination, &name);
             let series = Series::line(name, Colour::nth(index), report.time_s.clone(), values);
@@ -232,7 +269,7 @@ pub(super) fn unlabelled(bands: Vec<Band>) -> Vec<Band> {
     bands.into_iter().map(|band| Band { label: String::new(), ..band }).collect()
 }
 
-/// The state machine as coloured rows, one per combination.
+/// The states of the detection as coloured rows, one per combination.
 pub(super) fn state_chart(report: &RunReport) -> Chart {
     let many = report.combinations.len() > 1;
     let lanes: Vec<Lane> = report
@@ -283,7 +320,7 @@ pub(super) fn motion_section(report: &RunReport) -> Section {
         .chart(depth_chart(report, millimetres))
 }
 
-/// The range of the values with zero in it, so that noise on a constant does not fill the chart.
+/// The range of the values including zero, so that noise on a constant does not fill the chart.
 fn with_zero(values: &[f64]) -> Option<(f64, f64)> {
     finite_extent(values.iter().copied().chain([0.0])).filter(|(low, high)| low < high)
 }
@@ -291,16 +328,7 @@ fn with_zero(values: &[f64]) -> Option<(f64, f64)> {
 fn depth_chart(report: &RunReport, depth_mm: Vec<f64>) -> Chart {
     let mut chart = Chart::new("Force against depth", "Depth of the tip (mm)", "Force (N)").height(380);
     chart.parametric = true;
-    for (index, trace) in report.forces.iter().enumerate() {
-        let name = if report.forces.len() > 1 {
-            format!("measured · {}", trace.sensor)
-        } else {
-            "measured".to_owned()
-        };
-        let colour = if index == 0 { Colour::Grey } else { Colour::SkyBlue };
-        chart =
-            chart.with_series(Series::line(name, colour, depth_mm.clone(), trace.force_n.clone()).width(1.2));
-    }
+    chart.series.extend(measured_series(report, &depth_mm, 1.2));
     for (index, combination) in report.combinations.iter().enumerate() {
         let name = report.label(combination, "enhanced");
         let force = combination.enhanced_force_n.clone();

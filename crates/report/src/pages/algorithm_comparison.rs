@@ -8,7 +8,7 @@ fn percent(x: f64) -> String {
     significant_or_dash(Some(x), 100.0, 2)
 }
 
-/// The page, over `seeds` insertions a row. Tables: detection, estimates, calibration.
+/// The page over `seeds` insertions per row: tables of detection, estimates and interval coverage.
 #[must_use]
 pub fn page(rows: &[ComparisonRow], seeds: u64) -> Page {
     let head = |r: &ComparisonRow| vec![Cell::text(r.scenario.clone()), Cell::text(r.algorithm.clone())];
@@ -40,7 +40,7 @@ pub fn page(rows: &[ComparisonRow], seeds: u64) -> Page {
         )));
         cells
     });
-    // Only where there is a truth for them.
+    // Cases of the independent simulator have no true parameters.
     let estimates: Vec<_> =
         rows.iter()
             .filter(|r| r.enhancement_rms_relative.is_some())
@@ -57,15 +57,15 @@ pub fn page(rows: &[ComparisonRow], seeds: u64) -> Page {
                 cells
             })
             .collect();
-    let between = rows.iter().filter(|r| r.enhancement_rms_relative.is_some()).map(|r| {
+    let interval_rows = rows.iter().filter(|r| r.enhancement_rms_relative.is_some()).map(|r| {
         let mut cells = head(r);
         cells.push(Cell::number(intervals(&r.stiffness_error_interval)));
         cells
     });
-    let between = Table::new(
-        "95 % intervals of the median error of the stiffness, layer by layer, in %",
+    let stiffness_intervals = Table::new(
+        "95 % intervals of the median stiffness error per layer, in %",
         &["scenario", "algorithm", "stiffness"],
-        between.collect(),
+        interval_rows.collect(),
     );
     let calibrated: Vec<_> = rows
         .iter()
@@ -93,56 +93,55 @@ pub fn page(rows: &[ComparisonRow], seeds: u64) -> Page {
         detection.collect(),
     );
     let errors = Table::new(
-        "Errors in %",
+        "Median errors in %",
         &[
             "scenario",
             "algorithm",
-            "enhanced force",
-            "its 95 % interval",
-            "with noise",
-            "stiffness, layer by layer",
-            "friction, layer by layer",
+            "enhanced force, noise-free",
+            "95 % interval",
+            "enhanced force, with noise",
+            "stiffness per layer",
+            "friction per layer",
         ],
         estimates,
     );
     let covered = Table::new(
-        "Covered, %",
+        "Coverage of 95 % intervals, in %",
         &["scenario", "algorithm", "stiffness", "friction", "cumulative friction", "tip force"],
         calibrated,
     );
     let mut page = Page::new("Algorithms compared")
-        .subtitle(format!("{seeds} noise seeds per scenario and algorithm; the same insertions for each"))
+        .subtitle(format!("{seeds} noise seeds per scenario; every algorithm processes the same insertions"))
         .fact("version", env!("CARGO_PKG_VERSION"))
         .section(
             Section::new("Ruptures")
                 .text(
-                    "A rupture is found by the first detection from 50 ms before to 1 s after it; the interval is that of \
-                     missed and false together, Wilson's (a count's where there are more than ruptures).",
+                    "A rupture counts as found by the first detection from 50 ms before to 1 s after it. The interval is that of \
+                     missed plus false per rupture: Wilson's, or a Poisson count's where there are more errors than ruptures.",
                 )
                 .table(ruptures),
         );
     for (algorithm, [missed, false_alarms, ruptures]) in totals(rows) {
         page = page.fact(algorithm, format!("{missed} missed, {false_alarms} false of {ruptures} ruptures"));
     }
-    // A world of the referee knows ruptures alone.
     if estimated {
         page = page.section(
             Section::new("Estimates")
                 .text(
-                    "Medians over the seeds, with their intervals between order statistics. Enhanced force: RMS of \
-                     estimated less true friction over the RMS of the tip's force, from first contact to the deepest point; \
-                     beside it the same with the sensor's noise.",
+                    "Medians over the seeds with 95 % intervals from order statistics. Enhanced force, noise-free: RMS of \
+                     estimated minus true friction force, relative to the RMS of the tip force, from first contact to the \
+                     deepest point. With noise: the same for the enhanced force itself, sensor noise included.",
                 )
                 .table(errors)
-                .table(between),
+                .table(stiffness_intervals),
         );
     }
     if has_intervals {
         page = page.section(
             Section::new("Calibration")
                 .text(
-                    "How often the truth lay in a 95 % interval, in %: over layers and seeds, the tip's force over samples. \
-                     An algorithm that gives no intervals is not listed.",
+                    "Share of true values inside the 95 % intervals: over layers and seeds; for the tip force over samples. \
+                     Algorithms without intervals are not listed.",
                 )
                 .table(covered),
         );
@@ -150,7 +149,7 @@ pub fn page(rows: &[ComparisonRow], seeds: u64) -> Page {
     page
 }
 
-/// Missed, false and all ruptures of each algorithm over all scenarios, in the order of the rows.
+/// Missed, false and true ruptures of each algorithm summed over all scenarios, in the order of the rows.
 fn totals(rows: &[ComparisonRow]) -> Vec<(&str, [usize; 3])> {
     let mut totals: Vec<(&str, [usize; 3])> = Vec::new();
     for r in rows {
@@ -171,27 +170,28 @@ mod tests {
     use stylet_sweep::algorithm_comparison::{ComparisonRow, DetectionCounts};
 
     #[test]
-    fn a_world_that_knows_ruptures_alone_has_no_empty_sections() {
-        let heard = DetectionCounts { ruptures: 4, missed: 1, ..DetectionCounts::default() };
-        let html = page(&[ComparisonRow::new("rich world, clean", "Stylet", 2, &heard)], 2).to_html();
+    fn a_table_without_true_parameters_has_no_empty_sections() {
+        let counts = DetectionCounts { ruptures: 4, missed: 1, ..DetectionCounts::default() };
+        let html = page(&[ComparisonRow::new("clean", "Stylet", 2, &counts)], 2).to_html();
         assert!(html.contains("1 / 0 of 4"));
         assert!(!html.contains("Estimates") && !html.contains("Calibration"));
     }
 
     #[test]
-    fn the_page_begins_with_the_sums_of_each_algorithm() {
-        let heard = |missed, false_alarms| DetectionCounts {
+    fn the_page_head_sums_errors_per_algorithm() {
+        let counts = |missed, false_alarms| DetectionCounts {
             ruptures: 4,
             missed,
             false_alarms,
             ..DetectionCounts::default()
         };
-        let row = |scenario: &str, algorithm: &str, heard| ComparisonRow::new(scenario, algorithm, 2, &heard);
+        let row =
+            |scenario: &str, algorithm: &str, counts| ComparisonRow::new(scenario, algorithm, 2, &counts);
         let rows = [
-            row("a", "Paper", heard(1, 3)),
-            row("a", "Stylet", heard(0, 1)),
-            row("b", "Paper", heard(2, 2)),
-            row("b", "Stylet", heard(1, 0)),
+            row("a", "Paper", counts(1, 3)),
+            row("a", "Stylet", counts(0, 1)),
+            row("b", "Paper", counts(2, 2)),
+            row("b", "Stylet", counts(1, 0)),
         ];
         let html = page(&rows, 2).to_html();
         assert!(html.contains("3 missed, 5 false of 8 ruptures"), "{html}");

@@ -1,4 +1,4 @@
-//! The page of an examination: a map of where the engine fails, and the table.
+//! The page of a benchmark of the diagnosis: accuracy by misspecification and severity, as maps and a table.
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::svg::{FigureOptions, HeatMap, heat_map};
@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 use stylet_examine::table::Cell as Row;
 use stylet_examine::{Grade, Hide, Plan, Wrong};
 
-/// Columns of a map: nothing wrong, then the grades.
+/// Columns of a map: no misspecification, then its severities.
 const COLUMNS: [&str; 4] = ["none", "small", "medium", "large"];
 
-/// Shares right, one map per kind of case: rows what is wrong, columns how much of it.
+/// Accuracy maps, one per hidden cause: rows are misspecifications, columns severities.
 #[must_use]
 pub fn accuracy_maps(plan: &Plan, cells: &[Row]) -> Vec<(Hide, String)> {
     let kinds: BTreeSet<Hide> = cells.iter().map(|c| c.id.hide).collect();
@@ -28,21 +28,21 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
             })
             .map_or(f64::NAN, |c| c.right.share())
     };
-    // Only what was asked for has a column.
+    // Severities that were not run have no column.
     let columns: Vec<usize> =
         (0..COLUMNS.len()).filter(|k| rows.iter().any(|w| value(*w, *k).is_finite())).collect();
     let cases = of.iter().map(|c| c.right.of).max().unwrap_or(0);
     let title = match hide {
-        Hide::Clean => "Clean data called clean".to_owned(),
+        Hide::Clean => "No effect hidden: none reported".to_owned(),
         hide => {
             let says = hide.says();
             let (first, rest) = says.split_at(1);
-            format!("{}{rest}: right, and alone", first.to_uppercase())
+            format!("{}{rest}: correct, and nothing else", first.to_uppercase())
         }
     };
     let map = HeatMap {
-        row_label: "what the believed simulation or the sensor has wrong".to_owned(),
-        column_label: "how much of it".to_owned(),
+        row_label: "misspecification".to_owned(),
+        column_label: "severity".to_owned(),
         rows: rows.iter().map(|w| w.word().to_owned()).collect(),
         columns: columns.iter().map(|k| COLUMNS[*k].to_owned()).collect(),
         values: rows.iter().map(|w| columns.iter().map(|k| value(*w, *k)).collect()).collect(),
@@ -51,7 +51,7 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     let options = FigureOptions {
         title,
         subtitle: format!(
-            "world {}, {}, up to {cases} cases per cell, seed {}",
+            "simulator {}, {}, up to {cases} cases per cell, seed {}",
             plan.world,
             plan.size.says(),
             plan.seed
@@ -62,23 +62,23 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     heat_map(&map, &options)
 }
 
-/// The page of an examination; `text` is its table in words.
+/// The page of a benchmark; `text` is its table as printed on the terminal.
 #[must_use]
 pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
-    let mut worlds = Section::new("In which world it fails");
+    let mut worlds = Section::new("Accuracy by misspecification");
     for (hide, markup) in accuracy_maps(plan, cells) {
-        let description = format!("Share of right answers, {}: {}", hide, hide.says());
+        let description = format!("Share of correct diagnoses, {}: {}", hide, hide.says());
         worlds = worlds.picture(description, markup);
     }
     let mut table = Table::new(
         "Rates with 95 % Wilson intervals",
         &[
-            "wrong",
-            "how much",
+            "misspecification",
+            "severity",
             "hidden",
-            "right, and alone",
+            "correct, nothing else",
             "all found",
-            "a wrong name",
+            "false attribution",
             "unknown",
             "median s",
             "p90 s",
@@ -99,11 +99,11 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
             Cell::number(format!("{:.2}", c.p90_s)),
         ]);
     }
-    Page::new("The diagnosis examined")
-        .subtitle("by cases of an independent generator; which answers are right was written down before")
-        .fact("world", format!("{}: {}", plan.world, plan.world.says()))
-        .fact("strength", plan.size.says())
+    Page::new("Benchmark of the diagnosis")
+        .subtitle("Cases of an independent simulator; the correct answers were fixed beforehand")
+        .fact("simulator", format!("{}: {}", plan.world, plan.world.says()))
+        .fact("effect size", plan.size.says())
         .fact("seed", plan.seed.to_string())
         .section(worlds)
-        .section(Section::new("The table").table(table).folded("table.txt", text))
+        .section(Section::new("Rates").table(table).folded("table.txt", text))
 }

@@ -1,4 +1,4 @@
-//! The page of a plan.
+//! The page of an experiment plan: the proposed motion, expected forces, and which candidates it separates.
 
 use crate::chart_model::{Chart, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
@@ -9,21 +9,21 @@ use stylet_plan::{InformationState, Plan};
 use stylet_scenario::{Motion, Scenario, Segment};
 use stylet_stats::number_format::significant;
 
-/// Candidates whose forces are drawn.
-const DRAWN: usize = 7;
+/// Candidates whose expected forces are drawn.
+const MAX_CANDIDATES_DRAWN: usize = 7;
 
-/// The page of a plan.
+/// The page of a plan; `verdict` is the diagnosis it starts from.
 #[must_use]
 pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationState, plan: &Plan) -> Page {
     let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     let mut tiles = vec![
         Tile::new(
-            "Right single cause",
+            "Correct single cause",
             format!("{} → {}", percent(plan.probability_now), percent(plan.probability_decided)),
             if plan.probability_source == "simulated" {
-                "probability now and after the insertion, by simulated insertions and expected gaps"
+                "probability before and after the insertion, from simulated insertions and expected evidence"
             } else {
-                "probability now and after the insertion, by expected gaps alone"
+                "probability before and after the insertion, from expected evidence alone"
             },
         ),
         Tile::new(
@@ -39,7 +39,7 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationSt
         Tile::new(
             "Largest force",
             format!("{} N", significant(plan.force_n, 3)),
-            format!("expected under any candidate, noise included; limit {} N", plan.limits.force_n),
+            format!("largest under any candidate, noise included; limit {} N", plan.limits.force_n),
         ),
     ];
     if let Some(r) = &plan.repeats {
@@ -47,7 +47,7 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationSt
             "Repeats",
             r.insertions.to_string(),
             format!(
-                "forces at rupture scatter by {:.1} %: half at {} and half at {} mm/s give their mean to {:.1} %",
+                "puncture forces scatter by {:.1} %: half at {} and half at {} mm/s estimate their mean to {:.1} %",
                 100.0 * r.scatter,
                 significant(1e3 * r.speeds_mps[0], 2),
                 significant(1e3 * r.speeds_mps[1], 2),
@@ -57,10 +57,10 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationSt
     }
     let mut page = Page::new(format!("The next insertion: {}", scenario.name))
         .subtitle(verdict.unwrap_or_else(|| {
-            "Before any measurement: every effect of the library may be there.".to_owned()
+            "Without measurements: every effect of the library is a candidate.".to_owned()
         }))
         .fact("stylet", env!("CARGO_PKG_VERSION"))
-        .fact("motions looked at", plan.motions_evaluated.to_string())
+        .fact("motions evaluated", plan.motions_evaluated.to_string())
         .section(Section::new("Plan").tiles(tiles));
     page = page.section(motion(plan, ground)).section(pairs(plan));
     if !plan.simulated.is_empty() {
@@ -75,9 +75,9 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationSt
             })
             .collect();
         page = page.section(Section::new("Simulated and diagnosed").table(Table::new(
-            "The chosen motion simulated under each candidate and diagnosed with what is at hand; these insertions had no part in \
-             the choice",
-            &["what was simulated", "named, and alone"],
+            "The chosen motion simulated under each candidate and diagnosed together with the existing recordings; these \
+             simulations were not used to choose the motion",
+            &["simulated cause", "diagnosed as the single cause"],
             rows,
         )));
     }
@@ -97,11 +97,11 @@ fn motion(plan: &Plan, ground: &InformationState) -> Section {
         let mut forces = Chart::new("Expected force under each candidate", "Time (s)", "Force (N)")
             .group("plan")
             .height(320);
-        let mut differ = Chart::new("Where they differ", "Time (s)", "Force less that of the likeliest (N)")
-            .caption("Every candidate with the law's numbers that fit what is at hand. What re-fitting them once more takes back is left out of the nats, not of this picture.")
+        let mut differ = Chart::new("Differences between candidates", "Time (s)", "Force minus that of the likeliest (N)")
+            .caption("Each candidate with base parameters fitted to the existing recordings. Part of a difference may be absorbed by re-fitting them: the evidence in nats accounts for that, this chart does not.")
             .group("plan")
             .height(260);
-        for (k, f) in e.force_n.iter().enumerate().take(DRAWN) {
+        for (k, f) in e.force_n.iter().enumerate().take(MAX_CANDIDATES_DRAWN) {
             let name = effect_label(ground.name(k));
             forces = forces.with_series(
                 Series::line(name.clone(), Colour::nth(k), e.time_s.clone(), f.clone()).width(1.3),
@@ -119,7 +119,7 @@ fn motion(plan: &Plan, ground: &InformationState) -> Section {
     }
     let mut text = String::new();
     if let Motion::Program { start_m, segments } = &plan.motion {
-        let _ = writeln!(text, "from {:.2} mm", 1e3 * start_m);
+        let _ = writeln!(text, "start   {:>8.3} mm", 1e3 * start_m);
         for s in segments {
             let _ = match *s {
                 Segment::Move { velocity_mps, duration_s } => {
@@ -172,21 +172,26 @@ fn pairs(plan: &Plan) -> Section {
                 Cell::number(significant(p.nats_after, 3)).status(status),
                 Cell::number(format!("{:.0} %", 100.0 * p.p_correct_before)),
                 Cell::number(format!("{:.0} %", 100.0 * p.p_correct_after)),
-                Cell::text(if p.distinguishable { "" } else { "told apart by no motion within the limits" }),
+                Cell::text(if p.distinguishable { "" } else { "not separable within the limits" }),
             ]
         })
         .collect();
-    let mut section = Section::new("Pair by pair").text(
-        "The expected gap of the log-likelihoods, in nats: the truth against the other re-fitted together with all numbers of the base \
-         law. Three nats are a class, ten are seen. The probability is that of naming the right one of the two.",
+    let mut section = Section::new("Pairs of candidates").text(
+        "Expected difference of the log likelihood in nats between the true candidate and the other, re-fitted together with all base \
+         parameters. Below 3 nats two candidates are not separable; from 10 nats on they are. Probability: of choosing the right one of \
+         the two.",
     );
     if all.is_empty() {
-        section =
-            section.text("Nothing is left to tell apart: the motion was chosen for the sharpest intervals.");
+        section = section
+            .text("No candidates are left to separate: the motion was chosen for the narrowest intervals.");
     }
     section.table(
-        Table::new("Hardest first, at most 60", &["one", "other", "now", "then", "now", "then", ""], rows)
-            .with_column_groups(&[("", 2), ("nats", 2), ("right of the two", 2), ("", 1)]),
+        Table::new(
+            "Hardest pairs first, at most 60",
+            &["candidate", "alternative", "before", "after", "before", "after", ""],
+            rows,
+        )
+        .with_column_groups(&[("", 2), ("evidence, nats", 2), ("probability correct", 2), ("", 1)]),
     )
 }
 
@@ -203,8 +208,8 @@ fn intervals(plan: &Plan) -> Section {
         })
         .collect();
     Section::new("Intervals").table(Table::new(
-        "Half widths of 95 % intervals: of K, b and F relative, of places in m",
-        &["number", "now", "then"],
+        "Half widths of the 95 % intervals: relative for K, b and F; in m for positions",
+        &["parameter", "before", "after"],
         rows,
     ))
 }
@@ -229,9 +234,16 @@ fn alternatives(plan: &Plan) -> Section {
             ]
         })
         .collect();
-    Section::new("Next best").table(Table::new(
-        "Other motions; their segments stand in plan.json",
-        &["segments", "seconds", "largest N", "worst pair, nats", "decided, by gaps", "right, simulated"],
+    Section::new("Alternative motions").table(Table::new(
+        "Next best motions; their segments are in plan.json",
+        &[
+            "segments",
+            "duration, s",
+            "peak force, N",
+            "hardest pair, nats",
+            "probability correct",
+            "correct in simulation",
+        ],
         rows,
     ))
 }

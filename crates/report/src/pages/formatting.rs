@@ -1,31 +1,31 @@
-//! Words and numbers that several pages and the terminal share.
+//! Text shared by several pages and the terminal.
 
 use crate::page_model::{Cell, Table};
 use std::collections::BTreeMap;
 use stylet_diagnose::diagnosis_json::DataQualityNote;
 use stylet_stats::number_format::significant;
 
-/// The base law in the notation of SPEC section 1.
+/// The base law in the notation of docs/reference/model.md, section "Base law".
 pub(crate) const BASE_LAW_EQUATIONS: &str = "f   = f_K + f_B            until layer a = r + 1 ruptures: f_K >= F_a, or z >= s_a + d_a\nf_K = K_a max(0, z - s_a)\nf_B = v sum_i b_i l_i,      l_i = clamp(z - s_i, 0, d_i)\n";
 
-/// What there is, or a dash.
+/// The value, or a dash.
 #[must_use]
 pub fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "-".to_owned())
 }
 
-/// Three decimals, or a dash.
+/// Three decimals, or a dash when there is no finite value.
 #[must_use]
 pub fn three_decimals(x: Option<f64>) -> String {
     or_dash(x.filter(|x| x.is_finite()).map(|x| format!("{x:.3}")))
 }
 
-/// An effect's name as words.
+/// An effect's id with spaces for underscores.
 pub(crate) fn effect_label(id: &str) -> String {
     id.replace('_', " ")
 }
 
-/// An effect's numbers with their units.
+/// The strength parameters of an effect with their units.
 #[must_use]
 pub fn strength_parameters(effect: &str, values: &BTreeMap<String, f64>) -> String {
     let known = |path: &str| stylet_tissue::effect_info(effect).and_then(|i| i.parameter(path));
@@ -37,13 +37,13 @@ pub fn strength_parameters(effect: &str, values: &BTreeMap<String, f64>) -> Stri
     values.iter().filter(|(p, _)| strength(p)).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// A number in another unit (`unit` of them make one), with so many digits; a dash for nothing.
+/// `value * unit` with `digits` significant digits, or a dash.
 #[must_use]
 pub fn significant_or_dash(value: Option<f64>, unit: f64, digits: usize) -> String {
     or_dash(value.map(|x| significant(x * unit, digits)))
 }
 
-/// What is remarkable about recordings.
+/// The data quality remarks as a table.
 pub(crate) fn data_quality_table(title: &str, quality: &[DataQualityNote]) -> Table {
     let row = |q: &DataQualityNote| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())];
     Table::new(title, &["recording", "remark"], quality.iter().map(row).collect())

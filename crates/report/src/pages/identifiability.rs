@@ -1,4 +1,4 @@
-//! The page of what an experiment can show.
+//! The page of an identifiability analysis: which effects an experiment can identify, and which it cannot tell apart.
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::{effect_label, strength_parameters};
@@ -7,14 +7,15 @@ use stylet_plan::identifiability::Identifiability;
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
-/// The matrix of what an experiment can tell apart.
+/// Heat map of the correlation between effects after projecting out the base law.
 #[must_use]
 pub fn correlation_map(scenario: &Scenario, shown: &Identifiability) -> String {
     let visible: Vec<usize> = (0..shown.effects.len()).filter(|k| shown.effects[*k].identifiable).collect();
     let names: Vec<String> = visible.iter().map(|k| effect_label(&shown.effects[*k].effect)).collect();
     let map = HeatMap {
         row_label: String::new(),
-        column_label: "absolute correlation in per cent, the base law's numbers taken out".to_owned(),
+        column_label: "absolute correlation in per cent after projecting out the base law's parameters"
+            .to_owned(),
         rows: names.clone(),
         columns: names,
         values: visible
@@ -29,15 +30,15 @@ pub fn correlation_map(scenario: &Scenario, shown: &Identifiability) -> String {
         values_are_fractions: true,
     };
     let options = FigureOptions {
-        title: "What this experiment can tell apart".to_owned(),
-        subtitle: format!("{}; effects that it shows at their typical size", scenario.name),
+        title: "Which effects resemble one another".to_owned(),
+        subtitle: format!("{}; effects identifiable at their typical size", scenario.name),
         width_px: 1200.0,
         ..FigureOptions::default()
     };
     heat_map(&map, &options)
 }
 
-/// The page of what an experiment can show.
+/// The page of an identifiability analysis.
 #[must_use]
 pub fn page(scenario: &Scenario, shown: &Identifiability) -> Page {
     let rows = shown
@@ -65,28 +66,37 @@ pub fn page(scenario: &Scenario, shown: &Identifiability) -> Page {
         })
         .collect();
     let table = Table::new(
-        "Effect by effect",
-        &["effect", "typical size", "nats at it", "seen from", "explained as well by", "nearest"],
+        "Effects",
+        &[
+            "effect",
+            "typical size",
+            "evidence, nats",
+            "detectable from",
+            "not separable from",
+            "most similar (difference in evidence)",
+        ],
         rows,
     );
-    let mut summary = Section::new("What it shows").text(format!(
-        "Every effect at its typical size beside the base law, everything that is fitted taken out, at a noise of {} N in blocks of 20 ms. \
-         Ten nats are seen; effects within three nats of one another form a class.",
+    let mut summary = Section::new("Identifiable effects").text(format!(
+        "Expected log evidence of each effect at its typical size against the base law with all parameters re-fitted, at a noise of {} N \
+         in blocks of 20 ms. An effect counts as identifiable from 10 nats on; effects within 3 nats of one another cannot be separated.",
         significant(shown.noise_n, 2)
     ));
     if !shown.not_identifiable.is_empty() {
         let names: Vec<String> = shown.not_identifiable.iter().map(|n| effect_label(n)).collect();
-        summary = summary.text(format!("Invisible: {}.", names.join(", ")));
+        summary = summary.text(format!("Not identifiable: {}.", names.join(", ")));
     }
     for c in &shown.classes {
         let names: Vec<String> = c.iter().map(|n| effect_label(n)).collect();
-        summary = summary.text(format!("Cannot be told apart: {}.", names.join(", ")));
+        summary = summary.text(format!("Not separable: {}.", names.join(", ")));
     }
     Page::new(format!("What can be identified: {}", scenario.name))
-        .subtitle("Which effects this experiment shows, from which size on, and which it cannot tell apart.")
+        .subtitle(
+            "Which effects this experiment can identify, from which size on, and which it cannot separate.",
+        )
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(summary.table(table))
-        .section(Section::new("Which resemble one another").picture(
+        .section(Section::new("Similarity of effects").picture(
             "Absolute correlation of effects after projecting out the base law",
             correlation_map(scenario, shown),
         ))

@@ -1,4 +1,4 @@
-//! The page of many specimens, each indented once and held.
+//! The page of a set of specimens, each indented once and held (stress relaxation).
 
 use crate::page_model::{Cell, Page, Section, Table, Tile};
 use crate::palette::Colour;
@@ -8,17 +8,17 @@ use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::indentation_relaxation::SpecimenReport;
 use stylet_stats::number_format::significant;
 
-/// The page of the specimens of the data set `set`, which was read from `file`.
+/// The page of the data set `set`, read from `file`.
 #[must_use]
 pub fn page(set: &Dataset, file: &str, found: &SpecimenReport, d: &Diagnosis) -> Page {
     let tile = |label: &str, value: String, detail: &str| Tile::new(label, value, detail);
     let tiles = vec![
-        tile("Specimens", found.used.to_string(), "indented once and held, each a material of its own"),
-        tile("Punctures", found.punctured.len().to_string(), "specimens whose force drops"),
+        tile("Specimens", found.used.to_string(), "each indented once and held; parameters per specimen"),
+        tile("Punctures", found.punctured.len().to_string(), "specimens with a force drop"),
         tile(
-            "The rest of the hold",
+            "End of the hold",
             format!("{:.1} → {:.1} mN", 1e3 * d.gain.rmse_before_n, 1e3 * d.gain.rmse_after_n),
-            "median error before and after, on the last two fifths of the hold, which took no part in the fit",
+            "median held-out RMS on the last two fifths of the hold: base law → extended law",
         ),
     ];
     let bars = found
@@ -32,8 +32,8 @@ pub fn page(set: &Dataset, file: &str, found: &SpecimenReport, d: &Diagnosis) ->
         })
         .collect();
     let options = FigureOptions {
-        title: "What each cause buys".to_owned(),
-        subtitle: "median error on the rest of the hold; grey: not kept".to_owned(),
+        title: "Error by step".to_owned(),
+        subtitle: "median held-out RMS on the end of the hold; grey: not kept".to_owned(),
         width_px: 860.0,
         ..FigureOptions::default()
     };
@@ -56,19 +56,22 @@ pub fn page(set: &Dataset, file: &str, found: &SpecimenReport, d: &Diagnosis) ->
         .fact("data set", file)
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(Section::new("Verdict").tiles(tiles))
-        .section(Section::new("What each cause buys").picture("Error on the rest of the hold", markup))
         .section(
-            Section::new("Numbers over the specimens")
+            Section::new("Error by step")
+                .picture("Held-out RMS on the end of the hold, by step of the model", markup),
+        )
+        .section(
+            Section::new("Parameters over the specimens")
                 .table(Table::new(
-                    "Mean with its 95 % interval, and the scatter",
-                    &["", "mean", "95 % interval", "nine of ten specimens"],
+                    "Mean with its 95 % interval, and the spread between specimens",
+                    &["", "mean", "95 % interval", "5th to 95th percentile"],
                     rows,
                 ))
                 .texts(unused),
         )
 }
 
-/// What was found, in a sentence.
+/// The result in one sentence.
 #[must_use]
 pub fn summary_sentence(found: &SpecimenReport) -> String {
     let names: Vec<&str> = found.kept_effects().collect();
@@ -77,7 +80,7 @@ pub fn summary_sentence(found: &SpecimenReport) -> String {
         n => format!("{n} specimen(s) show a drop as at a puncture"),
     };
     if names.is_empty() {
-        return format!("The base law says what {} specimens do; {puncture}.", found.used);
+        return format!("The base law describes {} specimens; {puncture}.", found.used);
     }
     format!("The simulation lacks {} in {} specimens; {puncture}.", names.join(" and "), found.used)
 }

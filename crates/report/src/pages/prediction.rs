@@ -1,4 +1,4 @@
-//! The page of a prediction.
+//! The page of a prediction: a fitted model against recordings that took no part in the fit.
 
 use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Series, Side};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
@@ -8,8 +8,8 @@ use stylet_diagnose::prediction::{Prediction, PredictionCurves, PredictionResult
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
-/// Recordings that are drawn.
-const DRAWN: usize = 12;
+/// Recordings with charts of their own.
+const MAX_CHARTED: usize = 12;
 
 /// The page of what `model`, which was read from `file`, predicts.
 #[must_use]
@@ -21,22 +21,25 @@ pub fn page(model: &Scenario, file: &str, found: &PredictionResult) -> Page {
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(overview(found));
     let mut section = Section::new("Predicted and measured");
-    for (r, shown) in p.recordings.iter().zip(&found.curves).take(DRAWN) {
+    for (r, shown) in p.recordings.iter().zip(&found.curves).take(MAX_CHARTED) {
         section = section.chart(force(r, shown)).chart(residual(r, shown, p.floor_n));
     }
-    if p.recordings.len() > DRAWN {
-        section = section.text(format!("The other {} are in the table alone.", p.recordings.len() - DRAWN));
+    if p.recordings.len() > MAX_CHARTED {
+        section = section.text(format!(
+            "The other {} recordings are listed in the table only.",
+            p.recordings.len() - MAX_CHARTED
+        ));
     }
     page = page.section(section);
     page
 }
 
-/// How good a prediction is, in a sentence.
+/// The quality of a prediction in one sentence.
 #[must_use]
 pub fn summary_sentence(p: &Prediction) -> String {
     let ratio = p.rmse_n / p.floor_n.max(1e-300);
     let within = format!(
-        "{} N rms are left, {} times the noise; the 90 % band holds {:.0} %",
+        "residual {} N rms, {} times the noise; {:.0} % of the samples in the 90 % band",
         significant(p.rmse_n, 3),
         significant(ratio, 2),
         100.0 * p.band_coverage
@@ -44,9 +47,9 @@ pub fn summary_sentence(p: &Prediction) -> String {
     let how = if ratio < 1.2 && p.band_coverage >= 0.8 {
         "The model predicts these recordings to within the noise"
     } else if p.band_coverage >= 0.8 {
-        "The model predicts these recordings as well as its own scatter allows"
+        "The model predicts these recordings within the scatter it was fitted with"
     } else {
-        "The model misses something of these recordings"
+        "The model does not predict these recordings"
     };
     format!("{how}: {within}.")
 }
@@ -55,23 +58,23 @@ fn overview(found: &PredictionResult) -> Section {
     let p = &found.prediction;
     let mut tiles = vec![
         Tile::new(
-            "Left of the force",
+            "Residual",
             format!("{} N", significant(p.rmse_n, 3)),
-            format!("root mean square; the noise is {} N", significant(p.floor_n, 3)),
+            format!("RMS; noise {} N", significant(p.floor_n, 3)),
         )
         .status(Status::at_most(p.rmse_n, 1.2 * p.floor_n, 2.0 * p.floor_n)),
         Tile::new(
-            "In the band",
+            "In the 90 % band",
             format!("{:.0} %", 100.0 * p.band_coverage),
-            format!("90 % would be right; it holds {}", p.band_includes.join(", ")),
+            format!("nominal 90 %; the band includes {}", p.band_includes.join(", ")),
         )
         .status(Status::at_most((p.band_coverage - 0.9).abs(), 0.06, 0.15)),
     ];
     if let Some(before) = p.assumed_rmse_n {
         tiles.push(Tile::new(
-            "Believed before",
+            "Assumed scenario",
             format!("{} N", significant(before, 3)),
-            "left by the scenario that the diagnosis began with".to_owned(),
+            "RMS residual of the scenario before the diagnosis".to_owned(),
         ));
     }
     let rows = p
@@ -93,23 +96,25 @@ fn overview(found: &PredictionResult) -> Section {
             ]
         })
         .collect();
-    let mut section = Section::new("How good it is").tiles(tiles).table(Table::new(
-        "Each recording",
+    let mut section = Section::new("Prediction error").tiles(tiles).table(Table::new(
+        "By recording",
         &[
             "",
-            "left, N",
-            "left by what was believed, N",
-            "in the band",
-            "largest force: measured less predicted, N",
-            "surface",
-            "friction",
+            "residual RMS, N",
+            "residual RMS of the assumed scenario, N",
+            "in the 90 % band",
+            "peak force, measured minus predicted, N",
+            "fitted surface shift",
+            "fitted friction factor",
         ],
         rows,
     ));
     if !p.held_out {
-        let said = "Surface or friction were fitted to the recording that they predict: what is left is less than for the next one. \
-                    Two or more recordings are each predicted by what the others say.";
-        section = section.warnings(vec![said.to_owned()]);
+        section = section.warnings(vec![
+            "Surface or friction were fitted to the same recording, so the residual is smaller than for a new recording. With two or \
+             more recordings each is predicted from the others."
+                .to_owned(),
+        ]);
     }
     section
 }
@@ -125,7 +130,7 @@ fn force(r: &RecordingPrediction, s: &PredictionCurves) -> Chart {
     };
     let mut chart = Chart::new(r.name.clone(), "Time (s)", "Force (N)")
         .caption(format!(
-            "Measured and predicted; {} N rms are left. Thin lines should hold 90 %; they hold {:.0} %.",
+            "Residual {} N rms. The dashed band is nominally 90 %; it contains {:.0} % of the samples.",
             significant(r.rmse_n, 3),
             100.0 * r.band_coverage
         ))
@@ -133,7 +138,7 @@ fn force(r: &RecordingPrediction, s: &PredictionCurves) -> Chart {
         .height(320)
         .with_series(line("measured", Colour::Grey, &s.measured_n).width(3.0));
     if let Some(before) = &s.assumed_n {
-        chart = chart.with_series(line("believed before", Colour::Vermillion, before).width(1.0));
+        chart = chart.with_series(line("assumed scenario", Colour::Vermillion, before).width(1.0));
     }
     chart
         .with_series(line("predicted", Colour::Blue, &s.predicted_n).width(1.4))
@@ -143,11 +148,11 @@ fn force(r: &RecordingPrediction, s: &PredictionCurves) -> Chart {
 }
 
 fn residual(r: &RecordingPrediction, s: &PredictionCurves, floor_n: f64) -> Chart {
-    let left: Vec<f64> = s.measured_n.iter().zip(&s.predicted_n).map(|(y, f)| y - f).collect();
-    Chart::new(format!("{}: what is left", r.name), "Time (s)", "Left (N)")
+    let residual_n: Vec<f64> = s.measured_n.iter().zip(&s.predicted_n).map(|(y, f)| y - f).collect();
+    Chart::new(format!("{}: measured minus predicted", r.name), "Time (s)", "Residual (N)")
         .group(r.name.clone())
         .height(200)
-        .with_series(Series::line("left", Colour::Blue, s.time_s.clone(), left).width(1.0))
+        .with_series(Series::line("residual", Colour::Blue, s.time_s.clone(), residual_n).width(1.0))
         .with_level(Level::dotted(2.0 * floor_n, "twice the noise"))
         .with_level(Level::dotted(-2.0 * floor_n, ""))
 }

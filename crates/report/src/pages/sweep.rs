@@ -1,4 +1,4 @@
-//! The page of a sweep: the summary, and the robustness map as a picture.
+//! The page of a sweep, and the map of failure rates over all drawn quantities as a picture.
 
 use crate::chart_model::{Chart, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
@@ -12,11 +12,11 @@ use stylet_sweep::{
     failure_rate_bins, score_value,
 };
 
-fn between(i: &Interval) -> String {
+fn interval_text(i: &Interval) -> String {
     format!("95 % interval {} to {}", percent(i.low), percent(i.high))
 }
 
-/// The page of a sweep.
+/// The page of a sweep: rates, failures along each drawn quantity, sensitivities, worst trials, all scores.
 ///
 /// # Errors
 /// When the rows cannot be read.
@@ -33,31 +33,34 @@ pub fn page<T: TrialTable + ?Sized>(
         .fact("version", summary.version.clone())
         .fact("identity", summary.identity.chars().take(16).collect::<String>());
     if summary.redrawn > 0 {
-        page =
-            page.fact("redrawn", format!("{} trials, their first draw being out of range", summary.redrawn));
+        page = page.fact("redrawn", format!("{} trials whose first draw was out of range", summary.redrawn));
     }
     let page = page
-        .section(Section::new("Rates").tiles(tiles(summary)))
-        .section(worst(summary))
-        .section(explained(&summary.explained))
-        .section(against(sweep, columns, rows)?)
+        .section(Section::new("Rates").tiles(rate_tiles(summary)))
+        .section(failures_by_quantity(sweep, columns, rows)?)
+        .section(sensitivities(&summary.explained))
+        .section(worst_trials(summary))
         .section(Section::new("Scores").table(scores(summary)))
-        .section(Section::new("How it was drawn").folded("sweep", sweep.to_ron()));
+        .section(Section::new("Definition of the sweep").folded("sweep.ron", sweep.to_ron()));
     Ok(page)
 }
 
-fn tiles(s: &Summary) -> Vec<Tile> {
+fn rate_tiles(s: &Summary) -> Vec<Tile> {
     let rate = |label: &str, i: &Interval| {
-        Tile::new(label, percent(i.value), between(i)).status(Status::at_most(i.value, 0.01, 0.05))
+        Tile::new(label, percent(i.value), interval_text(i)).status(Status::at_most(i.value, 0.01, 0.05))
     };
     let mut tiles = vec![
         rate("insertions with an error", &s.failed),
         rate("ruptures missed", &s.missed),
         rate("insertions with a false alarm", &s.trials_with_false),
-        Tile::new("false alarms", s.false_alarms.to_string(), format!("beside {} ruptures", s.ruptures)),
+        Tile::new(
+            "false alarms",
+            s.false_alarms.to_string(),
+            format!("in {} insertions with {} ruptures", s.trials, s.ruptures),
+        ),
     ];
     for (score, label) in
-        [("enhancement.rms_relative", "enhanced force off by"), ("reconstruction_rms_n", "reconstruction")]
+        [("enhancement.rms_relative", "enhancement error"), ("reconstruction_rms_n", "reconstruction error")]
     {
         if let Some(found) = s.scores.iter().find(|f| f.score == score) {
             let unit = if score.ends_with("_n") { " N" } else { "" };
@@ -72,10 +75,10 @@ fn tiles(s: &Summary) -> Vec<Tile> {
     tiles
 }
 
-fn worst(s: &Summary) -> Section {
+fn worst_trials(s: &Summary) -> Section {
     let mut headers =
         vec!["trial".to_owned(), "missed".to_owned(), "false".to_owned(), "enhancement".to_owned()];
-    // Wide tables help nobody: the strongest quantities come first in `explained`.
+    // Only the quantities with the largest sensitivity, so that the table fits the page.
     let shown: Vec<usize> = match s.explained.first() {
         Some(outcome) => {
             outcome.by.iter().take(6).filter_map(|e| s.drawn.iter().position(|d| *d == e.quantity)).collect()
@@ -83,7 +86,7 @@ fn worst(s: &Summary) -> Section {
         None => (0..s.drawn.len().min(6)).collect(),
     };
     headers.extend(shown.iter().map(|i| s.drawn[*i].clone()));
-    headers.push("see it".to_owned());
+    headers.push("replay".to_owned());
     let rows = s
         .worst
         .iter()
@@ -102,16 +105,16 @@ fn worst(s: &Summary) -> Section {
     Section::new("Worst trials").table(Table { headers, rows, ..Table::default() })
 }
 
-fn explained(outcomes: &[OutcomeSensitivity]) -> Section {
-    let mut section = Section::new("What explains the outcomes");
+fn sensitivities(outcomes: &[OutcomeSensitivity]) -> Section {
+    let mut section = Section::new("Sensitivity");
     if outcomes.is_empty() {
         return section;
     }
     section = section.text(
-        "First-order Sobol index: the share of an outcome's variance that the mean over everything else, given one \
-         quantity, explains; estimated from this sample in groups of equal size along the quantity, chance taken off. \
-         Rank correlation: Spearman's, with its two-sided p-value. An index well above the squared correlation means a \
-         dependence that is not monotonic; indices that sum to far less than one mean interactions or noise.",
+        "First-order Sobol index: the share of the outcome's variance explained by its mean given one quantity, estimated \
+         in groups of equal size along the quantity and corrected for chance. Rank correlation: Spearman's, with its \
+         two-sided p-value. An index well above the squared correlation indicates a dependence that is not monotonic; \
+         indices that sum to far less than one indicate interactions or noise.",
     );
     for outcome in outcomes {
         let bars = outcome.by.iter().take(12).filter_map(|e| {
@@ -121,12 +124,13 @@ fn explained(outcomes: &[OutcomeSensitivity]) -> Section {
         let chart = BarChart { label: "first-order Sobol index".to_owned(), bars: bars.collect() };
         let title = outcome.outcome.clone();
         let options = FigureOptions { title: title.clone(), ..FigureOptions::default() };
-        section = section.picture(title.clone(), bar_chart(&chart, &options)).table(table(outcome));
+        section =
+            section.picture(title.clone(), bar_chart(&chart, &options)).table(sensitivity_table(outcome));
     }
     section
 }
 
-fn table(outcome: &OutcomeSensitivity) -> Table {
+fn sensitivity_table(outcome: &OutcomeSensitivity) -> Table {
     let number = |x: Option<f64>| significant_or_dash(x, 1.0, 3);
     Table::new(
         outcome.outcome.clone(),
@@ -154,7 +158,7 @@ fn scores(s: &Summary) -> Table {
     let range =
         |i: &Interval| Cell::number(format!("{} to {}", significant(i.low, 3), significant(i.high, 3)));
     Table::new(
-        "Medians and 95th percentiles with their 95 % intervals between order statistics",
+        "Medians and 95th percentiles with 95 % intervals from order statistics; relative errors as fractions",
         &["score", "trials", "median", "interval", "p95", "interval", "worst", "in trial"],
         s.scores
             .iter()
@@ -174,9 +178,13 @@ fn scores(s: &Summary) -> Table {
     )
 }
 
-/// The share of failed insertions against every quantity that explains something.
-fn against<T: TrialTable + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -> Result<Section, T::Error> {
-    let mut section = Section::new("Failures and errors along the drawn quantities");
+/// The share of failed insertions, and the enhancement error, over the drawn quantities (at most 12).
+fn failures_by_quantity<T: TrialTable + ?Sized>(
+    sweep: &Sweep,
+    columns: &Columns,
+    rows: &T,
+) -> Result<Section, T::Error> {
+    let mut section = Section::new("Failures by drawn quantity");
     for (index, quantity) in columns.drawn.iter().take(sweep.fields.len()).enumerate().take(12) {
         let bins = failure_rate_bins(sweep, columns, rows, index)?;
         if bins.len() < 2 {
@@ -184,14 +192,13 @@ fn against<T: TrialTable + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -
         }
         let x: Vec<f64> = bins.iter().map(|b| b.middle).collect();
         let line = |f: fn(&FailureRateBin) -> f64| bins.iter().map(f).map(|y| 100.0 * y).collect::<Vec<_>>();
-        let mut chart = Chart::new(
-            format!("Insertions with an error, along {quantity}"),
-            quantity.clone(),
-            "insertions (%)",
-        )
-        .with_series(Series::line("share", Colour::Vermillion, x.clone(), line(|b| b.failed.value)))
-        .with_series(Series::line("95 % low", Colour::Grey, x.clone(), line(|b| b.failed.low)).width(1.0))
-        .with_series(Series::line("95 % high", Colour::Grey, x, line(|b| b.failed.high)).width(1.0));
+        let mut chart =
+            Chart::new(format!("Failed insertions by {quantity}"), quantity.clone(), "insertions (%)")
+                .with_series(Series::line("failed", Colour::Vermillion, x.clone(), line(|b| b.failed.value)))
+                .with_series(
+                    Series::line("95 % low", Colour::Grey, x.clone(), line(|b| b.failed.low)).width(1.0),
+                )
+                .with_series(Series::line("95 % high", Colour::Grey, x, line(|b| b.failed.high)).width(1.0));
         chart.y_range = Some((0.0, 100.0));
         section = section.chart(chart);
     }
@@ -204,7 +211,7 @@ fn against<T: TrialTable + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let (x, y) = pairs.into_iter().unzip();
         let mut chart = Chart::new("Enhancement error", first.clone(), "relative error")
-            .caption("Enhanced force against the true tip force, one point per trial, at most 2000.")
+            .caption("RMS of enhanced minus true tip force, relative to the RMS of the tip force; one point per trial, at most 2000.")
             .with_series(Series::points("trials", Colour::Blue, x, y).width(2.0));
         chart.scale = crate::chart_model::Scale::Log;
         section = section.chart(chart);
@@ -212,12 +219,12 @@ fn against<T: TrialTable + ?Sized>(sweep: &Sweep, columns: &Columns, rows: &T) -
     Ok(section)
 }
 
-/// The robustness map as SVG.
+/// The map of failure rates as SVG: one row per drawn quantity, one column per tenth of its values.
 #[must_use]
 pub fn failure_map_svg(rows: &[FailureMapRow]) -> String {
     let map = HeatMap {
         row_label: String::new(),
-        column_label: "tenth of the drawn values, from the smallest to the largest".to_owned(),
+        column_label: "tenth of the drawn values, in ascending order".to_owned(),
         rows: rows.iter().map(|r| r.name.clone()).collect(),
         columns: (1..=BIN_COUNT).map(|i| i.to_string()).collect(),
         values: rows.iter().map(|r| r.failed_percent.clone()).collect(),
@@ -227,7 +234,7 @@ pub fn failure_map_svg(rows: &[FailureMapRow]) -> String {
         &map,
         &FigureOptions {
             title: "Where the algorithm fails".to_owned(),
-            subtitle: "insertions with a missed or a false rupture, in %; blank: none".to_owned(),
+            subtitle: "insertions with a missed or false rupture, in %; blank: none".to_owned(),
             ..FigureOptions::default()
         },
     )

@@ -11,7 +11,7 @@ use stylet_stats::number_format::significant;
 /// One bar.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bar {
-    /// Name beside the bar.
+    /// Label of the bar.
     pub name: String,
     /// Length.
     pub value: f64,

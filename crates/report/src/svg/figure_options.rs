@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-/// On which ground the picture is drawn.
+/// Colour theme of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Theme {
-    /// Light or dark as the reader's system asks (README pages).
+    /// Light or dark by the reader's system setting (README pages).
     #[default]
     Auto,
     /// Light (papers).
@@ -15,7 +15,7 @@ pub enum Theme {
     Dark,
 }
 
-/// Size and words of a picture.
+/// Size and titles of a picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FigureOptions {
     /// Heading; may be empty.
@@ -24,7 +24,7 @@ pub struct FigureOptions {
     pub subtitle: String,
     /// Width in pixels; the height follows from the content.
     pub width_px: f64,
-    /// Ground.
+    /// Colour theme.
     pub theme: Theme,
 }
 

@@ -1,4 +1,4 @@
-//! A coloured matrix: confusion of causes, a score over two parameters.
+//! A coloured matrix: a confusion matrix, a score over two parameters.
 
 use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
@@ -9,24 +9,23 @@ use stylet_stats::number_format::significant;
 /// A matrix with named rows and columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HeatMap {
-    /// What the rows are.
+    /// Meaning of the rows.
     pub row_label: String,
-    /// What the columns are.
+    /// Meaning of the columns.
     pub column_label: String,
     /// Names of the rows, from the top.
     pub rows: Vec<String>,
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// `values[row][column]`; what is not finite stays blank.
+    /// `values[row][column]`; a value that is not finite stays blank.
     pub values: Vec<Vec<f64>>,
-    /// The values are shares, 0 to 1: coloured from 0 to 1 whatever there is, written in per cent, zeros as well; what is
-    /// not finite has no cell.
+    /// The values are fractions, 0 to 1: coloured over that range and written in per cent, zeros included; a value that is not
+    /// finite has no cell.
     #[serde(default)]
     pub values_are_fractions: bool,
 }
 
-/// Draws the matrix in eight steps from pale to deep blue, each value written in its cell; zero cells stay empty
-/// unless the values are shares.
+/// Draws the matrix in eight shades of blue with each value in its cell; zeros stay empty unless the values are fractions.
 #[must_use]
 pub fn heat_map(map: &HeatMap, options: &FigureOptions) -> String {
     let mut canvas = Canvas::new(options);
@@ -75,17 +74,22 @@ pub fn heat_map(map: &HeatMap, options: &FigureOptions) -> String {
             if value.is_finite() && (*value != 0.0 || map.values_are_fractions) {
                 let class = if part > 0.5 { "t hi" } else { "t lo" };
                 let middle = y + cell_height / 2.0 + 4.0;
-                let said = if map.values_are_fractions {
+                let label = if map.values_are_fractions {
                     format!("{:.0} %", 100.0 * value)
                 } else {
                     significant(*value, 3)
                 };
-                canvas.text(x + cell_width / 2.0, middle, Anchor::Middle, class, &said);
+                canvas.text(x + cell_width / 2.0, middle, Anchor::Middle, class, &label);
             }
         }
     }
     let bottom = grid_top + cell_height * map.rows.len() as f64;
-    canvas.vertical_text(14.0, f64::midpoint(grid_top, bottom), "t", &map.row_label);
+    // A label longer than the rows are high would be cut at the ends.
+    if text_width(&map.row_label, 11.5) <= bottom - grid_top {
+        canvas.vertical_text(14.0, f64::midpoint(grid_top, bottom), "t", &map.row_label);
+    } else {
+        canvas.text(left - 8.0, grid_top - 8.0, Anchor::End, "t", &map.row_label);
+    }
     canvas.text(left + cell_width * columns / 2.0, bottom + 22.0, Anchor::Middle, "t", &map.column_label);
     canvas
         .finish(bottom + 34.0, &format!("{}. {} against {}", options.title, map.row_label, map.column_label))

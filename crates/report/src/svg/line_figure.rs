@@ -33,7 +33,7 @@ impl Panel<'_> {
     }
 }
 
-/// The ordinate on the chart's scale.
+/// The ordinate on the chart's scale (linear, log10 or asinh).
 fn bend(scale: Scale, y: f64) -> f64 {
     match scale {
         Scale::Linear => y,
@@ -49,7 +49,7 @@ fn bend(scale: Scale, y: f64) -> f64 {
 }
 
 /// Draws the charts one above the other over a common abscissa, with one legend; band labels stand in the uppermost.
-/// Names in several charts that look alike appear in the legend once.
+/// A name with the same colour in several charts appears in the legend once.
 #[must_use]
 pub fn figure(charts: &[Chart], options: &FigureOptions) -> String {
     let mut canvas = Canvas::new(options);
@@ -183,7 +183,7 @@ fn lanes(canvas: &mut Canvas, panel: &Panel<'_>) {
     }
 }
 
-/// Grey, the state of rest, stays in the background.
+/// Grey is the rest state and is drawn faint.
 fn lane_class(colour: &str) -> String {
     format!("f-{colour}{}", if colour == Colour::Grey.name() { " rest" } else { "" })
 }
@@ -196,7 +196,7 @@ fn dash(style: LineStyle) -> &'static str {
     }
 }
 
-/// Points up to this many have a rim of paper; in a crowd it would erase what lies below it.
+/// Up to this many points have a rim in the background colour; with more, the rims would hide the points below.
 const CROWD: usize = 100;
 
 fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
@@ -210,7 +210,7 @@ fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
             }
             continue;
         }
-        // Far outside is outside: keeps the numbers short.
+        // Clipped points need no exact coordinate.
         let point = (point.0, point.1.clamp(panel.top - 50.0, panel.top + panel.height + 50.0));
         if let (LineStyle::Step, Some(before)) = (series.style, run.last().copied()) {
             run.push((point.0, before.1));
@@ -228,7 +228,7 @@ fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
     canvas.path(&runs, series.width_px, &format!("l l-{} {}", series.colour.name(), dash(series.style)));
 }
 
-/// First, lowest, highest and last point of every pixel, in their order: what the eye can see of a long curve.
+/// Thins a curve to the first, lowest, highest and last point of every pixel column.
 fn thin(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut out: Vec<(f64, f64)> = Vec::new();
     for group in run.chunk_by(|a, b| a.0.floor() == b.0.floor()) {
@@ -271,7 +271,7 @@ fn markers(canvas: &mut Canvas, panel: &Panel<'_>) {
     }
 }
 
-/// What stands before a name in the legend.
+/// Symbol before a name in the legend.
 #[derive(Clone, Copy, PartialEq)]
 enum Mark {
     Curve,

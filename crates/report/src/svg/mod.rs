@@ -1,4 +1,4 @@
-//! Still pictures: SVG text without scripts or fonts of its own, the same bytes for the same numbers.
+//! Still pictures as SVG text without scripts or embedded fonts; the same input gives the same bytes.
 //!
 //! [`figure`] stacks charts over one abscissa, [`bar_chart`] compares values with error bars, [`heat_map`] colours a
 //! matrix (a confusion matrix, a sweep over two parameters), [`strip_chart`] shows all values of several groups, and

@@ -1,4 +1,4 @@
-//! A state machine: boxes and labelled arrows, every box at a place that the caller gives.
+//! A state diagram: boxes at given positions and labelled arrows.
 
 use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Node {
-    /// Its name, in as many lines as wanted.
+    /// Its name, one or more lines.
     pub lines: Vec<String>,
     /// Centre, in pixels from the left and from below the heading.
     pub at: (f64, f64),
@@ -20,7 +20,7 @@ pub struct Arrow {
     pub from: usize,
     /// Index of the box where it ends.
     pub to: usize,
-    /// Beside its middle, in as many lines as wanted.
+    /// Label at its middle, one or more lines.
     pub lines: Vec<String>,
     /// How far its middle is pushed to the left of its direction, in pixels.
     pub bend_px: f64,
@@ -42,7 +42,7 @@ pub struct Diagram {
 const HALF: (f64, f64) = (84.0, 27.0);
 const LINE: f64 = 16.0;
 
-/// Draws it.
+/// Draws the diagram as SVG.
 #[must_use]
 pub fn state_machine(diagram: &Diagram, options: &FigureOptions) -> String {
     let mut canvas = Canvas::new(options);
@@ -98,7 +98,7 @@ fn draw(canvas: &mut Canvas, arrow: &Arrow, from: (f64, f64), to: (f64, f64)) {
         canvas.path(&[head], 1.8, "l l-ink");
     }
     canvas.path(&[points], 1.6, &format!("l l-ink {dash}"));
-    // The words stand on the outer side of the bend.
+    // The label is placed on the outer side of the bend.
     let widest = arrow.lines.iter().map(|l| text_width(l, 12.0)).fold(0.0, f64::max);
     let rows = arrow.lines.len() as f64;
     let side = if arrow.bend_px < 0.0 { -1.0 } else { 1.0 };

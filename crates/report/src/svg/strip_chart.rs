@@ -46,7 +46,7 @@ pub struct StripChart {
 
 const LEFT: f64 = 76.0;
 
-/// Draws it.
+/// Draws the chart as SVG.
 #[must_use]
 pub fn strip_chart(chart: &StripChart, options: &FigureOptions) -> String {
     let mut canvas = Canvas::new(options);

@@ -1,4 +1,4 @@
-//! The pen: elements with rounded coordinates and colours by class, so that one file serves light and dark.
+//! Writes SVG elements with rounded coordinates and colours by class, so that one file serves light and dark themes.
 
 use super::axis::svg_coordinate;
 use super::figure_options::{FigureOptions, Theme};
@@ -9,7 +9,7 @@ use std::fmt::Write;
 const FONT: &str =
     "system-ui,-apple-system,'Segoe UI',Roboto,'Helvetica Neue',Arial,'DejaVu Sans',sans-serif";
 
-/// Eight blues from nothing to all, on light and on dark ground.
+/// Eight shades of blue from low to high, for light and dark backgrounds.
 const SHADES: [(&str, &str); 8] = [
     ("#f3f6f9", "#1a2027"),
     ("#dbe8f3", "#173247"),
@@ -21,7 +21,7 @@ const SHADES: [(&str, &str); 8] = [
     ("#074a7c", "#a5d6f5"),
 ];
 
-/// Where a text is held.
+/// Horizontal alignment of a text.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Start,
@@ -29,7 +29,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// An SVG being written.
+/// An SVG file under construction.
 pub(super) struct Canvas {
     body: String,
     width: f64,
@@ -47,7 +47,7 @@ impl Canvas {
         self.width
     }
 
-    /// Writes heading and subtitle; gives the ordinate below them.
+    /// Writes heading and subtitle; returns the ordinate below them.
     pub(super) fn heading(&mut self, options: &FigureOptions, left: f64) -> f64 {
         let mut y = 14.0;
         if !options.title.is_empty() {
@@ -154,7 +154,7 @@ impl Canvas {
         );
     }
 
-    /// What is drawn until [`Self::unclip`] stays inside the rectangle.
+    /// Clips everything drawn until [`Self::unclip`] to the rectangle.
     pub(super) fn clip(&mut self, x: f64, y: f64, width: f64, height: f64) {
         self.clips += 1;
         let _ = writeln!(
@@ -185,7 +185,7 @@ impl Canvas {
     }
 }
 
-/// Width of a text of the given size, estimated: no font is at hand.
+/// Width of a text of the given size, estimated without font metrics.
 pub(super) fn text_width(words: &str, size: f64) -> f64 {
     words
         .chars()

@@ -1,4 +1,4 @@
-//! What the simulation lacks, which numbers moved, what is no cause, what cannot be seen.
+//! Tables of the causes, the re-fitted base parameters, negligible effects and effects that cannot be identified.
 
 use crate::page_model::{Cell, Section, Status, Table};
 use crate::pages::formatting::BASE_LAW_EQUATIONS;
@@ -7,14 +7,14 @@ use stylet_diagnose::diagnosis_json::{BaseParameter, Diagnosis, Verdict};
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
-/// What the simulation lacks, with the extended law in the notation of SPEC section 1.
+/// The causes with their parameters, and the extended law in the notation of docs/reference/model.md.
 pub(super) fn causes(d: &Diagnosis) -> Section {
     let section = Section::new("Causes");
     if d.causes.is_empty() {
         return section.text(if d.verdict == Verdict::Unknown {
-            "None that could be named: what is left is more than an effect of the library explains."
+            "None identified: the residual is not explained by any effect of the library."
         } else {
-            "None: the base law, re-fitted, is as good as any extension of it that was tried."
+            "None: no effect of the library improves on the re-fitted base law."
         });
     }
     let mut text = String::from(BASE_LAW_EQUATIONS);
@@ -39,20 +39,26 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
         }
     }
     let g = &d.gain;
-    let what =
-        if g.held_out { "recordings left out of the fit" } else { "the recording, which was also fitted" };
+    let what = if g.held_out { "held-out recordings" } else { "the fitted recording" };
     let title = format!(
-        "What the simulation lacks; together it brings {what} down from {} N to {} N rms, the noise being {} N",
+        "Together the causes reduce the RMS residual of {what} from {} N to {} N; noise {} N",
         significant(g.rmse_before_n, 3),
         significant(g.rmse_after_n, 3),
         significant(g.floor_n, 3)
     );
-    let headers =
-        ["cause", "as good", "confidence", "of what the base law leaves", "number", "value", "95 % interval"];
+    let headers = [
+        "cause",
+        "not separable from",
+        "confidence",
+        "share of the residual",
+        "parameter",
+        "value",
+        "95 % interval",
+    ];
     section.table(Table::new(title, &headers, rows)).code("equation", text)
 }
 
-/// Base numbers, those that moved first.
+/// Fitted base parameters, those that changed first.
 pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
     let mut order: Vec<&BaseParameter> = d.base_parameters.iter().collect();
     order.sort_by_key(|b| (!b.changed, !b.at_bound));
@@ -75,20 +81,20 @@ pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
             ]
         })
         .collect();
-    let mut section = Section::new("Numbers of the base law that moved").table(Table::new(
+    let mut section = Section::new("Base parameters").table(Table::new(
         format!(
-            "{count} of {} differ from what was assumed by more than their interval",
+            "{count} of {} differ from the assumed value by more than their interval",
             d.base_parameters.len()
         ),
         &["", "parameter", "assumed", "fitted", "95 % interval", "change"],
         rows,
     ));
-    let mut aloud = Vec::new();
+    let mut warnings = Vec::new();
     let bounds = order.iter().filter(|b| b.at_bound).count();
     if bounds > 0 {
-        aloud.push(format!(
-            "{bounds} number{} at the bound of what was believed: the tolerance is too narrow, or something else takes its work. Widen `tolerance` in the scenario and ask again.",
-            if bounds == 1 { " stands" } else { "s stand" }
+        warnings.push(format!(
+            "{bounds} parameter{} at the bound of the assumed range: the tolerance is too narrow, or the parameter compensates for another error. Widen `tolerance` in the scenario and repeat the diagnosis.",
+            if bounds == 1 { " is" } else { "s are" }
         ));
     }
     let tolerance = |b: &BaseParameter| match b.name.as_str() {
@@ -96,30 +102,30 @@ pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
         "thickness_m" => scenario.thickness_tolerance * b.assumed,
         _ => scenario.tolerance * b.assumed,
     };
-    let blind: Vec<String> = order
+    let unconstrained: Vec<String> = order
         .iter()
-        .filter(|b| b.high - b.low > BLIND * 2.0 * 1.96 * tolerance(b) && tolerance(b) > 0.0)
+        .filter(|b| b.high - b.low > PRIOR_SHARE * 2.0 * 1.96 * tolerance(b) && tolerance(b) > 0.0)
         .map(|b| format!("{} of layer {}", b.name, b.layer))
         .collect();
-    if !blind.is_empty() {
-        aloud.push(format!(
-            "These recordings say next to nothing of {}: the interval is the belief's own.",
-            blind.join(", ")
+    if !unconstrained.is_empty() {
+        warnings.push(format!(
+            "These recordings hardly constrain {}: the interval is that of the prior.",
+            unconstrained.join(", ")
         ));
     }
-    if !aloud.is_empty() {
-        section = section.warnings(aloud);
+    if !warnings.is_empty() {
+        section = section.warnings(warnings);
     }
     section
 }
 
-/// An interval so large a share of what was believed before is the belief's own.
-const BLIND: f64 = 0.8;
+/// A posterior interval of at least this share of the prior's counts as unconstrained by the data.
+const PRIOR_SHARE: f64 = 0.8;
 
-/// By how much a re-fitted number differs from the one assumed, and whether it may go no further.
+/// Change of a re-fitted parameter from its assumed value, and whether it is at a bound.
 fn change(b: &BaseParameter) -> String {
     let place = matches!(b.name.as_str(), "surface_m" | "thickness_m");
-    // A rounded nothing has no sign.
+    // Adding 0 turns a rounded -0 into 0.
     let rounded = |x: f64, to: f64| (x * to).round() / to + 0.0;
     let by = if place {
         format!("{:+.2} mm", rounded(1e3 * (b.value - b.assumed), 100.0))
@@ -129,12 +135,13 @@ fn change(b: &BaseParameter) -> String {
     if b.at_bound { format!("{by}, at its bound") } else { by }
 }
 
-/// What was found and is no cause.
+/// Effects that were detected but are negligible.
 pub(super) fn negligible_effects(d: &Diagnosis) -> Section {
-    let section = Section::new("Traces");
+    let section = Section::new("Negligible effects");
     if d.negligible.is_empty() {
-        return section
-            .text("Nothing was found that is too small to matter or does not pay on recordings left out.");
+        return section.text(
+            "None: no effect was detected that is negligible or does not improve held-out recordings.",
+        );
     }
     let rows = d
         .negligible
@@ -148,9 +155,10 @@ pub(super) fn negligible_effects(d: &Diagnosis) -> Section {
             ]
         })
         .collect();
-    section.table(Table::new("Found, and no cause", &["effect", "numbers", "why it is no cause"], rows))
+    section.table(Table::new("Detected, but not causes", &["effect", "parameters", "reason"], rows))
 }
 
+/// Effects that cannot be identified from these recordings.
 pub(super) fn not_identifiable(d: &Diagnosis) -> Section {
     let rows = d
         .not_identifiable
@@ -164,9 +172,9 @@ pub(super) fn not_identifiable(d: &Diagnosis) -> Section {
             ]
         })
         .collect();
-    Section::new("What these recordings cannot show").table(Table::new(
-        "Effects that other base parameters imitate to within the noise",
-        &["effect", "equation", "how it would show"],
+    Section::new("Not identifiable").table(Table::new(
+        "Effects that the base parameters absorb to within the noise",
+        &["effect", "equation", "signature"],
         rows,
     ))
 }

@@ -1,4 +1,4 @@
-//! Which effects were tried, and what each would have gained.
+//! The steps of the search over the effect library, with the gain of each candidate.
 
 use crate::page_model::Section;
 use crate::palette::Colour;
@@ -7,17 +7,17 @@ use stylet_diagnose::diagnosis_json::Diagnosis;
 use stylet_stats::number_format::significant;
 
 pub(super) fn search_steps(d: &Diagnosis) -> Section {
-    let mut section = Section::new("Evidence").text(
-        "At each step every effect of the library was added to what stood and fitted together with all base parameters. The bars are the \
-         logarithm of the likelihood that it gains, in nats, after the noise's colour was taken out; pale: compared on averages at 50 Hz only. An \
-         effect is taken when it is the best and gains more than was needed on clean data.",
+    let mut section = Section::new("Search over the effect library").text(
+        "At each step every effect of the library was added to the current model and fitted together with all base parameters. The bars are \
+         the gain in log likelihood, in nats, with autocorrelated noise accounted for; grey: compared on 50 Hz averages only. The best \
+         effect is accepted when its gain exceeds the threshold calibrated on clean data.",
     );
     for (k, step) in d.search_steps.iter().enumerate() {
-        let stood =
+        let current =
             if step.included.is_empty() { "the base law".to_owned() } else { step.included.join(" + ") };
         let end = match &step.selected {
-            Some(taken) => format!("taken: {taken}"),
-            None => "nothing was taken".to_owned(),
+            Some(taken) => format!("accepted: {taken}"),
+            None => "no effect accepted".to_owned(),
         };
         let bars: Vec<Bar> = step
             .candidates
@@ -38,13 +38,16 @@ pub(super) fn search_steps(d: &Diagnosis) -> Section {
             continue;
         }
         let options = FigureOptions {
-            title: format!("Step {}: beyond {stood}", k + 1),
-            subtitle: format!("needed: {} nats; {end}", significant(step.required_nats, 3)),
+            title: format!("Step {}: in addition to {current}", k + 1),
+            subtitle: format!("threshold: {} nats; {end}", significant(step.required_nats, 3)),
             width_px: 960.0,
             theme: Theme::Auto,
         };
         let markup = bar_chart(
-            &BarChart { label: "nats gained (in brackets: numbers fitted)".to_owned(), bars },
+            &BarChart {
+                label: "gain in log likelihood, nats (in brackets: fitted parameters)".to_owned(),
+                bars,
+            },
             &options,
         );
         section = section.picture(options.title, markup);

@@ -1,4 +1,4 @@
-//! The page of a diagnosis: what was measured, what the base law cannot say, why, and what it gains.
+//! The page of a diagnosis: verdict, causes, fitted parameters, residuals before and after, and the steps of the search.
 
 mod causes_tables;
 mod effect_search_steps;
@@ -19,17 +19,17 @@ use stylet_diagnose::report_curves::recording_curves;
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
 
-/// The page of a diagnosis of `scenario`, which was read from `file`; `command` repeats it.
+/// The page of a diagnosis of `scenario`, read from `file`; `command` reproduces it.
 #[must_use]
 pub fn page(scenario: &Scenario, file: &str, command: String, examined: &DiagnosisResult) -> Page {
     let d = &examined.diagnosis;
     let all = recording_curves(examined);
-    let samples: usize = all.iter().map(|c| c.time_s.len()).sum();
+    let blocks: usize = all.iter().map(|c| c.time_s.len()).sum();
     Page::new(format!("Diagnosis: {}", scenario.name))
         .subtitle(summary_sentence(d))
         .fact("scenario", file)
         .fact("recordings", d.gain.recordings.join(", "))
-        .fact("samples", samples.to_string())
+        .fact("blocks of 20 ms", blocks.to_string())
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(verdict(d))
         .section(assumptions(scenario, d, &all))
@@ -42,7 +42,7 @@ pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Diagnos
         .section(base_law_residual(d, examined, &all))
         .section(search_steps(d))
         .section(quality(d))
-        .section(repeat(command, examined))
+        .section(reproduce(command, examined))
 }
 
 fn verdict(d: &Diagnosis) -> Section {
@@ -62,23 +62,24 @@ fn verdict(d: &Diagnosis) -> Section {
             .join(", ");
         let mut detail = format!("{parameters}; confidence {}", significant(c.confidence, 2));
         if !c.equivalent.is_empty() {
-            let _ = write!(detail, "; as good: {}", c.equivalent.join(", "));
+            let _ = write!(detail, "; not separable from: {}", c.equivalent.join(", "));
         }
         tiles.push(Tile::new("Cause", c.effect.replace('_', " "), detail));
     }
     let g = &d.gain;
-    let what = if g.held_out { "left-out recordings" } else { "the fitted recording" };
+    let what =
+        if g.held_out { "held-out recordings, rupture times predicted" } else { "the fitted recording" };
     tiles.push(Tile::new(
         "Residual",
         format!("{} → {} N", significant(g.rmse_before_n, 3), significant(g.rmse_after_n, 3)),
-        format!("root mean square on {what}; the noise is {} N", significant(g.floor_n, 3)),
+        format!("RMS of {what}; noise {} N", significant(g.floor_n, 3)),
     ));
     let status = if d.residual_structure.p_value < 1e-3 { Status::Warn } else { Status::Good };
     tiles.push(
         Tile::new(
-            "Left over",
+            "Remaining residual",
             if d.residual_structure.p_value < 1e-3 { "structure" } else { "noise" },
-            format!("{} that noise alone leaves as much", p_value(d.residual_structure.p_value)),
+            format!("{} for a residual of noise alone", p_value(d.residual_structure.p_value)),
         )
         .status(status),
     );
@@ -92,14 +93,13 @@ fn verdict(d: &Diagnosis) -> Section {
 fn quality(d: &Diagnosis) -> Section {
     let section = Section::new("Data quality");
     if d.data_quality.is_empty() {
-        return section
-            .text("No gaps, no jitter, no saturation, no quantisation, no spikes, no mixed-up units.");
+        return section.text("No gaps, jitter, saturation, quantisation, spikes or inconsistent units.");
     }
     section.table(data_quality_table("", &d.data_quality))
 }
 
-fn repeat(command: String, examined: &DiagnosisResult) -> Section {
-    Section::new("Repeat")
+fn reproduce(command: String, examined: &DiagnosisResult) -> Section {
+    Section::new("Reproduce")
         .code("command", command)
         .folded("extended.ron", examined.extended_scenario.to_ron().unwrap_or_default())
 }

@@ -1,4 +1,4 @@
-//! Residuals: what the base law leaves, what the extended model leaves, before and after.
+//! Residuals of the base law and the extended model: over time, depth, velocity and frequency, and before against after.
 
 use super::summary_sentence::recording_differences;
 use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Scale, Series, Side};
@@ -14,11 +14,11 @@ use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
 use stylet_tissue::Slab;
 
-/// What was believed, and what of it the measured force contradicts: the recording that the base law predicts worst.
+/// The assumed scenario, and the residual of the recording that the base law fits worst.
 pub(super) fn assumptions(scenario: &Scenario, d: &Diagnosis, all: &[RecordingCurves]) -> Section {
     let percent = |share: f64| significant(100.0 * share, 2);
-    let beliefs = format!(
-        "Believed: {} layer{}, stiffness, friction and puncture force to {} %, thickness to {} %, the surface to {} mm{}. Within that the base law was fitted.",
+    let text = format!(
+        "Assumed: {} layer{}; stiffness, friction and puncture force to {} %, thickness to {} %, surface to {} mm{}. The base law was fitted within these tolerances.",
         scenario.tissue.layers.len(),
         if scenario.tissue.layers.len() == 1 { "" } else { "s" },
         percent(scenario.tolerance),
@@ -29,7 +29,7 @@ pub(super) fn assumptions(scenario: &Scenario, d: &Diagnosis, all: &[RecordingCu
             n => format!(", {n} effect{} beyond the base law", if n == 1 { "" } else { "s" }),
         }
     );
-    let section = Section::new("What was believed, and what differs").text(beliefs);
+    let section = Section::new("Assumptions and misfit").text(text);
     let square = |c: &RecordingCurves| {
         c.base_residual_n.iter().zip(&c.used).filter(|(_, u)| **u).map(|(e, _)| e * e).sum::<f64>()
             / c.used.iter().filter(|u| **u).count().max(1) as f64
@@ -38,17 +38,21 @@ pub(super) fn assumptions(scenario: &Scenario, d: &Diagnosis, all: &[RecordingCu
     let Some((c, name)) = worst else { return section };
     let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, c.time_s.clone(), y.to_vec());
     section.chart(
-        Chart::new(format!("{name}: measured less predicted"), "Time (s)", "Residual (N)")
-            .caption("The recording that the base law fits worst: what it leaves, and what the extended model leaves.")
+        Chart::new(format!("{name}: measured minus fitted"), "Time (s)", "Residual (N)")
+            .caption(
+                "The recording that the base law fits worst. Forces are averages over blocks of 20 ms, and ruptures are at their observed times: the \
+                 held-out error in the verdict also contains the error of the predicted rupture times, which is briefly as large as the force drop.",
+            )
             .group(name.clone())
             .height(260)
             .with_series(line("base law, re-fitted", Colour::Vermillion, &c.base_residual_n).width(1.2))
             .with_series(line("extended model", Colour::Blue, &c.extended_residual_n).width(1.0))
-            .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise"))
+            .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise of a single sample"))
             .with_level(Level::dotted(-2.0 * d.noise.sd_n, "")),
     )
 }
 
+/// Errors before and after, and the fitted curves of up to 8 recordings.
 pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Section {
     let g = &d.gain;
     let rows = g
@@ -69,9 +73,9 @@ pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Sectio
         })
         .collect();
     let title = if g.held_out {
-        "Each recording predicted by models fitted to the others, with the law's own ruptures (N)"
+        "RMS error of each recording predicted from the others, rupture times predicted by the law (N)"
     } else {
-        "The one recording, which was also fitted, with the law's own ruptures (N)"
+        "RMS error of the fitted recording, rupture times predicted by the law (N)"
     };
     let mut section = Section::new("Before and after").table(Table::new(
         title.to_owned(),
@@ -80,7 +84,7 @@ pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Sectio
     ));
     for (c, name) in all.iter().zip(&g.recordings).take(8) {
         let ruptures = MarkerSet {
-            name: "ruptures in the data".to_owned(),
+            name: "observed ruptures".to_owned(),
             colour: Colour::Grey,
             style: LineStyle::Dashed,
             side: Side::Right,
@@ -89,7 +93,7 @@ pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Sectio
         let minus = |e: &[f64]| c.force_n.iter().zip(e).map(|(f, e)| f - e).collect::<Vec<_>>();
         section = section.chart(
             Chart::new(name.clone(), "Time (s)", "Force (N)")
-                .caption("Measured, and as base law and extended model have it.")
+                .caption("Measured, and fitted by the base law and the extended model with ruptures at their observed times.")
                 .group(name.clone())
                 .height(300)
                 .with_series(
@@ -114,20 +118,21 @@ pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Sectio
     section
 }
 
+/// The residual of the base law over time, depth, velocity and frequency.
 pub(super) fn base_law_residual(
     d: &Diagnosis,
     examined: &DiagnosisResult,
     all: &[RecordingCurves],
 ) -> Section {
-    let mut section = Section::new("What the base law cannot say").text(
-        "The residual of the re-fitted base law: measured less predicted force, ruptures taken where the data show them. These pictures \
-         propose causes; the likelihood below decides.",
+    let mut section = Section::new("Residual of the base law").text(
+        "Measured minus fitted force of the re-fitted base law, ruptures at their observed times. The charts suggest causes; the \
+         likelihood of the search below decides.",
     );
     let names = &d.gain.recordings;
     let mut time =
         Chart::new("Residual against time", "Time (s)", "Residual (N)").height(260).with_level(Level::zero());
     let mut depth = Chart::new("Residual against depth", "Depth (mm)", "Residual (N)")
-        .caption("Means over 60 bins of depth, advance and retraction apart (retraction dotted).")
+        .caption("Means over 60 bins of depth; retraction dotted.")
         .height(260)
         .with_level(Level::zero());
     let mut velocity = Chart::new("Residual against velocity", "Velocity (mm/s)", "Residual (N)")
@@ -148,8 +153,9 @@ pub(super) fn base_law_residual(
         depth = depth.with_series(Series::line(name.clone(), colour, x, y));
         let (x, y) = binned_means(&mm, &c.base_residual_n, &pick(&|i| c.velocity_mps[i] < -1e-5), 60);
         if !x.is_empty() {
-            depth = depth
-                .with_series(Series::line(format!("{name}, back"), colour, x, y).styled(LineStyle::Dotted));
+            depth = depth.with_series(
+                Series::line(format!("{name}, retraction"), colour, x, y).styled(LineStyle::Dotted),
+            );
         }
         let (x, y) = binned_means(&mmps, &c.base_residual_n, &pick(&|i| c.position_m[i] > 0.0), 60);
         velocity = velocity.with_series(Series::points(name.clone(), colour, x, y));
@@ -167,7 +173,7 @@ pub(super) fn base_law_residual(
         .map(|(k, (b, a))| {
             let name = match k {
                 0 => "in air".to_owned(),
-                k if k > layers => "behind the last layer".to_owned(),
+                k if k > layers => "beyond the last layer".to_owned(),
                 k => format!("layer {k}"),
             };
             let mut row = vec![Cell::text(name)];
@@ -184,7 +190,7 @@ pub(super) fn base_law_residual(
         .collect();
     section = section.table(
         Table::new(
-            "Root mean square by layer and phase (N): base law, extended model",
+            "RMS residual by layer and phase, averages over 20 ms (N)",
             &["", "base", "extended", "base", "extended", "base", "extended"],
             rows,
         )
@@ -196,7 +202,7 @@ pub(super) fn base_law_residual(
         correlations(all, |c| &c.extended_residual_n, &slabs),
     );
     section = section.table(Table::new(
-        "Correlation of the residual with what was done",
+        "Correlation of the residual with motion and force",
         &["", "base law", "extended model"],
         cb.iter()
             .zip(&ca)
@@ -212,7 +218,7 @@ pub(super) fn base_law_residual(
     let keep: Vec<usize> = thin(&f, &base);
     let pick = |x: &[f64]| keep.iter().map(|k| x[*k]).collect::<Vec<_>>();
     let chart = Chart::new("Spectrum of the residual", "log10 of frequency (Hz)", "N/sqrt(Hz)")
-        .caption("Amplitude of the residual at the recordings' own rate, mean over recordings; the highest of each fiftieth of a decade is drawn.")
+        .caption("Amplitude spectral density at the sampling rate of the recordings, averaged over recordings; the largest value of each 1/50 decade is drawn.")
         .height(240);
     let log: Vec<f64> = pick(&f).iter().map(|f| f.log10()).collect();
     section.chart(Chart {
@@ -223,7 +229,7 @@ pub(super) fn base_law_residual(
     })
 }
 
-/// The highest value of each fiftieth of a decade.
+/// Indices of the largest value in each 1/50 decade of frequency.
 fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
     let mut kept: Vec<(i64, usize)> = Vec::new();
     for (k, f) in f.iter().enumerate().filter(|(_, f)| **f > 0.01) {
@@ -240,10 +246,11 @@ fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
     kept.into_iter().map(|k| k.1).collect()
 }
 
+/// What remains of the residual with the extended model.
 pub(super) fn remaining_structure(d: &Diagnosis, all: &[RecordingCurves]) -> Section {
     let text = if d.residual_structure.p_value < 1e-3 {
         format!(
-            "The residual of the extended model is still predictable: it depends on {} ({}{}).",
+            "The residual of the extended model has structure: it depends on {} ({}{}).",
             d.residual_structure.depends_on.join(", "),
             p_value(d.residual_structure.p_value),
             if d.residual_structure.nats > 0.0 {
@@ -254,15 +261,15 @@ pub(super) fn remaining_structure(d: &Diagnosis, all: &[RecordingCurves]) -> Sec
         )
     } else {
         format!(
-            "Nothing that is the same in several recordings remains ({}). The noise: {} N, autoregressive coefficients {} and {} per sample, {}.",
+            "No structure common to the recordings remains ({}). Estimated noise of a single sample: {} N, autoregressive coefficients {} and {}, {}.",
             p_value(d.residual_structure.p_value),
             significant(d.noise.sd_n, 3),
             significant(d.noise.ar[0], 3),
             significant(d.noise.ar[1], 3),
-            if d.noise.from_air { "checked in air" } else { "without air to check it in" }
+            if d.noise.from_air { "checked on samples in air" } else { "not checked in air" }
         )
     };
-    let mut chart = Chart::new("What the extended model leaves", "Depth (mm)", "Residual (N)")
+    let mut chart = Chart::new("Residual of the extended model", "Depth (mm)", "Residual (N)")
         .caption("Means over 60 bins of depth.")
         .height(240)
         .with_level(Level::zero());
@@ -271,10 +278,10 @@ pub(super) fn remaining_structure(d: &Diagnosis, all: &[RecordingCurves]) -> Sec
         let (x, y) = binned_means(&mm, &c.extended_residual_n, &c.used, 60);
         chart = chart.with_series(Series::line(name.clone(), Colour::nth(k), x, y));
     }
-    let section = Section::new("What remains").text(text);
+    let section = Section::new("Remaining residual").text(text);
     let section = match recording_differences(d) {
-        Some(differ) => section.text(format!(
-            "Fitted, and no cause: {differ}. A simulation that does not know them misses the next insertion by as much."
+        Some(differences) => section.text(format!(
+            "Random effects, fitted but not causes: {differences}. They limit the prediction of a new insertion."
         )),
         None => section,
     };

@@ -1,19 +1,19 @@
-//! A diagnosis in sentences.
+//! A diagnosis in one sentence.
 
 use stylet_diagnose::diagnosis_json::{Cause, Diagnosis, Verdict};
 use stylet_record::QualityKind;
 use stylet_stats::number_format::significant;
 
-/// The verdict in a sentence, and which recordings should be looked at before it is believed.
+/// The verdict in one sentence, with the recordings that are outliers.
 #[must_use]
 pub fn summary_sentence(d: &Diagnosis) -> String {
-    let strangers = strangers(d);
-    let mut said = verdict(d, strangers.is_empty());
-    if !strangers.is_empty() {
-        let are = if strangers.len() == 1 { "is" } else { "are" };
-        said += &format!(" But {} {are} not like the other recordings: see the note.", strangers.join(", "));
+    let outliers = outlier_recordings(d);
+    let mut text = verdict(d, outliers.is_empty());
+    if !outliers.is_empty() {
+        let are = if outliers.len() == 1 { "is" } else { "are" };
+        text += &format!(" But {} {are} not like the other recordings: see the note.", outliers.join(", "));
     }
-    said
+    text
 }
 
 fn verdict(d: &Diagnosis, agrees: bool) -> String {
@@ -47,13 +47,13 @@ fn verdict(d: &Diagnosis, agrees: bool) -> String {
     }
 }
 
-/// The recordings that are not like the others.
-fn strangers(d: &Diagnosis) -> Vec<&str> {
+/// Recordings whose force is unlike that of the others.
+fn outlier_recordings(d: &Diagnosis) -> Vec<&str> {
     let all = d.data_quality.iter().filter(|q| q.note.kind == QualityKind::OutlierRecording);
     all.map(|q| q.recording.as_str()).collect()
 }
 
-/// What differs from insertion to insertion so much that a simulation of the next one will miss it.
+/// Random effects between insertions that limit the prediction of a new one; `None` when all are negligible.
 #[must_use]
 pub fn recording_differences(d: &Diagnosis) -> Option<String> {
     let x = &d.random_effect_sd;

@@ -1,4 +1,4 @@
-//! The law of repeated insertions: its causes, what each buys, its equation and numbers.
+//! The extended law of repeated insertions: its causes with their improvement, its equation and parameters.
 
 use crate::page_model::{Cell, Section, Table};
 use crate::pages::formatting::BASE_LAW_EQUATIONS;
@@ -18,19 +18,19 @@ fn bars(study: &SetDiagnosis) -> Vec<Bar> {
             Some(e) => bars.push(bar(format!("without {}", b.step), e, Colour::SkyBlue)),
         }
     }
-    bars.push(bar("the law".to_owned(), study.candidates.best.held_out_n(), Colour::Green));
+    bars.push(bar("selected law".to_owned(), study.candidates.best.held_out_n(), Colour::Green));
     if let Some(floor) = study.report.mean.floor_n {
-        bars.push(bar("mean of the other runs".to_owned(), floor, Colour::Grey));
+        bars.push(bar("mean of the other recordings".to_owned(), floor, Colour::Grey));
     }
     bars
 }
 
-/// What each step buys: errors of models and nothing of the measured curves.
+/// Bar chart of the held-out error of each model and of the selected law without each of its parts. It contains no measured data.
 #[must_use]
 pub fn ablation_figure(study: &SetDiagnosis) -> String {
     let options = FigureOptions {
-        title: "What each cause buys".to_owned(),
-        subtitle: "root mean square error on insertions that took no part in the fit".to_owned(),
+        title: "Held-out error by model".to_owned(),
+        subtitle: "RMS error on insertions that took no part in the fit".to_owned(),
         width_px: 860.0,
         ..FigureOptions::default()
     };
@@ -59,30 +59,31 @@ pub(super) fn causes(study: &SetDiagnosis) -> Section {
             Some(vec![
                 Cell::text(b.step.clone()),
                 Cell::number(format!("{without:.3}")),
-                Cell::text(if b.kept { "kept" } else { "left out" }),
+                Cell::text(if b.kept { "kept" } else { "removed" }),
             ])
         })
         .collect();
     let causes = Table::new(
-        "Causes: what comes back of the base law's error without each, and how sure it is that new runs need it",
-        &["effect", "of the error", "confidence"],
+        "Causes: share of the base law's error that returns without each, and confidence that new recordings need it",
+        &["effect", "share of the error", "confidence"],
         rows,
     );
     let title = format!(
-        "Without a part of the law, N on parts of the set left out; with all of them {:.3}",
+        "Ablation: cross-validated RMS without each part, N; with all parts {:.3}",
         study.candidates.best.held_out_n()
     );
-    Section::new("The causes, and what each buys")
+    Section::new("Causes and their improvement")
         .text(
-            "Three laws were fitted: the base law; the base law with what the search over the library adds to it; layers that \
-             cling to the shaft, slip, give way after a while and let go. The one that predicts parts of the set left out best \
-             was taken, the base law where the others are better by less than 2 %, and more than two effects of the library \
-             only when they are better than a slipping shaft by a tenth. Then every part of it went in turn, and stayed away \
-             where the others, and whole speeds left out, lose less than a twentieth without it (a hundredth for what only shapes an effect), or no more than chance.",
+            "Three laws were fitted: the base law; the base law with the effects that the search adds; and layers that stick to \
+             the shaft, slip, yield with a delay and release. The law with the smallest cross-validated error was selected: an \
+             extension only when it improves on the base law by 2 % or more, and more than two effects of the library only when \
+             they improve on the slipping shaft by 10 %. Each part of the selected law was then removed in turn, and stayed \
+             removed where the error on held-out recordings and speeds rises by less than 5 % (1 % for a parameter that only \
+             shapes an effect), or not significantly.",
         )
-        .picture("Error on runs left out of every law, and without every part", ablation_figure(study))
+        .picture("Held-out error of every law, and of the selected law without each part", ablation_figure(study))
         .table(causes)
-        .table(Table::new(title, &["part", "without it, N", ""], parts))
+        .table(Table::new(title, &["part", "RMS without it, N", ""], parts))
 }
 
 pub(super) fn extended_law(study: &SetDiagnosis) -> Section {
@@ -106,7 +107,7 @@ pub(super) fn extended_law(study: &SetDiagnosis) -> Section {
         .iter()
         .map(|b| {
             vec![
-                Cell::text(format!("layer {}", b.layer)),
+                Cell::text(if b.layer > 0 { format!("layer {}", b.layer) } else { "tissue".to_owned() }),
                 Cell::text(b.name.clone()),
                 Cell::number(significant(b.assumed, 4)),
                 Cell::number(significant(b.value, 4)),
@@ -115,11 +116,11 @@ pub(super) fn extended_law(study: &SetDiagnosis) -> Section {
             ]
         })
         .collect();
-    let headers = ["", "parameter", "believed", "fitted", "95 % interval", ""];
+    let headers = ["", "parameter", "assumed", "fitted", "95 % interval", ""];
     Section::new("The extended law")
         .text(
-            "Values of the mean insertion; intervals of 95 % by the jackknife over runs, which counts what one law cannot say \
-             about all of them.",
+            "Parameters of the mean insertion with 95 % intervals by the jackknife over recordings, which includes the variation \
+             between them.",
         )
         .code("equation", text)
         .texts(study.diagnosis.advice.clone())

@@ -1,4 +1,4 @@
-//! Each run predicted by laws fitted to the others, and what that leaves.
+//! Each recording predicted by laws fitted to the others: errors, curves, residuals over depth.
 
 use crate::chart_model::{Chart, Level, LineStyle, Series};
 use crate::page_model::{Cell, Section, Table};
@@ -41,29 +41,29 @@ pub(super) fn held_out_predictions(runs: &[&SegmentedRecording], study: &SetDiag
         .collect();
     let mut section = Section::new("Before and after").table(
         Table::new(
-            "Each run predicted by laws fitted to the others, root mean square (N)",
+            "RMS error of held-out recordings (N)",
             &[
                 "",
-                "runs",
+                "recordings",
                 "mean of the others",
                 "base law",
                 "extended law",
-                "and what is alike",
+                "with discrepancy",
                 "in the 90 % band",
                 "base law",
                 "extended law",
             ],
             rows,
         )
-        .with_column_groups(&[("", 2), ("one run left out", 5), ("a whole speed left out", 2)]),
+        .with_column_groups(&[("", 2), ("one recording held out", 5), ("a whole speed held out", 2)]),
     );
     section = section.text(
-        "What is alike: what the law leaves of the other runs of a speed, as far as it is more than their scatter, is learned beside the law and added to \
-         what it predicts. It says nothing of another speed and names no cause.",
+        "Empirical discrepancy: the mean residual of the other recordings at the same speed, as far as it exceeds their scatter, added to \
+         the prediction of the law. It does not extend to other speeds and identifies no cause.",
     );
     if let Some(nested) = &r.nested {
         section = section.text(format!(
-            "Parts of the set left out: {:.3} N by the law, {:.3} N by laws that were chosen without them.",
+            "Cross-validation over parts of the set: {:.3} N with the selected law, {:.3} N with laws selected without the held-out part.",
             nested.selected_with_n, nested.selected_without_n
         ));
     }
@@ -73,18 +73,15 @@ pub(super) fn held_out_predictions(runs: &[&SegmentedRecording], study: &SetDiag
             .iter()
             .map(|(name, floor, error)| {
                 format!(
-                    "{name}: {error:.3} N on runs left out, mean of the others {} N.",
+                    "{name}: {error:.3} N on held-out recordings, mean of the others {} N.",
                     three_decimals(*floor)
                 )
             })
             .collect();
-        paragraphs.push(format!(
-            "Both laws put together, on the whole: {:.3} N (mean over the speeds).",
-            parts.mean_n
-        ));
+        paragraphs.push(format!("Both laws combined: {:.3} N (mean over the speeds).", parts.mean_n));
         section = section.texts(paragraphs);
     }
-    // The middle run of each speed: neither the best nor the worst.
+    // The recording of median error at each speed.
     let groups = mean_speeds(runs);
     for (v, members) in groups {
         let mut order = members.clone();
@@ -98,15 +95,15 @@ pub(super) fn held_out_predictions(runs: &[&SegmentedRecording], study: &SetDiag
         section = section.chart(
             Chart::new(format!("{} ({:.2} mm/s)", run.name, 1e3 * v), "Time (s)", "Force (N)")
                 .caption(format!(
-                    "Measured, and predicted by laws fitted to the other runs: base law {:.3} N, extended law {:.3} N rms, with what is alike {:.3} N; thin \
-                     lines hold 90 %.",
+                    "Measured, and predicted from the other recordings: base law {:.3} N rms, extended law {:.3} N, with discrepancy {:.3} N. Dashed: \
+                     90 % band.",
                     r.recordings[i].base_n, r.recordings[i].model_n, r.recordings[i].with_discrepancy_n
                 ))
                 .height(320)
                 .with_series(line("measured", Colour::Grey, &run.recording.force_n).width(3.0))
                 .with_series(line("base law", Colour::Vermillion, &study.base_held_out[i].model_force_n).width(1.1))
                 .with_series(line("extended law", Colour::Blue, &study.held_out[i].model_force_n).width(1.5))
-                .with_series(line("and what is alike", Colour::Green, &p.mean_n).width(1.1))
+                .with_series(line("with discrepancy", Colour::Green, &p.mean_n).width(1.1))
                 .with_series(line("5 %", Colour::SkyBlue, &p.low_n).width(0.8).styled(LineStyle::Dashed))
                 .with_series(line("95 %", Colour::SkyBlue, &p.high_n).width(0.8).styled(LineStyle::Dashed)),
         );
@@ -115,13 +112,13 @@ pub(super) fn held_out_predictions(runs: &[&SegmentedRecording], study: &SetDiag
 }
 
 pub(super) fn residual_charts(runs: &[&SegmentedRecording], study: &SetDiagnosis) -> Section {
-    let mut section = Section::new("What remains").text(format!(
-        "Measured less predicted force of runs left out, averaged in 60 pieces of depth. The residual that all fitted runs have in common depends on {} \
+    let mut section = Section::new("Residual").text(format!(
+        "Measured minus predicted force of held-out recordings, averaged over 60 bins of depth. The residual common to all fitted recordings depends on {} \
          ({}).",
         if study.diagnosis.residual_structure.depends_on.is_empty() { "nothing".to_owned() } else { study.diagnosis.residual_structure.depends_on.join(", ") },
         p_value(study.diagnosis.residual_structure.p_value)
     ));
-    for (title, back) in [("Residual on the way in", false), ("Residual on the way back", true)] {
+    for (title, back) in [("Residual during insertion", false), ("Residual during retraction", true)] {
         let mut chart = Chart::new(title, "Depth (mm)", "Residual (N)").height(280).with_level(Level::zero());
         for (name, colour, predictions) in [
             ("base law", Colour::Vermillion, &study.base_held_out),

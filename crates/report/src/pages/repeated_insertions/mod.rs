@@ -1,5 +1,5 @@
-//! The page of repeated insertions: what the base law cannot say, the causes in the order of what each
-//! buys, the extended law, and how well it predicts runs that took no part.
+//! The page of repeated insertions: held-out prediction errors, the causes with their improvement, the extended law, and the
+//! variation between recordings.
 
 mod fitted_law;
 mod held_out_prediction;
@@ -19,15 +19,15 @@ use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
 use stylet_score::MeasuredScore;
 
-/// The page of a study of the data set `set`, which was read from `file`, with what the online core heard in its runs; `commands`
-/// repeat it.
+/// The page of the data set `set`, read from `file`, with the scores of the online algorithm on its recordings; `commands` reproduce
+/// it.
 #[must_use]
 pub fn page(
     set: &Dataset,
     file: &str,
     commands: String,
     study: &SetDiagnosis,
-    heard: &[MeasuredScore],
+    online: &[MeasuredScore],
 ) -> Page {
     let runs: Vec<&SegmentedRecording> = study.recordings.iter().collect();
     let runs = runs.as_slice();
@@ -44,13 +44,13 @@ pub fn page(
         .section(extended_law(study))
         .section(residual_charts(runs, study))
         .section(between_recordings(study))
-        .section(online_enhancement::section(heard))
+        .section(online_enhancement::section(online))
         .section(measurement_chain(study))
         .section(quality(study))
-        .section(Section::new("To repeat").code("commands", commands))
+        .section(Section::new("Reproduce").code("commands", commands))
 }
 
-/// The verdict in a sentence.
+/// The verdict in one sentence.
 #[must_use]
 pub fn summary_sentence(study: &SetDiagnosis) -> String {
     let d = &study.diagnosis;
@@ -60,7 +60,7 @@ pub fn summary_sentence(study: &SetDiagnosis) -> String {
             "The insertions hold structure that no effect of the library explains.".to_owned()
         }
         (Verdict::Unknown, false) => format!(
-            "The insertions hold structure that no effect of the library explains; beside it the simulation lacks {}.",
+            "The insertions hold structure that no effect of the library explains; in addition the simulation lacks {}.",
             names.join(", ")
         ),
         (_, true) => "The base law predicts new insertions as well as any extension of it.".to_owned(),
@@ -73,24 +73,24 @@ fn verdict(study: &SetDiagnosis) -> Section {
     let floor = m.floor_n;
     let tiles = vec![
         Tile::new(
-            "A run that took no part",
+            "Held-out recording",
             format!("{:.3} → {:.3} N", m.base_n, m.with_discrepancy_n),
             format!(
-                "base law → extended law ({:.3} N) with what it leaves alike of the other runs, root mean square; another real insertion: {} N",
+                "RMS: base law → extended law ({:.3} N) plus empirical discrepancy; mean of the other recordings: {} N",
                 m.model_n,
                 three_decimals(floor)
             ),
         )
         .status(floor.map_or(Status::Plain, |f| Status::at_most(m.with_discrepancy_n, 1.2 * f, 1.5 * f))),
         Tile::new(
-            "A speed that took no part",
+            "Held-out speed",
             format!("{} → {} N", three_decimals(m.base_held_out_speed_n), three_decimals(m.held_out_speed_n)),
-            "all runs of one speed predicted from the other speeds".to_owned(),
+            "RMS: all recordings of one speed predicted from the other speeds".to_owned(),
         ),
         Tile::new(
             "90 % band",
             format!("{:.1} %", 100.0 * m.coverage),
-            "of the samples of runs that took no part lie within it".to_owned(),
+            "of the samples of held-out recordings are inside".to_owned(),
         )
         .status(if (0.8..=0.97).contains(&m.coverage) { Status::Good } else { Status::Warn }),
         Tile::new("Causes", study.diagnosis.causes.len().to_string(), summary_sentence(study)),
@@ -101,7 +101,7 @@ fn verdict(study: &SetDiagnosis) -> Section {
 fn quality(study: &SetDiagnosis) -> Section {
     let title = match study.report.instrument.detected.is_empty() {
         true => "Remarks; nothing was corrected or resampled",
-        false => "Remarks; but for what the instrument shows nothing was corrected or resampled",
+        false => "Remarks; only the instrument effects above were corrected",
     };
     Section::new("Data quality").table(data_quality_table(title, &study.diagnosis.data_quality))
 }

@@ -1,4 +1,4 @@
-//! The online core on repeated insertions, in words and as a table.
+//! Scores of the online algorithm on repeated insertions, as text and as a table.
 
 use crate::page_model::{Cell, Section, Table};
 use std::fmt::Write as _;
@@ -19,27 +19,27 @@ fn mean(all: &[MeasuredScore], what: impl Fn(&MeasuredScore) -> f64) -> f64 {
     stylet_stats::mean(&all.iter().map(what).collect::<Vec<_>>())
 }
 
-fn with_law(online: &MeasuredScore, what: fn(ModelFrictionScore) -> f64) -> f64 {
+fn with_model(online: &MeasuredScore, what: fn(ModelFrictionScore) -> f64) -> f64 {
     online.with_model.map_or(f64::NAN, what)
 }
 
-/// What it found of all runs together, in lines.
+/// The scores over all recordings, in lines for the terminal.
 #[must_use]
 pub fn summary(all: &[MeasuredScore]) -> String {
     let [drops, found, inside, hold, back] = sums(all);
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "  online core: {found} of {drops} drops found; false: {inside} on the way in, {hold} in the hold, {back} on the way back"
+        "  online algorithm: {found} of {drops} force drops detected; false detections: {inside} during insertion, {hold} during the hold, {back} during retraction"
     );
     let measured_n = mean(all, |o| o.retraction_raw_n);
-    // Not every insertion is recorded on its way back.
+    // Not every recording contains a retraction.
     if measured_n.is_finite() {
         let _ = writeln!(
             out,
-            "  force on the way back, all of it friction (N rms): {measured_n:.3} measured, {:.3} left by the core alone, {:.3} with the extended law in it, {:.3} by that law replayed",
+            "  force during retraction, all of it friction (N rms): {measured_n:.3} measured, {:.3} enhanced, {:.3} enhanced with the extended law, {:.3} minus the replayed law",
             mean(all, |o| o.retraction_enhanced_n),
-            mean(all, |o| with_law(o, |w| w.residual_rms_n)),
+            mean(all, |o| with_model(o, |w| w.residual_rms_n)),
             mean(all, |o| o.retraction_model_n)
         );
         let largest =
@@ -49,7 +49,7 @@ pub fn summary(all: &[MeasuredScore]) -> String {
         };
         let _ = writeln!(
             out,
-            "  with the law in it the largest is {largest:.2} N; of a pull of 0.5 N over 2 mm put in {:.0} % of the peak is kept, of a step {:.0} % after 1 mm",
+            "  enhanced with the extended law: peak {largest:.2} N; of an added pulse of 0.5 N over 2 mm {:.0} % of the peak is kept, of a step {:.0} % after 1 mm",
             100.0 * median(|w| w.pulse_kept),
             100.0 * median(|w| w.step_kept)
         );
@@ -67,29 +67,29 @@ pub(super) fn section(all: &[MeasuredScore]) -> Section {
                 Cell::number(format!("{} / {} / {}", o.false_insertion, o.false_hold, o.false_retraction)),
                 Cell::number(format!("{:.3}", o.retraction_raw_n)),
                 Cell::number(format!("{:.3}", o.retraction_enhanced_n)),
-                Cell::number(format!("{:.3}", with_law(o, |w| w.residual_rms_n))),
+                Cell::number(format!("{:.3}", with_model(o, |w| w.residual_rms_n))),
                 Cell::number(format!("{:.3}", o.retraction_model_n)),
             ]
         })
         .collect();
-    let said = summary(all).lines().map(|l| format!("All: {}.", l.trim())).collect::<Vec<_>>().join(" ");
+    let totals = summary(all).lines().map(|l| format!("All: {}.", l.trim())).collect::<Vec<_>>().join(" ");
     let headers = [
         "",
-        "drops found",
-        "false: in / hold / back",
+        "drops detected",
+        "false: insertion / hold / retraction",
         "measured",
-        "core",
-        "core with the law",
-        "law replayed",
+        "enhanced",
+        "enhanced with the law",
+        "minus the replayed law",
     ];
-    let groups = [("", 3), ("force on the way back, N rms", 4)];
-    Section::new("The online core on these insertions")
+    let groups = [("", 3), ("force during retraction, N rms", 4)];
+    Section::new("Online enhancement")
         .text(
-            "On the way back nothing pushes the tip: all force there is friction, and an enhanced force should be zero. \
-             Core: what its enhanced force leaves, with the friction that it learns by itself. Core with the law: it begins from the friction of the \
-             law fitted to the other runs, a layer counting as punctured from the moment the core says so, and corrects it by what the \
-             way back shows. Law replayed: without that.",
+            "During retraction the force is friction alone, so the enhanced force should be zero. Enhanced: the online algorithm with the friction that \
+             it estimates itself. Enhanced with the law: it starts from the friction of the law fitted to the other recordings, treats a layer as \
+             ruptured from its detection on, and corrects the friction during retraction. Minus the replayed law: the fitted friction without the \
+             online algorithm.",
         )
-        .text(said)
-        .table(Table::new("By run", &headers, rows).with_column_groups(&groups))
+        .text(totals)
+        .table(Table::new("By recording", &headers, rows).with_column_groups(&groups))
 }

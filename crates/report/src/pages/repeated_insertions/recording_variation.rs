@@ -1,9 +1,10 @@
-//! What varies from run to run, and what the instrument does by itself.
+//! Variation between recordings, and effects of the instrument.
 
 use crate::page_model::{Cell, Section, Table};
 use crate::pages::formatting::three_decimals;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
 
+/// Random effects and the errors of each recording.
 pub(super) fn between_recordings(study: &SetDiagnosis) -> Section {
     let r = &study.report;
     let list = |x: &[Option<f64>], scale: f64| {
@@ -33,8 +34,8 @@ pub(super) fn between_recordings(study: &SetDiagnosis) -> Section {
         .collect();
     let p = &r.variability;
     let mut text = vec![format!(
-        "From run to run the surface shifts by {:.2} mm, friction varies by {:.1} % and what a layer bears by {:.1} %; from day to day (a speed, a \
-         stroke) the surface by {:.2} mm and friction by {:.1} % (standard deviations).",
+        "Standard deviations between recordings: surface {:.2} mm, friction {:.1} %, puncture force {:.1} %; between sessions (one speed and \
+         stroke each): surface {:.2} mm, friction {:.1} %.",
         1e3 * p.surface_m,
         100.0 * p.friction,
         100.0 * p.puncture,
@@ -43,17 +44,17 @@ pub(super) fn between_recordings(study: &SetDiagnosis) -> Section {
     )];
     for (i, drops) in p.drops.iter().enumerate() {
         let release = p.release_positions_m.get(i).copied().flatten().map_or(String::new(), |(z, sd)| {
-            format!("; lets go at {:.2} mm, give or take {:.2} mm", 1e3 * z, 1e3 * sd)
+            format!("; released at {:.2} ± {:.2} mm (standard deviation)", 1e3 * z, 1e3 * sd)
         });
         text.push(format!(
-            "Layer {}: its rupture is a drop in {drops} of {} runs{release}.",
+            "Layer {}: the rupture shows as a force drop in {drops} of {} recordings{release}.",
             i + 1,
             r.recordings.len()
         ));
     }
     if r.starts.0 > 1 {
         text.push(format!(
-            "{} starts of the fit went on after a first look; of these, {} starts agree.",
+            "{} starts of the fit were continued after screening; {} of them agree.",
             r.starts.0, r.starts.1
         ));
     }
@@ -69,31 +70,33 @@ pub(super) fn between_recordings(study: &SetDiagnosis) -> Section {
             ]
         })
         .collect();
-    Section::new("What varies from run to run")
+    Section::new("Variation between recordings")
         .texts(text)
         .table(Table::new(
-            "By part of an insertion, on runs left out (N rms)",
-            &["", "mean of the others", "extended law", "and what is alike"],
+            "RMS error of held-out recordings by phase (N)",
+            &["", "mean of the others", "extended law", "with discrepancy"],
             by_part,
         ))
         .table(Table::new(
-            "Runs",
+            "Recordings",
             &[
                 "",
                 "mm/s",
                 "surface, mm",
-                "friction, times",
+                "friction factor",
                 "puncture, N",
-                "lets go, mm",
-                "floor, N",
+                "release depth, mm",
+                "mean of the others, N",
                 "base law, N",
-                "extended, N",
+                "extended law, N",
+                "with discrepancy, N",
                 "in band",
             ],
             rows,
         ))
 }
 
+/// Effects of sensor and drive that were detected or excluded without a tissue model.
 pub(super) fn measurement_chain(study: &SetDiagnosis) -> Section {
     let i = &study.report.instrument;
     let row = |effect: &str, size_n: f64, evidence: &str| {
@@ -103,22 +106,21 @@ pub(super) fn measurement_chain(study: &SetDiagnosis) -> Section {
     let shown: Vec<_> = i.detected.iter().map(|e| row(&e.effect, e.max_force_n, &e.evidence)).collect();
     let mut section = Section::new("The instrument");
     if excluded.is_empty() && shown.is_empty() {
-        return section.text("No recording in air, no known load, no air before contact: nothing of the sensor can be excluded.");
+        return section.text("No recording in air, no known load and no samples before contact: no sensor effect can be excluded.");
     }
     section = section.text(
-        "Seen without a law: a motion in air and a known load where they were recorded, the force before the needle reaches the tissue, and whether \
-         the force answers at once where the needle stops or its way back begins.",
+        "Determined without a tissue model: from motion in air and known loads where recorded, from the force before contact, and from the delay of \
+         the force when the needle stops or reverses.",
     );
     if !shown.is_empty() {
         section = section.text(
-            "What it shows was undone before any law was fitted (but tones and the drive's friction): the forces on this page are the corrected ones, and \
-             the extended scenario has these effects in its sensor.",
+            "Detected effects were corrected before fitting (except tones and drive friction): forces on this page are corrected, and the extended \
+             scenario contains these effects.",
         );
     }
-    for (title, rows) in [("Shown: a cause", shown), ("Excluded as causes", excluded)] {
+    for (title, rows) in [("Detected", shown), ("Excluded", excluded)] {
         if !rows.is_empty() {
-            section =
-                section.table(Table::new(title.to_owned(), &["effect", "force here", "evidence"], rows));
+            section = section.table(Table::new(title.to_owned(), &["effect", "size", "evidence"], rows));
         }
     }
     section
