@@ -1,5 +1,5 @@
-//! Promise: `stylet compare` puts algorithms to the same insertions and writes the table as a page and as `compare.json`, the same
-//! bytes for any number of threads.
+//! Promise: `stylet compare` runs several algorithms on the same insertions and writes the table as a page and as `compare.json`, with
+//! the same bytes for any number of threads.
 
 mod support;
 
@@ -27,7 +27,7 @@ fn compare(scratch: &Scratch, name: &str, arguments: &[&str]) -> Vec<Value> {
 }
 
 #[test]
-fn ours_finds_every_rupture_of_every_row_and_the_paper_does_not() {
+fn stylet_detects_every_rupture_of_every_row_and_the_paper_algorithm_does_not() {
     let scratch = Scratch::new("compare-rows");
     let mut files: Vec<PathBuf> = std::fs::read_dir(root().join("scenarios/compare"))
         .expect("the folder")
@@ -40,15 +40,19 @@ fn ours_finds_every_rupture_of_every_row_and_the_paper_does_not() {
     assert_eq!(table.len(), 2 * files.len());
     assert!(files.len() >= 16, "the rows of docs/enhancer.md");
     let errors = |r: &Value| r["missed"].as_u64().expect("missed") + r["false"].as_u64().expect("false");
-    let (ours, paper): (Vec<&Value>, Vec<&Value>) = table.iter().partition(|r| r["algorithm"] == "Stylet");
-    for r in &ours {
+    let (stylet_rows, paper): (Vec<&Value>, Vec<&Value>) =
+        table.iter().partition(|r| r["algorithm"] == "Stylet");
+    for r in &stylet_rows {
         assert_eq!((r["ruptures"].as_u64(), errors(r)), (Some(9), 0), "{r}");
         for k in r["stiffness_error"].as_array().expect("layers") {
             assert!(k.as_f64().expect("an estimate") < 0.1, "{r}");
         }
         assert!(r["coverage"]["tip_force"].as_f64().expect("a band") > 0.85, "{r}");
     }
-    assert!(paper.iter().map(|r| errors(r)).sum::<u64>() > 50, "the rows show where the paper's breaks");
+    assert!(
+        paper.iter().map(|r| errors(r)).sum::<u64>() > 50,
+        "the rows include failures of the paper's algorithm"
+    );
     for pair in table.chunks_exact(2) {
         let off = |r: &Value| r["enhancement_rms_relative"].as_f64().expect("a number");
         assert!(off(&pair[1]) < off(&pair[0]), "{pair:?}");
@@ -56,27 +60,27 @@ fn ours_finds_every_rupture_of_every_row_and_the_paper_does_not() {
 }
 
 #[test]
-fn a_row_says_what_was_missed_how_late_and_how_far_off_with_intervals() {
+fn a_row_has_errors_delays_and_estimates_with_intervals() {
     let scratch = Scratch::new("compare-fields");
     let table = compare(&scratch, "fields", &[&row("03_constant_loud.ron"), "--seeds", "6"]);
     for r in &table {
         assert_eq!(r["scenario"], "constant, 0.1 N");
         let [value, low, high] = [0, 1, 2].map(|i| r["errors_per_rupture"][i].as_f64().expect("a number"));
         assert!(low <= value && value <= high && low >= 0.0, "{r}");
-        let told = (r["missed"].as_u64().expect("a count") + r["false"].as_u64().expect("a count")) as f64;
-        assert!((value - told / r["ruptures"].as_f64().expect("a count")).abs() < 1e-12, "{r}");
+        let errors = (r["missed"].as_u64().expect("a count") + r["false"].as_u64().expect("a count")) as f64;
+        assert!((value - errors / r["ruptures"].as_f64().expect("a count")).abs() < 1e-12, "{r}");
     }
-    let ours = &table[1];
-    let (median, p95) = (ours["delay_s"]["median"].as_f64(), ours["delay_s"]["p95"].as_f64());
+    let stylet_row = &table[1];
+    let (median, p95) = (stylet_row["delay_s"]["median"].as_f64(), stylet_row["delay_s"]["p95"].as_f64());
     assert!(median.expect("a delay") <= p95.expect("a delay") && p95.expect("a delay") < 0.05);
-    for (k, ends) in ours["stiffness_error"]
+    for (k, ends) in stylet_row["stiffness_error"]
         .as_array()
         .expect("layers")
         .iter()
-        .zip(ours["stiffness_error_interval"].as_array().expect("layers"))
+        .zip(stylet_row["stiffness_error_interval"].as_array().expect("layers"))
     {
         let [low, high] = [0, 1].map(|i| ends[i].as_f64().expect("an end"));
-        assert!((low..=high).contains(&k.as_f64().expect("a median")), "{ours}");
+        assert!((low..=high).contains(&k.as_f64().expect("a median")), "{stylet_row}");
     }
 }
 
@@ -104,7 +108,7 @@ fn one_two_and_three_threads_give_the_same_bytes() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_said() {
+fn invalid_comparisons_are_reported() {
     for (arguments, expected) in [
         (vec!["compare"], "required"),
         (vec!["compare", "--world", "poor"], "there is no `poor`; there are plain, rich"),

@@ -1,7 +1,6 @@
 //! Promise: the report of a run opens in a real browser without an error and shows its curves.
 //!
-//! The page tests itself when its address ends in `#selftest`; see `stylet-report`. Without a browser
-//! this test says loudly that it was skipped.
+//! The page tests itself when its address ends in `#selftest`; see `stylet-report`. Without a browser the test prints SKIPPED.
 
 #[allow(dead_code)]
 #[path = "../crates/report/tests/support/browser.rs"]

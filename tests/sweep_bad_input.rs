@@ -1,5 +1,5 @@
-//! Promise: a wrong sweep, a damaged shard, a full disk or a folder that cannot be written to is told
-//! in a sentence that names it, with exit code 2, and nothing that was there is lost.
+//! Promise: an invalid sweep, a damaged shard, a full disk or a read-only folder gives an error message that names it and exit code 2,
+//! and existing files are kept.
 
 mod support;
 
@@ -25,7 +25,7 @@ fn good() -> String {
 }
 
 #[test]
-fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
+fn an_invalid_sweep_is_rejected_with_line_column_and_remedy() {
     let cases: [(&str, &str, &str, &[&str]); 17] = [
         (
             "misspelt",
@@ -49,7 +49,7 @@ fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
         ("group", "sensor.noise_n", "enhance.cusum", &["5:16", "`sigma_rupture_n`"]),
         ("name", "sensor.noise_n", "enhance.model", &["5:16", "`MultiLayer`", "only numbers"]),
         ("variant", "sensor.noise_n", "motion.amplitude_m", &["5:16", "`velocity_mps`"]),
-        ("seed", "sensor.noise_n", "seed", &["5:16", "seed of its own"]),
+        ("seed", "sensor.noise_n", "seed", &["5:16", "its own seed"]),
         ("brackets", "sensor.noise_n", "tissue.layers[x]", &["5:16", "is not a path"]),
         ("swapped", "Uniform(0.01, 0.02)", "Uniform(0.02, 0.01)", &["5:40", "swap"]),
         ("log", "Uniform(0.01, 0.02)", "LogUniform(0.0, 0.01)", &["5:40", "above zero"]),
@@ -69,9 +69,9 @@ fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
         assert_eq!(output.status.code(), Some(2), "{name}: {stderr_text}");
         assert!(stderr_text.contains(&format!("{name}.ron:")), "{name}: {stderr_text}");
         for word in words {
-            assert!(stderr_text.contains(word), "{name} does not say {word}: {stderr_text}");
+            assert!(stderr_text.contains(word), "{name} lacks {word}: {stderr_text}");
         }
-        assert!(!out.exists(), "{name}: nothing is written");
+        assert!(!out.exists(), "{name}: no output");
     }
     let file = scratch.file("good.ron", good());
     let output = stylet(&["sweep", &text(&file), "--trials", "0", "--out", &text(&out)]);
@@ -80,7 +80,7 @@ fn a_wrong_sweep_is_refused_with_its_place_and_remedy() {
 }
 
 #[test]
-fn draws_that_no_scenario_allows_are_redrawn_and_hopeless_ones_are_reported() {
+fn invalid_draws_are_repeated_and_reported_when_all_are_invalid() {
     let scratch = Scratch::new("redraw");
     let wide = good()
         .replace("Uniform(0.01, 0.02)", "Normal(mean: 0.0, sd: 0.02)")
@@ -118,7 +118,7 @@ fn merge(scratch: &Scratch, out: &Path) -> std::process::Output {
 }
 
 #[test]
-fn merge_refuses_missing_damaged_and_foreign_shards_by_name_and_keeps_the_others() {
+fn merge_rejects_missing_damaged_and_foreign_shards_and_keeps_the_others() {
     let scratch = Scratch::new("merge");
     let second = "shards/000002-of-000002.shard";
     let spoil = |name: &str, change: &dyn Fn(&mut Vec<u8>), words: &[&str]| {
@@ -129,11 +129,7 @@ fn merge_refuses_missing_damaged_and_foreign_shards_by_name_and_keeps_the_others
         let output = merge(&scratch, &out);
         assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr_text(&output));
         for word in words.iter().chain(&["000002-of-000002.shard"]) {
-            assert!(
-                stderr_text(&output).contains(word),
-                "{name} does not say {word}: {}",
-                stderr_text(&output)
-            );
+            assert!(stderr_text(&output).contains(word), "{name} lacks {word}: {}", stderr_text(&output));
         }
         assert!(out.join("shards/000001-of-000002.shard").exists(), "{name}: the good shard is kept");
         assert!(!out.join("trials.csv").exists(), "{name}");
@@ -171,11 +167,11 @@ fn merge_refuses_missing_damaged_and_foreign_shards_by_name_and_keeps_the_others
 }
 
 #[test]
-fn a_file_size_limit_or_an_unwritable_folder_is_told_and_nothing_is_lost() {
+fn a_full_disk_or_unwritable_folder_is_reported_and_existing_files_are_kept() {
     let scratch = Scratch::new("limit");
     let file = scratch.file("sweep.ron", good().replace("trials: 6", "trials: 2000"));
     let out = scratch.path().join("out");
-    // 1 block of 1024 bytes: not even the first shard fits.
+    // 8 blocks of 1024 bytes: the first shard does not fit.
     let command = format!(
         "trap '' XFSZ; ulimit -f 8; '{}' sweep '{}' --out '{}'",
         env!("CARGO_BIN_EXE_stylet"),
@@ -187,7 +183,7 @@ fn a_file_size_limit_or_an_unwritable_folder_is_told_and_nothing_is_lost() {
     assert!(stderr_text(&output).contains("cannot be written"), "{}", stderr_text(&output));
     assert!(!out.join("trials.csv").exists());
     let parts = fs::read_dir(out.join("shards")).map_or(0, Iterator::count);
-    assert_eq!(parts, 0, "nothing half-written stays");
+    assert_eq!(parts, 0, "no partial file remains");
 
     let blocked = scratch.file("a_file", "precious");
     let output = stylet(&["sweep", &text(&file), "--trials", "6", "--out", &text(&blocked.join("out"))]);
@@ -196,8 +192,8 @@ fn a_file_size_limit_or_an_unwritable_folder_is_told_and_nothing_is_lost() {
     assert_eq!(fs::read_to_string(&blocked).expect("the file"), "precious");
 }
 
-/// `stylet` as somebody whom the system lets write only where the permissions say so: root may write
-/// anywhere, so root becomes nobody. `None` when nobody cannot start the binary.
+/// Runs `stylet` as a user whom file permissions restrict: as `nobody` if the test runs as root. `None` when `nobody` cannot start the
+/// binary.
 fn unprivileged(arguments: &[&str]) -> Option<std::process::Output> {
     use std::os::unix::process::CommandExt;
     let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
@@ -209,7 +205,7 @@ fn unprivileged(arguments: &[&str]) -> Option<std::process::Output> {
 }
 
 #[test]
-fn a_read_only_folder_is_told_and_its_shards_are_kept_for_the_next_attempt() {
+fn a_read_only_folder_is_reported_and_its_shards_are_kept() {
     use std::os::unix::fs::PermissionsExt;
     let scratch = Scratch::new("read-only");
     let out = shards(&scratch, "out", &[]);
@@ -219,7 +215,7 @@ fn a_read_only_folder_is_told_and_its_shards_are_kept_for_the_next_attempt() {
     let before = fs::read(&first).expect("a shard");
     let permit = |mode| {
         for folder in [out.join("shards"), out.clone()] {
-            fs::set_permissions(folder, fs::Permissions::from_mode(mode)).expect("they are ours");
+            fs::set_permissions(folder, fs::Permissions::from_mode(mode)).expect("own files");
         }
     };
     permit(0o555);
@@ -227,12 +223,12 @@ fn a_read_only_folder_is_told_and_its_shards_are_kept_for_the_next_attempt() {
     let second = ["sweep", "run-shard", "2/2", &file, "--out", &folder];
     let Some(output) = unprivileged(&second) else {
         permit(0o755);
-        println!("SKIPPED: nobody may not start the binary here, and root may write to read-only folders");
+        println!("SKIPPED: `nobody` cannot start the binary, and root can write to read-only folders");
         return;
     };
     assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
     for word in ["cannot be written", "000002-of-000002.shard", "finished shards are kept"] {
-        assert!(stderr_text(&output).contains(word), "it does not say {word}: {}", stderr_text(&output));
+        assert!(stderr_text(&output).contains(word), "it lacks {word}: {}", stderr_text(&output));
     }
     let sweep = unprivileged(&["sweep", &file, "--out", &text(&out.join("deeper"))]).expect("it starts");
     assert_eq!(sweep.status.code(), Some(2), "{}", stderr_text(&sweep));

@@ -1,5 +1,5 @@
-//! Promise: `stylet gate` ends with 1 for a worsened algorithm and with 0 for the shipped one,
-//! whatever the seed; it says what changed and writes JUnit and JSON.
+//! Promise: `stylet gate` has exit code 1 for a degraded algorithm and 0 for the shipped one with any seed; it reports changes against
+//! the baseline and writes JUnit and JSON.
 
 mod support;
 
@@ -16,7 +16,7 @@ fn the_shipped_gates_pass_on_the_committed_baseline_and_on_ten_other_seeds() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{text}{}", stderr_text(&output));
     assert!(text.contains("No number differs"), "update the baseline with --update: {text}");
-    // None of these seeds had been looked at when the bounds were set.
+    // The bounds were set without these seeds.
     for seed in 21..=30 {
         let output = stylet(&["gate", &gates(), "--seed", &seed.to_string()]);
         assert!(output.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&output.stdout));
@@ -24,7 +24,7 @@ fn the_shipped_gates_pass_on_the_committed_baseline_and_on_ten_other_seeds() {
 }
 
 #[test]
-fn with_cusum_off_the_gate_fails_and_says_where() {
+fn the_gate_fails_without_cusum_and_names_the_score() {
     let scratch = Scratch::new("gate");
     // The shipped gates, over scenarios whose CUSUM is off.
     for folder in ["gates", "sweeps"] {
@@ -33,7 +33,7 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
     let mut originals = Vec::new();
     for name in ["three_layer_latex_constant.ron", "three_layer_latex_sinusoidal.ron"] {
         let scenario = fs::read_to_string(root().join("scenarios").join(name)).expect("a scenario");
-        // Either the scenario has a part on the algorithm, or all of it is defaults.
+        // The scenario either configures the algorithm or uses its defaults.
         let off = "cusum: (enabled: false)";
         let mut worse = scenario.replace("enhance: (", &format!("enhance: ({off}, "));
         if worse == scenario {
@@ -67,7 +67,7 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
     let json: serde_json::Value = serde_json::from_slice(&fs::read(json).expect("JSON")).expect("JSON");
     assert!(json.as_array().is_some_and(|all| all.iter().any(|one| one["passed"] == false)));
 
-    // Against the baseline of the worse one the good one differs, readably.
+    // The shipped algorithm differs from the baseline of the degraded one.
     for (name, scenario) in originals {
         scratch.file(name, scenario);
     }
@@ -84,7 +84,7 @@ fn with_cusum_off_the_gate_fails_and_says_where() {
 }
 
 #[test]
-fn wrong_gates_are_refused_with_their_place() {
+fn invalid_gates_are_rejected_with_line_and_column() {
     let scratch = Scratch::new("bad-gates");
     let scenario = root().join("scenarios/three_layer_latex_constant.ron");
     let good = format!(
@@ -102,11 +102,7 @@ fn wrong_gates_are_refused_with_their_place() {
         let output = stylet(&["gate", file.to_str().expect("a path")]);
         assert_eq!(output.status.code(), Some(2), "{}", stderr_text(&output));
         for word in words {
-            assert!(
-                stderr_text(&output).contains(word),
-                "{to} does not say {word}: {}",
-                stderr_text(&output)
-            );
+            assert!(stderr_text(&output).contains(word), "{to} lacks {word}: {}", stderr_text(&output));
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Promise: a sweep gives the same bytes for any number of threads, for any split into shards, and
-//! after being killed at any time or ended by Ctrl-C, and resumed. A trial run again alone has the scores of its row.
+//! Promise: a sweep gives the same bytes for any number of threads, for any split into shards, and when resumed after SIGKILL or
+//! Ctrl-C. Repeating one trial gives the scores of its row.
 
 mod support;
 
@@ -73,9 +73,9 @@ fn any_split_into_shards_in_any_order_gives_the_bytes_of_the_sequential_run() {
     }
 }
 
-/// Kills as many times as `STYLET_KILLS` says (20 by `tests/kill_twenty_times.sh`), 3 without it.
+/// Number of kills: `STYLET_KILLS` (20 in `tests/kill_twenty_times.sh`), 3 by default.
 #[test]
-fn a_sweep_killed_at_any_time_goes_on_and_ends_with_the_same_bytes() {
+fn a_killed_sweep_resumes_to_the_same_bytes() {
     let kills: u64 = std::env::var("STYLET_KILLS").ok().and_then(|k| k.parse().ok()).unwrap_or(3);
     let scratch = Scratch::new("sweep-kill");
     let trials = ["--trials", "4000"];
@@ -93,7 +93,7 @@ fn a_sweep_killed_at_any_time_goes_on_and_ends_with_the_same_bytes() {
             .expect("it starts");
         // From before the first shard to after the third, spread by the golden ratio.
         std::thread::sleep(Duration::from_millis((k * 618_034 % 1_000_000) / 1400));
-        // SIGKILL: nothing can be tidied up.
+        // SIGKILL leaves no time for cleanup.
         killed += u32::from(child.try_wait().expect("a state").is_none());
         let _ = child.kill();
         let _ = child.wait();
@@ -104,12 +104,12 @@ fn a_sweep_killed_at_any_time_goes_on_and_ends_with_the_same_bytes() {
 }
 
 #[test]
-fn a_sweep_ended_by_ctrl_c_goes_on_and_ends_with_the_same_bytes() {
+fn a_sweep_interrupted_by_ctrl_c_resumes_to_the_same_bytes() {
     let scratch = Scratch::new("sweep-ctrl-c");
     let trials = ["--trials", "6000"];
     let whole = sweep(&scratch.path().join("whole"), &trials);
     let out = scratch.path().join("ended");
-    // Through `env`, because a shell without a terminal hands SIGINT down as ignored.
+    // `env` restores SIGINT, which a shell without a terminal ignores.
     let mut child = Command::new("env")
         .args(["--default-signal=INT", env!("CARGO_BIN_EXE_stylet"), "sweep", &text(&noise())])
         .args(["--threads", "1", "--out", &text(&out)])

@@ -3,10 +3,9 @@
 
     python crates/sweep/distributed/ray_sweep.py SWEEP.ron --shards 64 --out DIR [--trials N] [--seed S] [--stylet PATH] [--address auto]
 
-Every shard is `stylet sweep run-shard I/N`, the same binary as on a laptop; DIR must be a folder that all nodes see. A shard is a
-pure function of its inputs and is written beside its place, synced and renamed: whatever is killed, starting this script again goes on
-with the shards that are missing, and the merged bytes are those of `stylet sweep` on one machine. A task whose worker dies is
-retried by Ray.
+Every shard is run by `stylet sweep run-shard I/N`; DIR must be a folder that all nodes can access. A shard is a function of its
+inputs and is written to a temporary file, synced and renamed. After an interruption, starting this script again runs the missing
+shards; the merged files have the same bytes as those of `stylet sweep` on one machine. Ray retries a task whose worker dies.
 """
 
 import argparse
@@ -33,18 +32,18 @@ def arguments():
 
 def main():
     args = arguments()
-    which = [os.path.abspath(args.sweep)]
+    sweep_arguments = [os.path.abspath(args.sweep)]
     for name in ("trials", "seed"):
         value = getattr(args, name)
         if value is not None:
-            which += [f"--{name}", str(value)]
+            sweep_arguments += [f"--{name}", str(value)]
     out, stylet, cpus = os.path.abspath(args.out), args.stylet, args.cpus
 
     ray.init(address=args.address, include_dashboard=False, log_to_driver=False)
 
     @ray.remote(num_cpus=cpus, max_retries=20)
     def run_shard(shard):
-        command = [stylet, "sweep", "run-shard", shard, *which, "--out", out, "--threads", str(cpus), "--resume"]
+        command = [stylet, "sweep", "run-shard", shard, *sweep_arguments, "--out", out, "--threads", str(cpus), "--resume"]
         done = subprocess.run(command, capture_output=True, text=True)
         return shard, done.returncode, done.stderr
 
@@ -53,12 +52,12 @@ def main():
     finished = 0
     while waiting:
         ready, waiting = ray.wait(waiting)
-        for shard, code, said in ray.get(ready):
+        for shard, code, stderr in ray.get(ready):
             if code != 0:
-                sys.exit(f"shard {shard} ended with {code}:\n{said}")
+                sys.exit(f"shard {shard}: exit code {code}:\n{stderr}")
             finished += 1
             print(f"{finished}/{args.shards} shards, {time.monotonic() - begin:.1f} s", flush=True)
-    sys.exit(subprocess.run([stylet, "sweep", "merge", *which, "--out", out]).returncode)
+    sys.exit(subprocess.run([stylet, "sweep", "merge", *sweep_arguments, "--out", out]).returncode)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-//! The same insertions, heard by several algorithms: one row per scenario and algorithm.
+//! Several algorithms on the same simulated insertions: one row of errors per scenario and algorithm.
 
 use crate::sampling_design::sampling_phase;
 use crate::trial_simulation::{self, Workspace};
@@ -19,7 +19,7 @@ pub struct DelayQuantiles {
     pub p95: Option<f64>,
 }
 
-/// Shares of true values in the core's 95 % intervals; `null` for an algorithm that gives none.
+/// Share of true values inside the 95 % intervals; `null` for an algorithm without intervals.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Coverage {
     /// Of stiffness, over layers.
@@ -35,7 +35,7 @@ pub struct Coverage {
 /// One row of the table.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ComparisonRow {
-    /// Scenario, or kind of case.
+    /// Scenario, or type of case.
     pub scenario: String,
     /// Algorithm.
     pub algorithm: String,
@@ -43,14 +43,14 @@ pub struct ComparisonRow {
     pub seeds: u64,
     /// True ruptures in all of them.
     pub ruptures: usize,
-    /// Ruptures that were not found.
+    /// Ruptures without a detection.
     pub missed: usize,
     /// Detections without a rupture.
     #[serde(rename = "false")]
     pub false_alarms: usize,
     /// Missed and false per rupture, with its 95 % interval.
     pub errors_per_rupture: [f64; 3],
-    /// Detected less true instant in s.
+    /// Detected minus true rupture time in s.
     pub delay_s: DelayQuantiles,
     /// Median relative error per layer.
     pub stiffness_error: Vec<Option<f64>>,
@@ -58,31 +58,31 @@ pub struct ComparisonRow {
     pub stiffness_error_interval: Vec<Option<[f64; 2]>>,
     /// Median relative error per layer.
     pub friction_error: Vec<Option<f64>>,
-    /// RMS of estimated less true friction over the RMS of the tip's force, median.
+    /// Median of the RMS of estimated minus true friction force, relative to the RMS of the tip force.
     pub enhancement_rms_relative: Option<f64>,
     /// The median's 95 % interval.
     pub enhancement_interval: Option<[f64; 2]>,
-    /// The same against the noise-free tip force.
+    /// The same for enhanced minus true tip force, sensor noise included.
     pub enhancement_with_noise: Option<f64>,
-    /// How often the truth lay in the intervals.
+    /// Coverage of the 95 % intervals.
     pub coverage: Coverage,
 }
 
-/// Detections of the insertions of one row, counted.
+/// Detections and errors of the insertions of one row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DetectionCounts {
-    /// Ruptures that were not found.
+    /// Ruptures without a detection.
     pub missed: usize,
     /// Detections without a rupture.
     pub false_alarms: usize,
-    /// Detected less true instants in s.
+    /// Detected minus true rupture times in s.
     pub delays_s: Vec<f64>,
     /// True ruptures.
     pub ruptures: usize,
 }
 
 impl ComparisonRow {
-    /// A row with what every row has; estimates are added where there is a truth for them.
+    /// A row with detection errors only; the caller adds estimates where true parameters are known.
     #[must_use]
     pub fn new(scenario: &str, algorithm: &str, seeds: u64, scored: &DetectionCounts) -> Self {
         let delays = stylet_stats::sorted(scored.delays_s.iter().copied());
@@ -101,7 +101,8 @@ impl ComparisonRow {
     }
 }
 
-/// Errors per rupture with a 95 % interval: Wilson's of a share, or a count's (normal) where there are more errors than ruptures.
+/// Errors per rupture with a 95 % interval: Wilson's, or the normal interval of a Poisson count where there are more errors than
+/// ruptures.
 fn per_rupture(errors: usize, ruptures: usize) -> [f64; 3] {
     let (n, of) = (errors as f64, ruptures as f64);
     if errors <= ruptures {
@@ -112,7 +113,7 @@ fn per_rupture(errors: usize, ruptures: usize) -> [f64; 3] {
     [n, (n - half).max(0.0), n + half].map(|x| x / of)
 }
 
-/// An algorithm by its name in scenarios.
+/// Name of an algorithm in scenario files.
 #[must_use]
 pub const fn algorithm_name(algorithm: Algorithm) -> &'static str {
     match algorithm {
@@ -122,9 +123,9 @@ pub const fn algorithm_name(algorithm: Algorithm) -> &'static str {
     }
 }
 
-/// The row of a scenario heard by an algorithm, over so many seeds from the scenario's own on; `done` is told of each insertion. A seed
-/// draws the noise, and where within a sampling step the motion begins: a face is never at the same place between two samples,
-/// as it would be if the robot started with the sensor's clock. What a seed draws is the same for every algorithm.
+/// Runs an algorithm on a scenario with `seeds` seeds, counted from the scenario's; calls `done` after each insertion. A seed draws the
+/// noise and the sampling phase, the position of the samples relative to the start of the motion, so that faces do not always coincide
+/// with samples. The draws of a seed are the same for every algorithm.
 ///
 /// # Errors
 /// [`SimulateError`] when the scenario cannot be replayed.
@@ -136,7 +137,7 @@ pub fn compare_algorithm(
 ) -> Result<ComparisonRow, SimulateError> {
     let mut scenario = scenario.clone();
     scenario.enhance.algorithm = algorithm;
-    // In the order of the seeds, whatever the threads: the same bytes.
+    // In the order of the seeds, so that the bytes do not depend on the threads.
     let scores: Vec<Score> = (0..seeds)
         .into_par_iter()
         .map_init(Workspace::default, |workspace, seed| {

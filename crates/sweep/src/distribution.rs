@@ -1,5 +1,4 @@
-//! How a quantity is distributed. Every distribution is drawn by its quantile function, so that
-//! plain random, Latin hypercube and Sobol points serve alike.
+//! Distributions of drawn quantities. Each is sampled by its quantile function, so that every sampling design can be used.
 
 use serde::{Deserialize, Serialize};
 use stylet_scenario::FieldError;
@@ -8,9 +7,9 @@ use stylet_scenario::FieldError;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Distribution {
-    /// Every value between the two is as likely as any other.
+    /// Uniform between the two values.
     Uniform(f64, f64),
-    /// The logarithm is uniform between the two, which are positive.
+    /// The logarithm is uniform between the two positive values.
     LogUniform(f64, f64),
     /// Gaussian.
     Normal {
@@ -26,7 +25,7 @@ pub enum Distribution {
         /// Standard deviation of the natural logarithm.
         sd_log: f64,
     },
-    /// Rises from `min` to `mode` and falls to `max`.
+    /// Triangular density.
     Triangular {
         /// Smallest value.
         min: f64,
@@ -35,15 +34,15 @@ pub enum Distribution {
         /// Largest value.
         max: f64,
     },
-    /// One of the values, each as likely as any other.
+    /// One of the values with equal probability.
     Choice(Vec<f64>),
 }
 
 impl Distribution {
-    /// Checks the parameters; `path` is where the distribution stands.
+    /// Checks the parameters; `path` is the path of the field for the error.
     ///
     /// # Errors
-    /// [`Problem`] with what would be right.
+    /// [`Problem`] that names the valid range.
     pub fn check(&self, path: &str) -> Result<(), FieldError> {
         let fail = |what: String| Err(FieldError::new(path, what));
         let numbers: Vec<f64> = match self {
@@ -71,14 +70,14 @@ impl Distribution {
                 fail(format!("has sd_log {sd_log}; it must be zero or positive"))
             }
             Self::Triangular { min, mode, max } if !(min <= mode && mode <= max) => {
-                fail(format!("has min {min}, mode {mode}, max {max}; they must stand in this order"))
+                fail(format!("has min {min}, mode {mode}, max {max}; they must be in ascending order"))
             }
             Self::Choice(values) if values.is_empty() => fail("offers no value; give at least one".into()),
             _ => Ok(()),
         }
     }
 
-    /// The value below which a share `u` of the draws lies, `0 < u < 1`.
+    /// The `u`-quantile, `0 < u < 1`.
     #[must_use]
     pub fn quantile(&self, u: f64) -> f64 {
         match self {

@@ -1,11 +1,11 @@
-//! From the number of a trial to its scenario.
+//! Draws the scenario of a trial from its number.
 
 use crate::sampling_design::{SamplingDesign, trial_seed};
 use crate::scenario_field;
 use crate::sweep_file::Sweep;
 use stylet_scenario::Scenario;
 
-/// Draws in a row that no scenario allows before the sweep gives up.
+/// Consecutive invalid draws after which the sweep fails.
 pub const MAX_DRAW_ATTEMPTS: u32 = 100;
 
 /// A trial that is ready to run.
@@ -15,7 +15,7 @@ pub struct DrawnTrial {
     pub trial: u64,
     /// Seed of its noise.
     pub seed: u64,
-    /// Draws that were thrown away because no scenario allows them.
+    /// Draws rejected because they make no valid scenario.
     pub redrawn: u32,
     /// Values of `vary`, then 1 or 0 for each effect of the sweep.
     pub values: Vec<f64>,
@@ -23,15 +23,15 @@ pub struct DrawnTrial {
     pub scenario: Scenario,
 }
 
-/// Every draw of a trial was out of range.
+/// Every draw of a trial was invalid.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error(
-    "trial {trial}: {MAX_DRAW_ATTEMPTS} draws in a row make no scenario; the last: {why}; narrow the distributions"
+    "trial {trial}: {MAX_DRAW_ATTEMPTS} consecutive draws make no valid scenario; the last: {why}; narrow the distributions"
 )]
 pub struct DrawError {
     /// Number of the trial.
     pub trial: u64,
-    /// What was wrong with the last draw.
+    /// Why the last draw is invalid.
     pub why: String,
 }
 
@@ -43,17 +43,17 @@ pub struct TrialSampler<'a> {
 }
 
 impl<'a> TrialSampler<'a> {
-    /// For a sweep.
+    /// A sampler of the sweep's trials.
     #[must_use]
     pub fn new(sweep: &'a Sweep) -> Self {
         let file = &sweep.file;
         Self { sweep, design: SamplingDesign::new(file.sampling, file.seed, file.trials, sweep.dimensions()) }
     }
 
-    /// Trial `trial`: a function of scenario, sweep, seed and its number alone.
+    /// Trial `trial`, a function of scenario, sweep, seed and trial number.
     ///
     /// # Errors
-    /// [`DrawError`] when no draw is one that a scenario allows.
+    /// [`DrawError`] when no draw is valid.
     pub fn draw(&self, trial: u64) -> Result<DrawnTrial, DrawError> {
         let mut point = vec![0.0; self.sweep.dimensions()];
         let mut why = String::new();
@@ -92,7 +92,7 @@ impl<'a> TrialSampler<'a> {
                 || on.get(index - 1 - sweep.scenario_effects).copied().unwrap_or(false)
         });
         if !sweep.fields.iter().any(|f| f.path() == "physics_hz") {
-            // The replay takes no physics steps; the scenario stays one that the slide can run.
+            // The replay takes no physics steps; the rate is kept valid for the rigid-body simulation.
             let steps = libm::rint(sweep.template.physics_hz / scenario.sample_hz).max(1.0);
             scenario.physics_hz = steps * scenario.sample_hz;
         }

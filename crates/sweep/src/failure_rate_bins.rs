@@ -1,4 +1,4 @@
-//! Failures along a drawn quantity: the rows of the robustness map.
+//! Failure rates binned over a drawn quantity: the rows of the failure map.
 
 use crate::summary::score_column;
 use crate::sweep_file::Sweep;
@@ -7,19 +7,19 @@ use crate::trial_table::TrialTable;
 use stylet_stats::number_format::significant;
 use stylet_stats::{Interval, wilson};
 
-/// Bins of a drawn quantity.
+/// Number of bins.
 pub const BIN_COUNT: usize = 10;
 
 /// One bin of a drawn quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FailureRateBin {
-    /// The quantity in the middle row.
+    /// Median of the quantity in the bin.
     pub middle: f64,
-    /// The share of failed insertions, with its 95 % interval.
+    /// Share of failed insertions with its 95 % interval.
     pub failed: Interval,
 }
 
-/// Rows in groups of equal size along a drawn quantity; those of an effect that is off are left out.
+/// Failure rates in bins of equal size over drawn quantity `quantity`; trials in which the effect of the quantity is off are excluded.
 ///
 /// # Errors
 /// When the rows cannot be read.
@@ -49,16 +49,16 @@ pub fn failure_rate_bins<T: TrialTable + ?Sized>(
     Ok(kept.chunks(size).map(bin).collect())
 }
 
-/// A row of the robustness map.
+/// A row of the failure map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FailureMapRow {
-    /// Sweep and quantity with its range.
+    /// Quantity with its range.
     pub name: String,
-    /// Share of failed insertions per tenth of the draws, in %.
+    /// Share of failed insertions per bin, in %.
     pub failed_percent: Vec<f64>,
 }
 
-/// Rows of the robustness map that a sweep gives: one per drawn quantity.
+/// The rows of the failure map of a sweep, one per drawn quantity that is not constant.
 #[must_use]
 pub fn failure_map_rows(sweep: &Sweep, columns: &Columns, rows: &[TrialRow]) -> Vec<FailureMapRow> {
     (0..sweep.fields.len())
@@ -77,7 +77,7 @@ pub fn failure_map_rows(sweep: &Sweep, columns: &Columns, rows: &[TrialRow]) -> 
         .collect()
 }
 
-/// A quantity as people read it: an effect's by the effect's name.
+/// Short label of a quantity; that of an effect starts with the effect's id.
 fn name(sweep: &Sweep, quantity: usize) -> String {
     use stylet_tissue::Effect;
     let Some(field) = sweep.fields.get(quantity) else { return String::new() };

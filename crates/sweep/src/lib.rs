@@ -1,8 +1,8 @@
-//! Monte Carlo: a sweep draws scenarios, runs each through the kinematic replay, scores it, and tells
-//! which drawn quantity explains the failures.
+//! Monte Carlo sweeps over scenarios: draws trials, simulates and scores each by kinematic replay, and estimates the sensitivity of
+//! failures to the drawn quantities.
 //!
-//! A trial is a function of scenario, sweep, seed and its number alone; a shard is a range of trials.
-//! The same inputs give the same bytes for any number of threads and any split into shards.
+//! A trial is a function of scenario, sweep, seed and trial number; a shard is a range of trials. The same inputs give the same
+//! bytes for any number of threads and any split into shards.
 #![forbid(unsafe_code)]
 
 pub mod algorithm_comparison;
@@ -19,6 +19,7 @@ pub mod sensitivity;
 pub mod shard;
 mod summary;
 mod sweep_file;
+mod trial_csv;
 mod trial_row;
 pub mod trial_simulation;
 mod trial_table;
@@ -36,5 +37,10 @@ pub use summary::{
     summarise,
 };
 pub use sweep_file::{Overrides, RandomEffect, Sweep, SweepFile, VariedField};
-pub use trial_row::{Columns, TrialRow, write_csv};
+pub use trial_csv::write_csv;
+pub use trial_row::{Columns, TrialRow};
 pub use trial_table::{DiskTrialTable, TrialTable, TrialTableWriter};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

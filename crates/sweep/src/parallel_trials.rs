@@ -1,4 +1,4 @@
-//! Trials in parallel: the rows of a range, in order, the same bits for any number of threads.
+//! Runs trials in parallel. Rows are in order and have the same bits for any number of threads.
 
 use crate::draw_trial::{DrawError, TrialSampler};
 use crate::sweep_file::Sweep;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use stylet_testbed::SimulateError;
 
-/// Why a trial gives no row.
+/// Error of a trial.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
     /// No draw was valid.
@@ -24,13 +24,13 @@ pub enum TrialError {
     },
 }
 
-/// Trials that a thread takes at once.
+/// Trials per task.
 const CHUNK: u64 = 16;
 
-/// Runs the trials of `range` in the present thread pool; `done` is told of finished trials.
+/// Runs the trials of `range` in the current thread pool; `done` is called with the number of finished trials.
 ///
 /// # Errors
-/// The [`TrialError`] of the first trial that gives no row.
+/// The [`TrialError`] of the first trial that failed.
 pub fn run_trials(
     sweep: &Sweep,
     columns: &Columns,
@@ -69,10 +69,10 @@ fn one(
     Ok(columns.row(&drawn, &score))
 }
 
-/// As [`rows`] in a pool of its own with `threads` threads; 0 is one per core.
+/// As [`run_trials`] in a pool with `threads` threads; 0 means one per core.
 ///
 /// # Errors
-/// As [`rows`]; a pool that cannot be made falls back to the present one.
+/// As [`run_trials`]; if the pool cannot be created, the current one is used.
 pub fn run_trials_with_threads(
     sweep: &Sweep,
     columns: &Columns,

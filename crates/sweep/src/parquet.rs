@@ -1,4 +1,4 @@
-//! `trials.parquet`: the same table as `trials.csv`, one column per name, nulls for what does not exist.
+//! `trials.parquet`: the table of `trials.csv`, with nulls for missing values.
 
 use crate::trial_row::Columns;
 use crate::trial_table::TrialTable;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Writes the table as a Parquet file, the same bytes for the same rows.
 ///
 /// # Errors
-/// What the destination or the rows say; no table of a sweep makes the Parquet library say anything.
+/// An I/O error of the destination or of the rows.
 pub fn write_parquet<T: TrialTable + ?Sized>(
     columns: &Columns,
     rows: &T,
@@ -55,7 +55,7 @@ fn written<T: TrialTable + ?Sized>(
     let mut index = 0;
     while let Some(mut column) = group.next_column()? {
         if index < 3 {
-            // Seeds keep their 64 bits: those beyond the signed range come out negative.
+            // Seeds keep their 64 bits; those beyond the signed range are stored as negative numbers.
             let mut whole: Vec<i64> = Vec::with_capacity(rows.count());
             rows.for_each_row(|r| whole.push([r.trial, r.seed, r.redrawn][index] as i64)).map_err(read)?;
             column.typed::<Int64Type>().write_batch(&whole, None, None)?;
@@ -76,7 +76,8 @@ fn written<T: TrialTable + ?Sized>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Overrides, Sweep, run_trials_with_threads};
+    use crate::parallel_trials::run_trials_with_threads;
+    use crate::sweep_file::{Overrides, Sweep};
     use parquet::file::reader::SerializedFileReader;
     use parquet::record::Field;
     use std::path::Path;

@@ -1,27 +1,26 @@
-//! Points in the unit cube: what trial `k` draws from. Each point is a function of seed, trial and
-//! number of trials, never of the trials before it.
+//! Points of a sampling design in the unit cube. Each point is a function of seed, trial and number of trials.
 
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// How the points are spread.
+/// Sampling method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
     /// Independent random draws.
     #[default]
     Random,
-    /// Every quantity meets each of as many equally likely strata as there are trials exactly once.
+    /// Latin hypercube: each of `trials` equally likely strata of every quantity is sampled once.
     LatinHypercube,
-    /// Sobol's sequence (direction numbers of Joe and Kuo 2008) with a random digital shift: the
-    /// most even cover for up to [`SOBOL_DIMENSIONS`] quantities.
+    /// Sobol sequence (direction numbers of Joe and Kuo 2008) with a random digital shift, for up to [`MAX_SOBOL_DIMENSIONS`]
+    /// quantities.
     Sobol,
 }
 
 /// Largest number of quantities for [`Sampling::Sobol`].
 pub const MAX_SOBOL_DIMENSIONS: usize = 21;
 
-/// Streams of the generator, one per purpose.
+/// Streams of the random number generator.
 const POINT: u64 = 1;
 const REDRAW: u64 = 2;
 const SHIFT: u64 = 3;
@@ -38,7 +37,7 @@ fn open_unit(bits: u64) -> f64 {
     ((bits >> 12) as f64 + 0.5) * (1.0 / 4_503_599_627_370_496.0)
 }
 
-/// SplitMix64's finaliser: scatters the bits of a number.
+/// One step of SplitMix64 (Steele, Lea and Flood 2014): a hash of `x`.
 #[must_use]
 pub fn splitmix64(x: u64) -> u64 {
     let mut x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -47,25 +46,25 @@ pub fn splitmix64(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Seed of a trial's own random numbers: the noise.
+/// Seed of the noise of a trial.
 #[must_use]
 pub fn trial_seed(seed: u64, trial: u64) -> u64 {
     splitmix64(splitmix64(seed) ^ trial)
 }
 
-/// Where within a sampling step the motion of an insertion with this seed begins, 0 to 1.
+/// Time of the first sample after the start of the motion, in sampling steps (0 to 1), drawn from `seed`.
 #[must_use]
 pub fn sampling_phase(seed: u64) -> f64 {
     open_unit(generator(seed, CLOCK, 0).next_u64())
 }
 
-/// Makes the points of one sweep.
+/// Generates the points of one sweep.
 #[derive(Clone, Debug)]
 pub struct SamplingDesign {
     sampling: Sampling,
     seed: u64,
     trials: u64,
-    /// Per dimension: random shift of Sobol's digits.
+    /// Random digital shift per dimension of the Sobol sequence.
     shifts: Vec<u32>,
     directions: Vec<[u32; 32]>,
 }
@@ -84,8 +83,8 @@ impl SamplingDesign {
         design
     }
 
-    /// Point of trial `trial`, every coordinate above 0 and below 1. `attempt` counts from zero;
-    /// later attempts, after draws that no scenario allows, are plain random ones.
+    /// Point of trial `trial`, every coordinate above 0 and below 1. `attempt` counts from zero; attempts after the first, which follow
+    /// draws of invalid scenarios, are independent random points.
     pub fn point(&self, trial: u64, attempt: u32, point: &mut [f64]) {
         if attempt > 0 {
             let mut generator =
@@ -123,8 +122,8 @@ impl SamplingDesign {
     }
 }
 
-/// Where `index` goes in a random order of `0..count`: a Feistel cipher on the next power of four,
-/// walked until it lands inside, so that no list of the whole order is needed.
+/// Position of `index` in a random permutation of `0..count`: a Feistel cipher on the next power of four, iterated until the result is
+/// in range (cycle walking), so that the permutation need not be stored.
 fn permuted(index: u64, count: u64, key: u64) -> u64 {
     let half = (64 - count.saturating_sub(1).leading_zeros()).div_ceil(2).max(1);
     let mask = (1_u64 << half) - 1;
@@ -198,7 +197,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn motions_begin_anywhere_within_a_sampling_step_and_at_the_same_place_for_a_seed() {
+    fn sampling_phases_cover_the_step_and_repeat_for_a_seed() {
         let tenth = |seed: u64| (10.0 * super::sampling_phase(seed)) as usize;
         let mut found = [false; 10];
         (0..400).for_each(|seed| found[tenth(seed)] = true);
@@ -225,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_latin_hypercube_meets_every_stratum_once_in_every_dimension() {
+    fn a_latin_hypercube_samples_every_stratum_once_in_every_dimension() {
         for trials in [1, 2, 7, 100, 1000] {
             for d in 0..5 {
                 let values = column(Sampling::LatinHypercube, trials, 5, d);
@@ -239,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn sobol_meets_every_dyadic_stratum_equally_in_every_dimension_and_in_pairs() {
+    fn sobol_points_fill_dyadic_strata_equally_in_one_and_two_dimensions() {
         for d in 0..MAX_SOBOL_DIMENSIONS {
             let values = column(Sampling::Sobol, 1024, MAX_SOBOL_DIMENSIONS, d);
             assert_eq!(counts(&values, 1024), vec![1; 1024], "dimension {d}");
@@ -254,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn points_do_not_depend_on_those_before_them_and_seeds_differ() {
+    fn points_are_independent_of_the_calls_before_and_differ_between_seeds() {
         for sampling in [Sampling::Random, Sampling::LatinHypercube, Sampling::Sobol] {
             let (mut a, mut b) = ([0.0; 3], [0.0; 3]);
             let design = SamplingDesign::new(sampling, 1, 50, 3);

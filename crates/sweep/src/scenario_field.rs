@@ -1,8 +1,7 @@
-//! A field of the scenario by its path: found against the schema, set per trial.
+//! A numeric field of a scenario addressed by its path, such as `tissue.layers[1].stiffness_n_per_m`.
 //!
-//! The scenario's own types say which fields there are: the scenario is written as a tree of values,
-//! the path is followed in it, and a field that is not there (an option left out) is tried by reading
-//! the tree back. A trial reads back only the section that the field is in.
+//! The scenario's types define which fields exist: the scenario is serialised to a JSON tree and the path is followed in it. A missing
+//! optional field is validated by deserialising the tree. A trial deserialises only the sections with drawn fields.
 
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -15,12 +14,12 @@ enum Step {
     Index(usize),
 }
 
-/// What a field holds.
+/// Type of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum FieldType {
     Number,
-    Whole,
-    Switch,
+    Integer,
+    Boolean,
 }
 
 /// Sections of a scenario that a field may be in.
@@ -32,21 +31,21 @@ const SECTIONS: [&str; 8] =
 pub struct ScenarioField {
     path: String,
     steps: Vec<Step>,
-    kind: Kind,
+    field_type: FieldType,
 }
 
 impl ScenarioField {
-    /// Finds a field; the error says what there is instead.
+    /// Finds a field.
     ///
     /// # Errors
-    /// A sentence with the closest spelling and the fields that exist at that level.
+    /// A message with the closest spelling and the fields that exist at that level.
     pub fn find(scenario: &Scenario, path: &str) -> Result<Self, String> {
         let steps = split(path)?;
         let mut tree = serde_json::to_value(scenario).map_err(|e| e.to_string())?;
         match steps.first() {
             Some(Step::Name(first)) if SECTIONS.contains(&first.as_str()) => {}
             Some(Step::Name(first)) if first == "seed" => {
-                return Err("`seed` is not drawn: every trial has a seed of its own".to_owned());
+                return Err("`seed` is not drawn: every trial has its own seed".to_owned());
             }
             first => {
                 let found = match first {
@@ -99,10 +98,10 @@ impl ScenarioField {
                 }
             }
         }
-        let kind = match place {
-            Value::Number(n) if n.is_f64() => Kind::Number,
-            Value::Number(_) => Kind::Whole,
-            Value::Bool(_) => Kind::Switch,
+        let field_type = match place {
+            Value::Number(n) if n.is_f64() => FieldType::Number,
+            Value::Number(_) => FieldType::Integer,
+            Value::Bool(_) => FieldType::Boolean,
             Value::Object(fields) => {
                 let names: Vec<String> = content(fields).keys().cloned().collect();
                 return Err(format!(
@@ -118,8 +117,8 @@ impl ScenarioField {
             }
             Value::Null => return Err(format!("`{path}` has no value that could be drawn")),
         };
-        let field = Self { path: path.to_owned(), steps, kind };
-        // An option that was left out must be one that the schema has.
+        let field = Self { path: path.to_owned(), steps, field_type };
+        // A missing optional field must exist in the schema.
         serde_json::from_value::<Scenario>(tree).map_err(|e| format!("`{path}`: {e}"))?;
         Ok(field)
     }
@@ -130,25 +129,25 @@ impl ScenarioField {
         &self.path
     }
 
-    /// The value as the field can hold it: whole numbers are rounded, switches are 0 or 1.
+    /// The value converted to the type of the field: integers are rounded, booleans are 0 or 1.
     #[must_use]
     pub fn round_to_type(&self, value: f64) -> f64 {
-        match self.kind {
-            Kind::Number => value,
-            Kind::Whole => libm::rint(value).max(0.0),
-            Kind::Switch => f64::from(value >= 0.5),
+        match self.field_type {
+            FieldType::Number => value,
+            FieldType::Integer => libm::rint(value).max(0.0),
+            FieldType::Boolean => f64::from(value >= 0.5),
         }
     }
 
     fn value(&self, value: f64) -> Value {
-        match self.kind {
-            Kind::Number => Value::from(value),
-            Kind::Whole => Value::from(self.round_to_type(value) as u64),
-            Kind::Switch => Value::from(value >= 0.5),
+        match self.field_type {
+            FieldType::Number => Value::from(value),
+            FieldType::Integer => Value::from(self.round_to_type(value) as u64),
+            FieldType::Boolean => Value::from(value >= 0.5),
         }
     }
 
-    /// Index of the effect that the field belongs to, if it does.
+    /// Index of the effect that the field belongs to, if any.
     #[must_use]
     pub fn effect_index(&self) -> Option<usize> {
         match self.steps.as_slice() {
@@ -161,7 +160,7 @@ impl ScenarioField {
 /// Sets fields of a scenario, section by section.
 ///
 /// # Errors
-/// A sentence when a value does not fit; fields that were found do not fail.
+/// A message when a value does not fit the type of its field.
 pub fn set_fields(scenario: &mut Scenario, fields: &[ScenarioField], values: &[f64]) -> Result<(), String> {
     for section in SECTIONS {
         let mine: Vec<(&ScenarioField, f64)> = fields
@@ -236,7 +235,7 @@ fn is_variant(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_uppercase())
 }
 
-/// Past the name of a variant: a path does not write it.
+/// Skips the name of an enum variant, which a path does not contain.
 fn inner(place: &mut Value) -> &mut Value {
     let variant = match &*place {
         Value::Object(fields) if fields.len() == 1 => fields.keys().next().filter(|k| is_variant(k)).cloned(),
@@ -255,8 +254,8 @@ fn content(fields: &Map<String, Value>) -> &Map<String, Value> {
     }
 }
 
-/// All fields that the schema has at a level, options left out included: reading a field that no type
-/// has makes the schema list its own.
+/// All fields of the schema at a level, missing optional ones included: deserialising an unknown field makes serde list the known
+/// ones.
 fn known_here(scenario: &Scenario, steps: &[Step]) -> Vec<String> {
     let Ok(mut tree) = serde_json::to_value(scenario) else { return Vec::new() };
     let mut place = &mut tree;

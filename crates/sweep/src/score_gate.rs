@@ -1,7 +1,7 @@
-//! Gates: scenarios or sweeps with bounds on their scores, for CI (SPEC section 8).
+//! Gates: scenarios or sweeps with bounds on their scores, for CI. Format: docs/reference/files.md, section "Gates".
 //!
-//! A bound is judged by the unfavourable end of the statistic's 95 % interval: a rate that might be
-//! too high, given how many insertions were run, does not pass.
+//! A bound is compared with the unfavourable end of the statistic's 95 % interval: a rate that could be too high, given the number of
+//! insertions, fails.
 
 use crate::parallel_trials::{TrialError, run_trials};
 use crate::summary::score_value;
@@ -13,14 +13,14 @@ use std::path::{Path, PathBuf};
 use stylet_scenario::{FieldError, InputError, Scenario, closest_name, parse, read_text};
 use stylet_stats::{Interval, mean_interval, quantile_interval, sorted, wilson};
 
-/// What is made of a score over the insertions.
+/// Statistic of a score over the insertions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Statistic {
     /// Sum over all insertions, exact: the default for `missed`, `false` and `hits_are_chance`.
     Total,
     /// `missed` per rupture; for other counts the share of insertions that have any. Wilson interval.
     Rate,
-    /// Median, interval between order statistics: the default for all else.
+    /// Median, interval between order statistics: the default for other scores.
     Median,
     /// 95th percentile, interval between order statistics.
     P95,
@@ -36,7 +36,7 @@ pub enum Statistic {
 pub struct Expectation {
     /// Path of the score in `score.json`, such as `layers[1].stiffness_n_per_m.relative_error`.
     pub score: String,
-    /// What is made of it.
+    /// Statistic; the default depends on the score.
     #[serde(default)]
     pub statistic: Option<Statistic>,
     /// Upper bound.
@@ -47,7 +47,7 @@ pub struct Expectation {
     pub at_least: Option<f64>,
 }
 
-/// Insertions and what is expected of them.
+/// Insertions and the bounds on their scores.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gate {
@@ -60,7 +60,7 @@ pub struct Gate {
     /// Sweep file in place of a scenario.
     #[serde(default)]
     pub sweep: Option<PathBuf>,
-    /// Trials in place of the sweep's own number.
+    /// Number of trials in place of the sweep's.
     #[serde(default)]
     pub trials: Option<u64>,
     /// The bounds.
@@ -72,7 +72,7 @@ pub struct Gate {
 #[serde(rename = "Gates")]
 pub struct GatesFile(pub Vec<Gate>);
 
-/// A bound and how it was met.
+/// A bound and its result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GateResult {
     /// File of the gate, as written.
@@ -83,25 +83,25 @@ pub struct GateResult {
     pub statistic: Statistic,
     /// Insertions that have the score.
     pub insertions: usize,
-    /// What was found.
+    /// Value and interval of the statistic.
     pub found: Option<Interval>,
     /// Upper bound.
     pub at_most: Option<f64>,
     /// Lower bound.
     pub at_least: Option<f64>,
-    /// Whether the bounds hold for the interval's unfavourable end.
+    /// Whether the unfavourable end of the interval is within the bounds.
     pub passed: bool,
 }
 
 impl GateResult {
-    /// Name without the numbers: what a baseline is looked up by.
+    /// Key in the baseline: gate, score and statistic.
     #[must_use]
     pub fn name(&self) -> String {
         format!("{} {} {:?}", self.gate, self.score, self.statistic)
     }
 }
 
-/// A gate ready to run.
+/// A validated gate.
 #[derive(Clone, Debug)]
 pub struct LoadedGate {
     name: String,
@@ -113,12 +113,12 @@ pub struct LoadedGate {
 /// of every gate.
 ///
 /// # Errors
-/// [`InputError`] with file, line, column, what is wrong and what would be right.
+/// [`InputError`] with file, line, column, the problem and its remedy.
 pub fn load(path: &Path, seed: Option<u64>) -> Result<Vec<LoadedGate>, InputError> {
     let text = read_text(path)?;
     let shown = path.display().to_string();
     let file: GatesFile = parse(&shown, &text)?;
-    let beside = path.parent().unwrap_or(Path::new(""));
+    let folder = path.parent().unwrap_or(Path::new(""));
     if file.0.is_empty() {
         return Err(InputError::file(
             &shown,
@@ -131,12 +131,12 @@ pub fn load(path: &Path, seed: Option<u64>) -> Result<Vec<LoadedGate>, InputErro
         let at = |field: &str| format!("[{i}].{field}");
         let (named, sweep) = match (&gate.run, &gate.sweep) {
             (Some(run), None) => {
-                let scenario = Scenario::load(&beside.join(run))?;
+                let scenario = Scenario::load(&folder.join(run))?;
                 let trials = gate.seeds.unwrap_or(200);
                 let file = SweepFile {
                     scenario: run.clone(),
                     trials,
-                    sampling: crate::Sampling::Random,
+                    sampling: crate::sampling_design::Sampling::Random,
                     seed: seed.unwrap_or(scenario.seed),
                     vary: Vec::new(),
                     effects: Vec::new(),
@@ -150,7 +150,7 @@ pub fn load(path: &Path, seed: Option<u64>) -> Result<Vec<LoadedGate>, InputErro
             }
             (None, Some(file)) => {
                 let overrides = Overrides { trials: gate.trials, seed };
-                (file, Sweep::load(&beside.join(file), overrides)?)
+                (file, Sweep::load(&folder.join(file), overrides)?)
             }
             _ => {
                 let what = "names both a scenario and a sweep, or neither; give one of `run` and `sweep`";
@@ -196,10 +196,10 @@ impl LoadedGate {
         self.sweep.trials()
     }
 
-    /// Runs the gate's insertions and judges them.
+    /// Runs the gate's insertions and evaluates the bounds.
     ///
     /// # Errors
-    /// [`TrialError`] when a trial gives no row.
+    /// [`TrialError`] when a trial fails.
     pub fn run(&self, done: &(dyn Fn(u64) + Sync)) -> Result<Vec<GateResult>, TrialError> {
         let columns = Columns::new(&self.sweep);
         let rows = run_trials(&self.sweep, &columns, 0..self.sweep.trials(), done)?;
@@ -224,7 +224,7 @@ impl LoadedGate {
             Statistic::Mean => mean_interval(&all),
             Statistic::Worst => all.last().map(|x| exact(*x)),
         };
-        // A score that no insertion has passes no bound.
+        // A score that no insertion has fails.
         let passed = found.is_some_and(|f| {
             e.at_most.is_none_or(|bound| f.high <= bound) && e.at_least.is_none_or(|bound| f.low >= bound)
         });
@@ -241,16 +241,16 @@ impl LoadedGate {
     }
 }
 
-/// Found intervals by name: the committed baseline.
+/// Intervals by name: the committed baseline.
 pub type Baseline = BTreeMap<String, Interval>;
 
-/// The baseline that these results would be.
+/// The baseline of these results.
 #[must_use]
 pub fn baseline(judged: &[GateResult]) -> Baseline {
     judged.iter().filter_map(|j| Some((j.name(), j.found?))).collect()
 }
 
-/// What changed against a baseline, one line each; nothing when all numbers are the same.
+/// Changes against a baseline, one line each; empty when all values are the same.
 #[must_use]
 pub fn baseline_changes(old: &Baseline, new: &Baseline) -> Vec<String> {
     let show = |i: &Interval| stylet_stats::number_format::significant(i.value, 4);
@@ -258,7 +258,7 @@ pub fn baseline_changes(old: &Baseline, new: &Baseline) -> Vec<String> {
     for (name, now) in new {
         match old.get(name) {
             None => lines.push(format!("+ {name}: {} (new)", show(now))),
-            // A number read back from a file may differ in its last bit.
+            // A value read from a file may differ in its last bit.
             Some(before) if (before.value - now.value).abs() > 1e-12 * now.value.abs() => {
                 let share = if before.value != 0.0 {
                     format!(" ({:+.1} %)", 100.0 * (now.value - before.value) / before.value.abs())
@@ -305,7 +305,7 @@ pub fn junit_xml(judged: &[GateResult]) -> String {
     xml
 }
 
-/// A bound and what was found, in one line.
+/// A bound and its result in one line.
 #[must_use]
 pub fn describe_result(j: &GateResult) -> String {
     let number = |x: f64| stylet_stats::number_format::significant(x, 4);

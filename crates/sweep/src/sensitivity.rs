@@ -1,9 +1,8 @@
 //! First-order sensitivity.
 
-/// First-order Sobol index of `x` for `y`: the share of the variance of `y` that the mean of `y` given
-/// `x` explains. The sample is cut into about `sqrt(n)/2` groups (4 to 40) of equal size along `x`,
-/// equal values staying together; what groups of that size explain by chance is taken off (the
-/// correlation ratio's epsilon squared), so that an idle quantity comes out around zero.
+/// First-order Sobol index of `x` for `y`: the share of the variance of `y` explained by the mean of `y` given `x`. Estimated by the
+/// correlation ratio over about `sqrt(n)/2` groups (4 to 40) of equal size along `x`, ties in one group, corrected for chance (epsilon
+/// squared), so that a quantity without influence gives about zero.
 #[must_use]
 pub fn first_order(x: &[f64], y: &[f64]) -> Option<f64> {
     let n = x.len().min(y.len());

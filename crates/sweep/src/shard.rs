@@ -1,7 +1,7 @@
-//! Shards: ranges of trials in files of their own, each a pure function of its inputs. Written under
-//! another name, synced and renamed, so that a file that is there is whole; checked when read.
+//! Shards: files with the rows of a range of trials, each a function of its inputs. A file is written under a temporary name, synced
+//! and renamed, so that an existing file is complete; it is checked when read.
 //!
-//! A file is one line of JSON (the header), then the rows as little-endian 64-bit numbers.
+//! Format: one line of JSON (the header), then the rows as little-endian 64-bit numbers.
 
 use crate::sweep_file::{Sweep, hex};
 use crate::trial_row::{Columns, TrialRow};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Folder of the shards within a sweep's output.
 pub const SHARD_FOLDER: &str = "shards";
 
-/// What a shard says of itself.
+/// Header of a shard file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
     stylet_shard: u32,
@@ -32,7 +32,7 @@ struct Header {
     sha256: String,
 }
 
-/// Why a shard is refused.
+/// Error of a shard file.
 #[derive(Debug, thiserror::Error)]
 pub enum ShardError {
     /// It cannot be written.
@@ -40,10 +40,10 @@ pub enum ShardError {
     Write {
         /// File or folder.
         path: String,
-        /// What the system says.
+        /// The I/O error.
         why: io::Error,
     },
-    /// It is not there.
+    /// It does not exist.
     #[error(
         "{path}: shard {shard} of {of} is missing; make it with: stylet sweep run-shard {shard}/{of} ..."
     )]
@@ -52,10 +52,10 @@ pub enum ShardError {
         path: String,
         /// Its number, from 1.
         shard: u64,
-        /// How many there are.
+        /// Number of shards.
         of: u64,
     },
-    /// There are none at all.
+    /// There are none.
     #[error("{path}: holds no shards; make them with: stylet sweep run-shard 1/N ...")]
     None {
         /// Folder.
@@ -90,12 +90,12 @@ pub enum ShardError {
 pub struct ShardNumber {
     /// From 1.
     pub shard: u64,
-    /// How many.
+    /// Number of shards.
     pub of: u64,
 }
 
-/// Most shards of a sweep: their names have six digits.
-const MOST_SHARDS: u64 = 999_999;
+/// Largest number of shards: file names have six digits.
+const MAX_SHARDS: u64 = 999_999;
 
 impl std::str::FromStr for ShardNumber {
     type Err = String;
@@ -105,22 +105,22 @@ impl std::str::FromStr for ShardNumber {
         let (shard, of) = text.split_once('/').ok_or_else(wrong)?;
         let (shard, of) =
             (shard.trim().parse().map_err(|_| wrong())?, of.trim().parse().map_err(|_| wrong())?);
-        if of > MOST_SHARDS {
-            return Err(format!("`{text}` is one of too many shards; a sweep has at most {MOST_SHARDS}"));
+        if of > MAX_SHARDS {
+            return Err(format!("`{text}` is one of too many shards; a sweep has at most {MAX_SHARDS}"));
         }
         if shard == 0 || shard > of { Err(wrong()) } else { Ok(Self { shard, of }) }
     }
 }
 
 impl ShardNumber {
-    /// Trials of the shard: as even as can be.
+    /// Trials of the shard; sizes differ by at most one.
     #[must_use]
     pub fn range(&self, trials: u64) -> Range<u64> {
         let edge = |i: u64| (u128::from(trials) * u128::from(i) / u128::from(self.of.max(1))) as u64;
         edge(self.shard - 1)..edge(self.shard)
     }
 
-    /// Where the shard lies in a sweep's output folder.
+    /// Path of the shard in a sweep's output folder.
     #[must_use]
     pub fn path(&self, out: &Path) -> PathBuf {
         out.join(SHARD_FOLDER).join(format!("{:06}-of-{:06}.shard", self.shard, self.of))
@@ -145,10 +145,10 @@ fn header(sweep: &Sweep, columns: &Columns, number: ShardNumber, sha256: String)
     }
 }
 
-/// Writes a shard: beside its place, synced, renamed.
+/// Writes a shard to a temporary file, syncs it and renames it.
 ///
 /// # Errors
-/// [`ShardError::Write`]; what stood there before still does.
+/// [`ShardError::Write`]; an existing file is kept.
 pub fn write(
     sweep: &Sweep,
     columns: &Columns,
@@ -177,7 +177,7 @@ pub fn write(
         file.sync_all()
     });
     let moved = written.and_then(|()| fs::rename(&part, &path)).and_then(|()| {
-        // The name itself must survive too.
+        // Syncing the folder makes the rename durable.
         fs::File::open(&folder)?.sync_all()
     });
     moved.map_err(|why| {
@@ -186,7 +186,7 @@ pub fn write(
     })
 }
 
-/// Reads a shard and checks that it is this sweep's and whole.
+/// Reads a shard and checks that it belongs to this sweep and is complete.
 ///
 /// # Errors
 /// [`ShardError`] that names the file.
@@ -249,11 +249,10 @@ pub fn read(
         .collect())
 }
 
-/// How many shards the folder's files say that there are: the number that the first name gives.
+/// Number of shards according to the file names in the folder.
 ///
 /// # Errors
-/// [`ShardError::None`] without shards, [`ShardError::Foreign`] when files of different splits lie
-/// together.
+/// [`ShardError::None`] without shards, [`ShardError::Foreign`] when files of different splits are mixed.
 pub fn shard_count(out: &Path) -> Result<u64, ShardError> {
     let folder = out.join(SHARD_FOLDER);
     let mut found: Vec<(u64, String)> = fs::read_dir(&folder)

@@ -1,5 +1,4 @@
-//! What the rows say together: rates, medians, the worst trials, and which drawn quantity explains
-//! the failures.
+//! Summary statistics of a sweep: rates, quantiles, worst trials, and the sensitivity of outcomes to the drawn quantities.
 
 use crate::sensitivity::first_order;
 use crate::sweep_file::Sweep;
@@ -8,7 +7,7 @@ use crate::trial_table::TrialTable;
 use serde::{Deserialize, Serialize};
 use stylet_stats::{Interval, quantile_interval, sorted, spearman, wilson};
 
-/// How many of the worst trials are listed.
+/// Number of worst trials listed.
 const WORST: usize = 20;
 
 /// A score over all trials.
@@ -42,16 +41,16 @@ pub struct WorstTrial {
     pub enhancement: Option<f64>,
     /// The drawn values.
     pub drawn: Vec<f64>,
-    /// What runs it again with a full report.
+    /// Command that repeats the trial with a full report.
     pub replay: String,
 }
 
-/// How much of an outcome one drawn quantity explains.
+/// Sensitivity of an outcome to one drawn quantity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QuantitySensitivity {
     /// The quantity.
     pub quantity: String,
-    /// Spearman's rank correlation; none when either does not vary.
+    /// Spearman's rank correlation; `None` when either is constant.
     pub rank_correlation: Option<f64>,
     /// Its two-sided p-value.
     pub p_value: Option<f64>,
@@ -59,7 +58,7 @@ pub struct QuantitySensitivity {
     pub first_order: Option<f64>,
 }
 
-/// An outcome and what explains it, the strongest first.
+/// An outcome and its sensitivity to each quantity, largest first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OutcomeSensitivity {
     /// The outcome.
@@ -83,9 +82,9 @@ pub struct Summary {
     pub trials: usize,
     /// Seed.
     pub seed: u64,
-    /// How the points were spread.
+    /// Sampling method.
     pub sampling: String,
-    /// Trials whose first draw no scenario allows.
+    /// Trials whose first draw was invalid.
     pub redrawn: usize,
     /// True ruptures of all trials.
     pub ruptures: u64,
@@ -96,7 +95,7 @@ pub struct Summary {
     pub false_alarms: u64,
     /// Trials with a false detection.
     pub trials_with_false: Interval,
-    /// Trials that missed a rupture or alarmed falsely.
+    /// Trials with a missed or false rupture.
     pub failed: Interval,
     /// Every other score.
     pub scores: Vec<ScoreSummary>,
@@ -104,28 +103,28 @@ pub struct Summary {
     pub drawn: Vec<String>,
     /// The worst trials first.
     pub worst: Vec<WorstTrial>,
-    /// What explains the outcomes.
+    /// Sensitivity of the outcomes to the drawn quantities.
     pub explained: Vec<OutcomeSensitivity>,
 }
 
-/// Whether the trial missed a rupture or alarmed falsely.
+/// Whether the trial has a missed or false rupture.
 #[must_use]
 pub fn failed(columns: &Columns, row: &TrialRow) -> bool {
     ["missed", "false"].iter().any(|s| score_value(columns, row, s) > 0.0)
 }
 
-/// A score of a row; not a number when it has none.
+/// A score of a row; NaN when it does not exist.
 #[must_use]
 pub fn score_value(columns: &Columns, row: &TrialRow, score: &str) -> f64 {
     columns.score(score).and_then(|i| row.values.get(i)).copied().unwrap_or(f64::NAN)
 }
 
-/// Scores whose size matters, not their sign.
+/// Whether the score is signed; its magnitude is summarised.
 fn is_signed(score: &str) -> bool {
     score.starts_with("contact_m") || score.contains("delay")
 }
 
-/// A score of all rows; not numbers when they have none.
+/// A score of all rows; NaN where it does not exist.
 pub(crate) fn score_column<T: TrialTable + ?Sized>(
     columns: &Columns,
     rows: &T,
@@ -134,7 +133,7 @@ pub(crate) fn score_column<T: TrialTable + ?Sized>(
     columns.score(score).map_or_else(|| Ok(vec![f64::NAN; rows.count()]), |value| rows.column(value))
 }
 
-/// Sums up a sweep. `replay` is the folder that the replay commands name. Holds a few values of every row at a time, not the rows.
+/// Summarises a sweep. `replay` is the folder in the replay commands. Holds a few columns in memory at a time, not the rows.
 ///
 /// # Errors
 /// When the rows cannot be read.
@@ -178,12 +177,11 @@ pub fn summarise<T: TrialTable + ?Sized>(
     })
 }
 
-/// A score over all trials; nothing when no trial has it.
+/// A score over all trials; `None` when no trial has it.
 fn summary_of(name: &str, mut values: Vec<f64>) -> Option<ScoreSummary> {
     if is_signed(name) {
         values.iter_mut().for_each(|x| *x = x.abs());
     }
-    // Trials are numbered as they come.
     let worst = values
         .iter()
         .zip(0_u64..)
@@ -228,7 +226,7 @@ fn worst<T: TrialTable + ?Sized>(
     Ok(worst)
 }
 
-/// Outcomes of a trial that the drawn quantities are held against.
+/// Outcomes for which sensitivities are computed: name and the scores that are summed.
 const OUTCOMES: [(&str, &[&str]); 4] = [
     ("missed and false ruptures", &["missed", "false"]),
     ("missed ruptures", &["missed"]),
@@ -242,7 +240,7 @@ fn explained<T: TrialTable + ?Sized>(
 ) -> Result<Vec<OutcomeSensitivity>, T::Error> {
     let mut found = Vec::new();
     for (outcome, scores) in OUTCOMES {
-        // Minus zero is what adds nothing.
+        // -0.0 is the neutral element of addition, also for a sum of -0.0.
         let mut y = vec![-0.0; rows.count()];
         for name in scores {
             y.iter_mut().zip(score_column(columns, rows, name)?).for_each(|(sum, x)| *sum += x);

@@ -1,4 +1,4 @@
-//! The sweep as a file: which scenario, how many trials, what is drawn (SPEC section 8).
+//! The sweep file: scenario, number of trials, drawn quantities. Format: docs/reference/files.md, section "Sweep".
 
 use crate::distribution::Distribution;
 use crate::sampling_design::{MAX_SOBOL_DIMENSIONS, Sampling};
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use stylet_scenario::{FieldError, InputError, Robot, Scenario, Sensor, parse, read_text};
 use stylet_tissue::AnyEffect;
 
-/// Most trials of one sweep: row numbers and memory stay in bounds.
-const MOST_TRIALS: u64 = 100_000_000;
+/// Largest number of trials, which bounds row numbers and memory.
+const MAX_TRIALS: u64 = 100_000_000;
 
 /// One quantity that is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,11 +29,11 @@ pub struct VariedField {
 pub struct RandomEffect {
     /// The effect with its parameters.
     pub effect: AnyEffect,
-    /// How often it is on, 0 to 1.
+    /// Probability that it is on, 0 to 1.
     pub probability: f64,
 }
 
-/// `Sweep(...)` as it is written.
+/// `Sweep(...)` as in the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[serde(rename = "Sweep")]
@@ -42,7 +42,7 @@ pub struct SweepFile {
     pub scenario: PathBuf,
     /// Number of trials.
     pub trials: u64,
-    /// How the points are spread.
+    /// Sampling method.
     #[serde(default)]
     pub sampling: Sampling,
     /// Seed of all draws.
@@ -60,7 +60,7 @@ fn one() -> u64 {
     1
 }
 
-/// What the command line sets in place of the file.
+/// Values from the command line that replace those of the file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overrides {
     /// Number of trials.
@@ -69,16 +69,16 @@ pub struct Overrides {
     pub seed: Option<u64>,
 }
 
-/// A sweep ready to run: checked, with its scenario.
+/// A validated sweep with its scenario.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// Name for people: the file's stem.
+    /// Name: the stem of the file name.
     pub name: String,
     /// The file as written, with the overrides.
     pub file: SweepFile,
-    /// The scenario, as the replay runs it, with all effects of the sweep at its list's end.
+    /// The scenario for the kinematic replay, with the effects of the sweep appended.
     pub template: Scenario,
-    /// How many of the template's effects are the scenario's own.
+    /// Number of the template's effects that belong to the scenario.
     pub scenario_effects: usize,
     /// The fields that are drawn, in the order of `vary`.
     pub fields: Vec<ScenarioField>,
@@ -88,7 +88,7 @@ impl Sweep {
     /// Loads and checks a sweep file and its scenario.
     ///
     /// # Errors
-    /// [`InputError`] with file, line, column, what is wrong and what would be right.
+    /// [`InputError`] with file, line, column, the problem and its remedy.
     pub fn load(path: &Path, overrides: Overrides) -> Result<Self, InputError> {
         let text = read_text(path)?;
         let shown = path.display().to_string();
@@ -101,13 +101,13 @@ impl Sweep {
         Self::new(name, file, scenario).map_err(|problem| problem.in_file(&shown, &text))
     }
 
-    /// A sweep over a scenario that is at hand.
+    /// A sweep over a loaded scenario.
     ///
     /// # Errors
     /// [`Problem`] with the path of the field of the sweep that is wrong.
     pub fn new(name: String, file: SweepFile, scenario: Scenario) -> Result<Self, FieldError> {
-        if file.trials == 0 || file.trials > MOST_TRIALS {
-            let what = format!("is {}; it must lie between 1 and {MOST_TRIALS}", file.trials);
+        if file.trials == 0 || file.trials > MAX_TRIALS {
+            let what = format!("is {}; it must lie between 1 and {MAX_TRIALS}", file.trials);
             return Err(FieldError::new("trials", what));
         }
         let own_effects = scenario.effects.len();
@@ -118,7 +118,7 @@ impl Sweep {
                 let what = format!("is {}; it must lie between 0 and 1", random.probability);
                 return Err(FieldError::new(at, what));
             }
-            // Each effect alone, as a scenario would have it.
+            // Each effect is validated alone.
             template.effects.push(random.effect.clone());
             template.check().map_err(|p| in_sweep(&p, own_effects, i))?;
             template.effects.truncate(own_effects);
@@ -157,7 +157,7 @@ impl Sweep {
         self.file.vary.len() + self.file.effects.len()
     }
 
-    /// The sweep as a file over `scenario.ron` beside it, with the overrides.
+    /// The sweep as a file over `scenario.ron` in the same folder, with the overrides.
     #[must_use]
     pub fn to_ron(&self) -> String {
         let file = SweepFile { scenario: PathBuf::from("scenario.ron"), ..self.file.clone() };
@@ -166,7 +166,7 @@ impl Sweep {
         format!("Sweep{body}\n")
     }
 
-    /// The scenario of [`Sweep::to_ron`]: the sweep's without the sweep's effects.
+    /// The scenario of [`Sweep::to_ron`], without the sweep's effects.
     #[must_use]
     pub fn scenario(&self) -> Scenario {
         let mut scenario = self.template.clone();
@@ -174,7 +174,7 @@ impl Sweep {
         scenario
     }
 
-    /// SHA-256 over all that the results depend on: resolved scenario, sweep, seed, trials, version.
+    /// SHA-256 over everything that determines the results: resolved scenario, sweep, seed, trials, version.
     #[must_use]
     pub fn identity(&self) -> String {
         let mut hash = Sha256::new();
@@ -192,16 +192,16 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A problem with an effect, told by its place in the sweep.
-fn in_sweep(problem: &FieldError, own: usize, index: usize) -> FieldError {
-    let there = format!("effects[{own}]");
-    match problem.path.strip_prefix(&there) {
+/// Translates the path of an error in the sweep's effect `index`, validated as effect `scenario_effects` of the scenario.
+fn in_sweep(problem: &FieldError, scenario_effects: usize, index: usize) -> FieldError {
+    let prefix = format!("effects[{scenario_effects}]");
+    match problem.path.strip_prefix(&prefix) {
         Some(rest) => FieldError::new(format!("effects[{index}].effect{rest}"), problem.message.clone()),
         None => problem.clone(),
     }
 }
 
-/// The scenario as the kinematic replay runs it: no rigid bodies, one model, the force/torque sensor.
+/// The scenario for the kinematic replay: no rigid bodies, one model, the force/torque sensor.
 fn as_replayed(mut scenario: Scenario) -> Result<Scenario, FieldError> {
     if scenario.motion.plan().is_none() {
         let what =

@@ -1,9 +1,7 @@
-//! One row per trial: what was drawn and every score, in an order that does not change.
+//! The result of a trial as a row: drawn values, then scores, in a fixed order.
 
 use crate::draw_trial::DrawnTrial;
 use crate::sweep_file::Sweep;
-use crate::trial_table::TrialTable;
-use std::io::{self, BufWriter, Write};
 use stylet_score::{EstimateError, Score};
 use stylet_tissue::Effect;
 
@@ -14,13 +12,13 @@ pub struct TrialRow {
     pub trial: u64,
     /// Seed of its noise.
     pub seed: u64,
-    /// Draws that were thrown away because no scenario allows them.
+    /// Draws rejected because they make no valid scenario.
     pub redrawn: u64,
-    /// Drawn values, then scores; not a number when there is none.
+    /// Drawn values, then scores; NaN where a score does not exist.
     pub values: Vec<f64>,
 }
 
-/// What the columns are called.
+/// Names of the columns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Columns {
     /// Drawn quantities: paths, and `effect.<id>` for effects that are on (1) or off (0).
@@ -30,7 +28,7 @@ pub struct Columns {
     layers: usize,
 }
 
-/// Scores of a trial as a whole.
+/// Scores of the whole trial.
 const WHOLE: [&str; 10] = [
     "ruptures",
     "missed",
@@ -44,7 +42,7 @@ const WHOLE: [&str; 10] = [
     "reconstruction_rms_n",
 ];
 
-/// Scores of a layer.
+/// Scores per layer.
 const LAYER: [&str; 4] = [
     "stiffness_n_per_m.relative_error",
     "friction_ns_per_m2.relative_error",
@@ -86,7 +84,7 @@ impl Columns {
         self.drawn.len() + self.scores.len()
     }
 
-    /// Place of a score among a row's values.
+    /// Index of a score in [`TrialRow::values`].
     #[must_use]
     pub fn score(&self, name: &str) -> Option<usize> {
         self.scores.iter().position(|s| s == name).map(|i| self.drawn.len() + i)
@@ -127,34 +125,4 @@ impl Columns {
         }
         TrialRow { trial: drawn.trial, seed: drawn.seed, redrawn: u64::from(drawn.redrawn), values }
     }
-}
-
-/// `trials.csv`: a header, then one line per trial; a value that does not exist is empty. Numbers are
-/// the shortest that read back as the same bits.
-///
-/// # Errors
-/// What the destination or the rows say.
-pub fn write_csv<T: TrialTable + ?Sized>(columns: &Columns, rows: &T, output: impl Write) -> io::Result<()> {
-    let mut output = BufWriter::new(output);
-    writeln!(output, "{}", columns.names().collect::<Vec<_>>().join(","))?;
-    let mut written = Ok(());
-    let read = rows.for_each_row(|row| {
-        if written.is_ok() {
-            written = write_row(row, &mut output);
-        }
-    });
-    read.map_err(T::into_io_error)?;
-    written?;
-    output.flush()
-}
-
-fn write_row(row: &TrialRow, output: &mut impl Write) -> io::Result<()> {
-    write!(output, "{},{},{}", row.trial, row.seed, row.redrawn)?;
-    for value in &row.values {
-        match value.is_nan() {
-            true => output.write_all(b",")?,
-            false => write!(output, ",{value}")?,
-        }
-    }
-    output.write_all(b"\n")
 }

@@ -1,8 +1,8 @@
-//! One trial: law, sensor, core and score, a block of samples at a time; nothing is stored but the ring
-//! of raw samples that the core asks for, and nothing is allocated per sample.
+//! Simulates, enhances and scores one trial in blocks of samples, without allocation per sample. Only the ring of raw samples that
+//! the enhancer needs is stored.
 //!
-//! A block goes through each of the four before the next block begins: four short loops, each with its
-//! own recursion, cost a processor less than one long loop that runs all of them.
+//! A block passes through tissue, sensor, enhancer and scorer one after the other: four short loops with one recursion each are
+//! faster than one long loop.
 
 use stylet_core::{Enhancer, Sample};
 use stylet_record::TrueRupture;
@@ -11,35 +11,34 @@ use stylet_score::{EnhancedSample, MAX_STORED_SAMPLES, Score, Scorer, TrueSample
 use stylet_testbed::{ForceSensor, SampleRates, SimulateError, sample_rates};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 
-/// Samples in a block: few enough to stay in the fastest memory.
-const BLOCK: usize = 64;
+/// Samples per block; a block fits into the level 1 cache.
+const BLOCK_SAMPLES: usize = 64;
 
-/// A block of samples on its way from motion to score. Its steps are kept apart by the compiler, too: each
-/// has the processor's registers for itself.
+/// A block of samples on its way from motion to score. Its steps are not inlined, so that each has all registers.
 struct Block {
     count: usize,
-    points: [MotionPoint; BLOCK],
-    total_n: [f64; BLOCK],
-    tip_n: [f64; BLOCK],
-    samples: [Sample; BLOCK],
-    heard: [EnhancedSample; BLOCK],
+    points: [MotionPoint; BLOCK_SAMPLES],
+    total_n: [f64; BLOCK_SAMPLES],
+    tip_n: [f64; BLOCK_SAMPLES],
+    samples: [Sample; BLOCK_SAMPLES],
+    enhanced: [EnhancedSample; BLOCK_SAMPLES],
 }
 
 impl Default for Block {
     fn default() -> Self {
         Self {
             count: 0,
-            points: [MotionPoint::default(); BLOCK],
-            total_n: [0.0; BLOCK],
-            tip_n: [0.0; BLOCK],
-            samples: [Sample::default(); BLOCK],
-            heard: [EnhancedSample::default(); BLOCK],
+            points: [MotionPoint::default(); BLOCK_SAMPLES],
+            total_n: [0.0; BLOCK_SAMPLES],
+            tip_n: [0.0; BLOCK_SAMPLES],
+            samples: [Sample::default(); BLOCK_SAMPLES],
+            enhanced: [EnhancedSample::default(); BLOCK_SAMPLES],
         }
     }
 }
 
 impl Block {
-    /// Where the needle is, and where it is recorded to be, from sample number `first` on.
+    /// True and recorded position and velocity from sample `first` on.
     #[inline(never)]
     fn place(
         &mut self,
@@ -47,13 +46,13 @@ impl Block {
         measuring: &ForceSensor,
         rates: &SampleRates,
         first: usize,
-        late_s: f64,
+        start_offset_s: f64,
     ) {
-        self.count = BLOCK.min(rates.samples - first);
+        self.count = BLOCK_SAMPLES.min(rates.samples - first);
         for (k, (point, sample)) in (first..rates.samples).zip(self.points.iter_mut().zip(&mut self.samples))
         {
-            // Signed, because that is one instruction: a number of samples never needs the last bit.
-            let time_s = late_s + k as i64 as f64 / rates.sample_hz;
+            // Converting a signed integer is one instruction; the index fits.
+            let time_s = start_offset_s + k as i64 as f64 / rates.sample_hz;
             *point = plan.at(time_s);
             sample.time_s = time_s;
             sample.position_m = measuring.position(point.position_m);
@@ -61,7 +60,7 @@ impl Block {
         }
     }
 
-    /// The tissue's force.
+    /// The tissue force.
     #[inline(never)]
     fn load(&mut self, law: &ForceLaw, state: &mut ForceLawState, on_rupture: impl FnMut(Rupture)) {
         let moments = self.samples.iter().zip(&self.points).take(self.count);
@@ -74,7 +73,7 @@ impl Block {
         });
     }
 
-    /// The sensor's reading.
+    /// The measured force.
     #[inline(never)]
     fn measure(&mut self, measuring: &mut ForceSensor) {
         let truth = self.points.iter().zip(&self.total_n);
@@ -83,13 +82,13 @@ impl Block {
         }
     }
 
-    /// What the core makes of it.
+    /// Runs the enhancer.
     #[inline(never)]
     fn enhance(&mut self, core: &mut Enhancer<&mut [Sample]>, scorer: &mut Scorer) {
-        let mut heard = self.heard.iter_mut();
+        let mut enhanced = self.enhanced.iter_mut();
         let out = core.run(self.samples.get(..self.count).unwrap_or(&[]), |out| {
-            if let Some(heard) = heard.next() {
-                *heard = out.into();
+            if let Some(enhanced) = enhanced.next() {
+                *enhanced = out.into();
             }
             if out.detection.is_some() || out.estimate.is_some() {
                 scorer.add_event(out);
@@ -98,12 +97,12 @@ impl Block {
         scorer.set_contact(out.contact_m);
     }
 
-    /// How far that is from the truth.
+    /// Compares with the truth.
     #[inline(never)]
     fn score(&self, scorer: &mut Scorer) {
         let truth = self.points.iter().zip(self.tip_n.iter().zip(&self.total_n));
-        for ((sample, heard), (at, (tip_n, total_n))) in
-            self.samples.iter().zip(&self.heard).zip(truth).take(self.count)
+        for ((sample, enhanced), (at, (tip_n, total_n))) in
+            self.samples.iter().zip(&self.enhanced).zip(truth).take(self.count)
         {
             let moment = TrueSample {
                 position_m: at.position_m,
@@ -111,18 +110,18 @@ impl Block {
                 tip_n: *tip_n,
                 total_n: *total_n,
             };
-            scorer.add_sample(&moment, heard);
+            scorer.add_sample(&moment, enhanced);
         }
     }
 }
 
-/// What a thread keeps from trial to trial.
+/// Buffers that a thread reuses between trials.
 #[derive(Debug, Default)]
 pub struct Workspace {
     storage: Vec<Sample>,
 }
 
-/// Runs a scenario through the kinematic replay and scores it: the same bits as
+/// Simulates a scenario by kinematic replay and scores it, with the same bits as
 /// [`stylet_testbed::simulate`] with `robot: Replay` and [`stylet_score::score_run`], without the
 /// columns and the offline estimates.
 ///
@@ -132,14 +131,14 @@ pub fn run(scenario: &Scenario, workspace: &mut Workspace) -> Result<Score, Simu
     run_with_sampling_phase(scenario, 0.0, workspace)
 }
 
-/// The same, the first sample being taken so much later than the motion begins, as a share of a sampling step: a robot does not start
-/// with the sensor's clock.
+/// As [`run`], with the first sample `phase` sampling steps after the start of the motion, because robot and sensor clock are not
+/// synchronised.
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_with_sampling_phase(
     scenario: &Scenario,
-    late: f64,
+    phase: f64,
     workspace: &mut Workspace,
 ) -> Result<Score, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
@@ -151,7 +150,7 @@ pub fn run_with_sampling_phase(
         });
     };
     let rates = sample_rates(scenario, plan.duration_s());
-    let late_s = late / rates.sample_hz;
+    let start_offset_s = phase / rates.sample_hz;
     let mut measuring = ForceSensor::new(&scenario.effects, sensor, scenario.seed, scenario.sample_hz);
     let layers = stylet_testbed::true_layers(law.slabs());
     let surface_m = layers.first().map_or(0.0, |l| l.front_m);
@@ -165,8 +164,8 @@ pub fn run_with_sampling_phase(
     let mut ruptures: Vec<Rupture> = Vec::with_capacity(law.slabs().len());
     let mut state = ForceLawState::default();
     let mut block = Block::default();
-    for first in (0..rates.samples).step_by(BLOCK) {
-        block.place(&plan, &measuring, &rates, first, late_s);
+    for first in (0..rates.samples).step_by(BLOCK_SAMPLES) {
+        block.place(&plan, &measuring, &rates, first, start_offset_s);
         block.load(&law, &mut state, |r| ruptures.push(r));
         block.measure(&mut measuring);
         block.enhance(&mut core, &mut scorer);

@@ -1,4 +1,4 @@
-//! The rows of a sweep wherever they are: in memory, or column by column on disk, where millions of trials take no memory.
+//! The rows of a sweep in memory, or column by column on disk for sweeps that do not fit into memory.
 
 use crate::trial_row::{Columns, TrialRow};
 use std::convert::Infallible;
@@ -8,31 +8,31 @@ use stylet_record::disk_table::{DiskTable, DiskTableWriter};
 
 /// Rows in the order of their trials.
 pub trait TrialTable {
-    /// What can go wrong on the way.
+    /// Error of reading the rows.
     type Error;
 
-    /// How many.
+    /// Number of rows.
     fn count(&self) -> usize;
 
-    /// One of the values (`Row::values`) of every row.
+    /// One value (`Row::values`) of every row.
     ///
     /// # Errors
-    /// What can go wrong on the way.
+    /// Error of reading the rows.
     fn column(&self, value: usize) -> Result<Vec<f64>, Self::Error>;
 
-    /// One row, by its place.
+    /// One row, by its index.
     ///
     /// # Errors
-    /// What can go wrong on the way.
+    /// Error of reading the rows.
     fn row(&self, place: usize) -> Result<TrialRow, Self::Error>;
 
-    /// Hands over all rows.
+    /// Calls `each` with every row in order.
     ///
     /// # Errors
-    /// What can go wrong on the way.
+    /// Error of reading the rows.
     fn for_each_row(&self, each: impl FnMut(&TrialRow)) -> Result<(), Self::Error>;
 
-    /// What went wrong, as the system would say it.
+    /// The error as an I/O error.
     fn into_io_error(error: Self::Error) -> io::Error;
 }
 
@@ -61,10 +61,10 @@ impl TrialTable for [TrialRow] {
     }
 }
 
-/// Numbers of a row before its values: trial, seed and redrawn in halves, of which every one is exact.
-const WHOLE: usize = 6;
+/// Columns before the values: trial, seed and redrawn as two 32-bit halves each, which an `f64` holds exactly.
+const INTEGER_COLUMNS: usize = 6;
 
-/// Rows that go to the disk.
+/// Writes rows to disk.
 #[derive(Debug)]
 pub struct TrialTableWriter {
     table: DiskTableWriter,
@@ -72,18 +72,21 @@ pub struct TrialTableWriter {
 }
 
 impl TrialTableWriter {
-    /// No rows yet; they will lie in the folder, in a file that is gone with them.
+    /// An empty table in `folder`, in a temporary file that is removed with the table.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn new(folder: &Path, columns: &Columns) -> io::Result<Self> {
-        Ok(Self { table: DiskTableWriter::new(folder, WHOLE + columns.width())?, numbers: Vec::new() })
+        Ok(Self {
+            table: DiskTableWriter::new(folder, INTEGER_COLUMNS + columns.width())?,
+            numbers: Vec::new(),
+        })
     }
 
     /// Adds a row.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn push(&mut self, row: &TrialRow) -> io::Result<()> {
         self.numbers.clear();
         for whole in [row.trial, row.seed, row.redrawn] {
@@ -93,10 +96,10 @@ impl TrialTableWriter {
         self.table.push(&self.numbers)
     }
 
-    /// The rows, to be read.
+    /// Ends writing and opens the rows for reading.
     ///
     /// # Errors
-    /// What the system says.
+    /// An I/O error.
     pub fn finish(self) -> io::Result<DiskTrialTable> {
         Ok(DiskTrialTable { table: self.table.finish()? })
     }
@@ -115,7 +118,7 @@ fn row_of(numbers: &[f64], row: &mut TrialRow) {
     };
     (row.trial, row.seed, row.redrawn) = (whole(0), whole(1), whole(2));
     row.values.clear();
-    row.values.extend(numbers.iter().skip(WHOLE));
+    row.values.extend(numbers.iter().skip(INTEGER_COLUMNS));
 }
 
 impl TrialTable for DiskTrialTable {
@@ -129,7 +132,7 @@ impl TrialTable for DiskTrialTable {
         let mut all = Vec::with_capacity(self.table.rows());
         let (mut block, mut bytes) = (Vec::new(), Vec::new());
         for number in 0..self.table.block_count() {
-            self.table.read_block(number, WHOLE + value, &mut block, &mut bytes)?;
+            self.table.read_block(number, INTEGER_COLUMNS + value, &mut block, &mut bytes)?;
             all.extend_from_slice(&block);
         }
         Ok(all)
@@ -160,9 +163,12 @@ impl TrialTable for DiskTrialTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Overrides, Sweep, run_trials_with_threads, summarise, write_csv};
+    use crate::parallel_trials::run_trials_with_threads;
+    use crate::summary::summarise;
+    use crate::sweep_file::{Overrides, Sweep};
+    use crate::trial_csv::write_csv;
 
-    /// Tables and summary are the same wherever the rows are, seeds of 64 bits included.
+    /// CSV and summary are the same for rows in memory and on disk, 64-bit seeds included.
     #[test]
     fn rows_on_disk_are_those_in_memory() -> io::Result<()> {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/sweeps/noise.ron");
@@ -170,7 +176,7 @@ mod tests {
             Sweep::load(&file, Overrides { trials: Some(300), seed: None }).expect("the shipped sweep");
         let columns = Columns::new(&sweep);
         let mut rows = run_trials_with_threads(&sweep, &columns, 0..300, 1, &|_| {}).expect("it runs");
-        // Some that are rare.
+        // Values that rarely occur.
         rows[7].seed = u64::MAX;
         rows[8].redrawn = 3;
         rows[9].values.fill(f64::NAN);

@@ -1,5 +1,4 @@
-//! Promise: every distribution has the moments that its name and numbers say, with plain random,
-//! Latin hypercube and Sobol points alike, and never leaves its range.
+//! Promise: every distribution has its textbook moments with random, Latin hypercube and Sobol points, and stays in its range.
 
 use proptest::prelude::*;
 use stylet_sweep::{Distribution, Sampling, SamplingDesign};
@@ -21,7 +20,7 @@ fn moments(with: &Distribution, sampling: Sampling) -> (f64, f64) {
 }
 
 #[test]
-fn moments_are_those_of_the_textbook() {
+fn sample_moments_match_the_textbook() {
     let ln = |x: f64| x.ln();
     let cases = [
         (Distribution::Uniform(2.0, 5.0), 3.5, 3.0 / 12.0_f64.sqrt()),
@@ -65,7 +64,7 @@ fn moments_are_those_of_the_textbook() {
 
 proptest! {
     #[test]
-    fn draws_stay_in_their_range_and_grow_with_u(a in -5.0..5.0, width in 0.0..5.0, mode in 0.0..1.0, u in 1e-9..1.0, v in 1e-9..1.0) {
+    fn quantiles_stay_in_range_and_increase(a in -5.0..5.0, width in 0.0..5.0, mode in 0.0..1.0, u in 1e-9..1.0, v in 1e-9..1.0) {
         let (u, v) = if u < v { (u, v) } else { (v, u) };
         let top = a + width;
         for with in [

@@ -1,5 +1,5 @@
-//! Promise: a trial is a function of sweep, seed and its number alone; paths set exactly the field
-//! that they name; a trial has the scores of the ordinary run of its scenario.
+//! Promise: a trial is a function of sweep, seed and trial number; a path sets exactly the field that it names; a trial has the same
+//! scores as the ordinary run of its scenario.
 
 use std::path::Path;
 use stylet_scenario::{Motion, Robot, Scenario, Sensor};
@@ -32,7 +32,7 @@ fn sweep(paths: &[(&str, Distribution)], trials: u64) -> Sweep {
 }
 
 #[test]
-fn paths_set_the_field_that_they_name_and_no_other() {
+fn a_path_sets_its_field_and_no_other() {
     let exact = |x: f64| Distribution::Choice(vec![x]);
     let paths = [
         ("tissue.layers[1].stiffness_n_per_m", 61.5),
@@ -88,7 +88,7 @@ fn a_trial_does_not_depend_on_the_others_nor_on_how_they_are_split() {
     let mut seeds: Vec<u64> = all.iter().map(|r| r.seed).collect();
     seeds.sort_unstable();
     seeds.dedup();
-    assert_eq!(seeds.len(), 40, "every trial has noise of its own");
+    assert_eq!(seeds.len(), 40, "every trial has its own noise");
 }
 
 #[test]
@@ -112,22 +112,21 @@ fn a_trial_has_the_scores_of_the_ordinary_run() {
     }
 }
 
-/// With the start of the robot on the clock of the sensor every insertion would have its faces at the same places between two samples.
+/// Without a sampling phase every insertion would have its faces at the same places relative to the samples.
 #[test]
-fn an_insertion_whose_first_sample_is_late_has_its_ruptures_elsewhere_between_two_samples() {
+fn the_sampling_phase_shifts_the_samples_relative_to_the_ruptures() {
     let sweep = sweep(&[("sensor.noise_n", Distribution::Uniform(0.0, 0.001))], 1);
     let scenario = TrialSampler::new(&sweep).draw(0).expect("a valid draw").scenario;
     let mut workspace = trial_simulation::Workspace::default();
-    let mut delay_steps = |late: f64| {
+    let mut delay_steps = |phase: f64| {
         let score =
-            trial_simulation::run_with_sampling_phase(&scenario, late, &mut workspace).expect("it runs");
+            trial_simulation::run_with_sampling_phase(&scenario, phase, &mut workspace).expect("it runs");
         let delay_s = score.ruptures.first().and_then(|r| r.delay_s).expect("a rupture that is found");
         delay_s * scenario.sample_hz
     };
-    // The rupture stays where it is, and the samples move.
-    let at_once = delay_steps(0.0);
-    for late in [0.25, 0.5, 0.9] {
-        let moved = (delay_steps(late) - at_once).rem_euclid(1.0);
-        assert!((moved - late).abs() < 0.01, "{moved} for {late}");
+    let synchronous = delay_steps(0.0);
+    for phase in [0.25, 0.5, 0.9] {
+        let moved = (delay_steps(phase) - synchronous).rem_euclid(1.0);
+        assert!((moved - phase).abs() < 0.01, "{moved} for {phase}");
     }
 }
