@@ -57,7 +57,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     args.results.write_and_print(&folder, &output_files(&rows, args.seeds)?, || {
         let head = format!(
             "{:44} {:8} {:>13} {:>13} {:>18} {:>9}  covered K b D band %",
-            "", "", "missed/false", "delay ms", "K error %", "enh. off"
+            "", "", "missed/false", "delay ms", "K error %", "enh. %"
         );
         std::iter::once(head).chain(rows.iter().map(line)).collect::<Vec<_>>().join("\n")
     })
@@ -80,7 +80,7 @@ fn line(r: &ComparisonRow) -> String {
             significant_or_dash(r.delay_s.p95, 1e3, 2)
         ),
         list(&r.stiffness_error),
-        significant_or_dash(r.enhancement_rms_relative, 1.0, 2),
+        significant_or_dash(r.enhancement_rms_relative, 100.0, 2),
         covered.join(" ")
     )
 }

@@ -118,10 +118,13 @@ fn layers(out: &mut String, score: &Score) {
         row(format!("d{n} m"), l.thickness_m, None);
     }
     row("D N s/m".to_owned(), score.cumulative_friction_ns_per_m, None);
-    if score.layers.iter().any(|l| l.offline_separable == Some(false)) {
+    let inseparable = score.layers.iter().filter(|l| l.offline_separable == Some(false));
+    let inseparable: Vec<String> = inseparable.map(|l| l.layer.to_string()).collect();
+    if !inseparable.is_empty() {
         let _ = writeln!(
             out,
-            "    (at constant velocity the data do not tell K from b: the force drop decides, online and offline)"
+            "    (layer {}: the motion does not separate K from b; the force drop at the rupture does)",
+            inseparable.join(", ")
         );
     }
 }

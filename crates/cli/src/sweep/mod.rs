@@ -88,14 +88,19 @@ fn terminal(s: &Summary, out: &Path) -> String {
     rate("insertions with an error", &s.failed);
     rate("ruptures missed", &s.missed);
     rate("insertions with a false alarm", &s.trials_with_false);
-    let _ = writeln!(text, "  {:<30} {:>8}   beside {} ruptures", "false alarms", s.false_alarms, s.ruptures);
+    let _ = writeln!(
+        text,
+        "  {:<30} {:>8}   in insertions with {} ruptures",
+        "false alarms", s.false_alarms, s.ruptures
+    );
     for name in ["enhancement.rms_relative", "reconstruction_rms_n"] {
         if let Some(x) = s.scores.iter().find(|x| x.score == name) {
+            let show = |v: f64| if name.ends_with("relative") { percent(v) } else { significant(v, 3) };
             let _ = writeln!(
                 text,
                 "  {name:<30} {:>8}   median; p95 {}",
-                significant(x.median.value, 3),
-                significant(x.p95.value, 3)
+                show(x.median.value),
+                show(x.p95.value)
             );
         }
     }
