@@ -61,49 +61,33 @@ impl Canvas {
         y + 8.0
     }
 
-    pub(super) fn rect(&mut self, x: f64, y: f64, width: f64, height: f64, class: &str) {
-        let (w, h) = (width.max(0.0), height.max(0.0));
-        let _ = writeln!(
-            self.body,
-            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{class}\"/>",
-            svg_coordinate(x),
-            svg_coordinate(y),
-            svg_coordinate(w),
-            svg_coordinate(h)
-        );
+    /// An element without content: numeric attributes, then the class.
+    fn element(&mut self, name: &str, numbers: &[(&str, f64)], class: &str) {
+        let _ = write!(self.body, "<{name}");
+        for (attribute, value) in numbers {
+            let _ = write!(self.body, " {attribute}=\"{}\"", svg_coordinate(*value));
+        }
+        let _ = writeln!(self.body, " class=\"{class}\"/>");
     }
 
-    /// A box with round corners.
+    pub(super) fn rect(&mut self, x: f64, y: f64, width: f64, height: f64, class: &str) {
+        let size = [("x", x), ("y", y), ("width", width.max(0.0)), ("height", height.max(0.0))];
+        self.element("rect", &size, class);
+    }
+
+    /// A rectangle with round corners.
     pub(super) fn rounded(&mut self, x: f64, y: f64, width: f64, height: f64, class: &str) {
-        let _ = writeln!(
-            self.body,
-            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" rx=\"12\" class=\"{class}\"/>",
-            svg_coordinate(x),
-            svg_coordinate(y),
-            svg_coordinate(width),
-            svg_coordinate(height)
-        );
+        let size = [("x", x), ("y", y), ("width", width), ("height", height), ("rx", 12.0)];
+        self.element("rect", &size, class);
     }
 
     pub(super) fn line(&mut self, from: (f64, f64), to: (f64, f64), class: &str) {
-        let _ = writeln!(
-            self.body,
-            "<path d=\"M{} {}L{} {}\" class=\"{class}\"/>",
-            svg_coordinate(from.0),
-            svg_coordinate(from.1),
-            svg_coordinate(to.0),
-            svg_coordinate(to.1)
-        );
+        let [x1, y1, x2, y2] = [from.0, from.1, to.0, to.1].map(svg_coordinate);
+        let _ = writeln!(self.body, "<path d=\"M{x1} {y1}L{x2} {y2}\" class=\"{class}\"/>");
     }
 
     pub(super) fn circle(&mut self, x: f64, y: f64, radius: f64, class: &str) {
-        let _ = writeln!(
-            self.body,
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" class=\"{class}\"/>",
-            svg_coordinate(x),
-            svg_coordinate(y),
-            svg_coordinate(radius)
-        );
+        self.element("circle", &[("cx", x), ("cy", y), ("r", radius)], class);
     }
 
     /// A polyline per run of points; coordinates to a tenth of a pixel.
@@ -134,37 +118,27 @@ impl Canvas {
             Anchor::Middle => " text-anchor=\"middle\"",
             Anchor::End => " text-anchor=\"end\"",
         };
-        let words = escaping::escape_html(words);
-        let _ = writeln!(
-            self.body,
-            "<text x=\"{}\" y=\"{}\"{anchor} class=\"{class}\">{words}</text>",
-            svg_coordinate(x),
-            svg_coordinate(y)
-        );
+        let (x, y, words) = (svg_coordinate(x), svg_coordinate(y), escaping::escape_html(words));
+        let _ = writeln!(self.body, "<text x=\"{x}\" y=\"{y}\"{anchor} class=\"{class}\">{words}</text>");
     }
 
     /// Text turned a quarter to the left, centred on the point.
     pub(super) fn vertical_text(&mut self, x: f64, y: f64, class: &str, words: &str) {
+        let (x, y, words) = (svg_coordinate(x), svg_coordinate(y), escaping::escape_html(words));
         let _ = writeln!(
             self.body,
-            "<text transform=\"translate({} {}) rotate(-90)\" text-anchor=\"middle\" class=\"{class}\">{}</text>",
-            svg_coordinate(x),
-            svg_coordinate(y),
-            escaping::escape_html(words)
+            "<text transform=\"translate({x} {y}) rotate(-90)\" text-anchor=\"middle\" class=\"{class}\">{words}</text>"
         );
     }
 
     /// Clips everything drawn until [`Self::unclip`] to the rectangle.
     pub(super) fn clip(&mut self, x: f64, y: f64, width: f64, height: f64) {
         self.clips += 1;
+        let [x, y, width, height] = [x, y, width, height].map(svg_coordinate);
         let _ = writeln!(
             self.body,
-            "<clipPath id=\"c{0}\"><rect x=\"{1}\" y=\"{2}\" width=\"{3}\" height=\"{4}\"/></clipPath>\n<g clip-path=\"url(#c{0})\">",
-            self.clips,
-            svg_coordinate(x),
-            svg_coordinate(y),
-            svg_coordinate(width),
-            svg_coordinate(height)
+            "<clipPath id=\"c{0}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>\n<g clip-path=\"url(#c{0})\">",
+            self.clips
         );
     }
 
