@@ -24,7 +24,9 @@ d.dataset.errors=(d.dataset.errors||'')+e.message+'\\n'});";
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
 /// A cell with more characters may wrap at a minimum width of its own; a number is otherwise kept on one line.
 const LONG_TEXT: usize = 48;
-const LONG_NUMBER: usize = 20;
+const LONG_NUMBER: usize = 14;
+/// A longer text without spaces, a path of a field or score, may break after `_` and `.`.
+const LONG_IDENTIFIER: usize = 24;
 /// A table with more columns is set smaller.
 const WIDE_TABLE_COLUMNS: usize = 6;
 /// With more sections the links are folded.
@@ -239,7 +241,11 @@ fn render_cell(out: &mut String, cell: &Cell, heading: bool) {
         classes.push(cell.status.class());
     }
     let class = if classes.is_empty() { String::new() } else { format!(" class=\"{}\"", classes.join(" ")) };
-    let _ = write!(out, "<{tag}{scope}{class}>{}</{tag}>", escape_html(&cell.text));
+    let mut text = escape_html(&cell.text);
+    if cell.text.len() > LONG_IDENTIFIER && !cell.text.contains(' ') {
+        text = text.replace('_', "_<wbr>").replace('.', ".<wbr>");
+    }
+    let _ = write!(out, "<{tag}{scope}{class}>{text}</{tag}>");
 }
 
 fn render_text(out: &mut String, words: &Text) {
