@@ -1,10 +1,10 @@
 //! A chart as plain data: curves, marked times, bands, thresholds, lanes. Drawing is done by the page script and by `svg`.
 
 use crate::palette::Colour;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// How a curve or a marker line is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LineStyle {
     /// Unbroken line.
@@ -21,8 +21,7 @@ pub enum LineStyle {
 }
 
 /// The vertical axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Scale {
     /// Linear.
     #[default]
@@ -34,7 +33,7 @@ pub enum Scale {
 }
 
 /// One curve with its abscissae; equal columns are stored once in the page.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     /// Name in the legend.
     pub name: String,
@@ -94,7 +93,7 @@ impl Series {
 }
 
 /// Side of the line on which a marker's label is written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// To the left of the line.
@@ -105,7 +104,7 @@ pub enum Side {
 }
 
 /// Vertical lines with one meaning: true ruptures, detections, compensation times.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MarkerSet {
     /// Name in the legend.
     pub name: String,
@@ -120,7 +119,7 @@ pub struct MarkerSet {
 }
 
 /// A shaded interval of the abscissa over the chart's full height.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Band {
     /// Where it begins.
     pub from: f64,
@@ -133,7 +132,7 @@ pub struct Band {
 }
 
 /// A horizontal line: a threshold.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Level {
     /// Ordinate.
     pub y: f64,
@@ -160,7 +159,7 @@ impl Level {
 }
 
 /// One row of coloured spans: the states of a state machine.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Lane {
     /// Name of the row.
     pub name: String,
@@ -169,7 +168,7 @@ pub struct Lane {
 }
 
 /// A span of a [`Lane`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     /// Where it begins.
     pub from: f64,
@@ -182,7 +181,7 @@ pub struct Span {
 }
 
 /// One chart. Charts with the same `group` share zoom, pan and cursor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
     /// Heading.
     pub title: String,

@@ -3,7 +3,7 @@
 use crate::chart_json;
 use crate::chart_model::Chart;
 use crate::escaping::{escape_html, escape_script_json, percent_encode, slug};
-use crate::page_model::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text};
+use crate::page_model::{Block, Cell, Code, Page, Section, Status, SvgImage, Table, Text, Tile};
 use std::fmt::Write;
 
 const UPLOT_JS: &str = include_str!("../assets/uPlot.iife.min.js");
@@ -148,7 +148,7 @@ fn render_section(out: &mut String, section: &Section, index: usize, number: &mu
                 *number += 1;
             }
             Block::Table(table) => render_table(out, table),
-            Block::Scorecard(card) => render_scorecard(out, card),
+            Block::Scorecard(tiles) => render_scorecard(out, tiles),
             Block::Text(words) => render_text(out, words),
             Block::Svg(image) => render_image(out, image),
             Block::Code(code) => render_code(out, code),
@@ -176,12 +176,9 @@ fn render_chart(out: &mut String, chart: &Chart, number: usize) {
     );
 }
 
-fn render_scorecard(out: &mut String, card: &Scorecard) {
-    if !card.title.is_empty() {
-        let _ = writeln!(out, "<h3>{}</h3>", escape_html(&card.title));
-    }
+fn render_scorecard(out: &mut String, tiles: &[Tile]) {
     out.push_str("<dl class=\"scorecard\">\n");
-    for tile in &card.tiles {
+    for tile in tiles {
         let _ = writeln!(
             out,
             "<div class=\"tile {}\"><dt>{}</dt><dd>{}<small>{}</small></dd></div>",

@@ -22,7 +22,7 @@ pub mod svg;
 
 pub use chart_model::{Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span};
 pub use insertion_report::RunReport;
-pub use page_model::{Block, Cell, Code, Page, Scorecard, Section, Status, SvgImage, Table, Text, Tile};
+pub use page_model::{Block, Cell, Code, Page, Section, Status, SvgImage, Table, Text, Tile};
 pub use palette::Colour;
 pub use stylet_stats::number_format::{p_value, percent, plus_minus, significant};
 

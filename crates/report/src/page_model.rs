@@ -1,11 +1,9 @@
 //! A page as data: sections of charts, tables, score tiles, text, pictures and code.
 
 use crate::chart_model::Chart;
-use serde::{Deserialize, Serialize};
 
 /// Judgement of a value. Drawn as a colour and a sign, so that it does not depend on colour vision.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Status {
     /// Not judged.
     #[default]
@@ -44,7 +42,7 @@ impl Status {
 }
 
 /// One figure of a scorecard.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     /// What it is.
     pub label: String,
@@ -71,17 +69,8 @@ impl Tile {
     }
 }
 
-/// A row of tiles.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Scorecard {
-    /// Heading above the row; may be empty.
-    pub title: String,
-    /// The tiles.
-    pub tiles: Vec<Tile>,
-}
-
 /// A cell of a table.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cell {
     /// Text of the cell.
     pub text: String,
@@ -113,7 +102,7 @@ impl Cell {
 }
 
 /// A table. The first cell of a row is its heading.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     /// Caption above the table.
     pub title: String,
@@ -142,7 +131,7 @@ impl Table {
 }
 
 /// Paragraphs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Text {
     /// Paragraphs of plain text; markup in them is escaped.
     pub paragraphs: Vec<String>,
@@ -151,7 +140,7 @@ pub struct Text {
 }
 
 /// A still picture.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SvgImage {
     /// Alternative text.
     pub description: String,
@@ -160,7 +149,7 @@ pub struct SvgImage {
 }
 
 /// Text to be copied: a scenario, a command.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Code {
     /// Name, such as the file's.
     pub title: String,
@@ -171,8 +160,7 @@ pub struct Code {
 }
 
 /// A piece of a section.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "a page holds a few dozen blocks")]
 pub enum Block {
     /// A chart that zooms and pans.
@@ -180,7 +168,7 @@ pub enum Block {
     /// A table.
     Table(Table),
     /// Score tiles.
-    Scorecard(Scorecard),
+    Scorecard(Vec<Tile>),
     /// Paragraphs.
     Text(Text),
     /// A still picture.
@@ -190,7 +178,7 @@ pub enum Block {
 }
 
 /// A part of the page with its heading.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
     /// Heading.
     pub title: String,
@@ -246,10 +234,10 @@ impl Section {
         self.block(Block::Text(Text { paragraphs, status: Status::Warn }))
     }
 
-    /// Adds a row of tiles without a heading.
+    /// Adds a row of tiles.
     #[must_use]
     pub fn tiles(self, tiles: Vec<Tile>) -> Self {
-        self.block(Block::Scorecard(Scorecard { title: String::new(), tiles }))
+        self.block(Block::Scorecard(tiles))
     }
 
     /// Adds a still picture (SVG).
@@ -272,7 +260,7 @@ impl Section {
 }
 
 /// A page, rendered to one self-contained HTML file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Page {
     /// Title.
     pub title: String,

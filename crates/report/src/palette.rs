@@ -1,10 +1,7 @@
 //! Colours distinguishable with colour vision deficiency, on light and dark backgrounds.
 
-use serde::{Deserialize, Serialize};
-
 /// A colour by role; the eight hues are Okabe and Ito's (2008), `Ink` and `Grey` follow the theme.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Colour {
     /// The text colour: near black on paper, near white in the dark. Ground truth is drawn in it.
     Ink,

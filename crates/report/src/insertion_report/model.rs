@@ -1,10 +1,9 @@
 //! The columns and numbers of one insertion, as the report needs them.
 
 use crate::chart_model::Series;
-use serde::{Deserialize, Serialize};
 
 /// Origin of the results, sufficient to reproduce them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
     /// File name of the scenario or configuration.
     pub scenario_file: String,
@@ -21,7 +20,7 @@ pub struct Provenance {
 }
 
 /// A measured force: one per sensor.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForceTrace {
     /// Name of the sensor, such as `force_torque`.
     pub sensor: String,
@@ -30,7 +29,7 @@ pub struct ForceTrace {
 }
 
 /// True properties of a layer.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrueLayer {
     /// Name.
     pub name: String,
@@ -49,7 +48,7 @@ pub struct TrueLayer {
 }
 
 /// A true rupture.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrueRupture {
     /// Layer, counted from 1.
     pub layer: usize,
@@ -62,7 +61,7 @@ pub struct TrueRupture {
 }
 
 /// Ground truth of a simulation.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Truth {
     /// Tip force `f - D v` with the true `D`, per sample.
     pub tip_force_n: Vec<f64>,
@@ -75,7 +74,7 @@ pub struct Truth {
 }
 
 /// A detected rupture.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Detection {
     /// Time of the detection in s.
     pub time_s: f64,
@@ -88,7 +87,7 @@ pub struct Detection {
 }
 
 /// An interval in which the detection's state machine is in one state.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct StateSpan {
     /// `NoRupture`, `ExpectedRupture`, `DetectedRupture`, `ForceDropMeasuring`, `ForceCompensation`; others are drawn too.
     pub state: String,
@@ -99,7 +98,7 @@ pub struct StateSpan {
 }
 
 /// Final estimates of one layer. Relative errors are `(estimate - truth) / truth`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LayerEstimate {
     /// Layer, counted from 1.
     pub layer: usize,
@@ -109,7 +108,6 @@ pub struct LayerEstimate {
     /// Re-weighted stiffness.
     pub stiffness_n_per_m: Option<f64>,
     /// Half its 95 % interval, if the algorithm estimates it.
-    #[serde(default)]
     pub stiffness_half_width: Option<f64>,
     /// Its relative error.
     pub stiffness_error: Option<f64>,
@@ -118,7 +116,6 @@ pub struct LayerEstimate {
     /// Re-weighted friction of the whole layer (KV model).
     pub friction_ns_per_m: Option<f64>,
     /// Half the 95 % interval of the friction, if the algorithm estimates it.
-    #[serde(default)]
     pub friction_half_width: Option<f64>,
     /// Relative error of the friction.
     pub friction_error: Option<f64>,
@@ -133,12 +130,11 @@ pub struct LayerEstimate {
     /// Friction of the whole layer from the offline fit (KV model).
     pub offline_friction_ns_per_m: Option<f64>,
     /// Whether the motion within the layer separates stiffness from friction in the offline fit.
-    #[serde(default)]
     pub offline_separable: Option<bool>,
 }
 
 /// A true rupture and its matched detection.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RuptureScore {
     /// Layer, counted from 1.
     pub layer: usize,
@@ -153,7 +149,7 @@ pub struct RuptureScore {
 }
 
 /// The score of a combination against the truth.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
     /// One per true rupture, in the order of [`Truth::ruptures`].
     pub ruptures: Vec<RuptureScore>,
@@ -178,7 +174,7 @@ pub struct Score {
 }
 
 /// Results of one combination of algorithm, model and sensor.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Combination {
     /// Name, such as `paper/ml/force_torque`.
     pub name: String,
@@ -191,10 +187,8 @@ pub struct Combination {
     /// Enhanced force `f - D v`.
     pub enhanced_force_n: Vec<f64>,
     /// Lower end of the 95 % interval of the tip force in N; NaN without one.
-    #[serde(default)]
     pub tip_force_low_n: Vec<f64>,
     /// Upper end of the 95 % interval of the tip force in N; NaN without one.
-    #[serde(default)]
     pub tip_force_high_n: Vec<f64>,
     /// Online stiffness.
     pub stiffness_n_per_m: Vec<f64>,
@@ -209,11 +203,9 @@ pub struct Combination {
     /// Its alarm threshold.
     pub cusum_threshold_n2: Option<f64>,
     /// Whether the statistic is divided by its threshold and has no unit.
-    #[serde(default)]
     pub cusum_is_normalised: bool,
     /// Drift `nu` subtracted from the squared reconstruction error at each sample, in N²; `None` where the statistic is
     /// normalised.
-    #[serde(default)]
     pub cusum_drift_n2: Option<f64>,
     /// Filtered force derivative.
     pub force_derivative_n_per_s: Vec<f64>,
@@ -236,7 +228,7 @@ pub struct Combination {
 }
 
 /// All data of the report of one insertion.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunReport {
     /// Title: the scenario's name.
     pub title: String,

@@ -5,11 +5,10 @@ use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
 use crate::chart_model::finite_extent;
 use crate::palette::Colour;
-use serde::{Deserialize, Serialize};
 use stylet_stats::number_format::significant;
 
 /// One bar.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
     /// Label of the bar.
     pub name: String,
@@ -22,7 +21,7 @@ pub struct Bar {
 }
 
 /// Bars of one quantity.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct BarChart {
     /// Quantity and unit.
     pub label: String,

@@ -3,11 +3,10 @@
 use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
 use crate::chart_model::finite_extent;
-use serde::{Deserialize, Serialize};
 use stylet_stats::number_format::significant;
 
 /// A matrix with named rows and columns.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct HeatMap {
     /// Meaning of the rows.
     pub row_label: String,
@@ -21,7 +20,6 @@ pub struct HeatMap {
     pub values: Vec<Vec<f64>>,
     /// The values are fractions, 0 to 1: coloured over that range and written in per cent, zeros included; a value that is not
     /// finite has no cell.
-    #[serde(default)]
     pub values_are_fractions: bool,
 }
 

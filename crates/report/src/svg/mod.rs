@@ -14,7 +14,7 @@ mod strip_chart;
 mod svg_canvas;
 
 pub use bar_chart::{Bar, BarChart, bar_chart};
-pub use figure_options::{FigureOptions, Theme};
+pub use figure_options::FigureOptions;
 pub use heat_map::{HeatMap, heat_map};
 pub use line_figure::figure;
 pub use state_diagram::{Arrow, Diagram, Node, state_machine};

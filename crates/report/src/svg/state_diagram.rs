@@ -2,10 +2,9 @@
 
 use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas, text_width};
-use serde::{Deserialize, Serialize};
 
 /// A state.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Its name, one or more lines.
     pub lines: Vec<String>,
@@ -14,7 +13,7 @@ pub struct Node {
 }
 
 /// An arrow from the border of one box to that of another.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Arrow {
     /// Index of the box where it begins.
     pub from: usize,
@@ -29,7 +28,7 @@ pub struct Arrow {
 }
 
 /// Boxes and arrows.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Diagram {
     /// The boxes.
     pub nodes: Vec<Node>,

@@ -6,11 +6,10 @@ use super::figure_options::FigureOptions;
 use super::svg_canvas::{Anchor, Canvas};
 use crate::chart_model::finite_extent;
 use crate::palette::Colour;
-use serde::{Deserialize, Serialize};
 use stylet_stats::number_format::significant;
 
 /// The values of one strip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Strip {
     /// Name in the legend; the same name has the same colour.
     pub name: String,
@@ -21,7 +20,7 @@ pub struct Strip {
 }
 
 /// Strips that belong together.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct StripGroup {
     /// Name below the group.
     pub name: String,
@@ -32,7 +31,7 @@ pub struct StripGroup {
 }
 
 /// Groups over one ordinate.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct StripChart {
     /// Quantity and unit.
     pub label: String,

@@ -1,7 +1,7 @@
 //! Writes SVG elements with rounded coordinates and colours by class, so that one file serves light and dark themes.
 
 use super::axis::svg_coordinate;
-use super::figure_options::{FigureOptions, Theme};
+use super::figure_options::FigureOptions;
 use crate::escaping;
 use crate::palette::Colour;
 use std::fmt::Write;
@@ -33,14 +33,13 @@ pub(super) enum Anchor {
 pub(super) struct Canvas {
     body: String,
     width: f64,
-    theme: Theme,
     clips: usize,
 }
 
 impl Canvas {
     pub(super) fn new(options: &FigureOptions) -> Self {
         let width = if options.width_px.is_finite() { options.width_px.clamp(240.0, 4000.0) } else { 960.0 };
-        Self { body: String::new(), width, theme: options.theme, clips: 0 }
+        Self { body: String::new(), width, clips: 0 }
     }
 
     pub(super) const fn width(&self) -> f64 {
@@ -153,7 +152,7 @@ impl Canvas {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" role=\"img\" \
              aria-label=\"{}\">\n<style>{}</style>\n<rect width=\"{w}\" height=\"{h}\" class=\"paper\"/>\n{}</svg>\n",
             escaping::escape_html(description),
-            style(self.theme),
+            style(),
             self.body
         )
     }
@@ -176,20 +175,14 @@ pub(super) fn text_width(words: &str, size: f64) -> f64 {
         * size
 }
 
-fn style(theme: Theme) -> String {
+fn style() -> String {
     let fixed = format!(
         "text{{font:12px {FONT}}}.h{{font-size:18px;font-weight:650}}.s{{font-size:13px}}.b{{font-weight:600}}.t{{font-size:11.5px}}\
          .l{{fill:none;stroke-linejoin:round}}.dashed{{stroke-dasharray:7 4}}.dotted{{stroke-dasharray:1.5 3.5;stroke-width:2}}\
          .m{{stroke-width:1.5;fill:none}}.area{{fill-opacity:.13;stroke:none}}.halo{{paint-order:stroke;stroke-width:3.5px;stroke-linejoin:round}}\
          .grid{{fill:none;stroke-width:1}}.frame{{fill:none;stroke-width:1}}.p{{stroke-width:1.3}}.rest{{fill-opacity:.35}}.faint{{fill-opacity:.28}}"
     );
-    match theme {
-        Theme::Light => fixed + &colours(false),
-        Theme::Dark => fixed + &colours(true),
-        Theme::Auto => {
-            format!("{fixed}{}@media(prefers-color-scheme:dark){{{}}}", colours(false), colours(true))
-        }
-    }
+    format!("{fixed}{}@media(prefers-color-scheme:dark){{{}}}", colours(false), colours(true))
 }
 
 fn colours(dark: bool) -> String {

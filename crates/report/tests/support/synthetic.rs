@@ -1,5 +1,4 @@
-//! A made-up but plausible run: three gel layers, 50 s at 200 Hz, sawtooth elastic force, growing friction, noise.
-//! Detections are placed, not found: this crate draws results and computes none.
+//! A synthetic run: three gel layers, 50 s at 200 Hz, sawtooth elastic force, growing friction, noise. Detections are prescribed.
 
 use stylet_report::insertion_report::{
     Combination, Detection, ForceTrace, LayerEstimate, Provenance, RunReport, RuptureScore, StateSpan,

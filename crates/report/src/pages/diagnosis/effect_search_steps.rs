@@ -2,7 +2,7 @@
 
 use crate::page_model::Section;
 use crate::palette::Colour;
-use crate::svg::{Bar, BarChart, FigureOptions, Theme, bar_chart};
+use crate::svg::{Bar, BarChart, FigureOptions, bar_chart};
 use stylet_diagnose::diagnosis_json::Diagnosis;
 use stylet_stats::number_format::significant;
 
@@ -41,7 +41,6 @@ pub(super) fn search_steps(d: &Diagnosis) -> Section {
             title: format!("Step {}: in addition to {current}", k + 1),
             subtitle: format!("threshold: {} nats; {end}", significant(step.required_nats, 3)),
             width_px: 960.0,
-            theme: Theme::Auto,
         };
         let markup = bar_chart(
             &BarChart {
