@@ -194,17 +194,14 @@ fn changed<T: serde::Serialize + DeserializeOwned>(
         let last = field.steps.len() - 1;
         for (depth, step) in field.steps.iter().enumerate().skip(1) {
             place = inner(place);
-            place = match (step, place) {
-                (Step::Index(index), Value::Array(items)) => items.get_mut(*index),
-                (Step::Name(name), Value::Object(fields)) => {
-                    if depth == last && !fields.contains_key(name) {
-                        fields.insert(name.clone(), Value::Null);
-                    }
-                    fields.get_mut(name)
-                }
-                _ => None,
+            if let (Step::Name(name), Value::Object(fields)) = (step, &mut *place)
+                && depth == last
+                && !fields.contains_key(name)
+            {
+                fields.insert(name.clone(), Value::Null);
             }
-            .ok_or_else(|| format!("`{}` does not exist in this trial", field.path))?;
+            place =
+                child(place, step).ok_or_else(|| format!("`{}` does not exist in this trial", field.path))?;
         }
         *place = field.value(*value);
     }
@@ -229,6 +226,15 @@ fn split(path: &str) -> Result<Vec<Step>, String> {
         }
     }
     Ok(steps)
+}
+
+/// The entry of a list or the field of an object.
+fn child<'a>(place: &'a mut Value, step: &Step) -> Option<&'a mut Value> {
+    match (step, place) {
+        (Step::Index(index), Value::Array(items)) => items.get_mut(*index),
+        (Step::Name(name), Value::Object(fields)) => fields.get_mut(name),
+        _ => None,
+    }
 }
 
 fn is_variant(name: &str) -> bool {
@@ -260,13 +266,7 @@ fn known_here(scenario: &Scenario, steps: &[Step]) -> Vec<String> {
     let Ok(mut tree) = serde_json::to_value(scenario) else { return Vec::new() };
     let mut place = &mut tree;
     for step in steps {
-        place = inner(place);
-        let next = match (step, place) {
-            (Step::Index(index), Value::Array(items)) => items.get_mut(*index),
-            (Step::Name(name), Value::Object(fields)) => fields.get_mut(name),
-            _ => None,
-        };
-        let Some(next) = next else { return Vec::new() };
+        let Some(next) = child(inner(place), step) else { return Vec::new() };
         place = next;
     }
     if let Value::Object(fields) = inner(place) {

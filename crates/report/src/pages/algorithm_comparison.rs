@@ -28,11 +28,7 @@ pub fn page(rows: &[ComparisonRow], seeds: u64) -> Page {
             Cell::number(format!("{} / {} of {}", r.missed, r.false_alarms, r.ruptures))
                 .status(Status::at_most(value, 0.001, 0.05)),
         );
-        cells.push(Cell::number(format!(
-            "{} to {}",
-            significant_or_dash(Some(low), 100.0, 2),
-            significant_or_dash(Some(high), 100.0, 2)
-        )));
+        cells.push(Cell::number(intervals(&[Some([low, high])])));
         cells.push(Cell::number(format!(
             "{} / {}",
             significant_or_dash(r.delay_s.median, 1e3, 2),
