@@ -18,8 +18,8 @@ const GRID_HALF_POINTS: i32 = 12;
 
 /// Index of the model's delay effect, if it has the delay as its only parameter.
 fn delay_effect_index(model: &Model) -> Option<usize> {
-    let late = |c: &EffectTerm| c.effect().is_some_and(|e| e.delay_s() > 0.0);
-    model.effects.iter().position(|c| c.info.parameters.len() == 1 && late(c))
+    let is_delayed = |c: &EffectTerm| c.effect().is_some_and(|e| e.delay_s() > 0.0);
+    model.effects.iter().position(|c| c.info.parameters.len() == 1 && is_delayed(c))
 }
 
 /// Delay of the force in s.
@@ -34,10 +34,10 @@ pub fn delay_s(model: &Model) -> f64 {
 pub fn refine_delay(found: &Fit, data: &FitData) -> Option<(Fit, FitData)> {
     let step_s = data.recordings.iter().map(|b| b.sample_step_s).fold(f64::INFINITY, f64::min);
     let effect = delay_effect_index(&found.model)?;
-    let seen = data.with_recordings(
+    let delayed = data.with_recordings(
         data.recordings.par_iter().map(|b| b.with_delayed_jump_uncertainty(delay_s(&found.model))).collect(),
     );
-    let was = residuals(&found.model, &seen)?;
+    let was = residuals(&found.model, &delayed)?;
     let mut best: Option<Fit> = None;
     // The finer grid is centred on the result of the coarser one.
     for spacing_s in GRID_SPACINGS.map(|share| share * step_s) {
@@ -47,16 +47,18 @@ pub fn refine_delay(found: &Fit, data: &FitData) -> Option<(Fit, FitData)> {
             let to_s = from_s + spacing_s * f64::from(k);
             let mut model = Model { jump_delay_s: Some(to_s), ..about.clone() };
             model.effects[effect] = EffectTerm::new(model.effects[effect].info, &[to_s]);
-            let nats = if to_s > 0.0 { residuals(&model, &seen)?.nats } else { return None };
+            let nats = if to_s > 0.0 { residuals(&model, &delayed)?.nats } else { return None };
             Some((nats, model))
         };
         let tried: Vec<(f64, Model)> =
             (-GRID_HALF_POINTS..=GRID_HALF_POINTS).into_par_iter().filter_map(at).collect();
         let likeliest = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some(next) = likeliest.and_then(|(_, model)| fit(&model, &seen, Effort::FULL)) else { continue };
+        let Some(next) = likeliest.and_then(|(_, model)| fit(&model, &delayed, Effort::FULL)) else {
+            continue;
+        };
         if best.as_ref().is_none_or(|b| next.nats() < b.nats()) {
             best = Some(next);
         }
     }
-    best.filter(|b| b.nats() < was.nats).map(|better| (better, seen))
+    best.filter(|b| b.nats() < was.nats).map(|better| (better, delayed))
 }

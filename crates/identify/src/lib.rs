@@ -38,4 +38,6 @@ pub mod noise;
 pub mod rupture_assignment;
 pub mod rupture_likelihood;
 pub mod score_test;
+#[cfg(test)]
+mod test_support;
 pub mod update_event_times;

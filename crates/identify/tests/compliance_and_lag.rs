@@ -46,7 +46,7 @@ fn followed(needle: f64, end_s: f64) -> Vec<f64> {
 
 #[test]
 fn a_compliant_needle_agrees_with_fine_integration() {
-    let belief = one_layer(0.06, LAYER);
+    let assumptions = one_layer(0.06, LAYER);
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();
     let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("a recording");
@@ -54,7 +54,8 @@ fn a_compliant_needle_agrees_with_fine_integration() {
     let data = FitData::new(Arc::new(vec![blocks.clone()]), Noise::white(0.02), 0.0);
     let info = effect_info("needle_compliance").expect("in the library");
     for needle in [5000.0, 20_000.0, 80_000.0] {
-        let mut model = Model::base(Arc::clone(&belief), 1).with_effect(EffectTerm::new(info, &[needle]));
+        let mut model =
+            Model::base(Arc::clone(&assumptions), 1).with_effect(EffectTerm::new(info, &[needle]));
         model.rupture_times_s = vec![vec![NO_RUPTURE]];
         let predicted = replay(&model, &data, 0).expect("a replay").force_n;
         let force = followed(needle, 14.1);
@@ -80,7 +81,7 @@ fn worst(blocks: &BlockAverages, predicted: &[f64], force: &[f64]) -> (f64, f64)
 
 #[test]
 fn a_lagging_sensor_agrees_with_fine_integration() {
-    let belief = one_layer(0.06, LAYER);
+    let assumptions = one_layer(0.06, LAYER);
     let t: Vec<f64> = (0..2800).map(|k| f64::from(k) * 0.005).collect();
     let z = t.iter().map(|t| base(*t)).collect();
     let r = Recording::new(t.clone(), z, vec![0.0; t.len()]).expect("a recording");
@@ -89,7 +90,7 @@ fn a_lagging_sensor_agrees_with_fine_integration() {
     let info = effect_info("low_pass_lag").expect("in the library");
     let (k, b) = LAYER;
     for lag_s in [0.004, 0.009, 0.021, 0.1] {
-        let mut model = Model::base(Arc::clone(&belief), 1).with_effect(EffectTerm::new(info, &[lag_s]));
+        let mut model = Model::base(Arc::clone(&assumptions), 1).with_effect(EffectTerm::new(info, &[lag_s]));
         model.rupture_times_s = vec![vec![NO_RUPTURE]];
         let predicted = replay(&model, &data, 0).expect("a replay").force_n;
         let (mut lagged, mut force) = (0.0, vec![0.0]);

@@ -42,7 +42,7 @@ fn force(t: f64) -> f64 {
 
 #[test]
 fn a_delay_is_estimated_to_a_fraction_of_the_sampling_interval() {
-    let belief = one_layer(0.08, LAYER);
+    let assumptions = one_layer(0.08, LAYER);
     let (mut worst, mut worst_at_instants) = (0.0_f64, 0.0_f64);
     for truth in [0.0117, 0.0234, 0.0301, 0.0468] {
         let t: Vec<f64> = (0..2700).map(|k| f64::from(k) * STEP_S).collect();
@@ -54,11 +54,11 @@ fn a_delay_is_estimated_to_a_fraction_of_the_sampling_interval() {
         let blocks = BlockAverages::new(&recording, &vec![false; recording.time_s.len()], BLOCK_S);
         let data = FitData::new(Arc::new(vec![blocks]), Noise::white(1e-3), 0.0);
         let info = effect_info("time_delay").expect("an effect");
-        let mut model = Model::base(Arc::clone(&belief), 1).with_effect(EffectTerm::new(info, &[0.02]));
+        let mut model = Model::base(Arc::clone(&assumptions), 1).with_effect(EffectTerm::new(info, &[0.02]));
         model.rupture_times_s = vec![vec![NO_RUPTURE]];
         let found = fit(&model, &data, Effort::FULL).expect("a fit");
         worst_at_instants = worst_at_instants.max((delay_s(&found.model) - truth).abs());
-        let (found, _) = refine_delay(&found, &data).expect("a late force is better so");
+        let (found, _) = refine_delay(&found, &data).expect("an improved fit");
         worst = worst.max((delay_s(&found.model) - truth).abs());
     }
     assert!(worst < 0.02 * STEP_S, "{worst} s");

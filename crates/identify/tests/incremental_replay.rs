@@ -9,7 +9,7 @@ use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 use stylet_tissue::{Layer, Tissue, general_effects};
 
-fn belief() -> Assumptions {
+fn assumptions() -> Assumptions {
     let layer = |k: f64, b: f64, f: Option<f64>, d: f64| Layer {
         thickness_m: d,
         stiffness_n_per_m: k,
@@ -54,39 +54,39 @@ fn recording() -> Recording {
 
 #[test]
 fn incremental_replay_equals_a_full_replay_for_every_effect() {
-    let belief = Arc::new(belief());
+    let assumptions = Arc::new(assumptions());
     let r = recording();
     let blocks = vec![BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S)];
     let data = FitData::new(Arc::new(blocks), Noise::white(0.02), 0.0);
-    let mut models = vec![("none", Model::base(Arc::clone(&belief), 1))];
+    let mut models = vec![("none", Model::base(Arc::clone(&assumptions), 1))];
     for info in general_effects() {
         let values: Vec<f64> = info
             .parameters
             .iter()
             .map(|p| if p.integer { 1.0 } else { 0.5 * (p.search.0 + p.search.1) })
             .collect();
-        let choice = EffectTerm::new(info, &values);
-        if choice.effect().is_some() {
-            models.push((info.id, models[0].1.with_effect(choice)));
+        let term = EffectTerm::new(info, &values);
+        if term.effect().is_some() {
+            models.push((info.id, models[0].1.with_effect(term)));
         }
     }
     assert!(models.len() > 20, "{}", models.len());
     let mut compared = 0;
     // Rupture times anywhere between two checkpoints.
-    let instants = (0..24)
+    let rupture_times = (0..24)
         .map(|k| vec![2.1 + 0.02 * f64::from(k), 4.6 + 0.03 * f64::from(k), 9.7 + 0.07 * f64::from(k)]);
-    for ((name, mut model), instants) in models.into_iter().zip(instants.cycle()) {
-        model.rupture_times_s = vec![instants];
+    for ((name, mut model), rupture_times) in models.into_iter().zip(rupture_times.cycle()) {
+        model.rupture_times_s = vec![rupture_times];
         model.free.recording_surface = true;
         model.free.recording_friction = true;
-        let Some(trail) = ReplayCache::new(&model, &data, 0) else { continue };
+        let Some(cache) = ReplayCache::new(&model, &data, 0) else { continue };
         for n in model.shared_parameters().iter().chain(&model.recording_parameters()) {
             if matches!(n.role, stylet_identify::model::ParameterRole::Effect { .. }) {
                 continue;
             }
             let mut moved = model.clone();
             moved.set(n.role, 0, model.get(n.role, 0) + n.step);
-            let (Some(whole), Some(part)) = (replay(&moved, &data, 0), trail.replay(&moved, &data, 0)) else {
+            let (Some(whole), Some(part)) = (replay(&moved, &data, 0), cache.replay(&moved, &data, 0)) else {
                 continue;
             };
             let differ =

@@ -39,9 +39,9 @@ use stylet_tissue::{
 
 /// Results of all stages for one insertion or several: names and numbers in order.
 #[derive(Default)]
-struct Said(Vec<(String, Vec<f64>)>);
+struct Record(Vec<(String, Vec<f64>)>);
 
-impl Said {
+impl Record {
     fn numbers(&mut self, name: &str, numbers: &[f64]) {
         self.0.push((name.to_owned(), numbers.to_vec()));
     }
@@ -69,9 +69,9 @@ impl Said {
         self.column(name, &x.iter().map(|x| f64::from(u8::from(*x))).collect::<Vec<f64>>());
     }
 
-    fn kinks(&mut self, name: &str, kinks: &[VelocityJump]) {
-        self.count(&format!("{name} jumps"), kinks.len());
-        for (i, k) in kinks.iter().enumerate().take(6) {
+    fn jumps(&mut self, name: &str, jumps: &[VelocityJump]) {
+        self.count(&format!("{name} jumps"), jumps.len());
+        for (i, k) in jumps.iter().enumerate().take(6) {
             self.numbers(
                 &format!("{name} jump {i}"),
                 &[
@@ -91,7 +91,7 @@ impl Said {
         self.count(&format!("{name} pieces"), p.len());
         self.column(&format!("{name} pieces block"), &column(|p| f64::from(p.block)));
         self.column(&format!("{name} pieces length_s"), &column(|p| p.end_s - p.start_s));
-        self.column(&format!("{name} pieces place_m"), &column(|p| p.position_m));
+        self.column(&format!("{name} pieces position_m"), &column(|p| p.position_m));
         self.column(&format!("{name} pieces velocity_mps"), &column(|p| p.velocity_mps));
         self.column(&format!("{name} pieces acceleration_mps2"), &column(|p| p.acceleration_mps2));
     }
@@ -105,7 +105,7 @@ impl Said {
         self.flags(&format!("{name} compared"), &b.used);
         self.flags(&format!("{name} restart"), &b.memory_reset);
         self.column(&format!("{name} size_n"), &b.abs_force_n);
-        self.column(&format!("{name} doubt_n"), &b.extra_sd_n);
+        self.column(&format!("{name} extra_sd_n"), &b.extra_sd_n);
         self.pieces(name, &b.pieces);
     }
 
@@ -126,9 +126,10 @@ impl Said {
         }
     }
 
-    fn instants(&mut self, name: &str, instants: &[f64]) {
-        let told: Vec<f64> = instants.iter().map(|t| if *t < NO_RUPTURE { *t } else { -1.0 }).collect();
-        self.numbers(name, &told);
+    fn rupture_times(&mut self, name: &str, rupture_times: &[f64]) {
+        let actual: Vec<f64> =
+            rupture_times.iter().map(|t| if *t < NO_RUPTURE { *t } else { -1.0 }).collect();
+        self.numbers(name, &actual);
     }
 
     /// Estimates: shared and per-recording parameters, scatter, rupture times, residuals.
@@ -145,8 +146,8 @@ impl Said {
             &shared.iter().map(|n| m.get(n.role, 0)).collect::<Vec<f64>>(),
         );
         for r in 0..data.recording_count() {
-            let told: Vec<f64> = own.iter().map(|n| m.get(n.role, r)).collect();
-            self.instants(&format!("{name} own of {r}"), &told);
+            let actual: Vec<f64> = own.iter().map(|n| m.get(n.role, r)).collect();
+            self.rupture_times(&format!("{name} recording {r}"), &actual);
         }
         let s = &m.scatter;
         let scatter =
@@ -163,17 +164,17 @@ impl Said {
 }
 
 /// Relative tolerance, and absolute tolerance relative to the largest number of the line.
-const ALIKE: f64 = 1e-7;
-const NOTHING: f64 = 1e-10;
+const RELATIVE_TOLERANCE: f64 = 1e-7;
+const ABSOLUTE_TOLERANCE: f64 = 1e-10;
 
 fn file() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/recorded_stages.txt")
 }
 
-fn written(all: &[(&str, Said)]) -> String {
+fn written(all: &[(&str, Record)]) -> String {
     let mut text = String::new();
-    for (insertion, said) in all {
-        for (name, numbers) in &said.0 {
+    for (insertion, record) in all {
+        for (name, numbers) in &record.0 {
             let _ = write!(text, "{insertion}: {name} =");
             for x in numbers {
                 let _ = if *x == 0.0 || x.fract() == 0.0 && x.abs() < 1e6 {
@@ -197,10 +198,12 @@ fn parsed(text: &str) -> BTreeMap<&str, Vec<f64>> {
 }
 
 /// Whether two lines of numbers agree.
-fn alike(a: &[f64], b: &[f64]) -> bool {
+fn agree(a: &[f64], b: &[f64]) -> bool {
     let size = a.iter().filter(|x| x.is_finite()).fold(1e-15_f64, |m, x| m.max(x.abs()));
     let same = |(a, b): (&f64, &f64)| {
-        a == b || a.is_nan() && b.is_nan() || (a - b).abs() <= ALIKE * a.abs() + NOTHING * size
+        a == b
+            || a.is_nan() && b.is_nan()
+            || (a - b).abs() <= RELATIVE_TOLERANCE * a.abs() + ABSOLUTE_TOLERANCE * size
     };
     a.len() == b.len() && a.iter().zip(b).all(same)
 }
@@ -283,8 +286,8 @@ impl Insertion {
                 continue;
             }
             t.push(at);
-            let told = chain.recorded_position(true_m);
-            z.push(if self.step_m > 0.0 { libm::round(told / self.step_m) * self.step_m } else { told });
+            let actual = chain.recorded_position(true_m);
+            z.push(if self.step_m > 0.0 { libm::round(actual / self.step_m) * self.step_m } else { actual });
             f.push(force_n);
         }
         (Recording::new(t, z, f).expect("a recording"), ruptures)
@@ -304,7 +307,7 @@ fn tissue(surface_m: f64, layers: &[(f64, f64, f64, Option<f64>)]) -> Tissue {
 }
 
 /// Assumptions of all insertions.
-fn belief() -> Assumptions {
+fn assumptions() -> Assumptions {
     Assumptions {
         tissue: tissue(
             0.002,
@@ -337,7 +340,7 @@ fn effect(id: &str, values: &[f64]) -> AnyEffect {
     AnyEffect::from_parameters(id, values).expect("in the library")
 }
 
-fn choice(id: &str, values: &[f64]) -> EffectTerm {
+fn term(id: &str, values: &[f64]) -> EffectTerm {
     EffectTerm::new(effect_info(id).expect("in the library"), values)
 }
 
@@ -464,40 +467,40 @@ fn repeated(k: usize) -> Insertion {
 // ---- Stages ----
 
 /// Motion and raw force.
-fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
+fn raw_stages(record: &mut Record, r: &Recording, layers: usize) {
     let (t, z) = (&r.time_s, &r.position_m);
-    let told = estimate_velocity(t, z);
-    said.column("velocity mps", &told.velocity_mps);
-    said.number("velocity noise_mps", told.sd_mps);
-    said.kinks("velocity", &told.jumps);
+    let actual = estimate_velocity(t, z);
+    record.column("velocity mps", &actual.velocity_mps);
+    record.number("velocity noise_mps", actual.sd_mps);
+    record.jumps("velocity", &actual.jumps);
     let calm = smooth_positions(t, z);
-    said.column("settled place_m", &calm.position_m);
-    said.column("settled mps", &calm.velocity_mps);
-    said.number("settled sd_mps", calm.sd_mps);
-    said.kinks("settled", &calm.jumps);
+    record.column("smoothed position_m", &calm.position_m);
+    record.column("smoothed mps", &calm.velocity_mps);
+    record.number("smoothed sd_mps", calm.sd_mps);
+    record.jumps("smoothed", &calm.jumps);
     let motion = Motion::from_recording(r, SGN_DEAD_BAND_MPS);
-    said.numbers("motion noise", &[motion.velocity_sd_mps, motion.noise_m * 100.0]);
+    record.numbers("motion noise", &[motion.velocity_sd_mps, motion.noise_m * 100.0]);
     for (i, j) in motion.jumps.iter().enumerate().take(6) {
-        said.numbers(&format!("motion jump {i} instants_s"), &[j.time_s, j.sample_mid_s, j.time_sd_s]);
-        said.number(&format!("motion jump {i} place_m"), j.position_m);
-        said.numbers(&format!("motion jump {i} mps"), &j.velocity_mps);
+        record.numbers(&format!("motion jump {i} times_s"), &[j.time_s, j.sample_mid_s, j.time_sd_s]);
+        record.number(&format!("motion jump {i} position_m"), j.position_m);
+        record.numbers(&format!("motion jump {i} mps"), &j.velocity_mps);
     }
     let end = t[t.len() - 1];
     let between: Vec<(f64, f64)> = (0..400).map(|k| motion.at(end * (f64::from(k) - 3.0) / 390.0)).collect();
-    said.column("motion place_m", &between.iter().map(|m| m.0).collect::<Vec<f64>>());
-    said.column("motion mps", &between.iter().map(|m| m.1).collect::<Vec<f64>>());
+    record.column("motion position_m", &between.iter().map(|m| m.0).collect::<Vec<f64>>());
+    record.column("motion mps", &between.iter().map(|m| m.1).collect::<Vec<f64>>());
     let p = insertion_phases::detect_phases(r);
-    said.numbers("phases", &[p.start as f64, p.deepest as f64, p.retraction as f64]);
-    said.number("phases noise_n", insertion_phases::noise_n(&r.force_n));
-    said.number("phases contact_m", insertion_phases::contact_m(r, &p));
+    record.numbers("phases", &[p.start as f64, p.deepest as f64, p.retraction as f64]);
+    record.number("phases noise_n", insertion_phases::noise_n(&r.force_n));
+    record.number("phases contact_m", insertion_phases::contact_m(r, &p));
     let falls = insertion_phases::abrupt_drops(r, &p);
-    said.numbers("phases drops", &falls.iter().map(|d| d.sample as f64).collect::<Vec<f64>>());
-    said.numbers("phases drops_n", &falls.iter().map(|d| d.size_n).collect::<Vec<f64>>());
+    record.numbers("phases drops", &falls.iter().map(|d| d.sample as f64).collect::<Vec<f64>>());
+    record.numbers("phases drops_n", &falls.iter().map(|d| d.size_n).collect::<Vec<f64>>());
     let of = insertion_phases::rupture_samples(&falls, layers);
-    said.numbers("phases ruptures", &of.iter().map(|d| d.map_or(-1.0, |d| d as f64)).collect::<Vec<f64>>());
+    record.numbers("phases ruptures", &of.iter().map(|d| d.map_or(-1.0, |d| d as f64)).collect::<Vec<f64>>());
     for few in 1..=layers {
         let released = insertion_phases::releases(r, &p, few);
-        said.numbers(
+        record.numbers(
             &format!("phases {few} releases"),
             &released.iter().flat_map(|r| [r.position_m, 0.1 * r.size_n]).collect::<Vec<f64>>(),
         );
@@ -505,26 +508,26 @@ fn raw_stages(said: &mut Said, r: &Recording, layers: usize) {
 }
 
 /// Blocks: plain, delayed, coarser.
-fn block_stages(said: &mut Said, b: &BlockAverages) {
-    said.blocks("blocks", b);
-    said.blocks("coarse", &b.coarsened(3));
+fn block_stages(record: &mut Record, b: &BlockAverages) {
+    record.blocks("blocks", b);
+    record.blocks("coarse", &b.coarsened(3));
     for (name, smeared, late_s, placed_s) in [
-        ("smeared", true, 0.0, None),
-        ("late", false, 0.0137, None),
-        ("late and smeared", true, 0.0137, Some(0.02)),
-        ("placed", false, 0.0437, Some(0.0391)),
+        ("low-pass", true, 0.0, None),
+        ("delay", false, 0.0137, None),
+        ("delay and low-pass", true, 0.0137, Some(0.02)),
+        ("refined delay", false, 0.0437, Some(0.0391)),
     ] {
-        said.pieces(name, &b.motion_pieces(smeared, late_s, placed_s));
+        record.pieces(name, &b.motion_pieces(smeared, late_s, placed_s));
     }
-    said.column("late doubt_n", &b.with_delayed_jump_uncertainty(0.0437).extra_sd_n);
+    record.column("delay extra_sd_n", &b.with_delayed_jump_uncertainty(0.0437).extra_sd_n);
     let e: Vec<f64> = (0..b.len()).map(|k| 0.05 * libm::sin(0.3 * k as f64)).collect();
-    said.column("raw residual_n", &b.sample_residuals(&e));
-    said.number("within_n", b.within_block_sd_n());
+    record.column("raw residual_n", &b.sample_residuals(&e));
+    record.number("within_n", b.within_block_sd_n());
     let found = detect_force_drops(b);
-    said.numbers("drops at_s", &found.iter().map(|d| d.time_s).collect::<Vec<f64>>());
-    said.numbers("drops place_m", &found.iter().map(|d| d.position_m).collect::<Vec<f64>>());
-    said.numbers("drops size_n", &found.iter().map(|d| d.size_n).collect::<Vec<f64>>());
-    said.numbers("drops score", &found.iter().map(|d| d.score).collect::<Vec<f64>>());
+    record.numbers("drops at_s", &found.iter().map(|d| d.time_s).collect::<Vec<f64>>());
+    record.numbers("drops position_m", &found.iter().map(|d| d.position_m).collect::<Vec<f64>>());
+    record.numbers("drops size_n", &found.iter().map(|d| d.size_n).collect::<Vec<f64>>());
+    record.numbers("drops score", &found.iter().map(|d| d.score).collect::<Vec<f64>>());
 }
 
 /// Standard deviation in N of blocks about their neighbours.
@@ -536,8 +539,8 @@ fn roughness(blocks: &[BlockAverages]) -> f64 {
 
 /// The base model fitted as in a diagnosis: drops assigned to layers, parameters and rupture times in turn.
 fn base_stages(
-    said: &mut Said,
-    belief: &Arc<Assumptions>,
+    record: &mut Record,
+    assumptions: &Arc<Assumptions>,
     blocks: &Arc<Vec<BlockAverages>>,
 ) -> (Fit, FitData) {
     let found: Vec<_> = blocks.iter().map(detect_force_drops).collect();
@@ -545,17 +548,17 @@ fn base_stages(
     let rough_n = roughness(blocks);
     let largest = blocks.iter().flat_map(|b| &b.abs_force_n).fold(1e-9_f64, |m, f| m.max(*f));
     let mut data = FitData::new(Arc::clone(blocks), Noise::white(rough_n.max(0.03 * largest)), 1e-4);
-    let model = Model::base(Arc::clone(belief), blocks.len());
+    let model = Model::base(Arc::clone(assumptions), blocks.len());
     let mut best: Option<Fit> = None;
     for trust in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model).clone();
-        let instants = assign_ruptures(&from, blocks, &found, trust, rough_n);
-        for (r, i) in instants.iter().enumerate() {
-            said.instants(&format!("assigned with {trust} of {r} instants_s"), i);
+        let rupture_times = assign_ruptures(&from, blocks, &found, trust, rough_n);
+        for (r, i) in rupture_times.iter().enumerate() {
+            record.rupture_times(&format!("assigned with {trust} of {r} times_s"), i);
         }
-        let next = Model { rupture_times_s: instants, ..from };
+        let next = Model { rupture_times_s: rupture_times, ..from };
         let new = fit(&next, &data, Effort { max_iterations: 4, min_gain_nats: 0.3 }).expect("a fit");
-        said.fit(&format!("first fit with {trust}"), &new, &data);
+        record.fit(&format!("first fit with {trust}"), &new, &data);
         if best.as_ref().is_none_or(|b| new.nats() < b.nats()) {
             best = Some(new);
         }
@@ -563,53 +566,52 @@ fn base_stages(
     let mut best = best.expect("a fit");
     for round in 0..2 {
         data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
-        said.noise(&format!("calm noise {round}"), &data.noise);
+        record.noise(&format!("detrended noise {round}"), &data.noise);
         let mut model = best.model.clone();
         let moved = update_event_times(&mut model, &data, &times);
-        said.flags(&format!("round {round} moved"), &[moved]);
+        record.flags(&format!("round {round} moved"), &[moved]);
         for (r, i) in model.rupture_times_s.iter().enumerate() {
-            said.instants(&format!("round {round} of {r} instants_s"), i);
+            record.rupture_times(&format!("round {round} of {r} times_s"), i);
         }
         best = fit(&model, &data, Effort { max_iterations: 5, min_gain_nats: 0.3 }).expect("a fit");
-        said.fit(&format!("round {round}"), &best, &data);
+        record.fit(&format!("round {round}"), &best, &data);
     }
     data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
     best = fit_from_zero_scatter(&best.model, &data, Effort::FULL).expect("a fit");
-    said.fit("base", &best, &data);
+    record.fit("base", &best, &data);
     (best, data)
 }
 
 /// Noise from every source, and its effect on the residuals.
-fn noise_stages(said: &mut Said, found: &Fit, data: &FitData) {
+fn noise_stages(record: &mut Record, found: &Fit, data: &FitData) {
     let e = &found.residuals.residual_n;
     for from in
         [NoiseSource::Residual, NoiseSource::LongMemory, NoiseSource::Bootstrap, NoiseSource::Detrended]
     {
         let name = format!("noise {from:?}");
         let own = data.with_estimated_noise(e, from);
-        said.noise(&name, &own.noise);
-        said.number(&format!("{name} ln sizes"), own.noise.sum_ln_sd(&data.recordings));
+        record.noise(&name, &own.noise);
         let w = own.whiten(0, &e[0]);
-        said.column(&format!("{name} innovations"), &w);
-        said.column(&format!("{name} coloured_n"), &own.unwhiten(0, &w));
+        record.column(&format!("{name} innovations"), &w);
+        record.column(&format!("{name} coloured_n"), &own.unwhiten(0, &w));
         let nats = residuals(&found.model, &own).expect("a replay").nats;
-        said.number(&format!("{name} nats"), nats);
+        record.number(&format!("{name} nats"), nats);
     }
-    said.number("discrepancy_n", discrepancy_noise(&data.recordings, e, 1e-4).sd_n());
-    said.count("compared", data.compared_block_count());
+    record.number("discrepancy_n", discrepancy_noise(&data.recordings, e, 1e-4).sd_n());
+    record.count("compared", data.compared_block_count());
 }
 
 /// Linearization: columns, standard deviations, evidence; score tests of effects.
-fn picture_stages(said: &mut Said, found: &Fit, data: &FitData) {
-    let tangent = Linearization::new(&found.model, data, &found.residuals);
-    let factor = tangent.factor();
-    said.column("slope", &tangent.neg_gradient);
+fn picture_stages(record: &mut Record, found: &Fit, data: &FitData) {
+    let linearization = Linearization::new(&found.model, data, &found.residuals);
+    let factor = linearization.factor();
+    record.column("slope", &linearization.neg_gradient);
     let sds: Vec<f64> = factor.inverse_diagonal().iter().map(|v| v.sqrt()).collect();
-    said.numbers("sds", &sds);
-    said.number("ln determinant", factor.log_determinant());
-    let numbers = tangent.shared.iter().chain(&tangent.per_recording);
-    for (n, c) in numbers.zip(&tangent.columns) {
-        said.of_column(&format!("column {:?}", n.role), c);
+    record.numbers("sds", &sds);
+    record.number("ln determinant", factor.log_determinant());
+    let numbers = linearization.shared.iter().chain(&linearization.per_recording);
+    for (n, c) in numbers.zip(&linearization.columns) {
+        record.of_column(&format!("column {:?}", n.role), c);
     }
     let step = |n: &stylet_identify::model::Parameter| match n.role {
         ParameterRole::Surface | ParameterRole::Thickness(_) => Some(2e-4),
@@ -617,9 +619,9 @@ fn picture_stages(said: &mut Said, found: &Fit, data: &FitData) {
     };
     let wide = Linearization::new(&found.model, data, &found.residuals);
     let wide = wide.with_wide_differences(&found.model, data, &found.residuals, &step);
-    said.column("wide slope", &wide.neg_gradient);
-    said.number("wide ln determinant", wide.factor().log_determinant());
-    let look = ScoreTest::new(found, data);
+    record.column("wide slope", &wide.neg_gradient);
+    record.number("wide ln determinant", wide.factor().log_determinant());
+    let score_test = ScoreTest::new(found, data);
     for effect in general_effects() {
         let values: Vec<f64> = effect
             .parameters
@@ -627,42 +629,45 @@ fn picture_stages(said: &mut Said, found: &Fit, data: &FitData) {
             .map(|p| if p.integer { 1.0 } else { 0.7 * p.search.0 + 0.3 * p.search.1 })
             .collect();
         let one = EffectTerm::new(effect, &values);
-        let Some(c) = one.effect().and_then(|_| look.effect_column(&one)) else { continue };
-        let gain = look.gain(std::slice::from_ref(&c));
-        let name = format!("look {}", effect.id);
-        said.numbers(&name, &[gain.nats, gain.detectable_nats, gain.unexplained_share, gain.coefficients[0]]);
+        let Some(c) = one.effect().and_then(|_| score_test.effect_column(&one)) else { continue };
+        let gain = score_test.gain(std::slice::from_ref(&c));
+        let name = format!("score test {}", effect.id);
+        record
+            .numbers(&name, &[gain.nats, gain.detectable_nats, gain.unexplained_share, gain.coefficients[0]]);
         if effect.parameters.len() < 4 {
-            said.numbers(&format!("{name} scaled"), &scale_strengths(effect, &[&values], &gain.coefficients));
+            record
+                .numbers(&format!("{name} scaled"), &scale_strengths(effect, &[&values], &gain.coefficients));
         }
     }
-    let (one, two) = (choice("coulomb_friction", &[2.0]), choice("stress_relaxation", &[0.2, 1.1]));
+    let (one, two) = (term("coulomb_friction", &[2.0]), term("stress_relaxation", &[0.2, 1.1]));
     let force: Vec<Vec<f64>> =
         data.recordings.iter().map(|b| b.start_s.iter().map(|t| 0.01 * t).collect()).collect();
-    let columns = [look.effect_column(&one), look.effect_column(&two), Some(look.force_column(&force))]
-        .map(|c| c.expect("a column"));
-    let gain = look.gain(&columns);
-    said.numbers(
-        "look three",
+    let columns = [
+        score_test.effect_column(&one),
+        score_test.effect_column(&two),
+        Some(score_test.force_column(&force)),
+    ]
+    .map(|c| c.expect("a column"));
+    let gain = score_test.gain(&columns);
+    record.numbers(
+        "score test three",
         &[&[gain.nats, gain.detectable_nats, gain.unexplained_share][..], &gain.coefficients].concat(),
     );
-    let mut other = found.model.clone();
-    other.tissue.layers[0].friction_ns_per_m2 *= 1.03;
-    said.of_column("look change", &look.model_change_column(&other).expect("a column"));
     for (l, e) in found.residuals.ruptures.iter().flatten().enumerate().take(4) {
         let s = found.model.scatter;
         let (a, b) = rupture_sds(e, &s);
-        said.numbers(&format!("rupture {l} force"), &[e.force_excess, a, e.force_excess_rate, e.elastic_n]);
-        said.numbers(&format!("rupture {l} place_m"), &[e.depth_excess_m, b, e.depth_rate_mps]);
-        said.numbers(&format!("rupture {l} judged"), &evaluate_rupture(e, &s).rows);
-        said.number(&format!("rupture {l} nats"), evaluate_rupture(e, &s).nats);
+        record.numbers(&format!("rupture {l} force"), &[e.force_excess, a, e.force_excess_rate, e.elastic_n]);
+        record.numbers(&format!("rupture {l} position_m"), &[e.depth_excess_m, b, e.depth_rate_mps]);
+        record.numbers(&format!("rupture {l} judged"), &evaluate_rupture(e, &s).rows);
+        record.number(&format!("rupture {l} nats"), evaluate_rupture(e, &s).nats);
     }
     let all: Vec<_> = found.residuals.ruptures.iter().flatten().copied().collect();
     let s = estimate_rupture_scatter(&all, &found.model.scatter);
-    said.numbers("scatter told", &[s.rupture_force, s.rupture_depth_m]);
+    record.numbers("estimated scatter", &[s.rupture_force, s.rupture_depth_m]);
 }
 
 /// Every effect of the library replayed with the law's own ruptures.
-fn library_stages(said: &mut Said, found: &Fit, data: &FitData) {
+fn library_stages(record: &mut Record, found: &Fit, data: &FitData) {
     for effect in general_effects() {
         let values: Vec<f64> = effect
             .parameters
@@ -670,13 +675,13 @@ fn library_stages(said: &mut Said, found: &Fit, data: &FitData) {
             .map(|p| if p.integer { 1.0 } else { 0.6 * p.search.0 + 0.4 * p.search.1 })
             .collect();
         let model = found.model.with_effect(EffectTerm::new(effect, &values));
-        let Some(trail) = ReplayCache::new(&model, data, 0) else { continue };
-        let instants = trail.free_rupture_times();
-        let there = Model { rupture_times_s: vec![instants.clone()], ..model.clone() };
+        let Some(cache) = ReplayCache::new(&model, data, 0) else { continue };
+        let rupture_times = cache.free_rupture_times();
+        let there = Model { rupture_times_s: vec![rupture_times.clone()], ..model.clone() };
         let Some(out) = replay(&there, data, 0) else { continue };
-        said.instants(&format!("replay {} instants_s", effect.id), &instants);
-        said.column(&format!("replay {} force_n", effect.id), &out.force_n);
-        let told = |e: &stylet_identify::rupture_likelihood::RuptureEvent| {
+        record.rupture_times(&format!("replay {} times_s", effect.id), &rupture_times);
+        record.column(&format!("replay {} force_n", effect.id), &out.force_n);
+        let actual = |e: &stylet_identify::rupture_likelihood::RuptureEvent| {
             [
                 e.force_excess,
                 e.force_excess_rate,
@@ -686,64 +691,64 @@ fn library_stages(said: &mut Said, found: &Fit, data: &FitData) {
                 f64::from(u8::from(e.ruptured)),
             ]
         };
-        let told: Vec<f64> = out.ruptures.iter().flat_map(told).collect();
-        said.numbers(&format!("replay {} ruptures", effect.id), &told);
-        let nats = trail.nats_with_ruptures(&model, data, 0, &instants);
-        said.number(&format!("replay {} nats", effect.id), if nats < NO_RUPTURE { nats } else { -1.0 });
+        let actual: Vec<f64> = out.ruptures.iter().flat_map(actual).collect();
+        record.numbers(&format!("replay {} ruptures", effect.id), &actual);
+        let nats = cache.nats_with_ruptures(&model, data, 0, &rupture_times);
+        record.number(&format!("replay {} nats", effect.id), if nats < NO_RUPTURE { nats } else { -1.0 });
     }
 }
 
 /// Trial of an effect: rupture times updated, fitted, noise re-estimated.
-fn trial_stages(said: &mut Said, name: &str, found: &Fit, data: &FitData, with: EffectTerm) -> Fit {
+fn trial_stages(record: &mut Record, name: &str, found: &Fit, data: &FitData, with: EffectTerm) -> Fit {
     let mut model = found.model.with_effect(with);
     let times: Vec<Vec<f64>> =
         data.recordings.iter().map(|b| detect_force_drops(b).iter().map(|d| d.time_s).collect()).collect();
     let short = fit(&model, data, Effort::SHORT).expect("a fit");
-    said.number(&format!("{name} in short nats"), short.nats());
+    record.number(&format!("{name} short fit nats"), short.nats());
     let hopeless = fit_if_below(&model, data, Effort::FULL, 0.5 * short.nats()).expect("a fit");
-    said.number(&format!("{name} given up nats"), hopeless.nats());
+    record.number(&format!("{name} stopped fit nats"), hopeless.nats());
     model = short.model;
     update_event_times(&mut model, data, &times);
     let whole = fit(&model, data, Effort::FULL).expect("a fit");
     let own = data.with_estimated_noise(&whole.residuals.residual_n, NoiseSource::Residual);
     let best = fit_from_zero_scatter(&whole.model, &own, Effort::FULL).expect("a fit");
-    said.fit(name, &best, &own);
-    let tangent = Linearization::new(&best.model, &own, &best.residuals);
-    let sds = tangent.factor().inverse_diagonal();
-    said.numbers(
+    record.fit(name, &best, &own);
+    let linearization = Linearization::new(&best.model, &own, &best.residuals);
+    let sds = linearization.factor().inverse_diagonal();
+    record.numbers(
         &format!("{name} sds"),
-        &sds[..tangent.shared.len()].iter().map(|v| v.sqrt()).collect::<Vec<f64>>(),
+        &sds[..linearization.shared.len()].iter().map(|v| v.sqrt()).collect::<Vec<f64>>(),
     );
-    said.number(&format!("{name} ln determinant"), tangent.factor().log_determinant());
+    record.number(&format!("{name} ln determinant"), linearization.factor().log_determinant());
     best
 }
 
 /// All stages of a single insertion except effect trials.
-fn one(said: &mut Said, of: &Insertion) -> (Fit, FitData, Vec<f64>) {
+fn one(record: &mut Record, of: &Insertion) -> (Fit, FitData, Vec<f64>) {
     let (recording, ruptures) = of.recorded();
-    let belief = Arc::new(belief());
-    raw_stages(said, &recording, 3);
+    let assumptions = Arc::new(assumptions());
+    raw_stages(record, &recording, 3);
     let exclude: Vec<bool> = recording.time_s.iter().map(|t| (*t - 1.3).abs() < 0.031).collect();
     let blocks = BlockAverages::new(&recording, &exclude, BLOCK_S);
-    block_stages(said, &blocks);
-    let (found, data) = base_stages(said, &belief, &Arc::new(vec![blocks]));
-    noise_stages(said, &found, &data);
+    block_stages(record, &blocks);
+    let (found, data) = base_stages(record, &assumptions, &Arc::new(vec![blocks]));
+    noise_stages(record, &found, &data);
     (found, data, ruptures)
 }
 
 /// Rupture times agree with the true ones to `within_s`.
-fn near(found: &Fit, ruptures: &[f64], within_s: f64) {
-    let told = &found.model.rupture_times_s[0];
-    for (t, truth) in told.iter().zip(ruptures) {
-        assert!((t - truth).abs() < within_s, "{told:?} for {ruptures:?}");
+fn assert_close(found: &Fit, ruptures: &[f64], within_s: f64) {
+    let actual = &found.model.rupture_times_s[0];
+    for (t, truth) in actual.iter().zip(ruptures) {
+        assert!((t - truth).abs() < within_s, "{actual:?} for {ruptures:?}");
     }
 }
 
 /// Parameters of the first two layers agree with the true ones.
 fn lies_at(found: &Fit, truth: &Tissue) {
-    let told = &found.model.tissue;
-    assert!((told.surface_m - truth.surface_m).abs() < 1e-4, "{}", told.surface_m);
-    for (l, t) in told.layers.iter().zip(&truth.layers).take(2) {
+    let actual = &found.model.tissue;
+    assert!((actual.surface_m - truth.surface_m).abs() < 1e-4, "{}", actual.surface_m);
+    for (l, t) in actual.layers.iter().zip(&truth.layers).take(2) {
         close("stiffness", l.stiffness_n_per_m, t.stiffness_n_per_m, 0.02);
         close("friction", l.friction_ns_per_m2, t.friction_ns_per_m2, 0.02);
         close("puncture force", l.puncture_n.unwrap_or(0.0), t.puncture_n.unwrap_or(1.0), 0.02);
@@ -751,127 +756,128 @@ fn lies_at(found: &Fit, truth: &Tissue) {
     }
 }
 
-fn close(name: &str, told: f64, truth: f64, within: f64) {
-    assert!((told / truth - 1.0).abs() < within, "{name}: {told} for {truth}");
+fn close(name: &str, actual: f64, truth: f64, within: f64) {
+    assert!((actual / truth - 1.0).abs() < within, "{name}: {actual} for {truth}");
 }
 
-fn even_stages() -> Said {
-    let mut said = Said::default();
-    let (found, data, ruptures) = one(&mut said, &even());
-    near(&found, &ruptures, 0.03);
-    library_stages(&mut said, &found, &data);
-    let best = trial_stages(&mut said, "dry friction", &found, &data, choice("coulomb_friction", &[3.0]));
-    near(&best, &ruptures, 0.03);
+fn even_stages() -> Record {
+    let mut record = Record::default();
+    let (found, data, ruptures) = one(&mut record, &even());
+    assert_close(&found, &ruptures, 0.03);
+    library_stages(&mut record, &found, &data);
+    let best = trial_stages(&mut record, "dry friction", &found, &data, term("coulomb_friction", &[3.0]));
+    assert_close(&best, &ruptures, 0.03);
     lies_at(&best, &truth());
     close("dry friction", best.model.effects[0].values[0], 9.0, 0.03);
-    said
+    record
 }
 
-fn rippled_stages() -> Said {
-    let mut said = Said::default();
-    let (found, data, ruptures) = one(&mut said, &rippled());
-    near(&found, &ruptures, 0.03);
+fn rippled_stages() -> Record {
+    let mut record = Record::default();
+    let (found, data, ruptures) = one(&mut record, &rippled());
+    assert_close(&found, &ruptures, 0.03);
     lies_at(&found, &truth());
-    let bent = trial_stages(&mut said, "bent", &found, &data, choice("needle_compliance", &[4000.0]));
+    let bent = trial_stages(&mut record, "compliance", &found, &data, term("needle_compliance", &[4000.0]));
     assert!(bent.model.effects[0].values[0] > 1e5, "a rigid needle gives: {:?}", bent.model.effects);
-    library_stages(&mut said, &found, &data);
-    said
+    library_stages(&mut record, &found, &data);
+    record
 }
 
-fn held_stages() -> Said {
-    let mut said = Said::default();
-    let (found, data, ruptures) = one(&mut said, &held());
-    near(&found, &ruptures, 0.03);
-    picture_stages(&mut said, &found, &data);
-    library_stages(&mut said, &found, &data);
-    let best = trial_stages(&mut said, "relaxing", &found, &data, choice("stress_relaxation", &[0.2, 1.5]));
-    near(&best, &ruptures, 0.03);
+fn held_stages() -> Record {
+    let mut record = Record::default();
+    let (found, data, ruptures) = one(&mut record, &held());
+    assert_close(&found, &ruptures, 0.03);
+    picture_stages(&mut record, &found, &data);
+    library_stages(&mut record, &found, &data);
+    let best = trial_stages(&mut record, "relaxing", &found, &data, term("stress_relaxation", &[0.2, 1.5]));
+    assert_close(&best, &ruptures, 0.03);
     lies_at(&best, &truth());
     close("relaxing share", best.model.effects[0].values[0], 0.3, 0.03);
     close("time of relaxation", best.model.effects[0].values[1], 0.9, 0.1);
-    said
+    record
 }
 
-fn slow_stages() -> Said {
-    let mut said = Said::default();
-    let (found, data, _) = one(&mut said, &slow());
-    let best = trial_stages(&mut said, "late", &found, &data, choice("time_delay", &[0.03]));
-    let (to_the_step, seen) = refine_delay(&best, &data).expect("a late force is better so");
-    said.fit("placed", &to_the_step, &seen);
+fn slow_stages() -> Record {
+    let mut record = Record::default();
+    let (found, data, _) = one(&mut record, &slow());
+    let best = trial_stages(&mut record, "delay", &found, &data, term("time_delay", &[0.03]));
+    let (to_the_step, seen) = refine_delay(&best, &data).expect("an improved fit");
+    record.fit("refined delay", &to_the_step, &seen);
     close("delay", delay_s(&to_the_step.model), 0.0437, 0.05);
     lies_at(&to_the_step, &truth());
-    trial_stages(&mut said, "smeared", &found, &data, choice("low_pass_lag", &[0.03]));
-    said
+    trial_stages(&mut record, "low-pass", &found, &data, term("low_pass_lag", &[0.03]));
+    record
 }
 
-fn small_stages() -> Said {
-    let mut said = Said::default();
-    let (found, data, _) = one(&mut said, &small());
-    picture_stages(&mut said, &found, &data);
-    let with = choice("hidden_membrane", &[0.018, 100.0, 0.2]);
-    let best = trial_stages(&mut said, "membrane", &found, &data, with);
+fn small_stages() -> Record {
+    let mut record = Record::default();
+    let (found, data, _) = one(&mut record, &small());
+    picture_stages(&mut record, &found, &data);
+    let with = term("hidden_membrane", &[0.018, 100.0, 0.2]);
+    let best = trial_stages(&mut record, "membrane", &found, &data, with);
     let values = &best.model.effects[0].values;
     assert!((best.model.tissue.surface_m + values[0] - 0.0207).abs() < 2e-3, "{values:?}");
     close("the membrane's stiffness", values[1], 120.0, 0.1);
-    said
+    record
 }
 
-fn shifted_stages() -> Said {
-    let mut said = Said::default();
-    let (found, data, ruptures) = one(&mut said, &shifted());
-    near(&found, &ruptures, 0.03);
-    let breath = trial_stages(&mut said, "breath", &found, &data, choice("respiration", &[5e-4, 0.3, 0.5]));
+fn shifted_stages() -> Record {
+    let mut record = Record::default();
+    let (found, data, ruptures) = one(&mut record, &shifted());
+    assert_close(&found, &ruptures, 0.03);
+    let breath =
+        trial_stages(&mut record, "respiration", &found, &data, term("respiration", &[5e-4, 0.3, 0.5]));
     lies_at(&breath, &Tissue { surface_m: 0.0037, ..truth() });
     close("amplitude", breath.model.effects[0].values[0], 6e-4, 0.02);
     close("frequency", breath.model.effects[0].values[1], 0.31, 0.005);
-    trial_stages(&mut said, "by speed", &found, &data, choice("rate_dependent_puncture", &[0.1]));
-    said
+    trial_stages(&mut record, "by speed", &found, &data, term("rate_dependent_puncture", &[0.1]));
+    record
 }
 
 /// Three insertions, two on one day.
-fn several_stages() -> Said {
-    let mut said = Said::default();
-    let belief = Arc::new(belief());
+fn several_stages() -> Record {
+    let mut record = Record::default();
+    let assumptions = Arc::new(assumptions());
     let blocks: Vec<BlockAverages> = (0..3)
         .map(|k| {
             let (r, _) = repeated(k).recorded();
             BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S)
         })
         .collect();
-    let (found, data) = base_stages(&mut said, &belief, &Arc::new(blocks));
-    noise_stages(&mut said, &found, &data);
+    let (found, data) = base_stages(&mut record, &assumptions, &Arc::new(blocks));
+    noise_stages(&mut record, &found, &data);
     let mut own = found.model.clone();
     (own.free.recording_surface, own.free.recording_friction) = (true, true);
     let own = fit(&own, &data, Effort::FULL).expect("a fit");
-    said.fit("own", &own, &data);
-    for (k, wanted) in [0.11, -0.07, -0.02].iter().enumerate() {
+    record.fit("random effects", &own, &data);
+    for (k, expected) in [0.11, -0.07, -0.02].iter().enumerate() {
         let mean = own.model.per_recording.iter().map(|o| o.ln_friction).sum::<f64>() / 3.0;
-        let told = own.model.per_recording[k].ln_friction - mean;
-        assert!((told - (wanted - 0.0067)).abs() < 0.03, "friction of {k}: {told}");
+        let actual = own.model.per_recording[k].ln_friction - mean;
+        assert!((actual - (expected - 0.0067)).abs() < 0.03, "friction of {k}: {actual}");
     }
-    picture_stages(&mut said, &own, &data);
-    let mut lets_go = own.model.with_effect(choice("release_depth", &[2.0, 3e-3]));
-    lets_go.free.recording_effects = true;
-    let lets_go = fit(&lets_go, &data, Effort::FULL).expect("a fit");
-    said.fit("lets go", &lets_go, &data);
-    let tangent = Linearization::new(&lets_go.model, &data, &lets_go.residuals);
-    said.number("lets go ln determinant", tangent.factor().log_determinant());
-    said.column("lets go slope", &tangent.neg_gradient);
+    picture_stages(&mut record, &own, &data);
+    let mut incomplete = own.model.with_effect(term("release_depth", &[2.0, 3e-3]));
+    incomplete.free.recording_effects = true;
+    let incomplete = fit(&incomplete, &data, Effort::FULL).expect("a fit");
+    record.fit("incomplete release", &incomplete, &data);
+    let linearization = Linearization::new(&incomplete.model, &data, &incomplete.residuals);
+    record.number("incomplete release ln determinant", linearization.factor().log_determinant());
+    record.column("incomplete release slope", &linearization.neg_gradient);
     let mut days = found.model.clone();
     (days.days, days.day_of) = (vec![DayParameters::default(); 2], vec![0, 1, 0]);
     (days.free.day_surface, days.free.day_friction) = (true, true);
     days.fixed_scatter = true;
     let days = fit(&days, &data, Effort::FULL).expect("a fit");
-    said.fit("days", &days, &data);
+    record.fit("days", &days, &data);
     let two = data.subset(&[2, 0]);
     let fewer = fit(&days.model.subset(&[2, 0]), &two, Effort::SHORT).expect("a fit");
-    said.fit("two of them", &fewer, &two);
-    said
+    record.fit("two of them", &fewer, &two);
+    record
 }
 
 #[test]
 fn every_stage_agrees_with_the_recorded_values() {
-    type Stages = fn() -> Said;
+    type Stages = fn() -> Record;
     let insertions: [(&str, Stages); 7] = [
         ("even", even_stages),
         ("rippled", rippled_stages),
@@ -882,7 +888,7 @@ fn every_stage_agrees_with_the_recorded_values() {
         ("several", several_stages),
     ];
     let running = insertions.map(|(name, of)| (name, std::thread::spawn(of)));
-    let all = running.map(|(name, said)| (name, said.join().expect("stages that run to their end")));
+    let all = running.map(|(name, record)| (name, record.join().expect("stages that run to their end")));
     let now = written(&all);
     if std::env::var_os("STYLET_RECORD").is_some() {
         std::fs::write(file(), now).expect("a place to write");
@@ -891,7 +897,7 @@ fn every_stage_agrees_with_the_recorded_values() {
     let then = std::fs::read_to_string(file()).expect("recorded stages");
     let (then, now) = (parsed(&then), parsed(&now));
     let differs = |name: &&str| match (then.get(*name), now.get(*name)) {
-        (Some(a), Some(b)) => !alike(a, b),
+        (Some(a), Some(b)) => !agree(a, b),
         _ => true,
     };
     let names: std::collections::BTreeSet<&str> = then.keys().chain(now.keys()).copied().collect();

@@ -28,14 +28,14 @@ impl Candidate {
 
     /// One additional effect.
     #[must_use]
-    pub fn with_effect(choice: EffectTerm, weight: f64) -> Self {
-        Self { name: choice.info.id.to_owned(), effects: vec![choice], probability: weight }
+    pub fn with_effect(term: EffectTerm, weight: f64) -> Self {
+        Self { name: term.info.id.to_owned(), effects: vec![term], probability: weight }
     }
 
     /// The model of this candidate.
     #[must_use]
-    pub fn build_model(&self, stem: &Model) -> Model {
-        let mut model = stem.clone();
+    pub fn build_model(&self, base: &Model) -> Model {
+        let mut model = base.clone();
         model.effects.extend(self.effects.iter().cloned());
         model
     }
@@ -72,19 +72,18 @@ pub fn typical_effect(info: &'static EffectInfo) -> Option<EffectTerm> {
             _ => p.start,
         })
         .collect();
-    let choice = EffectTerm::new(info, &values);
-    choice.effect().filter(|e| e.check().is_ok())?;
-    Some(choice)
+    let term = EffectTerm::new(info, &values);
+    term.effect().filter(|e| e.check().is_ok())?;
+    Some(term)
 }
 
 /// Parameter values of the effect at `times` its strength.
 #[must_use]
-pub fn scaled_values(choice: &EffectTerm, times: f64) -> Vec<f64> {
-    choice
-        .info
+pub fn scaled_values(term: &EffectTerm, times: f64) -> Vec<f64> {
+    term.info
         .parameters
         .iter()
-        .zip(&choice.values)
+        .zip(&term.values)
         .map(|(p, x)| match (p.strength, p.fit_scale()) {
             (false, _) => *x,
             (true, FitScale::Reciprocal) => x / times,

@@ -8,19 +8,23 @@ use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 /// times among them) are eliminated. Priors of shared parameters are not included. In squares of whitened
 /// residuals: half of an entry is in nats.
 #[must_use]
-pub fn gram_matrix(tangent: &Linearization, data: &FitData, more: &[JacobianColumn]) -> SymmetricMatrix {
-    let ns = tangent.shared.len();
-    let columns: Vec<&JacobianColumn> = tangent.columns[..ns].iter().chain(more).collect();
-    let own = &tangent.columns[ns..];
+pub fn gram_matrix(
+    linearization: &Linearization,
+    data: &FitData,
+    more: &[JacobianColumn],
+) -> SymmetricMatrix {
+    let ns = linearization.shared.len();
+    let columns: Vec<&JacobianColumn> = linearization.columns[..ns].iter().chain(more).collect();
+    let per_recording = &linearization.columns[ns..];
     let n = columns.len();
     let mut out = SymmetricMatrix::zeros(n);
     for r in 0..data.recording_count() {
-        let mut among = SymmetricMatrix::zeros(own.len());
-        for (i, a) in own.iter().enumerate() {
-            for (j, b) in own.iter().enumerate().take(i + 1) {
+        let mut among = SymmetricMatrix::zeros(per_recording.len());
+        for (i, a) in per_recording.iter().enumerate() {
+            for (j, b) in per_recording.iter().enumerate().take(i + 1) {
                 among.add(i, j, a.dot(b, r));
             }
-            let sd = tangent.per_recording[i].prior_sd;
+            let sd = linearization.per_recording[i].prior_sd;
             if sd.is_finite() && sd > 0.0 {
                 among.add(i, i, 1.0 / (sd * sd));
             }
@@ -28,7 +32,9 @@ pub fn gram_matrix(tangent: &Linearization, data: &FitData, more: &[JacobianColu
         let factor = among.cholesky();
         let halves: Vec<Vec<f64>> = columns
             .iter()
-            .map(|c| factor.forward_substitute(&own.iter().map(|o| o.dot(c, r)).collect::<Vec<_>>()))
+            .map(|c| {
+                factor.forward_substitute(&per_recording.iter().map(|o| o.dot(c, r)).collect::<Vec<_>>())
+            })
             .collect();
         for i in 0..n {
             for j in 0..=i {

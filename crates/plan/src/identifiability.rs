@@ -49,50 +49,50 @@ pub struct Identifiability {
 const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
 
 /// Whether the library accepts these parameter values.
-fn valid(choice: &EffectTerm, values: &[f64]) -> bool {
-    EffectTerm::new(choice.info, values).effect().is_some_and(|e| e.check().is_ok())
+fn valid(term: &EffectTerm, values: &[f64]) -> bool {
+    EffectTerm::new(term.info, values).effect().is_some_and(|e| e.check().is_ok())
 }
 
 /// Identifiability from the available information.
 #[must_use]
-pub fn identifiability(ground: &InformationState) -> Identifiability {
-    let shown = ground.current();
+pub fn identifiability(state: &InformationState) -> Identifiability {
+    let information = state.current();
     let of: Vec<usize> =
-        (0..ground.candidates.len()).filter(|k| !ground.candidates[*k].effects.is_empty()).collect();
-    let null = ground.candidates.iter().position(|c| c.name == NONE);
+        (0..state.candidates.len()).filter(|k| !state.candidates[*k].effects.is_empty()).collect();
+    let null = state.candidates.iter().position(|c| c.name == NONE);
     let nats: Vec<Vec<f64>> = of
         .iter()
         .map(|i| {
             of.iter()
-                .map(|j| if i == j { 0.0 } else { ground.separation_nats(&shown, *i.min(j), *i.max(j)) })
+                .map(|j| if i == j { 0.0 } else { state.separation_nats(&information, *i.min(j), *i.max(j)) })
                 .collect()
         })
         .collect();
     let correlation =
-        of.iter().map(|i| of.iter().map(|j| ground.correlation(&shown, *i, *j)).collect()).collect();
+        of.iter().map(|i| of.iter().map(|j| state.correlation(&information, *i, *j)).collect()).collect();
     let mut effects = Vec::new();
     for (row, k) in of.iter().enumerate() {
-        let c = &ground.candidates[*k];
-        let Some(choice) = c.effects.last() else { continue };
-        let seen = null.map_or(0.0, |n| ground.separation_nats(&shown, n.min(*k), n.max(*k)));
-        let named = |values: &[f64]| -> BTreeMap<String, f64> {
-            choice.info.parameters.iter().zip(values).map(|(p, x)| (p.path.to_owned(), *x)).collect()
+        let c = &state.candidates[*k];
+        let Some(term) = c.effects.last() else { continue };
+        let separation = null.map_or(0.0, |n| state.separation_nats(&information, n.min(*k), n.max(*k)));
+        let values_by_name = |values: &[f64]| -> BTreeMap<String, f64> {
+            term.info.parameters.iter().zip(values).map(|(p, x)| (p.path.to_owned(), *x)).collect()
         };
-        let times = (DISTINGUISHABLE_NATS / seen.max(1e-12)).sqrt();
+        let times = (DISTINGUISHABLE_NATS / separation.max(1e-12)).sqrt();
         effects.push(EffectIdentifiability {
             effect: c.name.clone(),
-            nats: seen,
-            identifiable: seen >= DISTINGUISHABLE_NATS,
-            typical: named(&choice.values),
-            smallest_detectable: Some(scaled_values(choice, times))
-                .filter(|x| times <= MAX_PLAUSIBLE_FACTOR && valid(choice, x))
-                .map(|x| named(&x)),
+            nats: separation,
+            identifiable: separation >= DISTINGUISHABLE_NATS,
+            typical: values_by_name(&term.values),
+            smallest_detectable: Some(scaled_values(term, times))
+                .filter(|x| times <= MAX_PLAUSIBLE_FACTOR && valid(term, x))
+                .map(|x| values_by_name(&x)),
             indistinguishable_from: Vec::new(),
             nearest: of
                 .iter()
                 .enumerate()
                 .filter(|(other, _)| *other != row)
-                .map(|(other, j)| (ground.name(*j).to_owned(), nats[row][other]))
+                .map(|(other, j)| (state.name(*j).to_owned(), nats[row][other]))
                 .min_by(|a, b| a.1.total_cmp(&b.1)),
         });
     }
@@ -123,6 +123,6 @@ pub fn identifiability(ground: &InformationState) -> Identifiability {
         classes,
         correlation,
         nats,
-        noise_n: ground.noise.sd_n(),
+        noise_n: state.noise.sd_n(),
     }
 }

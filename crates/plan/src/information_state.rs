@@ -73,24 +73,24 @@ impl InformationState {
     /// model has been fitted to them.
     #[must_use]
     pub fn new(
-        stem: Model,
+        base: Model,
         candidates: Vec<Candidate>,
         unknown_n: Option<f64>,
         old: &[BlockAverages],
         noise: Noise,
         sample_hz: f64,
     ) -> Option<Self> {
-        let mut stem = stem;
+        let mut base = base;
         let scatter_assumed =
-            old.len() < MIN_RECORDINGS_FOR_SCATTER && stem.scatter.rupture_force <= DEFAULT_FORCE_SCATTER;
+            old.len() < MIN_RECORDINGS_FOR_SCATTER && base.scatter.rupture_force <= DEFAULT_FORCE_SCATTER;
         if old.len() < MIN_RECORDINGS_FOR_SCATTER {
-            stem.scatter.rupture_force = stem.scatter.rupture_force.max(DEFAULT_FORCE_SCATTER);
-            stem.scatter.rupture_depth_m = stem.scatter.rupture_depth_m.max(DEFAULT_DEPTH_SCATTER_M);
+            base.scatter.rupture_force = base.scatter.rupture_force.max(DEFAULT_FORCE_SCATTER);
+            base.scatter.rupture_depth_m = base.scatter.rupture_depth_m.max(DEFAULT_DEPTH_SCATTER_M);
         }
-        let numbers = stem.shared_parameters();
-        let mut ground = Self {
-            shared_count: numbers.len(),
-            base: stem,
+        let parameters = base.shared_parameters();
+        let mut state = Self {
+            shared_count: parameters.len(),
+            base: base,
             candidates,
             unmodelled_n: unknown_n,
             noise,
@@ -99,17 +99,19 @@ impl InformationState {
             scatter_assumed,
             prior_information: SymmetricMatrix::zeros(0),
         };
-        let mut before = SymmetricMatrix::zeros(ground.shared_count + ground.extra_columns());
-        for (i, n) in numbers.iter().enumerate().filter(|(_, n)| n.prior_sd.is_finite() && n.prior_sd > 0.0) {
+        let mut before = SymmetricMatrix::zeros(state.shared_count + state.extra_columns());
+        for (i, n) in
+            parameters.iter().enumerate().filter(|(_, n)| n.prior_sd.is_finite() && n.prior_sd > 0.0)
+        {
             before.add(i, i, 1.0 / (n.prior_sd * n.prior_sd));
         }
         if !old.is_empty() {
-            let data = FitData::new(Arc::new(old.to_vec()), ground.noise.clone(), 0.0);
-            before = add(&before, &ground.information_of(&ground.base, data)?);
+            let data = FitData::new(Arc::new(old.to_vec()), state.noise.clone(), 0.0);
+            before = add(&before, &state.information_of(&state.base, data)?);
         }
-        ground.prior_information = before;
-        ground.models = (0..ground.candidates.len()).map(|k| ground.refitted_model(k)).collect();
-        Some(ground)
+        state.prior_information = before;
+        state.models = (0..state.candidates.len()).map(|k| state.refitted_model(k)).collect();
+        Some(state)
     }
 
     /// A candidate's model with the base parameters re-fitted to first order: they had absorbed the candidate's
@@ -136,8 +138,8 @@ impl InformationState {
 
     /// Number of columns in addition to those of the shared parameters.
     fn extra_columns(&self) -> usize {
-        let own = |c: &Candidate| if c.effects.is_empty() { 0 } else { 1 + effect_parameter_count(c) };
-        self.candidates.iter().map(own).sum::<usize>() + usize::from(self.unmodelled_n.is_some())
+        let columns = |c: &Candidate| if c.effects.is_empty() { 0 } else { 1 + effect_parameter_count(c) };
+        self.candidates.iter().map(columns).sum::<usize>() + usize::from(self.unmodelled_n.is_some())
     }
 
     /// Column index of a candidate and of its parameters; `None` for the base model.
@@ -160,22 +162,22 @@ impl InformationState {
     }
 
     /// Information matrix of recordings simulated with the base model.
-    fn information_of(&self, stem: &Model, mut data: FitData) -> Option<SymmetricMatrix> {
+    fn information_of(&self, base: &Model, mut data: FitData) -> Option<SymmetricMatrix> {
         let mut blocks = (*data.recordings).clone();
         for (r, b) in blocks.iter_mut().enumerate() {
-            b.force_n = replay(stem, &data, r)?.force_n;
+            b.force_n = replay(base, &data, r)?.force_n;
         }
         data = FitData::new(Arc::new(blocks), (*data.noise).clone(), 0.0);
-        let at = residuals(stem, &data)?;
-        let tangent = Linearization::new(stem, &data, &at);
-        let change = |model: &Model| tangent.difference(stem, &data, &at, model);
-        let first = stem.effects.len();
+        let at = residuals(base, &data)?;
+        let linearization = Linearization::new(base, &data, &at);
+        let change = |model: &Model| linearization.difference(base, &data, &at, model);
+        let first = base.effects.len();
         let of: Vec<Option<Vec<JacobianColumn>>> = self
             .candidates
             .par_iter()
             .filter(|c| !c.effects.is_empty())
             .map(|c| {
-                let model = c.build_model(stem);
+                let model = c.build_model(base);
                 let whole = change(&model)?;
                 let mut columns = vec![whole.clone()];
                 for n in model.shared_parameters() {
@@ -207,8 +209,8 @@ impl InformationState {
             let mut column = JacobianColumn::default();
             for (r, b) in data.recordings.iter().enumerate() {
                 let mut f = vec![0.0; b.len()];
-                for p in b.pieces.iter().filter(|p| p.position_m > stem.tissue.surface_m) {
-                    let turn = core::f64::consts::TAU * (p.position_m - stem.tissue.surface_m)
+                for p in b.pieces.iter().filter(|p| p.position_m > base.tissue.surface_m) {
+                    let turn = core::f64::consts::TAU * (p.position_m - base.tissue.surface_m)
                         / UNMODELLED_WAVELENGTH_M;
                     f[p.block as usize] = size_n * core::f64::consts::SQRT_2 * libm::sin(turn);
                 }
@@ -217,7 +219,7 @@ impl InformationState {
             }
             more.push(column);
         }
-        Some(gram_matrix(&tangent, &data, &more))
+        Some(gram_matrix(&linearization, &data, &more))
     }
 
     /// The information before any further insertion.
@@ -230,20 +232,14 @@ impl InformationState {
         Information { schur: schur_complement(&all, self.shared_count), all, shared_count: self.shared_count }
     }
 
-    /// The information after a motion; `None` when the model cannot be replayed along it.
-    #[must_use]
-    pub fn after_motion(&self, motion: &Motion) -> Option<Information> {
-        self.after_blocks(&self.motion_blocks(motion)?)
-    }
-
-    /// The same for a motion in blocks.
+    /// The information after a motion in blocks; `None` when the model cannot be replayed along it.
     #[must_use]
     pub fn after_blocks(&self, blocks: &BlockAverages) -> Option<Information> {
         let (blocks, data) = self.with_expected_forces(blocks)?;
         let leader = single_recording_model(self.candidate_model(0), Vec::new());
-        let instants = free_rupture_times(&leader.compile(0)?, &blocks.pieces);
-        let stem = single_recording_model(&self.base, instants);
-        Some(self.to_information(add(&self.prior_information, &self.information_of(&stem, data)?)))
+        let rupture_times = free_rupture_times(&leader.compile(0)?, &blocks.pieces);
+        let base = single_recording_model(&self.base, rupture_times);
+        Some(self.to_information(add(&self.prior_information, &self.information_of(&base, data)?)))
     }
 
     /// A motion in blocks without forces; `None` for a recorded motion.
@@ -299,28 +295,32 @@ impl InformationState {
     /// other one. For nested candidates the special case is tested against the general one; otherwise the
     /// smaller of both directions.
     #[must_use]
-    pub fn separation_nats(&self, shown: &Information, a: usize, b: usize) -> f64 {
+    pub fn separation_nats(&self, information: &Information, a: usize, b: usize) -> f64 {
         let n = self.candidates.len();
         if b >= n {
-            return self.one_way_separation_nats(shown, b, a);
+            return self.one_way_separation_nats(information, b, a);
         }
         let (i, j) = (&self.candidates[a], &self.candidates[b]);
         if i.is_special_case_of(j) {
-            self.one_way_separation_nats(shown, b, a)
+            self.one_way_separation_nats(information, b, a)
         } else if j.is_special_case_of(i) {
-            self.one_way_separation_nats(shown, a, b)
+            self.one_way_separation_nats(information, a, b)
         } else {
-            self.one_way_separation_nats(shown, a, b).min(self.one_way_separation_nats(shown, b, a))
+            self.one_way_separation_nats(information, a, b).min(self.one_way_separation_nats(
+                information,
+                b,
+                a,
+            ))
         }
     }
 
     /// Remaining nats when `truth` holds and `other` is re-fitted: `min 1/2 |whitened(f_truth - f_other)|^2`
     /// over all parameters of the base model and of `other`, to first order.
     #[must_use]
-    pub fn one_way_separation_nats(&self, shown: &Information, truth: usize, other: usize) -> f64 {
+    pub fn one_way_separation_nats(&self, information: &Information, truth: usize, other: usize) -> f64 {
         let at = |k: usize| -> Option<usize> {
             if k >= self.candidates.len() {
-                Some(shown.schur.size.saturating_sub(1))
+                Some(information.schur.size.saturating_sub(1))
             } else {
                 self.columns_of(k).map(|p| p.0)
             }
@@ -328,23 +328,24 @@ impl InformationState {
         let mut x: Vec<(usize, f64)> = Vec::new();
         x.extend(at(truth).map(|k| (k, 1.0)));
         x.extend(at(other).map(|k| (k, -1.0)));
-        let g = &shown.schur;
+        let g = &information.schur;
         let all: f64 = x.iter().flat_map(|(i, a)| x.iter().map(move |(j, b)| a * b * g.at(*i, *j))).sum();
-        let numbers: Vec<usize> = self.columns_of(other).map_or_else(Vec::new, |p| p.1.collect());
-        let cross: Vec<f64> = numbers.iter().map(|e| x.iter().map(|(i, a)| a * g.at(*i, *e)).sum()).collect();
-        let half = g.submatrix(&numbers).cholesky().forward_substitute(&cross);
+        let parameters: Vec<usize> = self.columns_of(other).map_or_else(Vec::new, |p| p.1.collect());
+        let cross: Vec<f64> =
+            parameters.iter().map(|e| x.iter().map(|(i, a)| a * g.at(*i, *e)).sum()).collect();
+        let half = g.submatrix(&parameters).cholesky().forward_substitute(&cross);
         (0.5 * (all - half.iter().map(|h| h * h).sum::<f64>())).max(0.0)
     }
 
     /// Correlation of two candidates' columns with the shared parameters eliminated; 0 where one of them is not
     /// identifiable at all.
     #[must_use]
-    pub fn correlation(&self, shown: &Information, a: usize, b: usize) -> f64 {
+    pub fn correlation(&self, information: &Information, a: usize, b: usize) -> f64 {
         let (Some((i, _)), Some((j, _))) = (self.columns_of(a), self.columns_of(b)) else { return 0.0 };
-        let g = &shown.schur;
+        let g = &information.schur;
         let size = (g.at(i, i) * g.at(j, j)).sqrt();
-        let whole = (shown.all.at(shown.shared_count + i, shown.shared_count + i)
-            * shown.all.at(shown.shared_count + j, shown.shared_count + j))
+        let whole = (information.all.at(information.shared_count + i, information.shared_count + i)
+            * information.all.at(information.shared_count + j, information.shared_count + j))
         .sqrt();
         if size > 1e-8 * whole && size > 0.0 { (g.at(i, j) / size).clamp(-1.0, 1.0) } else { 0.0 }
     }
@@ -382,22 +383,23 @@ fn effect_parameter_count(c: &Candidate) -> usize {
 }
 
 /// The model for one future recording.
-fn single_recording_model(model: &Model, instants: Vec<f64>) -> Model {
+fn single_recording_model(model: &Model, rupture_times: Vec<f64>) -> Model {
     let mut model = model.clone();
     model.per_recording = vec![RecordingParameters::default()];
     let layers = model.layers();
-    model.rupture_times_s = vec![if instants.len() == layers { instants } else { vec![NO_RUPTURE; layers] }];
+    model.rupture_times_s =
+        vec![if rupture_times.len() == layers { rupture_times } else { vec![NO_RUPTURE; layers] }];
     model
 }
 
 /// Forces (N) of a model along blocks with its own ruptures, and their times (s).
 fn predict_forces(model: &Model, blocks: &BlockAverages) -> Option<(Vec<f64>, Vec<f64>)> {
     let compiled = single_recording_model(model, Vec::new()).compile(0)?;
-    let course = motion_pieces(&compiled, blocks);
-    let instants = free_rupture_times(&compiled, &course);
+    let pieces = motion_pieces(&compiled, blocks);
+    let rupture_times = free_rupture_times(&compiled, &pieces);
     let mut out = ReplayResult::default();
-    replay_with_ruptures(&compiled, blocks, &course, &instants, &mut out);
-    out.force_n.iter().all(|f| f.is_finite()).then_some((out.force_n, instants))
+    replay_with_ruptures(&compiled, blocks, &pieces, &rupture_times, &mut out);
+    out.force_n.iter().all(|f| f.is_finite()).then_some((out.force_n, rupture_times))
 }
 
 /// A motion as a recording without forces; `None` for a recorded motion.

@@ -121,16 +121,20 @@ pub fn p_separated(nats: f64) -> f64 {
     if nats <= 0.0 { 0.0 } else { stylet_stats::normal::cdf((nats - EQUIVALENCE_NATS) / (2.0 * nats).sqrt()) }
 }
 
-/// Probability that the diagnosis names the true effect and nothing else, over the candidates in `told`, the
+/// Probability that the diagnosis names the true effect and nothing else, over the candidates in `distinguishable`, the
 /// pairs that motions within the limits can distinguish.
 #[must_use]
-pub fn p_decided(ground: &InformationState, shown: &Information, told: &[(usize, usize)]) -> f64 {
+pub fn p_decided(
+    state: &InformationState,
+    information: &Information,
+    distinguishable: &[(usize, usize)],
+) -> f64 {
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (i, c) in ground.candidates.iter().enumerate() {
-        let of: Vec<f64> = told
+    for (i, c) in state.candidates.iter().enumerate() {
+        let of: Vec<f64> = distinguishable
             .iter()
             .filter(|(a, b)| *a == i || *b == i)
-            .map(|(a, b)| p_separated(ground.separation_nats(shown, *a, *b)))
+            .map(|(a, b)| p_separated(state.separation_nats(information, *a, *b)))
             .collect();
         if of.is_empty() {
             continue;
@@ -145,12 +149,12 @@ pub fn p_decided(ground: &InformationState, shown: &Information, told: &[(usize,
 ///
 /// # Errors [`PlanError`] when the limits cannot be satisfied or the model cannot be replayed.
 pub fn plan(
-    ground: &InformationState,
+    state: &InformationState,
     limits: &Limits,
     begin: &StartConditions,
 ) -> Result<(Plan, MotionSearchResult), PlanError> {
-    let found = search_motions(ground, limits, begin)?;
-    let plan = plan_with_motion(ground, limits, &found, 0)?;
+    let found = search_motions(state, limits, begin)?;
+    let plan = plan_with_motion(state, limits, &found, 0)?;
     Ok((plan, found))
 }
 
@@ -158,7 +162,7 @@ pub fn plan(
 ///
 /// # Errors [`PlanError::NoForce`] when there is no such motion.
 pub(crate) fn plan_with_motion(
-    ground: &InformationState,
+    state: &InformationState,
     limits: &Limits,
     found: &MotionSearchResult,
     which: usize,
@@ -166,17 +170,17 @@ pub(crate) fn plan_with_motion(
     let Some(best) = found.best.get(which) else {
         return Err(PlanError::NoForce("no motion can be compared".to_owned()));
     };
-    let known = ground.current();
-    let pairs: Vec<Pair> = ground
+    let known = state.current();
+    let pairs: Vec<Pair> = state
         .pairs()
         .into_iter()
         .map(|(a, b)| {
             let (before, after) =
-                (ground.separation_nats(&known, a, b), ground.separation_nats(&best.information, a, b));
+                (state.separation_nats(&known, a, b), state.separation_nats(&best.information, a, b));
             let even = |nats: f64| 0.5 + 0.5 * p_separated(nats);
             Pair {
-                a: ground.name(a).to_owned(),
-                b: ground.name(b).to_owned(),
+                a: state.name(a).to_owned(),
+                b: state.name(b).to_owned(),
                 nats_before: before,
                 nats_after: after,
                 p_correct_before: even(before),
@@ -189,7 +193,7 @@ pub(crate) fn plan_with_motion(
         found
             .distinguishable
             .iter()
-            .map(|(a, b)| ground.separation_nats(&f.information, *a, *b))
+            .map(|(a, b)| state.separation_nats(&f.information, *a, *b))
             .fold(f64::INFINITY, f64::min)
     };
     let alternatives = found
@@ -199,7 +203,7 @@ pub(crate) fn plan_with_motion(
         .filter(|(k, _)| *k != which)
         .map(|(_, f)| Alternative {
             worst_pair_nats: if found.distinguishable.is_empty() { 0.0 } else { worst(f) },
-            probability_decided: p_decided(ground, &f.information, &found.distinguishable),
+            probability_decided: p_decided(state, &f.information, &found.distinguishable),
             force_n: f.force_n,
             duration_s: f.motion.plan().map_or(0.0, |p| p.duration_s()),
             motion: f.motion.clone(),
@@ -207,41 +211,41 @@ pub(crate) fn plan_with_motion(
             correct: 0,
         })
         .collect();
-    let first = |a: usize, b: usize| if ground.name(a) == crate::candidate::NONE { Some(b) } else { None };
+    let first = |a: usize, b: usize| if state.name(a) == crate::candidate::NONE { Some(b) } else { None };
     let never = found
         .indistinguishable
         .iter()
         .filter_map(|(a, b)| first(*a, *b))
-        .map(|k| ground.name(k).to_owned())
+        .map(|k| state.name(k).to_owned())
         .collect();
-    let course = best.motion.plan();
+    let profile = best.motion.plan();
     Ok(Plan {
         pairs,
-        probability_decided: p_decided(ground, &best.information, &found.distinguishable),
-        probability_now: p_decided(ground, &known, &found.distinguishable),
+        probability_decided: p_decided(state, &best.information, &found.distinguishable),
+        probability_now: p_decided(state, &known, &found.distinguishable),
         probability_source: "gaps".to_owned(),
         simulated: Vec::new(),
-        candidates: ground.candidates.iter().map(|c| (c.name.clone(), c.probability)).collect(),
+        candidates: state.candidates.iter().map(|c| (c.name.clone(), c.probability)).collect(),
         motion: best.motion.clone(),
-        duration_s: course.as_ref().map_or(0.0, |p| p.duration_s()),
-        depth_m: course.as_ref().map_or(0.0, |p| p.deepest_m()),
+        duration_s: profile.as_ref().map_or(0.0, |p| p.duration_s()),
+        depth_m: profile.as_ref().map_or(0.0, |p| p.deepest_m()),
         force_n: best.force_n,
         limits: *limits,
         alternatives,
         never_detectable: never,
-        intervals: interval_changes(ground, &known, &best.information),
-        repeats: if ground.scatter_assumed { None } else { plan_repeats(&ground.base, limits) },
+        intervals: interval_changes(state, &known, &best.information),
+        repeats: if state.scatter_assumed { None } else { plan_repeats(&state.base, limits) },
         motions_evaluated: found.motions_evaluated,
     })
 }
 
 fn interval_changes(
-    ground: &InformationState,
+    state: &InformationState,
     before: &Information,
     after: &Information,
 ) -> Vec<IntervalChange> {
-    let numbers = ground.base.shared_parameters();
-    numbers
+    let parameters = state.base.shared_parameters();
+    parameters
         .iter()
         .zip(before.sds())
         .zip(after.sds())
@@ -253,7 +257,7 @@ fn interval_changes(
                 ParameterRole::Thickness(l) => format!("layer {} thickness_m", l + 1),
                 ParameterRole::Surface => "surface_m".to_owned(),
                 ParameterRole::Effect { effect, parameter } => {
-                    ground.base.effects.get(effect).map_or_else(String::new, |e| {
+                    state.base.effects.get(effect).map_or_else(String::new, |e| {
                         format!("{}.{}", e.info.id, e.info.parameters.get(parameter).map_or("", |p| p.path))
                     })
                 }

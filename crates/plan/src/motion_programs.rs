@@ -71,9 +71,10 @@ impl ProgramBuilder<'_> {
     }
 
     /// Travels a distance (m, in the direction of the velocity).
-    fn travel(&mut self, speed_mps: f64, way_m: f64) {
+    fn travel(&mut self, speed_mps: f64, distance_m: f64) {
         self.change_speed(speed_mps);
-        self.segments.push(Segment::Move { velocity_mps: speed_mps, duration_s: way_m / speed_mps.abs() });
+        self.segments
+            .push(Segment::Move { velocity_mps: speed_mps, duration_s: distance_m / speed_mps.abs() });
     }
 
     fn hold(&mut self, duration_s: f64) {
@@ -82,10 +83,10 @@ impl ProgramBuilder<'_> {
     }
 
     /// Travels a distance at a rippled velocity over whole periods, so that it ends at the mean velocity.
-    fn ripple(&mut self, speed_mps: f64, amplitude_mps: f64, frequency_hz: f64, way_m: f64) {
+    fn ripple(&mut self, speed_mps: f64, amplitude_mps: f64, frequency_hz: f64, distance_m: f64) {
         self.change_speed(speed_mps);
-        let periods = (way_m / speed_mps * frequency_hz).round().max(1.0);
-        let duration_s = way_m / speed_mps;
+        let periods = (distance_m / speed_mps * frequency_hz).round().max(1.0);
+        let duration_s = distance_m / speed_mps;
         self.segments.push(Segment::Ripple {
             velocity_mps: speed_mps,
             amplitude_mps,
@@ -128,45 +129,45 @@ fn build_program(
 ) -> Motion {
     let most_mps = LIMIT_SHARE * limits.speed_mps;
     let mut b = ProgramBuilder { limits, sample_hz: begin.sample_hz, segments: Vec::new(), speed_mps: 0.0 };
-    let number = |part: usize, which: usize| at(2 + part * COORDINATES_PER_PART + which);
+    let coordinate = |part: usize, which: usize| at(2 + part * COORDINATES_PER_PART + which);
     // For most points the last part is a retraction, which separates friction from effects independent of the
     // direction.
-    let back_last = number(parts - 1, 0) < 0.85;
+    let back_last = coordinate(parts - 1, 0) < 0.85;
     let forward = |part: usize| {
         let last = part + 1 == parts;
-        !(last && back_last) && (part == 0 || number(part, 0) >= 0.25)
+        !(last && back_last) && (part == 0 || coordinate(part, 0) >= 0.25)
     };
-    let ways: f64 = (0..parts).filter(|p| forward(*p)).map(|p| 0.2 + number(p, 2)).sum();
+    let shares: f64 = (0..parts).filter(|p| forward(*p)).map(|p| 0.2 + coordinate(p, 2)).sum();
     // Retractions in between are travelled again: the same depth is passed twice.
-    let backs: f64 = (0..parts)
-        .filter(|p| !forward(*p) && *p + 1 < parts && number(*p, 0) < 0.1)
-        .map(|p| 0.05 + 0.1 * number(p, 2))
+    let retracted: f64 = (0..parts)
+        .filter(|p| !forward(*p) && *p + 1 < parts && coordinate(*p, 0) < 0.1)
+        .map(|p| 0.05 + 0.1 * coordinate(p, 2))
         .sum();
     for part in 0..parts {
-        let speed = most_mps * log_between(number(part, 1), (slowest, 0.95));
-        let share = 0.2 + number(part, 2);
+        let speed = most_mps * log_between(coordinate(part, 1), (slowest, 0.95));
+        let share = 0.2 + coordinate(part, 2);
         if part + 1 == parts && back_last {
             b.change_speed(0.0);
-            b.travel(-speed, aim_m * between(number(part, 2), (0.15, 0.8)));
+            b.travel(-speed, aim_m * between(coordinate(part, 2), (0.15, 0.8)));
         } else if forward(part) {
-            let way_m = aim_m * (1.0 + backs) * share / ways;
-            let hz = log_between(number(part, 4), RIPPLE_HZ);
+            let distance_m = aim_m * (1.0 + retracted) * share / shares;
+            let hz = log_between(coordinate(part, 4), RIPPLE_HZ);
             // Speed and acceleration limit the amplitude; whole periods change the frequency by up to half a
             // period.
-            let periods = way_m / speed * hz;
+            let periods = distance_m / speed * hz;
             let most = (most_mps - speed)
                 .min(LIMIT_SHARE * limits.acceleration_mps2 / (TAU * hz * (1.0 + 0.5 / periods.max(0.5))));
-            let wanted = speed * between(number(part, 3), (0.2, 1.6));
-            let amplitude = wanted.min(most);
-            if number(part, 0) > 0.45 && amplitude > 0.05 * speed && periods > 0.8 {
-                b.ripple(speed, amplitude, hz, way_m);
+            let desired = speed * between(coordinate(part, 3), (0.2, 1.6));
+            let amplitude = desired.min(most);
+            if coordinate(part, 0) > 0.45 && amplitude > 0.05 * speed && periods > 0.8 {
+                b.ripple(speed, amplitude, hz, distance_m);
             } else {
-                b.travel(speed, way_m);
+                b.travel(speed, distance_m);
             }
-        } else if number(part, 0) < 0.1 {
-            b.travel(-speed, aim_m * (0.05 + 0.1 * number(part, 2)));
+        } else if coordinate(part, 0) < 0.1 {
+            b.travel(-speed, aim_m * (0.05 + 0.1 * coordinate(part, 2)));
         } else {
-            b.hold(log_between(number(part, 2), HOLD_S));
+            b.hold(log_between(coordinate(part, 2), HOLD_S));
         }
     }
     b.change_speed(0.0);
@@ -233,17 +234,17 @@ pub fn infeasibility(limits: &Limits, begin: &StartConditions) -> Option<(String
             format!("depth_m must be at least {:.4} m", begin.surface_m + MIN_DEPTH_M),
         ));
     }
-    let way_m = begin.surface_m + MIN_DEPTH_M - begin.start_m;
-    let fastest_s = way_m / limits.speed_mps + FRAC_PI_2 * limits.speed_mps / limits.acceleration_mps2;
+    let distance_m = begin.surface_m + MIN_DEPTH_M - begin.start_m;
+    let fastest_s = distance_m / limits.speed_mps + FRAC_PI_2 * limits.speed_mps / limits.acceleration_mps2;
     // Without reaching the speed, half of the distance is travelled at constant acceleration.
-    let by_acceleration_s = 2.0 * (way_m / limits.acceleration_mps2).sqrt();
-    let least_s = fastest_s.min(by_acceleration_s.max(way_m / limits.speed_mps));
+    let by_acceleration_s = 2.0 * (distance_m / limits.acceleration_mps2).sqrt();
+    let least_s = fastest_s.min(by_acceleration_s.max(distance_m / limits.speed_mps));
     if limits.duration_s < least_s {
         return Some((
             format!(
                 "duration_s is {} s, and {:.1} mm from the start to {:.0} mm into the tissue take {least_s:.2} s at {} m/s and {} m/s²",
                 limits.duration_s,
-                way_m * 1e3,
+                distance_m * 1e3,
                 MIN_DEPTH_M * 1e3,
                 limits.speed_mps,
                 limits.acceleration_mps2

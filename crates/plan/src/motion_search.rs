@@ -50,15 +50,15 @@ pub struct MotionSearchResult {
 }
 
 /// Objective of a motion.
-fn score(ground: &InformationState, shown: &Information, pairs: &[(usize, usize)], known: f64) -> f64 {
+fn score(state: &InformationState, information: &Information, pairs: &[(usize, usize)], known: f64) -> f64 {
     if pairs.is_empty() {
-        return shown.half_log_det() - known;
+        return information.half_log_det() - known;
     }
     let (mut worst, mut sum) = (f64::INFINITY, 0.0);
     for (a, b) in pairs {
-        let weight = |k: usize| ground.candidates.get(k).map_or(0.05, |c| c.probability).max(1e-3);
+        let weight = |k: usize| state.candidates.get(k).map_or(0.05, |c| c.probability).max(1e-3);
         // Prior odds count as nats of the gap.
-        let nats = ground.separation_nats(shown, *a, *b).min(MAX_USEFUL_NATS);
+        let nats = state.separation_nats(information, *a, *b).min(MAX_USEFUL_NATS);
         worst = worst.min(nats - libm::log(weight(*a) * weight(*b)));
         sum += nats;
     }
@@ -70,7 +70,7 @@ fn score(ground: &InformationState, shown: &Information, pairs: &[(usize, usize)
 /// # Errors [`PlanError::Infeasible`] when no motion satisfies the limits, [`PlanError::NoForce`] when none can
 /// be replayed.
 pub fn search_motions(
-    ground: &InformationState,
+    state: &InformationState,
     limits: &Limits,
     begin: &StartConditions,
 ) -> Result<MotionSearchResult, PlanError> {
@@ -79,9 +79,9 @@ pub fn search_motions(
         return Err(PlanError::Infeasible { why, remedy });
     }
     let points: Vec<Vec<f64>> = (0..SAMPLED_MOTIONS).map(low_discrepancy_point).collect();
-    let drawn: Vec<(Vec<f64>, Motion)> =
+    let sampled: Vec<(Vec<f64>, Motion)> =
         points.into_iter().filter_map(|p| motion_from_point(&p, limits, begin).map(|m| (p, m))).collect();
-    if drawn.is_empty() {
+    if sampled.is_empty() {
         return Err(PlanError::Infeasible {
             why: format!(
                 "none of {SAMPLED_MOTIONS} programs of two to six parts gets to {:.1} mm and back to rest in {} s",
@@ -91,16 +91,17 @@ pub fn search_motions(
             remedy: "give it more time, or allow a higher speed or acceleration".to_owned(),
         });
     }
-    let seen: Vec<Option<BlockAverages>> = drawn.par_iter().map(|(_, m)| ground.motion_blocks(m)).collect();
+    let blocks: Vec<Option<BlockAverages>> =
+        sampled.par_iter().map(|(_, m)| state.motion_blocks(m)).collect();
     let forces: Vec<Option<f64>> =
-        seen.par_iter().map(|b| b.as_ref().and_then(|b| expected_peak_force_n(ground, b))).collect();
+        blocks.par_iter().map(|b| b.as_ref().and_then(|b| expected_peak_force_n(state, b))).collect();
     if forces.iter().all(Option::is_none) {
         return Err(PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()));
     }
     let weakest = forces.iter().flatten().fold(f64::INFINITY, |m: f64, f| m.min(*f));
-    let safe: Vec<((Vec<f64>, Motion), BlockAverages, f64)> = drawn
+    let safe: Vec<((Vec<f64>, Motion), BlockAverages, f64)> = sampled
         .into_iter()
-        .zip(seen)
+        .zip(blocks)
         .zip(forces)
         .filter_map(|((d, b), f)| Some((d, b?, f.filter(|f| *f <= limits.force_n)?)))
         .collect();
@@ -114,20 +115,21 @@ pub fn search_motions(
             remedy: "allow more force, less depth (depth_m) or a lower speed (speed_mps)".to_owned(),
         });
     }
-    let shown: Vec<_> = safe
+    let information: Vec<_> = safe
         .into_par_iter()
         .filter_map(|((point, motion), blocks, force_n)| {
-            let shown = ground.after_blocks(&blocks)?;
-            Some(EvaluatedMotion { motion, information: shown, score: 0.0, force_n, point })
+            let information = state.after_blocks(&blocks)?;
+            Some(EvaluatedMotion { motion, information: information, score: 0.0, force_n, point })
         })
         .collect();
-    let (told, never): (Vec<_>, Vec<_>) = ground.pairs().into_iter().partition(|(a, b)| {
-        shown.iter().any(|f| ground.separation_nats(&f.information, *a, *b) >= DISTINGUISHABLE_NATS)
-    });
-    let known = ground.current().half_log_det();
-    let mut all: Vec<EvaluatedMotion> = shown
+    let (distinguishable, indistinguishable): (Vec<_>, Vec<_>) =
+        state.pairs().into_iter().partition(|(a, b)| {
+            information.iter().any(|f| state.separation_nats(&f.information, *a, *b) >= DISTINGUISHABLE_NATS)
+        });
+    let known = state.current().half_log_det();
+    let mut all: Vec<EvaluatedMotion> = information
         .into_par_iter()
-        .map(|f| EvaluatedMotion { score: score(ground, &f.information, &told, known), ..f })
+        .map(|f| EvaluatedMotion { score: score(state, &f.information, &distinguishable, known), ..f })
         .collect();
     if all.is_empty() {
         return Err(PlanError::NoForce("no motion can be compared".to_owned()));
@@ -135,7 +137,7 @@ pub fn search_motions(
     let mut looked_at = all.len();
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
     for k in 0..REFINED_MOTIONS.min(all.len()) {
-        let (better, tried) = refine_motion(ground, limits, begin, &all[k], &told, known, k);
+        let (better, tried) = refine_motion(state, limits, begin, &all[k], &distinguishable, known, k);
         looked_at += tried;
         all[k] = better;
     }
@@ -143,25 +145,25 @@ pub fn search_motions(
     all.truncate(5);
     Ok(MotionSearchResult {
         best: all,
-        distinguishable: told,
-        indistinguishable: never,
+        distinguishable: distinguishable,
+        indistinguishable: indistinguishable,
         motions_evaluated: looked_at,
     })
 }
 
 /// Largest force in N expected under any candidate, plus three standard deviations of the noise.
-fn expected_peak_force_n(ground: &InformationState, blocks: &BlockAverages) -> Option<f64> {
-    let most = ground.peak_forces_n(blocks)?.into_iter().fold(0.0, f64::max);
-    Some(most + 3.0 * ground.noise.sd_n())
+fn expected_peak_force_n(state: &InformationState, blocks: &BlockAverages) -> Option<f64> {
+    let most = state.peak_forces_n(blocks)?.into_iter().fold(0.0, f64::max);
+    Some(most + 3.0 * state.noise.sd_n())
 }
 
 /// Improves a motion by trials from the same low-discrepancy sequence in a shrinking neighbourhood.
 fn refine_motion(
-    ground: &InformationState,
+    state: &InformationState,
     limits: &Limits,
     begin: &StartConditions,
     from: &EvaluatedMotion,
-    told: &[(usize, usize)],
+    distinguishable: &[(usize, usize)],
     known: f64,
     which: usize,
 ) -> (EvaluatedMotion, usize) {
@@ -179,11 +181,11 @@ fn refine_motion(
                     .map(|i| (best.point[i] + reach * (2.0 * u[i] - 1.0)).clamp(0.0, 1.0))
                     .collect();
                 let motion = motion_from_point(&point, limits, begin)?;
-                let blocks = ground.motion_blocks(&motion)?;
-                let force_n = expected_peak_force_n(ground, &blocks).filter(|f| *f <= limits.force_n)?;
-                let shown = ground.after_blocks(&blocks)?;
-                let score = score(ground, &shown, told, known);
-                Some(EvaluatedMotion { motion, information: shown, score, force_n, point })
+                let blocks = state.motion_blocks(&motion)?;
+                let force_n = expected_peak_force_n(state, &blocks).filter(|f| *f <= limits.force_n)?;
+                let information = state.after_blocks(&blocks)?;
+                let score = score(state, &information, distinguishable, known);
+                Some(EvaluatedMotion { motion, information: information, score, force_n, point })
             })
             .collect();
         tried += near.len();

@@ -46,19 +46,19 @@ struct SimulationCheck<'a> {
 pub fn check_by_simulation(
     found: &MotionSearchResult,
     limits: &Limits,
-    believed: &Scenario,
-    ground: &InformationState,
+    assumed: &Scenario,
+    state: &InformationState,
     old: &[NamedRecording],
     mut progress: impl FnMut(&str),
 ) -> Result<Plan, PlanError> {
     let bench = SimulationCheck {
-        assumed: believed,
-        information: ground,
+        assumed: assumed,
+        information: state,
         recordings: old,
-        noise_n: sensor_noise(ground, believed),
+        noise_n: sensor_noise(state, assumed),
     };
-    let mut order: Vec<usize> = (0..ground.candidates.len()).collect();
-    order.sort_by(|a, b| ground.candidates[*b].probability.total_cmp(&ground.candidates[*a].probability));
+    let mut order: Vec<usize> = (0..state.candidates.len()).collect();
+    order.sort_by(|a, b| state.candidates[*b].probability.total_cmp(&state.candidates[*a].probability));
     order.truncate(TESTED_CANDIDATES);
     let raced = &order[..order.len().min(COMPARED_CANDIDATES)];
     let mut outcomes: Vec<Vec<bool>> = Vec::new();
@@ -76,23 +76,18 @@ pub fn check_by_simulation(
     }
     let each = spent / (outcomes.len() * raced.len()).max(1) as u64;
     // Weighted by the candidates' probabilities; the first of equals.
-    let worth = |of: &[bool]| -> f64 {
-        raced
-            .iter()
-            .zip(of)
-            .filter(|(_, right)| **right)
-            .map(|(c, _)| ground.candidates[*c].probability)
-            .sum()
+    let value = |of: &[bool]| -> f64 {
+        raced.iter().zip(of).filter(|(_, right)| **right).map(|(c, _)| state.candidates[*c].probability).sum()
     };
     let which = outcomes
         .iter()
         .enumerate()
         .fold((0, f64::NEG_INFINITY), |best, (k, of)| {
-            let worth = worth(of);
-            if worth > best.1 + 1e-9 { (k, worth) } else { best }
+            let value = value(of);
+            if value > best.1 + 1e-9 { (k, value) } else { best }
         })
         .0;
-    let mut plan = plan_with_motion(ground, limits, found, which)?;
+    let mut plan = plan_with_motion(state, limits, found, which)?;
     let others = (0..found.best.len()).filter(|k| *k != which);
     for (alternative, k) in plan.alternatives.iter_mut().zip(others) {
         let of = outcomes.get(k).map_or(&[][..], Vec::as_slice);
@@ -101,7 +96,7 @@ pub fn check_by_simulation(
     }
     let mut tried: Vec<CandidateTrials> = order
         .iter()
-        .map(|c| CandidateTrials { candidate: ground.name(*c).to_owned(), trials: 0, correct: 0 })
+        .map(|c| CandidateTrials { candidate: state.name(*c).to_owned(), trials: 0, correct: 0 })
         .collect();
     let mut judged = false;
     if let [only] = outcomes.as_slice() {
@@ -124,15 +119,15 @@ pub fn check_by_simulation(
         }
         judged = true;
     }
-    let weights: Vec<f64> = order.iter().map(|c| ground.candidates[*c].probability).collect();
+    let weights: Vec<f64> = order.iter().map(|c| state.candidates[*c].probability).collect();
     let sum: f64 = weights.iter().sum();
     if sum > 0.0 {
         // One success and one failure added (Laplace).
         let share = |t: &CandidateTrials| (t.correct as f64 + 1.0) / (t.trials as f64 + 2.0);
-        let seen = tried.iter().zip(&weights).map(|(t, w)| w * share(t)).sum::<f64>() / sum;
+        let share_correct = tried.iter().zip(&weights).map(|(t, w)| w * share(t)).sum::<f64>() / sum;
         let n = tried.iter().map(|t| t.trials).sum::<usize>() as f64;
         plan.probability_decided =
-            (n * seen + EXPECTED_GAP_WEIGHT * plan.probability_decided) / (n + EXPECTED_GAP_WEIGHT);
+            (n * share_correct + EXPECTED_GAP_WEIGHT * plan.probability_decided) / (n + EXPECTED_GAP_WEIGHT);
         plan.probability_source = "simulated".to_owned();
     }
     plan.simulated = tried;
@@ -148,9 +143,9 @@ impl SimulationCheck<'_> {
         spent: &mut u64,
     ) -> Result<Vec<bool>, PlanError> {
         let one = |(candidate, seed): &(usize, u64)| self.diagnose_one(motion, *candidate, *seed);
-        let said: Vec<(bool, u64)> = jobs.par_iter().map(one).collect::<Result<_, PlanError>>()?;
-        *spent += said.iter().map(|s| s.1).sum::<u64>();
-        Ok(said.into_iter().map(|s| s.0).collect())
+        let diagnosis: Vec<(bool, u64)> = jobs.par_iter().map(one).collect::<Result<_, PlanError>>()?;
+        *spent += diagnosis.iter().map(|s| s.1).sum::<u64>();
+        Ok(diagnosis.into_iter().map(|s| s.0).collect())
     }
 
     /// Whether the diagnosis is correct, and its cost in replayed blocks.
@@ -178,27 +173,27 @@ impl SimulationCheck<'_> {
 }
 
 /// Standard deviation of the noise of a sample in N.
-fn sensor_noise(ground: &InformationState, believed: &Scenario) -> f64 {
-    let samples = (stylet_identify::block_averages::BLOCK_S * ground.sample_hz).round().max(1.0);
-    believed
+fn sensor_noise(state: &InformationState, assumed: &Scenario) -> f64 {
+    let samples = (stylet_identify::block_averages::BLOCK_S * state.sample_hz).round().max(1.0);
+    assumed
         .sensor
         .force_torque()
         .map_or(0.0, |s| s.noise_n)
-        .min(ground.noise.sd_n() * samples.sqrt())
+        .min(state.noise.sd_n() * samples.sqrt())
         .max(1e-4)
 }
 
 /// Whether a diagnosis names the candidate, and besides it only effects of the base model.
-fn is_correct(said: &Diagnosis, ground: &InformationState, which: usize) -> bool {
-    let Some(candidate) = ground.candidates.get(which) else { return false };
-    let stem: Vec<&str> = ground.base.effects.iter().map(|e| e.info.id).collect();
-    let mut beside = said.causes.iter().filter(|c| !stem.contains(&c.effect.as_str()));
-    if said.verdict == Verdict::Unknown {
+fn is_correct(diagnosis: &Diagnosis, state: &InformationState, which: usize) -> bool {
+    let Some(candidate) = state.candidates.get(which) else { return false };
+    let base: Vec<&str> = state.base.effects.iter().map(|e| e.info.id).collect();
+    let mut additional = diagnosis.causes.iter().filter(|c| !base.contains(&c.effect.as_str()));
+    if diagnosis.verdict == Verdict::Unknown {
         return false;
     }
     if candidate.name == NONE {
-        return beside.next().is_none();
+        return additional.next().is_none();
     }
-    beside.next().is_some_and(|c| c.effect == candidate.name && c.equivalent.is_empty())
-        && beside.next().is_none()
+    additional.next().is_some_and(|c| c.effect == candidate.name && c.equivalent.is_empty())
+        && additional.next().is_none()
 }

@@ -54,9 +54,9 @@ pub fn from_diagnosis(
         .filter(|c| !c.equivalent.is_empty())
         .find_map(|c| best.effects.iter().position(|e| e.info.id == c.effect));
     let mut candidates = Vec::new();
-    let mut stem = best.clone();
+    let mut base = best.clone();
     if let Some(k) = ambiguous {
-        stem = best.without_effect(k);
+        base = best.without_effect(k);
         candidates.push(Candidate::with_effect(best.effects[k].clone(), 1.0));
         for rival in examined
             .competing_effects
@@ -72,7 +72,7 @@ pub fn from_diagnosis(
         candidates.push(Candidate::without_effect(1.0));
     }
     let sum: f64 = candidates.iter().map(|c| c.probability).sum();
-    let named: Vec<&str> = stem.effects.iter().map(|e| e.info.id).collect();
+    let named: Vec<&str> = base.effects.iter().map(|e| e.info.id).collect();
     let hidden: Vec<EffectTerm> = general_effects()
         .filter(|i| d.not_identifiable.iter().any(|n| n == i.id) && !named.contains(&i.id))
         .filter(|i| candidates.iter().all(|c| c.name != i.id))
@@ -91,8 +91,8 @@ pub fn from_diagnosis(
     let unknown = (d.verdict == Verdict::Unknown).then_some(d.gain.rmse_after_n.max(d.noise.sd_n));
     let first = |b: &BlockAverages| b.sample_time_s.first().map(|t| b.motion.at(*t).0);
     let start = search.data.recordings.iter().filter_map(first).fold(f64::INFINITY, f64::min);
-    let ground = InformationState::new(
-        stem,
+    let state = InformationState::new(
+        base,
         candidates,
         unknown.filter(|n| n.is_finite()),
         &search.data.recordings,
@@ -100,7 +100,7 @@ pub fn from_diagnosis(
         scenario.sample_hz,
     )
     .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))?;
-    Ok((ground, start_conditions(scenario, start.is_finite().then_some(start))))
+    Ok((state, start_conditions(scenario, start.is_finite().then_some(start))))
 }
 
 /// Every effect of the library at its typical size in addition to the diagnosed model, over the available
@@ -112,9 +112,9 @@ pub fn from_recordings(
     examined: &DiagnosisResult,
 ) -> Result<InformationState, PlanError> {
     let search = &examined.search;
-    let stem = search.best.model.clone();
+    let base = search.best.model.clone();
     let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
-    let found = |id: &str| stem.effects.iter().any(|e| e.info.id == id);
+    let found = |id: &str| base.effects.iter().any(|e| e.info.id == id);
     candidates.extend(
         general_effects()
             .filter(|i| !found(i.id))
@@ -122,7 +122,7 @@ pub fn from_recordings(
             .map(|c| Candidate::with_effect(c, 0.02)),
     );
     let noise = (*search.data.noise).clone();
-    InformationState::new(stem, candidates, None, &search.data.recordings, noise, scenario.sample_hz)
+    InformationState::new(base, candidates, None, &search.data.recordings, noise, scenario.sample_hz)
         .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))
 }
 
@@ -138,11 +138,11 @@ pub fn from_scenario(
     let recording = motion_to_recording(made, scenario.sample_hz);
     let start = recording.as_ref().and_then(|r| r.position_m.first().copied());
     let old: Vec<BlockAverages> = recording.iter().map(|r| BlockAverages::new(r, &[], BLOCK_S)).collect();
-    let mut stem = Model::base(Arc::new(assumptions_of(scenario)), old.len().max(1));
+    let mut base = Model::base(Arc::new(assumptions_of(scenario)), old.len().max(1));
     let failed = || PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned());
     for (r, b) in old.iter().enumerate() {
-        let compiled = stem.compile(r).ok_or_else(failed)?;
-        stem.rupture_times_s[r] = free_rupture_times(&compiled, &motion_pieces(&compiled, b));
+        let compiled = base.compile(r).ok_or_else(failed)?;
+        base.rupture_times_s[r] = free_rupture_times(&compiled, &motion_pieces(&compiled, b));
     }
     let given: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
     let choices: Vec<EffectTerm> =
@@ -150,10 +150,10 @@ pub fn from_scenario(
     let each = OTHER_EFFECTS_PROBABILITY / choices.len().max(1) as f64;
     let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
     candidates.extend(choices.into_iter().map(|c| Candidate::with_effect(c, each)));
-    let ground =
-        InformationState::new(stem, candidates, None, &old, sensor_noise(scenario), scenario.sample_hz)
+    let state =
+        InformationState::new(base, candidates, None, &old, sensor_noise(scenario), scenario.sample_hz)
             .ok_or_else(failed)?;
-    Ok((ground, start_conditions(scenario, start)))
+    Ok((state, start_conditions(scenario, start)))
 }
 
 /// Noise of blocks for a scenario's sensor: first-order autoregressive noise is white over a block, with its
@@ -168,13 +168,13 @@ fn sensor_noise(scenario: &Scenario) -> Noise {
 /// A candidate as a scenario that can be simulated.
 #[must_use]
 pub fn candidate_scenario(
-    believed: &Scenario,
-    ground: &InformationState,
+    assumed: &Scenario,
+    state: &InformationState,
     which: usize,
     motion: &Motion,
 ) -> Scenario {
-    let model = ground.candidate_model(which);
-    let mut effects: Vec<AnyEffect> = believed.effects.clone();
+    let model = state.candidate_model(which);
+    let mut effects: Vec<AnyEffect> = assumed.effects.clone();
     effects.extend(model.effects.iter().filter_map(EffectTerm::effect));
-    Scenario { tissue: model.tissue.clone(), effects, motion: motion.clone(), ..believed.clone() }
+    Scenario { tissue: model.tissue.clone(), effects, motion: motion.clone(), ..assumed.clone() }
 }

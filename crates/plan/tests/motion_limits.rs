@@ -95,7 +95,7 @@ fn scenario() -> Scenario {
 #[test]
 fn infeasible_limits_are_reported_with_a_reason() {
     let scenario = scenario();
-    let (ground, begin) = from_scenario(&scenario, None).expect("a ground");
+    let (state, begin) = from_scenario(&scenario, None).expect("a ground");
     let wide =
         Limits { depth_m: 0.05, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 20.0 };
     for (limits, word) in [
@@ -104,12 +104,12 @@ fn infeasible_limits_are_reported_with_a_reason() {
         (Limits { speed_mps: 1e-5, ..wide }, "duration_s"),
         (Limits { force_n: 0.05, ..wide }, "force_n"),
     ] {
-        let Err(PlanError::Infeasible { why, remedy }) = plan(&ground, &limits, &begin) else {
+        let Err(PlanError::Infeasible { why, remedy }) = plan(&state, &limits, &begin) else {
             unreachable!("{limits:?} cannot be kept")
         };
         assert!(why.contains(word) && !remedy.is_empty(), "{why}");
     }
-    let Err(PlanError::Limit { field, .. }) = plan(&ground, &Limits { speed_mps: f64::NAN, ..wide }, &begin)
+    let Err(PlanError::Limit { field, .. }) = plan(&state, &Limits { speed_mps: f64::NAN, ..wide }, &begin)
     else {
         unreachable!("not a number")
     };
@@ -119,13 +119,13 @@ fn infeasible_limits_are_reported_with_a_reason() {
 
 #[test]
 fn the_expected_force_stays_below_its_limit_under_every_candidate() {
-    let (ground, begin) = from_scenario(&scenario(), None).expect("a ground");
+    let (state, begin) = from_scenario(&scenario(), None).expect("a ground");
     let free =
         Limits { depth_m: 0.05, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 50.0 };
-    let strong = plan(&ground, &free, &begin).expect("a plan").0;
+    let strong = plan(&state, &free, &begin).expect("a plan").0;
     let gentle =
-        plan(&ground, &Limits { force_n: 0.8 * strong.force_n, ..free }, &begin).expect("a gentler plan").0;
-    let largest = ground.expected_forces(&gentle.motion).expect("forces").force_n;
+        plan(&state, &Limits { force_n: 0.8 * strong.force_n, ..free }, &begin).expect("a gentler plan").0;
+    let largest = state.expected_forces(&gentle.motion).expect("forces").force_n;
     let most = largest.iter().flatten().fold(0.0, |m: f64, f| m.max(f.abs()));
     assert!(most <= 0.8 * strong.force_n && gentle.force_n <= 0.8 * strong.force_n, "{most}");
     assert_ne!(strong.motion, gentle.motion);

@@ -8,7 +8,7 @@ use stylet_scenario::{Motion, Scenario};
 const LIMITS: Limits =
     Limits { depth_m: 0.05, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 20.0 };
 
-fn believed() -> Scenario {
+fn assumed() -> Scenario {
     Scenario::parse(
         "test",
         r#"Scenario(name: "two gels", tissue: (layers: [
@@ -20,7 +20,7 @@ fn believed() -> Scenario {
 }
 
 fn measured(motion: &Motion, seed: u64) -> NamedRecording {
-    let mut there = believed();
+    let mut there = assumed();
     there
         .effects
         .push(stylet_tissue::AnyEffect::from_parameters("coulomb_friction", &[5.0]).expect("an effect"));
@@ -32,7 +32,7 @@ fn measured(motion: &Motion, seed: u64) -> NamedRecording {
 
 #[test]
 fn a_planned_motion_identifies_friction_laws_hidden_at_constant_speed() {
-    let scenario = believed();
+    let scenario = assumed();
     let (before, begin) = from_scenario(&scenario, None).expect("a ground");
     let seen = identifiability(&before);
     for hidden in ["coulomb_friction", "stribeck_friction", "force_gain"] {
@@ -57,20 +57,20 @@ fn a_planned_motion_identifies_friction_laws_hidden_at_constant_speed() {
 
 #[test]
 fn the_planned_insertion_leads_to_the_correct_single_effect() {
-    let scenario = believed();
+    let scenario = assumed();
     let first = measured(&scenario.motion, 1);
     let blind =
         diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
     assert_eq!(blind.diagnosis.verdict, Verdict::None);
     assert!(blind.diagnosis.not_identifiable.iter().any(|i| i == "coulomb_friction"));
-    let (ground, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
-    let planned = plan(&ground, &LIMITS, &begin).expect("a plan").0;
+    let (state, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
+    let planned = plan(&state, &LIMITS, &begin).expect("a plan").0;
     assert!(planned.probability_decided > planned.probability_now + 0.3);
     // The recordings have different motions.
     let both = [first, measured(&planned.motion, 2)];
-    let told = diagnose(&scenario, &both, &Options { brief: true }, |_| {}).expect("a diagnosis").diagnosis;
-    assert_eq!(told.verdict, Verdict::Named, "{:?}", told.causes);
-    assert_eq!(told.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>(), ["coulomb_friction"]);
+    let actual = diagnose(&scenario, &both, &Options { brief: true }, |_| {}).expect("a diagnosis").diagnosis;
+    assert_eq!(actual.verdict, Verdict::Named, "{:?}", actual.causes);
+    assert_eq!(actual.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>(), ["coulomb_friction"]);
 }
 
 #[test]
@@ -78,8 +78,8 @@ fn the_plan_does_not_depend_on_the_number_of_threads() {
     let one = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (ground, begin) = from_scenario(&believed(), None).expect("a ground");
-            plan(&ground, &LIMITS, &begin).expect("a plan").0
+            let (state, begin) = from_scenario(&assumed(), None).expect("a ground");
+            plan(&state, &LIMITS, &begin).expect("a plan").0
         })
     };
     assert_eq!(one(1), one(3));
@@ -87,17 +87,17 @@ fn the_plan_does_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn the_selected_motion_is_tested_on_separate_simulations() {
-    let scenario = believed();
+    let scenario = assumed();
     let first = measured(&scenario.motion, 1);
     let blind =
         diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
-    let (ground, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
-    let (by_gaps, mut found) = plan(&ground, &LIMITS, &begin).expect("a plan");
+    let (state, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
+    let (by_gaps, mut found) = plan(&state, &LIMITS, &begin).expect("a plan");
     found.best.truncate(2);
-    let mut told = Vec::new();
+    let mut actual = Vec::new();
     let checked =
-        check_by_simulation(&found, &LIMITS, &scenario, &ground, std::slice::from_ref(&first), |what| {
-            told.push(what.to_owned());
+        check_by_simulation(&found, &LIMITS, &scenario, &state, std::slice::from_ref(&first), |what| {
+            actual.push(what.to_owned());
         })
         .expect("a plan");
     assert_eq!(checked.probability_source, "simulated");
@@ -111,5 +111,5 @@ fn the_selected_motion_is_tested_on_separate_simulations() {
     assert!(2 * decided > of, "{:?}", checked.simulated);
     assert!((checked.probability_decided - decided as f64 / of as f64).abs() < 0.25);
     assert!(checked.probability_decided > by_gaps.probability_now);
-    assert!(told.iter().any(|what| what.starts_with("motion 2 of 2")));
+    assert!(actual.iter().any(|what| what.starts_with("motion 2 of 2")));
 }

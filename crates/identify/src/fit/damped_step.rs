@@ -48,7 +48,7 @@ pub(super) fn damped_step(
     for i in 0..size {
         damped.add(i, i, damping * t.normal_matrix.at(i, i));
     }
-    let number = |i: usize| -> (Parameter, usize) {
+    let parameter = |i: usize| -> (Parameter, usize) {
         if i < ns {
             (t.shared[i], 0)
         } else {
@@ -73,7 +73,7 @@ pub(super) fn damped_step(
         let mut kept = Vec::new();
         let mut hit = false;
         for (&i, x) in free.iter().zip(&x) {
-            let (n, r) = number(i);
+            let (n, r) = parameter(i);
             let now = model.get(n.role, r);
             let (mut low, mut high) = (n.low - now, n.high - now);
             if let ParameterRole::RuptureTime(_) = n.role {
@@ -131,9 +131,9 @@ pub(super) fn apply_step(
 }
 
 /// Keeps rupture times inside the recording and in order.
-pub(super) fn order_rupture_times(instants: &mut [f64], (first, last): (f64, f64)) {
+pub(super) fn order_rupture_times(rupture_times: &mut [f64], (first, last): (f64, f64)) {
     let mut before = first;
-    for t in instants.iter_mut().filter(|t| **t < NO_RUPTURE) {
+    for t in rupture_times.iter_mut().filter(|t| **t < NO_RUPTURE) {
         *t = t.clamp(before, last);
         before = *t;
     }

@@ -32,14 +32,14 @@ pub struct Linearization {
 impl Linearization {
     /// Index of a per-recording parameter in the normal matrix.
     #[must_use]
-    pub fn index_of(&self, own: usize, r: usize) -> usize {
-        self.shared.len() + r * self.per_recording.len() + own
+    pub fn index_of(&self, per_recording: usize, r: usize) -> usize {
+        self.shared.len() + r * self.per_recording.len() + per_recording
     }
 
     /// Linearization of `model` with residuals `at`.
     #[must_use]
     pub fn new(model: &Model, data: &FitData, at: &Residuals) -> Self {
-        let (shared, own) = (model.shared_parameters(), model.recording_parameters());
+        let (shared, per_recording) = (model.shared_parameters(), model.recording_parameters());
         let roots: Vec<Vec<f64>> =
             at.innovations.iter().map(|w| w.iter().map(|w| HUBER_LOSS.weight(*w).sqrt()).collect()).collect();
         let mut t = Self {
@@ -48,16 +48,16 @@ impl Linearization {
                 rupture_rows: event_rows(model, at, at),
             },
             shared,
-            per_recording: own,
+            per_recording: per_recording,
             columns: Vec::new(),
             normal_matrix: SymmetricMatrix::zeros(0),
             neg_gradient: Vec::new(),
             sqrt_weights: roots,
             supports: Vec::new(),
         };
-        let numbers: Vec<Parameter> = t.shared.iter().chain(&t.per_recording).copied().collect();
-        let trails = replay_caches(model, data);
-        t.columns = numbers.par_iter().map(|n| t.derivative(model, data, at, n, &trails)).collect();
+        let parameters: Vec<Parameter> = t.shared.iter().chain(&t.per_recording).copied().collect();
+        let caches = replay_caches(model, data);
+        t.columns = parameters.par_iter().map(|n| t.derivative(model, data, at, n, &caches)).collect();
         t.assemble(model, data.recording_count());
         t
     }
@@ -73,9 +73,9 @@ impl Linearization {
         at: &Residuals,
         step: &(dyn Fn(&Parameter) -> Option<f64> + Sync),
     ) -> Self {
-        let trails = replay_caches(model, data);
+        let caches = replay_caches(model, data);
         let of =
-            |n: &Parameter, step: f64| self.derivative(model, data, at, &Parameter { step, ..*n }, &trails);
+            |n: &Parameter, step: f64| self.derivative(model, data, at, &Parameter { step, ..*n }, &caches);
         let wide = |n: &Parameter| {
             let step = step(n)?;
             let (mut up, down) = (of(n, step), of(n, -step));
@@ -89,8 +89,8 @@ impl Linearization {
             }
             Some(up)
         };
-        let numbers: Vec<Parameter> = self.shared.iter().chain(&self.per_recording).copied().collect();
-        let columns: Vec<Option<JacobianColumn>> = numbers.par_iter().map(wide).collect();
+        let parameters: Vec<Parameter> = self.shared.iter().chain(&self.per_recording).copied().collect();
+        let columns: Vec<Option<JacobianColumn>> = parameters.par_iter().map(wide).collect();
         for (column, wide) in self.columns.iter_mut().zip(columns) {
             if let Some(wide) = wide {
                 *column = wide;
@@ -107,7 +107,7 @@ impl Linearization {
         data: &FitData,
         at: &Residuals,
         n: &Parameter,
-        trails: &[Option<ReplayCache>],
+        caches: &[Option<ReplayCache>],
     ) -> JacobianColumn {
         let mut moved = model.clone();
         let mut steps = Vec::new();
@@ -126,8 +126,8 @@ impl Linearization {
             ParameterRole::RecordingFriction | ParameterRole::DayFriction(_) => model.has_friction_effects(),
             _ => false,
         };
-        let replayed = |r: usize| match trails.get(r).and_then(Option::as_ref).filter(|_| !whole) {
-            Some(trail) => trail.replay(&moved, data, r),
+        let replayed = |r: usize| match caches.get(r).and_then(Option::as_ref).filter(|_| !whole) {
+            Some(cache) => cache.replay(&moved, data, r),
             None => replay(&moved, data, r),
         };
         let mut column = self.column_of_change(model, data, at, replayed).unwrap_or_default();
@@ -231,16 +231,16 @@ impl Linearization {
 
     /// As [`JacobianColumn::dot`] of a Jacobian column with another one, over the support of the first.
     fn recording_product(&self, i: usize, c: &JacobianColumn, r: usize) -> f64 {
-        let own = &self.columns[i];
-        let blocks = match (self.supports[i].get(r), own.innovations.get(r), c.innovations.get(r)) {
-            (Some(lit), Some(a), Some(b)) => {
-                let end = lit.end.min(b.len());
-                let lit = lit.start.min(end)..end;
-                dot(&a[lit.clone()], &b[lit])
+        let per_recording = &self.columns[i];
+        let blocks = match (self.supports[i].get(r), per_recording.innovations.get(r), c.innovations.get(r)) {
+            (Some(support), Some(a), Some(b)) => {
+                let end = support.end.min(b.len());
+                let support = support.start.min(end)..end;
+                dot(&a[support.clone()], &b[support])
             }
             _ => 0.0,
         };
-        blocks + own.rupture_rows.get(r).zip(c.rupture_rows.get(r)).map_or(0.0, |(a, b)| dot(a, b))
+        blocks + per_recording.rupture_rows.get(r).zip(c.rupture_rows.get(r)).map_or(0.0, |(a, b)| dot(a, b))
     }
 
     /// Scalar products of a column with all Jacobian columns, in the order of the normal matrix.
@@ -248,9 +248,9 @@ impl Linearization {
     pub fn products_with(&self, c: &JacobianColumn, recordings: usize) -> Vec<f64> {
         let ns = self.shared.len();
         let all = |i: usize| (0..recordings).map(|r| self.recording_product(i, c, r)).sum();
-        let own = (0..recordings)
+        let per_recording = (0..recordings)
             .flat_map(|r| (ns..self.columns.len()).map(move |i| self.recording_product(i, c, r)));
-        (0..ns).map(all).chain(own).collect()
+        (0..ns).map(all).chain(per_recording).collect()
     }
 
     /// Cholesky factor of the normal matrix.

@@ -83,8 +83,8 @@ pub fn fit(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
 /// As [`fit`], but stops when the objective would not fall below `wanted` nats even if every remaining step
 /// gained as much as the last one.
 #[must_use]
-pub fn fit_if_below(model: &Model, data: &FitData, effort: Effort, wanted: f64) -> Option<Fit> {
-    descend(model, data, effort, wanted, update_scatter)
+pub fn fit_if_below(model: &Model, data: &FitData, effort: Effort, target_nats: f64) -> Option<Fit> {
+    descend(model, data, effort, target_nats, update_scatter)
 }
 
 /// As [`fit`]; where ruptures scatter, also starts from zero scatter and keeps the better result. Under a wide
@@ -108,7 +108,7 @@ fn descend(
     model: &Model,
     data: &FitData,
     effort: Effort,
-    wanted: f64,
+    target_nats: f64,
     scatter: impl Fn(&mut Model, &mut Residuals),
 ) -> Option<Fit> {
     let mut best = model.clone();
@@ -117,19 +117,19 @@ fn descend(
     scatter(&mut best, &mut at);
     let mut damping = FIRST_DAMPING;
     for turn in 1..=effort.max_iterations {
-        let tangent = Linearization::new(&best, data, &at);
+        let linearization = Linearization::new(&best, data, &at);
         let before = at.nats;
         let mut gained = false;
         for _ in 0..MAX_DAMPING_TRIALS {
-            let Some(delta) = damped_step(&best, data, &tangent, damping, |_| true) else { break };
-            let next = apply_step(&best, data, &tangent, &delta, 1.0);
+            let Some(delta) = damped_step(&best, data, &linearization, damping, |_| true) else { break };
+            let next = apply_step(&best, data, &linearization, &delta, 1.0);
             let Some(left) = residuals(&next, data) else {
                 damping *= 10.0;
                 continue;
             };
             if left.nats < at.nats {
-                let further = extrapolation_factor(&tangent, &delta, at.nats - left.nats)
-                    .map(|share| apply_step(&best, data, &tangent, &delta, share))
+                let further = extrapolation_factor(&linearization, &delta, at.nats - left.nats)
+                    .map(|share| apply_step(&best, data, &linearization, &delta, share))
                     .and_then(|next| residuals(&next, data).map(|left| (next, left)))
                     .filter(|(_, f)| f.nats < left.nats);
                 (best, at) = further.unwrap_or((next, left));
@@ -142,7 +142,7 @@ fn descend(
         }
         let gain = before - at.nats;
         let reach = at.nats - gain * (effort.max_iterations - turn) as f64;
-        if !gained || gain < effort.min_gain_nats || (turn > 1 && reach > wanted) {
+        if !gained || gain < effort.min_gain_nats || (turn > 1 && reach > target_nats) {
             break;
         }
     }

@@ -33,30 +33,30 @@ pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fi
 
 /// A better model near a point at which no step along the full linearization achieves the predicted gain.
 pub(super) fn escape_kink(at: &Fit, data: &FitData) -> Option<Model> {
-    let tangent = Linearization::new(&at.model, data, &at.residuals);
-    let whole = damped_step(&at.model, data, &tangent, FIRST_DAMPING, |_| true)?;
-    (0.5 * dot(&tangent.neg_gradient, &whole) >= MIN_PREDICTED_GAIN_NATS)
-        .then(|| step_of_improving_parameters(at, data, &tangent))?
+    let linearization = Linearization::new(&at.model, data, &at.residuals);
+    let whole = damped_step(&at.model, data, &linearization, FIRST_DAMPING, |_| true)?;
+    (0.5 * dot(&linearization.neg_gradient, &whole) >= MIN_PREDICTED_GAIN_NATS)
+        .then(|| step_of_improving_parameters(at, data, &linearization))?
 }
 
 /// A better model by a joint step of the parameters whose individual steps improve the objective.
 pub(super) fn step_of_improving_parameters(
     at: &Fit,
     data: &FitData,
-    tangent: &Linearization,
+    linearization: &Linearization,
 ) -> Option<Model> {
     let gains = |delta: &[f64]| {
-        let next = apply_step(&at.model, data, tangent, delta, 1.0);
+        let next = apply_step(&at.model, data, linearization, delta, 1.0);
         residuals(&next, data).filter(|left| left.nats < at.nats()).map(|_| next)
     };
-    let (ns, no) = (tangent.shared.len(), tangent.per_recording.len());
+    let (ns, no) = (linearization.shared.len(), linearization.per_recording.len());
     let kind = |i: usize| if i < ns { i } else { ns + (i - ns) % no };
-    let alone = |k: usize| damped_step(&at.model, data, tangent, FIRST_DAMPING, |i| kind(i) == k);
+    let alone = |k: usize| damped_step(&at.model, data, linearization, FIRST_DAMPING, |i| kind(i) == k);
     let trusted: Vec<bool> =
         (0..ns + no).into_par_iter().map(|k| alone(k).and_then(|d| gains(&d)).is_some()).collect();
     let mut damping = FIRST_DAMPING;
     for _ in 0..MAX_DAMPING_TRIALS {
-        let delta = damped_step(&at.model, data, tangent, damping, |i| trusted[kind(i)])?;
+        let delta = damped_step(&at.model, data, linearization, damping, |i| trusted[kind(i)])?;
         if let Some(next) = gains(&delta) {
             return Some(next);
         }

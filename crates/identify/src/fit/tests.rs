@@ -1,40 +1,17 @@
 use super::damped_step::order_rupture_times;
 use super::nonsmooth::{escape_kink, step_of_improving_parameters};
 use super::*;
-use crate::block_averages::{BLOCK_S, BlockAverages};
 use crate::likelihood::{ReplayCache, neg_log_posterior, replay};
-use crate::model::{Assumptions, RecordingParameters};
-use crate::model::{NO_RUPTURE, Parameter, ParameterRole};
+use crate::model::{NO_RUPTURE, Parameter, ParameterRole, RecordingParameters};
 use crate::noise::Noise;
 use crate::rupture_likelihood::RuptureEvent;
+use crate::test_support::{assert_close, base_model, sampled};
 use std::sync::Arc;
-use stylet_record::Recording;
-use stylet_tissue::{Layer, Tissue};
-
-fn near(told: f64, wanted: f64) {
-    assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1e-9), "{told} for {wanted}");
-}
 
 /// Two layers from 4 mm on, the first of which ruptures by force after 5 mm of 12 mm.
 fn model(recordings: usize) -> Model {
-    let layer = |thickness_m: f64, k: f64, puncture_n: Option<f64>| Layer {
-        thickness_m,
-        stiffness_n_per_m: k,
-        friction_ns_per_m2: 3000.0,
-        puncture_n,
-        name: String::new(),
-    };
-    let belief = Assumptions {
-        tissue: Tissue {
-            surface_m: 0.004,
-            layers: vec![layer(0.012, 200.0, Some(1.0)), layer(0.03, 80.0, None)],
-        },
-        known_effects: Vec::new(),
-        tolerance: vec![0.3; 2],
-        thickness_tolerance: vec![0.0; 2],
-        surface_tolerance_m: 0.002,
-    };
-    let mut model = Model::base(Arc::new(belief), recordings);
+    let layers = [(0.012, 200.0, 3000.0, Some(1.0)), (0.03, 80.0, 3000.0, None)];
+    let mut model = base_model(0.004, &layers, (0.3, 0.0), recordings);
     model.free.recording_surface = true;
     model.free.recording_friction = true;
     model
@@ -43,13 +20,10 @@ fn model(recordings: usize) -> Model {
 /// Data of a model for an insertion at 4 mm/s with a ripple, plus a small unmodelled force.
 fn data(truth: &Model, rough_n: f64) -> FitData {
     let recorded = |r: usize| {
-        let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.005).collect();
-        let z = t.iter().map(|t| 0.004 * t + 4e-4 * ((2.0 + r as f64) * t).sin()).collect();
-        let mut b =
-            BlockAverages::new(&Recording::new(t, z, vec![0.0; 1000]).expect("a recording"), &[], BLOCK_S);
-        let silent =
+        let mut b = sampled(1000, |t| 0.004 * t + 4e-4 * ((2.0 + r as f64) * t).sin(), |_| 0.0);
+        let unforced =
             FitData::new(Arc::new(vec![b.clone(); truth.per_recording.len()]), Noise::white(0.01), 0.0);
-        let mut f = replay(truth, &silent, r).expect("a replay").force_n;
+        let mut f = replay(truth, &unforced, r).expect("a replay").force_n;
         f.iter_mut()
             .enumerate()
             .for_each(|(k, f)| *f += rough_n * (1.7 * (k * k % (89 + 12 * r)) as f64).sin());
@@ -79,15 +53,15 @@ fn rms_uses_compared_blocks_only() {
     blocks[0].used = (0..blocks[0].len()).map(|k| k < 2).collect();
     let e = vec![(0..blocks[0].len()).map(|k| [3.0, 5.0, 100.0][k.min(2)]).collect()];
     let fit = Fit { model: m, residuals: Residuals { residual_n: e, nats: 7.5, ..Residuals::default() } };
-    near(fit.rms_n(&d.with_recordings(blocks)), 17.0_f64.sqrt());
+    assert_close(fit.rms_n(&d.with_recordings(blocks)), 17.0_f64.sqrt());
     assert_eq!((fit.nats(), fit.rms_n(&d.with_recordings(Vec::new()))), (7.5, 0.0));
 }
 
 #[test]
 fn rupture_times_are_ordered_and_inside_the_recording() {
-    let of = |mut instants: Vec<f64>| {
-        order_rupture_times(&mut instants, (1.0, 9.0));
-        instants
+    let of = |mut rupture_times: Vec<f64>| {
+        order_rupture_times(&mut rupture_times, (1.0, 9.0));
+        rupture_times
     };
     assert_eq!(of(vec![0.5, 4.0, 3.0, 12.0]), [1.0, 4.0, 4.0, 9.0]);
     assert_eq!(of(vec![2.0, NO_RUPTURE, NO_RUPTURE]), [2.0, NO_RUPTURE, NO_RUPTURE]);
@@ -100,9 +74,9 @@ fn parameters_are_clamped_to_the_assumed_tolerances() {
     m.tissue.layers[1].stiffness_n_per_m = 10.0;
     m.tissue.surface_m = 0.0045;
     clamp_to_bounds(&mut m);
-    near(m.tissue.layers[0].stiffness_n_per_m, 260.0);
-    near(m.tissue.layers[1].stiffness_n_per_m, 56.0);
-    near(m.tissue.surface_m, 0.0045);
+    assert_close(m.tissue.layers[0].stiffness_n_per_m, 260.0);
+    assert_close(m.tissue.layers[1].stiffness_n_per_m, 56.0);
+    assert_close(m.tissue.surface_m, 0.0045);
 }
 
 /// Without ruptures the objective is smooth.
@@ -139,9 +113,13 @@ fn the_gradient_agrees_with_finite_differences() {
     };
     let falls =
         |n: &Parameter, r: usize| (nats(n.role, r, -n.step) - nats(n.role, r, n.step)) / (2.0 * n.step);
-    let is = |told: f64, n: &Parameter, r: usize| {
-        let wanted = falls(n, r);
-        assert!((told - wanted).abs() < 0.01 * wanted.abs() + 1e-3, "{told} for {wanted}, {:?}", n.role);
+    let is = |actual: f64, n: &Parameter, r: usize| {
+        let expected = falls(n, r);
+        assert!(
+            (actual - expected).abs() < 0.01 * expected.abs() + 1e-3,
+            "{actual} for {expected}, {:?}",
+            n.role
+        );
     };
     assert!(t.shared.len() >= 5);
     for (k, n) in t.shared.iter().enumerate() {
@@ -167,26 +145,26 @@ fn the_normal_matrix_contains_all_columns_and_priors() {
     let t = Linearization::new(&m, &d, &at);
     let (ns, no) = (t.shared.len(), t.per_recording.len());
     // The parameter at an index of the matrix, and its recording.
-    let number = |i: usize| if i < ns { (i, None) } else { (ns + (i - ns) % no, Some((i - ns) / no)) };
+    let parameter = |i: usize| if i < ns { (i, None) } else { (ns + (i - ns) % no, Some((i - ns) / no)) };
     for i in 0..ns + 2 * no {
         for j in 0..=i {
-            let ((a, ra), (b, rb)) = (number(i), number(j));
+            let ((a, ra), (b, rb)) = (parameter(i), parameter(j));
             let products = |r: usize| t.columns[a].dot(&t.columns[b], r);
-            let mut wanted: f64 = (0..2)
+            let mut expected: f64 = (0..2)
                 .filter(|r| ra.is_none_or(|a| a == *r) && rb.is_none_or(|b| b == *r))
                 .map(products)
                 .sum();
             let sd = if a < ns { t.shared[a].prior_sd } else { t.per_recording[a - ns].prior_sd };
             if i == j && sd.is_finite() {
-                wanted += 1.0 / (sd * sd);
+                expected += 1.0 / (sd * sd);
             }
-            let told = t.normal_matrix.at(i, j);
-            assert!((told - wanted).abs() <= 1e-9 * wanted.abs(), "{told} for {wanted} at {i} {j}");
+            let actual = t.normal_matrix.at(i, j);
+            assert!((actual - expected).abs() <= 1e-9 * expected.abs(), "{actual} for {expected} at {i} {j}");
         }
     }
     let against = t.products_with(&t.columns[0], 2);
-    near(against[1], t.columns[0].dot_all(&t.columns[1]));
-    near(against[ns + no], t.columns[ns].dot(&t.columns[0], 1));
+    assert_close(against[1], t.columns[0].dot_all(&t.columns[1]));
+    assert_close(against[ns + no], t.columns[ns].dot(&t.columns[0], 1));
     assert_eq!(against.len(), ns + 2 * no);
 }
 
@@ -223,11 +201,13 @@ fn a_wide_difference_is_symmetric() {
         }
         for r in 0..2 {
             for i in 0..up.innovations[r].len() {
-                let wanted = (up.innovations[r][i] - down.innovations[r][i]) / 2e-3;
-                assert!((wide.columns[k].innovations[r][i] - wanted).abs() < 1e-6 * wanted.abs().max(1.0));
+                let expected = (up.innovations[r][i] - down.innovations[r][i]) / 2e-3;
+                assert!(
+                    (wide.columns[k].innovations[r][i] - expected).abs() < 1e-6 * expected.abs().max(1.0)
+                );
             }
         }
-        near(
+        assert_close(
             wide.normal_matrix.at(k, k),
             wide.columns[k].dot_all(&wide.columns[k]) + 1.0 / (n.prior_sd * n.prior_sd),
         );
@@ -254,8 +234,9 @@ fn a_fit_recovers_the_simulated_parameters() {
     m.rupture_times_s =
         [(0, -0.021), (1, 0.027)].map(|(r, by)| vec![truth.rupture_times_s[r][0] + by, NO_RUPTURE]).to_vec();
     let found = fit(&m, &d, Effort::FULL).expect("a fit");
-    let is =
-        |told: f64, wanted: f64, within: f64| assert!((told - wanted).abs() < within, "{told} for {wanted}");
+    let is = |actual: f64, expected: f64, within: f64| {
+        assert!((actual - expected).abs() < within, "{actual} for {expected}")
+    };
     let tissue = &found.model.tissue;
     is(tissue.layers[0].stiffness_n_per_m, 215.0, 2.0);
     is(tissue.layers[1].friction_ns_per_m2, 2700.0, 200.0);
@@ -272,7 +253,7 @@ fn a_fit_recovers_the_simulated_parameters() {
     let mut far = truth.clone();
     far.tissue.layers[0].stiffness_n_per_m = 300.0;
     let bound = fit(&m, &data(&far, 0.002), Effort::FULL).expect("a fit");
-    near(bound.model.tissue.layers[0].stiffness_n_per_m, 260.0);
+    assert_close(bound.model.tissue.layers[0].stiffness_n_per_m, 260.0);
 }
 
 /// A parameter whose perturbed model cannot be replayed.
@@ -284,9 +265,9 @@ fn a_missing_column_counts_as_zero() {
     let first = t.columns[1].clone();
     t.columns[0] = JacobianColumn::default();
     t.assemble(&m, 2);
-    near(t.normal_matrix.at(0, 0), 1.0 / (t.shared[0].prior_sd * t.shared[0].prior_sd));
+    assert_close(t.normal_matrix.at(0, 0), 1.0 / (t.shared[0].prior_sd * t.shared[0].prior_sd));
     assert_eq!((t.normal_matrix.at(1, 0), t.products_with(&first, 2)[0]), (0.0, 0.0));
-    near(t.products_with(&first, 2)[1], first.dot_all(&first));
+    assert_close(t.products_with(&first, 2)[1], first.dot_all(&first));
     assert!(t.products_with(&JacobianColumn::default(), 2).iter().all(|x| *x == 0.0));
 }
 
@@ -299,8 +280,8 @@ fn a_step_is_extrapolated_to_the_minimum_of_the_parabola() {
     let share = |gained: f64| extrapolation_factor(&t, &[1.0, 2.0], gained);
     assert_eq!(share(5.0), None);
     assert_eq!(share(6.1), None);
-    near(share(7.5).expect("further"), 2.0);
-    near(share(8.5).expect("further"), 10.0 / 3.0);
+    assert_close(share(7.5).expect("further"), 2.0);
+    assert_close(share(8.5).expect("further"), 10.0 / 3.0);
     assert_eq!([share(9.0), share(10.0), share(12.0)], [Some(4.0); 3]);
 }
 
@@ -383,19 +364,19 @@ fn scatter_is_the_rms_of_the_per_recording_parameters() {
         })
         .to_vec();
     let mut at = residuals(&m, &d).expect("a replay");
-    let mut told = m.clone();
-    update_scatter(&mut told, &mut at);
-    near(told.scatter.surface_m, (0.5_f64 * 25e-8).sqrt());
-    near(told.scatter.ln_friction, (0.5_f64 * 25e-4).sqrt());
-    near(at.nats, neg_log_posterior(&told, &at));
+    let mut actual = m.clone();
+    update_scatter(&mut actual, &mut at);
+    assert_close(actual.scatter.surface_m, (0.5_f64 * 25e-8).sqrt());
+    assert_close(actual.scatter.ln_friction, (0.5_f64 * 25e-4).sqrt());
+    assert_close(at.nats, neg_log_posterior(&actual, &at));
     // Bounded below; unchanged when they are given or the random effects are not free.
-    let mut alike = m.clone();
-    alike.per_recording = vec![RecordingParameters::default(); 2];
-    update_scatter(&mut alike, &mut at);
-    assert_eq!((alike.scatter.surface_m, alike.scatter.ln_friction), (1e-6, 1e-4));
+    let mut common = m.clone();
+    common.per_recording = vec![RecordingParameters::default(); 2];
+    update_scatter(&mut common, &mut at);
+    assert_eq!((common.scatter.surface_m, common.scatter.ln_friction), (1e-6, 1e-4));
     let mut steady = Model { fixed_scatter: true, ..m.clone() };
     update_scatter(&mut steady, &mut at);
-    near(at.nats, neg_log_posterior(&steady, &at));
+    assert_close(at.nats, neg_log_posterior(&steady, &at));
     assert_eq!(
         (steady.scatter.surface_m, steady.scatter.ln_friction),
         (m.scatter.surface_m, m.scatter.ln_friction)
@@ -422,21 +403,21 @@ fn a_layer_without_visible_ruptures_does_not_reduce_the_scatter() {
         sample_step_s: 0.01,
         ..RuptureEvent::INITIAL
     };
-    let told = |events: Vec<Vec<RuptureEvent>>, steady: bool| {
+    let actual = |events: Vec<Vec<RuptureEvent>>, steady: bool| {
         let layers = events[0].len();
         let mut at = Residuals { ruptures: events, ..at.clone() };
-        let mut belief = (*m.assumed).clone();
-        belief.tissue.layers.resize(layers, belief.tissue.layers[0].clone());
-        belief.tolerance.resize(layers, 0.3);
-        belief.thickness_tolerance.resize(layers, 0.1);
-        let mut model = Model { fixed_scatter: steady, ..Model::base(Arc::new(belief), 4) };
+        let mut assumptions = (*m.assumed).clone();
+        assumptions.tissue.layers.resize(layers, assumptions.tissue.layers[0].clone());
+        assumptions.tolerance.resize(layers, 0.3);
+        assumptions.thickness_tolerance.resize(layers, 0.1);
+        let mut model = Model { fixed_scatter: steady, ..Model::base(Arc::new(assumptions), 4) };
         update_scatter(&mut model, &mut at);
         model.scatter.rupture_force
     };
     let forces = [-0.2, -0.1, 0.1, 0.2];
     let (first, both): (Vec<_>, Vec<_>) =
         forces.map(|f| (vec![event(f)], vec![event(f), event(1e-6)])).into_iter().unzip();
-    let alone = told(first.clone(), true);
+    let alone = actual(first.clone(), true);
     assert!((0.09..0.3).contains(&alone), "{alone}");
-    assert_eq!((told(first, false), told(both, true)), (alone, alone));
+    assert_eq!((actual(first, false), actual(both, true)), (alone, alone));
 }

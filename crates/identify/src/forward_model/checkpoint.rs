@@ -44,16 +44,16 @@ impl CheckpointView<'_, '_> {
 
     /// Whether the remaining replay is the same as from `other`.
     pub(super) fn same_future_as(&self, other: &Checkpoint) -> bool {
-        let walk = self.stepper;
+        let stepper = self.stepper;
         self.piece == other.piece
-            && walk.ruptured_layers == other.ruptured_layers
+            && stepper.ruptured_layers == other.ruptured_layers
             && self.block == other.block
             && self.force_integral == other.force_integral
-            && walk.threshold_n == other.threshold_n
-            && walk.transient_until_s == other.transient_until_s
-            && walk.state == other.state
-            && walk.chain == other.chain
+            && stepper.threshold_n == other.threshold_n
+            && stepper.transient_until_s == other.transient_until_s
+            && stepper.state == other.state
+            && stepper.chain == other.chain
             && self.broken == other.broken
-            && walk.ruptures.get(walk.ruptured_layers..) == other.ruptures.get(other.ruptured_layers..)
+            && stepper.ruptures.get(stepper.ruptured_layers..) == other.ruptures.get(other.ruptured_layers..)
     }
 }

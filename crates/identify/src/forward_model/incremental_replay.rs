@@ -21,16 +21,16 @@ impl IncrementalReplay {
         model: &CompiledModel,
         blocks: &BlockAverages,
         pieces: &[MotionPiece],
-        instants: &[f64],
+        rupture_times: &[f64],
     ) -> Self {
-        let mut track = Self { rupture_times_s: instants.to_vec(), ..Self::default() };
-        let first = initial_checkpoint(model, blocks, &mut track.result);
-        let saved = &mut track.checkpoints;
-        advance(model, blocks, pieces, instants, first, &mut track.result, &mut |here| {
+        let mut replay = Self { rupture_times_s: rupture_times.to_vec(), ..Self::default() };
+        let first = initial_checkpoint(model, blocks, &mut replay.result);
+        let saved = &mut replay.checkpoints;
+        advance(model, blocks, pieces, rupture_times, first, &mut replay.result, &mut |here| {
             saved.push(here.to_checkpoint());
             true
         });
-        track
+        replay
     }
 
     /// The result of [`replay_with_ruptures`] for a similar model: the same effects and pieces, another base
@@ -43,23 +43,23 @@ impl IncrementalReplay {
         now: &CompiledModel,
         blocks: &BlockAverages,
         pieces: &[MotionPiece],
-        instants: &[f64],
+        rupture_times: &[f64],
     ) -> ReplayResult {
-        let first = self.first_difference(was, now, pieces, instants);
+        let first = self.first_difference(was, now, pieces, rupture_times);
         let at = self.checkpoints.partition_point(|s| s.piece <= first).saturating_sub(1);
         let mut out = self.result.clone();
         let Some(start) = self.checkpoints.get(at) else {
-            replay_with_ruptures(now, blocks, pieces, instants, &mut out);
+            replay_with_ruptures(now, blocks, pieces, rupture_times, &mut out);
             return out;
         };
         out.ruptures.clone_from(&start.ruptures);
         let done_with = ruptures_until_equal(was, now);
         // Before both rupture times have passed the states cannot agree again.
-        let moved = self.rupture_times_s.iter().zip(instants).filter(|(a, b)| a != b);
+        let moved = self.rupture_times_s.iter().zip(rupture_times).filter(|(a, b)| a != b);
         let passed_s = moved.map(|(a, b)| a.max(*b)).fold(f64::NEG_INFINITY, f64::max);
         let mut same: Option<(usize, usize)> = None;
         let mut next = at;
-        advance(now, blocks, pieces, instants, start.clone(), &mut out, &mut |s| {
+        advance(now, blocks, pieces, rupture_times, start.clone(), &mut out, &mut |s| {
             let known = self.checkpoints.get(next);
             next += 1;
             // The first visit is the start itself.
@@ -89,11 +89,11 @@ impl IncrementalReplay {
         was: &CompiledModel,
         now: &CompiledModel,
         pieces: &[MotionPiece],
-        instants: &[f64],
+        rupture_times: &[f64],
     ) -> usize {
         let mut first = pieces.len();
         let of = |t: f64| pieces.partition_point(|p| p.end_s < t).saturating_sub(1);
-        for (a, b) in self.rupture_times_s.iter().zip(instants).filter(|(a, b)| a != b) {
+        for (a, b) in self.rupture_times_s.iter().zip(rupture_times).filter(|(a, b)| a != b) {
             first = first.min(of(a.min(*b)));
         }
         let differs = was.law.slabs().iter().zip(now.law.slabs()).position(|(a, b)| a != b);

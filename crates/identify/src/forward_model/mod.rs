@@ -38,11 +38,11 @@ pub fn replay_with_ruptures(
     model: &CompiledModel,
     blocks: &BlockAverages,
     pieces: &[MotionPiece],
-    instants: &[f64],
+    rupture_times: &[f64],
     out: &mut ReplayResult,
 ) {
     let first = initial_checkpoint(model, blocks, out);
-    advance(model, blocks, pieces, instants, first, out, &mut |_| true);
+    advance(model, blocks, pieces, rupture_times, first, out, &mut |_| true);
 }
 
 /// Prepares a replay and its initial state.
@@ -74,7 +74,7 @@ fn advance(
     model: &CompiledModel,
     blocks: &BlockAverages,
     pieces: &[MotionPiece],
-    instants: &[f64],
+    rupture_times: &[f64],
     from: Checkpoint,
     out: &mut ReplayResult,
     visit: &mut impl FnMut(&CheckpointView) -> bool,
@@ -92,7 +92,7 @@ fn advance(
         ruptures: events,
     } = from;
     out.ruptures = events;
-    let mut walk = TimeStepper {
+    let mut stepper = TimeStepper {
         model,
         state,
         chain,
@@ -106,8 +106,13 @@ fn advance(
     let end_s = pieces.last().map_or(0.0, |p| p.end_s);
     for (index, piece) in pieces.iter().enumerate().skip(first) {
         if index % CHECKPOINT_PIECES == 0 {
-            let here =
-                CheckpointView { piece: index, stepper: &walk, broken: &broken, block, force_integral: sum };
+            let here = CheckpointView {
+                piece: index,
+                stepper: &stepper,
+                broken: &broken,
+                block,
+                force_integral: sum,
+            };
             if !visit(&here) {
                 return;
             }
@@ -118,33 +123,33 @@ fn advance(
             (block, sum) = (piece.block, 0.0);
         }
         if model.smears_jumps {
-            walk.samples = BlockSamples::new(blocks, block as usize);
+            stepper.samples = BlockSamples::new(blocks, block as usize);
         }
         if let Some(before) = index.checked_sub(1).and_then(|k| pieces.get(k)) {
-            walk.cross_piece_boundary(before, piece);
+            stepper.cross_piece_boundary(before, piece);
         }
         let mut at = piece.start_s;
         loop {
-            let rupture = instants.get(walk.ruptured_layers).copied().unwrap_or(NO_RUPTURE);
+            let rupture = rupture_times.get(stepper.ruptured_layers).copied().unwrap_or(NO_RUPTURE);
             let breaks = next_break(model, piece, at, &mut broken);
             let next = rupture.min(breaks);
             if next < piece.end_s || (rupture <= piece.end_s && piece.end_s >= end_s && rupture < NO_RUPTURE)
             {
                 let next = next.max(at).min(piece.end_s);
                 if next > at {
-                    sum += walk.force_integral(piece, at, next);
+                    sum += stepper.force_integral(piece, at, next);
                     at = next;
                 }
                 if breaks <= rupture {
-                    walk.mark_jump(at);
+                    stepper.mark_jump(at);
                 }
                 if rupture <= breaks {
-                    walk.rupture(piece, pieces.get(index + 1), at, local_acceleration_mps2(pieces, index));
+                    stepper.rupture(piece, pieces.get(index + 1), at, local_acceleration_mps2(pieces, index));
                 }
                 continue;
             }
             if piece.end_s > at {
-                sum += walk.force_integral(piece, at, piece.end_s);
+                sum += stepper.force_integral(piece, at, piece.end_s);
             }
             break;
         }
@@ -179,7 +184,7 @@ fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mu
 /// Times (s) at which the tip reaches the break positions.
 pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     let mut broken = vec![false; model.break_positions_m.len()];
-    let mut instants = Vec::new();
+    let mut rupture_times = Vec::new();
     for piece in pieces {
         let mut at = piece.start_s;
         loop {
@@ -187,25 +192,25 @@ pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
             if at == NO_RUPTURE {
                 break;
             }
-            instants.push(at);
+            rupture_times.push(at);
         }
     }
-    instants
+    rupture_times
 }
 
 /// Times (s) at which the law itself ruptures, as they appear in the recorded force.
 pub fn free_rupture_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     let mut state = ForceLawState::default();
-    let mut instants = vec![NO_RUPTURE; model.puncture_n.len()];
+    let mut rupture_times = vec![NO_RUPTURE; model.puncture_n.len()];
     for piece in pieces {
         for t in [0.75 * piece.start_s + 0.25 * piece.end_s, 0.25 * piece.start_s + 0.75 * piece.end_s] {
             let (z, v) = piece.at(t);
             model.law.step(&mut state, t, z * model.true_over_recorded, v * model.true_over_recorded, |r| {
-                if let Some(instant) = instants.get_mut(r.layer - 1) {
+                if let Some(instant) = rupture_times.get_mut(r.layer - 1) {
                     *instant = r.time_s;
                 }
             });
         }
     }
-    instants
+    rupture_times
 }

@@ -2,40 +2,22 @@ use super::incremental_replay::ruptures_until_equal;
 use super::time_stepper::record_strain;
 use super::*;
 use crate::block_averages::BLOCK_S;
-use crate::model::{Assumptions, EffectTerm, Model};
+use crate::model::{EffectTerm, Model};
 use crate::motion::JumpAppearance;
-use std::sync::Arc;
+use crate::test_support::{base_model, sampled};
 use stylet_record::Recording;
-use stylet_tissue::RuptureCriterion;
-use stylet_tissue::{Layer, Tissue, effect_info};
+use stylet_tissue::{RuptureCriterion, effect_info};
 
-fn near(told: f64, wanted: f64) {
-    assert!((told - wanted).abs() <= 1e-9 * wanted.abs().max(1.0), "{told} for {wanted}");
+fn assert_close(actual: f64, expected: f64) {
+    assert!((actual - expected).abs() <= 1e-9 * expected.abs().max(1.0), "{actual} for {expected}");
 }
 
 /// From 5 mm on: 10 mm of 200 N/m that rupture at 1.2 N, 20 mm of 100 N/m without a puncture force, 30 mm that
 /// rupture at 0.5 N.
 fn model() -> Model {
-    let layer = |thickness_m: f64, k: f64, b: f64, f: Option<f64>| Layer {
-        thickness_m,
-        stiffness_n_per_m: k,
-        friction_ns_per_m2: b,
-        puncture_n: f,
-        name: String::new(),
-    };
-    let layers = vec![
-        layer(0.01, 200.0, 4000.0, Some(1.2)),
-        layer(0.02, 100.0, 3000.0, None),
-        layer(0.03, 50.0, 5000.0, Some(0.5)),
-    ];
-    let belief = Assumptions {
-        tissue: Tissue { surface_m: 0.005, layers },
-        known_effects: Vec::new(),
-        tolerance: vec![0.3; 3],
-        thickness_tolerance: vec![0.1; 3],
-        surface_tolerance_m: 0.002,
-    };
-    Model::base(Arc::new(belief), 1)
+    let layers =
+        [(0.01, 200.0, 4000.0, Some(1.2)), (0.02, 100.0, 3000.0, None), (0.03, 50.0, 5000.0, Some(0.5))];
+    base_model(0.005, &layers, (0.3, 0.1), 1)
 }
 
 fn compiled(change: impl Fn(&mut Model)) -> CompiledModel {
@@ -46,29 +28,27 @@ fn compiled(change: impl Fn(&mut Model)) -> CompiledModel {
 
 /// 12 s at 4 mm/s, in blocks of 20 ms.
 fn blocks() -> BlockAverages {
-    let t: Vec<f64> = (0..2400).map(|k| f64::from(k) * 0.005).collect();
-    let z = t.iter().map(|t| 0.004 * t).collect();
-    BlockAverages::new(&Recording::new(t, z, vec![0.0; 2400]).expect("a recording"), &[], BLOCK_S)
+    sampled(2400, |t| 0.004 * t, |_| 0.0)
 }
 
-fn replayed(instants: &[f64]) -> ReplayResult {
+fn replayed(rupture_times: &[f64]) -> ReplayResult {
     let (b, mut out) = (blocks(), ReplayResult::default());
-    replay_with_ruptures(&compiled(|_| ()), &b, &b.motion_pieces(false, 0.0, None), instants, &mut out);
+    replay_with_ruptures(&compiled(|_| ()), &b, &b.motion_pieces(false, 0.0, None), rupture_times, &mut out);
     out
 }
 
 /// Ruptures at 2.003, 9.011 and 11.307 s: spring and friction forces in closed form.
 #[test]
 fn the_force_at_constant_velocity_agrees_with_the_closed_form() {
-    let instants = [2.003, 9.011, 11.307];
-    let told = replayed(&instants);
+    let rupture_times = [2.003, 9.011, 11.307];
+    let actual = replayed(&rupture_times);
     let b = blocks();
     let force = |t: f64| {
         let z = 0.004 * t;
         let inside = |from: f64, thick: f64| (z - from).clamp(0.0, thick);
         let rubbed = 0.004
             * (4000.0 * inside(0.005, 0.01) + 3000.0 * inside(0.015, 0.02) + 5000.0 * inside(0.035, 0.03));
-        let spring = match instants.iter().filter(|i| **i < t).count() {
+        let spring = match rupture_times.iter().filter(|i| **i < t).count() {
             0 => 200.0 * (z - 0.005).max(0.0),
             1 => 100.0 * (z - 0.015).max(0.0),
             2 => 50.0 * (z - 0.035).max(0.0),
@@ -84,22 +64,22 @@ fn the_force_at_constant_velocity_agrees_with_the_closed_form() {
         // Where a layer begins, the middle of the block represents it.
         let bends = [0.005, 0.015, 0.035].iter().any(|z| b.block_at(z / 0.004) == k);
         assert!(
-            (told.force_n[k] - mean).abs() < if bends { 2e-3 } else { 3e-4 },
+            (actual.force_n[k] - mean).abs() < if bends { 2e-3 } else { 3e-4 },
             "{} for {mean} in {k}",
-            told.force_n[k]
+            actual.force_n[k]
         );
     }
-    let [one, two, three] = [told.ruptures[0], told.ruptures[1], told.ruptures[2]];
+    let [one, two, three] = [actual.ruptures[0], actual.ruptures[1], actual.ruptures[2]];
     // 3.012 mm of 200 N/m, against 1.2 N and 10 mm, at 4 mm/s.
-    near(one.elastic_n, 200.0 * 0.003012);
-    near(one.force_excess, 200.0 * 0.003012 / 1.2 - 1.0);
-    near(one.depth_excess_m, 0.008012 - 0.015);
-    near(one.depth_rate_mps, 0.004);
-    near(one.force_excess_rate, 200.0 * 0.004 / 1.2);
+    assert_close(one.elastic_n, 200.0 * 0.003012);
+    assert_close(one.force_excess, 200.0 * 0.003012 / 1.2 - 1.0);
+    assert_close(one.depth_excess_m, 0.008012 - 0.015);
+    assert_close(one.depth_rate_mps, 0.004);
+    assert_close(one.force_excess_rate, 200.0 * 0.004 / 1.2);
     assert_eq!((two.force_excess, two.force_excess_rate), (f64::NEG_INFINITY, 0.0));
-    near(two.depth_excess_m, 0.004 * 9.011 - 0.035);
-    near(three.force_excess, 50.0 * (0.004 * 11.307 - 0.035) / 0.5 - 1.0);
-    assert!(told.ruptures.iter().all(|e| e.ruptured && (e.sample_step_s - 0.005).abs() < 1e-12));
+    assert_close(two.depth_excess_m, 0.004 * 9.011 - 0.035);
+    assert_close(three.force_excess, 50.0 * (0.004 * 11.307 - 0.035) / 0.5 - 1.0);
+    assert!(actual.ruptures.iter().all(|e| e.ruptured && (e.sample_step_s - 0.005).abs() < 1e-12));
 }
 
 #[test]
@@ -127,17 +107,17 @@ fn presliding_friction_reverses_with_the_needle() {
         let back = z(turn_s) - z(t);
         let (depth, v) = (z(t) - 0.005, -0.008);
         let bristle = -1.0 + 2.0 * (-back / delta_m).exp();
-        let wanted = 200.0 * depth + 4000.0 * depth * v + c * bristle * depth;
+        let expected = 200.0 * depth + 4000.0 * depth * v + c * bristle * depth;
         // The mean friction over a block of 0.16 mm deviates from that in its middle by about a hundredth.
         let close = 0.02 * (1.0 + bristle) * c * depth + 5e-4;
-        assert!((out.force_n[k] - wanted).abs() < close, "{} for {wanted} N at {t} s", out.force_n[k]);
+        assert!((out.force_n[k] - expected).abs() < close, "{} for {expected} N at {t} s", out.force_n[k]);
     }
 }
 
 #[test]
 fn an_intact_layer_keeps_its_largest_strain() {
-    let told = replayed(&[2.003, NO_RUPTURE, NO_RUPTURE]);
-    let [one, two, three] = [told.ruptures[0], told.ruptures[1], told.ruptures[2]];
+    let actual = replayed(&[2.003, NO_RUPTURE, NO_RUPTURE]);
+    let [one, two, three] = [actual.ruptures[0], actual.ruptures[1], actual.ruptures[2]];
     assert!(one.ruptured && !two.ruptured && !three.ruptured);
     // To the middle of the last block, at 11.9875 s; the motion is unknown after the last sample.
     assert!((two.depth_excess_m - (0.004 * 11.9875 - 0.035)).abs() < 1e-6);
@@ -152,13 +132,13 @@ fn an_intact_layer_keeps_its_largest_strain() {
 
 #[test]
 fn simultaneous_and_final_ruptures_are_applied() {
-    let told = replayed(&[9.2, 9.2, 9.2]);
-    assert!(told.ruptures.iter().all(|e| e.ruptured));
-    near(told.ruptures[2].depth_excess_m, 0.004 * 9.2 - 0.065);
+    let actual = replayed(&[9.2, 9.2, 9.2]);
+    assert!(actual.ruptures.iter().all(|e| e.ruptured));
+    assert_close(actual.ruptures[2].depth_excess_m, 0.004 * 9.2 - 0.065);
     let end_s = blocks().span_s().1;
-    let told = replayed(&[2.003, 9.011, end_s]);
-    assert!(told.ruptures[2].ruptured);
-    assert!((told.ruptures[2].depth_excess_m - (0.004 * end_s - 0.065)).abs() < 1e-5);
+    let actual = replayed(&[2.003, 9.011, end_s]);
+    assert!(actual.ruptures[2].ruptured);
+    assert!((actual.ruptures[2].depth_excess_m - (0.004 * end_s - 0.065)).abs() < 1e-5);
     let late = replayed(&[2.003, 9.011, end_s + 0.001]);
     assert!(!late.ruptures[2].ruptured);
     // A rupture before the recording appears at once.
@@ -170,20 +150,20 @@ fn simultaneous_and_final_ruptures_are_applied() {
 #[test]
 fn the_free_law_ruptures_by_force_or_at_the_interface() {
     let b = blocks();
-    let told = free_rupture_times(&compiled(|_| ()), &b.motion_pieces(false, 0.0, None));
+    let actual = free_rupture_times(&compiled(|_| ()), &b.motion_pieces(false, 0.0, None));
     // 1.2 N at 200 N/m are 6 mm; the second layer has its far interface at 35 mm, the third 0.5 N at 10 mm.
-    for (told, place) in told.iter().zip([0.011, 0.035, 0.045]) {
-        assert!((told - place / 0.004).abs() < 1e-6, "{told}");
+    for (actual, place) in actual.iter().zip([0.011, 0.035, 0.045]) {
+        assert!((actual - place / 0.004).abs() < 1e-6, "{actual}");
     }
     // At a varying velocity.
-    let course = |t: f64| 0.004 * t + 0.0015 * (2.0 * t).sin();
+    let trajectory = |t: f64| 0.004 * t + 0.0015 * (2.0 * t).sin();
     let t: Vec<f64> = (0..2400).map(|k| f64::from(k) * 0.005).collect();
-    let z = t.iter().map(|t| course(*t)).collect();
+    let z = t.iter().map(|t| trajectory(*t)).collect();
     let rippled =
         BlockAverages::new(&Recording::new(t, z, vec![0.0; 2400]).expect("a recording"), &[], BLOCK_S);
-    let told = free_rupture_times(&compiled(|_| ()), &rippled.motion_pieces(false, 0.0, None));
-    for (told, place) in told.iter().zip([0.011, 0.035, 0.045]) {
-        assert!((course(*told) - place).abs() < 2e-7, "{told}: {} for {place}", course(*told));
+    let actual = free_rupture_times(&compiled(|_| ()), &rippled.motion_pieces(false, 0.0, None));
+    for (actual, place) in actual.iter().zip([0.011, 0.035, 0.045]) {
+        assert!((trajectory(*actual) - place).abs() < 2e-7, "{actual}: {} for {place}", trajectory(*actual));
     }
     let stiff = compiled(|m| m.tissue.layers[2].puncture_n = Some(5.0));
     assert_eq!(free_rupture_times(&stiff, &b.motion_pieces(false, 0.0, None))[2], NO_RUPTURE);
@@ -197,14 +177,14 @@ fn the_largest_strain_of_a_layer_is_kept() {
         events.map(|e| (e.force_excess, e.depth_excess_m))
     };
     let none = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    let told = seen(2, 0.9, 1.2, 0.03);
-    assert_eq!(told[0], none);
-    near(told[1].0, -0.25);
-    near(told[1].1, 0.01);
-    assert_eq!(seen(2, 0.3, 1.2, 0.01), told);
-    near(seen(2, 1.5, 1.2, 0.01)[1].0, 0.25);
+    let actual = seen(2, 0.9, 1.2, 0.03);
+    assert_eq!(actual[0], none);
+    assert_close(actual[1].0, -0.25);
+    assert_close(actual[1].1, 0.01);
+    assert_eq!(seen(2, 0.3, 1.2, 0.01), actual);
+    assert_close(seen(2, 1.5, 1.2, 0.01)[1].0, 0.25);
     // Without a puncture force only the depth counts; unknown layers are ignored.
-    near(seen(1, 9.0, f64::INFINITY, 0.021)[0].1, 0.001);
+    assert_close(seen(1, 9.0, f64::INFINITY, 0.021)[0].1, 0.001);
     assert_eq!(seen(1, 9.0, 0.0, 0.021)[0].0, f64::NEG_INFINITY);
     let before = seen(1, 0.0, f64::INFINITY, 0.0);
     assert_eq!(seen(3, 9.0, 1.0, 9.0), before);
@@ -235,10 +215,10 @@ fn by_seconds() -> Vec<MotionPiece> {
 #[test]
 fn a_difference_appears_where_the_needle_first_reaches_it() {
     let pieces = by_seconds();
-    let first = |was: &CompiledModel, now: &CompiledModel, instants: [&[f64]; 2]| {
-        let track =
-            IncrementalReplay { rupture_times_s: instants[0].to_vec(), ..IncrementalReplay::default() };
-        track.first_difference(was, now, &pieces, instants[1])
+    let first = |was: &CompiledModel, now: &CompiledModel, rupture_times: [&[f64]; 2]| {
+        let replay_cache =
+            IncrementalReplay { rupture_times_s: rupture_times[0].to_vec(), ..IncrementalReplay::default() };
+        replay_cache.first_difference(was, now, &pieces, rupture_times[1])
     };
     let plain = compiled(|_| ());
     let never: [&[f64]; 2] = [&[NO_RUPTURE; 3]; 2];
@@ -246,9 +226,9 @@ fn a_difference_appears_where_the_needle_first_reaches_it() {
     // Surfaces (mm) of two laws: the nearer one counts, minus 0.01 mm.
     let at = |mm: f64| compiled(|m| m.tissue.surface_m = mm * 1e-3);
     let reached = |mm: f64| {
-        let told = [first(&at(mm), &at(mm + 0.5), never), first(&at(mm + 0.5), &at(mm), never)];
-        assert_eq!(told[0], told[1]);
-        told[0]
+        let actual = [first(&at(mm), &at(mm + 0.5), never), first(&at(mm + 0.5), &at(mm), never)];
+        assert_eq!(actual[0], actual[1]);
+        actual[0]
     };
     assert_eq!((reached(3.9), reached(4.009), reached(4.011)), (1, 1, 2));
     // The fifth piece extends 1 mm beyond its middle by its velocity and 2 mm by its acceleration.
@@ -258,9 +238,9 @@ fn a_difference_appears_where_the_needle_first_reaches_it() {
     // A stiffness: behind its front, and from the rupture of the previous layer on.
     let stiffer = compiled(|m| m.tissue.layers[1].stiffness_n_per_m = 111.0);
     assert_eq!(first(&plain, &stiffer, never), 7);
-    let instants: [&[f64]; 2] = [&[2.5, NO_RUPTURE, NO_RUPTURE]; 2];
-    assert_eq!(first(&plain, &stiffer, instants), 1);
-    assert_eq!(first(&plain, &compiled(|m| m.tissue.layers[0].stiffness_n_per_m = 111.0), instants), 2);
+    let rupture_times: [&[f64]; 2] = [&[2.5, NO_RUPTURE, NO_RUPTURE]; 2];
+    assert_eq!(first(&plain, &stiffer, rupture_times), 1);
+    assert_eq!(first(&plain, &compiled(|m| m.tissue.layers[0].stiffness_n_per_m = 111.0), rupture_times), 2);
     // A rupture time that moved: from the piece before the earlier one.
     let moved = |a: f64, b: f64| first(&plain, &plain, [&[a, 9.5, NO_RUPTURE], &[b, 9.5, NO_RUPTURE]]);
     assert_eq!([moved(3.4, 6.2), moved(6.2, 3.4), moved(6.2, NO_RUPTURE), moved(0.3, 0.4)], [2, 2, 5, 0]);
@@ -314,9 +294,9 @@ fn a_break_cuts_a_piece_where_the_tip_reaches_it() {
     };
     let mut broken = vec![false; 4];
     // From 4 to 6 mm: one after the other, the nearest first.
-    near(next_break(&m, &piece, 2.0, &mut broken), 2.1);
+    assert_close(next_break(&m, &piece, 2.0, &mut broken), 2.1);
     assert_eq!(broken, [false, true, false, false]);
-    near(next_break(&m, &piece, 2.1, &mut broken), 2.75);
+    assert_close(next_break(&m, &piece, 2.1, &mut broken), 2.75);
     assert_eq!(broken, [true, true, false, false]);
     // At the very end of the piece nothing is cut.
     assert_eq!(next_break(&m, &piece, 2.75, &mut broken), NO_RUPTURE);
@@ -331,7 +311,7 @@ fn a_break_cuts_a_piece_where_the_tip_reaches_it() {
     // In true positions, where recorded ones differ.
     m.break_positions_m = vec![0.0045];
     m.true_over_recorded = 0.9;
-    near(next_break(&m, &piece, 2.0, &mut [false]), 2.5);
+    assert_close(next_break(&m, &piece, 2.0, &mut [false]), 2.5);
 }
 
 #[test]
@@ -347,11 +327,11 @@ fn breaks_happen_once_and_in_order() {
         acceleration_mps2: 0.0,
     };
     // From 4 to 5 mm, back, and to 6 mm.
-    let told =
+    let actual =
         break_times(&m, &[piece(2.0, 0.004, 0.001), piece(3.0, 0.005, -0.001), piece(4.0, 0.004, 0.002)]);
-    assert_eq!(told.len(), 2);
-    near(told[0], 2.2);
-    near(told[1], 4.75);
+    assert_eq!(actual.len(), 2);
+    assert_close(actual[0], 2.2);
+    assert_close(actual[1], 4.75);
 }
 
 /// With pieces of 20 ms there is a checkpoint every 0.48 s: rupture times at, next to and between them.
@@ -364,7 +344,7 @@ fn incremental_replay_with_moved_ruptures_equals_a_full_replay() {
     for k in [5, 9, 14] {
         let border = saved_s[k];
         let was = [border, border + 1.7, border + 1.9];
-        let track = IncrementalReplay::new(&law, &b, &pieces, &was);
+        let replay_cache = IncrementalReplay::new(&law, &b, &pieces, &was);
         for layer in 0..3 {
             for off in [-0.6, -0.48, -0.01, 0.01, 0.47, 0.48, 0.49, 0.96] {
                 let mut now = was;
@@ -374,7 +354,7 @@ fn incremental_replay_with_moved_ruptures_equals_a_full_replay() {
                 }
                 let mut whole = ReplayResult::default();
                 replay_with_ruptures(&law, &b, &pieces, &now, &mut whole);
-                let part = track.replay_neighbour(&law, &law, &b, &pieces, &now);
+                let part = replay_cache.replay_neighbour(&law, &law, &b, &pieces, &now);
                 assert!(
                     part.force_n == whole.force_n && part.ruptures == whole.ruptures,
                     "{k} {layer} {off}"

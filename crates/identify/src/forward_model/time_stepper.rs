@@ -48,10 +48,10 @@ impl<'a> BlockSamples<'a> {
 }
 
 /// The times within `[from_s, to_s)`.
-fn between(instants: &[f64], from_s: f64, to_s: f64) -> &[f64] {
-    let first = instants.partition_point(|t| *t < from_s);
-    let count = instants[first..].iter().take_while(|t| **t < to_s).count();
-    &instants[first..first + count]
+fn between(times: &[f64], from_s: f64, to_s: f64) -> &[f64] {
+    let first = times.partition_point(|t| *t < from_s);
+    let count = times[first..].iter().take_while(|t| **t < to_s).count();
+    &times[first..first + count]
 }
 
 /// Duration in s of the transient after a velocity jump or rupture, during which the force of a compliant
@@ -88,13 +88,13 @@ impl TimeStepper<'_> {
     /// The same for a span with a transient: sum over samples, each times its share of the block.
     fn sampled_force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
         let (mut at_s, mut sum) = (from_s, 0.0);
-        let grid = self.samples;
-        for sample_s in between(grid.time_s, from_s, to_s) {
+        let samples = self.samples;
+        for sample_s in between(samples.time_s, from_s, to_s) {
             sum += self.force_at_sample(piece, at_s, *sample_s);
             at_s = *sample_s;
         }
         self.force_at_sample(piece, at_s, to_s);
-        sum * grid.share_s()
+        sum * samples.share_s()
     }
 
     /// Law and measurement chain from one time to another: force at the latter.
@@ -118,14 +118,14 @@ impl TimeStepper<'_> {
     fn law_force(&mut self, piece: &MotionPiece, at_s: f64) -> f64 {
         let (z, v) = piece.at(at_s);
         let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
-        let events = &mut self.ruptures[..];
+        let ruptures = &mut self.ruptures[..];
         let threshold = &mut self.threshold_n;
-        let note = |s: RuptureCriterion| {
-            record_strain(events, &s);
+        let record = |s: RuptureCriterion| {
+            record_strain(ruptures, &s);
             *threshold = s.puncture_n;
         };
         self.state.set_base_acceleration(piece.acceleration_mps2 * self.model.true_over_recorded);
-        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, note).total_n
+        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, record).total_n
     }
 
     /// Crosses the border between two pieces: a compliant needle starts to follow another velocity, and
@@ -154,14 +154,14 @@ impl TimeStepper<'_> {
         piece: &MotionPiece,
         after: Option<&MotionPiece>,
         at_s: f64,
-        gathers_mps2: f64,
+        acceleration_mps2: f64,
     ) {
         let (z, v) = piece.at(at_s);
         let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
         let layer = self.ruptured_layers;
         let (mut strained, mut tip_v) = (None, v);
         // Force just before.
-        let most = self.ruptures.get(layer).map_or(f64::NEG_INFINITY, |e| e.force_excess);
+        let excess_before = self.ruptures.get(layer).map_or(f64::NEG_INFINITY, |e| e.force_excess);
         let before = &mut self.ruptures[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
             record_strain(before, &s);
@@ -180,7 +180,7 @@ impl TimeStepper<'_> {
             && s.puncture_n.is_finite()
         {
             let jumped = |to: f64, from: f64| (to / from - 1.0).abs() > THRESHOLD_JUMP_SHARE;
-            if jumped(s.puncture_n, self.threshold_n) && most < 0.0 && event.force_excess > 0.0 {
+            if jumped(s.puncture_n, self.threshold_n) && excess_before < 0.0 && event.force_excess > 0.0 {
                 event.force_excess = 0.0;
             } else if let Some(next) =
                 after.filter(|_| event.force_excess < 0.0 && piece.end_s - at_s < self.sample_step_s)
@@ -203,11 +203,13 @@ impl TimeStepper<'_> {
             // The rate of the force minus that of the threshold.
             event.force_excess_rate = if s.puncture_n.is_finite() {
                 let ahead_s = self.sample_step_s;
-                let (now, then) =
-                    (threshold_n(v), threshold_n(v + gathers_mps2 * self.model.true_over_recorded * ahead_s));
+                let (now, then) = (
+                    threshold_n(v),
+                    threshold_n(v + acceleration_mps2 * self.model.true_over_recorded * ahead_s),
+                );
                 // An undefined threshold carries no information.
-                let falls = Some((now - then) / ahead_s).filter(|f| f.is_finite()).unwrap_or(0.0);
-                (stiffness * tip_v.max(0.0) + falls).max(0.0) / s.puncture_n
+                let threshold_fall = Some((now - then) / ahead_s).filter(|f| f.is_finite()).unwrap_or(0.0);
+                (stiffness * tip_v.max(0.0) + threshold_fall).max(0.0) / s.puncture_n
             } else {
                 0.0
             };
@@ -227,11 +229,11 @@ impl TimeStepper<'_> {
 /// Acceleration of the base around a piece from its neighbours of similar velocity.
 pub(super) fn local_acceleration_mps2(pieces: &[MotionPiece], index: usize) -> f64 {
     let Some(here) = pieces.get(index) else { return 0.0 };
-    let alike = |p: &&MotionPiece| {
+    let same_motion = |p: &&MotionPiece| {
         (p.velocity_mps - here.velocity_mps).abs() < SAME_MOTION_SHARE * here.velocity_mps.abs()
     };
-    let before = index.checked_sub(1).and_then(|k| pieces.get(k)).filter(alike).unwrap_or(here);
-    let after = pieces.get(index + 1).filter(alike).unwrap_or(here);
+    let before = index.checked_sub(1).and_then(|k| pieces.get(k)).filter(same_motion).unwrap_or(here);
+    let after = pieces.get(index + 1).filter(same_motion).unwrap_or(here);
     let middle_s = |p: &MotionPiece| 0.5 * (p.start_s + p.end_s);
     let between_s = middle_s(after) - middle_s(before);
     if between_s > 0.0 {
@@ -242,8 +244,8 @@ pub(super) fn local_acceleration_mps2(pieces: &[MotionPiece], index: usize) -> f
 }
 
 /// Keeps the largest strain of every layer while it is active.
-pub(super) fn record_strain(events: &mut [RuptureEvent], s: &RuptureCriterion) {
-    let Some(event) = events.get_mut(s.layer - 1) else { return };
+pub(super) fn record_strain(ruptures: &mut [RuptureEvent], s: &RuptureCriterion) {
+    let Some(event) = ruptures.get_mut(s.layer - 1) else { return };
     if s.puncture_n.is_finite() && s.puncture_n > 0.0 {
         event.force_excess = event.force_excess.max(s.elastic_n / s.puncture_n - 1.0);
     }

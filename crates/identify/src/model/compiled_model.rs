@@ -30,25 +30,25 @@ impl Model {
     #[must_use]
     pub fn compile(&self, recording: usize) -> Option<CompiledModel> {
         let mut effects = self.assumed.known_effects.clone();
-        let own = self.per_recording.get(recording).copied().unwrap_or_default();
+        let parameters = self.per_recording.get(recording).copied().unwrap_or_default();
         let day = self.day_parameters(recording);
-        for choice in &self.effects {
-            effects.push(choice.effect()?);
+        for term in &self.effects {
+            effects.push(term.effect()?);
         }
         if self.free.recording_effects {
             let given = self.assumed.known_effects.len();
-            for ((effect, parameter), beyond) in self.varying_parameters().zip(own.varying) {
-                let mut choice = self.effects[effect].clone();
-                choice.values[parameter] += beyond;
-                effects[given + effect] = choice.effect()?;
+            for ((effect, parameter), deviation) in self.varying_parameters().zip(parameters.varying) {
+                let mut term = self.effects[effect].clone();
+                term.values[parameter] += deviation;
+                effects[given + effect] = term.effect()?;
             }
         }
-        let law = if own == RecordingParameters::default() && day == DayParameters::default() {
+        let law = if parameters == RecordingParameters::default() && day == DayParameters::default() {
             ForceLaw::new(&self.tissue, &effects).ok()?
         } else {
             let mut tissue = self.tissue.clone();
-            tissue.surface_m += own.surface_m + day.surface_m;
-            let factor = libm::exp(own.ln_friction + day.ln_friction);
+            tissue.surface_m += parameters.surface_m + day.surface_m;
+            let factor = libm::exp(parameters.ln_friction + day.ln_friction);
             effects.iter_mut().for_each(|e| e.rubbed(factor));
             tissue.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= factor);
             ForceLaw::new(&tissue, &effects).ok()?

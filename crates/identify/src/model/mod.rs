@@ -66,10 +66,10 @@ pub struct Model {
 impl Model {
     /// The base law with free surface and thicknesses.
     #[must_use]
-    pub fn base(belief: Arc<Assumptions>, recordings: usize) -> Self {
-        let layers = belief.tissue.layers.len();
+    pub fn base(assumptions: Arc<Assumptions>, recordings: usize) -> Self {
+        let layers = assumptions.tissue.layers.len();
         Self {
-            tissue: belief.tissue.clone(),
+            tissue: assumptions.tissue.clone(),
             effects: Vec::new(),
             free: FreeParameters { surface: true, thickness: true, ..FreeParameters::default() },
             per_recording: vec![RecordingParameters::default(); recordings],
@@ -80,7 +80,7 @@ impl Model {
             days: Vec::new(),
             fixed_scatter: false,
             jump_delay_s: None,
-            assumed: belief,
+            assumed: assumptions,
         }
     }
 
@@ -98,10 +98,10 @@ impl Model {
 
     /// Effect parameters that vary between recordings: (effect, parameter) indices.
     pub fn varying_parameters(&self) -> impl Iterator<Item = (usize, usize)> {
-        let all = self.effects.iter().enumerate().flat_map(|(effect, choice)| {
-            let own =
-                choice.info.parameters.iter().enumerate().filter(|(_, p)| p.between_recordings_sd > 0.0);
-            own.map(move |(parameter, _)| (effect, parameter))
+        let all = self.effects.iter().enumerate().flat_map(|(effect, term)| {
+            let varying =
+                term.info.parameters.iter().enumerate().filter(|(_, p)| p.between_recordings_sd > 0.0);
+            varying.map(move |(parameter, _)| (effect, parameter))
         });
         all.take(MAX_VARYING_PARAMETERS)
     }
@@ -113,9 +113,9 @@ impl Model {
 
     /// The model with one more effect.
     #[must_use]
-    pub fn with_effect(&self, choice: EffectTerm) -> Self {
+    pub fn with_effect(&self, term: EffectTerm) -> Self {
         let mut model = self.clone();
-        model.effects.push(choice);
+        model.effects.push(term);
         model
     }
 

@@ -15,9 +15,9 @@ impl Model {
     #[must_use]
     pub fn thickness_out_of_tolerance(&self, layer: usize) -> bool {
         let b = &self.assumed;
-        let believed = b.tissue.layers[layer].thickness_m;
-        let off = (self.tissue.layers[layer].thickness_m - believed).abs();
-        off > MAX_TOLERANCES * b.thickness_tolerance[layer] * believed
+        let assumed_m = b.tissue.layers[layer].thickness_m;
+        let off = (self.tissue.layers[layer].thickness_m - assumed_m).abs();
+        off > MAX_TOLERANCES * b.thickness_tolerance[layer] * assumed_m
     }
 
     /// Parameters that all recordings share.
@@ -67,9 +67,9 @@ impl Model {
                 }
             }
         }
-        for (effect, choice) in self.effects.iter().enumerate() {
-            let at = choice.coordinates();
-            for (parameter, p) in choice.info.parameters.iter().enumerate().filter(|(_, p)| !p.integer) {
+        for (effect, term) in self.effects.iter().enumerate() {
+            let at = term.coordinates();
+            for (parameter, p) in term.info.parameters.iter().enumerate().filter(|(_, p)| !p.integer) {
                 if self.tied.iter().any(|b| b.effect == effect && b.parameter == parameter) {
                     continue;
                 }
@@ -89,7 +89,7 @@ impl Model {
                         let high = (to + 3.0 * wide).min(p.high);
                         // A parameter that moves an interface needs as fine a step as the interfaces have.
                         let fine = 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4);
-                        let bends = p.unit == "m" && choice.info.proposal == Proposal::MembraneRupture;
+                        let bends = p.unit == "m" && term.info.proposal == Proposal::MembraneRupture;
                         (low, high, if bends { 1e-7 } else { fine })
                     }
                 };
@@ -131,7 +131,7 @@ impl Model {
     #[must_use]
     pub fn recording_parameters(&self) -> Vec<Parameter> {
         let infinity = f64::INFINITY;
-        let number = |role, sd, step| Parameter {
+        let parameter = |role, sd, step| Parameter {
             role,
             low: -infinity,
             high: infinity,
@@ -141,18 +141,20 @@ impl Model {
         };
         let mut out = Vec::new();
         if self.free.recording_surface {
-            out.push(number(ParameterRole::RecordingSurface, self.scatter.surface_m, 1e-7));
+            out.push(parameter(ParameterRole::RecordingSurface, self.scatter.surface_m, 1e-7));
         }
         if self.free.recording_friction {
-            out.push(number(ParameterRole::RecordingFriction, self.scatter.ln_friction, 1e-5));
+            out.push(parameter(ParameterRole::RecordingFriction, self.scatter.ln_friction, 1e-5));
         }
         if self.free.recording_effects {
             for (k, (e, p)) in self.varying_parameters().enumerate() {
                 let step = 1e-3 * self.effects[e].info.parameters[p].between_recordings_sd;
-                out.push(number(ParameterRole::RecordingEffect(k), self.varying_sd(k), step));
+                out.push(parameter(ParameterRole::RecordingEffect(k), self.varying_sd(k), step));
             }
         }
-        out.extend((0..self.layers()).map(|layer| number(ParameterRole::RuptureTime(layer), infinity, 1e-5)));
+        out.extend(
+            (0..self.layers()).map(|layer| parameter(ParameterRole::RuptureTime(layer), infinity, 1e-5)),
+        );
         out
     }
 }

@@ -21,9 +21,9 @@ impl Model {
             ParameterRole::Surface => self.tissue.surface_m,
             ParameterRole::Thickness(l) => self.tissue.layers[l].thickness_m,
             ParameterRole::Effect { effect, parameter } => {
-                let choice = &self.effects[effect];
-                let x = choice.coordinates()[parameter];
-                match choice.info.parameters[parameter].fit_scale() {
+                let term = &self.effects[effect];
+                let x = term.coordinates()[parameter];
+                match term.info.parameters[parameter].fit_scale() {
                     FitScale::Linear => x,
                     FitScale::Log => libm::log(x.max(1e-300)),
                     FitScale::Reciprocal => 1.0 / x,
@@ -54,9 +54,9 @@ impl Model {
             ParameterRole::Surface => self.tissue.surface_m = x,
             ParameterRole::Thickness(l) => self.tissue.layers[l].thickness_m = x,
             ParameterRole::Effect { effect, parameter } => {
-                let choice = &mut self.effects[effect];
-                let mut at = choice.coordinates();
-                at[parameter] = match choice.info.parameters[parameter].fit_scale() {
+                let term = &mut self.effects[effect];
+                let mut at = term.coordinates();
+                at[parameter] = match term.info.parameters[parameter].fit_scale() {
                     FitScale::Linear => x,
                     FitScale::Log => libm::exp(x),
                     FitScale::Reciprocal => {
@@ -67,10 +67,10 @@ impl Model {
                         }
                     }
                 };
-                if let Some(effect) = AnyEffect::from_coordinates(choice.info.id, &at) {
-                    choice.values = effect.parameters();
+                if let Some(effect) = AnyEffect::from_coordinates(term.info.id, &at) {
+                    term.values = effect.parameters();
                 }
-                let values = choice.values.clone();
+                let values = term.values.clone();
                 for b in self.tied.iter().filter(|b| b.tied_to == Some(effect)) {
                     self.effects[b.effect].values[b.parameter] = values[b.parameter];
                 }

@@ -2,8 +2,8 @@ use super::*;
 use stylet_tissue::AnyEffect;
 use stylet_tissue::{Layer, effect_info};
 
-fn near(told: f64, wanted: f64) {
-    assert!((told - wanted).abs() <= 1e-12 * wanted.abs(), "{told} for {wanted}");
+fn assert_close(actual: f64, expected: f64) {
+    assert!((actual - expected).abs() <= 1e-12 * expected.abs(), "{actual} for {expected}");
 }
 
 fn layer(thickness_m: f64, stiffness: f64, friction: f64, puncture_n: Option<f64>) -> Layer {
@@ -16,7 +16,7 @@ fn layer(thickness_m: f64, stiffness: f64, friction: f64, puncture_n: Option<f64
     }
 }
 
-fn belief() -> Assumptions {
+fn assumptions() -> Assumptions {
     Assumptions {
         tissue: Tissue {
             surface_m: 0.002,
@@ -33,29 +33,29 @@ fn belief() -> Assumptions {
     }
 }
 
-fn choice(id: &str, values: &[f64]) -> EffectTerm {
+fn term(id: &str, values: &[f64]) -> EffectTerm {
     EffectTerm::new(effect_info(id).expect("in the library"), values)
 }
 
 fn base() -> Model {
-    Model::base(Arc::new(belief()), 3)
+    Model::base(Arc::new(assumptions()), 3)
 }
 
 /// Role, bounds, prior mean, prior standard deviation, step.
 type Line = (ParameterRole, f64, f64, f64, f64, f64);
 
-fn are(told: &[Parameter], wanted: &[Line]) {
+fn assert_all_close(actual: &[Parameter], expected: &[Line]) {
     assert_eq!(
-        told.iter().map(|n| n.role).collect::<Vec<_>>(),
-        wanted.iter().map(|w| w.0).collect::<Vec<_>>()
+        actual.iter().map(|n| n.role).collect::<Vec<_>>(),
+        expected.iter().map(|w| w.0).collect::<Vec<_>>()
     );
-    for (n, w) in told.iter().zip(wanted) {
-        for (told, wanted) in
+    for (n, w) in actual.iter().zip(expected) {
+        for (actual, expected) in
             [(n.low, w.1), (n.high, w.2), (n.prior_mean, w.3), (n.prior_sd, w.4), (n.step, w.5)]
         {
             assert!(
-                told == wanted || (told - wanted).abs() <= 1e-12 * wanted.abs(),
-                "{:?}: {told} for {wanted}",
+                actual == expected || (actual - expected).abs() <= 1e-12 * expected.abs(),
+                "{:?}: {actual} for {expected}",
                 n.role
             );
         }
@@ -66,7 +66,7 @@ const NO: f64 = f64::INFINITY;
 
 #[test]
 fn base_parameters_are_bounded_by_the_assumed_tolerances() {
-    are(
+    assert_all_close(
         &base().shared_parameters(),
         &[
             (ParameterRole::Stiffness(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
@@ -92,14 +92,14 @@ fn base_parameters_are_bounded_by_the_assumed_tolerances() {
     };
     for (is_far, low, high) in [(false, 0.0096, 0.0144), (true, 0.006, 0.018)] {
         far.free.wide_thickness = is_far;
-        near(of(&far).low, low);
-        near(of(&far).high, high);
+        assert_close(of(&far).low, low);
+        assert_close(of(&far).high, high);
     }
     for (thickness_m, strained) in [(0.0097, false), (0.0095, true), (0.0143, false), (0.0145, true)] {
         far.tissue.layers[0].thickness_m = thickness_m;
         assert_eq!(far.thickness_out_of_tolerance(0), strained, "{thickness_m}");
     }
-    let mut sure = belief();
+    let mut sure = assumptions();
     sure.surface_tolerance_m = 0.0;
     assert!(
         !Model::base(Arc::new(sure), 1).shared_parameters().iter().any(|n| n.role == ParameterRole::Surface)
@@ -109,15 +109,15 @@ fn base_parameters_are_bounded_by_the_assumed_tolerances() {
 #[test]
 fn effect_parameters_are_bounded_by_the_search_range() {
     let model = base()
-        .with_effect(choice("stress_relaxation", &[0.4, 3.0]))
-        .with_effect(choice("needle_compliance", &[700.0]))
-        .with_effect(choice("rate_dependent_puncture", &[-0.2]))
-        .with_effect(choice("periodic_interference", &[0.02, 4.0, 0.5]))
-        .with_effect(choice("release_depth", &[2.0, 1e-3]));
+        .with_effect(term("stress_relaxation", &[0.4, 3.0]))
+        .with_effect(term("needle_compliance", &[700.0]))
+        .with_effect(term("rate_dependent_puncture", &[-0.2]))
+        .with_effect(term("periodic_interference", &[0.02, 4.0, 0.5]))
+        .with_effect(term("release_depth", &[2.0, 1e-3]));
     let of = |effect: usize, parameter: usize| ParameterRole::Effect { effect, parameter };
     let at = |effect: usize| model.effects[effect].coordinates();
     let ln = libm::log;
-    let told: Vec<Parameter> = model
+    let actual: Vec<Parameter> = model
         .shared_parameters()
         .into_iter()
         .filter(|n| matches!(n.role, ParameterRole::Effect { .. }))
@@ -149,8 +149,8 @@ fn effect_parameters_are_bounded_by_the_search_range() {
         1e-6 / at(3)[frequency],
     );
     let interference: Vec<Line> = (0..3).map(|p| if p == frequency { beat } else { line(3, p) }).collect();
-    are(
-        &told,
+    assert_all_close(
+        &actual,
         &[
             &[
                 (of(0, 0), 0.0, 1.0, 0.0, NO, 4e-5),
@@ -185,10 +185,10 @@ fn effect_parameters_are_bounded_by_the_search_range() {
 #[test]
 fn random_effects_have_the_scatter_as_prior() {
     let mut model = base()
-        .with_effect(choice("release_depth", &[2.0, 1e-3]))
-        .with_effect(choice("release_depth", &[1.0, 2e-3]));
-    let instants = |n: usize| (0..n).map(|l| (ParameterRole::RuptureTime(l), -NO, NO, 0.0, NO, 1e-5));
-    are(&model.recording_parameters(), &instants(3).collect::<Vec<_>>());
+        .with_effect(term("release_depth", &[2.0, 1e-3]))
+        .with_effect(term("release_depth", &[1.0, 2e-3]));
+    let rupture_times = |n: usize| (0..n).map(|l| (ParameterRole::RuptureTime(l), -NO, NO, 0.0, NO, 1e-5));
+    assert_all_close(&model.recording_parameters(), &rupture_times(3).collect::<Vec<_>>());
     model.scatter = Scatter {
         surface_m: 7e-4,
         ln_friction: 0.03,
@@ -206,18 +206,21 @@ fn random_effects_have_the_scatter_as_prior() {
         (ParameterRole::RecordingEffect(0), -NO, NO, 0.0, 5e-4, 5e-7),
         (ParameterRole::RecordingEffect(1), -NO, NO, 0.0, 3e-4, 5e-7),
     ];
-    are(&model.recording_parameters(), &own.into_iter().chain(instants(3)).collect::<Vec<_>>());
+    assert_all_close(
+        &model.recording_parameters(),
+        &own.into_iter().chain(rupture_times(3)).collect::<Vec<_>>(),
+    );
     assert_eq!(
         (model.varying_sd(1), model.library_varying_sd(1), model.library_varying_sd(7)),
         (3e-4, 5e-4, 1.0)
     );
     assert_eq!(model.varying_parameters().collect::<Vec<_>>(), [(0, 1), (1, 1)]);
-    let many = (0..11).fold(base(), |m, _| m.with_effect(choice("release_depth", &[2.0, 1e-3])));
+    let many = (0..11).fold(base(), |m, _| m.with_effect(term("release_depth", &[2.0, 1e-3])));
     assert_eq!(many.varying_parameters().count(), MAX_VARYING_PARAMETERS);
     model.days = vec![DayParameters::default(); 2];
     let before = model.shared_parameters().len();
     (model.free.day_surface, model.free.day_friction) = (true, true);
-    are(
+    assert_all_close(
         &model.shared_parameters()[before..],
         &[
             (ParameterRole::DaySurface(0), -NO, NO, 0.0, 1.1e-3, 1e-7),
@@ -231,10 +234,10 @@ fn random_effects_have_the_scatter_as_prior() {
 #[test]
 fn setting_a_parameter_changes_no_other() {
     let mut model = base()
-        .with_effect(choice("stress_relaxation", &[0.4, 3.0]))
-        .with_effect(choice("needle_compliance", &[700.0]))
-        .with_effect(choice("respiration", &[1e-3, 0.3, 0.7]))
-        .with_effect(choice("release_depth", &[2.0, 1e-3]));
+        .with_effect(term("stress_relaxation", &[0.4, 3.0]))
+        .with_effect(term("needle_compliance", &[700.0]))
+        .with_effect(term("respiration", &[1e-3, 0.3, 0.7]))
+        .with_effect(term("release_depth", &[2.0, 1e-3]));
     model.free = FreeParameters {
         recording_surface: true,
         recording_friction: true,
@@ -245,10 +248,10 @@ fn setting_a_parameter_changes_no_other() {
     };
     model.days = vec![DayParameters::default(); 2];
     model.rupture_times_s = vec![vec![1.5, 2.5, NO_RUPTURE]; 3];
-    let numbers: Vec<Parameter> =
+    let parameters: Vec<Parameter> =
         model.shared_parameters().into_iter().chain(model.recording_parameters()).collect();
-    assert_eq!(numbers.len(), 9 + 2 + 1 + 3 + 1 + 4 + 3 + 3);
-    for (k, n) in numbers.iter().enumerate() {
+    assert_eq!(parameters.len(), 9 + 2 + 1 + 3 + 1 + 4 + 3 + 3);
+    for (k, n) in parameters.iter().enumerate() {
         let mut moved = model.clone();
         let x = match n.role {
             ParameterRole::Stiffness(_) | ParameterRole::Friction(_) | ParameterRole::Puncture(_) => 1.17,
@@ -259,7 +262,7 @@ fn setting_a_parameter_changes_no_other() {
         };
         moved.set(n.role, 2, x);
         assert!((moved.get(n.role, 2) - x).abs() < 1e-12, "{:?}", n.role);
-        for (other, o) in numbers.iter().enumerate().filter(|(other, _)| *other != k) {
+        for (other, o) in parameters.iter().enumerate().filter(|(other, _)| *other != k) {
             let was = model.get(o.role, 2);
             let now = moved.get(o.role, 2);
             assert!(now == was || (now - was).abs() < 1e-12, "{k} moves {other}");
@@ -272,9 +275,9 @@ fn setting_a_parameter_changes_no_other() {
     moved.set(ParameterRole::Friction(2), 0, 0.9);
     moved.set(ParameterRole::Puncture(2), 0, 1.1);
     moved.set(ParameterRole::Puncture(1), 0, 1.1);
-    near(moved.tissue.layers[1].stiffness_n_per_m, 180.0);
-    near(moved.tissue.layers[2].friction_ns_per_m2, 5400.0);
-    near(moved.tissue.layers[2].puncture_n.expect("a force"), 1.21);
+    assert_close(moved.tissue.layers[1].stiffness_n_per_m, 180.0);
+    assert_close(moved.tissue.layers[2].friction_ns_per_m2, 5400.0);
+    assert_close(moved.tissue.layers[2].puncture_n.expect("a force"), 1.21);
     assert_eq!(moved.tissue.layers[1].puncture_n, None);
     assert_eq!(model.get(ParameterRole::Puncture(1), 0), 1.0);
     moved.set(ParameterRole::Effect { effect: 1, parameter: 0 }, 0, 0.0);
@@ -287,9 +290,9 @@ fn setting_a_parameter_changes_no_other() {
 #[test]
 fn a_tied_parameter_follows_the_other_one() {
     let mut model = base()
-        .with_effect(choice("release_depth", &[1.0, 1e-3]))
-        .with_effect(choice("release_depth", &[2.0, 2e-3]))
-        .with_effect(choice("release_depth", &[3.0, 3e-3]));
+        .with_effect(term("release_depth", &[1.0, 1e-3]))
+        .with_effect(term("release_depth", &[2.0, 2e-3]))
+        .with_effect(term("release_depth", &[3.0, 3e-3]));
     model.tied = vec![
         TiedParameter { effect: 2, parameter: 1, tied_to: Some(0) },
         TiedParameter { effect: 1, parameter: 1, tied_to: None },
@@ -303,7 +306,7 @@ fn a_tied_parameter_follows_the_other_one() {
 fn ties_survive_the_removal_of_another_effect() {
     let mut model = base();
     for k in 0..4 {
-        model = model.with_effect(choice("release_depth", &[1.0, f64::from(k) * 1e-3]));
+        model = model.with_effect(term("release_depth", &[1.0, f64::from(k) * 1e-3]));
     }
     let bound = |effect: usize, like: Option<usize>| TiedParameter { effect, parameter: 1, tied_to: like };
     model.tied =
@@ -341,9 +344,9 @@ fn a_subset_keeps_parameters_and_days() {
 #[test]
 fn a_compiled_law_contains_recording_and_day_parameters() {
     let mut model = base()
-        .with_effect(choice("release_depth", &[1.0, 1e-3]))
-        .with_effect(choice("position_scale", &[0.02]))
-        .with_effect(choice("time_delay", &[0.03]));
+        .with_effect(term("release_depth", &[1.0, 1e-3]))
+        .with_effect(term("position_scale", &[0.02]))
+        .with_effect(term("time_delay", &[0.03]));
     let plain = model.compile(1).expect("a law");
     assert_eq!(plain.law.slabs()[0].front_m, 0.002);
     assert_eq!(plain.puncture_n, [0.6, f64::INFINITY, 1.1]);
@@ -352,52 +355,52 @@ fn a_compiled_law_contains_recording_and_day_parameters() {
         (plain.delay_s, plain.has_measurement_chain, plain.smears_jumps, plain.jump_delay_s),
         (0.03, true, false, None)
     );
-    near(plain.true_over_recorded, 1.0 / 1.02);
+    assert_close(plain.true_over_recorded, 1.0 / 1.02);
     assert!(plain.break_positions_m.is_empty());
     model.per_recording[1] =
         RecordingParameters { surface_m: 4e-4, ln_friction: 0.2, ..RecordingParameters::default() };
     (model.day_of, model.days) = (vec![0; 3], vec![DayParameters { surface_m: -1e-4, ln_friction: 0.1 }]);
     model.per_recording[1].varying[0] = 5e-4;
     let own = model.compile(1).expect("a law");
-    near(own.law.slabs()[0].front_m, 0.0023);
-    near(own.law.slabs()[0].friction_ns_per_m2, 4000.0 * libm::exp(0.3));
+    assert_close(own.law.slabs()[0].front_m, 0.0023);
+    assert_close(own.law.slabs()[0].friction_ns_per_m2, 4000.0 * libm::exp(0.3));
     assert_eq!(own.law.slabs()[0].release_m, 1e-3);
-    near(model.compile(0).expect("a law").law.slabs()[2].friction_ns_per_m2, 6000.0 * libm::exp(0.1));
+    assert_close(model.compile(0).expect("a law").law.slabs()[2].friction_ns_per_m2, 6000.0 * libm::exp(0.1));
     model.free.recording_effects = true;
-    near(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
+    assert_close(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
     assert_eq!(model.compile(0).expect("a law").law.slabs()[0].release_m, 1e-3);
     // In addition to known effects.
-    let mut given = belief();
+    let mut given = assumptions();
     given.known_effects = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
     model.assumed = Arc::new(given);
-    near(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
+    assert_close(model.compile(1).expect("a law").law.slabs()[0].release_m, 1.5e-3);
     // A day alone changes the law as well.
     let mut days = base();
     (days.day_of, days.days) = (vec![0; 3], vec![DayParameters { surface_m: 1e-4, ln_friction: 0.0 }]);
-    near(days.compile(0).expect("a law").law.slabs()[0].front_m, 0.0021);
+    assert_close(days.compile(0).expect("a law").law.slabs()[0].front_m, 0.0021);
 }
 
 #[test]
 fn break_positions_are_membranes_and_interfaces_of_tip_effects() {
-    let mut model = base().with_effect(choice("hidden_membrane", &[0.005, 100.0, 0.2]));
+    let mut model = base().with_effect(term("hidden_membrane", &[0.005, 100.0, 0.2]));
     model.per_recording[0].surface_m = 1e-3;
     // 0.2 N stretch it by 2 mm; tip forces change at every interface, too.
     let breaks = model.compile(0).expect("a law").break_positions_m;
-    for (told, wanted) in breaks.iter().zip([0.003 + 0.007, 0.015, 0.025, 0.055]) {
-        near(*told, wanted);
+    for (actual, expected) in breaks.iter().zip([0.003 + 0.007, 0.015, 0.025, 0.055]) {
+        assert_close(*actual, expected);
     }
     assert_eq!(breaks.len(), 4);
-    let neutral = base().with_effect(choice("hidden_membrane", &[0.005, 0.0, 0.2]));
+    let neutral = base().with_effect(term("hidden_membrane", &[0.005, 0.0, 0.2]));
     assert!(neutral.compile(0).expect("a law").break_positions_m.len() < 4);
     let smears =
-        |id: &str, x: f64| base().with_effect(choice(id, &[x])).compile(0).expect("a law").smears_jumps;
+        |id: &str, x: f64| base().with_effect(term(id, &[x])).compile(0).expect("a law").smears_jumps;
     assert!(smears("low_pass_lag", 0.02) && smears("needle_compliance", 900.0) && !smears("force_gain", 1.1));
     assert!(
         !base().has_friction_effects()
-            && base().with_effect(choice("coulomb_friction", &[2.0])).has_friction_effects()
+            && base().with_effect(term("coulomb_friction", &[2.0])).has_friction_effects()
     );
-    assert!(!base().with_effect(choice("force_gain", &[1.1])).has_friction_effects());
-    let mut given = belief();
+    assert!(!base().with_effect(term("force_gain", &[1.1])).has_friction_effects());
+    let mut given = assumptions();
     given.known_effects = vec![AnyEffect::from_parameters("coulomb_friction", &[2.0]).expect("an effect")];
     assert!(Model::base(Arc::new(given), 1).has_friction_effects());
 }
@@ -432,7 +435,7 @@ fn library_expectations_are_priors() {
     for n in model.shared_parameters() {
         let ParameterRole::Effect { parameter, .. } = n.role else { continue };
         let path = slips.parameters[parameter].path;
-        let wanted = if path == "rate" { (-0.1, 0.1) } else { (0.0, f64::INFINITY) };
-        assert_eq!((n.prior_mean, n.prior_sd), wanted, "{path}");
+        let expected = if path == "rate" { (-0.1, 0.1) } else { (0.0, f64::INFINITY) };
+        assert_eq!((n.prior_mean, n.prior_sd), expected, "{path}");
     }
 }

@@ -5,7 +5,7 @@
 //! `dv (a/2 - |t - t0|)^2 / (2 a)`, with duration `a` and intersection time `t0`. Under encoder noise this is the only visible trace; a force
 //! compared with an instantaneous jump would appear to have a lag or inertia.
 
-use super::smooth_positions::{Cells, SmoothInterval};
+use super::smooth_interval::{Cells, SmoothInterval};
 use super::velocity_estimate::VelocityJump;
 
 /// Longest ramp in s.
@@ -27,7 +27,7 @@ impl AccelerationRamp {
     pub fn between(
         left: &SmoothInterval,
         right: &SmoothInterval,
-        kink: &VelocityJump,
+        jump: &VelocityJump,
         cells: &Cells,
     ) -> Option<Self> {
         let even = |s: &SmoothInterval| {
@@ -37,13 +37,13 @@ impl AccelerationRamp {
             return None;
         }
         let of = |lasts_s: f64| Self {
-            mid_s: kink.time_s,
+            mid_s: jump.time_s,
             duration_s: lasts_s,
-            position_m: kink.position_m,
-            velocity_mps: kink.velocity_mps,
+            position_m: jump.position_m,
+            velocity_mps: jump.velocity_mps,
         };
         let reach = (0.5 * MAX_DURATION_S / cells.dt) as usize + 1;
-        let at = cells.t.partition_point(|t| *t < kink.time_s);
+        let at = cells.t.partition_point(|t| *t < jump.time_s);
         let around = at.saturating_sub(reach).max(left.from)..(at + reach).min(right.to);
         // Half of a shorter neighbour belongs to its other border.
         let longest = MAX_DURATION_S.min(cells.dt * (left.to - left.from).min(right.to - right.from) as f64);
@@ -83,8 +83,8 @@ mod tests {
     fn a_ramp_joins_both_lines_smoothly() {
         assert_eq!((RAMP.at(1.79), RAMP.at(2.2)), (None, None));
         for (t, z, v) in [(1.8, 0.009, 0.005), (2.0, 0.01 - 0.006 * 0.4 / 8.0, 0.002)] {
-            let told = RAMP.at(t).expect("within");
-            assert!((told.0 - z).abs() < 1e-12 && (told.1 - v).abs() < 1e-12, "{told:?} at {t}");
+            let actual = RAMP.at(t).expect("within");
+            assert!((actual.0 - z).abs() < 1e-12 && (actual.1 - v).abs() < 1e-12, "{actual:?} at {t}");
         }
         for t in [1.85, 1.97, 2.04, 2.15] {
             let slope = (RAMP.position(t + 1e-6) - RAMP.position(t - 1e-6)) / 2e-6;

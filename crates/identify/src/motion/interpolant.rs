@@ -1,6 +1,6 @@
 //! Position and velocity between samples, and their integrals.
 
-use super::JumpTiming;
+use super::jump_timing::JumpTiming;
 
 /// Position and velocity, linear between knots.
 #[derive(Clone, Debug, Default)]

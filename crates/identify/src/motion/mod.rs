@@ -4,17 +4,23 @@
 //! | module | contents |
 //! |---|---|
 //! | `velocity_estimate` | velocity and its jumps from exact positions |
-//! | `smooth_positions`, `motion_segment`, `acceleration_ramp` | from noisy positions: segments of commanded motion and the transitions between them |
-//! | `interpolant` | position and velocity between samples |
+//! | `smooth_positions` | the same from noisy positions |
+//! | `smooth_interval`, `interval_borders` | intervals between velocity jumps, and where they begin and end |
+//! | `motion_segment`, `acceleration_ramp` | parametric segments of commanded motion, and transitions between them |
+//! | `jump_timing`, `interpolant` | times of velocity jumps; position and velocity between samples |
 //! | `motion_pieces` | means over spans, cut at velocity jumps and reversals |
 
 mod acceleration_ramp;
 mod interpolant;
+mod interval_borders;
+mod jump_timing;
 mod motion_pieces;
 mod motion_segment;
+mod smooth_interval;
 mod smooth_positions;
 mod velocity_estimate;
 
+pub use jump_timing::JumpTiming;
 pub use motion_pieces::{JumpAppearance, MotionPiece};
 pub use smooth_positions::{SmoothedMotion, smooth_positions};
 pub use velocity_estimate::{MIN_JUMP_MPS, VelocityEstimate, VelocityJump, estimate_velocity};
@@ -41,21 +47,6 @@ pub struct Motion {
     pub noise_m: f64,
 }
 
-/// A velocity jump with its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JumpTiming {
-    /// Time in s.
-    pub time_s: f64,
-    /// Midpoint of the samples before and after it, in s.
-    pub sample_mid_s: f64,
-    /// Standard deviation of the time in s.
-    pub time_sd_s: f64,
-    /// Position in m.
-    pub position_m: f64,
-    /// Velocity in m/s before and after.
-    pub velocity_mps: [f64; 2],
-}
-
 /// Velocity noise in m/s above which positions are smoothed.
 const MAX_EXACT_SD_MPS: f64 = 1.2e-5;
 
@@ -65,15 +56,15 @@ impl Motion {
     #[must_use]
     pub fn from_recording(recording: &Recording, still_mps: f64) -> Self {
         let (t, z) = (&recording.time_s, &recording.position_m);
-        let told = estimate_velocity(t, z);
+        let estimate = estimate_velocity(t, z);
         let recorded_sd = stylet_stats::third_difference_sd([recording.velocity_mps.as_slice()]);
         let mut noise_m = position_noise(t, z);
-        let (z, v, kinks, sd) = if told.sd_mps <= MAX_EXACT_SD_MPS {
+        let (z, v, jumps, sd) = if estimate.sd_mps <= MAX_EXACT_SD_MPS {
             noise_m = noise_m.min(1e-6);
-            (z.clone(), told.velocity_mps, told.jumps, told.sd_mps)
+            (z.clone(), estimate.velocity_mps, estimate.jumps, estimate.sd_mps)
         } else {
-            let calm = smooth_positions(t, z);
-            (calm.position_m, calm.velocity_mps, calm.jumps, calm.sd_mps)
+            let smoothed = smooth_positions(t, z);
+            (smoothed.position_m, smoothed.velocity_mps, smoothed.jumps, smoothed.sd_mps)
         };
         if recording.velocity_measured && sd > MAX_EXACT_SD_MPS && recorded_sd < sd {
             let v = &recording.velocity_mps;
@@ -81,40 +72,40 @@ impl Motion {
                 velocity_mps: [v[k.next_sample.saturating_sub(1)], v[k.next_sample.min(v.len() - 1)]],
                 ..*k
             };
-            let kinks: Vec<VelocityJump> = kinks.iter().map(sides).collect();
-            return Self::from_knots(t, &z, v, &kinks, recorded_sd, noise_m, still_mps);
+            let jumps: Vec<VelocityJump> = jumps.iter().map(sides).collect();
+            return Self::from_knots(t, &z, v, &jumps, recorded_sd, noise_m, still_mps);
         }
-        Self::from_knots(t, &z, &v, &kinks, sd, noise_m, still_mps)
+        Self::from_knots(t, &z, &v, &jumps, sd, noise_m, still_mps)
     }
 
     fn from_knots(
         t: &[f64],
         z: &[f64],
         v: &[f64],
-        kinks: &[VelocityJump],
+        jumps: &[VelocityJump],
         sd: f64,
         noise_m: f64,
         still_mps: f64,
     ) -> Self {
         let mut m = Self { velocity_sd_mps: sd, noise_m, ..Self::default() };
-        let mut kinks = kinks.iter().peekable();
+        let mut jumps = jumps.iter().peekable();
         for i in 0..t.len() {
-            while let Some(kink) = kinks.next_if(|k| k.next_sample <= i) {
-                if kink.next_sample == i && i > 0 {
-                    let at_s = kink.time_s.clamp(t[i - 1], t[i]);
+            while let Some(jump) = jumps.next_if(|k| k.next_sample <= i) {
+                if jump.next_sample == i && i > 0 {
+                    let at_s = jump.time_s.clamp(t[i - 1], t[i]);
                     let between_s = 0.5 * (t[i - 1] + t[i]);
-                    for side in kink.velocity_mps {
-                        m.exact.push(at_s, kink.position_m, side);
-                        m.sampled.push(between_s, kink.position_m + side * (between_s - at_s), side);
+                    for side in jump.velocity_mps {
+                        m.exact.push(at_s, jump.position_m, side);
+                        m.sampled.push(between_s, jump.position_m + side * (between_s - at_s), side);
                     }
                     let doubt_s =
-                        kink.position_sd_m / (kink.velocity_mps[1] - kink.velocity_mps[0]).abs().max(1e-6);
+                        jump.position_sd_m / (jump.velocity_mps[1] - jump.velocity_mps[0]).abs().max(1e-6);
                     m.jumps.push(JumpTiming {
                         time_s: at_s,
                         sample_mid_s: between_s,
                         time_sd_s: doubt_s,
-                        position_m: kink.position_m,
-                        velocity_mps: kink.velocity_mps,
+                        position_m: jump.position_m,
+                        velocity_mps: jump.velocity_mps,
                     });
                 }
             }
@@ -130,13 +121,13 @@ impl Motion {
 
     /// Finds sign changes of the velocity between two samples without a jump.
     fn find_reversals(&mut self, t: &[f64], still_mps: f64) {
-        let way = |v: f64| i8::from(v > still_mps) - i8::from(v < -still_mps);
+        let sign = |v: f64| i8::from(v > still_mps) - i8::from(v < -still_mps);
         let mut near = 0;
         let mut before: Option<(f64, f64)> = None;
         for &now in t {
             let v = self.sampled.velocity_at(now, &mut near);
             if let Some((then, was)) = before
-                && way(v) != way(was)
+                && sign(v) != sign(was)
                 && !self.jumps.iter().any(|j| j.time_s >= then && j.time_s <= now)
             {
                 let share = (was / (was - v)).clamp(0.0, 1.0);
@@ -164,8 +155,8 @@ impl Motion {
 mod tests {
     use super::*;
 
-    pub(in crate::motion) fn near(told: f64, wanted: f64) {
-        assert!((told - wanted).abs() <= 1e-9, "{told} for {wanted}");
+    pub(in crate::motion) fn assert_close(actual: f64, expected: f64) {
+        assert!((actual - expected).abs() <= 1e-9, "{actual} for {expected}");
     }
 
     /// Velocity in m/s below which the needle counts as at rest.
@@ -175,11 +166,11 @@ mod tests {
         t: &[f64],
         z: &[f64],
         v: &[f64],
-        kinks: &[VelocityJump],
+        jumps: &[VelocityJump],
         sd: f64,
         noise_m: f64,
     ) -> Motion {
-        Motion::from_knots(t, z, v, kinks, sd, noise_m, STILL_MPS)
+        Motion::from_knots(t, z, v, jumps, sd, noise_m, STILL_MPS)
     }
 
     /// 2 m/s, from 0.53 s on back at 1 m/s, sampled every 0.1 s up to 1.2 s.
@@ -187,59 +178,59 @@ mod tests {
         let t: Vec<f64> = (0..=12).map(|k| 0.1 * f64::from(k)).collect();
         let z: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 * t } else { 1.06 - (t - 0.53) }).collect();
         let v: Vec<f64> = t.iter().map(|t| if *t < 0.53 { 2.0 } else { -1.0 }).collect();
-        let kink = VelocityJump {
+        let jump = VelocityJump {
             next_sample: 6,
             time_s: 0.53,
             position_m: 1.06,
             velocity_mps: [2.0, -1.0],
             position_sd_m: 0.006,
         };
-        from_knots(&t, &z, &v, &[kink], 0.0, 0.0)
+        from_knots(&t, &z, &v, &[jump], 0.0, 0.0)
     }
 
     #[test]
     fn position_and_velocity_are_linear_between_samples_and_jumps() {
         let m = bent();
         for (at_s, z, v) in [(0.0, 0.0, 2.0), (0.34, 0.68, 2.0), (0.52, 1.04, 2.0), (0.54, 1.05, -1.0)] {
-            near(m.at(at_s).0, z);
-            near(m.at(at_s).1, v);
+            assert_close(m.at(at_s).0, z);
+            assert_close(m.at(at_s).1, v);
         }
-        near(m.at(0.97).0, 0.62);
+        assert_close(m.at(0.97).0, 0.62);
         // Outside of the recording: the first and last sample.
         assert_eq!(m.at(-0.4), (0.0, 2.0));
-        near(m.at(7.0).0, 0.39);
+        assert_close(m.at(7.0).0, 0.39);
         // A velocity that changes between samples.
         let slowing = from_knots(&[1.0, 1.5, 3.0], &[0.0, 1.0, 4.0], &[3.0, 1.0, 7.0], &[], 0.0, 0.0);
-        near(slowing.at(1.125).1, 2.5);
-        near(slowing.at(2.0).0, 2.0);
-        near(slowing.at(2.0).1, 3.0);
+        assert_close(slowing.at(1.125).1, 2.5);
+        assert_close(slowing.at(2.0).0, 2.0);
+        assert_close(slowing.at(2.0).1, 3.0);
     }
 
     #[test]
     fn jump_timing_uncertainty_follows_from_the_position_uncertainty() {
-        let told = bent().jumps[0];
-        near(told.time_s, 0.53);
-        near(told.sample_mid_s, 0.55);
-        near(told.time_sd_s, 0.002);
-        assert_eq!((told.position_m, told.velocity_mps), (1.06, [2.0, -1.0]));
+        let actual = bent().jumps[0];
+        assert_close(actual.time_s, 0.53);
+        assert_close(actual.sample_mid_s, 0.55);
+        assert_close(actual.time_sd_s, 0.002);
+        assert_eq!((actual.position_m, actual.velocity_mps), (1.06, [2.0, -1.0]));
         // Clamped to the sampling interval; the smallest velocity change is 1 µm/s.
-        let kink = |sample: usize, t: f64, after: f64| VelocityJump {
+        let jump = |sample: usize, t: f64, after: f64| VelocityJump {
             next_sample: sample,
             time_s: t,
             position_m: 0.0,
             velocity_mps: [1.0, after],
             position_sd_m: 3e-6,
         };
-        let of = |kinks: &[VelocityJump]| {
-            from_knots(&[0.0, 1.0, 2.0, 3.0], &[0.0; 4], &[1.0; 4], kinks, 0.0, 0.0).jumps
+        let of = |jumps: &[VelocityJump]| {
+            from_knots(&[0.0, 1.0, 2.0, 3.0], &[0.0; 4], &[1.0; 4], jumps, 0.0, 0.0).jumps
         };
-        let told = of(&[kink(0, 0.0, 2.0), kink(1, 1.2, 1.5), kink(3, 1.7, 1.0), kink(4, 3.5, 2.0)]);
+        let actual = of(&[jump(0, 0.0, 2.0), jump(1, 1.2, 1.5), jump(3, 1.7, 1.0), jump(4, 3.5, 2.0)]);
         assert_eq!(
-            told.iter().map(|j| (j.time_s, j.sample_mid_s)).collect::<Vec<_>>(),
+            actual.iter().map(|j| (j.time_s, j.sample_mid_s)).collect::<Vec<_>>(),
             [(1.0, 0.5), (2.0, 2.5)]
         );
-        near(told[0].time_sd_s, 6e-6);
-        near(told[1].time_sd_s, 3.0);
+        assert_close(actual[0].time_sd_s, 6e-6);
+        assert_close(actual[1].time_sd_s, 3.0);
     }
 
     #[test]
@@ -268,12 +259,12 @@ mod tests {
             r.velocity_measured = measured;
             Motion::from_recording(&r, STILL_MPS)
         };
-        let told = of(0.0, true);
-        assert_eq!((told.at(1.0).1, told.at(2.5).1), (0.031, 0.0051));
-        assert_eq!(told.velocity_sd_mps, 0.0);
+        let actual = of(0.0, true);
+        assert_eq!((actual.at(1.0).1, actual.at(2.5).1), (0.031, 0.0051));
+        assert_eq!(actual.velocity_sd_mps, 0.0);
         // Jumps come from positions.
-        assert_eq!(told.jumps.len(), 1);
-        assert!((told.jumps[0].time_s - 1.5).abs() < 0.05, "{:?}", told.jumps);
+        assert_eq!(actual.jumps.len(), 1);
+        assert!((actual.jumps[0].time_s - 1.5).abs() < 0.05, "{:?}", actual.jumps);
         // Not measured, or too noisy.
         for from_positions in [of(0.0, false), of(0.01, true)] {
             assert!((from_positions.at(1.0).1 - 0.03).abs() < 3e-4, "{}", from_positions.at(1.0).1);
@@ -292,8 +283,8 @@ mod tests {
             let force = vec![0.0; t.len()];
             let m = Motion::from_recording(&Recording::new(t, z, force).expect("a recording"), STILL_MPS);
             for k in 1..240 {
-                let (at, told) = (0.1 * f64::from(k), m.at(0.1 * f64::from(k)).1);
-                assert!((told - speed_mps).abs() < 1e-5, "{speed_mps} m/s: {told} at {at} s");
+                let (at, actual) = (0.1 * f64::from(k), m.at(0.1 * f64::from(k)).1);
+                assert!((actual - speed_mps).abs() < 1e-5, "{speed_mps} m/s: {actual} at {at} s");
             }
         }
     }

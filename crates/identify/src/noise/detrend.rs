@@ -59,8 +59,9 @@ pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{normal, still};
+    use super::super::tests::still;
     use super::*;
+    use crate::test_support::normal;
 
     /// A trend smooth over one second is removed, and a window rougher than its neighbours is excluded.
     #[test]
@@ -74,7 +75,7 @@ mod tests {
         };
         let rough = |k: usize| if k / 50 == 7 { 1.9 } else { 1.0 };
         let e: Vec<f64> = (0..1020).map(|k| bent(k) + 0.01 * rough(k) * draw[k]).collect();
-        let told = detrended_residuals(&b, &e);
+        let actual = detrended_residuals(&b, &e);
         // Parabola by naive normal equations (Cramer's rule) in every second.
         for window in 0..20 {
             let (from, to) = (50 * window, 50 * window + 50);
@@ -99,15 +100,15 @@ mod tests {
             for k in from..to {
                 let left = e[k] - bent(k) - c[0] - c[1] * x(k) - c[2] * x(k) * x(k);
                 if window == 7 {
-                    assert!(told[k].is_nan(), "{k}");
+                    assert!(actual[k].is_nan(), "{k}");
                 } else {
-                    let wanted = left * (50.0 / 47.0_f64).sqrt();
-                    assert!((told[k] - wanted).abs() < 1e-8, "{k}: {} for {wanted}", told[k]);
+                    let expected = left * (50.0 / 47.0_f64).sqrt();
+                    assert!((actual[k] - expected).abs() < 1e-8, "{k}: {} for {expected}", actual[k]);
                 }
             }
         }
         // Less than half a second is left at the end.
-        assert!(told[1000..].iter().all(|x| x.is_nan()));
+        assert!(actual[1000..].iter().all(|x| x.is_nan()));
         assert!(detrended_residuals(&still(1025), &vec![0.1; 1025])[1000..].iter().all(|x| x.abs() < 1e-12));
     }
 }

@@ -1,8 +1,8 @@
 //! Long memory of slow drift: means over stretches further back than the autoregression (heterogeneous
 //! autoregression: Corsi 2009).
 
-use super::AR_ORDER;
-
+/// Largest autoregressive order.
+pub const AR_ORDER: usize = 4;
 /// Stretches of preceding blocks whose means are regressors: some tenths of a second, some seconds, ten
 /// seconds.
 pub(super) const STRETCHES: [(usize, usize); 3] = [(AR_ORDER, 24), (24, 124), (124, 624)];
@@ -41,8 +41,8 @@ pub(super) fn regression_row(e: &[f64], sums: &[f64], k: usize, reach: usize) ->
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{near, normal};
     use super::*;
+    use crate::test_support::{assert_close, normal};
 
     #[test]
     fn running_sums_and_stretch_means_agree_with_naive_ones() {
@@ -52,19 +52,19 @@ mod tests {
         let kept = |k: usize| if k % 5 != 2 && k != 13 { e[k] } else { 0.0 };
         assert_eq!(of.len(), 701);
         for k in [0, 1, 2, 3, 14, 650, 700] {
-            near(of[k], (0..k).map(kept).sum());
+            assert_close(of[k], (0..k).map(kept).sum());
         }
         for (k, reach) in [(690, 690), (690, 130), (690, 60), (690, 17), (690, 3), (3, 3), (200, 200)] {
             let means = stretch_means(&of, k, reach);
             for (mean, (from, to)) in means.into_iter().zip([(4, 24), (24, 124), (124, 624)]) {
                 let sum: f64 = (k - reach.min(to)..k - reach.min(from)).map(kept).sum();
-                near(mean, sum / (to - from) as f64);
+                assert_close(mean, sum / (to - from) as f64);
             }
         }
         let e = normal(2, 700);
         let of = running_sums(&e, |_| true);
-        let told = regression_row(&e, &of, 650, 650);
-        assert_eq!(told[..5], [e[650], e[649], e[648], e[647], e[646]]);
-        assert_eq!(told[5..], stretch_means(&of, 650, 650));
+        let actual = regression_row(&e, &of, 650, 650);
+        assert_eq!(actual[..5], [e[650], e[649], e[648], e[647], e[646]]);
+        assert_eq!(actual[5..], stretch_means(&of, 650, 650));
     }
 }
