@@ -337,10 +337,9 @@ impl BlockAverages {
         jump_delay_s: Option<f64>,
     ) -> Arc<Vec<MotionPiece>> {
         if let Some(jump_delay) = jump_delay_s.filter(|_| delay_s > 0.0 && !smeared) {
-            Arc::new(self.cut_motion(JumpAppearance::DelayedBetweenSamples {
-                delay_s: delay_s,
-                jump_delay_s: jump_delay,
-            }))
+            Arc::new(
+                self.cut_motion(JumpAppearance::DelayedBetweenSamples { delay_s, jump_delay_s: jump_delay }),
+            )
         } else if delay_s > 0.0 {
             Arc::new(self.cut_motion(JumpAppearance::Delayed(delay_s)))
         } else if smeared {

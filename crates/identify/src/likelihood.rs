@@ -168,7 +168,7 @@ impl ReplayCache {
         let pieces = motion_pieces(&compiled, blocks);
         let replay_cache = IncrementalReplay::new(&compiled, blocks, &pieces, &model.rupture_times_s[r]);
         data.count_replayed(blocks.len() as u64);
-        Some(Self { compiled, pieces: pieces, incremental: replay_cache })
+        Some(Self { compiled, pieces, incremental: replay_cache })
     }
 
     /// As [`replay`], for a model that differs in base parameters, geometry or a rupture time only.

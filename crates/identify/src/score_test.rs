@@ -39,7 +39,7 @@ impl<'a> ScoreTest<'a> {
         let linearization = Linearization::new(&fit.model, data, &fit.residuals);
         let factor = linearization.factor();
         let slope = factor.forward_substitute(&linearization.neg_gradient);
-        Self { fit, data, linearization: linearization, factor, half_neg_gradient: slope }
+        Self { fit, data, linearization, factor, half_neg_gradient: slope }
     }
 
     /// Joint gain of columns.

@@ -4,17 +4,17 @@
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// A limit is not a positive number.
-    #[error("{field}: is {value}; it must be {right}")]
+    #[error("{field} is {value}; it must be {expected}")]
     Limit {
         /// Field of the limits.
         field: &'static str,
         /// Its value.
         value: f64,
         /// An admissible value.
-        right: &'static str,
+        expected: &'static str,
     },
     /// No motion satisfies the limits.
-    #[error("no insertion keeps these limits: {why}; {remedy}")]
+    #[error("no motion satisfies these limits: {why}; {remedy}")]
     Infeasible {
         /// The limit that cannot be satisfied.
         why: String,
@@ -22,7 +22,7 @@ pub enum PlanError {
         remedy: String,
     },
     /// The model does not give a finite force.
-    #[error("the law gives no finite force along a motion: {0}")]
+    #[error("the model gives no finite force along the motion: {0}")]
     NoForce(String),
     /// A diagnosis failed.
     #[error(transparent)]

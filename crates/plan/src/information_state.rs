@@ -90,7 +90,7 @@ impl InformationState {
         let parameters = base.shared_parameters();
         let mut state = Self {
             shared_count: parameters.len(),
-            base: base,
+            base,
             candidates,
             unmodelled_n: unknown_n,
             noise,
@@ -295,32 +295,28 @@ impl InformationState {
     /// other one. For nested candidates the special case is tested against the general one; otherwise the
     /// smaller of both directions.
     #[must_use]
-    pub fn separation_nats(&self, information: &Information, a: usize, b: usize) -> f64 {
+    pub fn separation_nats(&self, info: &Information, a: usize, b: usize) -> f64 {
         let n = self.candidates.len();
         if b >= n {
-            return self.one_way_separation_nats(information, b, a);
+            return self.one_way_separation_nats(info, b, a);
         }
         let (i, j) = (&self.candidates[a], &self.candidates[b]);
         if i.is_special_case_of(j) {
-            self.one_way_separation_nats(information, b, a)
+            self.one_way_separation_nats(info, b, a)
         } else if j.is_special_case_of(i) {
-            self.one_way_separation_nats(information, a, b)
+            self.one_way_separation_nats(info, a, b)
         } else {
-            self.one_way_separation_nats(information, a, b).min(self.one_way_separation_nats(
-                information,
-                b,
-                a,
-            ))
+            self.one_way_separation_nats(info, a, b).min(self.one_way_separation_nats(info, b, a))
         }
     }
 
     /// Remaining nats when `truth` holds and `other` is re-fitted: `min 1/2 |whitened(f_truth - f_other)|^2`
     /// over all parameters of the base model and of `other`, to first order.
     #[must_use]
-    pub fn one_way_separation_nats(&self, information: &Information, truth: usize, other: usize) -> f64 {
+    pub fn one_way_separation_nats(&self, info: &Information, truth: usize, other: usize) -> f64 {
         let at = |k: usize| -> Option<usize> {
             if k >= self.candidates.len() {
-                Some(information.schur.size.saturating_sub(1))
+                Some(info.schur.size.saturating_sub(1))
             } else {
                 self.columns_of(k).map(|p| p.0)
             }
@@ -328,7 +324,7 @@ impl InformationState {
         let mut x: Vec<(usize, f64)> = Vec::new();
         x.extend(at(truth).map(|k| (k, 1.0)));
         x.extend(at(other).map(|k| (k, -1.0)));
-        let g = &information.schur;
+        let g = &info.schur;
         let all: f64 = x.iter().flat_map(|(i, a)| x.iter().map(move |(j, b)| a * b * g.at(*i, *j))).sum();
         let parameters: Vec<usize> = self.columns_of(other).map_or_else(Vec::new, |p| p.1.collect());
         let cross: Vec<f64> =
@@ -340,12 +336,12 @@ impl InformationState {
     /// Correlation of two candidates' columns with the shared parameters eliminated; 0 where one of them is not
     /// identifiable at all.
     #[must_use]
-    pub fn correlation(&self, information: &Information, a: usize, b: usize) -> f64 {
+    pub fn correlation(&self, info: &Information, a: usize, b: usize) -> f64 {
         let (Some((i, _)), Some((j, _))) = (self.columns_of(a), self.columns_of(b)) else { return 0.0 };
-        let g = &information.schur;
+        let g = &info.schur;
         let size = (g.at(i, i) * g.at(j, j)).sqrt();
-        let whole = (information.all.at(information.shared_count + i, information.shared_count + i)
-            * information.all.at(information.shared_count + j, information.shared_count + j))
+        let whole = (info.all.at(info.shared_count + i, info.shared_count + i)
+            * info.all.at(info.shared_count + j, info.shared_count + j))
         .sqrt();
         if size > 1e-8 * whole && size > 0.0 { (g.at(i, j) / size).clamp(-1.0, 1.0) } else { 0.0 }
     }

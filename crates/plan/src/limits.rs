@@ -35,11 +35,11 @@ impl Limits {
             ("force_n", self.force_n, "a positive force in N, such as 6.0"),
         ];
         if !self.depth_m.is_finite() {
-            let right = "a position in m, such as 0.09";
-            return Err(PlanError::Limit { field: "depth_m", value: self.depth_m, right });
+            let expected = "a position in m, such as 0.09";
+            return Err(PlanError::Limit { field: "depth_m", value: self.depth_m, expected });
         }
         match all.into_iter().find(|(_, value, _)| !(value.is_finite() && *value > 0.0)) {
-            Some((field, value, right)) => Err(PlanError::Limit { field, value, right }),
+            Some((field, value, expected)) => Err(PlanError::Limit { field, value, expected }),
             None => Ok(()),
         }
     }

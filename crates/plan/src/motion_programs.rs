@@ -226,7 +226,7 @@ pub fn infeasibility(limits: &Limits, begin: &StartConditions) -> Option<(String
     if into_m < MIN_DEPTH_M {
         return Some((
             format!(
-                "depth_m is {} m and the surface lies at {:.4} m, so that the needle would not come {:.0} mm into the tissue",
+                "depth_m is {} m and the surface lies at {:.4} m, so the needle would not reach {:.0} mm into the tissue",
                 limits.depth_m,
                 begin.surface_m,
                 MIN_DEPTH_M * 1e3

@@ -84,7 +84,7 @@ pub fn search_motions(
     if sampled.is_empty() {
         return Err(PlanError::Infeasible {
             why: format!(
-                "none of {SAMPLED_MOTIONS} programs of two to six parts gets to {:.1} mm and back to rest in {} s",
+                "none of {SAMPLED_MOTIONS} sampled programs reaches {:.1} mm and stops within {} s",
                 1e3 * limits.depth_m.min(begin.max_depth_m),
                 limits.duration_s
             ),
@@ -108,7 +108,7 @@ pub fn search_motions(
     if safe.is_empty() {
         return Err(PlanError::Infeasible {
             why: format!(
-                "force_n is {} N, and the gentlest of the motions to {:.1} mm is expected to need {weakest:.2} N",
+                "force_n is {} N, and every sampled motion to {:.1} mm is expected to need at least {weakest:.2} N",
                 limits.force_n,
                 1e3 * limits.depth_m.min(begin.max_depth_m)
             ),
@@ -119,7 +119,7 @@ pub fn search_motions(
         .into_par_iter()
         .filter_map(|((point, motion), blocks, force_n)| {
             let information = state.after_blocks(&blocks)?;
-            Some(EvaluatedMotion { motion, information: information, score: 0.0, force_n, point })
+            Some(EvaluatedMotion { motion, information, score: 0.0, force_n, point })
         })
         .collect();
     let (distinguishable, indistinguishable): (Vec<_>, Vec<_>) =
@@ -143,12 +143,7 @@ pub fn search_motions(
     }
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
     all.truncate(5);
-    Ok(MotionSearchResult {
-        best: all,
-        distinguishable: distinguishable,
-        indistinguishable: indistinguishable,
-        motions_evaluated: looked_at,
-    })
+    Ok(MotionSearchResult { best: all, distinguishable, indistinguishable, motions_evaluated: looked_at })
 }
 
 /// Largest force in N expected under any candidate, plus three standard deviations of the noise.
@@ -185,7 +180,7 @@ fn refine_motion(
                 let force_n = expected_peak_force_n(state, &blocks).filter(|f| *f <= limits.force_n)?;
                 let information = state.after_blocks(&blocks)?;
                 let score = score(state, &information, distinguishable, known);
-                Some(EvaluatedMotion { motion, information: information, score, force_n, point })
+                Some(EvaluatedMotion { motion, information, score, force_n, point })
             })
             .collect();
         tried += near.len();

@@ -52,7 +52,7 @@ pub fn check_by_simulation(
     mut progress: impl FnMut(&str),
 ) -> Result<Plan, PlanError> {
     let bench = SimulationCheck {
-        assumed: assumed,
+        assumed,
         information: state,
         recordings: old,
         noise_n: sensor_noise(state, assumed),
@@ -111,7 +111,11 @@ pub fn check_by_simulation(
         if judged && spent + each * order.len() as u64 > MAX_REPLAYED_BLOCKS {
             break;
         }
-        progress(&format!("the chosen motion, {} of {TEST_ROUNDS}: {} candidates", round + 1, order.len()));
+        progress(&format!(
+            "the selected motion, test {} of {TEST_ROUNDS}: {} candidates",
+            round + 1,
+            order.len()
+        ));
         let jobs: Vec<(usize, u64)> = order.iter().map(|c| (*c, TEST_SEED + round)).collect();
         for (tried, right) in tried.iter_mut().zip(bench.diagnose_all(&plan.motion, &jobs, &mut spent)?) {
             tried.trials += 1;
@@ -143,23 +147,20 @@ impl SimulationCheck<'_> {
         spent: &mut u64,
     ) -> Result<Vec<bool>, PlanError> {
         let one = |(candidate, seed): &(usize, u64)| self.diagnose_one(motion, *candidate, *seed);
-        let diagnosis: Vec<(bool, u64)> = jobs.par_iter().map(one).collect::<Result<_, PlanError>>()?;
-        *spent += diagnosis.iter().map(|s| s.1).sum::<u64>();
-        Ok(diagnosis.into_iter().map(|s| s.0).collect())
+        let outcomes: Vec<(bool, u64)> = jobs.par_iter().map(one).collect::<Result<_, PlanError>>()?;
+        *spent += outcomes.iter().map(|s| s.1).sum::<u64>();
+        Ok(outcomes.into_iter().map(|s| s.0).collect())
     }
 
     /// Whether the diagnosis is correct, and its cost in replayed blocks.
     fn diagnose_one(&self, motion: &Motion, candidate: usize, seed: u64) -> Result<(bool, u64), PlanError> {
-        let mut evidence = self.recordings.to_vec();
-        if evidence.is_empty() && self.assumed.motion.plan().is_some() {
-            evidence.push(self.simulate(candidate, &self.assumed.motion, seed + 7)?);
+        let mut recordings = self.recordings.to_vec();
+        if recordings.is_empty() && self.assumed.motion.plan().is_some() {
+            recordings.push(self.simulate(candidate, &self.assumed.motion, seed + 7)?);
         }
-        evidence.push(self.simulate(candidate, motion, seed)?);
-        let examined = diagnose(self.assumed, &evidence, &Options { brief: true }, |_| {})?;
-        Ok((
-            is_correct(&examined.diagnosis, self.information, candidate),
-            examined.search.data.blocks_replayed(),
-        ))
+        recordings.push(self.simulate(candidate, motion, seed)?);
+        let result = diagnose(self.assumed, &recordings, &Options { brief: true }, |_| {})?;
+        Ok((is_correct(&result.diagnosis, self.information, candidate), result.search.data.blocks_replayed()))
     }
 
     fn simulate(&self, candidate: usize, motion: &Motion, seed: u64) -> Result<NamedRecording, PlanError> {

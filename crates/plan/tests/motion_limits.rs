@@ -68,7 +68,7 @@ fn a_motion_that_violates_one_limit_is_rejected() {
         Limits { depth_m: 0.1, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
     let motion = (0..50)
         .find_map(|k| motion_from_point(&low_discrepancy_point(k), &wide, &begin()))
-        .expect("one keeps wide limits");
+        .expect("a motion within wide limits");
     let (depth, speed, acceleration, duration) = seen(&motion);
     assert!(within_limits(&motion, &wide));
     for narrow in [
@@ -95,7 +95,7 @@ fn scenario() -> Scenario {
 #[test]
 fn infeasible_limits_are_reported_with_a_reason() {
     let scenario = scenario();
-    let (state, begin) = from_scenario(&scenario, None).expect("a ground");
+    let (state, begin) = from_scenario(&scenario, None).expect("an information state");
     let wide =
         Limits { depth_m: 0.05, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 20.0 };
     for (limits, word) in [
@@ -119,7 +119,7 @@ fn infeasible_limits_are_reported_with_a_reason() {
 
 #[test]
 fn the_expected_force_stays_below_its_limit_under_every_candidate() {
-    let (state, begin) = from_scenario(&scenario(), None).expect("a ground");
+    let (state, begin) = from_scenario(&scenario(), None).expect("an information state");
     let free =
         Limits { depth_m: 0.05, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 50.0 };
     let strong = plan(&state, &free, &begin).expect("a plan").0;

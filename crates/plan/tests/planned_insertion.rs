@@ -33,7 +33,7 @@ fn measured(motion: &Motion, seed: u64) -> NamedRecording {
 #[test]
 fn a_planned_motion_identifies_friction_laws_hidden_at_constant_speed() {
     let scenario = assumed();
-    let (before, begin) = from_scenario(&scenario, None).expect("a ground");
+    let (before, begin) = from_scenario(&scenario, None).expect("an information state");
     let seen = identifiability(&before);
     for hidden in ["coulomb_friction", "stribeck_friction", "force_gain"] {
         assert!(
@@ -44,7 +44,8 @@ fn a_planned_motion_identifies_friction_laws_hidden_at_constant_speed() {
     }
     assert!(!seen.not_identifiable.iter().any(|i| i == "periodic_interference"));
     let planned = plan(&before, &LIMITS, &begin).expect("a plan").0;
-    let after = identifiability(&from_scenario(&scenario, Some(&planned.motion)).expect("a ground").0);
+    let after =
+        identifiability(&from_scenario(&scenario, Some(&planned.motion)).expect("an information state").0);
     for shown in ["coulomb_friction", "stribeck_friction"] {
         assert!(!after.not_identifiable.iter().any(|i| i == shown), "{shown}: {:?}", after.not_identifiable);
     }
@@ -63,7 +64,7 @@ fn the_planned_insertion_leads_to_the_correct_single_effect() {
         diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
     assert_eq!(blind.diagnosis.verdict, Verdict::None);
     assert!(blind.diagnosis.not_identifiable.iter().any(|i| i == "coulomb_friction"));
-    let (state, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
+    let (state, begin) = from_diagnosis(&scenario, &blind).expect("an information state");
     let planned = plan(&state, &LIMITS, &begin).expect("a plan").0;
     assert!(planned.probability_decided > planned.probability_now + 0.3);
     // The recordings have different motions.
@@ -78,7 +79,7 @@ fn the_plan_does_not_depend_on_the_number_of_threads() {
     let one = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (state, begin) = from_scenario(&assumed(), None).expect("a ground");
+            let (state, begin) = from_scenario(&assumed(), None).expect("an information state");
             plan(&state, &LIMITS, &begin).expect("a plan").0
         })
     };
@@ -91,7 +92,7 @@ fn the_selected_motion_is_tested_on_separate_simulations() {
     let first = measured(&scenario.motion, 1);
     let blind =
         diagnose(&scenario, std::slice::from_ref(&first), &Options::default(), |_| {}).expect("a diagnosis");
-    let (state, begin) = from_diagnosis(&scenario, &blind).expect("a ground");
+    let (state, begin) = from_diagnosis(&scenario, &blind).expect("an information state");
     let (by_gaps, mut found) = plan(&state, &LIMITS, &begin).expect("a plan");
     found.best.truncate(2);
     let mut actual = Vec::new();

@@ -1,5 +1,6 @@
 use super::*;
 use crate::motion::JumpTiming;
+use crate::test_support::sampled;
 
 fn assert_close(actual: f64, expected: f64) {
     assert!((actual - expected).abs() <= 1e-9 * expected.abs().max(1e-3), "{actual} for {expected}");
@@ -160,9 +161,7 @@ fn a_block_with_a_sample_at_a_velocity_jump_is_excluded() {
     assert_eq!(left_out(0.0775, 0.021), [2, 3, 4, 5]);
     assert_eq!(left_out(0.19, 0.03), [8, 9]);
     // In a recording: the needle stops at sample 60, in block 15.
-    let t = even(400);
-    let z: Vec<f64> = t.iter().map(|t| 0.002 * t.min(0.3)).collect();
-    let b = BlockAverages::new(&Recording::new(t, z, vec![0.0; 400]).expect("a recording"), &[], BLOCK_S);
+    let b = sampled(400, |t| 0.002 * t.min(0.3), |_| 0.0);
     assert_eq!((0..100).filter(|k| !b.used[*k]).collect::<Vec<_>>(), [15]);
 }
 
@@ -298,9 +297,7 @@ fn sample_midpoints_exclude_gaps_and_ends() {
 
 #[test]
 fn motion_is_cut_where_jumps_appear_in_the_force() {
-    let t = even(120);
-    let z: Vec<f64> = t.iter().map(|t| 0.002 * t.min(0.3013)).collect();
-    let b = BlockAverages::new(&Recording::new(t, z, vec![0.0; 120]).expect("a recording"), &[], BLOCK_S);
+    let b = sampled(120, |t| 0.002 * t.min(0.3013), |_| 0.0);
     let cut = |smeared: bool, late_s: f64, placed: Option<f64>| {
         let pieces = b.motion_pieces(smeared, late_s, placed);
         let ends: Vec<f64> =

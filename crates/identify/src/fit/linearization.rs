@@ -48,7 +48,7 @@ impl Linearization {
                 rupture_rows: event_rows(model, at, at),
             },
             shared,
-            per_recording: per_recording,
+            per_recording,
             columns: Vec::new(),
             normal_matrix: SymmetricMatrix::zeros(0),
             neg_gradient: Vec::new(),

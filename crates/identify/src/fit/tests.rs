@@ -2,7 +2,7 @@ use super::damped_step::order_rupture_times;
 use super::nonsmooth::{escape_kink, step_of_improving_parameters};
 use super::*;
 use crate::likelihood::{ReplayCache, neg_log_posterior, replay};
-use crate::model::{NO_RUPTURE, Parameter, ParameterRole, RecordingParameters};
+use crate::model::{NO_RUPTURE, Parameter, ParameterRole as Role, RecordingParameters};
 use crate::noise::Noise;
 use crate::rupture_likelihood::RuptureEvent;
 use crate::test_support::{assert_close, base_model, sampled};
@@ -52,7 +52,7 @@ fn rms_uses_compared_blocks_only() {
     let mut blocks = (*d.recordings).clone();
     blocks[0].used = (0..blocks[0].len()).map(|k| k < 2).collect();
     let e = vec![(0..blocks[0].len()).map(|k| [3.0, 5.0, 100.0][k.min(2)]).collect()];
-    let fit = Fit { model: m, residuals: Residuals { residual_n: e, nats: 7.5, ..Residuals::default() } };
+    let fit = Fit { model: m, residuals: Residuals { residual_n: e, nats: 7.5, ..Default::default() } };
     assert_close(fit.rms_n(&d.with_recordings(blocks)), 17.0_f64.sqrt());
     assert_eq!((fit.nats(), fit.rms_n(&d.with_recordings(Vec::new()))), (7.5, 0.0));
 }
@@ -92,7 +92,7 @@ fn smooth() -> (Model, FitData) {
         .map(|surface_m| RecordingParameters {
             surface_m,
             ln_friction: 10.0 * surface_m,
-            ..RecordingParameters::default()
+            ..Default::default()
         })
         .to_vec();
     (m, d)
@@ -106,7 +106,7 @@ fn the_gradient_agrees_with_finite_differences() {
     let rough = at.innovations.iter().flatten().filter(|w| w.abs() > 2.5).count();
     assert!(rough > 5 && rough < 400, "{rough}");
     let t = Linearization::new(&m, &d, &at);
-    let nats = |role: ParameterRole, r: usize, by: f64| {
+    let nats = |role: Role, r: usize, by: f64| {
         let mut moved = m.clone();
         moved.set(role, r, m.get(role, r) + by);
         residuals(&moved, &d).expect("a replay").nats
@@ -126,11 +126,8 @@ fn the_gradient_agrees_with_finite_differences() {
         is(t.neg_gradient[k], n, 0);
     }
     for r in 0..2 {
-        for (o, n) in t
-            .per_recording
-            .iter()
-            .enumerate()
-            .filter(|(_, n)| !matches!(n.role, ParameterRole::RuptureTime(_)))
+        for (o, n) in
+            t.per_recording.iter().enumerate().filter(|(_, n)| !matches!(n.role, Role::RuptureTime(_)))
         {
             assert_eq!(t.index_of(o, r), t.shared.len() + r * t.per_recording.len() + o);
             is(t.neg_gradient[t.index_of(o, r)], n, r);
@@ -185,17 +182,17 @@ fn a_derivative_costs_half_a_replay() {
 fn a_wide_difference_is_symmetric() {
     let (m, d) = smooth();
     let at = residuals(&m, &d).expect("a replay");
-    let surface = |n: &Parameter| (n.role == ParameterRole::Surface).then_some(1e-3);
+    let surface = |n: &Parameter| (n.role == Role::Surface).then_some(1e-3);
     let plain = Linearization::new(&m, &d, &at);
     let wide = Linearization::new(&m, &d, &at).with_wide_differences(&m, &d, &at, &surface);
     let moved = |by: f64| {
         let mut other = m.clone();
-        other.set(ParameterRole::Surface, 0, m.get(ParameterRole::Surface, 0) + by);
+        other.set(Role::Surface, 0, m.get(Role::Surface, 0) + by);
         plain.difference(&m, &d, &at, &other).expect("a column")
     };
     let (up, down) = (moved(1e-3), moved(-1e-3));
     for (k, n) in wide.shared.iter().enumerate() {
-        if n.role != ParameterRole::Surface {
+        if n.role != Role::Surface {
             assert_eq!(wide.columns[k].innovations, plain.columns[k].innovations);
             continue;
         }
@@ -221,9 +218,8 @@ fn a_fit_recovers_the_simulated_parameters() {
     truth.tissue.layers[0].stiffness_n_per_m = 215.0;
     truth.tissue.layers[1].friction_ns_per_m2 = 2700.0;
     truth.tissue.surface_m = 0.0043;
-    truth.per_recording = [4e-4, -4e-4]
-        .map(|surface_m| RecordingParameters { surface_m, ..RecordingParameters::default() })
-        .to_vec();
+    truth.per_recording =
+        [4e-4, -4e-4].map(|surface_m| RecordingParameters { surface_m, ..Default::default() }).to_vec();
     // At the law's own rupture times.
     truth.rupture_times_s = vec![vec![NO_RUPTURE; 2]; 2];
     let own =
@@ -308,7 +304,7 @@ fn parameters_with_valid_derivatives_move_without_one_at_a_kink() {
     m.tissue.layers[0].friction_ns_per_m2 = 3300.0;
     let at = Fit { residuals: residuals(&m, &d).expect("a replay"), model: m.clone() };
     let mut t = Linearization::new(&m, &d, &at.residuals);
-    let stiff = t.shared.iter().position(|n| n.role == ParameterRole::Stiffness(0)).expect("free");
+    let stiff = t.shared.iter().position(|n| n.role == Role::Stiffness(0)).expect("free");
     t.neg_gradient[stiff] *= -1e3;
     let along = damped_step(&m, &d, &t, FIRST_DAMPING, |_| true).expect("a step");
     let left = residuals(&apply_step(&m, &d, &t, &along, 1.0), &d).expect("a replay");
@@ -360,7 +356,7 @@ fn scatter_is_the_rms_of_the_per_recording_parameters() {
         .map(|(surface_m, friction)| RecordingParameters {
             surface_m,
             ln_friction: friction,
-            ..RecordingParameters::default()
+            ..Default::default()
         })
         .to_vec();
     let mut at = residuals(&m, &d).expect("a replay");

@@ -1,11 +1,9 @@
 use super::incremental_replay::ruptures_until_equal;
 use super::time_stepper::record_strain;
 use super::*;
-use crate::block_averages::BLOCK_S;
 use crate::model::{EffectTerm, Model};
 use crate::motion::JumpAppearance;
 use crate::test_support::{base_model, sampled};
-use stylet_record::Recording;
 use stylet_tissue::{RuptureCriterion, effect_info};
 
 fn assert_close(actual: f64, expected: f64) {
@@ -88,10 +86,7 @@ fn presliding_friction_reverses_with_the_needle() {
     // N/m over 0.3 mm.
     let (turn_s, c, delta_m) = (2.817, 40.0, 3e-4);
     let z = |t: f64| 0.004 * t.min(turn_s) - 0.008 * (t - turn_s).max(0.0);
-    let t: Vec<f64> = (0..640).map(|k| f64::from(k) * 0.005).collect();
-    let force = vec![0.0; t.len()];
-    let recording = Recording::new(t.clone(), t.iter().map(|t| z(*t)).collect(), force).expect("a recording");
-    let b = BlockAverages::new(&recording, &[], BLOCK_S);
+    let b = sampled(640, z, |_| 0.0);
     let effect = effect_info("presliding_friction").expect("an effect");
     let model = |m: &mut Model| m.effects.push(EffectTerm::new(effect, &[c, delta_m]));
     let mut out = ReplayResult::default();
@@ -157,10 +152,7 @@ fn the_free_law_ruptures_by_force_or_at_the_interface() {
     }
     // At a varying velocity.
     let trajectory = |t: f64| 0.004 * t + 0.0015 * (2.0 * t).sin();
-    let t: Vec<f64> = (0..2400).map(|k| f64::from(k) * 0.005).collect();
-    let z = t.iter().map(|t| trajectory(*t)).collect();
-    let rippled =
-        BlockAverages::new(&Recording::new(t, z, vec![0.0; 2400]).expect("a recording"), &[], BLOCK_S);
+    let rippled = sampled(2400, trajectory, |_| 0.0);
     let actual = free_rupture_times(&compiled(|_| ()), &rippled.motion_pieces(false, 0.0, None));
     for (actual, place) in actual.iter().zip([0.011, 0.035, 0.045]) {
         assert!((trajectory(*actual) - place).abs() < 2e-7, "{actual}: {} for {place}", trajectory(*actual));
@@ -374,13 +366,8 @@ fn a_layer_ruptures_where_its_threshold_falls_below_the_force() {
     // At 4 mm/s into the first layer until its spring holds a force between both thresholds; then at 1 mm/s.
     let held = 1.28;
     let slow_s = (0.005 + held / 200.0) / 0.004;
-    let n = 1200;
-    let t: Vec<f64> = (0..n).map(|k| f64::from(k) * 0.005).collect();
-    let z = t
-        .iter()
-        .map(|t| if *t < slow_s { 0.004 * t } else { 0.004 * slow_s + 0.001 * (t - slow_s) })
-        .collect();
-    let b = BlockAverages::new(&Recording::new(t, z, vec![0.0; 1200]).expect("a recording"), &[], BLOCK_S);
+    let z = |t: f64| if t < slow_s { 0.004 * t } else { 0.004 * slow_s + 0.001 * (t - slow_s) };
+    let b = sampled(1200, z, |_| 0.0);
     let pieces = b.motion.pieces(
         b.start_s.iter().copied().zip(b.end_s.iter().copied()),
         JumpAppearance::Delayed(0.0),

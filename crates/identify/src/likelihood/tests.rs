@@ -74,9 +74,8 @@ fn cost_is_counted_in_replayed_blocks() {
 #[test]
 fn the_log_posterior_sums_residuals_ruptures_and_priors() {
     let (mut m, d) = given();
-    m.per_recording = [1e-4, -3e-4]
-        .map(|surface_m| RecordingParameters { surface_m, ..RecordingParameters::default() })
-        .to_vec();
+    m.per_recording =
+        [1e-4, -3e-4].map(|surface_m| RecordingParameters { surface_m, ..Default::default() }).to_vec();
     m.tissue.layers[0].stiffness_n_per_m = 230.0;
     m.tissue.surface_m = 0.005;
     let left = residuals(&m, &d).expect("a replay");

@@ -71,7 +71,7 @@ impl Model {
         Self {
             tissue: assumptions.tissue.clone(),
             effects: Vec::new(),
-            free: FreeParameters { surface: true, thickness: true, ..FreeParameters::default() },
+            free: FreeParameters { surface: true, thickness: true, ..Default::default() },
             per_recording: vec![RecordingParameters::default(); recordings],
             scatter: Scatter::default(),
             rupture_times_s: vec![vec![NO_RUPTURE; layers]; recordings],

@@ -1,6 +1,6 @@
 //! Bounds and priors of all parameters.
 
-use super::{Model, Parameter, ParameterRole};
+use super::{Model, Parameter, ParameterRole as Role};
 use stylet_tissue::{FitScale, Proposal};
 
 /// Lower bound of stiffness, friction and puncture force, as a share of the assumed value.
@@ -33,21 +33,14 @@ impl Model {
                     out.push(Parameter { role, low, high, prior_mean: 1.0, prior_sd: tolerance, step: 1e-5 });
                 }
             };
-            relative(ParameterRole::Stiffness(layer), l.stiffness_n_per_m);
-            relative(ParameterRole::Friction(layer), l.friction_ns_per_m2);
-            relative(ParameterRole::Puncture(layer), l.puncture_n.unwrap_or(0.0));
+            relative(Role::Stiffness(layer), l.stiffness_n_per_m);
+            relative(Role::Friction(layer), l.friction_ns_per_m2);
+            relative(Role::Puncture(layer), l.puncture_n.unwrap_or(0.0));
         }
         if self.free.surface && b.surface_tolerance_m > 0.0 {
             let (at, sd) = (b.tissue.surface_m, b.surface_tolerance_m);
             let (low, high) = (at - MAX_TOLERANCES * sd, at + MAX_TOLERANCES * sd);
-            out.push(Parameter {
-                role: ParameterRole::Surface,
-                low,
-                high,
-                prior_mean: at,
-                prior_sd: sd,
-                step: 1e-7,
-            });
+            out.push(Parameter { role: Role::Surface, low, high, prior_mean: at, prior_sd: sd, step: 1e-7 });
         }
         if self.free.thickness {
             for (layer, l) in b.tissue.layers.iter().enumerate() {
@@ -57,7 +50,7 @@ impl Model {
                         if self.free.wide_thickness { MAX_TOLERANCES_WIDE } else { MAX_TOLERANCES } * sd;
                     let (low, high) = ((d - most).max(0.05 * d), d + most);
                     out.push(Parameter {
-                        role: ParameterRole::Thickness(layer),
+                        role: Role::Thickness(layer),
                         low,
                         high,
                         prior_mean: d,
@@ -73,7 +66,7 @@ impl Model {
                 if self.tied.iter().any(|b| b.effect == effect && b.parameter == parameter) {
                     continue;
                 }
-                let role = ParameterRole::Effect { effect, parameter };
+                let role = Role::Effect { effect, parameter };
                 let (from, to) = p.search;
                 let (low, high, step) = match p.fit_scale() {
                     FitScale::Log => {
@@ -103,10 +96,10 @@ impl Model {
         };
         for day in 0..self.days.len() {
             if self.free.day_surface {
-                of_day(ParameterRole::DaySurface(day), self.scatter.day_surface_m, 1e-7);
+                of_day(Role::DaySurface(day), self.scatter.day_surface_m, 1e-7);
             }
             if self.free.day_friction {
-                of_day(ParameterRole::DayFriction(day), self.scatter.day_ln_friction, 1e-5);
+                of_day(Role::DayFriction(day), self.scatter.day_ln_friction, 1e-5);
             }
         }
         out
@@ -141,20 +134,18 @@ impl Model {
         };
         let mut out = Vec::new();
         if self.free.recording_surface {
-            out.push(parameter(ParameterRole::RecordingSurface, self.scatter.surface_m, 1e-7));
+            out.push(parameter(Role::RecordingSurface, self.scatter.surface_m, 1e-7));
         }
         if self.free.recording_friction {
-            out.push(parameter(ParameterRole::RecordingFriction, self.scatter.ln_friction, 1e-5));
+            out.push(parameter(Role::RecordingFriction, self.scatter.ln_friction, 1e-5));
         }
         if self.free.recording_effects {
             for (k, (e, p)) in self.varying_parameters().enumerate() {
                 let step = 1e-3 * self.effects[e].info.parameters[p].between_recordings_sd;
-                out.push(parameter(ParameterRole::RecordingEffect(k), self.varying_sd(k), step));
+                out.push(parameter(Role::RecordingEffect(k), self.varying_sd(k), step));
             }
         }
-        out.extend(
-            (0..self.layers()).map(|layer| parameter(ParameterRole::RuptureTime(layer), infinity, 1e-5)),
-        );
+        out.extend((0..self.layers()).map(|layer| parameter(Role::RuptureTime(layer), infinity, 1e-5)));
         out
     }
 }

@@ -1,26 +1,26 @@
 //! Reading and writing parameter values.
 
-use super::{Model, ParameterRole};
+use super::{Model, ParameterRole as Role};
 use stylet_tissue::{AnyEffect, FitScale};
 
 impl Model {
     /// Value of a parameter, in recording `r` if it is per-recording.
     #[must_use]
-    pub fn get(&self, role: ParameterRole, r: usize) -> f64 {
+    pub fn get(&self, role: Role, r: usize) -> f64 {
         let assumed = &self.assumed.tissue;
         match role {
-            ParameterRole::Stiffness(l) => {
+            Role::Stiffness(l) => {
                 self.tissue.layers[l].stiffness_n_per_m / assumed.layers[l].stiffness_n_per_m
             }
-            ParameterRole::Friction(l) => {
+            Role::Friction(l) => {
                 self.tissue.layers[l].friction_ns_per_m2 / assumed.layers[l].friction_ns_per_m2
             }
-            ParameterRole::Puncture(l) => {
+            Role::Puncture(l) => {
                 self.tissue.layers[l].puncture_n.unwrap_or(1.0) / assumed.layers[l].puncture_n.unwrap_or(1.0)
             }
-            ParameterRole::Surface => self.tissue.surface_m,
-            ParameterRole::Thickness(l) => self.tissue.layers[l].thickness_m,
-            ParameterRole::Effect { effect, parameter } => {
+            Role::Surface => self.tissue.surface_m,
+            Role::Thickness(l) => self.tissue.layers[l].thickness_m,
+            Role::Effect { effect, parameter } => {
                 let term = &self.effects[effect];
                 let x = term.coordinates()[parameter];
                 match term.info.parameters[parameter].fit_scale() {
@@ -29,31 +29,31 @@ impl Model {
                     FitScale::Reciprocal => 1.0 / x,
                 }
             }
-            ParameterRole::RecordingSurface => self.per_recording[r].surface_m,
-            ParameterRole::RecordingFriction => self.per_recording[r].ln_friction,
-            ParameterRole::RecordingEffect(k) => self.per_recording[r].varying[k],
-            ParameterRole::DaySurface(d) => self.days[d].surface_m,
-            ParameterRole::DayFriction(d) => self.days[d].ln_friction,
-            ParameterRole::RuptureTime(l) => self.rupture_times_s[r][l],
+            Role::RecordingSurface => self.per_recording[r].surface_m,
+            Role::RecordingFriction => self.per_recording[r].ln_friction,
+            Role::RecordingEffect(k) => self.per_recording[r].varying[k],
+            Role::DaySurface(d) => self.days[d].surface_m,
+            Role::DayFriction(d) => self.days[d].ln_friction,
+            Role::RuptureTime(l) => self.rupture_times_s[r][l],
         }
     }
 
     /// Sets a parameter, in recording `r` if it is per-recording.
-    pub fn set(&mut self, role: ParameterRole, r: usize, x: f64) {
+    pub fn set(&mut self, role: Role, r: usize, x: f64) {
         let assumed = &self.assumed.tissue;
         match role {
-            ParameterRole::Stiffness(l) => {
+            Role::Stiffness(l) => {
                 self.tissue.layers[l].stiffness_n_per_m = x * assumed.layers[l].stiffness_n_per_m;
             }
-            ParameterRole::Friction(l) => {
+            Role::Friction(l) => {
                 self.tissue.layers[l].friction_ns_per_m2 = x * assumed.layers[l].friction_ns_per_m2;
             }
-            ParameterRole::Puncture(l) => {
+            Role::Puncture(l) => {
                 self.tissue.layers[l].puncture_n = assumed.layers[l].puncture_n.map(|f| f * x);
             }
-            ParameterRole::Surface => self.tissue.surface_m = x,
-            ParameterRole::Thickness(l) => self.tissue.layers[l].thickness_m = x,
-            ParameterRole::Effect { effect, parameter } => {
+            Role::Surface => self.tissue.surface_m = x,
+            Role::Thickness(l) => self.tissue.layers[l].thickness_m = x,
+            Role::Effect { effect, parameter } => {
                 let term = &mut self.effects[effect];
                 let mut at = term.coordinates();
                 at[parameter] = match term.info.parameters[parameter].fit_scale() {
@@ -75,12 +75,12 @@ impl Model {
                     self.effects[b.effect].values[b.parameter] = values[b.parameter];
                 }
             }
-            ParameterRole::RecordingSurface => self.per_recording[r].surface_m = x,
-            ParameterRole::RecordingFriction => self.per_recording[r].ln_friction = x,
-            ParameterRole::RecordingEffect(k) => self.per_recording[r].varying[k] = x,
-            ParameterRole::DaySurface(d) => self.days[d].surface_m = x,
-            ParameterRole::DayFriction(d) => self.days[d].ln_friction = x,
-            ParameterRole::RuptureTime(l) => self.rupture_times_s[r][l] = x,
+            Role::RecordingSurface => self.per_recording[r].surface_m = x,
+            Role::RecordingFriction => self.per_recording[r].ln_friction = x,
+            Role::RecordingEffect(k) => self.per_recording[r].varying[k] = x,
+            Role::DaySurface(d) => self.days[d].surface_m = x,
+            Role::DayFriction(d) => self.days[d].ln_friction = x,
+            Role::RuptureTime(l) => self.rupture_times_s[r][l] = x,
         }
     }
 }

@@ -1,4 +1,4 @@
-use super::*;
+use super::{ParameterRole as Role, *};
 use stylet_tissue::AnyEffect;
 use stylet_tissue::{Layer, effect_info};
 
@@ -42,7 +42,7 @@ fn base() -> Model {
 }
 
 /// Role, bounds, prior mean, prior standard deviation, step.
-type Line = (ParameterRole, f64, f64, f64, f64, f64);
+type Line = (Role, f64, f64, f64, f64, f64);
 
 fn assert_all_close(actual: &[Parameter], expected: &[Line]) {
     assert_eq!(
@@ -69,17 +69,17 @@ fn base_parameters_are_bounded_by_the_assumed_tolerances() {
     assert_all_close(
         &base().shared_parameters(),
         &[
-            (ParameterRole::Stiffness(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
-            (ParameterRole::Friction(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
-            (ParameterRole::Puncture(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
+            (Role::Stiffness(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
+            (Role::Friction(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
+            (Role::Puncture(0), 0.7, 1.3, 1.0, 0.3, 1e-5),
             // At least a fiftieth.
-            (ParameterRole::Stiffness(1), 0.02, 1.99, 1.0, 0.99, 1e-5),
-            (ParameterRole::Friction(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
-            (ParameterRole::Puncture(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
-            (ParameterRole::Surface, -0.001, 0.005, 0.002, 0.0015, 1e-7),
-            (ParameterRole::Thickness(0), 0.0096, 0.0144, 0.012, 0.0012, 1e-7),
+            (Role::Stiffness(1), 0.02, 1.99, 1.0, 0.99, 1e-5),
+            (Role::Friction(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
+            (Role::Puncture(2), 0.75, 1.25, 1.0, 0.25, 1e-5),
+            (Role::Surface, -0.001, 0.005, 0.002, 0.0015, 1e-7),
+            (Role::Thickness(0), 0.0096, 0.0144, 0.012, 0.0012, 1e-7),
             // At least a twentieth.
-            (ParameterRole::Thickness(1), 0.0005, 0.022, 0.01, 0.006, 1e-7),
+            (Role::Thickness(1), 0.0005, 0.022, 0.01, 0.006, 1e-7),
         ],
     );
     let mut fixed = base();
@@ -87,9 +87,8 @@ fn base_parameters_are_bounded_by_the_assumed_tolerances() {
     assert_eq!(fixed.shared_parameters().len(), 6);
     // Two tolerances, or five.
     let mut far = base();
-    let of = |m: &Model| {
-        m.shared_parameters().into_iter().find(|n| n.role == ParameterRole::Thickness(0)).expect("free")
-    };
+    let of =
+        |m: &Model| m.shared_parameters().into_iter().find(|n| n.role == Role::Thickness(0)).expect("free");
     for (is_far, low, high) in [(false, 0.0096, 0.0144), (true, 0.006, 0.018)] {
         far.free.wide_thickness = is_far;
         assert_close(of(&far).low, low);
@@ -101,9 +100,7 @@ fn base_parameters_are_bounded_by_the_assumed_tolerances() {
     }
     let mut sure = assumptions();
     sure.surface_tolerance_m = 0.0;
-    assert!(
-        !Model::base(Arc::new(sure), 1).shared_parameters().iter().any(|n| n.role == ParameterRole::Surface)
-    );
+    assert!(!Model::base(Arc::new(sure), 1).shared_parameters().iter().any(|n| n.role == Role::Surface));
 }
 
 #[test]
@@ -114,14 +111,11 @@ fn effect_parameters_are_bounded_by_the_search_range() {
         .with_effect(term("rate_dependent_puncture", &[-0.2]))
         .with_effect(term("periodic_interference", &[0.02, 4.0, 0.5]))
         .with_effect(term("release_depth", &[2.0, 1e-3]));
-    let of = |effect: usize, parameter: usize| ParameterRole::Effect { effect, parameter };
+    let of = |effect: usize, parameter: usize| Role::Effect { effect, parameter };
     let at = |effect: usize| model.effects[effect].coordinates();
     let ln = libm::log;
-    let actual: Vec<Parameter> = model
-        .shared_parameters()
-        .into_iter()
-        .filter(|n| matches!(n.role, ParameterRole::Effect { .. }))
-        .collect();
+    let actual: Vec<Parameter> =
+        model.shared_parameters().into_iter().filter(|n| matches!(n.role, Role::Effect { .. })).collect();
     let line = |effect: usize, parameter: usize| {
         let p = &model.effects[effect].info.parameters[parameter];
         let (from, to) = p.search;
@@ -172,7 +166,7 @@ fn effect_parameters_are_bounded_by_the_search_range() {
         TiedParameter { effect: 0, parameter: 1, tied_to: None },
         TiedParameter { effect: 3, parameter: 0, tied_to: Some(0) },
     ];
-    let left: Vec<ParameterRole> = bound.shared_parameters().iter().map(|n| n.role).collect();
+    let left: Vec<Role> = bound.shared_parameters().iter().map(|n| n.role).collect();
     assert_eq!(left.len() + 2, model.shared_parameters().len());
     assert!(
         left.contains(&of(0, 0))
@@ -187,24 +181,24 @@ fn random_effects_have_the_scatter_as_prior() {
     let mut model = base()
         .with_effect(term("release_depth", &[2.0, 1e-3]))
         .with_effect(term("release_depth", &[1.0, 2e-3]));
-    let rupture_times = |n: usize| (0..n).map(|l| (ParameterRole::RuptureTime(l), -NO, NO, 0.0, NO, 1e-5));
+    let rupture_times = |n: usize| (0..n).map(|l| (Role::RuptureTime(l), -NO, NO, 0.0, NO, 1e-5));
     assert_all_close(&model.recording_parameters(), &rupture_times(3).collect::<Vec<_>>());
     model.scatter = Scatter {
         surface_m: 7e-4,
         ln_friction: 0.03,
         day_surface_m: 1.1e-3,
         day_ln_friction: 0.07,
-        ..Scatter::default()
+        ..Default::default()
     };
     model.scatter.varying[1] = 3e-4;
     (model.free.recording_surface, model.free.recording_friction, model.free.recording_effects) =
         (true, true, true);
     let own = [
-        (ParameterRole::RecordingSurface, -NO, NO, 0.0, 7e-4, 1e-7),
-        (ParameterRole::RecordingFriction, -NO, NO, 0.0, 0.03, 1e-5),
+        (Role::RecordingSurface, -NO, NO, 0.0, 7e-4, 1e-7),
+        (Role::RecordingFriction, -NO, NO, 0.0, 0.03, 1e-5),
         // The library's value without an estimate.
-        (ParameterRole::RecordingEffect(0), -NO, NO, 0.0, 5e-4, 5e-7),
-        (ParameterRole::RecordingEffect(1), -NO, NO, 0.0, 3e-4, 5e-7),
+        (Role::RecordingEffect(0), -NO, NO, 0.0, 5e-4, 5e-7),
+        (Role::RecordingEffect(1), -NO, NO, 0.0, 3e-4, 5e-7),
     ];
     assert_all_close(
         &model.recording_parameters(),
@@ -223,10 +217,10 @@ fn random_effects_have_the_scatter_as_prior() {
     assert_all_close(
         &model.shared_parameters()[before..],
         &[
-            (ParameterRole::DaySurface(0), -NO, NO, 0.0, 1.1e-3, 1e-7),
-            (ParameterRole::DayFriction(0), -NO, NO, 0.0, 0.07, 1e-5),
-            (ParameterRole::DaySurface(1), -NO, NO, 0.0, 1.1e-3, 1e-7),
-            (ParameterRole::DayFriction(1), -NO, NO, 0.0, 0.07, 1e-5),
+            (Role::DaySurface(0), -NO, NO, 0.0, 1.1e-3, 1e-7),
+            (Role::DayFriction(0), -NO, NO, 0.0, 0.07, 1e-5),
+            (Role::DaySurface(1), -NO, NO, 0.0, 1.1e-3, 1e-7),
+            (Role::DayFriction(1), -NO, NO, 0.0, 0.07, 1e-5),
         ],
     );
 }
@@ -254,10 +248,10 @@ fn setting_a_parameter_changes_no_other() {
     for (k, n) in parameters.iter().enumerate() {
         let mut moved = model.clone();
         let x = match n.role {
-            ParameterRole::Stiffness(_) | ParameterRole::Friction(_) | ParameterRole::Puncture(_) => 1.17,
-            ParameterRole::Effect { effect: 0, parameter: 1 } => libm::log(1.3),
-            ParameterRole::Effect { effect: 1, .. } => 1.0 / 900.0,
-            ParameterRole::Effect { .. } => model.get(n.role, 0) * 1.2,
+            Role::Stiffness(_) | Role::Friction(_) | Role::Puncture(_) => 1.17,
+            Role::Effect { effect: 0, parameter: 1 } => libm::log(1.3),
+            Role::Effect { effect: 1, .. } => 1.0 / 900.0,
+            Role::Effect { .. } => model.get(n.role, 0) * 1.2,
             _ => 0.0123,
         };
         moved.set(n.role, 2, x);
@@ -271,19 +265,19 @@ fn setting_a_parameter_changes_no_other() {
     }
     // In their own units.
     let mut moved = model.clone();
-    moved.set(ParameterRole::Stiffness(1), 0, 1.2);
-    moved.set(ParameterRole::Friction(2), 0, 0.9);
-    moved.set(ParameterRole::Puncture(2), 0, 1.1);
-    moved.set(ParameterRole::Puncture(1), 0, 1.1);
+    moved.set(Role::Stiffness(1), 0, 1.2);
+    moved.set(Role::Friction(2), 0, 0.9);
+    moved.set(Role::Puncture(2), 0, 1.1);
+    moved.set(Role::Puncture(1), 0, 1.1);
     assert_close(moved.tissue.layers[1].stiffness_n_per_m, 180.0);
     assert_close(moved.tissue.layers[2].friction_ns_per_m2, 5400.0);
     assert_close(moved.tissue.layers[2].puncture_n.expect("a force"), 1.21);
     assert_eq!(moved.tissue.layers[1].puncture_n, None);
-    assert_eq!(model.get(ParameterRole::Puncture(1), 0), 1.0);
-    moved.set(ParameterRole::Effect { effect: 1, parameter: 0 }, 0, 0.0);
+    assert_eq!(model.get(Role::Puncture(1), 0), 1.0);
+    moved.set(Role::Effect { effect: 1, parameter: 0 }, 0, 0.0);
     assert_eq!(moved.effects[1].values, [f64::INFINITY]);
-    assert_eq!(moved.get(ParameterRole::Effect { effect: 1, parameter: 0 }, 0), 0.0);
-    moved.set(ParameterRole::Effect { effect: 1, parameter: 0 }, 0, -0.1);
+    assert_eq!(moved.get(Role::Effect { effect: 1, parameter: 0 }, 0), 0.0);
+    moved.set(Role::Effect { effect: 1, parameter: 0 }, 0, -0.1);
     assert_eq!(moved.effects[1].values, [f64::INFINITY]);
 }
 
@@ -297,7 +291,7 @@ fn a_tied_parameter_follows_the_other_one() {
         TiedParameter { effect: 2, parameter: 1, tied_to: Some(0) },
         TiedParameter { effect: 1, parameter: 1, tied_to: None },
     ];
-    model.set(ParameterRole::Effect { effect: 0, parameter: 1 }, 0, 4e-3);
+    model.set(Role::Effect { effect: 0, parameter: 1 }, 0, 4e-3);
     let values: Vec<Vec<f64>> = model.effects.iter().map(|e| e.values.clone()).collect();
     assert_eq!(values, [vec![1.0, 4e-3], vec![2.0, 2e-3], vec![3.0, 4e-3]]);
 }
@@ -357,8 +351,7 @@ fn a_compiled_law_contains_recording_and_day_parameters() {
     );
     assert_close(plain.true_over_recorded, 1.0 / 1.02);
     assert!(plain.break_positions_m.is_empty());
-    model.per_recording[1] =
-        RecordingParameters { surface_m: 4e-4, ln_friction: 0.2, ..RecordingParameters::default() };
+    model.per_recording[1] = RecordingParameters { surface_m: 4e-4, ln_friction: 0.2, ..Default::default() };
     (model.day_of, model.days) = (vec![0; 3], vec![DayParameters { surface_m: -1e-4, ln_friction: 0.1 }]);
     model.per_recording[1].varying[0] = 5e-4;
     let own = model.compile(1).expect("a law");
@@ -407,20 +400,17 @@ fn break_positions_are_membranes_and_interfaces_of_tip_effects() {
 
 #[test]
 fn per_recording_roles_are_distinguished() {
-    for role in [
-        ParameterRole::RecordingSurface,
-        ParameterRole::RecordingFriction,
-        ParameterRole::RecordingEffect(3),
-        ParameterRole::RuptureTime(1),
-    ] {
+    for role in
+        [Role::RecordingSurface, Role::RecordingFriction, Role::RecordingEffect(3), Role::RuptureTime(1)]
+    {
         assert!(role.is_per_recording());
     }
     for role in [
-        ParameterRole::Surface,
-        ParameterRole::Stiffness(0),
-        ParameterRole::DaySurface(0),
-        ParameterRole::DayFriction(1),
-        ParameterRole::Effect { effect: 0, parameter: 0 },
+        Role::Surface,
+        Role::Stiffness(0),
+        Role::DaySurface(0),
+        Role::DayFriction(1),
+        Role::Effect { effect: 0, parameter: 0 },
     ] {
         assert!(!role.is_per_recording());
     }
@@ -433,7 +423,7 @@ fn library_expectations_are_priors() {
     let values: Vec<f64> = slips.parameters.iter().map(|p| p.start).collect();
     let model = base().with_effect(EffectTerm::new(slips, &values));
     for n in model.shared_parameters() {
-        let ParameterRole::Effect { parameter, .. } = n.role else { continue };
+        let Role::Effect { parameter, .. } = n.role else { continue };
         let path = slips.parameters[parameter].path;
         let expected = if path == "rate" { (-0.1, 0.1) } else { (0.0, f64::INFINITY) };
         assert_eq!((n.prior_mean, n.prior_sd), expected, "{path}");

@@ -172,7 +172,7 @@ impl<'a> SegmentFit<'a> {
             middle: self.middle,
             half: self.half,
             poly,
-            sinusoids: sinusoids,
+            sinusoids,
             sd_m: variance.sqrt(),
             cost: 0.5 * n * libm::log(variance) + parameters * libm::log(n),
             white: false,

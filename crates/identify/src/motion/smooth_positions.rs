@@ -89,7 +89,7 @@ pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
         .unzip();
     let jumps = jumps.into_iter().zip(&ramps).filter(|(_, r)| r.is_none()).map(|(k, _)| k).collect();
     let mut sds: Vec<f64> = intervals.iter().flat_map(|s| s.sds.iter().copied()).collect();
-    SmoothedMotion { position_m: z, velocity_mps: v, jumps: jumps, sd_mps: median(&mut sds).max(1e-9) }
+    SmoothedMotion { position_m: z, velocity_mps: v, jumps, sd_mps: median(&mut sds).max(1e-9) }
 }
 
 /// The velocity jump between two intervals.

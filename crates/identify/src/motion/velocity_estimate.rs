@@ -97,7 +97,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
             v[i] = slope_at(&t[lo..hi], &z[lo..hi], t[i]);
         }
     }
-    VelocityEstimate { velocity_mps: v, sd_mps: noise_m * gain(half), jumps: jumps }
+    VelocityEstimate { velocity_mps: v, sd_mps: noise_m * gain(half), jumps }
 }
 
 /// Standard deviation of position noise from third divided differences, which are insensitive to irregular

@@ -71,17 +71,13 @@ impl Noise {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::block_averages::{BLOCK_S, BlockAverages};
-    use crate::test_support::{assert_close, normal};
-    use stylet_record::Recording;
+    use crate::block_averages::BlockAverages;
+    use crate::test_support::{assert_close, normal, sampled};
     use stylet_stats::order_statistics::quantile_of_sorted;
 
     /// Blocks of a needle at rest.
     pub(in crate::noise) fn still(blocks: usize) -> BlockAverages {
-        let t: Vec<f64> = (0..4 * blocks).map(|k| k as f64 / 200.0).collect();
-        let zero = vec![0.0; t.len()];
-        let r = Recording::new(t, zero.clone(), zero).expect("a recording");
-        let b = BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S);
+        let b = sampled(4 * blocks, |_| 0.0, |_| 0.0);
         assert_eq!(b.len(), blocks);
         b
     }
@@ -135,11 +131,7 @@ mod tests {
     /// blocks would count as several independent observations.
     #[test]
     fn slow_drift_continues_through_a_break() {
-        let n = 12_000;
-        let t: Vec<f64> = (0..4 * n).map(|k| f64::from(k) / 200.0).collect();
-        let zero = vec![0.0; t.len()];
-        let r = Recording::new(t, zero.clone(), zero).expect("a recording");
-        let mut b = BlockAverages::new(&r, &vec![false; r.time_s.len()], BLOCK_S);
+        let mut b = still(12_000);
         for k in (0..b.len()).filter(|k| k % 40 == 0) {
             b.used[k] = false;
             b.memory_reset[k + 1] = true;

@@ -1,7 +1,5 @@
 use super::*;
-use crate::block_averages::BLOCK_S;
 use crate::test_support::{base_model, sampled};
-use stylet_record::Recording;
 
 /// Layers by thickness (mm), stiffness (N/m) and puncture force (N), starting at 10 mm; tolerances of a
 /// fifth and a tenth.
@@ -160,9 +158,7 @@ fn layers_rupture_in_order() {
 /// Insertion at 10 mm/s to `to_mm`, a hold, retraction after 5 s.
 fn there_and_back(to_mm: f64) -> BlockAverages {
     let there_s = (to_mm - 0.1) / 10.0;
-    let t: Vec<f64> = (0..1800).map(|k| f64::from(k) * 0.005).collect();
-    let z = t.iter().map(|t| 1e-4 + 0.01 * (t.min(there_s) - (t - 5.0).max(0.0))).collect();
-    BlockAverages::new(&Recording::new(t, z, vec![0.0; 1800]).expect("a recording"), &[], BLOCK_S)
+    sampled(1800, |t| 1e-4 + 0.01 * (t.min(there_s) - (t - 5.0).max(0.0)), |_| 0.0)
 }
 
 #[test]

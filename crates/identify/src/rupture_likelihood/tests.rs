@@ -6,7 +6,7 @@ use crate::model::Scatter;
 use stylet_stats::normal;
 
 fn scatter(force: f64, place_m: f64) -> Scatter {
-    Scatter { rupture_force: force, rupture_depth_m: place_m, ..Scatter::default() }
+    Scatter { rupture_force: force, rupture_depth_m: place_m, ..Default::default() }
 }
 
 /// A ruptured layer with its force 3 % above the threshold, 0.4 mm before the far interface.
