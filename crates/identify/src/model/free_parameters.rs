@@ -11,7 +11,7 @@ pub struct FreeParameters {
     pub recording_surface: bool,
     /// Friction factor per recording.
     pub recording_friction: bool,
-    /// Per-recording deviations of varying effect parameters ([`stylet_tissue::ParameterInfo::differs`]).
+    /// Per-recording deviations of varying effect parameters ([`stylet_tissue::ParameterInfo::between_recordings_sd`]).
     pub recording_effects: bool,
     /// Surface offset per day.
     pub day_surface: bool,
