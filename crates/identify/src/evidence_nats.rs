@@ -8,11 +8,11 @@ use core::marker::PhantomData;
 use core::ops::{Neg, Sub};
 
 /// A value in nats on the basis `B`.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Nats<B>(f64, PhantomData<B>);
 
 /// Gain under the residual noise of the larger of two models, priors and ruptures of both included.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct UnderLargerModelNoise;
 
 impl<B> Nats<B> {
@@ -39,26 +39,6 @@ impl<B> Nats<B> {
     #[must_use]
     pub fn total_cmp(&self, other: &Self) -> Ordering {
         self.0.total_cmp(&other.0)
-    }
-}
-
-impl<B> Clone for Nats<B> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<B> Copy for Nats<B> {}
-
-impl<B> PartialEq for Nats<B> {
-    fn eq(&self, other: &Self) -> bool {
-        self.0 == other.0
-    }
-}
-
-impl<B> PartialOrd for Nats<B> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.0.partial_cmp(&other.0)
     }
 }
 

@@ -31,3 +31,10 @@ pub enum PlanError {
     #[error("the planned insertion cannot be simulated: {0}")]
     Simulate(#[from] stylet_testbed::SimulateError),
 }
+
+impl PlanError {
+    /// The model of the scenario cannot be replayed.
+    pub(crate) fn no_force() -> Self {
+        Self::NoForce("check stiffness, friction and effects of the scenario".to_owned())
+    }
+}

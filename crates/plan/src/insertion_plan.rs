@@ -147,7 +147,8 @@ pub fn p_decided(
 
 /// Plans the next insertion.
 ///
-/// # Errors [`PlanError`] when the limits cannot be satisfied or the model cannot be replayed.
+/// # Errors
+/// [`PlanError`] when the limits cannot be satisfied or the model cannot be replayed.
 pub fn plan(
     state: &InformationState,
     limits: &Limits,
@@ -160,7 +161,8 @@ pub fn plan(
 
 /// The plan with one of the motions found.
 ///
-/// # Errors [`PlanError::NoForce`] when there is no such motion.
+/// # Errors
+/// [`PlanError::NoForce`] when there is no such motion.
 pub(crate) fn plan_with_motion(
     state: &InformationState,
     limits: &Limits,

@@ -26,7 +26,8 @@ pub struct Limits {
 impl Limits {
     /// Checks that all limits are positive numbers.
     ///
-    /// # Errors [`PlanError::Limit`] with the field and an admissible value.
+    /// # Errors
+    /// [`PlanError::Limit`] with the field and an admissible value.
     pub fn check(&self) -> Result<(), PlanError> {
         let all = [
             ("speed_mps", self.speed_mps, "a positive speed in m/s, such as 0.008"),

@@ -67,7 +67,8 @@ fn score(state: &InformationState, information: &Information, pairs: &[(usize, u
 
 /// Searches the best motions within limits.
 ///
-/// # Errors [`PlanError::Infeasible`] when no motion satisfies the limits, [`PlanError::NoForce`] when none can
+/// # Errors
+/// [`PlanError::Infeasible`] when no motion satisfies the limits, [`PlanError::NoForce`] when none can
 /// be replayed.
 pub fn search_motions(
     state: &InformationState,
@@ -96,9 +97,9 @@ pub fn search_motions(
     let forces: Vec<Option<f64>> =
         blocks.par_iter().map(|b| b.as_ref().and_then(|b| expected_peak_force_n(state, b))).collect();
     if forces.iter().all(Option::is_none) {
-        return Err(PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()));
+        return Err(PlanError::no_force());
     }
-    let weakest = forces.iter().flatten().fold(f64::INFINITY, |m: f64, f| m.min(*f));
+    let smallest_n = forces.iter().flatten().fold(f64::INFINITY, |m: f64, f| m.min(*f));
     let safe: Vec<((Vec<f64>, Motion), BlockAverages, f64)> = sampled
         .into_iter()
         .zip(blocks)
@@ -108,7 +109,7 @@ pub fn search_motions(
     if safe.is_empty() {
         return Err(PlanError::Infeasible {
             why: format!(
-                "force_n is {} N, and every sampled motion to {:.1} mm is expected to need at least {weakest:.2} N",
+                "force_n is {} N, and every sampled motion to {:.1} mm is expected to need at least {smallest_n:.2} N",
                 limits.force_n,
                 1e3 * limits.depth_m.min(begin.max_depth_m)
             ),
@@ -134,16 +135,16 @@ pub fn search_motions(
     if all.is_empty() {
         return Err(PlanError::NoForce("no motion can be compared".to_owned()));
     }
-    let mut looked_at = all.len();
+    let mut evaluated = all.len();
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
     for k in 0..REFINED_MOTIONS.min(all.len()) {
         let (better, tried) = refine_motion(state, limits, begin, &all[k], &distinguishable, known, k);
-        looked_at += tried;
+        evaluated += tried;
         all[k] = better;
     }
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
     all.truncate(5);
-    Ok(MotionSearchResult { best: all, distinguishable, indistinguishable, motions_evaluated: looked_at })
+    Ok(MotionSearchResult { best: all, distinguishable, indistinguishable, motions_evaluated: evaluated })
 }
 
 /// Largest force in N expected under any candidate, plus three standard deviations of the noise.

@@ -42,7 +42,8 @@ struct SimulationCheck<'a> {
 /// come from insertions not used for the selection. `progress` receives a message per step. The plan does not
 /// depend on the machine's speed.
 ///
-/// # Errors [`PlanError`] when a planned insertion can be neither simulated nor diagnosed.
+/// # Errors
+/// [`PlanError`] when a planned insertion can be neither simulated nor diagnosed.
 pub fn check_by_simulation(
     found: &MotionSearchResult,
     limits: &Limits,
@@ -51,7 +52,7 @@ pub fn check_by_simulation(
     old: &[NamedRecording],
     mut progress: impl FnMut(&str),
 ) -> Result<Plan, PlanError> {
-    let bench = SimulationCheck {
+    let check = SimulationCheck {
         assumed,
         information: state,
         recordings: old,
@@ -60,24 +61,33 @@ pub fn check_by_simulation(
     let mut order: Vec<usize> = (0..state.candidates.len()).collect();
     order.sort_by(|a, b| state.candidates[*b].probability.total_cmp(&state.candidates[*a].probability));
     order.truncate(TESTED_CANDIDATES);
-    let raced = &order[..order.len().min(COMPARED_CANDIDATES)];
+    let compared = &order[..order.len().min(COMPARED_CANDIDATES)];
     let mut outcomes: Vec<Vec<bool>> = Vec::new();
     let mut spent = 0;
     for (k, motion) in found.best.iter().enumerate() {
         // Assumes equal cost per motion and leaves work for the test of the selected one.
-        let each = spent / (k * raced.len()).max(1) as u64;
-        if k > 0 && spent + each * (raced.len() + order.len()) as u64 > MAX_REPLAYED_BLOCKS {
+        let each = spent / (k * compared.len()).max(1) as u64;
+        if k > 0 && spent + each * (compared.len() + order.len()) as u64 > MAX_REPLAYED_BLOCKS {
             break;
         }
         let of = found.best.len();
-        progress(&format!("motion {} of {of}: simulating and diagnosing {} candidates", k + 1, raced.len()));
-        let jobs: Vec<(usize, u64)> = raced.iter().map(|c| (*c, SELECTION_SEED)).collect();
-        outcomes.push(bench.diagnose_all(&motion.motion, &jobs, &mut spent)?);
+        progress(&format!(
+            "motion {} of {of}: simulating and diagnosing {} candidates",
+            k + 1,
+            compared.len()
+        ));
+        let jobs: Vec<(usize, u64)> = compared.iter().map(|c| (*c, SELECTION_SEED)).collect();
+        outcomes.push(check.diagnose_all(&motion.motion, &jobs, &mut spent)?);
     }
-    let each = spent / (outcomes.len() * raced.len()).max(1) as u64;
+    let each = spent / (outcomes.len() * compared.len()).max(1) as u64;
     // Weighted by the candidates' probabilities; the first of equals.
     let value = |of: &[bool]| -> f64 {
-        raced.iter().zip(of).filter(|(_, right)| **right).map(|(c, _)| state.candidates[*c].probability).sum()
+        compared
+            .iter()
+            .zip(of)
+            .filter(|(_, correct)| **correct)
+            .map(|(c, _)| state.candidates[*c].probability)
+            .sum()
     };
     let which = outcomes
         .iter()
@@ -92,23 +102,23 @@ pub fn check_by_simulation(
     for (alternative, k) in plan.alternatives.iter_mut().zip(others) {
         let of = outcomes.get(k).map_or(&[][..], Vec::as_slice);
         alternative.simulated = of.len();
-        alternative.correct = of.iter().filter(|right| **right).count();
+        alternative.correct = of.iter().filter(|correct| **correct).count();
     }
     let mut tried: Vec<CandidateTrials> = order
         .iter()
         .map(|c| CandidateTrials { candidate: state.name(*c).to_owned(), trials: 0, correct: 0 })
         .collect();
-    let mut judged = false;
-    if let [only] = outcomes.as_slice() {
+    let mut tested = false;
+    if let [single] = outcomes.as_slice() {
         // With a single motion nothing was selected, so its simulations count as a test.
-        judged = spent + each * order.len() as u64 > MAX_REPLAYED_BLOCKS;
-        for (tried, right) in tried.iter_mut().zip(only) {
+        tested = spent + each * order.len() as u64 > MAX_REPLAYED_BLOCKS;
+        for (tried, correct) in tried.iter_mut().zip(single) {
             tried.trials += 1;
-            tried.correct += usize::from(*right);
+            tried.correct += usize::from(*correct);
         }
     }
     for round in 0..TEST_ROUNDS {
-        if judged && spent + each * order.len() as u64 > MAX_REPLAYED_BLOCKS {
+        if tested && spent + each * order.len() as u64 > MAX_REPLAYED_BLOCKS {
             break;
         }
         progress(&format!(
@@ -117,11 +127,11 @@ pub fn check_by_simulation(
             order.len()
         ));
         let jobs: Vec<(usize, u64)> = order.iter().map(|c| (*c, TEST_SEED + round)).collect();
-        for (tried, right) in tried.iter_mut().zip(bench.diagnose_all(&plan.motion, &jobs, &mut spent)?) {
+        for (tried, correct) in tried.iter_mut().zip(check.diagnose_all(&plan.motion, &jobs, &mut spent)?) {
             tried.trials += 1;
-            tried.correct += usize::from(right);
+            tried.correct += usize::from(correct);
         }
-        judged = true;
+        tested = true;
     }
     let weights: Vec<f64> = order.iter().map(|c| state.candidates[*c].probability).collect();
     let sum: f64 = weights.iter().sum();

@@ -40,7 +40,8 @@ pub fn start_conditions(scenario: &Scenario, start_m: Option<f64>) -> StartCondi
 /// Information and candidates after a diagnosis: the class that it could not resolve, or else the effects that
 /// were not identifiable.
 ///
-/// # Errors [`PlanError::NoForce`] when the model cannot be replayed.
+/// # Errors
+/// [`PlanError::NoForce`] when the model cannot be replayed.
 pub fn from_diagnosis(
     scenario: &Scenario,
     examined: &DiagnosisResult,
@@ -58,36 +59,38 @@ pub fn from_diagnosis(
     if let Some(k) = ambiguous {
         base = best.without_effect(k);
         candidates.push(Candidate::with_effect(best.effects[k].clone(), 1.0));
-        for rival in examined
+        for alternative in examined
             .competing_effects
             .get(k)
             .into_iter()
             .flatten()
             .filter(|r| r.nats_behind < EQUIVALENCE_NATS)
         {
-            candidates
-                .push(Candidate::with_effect(rival.choice.clone(), libm::exp(-rival.nats_behind.max(-3.0))));
+            candidates.push(Candidate::with_effect(
+                alternative.choice.clone(),
+                libm::exp(-alternative.nats_behind.max(-3.0)),
+            ));
         }
     } else {
         candidates.push(Candidate::without_effect(1.0));
     }
     let sum: f64 = candidates.iter().map(|c| c.probability).sum();
     let named: Vec<&str> = base.effects.iter().map(|e| e.info.id).collect();
-    let hidden: Vec<EffectTerm> = general_effects()
+    let others: Vec<EffectTerm> = general_effects()
         .filter(|i| d.not_identifiable.iter().any(|n| n == i.id) && !named.contains(&i.id))
         .filter(|i| candidates.iter().all(|c| c.name != i.id))
         .filter_map(typical_effect)
         .collect();
-    let unseen = if hidden.is_empty() {
+    let other_probability = if others.is_empty() {
         0.0
     } else if ambiguous.is_some() {
         0.5 * OTHER_EFFECTS_PROBABILITY
     } else {
         OTHER_EFFECTS_PROBABILITY
     };
-    candidates.iter_mut().for_each(|c| c.probability *= (1.0 - unseen) / sum);
-    let each = unseen / hidden.len().max(1) as f64;
-    candidates.extend(hidden.into_iter().map(|c| Candidate::with_effect(c, each)));
+    candidates.iter_mut().for_each(|c| c.probability *= (1.0 - other_probability) / sum);
+    let each = other_probability / others.len().max(1) as f64;
+    candidates.extend(others.into_iter().map(|c| Candidate::with_effect(c, each)));
     let unknown = (d.verdict == Verdict::Unknown).then_some(d.gain.rmse_after_n.max(d.noise.sd_n));
     let first = |b: &BlockAverages| b.sample_time_s.first().map(|t| b.motion.at(*t).0);
     let start = search.data.recordings.iter().filter_map(first).fold(f64::INFINITY, f64::min);
@@ -99,14 +102,15 @@ pub fn from_diagnosis(
         (*search.data.noise).clone(),
         scenario.sample_hz,
     )
-    .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))?;
+    .ok_or_else(PlanError::no_force)?;
     Ok((state, start_conditions(scenario, start.is_finite().then_some(start))))
 }
 
 /// Every effect of the library at its typical size in addition to the diagnosed model, over the available
 /// recordings.
 ///
-/// # Errors [`PlanError::NoForce`] when the model cannot be replayed.
+/// # Errors
+/// [`PlanError::NoForce`] when the model cannot be replayed.
 pub fn from_recordings(
     scenario: &Scenario,
     examined: &DiagnosisResult,
@@ -123,13 +127,14 @@ pub fn from_recordings(
     );
     let noise = (*search.data.noise).clone();
     InformationState::new(base, candidates, None, &search.data.recordings, noise, scenario.sample_hz)
-        .ok_or_else(|| PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned()))
+        .ok_or_else(PlanError::no_force)
 }
 
 /// Candidates before any measurement: no effect, or any one effect of the library at its typical size. The
 /// scenario's own motion, or the given one, counts as executed.
 ///
-/// # Errors [`PlanError::NoForce`] when the model cannot be replayed along the motion.
+/// # Errors
+/// [`PlanError::NoForce`] when the model cannot be replayed along the motion.
 pub fn from_scenario(
     scenario: &Scenario,
     made: Option<&Motion>,
@@ -139,20 +144,19 @@ pub fn from_scenario(
     let start = recording.as_ref().and_then(|r| r.position_m.first().copied());
     let old: Vec<BlockAverages> = recording.iter().map(|r| BlockAverages::new(r, &[], BLOCK_S)).collect();
     let mut base = Model::base(Arc::new(assumptions_of(scenario)), old.len().max(1));
-    let failed = || PlanError::NoForce("check stiffness, friction and effects of the scenario".to_owned());
     for (r, b) in old.iter().enumerate() {
-        let compiled = base.compile(r).ok_or_else(failed)?;
+        let compiled = base.compile(r).ok_or_else(PlanError::no_force)?;
         base.rupture_times_s[r] = free_rupture_times(&compiled, &motion_pieces(&compiled, b));
     }
-    let given: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
-    let choices: Vec<EffectTerm> =
-        general_effects().filter(|i| !given.contains(&i.id)).filter_map(typical_effect).collect();
-    let each = OTHER_EFFECTS_PROBABILITY / choices.len().max(1) as f64;
+    let known: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
+    let terms: Vec<EffectTerm> =
+        general_effects().filter(|i| !known.contains(&i.id)).filter_map(typical_effect).collect();
+    let each = OTHER_EFFECTS_PROBABILITY / terms.len().max(1) as f64;
     let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
-    candidates.extend(choices.into_iter().map(|c| Candidate::with_effect(c, each)));
+    candidates.extend(terms.into_iter().map(|c| Candidate::with_effect(c, each)));
     let state =
         InformationState::new(base, candidates, None, &old, sensor_noise(scenario), scenario.sample_hz)
-            .ok_or_else(failed)?;
+            .ok_or_else(PlanError::no_force)?;
     Ok((state, start_conditions(scenario, start)))
 }
 
