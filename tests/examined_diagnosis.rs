@@ -3,12 +3,14 @@
 
 use stylet_diagnose::prediction::{Refit, predict};
 use stylet_diagnose::{NamedRecording, Options};
-use stylet_examine::{Answer, CaseId, Grade, Hide, Plan, Question, Size, World, Wrong, run, table};
+use stylet_examine::{
+    Answer, CaseId, Hide, Plan, Question, Severity, Size, World, Wrong, results_table, run_cases,
+};
 use stylet_scenario::{Motion, Scenario, Segment};
 
 /// What is believed, and what was measured.
 fn asked(question: &Question) -> Result<(Scenario, Vec<NamedRecording>), String> {
-    let scenario = Scenario::parse("believed.ron", &question.believed_ron).map_err(|e| e.to_string())?;
+    let scenario = Scenario::parse("assumed.ron", &question.assumed_ron).map_err(|e| e.to_string())?;
     let evidence = question.recordings.iter();
     let evidence = evidence.map(|r| NamedRecording {
         name: r.name.clone(),
@@ -26,21 +28,21 @@ fn answer(question: &Question) -> Result<Answer, String> {
     Answer::from_json(&json).map_err(|e| e.to_string())
 }
 
-/// A case of the plain world, all strong and by the largest grade.
+/// A case of the plain world, all strong and by the largest severity.
 fn case(wrong: Wrong, hide: Hide, seed: u64, index: u64) -> CaseId {
-    CaseId { world: World::Plain, wrong, grade: Grade::Large, hide, size: Size::Strong, seed, index }
+    CaseId { world: World::Plain, wrong, severity: Severity::Large, hide, size: Size::Strong, seed, index }
 }
 
 #[test]
 fn in_a_world_that_it_did_not_make_clean_data_are_not_accused_and_strong_effects_are_found() {
     let plan = Plan { hide: vec![Hide::Clean, Hide::One], cases: 8, seed: 1, ..Plan::default() };
-    let outcomes = run(&plan.cases(), None, &answer, &|_, _| {}).expect("a run");
-    let table = table::text(&outcomes);
+    let outcomes = run_cases(&plan.cases(), None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
     println!("{table}");
     let clean: Vec<_> = outcomes.iter().filter(|o| o.id.hide == Hide::Clean).collect();
     assert_eq!(clean.len(), 4);
-    assert!(clean.iter().all(|o| o.worth.right), "{table}");
-    let found = outcomes.iter().filter(|o| o.id.hide == Hide::One && o.worth.right).count();
+    assert!(clean.iter().all(|o| o.worth.correct), "{table}");
+    let found = outcomes.iter().filter(|o| o.id.hide == Hide::One && o.worth.correct).count();
     assert!(found >= 3, "{table}");
     // Something was hidden, and it mattered.
     assert!(outcomes.iter().any(|o| o.strength_sd > 5.0));
@@ -53,9 +55,9 @@ fn a_cutting_force_whose_steps_look_like_ruptures_is_found_from_what_is_believed
     let cases: Vec<CaseId> = [(Wrong::Nothing, 35), (Wrong::ScatterPuncture, 29), (Wrong::Thickness, 1)]
         .map(|(wrong, index)| case(wrong, Hide::One, 128, index))
         .to_vec();
-    let outcomes = run(&cases, None, &answer, &|_, _| {}).expect("a run");
-    let table = table::text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.right), "{table}");
+    let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.correct), "{table}");
 }
 
 /// Further than a thickness may be off: once it was a scale of the positions, friction that is not given back, nothing, or another face.
@@ -70,10 +72,10 @@ fn a_moved_face_is_told_from_thicknesses_that_are_a_little_wrong() {
         (Wrong::ScatterSurface, 21),
     ];
     let outcomes =
-        run(&rows.map(|(wrong, index)| case(wrong, Hide::One, 128, index)), None, &answer, &|_, _| {})
+        run_cases(&rows.map(|(wrong, index)| case(wrong, Hide::One, 128, index)), None, &answer, &|_, _| {})
             .expect("a run");
-    let table = table::text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.worth.right), "{table}");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.worth.correct), "{table}");
     let shifts: Vec<_> =
         outcomes.iter().flat_map(|o| &o.numbers).filter(|n| n.name == "boundary_shift.shift_m").collect();
     assert!(
@@ -91,21 +93,21 @@ fn a_puncture_force_that_depends_on_the_speed_is_found_where_it_was_missed_once(
     let of =
         |(wrong, index): (Wrong, u64)| [case(wrong, Hide::One, 3, index), case(wrong, Hide::Clean, 3, 0)];
     let cases: Vec<CaseId> = rows.into_iter().flat_map(of).collect();
-    let outcomes = run(&cases, None, &answer, &|_, _| {}).expect("a run");
-    let table = table::text(&outcomes);
+    let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
     let (clean, one): (Vec<_>, Vec<_>) = outcomes.iter().partition(|o| o.id.hide == Hide::Clean);
     assert_eq!((clean.len(), one.len()), (4, 4));
-    assert!(clean.iter().all(|o| o.worth.right), "{table}");
-    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.right), "{table}");
+    assert!(clean.iter().all(|o| o.worth.correct), "{table}");
+    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.correct), "{table}");
 }
 
 /// Two lines close together and of one size: one of them was named, and an autoregression took the other for the noise's colour.
 #[test]
 fn beats_are_not_called_a_tone() {
     let outcomes =
-        run(&[case(Wrong::Nothing, Hide::Outside, 142, 6)], None, &answer, &|_, _| {}).expect("a run");
-    let table = table::text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.right), "{table}");
+        run_cases(&[case(Wrong::Nothing, Hide::Outside, 142, 6)], None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.correct), "{table}");
 }
 
 /// A wander of the zero made faces look shifted, and the shift was never weighed under the noise that it left; a tone beside it, or in a
@@ -119,9 +121,9 @@ fn a_wandering_zero_is_no_shifted_face_and_hides_no_tone() {
         (Wrong::Wander, Hide::One, 128, 29),
         (Wrong::Recordings, Hide::One, 128, 18),
     ];
-    let outcomes = run(&cases.map(of), None, &answer, &|_, _| {}).expect("a run");
-    let table = table::text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.worth.right), "{table}");
+    let outcomes = run_cases(&cases.map(of), None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.worth.correct), "{table}");
     assert_eq!(outcomes.iter().filter(|o| o.hidden == ["periodic_interference"]).count(), 2);
 }
 
@@ -131,7 +133,7 @@ fn a_second_time_constant_of_relaxation_is_found_where_there_is_one() {
     for (index, terms) in [(6, 2), (37, 1)] {
         let plan = Plan { hide: vec![Hide::One], cases: index + 1, seed: 128, ..Plan::default() };
         let id = plan.cases().into_iter().next_back().expect("a case");
-        let case = stylet_examine::case(&id).expect("a case");
+        let case = stylet_examine::make_case(&id).expect("a case");
         let truth = case.setup.effects[0].parameters();
         assert!(truth[0].0.starts_with("terms.0.") && truth.len() == 2 * terms, "{truth:?}");
         let (believed, evidence) = asked(&case.question).expect("a scenario");
@@ -151,7 +153,7 @@ fn a_second_time_constant_of_relaxation_is_found_where_there_is_one() {
 fn the_model_of_a_diagnosis_predicts_a_recording_that_took_no_part_to_about_its_noise() {
     let plan = Plan { hide: vec![Hide::One], cases: 2, seed: 1, ..Plan::default() };
     for id in plan.cases() {
-        let case = stylet_examine::case(&id).expect("a case");
+        let case = stylet_examine::make_case(&id).expect("a case");
         let (believed, mut evidence) = asked(&case.question).expect("a scenario");
         let kept = evidence.split_off(evidence.len() - 1);
         let found = stylet_diagnose::diagnose(&believed, &evidence, &Options { brief: true }, |_| {})

@@ -25,7 +25,7 @@ type Row = [f64; 3];
 
 /// An insertion, simulated with this noise seed, as rows of time, position and force.
 fn simulated(scratch: &Scratch, seed: u32) -> Vec<Row> {
-    let believed = scratch.file("believed.ron", BELIEVED);
+    let believed = scratch.file("assumed.ron", BELIEVED);
     let out = scratch.path().join(format!("made-{seed}"));
     let output =
         stylet(&["run", &text(&believed), "--seed", &seed.to_string(), "--quiet", "--out", &text(&out)]);
@@ -88,7 +88,7 @@ fn one_bad_recording_among_good_ones_is_named_in_the_same_words_wherever_it_ente
             &["force_n is 1e300", "remove the row"],
         ),
     ];
-    let believed = text(&scratch.path().join("believed.ron"));
+    let believed = text(&scratch.path().join("assumed.ron"));
     let set = scratch.file(
         "set.ron",
         r#"Dataset(
@@ -157,7 +157,7 @@ fn repeats_are_repaired_as_asked_and_tell_who_is_not_like_the_others() {
         }
         files.push(text(&scratch.file(&format!("run{seed}.csv"), csv(rows))));
     }
-    let believed = text(&scratch.path().join("believed.ron"));
+    let believed = text(&scratch.path().join("assumed.ron"));
     let folder = text(&scratch.path().join("out"));
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let command = [&["diagnose", &believed, "--repeats", "--out", &folder, "--data"], &files[..]].concat();
@@ -194,7 +194,7 @@ fn a_recording_whose_position_zero_lies_elsewhere_is_told() {
     let scratch = Scratch::new("alike-offset");
     let rows = simulated(&scratch, 1);
     let out = text(&scratch.path().join("out"));
-    let believed = text(&scratch.path().join("believed.ron"));
+    let believed = text(&scratch.path().join("assumed.ron"));
     let cases: [(f64, &[&str]); 4] = [
         (1.5, &["begins behind the tissue", "offset: -1.49", "surface_m"]),
         (0.1, &["begins behind the tissue", "offset: -0.09", "surface_m"]),
@@ -222,7 +222,7 @@ fn repeats_without_a_way_back_are_told_without_numbers_that_are_none() {
             text(&scratch.file(&format!("in{seed}.csv"), way_in))
         })
         .collect();
-    let believed = text(&scratch.path().join("believed.ron"));
+    let believed = text(&scratch.path().join("assumed.ron"));
     let out = text(&scratch.path().join("out"));
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let output =
@@ -259,7 +259,7 @@ fn a_recording_too_long_to_be_compared_is_thinned_and_that_is_said() {
         })
     });
     let long = text(&scratch.file("long.csv", csv(dense)));
-    let believed = text(&scratch.path().join("believed.ron"));
+    let believed = text(&scratch.path().join("assumed.ron"));
     let output =
         stylet(&["diagnose", &believed, "--data", &long, "--out", &text(&scratch.path().join("out"))]);
     let stderr_text = flat(&output);

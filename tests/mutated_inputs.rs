@@ -10,8 +10,8 @@ use mutate::{Dice, What, feed, hold};
 use std::path::Path;
 use std::str::from_utf8;
 use stylet::{Diagnosis, DiagnosisInputs, Limits, NamedRecording};
-use stylet_examine::challenge::Key;
-use stylet_examine::{Answer, Outcome, Plan};
+use stylet_examine::challenge_export::AnswerKey;
+use stylet_examine::{Answer, CaseOutcome, Plan};
 use stylet_record::{
     ColumnMap, ReadOptions, Recording, Truth, assess, read_csv_bytes, read_csv_skip_nonfinite,
 };
@@ -220,12 +220,13 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     let baseline = std::fs::read(root().join("scenarios/gates/ci.baseline.json")).expect("it is shipped");
     hold("baseline", 6_000, &[baseline], |bytes| serde_json::from_slice::<Baseline>(bytes).is_ok());
     let cases = Plan { cases: 2, ..Plan::default() }.cases();
-    let outcomes = stylet_examine::run(&cases, None, &|_| Ok(Answer::none()), &|_, _| {}).expect("two cases");
+    let outcomes =
+        stylet_examine::run_cases(&cases, None, &|_| Ok(Answer::none()), &|_, _| {}).expect("two cases");
     let lines: Vec<Vec<u8>> = outcomes.iter().filter_map(|o| serde_json::to_vec(o).ok()).collect();
-    hold("journal", 6_000, &lines, |bytes| serde_json::from_slice::<Outcome>(bytes).is_ok());
-    let key = Key { drawing: 1, cases: cases.iter().map(|id| (id.name(), *id)).collect() };
+    hold("journal", 6_000, &lines, |bytes| serde_json::from_slice::<CaseOutcome>(bytes).is_ok());
+    let key = AnswerKey { drawing: 1, cases: cases.iter().map(|id| (id.name(), *id)).collect() };
     let key = serde_json::to_vec_pretty(&key).expect("a key");
-    hold("key", 6_000, &[key], |bytes| serde_json::from_slice::<Key>(bytes).is_ok());
+    hold("key", 6_000, &[key], |bytes| serde_json::from_slice::<AnswerKey>(bytes).is_ok());
     let mut few = run.simulation.recording.clone();
     few.time_s.truncate(4);
     few.position_m.truncate(4);

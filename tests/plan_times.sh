@@ -11,7 +11,7 @@ trap 'rm -rf "$there"' EXIT
 echo 'Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)' >"$there/limits.ron"
 TIMEFORMAT=%R
 for case in "$there"/cases/cases/*; do
-    plan=("$stylet" plan "$case/believed.ron" --data "$case/1.csv" --limits "$there/limits.ron" --out "$there/plan.ron")
+    plan=("$stylet" plan "$case/assumed.ron" --data "$case/1.csv" --limits "$there/limits.ron" --out "$there/plan.ron")
     quick=$({ time "${plan[@]}" --quick >/dev/null 2>&1; } 2>&1)
     whole=$({ time "${plan[@]}" >/dev/null 2>&1; } 2>&1)
     echo "$(basename "$case"): $quick s without the check, $whole s with it"

@@ -9,9 +9,9 @@
 
 use serde_json::{Value, json};
 use std::sync::OnceLock;
+use stylet_reproduce::all_runs::Study;
 use stylet_reproduce::claims::{self, Claim, Sensitivity, definitions};
-use stylet_reproduce::effect::{Bar, Measured, Part, Scale};
-use stylet_reproduce::study::Study;
+use stylet_reproduce::effect_size::{Bar, Measured, Part, Scale};
 use stylet_reproduce::{Reproduction, plan, reproduce};
 
 /// The seeds that are run in every test.

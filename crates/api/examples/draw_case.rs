@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let case = hidden::case(&drawn);
     let dir = std::path::Path::new(text(1));
     std::fs::create_dir_all(dir)?;
-    std::fs::write(dir.join("believed.ron"), case.believed.to_ron()?)?;
+    std::fs::write(dir.join("assumed.ron"), case.believed.to_ron()?)?;
     for (k, r) in case.recordings.iter().enumerate() {
         let mut csv = Vec::new();
         stylet_record::write_csv(r, None, &[], &mut csv)?;

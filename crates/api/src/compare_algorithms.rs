@@ -7,7 +7,7 @@ use crate::output_files::OutputFiles;
 use rayon::prelude::*;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::Algorithm;
-use stylet_examine::{Case, CaseId, Grade, Hide, Plan, Size, World, Wrong};
+use stylet_examine::{Case, CaseId, Hide, Plan, Severity, Size, World, Wrong};
 use stylet_record::TrueRupture;
 use stylet_scenario::Scenario;
 use stylet_score::{Trace, match_ruptures};
@@ -51,14 +51,14 @@ pub struct CaseGroup {
 /// # Errors
 /// [`Error::Request`] for a word that there is not, with those that there are.
 pub fn case_groups(world: &str, hide: &[String], cases: u64, seed: u64) -> Result<Vec<CaseGroup>, Error> {
-    let world = parse_word("--world", world, World::ALL, World::parse, World::word)?;
+    let world = parse_word("--world", world, World::ALL, World::parse, World::as_str)?;
     hide.iter()
         .map(|given| {
-            let hide = parse_word("--hide", given, Hide::ALL, Hide::parse, Hide::word)?;
+            let hide = parse_word("--hide", given, Hide::ALL, Hide::parse, Hide::as_str)?;
             let plan = Plan {
                 world,
                 wrong: vec![Wrong::Nothing],
-                grades: vec![Grade::Large],
+                severities: vec![Severity::Large],
                 hide: vec![hide],
                 size: Size::Strong,
                 cases,
@@ -85,8 +85,8 @@ impl CaseGroup {
             .cases
             .par_iter()
             .map(|id| {
-                let case =
-                    stylet_examine::case(id).map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
+                let case = stylet_examine::make_case(id)
+                    .map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
                 let scored = algorithms.iter().map(|a| listen(&case, *a)).collect();
                 done(algorithms.len() as u64);
                 Ok(scored)
@@ -109,7 +109,7 @@ impl CaseGroup {
 /// What an algorithm makes of all recordings of a case.
 fn listen(case: &Case, algorithm: Algorithm) -> DetectionCounts {
     let config = EnhanceConfig { algorithm, ..EnhanceConfig::default() };
-    let surface_m = case.setup.believed.surface_m;
+    let surface_m = case.setup.assumed.surface_m;
     let mut all = DetectionCounts::default();
     for (named, there) in case.question.recordings.iter().zip(&case.there) {
         let recording = &named.recording;

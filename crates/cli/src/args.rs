@@ -467,14 +467,14 @@ pub struct CaseArgs {
     /// How much of it: small, medium, large.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "small,medium,large")]
     pub severity: Vec<String>,
-    /// What is hidden in the cases; those of a row and grade go round the list.
+    /// What is hidden in the cases; those of a row and severity go round the list.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "one,one,clean")]
     pub hide: Vec<String>,
     /// How strong that is, in standard deviations of the noise after re-fitting: faint (0.15 to 0.5), medium (0.5 to 5),
     /// strong (5 to 15).
     #[arg(long, value_name = "WORD", default_value = "strong")]
     pub size: String,
-    /// Number of cases per row and grade. World `own`: of all cases; of twenty, eight are clean, eight hide one effect, two
+    /// Number of cases per row and severity. World `own`: of all cases; of twenty, eight are clean, eight hide one effect, two
     /// hide two, two one outside the library.
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub cases: u64,
@@ -501,7 +501,7 @@ Words for --wrong:
   nothing thickness surface surface_each coefficients encoder encoder_steps jitter dropped late growing tails ar1
   ar2 wander hum bits rate layers no_air recordings scatter_puncture scatter_friction scatter_surface five
   geometry
-Words for --hide: clean one two three outside beside instrument.
+Words for --hide: clean one two three outside mixed instrument.
 
 The folder then holds report.html with the map of where the diagnosis fails, the same as SVG, table.txt (rates with 95 %
 Wilson intervals), table.json and cases.jsonl, one line per case: cases in it are not run again, so that a run that

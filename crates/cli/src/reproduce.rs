@@ -24,8 +24,14 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     let mut output = OutputFiles::default();
     let mut text = String::new();
     for claim in &made.claims {
-        let _ =
-            writeln!(text, "({}) {}: {}\n    {}", claim.id, claim.claim, claim.verdict.word(), claim.reason);
+        let _ = writeln!(
+            text,
+            "({}) {}: {}\n    {}",
+            claim.id,
+            claim.claim,
+            claim.verdict.as_str(),
+            claim.reason
+        );
     }
     output.add("claims.json", made.claims_json);
     output.add("switches.json", made.switches_json);

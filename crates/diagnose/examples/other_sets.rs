@@ -18,11 +18,11 @@ use std::error::Error;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::diagnose_set::diagnose_set;
 use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings;
-use stylet_examine::reality::insertion::insert;
-use stylet_examine::reality::motion::{Path, Piece};
-use stylet_examine::reality::rich::{Bristles, Damage, Foundation, Ingredients, Rich, Tearing};
-use stylet_examine::reality::sensor::Instrument;
-use stylet_examine::reality::tissue as real;
+use stylet_examine::simulator::force_sensor::SensorModel;
+use stylet_examine::simulator::insertion::simulate_insertion;
+use stylet_examine::simulator::motion_path::{MotionPath, MotionPiece};
+use stylet_examine::simulator::rich_world::{Bristles, Damage, Foundation, RichEffects, RichWorld, Tearing};
+use stylet_examine::simulator::tissue as real;
 use stylet_record::Recording;
 use stylet_tissue::{AnyEffect, DelayedPuncture, ForceLaw, ForceLawState, ReleaseDepth, ShaftSlip};
 
@@ -165,7 +165,7 @@ fn slipping(layer: usize, rng: &mut ChaCha8Rng) -> Vec<AnyEffect> {
 }
 
 /// What the rich law has.
-fn ingredients(rng: &mut ChaCha8Rng) -> Ingredients {
+fn ingredients(rng: &mut ChaCha8Rng) -> RichEffects {
     let bristles = Bristles {
         share: 0.5 + 0.5 * rng.random::<f64>(),
         delta_m: 5e-4 * times(rng, FACTOR),
@@ -176,27 +176,27 @@ fn ingredients(rng: &mut ChaCha8Rng) -> Ingredients {
     let damage = Damage { exponent: 10.0, time_s: times(rng, FACTOR) };
     let tearing =
         Tearing { steps: 1 + (rng.random::<f64>() * 3.0) as u32, travel_m: 1e-3 * times(rng, FACTOR) };
-    Ingredients {
+    RichEffects {
         bristles: Some(bristles),
         foundation: Some(foundation),
         damage: Some(damage),
         tearing: Some(tearing),
-        ..Ingredients::default()
+        ..RichEffects::default()
     }
 }
 
 type Columns = (Vec<f64>, Vec<f64>, Vec<f64>);
 
-fn path(m: Motion) -> Path {
+fn path(m: Motion) -> MotionPath {
     let travel_s = m.stroke_m / m.speed_mps;
-    Path::new(
+    MotionPath::new(
         0.0,
         vec![
-            Piece::steady(0.0, 0.5),
-            Piece::steady(m.speed_mps, travel_s),
-            Piece::steady(0.0, m.rest_s),
-            Piece::steady(-m.speed_mps, travel_s),
-            Piece::steady(0.0, 0.5),
+            MotionPiece::constant(0.0, 0.5),
+            MotionPiece::constant(m.speed_mps, travel_s),
+            MotionPiece::constant(0.0, m.rest_s),
+            MotionPiece::constant(-m.speed_mps, travel_s),
+            MotionPiece::constant(0.0, 0.5),
         ],
     )
 }
@@ -205,7 +205,7 @@ fn rich_run(
     layers: usize,
     thick_m: f64,
     strong: [f64; 2],
-    with: &Ingredients,
+    with: &RichEffects,
     m: Motion,
     by: Differs,
 ) -> Columns {
@@ -223,7 +223,14 @@ fn rich_run(
     let tissue = real::Tissue { surface_m: 0.004 + by[0], layers: thick };
     let path = path(m);
     let at: Vec<f64> = (0..(path.duration_s() * SAMPLE_HZ) as usize).map(|k| k as f64 / SAMPLE_HZ).collect();
-    let done = insert(&mut Rich::new(&tissue, with), &Instrument::new(&[], 0.0), None, &path, &at, STEP_S);
+    let done = simulate_insertion(
+        &mut RichWorld::new(&tissue, with),
+        &SensorModel::new(&[], 0.0),
+        None,
+        &path,
+        &at,
+        STEP_S,
+    );
     (done.time_s, done.position_m, done.force_n)
 }
 
@@ -257,7 +264,7 @@ fn slip_run(
     let mut out: Columns = Default::default();
     for k in 0..(path.duration_s() * SAMPLE_HZ) as usize {
         let t = k as f64 / SAMPLE_HZ;
-        while t > path.end_of(piece) {
+        while t > path.piece_end_s(piece) {
             piece += 1;
         }
         let at = path.at(piece, t);

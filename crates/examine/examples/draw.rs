@@ -1,7 +1,7 @@
 //! Draws cases and prints what is in them and what the drawing costs:
 //! `cargo run --release -p stylet-examine --example draw -- WRONG GRADE HIDE SIZE CASES SEED WORLD`
 
-use stylet_examine::{CaseId, Grade, Hide, Size, World, Wrong, case};
+use stylet_examine::{CaseId, Hide, Severity, Size, World, Wrong, make_case};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -13,14 +13,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let id = CaseId {
             world: World::parse(word(6)).unwrap_or(World::Plain),
             wrong: Wrong::parse(word(0)).unwrap_or(Wrong::Nothing),
-            grade: Grade::parse(word(1)).unwrap_or(Grade::Large),
+            severity: Severity::parse(word(1)).unwrap_or(Severity::Large),
             hide: Hide::parse(word(2)).unwrap_or(Hide::One),
             size: Size::parse(word(3)).unwrap_or(Size::Strong),
             seed,
             index,
         };
         let start = processor_s();
-        let case = case(&id)?;
+        let case = make_case(&id)?;
         let took = processor_s() - start;
         seconds.push(took);
         let hidden: Vec<String> =
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             case.samples(),
             hidden.join(" + "),
             case.setup.shape.as_ref().map_or("", |s| s.name()),
-            stylet_examine::world::ingredients::names(&case.setup.rich),
+            stylet_examine::cases::rich_world_effects::names(&case.setup.rich),
             case.setup.truth.layers.len()
         );
     }

@@ -2,14 +2,14 @@
 //! `cargo run --release -p stylet-examine --example trace > trace.json; python3 benches/peers/referee_scipy.py trace.json`
 
 use serde_json::json;
-use stylet_examine::reality::effect::Effect;
-use stylet_examine::reality::insertion::insert;
-use stylet_examine::reality::law::Law;
-use stylet_examine::reality::motion::{Path, Piece};
-use stylet_examine::reality::plain::Plain;
-use stylet_examine::reality::rich::{Ingredients, Rich};
-use stylet_examine::reality::sensor::Instrument;
-use stylet_examine::reality::tissue::{Layer, Tissue};
+use stylet_examine::simulator::effect::Effect;
+use stylet_examine::simulator::force_law::ForceLaw;
+use stylet_examine::simulator::force_sensor::SensorModel;
+use stylet_examine::simulator::insertion::simulate_insertion;
+use stylet_examine::simulator::motion_path::{MotionPath, MotionPiece};
+use stylet_examine::simulator::plain_world::PlainWorld;
+use stylet_examine::simulator::rich_world::{RichEffects, RichWorld};
+use stylet_examine::simulator::tissue::{Layer, Tissue};
 
 /// Samples per second.
 const SAMPLE_HZ: f64 = 100.0;
@@ -42,11 +42,11 @@ fn main() {
         [-0.006, 0.0, 0.0, 6.0],
     ];
     let start_m = -0.004;
-    let path = Path::new(
+    let path = MotionPath::new(
         start_m,
         pieces
             .iter()
-            .map(|&[speed_mps, ripple_mps, ripple_hz, duration_s]| Piece::Move {
+            .map(|&[speed_mps, ripple_mps, ripple_hz, duration_s]| MotionPiece::Move {
                 speed_mps,
                 ripple_mps,
                 ripple_hz,
@@ -68,11 +68,11 @@ fn main() {
     let runs: Vec<_> = runs
         .into_iter()
         .map(|(name, effects)| {
-            let mut law: Box<dyn Law> = match &effects {
-                Some(effects) => Box::new(Plain::new(&tissue, effects)),
-                None => Box::new(Rich::new(&tissue, &Ingredients::default())),
+            let mut law: Box<dyn ForceLaw> = match &effects {
+                Some(effects) => Box::new(PlainWorld::new(&tissue, effects)),
+                None => Box::new(RichWorld::new(&tissue, &RichEffects::default())),
             };
-            let there = insert(law.as_mut(), &Instrument::new(&[], 0.0), None, &path, &at, STEP_S);
+            let there = simulate_insertion(law.as_mut(), &SensorModel::new(&[], 0.0), None, &path, &at, STEP_S);
             let numbers: serde_json::Map<String, serde_json::Value> = effects
                 .iter()
                 .flatten()

@@ -3,16 +3,16 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use stylet_examine::case;
-use stylet_examine::challenge::{Key, key_path};
-use stylet_examine::judge::answers::expected;
+use stylet_examine::challenge_export::{AnswerKey, key_path};
+use stylet_examine::make_case;
+use stylet_examine::scoring::expected_answer::expected_answer;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("truth CHALLENGE")?);
-    let key: Key = serde_json::from_slice(&std::fs::read(key_path(&folder))?)?;
+    let key: AnswerKey = serde_json::from_slice(&std::fs::read(key_path(&folder))?)?;
     let mut out = BTreeMap::new();
     for (number, id) in &key.cases {
-        out.insert(number, expected(id, &case(id)?.setup));
+        out.insert(number, expected_answer(id, &make_case(id)?.setup));
     }
     println!("{}", serde_json::to_string_pretty(&out)?);
     Ok(())

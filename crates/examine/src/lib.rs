@@ -25,19 +25,19 @@
 //! | [`plan`], [`run`](mod@run) | which cases, and running an engine on them |
 #![forbid(unsafe_code)]
 
-pub mod challenge;
-pub mod judge;
-pub mod plan;
-pub mod reality;
-pub mod run;
-pub mod stats;
-pub mod world;
+pub mod cases;
+pub mod challenge_export;
+pub mod examination_plan;
+pub mod run_cases;
+pub mod scoring;
+pub mod simulator;
+pub mod success_rate;
 
-pub use judge::answer::{Answer, Verdict};
-pub use judge::outcome::Outcome;
-pub use judge::table;
-pub use plan::Plan;
-pub use run::{RunError, run};
-pub use world::again::Again;
-pub use world::case::{Case, Named, Question, case};
-pub use world::id::{CaseId, Grade, Hide, Size, World, Wrong};
+pub use cases::case_id::{CaseId, Hide, Severity, Size, World, Wrong};
+pub use cases::case_recordings::{Case, NamedFile, Question, make_case};
+pub use cases::second_insertion::SecondInsertion;
+pub use examination_plan::Plan;
+pub use run_cases::{RunError, run_cases};
+pub use scoring::case_outcome::CaseOutcome;
+pub use scoring::diagnosis_answer::{Answer, Verdict};
+pub use scoring::results_table;

@@ -1,15 +1,15 @@
 //! Promise: a challenge holds everything that an entrant needs and nothing of the truth, and answers from outside are judged like
 //! any engine's.
 
-use stylet_examine::{Hide, Plan, challenge};
+use stylet_examine::{Hide, Plan, challenge_export};
 
 #[test]
 fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_judged() {
     let folder = std::env::temp_dir().join(format!("stylet-challenge-{}", std::process::id()));
-    let key = challenge::key_path(&folder);
+    let key = challenge_export::key_path(&folder);
     let plan = Plan { hide: vec![Hide::Clean, Hide::One], cases: 4, seed: 5, ..Plan::default() };
-    assert_eq!(challenge::export(&plan, &folder).expect("a challenge"), 4);
-    let text = std::fs::read_to_string(folder.join("cases/0001/believed.ron")).expect("believed.ron");
+    assert_eq!(challenge_export::export(&plan, &folder).expect("a challenge"), 4);
+    let text = std::fs::read_to_string(folder.join("cases/0001/assumed.ron")).expect("assumed.ron");
     assert!(text.contains("stiffness_n_per_m") && !text.contains("effects: ["), "{text}");
     let csv = std::fs::read_to_string(folder.join("cases/0001/1.csv")).expect("1.csv");
     assert!(csv.starts_with("time_s,position_m,force_n\n"));
@@ -26,17 +26,17 @@ fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_judged() {
         r#"{"0001":{"verdict":"none"},"0002":{"verdict":"none"},"0003":{"verdict":"none"}}"#,
     )
     .expect("answers");
-    let outcomes = challenge::judge(&folder, &answers).expect("judged");
+    let outcomes = challenge_export::score_answers(&folder, &answers).expect("judged");
     assert_eq!(outcomes.len(), 4);
     assert_eq!(outcomes.iter().filter(|o| o.failed.is_some()).count(), 1);
     for o in outcomes.iter().filter(|o| o.failed.is_none() && o.id.hide == Hide::Clean) {
-        assert!(o.worth.right);
+        assert!(o.worth.correct);
     }
 
     std::fs::write(&answers, r#"{"0007":{"verdict":"none"}}"#).expect("answers");
-    let error = challenge::judge(&folder, &answers).expect_err("no such case").to_string();
+    let error = challenge_export::score_answers(&folder, &answers).expect_err("no such case").to_string();
     assert!(error.contains("0007") && error.contains("\"0004\""), "{error}");
-    assert!(challenge::export(&plan, &folder).is_err());
+    assert!(challenge_export::export(&plan, &folder).is_err());
     let _ = std::fs::remove_dir_all(&folder);
     let _ = std::fs::remove_file(key);
 }

@@ -1,17 +1,17 @@
 //! Promises of the two worlds: the rich law with nothing in it is the plain one, the plain one follows the equations of the page,
 //! events do not depend on the step, and the same seed gives the same case.
 
-use stylet_examine::reality::effect::Effect;
-use stylet_examine::reality::insertion::{Insertion, insert};
-use stylet_examine::reality::law::Law;
-use stylet_examine::reality::motion::{Path, Piece};
-use stylet_examine::reality::plain::Plain;
-use stylet_examine::reality::rich::{
-    Bending, Bristles, Damage, Foundation, Ingredients, Membrane, Rich, Tearing,
+use stylet_examine::simulator::effect::Effect;
+use stylet_examine::simulator::force_law::ForceLaw;
+use stylet_examine::simulator::force_sensor::SensorModel;
+use stylet_examine::simulator::insertion::{Insertion, simulate_insertion};
+use stylet_examine::simulator::motion_path::{MotionPath, MotionPiece};
+use stylet_examine::simulator::plain_world::PlainWorld;
+use stylet_examine::simulator::rich_world::{
+    Bending, Bristles, Damage, Foundation, Membrane, RichEffects, RichWorld, Tearing,
 };
-use stylet_examine::reality::sensor::Instrument;
-use stylet_examine::reality::tissue::{Layer, Tissue};
-use stylet_examine::{CaseId, Grade, Hide, Size, World, Wrong, case};
+use stylet_examine::simulator::tissue::{Layer, Tissue};
+use stylet_examine::{CaseId, Hide, Severity, Size, World, Wrong, make_case};
 
 fn tissue() -> Tissue {
     let layer = |thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {
@@ -30,25 +30,25 @@ fn tissue() -> Tissue {
     }
 }
 
-fn path() -> Path {
-    Path::new(
+fn path() -> MotionPath {
+    MotionPath::new(
         -0.004,
         vec![
-            Piece::steady(0.004, 5.0),
-            Piece::Move { speed_mps: 0.003, ripple_mps: 0.002, ripple_hz: 0.7, duration_s: 8.0 },
-            Piece::steady(0.0, 1.5),
-            Piece::steady(-0.003, 1.2),
-            Piece::steady(0.005, 9.0),
-            Piece::steady(0.0, 1.0),
-            Piece::steady(-0.006, 6.0),
+            MotionPiece::constant(0.004, 5.0),
+            MotionPiece::Move { speed_mps: 0.003, ripple_mps: 0.002, ripple_hz: 0.7, duration_s: 8.0 },
+            MotionPiece::constant(0.0, 1.5),
+            MotionPiece::constant(-0.003, 1.2),
+            MotionPiece::constant(0.005, 9.0),
+            MotionPiece::constant(0.0, 1.0),
+            MotionPiece::constant(-0.006, 6.0),
         ],
     )
 }
 
-fn go(law: &mut dyn Law, step_s: f64) -> Insertion {
+fn go(law: &mut dyn ForceLaw, step_s: f64) -> Insertion {
     let path = path();
     let at: Vec<f64> = (0..(path.duration_s() * 200.0) as usize).map(|k| k as f64 / 200.0).collect();
-    insert(law, &Instrument::new(&[], 0.0), None, &path, &at, step_s)
+    simulate_insertion(law, &SensorModel::new(&[], 0.0), None, &path, &at, step_s)
 }
 
 fn largest(force: &[f64]) -> f64 {
@@ -64,8 +64,8 @@ fn differs(a: &[f64], b: &[f64], jumps: usize) -> f64 {
 
 #[test]
 fn the_rich_law_with_nothing_in_it_is_the_plain_law() {
-    let plain = go(&mut Plain::new(&tissue(), &[]), 2e-4);
-    let rich = go(&mut Rich::new(&tissue(), &Ingredients::default()), 2e-4);
+    let plain = go(&mut PlainWorld::new(&tissue(), &[]), 2e-4);
+    let rich = go(&mut RichWorld::new(&tissue(), &RichEffects::default()), 2e-4);
     assert_eq!(plain.ruptures_s.len(), 3);
     for (a, b) in plain.ruptures_s.iter().zip(&rich.ruptures_s) {
         assert!((a - b).abs() < 1e-8, "{a} {b}");
@@ -77,7 +77,7 @@ fn the_rich_law_with_nothing_in_it_is_the_plain_law() {
 /// Not absent, but as good as neutral: what the ingredients do goes to nothing with their numbers.
 #[test]
 fn nearly_neutral_ingredients_leave_the_plain_force_within_a_thousandth() {
-    let nearly = Ingredients {
+    let nearly = RichEffects {
         bristles: Some(Bristles { share: 1.0, delta_m: 1e-7, dry_mps: 0.0, creep_s: f64::INFINITY }),
         foundation: Some(Foundation { softness: 1e-5, lag_s: 0.1 }),
         damage: Some(Damage { exponent: 4000.0, time_s: 1e-3 }),
@@ -85,8 +85,8 @@ fn nearly_neutral_ingredients_leave_the_plain_force_within_a_thousandth() {
         membrane: Some(Membrane { depth_m: 0.04, stiffness_n_per_m: 1e-3, puncture_n: 1.0 }),
         bending: Some(Bending { ratio: 0.1, compliance_m_per_n: 1e-5, length_m: 0.15, rubbing: 1e-4 }),
     };
-    let plain = go(&mut Plain::new(&tissue(), &[]), 2e-4);
-    let rich = go(&mut Rich::new(&tissue(), &nearly), 2e-4);
+    let plain = go(&mut PlainWorld::new(&tissue(), &[]), 2e-4);
+    let rich = go(&mut RichWorld::new(&tissue(), &nearly), 2e-4);
     // Bristles do not jump with the speed: the sample on each of six borders of the motion is left out, and two ruptures'.
     let off = differs(&plain.force_n, &rich.force_n, 8);
     assert!(off < 1e-3 * largest(&plain.force_n), "{off} of {}", largest(&plain.force_n));
@@ -95,25 +95,25 @@ fn nearly_neutral_ingredients_leave_the_plain_force_within_a_thousandth() {
 #[test]
 fn every_rich_ingredient_changes_the_force() {
     let all = [
-        Ingredients {
+        RichEffects {
             bristles: Some(Bristles { share: 0.7, delta_m: 2e-3, dry_mps: 5e-4, creep_s: 4.0 }),
-            ..Ingredients::default()
+            ..RichEffects::default()
         },
-        Ingredients { foundation: Some(Foundation { softness: 0.2, lag_s: 0.5 }), ..Ingredients::default() },
-        Ingredients { damage: Some(Damage { exponent: 8.0, time_s: 0.5 }), ..Ingredients::default() },
-        Ingredients { tearing: Some(Tearing { steps: 3, travel_m: 1e-3 }), ..Ingredients::default() },
-        Ingredients {
+        RichEffects { foundation: Some(Foundation { softness: 0.2, lag_s: 0.5 }), ..RichEffects::default() },
+        RichEffects { damage: Some(Damage { exponent: 8.0, time_s: 0.5 }), ..RichEffects::default() },
+        RichEffects { tearing: Some(Tearing { steps: 3, travel_m: 1e-3 }), ..RichEffects::default() },
+        RichEffects {
             membrane: Some(Membrane { depth_m: 0.034, stiffness_n_per_m: 200.0, puncture_n: 0.6 }),
-            ..Ingredients::default()
+            ..RichEffects::default()
         },
-        Ingredients {
+        RichEffects {
             bending: Some(Bending { ratio: 0.1, compliance_m_per_n: 0.06, length_m: 0.15, rubbing: 0.5 }),
-            ..Ingredients::default()
+            ..RichEffects::default()
         },
     ];
-    let plain = go(&mut Plain::new(&tissue(), &[]), 2e-4);
+    let plain = go(&mut PlainWorld::new(&tissue(), &[]), 2e-4);
     for with in all {
-        let rich = go(&mut Rich::new(&tissue(), &with), 2e-4);
+        let rich = go(&mut RichWorld::new(&tissue(), &with), 2e-4);
         assert_eq!(rich.ruptures_s.len(), 3, "{with:?}");
         let off = differs(&plain.force_n, &rich.force_n, 0);
         assert!(off > 0.05, "{with:?}: {off}");
@@ -124,15 +124,15 @@ fn every_rich_ingredient_changes_the_force() {
 /// The shaft's elements are a refinement, not a law: bristles that all began at the same depth follow one equation.
 #[test]
 fn steady_sliding_of_bristles_is_the_viscous_friction_of_the_page() {
-    let with = Ingredients {
+    let with = RichEffects {
         bristles: Some(Bristles { share: 1.0, delta_m: 1e-3, dry_mps: 0.0, creep_s: f64::INFINITY }),
-        ..Ingredients::default()
+        ..RichEffects::default()
     };
-    let path = Path::new(0.0, vec![Piece::steady(0.003, 40.0)]);
+    let path = MotionPath::new(0.0, vec![MotionPiece::constant(0.003, 40.0)]);
     let at: Vec<f64> = (0..200).map(|k| k as f64 * 0.2).collect();
-    let none = Instrument::new(&[], 0.0);
-    let plain = insert(&mut Plain::new(&tissue(), &[]), &none, None, &path, &at, 2e-4);
-    let rich = insert(&mut Rich::new(&tissue(), &with), &none, None, &path, &at, 2e-4);
+    let none = SensorModel::new(&[], 0.0);
+    let plain = simulate_insertion(&mut PlainWorld::new(&tissue(), &[]), &none, None, &path, &at, 2e-4);
+    let rich = simulate_insertion(&mut RichWorld::new(&tissue(), &with), &none, None, &path, &at, 2e-4);
     // Far behind the stack every element has slid for long.
     let (a, b) = (plain.force_n[199], rich.force_n[199]);
     assert!(a > 1.0 && (a - b).abs() < 1e-6 * a, "{a} {b}");
@@ -145,8 +145,8 @@ fn the_force_does_not_depend_on_the_step() {
         Effect::RateDependentPuncture { alpha: 0.1 },
         Effect::PreslidingFriction { c_n_per_m: 5.0, delta_m: 5e-4 },
     ];
-    let fine = go(&mut Plain::new(&tissue(), &effects), 2e-5);
-    let coarse = go(&mut Plain::new(&tissue(), &effects), 2e-4);
+    let fine = go(&mut PlainWorld::new(&tissue(), &effects), 2e-5);
+    let coarse = go(&mut PlainWorld::new(&tissue(), &effects), 2e-4);
     for (a, b) in fine.ruptures_s.iter().zip(&coarse.ruptures_s) {
         assert!((a - b).abs() < 1e-5, "{a} {b}");
     }
@@ -154,8 +154,8 @@ fn the_force_does_not_depend_on_the_step() {
     assert!(off < 1e-3 * largest(&fine.force_n), "{off}");
     // ... of a compliant needle after a rupture either.
     let bends = [Effect::NeedleCompliance { stiffness_n_per_m: 300.0 }];
-    let fine = go(&mut Plain::new(&tissue(), &bends), 2e-5);
-    let coarse = go(&mut Plain::new(&tissue(), &bends), 2e-4);
+    let fine = go(&mut PlainWorld::new(&tissue(), &bends), 2e-5);
+    let coarse = go(&mut PlainWorld::new(&tissue(), &bends), 2e-4);
     let off = differs(&fine.force_n, &coarse.force_n, 0);
     assert!(off < 1e-3 * largest(&fine.force_n), "{off}");
 }
@@ -172,9 +172,16 @@ fn a_rupture_by_force_comes_where_the_page_says() {
             puncture_n: Some(1.0),
         }],
     };
-    let path = Path::new(-0.004, vec![Piece::steady(0.004, 8.0)]);
+    let path = MotionPath::new(-0.004, vec![MotionPiece::constant(0.004, 8.0)]);
     let at: Vec<f64> = (0..1600).map(|k| k as f64 / 200.0).collect();
-    let there = insert(&mut Plain::new(&one, &[]), &Instrument::new(&[], 0.0), None, &path, &at, 2e-4);
+    let there = simulate_insertion(
+        &mut PlainWorld::new(&one, &[]),
+        &SensorModel::new(&[], 0.0),
+        None,
+        &path,
+        &at,
+        2e-4,
+    );
     // At 20 mm: 1 s in air and 5 s in tissue.
     assert!((there.ruptures_s[0] - 6.0).abs() < 1e-8);
     let force = |t: f64| there.force_n[(t * 200.0) as usize];
@@ -184,20 +191,23 @@ fn a_rupture_by_force_comes_where_the_page_says() {
 
 #[test]
 fn the_same_seed_draws_the_same_case_and_another_another() {
-    let id = |seed, grade| CaseId {
+    let id = |seed, severity| CaseId {
         world: World::Plain,
         wrong: Wrong::Thickness,
-        grade,
+        severity,
         hide: Hide::One,
         size: Size::Strong,
         seed,
         index: 4,
     };
-    let a = case(&id(1, Grade::Large)).expect("a case");
-    let b = case(&id(1, Grade::Large)).expect("a case");
+    let a = make_case(&id(1, Severity::Large)).expect("a case");
+    let b = make_case(&id(1, Severity::Large)).expect("a case");
     assert_eq!(a.question, b.question);
-    assert_ne!(a.question.recordings, case(&id(2, Grade::Large)).expect("a case").question.recordings);
+    assert_ne!(
+        a.question.recordings,
+        make_case(&id(2, Severity::Large)).expect("a case").question.recordings
+    );
     // Less of what is wrong leaves the believed stack as it is.
-    let small = case(&id(1, Grade::Small)).expect("a case");
-    assert_eq!(a.setup.believed, small.setup.believed);
+    let small = make_case(&id(1, Severity::Small)).expect("a case");
+    assert_eq!(a.setup.assumed, small.setup.assumed);
 }

@@ -11,30 +11,30 @@
 //! - [`figures`]: one file per group; [`truth`]: K and b against the truth; [`page`]: all together.
 #![forbid(unsafe_code)]
 
-pub mod case;
-pub mod change;
-pub mod chosen;
+pub mod algorithm_switches;
+pub mod algorithm_variant;
+pub mod all_runs;
+pub mod assumed_value_changes;
+pub mod assumed_values;
+pub mod claim_protocol;
+pub mod claim_verdict;
 pub mod claims;
-pub mod effect;
+pub mod detection_tuning;
+pub mod effect_size;
+pub mod estimates_against_truth;
 pub mod figures;
-pub mod friction;
-pub mod insertion;
-pub mod interval;
-pub mod outcome;
-pub mod page;
-pub mod protocol;
-pub mod source;
-pub mod spread;
-pub mod study;
-pub mod switches;
-pub mod truth;
-pub mod tuning;
-pub mod variant;
-pub mod verdict;
-pub mod view;
+pub mod friction_estimates;
+pub mod paper_experiments;
+pub mod reproduction_page;
+pub mod run_outcome;
+pub mod seed_interval;
+pub mod seed_spread;
+pub mod simulated_insertion;
+pub mod study_conditions;
+pub mod value_source;
 
+use all_runs::{Plan, ReproduceError, Study};
 use claims::Claim;
-use study::{Plan, ReproduceError, Study};
 
 /// Everything that `stylet reproduce` writes.
 #[derive(Clone, Debug)]
@@ -57,8 +57,8 @@ pub fn plan(first_seed: u64, seeds: u64) -> Plan {
     let asking = Study::asking(first_seed, seeds);
     let _ = claims::all(&asking);
     figures::ask(&asking);
-    let _ = switches::section(&asking);
-    let _ = truth::section(&asking, &truth::pictures(&asking));
+    let _ = algorithm_switches::section(&asking);
+    let _ = estimates_against_truth::section(&asking, &estimates_against_truth::pictures(&asking));
     asking.plan()
 }
 
@@ -71,11 +71,11 @@ pub fn reproduce(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Reproduction, 
     let study = Study::run(plan, done)?;
     let claims = claims::all(&study);
     let figures = figures::all(&study)?;
-    let mut pictures = truth::pictures(&study).to_vec();
+    let mut pictures = estimates_against_truth::pictures(&study).to_vec();
     let files: Vec<_> = figures.iter().flat_map(|f| f.files.clone()).collect();
-    let html = page::page(&study, &claims, figures, &pictures).to_html();
+    let html = reproduction_page::page(&study, &claims, figures, &pictures).to_html();
     let claims_json = serde_json::to_string_pretty(&claims)? + "\n";
-    let switches_json = serde_json::to_string_pretty(&switches::record(&study))? + "\n";
+    let switches_json = serde_json::to_string_pretty(&algorithm_switches::record(&study))? + "\n";
     pictures.extend(files);
     Ok(Reproduction { html, claims, claims_json, switches_json, pictures })
 }

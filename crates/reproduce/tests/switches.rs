@@ -1,11 +1,11 @@
 //! Promise: the algorithm's switches that the supplement and the laboratory leave open really run: to the
 //! letter it loses what the completions give, and the derivative may act on drops.
 
-use stylet_reproduce::case::Case;
-use stylet_reproduce::outcome::Outcome;
-use stylet_reproduce::study::Study;
-use stylet_reproduce::variant::Setup;
-use stylet_reproduce::view::View;
+use stylet_reproduce::algorithm_variant::Setup;
+use stylet_reproduce::all_runs::Study;
+use stylet_reproduce::paper_experiments::Case;
+use stylet_reproduce::run_outcome::Outcome;
+use stylet_reproduce::study_conditions::View;
 
 const CASES: [Case; 2] = [Case::LatexConstant, Case::LatexSinusoidal];
 const SETUPS: [Setup; 3] = [Setup::Tuned, Setup::Literal, Setup::FallingForce];

@@ -1,12 +1,12 @@
 //! Promise: the referee's law, written from the page, and the library's law give the same force for every effect of SPEC
 //! section 6. Neither knows the other; where they differ, one of them misreads the page.
 
-use stylet_examine::reality::effect::{Effect, IDS};
-use stylet_examine::reality::insertion::insert;
-use stylet_examine::reality::motion::{Path, Piece};
-use stylet_examine::reality::plain::Plain;
-use stylet_examine::reality::sensor::Instrument;
-use stylet_examine::reality::tissue::{Layer, Tissue};
+use stylet_examine::simulator::effect::{Effect, IDS};
+use stylet_examine::simulator::force_sensor::SensorModel;
+use stylet_examine::simulator::insertion::simulate_insertion;
+use stylet_examine::simulator::motion_path::{MotionPath, MotionPiece};
+use stylet_examine::simulator::plain_world::PlainWorld;
+use stylet_examine::simulator::tissue::{Layer, Tissue};
 use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState, MeasurementChain, SensorInput};
 
 /// Steps of both laws in s.
@@ -29,17 +29,17 @@ fn tissue() -> Tissue {
     }
 }
 
-fn path() -> Path {
-    Path::new(
+fn path() -> MotionPath {
+    MotionPath::new(
         -0.004,
         vec![
-            Piece::steady(0.004, 5.0),
-            Piece::Move { speed_mps: 0.003, ripple_mps: 0.002, ripple_hz: 0.7, duration_s: 8.0 },
-            Piece::steady(0.0, 1.5),
-            Piece::steady(-0.003, 1.2),
-            Piece::steady(0.005, 9.0),
-            Piece::steady(0.0, 1.0),
-            Piece::steady(-0.006, 6.0),
+            MotionPiece::constant(0.004, 5.0),
+            MotionPiece::Move { speed_mps: 0.003, ripple_mps: 0.002, ripple_hz: 0.7, duration_s: 8.0 },
+            MotionPiece::constant(0.0, 1.5),
+            MotionPiece::constant(-0.003, 1.2),
+            MotionPiece::constant(0.005, 9.0),
+            MotionPiece::constant(0.0, 1.0),
+            MotionPiece::constant(-0.006, 6.0),
         ],
     )
 }
@@ -108,7 +108,7 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
     let n = (path.duration_s() / STEP_S) as usize;
     for k in 0..n {
         let time_s = k as f64 * STEP_S;
-        while time_s >= path.end_of(piece) {
+        while time_s >= path.piece_end_s(piece) {
             piece += 1;
         }
         let p = path.at(piece, time_s);
@@ -126,12 +126,12 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
 /// The referee's.
 fn referee(effect: Option<&Effect>) -> Vec<f64> {
     let made: Vec<Effect> = effect.into_iter().copied().collect();
-    let instrument = Instrument::new(&made, 0.0);
+    let instrument = SensorModel::new(&made, 0.0);
     let path = path();
     let n = (path.duration_s() / STEP_S) as usize;
     let at: Vec<f64> = (0..n).step_by(50).map(|k| k as f64 * STEP_S).collect();
-    let mut law = Plain::new(&tissue(), &made);
-    let there = insert(&mut law, &instrument, None, &path, &at, STEP_S);
+    let mut law = PlainWorld::new(&tissue(), &made);
+    let there = simulate_insertion(&mut law, &instrument, None, &path, &at, STEP_S);
     at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect()
 }
 

@@ -22,7 +22,7 @@ pub fn answer_question(question: &Question) -> Result<Answer, String> {
 /// # Errors
 /// What is wrong with the belief.
 pub fn scenario_and_recordings(question: &Question) -> Result<(Scenario, Vec<NamedRecording>), String> {
-    let scenario = Scenario::parse(&question.name, &question.believed_ron).map_err(|e| e.to_string())?;
+    let scenario = Scenario::parse(&question.name, &question.assumed_ron).map_err(|e| e.to_string())?;
     let evidence = question
         .recordings
         .iter()

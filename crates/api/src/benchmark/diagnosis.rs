@@ -5,8 +5,8 @@ use crate::error::Error;
 use crate::output_files::OutputFiles;
 use crate::output_folder::OutputLock;
 use std::path::{Path, PathBuf};
-use stylet_examine::world::hide::{thing, things};
-use stylet_examine::{CaseId, Grade, Hide, Plan, Size, World, Wrong, table};
+use stylet_examine::cases::hide_effects::{hidden_name, hidden_names};
+use stylet_examine::{CaseId, Hide, Plan, Severity, Size, World, Wrong, results_table};
 use stylet_report::pages::examination::{accuracy_maps, page};
 
 /// Which cases are asked for, in words; `all` stands for all words of a list.
@@ -51,20 +51,20 @@ impl CaseSelection<'_> {
     /// [`Error::Request`] for a word that there is not, with those that there are.
     pub fn plan(&self) -> Result<Plan, Error> {
         let one = |given: &str| vec![given.to_owned()];
-        let world = words("--world", &one(self.world), World::ALL, World::parse, World::word)?;
-        let size = words("--size", &one(self.size), Size::ALL, Size::parse, Size::word)?;
+        let world = words("--world", &one(self.world), World::ALL, World::parse, World::as_str)?;
+        let size = words("--size", &one(self.size), Size::ALL, Size::parse, Size::as_str)?;
         let (Some(&world), Some(&size)) = (world.first(), size.first()) else {
             return Err(Error::internal("a list of words is empty"));
         };
         let plan = Plan {
             world,
-            wrong: words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::word)?,
-            grades: words("--severity", self.severity, Grade::ALL, Grade::parse, Grade::word)?,
-            hide: words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::word)?,
+            wrong: words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::as_str)?,
+            severities: words("--severity", self.severity, Severity::ALL, Severity::parse, Severity::as_str)?,
+            hide: words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::as_str)?,
             size,
             cases: self.cases,
             seed: self.seed,
-            only: words("--effect", self.effect, &things(), thing, |t| t)?,
+            only: words("--effect", self.effect, &hidden_names(), hidden_name, |t| t)?,
         };
         if !plan.only.is_empty() && plan.cases().is_empty() {
             return Err(Error::Request(format!(
@@ -96,7 +96,8 @@ impl DiagnosisBenchmark {
         let journal = folder.join("cases.jsonl");
         let mut cases = plan.cases();
         if look {
-            let there = stylet_examine::run::read(&journal).map_err(|why| Error::output(folder, why))?;
+            let there = stylet_examine::run_cases::read_journal(&journal)
+                .map_err(|why| Error::output(folder, why))?;
             cases.retain(|id| there.contains_key(id));
         }
         Ok(Self { cases, plan, journal, claim })
@@ -110,10 +111,12 @@ impl DiagnosisBenchmark {
     pub fn run(&self, threads: usize, tell: &(dyn Fn(usize, usize) + Sync)) -> Result<String, Error> {
         let Self { cases, plan, journal, claim } = self;
         let outcomes = thread_pool(threads)?
-            .install(|| stylet_examine::run(cases, Some(journal), &answer_question::answer_question, tell))
+            .install(|| {
+                stylet_examine::run_cases(cases, Some(journal), &answer_question::answer_question, tell)
+            })
             .map_err(Error::internal)?;
-        let text = table::text(&outcomes);
-        let cells = table::cells(&outcomes);
+        let text = results_table::results_text(&outcomes);
+        let cells = results_table::table_cells(&outcomes);
         let mut output = OutputFiles::default();
         output.add("table.txt", text.clone());
         output.add_json("table.json", &cells)?;
@@ -134,7 +137,7 @@ fn map_name(hide: Hide) -> &'static str {
         Hide::Two => "map_two.svg",
         Hide::Three => "map_three.svg",
         Hide::Outside => "map_outside.svg",
-        Hide::Beside => "map_beside.svg",
+        Hide::Mixed => "map_beside.svg",
         Hide::Instrument => "map_instrument.svg",
     }
 }

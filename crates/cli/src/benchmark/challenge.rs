@@ -2,7 +2,7 @@
 
 use crate::args::{BenchmarkExportArgs, BenchmarkScoreArgs};
 use crate::exit::Failure;
-use stylet_examine::{challenge, table};
+use stylet_examine::{challenge_export, results_table};
 
 /// Writes a challenge.
 ///
@@ -10,11 +10,11 @@ use stylet_examine::{challenge, table};
 /// [`Failure`] with the exit code that fits.
 pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
     let plan = args.cases.selection().plan()?;
-    let written = challenge::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
+    let written = challenge_export::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
     crate::terminal::print(&format!(
         "{written} cases in {}\nThe key, for the judge alone: {}\n",
         args.out.display(),
-        challenge::key_path(&args.out).display()
+        challenge_export::key_path(&args.out).display()
     ))
 }
 
@@ -23,7 +23,7 @@ pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn score(args: &BenchmarkScoreArgs) -> Result<(), Failure> {
-    let outcomes =
-        challenge::judge(&args.folder, &args.answers).map_err(|e| Failure::Check(e.to_string()))?;
-    crate::terminal::print(&table::text(&outcomes))
+    let outcomes = challenge_export::score_answers(&args.folder, &args.answers)
+        .map_err(|e| Failure::Check(e.to_string()))?;
+    crate::terminal::print(&results_table::results_text(&outcomes))
 }

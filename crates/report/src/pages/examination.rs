@@ -3,8 +3,8 @@
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::svg::{FigureOptions, HeatMap, heat_map};
 use std::collections::BTreeSet;
-use stylet_examine::table::Cell as Row;
-use stylet_examine::{Grade, Hide, Plan, Wrong};
+use stylet_examine::results_table::TableCell as Row;
+use stylet_examine::{Hide, Plan, Severity, Wrong};
 
 /// Columns of a map: no misspecification, then its severities.
 const COLUMNS: [&str; 4] = ["none", "small", "medium", "large"];
@@ -20,11 +20,11 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     let of: Vec<&Row> = cells.iter().filter(|c| c.id.hide == hide).collect();
     let rows: BTreeSet<Wrong> = of.iter().map(|c| c.id.wrong).collect();
     let value = |wrong: Wrong, column: usize| {
-        let grade = Grade::ALL.get(column.wrapping_sub(1)).copied();
+        let severity = Severity::ALL.get(column.wrapping_sub(1)).copied();
         of.iter()
             .find(|c| {
                 c.id.wrong == wrong
-                    && if wrong == Wrong::Nothing { column == 0 } else { Some(c.id.grade) == grade }
+                    && if wrong == Wrong::Nothing { column == 0 } else { Some(c.id.severity) == severity }
             })
             .map_or(f64::NAN, |c| c.right.share())
     };
@@ -35,7 +35,7 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     let title = match hide {
         Hide::Clean => "No effect hidden: none reported".to_owned(),
         hide => {
-            let says = hide.says();
+            let says = hide.description();
             let (first, rest) = says.split_at(1);
             format!("{}{rest}: correct, and nothing else", first.to_uppercase())
         }
@@ -43,7 +43,7 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
     let map = HeatMap {
         row_label: "misspecification".to_owned(),
         column_label: "severity".to_owned(),
-        rows: rows.iter().map(|w| w.word().to_owned()).collect(),
+        rows: rows.iter().map(|w| w.as_str().to_owned()).collect(),
         columns: columns.iter().map(|k| COLUMNS[*k].to_owned()).collect(),
         values: rows.iter().map(|w| columns.iter().map(|k| value(*w, *k)).collect()).collect(),
         values_are_fractions: true,
@@ -53,7 +53,7 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
         subtitle: format!(
             "simulator {}, {}, up to {cases} cases per cell, seed {}",
             plan.world,
-            plan.size.says(),
+            plan.size.description(),
             plan.seed
         ),
         width_px: 760.0,
@@ -67,7 +67,7 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
 pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
     let mut worlds = Section::new("Accuracy by misspecification");
     for (hide, markup) in accuracy_maps(plan, cells) {
-        let description = format!("Share of correct diagnoses, {}: {}", hide, hide.says());
+        let description = format!("Share of correct diagnoses, {}: {}", hide, hide.description());
         worlds = worlds.picture(description, markup);
     }
     let mut table = Table::new(
@@ -88,9 +88,9 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
     for c in cells {
         let good = Status::at_most(1.0 - c.right.share(), 0.05, 0.2);
         table.rows.push(vec![
-            Cell::text(c.id.wrong.says()),
-            Cell::text(if c.id.wrong == Wrong::Nothing { "" } else { c.id.grade.word() }),
-            Cell::text(c.id.hide.word()),
+            Cell::text(c.id.wrong.description()),
+            Cell::text(if c.id.wrong == Wrong::Nothing { "" } else { c.id.severity.as_str() }),
+            Cell::text(c.id.hide.as_str()),
             Cell::number(c.right.to_string()).status(good),
             Cell::number(c.all_found.to_string()),
             Cell::number(c.wrong_name.to_string()),
@@ -101,8 +101,8 @@ pub fn page(plan: &Plan, cells: &[Row], text: &str) -> Page {
     }
     Page::new("Benchmark of the diagnosis")
         .subtitle("Cases of an independent simulator; the correct answers were fixed beforehand")
-        .fact("simulator", format!("{}: {}", plan.world, plan.world.says()))
-        .fact("effect size", plan.size.says())
+        .fact("simulator", format!("{}: {}", plan.world, plan.world.description()))
+        .fact("effect size", plan.size.description())
         .fact("seed", plan.seed.to_string())
         .section(worlds)
         .section(Section::new("Rates").table(table).folded("table.txt", text))

@@ -1,9 +1,9 @@
 //! (a1) The friction estimates of the three isinglass phantoms do not overlap.
 
 use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::friction::{MOTIONS, Method, PHANTOMS, estimates};
-use crate::view::View;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates};
+use crate::study_conditions::View;
 
 fn gaps(view: &View<'_>, methods: &[Method]) -> Measured {
     let of = |phantom: usize| -> Vec<Vec<Option<f64>>> {

@@ -1,9 +1,9 @@
 //! (b1, b2) Friction estimated online, and in sinusoidal motion, is slightly lower.
 
 use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::friction::{MOTIONS, Method, PHANTOMS, estimates, over};
-use crate::view::View;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates, over};
+use crate::study_conditions::View;
 
 /// *Slightly* lower: by more than nothing and by less than a quarter.
 const SLIGHTLY: Bar = Bar::Between(0.75, 1.0);

@@ -2,12 +2,12 @@
 //! the liver the multi-layer model renders the elastic part better.
 
 use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
-use crate::case::Case;
-use crate::change::Number;
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::outcome::Outcome;
-use crate::variant::{Ablation, Sensor};
-use crate::view::View;
+use crate::algorithm_variant::{Ablation, Sensor};
+use crate::assumed_value_changes::Number;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::paper_experiments::Case;
+use crate::run_outcome::Outcome;
+use crate::study_conditions::View;
 
 fn ml_over_kv(
     view: &View<'_>,

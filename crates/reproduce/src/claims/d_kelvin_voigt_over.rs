@@ -1,9 +1,9 @@
 //! (d) Kelvin-Voigt over-compensates on 25 % isinglass in sinusoidal motion.
 
 use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
-use crate::case::Case;
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::view::View;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::paper_experiments::Case;
+use crate::study_conditions::View;
 
 /// Over-compensation: a cumulative friction this much above the true one, visible in a figure.
 pub(crate) const VISIBLY: f64 = 1.05;

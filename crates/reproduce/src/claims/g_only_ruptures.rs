@@ -1,11 +1,11 @@
 //! (g) Resetting the covariance only at ruptures reconstructs the force poorly.
 
 use super::{Definition, KNOWN, PUBLISHED, known, protocol, published};
-use crate::case::Case;
-use crate::change::Number;
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::variant::Ablation;
-use crate::view::View;
+use crate::algorithm_variant::Ablation;
+use crate::assumed_value_changes::Number;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::paper_experiments::Case;
+use crate::study_conditions::View;
 
 /// Poorly: a reconstruction error this many times that of the 40 Hz reset.
 const POORLY: Bar = Bar::Above(2.0);

@@ -3,10 +3,10 @@
 
 use super::g_only_ruptures::NUMBERS;
 use super::{Definition, KNOWN, PUBLISHED, known, protocol, published};
-use crate::case::Case;
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::variant::Ablation;
-use crate::view::View;
+use crate::algorithm_variant::Ablation;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::paper_experiments::Case;
+use crate::study_conditions::View;
 
 /// The targets of the supplement's Figs 13, 14, 15.
 const TARGETS: [Case; 3] = [Case::Gel70Sinusoidal, Case::LatexSinusoidal, Case::Liver];

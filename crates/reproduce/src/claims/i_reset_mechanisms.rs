@@ -1,12 +1,12 @@
 //! (i) Resetting at a constant frequency and when the uncertainty falls below a threshold are equivalent.
 
 use super::{Definition, protocol};
-use crate::case::Case;
-use crate::change::Number;
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::outcome::Outcome;
-use crate::variant::Ablation;
-use crate::view::View;
+use crate::algorithm_variant::Ablation;
+use crate::assumed_value_changes::Number;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::paper_experiments::Case;
+use crate::run_outcome::Outcome;
+use crate::study_conditions::View;
 
 /// Equivalent: within a quarter, as is customary (0.8 to 1.25).
 const EQUIVALENT: Bar = Bar::Below(1.25);

@@ -6,11 +6,11 @@
 //! without rounding, so that the identity must hold bit for bit; with the paper's weights up to rounding.
 
 use super::{Definition, protocol};
-use crate::case::Case;
-use crate::effect::{Bar, Measured, Part, Scale};
-use crate::insertion::Insertion;
-use crate::study::NOISE_MN;
-use crate::view::View;
+use crate::all_runs::NOISE_MN;
+use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::paper_experiments::Case;
+use crate::simulated_insertion::Insertion;
+use crate::study_conditions::View;
 use stylet_core::Rls;
 
 /// The prior variance of both parameters, `sigma_0²`.

@@ -5,20 +5,20 @@ mod a_friction_apart;
 mod b_slightly_lower;
 mod c_multi_layer_better;
 mod d_kelvin_voigt_over;
-mod detection;
+mod e_f_detection;
 mod g_only_ruptures;
 mod h_no_reweighting;
 mod i_reset_mechanisms;
 mod j_weighting;
-mod reason;
+mod verdict_reason;
 
-use crate::change::Number;
-use crate::effect::{Bar, Effect, Measured, Says};
-use crate::protocol::Protocol;
-use crate::study::Study;
-use crate::variant::Setup;
-use crate::verdict::{Trial, Verdict, verdict};
-use crate::view::View;
+use crate::algorithm_variant::Setup;
+use crate::all_runs::Study;
+use crate::assumed_value_changes::Number;
+use crate::claim_protocol::Protocol;
+use crate::claim_verdict::{Trial, Verdict, verdict};
+use crate::effect_size::{Bar, Effect, Measured, Says};
+use crate::study_conditions::View;
 use serde::Serialize;
 
 /// Measures a claim under a condition.
@@ -138,7 +138,7 @@ impl Definition {
             .collect();
         let primary = Primary { bar, effect, says, parts };
         let verdict = verdict(says, &trials);
-        let reason = reason::reason(&primary, &trials, &sensitivities);
+        let reason = verdict_reason::reason(&primary, &trials, &sensitivities);
         Claim { sensitivities, trials, ..head(Some(primary), verdict, reason) }
     }
 }
@@ -214,7 +214,7 @@ pub fn definitions() -> Vec<Definition> {
         c_multi_layer_better::on_the_liver(),
         d_kelvin_voigt_over::definition(),
     ];
-    all.extend(detection::definitions());
+    all.extend(e_f_detection::definitions());
     all.extend([
         Definition::untestable(protocol!("f2")),
         g_only_ruptures::definition(),
@@ -274,8 +274,8 @@ mod tests {
     fn constant(view: &View<'_>, value: f64) -> Measured {
         let values = vec![Some(value); view.seeds as usize];
         Measured {
-            scale: crate::effect::Scale::Mean,
-            parts: vec![crate::effect::Part::new("made up", values)],
+            scale: crate::effect_size::Scale::Mean,
+            parts: vec![crate::effect_size::Part::new("made up", values)],
         }
     }
 
@@ -284,7 +284,7 @@ mod tests {
         let study = Study::asking(1, 10);
         let (holds, fails): (Measure, Measure) = (|v| constant(v, 0.0), |v| constant(v, 2.0));
         // Contradicted alone when the noise is doubled: the number decides.
-        let hangs: Measure = |v| constant(v, if v.noise_mn > crate::study::NOISE_MN { 2.0 } else { 0.0 });
+        let hangs: Measure = |v| constant(v, if v.noise_mn > crate::all_runs::NOISE_MN { 2.0 } else { 0.0 });
         for (primary, numbers, expected) in [
             (holds, &[Number::Noise][..], Verdict::Supported),
             (fails, &[Number::Noise], Verdict::Contradicted),

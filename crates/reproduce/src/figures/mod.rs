@@ -1,19 +1,19 @@
 //! The figures: one file per group, each with its number in the supplement (S) or the main paper (M).
 
-mod ablations;
-mod beside;
-mod friction;
-mod insertions;
-mod machine;
-mod panels;
+mod ablation_figures;
+mod friction_figures;
+mod insertion_figures;
+mod insertion_panels;
+mod state_machine;
+mod supplement_comparison;
 
-use crate::case::Case;
-use crate::insertion::Insertion;
-use crate::source::Sourced;
-use crate::study::{NOISE_MN, ReproduceError, Study};
-use crate::tuning::Tuning;
-use crate::variant::Sensor;
-use crate::view::View;
+use crate::algorithm_variant::Sensor;
+use crate::all_runs::{NOISE_MN, ReproduceError, Study};
+use crate::detection_tuning::Tuning;
+use crate::paper_experiments::Case;
+use crate::simulated_insertion::Insertion;
+use crate::study_conditions::View;
+use crate::value_source::Sourced;
 use stylet_report::Chart;
 
 /// A figure of the paper, re-made.
@@ -59,9 +59,9 @@ impl Draw {
 
 /// Notes what the figures look up.
 pub fn ask(study: &Study) {
-    insertions::ask(study);
-    ablations::ask(study);
-    let _ = (friction::figure(study), friction::table_one(study));
+    insertion_figures::ask(study);
+    ablation_figures::ask(study);
+    let _ = (friction_figures::figure(study), friction_figures::table_one(study));
 }
 
 /// All figures in the order of the supplement, those of the main paper at the end.
@@ -69,11 +69,11 @@ pub fn ask(study: &Study) {
 /// # Errors
 /// [`ReproduceError`] when a shipped scenario is wrong.
 pub fn all(study: &Study) -> Result<Vec<Figure>, ReproduceError> {
-    let mut figures = vec![machine::figure(), friction::figure(study)];
-    let (supplement, main) = insertions::figures(study)?;
+    let mut figures = vec![state_machine::figure(), friction_figures::figure(study)];
+    let (supplement, main) = insertion_figures::figures(study)?;
     figures.extend(supplement);
-    figures.extend(ablations::figures(study)?);
-    figures.push(friction::table_one(study));
+    figures.extend(ablation_figures::figures(study)?);
+    figures.push(friction_figures::table_one(study));
     figures.extend(main);
     Ok(figures)
 }

@@ -60,8 +60,9 @@ impl PlanningBenchmark {
             left -= u64::from(c.open_because.is_some() && keep);
             keep
         });
-        let grade = if base.wrong == Wrong::Nothing { String::new() } else { format!(", {}", base.grade) };
-        let name = format!("{}: {}{grade}", base.world, base.wrong.word());
+        let severity =
+            if base.wrong == Wrong::Nothing { String::new() } else { format!(", {}", base.severity) };
+        let name = format!("{}: {}{severity}", base.world, base.wrong.as_str());
         write_table(&mut self.text, &name, &cases);
         self.rows.push((name, cases));
     }

@@ -4,8 +4,8 @@ use crate::benchmark::answer_question::{answer_question, scenario_and_recordings
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use stylet_diagnose::Options;
-use stylet_examine::reality::motion::{Path, Piece};
-use stylet_examine::{Again, Answer, CaseId};
+use stylet_examine::simulator::motion_path::{MotionPath, MotionPiece};
+use stylet_examine::{Answer, CaseId, SecondInsertion};
 use stylet_plan::Limits;
 use stylet_scenario::{Motion, Segment};
 use stylet_tissue::ForceGain;
@@ -61,13 +61,13 @@ pub(super) fn run_case(id: &CaseId) -> PlanningCase {
 
 fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
     let text = |e: &dyn std::fmt::Display| e.to_string();
-    let mut first = Again::new(id);
+    let mut first = SecondInsertion::new(id);
     case.hidden = first.hidden().join("+");
     // A gain cannot be seen in any motion.
     if case.hidden == ForceGain::ID {
         return Ok(());
     }
-    first.insert(first.constant()).map_err(|e| text(&e))?;
+    first.add_insertion(first.constant()).map_err(|e| text(&e))?;
     let (scenario, evidence) = scenario_and_recordings(&first.question())?;
     let examined =
         stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {}).map_err(|e| text(&e))?;
@@ -95,9 +95,9 @@ fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
     let (plan, _) = stylet_plan::plan(&ground, &limits, &begin).map_err(|e| text(&e))?;
     case.plan_s = begun.elapsed().as_secs_f64();
     case.predicted_probability = plan.probability_decided;
-    let second = |path: Path| -> Result<SecondDiagnosis, String> {
+    let second = |path: MotionPath| -> Result<SecondDiagnosis, String> {
         let mut reality = first.clone();
-        reality.insert(path).map_err(|e| e.to_string())?;
+        reality.add_insertion(path).map_err(|e| e.to_string())?;
         let answer = answer_question(&reality.question())?;
         Ok(said(&reality, &answer, &case.hidden))
     };
@@ -107,32 +107,32 @@ fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
     Ok(())
 }
 
-fn said(reality: &Again, answer: &Answer, hidden: &str) -> SecondDiagnosis {
-    let worth = reality.judge(answer);
+fn said(reality: &SecondInsertion, answer: &Answer, hidden: &str) -> SecondDiagnosis {
+    let worth = reality.score_answer(answer);
     SecondDiagnosis {
         causes: answer
             .causes
             .iter()
             .map(|c| std::iter::once(&c.effect).chain(&c.equivalent).cloned().collect())
             .collect(),
-        correct: worth.right && answer.causes.iter().all(|c| c.equivalent.is_empty()),
+        correct: worth.correct && answer.causes.iter().all(|c| c.equivalent.is_empty()),
         hidden_effect_named: answer.causes.iter().any(|c| c.effect == hidden && c.equivalent.is_empty()),
         unknown: answer.verdict == stylet_examine::Verdict::Unknown,
     }
 }
 
 /// A program as the referee's path: both have the same segments.
-fn path_of(motion: &Motion) -> Option<Path> {
+fn path_of(motion: &Motion) -> Option<MotionPath> {
     let Motion::Program { start_m, segments } = motion else { return None };
     let piece = |s: &Segment| match *s {
-        Segment::Move { velocity_mps, duration_s } => Piece::steady(velocity_mps, duration_s),
-        Segment::Hold { duration_s } => Piece::steady(0.0, duration_s),
-        Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s } => Piece::Move {
+        Segment::Move { velocity_mps, duration_s } => MotionPiece::constant(velocity_mps, duration_s),
+        Segment::Hold { duration_s } => MotionPiece::constant(0.0, duration_s),
+        Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s } => MotionPiece::Move {
             speed_mps: velocity_mps,
             ripple_mps: amplitude_mps,
             ripple_hz: frequency_hz,
             duration_s,
         },
     };
-    Some(Path::new(*start_m, segments.iter().map(piece).collect()))
+    Some(MotionPath::new(*start_m, segments.iter().map(piece).collect()))
 }

@@ -2,14 +2,14 @@
 
 use super::second_insertion::PlanningCase;
 use std::fmt::Write as _;
-use stylet_examine::stats::Rate;
+use stylet_examine::success_rate::SuccessRate;
 use stylet_stats::quantile;
 
 /// Adds the cases of a row.
 pub(super) fn write_table(out: &mut String, row: &str, cases: &[PlanningCase]) {
     let open: Vec<&PlanningCase> = cases.iter().filter(|c| c.open_because.is_some()).collect();
     let rate = |of: &[&PlanningCase], holds: &dyn Fn(&PlanningCase) -> bool| {
-        Rate::of(of.iter().copied(), |c| holds(c))
+        SuccessRate::of(of.iter().copied(), |c| holds(c))
     };
     let planned = |c: &PlanningCase| c.planned.as_ref().is_some_and(|s| s.correct);
     let sinusoid = |c: &PlanningCase| c.sinusoid.as_ref().is_some_and(|s| s.correct);

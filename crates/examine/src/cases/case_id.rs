@@ -1,0 +1,166 @@
+//! What names a case: everything about it follows from these words and numbers.
+
+use serde::{Deserialize, Serialize};
+
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $word:literal : $says:literal),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum $name {
+            $($(#[$vdoc])* #[doc = $says] #[serde(rename = $word)] $variant),*
+        }
+        impl $name {
+            /// All of them.
+            pub const ALL: &'static [$name] = &[$($name::$variant),*];
+            /// The word for it.
+            #[must_use]
+            pub fn as_str(self) -> &'static str {
+                match self { $($name::$variant => $word),* }
+            }
+            /// What it means.
+            #[must_use]
+            pub fn description(self) -> &'static str {
+                match self { $($name::$variant => $says),* }
+            }
+            /// By its word.
+            #[must_use]
+            pub fn parse(word: &str) -> Option<Self> {
+                Self::ALL.iter().copied().find(|x| x.as_str() == word)
+            }
+        }
+        impl core::fmt::Display for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.pad(self.as_str())
+            }
+        }
+    };
+}
+
+words! {
+    /// Which law the tissue follows.
+    World {
+        Plain = "plain": "the equations of SPEC sections 2 and 6, written anew",
+        Rich = "rich": "a law of another form: bristles, foundation springs, damage, tearing, a bending needle",
+    }
+}
+
+words! {
+    /// What the believed simulation or the sensor has wrong.
+    Wrong {
+        Nothing = "nothing": "nothing wrong: K, b, F known to 5 %, geometry exact, white or AR(1) noise, 200 Hz",
+        Thickness = "thickness": "every layer's thickness off by up to 2, 5, 10 %",
+        Surface = "surface": "the surface off by up to 0.5, 1, 2 mm, the same in all recordings",
+        SurfaceEach = "surface_each": "the surface off by up to 0.5, 1, 2 mm, in every recording by another amount",
+        Coefficients = "coefficients": "K, b, F off by up to 10, 20, 28 % (tolerance 30 %)",
+        Encoder = "encoder": "encoder noise of 2, 10, 20 um",
+        EncoderSteps = "encoder_steps": "encoder steps of 5, 20, 50 um",
+        Jitter = "jitter": "samples at irregular instants, up to 10, 20, 30 % of the interval off",
+        Dropped = "dropped": "1, 3, 10 % of the samples missing",
+        Late = "late": "the force late by 0.5, 1, 2 samples against the position",
+        Growing = "growing": "noise that grows with 0.5, 1, 2 % of the force",
+        Tails = "tails": "an eighth, a quarter, half of the noise's variance Student t of 3 degrees",
+        Ar1 = "ar1": "AR(1) noise of 0.5, 0.8, 0.95",
+        Ar2 = "ar2": "AR(2) noise of (0.8, -0.3), (1.3, -0.6), (1.6, -0.8)",
+        Wander = "wander": "1/f wander of 0.5, 1, 2 times the noise",
+        Hum = "hum": "mains hum of drifting frequency, amplitude 0.5, 1, 2 times the noise",
+        Bits = "bits": "a 12-bit converter over +-10, 20, 40 N",
+        Rate = "rate": "sampled at 50 Hz, 1 kHz, 5 kHz",
+        Layers = "layers": "one or two layers; five; six of 3 to 40 mm, K 10 to 1000 N/m, F 0.2 to 10 N",
+        NoAir = "no_air": "the recordings begin 1 mm, 0.3 mm before the surface, or on it",
+        Recordings = "recordings": "eight, two, one recordings in place of four",
+        ScatterPuncture = "scatter_puncture": "puncture forces scatter by 1, 3, 6 % between recordings",
+        ScatterFriction = "scatter_friction": "friction scatters by 1, 3, 6 % between recordings",
+        ScatterSurface = "scatter_surface": "the surface scatters by 1, 3, 6 % of the first layer between recordings",
+        Five = "five": "thickness, surface, coefficients, encoder and growing noise at once, at half the size",
+        Geometry = "geometry": "thickness and surface off at once, each as much as in its own row",
+    }
+}
+
+words! {
+    /// How much of it.
+    Severity {
+        Small = "small": "the first of the three amounts",
+        Medium = "medium": "the second",
+        Large = "large": "the third",
+    }
+}
+
+words! {
+    /// What is hidden in a case.
+    Hide {
+        Clean = "clean": "nothing",
+        One = "one": "one effect of the library",
+        Two = "two": "two effects",
+        Three = "three": "three effects",
+        Outside = "outside": "something that the library lacks",
+        Mixed = "mixed": "one effect together with something that the library lacks",
+        Instrument = "instrument": "an instrument fault in six repeats of three motions",
+    }
+}
+
+words! {
+    /// How strong what is hidden is, by the RMS that a base law re-fitted to it leaves.
+    Size {
+        Faint = "faint": "0.15 to 0.5 standard deviations of the noise",
+        Medium = "medium": "0.5 to 5 standard deviations of the noise",
+        Strong = "strong": "5 to 15 standard deviations of the noise",
+    }
+}
+
+/// Which drawing this is: under another number the same name may stand for another case, and outcomes do not mix. 2: every row
+/// hides other effects than its neighbours under the same index.
+pub const GENERATOR_VERSION: u32 = 2;
+
+/// The drawing of files that do not say it.
+pub(crate) fn first_generator_version() -> u32 {
+    1
+}
+
+/// A case by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct CaseId {
+    /// World.
+    pub world: World,
+    /// What is wrong.
+    pub wrong: Wrong,
+    /// How much of it.
+    pub severity: Severity,
+    /// What is hidden.
+    pub hide: Hide,
+    /// How strong it is.
+    pub size: Size,
+    /// Seed of the drawing.
+    pub seed: u64,
+    /// Number of the case among those of its kind.
+    pub index: u64,
+}
+
+impl CaseId {
+    /// A number that belongs to this case alone. The severity does not enter: the same insertion is judged with little and
+    /// with much of what is wrong.
+    #[must_use]
+    pub fn case_seed(&self) -> u64 {
+        let mut h = self.seed ^ 0x51_7c_c1_b7_27_22_0a_95;
+        for part in [self.world as u64, self.wrong as u64, self.hide as u64, self.size as u64, self.index] {
+            h = mix(h ^ part.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        }
+        h
+    }
+
+    /// A name for people and files.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!(
+            "{}-{}-{}-{}-{}-{}-{}",
+            self.world, self.wrong, self.severity, self.hide, self.size, self.seed, self.index
+        )
+    }
+}
+
+/// A bijective scramble of 64 bits (SplitMix64's finaliser, Steele, Lea and Flood 2014).
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

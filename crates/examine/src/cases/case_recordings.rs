@@ -1,0 +1,191 @@
+//! A case: what is believed, what is true, and what was measured.
+
+use super::case_id::{CaseId, World};
+use super::case_setup::set_up_case;
+use super::draw_tissue;
+use super::misspecification_amounts::MisspecificationAmounts;
+use super::unmodelled_shapes::UnmodelledShape;
+use crate::simulator::effect::Effect;
+use crate::simulator::force_law::ForceLaw;
+use crate::simulator::force_sensor::SensorModel;
+use crate::simulator::insertion::{Insertion, UnmodelledForce, simulate_insertion};
+use crate::simulator::motion_path::MotionPath;
+use crate::simulator::plain_world::PlainWorld;
+use crate::simulator::rich_world::{RichEffects, RichWorld};
+use crate::simulator::sensor_noise::{NoiseGenerator, SensorNoise};
+use crate::simulator::tissue::Tissue;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use stylet_record::Recording;
+
+/// Steps of the simulation are at most this long in s: 5 kHz.
+const STEP_S: f64 = 2e-4;
+/// ... and at least two to a sample.
+const STEPS_PER_SAMPLE: f64 = 2.0;
+
+/// Everything about a case but the noise.
+#[derive(Clone, Debug)]
+pub struct CaseSetup {
+    /// How much is wrong.
+    pub amounts: MisspecificationAmounts,
+    /// The stack as it is believed.
+    pub assumed: Tissue,
+    /// The stack as it is.
+    pub truth: Tissue,
+    /// The motions.
+    pub paths: Vec<MotionPath>,
+    /// The noise.
+    pub noise: SensorNoise,
+    /// The law that the tissue follows.
+    pub world: World,
+    /// Ingredients of the rich law.
+    pub rich: RichEffects,
+    /// What of the library is hidden.
+    pub effects: Vec<Effect>,
+    /// What else is.
+    pub shape: Option<UnmodelledShape>,
+    /// Strength of all that is hidden, in noise standard deviations.
+    pub strength_sd: f64,
+}
+
+impl CaseSetup {
+    /// The law of a tissue in this world. The rich law knows no effects of the library but those of tool and sensor.
+    #[must_use]
+    pub fn law(&self, tissue: &Tissue, effects: &[Effect]) -> Box<dyn ForceLaw> {
+        match self.world {
+            World::Plain => Box::new(PlainWorld::new(tissue, effects)),
+            World::Rich => Box::new(RichWorld::new(tissue, &self.rich)),
+        }
+    }
+}
+
+/// One recording under its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedFile {
+    /// Such as a file's name.
+    pub name: String,
+    /// The columns.
+    pub recording: Recording,
+}
+
+/// What an engine is given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Question {
+    /// The case's name; it says nothing about the truth that the recordings do not.
+    pub name: String,
+    /// The believed scenario (RON, SPEC section 8).
+    pub assumed_ron: String,
+    /// What was measured.
+    pub recordings: Vec<NamedFile>,
+}
+
+/// A case with its truth.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Which.
+    pub id: CaseId,
+    /// What is hidden, and how it was measured.
+    pub setup: CaseSetup,
+    /// What an engine is given.
+    pub question: Question,
+    /// What each recording met, without noise.
+    pub there: Vec<Insertion>,
+}
+/// Draws a case.
+///
+/// # Errors
+/// When the columns make no recording, which is a mistake of the referee.
+pub fn make_case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
+    let setup = set_up_case(id);
+    let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());
+    rng.set_stream(0);
+    let (mut recordings, mut there) = (Vec::new(), Vec::new());
+    for (k, path) in setup.paths.iter().enumerate() {
+        let mut own = ChaCha8Rng::seed_from_u64(rng.random());
+        let (recording, insertion) = measure(&setup, path, &mut own)?;
+        recordings.push(NamedFile { name: format!("{}.csv", k + 1), recording });
+        there.push(insertion);
+    }
+    let name = format!("case {:016x}", id.case_seed());
+    let believed_ron = draw_tissue::scenario_ron(&name, &setup.assumed, setup.amounts.rate_hz);
+    Ok(Case { id: *id, question: Question { name, assumed_ron: believed_ron, recordings }, setup, there })
+}
+
+/// Instants at which samples are taken in s.
+fn sample_times_s(path: &MotionPath, amounts: &MisspecificationAmounts, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let n = (path.duration_s() * amounts.rate_hz) as usize;
+    let mut out = Vec::with_capacity(n);
+    let mut missing = 0;
+    for k in 0..n {
+        let off = if k == 0 { 0.0 } else { amounts.jitter * (rng.random::<f64>() - 0.5) * 2.0 };
+        let lost = rng.random::<f64>();
+        let run = rng.random_range(1..=3);
+        if missing == 0 && k > 0 && lost < amounts.dropped / 2.0 {
+            missing = run;
+        }
+        if missing > 0 {
+            missing -= 1;
+            continue;
+        }
+        out.push((k as f64 + off) / amounts.rate_hz);
+    }
+    out
+}
+
+pub(crate) fn measure(
+    setup: &CaseSetup,
+    path: &MotionPath,
+    rng: &mut ChaCha8Rng,
+) -> Result<(Recording, Insertion), stylet_record::RecordError> {
+    let amounts = &setup.amounts;
+    let interval_s = 1.0 / amounts.rate_hz;
+    let mut met_rng = ChaCha8Rng::seed_from_u64(rng.random());
+    let mut time_rng = ChaCha8Rng::seed_from_u64(rng.random());
+    let mut noise_rng = ChaCha8Rng::seed_from_u64(rng.random());
+    let mut encoder_rng = ChaCha8Rng::seed_from_u64(rng.random());
+    let tissue = draw_tissue::draw_encountered_tissue(&mut met_rng, &setup.truth, amounts);
+    let mut instrument = SensorModel::new(&setup.effects, amounts.delay_s());
+    if let Some(range) = amounts.bits_range_n {
+        instrument = instrument.with_rounding(2.0 * range / 4096.0);
+    }
+    let at = sample_times_s(path, amounts, &mut time_rng);
+    let mut law = setup.law(&tissue, &setup.effects);
+    let mut strange = setup.shape.clone();
+    let strange = strange.as_mut().map(|s| s as &mut dyn UnmodelledForce);
+    let step_s = STEP_S.min(interval_s / STEPS_PER_SAMPLE);
+    let there = simulate_insertion(law.as_mut(), &instrument, strange, path, &at, step_s);
+    let mut noise = setup.noise.clone();
+    noise.spikes = setup.effects.iter().find_map(|e| match *e {
+        Effect::ForceSpikes { rate_hz, size_n } => Some((rate_hz, size_n)),
+        _ => None,
+    });
+    let mut source = NoiseGenerator::new(&noise, &mut noise_rng);
+    let force: Vec<f64> = there
+        .time_s
+        .iter()
+        .zip(&there.force_n)
+        .map(|(&t, &f)| {
+            let e = source.next(t, f, interval_s);
+            instrument.reading_n(t, f, e)
+        })
+        .collect();
+    let position: Vec<f64> = there
+        .position_m
+        .iter()
+        .map(|&z| {
+            let e: f64 = rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut encoder_rng);
+            let z = instrument.position_m(z) + amounts.encoder_m * e;
+            let q = amounts.encoder_step_m;
+            if q > 0.0 { libm::round(z / q) * q } else { z }
+        })
+        .collect();
+    Ok((Recording::new(there.time_s.clone(), position, force)?, there))
+}
+
+impl Case {
+    /// Samples of all recordings.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.question.recordings.iter().map(|r| r.recording.len()).sum()
+    }
+}

@@ -1,0 +1,57 @@
+//! Whether what is hidden can be seen by anybody.
+
+use super::case_id::Size;
+use super::case_recordings::CaseSetup;
+use super::effect_strength::simulate_effects;
+use crate::simulator::effect::Effect;
+
+/// The least distance in m from a rupture at which a membrane breaks: nearer ones are one event to anybody.
+const MEMBRANE_APART_M: f64 = 2e-3;
+
+/// Whether a membrane breaks clear of every rupture of a layer.
+pub fn is_clear_of_ruptures(setup: &CaseSetup) -> bool {
+    setup.effects.iter().all(|e| match *e {
+        Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
+            let breaks_m = setup.truth.surface_m + depth_m + puncture_n / stiffness_n_per_m;
+            breaks_m < setup.truth.end_m()
+                && simulate_effects(setup, &setup.effects, None).iter().all(|(there, _)| {
+                    there.ruptures_s.iter().all(|r| {
+                        let k = there.time_s.partition_point(|t| t < r).min(there.position_m.len() - 1);
+                        (there.position_m[k] - breaks_m).abs() > MEMBRANE_APART_M
+                    })
+                })
+        }
+        _ => true,
+    })
+}
+
+/// Whether a puncture force that depends on speed does so where it can be seen: at least one layer gives way by force in two
+/// recordings at forces that differ by as much as the size asks for.
+pub fn is_identified_by_ruptures(setup: &CaseSetup, size: Size) -> bool {
+    let depends = setup.effects.iter().any(|e| matches!(e, Effect::RateDependentPuncture { .. }));
+    if !depends || setup.paths.len() < 2 {
+        return true;
+    }
+    let least = match size {
+        Size::Faint => 0.005,
+        Size::Medium => 0.015,
+        Size::Strong => 0.05,
+    };
+    let all = simulate_effects(setup, &setup.effects, None);
+    (0..setup.truth.layers.len()).any(|i| {
+        let layer = &setup.truth.layers[i];
+        let front = setup.truth.front_m(i);
+        let mut forces = Vec::new();
+        for (there, _) in &all {
+            let Some(r) = there.ruptures_s.get(i) else { continue };
+            let k = there.time_s.partition_point(|t| t < r).min(there.position_m.len() - 1);
+            let x = there.position_m[k] - front;
+            if x < 0.97 * layer.thickness_m {
+                forces.push(x * layer.stiffness_n_per_m);
+            }
+        }
+        let high = forces.iter().fold(0.0, |m: f64, f| m.max(*f));
+        let low = forces.iter().fold(f64::INFINITY, |m: f64, f| m.min(*f));
+        forces.len() >= 2 && high - low >= least * high
+    })
+}

@@ -1,0 +1,286 @@
+//! Hiding effects, ingredients and shapes in a case, at the strength aimed at.
+
+use super::case_id::{CaseId, Hide, World};
+use super::case_recordings::CaseSetup;
+use super::draw_effect::{self, EffectContext};
+use super::effect_strength::{RefitTerms, max_force_n, unexplained_rms_n};
+use super::rich_world_effects::{self, RICH_EFFECTS};
+use super::unmodelled_shapes::{UNMODELLED_SHAPES, UnmodelledShape};
+use crate::simulator::effect::{Effect, IDS};
+use crate::simulator::rich_world::RichEffects;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+
+/// Effects that a tissue of one layer cannot have, or that cannot be told apart from one another when together.
+fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
+    let punctured = setup.truth.layers.iter().any(|l| l.puncture_n.is_some());
+    match effect {
+        Effect::BoundaryShift { .. } => setup.truth.layers.len() > 1,
+        Effect::RateDependentPuncture { .. } => punctured,
+        _ => true,
+    }
+}
+
+/// Pairs of which one contains the other, or that are one and the same for the base law.
+fn apart(a: &Effect, b: &Effect) -> bool {
+    const FAMILIES: [&[&str]; 3] = [
+        &["coulomb_friction", "stribeck_friction", "presliding_friction"],
+        &["boundary_shift", "position_scale"],
+        &["low_pass_lag", "time_delay"],
+    ];
+    a.id() != b.id() && !FAMILIES.iter().any(|f| f.contains(&a.id()) && f.contains(&b.id()))
+}
+
+/// Instrument faults, as issue and data sheets name them.
+const INSTRUMENT: [&str; 8] = [
+    "force_gain",
+    "force_bias",
+    "force_drift",
+    "periodic_interference",
+    "saturation",
+    "quantisation",
+    "time_delay",
+    "low_pass_lag",
+];
+
+fn number_of(id: &str) -> usize {
+    IDS.iter().position(|x| *x == id).unwrap_or(0)
+}
+
+/// Hides what the case's name asks for, `target_n` in N of residual in all.
+pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
+    let largest = max_force_n(setup);
+    let sd = setup.noise.sd_n;
+    let truth = setup.truth.clone();
+    let case = EffectContext {
+        tissue: &truth,
+        largest_n: largest,
+        rate_hz: setup.amounts.rate_hz,
+        coefficients: setup.amounts.coefficients,
+        size: id.size,
+    };
+    if id.world == World::Rich {
+        enrich(rng, id, setup, target_n);
+    }
+    let count = match id.hide {
+        Hide::One | Hide::Two | Hide::Three if id.world == World::Rich => 0,
+        Hide::Clean | Hide::Outside => 0,
+        Hide::One | Hide::Mixed | Hide::Instrument => 1,
+        Hide::Two => 2,
+        Hide::Three => 3,
+    };
+    let each = target_n / f64::from(count.max(1) as u32).sqrt();
+    for k in 0..count {
+        let effect = (0..200u64).find_map(|turn| {
+            let which = match (id.hide, k) {
+                // Every effect equally often; where one does not fit, the next.
+                (Hide::Instrument, _) => {
+                    let n = INSTRUMENT.len();
+                    number_of(INSTRUMENT[(in_turn(id, n) + turn as usize) % n])
+                }
+                (Hide::Mixed, _) if id.world == World::Rich => {
+                    let n = INSTRUMENT.len() - 1;
+                    number_of(INSTRUMENT[1 + (in_turn(id, n) + turn as usize) % n])
+                }
+                (_, 0) => (in_turn(id, IDS.len()) + turn as usize) % IDS.len(),
+                _ => rng.random_range(0..IDS.len()),
+            };
+            let e = draw_effect::draw_effect(rng, which, &case);
+            // Where several are asked for, none is one that nobody can see.
+            let lone = matches!(id.hide, Hide::One | Hide::Instrument);
+            let seen = lone || !matches!(e, Effect::ForceGain { .. });
+            (seen && fits(&e, setup) && setup.effects.iter().all(|o| apart(o, &e))).then_some(e)
+        });
+        let Some(effect) = effect else { continue };
+        setup.effects.push(strengthened(setup, effect, each, largest));
+    }
+    if id.hide == Hide::Outside || (id.hide == Hide::Mixed && id.world == World::Plain) {
+        let mut u = [0.0; 6];
+        u.iter_mut().for_each(|x| *x = rng.random());
+        let kind = in_turn(id, UNMODELLED_SHAPES.len());
+        let mut shape = UnmodelledShape::new(kind, u, sd);
+        for _ in 0..2 {
+            let left = unexplained_rms_n(setup, &[], Some(&shape), RefitTerms::Common);
+            shape = shape.scaled_to((shape.size_n * target_n / left.max(1e-6)).min(5.0));
+        }
+        setup.shape = Some(shape);
+    }
+    setup.strength_sd = match (&setup.shape, count) {
+        (None, 0) if setup.rich == RichEffects::default() => 0.0,
+        (Some(shape), 0) => unexplained_rms_n(setup, &[], Some(shape), RefitTerms::Common) / sd,
+        _ => unexplained_rms_n(setup, &setup.effects, None, RefitTerms::Nothing) / sd,
+    };
+}
+
+/// How many ingredients of the rich law a case has, and they.
+fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
+    let count = match id.hide {
+        Hide::One | Hide::Mixed => 1,
+        Hide::Two => 2,
+        Hide::Three => 3,
+        Hide::Clean | Hide::Outside | Hide::Instrument => 0,
+    };
+    let truth = setup.truth.clone();
+    let mut all = RichEffects::default();
+    for k in 0..count {
+        let turn = if k == 0 { 0 } else { rng.random_range(1..RICH_EFFECTS.len()) };
+        let which = (in_turn(id, RICH_EFFECTS.len()) + turn) % RICH_EFFECTS.len();
+        let mut one = RichEffects::default();
+        rich_world_effects::add_rich_effect(rng, which, &truth, id.size, &mut one);
+        for _ in 0..5 {
+            setup.rich = one;
+            let left = unexplained_rms_n(setup, &[], None, RefitTerms::Nothing);
+            let factor = (target_n / f64::from(count).sqrt() / left.max(1e-9)).clamp(0.05, 20.0);
+            match rich_world_effects::scaled(&one, factor) {
+                Some(next) if !(0.87..1.15).contains(&factor) && next != one => one = next,
+                _ => break,
+            }
+        }
+        all = rich_world_effects::combine(&all, &one);
+    }
+    setup.rich = all;
+}
+
+/// All that a case's number can ask for: the library's effects and the shapes outside it.
+#[must_use]
+pub fn hidden_names() -> Vec<&'static str> {
+    IDS.iter().chain(&UNMODELLED_SHAPES).copied().collect()
+}
+
+/// One of [`things`] by its name.
+#[must_use]
+pub fn hidden_name(name: &str) -> Option<&'static str> {
+    hidden_names().into_iter().find(|t| *t == name)
+}
+
+/// What a case's number asks it to hide first: an effect, a shape outside the library, or nothing. Where the stack cannot have
+/// an effect, the next of the list is hidden instead.
+#[must_use]
+pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
+    match id.hide {
+        Hide::Clean => None,
+        Hide::Outside => Some(UNMODELLED_SHAPES[in_turn(id, UNMODELLED_SHAPES.len())]),
+        Hide::Instrument => Some(INSTRUMENT[in_turn(id, INSTRUMENT.len())]),
+        _ if id.world == World::Rich => None,
+        _ => Some(IDS[in_turn(id, IDS.len())]),
+    }
+}
+
+/// Which of `n` things the case hides. In every row each comes once in `n` cases, in an order that the seed shuffles anew for
+/// every round; rows begin at different places of it (a cyclic Latin square with its rows shuffled), so that the same number of
+/// another row is another thing and a few cases of all rows hold everything about equally often. The severity does not
+/// enter: the same insertion is judged with little and with much of what is wrong.
+fn in_turn(id: &CaseId, n: usize) -> usize {
+    let round = id.index / n as u64;
+    let world = if id.world == World::Plain { 0 } else { 0x6a09_e667_f3bc_c909 };
+    let order = shuffled(id.seed ^ world ^ round.wrapping_mul(0x9e37_79b9_7f4a_7c15), n);
+    let starts = shuffled(id.seed ^ world ^ n as u64 ^ 0xbb67_ae85_84ca_a73b, n);
+    let start = starts[id.wrong as usize % n];
+    order[((id.index % n as u64) as usize + start) % n]
+}
+
+/// The numbers `0..n` in an order of the seed's.
+fn shuffled(seed: u64, n: usize) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut order: Vec<usize> = (0..n).collect();
+    for k in (1..n).rev() {
+        order.swap(k, rng.random_range(0..=k));
+    }
+    order
+}
+
+/// The effect at the strength aimed at, as nearly as plausible numbers allow.
+fn strengthened(setup: &CaseSetup, effect: Effect, target_n: f64, largest_n: f64) -> Effect {
+    let mut effect = effect;
+    for _ in 0..5 {
+        let left = unexplained_rms_n(setup, &[effect], None, RefitTerms::Nothing);
+        let factor = (target_n / left.max(1e-9)).clamp(0.05, 20.0);
+        if (0.87..1.15).contains(&factor) {
+            break;
+        }
+        match draw_effect::scaled(&effect, factor, largest_n) {
+            Some(next) if next != effect => effect = next,
+            _ => break,
+        }
+    }
+    effect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases::case_id::{Severity, Size, Wrong};
+    use crate::cases::case_setup::set_up_case;
+    use rayon::prelude::*;
+
+    fn id(wrong: Wrong, hide: Hide, index: u64) -> CaseId {
+        CaseId {
+            world: World::Plain,
+            wrong,
+            severity: Severity::Large,
+            hide,
+            size: Size::Strong,
+            seed: 77,
+            index,
+        }
+    }
+
+    /// How often each of `n` things is drawn in `cases` of every row.
+    fn counts(n: usize, cases: u64) -> Vec<usize> {
+        let mut of = vec![0; n];
+        for wrong in Wrong::ALL {
+            (0..cases).for_each(|k| of[in_turn(&id(*wrong, Hide::One, k), n)] += 1);
+        }
+        of
+    }
+
+    #[test]
+    fn in_every_row_each_thing_comes_once_a_round() {
+        for n in [IDS.len(), UNMODELLED_SHAPES.len(), RICH_EFFECTS.len(), INSTRUMENT.len()] {
+            for wrong in Wrong::ALL {
+                for round in 0..2 {
+                    let from = round * n as u64;
+                    let mut drawn: Vec<usize> =
+                        (from..from + n as u64).map(|k| in_turn(&id(*wrong, Hide::One, k), n)).collect();
+                    drawn.sort_unstable();
+                    assert_eq!(drawn, (0..n).collect::<Vec<_>>(), "{wrong}, round {round}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_number_of_another_row_hides_something_else() {
+        // A few cases of every row hold every effect and every shape, each about as often.
+        for n in [IDS.len(), UNMODELLED_SHAPES.len()] {
+            for cases in [1, 2, 4, 7] {
+                let of = counts(n, cases);
+                let mean = (Wrong::ALL.len() as u64 * cases) as f64 / n as f64;
+                assert!(of.iter().all(|c| (*c as f64 - mean).abs() <= cases as f64), "{n}, {cases}: {of:?}");
+            }
+            assert!(counts(n, 2).iter().all(|c| *c > 0));
+        }
+    }
+
+    #[test]
+    fn all_effects_and_all_outside_shapes_are_hidden_in_two_cases_of_every_row() {
+        let first = |what: usize, n: usize| {
+            let mut all = Wrong::ALL.iter().flat_map(|w| [(*w, 0), (*w, 1)]);
+            all.find(|(wrong, k)| in_turn(&id(*wrong, Hide::One, *k), n) == what)
+        };
+        (0..IDS.len() + UNMODELLED_SHAPES.len()).into_par_iter().for_each(|k| {
+            let (hide, what, n) = match k.checked_sub(IDS.len()) {
+                None => (Hide::One, k, IDS.len()),
+                Some(shape) => (Hide::Outside, shape, UNMODELLED_SHAPES.len()),
+            };
+            let (wrong, index) = first(what, n).expect("one of the cases");
+            let id = id(wrong, hide, index);
+            let setup = set_up_case(&id);
+            let hidden =
+                setup.effects.first().map(Effect::id).or(setup.shape.as_ref().map(UnmodelledShape::name));
+            let wanted = if hide == Hide::One { IDS[what] } else { UNMODELLED_SHAPES[what] };
+            assert_eq!(hidden, Some(wanted), "{wrong} {index}");
+            assert_eq!(intended_effect(&id), hidden, "{wrong} {index}");
+        });
+    }
+}

@@ -1,0 +1,227 @@
+//! What came of one case.
+
+use super::diagnosis_answer::{Answer, Estimate, Verdict};
+use super::expected_answer::{AnswerScore, Expected, expected_answer, score_answer};
+use crate::cases::case_id::{CaseId, GENERATOR_VERSION, first_generator_version};
+use crate::cases::case_recordings::Case;
+use crate::cases::rich_world_effects;
+use crate::simulator::effect::Effect;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One number of an answer beside the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScoredParameter {
+    /// Such as `coulomb_friction.c_n_per_m`, or `base.stiffness_n_per_m`.
+    pub name: String,
+    /// The truth.
+    pub truth: f64,
+    /// The answer.
+    pub value: f64,
+    /// Lower end of its 95 % interval.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub low: Option<f64>,
+    /// Upper end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub high: Option<f64>,
+    /// Whether the 95 % interval holds the truth; none without an interval.
+    pub held: Option<bool>,
+}
+
+/// What came of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaseOutcome {
+    /// The case.
+    pub id: CaseId,
+    /// The drawing that it is of ([`DRAWING`]).
+    #[serde(default = "first_generator_version")]
+    pub drawing: u32,
+    /// What was hidden, by name.
+    pub hidden: Vec<String>,
+    /// With which numbers.
+    pub values: Vec<(String, f64)>,
+    /// How strong it was, in noise standard deviations.
+    pub strength_sd: f64,
+    /// What was right.
+    pub expected: Expected,
+    /// What was said.
+    pub verdict: Verdict,
+    /// Causes named, each with its class.
+    pub named: Vec<Vec<String>>,
+    /// Confidences of the causes, and whether each is one that is there.
+    pub confidence: Vec<(f64, bool)>,
+    /// What that was worth.
+    pub worth: AnswerScore,
+    /// Numbers beside the truth.
+    pub numbers: Vec<ScoredParameter>,
+    /// Samples.
+    pub samples: usize,
+    /// Wall time of the answer in s.
+    pub seconds: f64,
+    /// Why there was no answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failed: Option<String>,
+}
+
+impl CaseOutcome {
+    /// Judges what an engine said. Without an answer the case counts as wrong.
+    #[must_use]
+    pub fn new(case: &Case, answer: Result<Answer, String>, seconds: f64) -> Self {
+        let expected = expected_answer(&case.id, &case.setup);
+        let (answer, failed) = match answer {
+            Ok(answer) => (answer, None),
+            Err(why) => (Answer { verdict: Verdict::Unknown, ..Answer::none() }, Some(why)),
+        };
+        let mut worth = score_answer(&expected, &answer);
+        if failed.is_some() {
+            worth.correct = false;
+        }
+        let mut hidden: Vec<String> = case.setup.effects.iter().map(|e| e.id().to_owned()).collect();
+        hidden.extend(rich_world_effects::names(&case.setup.rich).iter().map(|n| (*n).to_owned()));
+        hidden.extend(case.setup.shape.as_ref().map(|s| s.name().to_owned()));
+        let mut values = Vec::new();
+        for e in &case.setup.effects {
+            values.extend(e.parameters().into_iter().map(|(p, x)| (format!("{}.{p}", e.id()), x)));
+        }
+        let there = |name: &str| {
+            expected.wanted.iter().any(|w| w.effect == name || w.also.iter().any(|a| a == name))
+                || expected.optional.iter().any(|o| o == name)
+        };
+        Self {
+            id: case.id,
+            drawing: GENERATOR_VERSION,
+            hidden,
+            values,
+            strength_sd: case.setup.strength_sd,
+            verdict: answer.verdict,
+            named: answer
+                .causes
+                .iter()
+                .map(|c| {
+                    std::iter::once(&c.effect)
+                        .chain(c.equivalent.iter().filter(|e| **e != c.effect))
+                        .cloned()
+                        .collect()
+                })
+                .collect(),
+            confidence: answer
+                .causes
+                .iter()
+                .filter_map(|c| Some((c.confidence?, there(&c.effect))))
+                .collect(),
+            numbers: numbers(case, &answer),
+            worth,
+            expected,
+            samples: case.samples(),
+            seconds,
+            failed,
+        }
+    }
+}
+
+/// Numbers of two terms, the faster one first: which is called the first is a matter of words.
+fn in_order(numbers: &BTreeMap<String, Estimate>) -> BTreeMap<String, Estimate> {
+    let time = |term: &str| numbers.get(&format!("{term}.time_constant_s")).map(|e| e.value);
+    let (first, second) = ("terms.0", "terms.1");
+    if !matches!((time(first), time(second)), (Some(a), Some(b)) if a > b) {
+        return numbers.clone();
+    }
+    let swapped = |path: &String| match path.strip_prefix(first) {
+        Some(rest) => format!("{second}{rest}"),
+        None => path.strip_prefix(second).map_or_else(|| path.clone(), |rest| format!("{first}{rest}")),
+    };
+    numbers.iter().map(|(path, e)| (swapped(path), *e)).collect()
+}
+
+fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
+    let mut out = Vec::new();
+    if !rich_world_effects::names(&case.setup.rich).is_empty() {
+        // A law of another form has no true values of the base law's numbers.
+        return out;
+    }
+    for effect in &case.setup.effects {
+        let Some(cause) = answer.causes.iter().find(|c| c.effect == effect.id()) else { continue };
+        let told = in_order(&cause.parameters);
+        for (path, truth) in effect.parameters() {
+            let Some(e) = told.get(&path) else { continue };
+            if path == "layer" {
+                continue;
+            }
+            // A force that the sensor sends late as well is late by both.
+            let late = matches!(effect, Effect::TimeDelay { .. });
+            let truth = truth + if late { case.setup.amounts.delay_s() } else { 0.0 };
+            let turn = if path.ends_with("_rad") {
+                let whole = core::f64::consts::TAU;
+                libm::round((truth - e.value) / whole) * whole
+            } else {
+                0.0
+            };
+            out.push(number(
+                format!("{}.{path}", effect.id()),
+                truth,
+                e.value + turn,
+                e.low.map(|x| x + turn),
+                e.high.map(|x| x + turn),
+            ));
+        }
+    }
+    let truth = &case.setup.truth;
+    // A gain or a scale of the position is the base law with other numbers: which of them are true is a matter of words.
+    let relabelled = |e: &Effect| matches!(e, Effect::ForceGain { .. } | Effect::PositionScale { .. });
+    if case.setup.effects.iter().any(relabelled) {
+        return out;
+    }
+    let moved = case.setup.effects.iter().any(|e| matches!(e, Effect::BoundaryShift { .. }));
+    for p in &answer.base_parameters {
+        let layer = p.layer.checked_sub(1).and_then(|i| truth.layers.get(i));
+        let value = match (p.name.as_str(), layer) {
+            ("surface_m", _) => Some(truth.surface_m),
+            ("stiffness_n_per_m", Some(l)) => Some(l.stiffness_n_per_m),
+            ("friction_ns_per_m2", Some(l)) => Some(l.friction_ns_per_m2),
+            ("puncture_n", Some(l)) => l.puncture_n,
+            ("thickness_m", Some(l)) if !moved => Some(l.thickness_m),
+            _ => None,
+        };
+        if let Some(value) = value {
+            out.push(number(format!("base.{}", p.name), value, p.value, p.low, p.high));
+        }
+    }
+    out
+}
+
+fn number(name: String, truth: f64, value: f64, low: Option<f64>, high: Option<f64>) -> ScoredParameter {
+    let held = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
+    ScoredParameter { name, truth, value, low, high, held }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Estimate, in_order};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn of_two_terms_the_faster_one_is_the_first() {
+        let told = |numbers: &[(&str, f64)]| -> BTreeMap<String, Estimate> {
+            let of = |(path, value): &(&str, f64)| {
+                ((*path).to_owned(), Estimate { value: *value, ..Estimate::default() })
+            };
+            numbers.iter().map(of).collect()
+        };
+        let slow_first = told(&[
+            ("terms.0.fraction", 0.5),
+            ("terms.0.time_constant_s", 6.0),
+            ("terms.1.fraction", 0.2),
+            ("terms.1.time_constant_s", 0.3),
+        ]);
+        let fast_first = told(&[
+            ("terms.0.fraction", 0.2),
+            ("terms.0.time_constant_s", 0.3),
+            ("terms.1.fraction", 0.5),
+            ("terms.1.time_constant_s", 6.0),
+        ]);
+        assert_eq!(in_order(&slow_first), fast_first);
+        assert_eq!(in_order(&fast_first), fast_first);
+        let one = told(&[("terms.0.fraction", 0.2), ("terms.0.time_constant_s", 3.0)]);
+        assert_eq!(in_order(&one), one);
+    }
+}

@@ -1,0 +1,141 @@
+//! What an engine answers: `diagnosis.json` (SPEC section 7) as plain data. Fields that are not named here are ignored.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A value with its 95 % interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    #[serde(default)]
+    pub low: Option<f64>,
+    /// Upper end.
+    #[serde(default)]
+    pub high: Option<f64>,
+}
+
+/// One cause.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cause {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Effects that explain the data as well.
+    #[serde(default)]
+    pub equivalent: Vec<String>,
+    /// Probability that it belongs to the model.
+    #[serde(default)]
+    pub confidence: Option<f64>,
+    /// Parameters by their paths.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Estimate>,
+}
+
+/// A base parameter as fitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BaseParameter {
+    /// Layer, 1-based; 0 for the surface.
+    #[serde(default)]
+    pub layer: usize,
+    /// Field of the layer.
+    pub name: String,
+    /// Fitted value.
+    pub value: f64,
+    /// Lower end of the 95 % interval.
+    #[serde(default)]
+    pub low: Option<f64>,
+    /// Upper end.
+    #[serde(default)]
+    pub high: Option<f64>,
+}
+
+/// An effect too small to matter: never counted as a cause.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NegligibleEffect {
+    /// Effect, by its id.
+    pub effect: String,
+    /// Parameters by their paths.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Why it does not matter.
+    #[serde(default)]
+    pub reason: String,
+}
+
+/// The verdict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The simulation agrees with the data.
+    None,
+    /// One or more causes.
+    Named,
+    /// A class of effects that these data cannot tell apart.
+    Ambiguous,
+    /// Structure that no effect of the library explains dominates.
+    Unknown,
+}
+
+/// An answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Causes, strongest first.
+    #[serde(default)]
+    pub causes: Vec<Cause>,
+    /// Base parameters.
+    #[serde(default)]
+    pub base_parameters: Vec<BaseParameter>,
+    /// Effects that these recordings cannot show.
+    #[serde(default)]
+    pub not_identifiable: Vec<String>,
+    /// Effects too small to matter.
+    #[serde(default)]
+    pub negligible: Vec<NegligibleEffect>,
+}
+
+impl Answer {
+    /// "Nothing is wrong."
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            verdict: Verdict::None,
+            causes: Vec::new(),
+            base_parameters: Vec::new(),
+            not_identifiable: Vec::new(),
+            negligible: Vec::new(),
+        }
+    }
+
+    /// Reads `diagnosis.json`.
+    ///
+    /// # Errors
+    /// What is missing or of the wrong kind, and where.
+    pub fn from_json(text: &str) -> Result<Self, serde_json::Error> {
+        serde_json::from_str(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_of_the_specification_is_read_and_further_fields_are_ignored() {
+        let text = r#"{ "verdict": "named",
+          "causes": [ { "effect": "coulomb_friction", "equivalent": [], "confidence": 0.99, "gain_nats": 7.0,
+                        "parameters": { "c_n_per_m": { "value": 4.1, "low": 3.9, "high": 4.3 } } } ],
+          "base_parameters": [ { "layer": 1, "name": "stiffness_n_per_m", "assumed": 40.0, "value": 40.3, "low": 39.9,
+                                 "high": 40.7, "changed": false } ],
+          "not_identifiable": ["force_gain"],
+          "negligible": [ { "effect": "time_delay", "parameters": { "delay_s": { "value": 0.00015, "low": 0.0001,
+                        "high": 0.0002 } }, "reason": "below a twentieth of the sampling step" } ],
+          "residual_structure": { "p_value": 0.4, "depends_on": [], "share": 0.0 }, "data_quality": [ ] }"#;
+        let answer = Answer::from_json(text).expect("the example");
+        assert_eq!(answer.verdict, Verdict::Named);
+        assert_eq!(answer.causes[0].effect, "coulomb_friction");
+        assert_eq!(answer.negligible[0].effect, "time_delay");
+    }
+}

@@ -1,0 +1,306 @@
+//! Which answers are right: written down per cause before any run.
+//!
+//! The rules, with their reasons:
+//!
+//! 1. **What a user cannot know exactly is no cause** (SPEC section 7, 2): a wrong thickness, surface, K, b or F within the
+//!    stated tolerance, noise of any colour, growing, with tails, and scatter between recordings ask for the verdict
+//!    `none`. Irregular or missing samples are remarks on the data.
+//! 2. **What is there may be named, need not be** where a sensor's ordinary imperfection is the neutral form of an
+//!    effect: a force late by up to two samples *is* a `time_delay`, mains hum *is* a `periodic_interference`, a 12-bit
+//!    converter *is* a `quantisation`.
+//! 3. **`force_gain` cannot be seen** once K, b, F are re-fitted (all forces scale; SPEC section 6): naming it is a guess, and
+//!    `none` is right. Its size is drawn within the tolerance.
+//! 4. **`position_scale` is the base law with other numbers**: recorded depths and speeds times `1 + eps` are thicknesses times
+//!    `1 + eps`, K over `1 + eps`, b over its square. Within the tolerances both the name and `none` are right.
+//! 5. **`boundary_shift` is two thicknesses**: within the tolerance of both layers the name and `none` are right, beyond the
+//!    tolerance of either only the name.
+//! 6. **A puncture that depends on speed cannot be seen in one recording**, in which every layer is punctured once: name or
+//!    `none`.
+//! 7. **Lags and delays below one sampling interval** cannot be told from each other: either name.
+//! 8. **Stribeck and presliding friction beside which dry friction leaves less than 0.3 noise standard deviations** are
+//!    dry friction to anybody: `coulomb_friction` is right as well.
+//! 9. **A rich law's departures have no name of their own**: each ingredient lists the library effects that describe it
+//!    (a foundation spring may be `deep_indentation`), and `unknown` is right as well.
+//! 10. **Traces never count**, nor does what is listed as invisible.
+//! 11. **A class** (`equivalent`) counts as its best member would if it holds a right one among at most four.
+
+use crate::cases::case_id::{CaseId, Hide};
+use crate::cases::case_recordings::CaseSetup;
+use crate::cases::draw_effect::THICKNESS_TOLERANCE;
+use crate::cases::effect_strength::{RefitTerms, unexplained_rms_n};
+use crate::cases::rich_world_effects;
+use crate::scoring::diagnosis_answer::{Answer, Verdict};
+use crate::simulator::effect::Effect;
+use serde::{Deserialize, Serialize};
+
+/// A class of more effects than this says nothing.
+pub const MAX_CLASS_SIZE: usize = 4;
+/// What dry friction may leave of Stribeck or presliding friction, in noise standard deviations, to pass for it (rule 8).
+const DRY_FRICTION_LIMIT_SD: f64 = 0.3;
+
+/// A cause that has to be found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExpectedCause {
+    /// The effect that is there.
+    pub effect: String,
+    /// Names that are as right.
+    pub also: Vec<String>,
+    /// Whether silence is right as well.
+    pub may_be_silent: bool,
+    /// Whether naming it is wrong: it cannot be seen.
+    pub unseen: bool,
+}
+
+impl ExpectedCause {
+    fn fits(&self, class: &[&str]) -> bool {
+        !self.unseen
+            && class.len() <= MAX_CLASS_SIZE
+            && class.iter().any(|c| *c == self.effect || self.also.iter().any(|a| a == c))
+    }
+}
+
+/// What a right answer says.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Expected {
+    /// Causes.
+    pub wanted: Vec<ExpectedCause>,
+    /// Names that may stand beside them.
+    pub optional: Vec<String>,
+    /// Names that describe a rich law's ingredients.
+    pub allowed: Vec<String>,
+    /// Whether one of these, or `unknown`, has to be said.
+    pub asks_for_allowed: bool,
+    /// Whether something is there that no library has.
+    pub outside: bool,
+    /// Whether `unknown` is right as well.
+    pub unknown_is_right: bool,
+}
+
+/// What an answer was worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AnswerScore {
+    /// Right, and alone.
+    pub correct: bool,
+    /// Some cause is named that is not there.
+    pub wrong_name: bool,
+    /// Every wanted cause is found, whatever stands beside.
+    pub all_found: bool,
+}
+
+/// What is right for a case.
+#[must_use]
+pub fn expected_answer(id: &CaseId, setup: &CaseSetup) -> Expected {
+    let mut out = Expected {
+        outside: setup.shape.is_some(),
+        unknown_is_right: setup.shape.is_some(),
+        ..Expected::default()
+    };
+    for effect in &setup.effects {
+        out.wanted.push(expected_cause(effect, setup));
+    }
+    let a = &setup.amounts;
+    // Rule 2.
+    if a.late_samples > 0.0 {
+        out.optional.push("time_delay".to_owned());
+    }
+    if a.hum > 0.0 {
+        out.optional.push("periodic_interference".to_owned());
+    }
+    if a.bits_range_n.is_some() {
+        out.optional.push("quantisation".to_owned());
+    }
+    // Rule 9.
+    for name in rich_world_effects::names(&setup.rich) {
+        out.allowed.extend(rich_world_effects::accepted_names(name).iter().map(|s| (*s).to_owned()));
+        out.unknown_is_right = true;
+        out.asks_for_allowed |= !may_go_undetected(name, setup);
+    }
+    debug_assert!(id.hide != Hide::Clean || out.wanted.is_empty());
+    out
+}
+
+fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
+    let mut it = ExpectedCause {
+        effect: effect.id().to_owned(),
+        also: Vec::new(),
+        may_be_silent: false,
+        unseen: false,
+    };
+    let interval_s = 1.0 / setup.amounts.rate_hz;
+    let passes_for_dry = || {
+        unexplained_rms_n(setup, core::slice::from_ref(effect), None, RefitTerms::DryFriction)
+            < DRY_FRICTION_LIMIT_SD * setup.noise.sd_n
+    };
+    match *effect {
+        Effect::ForceGain { .. } => {
+            it.unseen = true;
+            it.may_be_silent = true;
+        }
+        Effect::PositionScale { eps } => {
+            it.may_be_silent = eps.abs() + setup.amounts.thickness <= THICKNESS_TOLERANCE;
+        }
+        Effect::BoundaryShift { layer, shift_m } => {
+            let thick = |i: usize| setup.assumed.layers.get(i).map_or(0.0, |l| l.thickness_m);
+            let least = thick(layer - 1).min(thick(layer));
+            it.may_be_silent = shift_m.abs() <= (THICKNESS_TOLERANCE + setup.amounts.thickness) * least;
+        }
+        Effect::RateDependentPuncture { .. } => it.may_be_silent = setup.paths.len() == 1,
+        Effect::LowPassLag { time_constant_s } if time_constant_s < interval_s => {
+            it.also.push("time_delay".to_owned());
+        }
+        Effect::TimeDelay { delay_s } if delay_s < interval_s => it.also.push("low_pass_lag".to_owned()),
+        Effect::StribeckFriction { .. } | Effect::PreslidingFriction { .. } if passes_for_dry() => {
+            it.also.push("coulomb_friction".to_owned());
+        }
+        _ => {}
+    }
+    it
+}
+
+/// Whether an ingredient may pass unsaid: a foundation that yields by less than the thickness may be off, or under layers that all
+/// give way by force (it is a softer layer then); damage that shows in no or in one recording's punctures; whatever leaves less
+/// than half a standard deviation of the noise.
+fn may_go_undetected(ingredient: &str, setup: &CaseSetup) -> bool {
+    match ingredient {
+        "foundation" => {
+            let softness = setup.rich.foundation.map_or(0.0, |f| f.softness);
+            softness / (1.0 + softness) <= THICKNESS_TOLERANCE + setup.amounts.thickness
+                || setup.truth.layers.iter().all(|l| l.puncture_n.is_some())
+        }
+        "damage" => setup.paths.len() == 1 || setup.rich.damage.is_none_or(|d| d.exponent > 10.0),
+        _ => setup.strength_sd < 0.5,
+    }
+}
+
+/// Judges an answer.
+#[must_use]
+pub fn score_answer(expected: &Expected, answer: &Answer) -> AnswerScore {
+    let classes: Vec<Vec<&str>> = answer
+        .causes
+        .iter()
+        .map(|c| {
+            let mut class = vec![c.effect.as_str()];
+            class.extend(c.equivalent.iter().map(String::as_str).filter(|e| *e != c.effect));
+            class
+        })
+        .collect();
+    // Each cause serves one wanted effect; exact names first, so that a class does not take another's place.
+    let mut taken = vec![false; classes.len()];
+    let mut all_found = true;
+    let mut missing = false;
+    let mut order: Vec<&ExpectedCause> = expected.wanted.iter().collect();
+    order.sort_by_key(|w| !answer.causes.iter().any(|c| c.effect == w.effect));
+    for w in order {
+        let exact =
+            (0..classes.len()).find(|&k| !taken[k] && classes[k][0] == w.effect && w.fits(&classes[k]));
+        let found = exact.or_else(|| (0..classes.len()).find(|&k| !taken[k] && w.fits(&classes[k])));
+        match found {
+            Some(k) => taken[k] = true,
+            None => {
+                all_found &= w.may_be_silent;
+                missing |= !w.may_be_silent;
+            }
+        }
+    }
+    let described = |c: &str| expected.optional.iter().chain(&expected.allowed).any(|o| o == c);
+    let stray = (0..classes.len()).any(|k| {
+        !taken[k] && (classes[k].len() > MAX_CLASS_SIZE || !classes[k].iter().any(|c| described(c)))
+    });
+    let says_allowed = classes.iter().flatten().any(|c| expected.allowed.iter().any(|a| a == c));
+    let unknown = answer.verdict == Verdict::Unknown;
+    let right = if expected.outside && expected.wanted.is_empty() {
+        unknown && !stray
+    } else if expected.outside {
+        // The known one beside the unknown: found, under whatever verdict.
+        !missing
+    } else if unknown {
+        expected.unknown_is_right && !missing && !stray
+    } else {
+        !missing && !stray && (says_allowed || !expected.asks_for_allowed)
+    };
+    AnswerScore { correct: right, wrong_name: stray, all_found }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scoring::diagnosis_answer::Cause;
+
+    fn says(verdict: Verdict, causes: &[(&str, &[&str])]) -> Answer {
+        let causes = causes
+            .iter()
+            .map(|(e, also)| Cause {
+                effect: (*e).to_owned(),
+                equivalent: also.iter().map(|a| (*a).to_owned()).collect(),
+                ..Cause::default()
+            })
+            .collect();
+        Answer { verdict, causes, ..Answer::none() }
+    }
+
+    fn wants(effects: &[&str]) -> Expected {
+        let wanted = effects
+            .iter()
+            .map(|e| ExpectedCause {
+                effect: (*e).to_owned(),
+                also: Vec::new(),
+                may_be_silent: false,
+                unseen: false,
+            })
+            .collect();
+        Expected { wanted, ..Expected::default() }
+    }
+
+    #[test]
+    fn clean_data_are_to_be_called_clean() {
+        assert!(score_answer(&wants(&[]), &says(Verdict::None, &[])).correct);
+        let accused = score_answer(&wants(&[]), &says(Verdict::Named, &[("force_bias", &[])]));
+        assert!(!accused.correct && accused.wrong_name);
+        assert!(!score_answer(&wants(&[]), &says(Verdict::Unknown, &[])).correct);
+    }
+
+    #[test]
+    fn a_cause_is_right_alone_or_in_a_small_class() {
+        let one = wants(&["coulomb_friction"]);
+        assert!(score_answer(&one, &says(Verdict::Named, &[("coulomb_friction", &[])])).correct);
+        let class: &[&str] = &["coulomb_friction"];
+        assert!(score_answer(&one, &says(Verdict::Ambiguous, &[("stribeck_friction", class)])).correct);
+        let wide: &[&str] = &["a", "b", "c", "coulomb_friction"];
+        assert!(!score_answer(&one, &says(Verdict::Ambiguous, &[("stribeck_friction", wide)])).correct);
+        let beside =
+            score_answer(&one, &says(Verdict::Named, &[("coulomb_friction", &[]), ("force_drift", &[])]));
+        assert!(!beside.correct && beside.all_found && beside.wrong_name);
+    }
+
+    #[test]
+    fn two_effects_ask_for_two_causes() {
+        let two = wants(&["coulomb_friction", "force_bias"]);
+        assert!(
+            score_answer(&two, &says(Verdict::Named, &[("force_bias", &[]), ("coulomb_friction", &[])]))
+                .correct
+        );
+        let class: &[&str] = &["force_bias"];
+        assert!(!score_answer(&two, &says(Verdict::Ambiguous, &[("coulomb_friction", class)])).correct);
+    }
+
+    #[test]
+    fn what_is_outside_the_library_is_unknown_and_what_cannot_be_seen_is_not_named() {
+        let outside = Expected { outside: true, unknown_is_right: true, ..Expected::default() };
+        assert!(score_answer(&outside, &says(Verdict::Unknown, &[])).correct);
+        assert!(!score_answer(&outside, &says(Verdict::None, &[])).correct);
+        assert!(score_answer(&outside, &says(Verdict::Named, &[("force_bias", &[])])).wrong_name);
+        let mut gain = wants(&["force_gain"]);
+        gain.wanted[0].unseen = true;
+        gain.wanted[0].may_be_silent = true;
+        assert!(score_answer(&gain, &says(Verdict::None, &[])).correct);
+        assert!(!score_answer(&gain, &says(Verdict::Named, &[("force_gain", &[])])).correct);
+    }
+
+    #[test]
+    fn traces_do_not_count() {
+        let mut answer = says(Verdict::None, &[]);
+        answer.negligible.push(crate::scoring::diagnosis_answer::NegligibleEffect::default());
+        assert!(score_answer(&wants(&[]), &answer).correct);
+    }
+}

@@ -1,0 +1,204 @@
+//! The table: one line per row of an examination.
+
+use super::case_outcome::CaseOutcome;
+use super::diagnosis_answer::Verdict;
+use crate::cases::case_id::{Hide, Severity, Size, World, Wrong};
+use crate::success_rate::SuccessRate;
+use core::fmt::Write as _;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use stylet_stats::quantile_of;
+
+/// A cell: cases of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct TableCellId {
+    /// World.
+    pub world: World,
+    /// What is wrong.
+    pub wrong: Wrong,
+    /// How much of it.
+    pub severity: Severity,
+    /// What is hidden.
+    pub hide: Hide,
+    /// How strong.
+    pub size: Size,
+}
+
+/// What came of a cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TableCell {
+    /// Which.
+    pub id: TableCellId,
+    /// Right answers.
+    pub right: SuccessRate,
+    /// Answers in which all that is there is named, whatever else is.
+    pub all_found: SuccessRate,
+    /// Answers with a cause that is not there.
+    pub wrong_name: SuccessRate,
+    /// Answers `unknown`.
+    pub unknown: SuccessRate,
+    /// Median wall time of an answer in s.
+    pub median_s: f64,
+    /// 90 % of the answers took no longer, in s.
+    pub p90_s: f64,
+}
+
+/// The cells of outcomes, in the order of the words.
+#[must_use]
+pub fn table_cells(outcomes: &[CaseOutcome]) -> Vec<TableCell> {
+    let mut by: BTreeMap<TableCellId, Vec<&CaseOutcome>> = BTreeMap::new();
+    for o in outcomes {
+        let id = TableCellId {
+            world: o.id.world,
+            wrong: o.id.wrong,
+            severity: o.id.severity,
+            hide: o.id.hide,
+            size: o.id.size,
+        };
+        by.entry(id).or_default().push(o);
+    }
+    by.into_iter()
+        .map(|(id, all)| {
+            let seconds: Vec<f64> = all.iter().map(|o| o.seconds).collect();
+            TableCell {
+                id,
+                right: SuccessRate::of(&all, |o| o.worth.correct),
+                all_found: SuccessRate::of(&all, |o| o.worth.all_found),
+                wrong_name: SuccessRate::of(&all, |o| o.worth.wrong_name),
+                unknown: SuccessRate::of(&all, |o| o.verdict == Verdict::Unknown && o.failed.is_none()),
+                median_s: quantile_of(seconds.iter().copied(), 0.5),
+                p90_s: quantile_of(seconds.iter().copied(), 0.9),
+            }
+        })
+        .collect()
+}
+
+/// The table as text: rates with 95 % Wilson intervals, then what was said in place of what, intervals, confidence.
+#[must_use]
+pub fn results_text(outcomes: &[CaseOutcome]) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{:<32}{:<20}{:<28}{:<28}{:<28}{:<10}{:>8}{:>8}",
+        "wrong", "hidden", "right, and alone", "all found", "a wrong name", "unknown", "med s", "p90 s"
+    );
+    for c in table_cells(outcomes) {
+        let row = match c.id.wrong {
+            Wrong::Nothing => format!("{}: nothing", c.id.world),
+            wrong => format!("{}: {wrong}, {}", c.id.world, c.id.severity),
+        };
+        let hidden = match c.id.hide {
+            Hide::Clean => "clean".to_owned(),
+            hide => format!("{hide}, {}", c.id.size),
+        };
+        let _ = writeln!(
+            out,
+            "{row:<32}{hidden:<20}{:<28}{:<28}{:<28}{:<10}{:>8.2}{:>8.2}",
+            c.right,
+            if matches!(c.id.hide, Hide::Clean | Hide::Outside) {
+                SuccessRate::default()
+            } else {
+                c.all_found
+            },
+            c.wrong_name,
+            format!("{}/{}", c.unknown.hits, c.unknown.of),
+            c.median_s,
+            c.p90_s
+        );
+    }
+    together(&mut out, outcomes);
+    said(&mut out, outcomes);
+    held(&mut out, outcomes);
+    confident(&mut out, outcomes);
+    let failed: Vec<&CaseOutcome> = outcomes.iter().filter(|o| o.failed.is_some()).collect();
+    if let Some(first) = failed.first() {
+        let why = first.failed.as_deref().unwrap_or("");
+        let _ =
+            writeln!(out, "\n{} cases without an answer, the first {}: {why}", failed.len(), first.id.name());
+    }
+    out
+}
+
+/// What is hidden, over all rows.
+fn together(out: &mut String, outcomes: &[CaseOutcome]) {
+    let mut by: BTreeMap<_, Vec<&CaseOutcome>> = BTreeMap::new();
+    for o in outcomes {
+        by.entry((o.id.world, o.id.hide, o.id.size)).or_default().push(o);
+    }
+    let _ = writeln!(out, "\nall rows together: right, and alone; a wrong name");
+    for ((world, hide, size), all) in by {
+        let right = SuccessRate::of(&all, |o| o.worth.correct);
+        let wrong = SuccessRate::of(&all, |o| o.worth.wrong_name);
+        let _ = writeln!(out, "    {:<48}{right:<28}{wrong}", format!("{world}: {hide}, {size}"));
+    }
+}
+
+/// What was said where the answer was not right.
+fn said(out: &mut String, outcomes: &[CaseOutcome]) {
+    let mut by: BTreeMap<(String, String), usize> = BTreeMap::new();
+    for o in outcomes.iter().filter(|o| !o.worth.correct) {
+        let hidden = if o.hidden.is_empty() { "(clean)".to_owned() } else { o.hidden.join(" + ") };
+        let causes: Vec<String> = o.named.iter().map(|c| c.join("|")).collect();
+        let said = match o.verdict {
+            _ if o.failed.is_some() => "no answer".to_owned(),
+            Verdict::None => "none".to_owned(),
+            Verdict::Unknown if causes.is_empty() => "unknown".to_owned(),
+            Verdict::Unknown => format!("unknown, beside {}", causes.join(" + ")),
+            _ => causes.join(" + "),
+        };
+        *by.entry((hidden, said)).or_default() += 1;
+    }
+    if !by.is_empty() {
+        let _ = writeln!(out, "\nnot right: hidden -> said (cases)");
+    }
+    for ((hidden, said), n) in by {
+        let _ = writeln!(out, "    {hidden} -> {said}  {n}");
+    }
+}
+
+/// How often 95 % intervals hold the truth.
+fn held(out: &mut String, outcomes: &[CaseOutcome]) {
+    let mut by: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
+    for n in outcomes.iter().flat_map(|o| &o.numbers) {
+        if let Some(held) = n.held {
+            by.entry(&n.name).or_default().push(held);
+        }
+    }
+    let all = |base: bool| {
+        SuccessRate::of(
+            by.iter().filter(|(name, _)| name.starts_with("base.") == base).flat_map(|(_, h)| h),
+            |h| **h,
+        )
+    };
+    if by.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        out,
+        "\n95 % intervals hold the truth: causes' numbers {}, base numbers {}",
+        all(false),
+        all(true)
+    );
+    for (name, held) in &by {
+        let rate = SuccessRate::of(held, |h| **h);
+        let _ = writeln!(out, "    {name:<52}{rate}");
+    }
+}
+
+/// How often a cause is there, by the confidence with which it is named; and the mean squared difference (Brier).
+fn confident(out: &mut String, outcomes: &[CaseOutcome]) {
+    let all: Vec<(f64, bool)> = outcomes.iter().flat_map(|o| o.confidence.iter().copied()).collect();
+    if all.is_empty() {
+        return;
+    }
+    let brier = all.iter().map(|(p, there)| (p - f64::from(*there)).powi(2)).sum::<f64>() / all.len() as f64;
+    let _ = writeln!(out, "\nconfidence of {} causes, Brier score {brier:.4}", all.len());
+    for k in 0..10 {
+        let (low, high) = (0.1 * f64::from(k), 0.1 * f64::from(k + 1));
+        let bin = all.iter().filter(|(p, _)| *p >= low && (*p < high || (k == 9 && *p <= 1.0)));
+        let rate = SuccessRate::of(bin, |(_, there)| *there);
+        if rate.of > 0 {
+            let _ = writeln!(out, "    said {low:.1} to {high:.1}: there in {rate}");
+        }
+    }
+}

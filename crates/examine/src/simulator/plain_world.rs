@@ -1,0 +1,450 @@
+//! The plain law: the equations of SPEC sections 2 and 6.
+//!
+//! Between two instants everything but ruptures is taken along exactly or to second order; a rupture is looked for inside
+//! the step by bisection and put where its condition is met, so that the instants do not depend on the step.
+
+use super::effect::Effect;
+use super::force_law::{ForceKnot, ForceLaw};
+use super::motion_path::MotionState;
+use super::tissue::Tissue;
+
+/// `sgn` is zero below this speed in m/s (SPEC section 6).
+pub const DEAD_BAND_MPS: f64 = 1e-5;
+/// Reference speed of power law and rate-dependent puncture in m/s (SPEC section 6).
+const V0_MPS: f64 = 1e-3;
+/// Ruptures are placed to this precision in s.
+const INSTANT_S: f64 = 1e-9;
+/// A compliant needle's tip is solved for to this force in N.
+const BALANCE_N: f64 = 1e-9;
+
+/// Sign with the dead band.
+#[must_use]
+pub fn sgn(v: f64) -> f64 {
+    if v > DEAD_BAND_MPS {
+        1.0
+    } else if v < -DEAD_BAND_MPS {
+        -1.0
+    } else {
+        0.0
+    }
+}
+
+struct Slab {
+    front: f64,
+    far: f64,
+    stiffness: f64,
+    friction: f64,
+    puncture: f64,
+}
+
+/// The tissue's departures, by their place in the law. Neutral ones are absent.
+#[derive(Default)]
+struct Departures {
+    kappa: f64,
+    prony: [(f64, f64); 2],
+    relaxes: bool,
+    coulomb: f64,
+    stribeck: Option<(f64, f64, f64)>,
+    dahl: Option<(f64, f64)>,
+    asymmetry: f64,
+    exponent: f64,
+    cutting: f64,
+    kept: f64,
+    alpha: f64,
+    membrane: Option<(f64, f64, f64)>,
+    width: f64,
+    breath: Option<(f64, f64, f64)>,
+    spring: Option<f64>,
+}
+
+/// What the law remembers.
+#[derive(Clone, Copy, Default)]
+struct Memory {
+    t: f64,
+    /// Tip position and velocity relative to the tissue.
+    z: f64,
+    v: f64,
+    /// Base relative to the tissue.
+    base: f64,
+    base_v: f64,
+    /// Elastic force before relaxation, its relaxed parts, and what is left.
+    elastic: f64,
+    relaxed: [f64; 2],
+    active_n: f64,
+    /// Dahl's state.
+    bristle: f64,
+    deepest: f64,
+    /// Tip force kept back at the last rupture.
+    kept: f64,
+    membrane_gone: bool,
+    total: f64,
+    /// Tip one step before, and the length of that step; for the tip's speed.
+    before: Option<(f64, f64)>,
+}
+
+/// The plain law with its state.
+pub struct PlainWorld {
+    slabs: Vec<Slab>,
+    with: Departures,
+    now: Memory,
+    ruptures: Vec<f64>,
+    /// Releases under way: force and position.
+    soft: Vec<(f64, f64)>,
+    /// Step for which the decays stand, and they.
+    decay: (f64, [f64; 2]),
+}
+
+impl PlainWorld {
+    /// The law of a tissue with departures; those of tool, sensor and position do not concern it.
+    #[must_use]
+    pub fn new(tissue: &Tissue, effects: &[Effect]) -> Self {
+        let mut slabs: Vec<Slab> = tissue
+            .layers
+            .iter()
+            .enumerate()
+            .map(|(i, l)| Slab {
+                front: tissue.front_m(i),
+                far: tissue.front_m(i + 1),
+                stiffness: l.stiffness_n_per_m,
+                friction: l.friction_ns_per_m2,
+                puncture: l.puncture_n.unwrap_or(f64::INFINITY),
+            })
+            .collect();
+        let mut with = Departures { exponent: 1.0, ..Departures::default() };
+        for effect in effects {
+            match *effect {
+                Effect::NonlinearElasticity { kappa_per_m } => with.kappa += kappa_per_m,
+                Effect::StressRelaxation { terms } => {
+                    with.prony = terms;
+                    with.relaxes = terms.iter().any(|t| t.0 != 0.0);
+                }
+                Effect::CoulombFriction { c_n_per_m } => with.coulomb += c_n_per_m,
+                Effect::StribeckFriction { c_n_per_m, c_static_n_per_m, v_stribeck_mps } => {
+                    with.stribeck = Some((c_n_per_m, c_static_n_per_m, v_stribeck_mps));
+                }
+                Effect::PreslidingFriction { c_n_per_m, delta_m } => with.dahl = Some((c_n_per_m, delta_m)),
+                Effect::AsymmetricFriction { eps } => with.asymmetry = eps,
+                Effect::PowerLawFriction { exponent } => with.exponent = exponent,
+                Effect::CuttingForce { force_n } => with.cutting = force_n,
+                Effect::IncompleteRelease { fraction } => with.kept = fraction,
+                Effect::RateDependentPuncture { alpha } => with.alpha = alpha,
+                Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
+                    with.membrane = Some((tissue.surface_m + depth_m, stiffness_n_per_m, puncture_n));
+                }
+                Effect::BoundaryShift { layer, shift_m } if layer >= 1 && layer < slabs.len() => {
+                    slabs[layer - 1].far += shift_m;
+                    slabs[layer].front += shift_m;
+                }
+                Effect::SoftBoundary { width_m } => with.width = width_m,
+                Effect::Respiration { amplitude_m, frequency_hz, phase_rad } => {
+                    with.breath = Some((amplitude_m, core::f64::consts::TAU * frequency_hz, phase_rad));
+                }
+                Effect::NeedleCompliance { stiffness_n_per_m } => with.spring = Some(stiffness_n_per_m),
+                _ => {}
+            }
+        }
+        Self {
+            slabs,
+            with,
+            now: Memory::default(),
+            ruptures: Vec::new(),
+            soft: Vec::new(),
+            decay: (-1.0, [1.0; 2]),
+        }
+    }
+
+    /// Depth and speed of the base relative to the tissue.
+    fn relative(&self, p: &MotionState) -> (f64, f64) {
+        match self.with.breath {
+            None => (p.z, p.v),
+            Some((amplitude, w, phase)) => {
+                let (sin, cos) = libm::sincos(w * p.t + phase);
+                (p.z - amplitude * sin, p.v - amplitude * w * cos)
+            }
+        }
+    }
+
+    fn elastic(&self, z: f64) -> f64 {
+        let Some(slab) = self.slabs.get(self.ruptures.len()) else { return 0.0 };
+        let x = (z - slab.front).max(0.0);
+        slab.stiffness * x * (1.0 + self.with.kappa * x)
+    }
+
+    /// Friction coefficient and length of needle inside.
+    fn shaft(&self, z: f64) -> (f64, f64) {
+        let (mut viscous, mut inside) = (0.0, 0.0);
+        for slab in &self.slabs {
+            if z <= slab.front {
+                break;
+            }
+            let l = z.min(slab.far) - slab.front;
+            viscous += slab.friction * l;
+            inside += l;
+        }
+        (viscous, inside)
+    }
+
+    /// The state after `dt` with the tip at `z`, moving at `v`, if nothing gives way.
+    fn taken_to(&mut self, dt: f64, z: f64, v: f64) -> Memory {
+        let from = self.now;
+        let mut to = Memory { t: from.t + dt, z, v, deepest: from.deepest.max(z), ..from };
+        to.elastic = self.elastic(z);
+        to.active_n = to.elastic;
+        if self.with.relaxes {
+            if (dt - self.decay.0).abs() > 1e-9 * dt {
+                self.decay =
+                    (dt, self.with.prony.map(|(_, tau)| if tau > 0.0 { libm::exp(-dt / tau) } else { 0.0 }));
+            }
+            for (k, &(g, tau)) in self.with.prony.iter().enumerate() {
+                if g == 0.0 || dt <= 0.0 {
+                    to.active_n -= to.relaxed[k];
+                    continue;
+                }
+                // Exact for an elastic force that is linear within the step.
+                let keep = self.decay.1[k];
+                let ramp = 1.0 - (1.0 - keep) * tau / dt;
+                to.relaxed[k] = keep * from.relaxed[k]
+                    + g * ((1.0 - keep) * from.elastic + ramp * (to.elastic - from.elastic));
+                to.active_n -= to.relaxed[k];
+            }
+        }
+        let (viscous, inside) = self.shaft(z);
+        if let Some((_, delta)) = self.with.dahl
+            && inside > 0.0
+        {
+            let (s, travel) = (sgn(v), z - from.z);
+            to.bristle = if s == 0.0 {
+                (from.bristle + travel / delta).clamp(-1.0, 1.0)
+            } else {
+                s + (from.bristle - s) * libm::exp(-travel.abs() / delta)
+            };
+        }
+        if v < -DEAD_BAND_MPS {
+            to.kept = 0.0;
+        }
+        to.total = self.total(&to, viscous, inside);
+        to
+    }
+
+    fn total(&self, m: &Memory, viscous: f64, inside: f64) -> f64 {
+        let with = &self.with;
+        let s = sgn(m.v);
+        let mut slip = m.v;
+        if with.exponent != 1.0 {
+            slip = if s == 0.0 { 0.0 } else { s * V0_MPS * libm::pow(m.v.abs() / V0_MPS, with.exponent) };
+        }
+        let mut force = m.active_n + slip * viscous * (1.0 + with.asymmetry * s);
+        if inside > 0.0 {
+            let mut dry = with.coulomb * s;
+            if let Some((c, rest, v_s)) = with.stribeck
+                && s != 0.0
+            {
+                let x = m.v / v_s;
+                dry += s * (c + (rest - c) * libm::exp(-x * x));
+            }
+            if let Some((c, _)) = with.dahl {
+                dry += c * m.bristle;
+            }
+            force += dry * inside;
+        }
+        if with.cutting != 0.0 && s > 0.0 && self.cuts(m.z) {
+            force += with.cutting;
+        }
+        if let Some((depth, stiffness, _)) = with.membrane
+            && !m.membrane_gone
+        {
+            force += stiffness * (m.z - depth).max(0.0);
+        }
+        force += m.kept;
+        for (released, at) in &self.soft {
+            force += released * (1.0 - (m.deepest - at) / with.width).max(0.0);
+        }
+        force
+    }
+
+    /// Whether the tip is inside a layer that was punctured or needs no puncture.
+    fn cuts(&self, z: f64) -> bool {
+        let at = self.slabs.iter().position(|s| z >= s.front && z < s.far);
+        at.is_some_and(|i| i < self.ruptures.len() || self.slabs[i].puncture == f64::INFINITY)
+    }
+
+    fn threshold(&self, puncture: f64, v: f64) -> f64 {
+        if self.with.alpha == 0.0 || puncture == f64::INFINITY {
+            return puncture;
+        }
+        let speed = v.abs().max(0.1 * V0_MPS);
+        puncture * (1.0 + self.with.alpha * libm::log(speed / V0_MPS)).max(0.1)
+    }
+
+    fn layer_gives_way(&self, m: &Memory) -> bool {
+        self.slabs
+            .get(self.ruptures.len())
+            .is_some_and(|s| m.z >= s.far || m.active_n >= self.threshold(s.puncture, m.v))
+    }
+
+    fn membrane_gives_way(&self, m: &Memory) -> bool {
+        self.with.membrane.is_some_and(|(depth, k, f)| !m.membrane_gone && k > 0.0 && k * (m.z - depth) >= f)
+    }
+
+    /// The state a share `s` of the way to the base's next place.
+    fn part(&mut self, s: f64, dt: f64, base: f64, base_v: f64) -> Memory {
+        let from = self.now;
+        let (z, v) = (from.base + (base - from.base) * s, from.base_v + (base_v - from.base_v) * s);
+        let mut to = match self.with.spring {
+            None => self.taken_to(dt * s, z, v),
+            Some(spring) => self.balanced(dt * s, z, spring),
+        };
+        to.base = z;
+        to.base_v = v;
+        to
+    }
+
+    /// The tip of a compliant needle: where the law's force is the spring's. The tip's speed is the slope of its
+    /// position by the second-order backward formula, after a jump by the first-order one.
+    fn balanced(&mut self, dt: f64, base: f64, spring: f64) -> Memory {
+        let from = self.now;
+        let dt = dt.max(1e-12);
+        let (lead, rest) = match from.before {
+            Some((z, h)) => {
+                let w = dt / h;
+                let old = w * w / (1.0 + w);
+                ((1.0 + 2.0 * w) / (1.0 + w), (1.0 + w) * from.z - old * z)
+            }
+            None => (1.0, from.z),
+        };
+        let speed = |z: f64| (lead * z - rest) / dt;
+        let guess = (from.z + from.v * dt).clamp(from.z - 1e-3, from.z + 1e-3);
+        let (viscous, inside) = self.shaft(guess);
+        let slab = self.slabs.get(self.ruptures.len()).map_or(0.0, |s| s.stiffness);
+        let slope = spring + slab + (viscous + self.with.coulomb * inside * 1e-3) * lead / dt;
+        let eval = |this: &mut Self, z: f64| {
+            let m = this.taken_to(dt, z, speed(z));
+            let off = m.total - spring * (base - z);
+            (m, off)
+        };
+        let (mut m, mut off) = eval(self, guess);
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let (mut z, mut z_old, mut off_old) = (guess, f64::NAN, f64::NAN);
+        for _ in 0..60 {
+            if off.abs() < BALANCE_N || high - low < 1e-14 {
+                break;
+            }
+            if off > 0.0 {
+                high = high.min(z);
+            } else {
+                low = low.max(z);
+            }
+            let chord = (off - off_old) / (z - z_old);
+            let step = if chord.is_finite() && chord > 0.1 * spring { off / chord } else { off / slope };
+            let mut next = z - step;
+            if !(next > low && next < high) {
+                next = match (low.is_finite(), high.is_finite()) {
+                    (true, true) => 0.5 * (low + high),
+                    (true, false) => low + 2.0 * step.abs(),
+                    _ => high - 2.0 * step.abs(),
+                };
+            }
+            (z_old, off_old) = (z, off);
+            z = next;
+            (m, off) = eval(self, z);
+        }
+        // Within the dead band the law's force jumps: the needle sticks, and the spring says how strongly.
+        m.total = spring * (base - m.z);
+        m.before = Some((from.z, dt));
+        m
+    }
+
+    fn gives_way(&self, m: &Memory) -> bool {
+        self.layer_gives_way(m) || self.membrane_gives_way(m)
+    }
+
+    /// What has reached its limit in the present state gives way.
+    fn rupture(&mut self) {
+        let m = self.now;
+        if self.membrane_gives_way(&m) {
+            self.now.membrane_gone = true;
+        }
+        if self.layer_gives_way(&m) {
+            let kept = self.with.kept * m.active_n;
+            if self.with.kept != 0.0 {
+                self.now.kept = kept;
+            }
+            if self.with.width > 0.0 {
+                self.soft.retain(|(_, at)| m.deepest - at < self.with.width);
+                self.soft.push((m.active_n - kept, m.z));
+                self.now.deepest = m.z;
+            }
+            self.ruptures.push(m.t);
+            self.now.relaxed = [0.0; 2];
+            self.now.elastic = self.elastic(m.z);
+            self.now.active_n = self.now.elastic;
+        }
+        self.now.before = None;
+        if self.with.spring.is_none() {
+            let (viscous, inside) = self.shaft(m.z);
+            self.now.total = self.total(&self.now, viscous, inside);
+        }
+    }
+}
+
+impl ForceLaw for PlainWorld {
+    fn start(&mut self, at: &MotionState) -> f64 {
+        let (z, v) = self.relative(at);
+        self.now = Memory { t: at.t, z, v, base: z, base_v: v, deepest: z, ..Memory::default() };
+        self.now.elastic = self.elastic(z);
+        self.now.active_n = self.now.elastic;
+        while self.gives_way(&self.now) {
+            self.rupture();
+        }
+        let (viscous, inside) = self.shaft(z);
+        self.now.total =
+            if self.with.spring.is_some() { 0.0 } else { self.total(&self.now, viscous, inside) };
+        self.now.total
+    }
+
+    fn advance(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>) {
+        let (base, base_v) = self.relative(to);
+        loop {
+            let dt = to.t - self.now.t;
+            let end = self.part(1.0, dt, base, base_v);
+            if !self.gives_way(&end) {
+                self.now = Memory { t: to.t, ..end };
+                break;
+            }
+            let (mut low, mut high, mut at) = (0.0, 1.0, end);
+            while (high - low) * dt > INSTANT_S {
+                let middle = 0.5 * (low + high);
+                let m = self.part(middle, dt, base, base_v);
+                if self.gives_way(&m) {
+                    (high, at) = (middle, m);
+                } else {
+                    low = middle;
+                }
+            }
+            self.now = at;
+            knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+            self.rupture();
+            knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+        }
+        knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+    }
+
+    fn jump(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>) {
+        let (base, base_v) = self.relative(to);
+        self.now.base = base;
+        self.now.base_v = base_v;
+        self.now.before = None;
+        if self.with.spring.is_none() {
+            let m = self.taken_to(0.0, base, base_v);
+            self.now = Memory { base, base_v, ..m };
+            while self.gives_way(&self.now) {
+                self.rupture();
+            }
+        }
+        knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+    }
+
+    fn ruptures(&self) -> &[f64] {
+        &self.ruptures
+    }
+}

@@ -1,0 +1,348 @@
+//! All runs over all seeds, once: claims, tables and figures only read them.
+//!
+//! What has to be run is what they ask for: they are asked first, of a study without any runs, and every
+//! combination that they look up is noted.
+
+use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
+use crate::assumed_value_changes::Change;
+use crate::detection_tuning::{TUNING_FIRST_SEED, TUNING_SEEDS, TUNING_SEEDS_ARM, Tuning};
+use crate::paper_experiments::Case;
+use crate::run_outcome::{Offline, Outcome};
+use crate::simulated_insertion::Insertion;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+use stylet_scenario::InputError;
+use stylet_testbed::SimulateError;
+
+/// Noise of the force/torque sensor, in mN, where nothing else is said: the laboratory's standard deviation of
+/// the error in ordinary insertion.
+pub const NOISE_MN: u32 = 10;
+/// Noise levels of the comparison with the truth, in mN: half, as it is, twice (that of the shipped
+/// scenarios), and one at which the algorithm breaks down.
+pub const NOISE_LEVELS_MN: [u32; 4] = [5, 10, 20, 50];
+
+/// Why nothing could be reproduced: a mistake in what is shipped.
+#[derive(Debug, thiserror::Error)]
+pub enum ReproduceError {
+    /// A shipped scenario is wrong.
+    #[error(transparent)]
+    Scenario(#[from] InputError),
+    /// A shipped scenario cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// No such runs were made.
+    #[error("no runs of {0}")]
+    NotRun(String),
+    /// The claims cannot be written.
+    #[error("claims: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// What is recorded: an experiment, perhaps with a changed number, and the noise of the force/torque sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Recorded {
+    /// Experiment.
+    pub case: Case,
+    /// What was changed in it.
+    pub change: Option<Change>,
+    /// Noise of the force/torque sensor in mN.
+    pub noise_mn: u32,
+}
+
+/// What was run: a recording, the sensor that is listened to, the way of running.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    /// The recording.
+    pub recorded: Recorded,
+    /// Sensor.
+    pub sensor: Sensor,
+    /// Model and protocol.
+    pub variant: Variant,
+}
+
+/// What somebody looked up, and for how many seeds.
+#[derive(Clone, Debug, Default)]
+struct Wanted {
+    runs: BTreeMap<Key, u64>,
+    offline: BTreeMap<Recorded, u64>,
+}
+
+/// The outcomes of every run, by seed.
+#[derive(Debug, Default)]
+pub struct Study {
+    /// First noise seed.
+    pub first_seed: u64,
+    /// Number of noise seeds.
+    pub seeds: u64,
+    runs: BTreeMap<Key, Vec<Outcome>>,
+    offline: BTreeMap<Recorded, Vec<Offline>>,
+    tunings: BTreeMap<(Recorded, Sensor), Tuning>,
+    wanted: Option<Mutex<Wanted>>,
+}
+
+/// Recordings that share one simulation, or on the arm the seeds' simulations.
+type Group = (Case, Option<Change>);
+
+/// One recording of one seed, with all that is asked of it.
+struct Job<'a> {
+    recorded: Recorded,
+    once: &'a Insertion,
+    seed: u64,
+    runs: Vec<Key>,
+    offline: bool,
+}
+
+/// What a job gives.
+#[derive(Default)]
+struct Done {
+    runs: Vec<(Key, Outcome)>,
+    offline: Option<(Recorded, Offline)>,
+}
+
+/// A plan: everything that was asked for.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    first_seed: u64,
+    seeds: u64,
+    wanted: Wanted,
+}
+
+impl Plan {
+    /// The recordings with their number of seeds, dear ones first, so that no thread is left alone at the end.
+    fn recordings(&self) -> Vec<(Recorded, u64)> {
+        let mut all: BTreeMap<Recorded, u64> = self.wanted.offline.clone();
+        for (key, seeds) in &self.wanted.runs {
+            let most = all.entry(key.recorded).or_default();
+            *most = (*most).max(*seeds);
+        }
+        let mut list: Vec<(Recorded, u64)> = all.into_iter().collect();
+        list.sort_by_key(|(r, _)| (!r.case.on_arm(), !r.case.is_liver()));
+        list
+    }
+
+    /// Number of recordings over all seeds: what progress counts.
+    #[must_use]
+    pub fn recordings_in_all(&self) -> u64 {
+        self.recordings().iter().map(|(_, seeds)| seeds).sum()
+    }
+
+    /// Number of runs of the algorithm over all seeds, without those of the tuning.
+    #[must_use]
+    pub fn runs_in_all(&self) -> u64 {
+        self.wanted.runs.values().sum()
+    }
+
+    fn insertions(&self) -> Result<BTreeMap<Group, Insertion>, ReproduceError> {
+        let groups: BTreeSet<Group> = self.recordings().iter().map(|(r, _)| (r.case, r.change)).collect();
+        let made: Vec<(Group, Insertion)> = groups
+            .into_par_iter()
+            .map(|(case, change)| {
+                let mut scenario = case.scenario()?;
+                if let Some(change) = change {
+                    change.apply(&mut scenario);
+                }
+                Ok::<_, ReproduceError>(((case, change), Insertion::of(&scenario, self.first_seed)?))
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(made.into_iter().collect())
+    }
+
+    /// What has to be tuned, for which sensors, and whether the triggered reset's threshold too.
+    fn to_tune(&self) -> BTreeMap<Recorded, BTreeMap<Sensor, bool>> {
+        let mut all: BTreeMap<Recorded, BTreeMap<Sensor, bool>> = BTreeMap::new();
+        for key in self.wanted.runs.keys().filter(|k| k.variant.is_tuned()) {
+            let sensors = all.entry(unchanged_on_arm(key.recorded)).or_default();
+            *sensors.entry(key.sensor).or_default() |= key.variant.ablation == Ablation::Trace;
+        }
+        all
+    }
+}
+
+/// On the arm a changed phantom is run with the tuning of the unchanged one.
+fn unchanged_on_arm(recorded: Recorded) -> Recorded {
+    if recorded.case.on_arm() { Recorded { change: None, ..recorded } } else { recorded }
+}
+
+impl Study {
+    /// A study without runs that notes what is asked of it.
+    #[must_use]
+    pub fn asking(first_seed: u64, seeds: u64) -> Self {
+        Self { first_seed, seeds, wanted: Some(Mutex::default()), ..Self::default() }
+    }
+
+    /// Whether it only notes what is asked of it.
+    #[must_use]
+    pub const fn is_asking(&self) -> bool {
+        self.wanted.is_some()
+    }
+
+    /// What was asked of a study made by [`Study::asking`].
+    #[must_use]
+    pub fn plan(self) -> Plan {
+        let wanted = self.wanted.and_then(|w| w.into_inner().ok()).unwrap_or_default();
+        Plan { first_seed: self.first_seed, seeds: self.seeds, wanted }
+    }
+
+    /// Runs everything in a plan; `done` is called once for each of [`Plan::recordings_in_all`], from any
+    /// thread. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// [`ReproduceError`] when a shipped scenario is wrong.
+    pub fn run(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Self, ReproduceError> {
+        let insertions = plan.insertions()?;
+        let missing = |r: &Recorded| ReproduceError::NotRun(r.case.name().to_owned());
+        let tunings: Vec<Vec<Tuned>> = plan
+            .to_tune()
+            .into_par_iter()
+            .map(|(recorded, sensors)| {
+                let once = insertions.get(&(recorded.case, recorded.change));
+                tune(recorded, once.ok_or_else(|| missing(&recorded))?, &sensors)
+            })
+            .collect::<Result<_, _>>()?;
+        let tunings: BTreeMap<(Recorded, Sensor), Tuning> = tunings.into_iter().flatten().collect();
+        let mut jobs = Vec::new();
+        for (recorded, seeds) in plan.recordings() {
+            let once = insertions.get(&(recorded.case, recorded.change)).ok_or_else(|| missing(&recorded))?;
+            for index in 0..seeds {
+                let wants = |most: &u64| *most > index;
+                let runs = plan.wanted.runs.iter().filter(|(k, n)| k.recorded == recorded && wants(n));
+                jobs.push(Job {
+                    recorded,
+                    once,
+                    seed: plan.first_seed + index,
+                    runs: runs.map(|(k, _)| *k).collect(),
+                    offline: plan.wanted.offline.get(&recorded).is_some_and(wants),
+                });
+            }
+        }
+        let first = plan.first_seed;
+        let outcomes: Vec<Done> = jobs
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|job| {
+                let found = one(&job, first, &tunings);
+                done();
+                found
+            })
+            .collect::<Result<_, _>>()?;
+        let mut runs: BTreeMap<Key, Vec<Outcome>> = BTreeMap::new();
+        let mut offline: BTreeMap<Recorded, Vec<Offline>> = BTreeMap::new();
+        for done in outcomes {
+            for (key, outcome) in done.runs {
+                runs.entry(key).or_default().push(outcome);
+            }
+            if let Some((recorded, found)) = done.offline {
+                offline.entry(recorded).or_default().push(found);
+            }
+        }
+        Ok(Self { first_seed: first, seeds: plan.seeds, runs, offline, tunings, wanted: None })
+    }
+
+    /// The outcomes of one combination, by seed, at most `seeds` of them; notes it in a study that asks.
+    #[must_use]
+    pub fn runs(&self, key: Key, seeds: u64) -> &[Outcome] {
+        let seeds = seeds.min(self.seeds);
+        if let Some(mut wanted) = self.wanted.as_ref().and_then(|w| w.lock().ok()) {
+            let most = wanted.runs.entry(key).or_default();
+            *most = (*most).max(seeds);
+        }
+        let all = self.runs.get(&key).map_or(&[][..], Vec::as_slice);
+        &all[..all.len().min(seeds as usize)]
+    }
+
+    /// The offline estimates of a recording, as [`Study::runs`].
+    #[must_use]
+    pub fn offline(&self, recorded: Recorded, seeds: u64) -> &[Offline] {
+        let seeds = seeds.min(self.seeds);
+        if let Some(mut wanted) = self.wanted.as_ref().and_then(|w| w.lock().ok()) {
+            let most = wanted.offline.entry(recorded).or_default();
+            *most = (*most).max(seeds);
+        }
+        let all = self.offline.get(&recorded).map_or(&[][..], Vec::as_slice);
+        &all[..all.len().min(seeds as usize)]
+    }
+
+    /// How a phantom's detection was tuned; the published defaults where nothing was.
+    #[must_use]
+    pub fn tuning(&self, recorded: Recorded, sensor: Sensor) -> Tuning {
+        self.tunings.get(&(unchanged_on_arm(recorded), sensor)).copied().unwrap_or_default()
+    }
+
+    /// All tunings.
+    pub fn tunings(&self) -> impl Iterator<Item = (&(Recorded, Sensor), &Tuning)> {
+        self.tunings.iter()
+    }
+}
+
+/// What was tuned, and how.
+type Tuned = ((Recorded, Sensor), Tuning);
+
+/// The tunings of a recording; on the arm one simulation of each tuning seed serves every sensor.
+fn tune(
+    recorded: Recorded,
+    once: &Insertion,
+    sensors: &BTreeMap<Sensor, bool>,
+) -> Result<Vec<Tuned>, ReproduceError> {
+    let on_arm = recorded.case.on_arm();
+    let seeds: Vec<u64> = (0..if on_arm { TUNING_SEEDS_ARM } else { TUNING_SEEDS })
+        .map(|index| TUNING_FIRST_SEED + index)
+        .collect();
+    let made: Vec<Insertion> = if on_arm {
+        seeds.par_iter().map(|seed| Insertion::of(&once.scenario, *seed)).collect::<Result<_, _>>()?
+    } else {
+        Vec::new()
+    };
+    let of = |sensor: Sensor, trace: bool| {
+        let recording = |(index, seed): (usize, &u64)| {
+            let insertion = made.get(index).unwrap_or(once);
+            (insertion, samples_of(insertion, *seed, recorded.noise_mn, sensor))
+        };
+        let recordings: Vec<_> = seeds.iter().enumerate().map(recording).collect();
+        ((recorded, sensor), Tuning::of(&recordings, sensor, trace))
+    };
+    Ok(sensors.iter().map(|(sensor, trace)| of(*sensor, *trace)).collect())
+}
+
+fn samples_of(insertion: &Insertion, seed: u64, noise_mn: u32, sensor: Sensor) -> Vec<stylet_core::Sample> {
+    match sensor {
+        Sensor::ForceTorque => insertion.samples(&insertion.reading(seed, noise_mn)),
+        Sensor::Virtual => insertion.samples(insertion.force_n(sensor)),
+    }
+}
+
+fn one(
+    job: &Job<'_>,
+    first_seed: u64,
+    tunings: &BTreeMap<(Recorded, Sensor), Tuning>,
+) -> Result<Done, ReproduceError> {
+    let mut done = Done::default();
+    // On the arm the torques' noise moves the needle: each seed is an insertion of its own.
+    let fresh;
+    let insertion = if job.recorded.case.on_arm() && job.seed != first_seed {
+        fresh = Insertion::of(&job.once.scenario, job.seed)?;
+        &fresh
+    } else {
+        job.once
+    };
+    for sensor in [Sensor::ForceTorque, Sensor::Virtual] {
+        let asked = job.runs.iter().filter(|k| k.sensor == sensor);
+        if !(job.offline && sensor == Sensor::ForceTorque) && asked.clone().next().is_none() {
+            continue;
+        }
+        let samples = samples_of(insertion, job.seed, job.recorded.noise_mn, sensor);
+        let tuning = tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
+        let mut shares = Vec::new();
+        for key in asked {
+            let outcome = insertion.run(&samples, sensor, key.variant, &tuning);
+            if key.variant == Variant::ml(Setup::Tuned) {
+                shares.clone_from(&outcome.shares);
+            }
+            done.runs.push((*key, outcome));
+        }
+        if job.offline && sensor == Sensor::ForceTorque {
+            done.offline = Some((job.recorded, Offline::of(insertion, &samples, &shares)));
+        }
+    }
+    Ok(done)
+}

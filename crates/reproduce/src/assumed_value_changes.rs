@@ -1,0 +1,237 @@
+//! The numbers of a phantom that are not the paper's, and what halving or doubling them makes of it.
+
+use crate::paper_experiments::Case;
+use serde::Serialize;
+use stylet_scenario::{Motion, Scenario, Sensor};
+
+/// A number that had to be chosen, or taken from elsewhere, because the paper does not give it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Number {
+    /// Noise of the force/torque sensor.
+    Noise,
+    /// K of the three single gels.
+    GelStiffness,
+    /// b of the three single gels.
+    GelFriction,
+    /// Ratio of b between neighbouring single gels.
+    GelContrast,
+    /// K of the stack's three layers.
+    StackStiffness,
+    /// b of the stack's three layers.
+    StackFriction,
+    /// Puncture force of the latex.
+    Latex,
+    /// K of both layers of the liver.
+    LiverStiffness,
+    /// b of both layers of the liver.
+    LiverFriction,
+    /// Both puncture forces of the liver.
+    LiverPuncture,
+    /// Thicknesses of both layers of the liver.
+    LiverThickness,
+    /// K of the abdomen's three layers.
+    AbdomenStiffness,
+    /// b of the abdomen's three layers.
+    AbdomenFriction,
+    /// Way in air between start and contact.
+    Start,
+    /// Time that the motion goes on for after the target has been passed.
+    Behind,
+    /// Noise of the arm's joint torques.
+    TorqueNoise,
+    /// `s1` with which the virtual sensor is listened to.
+    VirtualSigma,
+}
+
+/// A number halved or doubled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Change {
+    /// Which number.
+    pub number: Number,
+    /// Doubled instead of halved.
+    pub doubled: bool,
+}
+
+impl Serialize for Change {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.words())
+    }
+}
+
+impl Number {
+    /// All.
+    pub const ALL: [Number; 17] = [
+        Number::Noise,
+        Number::GelStiffness,
+        Number::GelFriction,
+        Number::GelContrast,
+        Number::StackStiffness,
+        Number::StackFriction,
+        Number::Latex,
+        Number::LiverStiffness,
+        Number::LiverFriction,
+        Number::LiverPuncture,
+        Number::LiverThickness,
+        Number::AbdomenStiffness,
+        Number::AbdomenFriction,
+        Number::Start,
+        Number::Behind,
+        Number::TorqueNoise,
+        Number::VirtualSigma,
+    ];
+
+    /// As it stands in the protocols.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Number::Noise => "noise of the force sensor",
+            Number::GelStiffness => "K of the single gels",
+            Number::GelFriction => "b of the single gels",
+            Number::GelContrast => "contrast of b between the single gels",
+            Number::StackStiffness => "K of the stack",
+            Number::StackFriction => "b of the stack",
+            Number::Latex => "puncture force of the latex",
+            Number::LiverStiffness => "K of the liver",
+            Number::LiverFriction => "b of the liver",
+            Number::LiverPuncture => "puncture forces of the liver",
+            Number::LiverThickness => "thicknesses of the liver",
+            Number::AbdomenStiffness => "K of the abdomen",
+            Number::AbdomenFriction => "b of the abdomen",
+            Number::Start => "way in air before contact",
+            Number::Behind => "time behind the target",
+            Number::TorqueNoise => "noise of the joint torques",
+            Number::VirtualSigma => "s1 for the virtual sensor",
+        }
+    }
+
+    /// Halved and doubled.
+    #[must_use]
+    pub const fn changes(self) -> [Change; 2] {
+        [Change { number: self, doubled: false }, Change { number: self, doubled: true }]
+    }
+
+    /// Whether the number enters a recording. The noise of the force/torque sensor is a key of its own, and `s1`
+    /// belongs to the algorithm.
+    #[must_use]
+    pub const fn enters(self, case: Case) -> bool {
+        match self {
+            Number::Noise | Number::VirtualSigma => false,
+            Number::GelStiffness | Number::GelFriction | Number::GelContrast => case.is_gel(),
+            Number::StackStiffness | Number::StackFriction | Number::Latex => case.is_stack(),
+            Number::LiverStiffness
+            | Number::LiverFriction
+            | Number::LiverPuncture
+            | Number::LiverThickness => case.is_liver(),
+            Number::AbdomenStiffness | Number::AbdomenFriction => case.is_abdomen(),
+            Number::Start => true,
+            // The abdomen's motion ends in the kidney.
+            Number::Behind => !case.is_abdomen(),
+            Number::TorqueNoise => case.on_arm(),
+        }
+    }
+}
+
+/// Friction of the middle gel: the contrast is changed about it.
+const MIDDLE_NS_PER_M2: f64 = 12_000.0;
+
+impl Change {
+    /// ½ or 2.
+    #[must_use]
+    pub const fn factor(self) -> f64 {
+        if self.doubled { 2.0 } else { 0.5 }
+    }
+
+    /// `K of the stack halved`.
+    #[must_use]
+    pub fn words(self) -> String {
+        format!("{} {}", self.number.name(), if self.doubled { "doubled" } else { "halved" })
+    }
+
+    /// Changes a scenario.
+    pub fn apply(self, scenario: &mut Scenario) {
+        let factor = self.factor();
+        for layer in &mut scenario.tissue.layers {
+            match self.number {
+                Number::GelStiffness
+                | Number::StackStiffness
+                | Number::LiverStiffness
+                | Number::AbdomenStiffness => layer.stiffness_n_per_m *= factor,
+                Number::GelFriction
+                | Number::StackFriction
+                | Number::LiverFriction
+                | Number::AbdomenFriction => layer.friction_ns_per_m2 *= factor,
+                Number::GelContrast => {
+                    let ratio = layer.friction_ns_per_m2 / MIDDLE_NS_PER_M2;
+                    layer.friction_ns_per_m2 = MIDDLE_NS_PER_M2 * ratio.powf(factor);
+                }
+                Number::Latex | Number::LiverPuncture => {
+                    layer.puncture_n = layer.puncture_n.map(|f| f * factor);
+                }
+                Number::LiverThickness => layer.thickness_m *= factor,
+                Number::Noise
+                | Number::Start
+                | Number::Behind
+                | Number::TorqueNoise
+                | Number::VirtualSigma => {}
+            }
+        }
+        if let (Number::Start, Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. }) =
+            (self.number, &mut scenario.motion)
+        {
+            *start_m *= factor;
+        }
+        if let (Number::Behind, Some(out_s)) = (self.number, out_of_the_target_s(scenario))
+            && let Motion::Constant { duration_s, .. } | Motion::Sinusoidal { duration_s, .. } =
+                &mut scenario.motion
+        {
+            *duration_s = out_s + factor * (*duration_s - out_s);
+        }
+        if let (Number::TorqueNoise, Sensor::Both { virtual_sensor, .. } | Sensor::Virtual(virtual_sensor)) =
+            (self.number, &mut scenario.sensor)
+        {
+            virtual_sensor.torque_noise_nm *= factor;
+        }
+    }
+}
+
+/// When the ideal motion passes the last far face, in s; `None` when it never does.
+fn out_of_the_target_s(scenario: &Scenario) -> Option<f64> {
+    let tissue = &scenario.tissue;
+    let far_m = tissue.surface_m + tissue.layers.iter().map(|l| l.thickness_m).sum::<f64>();
+    let plan = scenario.motion.plan()?;
+    let end_s = plan.duration_s();
+    if plan.at(end_s).position_m <= far_m {
+        return None;
+    }
+    let (mut before_s, mut after_s) = (0.0, end_s);
+    for _ in 0..60 {
+        let mid_s = 0.5 * (before_s + after_s);
+        *if plan.at(mid_s).position_m > far_m { &mut after_s } else { &mut before_s } = mid_s;
+    }
+    Some(after_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_change_makes_another_valid_scenario_of_the_experiments_that_it_enters() {
+        for case in Case::ALL {
+            let plain = case.scenario().expect("valid");
+            for change in Number::ALL.into_iter().flat_map(Number::changes) {
+                if !change.number.enters(case) {
+                    continue;
+                }
+                let mut changed = plain.clone();
+                change.apply(&mut changed);
+                // The middle gel stays where it is when the contrast changes.
+                if change.number != Number::GelContrast {
+                    assert_ne!(changed, plain, "{case:?} {}", change.words());
+                }
+                let checked = changed.check().map_err(|p| p.message);
+                assert_eq!(checked, Ok(()), "{case:?} {}", change.words());
+            }
+        }
+    }
+}

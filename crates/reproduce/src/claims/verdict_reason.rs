@@ -1,0 +1,54 @@
+//! Why a verdict is what it is, in words made of the conditions.
+
+use super::{Condition, Primary};
+use crate::claim_verdict::Trial;
+use crate::effect_size::Says;
+use std::fmt::Write as _;
+
+/// Names with their effects: `depth known 0.93 (0.91 to 0.95)`.
+fn list<'a>(conditions: impl Iterator<Item = &'a Condition>) -> String {
+    conditions.map(|c| format!("{} {}", c.name, c.effect.words())).collect::<Vec<_>>().join("; ")
+}
+
+/// From the primary condition, the numbers of ours and the sensitivity conditions.
+pub(super) fn reason(primary: &Primary, trials: &[Trial], sensitivities: &[Condition]) -> String {
+    let bar = primary.bar.words();
+    let says = match (primary.says, primary.effect.interval.is_some()) {
+        (Says::Supports, _) => "the whole interval is on the claim's side",
+        (Says::Contradicts, _) => "the whole interval is on the other side",
+        (Says::Undecided, true) => "the interval holds the bar",
+        (Says::Undecided, false) => "too few seeds give a value",
+    };
+    let mut text = format!("The primary condition gives {}, asked is {bar}: {says}.", primary.effect.words());
+    let others: Vec<&Condition> = primary.parts.iter().filter(|p| p.says != primary.says).collect();
+    if primary.parts.len() > 1 && !others.is_empty() {
+        let _ = write!(text, " Otherwise alone: {}.", list(others.into_iter()));
+    }
+    let deciding: Vec<String> = trials
+        .iter()
+        .filter(|t| t.decides)
+        .map(|t| format!("{} {}", t.change.words(), t.effect.words()))
+        .collect();
+    if deciding.is_empty() {
+        if !trials.is_empty() {
+            let _ = write!(
+                text,
+                " None of the {} numbers of ours, halved or doubled, changes that.",
+                trials.len() / 2
+            );
+        }
+    } else {
+        let _ = write!(text, " It hangs on numbers of ours: {}.", deciding.join("; "));
+    }
+    for (says, verb) in [
+        (Says::Supports, "It holds with"),
+        (Says::Contradicts, "It does not hold with"),
+        (Says::Undecided, "Undecided with"),
+    ] {
+        let some: Vec<&Condition> = sensitivities.iter().filter(|s| s.says == says).collect();
+        if !some.is_empty() {
+            let _ = write!(text, " {verb}: {}.", list(some.into_iter()));
+        }
+    }
+    text
+}

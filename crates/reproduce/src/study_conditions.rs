@@ -1,0 +1,120 @@
+//! The conditions under which a claim looks at the study.
+
+use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
+use crate::all_runs::{Key, NOISE_MN, Recorded, Study};
+use crate::assumed_value_changes::{Change, Number};
+use crate::paper_experiments::Case;
+use crate::run_outcome::{Offline, Outcome};
+
+/// Seeds on which a halved or doubled number is tried,
+pub const CHANGED_SEEDS: u64 = 12;
+/// the same where the arm takes part,
+pub const CHANGED_SEEDS_ARM: u64 = 2;
+/// and seeds of sensitivity conditions that need an arm of their own.
+pub const SENSITIVITY_SEEDS_ARM: u64 = 4;
+
+/// The study under one condition: what was changed, the noise, what the algorithm is told, how many seeds.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The study.
+    pub study: &'a Study,
+    /// A number halved or doubled.
+    pub change: Option<Change>,
+    /// Noise of the force/torque sensor in mN.
+    pub noise_mn: u32,
+    /// What the algorithm is told.
+    pub setup: Setup,
+    /// Seeds.
+    pub seeds: u64,
+}
+
+impl<'a> View<'a> {
+    /// The paper's own protocol over all seeds: the primary condition.
+    #[must_use]
+    pub const fn primary(study: &'a Study) -> Self {
+        Self { study, change: None, noise_mn: NOISE_MN, setup: Setup::Tuned, seeds: study.seeds }
+    }
+
+    /// Another setup.
+    #[must_use]
+    pub const fn setup(self, setup: Setup) -> Self {
+        Self { setup, ..self }
+    }
+
+    /// Another noise.
+    #[must_use]
+    pub const fn noise(self, noise_mn: u32) -> Self {
+        Self { noise_mn, ..self }
+    }
+
+    /// Fewer seeds.
+    #[must_use]
+    pub fn fewer(self, seeds: u64) -> Self {
+        Self { seeds: self.seeds.min(seeds), ..self }
+    }
+
+    /// A number halved or doubled, on fewer seeds.
+    #[must_use]
+    pub fn changed(self, change: Change, with_arm: bool) -> Self {
+        let fewer = self.fewer(if with_arm { CHANGED_SEEDS_ARM } else { CHANGED_SEEDS });
+        if change.number == Number::Noise {
+            let noise_mn = if change.doubled { 2 * NOISE_MN } else { NOISE_MN / 2 };
+            return Self { noise_mn, ..fewer };
+        }
+        Self { change: Some(change), ..fewer }
+    }
+
+    /// The recording of an experiment under this condition.
+    #[must_use]
+    pub fn recorded(&self, case: Case) -> Recorded {
+        Recorded { case, change: self.change.filter(|c| c.number.enters(case)), noise_mn: self.noise_mn }
+    }
+
+    /// The outcomes by seed.
+    #[must_use]
+    pub fn runs(&self, case: Case, sensor: Sensor, kelvin_voigt: bool, ablation: Ablation) -> &'a [Outcome] {
+        let mut recorded = self.recorded(case);
+        if sensor == Sensor::Virtual {
+            // The force/torque sensor's noise does not reach the virtual one.
+            recorded.noise_mn = NOISE_MN;
+        }
+        let setup = match self.change {
+            Some(Change { number: Number::VirtualSigma, doubled })
+                if sensor == Sensor::Virtual && self.setup == Setup::Tuned =>
+            {
+                if doubled {
+                    Setup::SigmaDoubled
+                } else {
+                    Setup::SigmaHalved
+                }
+            }
+            _ => self.setup,
+        };
+        let variant = Variant { kelvin_voigt, setup, ablation };
+        self.study.runs(Key { recorded, sensor, variant }, self.seeds)
+    }
+
+    /// Multi-layer model, force/torque sensor.
+    #[must_use]
+    pub fn ml(&self, case: Case) -> &'a [Outcome] {
+        self.runs(case, Sensor::ForceTorque, false, Ablation::None)
+    }
+
+    /// Kelvin-Voigt model, force/torque sensor.
+    #[must_use]
+    pub fn kv(&self, case: Case) -> &'a [Outcome] {
+        self.runs(case, Sensor::ForceTorque, true, Ablation::None)
+    }
+
+    /// Multi-layer model, force/torque sensor, something left out.
+    #[must_use]
+    pub fn without(&self, case: Case, ablation: Ablation) -> &'a [Outcome] {
+        self.runs(case, Sensor::ForceTorque, false, ablation)
+    }
+
+    /// The offline estimates by seed.
+    #[must_use]
+    pub fn offline(&self, case: Case) -> &'a [Offline] {
+        self.study.offline(self.recorded(case), self.seeds)
+    }
+}
