@@ -1,5 +1,5 @@
-//! What a physics step of the arm costs: rapier's multibody, control, disturbance observer, tissue law
-//! and virtual sensor; and MuJoCo's `mj_step` of the same arm (rigid bodies only) beside it in the same
+//! Time of a physics step of the arm: rapier's multibody, control, disturbance observer, tissue law
+//! and virtual sensor; and MuJoCo's `mj_step` of the same arm (rigid bodies only) in the same
 //! run, as a ratio.
 //!
 //! Run with `STYLET_PEERS_PYTHON=.../venv/bin/python cargo bench --bench arm`, the path being that of a
@@ -183,7 +183,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "arm with control and virtual sensor: {all:.1} us per step, median ({best:.1} best; bar {BAR_US} us)"
     );
     if peer.is_empty() {
-        println!("SKIPPED: MuJoCo beside it. Set STYLET_PEERS_PYTHON to a Python with the package `mujoco`.");
+        println!(
+            "SKIPPED: the comparison with MuJoCo. Set STYLET_PEERS_PYTHON to a Python with the package `mujoco`."
+        );
     } else {
         let peer = median(peer);
         println!(

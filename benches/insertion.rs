@@ -1,4 +1,4 @@
-//! What a sample of an insertion costs: base law, noise and core, each beside a bare scalar loop
+//! Time per sample of an insertion: base law, noise and online algorithm, each compared with a plain scalar loop
 //! that does the same arithmetic, in the same run; and a step of the rapier slide.
 //!
 //! Run with `cargo bench --bench insertion`. The last lines print ns per sample and the ratios,
@@ -131,7 +131,7 @@ fn in_turns(mut ours: impl FnMut() -> f64, mut bare: impl FnMut() -> f64) -> (f6
     (median(|p| p.0), median(|p| p.1))
 }
 
-/// padasip's RLS alone, on the first layer's samples, beside the whole core.
+/// padasip's RLS on the samples of the first layer, compared with the whole online algorithm.
 fn python_peer(data: &[Sample], core_ns: f64) {
     let file = std::env::temp_dir().join(format!("stylet-bench-{}.csv", std::process::id()));
     let rows: String = data

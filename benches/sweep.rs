@@ -1,6 +1,6 @@
-//! What a trial of a sweep costs: ns per sample and the share of law, noise, core and score; one
+//! Time of a sweep's trial: ns per sample and the share of law, noise, core and score; one
 //! against two threads; the cost per insertion from 100 to 100 000 trials, 10 000 among them; memory; and
-//! the pure NumPy version of the same trial beside it. The load of the machine is printed first.
+//! the pure NumPy version of the same trial for comparison. The load of the machine is printed first.
 //!
 //! Run with `cargo bench --bench sweep` (NumPy: `bash benches/peers/setup.sh` once before);
 //! `STYLET_BENCH_TRIALS` sets the largest sweep (default 100 000). The best of several passes is printed,
@@ -88,21 +88,21 @@ impl Parts {
 
     fn core(&self, storage: &mut [Sample]) -> Vec<EnhancedSample> {
         let mut core = Enhancer::new(self.scenario.enhance.clone(), 0.0, storage);
-        let mut heard = Vec::with_capacity(self.count);
-        core.run(&self.samples, |out| heard.push(out.into()));
-        heard
+        let mut enhanced = Vec::with_capacity(self.count);
+        core.run(&self.samples, |out| enhanced.push(out.into()));
+        enhanced
     }
 
-    fn score(&self, heard: &[EnhancedSample]) {
+    fn score(&self, enhanced: &[EnhancedSample]) {
         let mut scorer = self.scorer();
-        for ((s, tip_n), heard) in self.samples.iter().zip(&self.tips).zip(heard) {
+        for ((s, tip_n), enhanced) in self.samples.iter().zip(&self.tips).zip(enhanced) {
             let moment = TrueSample {
                 position_m: s.position_m,
                 force_n: s.force_n,
                 tip_n: *tip_n,
                 total_n: s.force_n,
             };
-            scorer.add_sample(&moment, heard);
+            scorer.add_sample(&moment, enhanced);
         }
         black_box(scorer.finish());
     }
@@ -125,8 +125,8 @@ fn shares(sweep: &Sweep) -> f64 {
     let core = per_sample(best(300, || {
         black_box(parts.core(&mut storage));
     }));
-    let heard = parts.core(&mut storage);
-    let score = per_sample(best(300, || parts.score(&heard)));
+    let enhanced = parts.core(&mut storage);
+    let score = per_sample(best(300, || parts.score(&enhanced)));
     let mut workspace = trial_simulation::Workspace::default();
     let whole =
         per_sample(best(300, || drop(black_box(trial_simulation::run(&parts.scenario, &mut workspace)))));

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Memory and time of `stylet enhance` on a log of N samples (default 1e7): peak memory, samples per second, and what reading costs beside
-# a bare loop over the same columns with the csv crate. Takes about 34 bytes of disk per sample for the log and 300 for the work,
-# beside the script's own folder under TMPDIR, and gives them back. Needs an otherwise idle machine to say anything about time.
+# Memory and time of `stylet enhance` on a log of N samples (default 1e7): peak memory, samples per second, and the cost of reading compared with
+# a plain loop over the same columns with the csv crate. Takes about 34 bytes of disk per sample for the log and 300 for the work,
+# in a temporary folder under TMPDIR, which is removed. Needs an otherwise idle machine to say anything about time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 samples=${1:-1e7}

@@ -1,9 +1,7 @@
-//! Promise: the core runs on really measured insertions: it finds the skin's puncture where the force
-//! drops, and nothing in air.
+//! The online algorithm on measured insertions: it detects the puncture of the skin, and nothing in air.
 //!
 //! The recordings have no licence and stay outside the repository. They are read from the folder
-//! `STYLET_MEASURED`, by default `../shared/measured` beside the checkout; without it these tests say
-//! loudly that they were skipped.
+//! named by `STYLET_MEASURED`; without it these tests report that they were skipped.
 
 mod support;
 

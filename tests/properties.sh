@@ -5,14 +5,14 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 rounds=${1:-20} first=${2:-1}
-said=$(mktemp)
-trap 'rm -f "$said"' EXIT
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
 for ((seed = first; seed < first + rounds; seed++)); do
     echo "seed $seed"
     while read -r crate tests; do
         # shellcheck disable=SC2086
-        PROPTEST_RNG_SEED=$seed cargo test --quiet --release -p "stylet-$crate" $tests >"$said" 2>&1 || {
-            cat "$said"
+        PROPTEST_RNG_SEED=$seed cargo test --quiet --release -p "stylet-$crate" $tests >"$log" 2>&1 || {
+            cat "$log"
             echo "seed $seed of stylet-$crate does not hold" >&2
             exit 1
         }

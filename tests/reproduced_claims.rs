@@ -1,11 +1,11 @@
-//! Promise: what our testbed says of the paper's claims does not change unnoticed, and the page is the same
+//! The verdicts of the testbed on the paper's claims do not change unnoticed, and the page is the same
 //! for any number of threads.
 //!
 //! `tests/expected_verdicts.json` holds verdicts, numbers and reasons for four noise seeds and what the algorithm's
-//! switches do on them, which are run here, and verdicts and primary effects for two disjoint sets of fifty. The latter are run anew, and the file is
+//! switches do on them, which are run here, and verdicts and primary effects for two disjoint sets of fifty. The latter are run again, and the file is
 //! written, with
 //! `STYLET_RECORD=1 cargo test --release --test reproduced_claims -- --ignored`; without the variable they are
-//! held against it. A change is to be understood before the file is.
+//! held against it. Understand a change before recording it.
 
 use serde_json::{Value, json};
 use std::sync::OnceLock;
@@ -38,7 +38,7 @@ fn claims_of(first_seed: u64, seeds: u64) -> Vec<Claim> {
     claims::all(&Study::run(&asking.plan(), &|| {}).expect("shipped scenarios"))
 }
 
-/// Numbers within a billionth, everything else alike; what differs, with its path.
+/// Numbers within a billionth, everything else equal; what differs, with its path.
 fn differences(path: &str, was: &Value, is: &Value, found: &mut Vec<String>) {
     match (was, is) {
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
@@ -253,7 +253,7 @@ fn every_number_on_the_page_has_its_source_class() {
     assert_eq!(
         html.matches("<caption>Beside the supplement").count(),
         19,
-        "every figure beside the supplement"
+        "every figure is compared with the supplement"
     );
     assert!(html.contains("Numbers of ours, and the verdicts that hang on them"));
 }

@@ -5,8 +5,8 @@
     stylet benchmark score out/challenge out/answers.json
 
 Per recording: means over 20 ms; ruptures where the force falls most between 60 % of a layer and 12 % beyond its far face. Columns:
-the believed law's `K` and `b` of every layer, which are fitted freely, and what the library's effects that are linear in their
-strength would add. An effect is named when its column, beside those of the believed law, contributes more than a tenth of what
+the assumed law's `K` and `b` of every layer, which are fitted freely, and what the library's effects that are linear in their
+strength would add. An effect is named when its column, together with those of the assumed law, contributes more than a tenth of what
 remains, or 0.3 noise standard deviations, whichever is larger. Whoever wants to enter with a better method starts here.
 """
 
@@ -23,7 +23,7 @@ warnings.filterwarnings("ignore")
 BLOCK_S, BAND = 0.02, 1e-5
 
 
-def believed(text):
+def assumed_tissue(text):
     number = r"(-?[\d.e+-]+)"
     surface = float(re.search(r"surface_m: " + number, text)[1])
     layers = []
@@ -86,7 +86,7 @@ def columns(t, z, v, count, fronts):
 
 
 def answer(folder):
-    surface, layers = believed((folder / "assumed.ron").read_text())
+    surface, layers = assumed_tissue((folder / "assumed.ron").read_text())
     fronts = surface + np.concatenate([[0.0], np.cumsum(layers[:, 0])])
     base, extra, force, quiet = [], [], [], []
     for path in sorted(folder.glob("*.csv")):
@@ -117,9 +117,9 @@ def main():
     for case in sorted((folder / "cases").iterdir()):
         answers[case.name] = answer(case)
         print(case.name, answers[case.name], file=sys.stderr, flush=True)
-    beside = out.with_suffix(".part")
-    beside.write_text(json.dumps(answers, indent=1))
-    beside.rename(out)
+    part = out.with_suffix(".part")
+    part.write_text(json.dumps(answers, indent=1))
+    part.rename(out)
 
 
 main()

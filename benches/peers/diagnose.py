@@ -1,9 +1,9 @@
-"""Sparse regressions on the referee's cases: the peers of `stylet diagnose`.
+"""Sparse regressions on cases of the independent simulator: the peers of `stylet diagnose`.
 
     python diagnose.py TUNING_TERMS TUNING_TRUTH TEST_TERMS ANSWERS
 
 The folders of terms hold what `cargo run --release -p stylet-diagnose --example peers_terms` wrote for two challenges. Every peer sees
-the residual of the fitted base law, what the base law's numbers change (projected out), and what every effect of the library adds to
+the residual of the fitted base law, what the parameters of the base law change (projected out), and what every effect of the library adds to
 the force at the values from which Stylet's own search begins.
 
 Every peer is tuned by itself on the tuning challenge, to the most right answers: its own settings (see diagnose_regressions.py);
@@ -45,7 +45,7 @@ def load(folder, truth=None):
 
 def tune(cases):
     """The best of every peer: (score, view, setting, cut)."""
-    told = {name: {} for name in PEERS}
+    results = {name: {} for name in PEERS}
     for number, case in enumerate(cases):
         for view in VIEWS:
             problem = case.problem(*view)
@@ -54,7 +54,7 @@ def tune(cases):
                     if view[1] and setting[0] == "NARX":
                         continue  # rows of ruptures have no sample before
                     found, worth = problem.contributions(coefficients), {}
-                    rows = told[name].setdefault((view, setting), np.zeros((len(cases), len(CUTS)), bool))
+                    rows = results[name].setdefault((view, setting), np.zeros((len(cases), len(CUTS)), bool))
                     for k, cut in enumerate(CUTS):
                         named = chosen(found, *cut)  # the largest first: how many there are says which
                         if len(named) not in worth:
@@ -62,7 +62,7 @@ def tune(cases):
                         rows[number, k] = worth[len(named)]
         print(f"tuning: {number + 1} of {len(cases)}", file=sys.stderr, flush=True)
     best = {}
-    for name, settings in told.items():
+    for name, settings in results.items():
         for (view, setting), rows in settings.items():
             score = rows.mean(axis=0)
             k = int(np.argmax(score))
@@ -84,9 +84,9 @@ def describe(best):
 
 
 def put(path, answers):
-    beside = path.with_suffix(".part")
-    beside.write_text(json.dumps(answers, indent=1))
-    beside.rename(path)
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(answers, indent=1))
+    part.rename(path)
 
 
 def main():

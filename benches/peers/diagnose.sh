@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Stylet's diagnosis and sparse regressions on the referee's cases, in one run, on one thread.
+# Stylet's diagnosis and sparse regressions on cases of the independent simulator, in one run, on one thread.
 #
 #   bash benches/peers/diagnose.sh [CASES] [SEED] [WORLD...]
 #
 # Per world (plain and rich): exports TUNING_CASES (40) cases of the public seed 701 to tune the peers on and CASES (100) cases of SEED
-# (702) to judge all on, half of them with nothing wrong and half with thicknesses wrong by the largest grade; two of five hide one effect,
+# (702) to score all on, half of them without a wrong assumption and half with wrong thicknesses of the largest severity; two of five hide one effect,
 # one two effects, one something that the library lacks, one nothing. Writes what regressions are given, lets Stylet diagnose, tunes the
 # peers, lets them answer, and judges every answer by `stylet benchmark score`. What is there already is not made again (remove
-# target/peers_cases to begin anew). Then draws target/peers_cases/diagnosis_peers.svg of the table. Needs `bash benches/peers/setup.sh` once before.
+# target/peers_cases to start over). Then draws target/peers_cases/diagnosis_peers.svg of the table. Needs `bash benches/peers/setup.sh` once before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 cases=${1:-100}

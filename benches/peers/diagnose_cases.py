@@ -1,5 +1,5 @@
 """The cases of a challenge as `peers_terms` wrote them, the problem a regression is given, its answer, and what an answer is worth
-while a peer is tuned (as the referee judges: `crates/examine/src/judge/answers.rs`)."""
+while a peer is tuned (as the benchmark scores: `crates/examine/src/judge/answers.rs`)."""
 
 import json
 
@@ -27,7 +27,7 @@ class Case:
 
 
 class Problem:
-    """Residual `y` and columns `x` less what the base law's numbers imitate, in noise standard deviations; columns of
+    """Residual `y` and columns `x` minus what the parameters of the base law can imitate, in noise standard deviations; columns of
     unit RMS with the effect that each belongs to in `names`, `groups` the recording of every row."""
 
     def __init__(self, table, names, groups):
@@ -56,12 +56,12 @@ class Problem:
         return out
 
     def like(self, effect, columns):
-        """Other effects with a column that is nearly one of these, most alike first; no more than a class may have."""
-        alike = {}
+        """Other effects with a column that is nearly one of these, most similar first; no more than a class may have."""
+        similarity = {}
         for k, name in enumerate(self.names):
             if name != effect:
-                alike[name] = max(alike.get(name, 0.0), *(abs(self.gram[k, j]) for j in columns))
-        order = sorted((n for n in alike if alike[n] > SAME), key=lambda n: (-alike[n], n))
+                similarity[name] = max(similarity.get(name, 0.0), *(abs(self.gram[k, j]) for j in columns))
+        order = sorted((n for n in similarity if similarity[n] > SAME), key=lambda n: (-similarity[n], n))
         return order[: LARGEST_CLASS - 1]
 
 

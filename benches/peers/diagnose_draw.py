@@ -29,8 +29,8 @@ def read(path):
         if row:
             world, hidden, right, *right_ends, wrong, low, high = row.groups()
             share = [100 * int(x.split("/")[0]) / int(x.split("/")[1].split()[0]) for x in (right, wrong)]
-            told = (share[0], *map(int, right_ends), share[1], int(low), int(high))
-            table.setdefault(world, {}).setdefault(program, {})[hidden] = told
+            rates = (share[0], *map(int, right_ends), share[1], int(low), int(high))
+            table.setdefault(world, {}).setdefault(program, {})[hidden] = rates
     return table
 
 
@@ -40,10 +40,10 @@ def main(table, picture):
     for row, (world, programs) in zip(axes, table.items()):
         for axis, first, what in zip(row, (0, 3), ("right, and nothing else named", "a wrong name")):
             for k, (program, name) in enumerate(NAMES.items()):
-                told = [programs[program][hidden] for hidden in HIDDEN]
+                rates = [programs[program][hidden] for hidden in HIDDEN]
                 at = [g + 0.16 * (k - 2) for g in range(len(HIDDEN))]
-                share = [t[first] for t in told]
-                ends = [[max(s - t[first + 1], 0) for s, t in zip(share, told)], [max(t[first + 2] - s, 0) for s, t in zip(share, told)]]
+                share = [t[first] for t in rates]
+                ends = [[max(s - t[first + 1], 0) for s, t in zip(share, rates)], [max(t[first + 2] - s, 0) for s, t in zip(share, rates)]]
                 axis.bar(at, share, 0.14, color=COLOURS[k], label=name)
                 axis.errorbar(at, share, ends, fmt="none", ecolor="#333333", elinewidth=0.8, capsize=2)
             axis.set_title(f"{world}: {what}", fontsize=10, loc="left")

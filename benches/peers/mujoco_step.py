@@ -1,4 +1,4 @@
-"""Time of MuJoCo's mj_step on the arm of benches/arm.rs, for the ratio beside our own.
+"""Time of MuJoCo's mj_step on the arm of benches/arm.rs, for comparison with ours.
 
     python mujoco_step.py MODEL.xml Q1,...,Q7 STEPS ROUNDS
 

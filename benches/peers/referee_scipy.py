@@ -1,4 +1,4 @@
-"""The referee's laws against SciPy: the equations of the page (base law, relaxation, Dahl friction, a puncture that depends on
+"""The laws of the independent simulator against SciPy: the equations of the page (base law, relaxation, Dahl friction, a puncture that depends on
 speed, a compliant needle), integrated by `solve_ivp` with its own event finding.
 
     cargo run --release -p stylet-examine --example trace > trace.json

@@ -1,4 +1,4 @@
-//! Bare scalar loops that do the same arithmetic as the law and the core, with nothing around it:
+//! Plain scalar loops with the arithmetic of the force law and of the online algorithm, for comparison:
 //! what a hand-written program for exactly this one case would cost. They are the yardstick of the
 //! benchmarks, not part of Stylet.
 

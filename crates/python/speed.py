@@ -1,4 +1,4 @@
-"""What a sample costs from Python, beside the same core in Rust over the same samples, in the same run.
+"""Time per sample from Python, compared with the same algorithm in Rust on the same samples, in the same run.
 
     crates/python/test.sh --release --collect-only >/dev/null      # builds the module in release
     PYTHONPATH=target/python-module target/python/bin/python crates/python/speed.py
@@ -17,14 +17,14 @@ ROOT = Path(__file__).resolve().parents[2]
 COLUMNS = ("time_s", "position_m", "velocity_mps", "force_n")
 
 
-def least(repeats, one):
-    """Seconds of the quickest of many: what other programs do not disturb."""
+def fastest(repeats, one):
+    """Seconds of the fastest of many repetitions, which other programs disturb least."""
     best = np.inf
     for _ in range(repeats):
         core = stylet.Enhancer()
-        begun = time.perf_counter()
+        start = time.perf_counter()
         one(core)
-        best = min(best, time.perf_counter() - begun)
+        best = min(best, time.perf_counter() - start)
     return best
 
 
@@ -35,22 +35,22 @@ def main():
     with tempfile.NamedTemporaryFile(suffix=".bin") as file:
         np.column_stack([columns[c] for c in COLUMNS]).astype("<f8").tofile(file.name)
         command = ["cargo", "run", "--quiet", "--release", "-p", "stylet-core", "--example", "speed", "--", file.name]
-        said = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
-    rust = {"step": float(said[1]), "run": float(said[3])}
+        output = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
+    rust = {"step": float(output[1]), "run": float(output[3])}
     rows = list(zip(*(columns[c].tolist() for c in COLUMNS)))
 
     def steps(core):
         step = core.step
         for t, z, v, f in rows:
-            step(t, z, v, f)
+            step(time_s=t, position_m=z, velocity_mps=v, force_n=f)
 
     def brief(core):
         enhanced = core.enhanced
         for t, z, v, f in rows:
-            enhanced(t, z, v, f)
+            enhanced(time_s=t, position_m=z, velocity_mps=v, force_n=f)
 
-    run = 1e9 * least(100, lambda core: core.run(**columns)) / n
-    step, enhanced = (1e9 * least(20, one) / n for one in (steps, brief))
+    run = 1e9 * fastest(100, lambda core: core.run(**columns)) / n
+    step, enhanced = (1e9 * fastest(20, one) / n for one in (steps, brief))
     print(f"{n} samples; Python {sys.version.split()[0]}")
     print(f"run(arrays)   {run:6.0f} ns a sample, in Rust {rust['run']:.0f}: ratio {run / rust['run']:.2f}")
     print(f"step(...)     {step:6.0f} ns a sample, in Rust {rust['step']:.0f}")

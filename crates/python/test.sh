@@ -29,8 +29,8 @@ export MPLBACKEND=agg PYTHONPATH="$target/python-module"
 profile=debug
 read -ra build <<<"${STYLET_BUILD:-}"
 [ "${1:-}" = --release ] && { profile=release; build+=(--release); shift; }
-# Built beside the command, which the tests compare it with, so that both share every dependency; maturin would choose other features
-# for them.
+# Built together with the command, with which the tests compare it, so that both share every dependency; maturin would choose other
+# features for them.
 if [ -z "${STYLET_COMMAND:-}" ]; then
     cargo build "${build[@]}" -p stylet
     export STYLET_COMMAND="$target/$profile/stylet"

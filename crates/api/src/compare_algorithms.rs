@@ -1,5 +1,4 @@
-//! The same insertions, heard by several algorithms: replayed scenarios, and the referee's cases. The only place where those cases and the
-//! online core meet; neither knows of the other.
+//! Several online algorithms on the same insertions: replayed scenarios, and cases of the independent simulator.
 
 use crate::benchmark::parse_word;
 use crate::error::Error;
@@ -13,7 +12,7 @@ use stylet_scenario::Scenario;
 use stylet_score::{Trace, match_ruptures};
 use stylet_sweep::algorithm_comparison::{ComparisonRow, DetectionCounts, algorithm_name, compare_algorithm};
 
-/// The row of a scenario, which was read from `file`, over so many noise seeds; `done` is told of each insertion.
+/// The row of a scenario read from `file`, over this many noise seeds; `done` is called after each insertion.
 ///
 /// # Errors
 /// [`Error::Simulate`] when it cannot be replayed.
@@ -28,7 +27,7 @@ pub fn compare_on_scenario(
         .map_err(|why| Error::Simulate { file: file.to_owned(), why })
 }
 
-/// All files that `stylet compare` writes, of rows over `seeds` insertions.
+/// All files that `stylet compare` writes, for rows of `seeds` insertions.
 ///
 /// # Errors
 /// [`Error::Internal`] when a value cannot be written.
@@ -39,22 +38,21 @@ pub fn output_files(rows: &[ComparisonRow], seeds: u64) -> Result<OutputFiles, E
     Ok(output)
 }
 
-/// Cases of one kind: a row per algorithm.
+/// Cases that hide the same kind of departure: one row of the table per algorithm.
 pub struct CaseGroup {
     name: String,
     cases: Vec<CaseId>,
 }
 
-/// Kinds of so many cases of a world, drawn with a seed, in which nothing that is believed is wrong; one per word of what departs from the base
-/// law.
+/// One group of `cases` cases per word of `hide`, with this tissue model and seed, and without wrong assumptions.
 ///
 /// # Errors
-/// [`Error::Request`] for a word that there is not, with those that there are.
+/// [`Error::Request`] for an unknown word, with the known ones.
 pub fn case_groups(world: &str, hide: &[String], cases: u64, seed: u64) -> Result<Vec<CaseGroup>, Error> {
     let world = parse_word("--world", world, World::ALL, World::parse, World::as_str)?;
     hide.iter()
-        .map(|given| {
-            let hide = parse_word("--hide", given, Hide::ALL, Hide::parse, Hide::as_str)?;
+        .map(|word| {
+            let hide = parse_word("--hide", word, Hide::ALL, Hide::parse, Hide::as_str)?;
             let plan = Plan {
                 world,
                 wrong: vec![Wrong::Nothing],
@@ -71,43 +69,43 @@ pub fn case_groups(world: &str, hide: &[String], cases: u64, seed: u64) -> Resul
 }
 
 impl CaseGroup {
-    /// Draws each case once and lets every algorithm hear it; `done` is told of the insertions that were heard.
+    /// Simulates each case once and runs every algorithm on it; `done` is called with the number of insertions processed.
     ///
     /// # Errors
-    /// [`Error::Internal`] when a case cannot be drawn, which is a mistake of the referee.
+    /// [`Error::Internal`] when a case cannot be simulated.
     pub fn run_algorithms(
         &self,
         algorithms: &[Algorithm],
         done: &(dyn Fn(u64) + Sync),
     ) -> Result<Vec<ComparisonRow>, Error> {
-        // In the order of the cases, whatever the threads: the same bytes.
-        let heard: Vec<Vec<DetectionCounts>> = self
+        // In the order of the cases, so that the bytes do not depend on the number of threads.
+        let counts: Vec<Vec<DetectionCounts>> = self
             .cases
             .par_iter()
             .map(|id| {
-                let case = stylet_examine::make_case(id)
-                    .map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
-                let scored = algorithms.iter().map(|a| listen(&case, *a)).collect();
+                let case =
+                    stylet_examine::make_case(id).map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
+                let counts = algorithms.iter().map(|a| count_detections(&case, *a)).collect();
                 done(algorithms.len() as u64);
-                Ok(scored)
+                Ok(counts)
             })
             .collect::<Result<_, Error>>()?;
         let row = |(k, algorithm): (usize, &Algorithm)| {
-            let mut all = DetectionCounts::default();
-            for one in heard.iter().filter_map(|of| of.get(k)) {
-                all.missed += one.missed;
-                all.false_alarms += one.false_alarms;
-                all.ruptures += one.ruptures;
-                all.delays_s.extend(&one.delays_s);
+            let mut sum = DetectionCounts::default();
+            for one in counts.iter().filter_map(|case| case.get(k)) {
+                sum.missed += one.missed;
+                sum.false_alarms += one.false_alarms;
+                sum.ruptures += one.ruptures;
+                sum.delays_s.extend(&one.delays_s);
             }
-            ComparisonRow::new(&self.name, algorithm_name(*algorithm), self.cases.len() as u64, &all)
+            ComparisonRow::new(&self.name, algorithm_name(*algorithm), self.cases.len() as u64, &sum)
         };
         Ok(algorithms.iter().enumerate().map(row).collect())
     }
 }
 
-/// What an algorithm makes of all recordings of a case.
-fn listen(case: &Case, algorithm: Algorithm) -> DetectionCounts {
+/// Runs an algorithm on all recordings of a case and counts its detections.
+fn count_detections(case: &Case, algorithm: Algorithm) -> DetectionCounts {
     let config = EnhanceConfig { algorithm, ..EnhanceConfig::default() };
     let surface_m = case.setup.assumed.surface_m;
     let mut all = DetectionCounts::default();

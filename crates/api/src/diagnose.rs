@@ -1,4 +1,4 @@
-//! What a scenario gets wrong about measured recordings. The only file here that knows the engine.
+//! Diagnosis of single recordings, and prediction of held-out ones, with the files that the commands write.
 
 use crate::diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE};
 use crate::error::Error;
@@ -8,13 +8,13 @@ use stylet_diagnose::{Diagnosis, DiagnosisResult, NamedRecording, Options};
 use stylet_record::{QualityNote, assess, check_usable, downsample};
 use stylet_scenario::Scenario;
 
-/// What a diagnosis gives.
+/// Result of a diagnosis.
 pub struct DiagnosisReport {
     /// Verdict, causes, intervals, gain.
     pub diagnosis: Diagnosis,
     /// The scenario with re-fitted parameters and the effects found.
     pub extended: Scenario,
-    /// All that the engine knows, for the report.
+    /// Intermediate results, for the report.
     pub details: DiagnosisResult,
 }
 
@@ -27,32 +27,32 @@ impl DiagnosisReport {
         to_json_bytes(&self.diagnosis)
     }
 
-    /// `extended.ron`; `believed` names the scenario in its first line.
+    /// `extended.ron`; its first line names the assumed scenario.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
-    pub fn extended_ron(&self, believed: &str) -> Result<String, Error> {
+    pub fn extended_ron(&self, assumed: &str) -> Result<String, Error> {
         Ok(format!(
-            "// {believed} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
+            "// {assumed} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
             env!("CARGO_PKG_VERSION"),
             self.extended.to_ron().map_err(Error::internal)?
         ))
     }
 
-    /// The report: `believed` was read from `file`, `command` repeats it.
+    /// The report; `file` is the path of the assumed scenario, `command` repeats the diagnosis.
     #[must_use]
-    pub fn html(&self, believed: &Scenario, file: &str, command: String) -> String {
-        stylet_report::pages::diagnosis::page(believed, file, command, &self.details).to_html()
+    pub fn html(&self, assumed: &Scenario, file: &str, command: String) -> String {
+        stylet_report::pages::diagnosis::page(assumed, file, command, &self.details).to_html()
     }
 
-    /// All files that `stylet diagnose` writes for single recordings; `believed` was read from the inputs' scenario.
+    /// All files that `stylet diagnose` writes for single recordings; `assumed` is the inputs' scenario.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
-    pub fn output(&self, believed: &Scenario, inputs: &DiagnosisInputs) -> Result<OutputFiles, Error> {
+    pub fn output(&self, assumed: &Scenario, inputs: &DiagnosisInputs) -> Result<OutputFiles, Error> {
         let file = inputs.scenario.display().to_string();
         let mut output = OutputFiles::default();
-        output.add("report.html", self.html(believed, &file, inputs.command_line()));
+        output.add("report.html", self.html(assumed, &file, inputs.command_line()));
         output.add("diagnosis.json", self.json()?);
         output.add_json(INPUTS_FILE, &inputs.with_absolute_paths())?;
         output.add("extended.ron", self.extended_ron(&file)?);
@@ -60,61 +60,59 @@ impl DiagnosisReport {
     }
 }
 
-/// Compares what a scenario believes with what was measured; `progress` is told what is being done. At least one recording;
-/// with two or more the gain is measured on recordings left out of the fit.
-///
-/// Recordings that are too long are thinned first, and the diagnosis says so.
+/// Compares an assumed scenario with one or more recordings; `progress` is called with the name of each stage. With two or more recordings
+/// the gain is measured on held-out recordings. Very long recordings are downsampled first, and the diagnosis notes it.
 ///
 /// # Errors
-/// [`Error::Recording`] when a recording allows no conclusion (a dead or reversed sensor, millimetres for metres, ...),
+/// [`Error::Recording`] when a recording is unusable (a dead or reversed sensor, millimetres for metres, ...),
 /// [`Error::Diagnose`] when the recordings do not fit the scenario.
 pub fn diagnose(
-    believed: &Scenario,
-    evidence: &[NamedRecording],
+    assumed: &Scenario,
+    recordings: &[NamedRecording],
     progress: impl FnMut(&str),
 ) -> Result<DiagnosisReport, Error> {
-    let thinned = within_reach_all(evidence)?;
-    let examined = stylet_diagnose::diagnose(believed, &thinned, &Options::default(), progress)?;
+    let recordings = usable_recordings(recordings)?;
+    let details = stylet_diagnose::diagnose(assumed, &recordings, &Options::default(), progress)?;
     Ok(DiagnosisReport {
-        diagnosis: examined.diagnosis.clone(),
-        extended: examined.extended_scenario.clone(),
-        details: examined,
+        diagnosis: details.diagnosis.clone(),
+        extended: details.extended_scenario.clone(),
+        details,
     })
 }
 
-/// How well a scenario predicts recordings that took no part in making it. `diagnosis` is the one it came from, for noise,
-/// scatter and intervals; `believed` is what was believed before; what is in `refit` is fitted to the recordings first, and
-/// with two or more each is predicted by what the others say.
+/// Predicts held-out recordings by a model. Noise, scatter and intervals come from the `diagnosis` that gave the model; `assumed` is the
+/// scenario before that diagnosis, for comparison. The parameters in `refit` are fitted to the recordings first; of two or more recordings
+/// each is predicted by the values from the others.
 ///
 /// # Errors
 /// As [`diagnose`].
 pub fn predict_recordings(
     model: &Scenario,
     diagnosis: Option<&Diagnosis>,
-    believed: Option<&Scenario>,
+    assumed: Option<&Scenario>,
     refit: &[Refit],
-    evidence: &[NamedRecording],
+    recordings: &[NamedRecording],
 ) -> Result<PredictionResult, Error> {
-    let thinned = within_reach_all(evidence)?;
-    Ok(stylet_diagnose::prediction::predict(model, diagnosis, believed, refit, &thinned)?)
+    let recordings = usable_recordings(recordings)?;
+    Ok(stylet_diagnose::prediction::predict(model, diagnosis, assumed, refit, &recordings)?)
 }
 
-/// The recordings as long as the engine can use them, if it can.
-fn within_reach_all(evidence: &[NamedRecording]) -> Result<Vec<NamedRecording>, Error> {
-    let mut judged: Vec<(&str, Vec<QualityNote>)> = Vec::with_capacity(evidence.len());
-    for e in evidence {
-        // Samples that are no numbers are the engine's to cut out.
+/// Checks the recordings and downsamples those that are too long.
+fn usable_recordings(recordings: &[NamedRecording]) -> Result<Vec<NamedRecording>, Error> {
+    let mut notes_by_name: Vec<(&str, Vec<QualityNote>)> = Vec::with_capacity(recordings.len());
+    for e in recordings {
+        // Samples that are not finite are cut out by the diagnosis itself.
         let notes = if e.recording.check().is_ok() { assess(&e.recording) } else { Vec::new() };
-        judged.push((&e.name, notes));
+        notes_by_name.push((&e.name, notes));
     }
-    check_usable(judged.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
-    Ok(evidence.iter().map(within_reach).collect())
+    check_usable(notes_by_name.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
+    Ok(recordings.iter().map(downsampled).collect())
 }
 
-/// The recording as long as a diagnosis can use it.
-fn within_reach(evidence: &NamedRecording) -> NamedRecording {
-    let Some((recording, note)) = downsample(&evidence.recording) else { return evidence.clone() };
-    let mut notes = evidence.notes.clone();
+/// The recording, downsampled when it is too long for a diagnosis.
+fn downsampled(named: &NamedRecording) -> NamedRecording {
+    let Some((recording, note)) = downsample(&named.recording) else { return named.clone() };
+    let mut notes = named.notes.clone();
     notes.push(note);
-    NamedRecording { name: evidence.name.clone(), recording, notes }
+    NamedRecording { name: named.name.clone(), recording, notes }
 }

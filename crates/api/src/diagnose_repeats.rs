@@ -1,4 +1,4 @@
-//! Repeated insertions: a data set, or a scenario and recordings that repeat one insertion.
+//! Diagnosis of repeated insertions: a data set, or a scenario and recordings of the same insertion.
 
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
@@ -22,14 +22,14 @@ use stylet_scenario::Scenario;
 use stylet_score::{MeasuredRecording, MeasuredScore, Trace};
 use stylet_tissue::Effect as _;
 
-/// Fewest recordings that can be told from a law.
-const FEWEST: usize = 3;
+/// Fewest recordings from which the variation between recordings can be estimated.
+const MIN_RECORDINGS: usize = 3;
 
-/// What a study of repeated insertions gives.
+/// Result for a set of repeated insertions.
 pub struct RepeatsReport {
-    /// Laws, verdict, what varies from run to run, predictions of runs left out.
+    /// Candidate models, verdict, variation between recordings, held-out predictions.
     pub study: SetDiagnosis,
-    /// What the online core hears in each run.
+    /// Outputs of the online algorithm per recording.
     pub online: Vec<MeasuredScore>,
 }
 
@@ -42,10 +42,10 @@ struct Written<'a> {
     online: &'a [MeasuredScore],
 }
 
-/// The data set that the inputs name; of a scenario one that believes in its tissue.
+/// Reads the data set of the inputs; a scenario becomes a data set with its tissue.
 ///
 /// # Errors
-/// [`Error::Input`] when a file is wrong, [`Error::Request`] when the scenario believes in effects.
+/// [`Error::Input`] when a file is wrong, [`Error::Request`] when the scenario assumes effects.
 pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
     let mut set = if is_dataset(&inputs.scenario)? {
         Dataset::load(&inputs.scenario)?
@@ -54,7 +54,7 @@ pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
         if !scenario.effects.is_empty() {
             let names: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
             return Err(Error::Request(format!(
-                "{}: believes in {}, and repeats are held against the base law alone: take `effects` out of the scenario, or diagnose \
+                "{}: assumes {}, and repeats are compared with the base law alone: take `effects` out of the scenario, or diagnose \
                  the recordings without --repeats",
                 inputs.scenario.display(),
                 names.join(", ")
@@ -80,10 +80,10 @@ pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
     Ok(set)
 }
 
-/// The recordings that are given, else those that the data set names.
+/// The given recordings, or else those that the data set names.
 ///
 /// # Errors
-/// [`Error::Request`] when there are none, [`Error::Dataset`] when a file is not there.
+/// [`Error::Request`] when there are none, [`Error::Dataset`] when a file is missing.
 pub fn recording_files(set: &Dataset, given: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     if !given.is_empty() {
         return Ok(given.to_vec());
@@ -100,20 +100,20 @@ pub fn recording_files(set: &Dataset, given: &[PathBuf]) -> Result<Vec<PathBuf>,
     Ok(out)
 }
 
-/// Studies the runs of a data set; `progress` is told what is being done. With recordings `given` by hand, others that the set names
-/// (checks in air and under a load, single layers) may be missing.
+/// Diagnoses the recordings of a data set; `progress` is called with the name of each stage. With recordings `given` by hand the others that
+/// the set names (in air, under a known load, single layers) may be missing.
 ///
 /// # Errors
-/// [`Error::Dataset`] when there is too little, [`Error::Recording`] when a recording is wrong.
+/// [`Error::Dataset`] when there are too few recordings, [`Error::Recording`] when a recording is wrong.
 pub fn diagnose_repeats(
     set: &Dataset,
     runs: &[SegmentedRecording],
     given: bool,
     progress: &mut dyn FnMut(&str),
 ) -> Result<RepeatsReport, Error> {
-    if runs.len() < FEWEST {
+    if runs.len() < MIN_RECORDINGS {
         return Err(DatasetError::TooLittle(format!(
-            "{} recording(s): repeats are told from the law with {FEWEST} or more; without --repeats single recordings are diagnosed",
+            "{} recording(s): the variation between recordings needs {MIN_RECORDINGS} or more; without --repeats single recordings are diagnosed",
             runs.len()
         ))
         .into());
@@ -124,14 +124,14 @@ pub fn diagnose_repeats(
     let refs: Vec<&SegmentedRecording> = runs.iter().collect();
     let checks = ReferenceRecordings { air: air.as_ref(), load: known };
     let mut study = diagnose_set(&set.name, &set.tissue, &refs, &checks, &mut *progress)
-        .ok_or_else(|| Error::internal("no law could be fitted to these recordings"))?;
-    progress("the law chosen without parts of the set");
+        .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
+    progress("model selection without parts of the set");
     study.run_nested_cross_validation();
     if !set.parts.is_empty() {
-        progress("layers measured alone, put together");
+        progress("composition of layers measured separately");
         study.report.composition = parts(set, &study, given)?;
     }
-    let online = study.recordings.iter().enumerate().map(|(i, run)| listen(run, &study, i)).collect();
+    let online = study.recordings.iter().enumerate().map(|(i, run)| run_online(run, &study, i)).collect();
     Ok(RepeatsReport { study, online })
 }
 
@@ -144,7 +144,7 @@ impl RepeatsReport {
         let Self { study, online } = self;
         let file = inputs.scenario.display();
         let ron = format!(
-            "// {file}: the law that stylet diagnose {} found, with the mean of what varies from run to run.\n{}",
+            "// {file}: the model that stylet diagnose {} fitted, with the means of the per-recording parameters.\n{}",
             env!("CARGO_PKG_VERSION"),
             study.mean_scenario.to_ron().map_err(Error::internal)?
         );
@@ -165,8 +165,8 @@ impl RepeatsReport {
     }
 }
 
-/// What the online core hears in run `i`, and what it leaves of the way back with the friction of a law fitted to the other runs.
-fn listen(run: &SegmentedRecording, study: &SetDiagnosis, i: usize) -> MeasuredScore {
+/// Outputs of the online algorithm on recording `i`, and its residual during retraction with the friction model of the other recordings.
+fn run_online(run: &SegmentedRecording, study: &SetDiagnosis, i: usize) -> MeasuredScore {
     let r = &run.recording;
     let config = EnhanceConfig::default();
     let trace = Trace::run(r, &r.force_n, &config, 0.0, |_, _| {});
@@ -186,7 +186,7 @@ fn listen(run: &SegmentedRecording, study: &SetDiagnosis, i: usize) -> MeasuredS
     })
 }
 
-/// A recording that a data set names; with recordings given by hand it may be missing.
+/// Reads a recording that the data set names; with recordings given by hand it may be missing.
 fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Recording>, Error> {
     let Some(file) = file else { return Ok(None) };
     let found = match find_files(file) {
@@ -198,7 +198,7 @@ fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Rec
     Ok(Some(read_csv(first, &set.options())?.0))
 }
 
-/// Laws of layers that were measured alone, put together.
+/// Composition of models of layers that were measured separately.
 fn parts(set: &Dataset, study: &SetDiagnosis, given: bool) -> Result<Option<CompositionReport>, Error> {
     let mut alone: Vec<(String, Vec<SegmentedRecording>)> = Vec::new();
     for layer in 1..=set.tissue.layers.len() {

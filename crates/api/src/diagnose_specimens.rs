@@ -1,4 +1,4 @@
-//! Many specimens, each indented once and held: a data set with `split_by`.
+//! Diagnosis of many specimens, each indented once and held: a data set with `split_by`.
 
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
@@ -10,9 +10,9 @@ use stylet_diagnose::repeated_insertions::dataset::{Dataset, DatasetError};
 use stylet_diagnose::repeated_insertions::indentation_relaxation::{SpecimenReport, analyze_specimens};
 use stylet_report::pages::indented_specimens::page;
 
-/// What a look at specimens gives.
+/// Result for a set of specimens.
 pub struct SpecimensReport {
-    /// Causes, numbers over the specimens, those that were not used.
+    /// Causes, parameters over the specimens, unused specimens.
     pub specimens: SpecimenReport,
     /// The same as a diagnosis.
     pub diagnosis: Diagnosis,
@@ -26,7 +26,7 @@ struct Written<'a> {
     specimens: &'a SpecimenReport,
 }
 
-/// Fits every specimen of a data set by itself.
+/// Fits every specimen of a data set separately.
 ///
 /// # Errors
 /// [`Error::Dataset`] when no specimen is held long enough.

@@ -1,4 +1,4 @@
-//! What a diagnosis is made of: scenario, recordings, column map.
+//! Inputs of a diagnosis: scenario, recordings, column map.
 
 use crate::error::Error;
 use crate::output_folder::recover;
@@ -9,24 +9,24 @@ use std::path::{Path, PathBuf};
 use stylet_diagnose::NamedRecording;
 use stylet_record::{ReadOptions, read_csv_skip_nonfinite};
 
-/// What a diagnosis is made of: `inputs.json` of its folder. Paths as they were given.
+/// Inputs of a diagnosis, as `inputs.json` holds them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DiagnosisInputs {
-    /// Scenario.
+    /// Scenario file.
     pub scenario: PathBuf,
-    /// Recordings.
+    /// Files of the recordings.
     pub data: Vec<PathBuf>,
-    /// Column map.
+    /// File of the column map.
     pub columns: Option<PathBuf>,
-    /// Whether rows with backward time stamps were dropped.
+    /// Whether rows with backward time stamps are dropped.
     pub repair: bool,
 }
 
-/// The file in which a diagnosis names its inputs.
+/// File in the folder of a diagnosis that lists its inputs.
 pub const INPUTS_FILE: &str = "inputs.json";
 
 impl DiagnosisInputs {
-    /// The inputs with absolute paths, so that the folder can be used from anywhere.
+    /// The same with absolute paths, independent of the working directory.
     #[must_use]
     pub fn with_absolute_paths(&self) -> Self {
         let full = |p: &PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
@@ -38,10 +38,10 @@ impl DiagnosisInputs {
         }
     }
 
-    /// What the diagnosis in a folder was made of.
+    /// The inputs of the diagnosis in a folder.
     ///
     /// # Errors
-    /// [`Error::Request`] when the folder does not say; as [`settle`] when a killed command had begun something there.
+    /// [`Error::Request`] when the folder has no valid `inputs.json`; as [`recover`].
     pub fn from_folder(folder: &Path) -> Result<Self, Error> {
         recover(folder)?;
         let path = folder.join(INPUTS_FILE);
@@ -52,13 +52,13 @@ impl DiagnosisInputs {
             ))
         })?;
         serde_json::from_str(&text)
-            .map_err(|e| Error::Request(format!("{}: {e}; make the diagnosis anew", path.display())))
+            .map_err(|e| Error::Request(format!("{}: {e}; repeat the diagnosis", path.display())))
     }
 
-    /// The recordings, read.
+    /// Reads the recordings.
     ///
     /// # Errors
-    /// What is wrong with the column map or with a recording, and where.
+    /// [`Error::Input`] for the column map, [`Error::Recording`] with file and line.
     pub fn read_recordings(&self) -> Result<Vec<NamedRecording>, Error> {
         read_recordings(&self.data, &read_options(self.columns.as_deref(), self.repair)?)
     }
@@ -77,7 +77,7 @@ impl DiagnosisInputs {
     }
 }
 
-/// How recordings are read: by the column map of a file, if there is one.
+/// Options for reading recordings, with the column map of a file.
 ///
 /// # Errors
 /// [`Error::Input`] when the map is wrong.
@@ -85,7 +85,7 @@ pub fn read_options(columns: Option<&Path>, repair: bool) -> Result<ReadOptions,
     Ok(ReadOptions { columns: columns.map(stylet_scenario::load).transpose()?, repair })
 }
 
-/// Reads recordings, several at once.
+/// Reads recordings in parallel.
 ///
 /// # Errors
 /// [`Error::Recording`] with file and line.
@@ -98,7 +98,7 @@ pub fn read_recordings(data: &[PathBuf], options: &ReadOptions) -> Result<Vec<Na
     named.collect()
 }
 
-/// The file's name, with its folder when names repeat.
+/// Name of a recording: the file name, or the whole path when file names repeat.
 #[must_use]
 pub fn recording_name(path: &Path, all: &[PathBuf]) -> String {
     let repeated = all.iter().filter(|p| p.file_name() == path.file_name()).count() > 1;

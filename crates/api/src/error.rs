@@ -1,4 +1,4 @@
-//! Why a function ends early: what, where, and what would be right.
+//! Errors: what is wrong, where, and the remedy.
 
 use miette::Diagnostic;
 use std::path::Path;
@@ -6,20 +6,20 @@ use stylet_diagnose::repeated_insertions::dataset::DatasetError;
 use stylet_plan::PlanError;
 use stylet_sweep::shard::ShardError;
 
-/// Why a function ended early. The sentence is the one that the command prints.
+/// Error of a command; its text is what the command prints.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum Error {
     /// A scenario or configuration is wrong.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Input(Box<stylet_scenario::InputError>),
-    /// A number of a scenario or sweep that did not come from a file is wrong.
+    /// A value of a scenario or sweep that was not read from a file is wrong.
     #[error("{}: {}", .0.path, .0.message)]
     Problem(stylet_scenario::FieldError),
     /// A recording is wrong.
     #[error(transparent)]
     Recording(#[from] stylet_record::RecordError),
-    /// The scenario asks for what cannot be simulated.
+    /// The scenario cannot be simulated.
     #[error("{file}: {why}")]
     Simulate {
         /// Scenario file, or its name.
@@ -27,16 +27,16 @@ pub enum Error {
         /// Reason and remedy.
         why: stylet_testbed::SimulateError,
     },
-    /// Recordings and scenario do not belong together.
+    /// Recordings and scenario do not match.
     #[error(transparent)]
     Diagnose(#[from] stylet_diagnose::DiagnoseError),
     /// A data set cannot be used.
     #[error(transparent)]
     Dataset(Box<DatasetError>),
-    /// What was asked for cannot be done with what was given; the sentence says why and what would.
+    /// The request cannot be fulfilled with these inputs; the text gives reason and remedy.
     #[error("{0}")]
     Request(String),
-    /// A trial of a sweep gives no row.
+    /// A trial of a sweep failed.
     #[error(transparent)]
     Trial(#[from] stylet_sweep::TrialError),
     /// The output cannot be written.
@@ -44,38 +44,51 @@ pub enum Error {
     Output {
         /// File or folder.
         path: String,
-        /// What the system says.
+        /// The system's error.
         why: std::io::Error,
     },
-    /// The output is written aside, and cannot be brought to its places or given up.
+    /// The output is committed, but can neither be moved to its place nor withdrawn.
     #[error(
-        "{path}: cannot be written: {why}; the new results are whole in its folder .stylet-set, and the next stylet command that uses \
-         {path} puts them in their places: mend the disk and give it again"
+        "{path}: cannot be written: {why}; the new results are complete in its folder .stylet-set, and the next stylet command that uses \
+         {path} moves them to their places: repair the disk and repeat the command"
     )]
     Unfinished {
         /// Folder.
         path: String,
-        /// What the system says.
+        /// The system's error.
         why: std::io::Error,
     },
-    /// Another process writes there.
+    /// Another process holds the folder.
     #[error(
-        "{path}: another stylet is writing to this folder; wait until it has ended, or give this one a folder of its own with --out"
+        "{path}: another stylet is writing to this folder; wait until it has ended, or give this command a folder of its own with --out"
     )]
     Busy {
         /// Folder.
         path: String,
     },
+    /// The folder holds the results of another command.
+    #[error(
+        "{path}: holds the results of `stylet {command}` ({file}), with which these would be mixed; give this command a folder of its own \
+         with --out"
+    )]
+    OtherCommand {
+        /// Folder.
+        path: String,
+        /// The other command.
+        command: &'static str,
+        /// Its result file.
+        file: &'static str,
+    },
     /// A file of a set was changed or replaced.
     #[error(
-        "{path}: does not belong to the same set of results as the folder's manifest.json: it was changed or replaced; make the \
-         results anew, or put the file back"
+        "{path}: does not belong to the same set of results as the folder's manifest.json: it was changed or replaced; repeat the \
+         command, or restore the file"
     )]
     InconsistentSet {
         /// File.
         path: String,
     },
-    /// A mistake of ours.
+    /// A bug of Stylet.
     #[error("internal error: {0}; please report it")]
     Internal(String),
 }
@@ -109,7 +122,7 @@ impl From<ShardError> for Error {
 }
 
 impl Error {
-    /// Why there is no plan, with the file that says what is wrong.
+    /// Why planning failed, with the file concerned.
     pub(crate) fn of_plan(file: &Path, why: PlanError) -> Self {
         match why {
             PlanError::Diagnose(why) => Self::Diagnose(why),
@@ -123,7 +136,7 @@ impl Error {
         Self::Output { path: path.display().to_string(), why }
     }
 
-    /// A mistake of ours, from what was said about it.
+    /// A bug of Stylet, from its description.
     pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())
     }

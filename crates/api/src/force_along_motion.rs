@@ -1,4 +1,4 @@
-//! What a scenario says about a motion that was recorded.
+//! Force of a scenario along a recorded motion.
 
 use crate::error::Error;
 use stylet_record::Recording;
@@ -6,18 +6,19 @@ use stylet_scenario::{ForceTorque, MotionPoint, Scenario};
 use stylet_testbed::{ForceSensor, SimulateError};
 use stylet_tissue::{AnyEffect, ForceLaw, ForceLawState};
 
-/// The force (N, one value per sample) that a scenario's tissue, effects and noise-free sensor give along the motion of a
-/// recording: the law is stepped once per sample on the recorded position and velocity. The scenario's own motion, robot
-/// and noise play no part; neither does the recording's force.
+/// Force (N, one value per sample) of a scenario's tissue, effects and noise-free sensor along the motion of a recording. The force law is
+/// stepped once per sample on the recorded position and velocity. The scenario's motion, robot and noise are not used, nor is the recorded
+/// force.
 ///
 /// # Errors
-/// [`Error::Simulate`] when the scenario has more effects than the law takes.
+/// [`Error::Simulate`] when the scenario has more effects than the force law supports.
 pub fn force_along_motion(scenario: &Scenario, motion: &Recording) -> Result<Vec<f64>, Error> {
     let law = ForceLaw::new(&scenario.tissue, &scenario.effects)
         .map_err(|why| Error::Simulate { file: scenario.name.clone(), why: SimulateError::Effects(why) })?;
-    let silent = ForceTorque { noise_n: 0.0, ..scenario.sensor.force_torque().cloned().unwrap_or_default() };
-    let mut measuring = ForceSensor::new(&scenario.effects, &silent, 0, motion.sample_hz());
-    // What was recorded is the true position times the scale.
+    let noise_free =
+        ForceTorque { noise_n: 0.0, ..scenario.sensor.force_torque().cloned().unwrap_or_default() };
+    let mut measuring = ForceSensor::new(&scenario.effects, &noise_free, 0, motion.sample_hz());
+    // Recorded position = scale * true position.
     let scale: f64 = scenario
         .effects
         .iter()

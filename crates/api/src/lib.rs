@@ -1,19 +1,19 @@
-//! What the commands of Stylet do, as functions with plain results.
+//! The commands of Stylet as functions with plain results.
 //!
-//! | function | from | to |
+//! | function | input | result |
 //! |---|---|---|
-//! | [`simulate`] | [`Scenario`] | [`Run`]: recording, truth, what the core made of it, scores |
-//! | [`enhance`] | [`Recording`] | [`Enhanced`]: enhanced force, ruptures, layers |
-//! | [`diagnose`] | [`Scenario`] and recordings | [`Diagnosed`]: what the scenario gets wrong, and the scenario that does not |
-//! | [`forecast`] | [`Scenario`] and recordings that took no part | [`Foretold`]: errors beside the noise, coverage of the band |
-//! | [`sweep`](fn@sweep) | [`Sweep`] | [`Swept`]: one row per insertion, summary |
-//! | [`repeats`](fn@repeats::repeats), [`specimens`](fn@specimens::specimens) | a data set | laws, what varies from run to run, numbers over the specimens |
-//! | [`plan`](fn@plan::plan), [`identifiability`](plan::identifiability) | [`Inputs`] | the next insertion; what an experiment can show |
-//! | [`compare`] | scenarios, or the referee's cases | one row per algorithm |
-//! | [`benchmark`] | the referee's cases | the diagnosis and the planning examined |
+//! | [`simulate`](fn@simulate) | [`Scenario`] | [`Run`]: recording, truth, outputs of the online algorithm, scores |
+//! | [`enhance`](fn@enhance) | [`Recording`] | [`Enhanced`]: enhanced force, ruptures, layers |
+//! | [`diagnose`](fn@diagnose) | assumed [`Scenario`] and recordings | [`DiagnosisReport`]: causes, re-fitted scenario |
+//! | [`predict_recordings`] | model and held-out recordings | errors, noise, coverage of the band |
+//! | [`sweep`](fn@sweep) | [`Sweep`] | [`SweepResult`]: one row per insertion, summary |
+//! | [`diagnose_repeats`](fn@diagnose_repeats::diagnose_repeats), [`diagnose_specimens`](fn@diagnose_specimens::diagnose_specimens) | a data set | fitted models, variation between recordings or specimens |
+//! | [`plan`](fn@plan_insertion::plan), [`identifiability`](plan_insertion::identifiability) | [`DiagnosisInputs`] | the next insertion; what an experiment can identify |
+//! | [`compare_algorithms`] | scenarios, or cases of the independent simulator | one row per algorithm |
+//! | [`benchmark`] | cases of the independent simulator | accuracy of diagnosis and planning |
 //!
-//! Every result has the files that the command writes, byte for byte, as an [`Output`] that is written at once or not at
-//! all. The command line, the package `stylet` and the Python package are thin layers over this crate.
+//! Every result holds the files that the command writes, byte for byte, as [`OutputFiles`], which are written all or none. The command, the
+//! package `stylet` and the Python package are thin layers over this crate.
 #![forbid(unsafe_code)]
 
 pub mod benchmark;

@@ -1,11 +1,11 @@
-//! Files of one output folder, waiting to be written as one set.
+//! The files of one output folder, collected in memory and written as one set.
 
 use crate::error::Error;
 use crate::output_folder::{OutputLock, StagedFile};
 use serde::Serialize;
 use std::path::Path;
 
-/// A value as the text of a JSON file.
+/// A value as the content of a JSON file.
 ///
 /// # Errors
 /// [`Error::Internal`] when the value cannot be written.
@@ -15,12 +15,12 @@ pub fn to_json_bytes(value: &impl Serialize) -> Result<Vec<u8>, Error> {
     Ok(json)
 }
 
-/// Files of one output folder, waiting to be written together.
+/// The files of one output folder.
 #[derive(Debug, Default)]
 pub struct OutputFiles {
     files: Vec<(&'static str, Vec<u8>)>,
-    /// Files that lie in the claimed folder already.
-    parts: Vec<StagedFile>,
+    /// Files already staged in the locked folder.
+    staged: Vec<StagedFile>,
 }
 
 impl OutputFiles {
@@ -38,9 +38,9 @@ impl OutputFiles {
         Ok(())
     }
 
-    /// Adds a file that was written piece by piece; the set then belongs into the folder of the claim that began it.
+    /// Adds a file that was staged piece by piece. The set must then be written with the lock that staged it.
     pub fn add_staged(&mut self, part: StagedFile) {
-        self.parts.push(part);
+        self.staged.push(part);
     }
 
     /// Names and contents of the files in memory.
@@ -48,20 +48,19 @@ impl OutputFiles {
         self.files.iter().map(|(name, content)| (*name, content.as_slice()))
     }
 
-    /// Writes all files into `folder`, which is made when it does not exist, and `manifest.json` that tells of them. Files of the
-    /// same names are replaced, others are left alone.
+    /// Writes all files and `manifest.json` into `folder`, which is created if missing. Files of the same names are replaced.
     ///
     /// # Errors
-    /// [`Error::Output`], [`Error::Busy`]; the folder is then as it was before.
+    /// [`Error::Output`], [`Error::Busy`], [`Error::OtherCommand`]; the folder is then unchanged.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
         self.write_locked(&OutputLock::new(folder)?)
     }
 
-    /// The same into a folder that is claimed already.
+    /// As [`Self::write`], into a folder that is locked already.
     ///
     /// # Errors
-    /// [`Error::Output`]; the folder is then as it was before.
-    pub fn write_locked(&self, claim: &OutputLock) -> Result<(), Error> {
-        claim.write_staged(&self.parts, &self.files)
+    /// [`Error::Output`], [`Error::OtherCommand`]; the folder is then unchanged.
+    pub fn write_locked(&self, lock: &OutputLock) -> Result<(), Error> {
+        lock.write_staged(&self.staged, &self.files)
     }
 }

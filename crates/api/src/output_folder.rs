@@ -1,9 +1,8 @@
-//! An output folder while a command works in it: nobody else writes there, and a set of results appears as one.
+//! Locking of an output folder, and atomic replacement of the set of result files in it.
 //!
-//! A set is written into a folder of its own inside the output folder, synced, and announced by one rename; then its files are
-//! moved to their places, the manifest last. Whoever is killed before that rename leaves the old set, whoever is killed after it the
-//! new one: the next command that looks at the folder ends what was begun ([`settle`]). Whoever is told that something cannot be
-//! written puts the old set back.
+//! A set is written to a subfolder, synced and committed by one rename; then its files are moved to their places, the manifest last. A
+//! process killed before that rename leaves the old set, one killed after it the new set: the next command that uses the folder completes
+//! the move ([`recover`]). After a write error the old set is restored.
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
@@ -14,34 +13,47 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The file that says which files make the set; written last.
+/// The file that lists the files of the set; written last.
 pub const MANIFEST: &str = "manifest.json";
-/// Where a set is being written.
+/// Subfolder in which a set is staged.
 const NEW: &str = ".stylet-new";
-/// A set that is whole, on its way to its places.
-const WHOLE: &str = ".stylet-set";
-/// What stood there before, while the new files come in.
+/// Subfolder of a complete set whose files are being moved to their places.
+const COMPLETE: &str = ".stylet-set";
+/// Subfolder of the former files until the new ones are in place.
 const OLD: &str = ".stylet-old";
 
-/// `manifest.json`: the files of a set with the SHA-256 of each.
+/// The file by which the results of a command are recognised, and the command.
+const RESULT_FILES: [(&str, &str); 9] = [
+    ("score.json", "run"),
+    ("enhance.json", "enhance"),
+    ("diagnosis.json", "diagnose"),
+    ("predict.json", "predict"),
+    ("identifiability.json", "identifiability"),
+    ("summary.json", "sweep"),
+    ("compare.json", "compare"),
+    ("claims.json", "reproduce"),
+    ("cases.json", "benchmark plan"),
+];
+
+/// `manifest.json`: version, and the files of a set with their SHA-256.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Manifest {
     stylet: String,
     sha256: BTreeMap<String, String>,
 }
 
-/// An output folder that this process alone writes to, until it is dropped.
+/// Exclusive use of an output folder, until it is dropped.
 #[derive(Debug)]
 pub struct OutputLock {
     folder: PathBuf,
-    /// Folders that were made for it; those that are still empty at the end go again.
+    /// Folders created for it; the empty ones are removed on drop.
     made: Vec<PathBuf>,
-    /// Whether a file of a set was begun that is not announced.
-    begun: AtomicBool,
+    /// Whether files are staged that are not committed.
+    staging: AtomicBool,
     _lock: Option<File>,
 }
 
-/// A file of a set that is written piece by piece, where the set is being written.
+/// Writer of a staged file.
 #[derive(Debug)]
 pub struct StagedFileWriter {
     name: &'static str,
@@ -63,7 +75,7 @@ impl io::Write for StagedFileWriter {
 }
 
 impl StagedFileWriter {
-    /// The file is whole.
+    /// Syncs the complete file.
     ///
     /// # Errors
     /// [`Error::Output`].
@@ -73,7 +85,7 @@ impl StagedFileWriter {
     }
 }
 
-/// A file of a set that lies where the set is being written.
+/// A complete staged file.
 #[derive(Debug)]
 pub struct StagedFile {
     name: &'static str,
@@ -81,50 +93,50 @@ pub struct StagedFile {
 }
 
 impl OutputLock {
-    /// Makes the folder when it is not there and keeps others from writing to it.
+    /// Creates the folder if missing, locks it, and completes what an interrupted command left.
     ///
     /// # Errors
-    /// [`Error::Output`] when it cannot be made, [`Error::Busy`] when another process works there.
+    /// [`Error::Output`] when it cannot be created, [`Error::Busy`] when another process holds it.
     pub fn new(folder: &Path) -> Result<Self, Error> {
-        let claim = Self::take(folder, File::try_lock)?;
-        let begun = || {
-            if folder.join(WHOLE).exists() {
+        let lock = Self::take(folder, File::try_lock)?;
+        let recovered = || {
+            if folder.join(COMPLETE).exists() {
                 move_in(folder, &mut || false)?;
             }
             remove_scratch(folder)?;
-            tidy(folder, &mut || false)
+            remove_staging(folder, &mut || false)
         };
-        begun().map_err(|why| failed(folder, why))?;
-        Ok(claim)
+        recovered().map_err(|why| failed(folder, why))?;
+        Ok(lock)
     }
 
-    /// The same beside others that write files of their own there, as shards of a sweep.
+    /// Shared lock for processes that write different files, such as the shards of a sweep.
     ///
     /// # Errors
-    /// As [`Claim::new`].
+    /// As [`OutputLock::new`].
     pub fn lock_shared(folder: &Path) -> Result<Self, Error> {
         Self::take(folder, File::try_lock_shared)
     }
 
-    fn take(folder: &Path, lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self, Error> {
+    fn take(folder: &Path, try_lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self, Error> {
         let made: Vec<PathBuf> = folder
             .ancestors()
             .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
             .map(Path::to_path_buf)
             .collect();
-        let mut claim =
-            Self { folder: folder.to_path_buf(), made, begun: AtomicBool::new(false), _lock: None };
+        let mut lock =
+            Self { folder: folder.to_path_buf(), made, staging: AtomicBool::new(false), _lock: None };
         fs::create_dir_all(folder).map_err(|why| failed(folder, why))?;
-        // Where a folder cannot be locked (not on every system, not on every network disk) nothing keeps others away.
+        // Not every system and network disk can lock a folder; there the lock has no effect.
         if let Ok(file) = File::open(folder) {
-            match lock(&file) {
+            match try_lock(&file) {
                 Err(TryLockError::WouldBlock) => {
                     return Err(Error::Busy { path: folder.display().to_string() });
                 }
-                Ok(()) | Err(TryLockError::Error(_)) => claim._lock = Some(file),
+                Ok(()) | Err(TryLockError::Error(_)) => lock._lock = Some(file),
             }
         }
-        Ok(claim)
+        Ok(lock)
     }
 
     /// The folder.
@@ -133,18 +145,18 @@ impl OutputLock {
         &self.folder
     }
 
-    /// Begins a file of a set whose other files come later, by [`Claim::write_with`]. Without those it goes with the claim.
+    /// Opens a file of a set for writing in pieces; [`OutputLock::write_staged`] commits it. Without that it is removed with the lock.
     ///
     /// # Errors
-    /// [`Error::Output`]; the folder then holds what it held before.
+    /// [`Error::Output`]; the folder is then unchanged.
     pub fn stage_file(&self, name: &'static str) -> Result<StagedFileWriter, Error> {
         let new = self.folder.join(NEW);
         let made = fs::create_dir(&new).or_else(|why| match why.kind() {
-            io::ErrorKind::AlreadyExists if self.begun.load(Ordering::Relaxed) => Ok(()),
+            io::ErrorKind::AlreadyExists if self.staging.load(Ordering::Relaxed) => Ok(()),
             _ => Err(why),
         });
         made.map_err(|why| failed(&self.folder, why))?;
-        self.begun.store(true, Ordering::Relaxed);
+        self.staging.store(true, Ordering::Relaxed);
         let place = new.join(name);
         let file = File::create(&place).map_err(|why| failed(&place, why))?;
         Ok(StagedFileWriter { name, place, file, hash: Sha256::new() })
@@ -153,28 +165,29 @@ impl OutputLock {
     /// Writes a set of files. Files of the same names are replaced, others are left alone.
     ///
     /// # Errors
-    /// [`Error::Output`]; the folder then holds what it held before. [`Error::Begun`] where the disk does not even let what it held be
-    /// put back.
+    /// [`Error::OtherCommand`], [`Error::Output`]; the folder is then unchanged. [`Error::Unfinished`] when the old set cannot be restored.
     pub fn write_all_files(&self, files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
         self.write_staged(&[], files)
     }
 
-    /// The same with files that were written piece by piece.
+    /// As [`Self::write_all_files`], together with staged files.
     ///
     /// # Errors
-    /// As [`Claim::write`].
+    /// As [`Self::write_all_files`].
     pub fn write_staged(&self, parts: &[StagedFile], files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
+        let names = files.iter().map(|(name, _)| *name).chain(parts.iter().map(|part| part.name));
+        check_same_command(&self.folder, &names.collect::<Vec<_>>())?;
         let Err(why) = self.write_until(parts, files, &mut || false) else { return Ok(()) };
         let names = files.iter().map(|(name, _)| *name);
         let names = names.chain(parts.iter().map(|part| part.name)).chain([MANIFEST]);
-        if self.folder.join(WHOLE).exists() && take_back(&self.folder, names).is_err() {
+        if self.folder.join(COMPLETE).exists() && restore_old(&self.folder, names).is_err() {
             return Err(Error::Unfinished { path: self.folder.display().to_string(), why });
         }
-        let _ = tidy(&self.folder, &mut || false);
+        let _ = remove_staging(&self.folder, &mut || false);
         Err(failed(&self.folder, why))
     }
 
-    /// `killed` is asked before every change of the disk; tests end the work there as a kill would.
+    /// `killed` is called before every change of the disk; tests abort there, as a kill would.
     fn write_until(
         &self,
         parts: &[StagedFile],
@@ -190,12 +203,12 @@ impl OutputLock {
         }
         let new = folder.join(NEW);
         if parts.is_empty() {
-            go_on(killed)?;
+            check_killed(killed)?;
             fs::create_dir(&new)?;
         }
         let mut manifest = Manifest { stylet: env!("CARGO_PKG_VERSION").to_owned(), ..Manifest::default() };
         for (name, content) in files {
-            go_on(killed)?;
+            check_killed(killed)?;
             synced(&new.join(name), content)?;
             manifest.sha256.insert((*name).to_owned(), sum(content));
         }
@@ -204,52 +217,67 @@ impl OutputLock {
         }
         let mut text = serde_json::to_vec_pretty(&manifest).map_err(io::Error::other)?;
         text.push(b'\n');
-        go_on(killed)?;
+        check_killed(killed)?;
         synced(&new.join(MANIFEST), &text)?;
         sync_names(&new)?;
-        go_on(killed)?;
-        // From here on it is the new set.
-        fs::rename(&new, folder.join(WHOLE))?;
+        check_killed(killed)?;
+        // Commit.
+        fs::rename(&new, folder.join(COMPLETE))?;
         sync_names(folder)?;
         move_in(folder, killed)?;
-        // The new set is in its places. What cannot be tidied now is tidied by the next command, or stops it.
-        tidy(folder, killed).or_else(|why| if is_kill(&why) { Err(why) } else { Ok(()) })
+        // The new set is in place. Staging folders that cannot be removed now are left to the next command.
+        remove_staging(folder, killed).or_else(|why| if is_kill(&why) { Err(why) } else { Ok(()) })
     }
 }
 
 impl Drop for OutputLock {
     fn drop(&mut self) {
-        if self.begun.load(Ordering::Relaxed) {
+        if self.staging.load(Ordering::Relaxed) {
             let _ = fs::remove_dir_all(self.folder.join(NEW));
         }
         for folder in &self.made {
-            // Only empty folders go.
+            // Fails for folders that are not empty, as intended.
             let _ = fs::remove_dir(folder);
         }
     }
 }
 
-/// Ends what a killed command had begun in a folder: afterwards it holds one set. Does nothing in a folder where nothing is begun.
+/// Completes a set that a killed command had committed but not moved; does nothing otherwise.
 ///
 /// # Errors
-/// [`Error::Output`], [`Error::Busy`] when the other command is still at it.
+/// [`Error::Output`], [`Error::Busy`] when the other command still runs.
 pub fn recover(folder: &Path) -> Result<(), Error> {
-    if folder.join(WHOLE).exists() {
+    if folder.join(COMPLETE).exists() {
         OutputLock::new(folder)?;
     }
     Ok(())
 }
 
-/// The same for the folder that a file lies in, before the file is read.
+/// Refuses to write a set into a folder that holds the results of another command: files of both would remain there.
 ///
 /// # Errors
-/// As [`settle`].
+/// [`Error::OtherCommand`].
+pub fn check_same_command(folder: &Path, new_files: &[&str]) -> Result<(), Error> {
+    let Ok(text) = fs::read(folder.join(MANIFEST)) else { return Ok(()) };
+    let Ok(manifest) = serde_json::from_slice::<Manifest>(&text) else { return Ok(()) };
+    for (file, command) in RESULT_FILES {
+        if manifest.sha256.contains_key(file) && folder.join(file).exists() && !new_files.contains(&file) {
+            return Err(Error::OtherCommand { path: folder.display().to_string(), command, file });
+        }
+    }
+    Ok(())
+}
+
+/// As [`recover`], for the folder of a file that is about to be read.
+///
+/// # Errors
+/// As [`recover`].
 pub fn recover_parent(file: &Path) -> Result<(), Error> {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
     recover(folder.unwrap_or(Path::new(".")))
 }
 
-/// Whether the files are those that the folder's manifest tells of; a folder without manifest is not judged.
+/// Checks files against the folder's manifest; a folder without manifest passes.
 ///
 /// # Errors
 /// [`Error::NotOneSet`] naming the first file that is not, or a manifest that cannot be read.
@@ -272,10 +300,10 @@ pub fn verify_manifest(folder: &Path, names: &[&str]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes one file: beside its place, synced, then renamed.
+/// Writes one file atomically: to a temporary name, synced, then renamed.
 ///
 /// # Errors
-/// [`Error::Output`]; what stood there before still does.
+/// [`Error::Output`]; the former file is then unchanged.
 pub fn write_file_atomically(path: &Path, content: &[u8]) -> Result<(), Error> {
     let mut part = path.as_os_str().to_owned();
     part.push(format!(".{}.part", std::process::id()));
@@ -294,24 +322,24 @@ fn failed(path: &Path, why: io::Error) -> Error {
     Error::Output { path: path.display().to_string(), why }
 }
 
-/// A set that is whole goes to its places; what it replaces waits aside until all are there.
+/// Moves a complete set to its places; replaced files are kept until all are there.
 fn move_in(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
-    let (whole, old) = (folder.join(WHOLE), folder.join(OLD));
+    let (whole, old) = (folder.join(COMPLETE), folder.join(OLD));
     let names = names_in(&whole)?;
-    go_on(killed)?;
+    check_killed(killed)?;
     fs::create_dir(&old)
         .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
-    // The old manifest goes first: it does not speak of a folder in between.
+    // The old manifest first: it does not describe the intermediate state.
     for name in names.iter().rev() {
         let place = folder.join(name);
-        // What was put aside before a kill is the older one.
+        // A file already in the old folder was put there before a kill.
         if place.exists() && !old.join(name).exists() {
-            go_on(killed)?;
+            check_killed(killed)?;
             fs::rename(&place, old.join(name))?;
         }
     }
     for name in &names {
-        go_on(killed)?;
+        check_killed(killed)?;
         fs::rename(whole.join(name), folder.join(name))?;
     }
     sync_names(folder)
@@ -327,9 +355,9 @@ fn names_in(whole: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// As it was before [`move_in`] began, with a set of these names. Until the last rename a kill leaves the new set.
-fn take_back<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Result<()> {
-    let (whole, old) = (folder.join(WHOLE), folder.join(OLD));
+/// Undoes [`move_in`] for a set of these names. Until the last rename a kill leaves the new set.
+fn restore_old<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Result<()> {
+    let (whole, old) = (folder.join(COMPLETE), folder.join(OLD));
     for name in names {
         let (place, new, aside) = (folder.join(name), whole.join(name), old.join(name));
         if !new.exists() && place.exists() {
@@ -342,25 +370,25 @@ fn take_back<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Res
     fs::rename(&whole, folder.join(NEW))
 }
 
-/// What is left of a set that was written or given up: nothing of it is needed any more.
-fn tidy(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
-    for left in [NEW, WHOLE, OLD] {
-        go_on(killed)?;
-        fs::remove_dir_all(folder.join(left)).or_else(absent)?;
+/// Removes the staging folders.
+fn remove_staging(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+    for name in [NEW, COMPLETE, OLD] {
+        check_killed(killed)?;
+        fs::remove_dir_all(folder.join(name)).or_else(ignore_not_found)?;
     }
     Ok(())
 }
 
-fn go_on(killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+fn check_killed(killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
     if killed() { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
 }
 
-/// Whether an error is that of [`go_on`] rather than the system's.
+/// Whether an error comes from [`check_killed`] rather than from the system.
 fn is_kill(why: &io::Error) -> bool {
     why.kind() == io::ErrorKind::Interrupted && why.raw_os_error().is_none()
 }
 
-fn absent(why: io::Error) -> io::Result<()> {
+fn ignore_not_found(why: io::Error) -> io::Result<()> {
     if why.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(why) }
 }
 
@@ -370,21 +398,21 @@ fn synced(path: &Path, content: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Names survive a power cut too, where the system can sync a folder; not all can.
+/// Syncs the directory entries, where the system can sync a folder.
 fn sync_names(folder: &Path) -> io::Result<()> {
     let synced = File::open(folder).and_then(|folder| folder.sync_all());
-    synced.or_else(|why| if is_of_the_disk(&why) { Err(why) } else { Ok(()) })
+    synced.or_else(|why| if is_disk_failure(&why) { Err(why) } else { Ok(()) })
 }
 
-/// Whether the disk is full or broken, rather than asked for what it cannot do.
-fn is_of_the_disk(why: &io::Error) -> bool {
+/// Whether the disk is full or broken, as opposed to an unsupported operation.
+fn is_disk_failure(why: &io::Error) -> bool {
     /// `EIO` on every Unix.
     const INPUT_OUTPUT: i32 = 5;
     let full = matches!(why.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
     full || (cfg!(unix) && why.raw_os_error() == Some(INPUT_OUTPUT))
 }
 
-/// Where a system keeps the names of scratch files, a kill leaves them behind.
+/// Removes scratch files that a killed command left.
 fn remove_scratch(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -410,166 +438,4 @@ fn hex(hash: &[u8]) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    struct Scratch(PathBuf);
-
-    impl Scratch {
-        fn new(name: &str) -> Self {
-            let path = std::env::temp_dir().join(format!("stylet-folder-{}-{name}", std::process::id()));
-            let _ = fs::remove_dir_all(&path);
-            Self(path)
-        }
-    }
-
-    impl Drop for Scratch {
-        fn drop(&mut self) {
-            let _ = fs::remove_dir_all(&self.0);
-        }
-    }
-
-    const NAMES: [&str; 3] = ["a.csv", "b.json", "c.html"];
-
-    fn set(of: &str) -> Vec<(&'static str, Vec<u8>)> {
-        NAMES.iter().map(|name| (*name, format!("{of} {name}").into_bytes())).collect()
-    }
-
-    /// Which set the folder holds; `None` for a mixture.
-    fn held(folder: &Path) -> Option<String> {
-        let read = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_default();
-        let of = read(NAMES[0]).split(' ').next().unwrap_or_default().to_owned();
-        let all = NAMES
-            .iter()
-            .all(|name| read(name) == format!("{of} {name}") || (of.is_empty() && read(name).is_empty()));
-        (all && verify_manifest(folder, &NAMES).is_ok()).then_some(of)
-    }
-
-    fn leftovers(folder: &Path) -> Vec<String> {
-        let all = fs::read_dir(folder)
-            .map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect());
-        all.map(|all: Vec<String>| all.into_iter().filter(|name| name.starts_with('.')).collect())
-            .unwrap_or_default()
-    }
-
-    #[test]
-    fn killed_at_any_change_of_the_disk_the_folder_holds_the_old_set_or_the_new_one() -> Result<(), Error> {
-        let scratch = Scratch::new("kills");
-        let (mut olds, mut news, mut at) = (0, 0, 0);
-        loop {
-            let folder = scratch.0.join(format!("{at}"));
-            OutputLock::new(&folder)?.write_all_files(&set("old"))?;
-            fs::write(folder.join("notes.txt"), "mine").map_err(|e| failed(&folder, e))?;
-            let claim = OutputLock::new(&folder)?;
-            let mut left = at;
-            // Every other time the first file comes piece by piece.
-            let (parts, files) = if at % 2 == 0 {
-                let (name, content) = &set("new")[0];
-                let mut part = claim.stage_file(name)?;
-                content
-                    .chunks(3)
-                    .try_for_each(|piece| part.write_all(piece))
-                    .map_err(|e| failed(&folder, e))?;
-                (vec![part.finish()?], set("new").split_off(1))
-            } else {
-                (Vec::new(), set("new"))
-            };
-            let done = claim.write_until(&parts, &files, &mut || {
-                left -= 1;
-                left < 0
-            });
-            drop(claim);
-            recover(&folder)?;
-            let now = held(&folder);
-            assert!(matches!(now.as_deref(), Some("old" | "new")), "killed at change {at}: {now:?}");
-            if now.as_deref() == Some("old") {
-                olds += 1;
-            } else {
-                news += 1;
-            }
-            // What a kill leaves behind goes with the next set, and that is whole.
-            OutputLock::new(&folder)?.write_all_files(&set("next"))?;
-            assert_eq!(
-                (held(&folder).as_deref(), leftovers(&folder)),
-                (Some("next"), vec![]),
-                "killed at change {at}"
-            );
-            assert_eq!(fs::read_to_string(folder.join("notes.txt")).unwrap_or_default(), "mine");
-            if done.is_ok() {
-                break;
-            }
-            at += 1;
-        }
-        assert!(olds >= 5 && news >= 8, "the kills fell on both sides: {olds} old, {news} new");
-        Ok(())
-    }
-
-    #[test]
-    fn a_move_that_fails_anywhere_gives_everything_back() -> Result<(), Error> {
-        let scratch = Scratch::new("back");
-        let mut taken_back = 0;
-        for at in 0..40 {
-            let folder = scratch.0.join(format!("{at}"));
-            OutputLock::new(&folder)?.write_all_files(&set("old"))?;
-            let mut left = at;
-            let new = [set("new"), vec![("only-new.svg", b"new".to_vec())]].concat();
-            let claim = OutputLock::new(&folder)?;
-            let _ = claim.write_until(&[], &new, &mut || {
-                left -= 1;
-                left < 0
-            });
-            // What is announced and not yet in its places.
-            if !folder.join(WHOLE).join(MANIFEST).exists() {
-                continue;
-            }
-            taken_back += 1;
-            let names = new.iter().map(|(name, _)| *name).chain([MANIFEST]);
-            take_back(&folder, names)
-                .and_then(|()| tidy(&folder, &mut || false))
-                .map_err(|e| failed(&folder, e))?;
-            assert_eq!((held(&folder).as_deref(), leftovers(&folder)), (Some("old"), vec![]), "at {at}");
-            assert!(!folder.join("only-new.svg").exists(), "at {at}: a file of the set that was given up");
-        }
-        assert!(taken_back > 8, "{taken_back}");
-        Ok(())
-    }
-
-    #[test]
-    fn two_commands_do_not_write_to_one_folder_and_shards_do() -> Result<(), Error> {
-        let scratch = Scratch::new("lock");
-        let first = OutputLock::new(&scratch.0)?;
-        for second in [OutputLock::new(&scratch.0), OutputLock::lock_shared(&scratch.0)] {
-            let said = second.map(|_| ()).expect_err("it is taken").to_string();
-            assert!(said.contains("another stylet") && said.contains("--out"), "{said}");
-        }
-        drop(first);
-        let (one, two) = (OutputLock::lock_shared(&scratch.0)?, OutputLock::lock_shared(&scratch.0)?);
-        assert!(OutputLock::new(&scratch.0).is_err(), "shards are being written");
-        drop((one, two));
-        assert!(!scratch.0.exists(), "a folder that was made and stayed empty goes again");
-        Ok(())
-    }
-
-    #[test]
-    fn a_file_that_was_begun_and_not_ended_goes_with_the_claim() -> Result<(), Error> {
-        let scratch = Scratch::new("begun");
-        OutputLock::new(&scratch.0)?.write_all_files(&set("old"))?;
-        let claim = OutputLock::new(&scratch.0)?;
-        claim.stage_file(NAMES[0])?.write_all(b"half").map_err(|e| failed(&scratch.0, e))?;
-        assert_eq!(leftovers(&scratch.0), [NEW]);
-        drop(claim);
-        assert_eq!((held(&scratch.0).as_deref(), leftovers(&scratch.0)), (Some("old"), vec![]));
-        Ok(())
-    }
-
-    #[test]
-    fn a_set_with_a_changed_file_is_told() -> Result<(), Error> {
-        let scratch = Scratch::new("changed");
-        OutputLock::new(&scratch.0)?.write_all_files(&set("old"))?;
-        assert!(verify_manifest(&scratch.0, &NAMES).is_ok());
-        fs::write(scratch.0.join(NAMES[1]), "other").map_err(|e| failed(&scratch.0, e))?;
-        let said = verify_manifest(&scratch.0, &NAMES).expect_err("b.json is another").to_string();
-        assert!(said.contains("b.json") && said.contains("same set"), "{said}");
-        Ok(())
-    }
-}
+mod tests;

@@ -1,4 +1,4 @@
-//! Which insertion to make next, and what an experiment can show.
+//! Planning of the next insertion, and identifiability of an experiment, with the files that the commands write.
 
 use crate::diagnose::diagnose;
 use crate::diagnosis_inputs::DiagnosisInputs;
@@ -12,7 +12,7 @@ use stylet_plan::{InformationState, Limits, Plan};
 use stylet_report::pages::{diagnosis, experiment_plan as plan_page, identifiability as shown_page};
 use stylet_scenario::{Motion, Scenario, motion_to_ron};
 
-/// A planned insertion, and what it was planned on.
+/// A planned insertion and its basis.
 pub struct PlanReport {
     /// The plan.
     pub plan: Plan,
@@ -21,21 +21,21 @@ pub struct PlanReport {
     ground: InformationState,
 }
 
-/// The limits of a file.
+/// Reads the limits of a motion.
 ///
 /// # Errors
-/// [`Error::Input`] or [`Error::Request`] with what is wrong with them.
+/// [`Error::Input`] or [`Error::Request`] when they are invalid.
 pub fn load_limits(file: &Path) -> Result<Limits, Error> {
     let limits: Limits = stylet_scenario::load(file)?;
     limits.check().map_err(|why| Error::of_plan(file, why))?;
     Ok(limits)
 }
 
-/// Plans the next insertion within the limits of a file: before any measurement, or after those of the inputs. With `simulated` the
-/// best motions are tried by simulated insertions. `progress` is told what is being done.
+/// Plans the next insertion within limits read from a file: before any measurement, or after the recordings of the inputs. With `simulated`
+/// the best motions are checked by simulated insertions. `progress` is called with the name of each stage.
 ///
 /// # Errors
-/// What is wrong with the inputs, or why no motion is within the limits.
+/// Invalid inputs, or no motion within the limits.
 pub fn plan(
     inputs: &DiagnosisInputs,
     (limits_file, limits): (&Path, &Limits),
@@ -43,37 +43,37 @@ pub fn plan(
     progress: &dyn Fn(&str),
 ) -> Result<PlanReport, Error> {
     let scenario = Scenario::load(&inputs.scenario)?;
-    let evidence = inputs.read_recordings()?;
+    let recordings = inputs.read_recordings()?;
     let at = [inputs.scenario.as_path(), limits_file];
-    plan_after_recordings(scenario, &evidence, limits, simulated, at, progress)
+    plan_after_recordings(scenario, &recordings, limits, simulated, at, progress)
 }
 
-/// Plans the next insertion after recordings that are at hand, or, without any, before the first. `named`: what messages call the
-/// scenario and the limits.
+/// Plans the next insertion after the given recordings, or without any before the first. `named` are the names of scenario and limits in
+/// error messages.
 ///
 /// # Errors
-/// What is wrong with scenario or recordings, or why no motion is within the limits.
+/// Invalid scenario or recordings, or no motion within the limits.
 pub fn plan_after_recordings(
     scenario: Scenario,
-    evidence: &[NamedRecording],
+    recordings: &[NamedRecording],
     limits: &Limits,
     simulated: bool,
     named: [&Path; 2],
     progress: &dyn Fn(&str),
 ) -> Result<PlanReport, Error> {
     let failed = |why| Error::of_plan(named[0], why);
-    let (diagnosed, (ground, begin)) = if evidence.is_empty() {
+    let (diagnosed, (ground, begin)) = if recordings.is_empty() {
         (None, stylet_plan::from_scenario(&scenario, None).map_err(failed)?)
     } else {
-        let found = diagnose(&scenario, evidence, |what| progress(what))?;
-        let start = stylet_plan::from_diagnosis(&scenario, &found.details).map_err(failed)?;
-        (Some(found), start)
+        let report = diagnose(&scenario, recordings, |stage| progress(stage))?;
+        let start = stylet_plan::from_diagnosis(&scenario, &report.details).map_err(failed)?;
+        (Some(report), start)
     };
-    progress("looking for the motion that tells most");
+    progress("searching the most informative motion");
     let (mut plan, found) =
         stylet_plan::plan(&ground, limits, &begin).map_err(|why| Error::of_plan(named[1], why))?;
     if simulated {
-        plan = stylet_plan::check_by_simulation(&found, limits, &scenario, &ground, evidence, progress)
+        plan = stylet_plan::check_by_simulation(&found, limits, &scenario, &ground, recordings, progress)
             .map_err(failed)?;
     }
     let verdict = diagnosed.map(|d| diagnosis::summary_sentence(&d.diagnosis));
@@ -103,7 +103,7 @@ impl PlanReport {
         plan_page::page(&self.scenario, self.verdict.clone(), &self.ground, &self.plan).to_html()
     }
 
-    /// Writes the motion to `out`, and the plan beside it as JSON and as a page.
+    /// Writes the motion to `out`, and the plan with the endings `.json` and `.html`.
     ///
     /// # Errors
     /// [`Error::Output`] when a file cannot be written.
@@ -123,18 +123,18 @@ impl PlanReport {
     }
 }
 
-/// What an experiment can show.
+/// Identifiability of the effects in an experiment.
 pub struct IdentifiabilityReport {
-    /// Effect by effect, and which resemble one another.
+    /// Result per effect, and groups of indistinguishable effects.
     pub identifiability: Identifiability,
     scenario: Scenario,
 }
 
-/// What the scenario's motion can show, or another `motion` (a file), or the recordings of the inputs. `progress` is told what is being
-/// done.
+/// Identifiability with the scenario's motion, another `motion` (a file), or the recordings of the inputs. `progress` is called with the name
+/// of each stage.
 ///
 /// # Errors
-/// What is wrong with the inputs; [`Error::Request`] when there is neither a motion nor a recording.
+/// Invalid inputs; [`Error::Request`] when there is neither a motion nor a recording.
 pub fn identifiability(
     inputs: &DiagnosisInputs,
     motion: Option<&Path>,
@@ -144,19 +144,19 @@ pub fn identifiability(
     if let Some(path) = motion {
         replace_motion(&mut scenario, path)?;
     }
-    let evidence = inputs.read_recordings()?;
-    if evidence.is_empty() && scenario.motion.plan().is_none() {
+    let recordings = inputs.read_recordings()?;
+    if recordings.is_empty() && scenario.motion.plan().is_none() {
         return Err(Error::Request(
             "the scenario's motion is `Recorded`: give recordings with --data, or a motion with --motion"
                 .to_owned(),
         ));
     }
     let failed = |why| Error::of_plan(&inputs.scenario, why);
-    let ground = if evidence.is_empty() {
+    let ground = if recordings.is_empty() {
         stylet_plan::from_scenario(&scenario, None).map_err(failed)?.0
     } else {
-        let found = diagnose(&scenario, &evidence, |what| progress(what))?;
-        stylet_plan::starting_information::from_recordings(&scenario, &found.details).map_err(failed)?
+        let report = diagnose(&scenario, &recordings, |stage| progress(stage))?;
+        stylet_plan::starting_information::from_recordings(&scenario, &report.details).map_err(failed)?
     };
     Ok(IdentifiabilityReport { identifiability: stylet_plan::identifiability(&ground), scenario })
 }
@@ -176,10 +176,10 @@ impl IdentifiabilityReport {
     }
 }
 
-/// Gives a scenario the motion of a file, such as one that a plan wrote.
+/// Replaces a scenario's motion by the one in a file, such as `stylet plan` writes.
 ///
 /// # Errors
-/// What is wrong with the file, or why the scenario cannot be carried along.
+/// An invalid file, or a motion that the scenario's robot cannot make.
 pub fn replace_motion(scenario: &mut Scenario, motion: &Path) -> Result<(), Error> {
     scenario.motion = stylet_scenario::load::<Motion>(motion)?;
     scenario.check().map_err(|p| Error::Request(format!("{}: {p}", motion.display())))

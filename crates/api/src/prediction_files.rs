@@ -1,4 +1,4 @@
-//! A model against recordings that took no part in making it.
+//! Inputs and files of `stylet predict`: the origin of a model, and the report of a prediction.
 
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
@@ -8,40 +8,40 @@ use stylet_diagnose::Diagnosis;
 use stylet_diagnose::prediction::PredictionResult;
 use stylet_scenario::Scenario;
 
-/// Where a model came from, as the folder in which it lies tells.
+/// Origin of a model, read from its folder.
 #[derive(Clone, Debug, Default)]
 pub struct ModelOrigin {
-    /// The diagnosis that made it.
+    /// The diagnosis that gave the model.
     pub diagnosis: Option<Diagnosis>,
-    /// What was believed before.
+    /// The scenario assumed before the diagnosis.
     pub assumed: Option<Scenario>,
 }
 
 impl ModelOrigin {
-    /// What lies beside a model; `believed` is what was believed before, where the folder is not to tell. A scenario that is gone since
-    /// the diagnosis is nobody's error.
+    /// Reads the origin of a model from `diagnosis.json` and `inputs.json` in its folder; `assumed` replaces the scenario named there. A scenario
+    /// that no longer exists is ignored.
     ///
     /// # Errors
     /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `believed` is wrong.
-    pub fn of_model_file(model: &Path, believed: Option<&Path>) -> Result<Self, Error> {
-        let beside = model.parent().unwrap_or(Path::new("."));
-        let diagnosis = diagnosis(&beside.join("diagnosis.json"))?;
-        let believed = match believed {
+    pub fn of_model_file(model: &Path, assumed: Option<&Path>) -> Result<Self, Error> {
+        let folder = model.parent().unwrap_or(Path::new("."));
+        let diagnosis = diagnosis(&folder.join("diagnosis.json"))?;
+        let assumed = match assumed {
             Some(path) => Some(Scenario::load(path)?),
-            None => DiagnosisInputs::from_folder(beside)
+            None => DiagnosisInputs::from_folder(folder)
                 .ok()
                 .and_then(|inputs| Scenario::load(&inputs.scenario).ok()),
         };
-        Ok(Self { diagnosis, assumed: believed })
+        Ok(Self { diagnosis, assumed: assumed })
     }
 }
 
-/// The diagnosis that a model came from, if it lies beside it.
+/// Reads `diagnosis.json`, if it exists.
 fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
     let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
     serde_json::from_str(&text)
         .map(Some)
-        .map_err(|e| Error::Request(format!("{}: {e}; make the diagnosis anew", path.display())))
+        .map_err(|e| Error::Request(format!("{}: {e}; repeat the diagnosis", path.display())))
 }
 
 /// All files that `stylet predict` writes; `model` was read from `file`.

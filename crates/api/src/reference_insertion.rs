@@ -1,4 +1,4 @@
-//! What an effect of the library does to a reference insertion.
+//! Reference insertion without and with an effect of the library.
 
 use stylet_tissue::{
     AnyEffect, EffectInfo, ForceLaw, ForceLawState, Layer, MeasurementChain, SensorInput, Tissue,
@@ -6,7 +6,7 @@ use stylet_tissue::{
 
 /// The force of a reference insertion without and with an effect.
 pub struct ReferenceInsertion {
-    /// The effect's parameters, in their order: typical values, or such as show in this insertion.
+    /// Parameters of the effect, in order: typical values, or values with a visible influence on this insertion.
     pub parameters: Vec<f64>,
     /// Force at the needle's base by the base law (N), every 5 ms over 25 s.
     pub base_n: Vec<f64>,
@@ -14,7 +14,7 @@ pub struct ReferenceInsertion {
     pub with_effect_n: Vec<f64>,
 }
 
-/// Inserts into three gels with ripple, holds at 10 s, goes on at 14 s, retracts from 20 s on.
+/// Insertion into three gels: ripple, hold at 10 s, advance at 14 s, retraction from 20 s on.
 #[must_use]
 pub fn reference_insertion(entry: &EffectInfo) -> ReferenceInsertion {
     let typical: Vec<f64> = entry.parameters.iter().map(|p| p.demonstration.unwrap_or(p.start)).collect();
@@ -22,7 +22,7 @@ pub fn reference_insertion(entry: &EffectInfo) -> ReferenceInsertion {
     ReferenceInsertion { base_n: force(&[]), with_effect_n: force(&with), parameters: typical }
 }
 
-/// A reference insertion with ripple, hold and retraction: (t, z, v, a).
+/// Motion of the reference insertion: time, position, velocity, acceleration.
 fn motion() -> Vec<[f64; 4]> {
     let (mut z, dt) = (-0.002, 0.005);
     (0..5000)

@@ -1,52 +1,53 @@
-//! What a command will need, reckoned before it begins.
+//! Estimates of the memory and time of a command, made before it starts.
 
 use std::path::{Path, PathBuf};
 use stylet_report::significant;
 use stylet_scenario::{Robot, Scenario};
 use stylet_sweep::Sweep;
 
-/// Bytes that `run` holds per sample: columns, truth, traces of one model, the page. Measured with 1.6e5 samples: 970.
+/// Memory of `run` per sample (bytes): columns, truth, traces of one model, report. Measured with 1.6e5 samples: 970.
 const RUN_BYTES: f64 = 1000.0;
-/// Bytes that `enhance` holds per sample of one model. Measured with 1e5 samples: 770.
+/// Memory of `enhance` per sample with one model (bytes). Measured with 1e5 samples: 770.
 const ENHANCE_BYTES: f64 = 800.0;
-/// Bytes per sample for each further model. Measured: 290.
+/// Memory per sample for each further model (bytes). Measured: 290.
 const MODEL_BYTES: f64 = 300.0;
-/// Samples of a CSV file above which `enhance` keeps them on disk. Below, the page draws every sample that it can.
+/// Number of samples of a CSV file above which `enhance` streams them from disk.
 const LONG_SAMPLES: f64 = 1e6;
-/// Bytes that it holds then, however long the recording is. `tests/enhance_long.sh` measures it.
+/// Memory of `enhance` when it streams (bytes). Measured by `tests/enhance_long.sh`.
 const LONG_BYTES: f64 = 1e8;
-/// Bytes that `diagnose` holds per sample that it reads.
+/// Memory of `diagnose` per sample read (bytes).
 const DIAGNOSE_BYTES: f64 = 300.0;
-/// Bytes that a sweep holds however many trials it has: a shard and a block of rows (`tests/sweep_large.sh`).
+/// Memory of a sweep independent of the number of trials (bytes): a shard and a block of rows. Measured by `tests/sweep_large.sh`.
 const SWEEP_BYTES: f64 = 5e7;
-/// Bytes per trial at the end, when a few values of every trial are ranked at a time. Measured from 1e5 to 1e6 trials: 70.
+/// Memory of a sweep per trial (bytes), for ranking. Measured from 1e5 to 1e6 trials: 70.
 const TRIAL_BYTES: f64 = 100.0;
-/// Seconds per sample of `run` and `enhance`; an optimised build is faster.
+/// Time of `run` and `enhance` per sample (s).
 const SAMPLE_S: f64 = 6e-6;
-/// Seconds per physics step of the slide and of the arm.
+/// Time per physics step of the slide (s).
 const SLIDE_S: f64 = 4e-6;
+/// Time per physics step of the arm (s).
 const ARM_S: f64 = 25e-6;
-/// Seconds per sample of a sweep's trial.
+/// Time of a sweep's trial per sample (s).
 const TRIAL_SAMPLE_S: f64 = 1.5e-7;
-/// Seconds per sample that a diagnosis compares; the search makes more or less of it.
+/// Time of a diagnosis per sample (s), on average over searches.
 const DIAGNOSE_S: f64 = 2e-4;
-/// A prediction takes this share of a diagnosis' time.
+/// Time of a prediction relative to a diagnosis.
 const PREDICT_SHARE: f64 = 0.1;
 
-/// What some work needs.
+/// Estimated memory and time of a command.
 #[derive(Clone, Debug)]
 pub struct ResourceEstimate {
-    /// What makes it much, for people: `3.5e8 samples (3500 s at 1e5 Hz)`.
+    /// Amount of work, such as `1e6 trials`.
     pub description: String,
-    /// Memory in bytes.
+    /// Memory (bytes).
     pub memory_bytes: f64,
-    /// Time in s.
+    /// Time (s).
     pub duration_s: f64,
-    /// What would make it less.
+    /// How to reduce it.
     pub remedy: &'static str,
 }
 
-/// What `stylet run` needs; nothing for a motion that is recorded, which it refuses by itself.
+/// Estimate for `stylet run`; `None` for a motion `Recorded`, which cannot be simulated.
 #[must_use]
 pub fn estimate_run(scenario: &Scenario) -> Option<ResourceEstimate> {
     let seconds = scenario.motion.plan()?.duration_s();
@@ -70,7 +71,7 @@ pub fn estimate_run(scenario: &Scenario) -> Option<ResourceEstimate> {
     })
 }
 
-/// What `stylet sweep` needs; 0 threads are one per core.
+/// Estimate for `stylet sweep`; 0 threads are one per core.
 #[must_use]
 pub fn estimate_sweep(sweep: &Sweep, threads: usize) -> ResourceEstimate {
     let trials = sweep.trials() as f64;
@@ -85,7 +86,7 @@ pub fn estimate_sweep(sweep: &Sweep, threads: usize) -> ResourceEstimate {
     }
 }
 
-/// What `stylet enhance` needs for a recording with so many models.
+/// Estimate for `stylet enhance` with this number of models.
 #[must_use]
 pub fn estimate_enhance(data: &Path, models: usize) -> Option<ResourceEstimate> {
     let samples = samples(data)?;
@@ -97,19 +98,19 @@ pub fn estimate_enhance(data: &Path, models: usize) -> Option<ResourceEstimate> 
     })
 }
 
-/// What `stylet enhance` needs for a recording that is long enough to be kept on disk.
+/// Estimate for `stylet enhance` when the recording is long enough to be streamed, else `None`.
 #[must_use]
 pub fn estimate_long_enhance(data: &Path, models: usize) -> Option<ResourceEstimate> {
     let need = estimate_enhance(data, models)?;
     (samples(data)? > LONG_SAMPLES).then_some(ResourceEstimate { memory_bytes: LONG_BYTES, ..need })
 }
 
-/// What `stylet diagnose` needs for these recordings.
+/// Estimate for `stylet diagnose`.
 #[must_use]
 pub fn estimate_diagnose(data: &[PathBuf]) -> ResourceEstimate {
     let each: Vec<f64> = data.iter().filter_map(|path| samples(path)).collect();
     let all: f64 = each.iter().sum();
-    // Beyond that they are thinned.
+    // Longer recordings are downsampled.
     let used: f64 = each.iter().map(|n| n.min(stylet_record::downsample::MAX_SAMPLES as f64)).sum();
     ResourceEstimate {
         description: format!("about {} samples in {} recording(s)", significant(all, 2), data.len()),
@@ -119,14 +120,14 @@ pub fn estimate_diagnose(data: &[PathBuf]) -> ResourceEstimate {
     }
 }
 
-/// What `stylet predict` needs for these recordings.
+/// Estimate for `stylet predict`.
 #[must_use]
 pub fn estimate_predict(data: &[PathBuf]) -> ResourceEstimate {
     let need = estimate_diagnose(data);
     ResourceEstimate { duration_s: need.duration_s * PREDICT_SHARE, ..need }
 }
 
-/// Samples of a CSV file, by its size and the length of its first lines. Nothing for what is no plain file.
+/// Number of samples of a CSV file, from its size and the length of its first lines; `None` unless it is a plain file.
 fn samples(path: &Path) -> Option<f64> {
     use std::io::Read as _;
     const HEAD: u64 = 1 << 16;

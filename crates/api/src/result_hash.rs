@@ -1,10 +1,10 @@
-//! A hash of results: same inputs, same bytes.
+//! Hash over results, to compare runs.
 
 use sha2::{Digest, Sha256};
 use stylet_core::Output;
 use stylet_score::{Trace, coefficients};
 
-/// First 16 bytes of the SHA-256 over the recording's bytes and every output of the core, in hex.
+/// First 16 bytes, in hex, of the SHA-256 over the recording's CSV and every output of the online algorithm.
 #[must_use]
 pub fn hash_results(recording_csv: &[u8], traces: &[&Trace]) -> String {
     let mut hash = ResultHash::default();
@@ -25,10 +25,10 @@ pub fn hash_results(recording_csv: &[u8], traces: &[&Trace]) -> String {
     hash.finish()
 }
 
-/// Number of columns of [`hashed`].
+/// Number of columns of [`hashed_values`].
 pub(crate) const HASHED_COLUMNS: usize = 7;
 
-/// What of a sample's output is hashed, in the order of the columns of [`of_results`].
+/// The hashed outputs of a sample, in the order of the columns of [`hash_results`].
 pub(crate) fn hashed_values(out: &Output) -> [f64; HASHED_COLUMNS] {
     let [stiffness, friction] = coefficients(out);
     [
@@ -42,7 +42,7 @@ pub(crate) fn hashed_values(out: &Output) -> [f64; HASHED_COLUMNS] {
     ]
 }
 
-/// [`of_results`] piece by piece: the recording's text, then one column after the other.
+/// Incremental [`hash_results`]: the recording's CSV, then one column after the other.
 #[derive(Clone, Default)]
 pub(crate) struct ResultHash(Sha256);
 

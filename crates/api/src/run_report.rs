@@ -1,4 +1,4 @@
-//! From results to the structures that the report draws.
+//! Conversion of results to the plain structures that the run report draws.
 
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
 use stylet_record::{Recording, Truth};
@@ -6,21 +6,21 @@ use stylet_report::insertion_report as report;
 use stylet_scenario::Scenario;
 use stylet_score::{LayerTruth, Score, Trace};
 
-/// One combination of model and sensor, with its score when there is a truth.
+/// A run of the online algorithm with one model on one sensor.
 pub struct AlgorithmRun {
     /// Name such as `paper/ml/force_torque`.
     pub name: String,
-    /// Sensor it listened to.
+    /// Sensor.
     pub sensor: &'static str,
     /// Configuration.
     pub config: EnhanceConfig,
     /// Outputs.
     pub trace: Trace,
-    /// Score.
+    /// Score, when the truth is known.
     pub score: Option<Score>,
 }
 
-/// The report of a run without truth yet; combinations filled in.
+/// The report of a run, without the truth.
 pub fn run_report(
     recording: &Recording,
     forces: Vec<report::ForceTrace>,
@@ -36,7 +36,7 @@ pub fn run_report(
     }
 }
 
-/// What the simulation knows.
+/// The truth of a simulation.
 pub fn report_truth(truth: &Truth, scenario: &Scenario, layers: &[LayerTruth]) -> report::Truth {
     let entered = |index: usize| match index.checked_sub(1) {
         None => truth.surface_contact_s,
@@ -97,7 +97,7 @@ fn combination(recording: &Recording, ran: &AlgorithmRun) -> report::Combination
         friction_ns_per_m: of(!multi_layer, &trace.friction),
         cumulative_friction_ns_per_m: trace.cumulative_friction_ns_per_m.clone(),
         cusum_n2: trace.cusum_n2.clone(),
-        // Ours says the largest of its sums as a share of its threshold, and looks at no derivative.
+        // The algorithm `Stylet` reports its largest CUSUM statistic relative to the threshold, and uses no derivative.
         cusum_threshold_n2: Some(if ours { 1.0 } else { config.cusum.threshold_n2() }),
         cusum_is_normalised: ours,
         cusum_drift_n2: (!ours).then(|| config.cusum.drift_n2()),

@@ -1,4 +1,4 @@
-//! A scenario simulated, felt by the online core, scored.
+//! A simulated scenario: recording, outputs of the online algorithm, scores.
 
 use crate::error::Error;
 use crate::output_files::{OutputFiles, to_json_bytes};
@@ -40,28 +40,28 @@ struct VirtualScore {
 
 impl From<VirtualSensorAccuracy> for VirtualScore {
     fn from(error: VirtualSensorAccuracy) -> Self {
-        let VirtualSensorAccuracy { lag_s, rms_n, lag_corrected_rms_n: lag_corrected_rms_n } = error;
-        Self { lag_s, rms_n, lag_corrected_rms_n: lag_corrected_rms_n }
+        let VirtualSensorAccuracy { lag_s, rms_n, lag_corrected_rms_n } = error;
+        Self { lag_s, rms_n, lag_corrected_rms_n }
     }
 }
 
-/// Everything that one run made.
+/// Result of a run.
 pub struct Run {
-    /// What was simulated.
+    /// Scenario.
     pub scenario: Scenario,
-    /// Recording, truth, readings.
+    /// Recording, truth, sensor readings.
     pub simulation: Simulation,
-    /// What the core made of it, per model and sensor.
+    /// Outputs of the online algorithm, per model and sensor.
     pub algorithm_runs: Vec<AlgorithmRun>,
-    /// The layers as the law has them.
+    /// True layers.
     pub layers: Vec<LayerTruth>,
     /// Hash over all results: the same scenario and seed give the same.
     pub hash: String,
-    /// The recording as CSV, beside truth and enhanced force.
+    /// The recording with truth and enhanced force, as CSV.
     csv: Vec<u8>,
 }
 
-/// Simulates a scenario with its own seed and runs the core on it, once per model and sensor.
+/// Simulates a scenario with its own seed and runs the online algorithm on it, once per model and sensor.
 ///
 /// # Errors
 /// [`Error::Simulate`] when the scenario cannot be simulated.
@@ -77,7 +77,7 @@ pub fn simulate_from(scenario: &Scenario, file: &str) -> Result<Run, Error> {
     let simulation = stylet_testbed::simulate(scenario, scenario.seed)
         .map_err(|why| Error::Simulate { file: file.to_owned(), why })?;
     let layers = simulation.true_layers();
-    let listen = |model: Model, reading: &SensorReadings| {
+    let run_algorithm = |model: Model, reading: &SensorReadings| {
         let mut config = match reading.sensor {
             "virtual" => scenario.enhance_for_virtual().clone(),
             _ => scenario.enhance.clone(),
@@ -100,14 +100,14 @@ pub fn simulate_from(scenario: &Scenario, file: &str) -> Result<Run, Error> {
     };
     let models = scenario.models();
     let pairs = models.iter().flat_map(|model| simulation.readings.iter().map(|r| (*model, r)));
-    let ran: Vec<AlgorithmRun> = pairs.map(|(model, reading)| listen(model, reading)).collect();
+    let ran: Vec<AlgorithmRun> = pairs.map(|(model, reading)| run_algorithm(model, reading)).collect();
     let csv = recording_csv(&simulation.recording, &simulation, &ran)?;
     let hash = result_hash::hash_results(&csv, &ran.iter().map(|r| &r.trace).collect::<Vec<_>>());
     Ok(Run { scenario: scenario.clone(), simulation, algorithm_runs: ran, layers, hash, csv })
 }
 
 impl Run {
-    /// `recording.csv`: what the sensors recorded, beside truth and enhanced force.
+    /// `recording.csv`: the recording with truth and enhanced force.
     #[must_use]
     pub fn recording_csv(&self) -> &[u8] {
         &self.csv
@@ -148,7 +148,7 @@ impl Run {
         ))
     }
 
-    /// What the report shows; `file` is the scenario's in the command that repeats it.
+    /// The report; `file` is the scenario in the command that repeats the run.
     ///
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
@@ -188,12 +188,12 @@ impl Run {
     }
 }
 
-/// How far the virtual sensor is off, in a sentence.
+/// Lag and error of the virtual sensor, as a sentence.
 #[must_use]
 pub fn virtual_note(simulation: &Simulation) -> Option<String> {
     simulation.virtual_sensor_accuracy.map(|error| {
         format!(
-            "The virtual sensor lags by {} s; it is off by {} N (rms), by {} N beside its lag.",
+            "The virtual sensor lags by {} s; its error is {} N (rms), {} N after correction of the lag.",
             significant(error.lag_s, 3),
             significant(error.rms_n, 3),
             significant(error.lag_corrected_rms_n, 3)
@@ -201,29 +201,29 @@ pub fn virtual_note(simulation: &Simulation) -> Option<String> {
     })
 }
 
-/// Settings that were changed and have no effect on the algorithms that ran, in a sentence.
+/// Settings that differ from their defaults and have no effect on the algorithms that ran, as a sentence.
 #[must_use]
 pub fn settings_note(ran: &[AlgorithmRun]) -> Option<String> {
-    let mut idle: Vec<&str> = ran.iter().flat_map(|r| unused_settings(&r.config)).collect();
-    idle.sort_unstable();
-    idle.dedup();
-    // What one of several looks at does have an effect.
-    idle.retain(|name| ran.iter().all(|r| unused_settings(&r.config).contains(name)));
+    let mut unused: Vec<&str> = ran.iter().flat_map(|r| unused_settings(&r.config)).collect();
+    unused.sort_unstable();
+    unused.dedup();
+    // A setting that one of several runs uses has an effect.
+    unused.retain(|name| ran.iter().all(|r| unused_settings(&r.config).contains(name)));
     let first = ran.first()?;
     let other = match first.config.active_algorithm() {
         Algorithm::Stylet => "Paper",
         Algorithm::Paper | Algorithm::Literal => "Stylet",
     };
-    (!idle.is_empty()).then(|| {
+    (!unused.is_empty()).then(|| {
         format!(
-            "Set, but without effect: {}. The algorithm that ran, {}, has no such thing; write algorithm: {other} if it was meant for that.",
-            idle.join(", "),
+            "Set, but without effect: {}. The algorithm that ran, {}, has no such setting; write algorithm: {other} to use it.",
+            unused.join(", "),
             algorithm_name(first.config.active_algorithm()),
         )
     })
 }
 
-/// What a sensor recorded; in the picture also before it was zeroed.
+/// The force trace of a sensor, including the samples before zeroing.
 fn force_trace(reading: &SensorReadings, recording: &Recording) -> ForceTrace {
     let recorded = match (reading.sensor, &recording.force_virtual_n) {
         ("virtual", Some(force_n)) => force_n,

@@ -1,4 +1,4 @@
-//! Many drawn insertions: rows, summary, the files of a sweep's folder.
+//! Sweeps: trials with random parameters, their summary, and the result files.
 
 use crate::error::Error;
 use crate::output_files::OutputFiles;
@@ -8,13 +8,13 @@ use stylet_report::pages::sweep::page;
 pub use stylet_sweep::Overrides;
 use stylet_sweep::{Columns, DiskTrialTable, Summary, Sweep, TrialRow, run_trials, summarise, write_csv};
 
-/// What a sweep gives.
+/// Result of a sweep.
 pub struct SweepResult {
-    /// What the columns of a row are called.
+    /// Names of the columns of a row.
     pub columns: Columns,
     /// One row per insertion.
     pub rows: Vec<TrialRow>,
-    /// Rates with intervals, distributions, worst trials, what explains them.
+    /// Rates with intervals, distributions, worst trials, sensitivity.
     pub summary: Summary,
 }
 
@@ -27,13 +27,13 @@ impl SweepResult {
     }
 }
 
-/// Trials between two questions whether to go on.
+/// Trials between two calls of `progress`.
 const BATCH: u64 = 256;
 
-/// Runs all trials of a sweep on all cores; `progress` is told how many are done, and ends the sweep (`None`) by `false`.
+/// Runs all trials of a sweep on all cores. `progress` is called with the number of finished trials; `false` ends the sweep (`None`).
 ///
 /// # Errors
-/// [`Error::Trial`] for the first trial that gives no row.
+/// [`Error::Trial`] for the first trial that fails.
 pub fn sweep(sweep: &Sweep, mut progress: impl FnMut(u64) -> bool) -> Result<Option<SweepResult>, Error> {
     let columns = Columns::new(sweep);
     let mut all: Vec<TrialRow> = Vec::with_capacity(sweep.trials() as usize);
@@ -44,14 +44,14 @@ pub fn sweep(sweep: &Sweep, mut progress: impl FnMut(u64) -> bool) -> Result<Opt
             return Ok(None);
         }
     }
-    let Ok(summary) = summarise(sweep, &columns, &all[..], HERE);
+    let Ok(summary) = summarise(sweep, &columns, &all[..], FOLDER_PLACEHOLDER);
     Ok(Some(SweepResult { columns, rows: all, summary }))
 }
 
-/// Folder name in replay commands: results do not depend on where they lie.
-const HERE: &str = "DIR";
+/// Folder name in replay commands, so that results do not depend on their folder.
+const FOLDER_PLACEHOLDER: &str = "DIR";
 
-/// What repeats the sweep.
+/// The files that repeat the sweep.
 ///
 /// # Errors
 /// [`Error::Internal`] when a value cannot be written.
@@ -62,26 +62,25 @@ pub fn input_files(sweep: &Sweep) -> Result<OutputFiles, Error> {
     Ok(output)
 }
 
-/// Table, summary and report. The table is written into the claimed folder at once, as part of a set that is announced when the output is
-/// written there.
+/// Table, summary and report. The table is staged in the locked folder; writing the returned files there commits it.
 ///
 /// # Errors
-/// [`Error::Output`] when the folder does not take the table or give the rows, [`Error::Internal`] when a value cannot be written.
+/// [`Error::Output`] when the table cannot be written or the rows cannot be read, [`Error::Internal`] when a value cannot be written.
 pub fn write_result_files(
     sweep: &Sweep,
     columns: &Columns,
     rows: &DiskTrialTable,
-    claim: &OutputLock,
+    lock: &OutputLock,
 ) -> Result<(OutputFiles, Summary), Error> {
-    let out_of = |why: io::Error| Error::output(claim.folder(), why);
-    let summary = summarise(sweep, columns, rows, HERE).map_err(out_of)?;
+    let out_of = |why: io::Error| Error::output(lock.folder(), why);
+    let summary = summarise(sweep, columns, rows, FOLDER_PLACEHOLDER).map_err(out_of)?;
     let mut output = input_files(sweep)?;
-    let mut table = claim.stage_file("trials.csv")?;
+    let mut table = lock.stage_file("trials.csv")?;
     write_csv(columns, rows, &mut table).map_err(out_of)?;
     output.add_staged(table.finish()?);
     #[cfg(feature = "parquet")]
     {
-        let mut table = claim.stage_file("trials.parquet")?;
+        let mut table = lock.stage_file("trials.parquet")?;
         stylet_sweep::write_parquet(columns, rows, &mut table).map_err(out_of)?;
         output.add_staged(table.finish()?);
     }

@@ -1,4 +1,4 @@
-//! A sweep in its folder: shards that outlive a kill, the tables made of them, one trial of it again.
+//! The folder of a sweep: resumable shards, the tables made of them, and single trials.
 
 use crate::error::Error;
 use crate::output_folder::{self, OutputLock};
@@ -11,16 +11,16 @@ use stylet_sweep::{
     Columns, DiskTrialTable, Overrides, Summary, Sweep, TrialRow, TrialSampler, TrialTableWriter, run_trials,
 };
 
-/// Trials of a shard when a whole sweep splits the work itself: what a kill can cost at most.
+/// Trials per shard of a whole sweep: the most that an interruption can lose.
 pub const SHARD_TRIALS: u64 = 1024;
 
-/// Trials that are run to see how long one takes.
-const PROBE: u64 = 32;
+/// Trials run to measure the time of one.
+const PROBE_TRIALS: u64 = 32;
 
-/// Refuses to mix a sweep of so many shards with what is unfinished in the folder.
+/// Refuses to mix a sweep of `of` shards with an unfinished one, or with the results of another command, in the folder.
 ///
 /// # Errors
-/// [`Error::Request`] with what would be right.
+/// [`Error::Request`] with the remedy, [`Error::OtherCommand`].
 pub fn check_unfinished(
     sweep: &Sweep,
     columns: &Columns,
@@ -28,6 +28,7 @@ pub fn check_unfinished(
     of: u64,
     resume: bool,
 ) -> Result<(), Error> {
+    output_folder::check_same_command(out, &["summary.json"])?;
     let unfinished = shard::shard_count(out);
     if let (Ok(split), false) = (&unfinished, resume) {
         let what = format!(
@@ -40,7 +41,7 @@ pub fn check_unfinished(
     if let (Ok(split), true) = (&unfinished, resume)
         && *split != of
     {
-        // A shard of another split is foreign, whatever it holds.
+        // Reading fails with a better message when the shard belongs to another sweep.
         shard::read(sweep, columns, ShardNumber { shard: 1, of: *split }, out)?;
         let what = format!(
             "{}: is split into {split} shards, not {of}; finish it with: stylet sweep merge",
@@ -51,17 +52,17 @@ pub fn check_unfinished(
     Ok(())
 }
 
-/// The rows of all shards: those that are in the folder (`there` is told of their trials), and new ones, which are written there (`done` is
-/// told of them). They lie on disk, in the folder.
+/// The rows of all shards, on disk in the folder: shards present in the folder are read (`present` is called with their trials), the others
+/// are run and written there (`done` is called with finished trials).
 ///
 /// # Errors
-/// [`Error::Trial`] for a trial that gives no row, [`Error::Request`] for a shard that is foreign or cannot be written.
+/// [`Error::Trial`] for a trial that fails, [`Error::Request`] for a shard of another sweep or one that cannot be written.
 pub fn run_all_shards(
     sweep: &Sweep,
     columns: &Columns,
     out: &Path,
     of: u64,
-    there: &(dyn Fn(u64) + Sync),
+    present: &(dyn Fn(u64) + Sync),
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<DiskTrialTable, Error> {
     let mut all = Gathered::new(columns, out)?;
@@ -69,7 +70,7 @@ pub fn run_all_shards(
         let number = ShardNumber { shard, of };
         if number.path(out).exists() {
             let rows = shard::read(sweep, columns, number, out)?;
-            there(rows.len() as u64);
+            present(rows.len() as u64);
             all.take(&rows)?;
             continue;
         }
@@ -80,7 +81,7 @@ pub fn run_all_shards(
     all.finish()
 }
 
-/// Rows of one shard after the other.
+/// Collects the rows of the shards in order.
 struct Gathered<'a> {
     out: &'a Path,
     rows: TrialTableWriter,
@@ -101,10 +102,10 @@ impl<'a> Gathered<'a> {
     }
 }
 
-/// Runs one shard and writes it; with `resume` a whole shard of this sweep stays as it is.
+/// Runs one shard and writes it; with `resume` a complete shard of this sweep is kept.
 ///
 /// # Errors
-/// As [`all_shards`]; [`Error::Busy`] when a whole sweep is written there.
+/// As [`run_all_shards`]; [`Error::Busy`] when a whole sweep uses the folder.
 pub fn run_shard(
     sweep: &Sweep,
     columns: &Columns,
@@ -123,7 +124,7 @@ pub fn run_shard(
 /// The rows of the shards in a folder.
 ///
 /// # Errors
-/// [`Error::Request`] when one is missing or foreign.
+/// [`Error::Request`] when one is missing or of another sweep.
 pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<DiskTrialTable, Error> {
     let of = shard::shard_count(out)?;
     let mut all = Gathered::new(columns, out)?;
@@ -133,7 +134,7 @@ pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<D
     all.finish()
 }
 
-/// Writes the results into the claimed folder `out` and removes the shards.
+/// Writes the results into the locked folder `out` and removes the shards.
 ///
 /// # Errors
 /// [`Error::Output`].
@@ -141,29 +142,29 @@ pub fn write_results(
     sweep: &Sweep,
     columns: &Columns,
     rows: &DiskTrialTable,
-    (claim, out): (&OutputLock, &Path),
+    (lock, out): (&OutputLock, &Path),
 ) -> Result<Summary, Error> {
-    let (output, summary) = write_result_files(sweep, columns, rows, claim)?;
-    output.write_locked(claim)?;
+    let (output, summary) = write_result_files(sweep, columns, rows, lock)?;
+    output.write_locked(lock)?;
     let _ = std::fs::remove_dir_all(out.join(shard::SHARD_FOLDER));
     Ok(summary)
 }
 
-/// Seconds that a trial takes here on the threads that call, by running a few.
+/// Measures the time of a trial (s) on the calling threads by running a few.
 ///
 /// # Errors
-/// [`Error::Trial`] for a trial that gives no row.
+/// [`Error::Trial`] for a trial that fails.
 pub fn measure_trial_s(sweep: &Sweep, columns: &Columns) -> Result<f64, Error> {
-    let probe = PROBE.min(sweep.trials());
+    let probe = PROBE_TRIALS.min(sweep.trials());
     let start = Instant::now();
     run_trials(sweep, columns, 0..probe, &|_| {})?;
     Ok(start.elapsed().as_secs_f64() / probe as f64)
 }
 
-/// The scenario of a trial of the sweep whose results a folder holds.
+/// The scenario of a trial of the sweep in a folder.
 ///
 /// # Errors
-/// [`Error::Request`] when it is no such folder or has no such trial, [`Error::NotOneSet`] when its files were changed.
+/// [`Error::Request`] when the folder holds no sweep or no such trial, [`Error::InconsistentSet`] when its files were changed.
 pub fn trial_scenario(folder: &Path, trial: u64) -> Result<Scenario, Error> {
     let file = folder.join("sweep.ron");
     output_folder::recover(folder)?;

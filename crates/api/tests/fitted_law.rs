@@ -1,5 +1,5 @@
-//! Promise: with a law that was fitted to other insertions the enhanced force is nearer to what the tip feels than without, in a hold and on the
-//! way back, and near to it on the way in; causally, and with punctures where the core says so rather than where the law has them.
+//! With a model fitted to other insertions the enhanced force is closer to the tip force in holds and during retraction than without, and
+//! about as close during insertion; causally, and with punctures at the detected ruptures instead of the model's own.
 
 use stylet_api::{Error, IdentifiedModel, enhance, enhance_with_model};
 use stylet_core::config::{Algorithm, EnhanceConfig};
@@ -48,8 +48,8 @@ fn off_n(simulation: &Simulation, enhanced_n: &[f64], from_s: f64, to_s: f64) ->
     rms(&within.map(|i| enhanced_n[i] - simulation.truth.tip_force_n[i]).collect::<Vec<_>>())
 }
 
-/// The law replayed with the ruptures that it has by itself.
-fn by_itself(law: &Scenario, r: &Recording) -> Vec<f64> {
+/// The model replayed with its own ruptures.
+fn replayed_alone(law: &Scenario, r: &Recording) -> Vec<f64> {
     let law = ForceLaw::new(&law.tissue, &law.effects).expect("a law");
     let mut state = ForceLawState::default();
     let tip = |(i, s): (usize, stylet_record::Sample)| {
@@ -69,33 +69,33 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
         let drawn = drawn(seed);
         let r = &drawn.recording;
         let alone = enhance(r, &config).trace;
-        let told = enhance_with_model(r, &config, &law)?.trace;
-        assert_eq!(told.detections, alone.detections, "a law changes nothing of what is found");
-        assert_eq!(told.detections.len(), 2, "seed {seed}: both ruptures");
-        let replayed = by_itself(&fitted(), r);
+        let with_model = enhance_with_model(r, &config, &law)?.trace;
+        assert_eq!(with_model.detections, alone.detections, "a model does not change the detections");
+        assert_eq!(with_model.detections.len(), 2, "seed {seed}: both ruptures");
+        let replayed = replayed_alone(&fitted(), r);
         for (part, (from_s, to_s)) in [(0.0, 12.0), (12.0, 14.0), (14.0, 24.0)].into_iter().enumerate() {
-            for (sum, trace) in
-                [(&mut without, &alone.enhanced_n), (&mut with, &told.enhanced_n), (&mut own, &replayed)]
-            {
+            for (sum, trace) in [
+                (&mut without, &alone.enhanced_n),
+                (&mut with, &with_model.enhanced_n),
+                (&mut own, &replayed),
+            ] {
                 sum[part] += off_n(&drawn, trace, from_s, to_s) / 12.0;
             }
         }
     }
     println!(
-        "N rms on the way in, in the hold, on the way back: alone {without:.3?}, with the law {with:.3?}, replayed with its own ruptures {own:.3?}"
+        "N rms in insertion, hold, retraction: alone {without:.3?}, with the model {with:.3?}, replayed with its own ruptures {own:.3?}"
     );
-    // At one speed the core knows the friction of a drop from this very insertion, to the noise; the law is off by what insertions differ.
+    // During insertion at constant speed the algorithm estimates the friction from this insertion itself; the model differs by the variation
+    // between insertions.
     assert!(with[0] < 0.05, "{with:?}");
     for part in [1, 2] {
         assert!(
             with[part] < 0.5 * without[part],
-            "part {part}: {with:?} N rms with the law, {without:?} without"
+            "part {part}: {with:?} N rms with the model, {without:?} without"
         );
     }
-    assert!(
-        with[0] < 0.7 * own[0],
-        "{with:?} with punctures where the core says so, {own:?} where the law has them"
-    );
+    assert!(with[0] < 0.7 * own[0], "{with:?} with the detected ruptures, {own:?} with those of the model");
     Ok(())
 }
 
@@ -103,7 +103,7 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
 fn what_is_said_of_a_sample_does_not_depend_on_later_ones() -> Result<(), Error> {
     let law = IdentifiedModel::new("extended.ron", &fitted())?;
     let whole = drawn(1).recording;
-    let told = enhance_with_model(&whole, &EnhancerConfigFile::default(), &law)?.trace;
+    let with_model = enhance_with_model(&whole, &EnhancerConfigFile::default(), &law)?.trace;
     for samples in [1500, 2500, 3300] {
         let mut begin = whole.clone();
         begin.time_s.truncate(samples);
@@ -111,8 +111,8 @@ fn what_is_said_of_a_sample_does_not_depend_on_later_ones() -> Result<(), Error>
         begin.velocity_mps.truncate(samples);
         begin.force_n.truncate(samples);
         let first = enhance_with_model(&begin, &EnhancerConfigFile::default(), &law)?.trace;
-        assert_eq!(first.enhanced_n, told.enhanced_n[..samples]);
-        assert_eq!(first.low_n, told.low_n[..samples]);
+        assert_eq!(first.enhanced_n, with_model.enhanced_n[..samples]);
+        assert_eq!(first.low_n, with_model.low_n[..samples]);
     }
     Ok(())
 }
@@ -158,7 +158,7 @@ fn a_law_is_refused_by_algorithms_that_take_none_and_doubted_where_it_does_not_b
     elsewhere.tissue.layers.truncate(1);
     let doubts = IdentifiedModel::new("other.ron", &elsewhere)?.warnings(&trace).join("; ");
     assert!(doubts.contains("surface at 30.0 mm") && doubts.contains("has 1 layer"), "{doubts}");
-    // Effects that the law cannot hold all of.
+    // More effects than the force law supports.
     let mut many = fitted();
     many.effects =
         vec![AnyEffect::PreslidingFriction(PreslidingFriction { c_n_per_m: 1.0, delta_m: 0.002 }); 17];

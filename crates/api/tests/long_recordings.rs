@@ -1,5 +1,5 @@
-//! Promise: a recording that is heard from disk gives the files of one that is heard in memory, byte for byte; only the report of one that
-//! is longer than a page can draw shows a selection, and says so.
+//! A recording that is streamed from disk gives the same files as one in memory, byte for byte; only the report of one that
+//! is longer than a page can draw shows a selection, with a note.
 
 use std::fmt::Write;
 use std::fs;
@@ -54,8 +54,8 @@ fn of(config: EnhanceConfig) -> EnhancerConfigFile {
     EnhancerConfigFile { enhance: config, ..EnhancerConfigFile::default() }
 }
 
-/// Both ways; gives what was heard from disk, after its files were held against the other's.
-fn alike(
+/// Enhances a recording in memory and from disk and compares the files; returns the result from disk.
+fn compare_outputs(
     name: &str,
     text: &str,
     config: &EnhancerConfigFile,
@@ -71,17 +71,17 @@ fn alike(
     let (here, there) = (scratch.0.join("here"), scratch.0.join("there"));
 
     let (recording, notes) = read_csv(&path, &ReadOptions::default())?;
-    let heard = enhance_recording(recording, notes, config.clone(), models, law)?;
-    let found = said(&heard);
+    let enhanced = enhance_recording(recording, notes, config.clone(), models, law)?;
+    let found = summary(&enhanced);
     assert!(found.contains("rupture"), "{name}: there was something to be found: {found}");
-    heard.output_files(&source(&path))?.write(&here)?;
+    enhanced.output_files(&source(&path))?.write(&here)?;
 
-    let claim = OutputLock::new(&there)?;
+    let lock = OutputLock::new(&there)?;
     let (recording, notes) = read_long_csv(&path, &ReadOptions::default(), &there)?.expect("a plain file");
-    let heard = enhance_long_recording(&recording, notes, config.clone(), models, law, &claim)?;
-    assert_eq!(said(&heard), found, "{name}");
-    heard.output_files(&source(&path))?.write_locked(&claim)?;
-    drop((recording, claim));
+    let enhanced = enhance_long_recording(&recording, notes, config.clone(), models, law, &lock)?;
+    assert_eq!(summary(&enhanced), found, "{name}");
+    enhanced.output_files(&source(&path))?.write_locked(&lock)?;
+    drop((recording, lock));
 
     for file in same {
         let read = |folder: &Path| fs::read(folder.join(file)).expect("a result");
@@ -99,18 +99,18 @@ fn alike(
     Ok(())
 }
 
-fn said(heard: &EnhancementResult) -> String {
-    let mut said = format!("{:?} {}", heard.extent, heard.hash);
-    for ran in &heard.algorithm_runs {
+fn summary(enhanced: &EnhancementResult) -> String {
+    let mut text = format!("{:?} {}", enhanced.extent, enhanced.hash);
+    for ran in &enhanced.algorithm_runs {
         let trace = &ran.trace;
-        let _ = write!(said, "\n{} contact {:?} {:?}", ran.name, trace.contact_m, trace.contact_s);
-        trace.detections.iter().for_each(|d| said += &format!("\nrupture {d:?}"));
-        trace.estimates.iter().for_each(|e| said += &format!("\nlayer {e:?}"));
+        let _ = write!(text, "\n{} contact {:?} {:?}", ran.name, trace.contact_m, trace.contact_s);
+        trace.detections.iter().for_each(|d| text += &format!("\nrupture {d:?}"));
+        trace.estimates.iter().for_each(|e| text += &format!("\nlayer {e:?}"));
     }
-    said
+    text
 }
 
-/// A law whose shaft is held behind its ruptures.
+/// A model whose shaft friction depends on its ruptures.
 fn law() -> IdentifiedModel {
     let text = r#"Scenario(name: "dry", tissue: (surface_m: 0.015, layers: [
         (thickness_m: 0.015, stiffness_n_per_m: 60.0, friction_ns_per_m2: 2000.0),
@@ -127,8 +127,15 @@ const ALL: [&str; 6] =
 #[test]
 fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memory() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("short", &log(20_000, true), &EnhancerConfigFile::default(), &[Model::MultiLayer], None, &ALL)?;
-    alike(
+    compare_outputs(
+        "short",
+        &log(20_000, true),
+        &EnhancerConfigFile::default(),
+        &[Model::MultiLayer],
+        None,
+        &ALL,
+    )?;
+    compare_outputs(
         "positions",
         &log(19_000, false),
         &EnhancerConfigFile::default(),
@@ -137,20 +144,27 @@ fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memo
         &ALL,
     )?;
     let law = law();
-    alike(
-        "told",
+    compare_outputs(
+        "with a model",
         &log(18_000, true),
         &EnhancerConfigFile::default(),
         &[Model::MultiLayer],
         Some(&law),
         &ALL,
     )?;
-    alike("compared", &log(17_000, true), &of(paper), &BOTH, None, &ALL)
+    compare_outputs("compared", &log(17_000, true), &of(paper), &BOTH, None, &ALL)
 }
 
 #[test]
 fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
-    alike("long", &log(60_000, true), &EnhancerConfigFile::default(), &[Model::MultiLayer], None, &TABLES)?;
-    alike("long, compared", &log(50_000, false), &of(paper), &BOTH, None, &TABLES)
+    compare_outputs(
+        "long",
+        &log(60_000, true),
+        &EnhancerConfigFile::default(),
+        &[Model::MultiLayer],
+        None,
+        &TABLES,
+    )?;
+    compare_outputs("long, compared", &log(50_000, false), &of(paper), &BOTH, None, &TABLES)
 }

@@ -279,7 +279,7 @@ pub enum Algorithm {
     Paper,
     /// The paper's to the letter: no blind travel after contact, no motion guards, drop by
     /// extremes. For the record: at 20 mN of noise and with contact found from the data, nearly every insertion has a false
-    /// rupture right after it, and in the sinusoid from rest the first layer's K is off by half (`tests/noise_seeds.rs`).
+    /// rupture right after it, and in the sinusoid from rest the first layer's K is off by half (`tests/detection_over_noise_seeds.rs`).
     Literal,
     /// This project's: calibrated, one pass, with the uncertainty of everything it says (see [`StyletConfig`]). It knows the
     /// multi-layer law alone and finds depths itself: with [`Model::KelvinVoigt`] or [`Depths::Known`] the paper's runs.

@@ -2,29 +2,24 @@
 //! remedy; gaps in a recording are tolerated.
 
 use stylet_diagnose::{DiagnoseError, Diagnosis, NamedRecording, Options, Verdict, diagnose};
-use stylet_own_world::{self as hidden, Drawn, Motions};
+use stylet_examine::{Hide, Plan};
 use stylet_record::Recording;
+use stylet_scenario::Scenario;
 
-fn case() -> hidden::Case {
-    hidden::case(&Drawn {
-        seed: 3,
-        effects: Vec::new(),
-        outside: None,
-        noise_n: 0.02,
-        ar: [0.0; 2],
-        off: 0.1,
-        motions: Motions::One,
-        scatter: 0.0,
-        velocity_noise_mps: 0.0,
-    })
+/// A simulated case in which nothing is hidden: the assumed scenario and four recordings.
+fn case() -> (Scenario, Vec<Recording>) {
+    let plan = Plan { hide: vec![Hide::Clean], cases: 1, seed: 3, ..Plan::default() };
+    let question = stylet_examine::make_case(&plan.cases()[0]).expect("a case").question;
+    let assumed = Scenario::parse(&question.name, &question.assumed_ron).expect("a scenario");
+    (assumed, question.recordings.into_iter().map(|named| named.recording).collect())
 }
 
 fn with(change: impl Fn(&mut Recording)) -> Result<Diagnosis, DiagnoseError> {
-    let case = case();
-    let mut recording = case.recordings[0].clone();
+    let (assumed, simulated) = case();
+    let mut recording = simulated[2].clone();
     change(&mut recording);
     let recordings = [NamedRecording { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
-    diagnose(&case.believed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
+    diagnose(&assumed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
 }
 
 fn message(change: impl Fn(&mut Recording)) -> String {
@@ -67,7 +62,7 @@ fn one_sample_or_none_that_is_a_number_is_too_little() {
     assert!(text.contains("1 usable sample"), "{text}");
     let text = message(|r| r.force_n.iter_mut().for_each(|f| *f = f64::NAN));
     assert!(text.contains("0 usable sample"), "{text}");
-    let none = diagnose(&case().believed, &[], &Options::default(), |_| {});
+    let none = diagnose(&case().0, &[], &Options::default(), |_| {});
     assert!(matches!(none.err(), Some(DiagnoseError::NoRecording)));
 }
 
@@ -92,19 +87,9 @@ fn gap_in_a_recording_is_tolerated() {
 
 #[test]
 fn recordings_at_different_rates_are_fitted_together() {
-    let case = hidden::case(&Drawn {
-        seed: 4,
-        effects: Vec::new(),
-        outside: None,
-        noise_n: 0.02,
-        ar: [0.0; 2],
-        off: 0.1,
-        motions: Motions::Rich,
-        scatter: 0.0,
-        velocity_noise_mps: 0.0,
-    });
-    let one = case.recordings[0].clone();
-    let mut half = case.recordings[2].clone();
+    let (assumed, simulated) = case();
+    let one = simulated[0].clone();
+    let mut half = simulated[2].clone();
     for c in [&mut half.time_s, &mut half.position_m, &mut half.velocity_mps, &mut half.force_n] {
         let mut keep = false;
         c.retain(|_| {
@@ -117,22 +102,22 @@ fn recordings_at_different_rates_are_fitted_together() {
         .map(|(name, recording)| NamedRecording { name: name.to_owned(), recording, notes: Vec::new() })
         .collect();
     let found =
-        diagnose(&case.believed, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+        diagnose(&assumed, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
     assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
 }
 
 #[test]
 fn result_does_not_depend_on_the_number_of_threads() {
-    let case = case();
+    let (assumed, simulated) = case();
     let recordings = [NamedRecording {
         name: "a.csv".to_owned(),
-        recording: case.recordings[0].clone(),
+        recording: simulated[2].clone(),
         notes: Vec::new(),
     }];
     let json = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let found = pool.install(|| {
-            diagnose(&case.believed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
+            diagnose(&assumed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
         });
         serde_json::to_string(&found.expect("a diagnosis")).expect("JSON")
     };

@@ -1,4 +1,4 @@
-//! What a scenario gets wrong about measured data.
+//! Diagnosis of measured recordings.
 
 use crate::arrays::{Column, recording};
 use crate::failure;
@@ -19,14 +19,14 @@ pub enum Measured<'py> {
     Columns(String, Column<'py>, Column<'py>, Column<'py>, Option<Column<'py>>),
 }
 
-/// What a diagnosis found.
+/// Result of a diagnosis.
 #[pyclass(frozen)]
 pub struct Diagnosis {
     found: Parts,
     assumed: String,
 }
 
-/// What is kept of it; the engine's own state stays on the thread that made it.
+/// The parts that are kept; the intermediate results stay on the worker thread.
 struct Parts {
     json: Vec<u8>,
     extended: Scenario,
@@ -34,7 +34,7 @@ struct Parts {
     html: String,
 }
 
-/// Compares what a scenario believes with what was measured.
+/// Compares an assumed scenario with measured recordings.
 #[pyfunction]
 #[pyo3(signature = (kind, source, measured, columns=None, repair=false, progress=None))]
 pub fn diagnose(
@@ -47,15 +47,16 @@ pub fn diagnose(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Diagnosis> {
     let scenario = parse(kind, source)?;
-    let evidence = to_recordings(&measured, columns, repair)?;
+    let recordings = to_recordings(&measured, columns, repair)?;
     let assumed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
     let named = assumed.clone();
-    let found = run_in_background(py, progress, move |told| {
+    let found = run_in_background(py, progress, move |callback| {
         let mut done = 0;
-        let found: Result<DiagnosisReport, stylet::Error> = stylet::diagnose(&scenario, &evidence, |what| {
-            done += 1;
-            told.report_or_stop(what, done);
-        });
+        let found: Result<DiagnosisReport, stylet::Error> =
+            stylet::diagnose(&scenario, &recordings, |what| {
+                done += 1;
+                callback.report_or_stop(what, done);
+            });
         found.and_then(|found| {
             let (json, ron) = (found.json()?, found.extended_ron(&named)?);
             let html = found.html(&scenario, &named, "stylet.diagnose".to_owned());
@@ -65,7 +66,7 @@ pub fn diagnose(
     Ok(Diagnosis { found: found.map_err(failure)?, assumed })
 }
 
-/// Recordings as the engine takes them.
+/// Reads recordings from files or columns.
 pub fn to_recordings(
     measured: &[Measured<'_>],
     columns: Option<PathBuf>,
@@ -80,9 +81,9 @@ pub fn to_recordings(
             Measured::Columns(..) => None,
         })
         .collect();
-    let mut evidence = Vec::with_capacity(measured.len());
+    let mut recordings = Vec::with_capacity(measured.len());
     for one in measured {
-        evidence.push(match one {
+        recordings.push(match one {
             Measured::File(path) => {
                 let (recording, notes) = read_csv_skip_nonfinite(path, &options).map_err(failure)?;
                 NamedRecording { name: stylet::recording_name(path, &files), recording, notes }
@@ -94,7 +95,7 @@ pub fn to_recordings(
             },
         });
     }
-    Ok(evidence)
+    Ok(recordings)
 }
 
 #[pymethods]
@@ -114,13 +115,13 @@ impl Diagnosis {
         &self.found.html
     }
 
-    /// The scenario that was assumed.
+    /// The assumed scenario.
     #[getter]
     fn assumed(&self) -> &str {
         &self.assumed
     }
 
-    /// The force (N) that the extended scenario predicts along a recorded motion.
+    /// Force (N) of the extended scenario along a recorded motion.
     #[pyo3(signature = (time_s, position_m, velocity_mps=None))]
     fn predict<'py>(
         &self,

@@ -1,4 +1,4 @@
-//! The online core, sample by sample or over arrays.
+//! The online algorithm, sample by sample or over arrays.
 
 use crate::arrays::{Column, insert_columns, recording};
 use crate::failure;
@@ -11,7 +11,7 @@ use stylet::core::{Enhancer as Core, Output as CoreOutput, Sample};
 use stylet::enhancement::{EnhancementResult, ResultSource, enhance_recording};
 use stylet::{EnhancerConfigFile, record::differentiate};
 
-/// A configuration from a file (`"path"`), RON text (`"ron"`) or the defaults (empty text).
+/// Reads a configuration: a file (`"path"`), RON or JSON text, or the defaults (empty text).
 fn parse(kind: &str, source: &str) -> PyResult<EnhancerConfigFile> {
     match kind {
         "path" => EnhancerConfigFile::load(Path::new(source)).map_err(failure),
@@ -32,7 +32,7 @@ pub fn check_config(kind: &str, source: &str) -> PyResult<()> {
     parse(kind, source).map(drop)
 }
 
-/// What one step gave.
+/// Output of one step.
 #[pyclass(frozen)]
 pub struct Output {
     out: CoreOutput,
@@ -110,7 +110,7 @@ impl Output {
     }
 }
 
-/// The online core.
+/// The online algorithm.
 #[pyclass]
 pub struct Enhancer {
     core: Core<Vec<Sample>>,
@@ -131,20 +131,22 @@ impl Enhancer {
         Ok(Self { core, config, storage })
     }
 
-    /// Takes one sample.
+    /// Processes one sample.
+    #[pyo3(signature = (*, time_s, position_m, velocity_mps, force_n))]
     #[inline]
     fn step(&mut self, time_s: f64, position_m: f64, velocity_mps: f64, force_n: f64) -> Output {
         Output { out: self.core.step(Sample { time_s, position_m, velocity_mps, force_n }) }
     }
 
-    /// Takes one sample and returns the enhanced force alone (N), the quickest way.
+    /// Processes one sample and returns only the enhanced force (N): the fastest call.
+    #[pyo3(signature = (*, time_s, position_m, velocity_mps, force_n))]
     #[inline]
     fn enhanced(&mut self, time_s: f64, position_m: f64, velocity_mps: f64, force_n: f64) -> f64 {
         self.core.step_brief(Sample { time_s, position_m, velocity_mps, force_n }).enhanced_n
     }
 
-    /// Takes many samples; the state goes on from the last.
-    #[pyo3(signature = (time_s, position_m, velocity_mps, force_n))]
+    /// Processes many samples, continuing from the last state.
+    #[pyo3(signature = (*, time_s, position_m, velocity_mps, force_n))]
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -176,7 +178,7 @@ impl Enhancer {
         let (mut state, mut ruptures) = (Vec::with_capacity(n), Vec::with_capacity(n));
         let core = &mut self.core;
         py.detach(|| {
-            /// Samples put together at a time: they stay in the cache.
+            /// Samples per block, small enough for the cache.
             const BLOCK: usize = 256;
             let mut block = [Sample::default(); BLOCK];
             let mut from = 0;
@@ -210,15 +212,15 @@ impl Enhancer {
     }
 }
 
-/// What the core made of a recording.
+/// Outputs of the online algorithm on a recording.
 #[pyclass(frozen)]
 pub struct Enhanced {
-    heard: EnhancementResult,
+    enhancement: EnhancementResult,
     json: Vec<u8>,
     html: String,
 }
 
-/// Runs the core over a whole recording.
+/// Runs the online algorithm on a recording.
 #[pyfunction]
 #[pyo3(signature = (kind, source, time_s, position_m, force_n, velocity_mps=None))]
 pub fn enhance(
@@ -234,11 +236,11 @@ pub fn enhance(
     let recording = recording(&time_s, &position_m, &force_n, velocity_mps.as_ref())?;
     let model = config.enhance.model;
     py.detach(|| {
-        let heard = enhance_recording(recording, Vec::new(), config, &[model], None)?;
+        let enhancement = enhance_recording(recording, Vec::new(), config, &[model], None)?;
         let named =
             ResultSource { data: Path::new("recording"), config: None, command: "stylet.enhance".to_owned() };
-        let (json, html) = (heard.json("recording")?, heard.report(&named)?.to_html());
-        Ok(Enhanced { heard, json, html })
+        let (json, html) = (enhancement.json("recording")?, enhancement.report(&named)?.to_html());
+        Ok(Enhanced { enhancement, json, html })
     })
     .map_err(|e: stylet::Error| failure(e))
 }
@@ -257,7 +259,7 @@ impl Enhanced {
 
     /// Recording and outputs, one value per sample.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (dict, recording) = (PyDict::new(py), &self.heard.recording);
+        let (dict, recording) = (PyDict::new(py), &self.enhancement.recording);
         let measured: [(&str, &[f64]); 4] = [
             ("time_s", &recording.time_s),
             ("position_m", &recording.position_m),
@@ -265,7 +267,7 @@ impl Enhanced {
             ("force_n", &recording.force_n),
         ];
         insert_columns(py, &dict, &measured)?;
-        if let Some(ran) = self.heard.algorithm_runs.first() {
+        if let Some(ran) = self.enhancement.algorithm_runs.first() {
             insert_columns(py, &dict, &[("low_n", &ran.trace.low_n), ("high_n", &ran.trace.high_n)])?;
             insert_trace(py, &dict, &ran.trace)?;
         }

@@ -1,4 +1,4 @@
-//! Which insertion to make next.
+//! Planning of the next insertion.
 
 use crate::diagnosis::{Measured, to_recordings};
 use crate::failure;
@@ -28,8 +28,8 @@ fn limits(kind: &str, source: &str) -> PyResult<Limits> {
     Ok(limits)
 }
 
-/// Plans the next insertion: before any measurement, or after those given. `read`: the column map of files, and whether rows whose time goes
-/// back are dropped.
+/// Plans the next insertion, after the given recordings if any. `read`: column map of the files, and whether rows with backward time stamps are
+/// dropped.
 #[pyfunction]
 #[pyo3(signature = (scenario, measured, within, read, simulated=true, progress=None))]
 pub fn plan(
@@ -43,16 +43,16 @@ pub fn plan(
 ) -> PyResult<Plan> {
     let assumed = parse(&scenario.0, &scenario.1)?;
     let limits = limits(&within.0, &within.1)?;
-    let evidence = to_recordings(&measured, read.0, read.1)?;
+    let recordings = to_recordings(&measured, read.0, read.1)?;
     let name = if scenario.0 == "path" { scenario.1 } else { "scenario".to_owned() };
-    let planned = run_in_background(py, progress, move |told| {
+    let planned = run_in_background(py, progress, move |callback| {
         let done = Cell::new(0);
         let tell = |what: &str| {
             done.set(done.get() + 1);
-            told.report_or_stop(what, done.get());
+            callback.report_or_stop(what, done.get());
         };
         let at = [Path::new(&name), Path::new("limits")];
-        let planned = stylet::plan_after_recordings(assumed, &evidence, &limits, simulated, at, &tell)?;
+        let planned = stylet::plan_after_recordings(assumed, &recordings, &limits, simulated, at, &tell)?;
         Ok(Plan { json: planned.json()?, motion: planned.motion_ron()?, html: planned.html() })
     })?;
     planned.map_err(|e: stylet::Error| failure(e))

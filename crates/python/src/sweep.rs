@@ -1,4 +1,4 @@
-//! Many drawn insertions.
+//! Sweeps: insertions with random parameters.
 
 use crate::failure;
 use crate::run::parse;
@@ -16,7 +16,7 @@ pub struct Sweep {
     sweep: stylet::Sweep,
 }
 
-/// Runs a sweep: a file, or a `Sweep(...)` as JSON over a scenario given apart.
+/// Runs a sweep: a file, or a `Sweep(...)` as JSON with its scenario as a separate argument.
 #[pyfunction]
 #[pyo3(signature = (path=None, json=None, kind="ron", source="", trials=None, seed=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
@@ -45,8 +45,8 @@ pub fn sweep(
         }
         _ => return Err(failure("a sweep is either a file or a dict")),
     };
-    let ran = run_in_background(py, progress, move |told| {
-        let swept = stylet::sweep(&sweep, |done| told.report("trials", done));
+    let ran = run_in_background(py, progress, move |callback| {
+        let swept = stylet::sweep(&sweep, |done| callback.report("trials", done));
         (sweep, swept)
     })?;
     let (sweep, swept) = ran;
@@ -56,7 +56,7 @@ pub fn sweep(
 
 #[pymethods]
 impl Sweep {
-    /// One row per insertion: trial, seed, drawn quantities, scores.
+    /// One row per insertion: trial, seed, varied parameters, scores.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         let (columns, rows) = (&self.swept.columns, &self.swept.rows);
@@ -80,7 +80,7 @@ impl Sweep {
         self.swept.html(&self.sweep)
     }
 
-    /// `sweep.ron` and `scenario.ron`: what repeats it.
+    /// `sweep.ron` and `scenario.ron`, which repeat the sweep.
     fn inputs(&self) -> PyResult<Vec<(String, String)>> {
         let output = input_files(&self.sweep).map_err(failure)?;
         Ok(output.files().map(|(n, c)| (n.to_owned(), String::from_utf8_lossy(c).into_owned())).collect())

@@ -1,4 +1,4 @@
-//! Long work beside the interpreter: it is released, Ctrl-C is honoured, progress is told.
+//! Long work on a background thread: the interpreter stays free, Ctrl-C works, progress is reported.
 
 use pyo3::prelude::*;
 use std::sync::Mutex;
@@ -6,27 +6,27 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// How long Ctrl-C may have to wait.
-const LOOK_AT_SIGNALS: Duration = Duration::from_millis(50);
+/// Interval between checks for Ctrl-C.
+const SIGNAL_CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// What unwinds out of work that is no longer wanted.
+/// Panic payload that ends cancelled work.
 struct Stopped;
 
-/// What the work is given: it tells how far it is, and ends when nobody wants it any more.
+/// Reports progress from the worker thread and carries the request to stop.
 pub struct ProgressCallback {
     sender: Sender<(String, u64)>,
     stop: std::sync::Arc<AtomicBool>,
 }
 
 impl ProgressCallback {
-    /// Tells what is done now, and how many parts are done. `false` when the work should end.
+    /// Reports the current stage and the number of finished parts; `false` asks the work to end.
     pub fn report(&self, what: &str, done: u64) -> bool {
-        // Nobody listening is no reason to fail.
+        // A closed channel is no reason to fail.
         let _ = self.sender.send((what.to_owned(), done));
         !self.stop.load(Ordering::Relaxed)
     }
 
-    /// Tells, and leaves the work at once when it should end: for work that asks nobody.
+    /// Reports, and unwinds out of the work when it should end: for work that does not check.
     pub fn report_or_stop(&self, what: &str, done: u64) {
         if !self.report(what, done) {
             std::panic::resume_unwind(Box::new(Stopped));
@@ -34,8 +34,8 @@ impl ProgressCallback {
     }
 }
 
-/// Does `work` on another thread while the interpreter is free; `progress` (a callable or none) is called with a text and a
-/// count. On Ctrl-C, or when `progress` raises, the work ends at its next word and the exception is raised.
+/// Runs `work` on another thread while the interpreter is free; `progress` (a callable or none) is called with a text and a count. On
+/// Ctrl-C, or when `progress` raises, the work ends at its next report and the exception is raised.
 pub fn run_in_background<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -44,12 +44,12 @@ pub fn run_in_background<T: Send + 'static>(
     let (sender, words) = channel();
     let words = Mutex::new(words);
     let stop = std::sync::Arc::new(AtomicBool::new(false));
-    let told = ProgressCallback { sender, stop: stop.clone() };
-    let thread = std::thread::spawn(move || work(&told));
+    let callback = ProgressCallback { sender, stop: stop.clone() };
+    let thread = std::thread::spawn(move || work(&callback));
     let outcome = loop {
-        // Nobody else locks it; the lock is what lets it leave the interpreter's thread.
+        // The mutex only makes the receiver usable outside the interpreter's thread.
         let word = py.detach(|| match words.lock() {
-            Ok(words) => words.recv_timeout(LOOK_AT_SIGNALS),
+            Ok(words) => words.recv_timeout(SIGNAL_CHECK_INTERVAL),
             Err(_) => Err(RecvTimeoutError::Disconnected),
         });
         let asked = match word {

@@ -1,4 +1,4 @@
-"""Where the scenarios and the command are."""
+"""Scenarios and the command."""
 
 import os
 import subprocess
@@ -37,7 +37,7 @@ def scenarios():
 
 @pytest.fixture(scope="session")
 def command():
-    """The `stylet` command that `test.sh` built beside this module."""
+    """The `stylet` command that `test.sh` built together with this module."""
     found = os.environ.get("STYLET_COMMAND")
     if not found or not Path(found).exists():
         pytest.skip("SKIPPED: STYLET_COMMAND names no command; crates/python/test.sh builds it")

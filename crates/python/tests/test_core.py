@@ -1,4 +1,6 @@
-"""Promises of the online core in Python: steps, arrays and the whole recording say the same; what is wrong is said."""
+"""The online algorithm in Python: samples, arrays and whole recordings agree; wrong inputs raise the command's message."""
+
+import pydoc
 
 import numpy as np
 import pandas
@@ -17,7 +19,7 @@ def test_step_run_and_enhance_agree(two_gels):
     arrays = stylet.Enhancer().run(**{c: data[c].to_numpy() for c in data})
     core, outs = stylet.Enhancer(), []
     for row in data.itertuples(index=False):
-        outs.append(core.step(row.time_s, row.position_m, row.velocity_mps, row.force_n))
+        outs.append(core.step(**row._asdict()))
     assert np.array_equal(arrays["enhanced_n"], [o.enhanced_n for o in outs])
     assert [stylet.STATES[s] for s in arrays["state"]] == [o.state for o in outs]
     whole = stylet.enhance(data)
@@ -26,7 +28,7 @@ def test_step_run_and_enhance_agree(two_gels):
     assert len(whole.ruptures) >= 1 and len(whole.layers) >= 1
 
 
-def test_a_core_goes_on_where_it_was_and_resets(two_gels):
+def test_an_enhancer_continues_and_resets(two_gels):
     _, data = measured(two_gels)
     columns = {c: data[c].to_numpy() for c in data}
     core = stylet.Enhancer()
@@ -56,6 +58,13 @@ def test_wrong_input_is_an_exception_with_the_commands_sentence(two_gels):
     with pytest.raises(ValueError, match="no column `force_n`"):
         stylet.enhance(pandas.DataFrame({"time_s": [0.0, 1.0], "position_m": [0.0, 1.0]}))
     with pytest.raises(stylet.StyletError, match="different lengths"):
-        stylet.Enhancer().run([0.0, 1.0], [0.0, 1.0], [0.0], [0.0, 1.0])
+        stylet.Enhancer().run(time_s=[0.0, 1.0], position_m=[0.0, 1.0], velocity_mps=[0.0], force_n=[0.0, 1.0])
     with pytest.raises(stylet.StyletError, match="missing.ron"):
         stylet.simulate("missing.ron")
+
+
+def test_arguments_are_given_by_keyword_and_help_lists_them():
+    for call in (stylet.Enhancer().step, stylet.Enhancer().enhanced, stylet.Enhancer().run):
+        with pytest.raises(TypeError):
+            call(0.0, 0.0, 0.0, 0.0)
+    assert "step(self, *, time_s" in pydoc.render_doc(stylet.Enhancer, renderer=pydoc.plaintext)

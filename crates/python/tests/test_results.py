@@ -1,4 +1,4 @@
-"""Promises of the results: data frames, plots, reports, dicts as scenarios, sweeps, Ctrl-C."""
+"""Results in Python: data frames, plots, reports, dicts as scenarios, sweeps, Ctrl-C."""
 
 import os
 import signal
@@ -19,17 +19,24 @@ def test_a_run_plots_and_shows_itself(two_gels):
     assert "<iframe" in run._repr_html_() and "<html" in run.html().lower()
 
 
-def test_what_was_enhanced_has_intervals_and_a_report(two_gels):
+def test_an_enhanced_recording_has_intervals_and_a_report(two_gels):
     frame = stylet.simulate(two_gels).to_pandas()
-    heard = stylet.enhance(frame[["time_s", "position_m", "force_n", "velocity_mps"]])
-    low, high = heard.layers[0]["stiffness_interval"]
-    assert low < heard.layers[0]["stiffness_n_per_m"] < high and low < 50.0 < high
-    assert (heard.to_pandas()["low_n"] <= heard.to_pandas()["high_n"]).all()
-    assert "<iframe" in heard._repr_html_() and "<html" in heard.html().lower()
-    assert heard.plot().get_ylabel() == "force (N)"
+    enhanced = stylet.enhance(frame[["time_s", "position_m", "force_n", "velocity_mps"]])
+    low, high = enhanced.layers[0]["stiffness_interval"]
+    assert low < enhanced.layers[0]["stiffness_n_per_m"] < high and low < 50.0 < high
+    assert (enhanced.to_pandas()["low_n"] <= enhanced.to_pandas()["high_n"]).all()
+    assert "<iframe" in enhanced._repr_html_() and "<html" in enhanced.html().lower()
+    assert enhanced.plot().get_ylabel() == "force (N)"
 
 
-def test_a_plan_tells_candidates_apart_and_is_a_motion(two_gels):
+def test_every_plot_returns_axes(two_gels):
+    data = stylet.simulate(two_gels).to_pandas()[["time_s", "position_m", "force_n"]]
+    found = stylet.diagnose(two_gels, [data, data], progress=False)
+    for recording in (0, 1):
+        assert found.plot(recording).get_ylabel() == "force (N)"
+
+
+def test_a_plan_separates_candidates_and_is_a_motion(two_gels):
     limits = {"depth_m": 0.02, "speed_mps": 0.008, "acceleration_mps2": 0.1, "duration_s": 30.0, "force_n": 6.0}
     planned = stylet.plan(two_gels, limits=limits, simulated=False, progress=False)
     assert 0.0 < planned.probability_decided <= 1.0 and planned.result["depth_m"] <= 0.02 + 1e-9
@@ -65,17 +72,19 @@ def test_a_sweep_is_a_data_frame(two_gels):
     assert swept.summary["trials"] == 20
     again = stylet.sweep({"trials": 20, "vary": vary}, two_gels, progress=False).to_pandas()
     assert frame.equals(again)
+    with pytest.raises(stylet.StyletError, match="second argument"):
+        stylet.sweep({"scenario": two_gels, "trials": 20, "vary": vary})
 
 
-def test_ctrl_c_ends_a_sweep_and_progress_is_told(two_gels):
+def test_ctrl_c_ends_a_sweep_and_progress_is_reported(two_gels):
     vary = [{"path": "sensor.noise_n", "with": {"Uniform": [0.0, 0.05]}}]
-    told = []
+    reported = []
     timer = threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        stylet.sweep({"trials": 1_000_000, "vary": vary}, two_gels, progress=lambda what, done: told.append(done))
-    assert time.monotonic() - start < 20 and told == sorted(told) and told
+        stylet.sweep({"trials": 1_000_000, "vary": vary}, two_gels, progress=lambda what, done: reported.append(done))
+    assert time.monotonic() - start < 20 and reported == sorted(reported) and reported
 
 
 def test_the_interpreter_is_free_during_work(two_gels):

@@ -1,4 +1,4 @@
-"""Promise: the type stubs name what the module has."""
+"""The type stubs list exactly the names of the module."""
 
 import ast
 import sys
@@ -18,9 +18,9 @@ def test_the_stub_names_what_the_compiled_module_has():
     assert set(stub) == have
     for name, node in stub.items():
         if isinstance(node, ast.ClassDef) and name != "StyletError":
-            told = {n.name for n in node.body if isinstance(n, ast.FunctionDef)} - {"__init__", "__new__", "__repr__"}
+            listed = {n.name for n in node.body if isinstance(n, ast.FunctionDef)} - {"__init__", "__new__", "__repr__"}
             real = {n for n in dir(getattr(_stylet, name)) if not n.startswith("_")}
-            assert told == real, name
+            assert listed == real, name
 
 
 def test_types_check():

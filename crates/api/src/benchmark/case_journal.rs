@@ -1,4 +1,4 @@
-//! Cases that are done, one JSON line each, so that a run that was stopped goes on.
+//! Journal of completed cases, one JSON line each, from which an interrupted benchmark resumes.
 
 use crate::error::Error;
 use crate::output_folder::write_file_atomically;
@@ -9,18 +9,18 @@ use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};
 use std::path::Path;
 use std::sync::Mutex;
 
-/// A journal, open for more.
+/// A journal, open for appending.
 pub struct CaseJournal<T> {
-    /// What it held.
+    /// The cases that it held when it was opened.
     pub completed: Vec<T>,
     file: Mutex<File>,
 }
 
 impl<T: Serialize + DeserializeOwned> CaseJournal<T> {
-    /// Opens a journal, or begins it. A line that was cut off when the run was stopped goes, and its case is run again.
+    /// Opens or creates a journal. A line that was cut off by an interruption is dropped, so its case is run again.
     ///
     /// # Errors
-    /// [`Error::Output`] when it cannot be read (what it holds is then left alone) or written.
+    /// [`Error::Output`] when it cannot be read (it is then left unchanged) or written.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let mut done: Vec<T> = Vec::new();
         match File::open(path) {
@@ -33,15 +33,15 @@ impl<T: Serialize + DeserializeOwned> CaseJournal<T> {
             Err(why) if why.kind() == ErrorKind::NotFound => {}
             Err(why) => return Err(Error::output(path, why)),
         }
-        let kept: String =
+        let complete: String =
             done.iter().filter_map(|d| serde_json::to_string(d).ok()).map(|l| l + "\n").collect();
-        write_file_atomically(path, kept.as_bytes())?;
+        write_file_atomically(path, complete.as_bytes())?;
         let folder = path.parent().unwrap_or(path);
         let file = OpenOptions::new().append(true).open(path).map_err(|why| Error::output(folder, why))?;
         Ok(Self { completed: done, file: Mutex::new(file) })
     }
 
-    /// Notes a case. What cannot be written is run again another time.
+    /// Appends a case. A case that cannot be written is run again by the next run.
     pub fn append(&self, case: &T) {
         if let (Ok(mut file), Ok(line)) = (self.file.lock(), serde_json::to_string(case)) {
             let _ = writeln!(file, "{line}");

@@ -1,4 +1,4 @@
-//! The diagnosis examined in the referee's worlds.
+//! Accuracy of the diagnosis on cases of the independent simulator.
 
 use super::{answer_question, parse_word, thread_pool};
 use crate::error::Error;
@@ -9,67 +9,67 @@ use stylet_examine::cases::hide_effects::{hidden_name, hidden_names};
 use stylet_examine::{CaseId, Hide, Plan, Severity, Size, World, Wrong, results_table};
 use stylet_report::pages::examination::{accuracy_maps, page};
 
-/// Which cases are asked for, in words; `all` stands for all words of a list.
+/// Selection of cases in words; `all` stands for all words of a list.
 #[derive(Clone, Debug)]
 pub struct CaseSelection<'a> {
-    /// World of the referee.
+    /// Tissue model of the independent simulator.
     pub world: &'a str,
-    /// What the believed simulation or the sensor has wrong.
+    /// Wrong assumptions about tissue or sensor.
     pub misspecification: &'a [String],
-    /// How much of it.
+    /// Severity of the wrong assumptions.
     pub severity: &'a [String],
-    /// What is hidden.
+    /// What the cases hide.
     pub hide: &'a [String],
-    /// How strong it is.
+    /// Size of the hidden effects.
     pub size: &'a str,
     /// Cases per cell.
     pub cases: u64,
-    /// Seed of all draws.
+    /// Seed of the cases.
     pub seed: u64,
-    /// Of these cases those alone that hide one of these; empty: all.
+    /// Only cases that hide one of these; empty: all.
     pub effect: &'a [String],
 }
 
-/// The words of a list, or all of them.
-fn words<T: Copy>(
+/// Parses a list of words, or gives all of them for `all`.
+fn parse_words<T: Copy>(
     what: &str,
     given: &[String],
     all: &[T],
     parse: fn(&str) -> Option<T>,
-    says: fn(T) -> &'static str,
+    word: fn(T) -> &'static str,
 ) -> Result<Vec<T>, Error> {
     if given.iter().any(|g| g == "all") {
         return Ok(all.to_vec());
     }
-    given.iter().map(|g| parse_word(what, g.trim(), all, parse, says)).collect()
+    given.iter().map(|g| parse_word(what, g.trim(), all, parse, word)).collect()
 }
 
 impl CaseSelection<'_> {
     /// The plan of the cases.
     ///
     /// # Errors
-    /// [`Error::Request`] for a word that there is not, with those that there are.
+    /// [`Error::Request`] for an unknown word, with the known ones.
     pub fn plan(&self) -> Result<Plan, Error> {
         let one = |given: &str| vec![given.to_owned()];
-        let world = words("--world", &one(self.world), World::ALL, World::parse, World::as_str)?;
-        let size = words("--size", &one(self.size), Size::ALL, Size::parse, Size::as_str)?;
+        let world = parse_words("--world", &one(self.world), World::ALL, World::parse, World::as_str)?;
+        let size = parse_words("--size", &one(self.size), Size::ALL, Size::parse, Size::as_str)?;
         let (Some(&world), Some(&size)) = (world.first(), size.first()) else {
             return Err(Error::internal("a list of words is empty"));
         };
         let plan = Plan {
             world,
-            wrong: words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::as_str)?,
-            severities: words("--severity", self.severity, Severity::ALL, Severity::parse, Severity::as_str)?,
-            hide: words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::as_str)?,
+            wrong: parse_words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::as_str)?,
+            severities: parse_words("--severity", self.severity, Severity::ALL, Severity::parse, Severity::as_str)?,
+            hide: parse_words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::as_str)?,
             size,
             cases: self.cases,
             seed: self.seed,
-            only: words("--effect", self.effect, &hidden_names(), hidden_name, |t| t)?,
+            only: parse_words("--effect", self.effect, &hidden_names(), hidden_name, |t| t)?,
         };
         if !plan.only.is_empty() && plan.cases().is_empty() {
             return Err(Error::Request(format!(
                 "--effect {}: none of these cases hides it; effects are hidden by `--hide one` in the plain world, other shapes by `--hide \
-                 outside`, and every one of 27 effects (16 shapes) once in so many cases of a row",
+                 outside`, and each of the 27 effects (16 shapes) once in as many cases of a row",
                 plan.only.join(",")
             )));
         }
@@ -77,42 +77,41 @@ impl CaseSelection<'_> {
     }
 }
 
-/// An examination in its folder, which it alone writes to.
+/// A benchmark of the diagnosis, with its locked output folder.
 pub struct DiagnosisBenchmark {
     /// The cases.
     pub cases: Vec<CaseId>,
     plan: Plan,
     journal: PathBuf,
-    claim: OutputLock,
+    lock: OutputLock,
 }
 
 impl DiagnosisBenchmark {
-    /// Claims the folder. With `look` the cases are those alone that its journal holds.
+    /// Locks the folder. With `from_journal` only the cases that its journal holds are selected.
     ///
     /// # Errors
     /// [`Error::Output`], [`Error::Busy`].
-    pub fn new(plan: Plan, folder: &Path, look: bool) -> Result<Self, Error> {
-        let claim = OutputLock::new(folder)?;
+    pub fn new(plan: Plan, folder: &Path, from_journal: bool) -> Result<Self, Error> {
+        let lock = OutputLock::new(folder)?;
         let journal = folder.join("cases.jsonl");
         let mut cases = plan.cases();
-        if look {
-            let there = stylet_examine::run_cases::read_journal(&journal)
-                .map_err(|why| Error::output(folder, why))?;
-            cases.retain(|id| there.contains_key(id));
+        if from_journal {
+            let completed = stylet_examine::run_cases::read_journal(&journal).map_err(|why| Error::output(folder, why))?;
+            cases.retain(|id| completed.contains_key(id));
         }
-        Ok(Self { cases, plan, journal, claim })
+        Ok(Self { cases, plan, journal, lock })
     }
 
-    /// Asks the engine, judges its answers, writes table, page and maps, and gives the table in words. `tell` is told how many of how
-    /// many cases are done. 0 threads are one per core.
+    /// Diagnoses the cases, scores the answers, writes table, page and maps, and returns the table as text. `progress` is called with the
+    /// numbers of completed and of all cases. 0 threads are one per core.
     ///
     /// # Errors
-    /// [`Error::Internal`] for a mistake of the referee, [`Error::Output`].
-    pub fn run(&self, threads: usize, tell: &(dyn Fn(usize, usize) + Sync)) -> Result<String, Error> {
-        let Self { cases, plan, journal, claim } = self;
+    /// [`Error::Internal`] when a case cannot be simulated, [`Error::Output`].
+    pub fn run(&self, threads: usize, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<String, Error> {
+        let Self { cases, plan, journal, lock } = self;
         let outcomes = thread_pool(threads)?
             .install(|| {
-                stylet_examine::run_cases(cases, Some(journal), &answer_question::answer_question, tell)
+                stylet_examine::run_cases(cases, Some(journal), &answer_question::answer_question, progress)
             })
             .map_err(Error::internal)?;
         let text = results_table::results_text(&outcomes);
@@ -124,12 +123,12 @@ impl DiagnosisBenchmark {
         for (hide, svg) in accuracy_maps(plan, &cells) {
             output.add(map_name(hide), svg);
         }
-        output.write_locked(claim)?;
+        output.write_locked(lock)?;
         Ok(text)
     }
 }
 
-/// The file of a map.
+/// File name of a map.
 fn map_name(hide: Hide) -> &'static str {
     match hide {
         Hide::Clean => "map_clean.svg",

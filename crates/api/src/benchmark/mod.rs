@@ -1,23 +1,19 @@
-//! Examinations at scale: the referee's cases handed to the engine, and what comes of it.
+//! Accuracy of diagnosis and planning on cases of the independent simulator.
 
 mod answer_question;
 mod case_journal;
 mod diagnosis;
-#[cfg(feature = "own_world")]
-pub mod own;
 mod planning;
 
 pub use diagnosis::{CaseSelection, DiagnosisBenchmark};
-#[cfg(feature = "own_world")]
-pub use own::own;
 pub use planning::PlanningBenchmark;
 
 use crate::error::Error;
 
-/// A word of a list.
+/// Parses a word of the argument `what`.
 ///
 /// # Errors
-/// [`Error::Request`] for a word that there is not, with those that there are; `what` is the argument.
+/// [`Error::Request`] for an unknown word, with the known ones.
 pub(crate) fn parse_word<T: Copy>(
     what: &str,
     given: &str,
@@ -31,10 +27,10 @@ pub(crate) fn parse_word<T: Copy>(
     })
 }
 
-/// Runs `work` with a number of threads; 0 is one per core.
+/// A pool of this many threads; 0 is one per core.
 ///
 /// # Errors
-/// [`Error::Internal`] when the threads cannot be had.
+/// [`Error::Internal`] when the threads cannot be started.
 pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Error::internal)
 }

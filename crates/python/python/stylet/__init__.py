@@ -1,4 +1,4 @@
-"""Needle insertion into layered tissue: simulated, felt, identified, and put against measured data.
+"""Robot-assisted needle insertion into layered tissue: simulation, online estimation, diagnosis of measured data.
 
 >>> import stylet
 >>> run = stylet.simulate("three_layer_latex_constant.ron")   # doctest: +SKIP
@@ -23,7 +23,7 @@ STATES = (
     "ForceCompensation",
     "FreeTip",
 )
-"""Names of the numbers in a column `state`."""
+"""Names of the codes in a column `state`."""
 
 __all__ = [
     "Diagnosis",

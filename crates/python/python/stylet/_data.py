@@ -1,4 +1,4 @@
-"""What comes in: files, text, dicts, data frames, arrays."""
+"""Conversion of inputs: files, text, dicts, data frames, arrays."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def source(given) -> tuple[str, str]:
     if isinstance(given, os.PathLike):
         return "path", os.fspath(given)
     if isinstance(given, str):
-        # RON has brackets, a file name has not.
+        # RON text contains parentheses, a file name does not.
         return ("ron", given) if "(" in given else ("path", given)
     if hasattr(given, "to_ron"):
         return "ron", given.to_ron()
@@ -28,22 +28,19 @@ def source(given) -> tuple[str, str]:
 
 
 def column(values) -> np.ndarray:
-    """A column as the library takes it."""
+    """A contiguous float64 column."""
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
-def columns(data, velocity=True):
-    """time, position, force and velocity (or None) of a data frame, a dict of arrays, or a tuple in this order."""
-    if isinstance(data, (tuple, list)) and len(data) in (3, 4):
-        time, position, force, *rest = data
-        return column(time), column(position), column(force), column(rest[0]) if rest else None
+def columns(data):
+    """Time, position, force and velocity (or None) of a data frame or a dict of arrays."""
     missing = [name for name in COLUMNS if name not in data]
     if missing:
         raise _stylet.StyletError(
             f"no column `{missing[0]}`; a recording has {', '.join(f'`{c}`' for c in COLUMNS)} and optionally `velocity_mps`"
         )
-    own = "velocity_mps" in data and velocity
-    return (*(column(data[name]) for name in COLUMNS), column(data["velocity_mps"]) if own else None)
+    measured = "velocity_mps" in data
+    return (*(column(data[name]) for name in COLUMNS), column(data["velocity_mps"]) if measured else None)
 
 
 def frame(columns: dict):
@@ -55,26 +52,24 @@ def frame(columns: dict):
     return pandas.DataFrame(columns)
 
 
-def axes(ax, rows: int = 1):
-    """The axes given, or new ones."""
+def axes(ax):
+    """The given axes, or new ones."""
     try:
         import matplotlib.pyplot as plt
     except ImportError as error:
         raise ImportError("matplotlib is needed for this: pip install matplotlib") from error
-    if ax is not None:
-        return np.atleast_1d(ax)
-    return np.atleast_1d(plt.subplots(rows, sharex=True, figsize=(8, 2.6 * rows), layout="constrained")[1])
+    return plt.subplots(figsize=(8, 2.6), layout="constrained")[1] if ax is None else ax
 
 
 def embedded(page: str) -> str:
-    """A page of its own inside a notebook."""
+    """An HTML page embedded in a notebook."""
     import html
 
     return f'<iframe srcdoc="{html.escape(page, quote=True)}" width="100%" height="720" style="border:0"></iframe>'
 
 
 class Progress:
-    """What long work says, in a notebook by tqdm when it is there, on a terminal as a line; `False` is silent."""
+    """Progress of long work: a callable, a tqdm bar when tqdm is installed, or nothing."""
 
     def __init__(self, shown, total=None):
         self.bar = None
@@ -103,8 +98,8 @@ class Progress:
 
 def read_csv(path, columns=None, repair: bool = False) -> dict:
     """Reads a recording as the command does: a dict of arrays (`time_s`, `position_m`, `force_n`, `velocity_mps`) for
-    `pandas.DataFrame(...)`, `enhance` and `diagnose`. `columns` is the path of a column map; `repair` drops rows whose time
-    stamps go back. Notes on the quality of the data are warnings."""
+    `pandas.DataFrame(...)`, `enhance` and `diagnose`. `columns` is the path of a column map; `repair` drops rows with backward
+    time stamps. Notes on data quality are issued as warnings."""
     import warnings
 
     found, notes = _stylet.read_csv(Path(path), columns and Path(columns), repair)

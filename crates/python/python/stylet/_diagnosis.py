@@ -1,4 +1,4 @@
-"""What a scenario gets wrong about measured data."""
+"""Diagnosis of measured recordings."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from ._run import Scenario
 
 
 class Diagnosis:
-    """Verdict, causes with intervals, the extended scenario, the gain."""
+    """Verdict, causes with intervals, extended scenario, gain."""
 
-    def __init__(self, inner, measured):
+    def __init__(self, inner, measured, read):
         self._inner = inner
         self._measured = measured
+        self._read = read
         self.result: dict = json.loads(inner.json())
         """`diagnosis.json` as a dict."""
 
@@ -28,7 +29,7 @@ class Diagnosis:
 
     @property
     def gain(self) -> dict:
-        """RMS before, after, floor, in N."""
+        """RMS before and after, and noise floor, in N."""
         return self.result["gain"]
 
     @property
@@ -46,7 +47,7 @@ class Diagnosis:
 
     @property
     def base_parameters(self):
-        """A table: what was assumed of the layers, what fits."""
+        """A table: assumed and fitted parameters of the layers."""
         return _data.frame(self.result["base_parameters"])
 
     @property
@@ -63,7 +64,7 @@ class Diagnosis:
         return bytes(self._inner.json())
 
     def predict(self, data) -> np.ndarray:
-        """The force in N that the extended scenario gives along a recorded motion (a data frame or dict of arrays)."""
+        """Force in N of the extended scenario along a recorded motion (a data frame or dict of arrays)."""
         time_s = _data.column(data["time_s"])
         velocity = _data.column(data["velocity_mps"]) if "velocity_mps" in data else None
         return self._inner.predict(time_s, _data.column(data["position_m"]), velocity)
@@ -73,25 +74,24 @@ class Diagnosis:
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in (("diagnosis.json", self.json()), ("extended.ron", self.extended_ron().encode())):
-            beside = folder / f".{name}.part"
-            beside.write_bytes(content)
-            os.replace(beside, folder / name)
+            part = folder / f".{name}.part"
+            part.write_bytes(content)
+            os.replace(part, folder / name)
 
-    def plot(self, ax=None):
-        """Measured force and what the extended scenario predicts, one panel per recording (at most four), the residual
-        below it in the same unit. Returns the axes."""
-        shown = self._measured[:4]
-        axes = _data.axes(ax, len(shown))
-        for ax, (name, data) in zip(axes, shown):
-            predicted = self.predict(data)
-            ax.plot(data["time_s"], data["force_n"], color="0.6", lw=1, label="measured")
-            ax.plot(data["time_s"], predicted, color="#0072b2", lw=1.2, label="extended scenario")
-            ax.plot(data["time_s"], data["force_n"] - predicted, color="#d55e00", lw=0.8, label="residual")
-            ax.set_title(name, loc="left", fontsize="medium")
-            ax.set_ylabel("force (N)")
-        axes[-1].set_xlabel("time (s)")
-        axes[0].legend(frameon=False, fontsize="small")
-        return axes
+    def plot(self, recording: int = 0, ax=None):
+        """Measured force, prediction of the extended scenario and residual of one recording, by its index. Returns the axes."""
+        name, data = self._measured[recording]
+        if not isinstance(data, dict):
+            data = _stylet.read_csv(os.fspath(data), *self._read)[0]
+        ax = _data.axes(ax)
+        predicted = self.predict(data)
+        ax.plot(data["time_s"], data["force_n"], color="0.6", lw=1, label="measured")
+        ax.plot(data["time_s"], predicted, color="#0072b2", lw=1.2, label="extended scenario")
+        ax.plot(data["time_s"], data["force_n"] - predicted, color="#d55e00", lw=0.8, label="residual")
+        ax.set_title(name, loc="left", fontsize="medium")
+        ax.set(xlabel="time (s)", ylabel="force (N)")
+        ax.legend(frameon=False, fontsize="small")
+        return ax
 
     def __repr__(self) -> str:
         names = ", ".join(c["effect"] for c in self.result["causes"]) or "nothing"
@@ -102,7 +102,7 @@ class Diagnosis:
         )
 
     def html(self) -> str:
-        """The report, a page of its own."""
+        """The report as one HTML page."""
         return self._inner.html()
 
     def _repr_html_(self) -> str:
@@ -110,7 +110,7 @@ class Diagnosis:
 
 
 def recordings(measured, names=None) -> tuple[list, list]:
-    """Recordings as the library takes them, and as they are kept for pictures."""
+    """Recordings as the compiled module takes them, and as they are kept for plots."""
     if isinstance(measured, (str, os.PathLike, dict)) or hasattr(measured, "columns"):
         measured = [measured]
     given: list = []
@@ -129,24 +129,19 @@ def recordings(measured, names=None) -> tuple[list, list]:
 
 
 def diagnose(assumed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
-    """Compares what a scenario believes with measured recordings.
+    """Compares an assumed scenario with measured recordings.
 
     `assumed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
-    `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on recordings left out.
+    `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on held-out recordings.
     `columns`: path of a column map for the files. `progress`: True, False, or a callable `(text, count)`; by default shown
-    where tqdm is there. Ctrl-C ends it. The same bytes as `stylet diagnose`."""
+    where tqdm is there. Ctrl-C ends it. Gives the same bytes as `stylet diagnose`."""
     given, kept = recordings(measured, names)
     if not given:
         raise _stylet.StyletError("no recordings: give at least one")
     kind, text = _data.source(assumed)
-    told = _data.Progress(True if progress is None else progress)
+    bar = _data.Progress(True if progress is None else progress)
     try:
-        inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, told)
+        inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, bar)
     finally:
-        told.close()
-    shown: list = []
-    for name, one in kept[:4]:
-        if not isinstance(one, dict):
-            one = _stylet.read_csv(os.fspath(one), columns and os.fspath(columns), repair)[0]
-        shown.append((name, one))
-    return Diagnosis(inner, shown)
+        bar.close()
+    return Diagnosis(inner, kept, (columns and os.fspath(columns), repair))

@@ -1,4 +1,4 @@
-"""Which insertion to make next."""
+"""Planning of the next insertion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ._diagnosis import recordings
 
 
 class Plan:
-    """The motion that best tells apart what is left open, and how likely it decides."""
+    """The motion that best separates the remaining candidate causes, and the probability that it decides."""
 
     def __init__(self, inner):
         self._inner = inner
@@ -19,12 +19,12 @@ class Plan:
 
     @property
     def probability_decided(self) -> float:
-        """Probability that the next diagnosis names the right single cause."""
+        """Probability that the next diagnosis identifies the correct single cause."""
         return self.result["probability_decided"]
 
     @property
     def pairs(self):
-        """A table: two candidates, nats between them before and after, whether any motion within the limits tells them apart."""
+        """A table: two candidates, nats between them before and after, whether any motion within the limits separates them."""
         return _data.frame(self.result["pairs"])
 
     def motion_ron(self) -> str:
@@ -36,17 +36,17 @@ class Plan:
         return bytes(self._inner.json())
 
     def html(self) -> str:
-        """The report, a page of its own."""
+        """The report as one HTML page."""
         return self._inner.html()
 
     def plot(self, ax=None):
         """Nats between the candidates before and after the planned insertion. Returns the axes."""
-        ax = _data.axes(ax)[0]
-        distinguishable = [p for p in self.result["pairs"] if p["distinguishable"]]
-        names = [f"{p['a']} | {p['b']}" for p in distinguishable]
-        rows = range(len(distinguishable))
-        ax.barh([r + 0.2 for r in rows], [p["nats_before"] for p in distinguishable], 0.4, color="0.7", label="now")
-        ax.barh([r - 0.2 for r in rows], [p["nats_after"] for p in distinguishable], 0.4, color="#0072b2", label="then")
+        ax = _data.axes(ax)
+        pairs = [p for p in self.result["pairs"] if p["distinguishable"]]
+        names = [f"{p['a']} | {p['b']}" for p in pairs]
+        rows = range(len(pairs))
+        ax.barh([r + 0.2 for r in rows], [p["nats_before"] for p in pairs], 0.4, color="0.7", label="now")
+        ax.barh([r - 0.2 for r in rows], [p["nats_after"] for p in pairs], 0.4, color="#0072b2", label="after the insertion")
         ax.set_yticks(list(rows), names)
         ax.set_xscale("symlog", linthresh=1.0)
         ax.set_xlabel("expected gap of the log-likelihoods (nats)")
@@ -68,13 +68,13 @@ def plan(assumed, measured=(), *, limits, columns=None, repair: bool = False, si
     """Plans the next insertion: after the recordings `measured` (as for `diagnose`), or, without any, before the first.
 
     `limits`: dict, RON text or path: `depth_m`, `speed_mps`, `acceleration_mps2`, `duration_s`, `force_n`. `simulated`: the best
-    motions are simulated under the likeliest candidates and diagnosed (up to a minute). The same plan as `stylet plan`."""
+    motions are simulated under the likeliest candidates and diagnosed (up to a minute). Gives the same plan as `stylet plan`."""
     given, _ = recordings(measured)
-    distinguishable = _data.Progress(True if progress is None else progress)
+    bar = _data.Progress(True if progress is None else progress)
     try:
         inner = _stylet.plan(
-            _data.source(assumed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, distinguishable
+            _data.source(assumed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, bar
         )
     finally:
-        distinguishable.close()
+        bar.close()
     return Plan(inner)

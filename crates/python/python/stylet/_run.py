@@ -26,7 +26,7 @@ class Scenario:
 
 
 class Run:
-    """A simulated insertion, what the online core made of it, and how far it is from the truth."""
+    """A simulated insertion: recording, truth, outputs of the online algorithm, scores."""
 
     def __init__(self, inner):
         self._inner = inner
@@ -39,7 +39,7 @@ class Run:
 
     @property
     def hash(self) -> str:
-        """The same scenario and seed give the same."""
+        """Hash over the results; the same scenario and seed give the same hash."""
         return self._inner.hash
 
     @property
@@ -48,7 +48,7 @@ class Run:
         return self._inner.combinations
 
     def arrays(self, combination: int = 0) -> dict[str, np.ndarray]:
-        """Recording, truth and outputs of the core, one value per sample."""
+        """Recording, truth and outputs, one value per sample."""
         return self._inner.columns(combination)
 
     def to_pandas(self, combination: int = 0):
@@ -57,7 +57,7 @@ class Run:
 
     @property
     def ruptures_s(self) -> list[float]:
-        """Instants at which the core declared ruptures."""
+        """Times of the detected ruptures."""
         return self._inner.ruptures_s()
 
     @property
@@ -84,17 +84,17 @@ class Run:
         self._inner.write(Path(folder))
 
     def plot(self, combination: int = 0, ax=None):
-        """Measured, enhanced and true tip force; a line where a rupture was declared. Returns the axes."""
-        own = ax is None
-        ax = _data.axes(ax)[0]
+        """Measured, enhanced and true tip force; a line at each detected rupture. Returns the axes."""
+        new = ax is None
+        ax = _data.axes(ax)
         c = self.arrays(combination)
         ax.plot(c["time_s"], c["force_n"], color="0.6", lw=1, label="measured")
         ax.plot(c["time_s"], c["true_tip_force_n"], color="k", lw=1, ls="--", label="true tip force")
         ax.plot(c["time_s"], c["enhanced_n"], color="#0072b2", lw=1.4, label="enhanced")
         for k, t in enumerate(self._inner.ruptures_s(combination)):
-            ax.axvline(t, color="#d55e00", lw=1, label=None if k else "rupture found")
+            ax.axvline(t, color="#d55e00", lw=1, label=None if k else "detected rupture")
         ax.set(xlabel="time (s)", ylabel="force (N)")
-        if own:
+        if new:
             ax.set_title(self.name, loc="left", fontsize="medium")
         ax.legend(frameon=False, fontsize="small")
         return ax
@@ -109,8 +109,8 @@ class Run:
 
 
 def simulate(scenario, seed: int | None = None, compare: bool = False) -> Run:
-    """Simulates a scenario (path, RON text, dict or `Scenario`), runs the online core on it, scores it.
+    """Simulates a scenario (path, RON text, dict or `Scenario`), runs the online algorithm on it and scores the result.
 
-    `seed` replaces the scenario's; `compare` runs both tissue models. The same bytes as `stylet run`."""
+    `seed` replaces the scenario's; `compare` runs both tissue models. Gives the same bytes as `stylet run`."""
     kind, text = _data.source(scenario)
     return Run(_stylet.simulate(kind, text, seed, compare))

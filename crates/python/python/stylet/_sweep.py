@@ -1,4 +1,4 @@
-"""Many drawn insertions."""
+"""Sweeps: insertions with random parameters."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class Sweep:
         return self._inner.columns()
 
     def to_pandas(self):
-        """trial, seed, drawn quantities, scores."""
+        """Data frame: trial, seed, varied parameters, scores."""
         return _data.frame(self.arrays())
 
     def html(self) -> str:
         return self._inner.html()
 
     def plot(self, quantity: str | None = None, score: str = "enhancement.rms_relative", ax=None):
-        """A score against a drawn quantity (the first). Returns the axes."""
+        """A score over a varied parameter (by default the first). Returns the axes."""
         columns = self.arrays()
         quantity = quantity or self.summary["drawn"][0]
-        ax = _data.axes(ax)[0]
+        ax = _data.axes(ax)
         ax.plot(columns[quantity], columns[score], ".", ms=3, color="#0072b2")
         ax.set(xlabel=quantity, ylabel=score)
         return ax
@@ -46,17 +46,21 @@ class Sweep:
 
 def sweep(given, scenario=None, *, trials: int | None = None, seed: int | None = None, progress=None) -> Sweep:
     """Runs a sweep: the path of a sweep file, or a dict (`{"trials": 100, "vary": [{"path": ..., "with": {"Normal": {...}}}]}`)
-    over a `scenario` (path, RON text, dict). Ctrl-C ends it."""
-    told = _data.Progress(True if progress is None else progress, trials)
+    and its `scenario` (path, RON text, dict). Ctrl-C ends it."""
+    bar = _data.Progress(True if progress is None else progress, trials)
     try:
         if isinstance(given, dict):
+            if "scenario" in given:
+                raise _stylet.StyletError(
+                    "the dict of a sweep has no entry `scenario`: pass it as the second argument, sweep({...}, scenario)"
+                )
             if scenario is None:
-                raise _stylet.StyletError("a sweep given as a dict needs `scenario`")
+                raise _stylet.StyletError("a sweep given as a dict needs a second argument: sweep({...}, scenario)")
             kind, text = _data.source(scenario)
             whole = {"scenario": "scenario.ron"} | given
-            inner = _stylet.sweep(None, json.dumps(whole), kind, text, trials, seed, told)
+            inner = _stylet.sweep(None, json.dumps(whole), kind, text, trials, seed, bar)
         else:
-            inner = _stylet.sweep(Path(os.fspath(given)), None, "ron", "", trials, seed, told)
+            inner = _stylet.sweep(Path(os.fspath(given)), None, "ron", "", trials, seed, bar)
     finally:
-        told.close()
+        bar.close()
     return Sweep(inner)

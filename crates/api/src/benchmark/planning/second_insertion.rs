@@ -1,4 +1,4 @@
-//! One reality: diagnosed after one insertion, and, where that leaves the cause open, after a second one.
+//! One case: diagnosed after one insertion and, when that leaves the cause open, after a second one.
 
 use crate::benchmark::answer_question::{answer_question, scenario_and_recordings};
 use serde::{Deserialize, Serialize};
@@ -15,9 +15,9 @@ use stylet_tissue::ForceGain;
 pub(super) struct PlanningCase {
     pub id: CaseId,
     pub hidden: String,
-    /// How the first diagnosis leaves the cause open: `class`, `invisible`, or not at all.
+    /// Why the first diagnosis leaves the cause open: `class` or `not_identifiable`.
     pub open_because: Option<String>,
-    /// Predicted probability that the diagnosis decides after the planned insertion.
+    /// Predicted probability that the planned insertion decides.
     pub predicted_probability: f64,
     pub planned: Option<SecondDiagnosis>,
     pub sinusoid: Option<SecondDiagnosis>,
@@ -26,21 +26,21 @@ pub(super) struct PlanningCase {
     pub error: Option<String>,
 }
 
-/// What was said after a second insertion.
+/// Diagnosis after the second insertion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct SecondDiagnosis {
-    /// Causes, each with its class.
+    /// Causes, each with its equivalents.
     pub causes: Vec<Vec<String>>,
-    /// The right single cause by the referee's rules, no class.
+    /// A single correct cause without equivalents, by the benchmark's rules.
     pub correct: bool,
-    /// The hidden effect itself is named (the rules let some pass unsaid).
+    /// The hidden effect itself is named; the rules do not require it for negligible effects.
     pub hidden_effect_named: bool,
     pub unknown: bool,
 }
 
-/// Goes through a case; why it could not be is noted in it.
+/// Runs a case; an error is recorded in the case.
 pub(super) fn run_case(id: &CaseId) -> PlanningCase {
-    let begun = Instant::now();
+    let started = Instant::now();
     let mut case = PlanningCase {
         id: *id,
         hidden: String::new(),
@@ -52,38 +52,38 @@ pub(super) fn run_case(id: &CaseId) -> PlanningCase {
         seconds: 0.0,
         error: None,
     };
-    if let Err(why) = go_through(id, &mut case) {
+    if let Err(why) = diagnose_twice(id, &mut case) {
         case.error = Some(why);
     }
-    case.seconds = begun.elapsed().as_secs_f64();
+    case.seconds = started.elapsed().as_secs_f64();
     case
 }
 
-fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
+fn diagnose_twice(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
     let text = |e: &dyn std::fmt::Display| e.to_string();
     let mut first = SecondInsertion::new(id);
     case.hidden = first.hidden().join("+");
-    // A gain cannot be seen in any motion.
+    // A gain is not identifiable by any motion.
     if case.hidden == ForceGain::ID {
         return Ok(());
     }
     first.add_insertion(first.constant()).map_err(|e| text(&e))?;
-    let (scenario, evidence) = scenario_and_recordings(&first.question())?;
-    let examined =
-        stylet_diagnose::diagnose(&scenario, &evidence, &Options::default(), |_| {}).map_err(|e| text(&e))?;
-    let d = &examined.diagnosis;
+    let (scenario, recordings) = scenario_and_recordings(&first.question())?;
+    let result = stylet_diagnose::diagnose(&scenario, &recordings, &Options::default(), |_| {})
+        .map_err(|e| text(&e))?;
+    let d = &result.diagnosis;
     let in_class = d.causes.iter().any(|c| {
         !c.equivalent.is_empty() && (c.effect == case.hidden || c.equivalent.contains(&case.hidden))
     });
     case.open_because = if in_class {
         Some("class".to_owned())
     } else {
-        d.not_identifiable.contains(&case.hidden).then(|| "invisible".to_owned())
+        d.not_identifiable.contains(&case.hidden).then(|| "not_identifiable".to_owned())
     };
     if case.open_because.is_none() {
         return Ok(());
     }
-    let begun = Instant::now();
+    let started = Instant::now();
     let limits = Limits {
         depth_m: first.depth_m(),
         speed_mps: 0.008,
@@ -91,15 +91,15 @@ fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
         duration_s: 90.0,
         force_n: 30.0,
     };
-    let (ground, begin) = stylet_plan::from_diagnosis(&scenario, &examined).map_err(|e| text(&e))?;
+    let (ground, begin) = stylet_plan::from_diagnosis(&scenario, &result).map_err(|e| text(&e))?;
     let (plan, _) = stylet_plan::plan(&ground, &limits, &begin).map_err(|e| text(&e))?;
-    case.plan_s = begun.elapsed().as_secs_f64();
+    case.plan_s = started.elapsed().as_secs_f64();
     case.predicted_probability = plan.probability_decided;
     let second = |path: MotionPath| -> Result<SecondDiagnosis, String> {
-        let mut reality = first.clone();
-        reality.add_insertion(path).map_err(|e| e.to_string())?;
-        let answer = answer_question(&reality.question())?;
-        Ok(said(&reality, &answer, &case.hidden))
+        let mut second = first.clone();
+        second.add_insertion(path).map_err(|e| e.to_string())?;
+        let answer = answer_question(&second.question())?;
+        Ok(summarise(&second, &answer, &case.hidden))
     };
     let path = path_of(&plan.motion).ok_or_else(|| "the plan is no program".to_owned())?;
     let (planned, sinusoid) = rayon::join(|| second(path), || second(first.sinusoid()));
@@ -107,21 +107,21 @@ fn go_through(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
     Ok(())
 }
 
-fn said(reality: &SecondInsertion, answer: &Answer, hidden: &str) -> SecondDiagnosis {
-    let worth = reality.score_answer(answer);
+fn summarise(case: &SecondInsertion, answer: &Answer, hidden: &str) -> SecondDiagnosis {
+    let judged = case.score_answer(answer);
     SecondDiagnosis {
         causes: answer
             .causes
             .iter()
             .map(|c| std::iter::once(&c.effect).chain(&c.equivalent).cloned().collect())
             .collect(),
-        correct: worth.correct && answer.causes.iter().all(|c| c.equivalent.is_empty()),
+        correct: judged.correct && answer.causes.iter().all(|c| c.equivalent.is_empty()),
         hidden_effect_named: answer.causes.iter().any(|c| c.effect == hidden && c.equivalent.is_empty()),
         unknown: answer.verdict == stylet_examine::Verdict::Unknown,
     }
 }
 
-/// A program as the referee's path: both have the same segments.
+/// A program as a path of the independent simulator, which has the same segments.
 fn path_of(motion: &Motion) -> Option<MotionPath> {
     let Motion::Program { start_m, segments } = motion else { return None };
     let piece = |s: &Segment| match *s {

@@ -1,11 +1,11 @@
-//! The table of an examination of planning, in words.
+//! The table of the planning benchmark as text.
 
 use super::second_insertion::PlanningCase;
 use std::fmt::Write as _;
 use stylet_examine::success_rate::SuccessRate;
 use stylet_stats::quantile;
 
-/// Adds the cases of a row.
+/// Appends the table of a row's cases.
 pub(super) fn write_table(out: &mut String, row: &str, cases: &[PlanningCase]) {
     let open: Vec<&PlanningCase> = cases.iter().filter(|c| c.open_because.is_some()).collect();
     let rate = |of: &[&PlanningCase], holds: &dyn Fn(&PlanningCase) -> bool| {
@@ -16,20 +16,20 @@ pub(super) fn write_table(out: &mut String, row: &str, cases: &[PlanningCase]) {
     let _ = writeln!(out, "{row}");
     let _ = writeln!(
         out,
-        "  {} realities drawn, {} left open by one insertion at constant speed (class {}, invisible {})",
+        "  {} cases, {} open after one insertion at constant speed (class {}, not identifiable {})",
         cases.len(),
         open.len(),
         open.iter().filter(|c| c.open_because.as_deref() == Some("class")).count(),
-        open.iter().filter(|c| c.open_because.as_deref() == Some("invisible")).count()
+        open.iter().filter(|c| c.open_because.as_deref() == Some("not_identifiable")).count()
     );
     let predicted: Vec<f64> =
         open.iter().filter(|c| c.planned.is_some()).map(|c| c.predicted_probability).collect();
     let mean = predicted.iter().sum::<f64>() / predicted.len().max(1) as f64;
-    let _ = writeln!(out, "  right single cause, planned second insertion   {}", rate(&open, &planned));
-    let _ = writeln!(out, "  right single cause, the paper's sinusoid       {}", rate(&open, &sinusoid));
+    let _ = writeln!(out, "  correct single cause, planned second insertion {}", rate(&open, &planned));
+    let _ = writeln!(out, "  correct single cause, the paper's sinusoid     {}", rate(&open, &sinusoid));
     let named = |c: &PlanningCase| c.planned.as_ref().is_some_and(|s| s.correct && s.hidden_effect_named);
-    let _ = writeln!(out, "  ... and by its name (planned)                  {}", rate(&open, &named));
-    let _ = writeln!(out, "  predicted for the planned one                  {:.0} %", 100.0 * mean);
+    let _ = writeln!(out, "  ... and the hidden effect itself (planned)     {}", rate(&open, &named));
+    let _ = writeln!(out, "  predicted for the planned insertion            {:.0} %", 100.0 * mean);
     let mut seconds: Vec<f64> = open.iter().map(|c| c.plan_s).collect();
     let mut all: Vec<f64> = open.iter().map(|c| c.seconds).collect();
     let _ = writeln!(
@@ -64,7 +64,7 @@ pub(super) fn write_table(out: &mut String, row: &str, cases: &[PlanningCase]) {
             "  {name:<26} {:<28} {:<28} {}",
             rate(&of, &planned).to_string(),
             rate(&of, &sinusoid).to_string(),
-            if wrong.is_empty() { String::new() } else { format!("said {}", wrong.join("; ")) }
+            if wrong.is_empty() { String::new() } else { format!("reported {}", wrong.join("; ")) }
         );
         let _ = writeln!(out, "{}", line.trim_end());
     }

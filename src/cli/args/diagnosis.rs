@@ -1,0 +1,175 @@
+//! Arguments of `stylet diagnose`, `predict`, `identifiability`, `plan` and `effects`.
+
+use crate::cli::output_args::OutputArgs;
+use crate::cli::resource_limits::ResourceLimits;
+use clap::Args;
+use std::path::PathBuf;
+use stylet_api::DiagnosisInputs;
+
+/// Arguments of `stylet diagnose`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet diagnose scenario.ron --data a.csv b.csv c.csv --out out/diagnosis
+  stylet diagnose scenario.ron --data log1.csv log2.csv --columns map.ron
+  stylet diagnose scenario.ron --repeats --data run1.csv run2.csv run3.csv --columns map.ron
+  stylet diagnose scenarios/measured/skin_on_muscle.ron
+
+Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
+effects found, ready for `stylet run` (give it a motion if the scenario says `Recorded`). The exit code
+is 0 whatever the verdict, 2 when an input is wrong.")]
+pub struct DiagnoseArgs {
+    /// Assumed scenario, or a data set of repeated insertions (RON).
+    pub scenario: PathBuf,
+    /// Treat the recordings as repeats of one insertion: separate the variation between recordings from
+    /// what the model lacks, and predict each recording by the others. A data set implies it.
+    #[arg(long)]
+    pub repeats: bool,
+    /// Recordings (CSV with header); different motions identify more than one. A data set names its own.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub data: Vec<PathBuf>,
+    /// Column map: names and units of the logs' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and report which.
+    #[arg(long)]
+    pub repair: bool,
+    #[command(flatten)]
+    pub results: OutputArgs,
+    #[command(flatten)]
+    pub limits: ResourceLimits,
+}
+
+impl DiagnoseArgs {
+    /// Scenario, recordings and column map.
+    pub fn inputs(&self) -> DiagnosisInputs {
+        DiagnosisInputs {
+            scenario: self.scenario.clone(),
+            data: self.data.clone(),
+            columns: self.columns.clone(),
+            repair: self.repair,
+        }
+    }
+}
+
+/// Arguments of `stylet predict`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet predict out/diagnosis/extended.ron --data next_day.csv
+  stylet predict out/diagnosis/extended.ron --data d.csv e.csv --refit friction,surface
+  stylet predict phantom.ron --data a.csv --out out/phantom
+
+Writes report.html and predict.json: the RMS error per recording, the sensor noise, and the share of
+samples inside the 90 % band. Noise, scatter, intervals and the formerly assumed scenario are taken from
+diagnosis.json and inputs.json in the model's folder. The exit code is 0 however large the error is.")]
+pub struct PredictArgs {
+    /// Model: extended.ron of a diagnosis, or any scenario (RON).
+    pub model: PathBuf,
+    /// Held-out recordings (CSV with header).
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    pub data: Vec<PathBuf>,
+    /// Formerly assumed scenario (RON), for comparison [default: the one in the model's inputs.json].
+    #[arg(long, value_name = "FILE")]
+    pub assumed: Option<PathBuf>,
+    /// Parameters to fit to the new recordings first; of two or more recordings each is predicted by the
+    /// values from the others.
+    #[arg(long, value_name = "PARAMETERS", value_delimiter = ',')]
+    pub refit: Vec<RefitArg>,
+    /// Column map: names and units of the logs' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    #[command(flatten)]
+    pub results: OutputArgs,
+    #[command(flatten)]
+    pub limits: ResourceLimits,
+}
+
+/// A parameter that another needle or another day may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum RefitArg {
+    /// Friction: one factor for all layers.
+    Friction,
+    /// Position of the surface.
+    Surface,
+}
+
+/// Arguments of `stylet identifiability`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet identifiability scenario.ron
+  stylet identifiability scenario.ron --motion plan.ron --out out/with-plan
+  stylet identifiability scenario.ron --data a.csv b.csv
+
+Writes report.html, identifiability.json and matrix.svg. `stylet effects NAME` prints the typical sizes.")]
+pub struct IdentifiabilityArgs {
+    /// Scenario: assumed tissue, and the motion of the experiment (RON).
+    pub scenario: PathBuf,
+    /// Replace the scenario's motion by the one in this file (RON), such as `stylet plan` writes.
+    #[arg(long, value_name = "FILE", conflicts_with = "data")]
+    pub motion: Option<PathBuf>,
+    /// Use motion and noise of these recordings (CSV with header) instead of a motion.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub data: Vec<PathBuf>,
+    /// Column map: names and units of the logs' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    #[command(flatten)]
+    pub results: OutputArgs,
+    #[command(flatten)]
+    pub resources: ResourceLimits,
+}
+
+/// Arguments of `stylet plan`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet plan out/diagnosis --limits limits.ron --out plan.ron
+  stylet plan scenario.ron --data a.csv --limits limits.ron --out plan.ron
+  stylet plan scenario.ron --limits limits.ron --quick
+
+limits.ron: Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)
+
+Writes plan.ron, plan.json and plan.html. plan.ron is a motion: `stylet run scenario.ron --motion plan.ron`
+simulates it; after the experiment give `stylet diagnose` the old and the new recordings together. Without
+recordings the scenario's own motion counts as done. The exit code is 2 when no motion keeps the limits.")]
+pub struct PlanArgs {
+    /// Folder of a diagnosis, or a scenario (RON).
+    pub from: PathBuf,
+    /// Limits of depth, speed, acceleration, duration and force (RON).
+    #[arg(long, value_name = "FILE")]
+    pub limits: PathBuf,
+    /// File for the motion [default: stylet-out/<name>-plan/plan.ron].
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// With a scenario: recordings made so far (CSV with header).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub data: Vec<PathBuf>,
+    /// Column map: names and units of the logs' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    /// Skip the simulated check of the planned insertion: seconds instead of minutes.
+    #[arg(long)]
+    pub quick: bool,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub resources: ResourceLimits,
+}
+
+/// Arguments of `stylet effects`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet effects
+  stylet effects coulomb_friction")]
+pub struct EffectsArgs {
+    /// Effect to describe, by its id [default: list all].
+    pub name: Option<String>,
+}

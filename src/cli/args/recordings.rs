@@ -1,0 +1,119 @@
+//! Arguments of `stylet enhance`, `stylet convert` and `stylet listen`.
+
+use crate::cli::output_args::OutputArgs;
+use crate::cli::resource_limits::ResourceLimits;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `stylet enhance`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet enhance recording.csv
+  stylet enhance log.csv --columns map.ron --config tuned.ron --out out/log
+  stylet enhance next_day.csv --model out/diagnosis/extended.ron
+
+A column map for a log in microseconds and millimetres:
+  Columns(time: (name: \"time\", scale: 1e-6), position: (name: \"pz\", scale: 1e-3),
+          force: (name: \"fz\"))
+
+A configuration: Enhance(cusum: (sigma_rupture_n: 0.1), model: MultiLayer).
+Of a scenario file the `enhance` part and the surface are used.
+
+With --model the friction along the shaft comes from a model that `stylet diagnose` fitted to other
+insertions. It is evaluated sample by sample along the recorded positions, each layer punctured as soon
+as its rupture is detected, and corrected during retraction by the measured force. Model and recording
+must have the same position origin.")]
+pub struct EnhanceArgs {
+    /// Recording (CSV with header).
+    pub data: PathBuf,
+    /// Configuration of the online algorithm (RON) [default: algorithm `Stylet` with its defaults].
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Take the shaft friction from this model: extended.ron of a diagnosis, or any scenario (RON).
+    #[arg(long, value_name = "EXTENDED.RON")]
+    pub model: Option<PathBuf>,
+    /// Column map: names and units of a log's columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and report which.
+    #[arg(long)]
+    pub repair: bool,
+    /// Run both the multi-layer and the Kelvin-Voigt model.
+    #[arg(long)]
+    pub compare: bool,
+    #[command(flatten)]
+    pub results: OutputArgs,
+    #[command(flatten)]
+    pub limits: ResourceLimits,
+}
+
+/// Arguments of `stylet convert`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet convert bag.mcap insertion.csv --columns map.ron
+  stylet convert out/recording.csv insertion.parquet
+
+A column map for a robot's log with force and position on separate topics:
+  Columns(time: (name: \"/ft_sensor/wrench.log_time\"), force: (name: \"/ft_sensor/wrench.wrench.force.z\"),
+          position: (name: \"/tip.pose.position.z\"))
+
+Every command reads CSV, and with the feature `formats` also MCAP (JSON, ROS 2 messages), MATLAB v7.3 and Parquet.")]
+pub struct ConvertArgs {
+    /// Recording to read.
+    pub from: PathBuf,
+    /// File to write; the ending .csv, .parquet or .mcap selects the format.
+    pub to: PathBuf,
+    /// Column map: names and units of a log's columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and report which.
+    #[arg(long)]
+    pub repair: bool,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Arguments of `stylet listen`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet listen --udp 5005 --page 8080 --forward 127.0.0.1:9870
+  tail -f samples.csv | stylet listen --stdin --page 8080
+
+A sample is a line `time_s,position_m,force_n[,velocity_mps]` or a JSON object with these names; a datagram
+may hold several. Results go as JSON lines to standard output and to --forward (PlotJuggler: UDP server,
+message protocol JSON). A slow reader loses its own oldest lines and never delays the algorithm; every line
+and the summary on standard error give the number lost. The datagram `end` ends the session.")]
+pub struct ListenArgs {
+    /// Receive samples on this UDP port.
+    #[arg(long, value_name = "PORT", conflicts_with = "stdin", required_unless_present = "stdin")]
+    pub udp: Option<u16>,
+    /// Read samples from standard input.
+    #[arg(long)]
+    pub stdin: bool,
+    /// Address to receive and serve on; `0.0.0.0` opens it to the network.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    pub host: String,
+    /// Serve a page with live curves on this port (0: any free one).
+    #[arg(long, value_name = "PORT")]
+    pub page: Option<u16>,
+    /// Send every line as a datagram to this address.
+    #[arg(long, value_name = "HOST:PORT")]
+    pub forward: Option<String>,
+    /// Configuration of the online algorithm: an Enhance(...) or Scenario(...) file.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// End after this many seconds (with --udp).
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub duration_s: Option<f64>,
+    /// Print no lines.
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if s > 0.0 && s < 1e9 => Ok(s),
+        _ => Err("must be a positive number of seconds".to_owned()),
+    }
+}

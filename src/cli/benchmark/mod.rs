@@ -1,0 +1,21 @@
+//! `stylet benchmark`: accuracy of diagnosis and planning over many simulated cases.
+
+mod diagnose;
+mod export_and_score;
+mod plan;
+
+use crate::cli::args::{BenchmarkArgs, BenchmarkCommand};
+use crate::cli::exit_codes::Failure;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
+    match &args.command {
+        BenchmarkCommand::Diagnose(args) => diagnose::diagnose(args),
+        BenchmarkCommand::Export(args) => export_and_score::export(args),
+        BenchmarkCommand::Score(args) => export_and_score::score(args),
+        BenchmarkCommand::Plan(args) => plan::plan(args),
+    }
+}

@@ -1,0 +1,54 @@
+//! `stylet convert`: a recording in another file format.
+
+use crate::cli::args::ConvertArgs;
+use crate::cli::exit_codes::Failure;
+use crate::cli::terminal_output::{print, print_error};
+use std::path::Path;
+use stylet_api::output_folder::write_file_atomically;
+use stylet_api::read_options;
+use stylet_record::{Recording, read_csv, write_csv};
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn convert(args: &ConvertArgs) -> Result<(), Failure> {
+    let encode = encoder(&args.to)?;
+    let options = read_options(args.columns.as_deref(), args.repair)?;
+    let (recording, notes) = read_csv(&args.from, &options)?;
+    write_file_atomically(&args.to, &encode(&recording, &args.to)?)?;
+    if !args.quiet {
+        for note in notes {
+            print_error(&format!("{}: {}\n", args.from.display(), note.message));
+        }
+        print(&format!("{}: {} samples\n", args.to.display(), recording.len()))?;
+    }
+    Ok(())
+}
+
+type Encode = fn(&Recording, &Path) -> Result<Vec<u8>, Failure>;
+
+/// The encoder for the ending of a file name.
+fn encoder(to: &Path) -> Result<Encode, Failure> {
+    let ending = to.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match ending.as_str() {
+        "csv" => Ok(|recording, _| {
+            let mut bytes = Vec::new();
+            write_csv(recording, None, &[], &mut bytes)?;
+            Ok(bytes)
+        }),
+        #[cfg(feature = "formats")]
+        "parquet" => Ok(|recording, path| Ok(stylet_record::file_formats::to_parquet(recording, path)?)),
+        #[cfg(feature = "formats")]
+        "mcap" => Ok(|recording, path| Ok(stylet_record::file_formats::to_mcap(recording, path)?)),
+        #[cfg(not(feature = "formats"))]
+        "parquet" | "mcap" => Err(Failure::Check(format!(
+            "{}: this build writes only CSV: install with `cargo install --path . --features formats`",
+            to.display()
+        ))),
+        _ => Err(Failure::Check(format!(
+            "{}: the name must end in .csv, .parquet or .mcap, which selects the format",
+            to.display()
+        ))),
+    }
+}

@@ -1,0 +1,97 @@
+//! `stylet diagnose`: measured recordings compared with an assumed scenario.
+
+use crate::cli::args::DiagnoseArgs;
+use crate::cli::exit_codes::Failure;
+use crate::cli::terminal_output::stage_printer;
+use std::fmt::Write as _;
+use stylet_api::output_folder::recover_parent;
+use stylet_api::{DiagnosisInputs, resource_estimate};
+use stylet_diagnose::Diagnosis;
+use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_report::significant;
+use stylet_scenario::Scenario;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
+    // The scenario may be the result of an interrupted diagnosis.
+    recover_parent(&args.scenario)?;
+    if args.repeats || stylet_diagnose::repeated_insertions::dataset::is_dataset(&args.scenario)? {
+        return crate::cli::diagnose_repeats::diagnose(args);
+    }
+    if args.data.is_empty() {
+        return Err(Failure::Check(
+            "no recordings: name them with --data A.csv B.csv, or give a data set in place of the scenario"
+                .to_owned(),
+        ));
+    }
+    let scenario = Scenario::load(&args.scenario)?;
+    args.limits.check(
+        &args.scenario,
+        &resource_estimate::estimate_diagnose(&args.data),
+        args.results.quiet,
+    )?;
+    let inputs = args.inputs();
+    let progress = stage_printer(args.results.quiet, " ...");
+    let found = stylet_api::diagnose(&scenario, &inputs.read_recordings()?, progress)?;
+    let folder = args.results.output_folder(&args.scenario, "-diagnosis");
+    args.results.write_and_print(&folder, &found.output(&scenario, &inputs)?, || summary(&found.diagnosis))
+}
+
+fn summary(d: &Diagnosis) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "{}", summary_sentence(d));
+    for c in &d.causes {
+        let _ = writeln!(out, "\n  {}, confidence {}", c.effect, significant(c.confidence, 3));
+        for (path, e) in &c.parameters {
+            let _ = writeln!(
+                out,
+                "    {path} = {} (95 %: {} to {})",
+                significant(e.value, 4),
+                significant(e.low, 4),
+                significant(e.high, 4)
+            );
+        }
+        if !c.equivalent.is_empty() {
+            let _ = writeln!(out, "    equivalent: {}", c.equivalent.join(", "));
+        }
+    }
+    let g = &d.gain;
+    let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
+    let _ = writeln!(
+        out,
+        "\n  residual {what}: {} N before, {} N after, noise {} N",
+        significant(g.rmse_before_n, 3),
+        significant(g.rmse_after_n, 3),
+        significant(g.floor_n, 3)
+    );
+    if let Some(differ) = recording_differences(d) {
+        let _ = writeln!(out, "  {differ}");
+    }
+    if d.residual_structure.p_value < 1e-3 {
+        let _ = writeln!(
+            out,
+            "  the residual still depends on {} ({})",
+            d.residual_structure.depends_on.join(", "),
+            stylet_report::p_value(d.residual_structure.p_value)
+        );
+    }
+    let imitated = d.negligible.iter().filter(|t| t.reason == stylet_diagnose::REASON_IMITATES_UNMODELLED);
+    let imitated: Vec<&str> = imitated.map(|t| t.effect.as_str()).collect();
+    if !imitated.is_empty() {
+        let _ = writeln!(
+            out,
+            "  nearest effects of the library, which may only imitate the true one: {}",
+            imitated.join(", ")
+        );
+    }
+    if !d.not_identifiable.is_empty() {
+        let _ = writeln!(out, "  not identifiable from these recordings: {}", d.not_identifiable.join(", "));
+    }
+    for q in &d.data_quality {
+        let _ = writeln!(out, "  note: {}: {}", q.recording, q.note.message);
+    }
+    out
+}

@@ -1,0 +1,90 @@
+//! `stylet effects`: the library of effects that extend the base law.
+
+use crate::cli::args::EffectsArgs;
+use crate::cli::exit_codes::Failure;
+use crate::cli::terminal_output::print;
+use std::fmt::Write as _;
+use stylet_api::reference_insertion::{ReferenceInsertion, reference_insertion};
+use stylet_report::significant;
+use stylet_tissue::{EffectInfo, effect_info, general_effects, per_layer_effects};
+
+/// The command.
+///
+/// # Errors
+/// [`Failure::Check`] for an effect that is not in the library.
+pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
+    match &args.name {
+        None => {
+            let mut text = String::new();
+            for entry in general_effects().chain(per_layer_effects()) {
+                let _ =
+                    writeln!(text, "{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
+            }
+            text += "`stylet effects NAME` describes one: parameters, source, and its influence on a reference insertion.\n";
+            print(&text)
+        }
+        Some(name) => match effect_info(name) {
+            Some(entry) => print(&description(entry)),
+            None => {
+                let known: Vec<&str> = general_effects().chain(per_layer_effects()).map(|e| e.id).collect();
+                let hint = stylet_scenario::closest_name(name, &known)
+                    .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                Err(Failure::Check(format!("there is no effect `{name}`{hint}; `stylet effects` lists them")))
+            }
+        },
+    }
+}
+
+fn description(entry: &EffectInfo) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{}\n\n  {}\n\n  source     {}\n  signature  {}\n",
+        entry.id, entry.equation, entry.source, entry.signature
+    );
+    for p in entry.parameters {
+        let unit = if p.unit.is_empty() { "-" } else { p.unit };
+        let _ = writeln!(
+            out,
+            "  {:<24} {:<8} {}; {} to {}, inactive {}, typical {}",
+            p.path,
+            unit,
+            p.meaning,
+            significant(p.low, 3),
+            significant(p.high, 3),
+            significant(p.inactive, 3),
+            significant(p.start, 3)
+        );
+    }
+    out.push_str(&reference_plot(entry));
+    out
+}
+
+/// Text plot of the force over time, with (`#`) and without (`.`) the effect.
+fn reference_plot(entry: &EffectInfo) -> String {
+    const WIDTH: usize = 90;
+    const HEIGHT: usize = 18;
+    let ReferenceInsertion { parameters, base_n: base, with_effect_n: changed } = reference_insertion(entry);
+    let all = || base.iter().chain(&changed).copied();
+    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+    let mut rows = vec![vec![' '; WIDTH]; HEIGHT];
+    for (curve, mark) in [(&base, '.'), (&changed, '#')] {
+        for (i, f) in curve.iter().enumerate() {
+            let column = i * WIDTH / curve.len().max(1);
+            let row = ((high - f) / (high - low).max(1e-12) * (HEIGHT - 1) as f64).round() as usize;
+            if let Some(cell) = rows.get_mut(row).and_then(|r| r.get_mut(column)) {
+                *cell = mark;
+            }
+        }
+    }
+    let mut out = format!(
+        "\n  force at the needle's base (N) against time, 25 s: ripple, hold at 10 s, advance at 14 s, retraction at 20 s\n  `.` base law, `#` with {} = {}\n\n",
+        entry.parameters.iter().map(|p| p.path).collect::<Vec<_>>().join(", "),
+        parameters.iter().map(|x| significant(*x, 3)).collect::<Vec<_>>().join(", ")
+    );
+    for (k, row) in rows.iter().enumerate() {
+        let value = high - (high - low) * k as f64 / (HEIGHT - 1) as f64;
+        let _ = writeln!(out, "  {value:>7.2} |{}", row.iter().collect::<String>().trim_end());
+    }
+    out
+}

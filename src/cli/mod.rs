@@ -1,0 +1,68 @@
+//! The `stylet` command: arguments, terminal output, exit codes. The work is done by `stylet-api`.
+
+mod args;
+mod benchmark;
+mod compare;
+mod convert;
+mod diagnose;
+mod diagnose_repeats;
+mod effects;
+mod enhance;
+mod exit_codes;
+mod listen;
+mod output_args;
+mod plan;
+mod predict;
+mod progress_bar;
+mod reproduce;
+mod resource_limits;
+mod run;
+mod scorecard;
+mod sweep;
+mod terminal_output;
+
+use args::{Cli, Command};
+use clap::Parser;
+use exit_codes::Failure;
+use std::process::ExitCode;
+
+/// Runs the command line and returns the exit code (see [`exit_codes`]).
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    // A panic is a bug: it ends with the exit code of internal errors.
+    let outcome = std::panic::catch_unwind(|| match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Enhance(args) => enhance::enhance(args),
+        Command::Convert(args) => convert::convert(args),
+        Command::Sweep(args) => sweep::sweep(args),
+        Command::Replay(args) => sweep::replay(args),
+        Command::Gate(args) => sweep::gate(args),
+        Command::Compare(args) => compare::compare(args),
+        Command::Diagnose(args) => diagnose::diagnose(args),
+        Command::Predict(args) => predict::predict(args),
+        Command::Identifiability(args) => plan::identifiability(args),
+        Command::Plan(args) => plan::plan(args),
+        Command::Effects(args) => effects::effects(args),
+        Command::Benchmark(args) => benchmark::benchmark(args),
+        Command::Listen(args) => listen::listen(args),
+        Command::Reproduce(args) => reproduce::reproduce(args),
+    })
+    .unwrap_or_else(|_| Err(Failure::internal("the command stopped unexpectedly")));
+    match outcome {
+        Ok(()) => ExitCode::from(exit_codes::DONE),
+        Err(failure) => {
+            let code = failure.code();
+            terminal_output::print_error(&rendered(failure));
+            code
+        }
+    }
+}
+
+/// The error with an excerpt of the source where that can be rendered, else the message alone.
+fn rendered(failure: Failure) -> String {
+    let message = failure.to_string();
+    let report = miette::Report::new(failure);
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| format!("{report:?}\n")))
+        .unwrap_or_else(|_| format!("{message}\n"))
+}

@@ -1,0 +1,78 @@
+//! `stylet predict`: held-out recordings predicted by a model.
+
+use crate::cli::args::{PredictArgs, RefitArg};
+use crate::cli::exit_codes::Failure;
+use std::fmt::Write as _;
+use stylet_api::output_folder::recover_parent;
+use stylet_api::prediction_files::{ModelOrigin, output_files};
+use stylet_api::{Prediction, Refit, read_options, read_recordings, resource_estimate};
+use stylet_report::pages::formatting::significant_or_dash;
+use stylet_report::pages::prediction::summary_sentence;
+use stylet_report::significant;
+use stylet_scenario::Scenario;
+
+/// The command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
+    recover_parent(&args.model)?;
+    let model = Scenario::load(&args.model)?;
+    args.limits.check(&args.model, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
+    let ModelOrigin { diagnosis, assumed } =
+        ModelOrigin::of_model_file(&args.model, args.assumed.as_deref())?;
+    let recordings = read_recordings(&args.data, &read_options(args.columns.as_deref(), args.repair)?)?;
+    let refit: Vec<Refit> = args
+        .refit
+        .iter()
+        .map(|a| match a {
+            RefitArg::Friction => Refit::Friction,
+            RefitArg::Surface => Refit::Surface,
+        })
+        .collect();
+    let found =
+        stylet_api::predict_recordings(&model, diagnosis.as_ref(), assumed.as_ref(), &refit, &recordings)?;
+    let folder = args.results.output_folder(&args.model, "-prediction");
+    args.results
+        .write_and_print(&folder, &output_files(&model, &args.model, &found)?, || summary(&found.prediction))
+}
+
+fn summary(p: &Prediction) -> String {
+    let mut out = format!("{}\n", summary_sentence(p));
+    let _ = writeln!(
+        out,
+        "\n  {:<24} {:>10} {:>10} {:>12} {:>12}",
+        "recording", "rms, N", "assumed", "in the band", "peak err, N"
+    );
+    for r in &p.recordings {
+        let before = significant_or_dash(r.assumed_rmse_n, 1.0, 3);
+        let _ = writeln!(
+            out,
+            "  {:<24} {:>10} {:>10} {:>10.0} % {:>12}",
+            r.name,
+            significant(r.rmse_n, 3),
+            before,
+            100.0 * r.band_coverage,
+            significant(r.peak_error_n, 2)
+        );
+        if let Some(m) = r.surface_shift_m {
+            let _ = writeln!(out, "    surface {:+.2} mm", 1e3 * m);
+        }
+        if let Some(factor) = r.friction_factor {
+            let _ = writeln!(out, "    friction x {}", significant(factor, 3));
+        }
+    }
+    let _ = writeln!(
+        out,
+        "\n  noise {} N; the band includes {}",
+        significant(p.floor_n, 3),
+        p.band_includes.join(", ")
+    );
+    if !p.held_out {
+        let _ = writeln!(
+            out,
+            "  re-fitted to the predicted recording itself; with two or more each is predicted by the values from the others"
+        );
+    }
+    out
+}

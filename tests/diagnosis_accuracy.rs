@@ -1,0 +1,248 @@
+//! Accuracy of the diagnosis on cases of the independent simulator: no false positives on clean data, and most strong effects are
+//! identified. A sample of `stylet benchmark diagnose`.
+
+use stylet_diagnose::prediction::{Refit, predict};
+use stylet_diagnose::{NamedRecording, Options};
+use stylet_examine::{
+    Answer, CaseId, Hide, Plan, Question, Severity, Size, World, Wrong, results_table, run_cases,
+};
+use stylet_scenario::{Motion, Scenario, Segment};
+use stylet_tissue::{AnyEffect, CoulombFriction, ForceDrift};
+
+/// The assumed scenario and the recordings of a case.
+fn inputs(question: &Question) -> Result<(Scenario, Vec<NamedRecording>), String> {
+    let scenario = Scenario::parse("assumed.ron", &question.assumed_ron).map_err(|e| e.to_string())?;
+    let recordings = question.recordings.iter();
+    let recordings = recordings.map(|r| NamedRecording {
+        name: r.name.clone(),
+        recording: r.recording.clone(),
+        notes: Vec::new(),
+    });
+    Ok((scenario, recordings.collect()))
+}
+
+fn answer(question: &Question) -> Result<Answer, String> {
+    let (scenario, recordings) = inputs(question)?;
+    let examined = stylet_diagnose::diagnose(&scenario, &recordings, &Options::default(), |_| {})
+        .map_err(|e| e.to_string())?;
+    let json = serde_json::to_string(&examined.diagnosis).map_err(|e| e.to_string())?;
+    Answer::from_json(&json).map_err(|e| e.to_string())
+}
+
+/// A case of the plain world, all strong and by the largest severity.
+fn case(wrong: Wrong, hide: Hide, seed: u64, index: u64) -> CaseId {
+    CaseId { world: World::Plain, wrong, severity: Severity::Large, hide, size: Size::Strong, seed, index }
+}
+
+#[test]
+fn clean_data_give_no_cause_and_strong_effects_are_identified() {
+    let plan = Plan { hide: vec![Hide::Clean, Hide::One], cases: 8, seed: 1, ..Plan::default() };
+    let outcomes = run_cases(&plan.cases(), None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    println!("{table}");
+    let clean: Vec<_> = outcomes.iter().filter(|o| o.id.hide == Hide::Clean).collect();
+    assert_eq!(clean.len(), 4);
+    assert!(clean.iter().all(|o| o.worth.correct), "{table}");
+    let found = outcomes.iter().filter(|o| o.id.hide == Hide::One && o.worth.correct).count();
+    assert!(found >= 3, "{table}");
+    // The hidden effects were significant.
+    assert!(outcomes.iter().any(|o| o.strength_sd > 5.0));
+}
+
+/// Its force steps at stops and layer boundaries resemble ruptures.
+#[test]
+fn a_cutting_force_with_steps_like_ruptures_is_identified() {
+    let cases: Vec<CaseId> = [(Wrong::Nothing, 35), (Wrong::ScatterPuncture, 29), (Wrong::Thickness, 1)]
+        .map(|(wrong, index)| case(wrong, Hide::One, 128, index))
+        .to_vec();
+    let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.correct), "{table}");
+}
+
+/// Shifts larger than the assumed tolerance of a thickness.
+#[test]
+fn a_shifted_boundary_is_distinguished_from_slightly_wrong_thicknesses() {
+    let rows = [
+        (Wrong::Nothing, 38),
+        (Wrong::Ar2, 17),
+        (Wrong::Thickness, 0),
+        (Wrong::Thickness, 37),
+        (Wrong::Coefficients, 44),
+        (Wrong::ScatterSurface, 21),
+    ];
+    let outcomes =
+        run_cases(&rows.map(|(wrong, index)| case(wrong, Hide::One, 128, index)), None, &answer, &|_, _| {})
+            .expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.worth.correct), "{table}");
+    let shifts: Vec<_> =
+        outcomes.iter().flat_map(|o| &o.numbers).filter(|n| n.name == "boundary_shift.shift_m").collect();
+    assert!(
+        shifts.len() == rows.len()
+            && shifts.iter().filter(|n| n.held == Some(true)).count() + 1 >= rows.len(),
+        "{table}"
+    );
+}
+
+/// Not confused with scatter between insertions.
+#[test]
+fn a_rate_dependent_puncture_force_is_identified_under_wrong_assumptions() {
+    let rows =
+        [(Wrong::Growing, 11), (Wrong::Encoder, 17), (Wrong::SurfaceEach, 18), (Wrong::ScatterFriction, 13)];
+    let of =
+        |(wrong, index): (Wrong, u64)| [case(wrong, Hide::One, 3, index), case(wrong, Hide::Clean, 3, 0)];
+    let cases: Vec<CaseId> = rows.into_iter().flat_map(of).collect();
+    let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    let (clean, one): (Vec<_>, Vec<_>) = outcomes.iter().partition(|o| o.id.hide == Hide::Clean);
+    assert_eq!((clean.len(), one.len()), (4, 4));
+    assert!(clean.iter().all(|o| o.worth.correct), "{table}");
+    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.correct), "{table}");
+}
+
+/// Two spectral lines close together and of equal size are no single tone.
+#[test]
+fn beats_are_not_identified_as_a_tone() {
+    let outcomes =
+        run_cases(&[case(Wrong::Nothing, Hide::Outside, 142, 6)], None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.correct), "{table}");
+}
+
+/// Sensor drift must neither imitate a boundary shift nor hide a tone in the coloured noise.
+#[test]
+fn sensor_drift_is_no_boundary_shift_and_hides_no_tone() {
+    let of = |(wrong, hide, seed, index)| case(wrong, hide, seed, index);
+    let cases = [
+        (Wrong::Wander, Hide::Clean, 141, 0),
+        (Wrong::Wander, Hide::Clean, 141, 5),
+        (Wrong::Wander, Hide::One, 128, 29),
+        (Wrong::Recordings, Hide::One, 128, 18),
+    ];
+    let outcomes = run_cases(&cases.map(of), None, &answer, &|_, _| {}).expect("a run");
+    let table = results_table::results_text(&outcomes);
+    assert!(outcomes.iter().all(|o| o.worth.correct), "{table}");
+    assert_eq!(outcomes.iter().filter(|o| o.hidden == ["periodic_interference"]).count(), 2);
+}
+
+/// Case 6 has the time constants 0.33 and 6.5 s, case 37 has 7.4 s.
+#[test]
+fn two_time_constants_of_relaxation_are_identified() {
+    for (index, terms) in [(6, 2), (37, 1)] {
+        let plan = Plan { hide: vec![Hide::One], cases: index + 1, seed: 128, ..Plan::default() };
+        let id = plan.cases().into_iter().next_back().expect("a case");
+        let case = stylet_examine::make_case(&id).expect("a case");
+        let truth = case.setup.effects[0].parameters();
+        assert!(truth[0].0.starts_with("terms.0.") && truth.len() == 2 * terms, "{truth:?}");
+        let (assumed, recordings) = inputs(&case.question).expect("a scenario");
+        let found = stylet_diagnose::diagnose(&assumed, &recordings, &Options { brief: true }, |_| {})
+            .expect("a diagnosis")
+            .diagnosis;
+        let [cause] = found.causes.as_slice() else { panic!("{:?}", found.causes) };
+        assert_eq!((cause.effect.as_str(), cause.parameters.len()), ("stress_relaxation", 2 * terms));
+        for (path, value) in truth {
+            let estimate = cause.parameters[&path];
+            assert!((estimate.value / value - 1.0).abs() < 0.1, "{path}: {estimate:?} for {value}");
+        }
+    }
+}
+
+#[test]
+fn the_model_of_a_diagnosis_predicts_a_held_out_recording_to_about_its_noise() {
+    let plan = Plan { hide: vec![Hide::One], cases: 2, seed: 1, ..Plan::default() };
+    for id in plan.cases() {
+        let case = stylet_examine::make_case(&id).expect("a case");
+        let (assumed, mut recordings) = inputs(&case.question).expect("a scenario");
+        let kept = recordings.split_off(recordings.len() - 1);
+        let found = stylet_diagnose::diagnose(&assumed, &recordings, &Options { brief: true }, |_| {})
+            .expect("a diagnosis");
+        let predicted = predict(&found.extended_scenario, Some(&found.diagnosis), Some(&assumed), &[], &kept)
+            .expect("a prediction");
+        let p = &predicted.prediction;
+        println!("{:?}: {p:?}", case.setup.effects);
+        assert!(p.rmse_n < 1.25 * p.floor_n && p.held_out, "{p:?}");
+        assert!((0.8..=0.98).contains(&p.band_coverage), "{p:?}");
+        assert!(p.assumed_rmse_n.expect("of the assumed scenario") > 5.0 * p.rmse_n, "{p:?}");
+    }
+}
+
+/// A needle with 30 % more friction, and a surface 1.5 mm closer.
+#[test]
+fn friction_and_surface_of_another_needle_are_refitted() {
+    let text = "Scenario(name: \"two gels\", tissue: (layers: [
+        (thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0, puncture_n: 0.8),
+        (thickness_m: 0.02, stiffness_n_per_m: 90.0, friction_ns_per_m2: 12000.0)]),
+        motion: Program(start_m: -0.004, segments: [Move(velocity_mps: 0.004, duration_s: 8.0)]), robot: Replay)";
+    let model = Scenario::parse("model.ron", text).expect("a scenario");
+    let other = |seed: u64, velocity_mps: f64| {
+        let mut scenario = model.clone();
+        scenario.seed = seed;
+        scenario.tissue.surface_m -= 1.5e-3;
+        scenario.tissue.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= 1.3);
+        let duration_s = 0.032 / velocity_mps;
+        let segments = vec![Segment::Move { velocity_mps, duration_s }];
+        scenario.motion = Motion::Program { start_m: -0.004, segments };
+        let recording = stylet_testbed::simulate(&scenario, seed).expect("an insertion").recording;
+        NamedRecording { name: format!("{seed}"), recording, notes: Vec::new() }
+    };
+    let recordings = [other(1, 0.004), other(2, 0.003)];
+    let both = [Refit::Surface, Refit::Friction];
+    let without = predict(&model, None, None, &[], &recordings).expect("a prediction").prediction;
+    let with = predict(&model, None, None, &both, &recordings).expect("a prediction").prediction;
+    assert!(without.rmse_n > 3.0 * without.floor_n && without.band_coverage < 0.6, "{without:?}");
+    assert!(with.rmse_n < 1.15 * with.floor_n && with.band_coverage > 0.8 && with.held_out, "{with:?}");
+    for r in &with.recordings {
+        let (shift, factor) = (r.surface_shift_m.expect("a shift"), r.friction_factor.expect("a factor"));
+        assert!((shift + 1.5e-3).abs() < 1e-4 && (factor - 1.3).abs() < 0.03, "{r:?}");
+    }
+    let alone = predict(&model, None, None, &both, &recordings[..1]).expect("a prediction").prediction;
+    assert!(!alone.held_out && alone.rmse_n < 1.15 * alone.floor_n, "{alone:?}");
+}
+
+/// Two gels, replayed with these effects at the given speeds.
+fn two_gels(effects: Vec<AnyEffect>, segments: Vec<Segment>, seed: u64) -> (Scenario, NamedRecording) {
+    let text = "Scenario(name: \"two gels\", tissue: (layers: [
+        (thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0, puncture_n: 0.8),
+        (thickness_m: 0.02, stiffness_n_per_m: 90.0, friction_ns_per_m2: 12000.0)]),
+        motion: Recorded, robot: Replay)";
+    let assumed = Scenario::parse("two_gels.ron", text).expect("a scenario");
+    let motion = Motion::Program { start_m: -0.004, segments };
+    let truth = Scenario { effects, motion, ..assumed.clone() };
+    let recording = stylet_testbed::simulate(&truth, seed).expect("an insertion").recording;
+    (assumed, NamedRecording { name: format!("{seed}.csv"), recording, notes: Vec::new() })
+}
+
+#[test]
+fn dry_friction_is_not_identifiable_at_one_constant_speed_and_is_not_reported() {
+    let segments = vec![Segment::Move { velocity_mps: 0.0023, duration_s: 18.0 }];
+    let friction: AnyEffect = CoulombFriction { c_n_per_m: 2.0 }.into();
+    let runs = [1, 2].map(|seed| two_gels(vec![friction.clone()], segments.clone(), seed));
+    let recordings = runs.each_ref().map(|(_, recording)| recording.clone());
+    let found = stylet_diagnose::diagnose(&runs[0].0, &recordings, &Options::default(), |_| {})
+        .expect("a diagnosis")
+        .diagnosis;
+    assert_eq!(found.verdict, stylet_diagnose::Verdict::None, "{:?}", found.causes);
+    for id in ["coulomb_friction", "power_law_friction", "force_gain"] {
+        assert!(found.not_identifiable.iter().any(|i| i == id), "{id} not in {:?}", found.not_identifiable);
+    }
+    assert!(!found.advice.is_empty());
+}
+
+#[test]
+fn the_extended_scenario_can_be_read_again_and_holds_the_effect_found() {
+    let segments = vec![
+        Segment::Move { velocity_mps: 0.003, duration_s: 8.0 },
+        Segment::Hold { duration_s: 2.0 },
+        Segment::Move { velocity_mps: 0.004, duration_s: 4.0 },
+        Segment::Move { velocity_mps: -0.004, duration_s: 12.0 },
+    ];
+    let (assumed, recording) = two_gels(vec![ForceDrift { rate_n_per_s: 0.01 }.into()], segments, 5);
+    let found =
+        stylet_diagnose::diagnose(&assumed, &[recording], &Options::default(), |_| {}).expect("a diagnosis");
+    let text = found.extended_scenario.to_ron().expect("RON");
+    let read = Scenario::parse("extended.ron", &text).expect("a valid scenario");
+    let drift = |e: &AnyEffect| matches!(e, AnyEffect::ForceDrift(d) if (d.rate_n_per_s - 0.01).abs() < 1e-3);
+    assert!(read.effects.iter().any(drift), "{text}");
+    assert!(!found.diagnosis.gain.held_out, "one recording cannot be held out");
+}

@@ -1,5 +1,0 @@
-#!/usr/bin/env bash
-# Faults of a disk at every call of run, sweep, enhance, diagnose and reproduce, and a hundred kills at any instant (about a quarter of an hour).
-set -euo pipefail
-cd "$(dirname "$0")/.."
-cargo test --release --test faults -- --include-ignored --nocapture --test-threads 1
