@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Every crate that is published packs, and builds from its package alone. Minutes: a clean build of everything. With --list,
-# only what would be packed (seconds).
+# Packs every published crate and builds it from its package alone (minutes: a clean build). With --list, only packs (seconds).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if [ "${1:-}" = --list ]; then

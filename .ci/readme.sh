@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs the commands that the README shows, so that it cannot rot: every line of a ```sh block that begins with `stylet` (or
-# `cargo run --release --`), by the binary given (default: the one that `cargo test` made), in a folder of its own. Files that a
-# reader would bring (log.csv, assumed.ron, a.csv ...) are made first. What is not run is named with the reason.
+# Runs the commands in the README: every line of a ```sh block that begins with `stylet` (or `cargo run --release --`), with the given
+# binary (default: the one that `cargo test` built), in a temporary folder. Files that a reader would bring (log.csv, assumed.ron,
+# a.csv ...) are created first. Lines that are not run are printed with the reason.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 stylet=$(realpath "${1:-${CARGO_TARGET_DIR:-$root/target}/debug/stylet}")
@@ -52,8 +52,8 @@ while IFS= read -r line; do
     echo "readme: $line"
     PATH="$work/bin:$PATH"
     mkdir -p bin && ln -sf "$stylet" bin/stylet
-    bash -euo pipefail -c "$line" >said.txt 2>&1 || {
-        cat said.txt
+    bash -euo pipefail -c "$line" >output.txt 2>&1 || {
+        cat output.txt
         echo "readme: FAILED: $line" >&2
         exit 1
     }

@@ -1,4 +1,4 @@
-//! Stylet: needle insertion into layered tissue, simulated, felt, identified, and put against measured data.
+//! Stylet: robot-assisted needle insertion into layered tissue. Simulation, online estimation, diagnosis of measured data.
 //!
 //! ```
 //! use stylet::{Scenario, simulate};
@@ -13,14 +13,14 @@
 //!     robot: Replay,
 //! )"#)?;
 //! let run = simulate(&scenario)?;
-//! let score = run.ran[0].score.as_ref().expect("a simulated run has a score");
+//! let score = run.algorithm_runs[0].score.as_ref().expect("a simulated run has a score");
 //! println!("{} of {} ruptures missed", score.missed, score.ruptures.len());
 //! # assert!(score.missed == 0 && !score.ruptures.is_empty());
 //! # Ok::<(), stylet::Error>(())
 //! ```
 //!
-//! The functions and their results are those of [`stylet_api`]; the crates below them are re-exported under their own
-//! names: [`core`] (the online algorithm, `no_std`), [`record`], [`scenario`], [`testbed`], [`score`], [`tissue`],
+//! The functions and their results are those of [`stylet_api`]; the crates below are re-exported under their own names:
+//! [`core`] (the online algorithms, `no_std`), [`record`], [`scenario`], [`testbed`], [`score`], [`tissue`],
 //! [`stats`].
 #![forbid(unsafe_code)]
 

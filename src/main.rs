@@ -7,7 +7,7 @@ mod cli;
 
 use std::process::ExitCode;
 
-/// Fits ask for vectors as long as the recordings again and again; this allocator keeps their pages.
+/// Fits repeatedly allocate vectors as long as the recordings; this allocator reuses their pages.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

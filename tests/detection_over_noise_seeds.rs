@@ -20,7 +20,7 @@ fn load(name: &str) -> Scenario {
     Scenario::load(&support::scenario(name)).expect("a shipped scenario")
 }
 
-/// The insertion is simulated once by rapier; each seed only draws other noise.
+/// The insertion is simulated once; a seed changes only the noise.
 fn scores(scenario: &Scenario, config: &EnhanceConfig) -> Vec<Score> {
     let once = simulate(scenario, 1).expect("a simulation");
     let layers = once.true_layers();
@@ -39,7 +39,7 @@ struct Summary {
     p99_delay_s: f64,
     median_stiffness: Vec<f64>,
     median_friction: Vec<f64>,
-    /// Enhanced force off by, up to the exit, median.
+    /// Median relative error of the enhanced force up to the exit.
     enhancement: f64,
 }
 
@@ -86,7 +86,7 @@ fn summarise(name: &str, scores: &[Score]) -> Summary {
 }
 
 #[test]
-fn both_three_layer_scenarios_miss_nothing_and_alarm_falsely_never_over_200_noise_seeds() {
+fn both_three_layer_scenarios_have_no_miss_and_no_false_alarm_over_200_noise_seeds() {
     for name in ["three_layer_latex_constant", "three_layer_latex_sinusoidal"] {
         let scenario = load(name);
         let s = summarise(name, &scores(&scenario, &scenario.enhance));
@@ -101,7 +101,7 @@ fn both_three_layer_scenarios_miss_nothing_and_alarm_falsely_never_over_200_nois
     }
 }
 
-/// A number of the reference as it stands, in the digits in which it stands, and ours.
+/// A reference value as text, and our value.
 struct Line {
     what: String,
     reference: f64,
@@ -186,8 +186,8 @@ fn from_full_speed() -> Scenario {
     sinusoid
 }
 
-/// Least squares of the force less the true cumulative friction on `[dz, v]` over every whole layer, by nothing but
-/// the normal equations, friction not below zero: relative error of K, layer by layer, median over the seeds.
+/// Least squares of the force minus the true cumulative friction on `[dz, v]` over each layer, with non-negative friction: relative error of K
+/// per layer, median over the seeds.
 fn kelvin_voigt_by_least_squares(scenario: &Scenario) -> Vec<f64> {
     let once = simulate(scenario, 1).expect("a simulation");
     let layers = once.true_layers();
@@ -229,7 +229,7 @@ fn kelvin_voigt_by_least_squares(scenario: &Scenario) -> Vec<f64> {
 /// With resets at 40 Hz and no re-weighting it is less in constant motion, with both, as the algorithm is written, a
 /// tenth.
 #[test]
-fn kelvin_voigt_is_off_as_in_the_reference_without_covariance_resets_and_less_with_them() {
+fn kelvin_voigt_errors_are_those_of_the_reference_without_covariance_resets_and_smaller_with_them() {
     let run = |name: &str, scenario: &Scenario, reset: Reset, reweight: bool| {
         let mut config = EnhanceConfig {
             contact: Contact::Known,
@@ -273,19 +273,18 @@ fn kelvin_voigt_is_off_as_in_the_reference_without_covariance_resets_and_less_wi
     assert!(both[0] > 1.495 && both[1] > 1.495 && both[2] < 1.495, "the third layer is better: {both:?}");
 }
 
-/// The lines of the reference above 0.02 N that are not met. At 0.03 N as many are missed and 153 false where it
-/// has 138; at 0.1 N ours is worse, 502 missed and 2902 false where it has 256 and 1985.
+/// Reference values above 0.02 N that are not met. At 0.03 N there are as many misses and 153 instead of 138 false alarms; at 0.1 N 502
+/// instead of 256 misses and 2902 instead of 1985 false alarms.
 const NOISE_NOT_MET: &[&str] = &["0.03 N: false", "0.1 N: missed", "0.1 N: false"];
 
-/// The same with the 2 mm without a rupture counted from the end of the 7.5 mm in which detection is off anyway, not
-/// from the rupture as the specification words it.
+/// The same with the 2 mm without a rupture counted from the end of the 7.5 mm in which detection is off, instead of from the rupture.
 const LATER_NOT_MET: &[&str] = &["0.03 N: missed"];
 
-/// Above 0.02 N the algorithm breaks down: in the reference 37 of 600 missed and 138 false at 0.03 N, 256 and
-/// 1985 at 0.1 N. At 0.1 N it alarms whenever it may, so that the counts are those of the travel between two alarms:
-/// 7.5 mm here. With 9.5 mm both lines of 0.1 N are met, and the false ones of 0.03 N.
+/// Above 0.02 N detection fails: in the reference 37 of 600 missed and 138 false at 0.03 N, 256 and
+/// 1985 at 0.1 N. At 0.1 N it alarms as often as the blind travel allows,
+/// 7.5 mm here. With 9.5 mm both reference values at 0.1 N are met, and the false alarms at 0.03 N.
 #[test]
-fn above_twenty_millinewtons_of_noise_it_breaks_down_as_in_the_reference() {
+fn detection_fails_above_twenty_millinewtons_of_noise_as_in_the_reference() {
     let mut constant = load("three_layer_latex_constant");
     let detection_off_m = {
         let drop = EnhanceConfig::paper().drop;
@@ -317,11 +316,10 @@ fn above_twenty_millinewtons_of_noise_it_breaks_down_as_in_the_reference() {
     }
 }
 
-/// To the letter, without blind travel after contact, nearly every insertion whose contact is found from the data has a false
-/// rupture right after it, and from rest K of the first layer is off by half; it does not diverge further. With the
-/// surface known there is none.
+/// The literal algorithm has no blind travel after contact: nearly every insertion with detected contact has a false rupture right after it, and
+/// from rest the error of K of the first layer is one half. With a known surface there is none.
 #[test]
-fn to_the_letter_an_insertion_with_contact_found_from_the_data_has_a_false_rupture() {
+fn the_literal_algorithm_has_a_false_rupture_after_detected_contact() {
     let sinusoid = load("three_layer_latex_sinusoidal");
     let with = |algorithm: Algorithm, contact: Contact| {
         let config = EnhanceConfig { algorithm, contact, ..EnhanceConfig::paper() };

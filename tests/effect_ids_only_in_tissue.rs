@@ -1,9 +1,9 @@
-//! Promise: what an effect is stands in its file in `stylet-tissue`. No other source names one by its id, but the referee's
-//! (`stylet-examine`, which has to stay independent) and tests: who does has written a rule for one effect.
+//! An effect is described only by its file in `stylet-tissue`. No other source names an effect by its id, which would be a special rule for
+//! one effect; exceptions are the independent simulator (`stylet-examine`) and tests.
 
 use std::path::{Path, PathBuf};
 
-/// Sources under a folder, but tests, benchmarks and what is built.
+/// Sources under a folder, without tests and build products.
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder of the repository").flatten() {
         let path = entry.path();
@@ -33,7 +33,7 @@ fn code(text: &str) -> String {
     out
 }
 
-/// Ids (as a source writes them) that a source names.
+/// Ids in quotes that occur in a source.
 fn named(text: &str) -> Vec<String> {
     let code = code(text);
     stylet_tissue::general_effects()
@@ -73,7 +73,7 @@ fn no_source_outside_the_library_names_an_effect_by_its_id() {
 }
 
 #[test]
-fn a_rule_for_one_effect_is_seen_and_a_test_or_a_remark_about_one_is_not() {
+fn an_id_in_code_is_found_and_one_in_a_test_or_comment_is_not() {
     let rule = "fn f(id: &str) -> bool {\n    id == \"force_gain\"\n}\n";
     assert_eq!(named(rule), ["\"force_gain\""]);
     assert!(named("// as \"force_gain\" does\n").is_empty());
@@ -81,7 +81,7 @@ fn a_rule_for_one_effect_is_seen_and_a_test_or_a_remark_about_one_is_not() {
     assert_eq!(named(&format!("#[cfg(test)]\nmod tests {{\n}}\n{rule}")).len(), 1);
 }
 
-/// The name by which a source may speak of an effect is its id.
+/// Every effect type has its id as a constant.
 #[test]
 fn an_effects_constant_is_its_id() {
     use stylet_tissue::{CoulombFriction, Effect, ForceGain, Saturation};

@@ -1,5 +1,5 @@
-//! Promise: however a command ends, it ends with a sentence and its exit code: readers that go away, full disks behind standard
-//! output, errors far to the right, work that is too much. Nothing panics (101), nothing runs for ever in silence.
+//! Every command ends with a message and its documented exit code: closed pipes, full disks behind standard output, errors in very long
+//! lines, work above the limits. Nothing panics (exit code 101).
 
 mod support;
 
@@ -19,7 +19,7 @@ fn ended(arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// A pipe whose reader has gone away, as behind `| head`.
+/// A pipe whose reader has closed it, as `| head` does.
 fn gone() -> Stdio {
     let (reader, writer) = std::io::pipe().expect("a pipe");
     drop(reader);
@@ -31,7 +31,7 @@ fn full() -> Option<Stdio> {
 }
 
 #[test]
-fn a_reader_that_goes_away_changes_no_exit_code_and_a_full_disk_is_told_in_a_sentence() {
+fn a_closed_pipe_changes_no_exit_code_and_a_full_disk_is_reported() {
     let scratch = Scratch::new("pipes");
     let gel = scratch.file("gel.ron", ONE_GEL);
     let sweep = scratch.file(
@@ -95,7 +95,7 @@ fn an_impossible_number_of_shards_is_refused() {
 }
 
 #[test]
-fn nobody_hears_the_error_and_the_exit_code_is_still_the_right_one() {
+fn a_closed_standard_error_changes_no_exit_code() {
     let (Some(out), Ok(err)) = (full(), File::options().write(true).open("/dev/full")) else { return };
     let mut command = Command::new(env!("CARGO_BIN_EXE_stylet"));
     let status = command.args(["run", "nowhere.ron"]).stdout(out).stderr(err).status().expect("it starts");
@@ -103,7 +103,7 @@ fn nobody_hears_the_error_and_the_exit_code_is_still_the_right_one() {
 }
 
 #[test]
-fn an_error_seventy_thousand_columns_to_the_right_is_told_with_its_place() {
+fn an_error_at_column_seventy_thousand_is_reported_with_its_place() {
     let scratch = Scratch::new("wide");
     let wide = ONE_GEL.replace('\n', " ").replace("robot", &format!("{}robbot", " ".repeat(70_000)));
     let file = scratch.file("wide.ron", wide);
@@ -122,7 +122,7 @@ fn an_error_seventy_thousand_columns_to_the_right_is_told_with_its_place() {
 }
 
 #[test]
-fn too_much_work_is_refused_before_it_begins_with_what_would_help() {
+fn work_above_the_limits_is_refused_with_the_remedy() {
     let scratch = Scratch::new("limits");
     let gel = scratch.file("gel.ron", ONE_GEL);
     let rates = |name: &str, line: &str| {
@@ -189,7 +189,7 @@ fn a_refused_sweep_leaves_no_folder() {
 }
 
 #[test]
-fn what_is_wrong_with_a_log_is_told_with_file_line_and_remedy() {
+fn a_wrong_log_is_reported_with_file_line_and_remedy() {
     let scratch = Scratch::new("messages");
     let rows = "0.0,0.0,0.1\n0.01,0.001,0.2\n0.02,0.002,0.1\n";
     let head = "time_s,position_m,force_n\n";

@@ -1,4 +1,4 @@
-//! Promise: the report of a run opens in a real browser without an error and shows its curves.
+//! The report of a run opens in a real browser without an error and shows its curves.
 //!
 //! The page tests itself when its address ends in `#selftest`; see `stylet-report`. Without a browser the test prints SKIPPED.
 

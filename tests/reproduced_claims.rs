@@ -14,7 +14,7 @@ use stylet_reproduce::claims::{self, Claim, Sensitivity, definitions};
 use stylet_reproduce::effect_size::{Bar, Measured, Part, Scale};
 use stylet_reproduce::{Reproduction, plan, reproduce};
 
-/// The seeds that are run in every test.
+/// Seeds of every test run.
 const FEW: u64 = 4;
 
 fn with_threads(threads: usize) -> Reproduction {
@@ -31,14 +31,14 @@ fn expected() -> Value {
     serde_json::from_str(include_str!("expected_verdicts.json")).expect("the expected verdicts")
 }
 
-/// The claims of a study that runs what they ask for and nothing else.
+/// The claims of a study that runs only the required conditions.
 fn claims_of(first_seed: u64, seeds: u64) -> Vec<Claim> {
     let asking = Study::asking(first_seed, seeds);
     let _ = claims::all(&asking);
     claims::all(&Study::run(&asking.plan(), &|| {}).expect("shipped scenarios"))
 }
 
-/// Numbers within a billionth, everything else equal; what differs, with its path.
+/// The differences, with their paths: numbers by more than 1e-9, everything else exactly.
 fn differences(path: &str, was: &Value, is: &Value, found: &mut Vec<String>) {
     match (was, is) {
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
@@ -65,7 +65,7 @@ fn differences(path: &str, was: &Value, is: &Value, found: &mut Vec<String>) {
 }
 
 #[test]
-fn verdicts_numbers_and_reasons_are_those_that_were_recorded() {
+fn verdicts_numbers_and_reasons_are_those_recorded() {
     let is: Value = serde_json::from_str(&once().claims_json).expect("claims as JSON");
     let mut found = Vec::new();
     differences("", &expected()["few"], &is, &mut found);
@@ -73,7 +73,7 @@ fn verdicts_numbers_and_reasons_are_those_that_were_recorded() {
 }
 
 #[test]
-fn what_the_switches_do_is_what_was_recorded() {
+fn the_effects_of_the_switches_are_those_recorded() {
     let is: Value = serde_json::from_str(&once().switches_json).expect("switches as JSON");
     let mut found = Vec::new();
     differences("", &expected()["switches_few"], &is, &mut found);
@@ -128,7 +128,7 @@ fn verdicts_are_stable_over_two_disjoint_sets_of_fifty_seeds() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
-/// A condition under which nothing holds.
+/// A condition under which no claim holds.
 fn contrary() -> Sensitivity {
     Sensitivity {
         name: "added",

@@ -1,5 +1,5 @@
-//! Promise: the same scenario and seed give the same bytes in every file, also in a second process,
-//! and `score.json` says so with a hash; another seed gives others.
+//! The same scenario and seed give the same bytes in every file, also in a second process, and the same hash in `score.json`; another
+//! seed gives others.
 
 mod support;
 

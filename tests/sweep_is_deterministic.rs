@@ -133,7 +133,7 @@ fn a_sweep_interrupted_by_ctrl_c_resumes_to_the_same_bytes() {
 }
 
 #[test]
-fn an_unfinished_sweep_is_not_overwritten_without_being_told_to() {
+fn an_unfinished_sweep_is_not_overwritten_by_default() {
     let scratch = Scratch::new("sweep-unfinished");
     let out = text(scratch.path());
     let shard = ["sweep", "run-shard", "1/2", &text(&noise()), "--trials", "8", "--out", &out];

@@ -1,9 +1,8 @@
-//! Promise (the paper's claim): at the clean setting liver and abdomen show the same two ruptures by
-//! force/torque sensor and by virtual sensor, without false alarms. And its limit: where the joints rub
-//! as measured on a Panda, the motion starts from rest and the residual is zeroed before it, the claim
-//! does not hold.
+//! The paper's claim: without joint friction, force/torque sensor and virtual sensor detect the same two ruptures in liver and abdomen, without
+//! false alarms. Its limit: with the joint friction of a Panda, a start from rest and a residual zeroed before the motion, the claim does not
+//! hold.
 //!
-//! The table with all steps in between: `cargo run --release -p stylet-reproduce --example virtual_sensor_table`.
+//! Table of the intermediate conditions: `cargo run --release -p stylet-reproduce --example virtual_sensor_table`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -54,7 +53,7 @@ fn liver_and_abdomen_show_two_ruptures_each_by_both_sensors() {
 }
 
 #[test]
-fn joint_friction_drowns_the_abdomens_ruptures_in_false_alarms_when_the_sensor_is_zeroed_at_rest() {
+fn with_joint_friction_and_zeroing_at_rest_the_abdomen_has_false_alarms() {
     let mut scenario = Scenario::load(&path(FILES[1])).expect("valid");
     if let Robot::Arm(arm) = &mut scenario.robot {
         arm.joint_friction = ArmFriction::MeasuredDirectional;

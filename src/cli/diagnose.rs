@@ -5,7 +5,7 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;
 use stylet_api::output_folder::recover_parent;
-use stylet_api::{DiagnosisInputs, resource_estimate};
+use stylet_api::resource_estimate;
 use stylet_diagnose::Diagnosis;
 use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;

@@ -1,4 +1,4 @@
-//! The `stylet` binary and scratch folders for the tests of the whole.
+//! The `stylet` binary and temporary folders for the integration tests.
 #![allow(dead_code)]
 
 pub mod measured;
@@ -19,7 +19,7 @@ pub fn text(path: &Path) -> String {
     path.to_str().expect("a path").to_owned()
 }
 
-/// A folder of its own for a test, removed at the end.
+/// A temporary folder, removed on drop.
 pub struct Scratch(PathBuf);
 
 impl Scratch {
@@ -27,7 +27,7 @@ impl Scratch {
         Self::below(&std::env::temp_dir(), name)
     }
 
-    /// The same where nothing waits for a disk, on systems that have such a place.
+    /// The same in memory, on systems that support it.
     pub fn in_memory(name: &str) -> Self {
         let memory = Path::new("/dev/shm");
         if memory.is_dir() { Self::below(memory, name) } else { Self::new(name) }
@@ -77,7 +77,7 @@ pub fn stylet<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
         .expect("the binary starts")
 }
 
-/// Standard error as text, without the line breaks and frames that a terminal's width brings.
+/// Standard error as text, without line breaks and frames.
 pub fn stderr_text(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")

@@ -59,3 +59,8 @@ pub use stylet_plan::Limits;
 pub use stylet_record::{ColumnMap, ReadOptions, Recording, read_csv};
 pub use stylet_scenario::{EnhancerConfigFile, Scenario};
 pub use stylet_sweep::{Sweep, SweepFile};
+
+/// The README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -8,7 +8,7 @@ mod sweep;
 
 pub use benchmark::{
     BenchmarkArgs, BenchmarkCommand, BenchmarkDiagnoseArgs, BenchmarkExportArgs, BenchmarkPlanArgs,
-    BenchmarkScoreArgs, CaseArgs,
+    BenchmarkScoreArgs,
 };
 pub use diagnosis::{DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, PlanArgs, PredictArgs, RefitArg};
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
