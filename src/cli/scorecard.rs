@@ -8,7 +8,7 @@ use stylet_report::{percent, significant};
 use stylet_scenario::Scenario;
 use stylet_score::{EstimateError, Score, Trace};
 
-/// The scorecard of a simulated run, ready to print.
+/// Detected ruptures, estimates and errors of a simulated run.
 #[must_use]
 pub fn scorecard(finished: &Run) -> String {
     let (scenario, hash) = (&finished.scenario, &finished.hash);
@@ -28,10 +28,10 @@ pub fn scorecard(finished: &Run) -> String {
     if let Some(note) = settings_note(&finished.algorithm_runs) {
         let _ = writeln!(out, "note: {note}");
     }
-    for ran in &finished.algorithm_runs {
-        let Some(score) = &ran.score else { continue };
-        let _ = writeln!(out, "\n{}", ran.name);
-        ruptures(&mut out, scenario, score, &ran.trace);
+    for run in &finished.algorithm_runs {
+        let Some(score) = &run.score else { continue };
+        let _ = writeln!(out, "\n{}", run.name);
+        ruptures(&mut out, scenario, score, &run.trace);
         layers(&mut out, score);
         summary(&mut out, score);
     }
@@ -104,7 +104,7 @@ fn summary(out: &mut String, score: &Score) {
     let share = |value: Option<f64>| or_dash(value.map(percent));
     let _ = writeln!(
         out,
-        "  enhanced force  off by {} of the tip force (rms); {} before the exit; after the exit {} of the force is left",
+        "  enhanced force  relative rms error {}; {} before the exit; residual force after the exit {}",
         share(score.enhancement.rms_relative),
         share(score.enhancement.in_tissue_relative),
         share(score.enhancement.after_exit_relative),

@@ -22,7 +22,7 @@ impl ModelOrigin {
     /// that no longer exists is ignored.
     ///
     /// # Errors
-    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `believed` is wrong.
+    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `assumed` is invalid.
     pub fn of_model_file(model: &Path, assumed: Option<&Path>) -> Result<Self, Error> {
         let folder = model.parent().unwrap_or(Path::new("."));
         let diagnosis = diagnosis(&folder.join("diagnosis.json"))?;
@@ -32,7 +32,7 @@ impl ModelOrigin {
                 .ok()
                 .and_then(|inputs| Scenario::load(&inputs.scenario).ok()),
         };
-        Ok(Self { diagnosis, assumed: assumed })
+        Ok(Self { diagnosis, assumed })
     }
 }
 

@@ -47,12 +47,12 @@ pub fn plan(
     let name = if scenario.0 == "path" { scenario.1 } else { "scenario".to_owned() };
     let planned = run_in_background(py, progress, move |callback| {
         let done = Cell::new(0);
-        let tell = |what: &str| {
+        let report_stage = |what: &str| {
             done.set(done.get() + 1);
             callback.report_or_stop(what, done.get());
         };
         let at = [Path::new(&name), Path::new("limits")];
-        let planned = stylet::plan_after_recordings(assumed, &recordings, &limits, simulated, at, &tell)?;
+        let planned = stylet::plan_after_recordings(assumed, &recordings, &limits, simulated, at, &report_stage)?;
         Ok(Plan { json: planned.json()?, motion: planned.motion_ron()?, html: planned.html() })
     })?;
     planned.map_err(|e: stylet::Error| failure(e))

@@ -18,7 +18,7 @@ pub fn parse(kind: &str, source: &str) -> PyResult<Scenario> {
         "json" => {
             let scenario: Scenario = serde_json::from_str(source).map_err(|e| {
                 let text = e.to_string();
-                // The place is one in text that nobody wrote.
+                // The position refers to generated text.
                 let what = text.split(" at line ").next().unwrap_or(&text).to_owned();
                 failure(format!("scenario: {what}"))
             })?;
@@ -67,7 +67,7 @@ pub fn read_csv<'py>(
     Ok((dict, notes.into_iter().map(|n| n.message).collect()))
 }
 
-/// A simulated, felt and scored insertion.
+/// A simulated and scored insertion.
 #[pyclass(frozen)]
 pub struct Run {
     run: stylet::Run,

@@ -13,7 +13,7 @@ pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
     let plan = args.cases.selection().plan()?;
     let written = challenge_export::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
     print(&format!(
-        "{written} cases in {}\nKey (keep it from whoever answers): {}\n",
+        "{written} cases in {}\nKey, to be kept secret: {}\n",
         args.out.display(),
         challenge_export::key_path(&args.out).display()
     ))
