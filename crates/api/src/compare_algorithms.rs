@@ -83,8 +83,8 @@ impl CaseGroup {
             .cases
             .par_iter()
             .map(|id| {
-                let case =
-                    stylet_examine::make_case(id).map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
+                let case = stylet_examine::make_case(id)
+                    .map_err(|e| Error::internal(format!("{}: {e}", id.name())))?;
                 let counts = algorithms.iter().map(|a| count_detections(&case, *a)).collect();
                 done(algorithms.len() as u64);
                 Ok(counts)

@@ -101,24 +101,19 @@ fn recordings_at_different_rates_are_fitted_together() {
         .into_iter()
         .map(|(name, recording)| NamedRecording { name: name.to_owned(), recording, notes: Vec::new() })
         .collect();
-    let found =
-        diagnose(&assumed, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+    let found = diagnose(&assumed, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
     assert_eq!(found.verdict, Verdict::None, "{:?}", found.causes);
 }
 
 #[test]
 fn result_does_not_depend_on_the_number_of_threads() {
     let (assumed, simulated) = case();
-    let recordings = [NamedRecording {
-        name: "a.csv".to_owned(),
-        recording: simulated[2].clone(),
-        notes: Vec::new(),
-    }];
+    let recordings =
+        [NamedRecording { name: "a.csv".to_owned(), recording: simulated[2].clone(), notes: Vec::new() }];
     let json = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let found = pool.install(|| {
-            diagnose(&assumed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis)
-        });
+        let found = pool
+            .install(|| diagnose(&assumed, &recordings, &Options::default(), |_| {}).map(|e| e.diagnosis));
         serde_json::to_string(&found.expect("a diagnosis")).expect("JSON")
     };
     assert_eq!(json(1), json(3));

@@ -410,8 +410,8 @@ fn unmodelled_effect_gives_the_verdict_unknown() {
 fn unmodelled_effects_are_detected_with_a_cause_and_in_a_single_recording() {
     let ripple = |size_n| Some(UnmodelledForce::DepthRipple(size_n));
     let friction: AnyEffect = CoulombFriction { c_n_per_m: 90.0 }.into();
-    let with_cause = Case { outside: ripple(0.12), ..Case::with([friction]) }
-        .diagnosed("unmodelled effect and friction");
+    let with_cause =
+        Case { outside: ripple(0.12), ..Case::with([friction]) }.diagnosed("unmodelled effect and friction");
     assert_eq!(
         (with_cause.diagnosis.verdict, effects_of(&with_cause)),
         (Verdict::Unknown, vec!["coulomb_friction"])
@@ -419,7 +419,8 @@ fn unmodelled_effects_are_detected_with_a_cause_and_in_a_single_recording() {
     let alone = Case { outside: ripple(0.3), count: 1, ..Case::default() }
         .diagnosed("unmodelled effect in a single recording");
     assert_eq!(alone.diagnosis.verdict, Verdict::Unknown, "{:?}", effects_of(&alone));
-    let chirp = Case { outside: Some(UnmodelledForce::Chirp(0.1)), ..Case::default() }.diagnosed("unmodelled chirp");
+    let chirp =
+        Case { outside: Some(UnmodelledForce::Chirp(0.1)), ..Case::default() }.diagnosed("unmodelled chirp");
     assert_eq!(chirp.diagnosis.verdict, Verdict::Unknown, "{:?}", effects_of(&chirp));
 }
 

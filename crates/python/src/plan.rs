@@ -52,7 +52,8 @@ pub fn plan(
             callback.report_or_stop(what, done.get());
         };
         let at = [Path::new(&name), Path::new("limits")];
-        let planned = stylet::plan_after_recordings(assumed, &recordings, &limits, simulated, at, &report_stage)?;
+        let planned =
+            stylet::plan_after_recordings(assumed, &recordings, &limits, simulated, at, &report_stage)?;
         Ok(Plan { json: planned.json()?, motion: planned.motion_ron()?, html: planned.html() })
     })?;
     planned.map_err(|e: stylet::Error| failure(e))

@@ -24,7 +24,7 @@ pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn score(args: &BenchmarkScoreArgs) -> Result<(), Failure> {
-    let outcomes =
-        challenge_export::score_answers(&args.folder, &args.answers).map_err(|e| Failure::Check(e.to_string()))?;
+    let outcomes = challenge_export::score_answers(&args.folder, &args.answers)
+        .map_err(|e| Failure::Check(e.to_string()))?;
     print(&results_table::results_text(&outcomes))
 }

@@ -58,8 +58,20 @@ impl CaseSelection<'_> {
         };
         let plan = Plan {
             world,
-            wrong: parse_words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::as_str)?,
-            severities: parse_words("--severity", self.severity, Severity::ALL, Severity::parse, Severity::as_str)?,
+            wrong: parse_words(
+                "--misspecification",
+                self.misspecification,
+                Wrong::ALL,
+                Wrong::parse,
+                Wrong::as_str,
+            )?,
+            severities: parse_words(
+                "--severity",
+                self.severity,
+                Severity::ALL,
+                Severity::parse,
+                Severity::as_str,
+            )?,
             hide: parse_words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::as_str)?,
             size,
             cases: self.cases,
@@ -96,7 +108,8 @@ impl DiagnosisBenchmark {
         let journal = folder.join("cases.jsonl");
         let mut cases = plan.cases();
         if from_journal {
-            let completed = stylet_examine::run_cases::read_journal(&journal).map_err(|why| Error::output(folder, why))?;
+            let completed = stylet_examine::run_cases::read_journal(&journal)
+                .map_err(|why| Error::output(folder, why))?;
             cases.retain(|id| completed.contains_key(id));
         }
         Ok(Self { cases, plan, journal, lock })

@@ -60,7 +60,8 @@ impl PlanningBenchmark {
             remaining -= u64::from(c.open_because.is_some() && keep);
             keep
         });
-        let severity = if base.wrong == Wrong::Nothing { String::new() } else { format!(", {}", base.severity) };
+        let severity =
+            if base.wrong == Wrong::Nothing { String::new() } else { format!(", {}", base.severity) };
         let name = format!("{}: {}{severity}", base.world, base.wrong.as_str());
         write_table(&mut self.text, &name, &cases);
         self.rows.push((name, cases));
