@@ -33,7 +33,7 @@ pub struct ReplayResult {
 /// Pieces between two checkpoints.
 const CHECKPOINT_PIECES: usize = 24;
 
-/// Replays a law with ruptures at `instants` (s; [`NO_RUPTURE`] for layers that do not rupture).
+/// Replays a law with ruptures at `rupture_times` (s; [`NO_RUPTURE`] for layers that do not rupture).
 pub fn replay_with_ruptures(
     model: &CompiledModel,
     blocks: &BlockAverages,

@@ -262,8 +262,8 @@ fn the_intersection_is_near_the_border() {
     let at = intersection_time(&of(&one, 0, 180), &of(&two, 180, 240), &whole.cells()).expect("an instant");
     assert!((at - (3.59 - 0.5)).abs() < 1e-9, "{at}");
     // Parallel segments meet at their border.
-    let beside = Given::new(240, |t| 0.002 * (t - 2.4) + 1e-4);
-    let mut pair = [of(&one, 0, 100), of(&beside, 100, 240)];
+    let parallel = Given::new(240, |t| 0.002 * (t - 2.4) + 1e-4);
+    let mut pair = [of(&one, 0, 100), of(&parallel, 100, 240)];
     pair[1].segment = pair[0].segment.clone();
     let at = intersection_time(&pair[0], &pair[1], &one.cells()).expect("an instant");
     assert!((at - 1.99).abs() < 1e-9, "{at}");
