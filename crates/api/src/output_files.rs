@@ -61,6 +61,6 @@ impl OutputFiles {
     /// # Errors
     /// [`Error::Output`], [`Error::OtherCommand`]; the folder is then unchanged.
     pub fn write_locked(&self, lock: &OutputLock) -> Result<(), Error> {
-        lock.write_staged(&self.staged, &self.files)
+        lock.write_set(&self.staged, &self.files)
     }
 }

@@ -145,7 +145,7 @@ impl OutputLock {
         &self.folder
     }
 
-    /// Opens a file of a set for writing in pieces; [`OutputLock::write_staged`] commits it. Without that it is removed with the lock.
+    /// Opens a file of a set for writing in pieces; [`OutputLock::write_set`] commits it. Without that it is removed with the lock.
     ///
     /// # Errors
     /// [`Error::Output`]; the folder is then unchanged.
@@ -162,19 +162,11 @@ impl OutputLock {
         Ok(StagedFileWriter { name, place, file, hash: Sha256::new() })
     }
 
-    /// Writes a set of files. Files of the same names are replaced, others are left alone.
+    /// Writes a set: files in memory and staged files. Files of the same names are replaced, others are left alone.
     ///
     /// # Errors
     /// [`Error::OtherCommand`], [`Error::Output`]; the folder is then unchanged. [`Error::Unfinished`] when the old set cannot be restored.
-    pub fn write_all_files(&self, files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
-        self.write_staged(&[], files)
-    }
-
-    /// As [`Self::write_all_files`], together with staged files.
-    ///
-    /// # Errors
-    /// As [`Self::write_all_files`].
-    pub fn write_staged(&self, parts: &[StagedFile], files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
+    pub fn write_set(&self, parts: &[StagedFile], files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
         let names = files.iter().map(|(name, _)| *name).chain(parts.iter().map(|part| part.name));
         check_same_command(&self.folder, &names.collect::<Vec<_>>())?;
         let Err(why) = self.write_until(parts, files, &mut || false) else { return Ok(()) };
