@@ -131,7 +131,7 @@ impl ForceSensor {
         chain.extend_from_slice(effects);
         let chain = MeasurementChain::new(&chain);
         let spikes = effects.iter().filter_map(|effect| match effect {
-            AnyEffect::ForceSpikes(spikes) if !effect.is_neutral() => Some(spikes),
+            AnyEffect::ForceSpikes(spikes) if !effect.is_inactive() => Some(spikes),
             _ => None,
         });
         let spikes: Vec<Spikes> = spikes

@@ -128,7 +128,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         Some(sensor) => sensor,
         None => {
             let beside =
-                |e: &AnyEffect| matches!(e.place(), ChainStage::Tool | ChainStage::Sensor) && !e.is_neutral();
+                |e: &AnyEffect| matches!(e.stage(), ChainStage::Tool | ChainStage::Sensor) && !e.is_inactive();
             if scenario.effects.iter().any(beside) {
                 return Err(SimulateError::NotSupported {
                     what: "an effect of tool or force/torque sensor with `sensor: Virtual`",

@@ -1,16 +1,14 @@
-//! A needle that gives: the position of the tip at which needle and tissue are in balance.
+//! Compliant needle: the tip position at which needle and tissue are in balance.
 //!
-//! `needle_compliance` asks for `z_tip = z - f(z_tip, v_tip)/k_s` at every instant. Within a step the
-//! unknown is the tip's velocity `v` at its end, with the travel `dt ((1 - theta) v_before + theta v)`;
-//! `theta` is such that the step is exact for the tip's own relaxation, whose time constant is
-//! `tau = sum_i b_i l_i/(k_s + K_a)` (exponential fitting: Liniger and Willoughby 1970): 1/2 in steps far
-//! shorter than that, 1 (backward Euler) without viscous friction. The surplus
-//! `h(v) = z_tip + f/k_s - z` rises with `v` wherever force rises with depth and speed. It is solved by
-//! secant steps inside a bracket, without ruptures first. A layer that would give way on the way does,
-//! at its instant: the tip stays where it is, gets the velocity at which friction takes over what the
-//! layer has let go, and the rest of the step goes on from there. (Without viscous friction the tip
-//! jumps.) Where the force jumps at the dead band of `sgn` (dry friction), the solution may lie in the
-//! jump: the tip sticks and friction is what the spring asks for.
+//! `needle_compliance` requires `z_tip = z - f(z_tip, v_tip)/k_s` at every sample. Within a step the unknown is the tip
+//! velocity `v` at its end, with the travel `dt ((1 - theta) v_before + theta v)`. `theta` makes the step exact for the
+//! relaxation of the tip, whose time constant is `tau = sum_i b_i l_i/(k_s + K_a)` (exponential fitting: Liniger and
+//! Willoughby 1970): 1/2 in steps much shorter than `tau`, 1 (backward Euler) without viscous friction. The residual
+//! `h(v) = z_tip + f/k_s - z` increases with `v` wherever the force increases with depth and speed; its root is found by
+//! secant steps inside a bracket, first without ruptures. A layer that would rupture on the way does so at its time: the
+//! tip keeps its position, gets the velocity at which friction balances the released force, and the rest of the step
+//! continues from there (without viscous friction the tip jumps). Where the force jumps at the dead band of `sgn` (dry
+//! friction), the root may lie in the jump: the tip sticks, and the friction is what the spring force requires.
 
 use crate::effect::{SGN_DEAD_BAND_MPS, sgn};
 use crate::force::{Rupture, TissueForce};
@@ -18,46 +16,46 @@ use crate::force_law::ForceLaw;
 use crate::force_law_state::ForceLawState;
 use crate::rupture_policy::RupturePolicy;
 
-/// Largest surplus in metres that counts as balance.
+/// Largest residual in metres that counts as balance.
 const TOLERANCE_M: f64 = 1e-13;
 
-/// Share of the forces in play that may be missing when a tip slips.
-const NEARLY: f64 = 1e-9;
+/// Relative tolerance of the force balance of a slipping tip.
+const SLIP_TOLERANCE: f64 = 1e-9;
 
-/// Evaluations of the law per search at most.
+/// Most evaluations of the force law per root search.
 const MAX_TRIALS: usize = 80;
 
-/// Evaluations after which the bracket is only halved: those left are enough for any.
-const SECANTS: usize = 16;
+/// Evaluations after which the search only bisects; the remaining ones suffice for any bracket.
+const MAX_SECANT_TRIALS: usize = 16;
 
-/// Just outside the dead band.
+/// Velocity in m/s just outside the dead band.
 const SLIDING_MPS: f64 = SGN_DEAD_BAND_MPS * (1.0 + 1e-9);
 
-/// Where the tip is in balance.
+/// Tip position and velocity in balance.
 #[derive(Clone, Copy)]
 struct Balance {
     z: f64,
     v: f64,
-    /// The force there, when it could be told without the effects' remembering anything.
+    /// The force there, when it does not depend on the state of an effect.
     force: Option<TissueForce>,
-    /// Force in N when the tip sticks, the spring's, and the law's on the two sides of the jump in which it lies.
+    /// For a sticking tip: the spring force in N, and the force on both sides of the jump.
     stuck: Option<(f64, [TissueForce; 2])>,
 }
 
-/// What is sought: the tip's velocity, or its position when no time has passed.
+/// The equation of a step. Its unknown is the tip velocity, or the tip position in a step of zero length.
 #[derive(Clone, Copy)]
 struct Step {
     dt: f64,
-    /// Share of the velocity at the end in the travel, 1/2 to 1.
+    /// Weight of the end velocity in the travel, 1/2 to 1.
     theta: f64,
     base_m: f64,
     from_m: f64,
     v_before: f64,
-    /// Added to the travel, so that a tip that follows an accelerating base is where it belongs.
+    /// Correction of the travel for an accelerating base.
     lead_m: f64,
 }
 
-/// The weight of the velocity at the end of a step of `dt_s` for a relaxation with `tau_s`.
+/// Weight of the end velocity in a step of `dt_s` that is exact for a relaxation with `tau_s`.
 fn theta(dt_s: f64, tau_s: f64) -> f64 {
     let ratio = dt_s / tau_s;
     if ratio.is_nan() || ratio > 700.0 {
@@ -69,8 +67,8 @@ fn theta(dt_s: f64, tau_s: f64) -> f64 {
     }
 }
 
-/// The force of a tip that sticks: `total_n`, with what is missing of it given to friction and tip as they share the jump of the law's
-/// force between its two sides.
+/// Sets the force of a sticking tip to `total_n`. The difference is shared between friction and tip force in the proportion
+/// of the jump between the forces on both sides.
 fn stick(force: &mut TissueForce, total_n: f64, [low, high]: [TissueForce; 2]) {
     let missing = total_n - force.total_n;
     let jump = high.total_n - low.total_n;
@@ -92,9 +90,8 @@ impl Step {
         }
     }
 
-    /// Where to go from `u` towards `target`: not across an edge of the dead band without having
-    /// looked at both of its sides.
-    fn up_to_the_jump(&self, u: f64, target: f64) -> f64 {
+    /// The next trial from `u` towards `target`, which evaluates both sides of an edge of the dead band before crossing it.
+    fn limit_to_dead_band_edge(&self, u: f64, target: f64) -> f64 {
         let (here, there) = (sgn(u), sgn(target));
         if self.dt == 0.0 || here == there {
             return target;
@@ -110,26 +107,26 @@ impl Step {
 }
 
 impl ForceLaw {
-    /// [`Law::step`] with a needle that gives, from its kinematics on.
+    /// [`ForceLaw::step`] with a compliant needle, after the kinematic effects.
     #[inline(never)]
     pub(crate) fn step_compliant_needle(
         &self,
         state: &mut ForceLawState,
         time_s: f64,
         base_m: f64,
-        breaking: &mut impl RupturePolicy,
+        policy: &mut impl RupturePolicy,
     ) -> TissueForce {
         let mut base_before = if state.base_known { state.base_m } else { base_m };
         state.base_known = true;
         state.base_m = base_m;
-        let mut just_released = false; // a layer has given way at this very instant
+        let mut just_released = false; // a layer has ruptured at this time
         loop {
-            // Every turn but the last breaks a layer or a membrane, so there are few.
+            // Every iteration but the last ruptures a layer or a membrane, so there are few.
             let dt = time_s - state.time_s;
             let (viscous, stiffness) = self.resistance(state);
             let tau = viscous / (self.needle_n_per_m + stiffness);
             let theta = theta(dt, tau);
-            // The tip's speed changes as the base's does: its travel is the mean of both speeds.
+            // The tip accelerates with the base: its travel is that of the mean speed.
             let lead_m = (0.5 - theta) * state.base_acceleration_mps2 * dt * dt;
             let step = Step { dt, theta, base_m, from_m: state.z_m, v_before: state.v_mps, lead_m };
             let Balance { z, v, force, stuck } = if just_released && dt <= 0.0 && viscous > 0.0 {
@@ -146,7 +143,7 @@ impl ForceLaw {
                     Some(force) => force.elastic_n,
                     None => self.layer_elastic_force(state.ruptured, slab, dt, z, &mut state.effects),
                 };
-                if let Some(rupture) = self.try_rupture(state, slab, dt, (z, v), elastic, 0.0, breaking) {
+                if let Some(rupture) = self.try_rupture(state, slab, dt, (z, v), elastic, 0.0, policy) {
                     let share = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
                     let base = base_before + share * (base_m - base_before);
                     self.release_layer(state, &rupture, base, v, share);
@@ -155,9 +152,9 @@ impl ForceLaw {
                     continue;
                 }
             }
-            let moment = state.tip_state(time_s, z, v);
-            state.store(&moment, elastic);
-            let mut force = force.unwrap_or_else(|| self.total_force(&moment, elastic, &mut state.effects));
+            let tip = state.tip_state(time_s, z, v);
+            state.store(&tip, elastic);
+            let mut force = force.unwrap_or_else(|| self.total_force(&tip, elastic, &mut state.effects));
             if let Some((total_n, sides)) = stuck {
                 stick(&mut force, total_n, sides);
             }
@@ -165,8 +162,8 @@ impl ForceLaw {
         }
     }
 
-    /// The tip at the instant at which a layer has given way, the base being at `base_m`: friction takes
-    /// over what the layer has let go.
+    /// Moves the tip to the time of a rupture, with the base at `base_m` and the velocity at which friction balances the
+    /// released force.
     fn release_layer(
         &self,
         state: &mut ForceLawState,
@@ -185,25 +182,24 @@ impl ForceLaw {
         }
     }
 
-    /// The tip's velocity, where it is, at which friction is what the needle presses with.
+    /// The tip velocity at which friction balances the needle force, at the present tip position.
     ///
-    /// Plain viscous friction tells it at once. Where friction is more than that at such a speed
-    /// (`power_law_friction` above 1), a lower one is looked for: false position (Illinois) in between.
-    /// Where it is less, the plain one stays: the tip would be faster still, by any factor for friction
-    /// that hardly grows with speed, but its travel to the new balance is the same.
+    /// Linear viscous friction gives it directly. Where friction is larger at that speed (`power_law_friction` above 1), the
+    /// root below is found by false position (Illinois). Where friction is smaller, the linear value is kept: the tip would
+    /// be faster, but its travel to the new balance is the same.
     fn slip_speed(&self, state: &mut ForceLawState, base_m: f64, viscous: f64) -> f64 {
-        let memory = state.effects;
+        let effect_states = state.effects;
         let (at_m, v_mps) = (state.z_m, state.v_mps);
         let pressed_n = (base_m - at_m) * self.needle_n_per_m;
         let mut missing = |v_before: f64| {
             let step = Step { dt: 0.0, theta: 1.0, base_m, from_m: at_m, v_before, lead_m: 0.0 };
             let force = self.trial(state, &step, at_m);
-            state.effects = memory;
+            state.effects = effect_states;
             pressed_n - force.total_n
         };
         let (mut from, mut lacks) = (v_mps, missing(v_mps));
         let mut to = from + lacks / viscous;
-        let close = NEARLY * (f64::abs(pressed_n) + f64::abs(lacks));
+        let close = SLIP_TOLERANCE * (f64::abs(pressed_n) + f64::abs(lacks));
         let mut left = missing(to);
         for _ in 0..MAX_TRIALS {
             if left.abs() <= close || to == from || (lacks > 0.0) == (left > 0.0) {
@@ -221,14 +217,14 @@ impl ForceLaw {
         to
     }
 
-    /// Viscous friction in N s/m and stiffness in N/m that the tip feels where it is.
+    /// Viscous friction in N s/m and stiffness in N/m at the present tip position.
     fn resistance(&self, state: &ForceLawState) -> (f64, f64) {
         let viscous = self.slabs.iter().map(|s| s.friction_ns_per_m2 * s.length_inside_m(state.z_m)).sum();
         let active = self.slabs.get(state.ruptured).filter(|s| state.z_m > s.front_m);
         (viscous, active.map_or(0.0, |s| s.stiffness_n_per_m))
     }
 
-    /// Force at a trial position of the tip, with nothing breaking and nothing remembered.
+    /// Force at a trial value of the unknown, without ruptures.
     fn trial(&self, state: &mut ForceLawState, step: &Step, u: f64) -> TissueForce {
         let (z_m, v_mps) = step.tip(u);
         let elastic = match self.slabs.get(state.ruptured) {
@@ -238,7 +234,7 @@ impl ForceLaw {
         self.total_force(&state.tip_state(state.time_s + step.dt, z_m, v_mps), elastic, &mut state.effects)
     }
 
-    /// How fast the surplus rises with the unknown by stiffness and viscous friction alone.
+    /// Derivative of the residual by the unknown, from stiffness and viscous friction only.
     fn slope(&self, state: &ForceLawState, step: &Step, u: f64) -> f64 {
         let (z, v) = step.tip(u);
         let mut friction = 0.0;
@@ -261,11 +257,11 @@ impl ForceLaw {
         }
     }
 
-    /// Solves `z_tip + f/k_s - z = 0` with the layers as they are.
+    /// Solves `z_tip + f/k_s - z = 0` without ruptures.
     fn balance(&self, state: &mut ForceLawState, step: Step) -> Balance {
-        let memory = self.has_state.then_some(state.effects);
+        let effect_states = self.has_state.then_some(state.effects);
         let mut u = if step.dt > 0.0 { step.v_before + state.dv_mps } else { step.base_m };
-        let (mut low, mut high) = (None, None); // the bracket: surplus negative, positive
+        let (mut low, mut high) = (None, None); // the bracket: residual negative, positive
         let mut sides = [TissueForce::default(); 2]; // and the forces there
         let mut before: Option<(f64, f64)> = None;
         let mut best = (u, f64::INFINITY, None);
@@ -273,18 +269,18 @@ impl ForceLaw {
         let mut sticks = false;
         for turn in 0..MAX_TRIALS {
             let force = self.trial(state, &step, u);
-            if let Some(memory) = &memory {
-                state.effects = *memory;
+            if let Some(effect_states) = &effect_states {
+                state.effects = *effect_states;
             }
-            let surplus = step.tip(u).0 + force.total_n / self.needle_n_per_m - step.base_m;
-            if surplus.abs() < best.1 {
-                best = (u, surplus.abs(), Some(force));
+            let residual = step.tip(u).0 + force.total_n / self.needle_n_per_m - step.base_m;
+            if residual.abs() < best.1 {
+                best = (u, residual.abs(), Some(force));
             }
-            if surplus.abs() <= TOLERANCE_M {
+            if residual.abs() <= TOLERANCE_M {
                 break;
             }
-            *if surplus < 0.0 { &mut low } else { &mut high } = Some(u);
-            sides[usize::from(surplus >= 0.0)] = force;
+            *if residual < 0.0 { &mut low } else { &mut high } = Some(u);
+            sides[usize::from(residual >= 0.0)] = force;
             if let (Some(low), Some(high)) = (low, high)
                 && f64::abs(high - low) <= smallest
             {
@@ -292,32 +288,32 @@ impl ForceLaw {
                 best = (if low.abs() < high.abs() { low } else { high }, 0.0, None);
                 break;
             }
-            let secant = before.map(|(at, was)| (surplus - was) / (u - at));
+            let secant = before.map(|(at, was)| (residual - was) / (u - at));
             let slope = match (secant, before) {
                 (Some(slope), Some((at, _))) if slope > 0.0 && slope.is_finite() && sgn(at) == sgn(u) => {
                     slope
                 }
                 _ => self.slope(state, &step, u),
             };
-            let mut next = u - surplus / slope;
+            let mut next = u - residual / slope;
             if self.force_may_jump {
-                next = step.up_to_the_jump(u, next);
+                next = step.limit_to_dead_band_edge(u, next);
             }
             if let (Some(low), Some(high)) = (low, high) {
                 let inside = f64::min(low, high) < next && next < f64::max(low, high);
-                // Where the force jumps, secants creep: a search that takes long halves the bracket alone.
-                if !inside || turn % 4 == 3 || turn >= SECANTS {
+                // Where the force jumps, secant steps converge slowly: then bisect.
+                if !inside || turn % 4 == 3 || turn >= MAX_SECANT_TRIALS {
                     next = 0.5 * (low + high);
                 }
             } else if turn > 3 {
-                // Force that falls with depth or speed: look further and further.
+                // Force that decreases with depth or speed: extend the search range.
                 next = u + (next - u) * (1u64 << (turn - 3).min(40)) as f64;
             }
-            before = Some((u, surplus));
+            before = Some((u, residual));
             u = next;
         }
         let (z, v) = step.tip(best.0);
-        let force = best.2.filter(|_| memory.is_none());
+        let force = best.2.filter(|_| effect_states.is_none());
         Balance { z, v, force, stuck: sticks.then_some(((step.base_m - z) * self.needle_n_per_m, sides)) }
     }
 }
@@ -364,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_exact_for_a_speed_that_dies_away() {
+    fn a_step_is_exact_for_an_exponentially_decaying_speed() {
         // v = exp(-t/tau) travels tau (1 - exp(-dt/tau)), which (1 - theta) v(0) + theta v(dt) has to be per unit of time.
         for ratio in [1e-6, 9e-4, 1.1e-3, 0.02, 0.5, 3.0, 40.0, 699.0] {
             let (end, travel) = (libm::exp(-ratio), -libm::expm1(-ratio) / ratio);
@@ -378,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tip_travels_with_the_weighted_mean_of_its_speeds_and_in_no_time_goes_where_it_is_put() {
+    fn the_travel_is_the_weighted_mean_speed_and_a_step_of_zero_length_sets_the_position() {
         let step = Step { dt: 0.1, theta: 0.7, base_m: 9.0, from_m: 2.0, v_before: 3.0, lead_m: 0.25 };
         let (z, v) = step.tip(5.0);
         assert_eq!(v, 5.0);
@@ -387,27 +383,27 @@ mod tests {
     }
 
     #[test]
-    fn a_search_looks_at_both_sides_of_an_edge_of_the_dead_band_before_it_crosses_it() {
+    fn a_search_evaluates_both_sides_of_a_dead_band_edge_before_crossing_it() {
         let step = Step { dt: 0.1, theta: 0.7, base_m: 0.0, from_m: 0.0, v_before: 0.0, lead_m: 0.0 };
         let edge = SGN_DEAD_BAND_MPS;
         for side in [1.0, -1.0] {
             // From outside to the inside or to the other side: just outside first, then the edge, which is inside.
             for target in [0.0, -side * 0.01] {
-                assert_eq!(step.up_to_the_jump(side * 0.01, target), side * SLIDING_MPS);
-                assert_eq!(step.up_to_the_jump(side * SLIDING_MPS, target), side * edge);
+                assert_eq!(step.limit_to_dead_band_edge(side * 0.01, target), side * SLIDING_MPS);
+                assert_eq!(step.limit_to_dead_band_edge(side * SLIDING_MPS, target), side * edge);
             }
             // From inside to the outside the other way round.
-            assert_eq!(step.up_to_the_jump(0.3 * edge, side * 0.01), side * edge);
-            assert_eq!(step.up_to_the_jump(side * edge, side * 0.01), side * SLIDING_MPS);
+            assert_eq!(step.limit_to_dead_band_edge(0.3 * edge, side * 0.01), side * edge);
+            assert_eq!(step.limit_to_dead_band_edge(side * edge, side * 0.01), side * SLIDING_MPS);
             assert!(sgn(side * edge) == 0.0 && sgn(side * SLIDING_MPS) == side);
             // On one side there is nothing to look at, and without time no speed.
-            assert_eq!(step.up_to_the_jump(side * 0.01, side * 0.02), side * 0.02);
-            assert_eq!(Step { dt: 0.0, ..step }.up_to_the_jump(side * 0.01, -side), -side);
+            assert_eq!(step.limit_to_dead_band_edge(side * 0.01, side * 0.02), side * 0.02);
+            assert_eq!(Step { dt: 0.0, ..step }.limit_to_dead_band_edge(side * 0.01, -side), -side);
         }
     }
 
     #[test]
-    fn the_tip_feels_the_friction_of_all_it_is_in_and_the_spring_of_the_active_layer() {
+    fn resistance_is_the_friction_of_all_layers_and_the_stiffness_of_the_active_one() {
         let (law, mut state) = law(&[]);
         let resistance = |state: &ForceLawState| law.resistance(state);
         assert_eq!(resistance(&state), (5000.0 * 0.01 + 7000.0 * 0.005, 90.0));
@@ -419,13 +415,13 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_is_the_surplus_s_derivative_where_the_force_rises() {
+    fn the_slope_is_the_derivative_of_the_residual_where_the_force_increases() {
         let (law, mut state) = law(&[]);
         let base = Step { dt: 0.005, theta: 0.6, base_m: 0.017, from_m: 0.015, v_before: 0.004, lead_m: 0.0 };
-        let mut surplus = |step: &Step, u: f64| {
-            let memory = state.effects;
+        let mut residual = |step: &Step, u: f64| {
+            let effect_states = state.effects;
             let force = law.trial(&mut state, step, u);
-            state.effects = memory;
+            state.effects = effect_states;
             step.tip(u).0 + force.total_n / NEEDLE_N_PER_M - step.base_m
         };
         // Advancing and gently retracting; in no time where the tip is anywhere in the stack or behind it.
@@ -433,7 +429,7 @@ mod tests {
         let at_once = [0.004, 0.012, 0.029, 0.031].map(|z| (Step { dt: 0.0, ..base }, z));
         for (step, u) in in_time.into_iter().chain(at_once) {
             let h = 1e-7;
-            let derivative = (surplus(&step, u + h) - surplus(&step, u - h)) / (2.0 * h);
+            let derivative = (residual(&step, u + h) - residual(&step, u - h)) / (2.0 * h);
             near(
                 law.slope(&ForceLawState { ruptured: 1, ..ForceLawState::default() }, &step, u),
                 derivative,
@@ -443,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_force_falls_with_depth_the_slope_is_that_of_friction_alone() {
+    fn where_the_force_decreases_with_depth_the_slope_is_that_of_friction_only() {
         let (law, state) = law(&[]);
         let step = Step { dt: 0.005, theta: 0.6, base_m: 0.017, from_m: 0.015, v_before: 0.0, lead_m: 0.0 };
         // Out of the tissue at 20 mm/s friction on the growing length outweighs the spring of 90 N/m.
@@ -453,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tip_slips_at_the_speed_at_which_friction_is_what_the_needle_presses_with() {
+    fn the_slip_speed_balances_friction_and_needle_force() {
         // 2 mm behind its base the tip is pressed with 1.6 N; 85 Ns/m rub, and the spring still holds 0.45 N.
         for (v_before, exponent, exact) in
             [(0.004, 1.0, true), (0.004, 1.5, true), (0.0, 3.0, true), (0.3, 1.7, true), (0.004, 0.6, false)]
@@ -473,7 +469,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_that_gives_way_leaves_the_tip_where_it_is_with_the_speed_of_that_instant() {
+    fn at_a_rupture_the_tip_keeps_its_position_and_gets_the_slip_speed() {
         let rupture =
             Rupture { layer: 2, time_s: 0.004, position_m: 0.0152, released_n: 0.4, by_force: true };
         let (mut law, state) = law(&[]);
@@ -497,7 +493,7 @@ mod tests {
     }
 
     #[test]
-    fn what_holds_a_tip_is_shared_as_the_jump_of_the_force_is() {
+    fn the_force_of_a_sticking_tip_is_shared_in_proportion_to_the_jump() {
         let side = |friction_n, tip_extra_n, tip_n| TissueForce {
             total_n: friction_n + tip_extra_n,
             friction_n,
@@ -524,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn a_balance_is_exact_or_stuck_where_dry_friction_jumps() {
+    fn a_balance_is_exact_or_the_tip_sticks_in_the_jump_of_dry_friction() {
         for (v_before, base_m, sticks) in
             [(0.004, 0.0165, false), (-0.004, 0.0145, false), (0.0, 0.015_45, true)]
         {

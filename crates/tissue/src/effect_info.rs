@@ -1,37 +1,50 @@
-//! What is known about each effect, for listing (`stylet effects`), validating and fitting.
+//! Description of each effect, for listing (`stylet effects`), validation and fitting.
 
-use crate::effect::ChainStage;
-use crate::effects::LIBRARY;
+use crate::chain_stage::ChainStage;
 
-/// One effect of the library: what it says, where it comes from and how it shows.
+/// Description of one effect of the library.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct EffectInfo {
     /// Stable name in snake case.
     pub id: &'static str,
-    /// The equation, in the symbols of SPEC section 1.
+    /// The equation, in the symbols of docs/reference/model.md.
     pub equation: &'static str,
-    /// Who described it, or where it was measured.
+    /// Literature, or where it was measured.
     pub source: &'static str,
     /// How it is recognised in a recording.
     pub signature: &'static str,
-    /// Place in the chain.
+    /// Stage in the chain.
     pub stage: ChainStage,
     /// Its parameters, in the order of [`AnyEffect::parameters`](crate::AnyEffect::parameters).
     pub parameters: &'static [ParameterInfo],
     /// The same effect with more terms, if there is such a variant.
     pub extended: Option<&'static EffectInfo>,
-    /// Where a search for it begins.
+    /// Start values of a search for it.
     pub proposal: Proposal,
     /// Ids of effects that hold this one as a special case.
     pub nested_in: &'static [&'static str],
-    /// It takes the part that any force of its kind would, whatever the law behind that: a tone or a breath of whatever comes and goes,
-    /// presliding friction of any play at a turn. Beside something unknown it has to act all the more by its own law to be a cause.
+    /// Whether the effect also fits forces of another origin: a tone or a tissue motion fits any periodic force, presliding
+    /// friction any hysteresis at a reversal. Together with an unmodelled force such an effect needs stronger evidence.
     pub absorbs_unmodelled: bool,
 }
 
 impl EffectInfo {
-    /// What is known about the parameter of this path, further terms of the larger variant included.
+    /// Fields that most entries share: a per-layer effect without an extended form.
+    pub(crate) const DEFAULTS: Self = Self {
+        id: "",
+        equation: "",
+        source: "",
+        signature: "",
+        stage: ChainStage::Geometry,
+        parameters: &[],
+        extended: None,
+        proposal: Proposal::PerLayer,
+        nested_in: &[],
+        absorbs_unmodelled: false,
+    };
+
+    /// The parameter of this path, including further terms of the extended form.
     #[must_use]
     pub fn parameter(&self, path: &str) -> Option<&'static ParameterInfo> {
         let larger = self.extended.map_or(&[][..], |l| l.parameters);
@@ -39,38 +52,39 @@ impl EffectInfo {
     }
 }
 
-/// Where a search for an effect in measured data begins.
+/// Start values of a search for an effect in measured data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Proposal {
-    /// Groups of parameter vectors. What such an effect adds to the force is a column; the columns of a group act together,
-    /// and their coefficients scale the strengths. Several groups: shapes in which the force is not linear.
+    /// Groups of parameter vectors. The change of force at each vector is a column of a regression; the columns of a group
+    /// enter together, and their coefficients scale the strengths. Several groups: shapes in which the force is not linear.
     LinearColumns(&'static [&'static [&'static [f64]]]),
-    /// One column per inner face, moved by so many metres; the first parameter is the layer before it.
+    /// One column per inner face, moved by this many metres; the first parameter is the layer in front of it.
     LayerFaces(f64),
-    /// A motion of the tissue at any of a grid of frequencies: how the force changes with depth and speed makes the columns.
+    /// A motion of the tissue at each of a grid of frequencies: columns from the sensitivity to depth and speed.
     TissueMotion,
-    /// A line of the residual's spectrum.
+    /// A spectral line of the residual.
     SpectralTone,
-    /// An element that stretches and breaks, at any depth.
+    /// A membrane at any depth.
     MembraneRupture,
-    /// The [larger form](EffectInfo::larger) of an effect that stands: factors of its numbers, repeated until they are as many.
+    /// The [extended form](EffectInfo::extended) of an effect that is already in the model: factors on its parameters,
+    /// repeated to the length of the extended form.
     SplitTerm(&'static [&'static [f64]]),
-    /// Read off the raw samples before any law.
+    /// Found in the raw samples, without a force law.
     RawSamples,
-    /// Describes one layer at a time: not sought in single insertions.
+    /// Acts on one layer at a time: not a candidate for single insertions.
     PerLayer,
 }
 
 /// How a parameter enters a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FitScale {
-    /// As it is.
+    /// Unchanged.
     Linear,
     /// By its logarithm: a time constant, a frequency.
     Log,
-    /// By its reciprocal: the stiffness of what is rigid when neutral.
+    /// By its reciprocal: a stiffness that is infinite when inactive.
     Reciprocal,
 }
 
@@ -80,41 +94,39 @@ pub enum FitScale {
 pub struct ParameterInfo {
     /// Path from the effect, as in outputs: `c_n_per_m`, `terms.0.fraction`.
     pub path: &'static str,
-    /// Unit; empty for a ratio or a number.
+    /// Unit; empty for a ratio or a count.
     pub unit: &'static str,
-    /// What it is.
+    /// Meaning, for listings.
     pub meaning: &'static str,
     /// Smallest value that makes sense physically.
     pub low: f64,
     /// Largest value that makes sense physically.
     pub high: f64,
-    /// Value at which the effect vanishes, all strengths being at theirs. For a parameter that is
-    /// not a strength just a valid value.
+    /// Value at which the effect vanishes, together with the other strengths. For a shape parameter any valid value.
     pub inactive: f64,
-    /// True when this parameter says how strong the effect is; false for one that only shapes it
-    /// (a frequency, a time constant, a depth).
+    /// Whether the parameter is a strength; otherwise it only shapes the effect (a frequency, a time constant, a depth).
     pub strength: bool,
-    /// Where a fit may start: a typical value.
+    /// Typical value, a start value of fits.
     pub start: f64,
-    /// Where a fit should look, for forces of 0.5-6 N, layers of 5-80 mm and 0.5-13 mm/s.
+    /// Search range of fits, for forces of 0.5-6 N, layers of 5-80 mm and speeds of 0.5-13 mm/s.
     pub search: (f64, f64),
-    /// Where it shows in a reference insertion of some newtons and centimetres, when a typical value does not.
+    /// Value for the reference insertion of `stylet effects`, where the typical value has no visible effect.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub demonstration: Option<f64>,
-    /// True when the search should go in the logarithm.
+    /// Whether the search is on a logarithmic scale.
     pub log: bool,
-    /// True when only whole numbers make sense.
+    /// Whether only integers are valid.
     pub integer: bool,
-    /// Standard deviation with which it typically differs from one insertion to the next; zero for a number of the law.
+    /// Typical standard deviation between recordings; zero for a parameter that is common to all.
     pub between_recordings_sd: f64,
-    /// Mean and standard deviation of what was measured of it elsewhere, where a set alone says too little.
+    /// Normal prior (mean, standard deviation) from other measurements, where one data set does not identify it.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub measured_prior: Option<(f64, f64)>,
 }
 
 impl ParameterInfo {
-    /// How the parameter enters a fit: strengths as they are (a fit may then shrink them to nothing), shapes by their
-    /// logarithm where the library says so.
+    /// How the parameter enters a fit: strengths unchanged, so that a fit may shrink them to zero, shapes by their logarithm
+    /// where [`log`](Self::log) is set.
     #[must_use]
     pub fn fit_scale(&self) -> FitScale {
         match (self.strength, self.inactive == f64::INFINITY) {
@@ -124,7 +136,7 @@ impl ParameterInfo {
         }
     }
 
-    /// A parameter that says how strong the effect is.
+    /// A strength.
     pub(crate) const fn strength(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self {
             path,
@@ -144,7 +156,7 @@ impl ParameterInfo {
         }
     }
 
-    /// A parameter that only shapes the effect.
+    /// A shape parameter.
     pub(crate) const fn shape(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self { strength: false, ..Self::strength(path, unit, meaning) }
     }
@@ -154,37 +166,37 @@ impl ParameterInfo {
         Self { low, high, ..self }
     }
 
-    /// Neutral value.
-    pub(crate) const fn inactive(self, neutral: f64) -> Self {
-        Self { inactive: neutral, ..self }
+    /// Inactive value.
+    pub(crate) const fn inactive(self, value: f64) -> Self {
+        Self { inactive: value, ..self }
     }
 
-    /// Typical value and range of a fit.
+    /// Typical value and search range.
     pub(crate) const fn search(self, start: f64, low: f64, high: f64) -> Self {
         Self { start, search: (low, high), ..self }
     }
 
-    /// A value that shows in a reference insertion.
-    pub(crate) const fn demonstration(self, shown: f64) -> Self {
-        Self { demonstration: Some(shown), ..self }
+    /// Value for the reference insertion.
+    pub(crate) const fn demonstration(self, value: f64) -> Self {
+        Self { demonstration: Some(value), ..self }
     }
 
-    /// To be searched in the logarithm.
+    /// Logarithmic search.
     pub(crate) const fn log(self) -> Self {
         Self { log: true, ..self }
     }
 
-    /// Another value in every insertion, with this standard deviation.
+    /// Differs between recordings, with this standard deviation.
     pub(crate) const fn between_recordings_sd(self, sd: f64) -> Self {
         Self { between_recordings_sd: sd, ..self }
     }
 
-    /// Measured elsewhere with this mean and standard deviation.
+    /// Normal prior with this mean and standard deviation.
     pub(crate) const fn measured_prior(self, mean: f64, sd: f64) -> Self {
         Self { measured_prior: Some((mean, sd)), ..self }
     }
 
-    /// Whole numbers only.
+    /// Integers only.
     pub(crate) const fn integer(self) -> Self {
         Self { integer: true, ..self }
     }
@@ -193,13 +205,13 @@ impl ParameterInfo {
 /// A parameter outside its physical range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterError {
-    /// Effect, by its id.
+    /// Id of the effect.
     pub effect: &'static str,
     /// Path of the parameter.
     pub path: &'static str,
-    /// The value that was given.
+    /// The invalid value.
     pub value: f64,
-    /// What would be right, both ends included.
+    /// Valid range, both ends included.
     pub allowed: (f64, f64),
 }
 
@@ -216,31 +228,3 @@ impl core::fmt::Display for ParameterError {
 }
 
 impl core::error::Error for ParameterError {}
-
-/// Effects that measured insertions asked for beyond the general library. They describe one layer at a
-/// time, so that a search over single effects has no use for them.
-const PER_LAYER: [&str; 7] = [
-    "deep_indentation",
-    "layer_coupling",
-    "layer_stiffening",
-    "release_depth",
-    "delayed_puncture",
-    "viscoelastic_presliding",
-    "shaft_slip",
-];
-
-/// The general effects in the order of the chain, one entry per row of SPEC section 6.
-pub fn general_effects() -> impl Iterator<Item = &'static EffectInfo> {
-    LIBRARY.iter().map(|entry| entry()).filter(|entry| !PER_LAYER.contains(&entry.id))
-}
-
-/// Effects that describe one layer at a time, or how layers give way: found in measured insertions.
-pub fn per_layer_effects() -> impl Iterator<Item = &'static EffectInfo> {
-    LIBRARY.iter().map(|entry| entry()).filter(|entry| PER_LAYER.contains(&entry.id))
-}
-
-/// The entry of one effect.
-#[must_use]
-pub fn effect_info(id: &str) -> Option<&'static EffectInfo> {
-    general_effects().chain(per_layer_effects()).find(|entry| entry.id == id)
-}

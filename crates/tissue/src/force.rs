@@ -1,9 +1,9 @@
-//! What the law says about one sample: forces with their ground truth, and ruptures.
+//! Output of the force law: the force of one sample with its ground truth, and ruptures.
 
-/// The force of one sample, with its ground truth.
+/// The force of one sample with its components (docs/reference/model.md, Symbols).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissueForce {
-    /// Whole force at the needle's base, `f`, in N; positive resists insertion.
+    /// Total force `f` at the needle's base in N; positive resists the insertion.
     pub total_n: f64,
     /// Elastic force `f_K` of the active layer in N.
     pub elastic_n: f64,
@@ -13,8 +13,8 @@ pub struct TissueForce {
     pub tip_extra_n: f64,
     /// Cumulative friction of the ruptured layers, `D = sum b_j l_j`, in N s/m.
     pub cumulative_friction_ns_per_m: f64,
-    /// What the tip feels, in N: the force less all friction of the passed layers along the shaft, viscous (`D v`), dry and
-    /// presliding; what enhancement is after.
+    /// Tip force in N, the target of force enhancement: `f` without the friction of the passed layers along the shaft,
+    /// viscous (`D v`), dry and presliding.
     pub tip_n: f64,
     /// Active layer, 1-based; number of layers + 1 after the last rupture.
     pub active_layer: usize,
@@ -36,17 +36,17 @@ impl TissueForce {
     }
 }
 
-/// A layer gave way.
+/// A rupture of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rupture {
     /// Layer, 1-based.
     pub layer: usize,
-    /// Instant in seconds, interpolated between the two samples around it.
+    /// Time in seconds, interpolated between the two samples around it.
     pub time_s: f64,
-    /// Tip position at that instant in metres, relative to the tissue.
+    /// Tip position at that time in metres, relative to the tissue.
     pub position_m: f64,
     /// Elastic force that was released, in N.
     pub released_n: f64,
-    /// True when the puncture force was reached, false when the far face was.
+    /// Whether the puncture force was reached; otherwise the tip reached the far face.
     pub by_force: bool,
 }

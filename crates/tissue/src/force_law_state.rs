@@ -1,12 +1,14 @@
-//! What the law remembers between samples.
+//! State of the force law between samples.
 
 use crate::effect::{EffectState, TipState};
-use crate::force_law::MAX_EFFECTS;
 
-/// What all effects of a law remember.
+/// How many tissue effects one force law can hold.
+pub const MAX_EFFECTS: usize = 16;
+
+/// The states of all effects of a force law.
 pub(crate) type EffectStates = [EffectState; MAX_EFFECTS];
 
-/// What the law remembers between samples.
+/// State of a [`ForceLaw`](crate::ForceLaw) between samples. The default is the state before the first sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceLawState {
     pub(crate) ruptured: usize,
@@ -14,13 +16,13 @@ pub struct ForceLawState {
     pub(crate) time_s: f64,
     pub(crate) z_m: f64,
     pub(crate) v_mps: f64,
-    /// Change of the velocity in the last step; only a needle that gives asks for it.
+    /// Change of the velocity in the last step; used by a compliant needle only.
     pub(crate) dv_mps: f64,
     pub(crate) elastic_n: f64,
-    /// Position of the base, and whether it is known; only a needle that gives asks for them.
+    /// Position of the base, and whether it is known; used by a compliant needle only.
     pub(crate) base_m: f64,
     pub(crate) base_known: bool,
-    /// Acceleration of the base, zero where nobody tells it; only a needle that gives asks for it.
+    /// Acceleration of the base, zero where it was not set; used by a compliant needle only.
     pub(crate) base_acceleration_mps2: f64,
     pub(crate) effects: EffectStates,
 }
@@ -50,8 +52,8 @@ impl ForceLawState {
         self.ruptured
     }
 
-    /// Position of the tip relative to the tissue at the last sample, in metres: not the one given
-    /// to [`Law::step`](crate::Law::step) when the tissue moves or the needle gives.
+    /// Position of the tip relative to the tissue at the last sample, in metres. It differs from the position given to
+    /// [`ForceLaw::step`](crate::ForceLaw::step) when the tissue moves or the needle is compliant.
     #[must_use]
     pub fn tip_m(&self) -> f64 {
         self.z_m
@@ -63,13 +65,13 @@ impl ForceLawState {
         self.v_mps
     }
 
-    /// Tells the acceleration of the base (m/s²) up to the next sample: a needle that gives follows it exactly then, however
-    /// long the steps; without it late by a share of the step.
+    /// Sets the acceleration of the base (m/s²) up to the next sample. A compliant needle then follows the base exactly,
+    /// however long the steps; without it, the tip lags by a fraction of the step.
     pub fn set_base_acceleration(&mut self, base_mps2: f64) {
         self.base_acceleration_mps2 = base_mps2;
     }
 
-    /// Begins with the first sample.
+    /// Starts at the first sample.
     #[cold]
     pub(crate) fn begin(&mut self, time_s: f64, z_m: f64, v_mps: f64) {
         self.started = true;
@@ -78,7 +80,7 @@ impl ForceLawState {
         self.v_mps = v_mps;
     }
 
-    /// What effects may look at in the sample that follows.
+    /// Motion of the tip up to a sample, for the effects.
     #[inline]
     pub(crate) fn tip_state(&self, time_s: f64, z_m: f64, v_mps: f64) -> TipState {
         TipState {
@@ -91,13 +93,13 @@ impl ForceLawState {
         }
     }
 
-    /// Makes a sample the last one.
+    /// Stores a sample as the last one.
     #[inline]
-    pub(crate) fn store(&mut self, moment: &TipState, elastic_n: f64) {
-        self.time_s = moment.time_s;
-        self.z_m = moment.z_m;
-        self.dv_mps = moment.v_mps - self.v_mps;
-        self.v_mps = moment.v_mps;
+    pub(crate) fn store(&mut self, tip: &TipState, elastic_n: f64) {
+        self.time_s = tip.time_s;
+        self.z_m = tip.z_m;
+        self.dv_mps = tip.v_mps - self.v_mps;
+        self.v_mps = tip.v_mps;
         self.elastic_n = elastic_n;
     }
 }

@@ -1,14 +1,13 @@
-//! Layers and the stack they form.
+//! Layers of a tissue, as scenarios describe them.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// One tissue layer of the base law (SPEC section 1; multi-layer model, supplement eq. 4).
+/// One layer of the base law (docs/reference/model.md, Symbols; multi-layer model, supplement eq. 4).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Layer {
-    /// What the layer is, for people.
+    /// Name, for reports.
     #[cfg_attr(feature = "serde", serde(default))]
     pub name: String,
     /// Thickness `d_i` in metres, positive.
@@ -17,16 +16,14 @@ pub struct Layer {
     pub stiffness_n_per_m: f64,
     /// Viscous friction per metre of needle inside the layer, `b_i` in N s/m², zero or positive.
     pub friction_ns_per_m2: f64,
-    /// Elastic force `F_i` in N at which the layer ruptures before its far face; absent: only the
-    /// far face ends the layer.
+    /// Puncture force `F_i` in N, at which the layer ruptures before its far face; absent: it ruptures at its far face.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub puncture_n: Option<f64>,
 }
 
-/// A stack of layers behind a surface.
+/// A stack of layers.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Tissue {
     /// Position of the first layer's front face along the insertion axis, in metres.
     #[cfg_attr(feature = "serde", serde(default))]
@@ -37,7 +34,7 @@ pub struct Tissue {
 
 impl Tissue {
     /// The paper's phantom of Fig. 12: three layers of isinglass gel (25, 50 and 70 %), 98.1 mm in all, latex
-    /// around the second, which gives way at 2.2 N.
+    /// around the second, which ruptures at 2.2 N.
     #[must_use]
     pub fn three_gels() -> Self {
         let layer = |name: &str, thickness_m, stiffness_n_per_m, friction_ns_per_m2, puncture_n| Layer {

@@ -1,9 +1,9 @@
-//! A layer as the law sees it: faces instead of thicknesses, no names.
+//! Layers in space: faces and coefficients as the force law uses them, after geometric effects.
 
 use crate::layer::Tissue;
 use alloc::vec::Vec;
 
-/// A layer placed in space. Infinite puncture force means: only the far face ruptures it.
+/// A layer in space. With an infinite puncture force only its far face ruptures it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slab {
     /// Front face `s_i` in metres.
@@ -16,22 +16,22 @@ pub struct Slab {
     pub friction_ns_per_m2: f64,
     /// Puncture force `F_i` in N, or infinity.
     pub puncture_n: f64,
-    /// How far in metres the tip may push the layer beyond its far face before that ruptures it.
+    /// Indentation in metres beyond the far face at which the layer ruptures without its puncture force.
     pub reach_m: f64,
     /// Stiffening of this layer alone in 1/m: `K_i kappa_i x^2` is added to its elastic force.
     pub kappa_per_m: f64,
-    /// Share of the friction that effects have taken over from `b_i l_i v`, 0 to 1.
+    /// Share of the viscous friction `b_i l_i v` that effects replace, 0 to 1.
     pub replaced_friction_share: f64,
     /// Curvature of this layer alone in N/m²: `b_i x^2` is added to its elastic force.
     pub curvature_n_per_m2: f64,
-    /// Compliance in m/N of the ground that the layer presses into.
+    /// Compliance in m/N of the foundation under the layer.
     pub foundation_compliance_m_per_n: f64,
-    /// Where the layer lets go of the shaft on the way back, in metres beyond its front face.
+    /// Depth in metres beyond the front face at which the layer releases the shaft in retraction.
     pub release_m: f64,
 }
 
 impl Slab {
-    /// Whether effects have left the layer as the base law has it.
+    /// Whether no geometric effect has changed the layer.
     #[must_use]
     pub(crate) fn is_plain(&self) -> bool {
         self.reach_m == 0.0
@@ -40,7 +40,7 @@ impl Slab {
             && self.release_m == 0.0
     }
 
-    /// Whether the layer's own spring is curved.
+    /// Whether the layer's layer_m spring is nonlinear.
     #[must_use]
     #[inline]
     pub(crate) fn is_curved(&self) -> bool {
@@ -54,8 +54,7 @@ impl Slab {
         self.front_m + self.thickness_m
     }
 
-    /// Position of the tip in metres at which the layer gives way whatever its force: the far face,
-    /// and as much beyond as the layer can be pushed.
+    /// Tip position in metres at which the layer ruptures without its puncture force.
     #[must_use]
     #[inline]
     pub fn rupture_position_m(&self) -> f64 {
@@ -67,13 +66,13 @@ impl Slab {
     #[inline]
     pub fn length_inside_m(&self, z_m: f64) -> f64 {
         let depth = z_m - self.front_m;
-        // Written so that it compiles to a maximum and a minimum, without branches.
+        // Compiles to a maximum and a minimum, without branches.
         let inside = if depth > 0.0 { depth } else { 0.0 };
         if inside < self.thickness_m { inside } else { self.thickness_m }
     }
 
-    /// How far in metres the layer itself is indented when the tip is `x_m` beyond its front face: less than that when
-    /// its ground gives.
+    /// Indentation in metres of the layer itself when the tip is `x_m` beyond its front face: less than `x_m` on a
+    /// compliant foundation.
     #[must_use]
     #[inline]
     pub fn indentation_m(&self, x_m: f64) -> f64 {
@@ -83,18 +82,19 @@ impl Slab {
         }
         let slope = 1.0 + c * self.stiffness_n_per_m;
         let curve = c * (self.curvature_n_per_m2 + self.stiffness_n_per_m * self.kappa_per_m);
-        // c b x'^2 + (1 + c K) x' = x, written so that it holds for b = 0.
+        // c b x'^2 + (1 + c K) x' = x, in a form that holds for b = 0.
         2.0 * x_m / (slope + libm::sqrt((slope * slope + 4.0 * curve * x_m).max(0.0)))
     }
 
-    /// Length of needle in metres that rubs against the layer once it has ruptured: nothing beyond where it lets go on the way back.
+    /// Length of needle in metres in contact with the layer after its rupture: zero in retraction in front of the release
+    /// depth.
     #[must_use]
     #[inline]
     pub fn contact_length_m(&self, z_m: f64, v_mps: f64) -> f64 {
         if v_mps < 0.0 && z_m < self.front_m + self.release_m { 0.0 } else { self.length_inside_m(z_m) }
     }
 
-    /// Places the layers of a tissue in space.
+    /// The layers of a tissue in space.
     #[must_use]
     pub fn stack(tissue: &Tissue) -> Vec<Slab> {
         tissue
@@ -138,7 +138,7 @@ mod tests {
     };
 
     #[test]
-    fn a_layer_is_plain_until_an_effect_gives_it_something_of_its_own() {
+    fn a_layer_is_plain_until_an_effect_changes_it() {
         assert!(PLAIN.is_plain() && !PLAIN.is_curved());
         let stiffening = Slab { kappa_per_m: 3.0, ..PLAIN };
         let curved = Slab { curvature_n_per_m2: 3.0, ..PLAIN };
@@ -155,23 +155,23 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_gives_way_as_far_behind_its_far_face_as_it_can_be_pushed() {
+    fn the_rupture_position_is_the_far_face_plus_the_reach() {
         let slab = Slab { reach_m: 0.005, ..PLAIN };
         assert!((slab.far_m() - 0.03).abs() < 1e-17 && (slab.rupture_position_m() - 0.035).abs() < 1e-17);
     }
 
     #[test]
-    fn the_length_inside_a_layer_ends_at_its_faces() {
+    fn the_length_inside_a_layer_is_clamped_to_its_faces() {
         for (z, inside) in [(-1.0, 0.0), (0.01, 0.0), (0.012, 0.002), (0.03, 0.02), (0.5, 0.02)] {
             assert!((PLAIN.length_inside_m(z) - inside).abs() < 1e-17, "{z}");
         }
     }
 
     #[test]
-    fn a_shaft_rubs_on_the_way_back_until_the_layer_lets_go() {
+    fn in_retraction_the_contact_ends_at_the_release_depth() {
         let slab = Slab { release_m: 0.004, ..PLAIN };
-        // Just inside, on the way in, at rest, out; on the place where it lets go it still rubs.
-        for (z, v, rubs) in [
+        // Advancing, at rest and in retraction; at the release depth itself there is still contact.
+        for (z, v, contact_m) in [
             (0.013, 0.002, 0.003),
             (0.013, 0.0, 0.003),
             (0.013, -0.002, 0.0),
@@ -179,7 +179,7 @@ mod tests {
             (0.025, -0.002, 0.015),
         ] {
             assert!(
-                (slab.contact_length_m(z, v) - rubs).abs() < 1e-17,
+                (slab.contact_length_m(z, v) - contact_m).abs() < 1e-17,
                 "{z} {v}: {}",
                 slab.contact_length_m(z, v)
             );
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_on_ground_that_gives_is_indented_by_what_the_ground_leaves() {
+    fn a_layer_on_a_compliant_foundation_is_in_series_with_it() {
         let plain = Slab { foundation_compliance_m_per_n: 0.0, ..PLAIN };
         assert_eq!(plain.indentation_m(0.007), 0.007);
         for (kappa_per_m, curvature_n_per_m2) in [(0.0, 0.0), (20.0, 0.0), (0.0, 3000.0), (-15.0, 2500.0)] {
@@ -199,11 +199,12 @@ mod tests {
                     ..PLAIN
                 };
                 for x in [0.0, 0.003, 0.015] {
-                    // The layer's own force, K x' (1 + kappa x') + b x'^2, pushes the ground by the rest of the way.
-                    let own = slab.indentation_m(x);
-                    let force = 50.0 * own * (1.0 + kappa_per_m * own) + curvature_n_per_m2 * own * own;
-                    assert!((own + ground_m_per_n * force - x).abs() < 1e-15, "{slab:?} {x}: {own}");
-                    assert!((0.0..=x).contains(&own));
+                    // The layer's force K x' (1 + kappa x') + b x'^2 compresses the foundation by the rest of the travel.
+                    let layer_m = slab.indentation_m(x);
+                    let force = 50.0 * layer_m * (1.0 + kappa_per_m * layer_m)
+                        + curvature_n_per_m2 * layer_m * layer_m;
+                    assert!((layer_m + ground_m_per_n * force - x).abs() < 1e-15, "{slab:?} {x}: {layer_m}");
+                    assert!((0.0..=x).contains(&layer_m));
                 }
             }
         }

@@ -1,12 +1,11 @@
-//! Layered tissue as a needle feels it: the base law of puncture and friction, the effects by
-//! which reality departs from it, the chain from the tissue's force to the recorded one, and the
-//! kinematic replay.
+//! Force model of layered tissue: the base law of puncture and friction, a library of effects that depart from it, the
+//! measurement chain from the force of the tissue to the recorded one, and kinematic replay.
 //!
-//! Pure state machines in SI units: `no_std` (with `alloc` for the lists of layers and effects),
-//! no randomness, no allocation per sample, the same bits on every platform.
+//! Pure state machines in SI units: `no_std` (with `alloc` for the lists of layers and effects), no randomness, no
+//! allocation per sample, the same bits on every platform. Symbols and equations: docs/reference/model.md.
 //!
 //! ```
-//! use stylet_tissue::{Law, LawState, Layer, Tissue};
+//! use stylet_tissue::{ForceLaw, ForceLawState, Layer, Tissue};
 //!
 //! let gel = Layer {
 //!     name: "gel".into(),
@@ -15,8 +14,8 @@
 //!     friction_ns_per_m2: 9000.0,
 //!     puncture_n: None,
 //! };
-//! let law = Law::base(&Tissue { surface_m: 0.0, layers: vec![gel] });
-//! let mut state = LawState::default();
+//! let law = ForceLaw::base(&Tissue { surface_m: 0.0, layers: vec![gel] });
+//! let mut state = ForceLawState::default();
 //! let force = law.step(&mut state, 0.0, 0.01, 0.002, |_| {});
 //! assert!((force.total_n - (40.0 * 0.01 + 9000.0 * 0.01 * 0.002)).abs() < 1e-12);
 //! ```
@@ -25,6 +24,7 @@
 
 extern crate alloc;
 
+mod chain_stage;
 mod compliant_needle;
 pub mod effect;
 mod effect_info;
@@ -39,15 +39,13 @@ mod replay;
 mod rupture_policy;
 mod shaft_friction;
 
-pub use effect::{ChainStage, Effect};
-pub use effect_info::{
-    EffectInfo, FitScale, ParameterError, ParameterInfo, Proposal, effect_info, general_effects,
-    per_layer_effects,
-};
+pub use chain_stage::ChainStage;
+pub use effect::Effect;
+pub use effect_info::{EffectInfo, FitScale, ParameterError, ParameterInfo, Proposal};
 pub use effects::*;
 pub use force::{Rupture, TissueForce};
-pub use force_law::{ForceLaw, MAX_EFFECTS, TooManyEffects};
-pub use force_law_state::ForceLawState;
+pub use force_law::{ForceLaw, TooManyEffects};
+pub use force_law_state::{ForceLawState, MAX_EFFECTS};
 pub use layer::{Layer, Tissue};
 pub use layer_geometry::Slab;
 pub use measurement_chain::{AveragingInterval, MeasurementChain, MeasurementState, SensorInput};

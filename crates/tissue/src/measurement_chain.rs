@@ -1,14 +1,15 @@
-//! From the tissue's force to the recorded one: arm and tool, then the sensor, then the recorded
-//! position, in the order of SPEC section 6.
+//! From the force of the tissue to the recorded one: tool, sensor, recorded position (docs/reference/model.md, Measurement
+//! chain).
 //!
-//! tool (`m a`, drive friction) -> gain -> low-pass -> delay -> bias, drift -> interference ->
-//! noise and spikes (drawn by the caller) -> saturation -> quantisation.
+//! tool (`m a`, drive friction) -> gain -> low-pass -> delay -> bias, drift -> interference -> noise and spikes (drawn by
+//! the caller) -> saturation -> quantisation.
 
-use crate::AnyEffect;
-use crate::effect::{ChainStage, Effect, EffectState};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState};
+use crate::effects::AnyEffect;
 use alloc::vec::Vec;
 
-/// The effects between tissue and recording: configuration only.
+/// The effects between tissue and recording: configuration only, stepped with a [`MeasurementState`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasurementChain {
     tool: Vec<AnyEffect>,
@@ -19,19 +20,19 @@ pub struct MeasurementChain {
     position_factor: f64,
 }
 
-/// What a [`Measurement`] remembers between samples.
+/// State of a [`MeasurementChain`] between samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasurementState {
     time_s: Option<f64>,
     /// One per effect before the delay.
-    memory: Vec<EffectState>,
-    /// Forces on their way, (time, force), used as a ring.
+    effects: Vec<EffectState>,
+    /// Delayed forces, (time, force), as a ring buffer.
     ring: Vec<(f64, f64)>,
     oldest: usize,
     held: usize,
 }
 
-/// What there is to be measured in one sample.
+/// Input of the chain in one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorInput {
     /// Time in seconds; must not run backwards.
@@ -46,14 +47,14 @@ pub struct SensorInput {
     pub noise_n: f64,
 }
 
-/// A span of time whose mean is measured.
+/// Input of the chain averaged over an interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AveragingInterval {
-    /// Middle of the span in s.
+    /// Middle of the interval in s.
     pub time_s: f64,
-    /// Its length in s.
+    /// Length of the interval in s.
     pub span_s: f64,
-    /// Samples that the sensor takes in it, evenly spaced.
+    /// Number of sensor samples in it, evenly spaced.
     pub samples: f64,
     /// Mean velocity of the needle's base in m/s.
     pub velocity_mps: f64,
@@ -64,12 +65,11 @@ pub struct AveragingInterval {
 }
 
 impl MeasurementChain {
-    /// The chain of those effects that act outside the tissue. Neutral effects and those of the
-    /// tissue are left out.
+    /// The chain of the effects that act outside the tissue. Inactive effects and those of the tissue are left out.
     #[must_use]
     pub fn new(effects: &[AnyEffect]) -> Self {
         let mut active: Vec<&AnyEffect> =
-            effects.iter().filter(|e| e.place() >= ChainStage::Tool && !e.is_neutral()).collect();
+            effects.iter().filter(|e| e.stage() >= ChainStage::Tool && !e.is_inactive()).collect();
         active.sort_by_key(|e| e.rank());
         let mut chain = Self {
             tool: Vec::new(),
@@ -80,7 +80,7 @@ impl MeasurementChain {
             position_factor: 1.0,
         };
         for effect in active {
-            match (effect, effect.place()) {
+            match (effect, effect.stage()) {
                 (AnyEffect::TimeDelay(delay), _) => chain.delay_s += delay.delay_s,
                 (AnyEffect::ForceSpikes(_), _) => {}
                 (AnyEffect::ForceGain(_) | AnyEffect::LowPassLag(_), _) => {
@@ -97,11 +97,11 @@ impl MeasurementChain {
         chain
     }
 
-    /// The state before the first sample. `sample_hz` sizes the history of a delay: should samples
-    /// come faster, the delay becomes as long as the history reaches.
+    /// The state before the first sample. `sample_hz` sizes the buffer of a delay; at a higher rate the delay is limited to
+    /// the length of the buffer.
     #[must_use]
     pub fn start(&self, sample_hz: f64) -> MeasurementState {
-        let on_the_way = if self.delay_s > 0.0 {
+        let length = if self.delay_s > 0.0 {
             // A thousandth more for jitter; casts of floats saturate.
             (libm::ceil(self.delay_s * sample_hz * 1.001) as usize).min(1 << 24) + 3
         } else {
@@ -109,14 +109,14 @@ impl MeasurementChain {
         };
         MeasurementState {
             time_s: None,
-            memory: alloc::vec![[0.0; 8]; self.before_delay.len()],
-            ring: alloc::vec![(0.0, 0.0); on_the_way],
+            effects: alloc::vec![[0.0; 8]; self.before_delay.len()],
+            ring: alloc::vec![(0.0, 0.0); length],
             oldest: 0,
             held: 0,
         }
     }
 
-    /// The recorded force in N. Before the first sample the force is taken to have been constant.
+    /// The recorded force in N. Before the first sample the force is assumed constant.
     pub fn step(&self, state: &mut MeasurementState, reading: &SensorInput) -> f64 {
         let time_s = reading.time_s;
         let dt_s = (time_s - state.time_s.unwrap_or(time_s)).max(0.0);
@@ -125,67 +125,79 @@ impl MeasurementChain {
         for effect in &self.tool {
             force += effect.tool_force(reading.velocity_mps, reading.acceleration_mps2);
         }
-        for (effect, memory) in self.before_delay.iter().zip(&mut state.memory) {
-            force = effect.sense(time_s, dt_s, force, memory);
+        for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
+            force = effect.sensor_output(time_s, dt_s, force, state_of_effect);
         }
         if self.delay_s > 0.0 {
             force = state.delayed(time_s, force, self.delay_s);
         }
         let mut none = [0.0; 8];
         for effect in &self.before_noise {
-            force = effect.sense(time_s, dt_s, force, &mut none);
+            force = effect.sensor_output(time_s, dt_s, force, &mut none);
         }
         if reading.noise_n != 0.0 {
             force += reading.noise_n;
         }
         for effect in &self.after_noise {
-            force = effect.sense(time_s, dt_s, force, &mut none);
+            force = effect.sensor_output(time_s, dt_s, force, &mut none);
         }
         force
     }
 
-    /// Time in s by which the recorded force comes late.
+    /// Delay of the recorded force in s.
     #[must_use]
     pub fn delay_s(&self) -> f64 {
         self.delay_s
     }
 
-    /// Whether a jump of the force is smeared.
+    /// Whether a lag smears a jump of the force.
     #[must_use]
     pub fn has_lag(&self) -> bool {
-        self.before_delay.iter().any(Effect::remembers)
+        self.before_delay.iter().any(Effect::has_state)
     }
 
-    /// The mean of the recorded force over a span of time, without delay, noise and what comes after the noise. Spans
-    /// follow one another without gaps; a lag is integrated through them.
-    pub fn mean_force(&self, state: &mut MeasurementState, cell: &AveragingInterval) -> f64 {
-        let mut force = cell.tissue_n;
+    /// Mean recorded force in N over an interval, without delay, noise, saturation and quantisation. Intervals follow one
+    /// another without gaps; a lag is integrated through them.
+    pub fn mean_force(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
+        let mut force = interval.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(cell.velocity_mps, cell.acceleration_mps2);
+            force += effect.tool_force(interval.velocity_mps, interval.acceleration_mps2);
         }
-        for (effect, memory) in self.before_delay.iter().zip(&mut state.memory) {
-            force = effect.sense_mean(cell.time_s, cell.span_s, cell.samples, force, memory);
+        for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
+            force = effect.mean_sensor_output(
+                interval.time_s,
+                interval.span_s,
+                interval.samples,
+                force,
+                state_of_effect,
+            );
         }
         let mut none = [0.0; 8];
         for effect in &self.before_noise {
-            force = effect.sense_mean(cell.time_s, cell.span_s, cell.samples, force, &mut none);
+            force = effect.mean_sensor_output(
+                interval.time_s,
+                interval.span_s,
+                interval.samples,
+                force,
+                &mut none,
+            );
         }
         force
     }
 
-    /// The recorded force at the end of a span whose means `cell` has, `cell.time_s` being that end: for stretches in which a mean over several
-    /// samples is not what the samples give. The state is that of [`Measurement::mean`].
-    pub fn force_at_end(&self, state: &mut MeasurementState, cell: &AveragingInterval) -> f64 {
-        let mut force = cell.tissue_n;
+    /// Recorded force in N at the end `interval.time_s` of an interval with the means `interval`, where a mean over several samples
+    /// does not represent them. The state is that of [`MeasurementChain::mean_force`].
+    pub fn force_at_end(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
+        let mut force = interval.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(cell.velocity_mps, cell.acceleration_mps2);
+            force += effect.tool_force(interval.velocity_mps, interval.acceleration_mps2);
         }
-        for (effect, memory) in self.before_delay.iter().zip(&mut state.memory) {
-            force = effect.sense_after(cell.time_s, cell.span_s, force, memory);
+        for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
+            force = effect.sensor_output_at_end(interval.time_s, interval.span_s, force, state_of_effect);
         }
         let mut none = [0.0; 8];
         for effect in &self.before_noise {
-            force = effect.sense_after(cell.time_s, cell.span_s, force, &mut none);
+            force = effect.sensor_output_at_end(interval.time_s, interval.span_s, force, &mut none);
         }
         force
     }
@@ -204,7 +216,7 @@ impl MeasurementChain {
         recorded_m / self.position_factor
     }
 
-    /// True when nothing acts on the force.
+    /// Whether no effect acts on the force.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.tool.is_empty()
@@ -216,7 +228,7 @@ impl MeasurementChain {
 }
 
 impl MeasurementState {
-    /// Takes in the force at `time_s` and gives the one of `delay_s` before.
+    /// Stores the force at `time_s` and returns the force of `delay_s` earlier.
     fn delayed(&mut self, time_s: f64, force_n: f64, delay_s: f64) -> f64 {
         let size = self.ring.len();
         if size == 0 {

@@ -1,13 +1,12 @@
-//! The kinematic replay: recorded or ideal motion fed to the law, no rigid bodies.
+//! Kinematic replay: the force law along a given motion, without rigid-body dynamics.
 
 use crate::force::{Rupture, TissueForce};
 use crate::force_law::ForceLaw;
 use crate::force_law_state::ForceLawState;
 
-/// Feeds `(time_s, z_m, v_mps)` samples to a law and calls `sink` with each force.
+/// Steps a force law along `(time_s, z_m, v_mps)` samples and passes each force to `sink`.
 ///
-/// The force at a sample is the same, bit for bit, as that of a rigid-body run which reaches the
-/// same `t, z, v` at the same samples.
+/// The force at a sample is bit for bit that of a rigid-body simulation with the same `t, z, v` at the same samples.
 pub fn replay(
     law: &ForceLaw,
     motion: impl IntoIterator<Item = (f64, f64, f64)>,

@@ -1,25 +1,27 @@
-//! What a law says that the shaft takes of a measured force: the law replayed along the positions, with the ruptures where somebody says.
+//! Predicted friction along the shaft: the force law replayed along recorded positions, with imposed ruptures.
 
-use crate::AnyEffect;
+use crate::effects::AnyEffect;
 use crate::force_law::ForceLaw;
 use crate::force_law_state::ForceLawState;
 use crate::measurement_chain::{MeasurementChain, MeasurementState, SensorInput};
 
-/// Friction along the shaft as a law has it, sample by sample and from nothing that comes later.
+/// Friction along the shaft, predicted sample by sample without later samples.
 ///
-/// On the way in it is the friction of the passed layers, what the tip does not feel ([`TissueForce::tip_n`](crate::TissueForce::tip_n)); on the way back
-/// all friction, for nothing pushes the tip. It is given as the sensor shows it, with the effects that scale, smear or delay a force;
-/// bias, drift, disturbances and the friction of a drive are not the shaft's, and an undo of clipping or rounding there is not.
+/// While advancing it is the friction of the passed layers, the difference of total and tip force
+/// ([`TissueForce::tip_n`](crate::TissueForce::tip_n)); in retraction it is the whole friction, since no force acts on the
+/// tip. It passes through the sensor effects that scale, lag or delay a force; bias, drift, interference and drive friction
+/// are no friction of the shaft, and clipping and rounding are not modelled.
 #[derive(Clone, Debug)]
 pub struct ShaftFriction {
     law: ForceLaw,
     sensor: MeasurementChain,
     state: ForceLawState,
-    shown: MeasurementState,
+    sensor_state: MeasurementState,
 }
 
 impl ShaftFriction {
-    /// The friction of `law`, seen by a sensor with these of the `effects` that pass friction on as they pass a force, at about `sample_hz`.
+    /// The friction of `law` as recorded at about `sample_hz` through those of the `effects` that pass friction on as they
+    /// pass any force.
     #[must_use]
     pub fn new(law: ForceLaw, effects: &[AnyEffect], sample_hz: f64) -> Self {
         let passes = |e: &&AnyEffect| {
@@ -33,12 +35,12 @@ impl ShaftFriction {
         };
         let effects: alloc::vec::Vec<AnyEffect> = effects.iter().filter(passes).cloned().collect();
         let sensor = MeasurementChain::new(&effects);
-        let shown = sensor.start(sample_hz);
-        Self { law, sensor, state: ForceLawState::default(), shown }
+        let sensor_state = sensor.start(sample_hz);
+        Self { law, sensor, state: ForceLawState::default(), sensor_state }
     }
 
-    /// Friction in N at the next sample of a recording, when `ruptured` layers have given way. Not a number when the sample is
-    /// not finite; that changes nothing.
+    /// Friction in N at the next sample of a recording when `ruptured` layers are ruptured. NaN when the sample is not
+    /// finite; the state is then unchanged.
     pub fn step(&mut self, time_s: f64, position_m: f64, velocity_mps: f64, ruptured: usize) -> f64 {
         if !(time_s + position_m + velocity_mps).is_finite() {
             return f64::NAN;
@@ -47,7 +49,7 @@ impl ShaftFriction {
         let force = self.law.step_imposed(&mut self.state, time_s, z_m, v_mps, ruptured, |_| {});
         let tissue_n = if v_mps < 0.0 { force.friction_n } else { force.total_n - force.tip_n };
         let reading = SensorInput { time_s, velocity_mps: v_mps, tissue_n, ..SensorInput::default() };
-        self.sensor.step(&mut self.shown, &reading)
+        self.sensor.step(&mut self.sensor_state, &reading)
     }
 }
 
@@ -73,19 +75,19 @@ mod tests {
     }
 
     #[test]
-    fn the_passed_layers_hold_the_shaft_on_the_way_in_and_all_on_the_way_back() {
+    fn passed_layers_rub_while_advancing_and_all_layers_in_retraction() {
         let mut shaft = ShaftFriction::new(law(), &[], 100.0);
         near(shaft.step(0.0, 0.01, 0.002, 0), 0.0);
         near(shaft.step(5.0, 0.018, 0.002, 1), 0.002 * 4000.0 * 0.018);
         near(shaft.step(10.0, 0.025, 0.002, 1), 0.002 * 4000.0 * 0.02);
-        // What is no sample changes nothing.
+        // A sample that is not finite changes nothing.
         assert!(shaft.step(11.0, f64::NAN, 0.002, 2).is_nan());
         near(shaft.step(12.0, 0.025, 0.0, 1), 0.0);
         near(shaft.step(13.0, 0.025, -0.002, 1), -0.002 * (4000.0 * 0.02 + 6000.0 * 0.005));
     }
 
     #[test]
-    fn a_gain_shows_more_of_it_a_bias_does_not_and_a_scale_of_the_positions_is_undone() {
+    fn gain_scales_the_friction_bias_does_not_and_a_position_scale_is_undone() {
         let effects = [
             ForceGain { eps: 0.5 }.into(),
             ForceBias { force_n: 3.0 }.into(),

@@ -164,8 +164,8 @@ fn imposed_ruptures_at_the_law_s_own_instants_give_the_same_bits() {
             let (t, v) = (f64::from(i) * 0.002, 0.002);
             let z = v * t - 0.001;
             let expected = law.step(&mut free, t, z, v, |_| {});
-            let found = law.step_imposed(&mut imposed, t, z, v, free.ruptured(), |strain| {
-                strained += usize::from(strain.is_met());
+            let found = law.step_imposed(&mut imposed, t, z, v, free.ruptured(), |criterion| {
+                strained += usize::from(criterion.is_met());
             });
             assert_eq!(expected, found, "sample {i}");
         }
@@ -312,7 +312,7 @@ fn ruptures_may_be_imposed_before_the_law_would_bring_them() {
     let seen: Vec<_> = strains.iter().map(|s| (s.layer, s.elastic_n, s.tip_m, s.is_met())).collect();
     assert_eq!(seen, [(1, 0.4, 0.01, false), (1, 0.8, 0.02, false), (2, 0.0, 0.02, false)]);
     assert_eq!((strains[1].puncture_n, strains[1].far_m), (f64::INFINITY, 0.0282));
-    // And it may hold longer than the law would: its strain says so.
+    // And it may hold longer than the law would: its criterion says so.
     let later = law.step_imposed(&mut state, 2.0, 0.09, 0.0, 1, |s| strains.push(s));
     assert!((later.elastic_n - 60.0 * (0.09 - 0.0282)).abs() < 1e-12 && strains[3].is_met());
 }

@@ -82,8 +82,8 @@ fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
     for effect in typical_effects() {
         let info = effect.info();
         assert_eq!(effect.id(), info.id);
-        assert_eq!(effect.place(), info.stage);
-        assert!(!effect.is_neutral(), "{effect:?}");
+        assert_eq!(effect.stage(), info.stage);
+        assert!(!effect.is_inactive(), "{effect:?}");
         effect.check().expect("typical values are allowed");
         let values = effect.parameters();
         assert_eq!(values.len(), info.parameters.len());
@@ -95,7 +95,7 @@ fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
         let all_off: Vec<f64> = info.parameters.iter().map(|p| p.inactive).collect();
         for values in [strengths_off, all_off] {
             let neutral = AnyEffect::from_parameters(info.id, &values).expect("right number");
-            assert!(neutral.is_neutral(), "{neutral:?}");
+            assert!(neutral.is_inactive(), "{neutral:?}");
             neutral.check().expect("neutral values are allowed");
         }
     }
@@ -202,7 +202,7 @@ proptest! {
 #[test]
 fn every_typical_effect_of_the_tissue_changes_the_force() {
     let base = forces(&three_gels(), &[], &usual_motion());
-    for effect in typical_effects().into_iter().filter(|e| e.place() < ChainStage::Tool) {
+    for effect in typical_effects().into_iter().filter(|e| e.stage() < ChainStage::Tool) {
         let changed = forces(&three_gels(), std::slice::from_ref(&effect), &usual_motion());
         assert!(worst(&base, &changed) > 0.02, "{effect:?} changes the force by {}", worst(&base, &changed));
     }

@@ -306,7 +306,7 @@ fn the_balance_holds_with_every_effect_of_the_tissue() {
     });
     let bends = |e: &AnyEffect| e.id() == "needle_compliance";
     // What moves the tissue or shakes it moves the base with it.
-    let moves = |e: &AnyEffect| e.place() == ChainStage::Kinematics || e.place() >= ChainStage::Tool;
+    let moves = |e: &AnyEffect| e.stage() == ChainStage::Kinematics || e.stage() >= ChainStage::Tool;
     for effect in typical_effects().into_iter().chain(per_layer).filter(|e| !moves(e) && !bends(e)) {
         let (f, tips, _) = bend(&three_gels(), &[effect.clone(), spring(ks)], &motion);
         for (k, (&(_, z, _), (force, tip))) in motion.iter().zip(f.iter().zip(&tips)).enumerate() {

@@ -46,7 +46,7 @@ fn neutral_effects_leave_the_base_law_bit_for_bit() {
     for info in per_layer_effects() {
         let values: Vec<f64> = info.parameters.iter().map(|p| p.inactive).collect();
         let effect = AnyEffect::from_parameters(info.id, &values).expect("its own parameters");
-        assert!(effect.is_neutral() && effect.check().is_ok(), "{}", info.id);
+        assert!(effect.is_inactive() && effect.check().is_ok(), "{}", info.id);
         assert_eq!(effect.parameters(), values);
         assert!(general_effects().all(|general| general.id != info.id));
         assert_eq!(stylet_tissue::effect_info(info.id), Some(info));
@@ -119,18 +119,18 @@ fn a_creeping_branch_fades_in_the_hold_with_its_time_constant_and_is_the_same_at
 fn a_tougher_layer_and_a_rougher_shaft_change_the_effects_that_hold_their_numbers() {
     let waits = |force_n| AnyEffect::from(DelayedPuncture { layer: 2, force_n, exponent: 3.0 });
     let mut tough = waits(2.0);
-    tough.toughened(1, 1.5);
+    tough.scale_puncture(1, 1.5);
     assert_eq!(tough, waits(2.0), "another layer");
-    tough.toughened(2, 1.5);
+    tough.scale_puncture(2, 1.5);
     assert_eq!(tough, waits(3.0));
     let clings = |push_n, pull_n| AnyEffect::from(ShaftSlip { push_n, pull_n, ..ShaftSlip::default() });
     let mut rough = clings(2.0, 1.0);
-    rough.rubbed(1.5);
+    rough.scale_friction(1.5);
     assert_eq!(rough, clings(3.0, 1.5));
     // Others take what the layers hold.
     let mut other = holds(0.5, 0.004, 2.0);
-    other.rubbed(1.5);
-    other.toughened(1, 1.5);
+    other.scale_friction(1.5);
+    other.scale_puncture(1, 1.5);
     assert_eq!(other, holds(0.5, 0.004, 2.0));
 }
 

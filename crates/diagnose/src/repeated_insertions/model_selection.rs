@@ -622,7 +622,7 @@ pub fn have_several_speeds(runs: &[&SegmentedRecording]) -> bool {
 pub fn active_effects(model: &Model) -> Vec<&'static str> {
     let mut out: Vec<&str> = Vec::new();
     for c in &model.effects {
-        let neutral = c.effect().is_none_or(|e| e.is_neutral());
+        let neutral = c.effect().is_none_or(|e| e.is_inactive());
         if !neutral && !out.contains(&c.info.id) {
             out.push(c.info.id);
         }

@@ -183,7 +183,7 @@ fn across(model: &mut Model, data: &FitData) {
     for e in which {
         let choice = &model.effects[e];
         if let Some(AnyEffect::ShaftSlip(mut s)) = choice.effect() {
-            s.rubbed(libm::exp(level));
+            s.scale_friction(libm::exp(level));
             s.rate += slope;
             model.effects[e] = EffectTerm::new(choice.info, &AnyEffect::from(s).parameters());
         }

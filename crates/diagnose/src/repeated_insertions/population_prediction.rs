@@ -172,7 +172,7 @@ impl Population {
             }
             for choice in &mut model.effects {
                 if let Some(mut effect) = choice.effect() {
-                    effect.toughened(layer + 1, factor);
+                    effect.scale_puncture(layer + 1, factor);
                     *choice = EffectTerm::new(choice.info, &effect.parameters());
                 }
             }

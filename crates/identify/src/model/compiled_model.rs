@@ -49,7 +49,7 @@ impl Model {
             let mut tissue = self.tissue.clone();
             tissue.surface_m += parameters.surface_m + day.surface_m;
             let factor = libm::exp(parameters.ln_friction + day.ln_friction);
-            effects.iter_mut().for_each(|e| e.rubbed(factor));
+            effects.iter_mut().for_each(|e| e.scale_friction(factor));
             tissue.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= factor);
             ForceLaw::new(&tissue, &effects).ok()?
         };
@@ -63,8 +63,8 @@ impl Model {
             has_measurement_chain: !chain.is_plain(),
             break_positions_m: {
                 let mut places: Vec<f64> =
-                    effects.iter().filter_map(Effect::break_depth_m).map(|d| surface + d).collect();
-                if effects.iter().any(|e| e.place() == ChainStage::Tip && !e.is_neutral()) {
+                    effects.iter().filter_map(Effect::membrane_depth_m).map(|d| surface + d).collect();
+                if effects.iter().any(|e| e.stage() == ChainStage::Tip && !e.is_inactive()) {
                     places.extend(law.slabs().iter().map(stylet_tissue::Slab::far_m));
                 }
                 places
@@ -83,6 +83,6 @@ impl Model {
             .iter()
             .filter_map(EffectTerm::effect)
             .chain(self.assumed.known_effects.iter().cloned())
-            .any(|e| e.place() == ChainStage::Friction)
+            .any(|e| e.stage() == ChainStage::Friction)
     }
 }

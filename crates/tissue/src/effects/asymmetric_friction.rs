@@ -1,17 +1,16 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, sgn};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Friction that differs between advance and retraction: `b_i -> b_i (1 + eps sgn v)`, in the
-/// cumulative friction `D` as well.
+/// Viscous friction that differs between advance and retraction: `b_i -> b_i (1 + eps sgn v)` for every layer, in
+/// the cumulative friction `D` as well.
 ///
-/// Source: Okamura, Simone, O'Leary 2004, table I (b+ 212, b- 293 N s/m^2). Signature: the friction
-/// line has another slope in retraction; invisible without a retraction.
+/// Inactive: `eps = 0`. Signature: the friction line has another slope in retraction; not identifiable without one.
+/// Source: Okamura, Simone, O'Leary 2004, table I (`b+` 212, `b-` 293 N s/m²).
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct AsymmetricFriction {
-    /// Asymmetry `eps`, -1 to 1. Neutral: 0.
+    /// Asymmetry `eps`, -1 to 1. Inactive: 0.
     pub eps: f64,
 }
 
@@ -24,27 +23,17 @@ static INFO: EffectInfo = EffectInfo {
     parameters: &[ParameterInfo::strength("eps", "", "asymmetry between advance and retraction")
         .allowed(-1.0, 1.0)
         .search(0.2, -0.9, 0.9)],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[0.01]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for AsymmetricFriction {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.eps]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [eps] = *values else { return None };
-        Some(Self { eps })
-    }
-}
+described!(AsymmetricFriction { eps });
 
 impl Effect for AsymmetricFriction {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.eps == 0.0
     }
     fn friction_factor(&self, v_mps: f64) -> f64 {

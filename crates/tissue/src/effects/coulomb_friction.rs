@@ -1,16 +1,15 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction along the shaft: `f_B += c sgn(v) sum l_i`.
 ///
-/// Source: Okamura, Simone, O'Leary 2004 (Karnopp model, per unit length). Signature: a plateau
-/// that does not depend on speed, with a step at reversal; invisible at one constant velocity.
+/// Inactive: `c = 0`. Signature: a plateau that does not depend on speed, with a step at reversal; not identifiable at
+/// one constant velocity. Source: Okamura, Simone, O'Leary 2004 (Karnopp model, per unit length).
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct CoulombFriction {
-    /// Friction per metre of needle inside, `c` in N/m, 0 to 10 000. Neutral: 0.
+    /// Friction per metre of needle inside, `c` in N/m, 0 to 10 000. Inactive: 0.
     pub c_n_per_m: f64,
 }
 
@@ -24,30 +23,21 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(0.0, 1e4)
         .search(3.0, 0.05, 100.0)
         .log()],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[1.0]]]),
     nested_in: &["stribeck_friction", "presliding_friction"],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for CoulombFriction {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.c_n_per_m]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [c_n_per_m] = *values else { return None };
-        Some(Self { c_n_per_m })
-    }
-}
+described!(CoulombFriction { c_n_per_m });
 
 impl Effect for CoulombFriction {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.c_n_per_m == 0.0
     }
-    fn shaft_force(&self, moment: &TipState, inside_m: f64, _memory: &mut EffectState) -> f64 {
-        self.c_n_per_m * sgn(moment.v_mps) * inside_m
+    fn shaft_force(&self, tip: &TipState, inside_m: f64, _state: &mut EffectState) -> f64 {
+        self.c_n_per_m * sgn(tip.v_mps) * inside_m
     }
 }

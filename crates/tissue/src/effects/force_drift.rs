@@ -1,16 +1,15 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// A sensor that drifts: `+ rate t`, `t` being the recording's time.
+/// Sensor drift, linear in the recording's time: `+ rate t`.
 ///
-/// Source: thermal drift of strain gauges. Signature: slow, and the force in air does not come back
-/// after the needle has left.
+/// Inactive: `rate = 0`. Signature: the force in air after the insertion differs from that before.
+/// Source: thermal drift of strain gauges.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ForceDrift {
-    /// Rate in N/s, -10 to 10. Neutral: 0.
+    /// Rate in N/s, -10 to 10. Inactive: 0.
     pub rate_n_per_s: f64,
 }
 
@@ -23,30 +22,20 @@ static INFO: EffectInfo = EffectInfo {
     parameters: &[ParameterInfo::strength("rate_n_per_s", "N/s", "drift")
         .allowed(-10.0, 10.0)
         .search(0.005, -0.1, 0.1)],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[1e-3]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for ForceDrift {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.rate_n_per_s]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [rate_n_per_s] = *values else { return None };
-        Some(Self { rate_n_per_s })
-    }
-}
+described!(ForceDrift { rate_n_per_s });
 
 impl Effect for ForceDrift {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.rate_n_per_s == 0.0
     }
-    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
+    fn sensor_output(&self, time_s: f64, _dt_s: f64, force_n: f64, _state: &mut EffectState) -> f64 {
         force_n + self.rate_n_per_s * time_s
     }
 }

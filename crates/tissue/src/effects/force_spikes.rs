@@ -1,19 +1,18 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect};
+use crate::chain_stage::ChainStage;
+use crate::effect::Effect;
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Isolated outlying samples. Only their parameters live here: the drawing is the sensor's, and the
-/// spikes enter the chain with the noise.
+/// Isolated outlying samples of the force. The effect holds the parameters only: the sensor draws the spikes and
+/// adds them with the noise.
 ///
-/// Source: lost bits and loose contacts. Signature: single samples far from their neighbours, at any
-/// depth and in air.
+/// Inactive: `rate = 0` or `size = 0`. Signature: single samples far from their neighbours, at any depth and in air.
+/// Source: lost bits and loose contacts.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ForceSpikes {
-    /// Mean number per second, 0 to 1000. Neutral: 0.
+    /// Mean number per second, 0 to 1000. Inactive: 0.
     pub rate_hz: f64,
-    /// Size of a spike in N, -1000 to 1000. Neutral: 0.
+    /// Size of a spike in N, -1000 to 1000. Inactive: 0.
     pub size_n: f64,
 }
 
@@ -33,27 +32,17 @@ static INFO: EffectInfo = EffectInfo {
             .search(1.0, 0.1, 20.0)
             .log(),
     ],
-    extended: None,
     proposal: Proposal::RawSamples,
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for ForceSpikes {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.rate_hz, self.size_n]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [rate_hz, size_n] = *values else { return None };
-        Some(Self { rate_hz, size_n })
-    }
-}
+described!(ForceSpikes { rate_hz, size_n });
 
 impl Effect for ForceSpikes {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.rate_hz == 0.0 || self.size_n == 0.0
     }
 }

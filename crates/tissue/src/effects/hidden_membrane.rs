@@ -1,26 +1,24 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState};
+use super::parameters::Described;
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 use crate::layer_geometry::Slab;
 
-/// A membrane that the layers do not know: an elastic element `+ K_m max(0, z - s_1 - z_m)`, gone
-/// when its force reaches `F_m`.
+/// A membrane that is not among the layers: `+ K_m max(0, z - s_1 - z_m)` until its force reaches `F_m`, then zero.
 ///
-/// The depth counts from the tissue's surface. The membrane is no layer: its breaking is not reported
-/// as a [`Rupture`](crate::Rupture), the active layer and its elastic force do not change, and
-/// relaxation or soft boundaries do not act on it.
+/// Its rupture is not reported as a [`Rupture`](crate::Rupture); the active layer and its elastic force do not change, and
+/// relaxation and soft boundaries do not act on it.
 ///
-/// Source: inner structures, vessels and capsules (Okamura et al. 2004, fig. 1). Signature: a peak
-/// and a drop that belong to no boundary.
+/// Inactive: `K_m = 0` or `F_m = 0`. Signature: a peak and a drop at a depth without a boundary, once.
+/// Source: inner structures, vessels and capsules (Okamura, Simone, O'Leary 2004, fig. 1).
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct HiddenMembrane {
     /// Depth `z_m` below the surface in metres, 0 to 1.
     pub depth_m: f64,
-    /// Stiffness `K_m` in N/m, 0 to 1e6. Neutral: 0.
+    /// Stiffness `K_m` in N/m, 0 to 1e6. Inactive: 0.
     pub stiffness_n_per_m: f64,
-    /// Force `F_m` in N at which it breaks, 0 to 100. Neutral: 0.
+    /// Force `F_m` in N at which it breaks, 0 to 100. Inactive: 0.
     pub puncture_n: f64,
 }
 
@@ -45,10 +43,8 @@ static INFO: EffectInfo = EffectInfo {
             .search(0.5, 0.02, 5.0)
             .log(),
     ],
-    extended: None,
     proposal: Proposal::MembraneRupture,
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
 impl Described for HiddenMembrane {
@@ -74,25 +70,25 @@ impl Effect for HiddenMembrane {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         !(self.stiffness_n_per_m > 0.0 && self.puncture_n > 0.0)
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    /// Memory: 1 once broken.
-    fn breaks(&self, z_m: f64, slabs: &[Slab], memory: &mut EffectState) -> bool {
-        if memory[0] != 0.0 || self.force(z_m, slabs) < self.puncture_n {
+    /// State: 1 once broken.
+    fn ruptures_membrane(&self, z_m: f64, slabs: &[Slab], state: &mut EffectState) -> bool {
+        if state[0] != 0.0 || self.force(z_m, slabs) < self.puncture_n {
             return false;
         }
-        memory[0] = 1.0;
+        state[0] = 1.0;
         true
     }
-    fn break_depth_m(&self) -> Option<f64> {
+    fn membrane_depth_m(&self) -> Option<f64> {
         Some(self.depth_m + self.stretch_m())
     }
-    fn tip_force(&self, moment: &TipState, slabs: &[Slab], memory: &mut EffectState) -> f64 {
-        if memory[0] != 0.0 { 0.0 } else { self.force(moment.z_m, slabs) }
+    fn tip_force(&self, tip: &TipState, slabs: &[Slab], state: &mut EffectState) -> f64 {
+        if state[0] != 0.0 { 0.0 } else { self.force(tip.z_m, slabs) }
     }
 }
 

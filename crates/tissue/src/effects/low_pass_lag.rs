@@ -1,19 +1,17 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, lag_weights, same_step};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, lag_weights, same_step};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// A sensor or filter that lags: first order, `tau y' = f - y`, at rest at the first sample.
+/// First-order lag of sensor or filter: `tau y' = f - y`, in steady state at the first sample.
 ///
-/// Integrated exactly for a force that is linear between samples, so that the lag is the same at every
-/// sampling rate.
+/// Integrated exactly for a force that is linear between samples, so that the lag is the same at every sampling rate.
 ///
-/// Source: the laboratory's filter (0.01 at 200 Hz is 0.5 s). Signature: a drop lasts longer than the
-/// sampling, for a time and not for a depth.
+/// Inactive: `tau = 0`. Signature: a drop is extended in time, not in depth.
+/// Source: first-order filter of the laboratory (0.01 at 200 Hz is 0.5 s).
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct LowPassLag {
-    /// Time constant `tau` in seconds, 0 to 100. Neutral: 0.
+    /// Time constant `tau` in seconds, 0 to 100. Inactive: 0.
     pub time_constant_s: f64,
 }
 
@@ -27,76 +25,66 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(0.0, 100.0)
         .search(0.05, 0.002, 2.0)
         .log()],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[0.004]], &[&[0.02]], &[&[0.08]], &[&[0.3]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for LowPassLag {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.time_constant_s]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [time_constant_s] = *values else { return None };
-        Some(Self { time_constant_s })
-    }
-}
+described!(LowPassLag { time_constant_s });
 
 impl Effect for LowPassLag {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.time_constant_s <= 0.0
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    /// Memory: output, input, whether started, step, its two weights.
-    fn sense(&self, _time_s: f64, dt_s: f64, force_n: f64, memory: &mut EffectState) -> f64 {
-        if memory[2] == 0.0 {
-            memory[2] = 1.0;
-            memory[0] = force_n;
+    /// State: output, input, whether started, step, its two weights.
+    fn sensor_output(&self, _time_s: f64, dt_s: f64, force_n: f64, state: &mut EffectState) -> f64 {
+        if state[2] == 0.0 {
+            state[2] = 1.0;
+            state[0] = force_n;
         } else if dt_s > 0.0 {
-            if !same_step(dt_s, memory[3]) {
+            if !same_step(dt_s, state[3]) {
                 let (keep, ramp) = lag_weights(dt_s, self.time_constant_s);
-                memory[3..6].copy_from_slice(&[dt_s, keep, ramp]);
+                state[3..6].copy_from_slice(&[dt_s, keep, ramp]);
             }
-            let [output, input, _, _, keep, ramp, ..] = *memory;
-            memory[0] = input + keep * (output - input) + ramp * (force_n - input);
+            let [output, input, _, _, keep, ramp, ..] = *state;
+            state[0] = input + keep * (output - input) + ramp * (force_n - input);
         }
-        memory[1] = force_n;
-        memory[0]
+        state[1] = force_n;
+        state[0]
     }
-    /// Memory: span and what of a step is through after it, output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
+    /// State: span and what of a step is through after it, output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
     /// `y` follows from `tau y' = x - y` integrated over the span.
-    fn sense_mean(
+    fn mean_sensor_output(
         &self,
         _time_s: f64,
         span_s: f64,
         _samples: f64,
         force_n: f64,
-        memory: &mut EffectState,
+        state: &mut EffectState,
     ) -> f64 {
-        if memory[7] == 0.0 {
-            memory[7] = 1.0;
-            memory[6] = force_n;
+        if state[7] == 0.0 {
+            state[7] = 1.0;
+            state[6] = force_n;
         }
-        let before = memory[6];
+        let before = state[6];
         if span_s <= 0.0 {
             return before;
         }
         let ratio = span_s / self.time_constant_s;
-        if !same_step(span_s, memory[3]) {
-            (memory[3], memory[4]) = (span_s, -libm::expm1(-ratio));
+        if !same_step(span_s, state[3]) {
+            (state[3], state[4]) = (span_s, -libm::expm1(-ratio));
         }
-        let change = memory[4] * (force_n - before);
-        memory[6] = before + change;
+        let change = state[4] * (force_n - before);
+        state[6] = before + change;
         force_n - change / ratio
     }
-    fn sense_after(&self, time_s: f64, span_s: f64, force_n: f64, memory: &mut EffectState) -> f64 {
-        self.sense_mean(time_s, span_s, 1.0, force_n, memory);
-        memory[6]
+    fn sensor_output_at_end(&self, time_s: f64, span_s: f64, force_n: f64, state: &mut EffectState) -> f64 {
+        self.mean_sensor_output(time_s, span_s, 1.0, force_n, state);
+        state[6]
     }
 }

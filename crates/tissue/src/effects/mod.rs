@@ -1,14 +1,18 @@
-//! The effects library: one file per effect.
+//! The effect library: one file per effect.
 //!
-//! [`AnyEffect`] is the closed list that scenarios can name; adding an effect is one file and
-//! two lines here: its module, and its place in the list below, which is the order of the chain.
+//! [`AnyEffect`] is the closed list that scenarios can name. A new effect takes one file and two lines here: its module,
+//! and its place in the list below, which is the order of the measurement chain.
 
 use crate::effect::{Effect, EffectState, TipState};
 use crate::effect_info::{EffectInfo, ParameterError};
 use crate::layer_geometry::Slab;
 use alloc::vec::Vec;
+use parameters::Described;
 
-// Outside the macro, where rustfmt and cargo-mutants see them.
+#[macro_use]
+mod parameters;
+
+// Declared outside the macro, so that rustfmt and cargo-mutants see them.
 mod asymmetric_friction;
 mod boundary_shift;
 mod coulomb_friction;
@@ -44,37 +48,7 @@ mod time_delay;
 mod tool_inertia;
 mod viscoelastic_presliding;
 
-/// What an effect's parameters are as a list of numbers.
-trait Described: Effect + Default {
-    /// The library's entry.
-    fn entry() -> &'static EffectInfo {
-        Self::default().info()
-    }
-
-    /// The parameters, in the order of [`EffectInfo::parameters`].
-    fn values(&self) -> Vec<f64>;
-
-    /// The effect with these parameters; `None` when their number is wrong.
-    fn from_values(values: &[f64]) -> Option<Self>;
-
-    /// The parameters in coordinates in which a force is less curved, as many as parameters, each in the scale of its
-    /// parameter's [`FitScale`](crate::FitScale); by default the parameters themselves.
-    fn coordinates(&self) -> Vec<f64> {
-        self.values()
-    }
-
-    /// The effect at these coordinates.
-    fn from_coordinates(coordinates: &[f64]) -> Option<Self> {
-        Self::from_values(coordinates)
-    }
-
-    /// Conditions on several parameters together.
-    fn check_together(&self) -> Result<(), ParameterError> {
-        Ok(())
-    }
-}
-
-/// Declares the effect modules and the enum that scenarios write in camel case.
+/// Declares [`AnyEffect`], whose variants scenarios write in camel case, and passes every hook on to the variant.
 macro_rules! effects {
     ($($module:ident :: $name:ident),* $(,)?) => {
         $(pub use $module::*;)*
@@ -87,7 +61,7 @@ macro_rules! effects {
         }
 
         $(impl $name {
-            /// Its name in files.
+            /// Id in snake case, as in results.
             pub const ID: &'static str = stringify!($module);
         })*
 
@@ -96,9 +70,9 @@ macro_rules! effects {
         })*
 
         /// The entries of all effects, in the order of the chain.
-        pub(crate) const LIBRARY: &[fn() -> &'static EffectInfo] = &[$($name::entry),*];
+        const LIBRARY: &[fn() -> &'static EffectInfo] = &[$($name::entry),*];
 
-        /// The effects by number, in the order of the chain.
+        /// Order of the effects in the chain.
         enum Rank { $($name),* }
 
         impl AnyEffect {
@@ -123,7 +97,7 @@ macro_rules! effects {
                 match self { $(Self::$name(effect) => effect.values(),)* }
             }
 
-            /// The parameters in coordinates that suit a fit: as many as parameters, in their order.
+            /// The parameters in coordinates for fitting: as many as parameters, in their order.
             #[must_use]
             pub fn coordinates(&self) -> Vec<f64> {
                 match self { $(Self::$name(effect) => effect.coordinates(),)* }
@@ -145,30 +119,30 @@ macro_rules! effects {
 
         effects!(@delegate [$($name)*]
             fn info() -> &'static EffectInfo;
-            fn is_neutral() -> bool;
-            fn remembers() -> bool;
-            fn shape(slabs: &mut [Slab]) -> ();
-            fn relative(time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64);
-            fn elastic(k_n_per_m: f64, x_m: f64, force_n: f64) -> f64;
-            fn relax(dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64;
-            fn puncture(threshold_n: f64, v_mps: f64) -> f64;
-            fn endure(layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, memory: &mut EffectState) -> f64;
-            fn withheld(released_n: f64) -> f64;
-            fn on_rupture(released_n: f64, z_m: f64, memory: &mut EffectState) -> ();
+            fn is_inactive() -> bool;
+            fn has_state() -> bool;
+            fn modify_layers(slabs: &mut [Slab]) -> ();
+            fn relative_motion(time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64);
+            fn elastic_force(k_n_per_m: f64, x_m: f64, force_n: f64) -> f64;
+            fn relax(dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64;
+            fn puncture_force(threshold_n: f64, v_mps: f64) -> f64;
+            fn puncture_force_after_load(layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, state: &mut EffectState) -> f64;
+            fn retained_force(released_n: f64) -> f64;
+            fn on_rupture(released_n: f64, z_m: f64, state: &mut EffectState) -> ();
             fn friction_velocity(v_mps: f64) -> f64;
             fn friction_factor(v_mps: f64) -> f64;
-            fn shaft_force(moment: &TipState, inside_m: f64, memory: &mut EffectState) -> f64;
-            fn on_layer_rupture(layer: usize, released_n: f64, memory: &mut EffectState) -> ();
-            fn press(layer: usize, dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64;
-            fn grip(moment: &TipState, slabs: &[Slab], sliding_mps: f64, memory: &mut EffectState) -> f64;
-            fn breaks(z_m: f64, slabs: &[Slab], memory: &mut EffectState) -> bool;
-            fn tip_force(moment: &TipState, slabs: &[Slab], memory: &mut EffectState) -> f64;
+            fn shaft_force(tip: &TipState, inside_m: f64, state: &mut EffectState) -> f64;
+            fn on_layer_rupture(layer: usize, released_n: f64, state: &mut EffectState) -> ();
+            fn relax_layer(layer: usize, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64;
+            fn layer_friction(tip: &TipState, slabs: &[Slab], sliding_mps: f64, state: &mut EffectState) -> f64;
+            fn ruptures_membrane(z_m: f64, slabs: &[Slab], state: &mut EffectState) -> bool;
+            fn tip_force(tip: &TipState, slabs: &[Slab], state: &mut EffectState) -> f64;
             fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
-            fn sense(time_s: f64, dt_s: f64, force_n: f64, memory: &mut EffectState) -> f64;
-            fn sense_mean(time_s: f64, span_s: f64, samples: f64, force_n: f64, memory: &mut EffectState) -> f64;
-            fn sense_after(time_s: f64, span_s: f64, force_n: f64, memory: &mut EffectState) -> f64;
+            fn sensor_output(time_s: f64, dt_s: f64, force_n: f64, state: &mut EffectState) -> f64;
+            fn mean_sensor_output(time_s: f64, span_s: f64, samples: f64, force_n: f64, state: &mut EffectState) -> f64;
+            fn sensor_output_at_end(time_s: f64, span_s: f64, force_n: f64, state: &mut EffectState) -> f64;
             fn delay_s() -> f64;
-            fn break_depth_m() -> Option<f64>;
+            fn membrane_depth_m() -> Option<f64>;
             fn position_factor() -> f64;
         );
     };
@@ -177,15 +151,15 @@ macro_rules! effects {
     (@delegate $names:tt $(fn $hook:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
         impl Effect for AnyEffect {
             $(effects!(@hook $names $hook [$($argument: $type),*] ($($argument),*) $result);)*
-            effects!(@rubbed $names);
+            effects!(@scale $names);
         }
     };
-    (@rubbed [$($name:ident)*]) => {
-        fn rubbed(&mut self, factor: f64) {
-            match self { $(Self::$name(effect) => effect.rubbed(factor),)* }
+    (@scale [$($name:ident)*]) => {
+        fn scale_friction(&mut self, factor: f64) {
+            match self { $(Self::$name(effect) => effect.scale_friction(factor),)* }
         }
-        fn toughened(&mut self, layer: usize, factor: f64) {
-            match self { $(Self::$name(effect) => effect.toughened(layer, factor),)* }
+        fn scale_puncture(&mut self, layer: usize, factor: f64) {
+            match self { $(Self::$name(effect) => effect.scale_puncture(layer, factor),)* }
         }
     };
     (@hook [$($name:ident)*] $hook:ident [$($parameters:tt)*] $call:tt $result:ty) => {
@@ -247,4 +221,31 @@ impl AnyEffect {
         }
         self.check_together()
     }
+}
+
+/// Effects that act on one layer at a time, which a search over single insertions does not consider.
+const PER_LAYER: [&str; 7] = [
+    "deep_indentation",
+    "layer_coupling",
+    "layer_stiffening",
+    "release_depth",
+    "delayed_puncture",
+    "viscoelastic_presliding",
+    "shaft_slip",
+];
+
+/// The general effects in the order of the chain (docs/reference/model.md, Effects).
+pub fn general_effects() -> impl Iterator<Item = &'static EffectInfo> {
+    LIBRARY.iter().map(|entry| entry()).filter(|entry| !PER_LAYER.contains(&entry.id))
+}
+
+/// Effects that act on one layer at a time, found in measured insertions.
+pub fn per_layer_effects() -> impl Iterator<Item = &'static EffectInfo> {
+    LIBRARY.iter().map(|entry| entry()).filter(|entry| PER_LAYER.contains(&entry.id))
+}
+
+/// The entry of one effect, general or per layer.
+#[must_use]
+pub fn effect_info(id: &str) -> Option<&'static EffectInfo> {
+    general_effects().chain(per_layer_effects()).find(|entry| entry.id == id)
 }

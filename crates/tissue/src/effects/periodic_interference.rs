@@ -1,16 +1,15 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A tone in the force: `+ A sin(2 pi f t + phase)`, in air too.
 ///
-/// Source: mains, drives, stage vibration. Signature: a narrow line in the periodogram in time, the
-/// same in air, in holds and at every depth.
+/// Inactive: `A = 0`. Signature: a narrow spectral line, the same in air, in holds and at every depth.
+/// Source: mains, drives, vibration of the stage.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct PeriodicInterference {
-    /// Amplitude `A` in N, 0 to 100. Neutral: 0.
+    /// Amplitude `A` in N, 0 to 100. Inactive: 0.
     pub amplitude_n: f64,
     /// Frequency in Hz, 0 to 1e5.
     pub frequency_hz: f64,
@@ -40,41 +39,32 @@ static INFO: EffectInfo = EffectInfo {
             core::f64::consts::PI,
         ),
     ],
-    extended: None,
     proposal: Proposal::SpectralTone,
-    nested_in: &[],
     absorbs_unmodelled: true,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for PeriodicInterference {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.amplitude_n, self.frequency_hz, self.phase_rad]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [amplitude_n, frequency_hz, phase_rad] = *values else { return None };
-        Some(Self { amplitude_n, frequency_hz, phase_rad })
-    }
-}
+described!(PeriodicInterference { amplitude_n, frequency_hz, phase_rad });
 
 impl Effect for PeriodicInterference {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.amplitude_n == 0.0
     }
-    fn sense(&self, time_s: f64, _dt_s: f64, force_n: f64, _memory: &mut EffectState) -> f64 {
+    fn sensor_output(&self, time_s: f64, _dt_s: f64, force_n: f64, _state: &mut EffectState) -> f64 {
         let angle = core::f64::consts::TAU * self.frequency_hz * time_s + self.phase_rad;
         force_n + self.amplitude_n * libm::sin(angle)
     }
     /// The mean of a line over evenly spaced samples (Dirichlet's kernel).
-    fn sense_mean(
+    fn mean_sensor_output(
         &self,
         time_s: f64,
         span_s: f64,
         samples: f64,
         force_n: f64,
-        _memory: &mut EffectState,
+        _state: &mut EffectState,
     ) -> f64 {
         let half = core::f64::consts::PI * self.frequency_hz * span_s / samples.max(1.0);
         let (below, above) = (libm::sin(half), libm::sin(samples * half));

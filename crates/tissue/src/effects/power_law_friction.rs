@@ -1,23 +1,20 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, sgn};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Friction that is not linear in speed: `v -> sgn(v) v0 (abs(v)/v0)^n` in the viscous friction,
-/// `v0 = 1 mm/s`.
+/// Friction that is a power of speed: `v -> sgn(v) v0 (abs(v)/v0)^n` in the viscous friction, `v0` = 1 mm/s.
 ///
-/// Source: rate dependence of phantoms and liver (van Gerwen et al. 2012: log-like, then flat).
-/// Signature: friction against speed is a curve through the base law's value at 1 mm/s; invisible at
-/// one constant velocity.
+/// Inactive: `n = 1`. Signature: friction against speed is a curve through the base law's value at 1 mm/s; not
+/// identifiable at one constant velocity. Source: rate dependence of phantoms and liver (van Gerwen et al. 2012).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct PowerLawFriction {
-    /// Exponent `n`, -0.9 to 3; below zero friction falls with speed. Neutral: 1.
+    /// Exponent `n`, -0.9 to 3; below zero friction falls with speed. Inactive: 1.
     pub exponent: f64,
 }
 
 impl Default for PowerLawFriction {
-    /// The neutral effect.
+    /// The inactive effect.
     fn default() -> Self {
         Self { exponent: 1.0 }
     }
@@ -33,27 +30,17 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(-0.9, 3.0)
         .inactive(1.0)
         .search(0.7, 0.1, 2.0)],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[1.02]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for PowerLawFriction {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.exponent]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [exponent] = *values else { return None };
-        Some(Self { exponent })
-    }
-}
+described!(PowerLawFriction { exponent });
 
 impl Effect for PowerLawFriction {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.exponent == 1.0
     }
     fn friction_velocity(&self, v_mps: f64) -> f64 {

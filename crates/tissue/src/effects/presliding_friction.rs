@@ -1,29 +1,27 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Dry friction that builds up with travel (Dahl): `f_B += c xi sum l_i`,
-/// `xi' = (v/delta)(1 - xi sgn v)` while any shaft is inside.
+/// Dry friction that builds up with travel (Dahl): `f_B += c xi sum l_i`, `xi' = (v/delta)(1 - xi sgn v)` while the
+/// shaft is inside.
 ///
-/// Integrated exactly in the travel `dz` of a sample: `xi` relaxes towards `sgn v` as
-/// `exp(-abs(dz)/delta)`; within the dead band of `sgn` it follows `dz/delta`, a spring. `xi` stays
-/// within -1 and 1.
+/// Integrated exactly in the travel `dz` of a sample: `xi` relaxes towards `sgn v` as `exp(-abs(dz)/delta)`; within the
+/// dead band of `sgn` it follows `dz/delta`, a spring. `xi` stays within -1 and 1. For `delta -> 0` it is
+/// `coulomb_friction`.
 ///
-/// Source: Dahl 1968; LuGre model. Signature: after each reversal a line of force against travel
-/// whose slope does not depend on speed; the friction stays while the needle is held. With `delta`
-/// towards zero it is `coulomb_friction`.
+/// Inactive: `c = 0`. Signature: after each reversal a line of force against travel whose slope does not depend on speed;
+/// the friction persists in holds. Source: Dahl 1968; LuGre model.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct PreslidingFriction {
-    /// Friction per metre of needle inside once sliding, `c` in N/m, 0 to 10 000. Neutral: 0.
+    /// Friction per metre of needle inside once sliding, `c` in N/m, 0 to 10 000. Inactive: 0.
     pub c_n_per_m: f64,
     /// Travel `delta` over which it builds up, in metres, 1e-7 to 0.1.
     pub delta_m: f64,
 }
 
 impl Default for PreslidingFriction {
-    /// The neutral effect.
+    /// The inactive effect.
     fn default() -> Self {
         Self { c_n_per_m: 0.0, delta_m: 5e-4 }
     }
@@ -46,51 +44,42 @@ static INFO: EffectInfo = EffectInfo {
             .search(5e-4, 1e-5, 2e-2)
             .log(),
     ],
-    extended: None,
     proposal: Proposal::LinearColumns(&[
         &[&[1.0, 6e-5]],
         &[&[1.0, 2.5e-4]],
         &[&[1.0, 1e-3]],
         &[&[1.0, 4e-3]],
     ]),
-    nested_in: &[],
     absorbs_unmodelled: true,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for PreslidingFriction {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.c_n_per_m, self.delta_m]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [c_n_per_m, delta_m] = *values else { return None };
-        Some(Self { c_n_per_m, delta_m })
-    }
-}
+described!(PreslidingFriction { c_n_per_m, delta_m });
 
 impl Effect for PreslidingFriction {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.c_n_per_m == 0.0
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    /// Memory: `xi`.
-    fn shaft_force(&self, moment: &TipState, inside_m: f64, memory: &mut EffectState) -> f64 {
+    /// State: `xi`.
+    fn shaft_force(&self, tip: &TipState, inside_m: f64, state: &mut EffectState) -> f64 {
         if inside_m > 0.0 {
             // On entry only the travel inside the tissue counts.
-            let dz = moment.dz_m.min(inside_m);
-            let sign = sgn(moment.v_mps);
-            let xi = memory[0];
+            let dz = tip.dz_m.min(inside_m);
+            let sign = sgn(tip.v_mps);
+            let xi = state[0];
             let next = if sign * dz > 0.0 {
                 sign + (xi - sign) * libm::exp(-dz.abs() / self.delta_m)
             } else {
                 xi + dz / self.delta_m * (1.0 - xi * sign)
             };
-            memory[0] = next.clamp(-1.0, 1.0);
+            state[0] = next.clamp(-1.0, 1.0);
         }
-        self.c_n_per_m * memory[0] * inside_m
+        self.c_n_per_m * state[0] * inside_m
     }
 }

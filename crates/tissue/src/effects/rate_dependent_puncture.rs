@@ -1,17 +1,16 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect};
+use crate::chain_stage::ChainStage;
+use crate::effect::Effect;
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Puncture force that depends on speed: `F_i -> F_i max(0.1, 1 + alpha ln(abs(v)/v0))`,
-/// `v0 = 1 mm/s`, `abs(v)` at least 0.1 mm/s.
+/// Puncture force that depends on speed: `F_i -> F_i max(0.1, 1 + alpha ln(abs(v)/v0))`, `v0` = 1 mm/s, `abs(v)` at
+/// least 0.1 mm/s.
 ///
+/// Inactive: `alpha = 0`. Signature: the peak changes with speed while the loading curve does not.
 /// Source: van Gerwen, Dankelman, van den Dobbelsteen 2012 (living tissue: falls with speed).
-/// Signature: the peak changes with speed while the loading curve does not.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct RateDependentPuncture {
-    /// Change per factor e in speed, `alpha`, -2 to 2. Neutral: 0.
+    /// Change per factor e in speed, `alpha`, -2 to 2. Inactive: 0.
     pub alpha: f64,
 }
 
@@ -24,30 +23,20 @@ static INFO: EffectInfo = EffectInfo {
     parameters: &[ParameterInfo::strength("alpha", "", "change of the puncture force per factor e in speed")
         .allowed(-2.0, 2.0)
         .search(0.1, -0.5, 0.5)],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[0.02]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for RateDependentPuncture {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.alpha]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [alpha] = *values else { return None };
-        Some(Self { alpha })
-    }
-}
+described!(RateDependentPuncture { alpha });
 
 impl Effect for RateDependentPuncture {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.alpha == 0.0
     }
-    fn puncture(&self, threshold_n: f64, v_mps: f64) -> f64 {
+    fn puncture_force(&self, threshold_n: f64, v_mps: f64) -> f64 {
         if threshold_n == f64::INFINITY {
             return threshold_n;
         }

@@ -1,17 +1,16 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect};
+use crate::chain_stage::ChainStage;
+use crate::effect::Effect;
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Tissue that moves with the breath: `s_i -> s_i + A sin(2 pi f t + phase)`; depth and velocity
-/// in the law become relative to it.
+/// Tissue that moves periodically: `s_i -> s_i + A sin(2 pi f t + phase)`; `z` and `v` in the force law are relative
+/// to the tissue.
 ///
-/// Source: respiratory motion of abdominal organs, 0.2-0.4 Hz (research notes, number 18).
-/// Signature: periodic in time, also while the needle is held.
+/// Inactive: `A = 0`. Signature: periodic in time, also while the needle is held.
+/// Source: respiratory motion of abdominal organs, 0.2-0.4 Hz.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Respiration {
-    /// Amplitude `A` in metres, 0 to 0.1. Neutral: 0.
+    /// Amplitude `A` in metres, 0 to 0.1. Inactive: 0.
     pub amplitude_m: f64,
     /// Frequency in Hz, 0 to 20.
     pub frequency_hz: f64,
@@ -41,30 +40,21 @@ static INFO: EffectInfo = EffectInfo {
             core::f64::consts::PI,
         ),
     ],
-    extended: None,
     proposal: Proposal::TissueMotion,
-    nested_in: &[],
     absorbs_unmodelled: true,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for Respiration {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.amplitude_m, self.frequency_hz, self.phase_rad]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [amplitude_m, frequency_hz, phase_rad] = *values else { return None };
-        Some(Self { amplitude_m, frequency_hz, phase_rad })
-    }
-}
+described!(Respiration { amplitude_m, frequency_hz, phase_rad });
 
 impl Effect for Respiration {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.amplitude_m == 0.0
     }
-    fn relative(&self, time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64) {
+    fn relative_motion(&self, time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64) {
         let omega = core::f64::consts::TAU * self.frequency_hz;
         let (sin, cos) = libm::sincos(omega * time_s + self.phase_rad);
         (z_m - self.amplitude_m * sin, v_mps - self.amplitude_m * omega * cos)

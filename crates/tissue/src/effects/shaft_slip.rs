@@ -1,6 +1,7 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState, lag_weights, sgn};
-use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
+use super::parameters::{Described, LAYER, layer_mut};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState, lag_weights, sgn};
+use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo};
 use crate::layer_geometry::Slab;
 
 /// Reference speed `v0` of the slip in m/s (1 mm/s).
@@ -22,36 +23,36 @@ const LEAST_N: f64 = 1e-3;
 /// Turns of the solver at most; it needs two or three.
 const TURNS: usize = 80;
 
-/// A layer that clings to the shaft, is stretched, relaxes and slips by a power of the force.
+/// A layer that adheres to the shaft, deforms, relaxes and slips by a power of the force.
 ///
-/// `w` is the displacement of the layer's tissue against its rest, positive when pushed in. Its force is that of a curved
-/// spring with two relaxing terms,
+/// `w` is the displacement of the layer's tissue from rest, positive when pushed in. Its force is that of a curved spring
+/// with two relaxing terms,
 ///
 /// `E = K w + b w |w|`, `q_j' = (g_j E - q_j)/tau_j`, `F = E - q_1 - q_2`.
 ///
-/// - *Pressed*, before the rupture, `w = max(0, z - s_i)`: `F` is the layer's elastic force.
+/// - *Before the rupture* `w = max(0, z - s_i)`: `F` is the layer's elastic force.
 /// - *At the rupture* `w` falls back so that `F = r C (v/v0)^a`, or stays when `F` is less; the `q_j` stay.
-/// - *Broken*, the shaft drags the tissue along and slips: `w' = z' - v0 sgn(F) (abs(F)/L)^m` with `v0` = 1 mm/s,
-///   `L = C (v/v0)^a max(0.2, 1 - d s)` when it is pushed (`s` is how far it has slipped so, `v` the speed, which the contact
-///   comes to know over a millimetre of travel and does not forget at rest) and `L = S (v/v0)^a` when it is pulled.
+/// - *After the rupture* the shaft drags the tissue along and slips: `w' = z' - v0 sgn(F) (abs(F)/L)^m`, `v0` = 1 mm/s,
+///   `L = C (v/v0)^a max(0.2, 1 - d s)` when pushed (`s`: slipped travel; `v`: speed, followed over a millimetre of travel
+///   and kept at rest) and `L = S (v/v0)^a` when pulled.
 ///
-/// Far below `L` nothing slips, which is presliding; steady sliding at speed `v` takes `F = L (v/v0)^(1/m)`: a large `m` is
-/// dry friction, `m` = 1 viscous; the net exponent of the plateau is `a + 1/m`. In a hold, `F` creeps down by slip and by relaxation. When the tip comes back to where the layer
-/// lets go (its front face, or as `release_depth` says), `F` ends within 0.2 mm. The layer's viscous friction `b_i l_i v` is replaced.
+/// Far below `L` nothing slips, which is presliding; steady sliding at speed `v` takes `F = L (v/v0)^(1/m)`: a large `m`
+/// is dry friction, `m = 1` viscous, and the plateau has the net exponent `a + 1/m`. In a hold `F` creeps down by slip and
+/// relaxation. When the tip comes back to where the layer releases the shaft (its front face, or `release_depth`), `F`
+/// ends within 0.2 mm. The layer's viscous friction `b_i l_i v` is replaced.
 ///
-/// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation; the error falls with the step
+/// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation
 /// (`crates/tissue/tests/shaft_slip.rs`). `m`, `b`, `g_j`, `tau_j` have no effect without `C` and `S`.
 ///
-/// Source: creep of dragged contacts by a power of the stress (Persson 2000, section 12; Norton's law), Maxwell relaxation; fitted to
-/// insertions into skin and muscle phantoms. Signature: after a stop the force falls at once and then stays; after a reversal it
-/// follows travel over millimetres; the plateau while sliding hardly depends on speed.
+/// Inactive: `C = 0` and `S = 0`. Signature: after a stop the force falls fast and then stays; after a reversal it follows
+/// travel over millimetres; the sliding plateau hardly depends on speed. Source: power-law creep of dragged contacts
+/// (Persson 2000, section 12; Norton's law) with Maxwell relaxation; fitted to insertions into skin and muscle phantoms.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ShaftSlip {
     /// Layer `i`, 1-based; one that is not there changes nothing.
     pub layer: usize,
-    /// Hold `C` in N when pushed at 1 mm/s, zero or positive. Neutral: 0, with `pull_n` 0.
+    /// Hold `C` in N when pushed at 1 mm/s, zero or positive. Inactive: 0, with `pull_n` 0.
     pub push_n: f64,
     /// Hold `S` in N when pulled at 1 mm/s, zero or positive.
     pub pull_n: f64,
@@ -72,7 +73,7 @@ pub struct ShaftSlip {
 }
 
 impl Default for ShaftSlip {
-    /// The neutral effect.
+    /// The inactive effect.
     fn default() -> Self {
         Self {
             layer: 1,
@@ -89,11 +90,6 @@ impl Default for ShaftSlip {
     }
 }
 
-const LAYER: ParameterInfo = ParameterInfo::shape("layer", "", "layer, 1-based")
-    .allowed(1.0, 1000.0)
-    .inactive(1.0)
-    .search(1.0, 1.0, 10.0)
-    .integer();
 const FRACTION: ParameterInfo = ParameterInfo::shape("fractions.0", "", "share of the force that relaxes")
     .allowed(0.0, 1.0)
     .search(0.2, 0.0, 0.9);
@@ -141,10 +137,7 @@ static INFO: EffectInfo = EffectInfo {
         TIME,
         ParameterInfo { path: "time_constants_s.1", ..TIME }.inactive(10.0).search(10.0, 5.0, 60.0),
     ],
-    extended: None,
-    proposal: Proposal::PerLayer,
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
 impl Described for ShaftSlip {
@@ -189,7 +182,7 @@ impl Described for ShaftSlip {
             layer,
             push_n,
             pull_n,
-            retained_share: retained_share,
+            retained_share,
             exponent,
             wear_per_m,
             rate,
@@ -220,16 +213,16 @@ impl Described for ShaftSlip {
     }
 }
 
-/// Place of the speed in the memory.
+/// Place of the speed in the state.
 const SPEED: usize = 7;
 
 /// The speed that the contact knows follows the tip's over the travel in which the contact renews itself.
-fn renew(known_mps: &mut f64, moment: &TipState) {
-    let now = moment.v_mps.abs();
+fn renew(known_mps: &mut f64, tip: &TipState) {
+    let now = tip.v_mps.abs();
     if *known_mps <= 0.0 {
         *known_mps = now;
     } else if now > REST_MPS {
-        let share = -libm::expm1(-moment.dz_m.abs() / RENEWED_M);
+        let share = -libm::expm1(-tip.dz_m.abs() / RENEWED_M);
         *known_mps *= libm::exp(share * libm::log(now / *known_mps));
     }
 }
@@ -254,14 +247,14 @@ struct Contact {
 }
 
 impl Contact {
-    fn of(memory: &EffectState) -> Self {
-        let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, speed_mps] = *memory;
+    fn of(state: &EffectState) -> Self {
+        let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, speed_mps] = *state;
         Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, broke: broke != 0.0, speed_mps }
     }
-    fn keep(self, memory: &mut EffectState) {
-        *memory = self.memory();
+    fn keep(self, state: &mut EffectState) {
+        *state = self.state();
     }
-    fn memory(self) -> EffectState {
+    fn state(self) -> EffectState {
         let broke = if self.broke { 1.0 } else { 0.0 };
         let [q1, q2] = self.q_n;
         [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, broke, self.speed_mps]
@@ -362,70 +355,76 @@ impl Effect for ShaftSlip {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.push_n == 0.0 && self.pull_n == 0.0
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    fn rubbed(&mut self, factor: f64) {
+    fn scale_friction(&mut self, factor: f64) {
         self.push_n *= factor;
         self.pull_n *= factor;
     }
-    fn shape(&self, slabs: &mut [Slab]) {
-        if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
+    fn modify_layers(&self, slabs: &mut [Slab]) {
+        if let Some(slab) = layer_mut(slabs, self.layer) {
             slab.replaced_friction_share = 1.0;
             slab.curvature_n_per_m2 += self.curvature_n_per_m2;
         }
     }
     /// Pressed, the layer relaxes as it will when it is dragged.
-    fn press(&self, layer: usize, dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64 {
+    fn relax_layer(&self, layer: usize, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
         if layer != self.layer {
             return elastic_n;
         }
-        let mut c = Contact::of(memory);
+        let mut c = Contact::of(state);
         if dt_s > 0.0 && (elastic_n != 0.0 || c.q_n != [0.0; 2] || c.spring_n != 0.0) {
             c.q_n = self.relaxed(c.q_n, self.weights(dt_s), c.spring_n, elastic_n);
         }
         c.spring_n = elastic_n;
-        c.keep(memory);
+        c.keep(state);
         elastic_n - c.q_n[0] - c.q_n[1]
     }
-    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut EffectState) {
+    fn on_layer_rupture(&self, layer: usize, released_n: f64, state: &mut EffectState) {
         if layer == self.layer {
-            let c = Contact::of(memory);
+            let c = Contact::of(state);
             let fall_n = released_n.min(self.retained_share * self.push_n * self.fast(c.speed_mps));
-            Contact { fall_n, broke: true, slipped_m: 0.0, ..c }.keep(memory);
+            Contact { fall_n, broke: true, slipped_m: 0.0, ..c }.keep(state);
         }
     }
-    fn grip(&self, moment: &TipState, slabs: &[Slab], _sliding_mps: f64, memory: &mut EffectState) -> f64 {
+    fn layer_friction(
+        &self,
+        tip: &TipState,
+        slabs: &[Slab],
+        _sliding_mps: f64,
+        state: &mut EffectState,
+    ) -> f64 {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
-        renew(&mut memory[SPEED], moment);
-        if moment.ruptured < self.layer {
+        renew(&mut state[SPEED], tip);
+        if tip.ruptured < self.layer {
             return 0.0;
         }
         let spring = Spring { k_n_per_m: slab.stiffness_n_per_m, b_n_per_m2: slab.curvature_n_per_m2 };
-        let end_m = if moment.v_mps < 0.0 { slab.release_m } else { slab.release_m.min(0.0) };
-        let held = ((moment.z_m - slab.front_m - end_m) / EDGE_M).clamp(0.0, 1.0);
+        let end_m = if tip.v_mps < 0.0 { slab.release_m } else { slab.release_m.min(0.0) };
+        let held = ((tip.z_m - slab.front_m - end_m) / EDGE_M).clamp(0.0, 1.0);
         if held == 0.0 {
-            *memory = Contact { speed_mps: memory[SPEED], ..Contact::of(&[0.0; 8]) }.memory();
+            *state = Contact { speed_mps: state[SPEED], ..Contact::of(&[0.0; 8]) }.state();
             return 0.0;
         }
-        let mut c = Contact::of(memory);
+        let mut c = Contact::of(state);
         if c.broke {
             // The step in which it broke ends here.
             c.broke = false;
             c.w_m = spring.at(c.fall_n + c.q_n[0] + c.q_n[1]);
             c.spring_n = spring.force(c.w_m);
-        } else if moment.dt_s > 0.0 || moment.dz_m != 0.0 {
-            let steps = libm::ceil(moment.dz_m.abs() / SUBSTEP_M).clamp(1.0, MOST_STEPS);
-            let (dt, dz) = (moment.dt_s / steps, moment.dz_m / steps);
+        } else if tip.dt_s > 0.0 || tip.dz_m != 0.0 {
+            let steps = libm::ceil(tip.dz_m.abs() / SUBSTEP_M).clamp(1.0, MOST_STEPS);
+            let (dt, dz) = (tip.dt_s / steps, tip.dz_m / steps);
             let weights = self.weights(dt);
             for _ in 0..steps as usize {
                 self.drag(&mut c, spring, dt, dz, weights);
             }
         }
-        c.keep(memory);
+        c.keep(state);
         held * (c.spring_n - c.q_n[0] - c.q_n[1])
     }
 }

@@ -1,21 +1,19 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 use crate::layer_geometry::Slab;
 
-/// A boundary that gives way gradually: the elastic release of a rupture is spread over travel `w`,
-/// linear in the deepest travel since; what is released stays released.
+/// A gradual release: the elastic force `R` released by a rupture at `z_r` is spread over the travel `w`, so that the
+/// tip keeps `R max(0, 1 - (deepest - z_r)/w)`.
 ///
-/// With `R` the force released at `z_r`, the tip keeps `R max(0, 1 - (deepest - z_r)/w)`. What
-/// `incomplete_release` keeps back is not released and not spread.
+/// What is released stays released; what `incomplete_release` retains is not spread.
 ///
-/// Source: tilted or blunt interfaces, width about needle tip length (research notes, number 15).
-/// Signature: drops last for a travel, not for a time.
+/// Inactive: `w = 0`. Signature: drops extended over a travel, not over a time.
+/// Source: tilted or blunt interfaces, width about the length of the needle tip.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct SoftBoundary {
-    /// Travel `w` in metres, 0 to 0.1. Neutral: 0.
+    /// Travel `w` in metres, 0 to 0.1. Inactive: 0.
     pub width_m: f64,
 }
 
@@ -29,52 +27,42 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(0.0, 0.1)
         .search(0.003, 1e-4, 0.02)
         .log()],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[3e-4]], &[&[1e-3]], &[&[3e-3]], &[&[8e-3]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for SoftBoundary {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.width_m]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [width_m] = *values else { return None };
-        Some(Self { width_m })
-    }
-}
+described!(SoftBoundary { width_m });
 
 impl Effect for SoftBoundary {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.width_m <= 0.0
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    /// Memory: the deepest position, then up to three releases under way as (force, position).
-    fn on_rupture(&self, released_n: f64, z_m: f64, memory: &mut EffectState) {
+    /// State: the deepest position, then up to three releases under way as (force, position).
+    fn on_rupture(&self, released_n: f64, z_m: f64, state: &mut EffectState) {
         // The newest release goes first; a fourth one under way, with three layers inside one
         // width, takes over what is left of the oldest.
-        let deepest = memory[0].max(z_m);
-        let oldest = self.rest(memory[5], memory[6], deepest);
-        memory[0] = if memory[7] == 0.0 { z_m } else { deepest };
-        memory[7] = 1.0;
-        memory.copy_within(1..5, 3);
-        memory[1] = released_n + oldest;
-        memory[2] = z_m;
+        let deepest = state[0].max(z_m);
+        let oldest = self.rest(state[5], state[6], deepest);
+        state[0] = if state[7] == 0.0 { z_m } else { deepest };
+        state[7] = 1.0;
+        state.copy_within(1..5, 3);
+        state[1] = released_n + oldest;
+        state[2] = z_m;
     }
-    fn tip_force(&self, moment: &TipState, _slabs: &[Slab], memory: &mut EffectState) -> f64 {
-        if memory[7] == 0.0 {
+    fn tip_force(&self, tip: &TipState, _slabs: &[Slab], state: &mut EffectState) -> f64 {
+        if state[7] == 0.0 {
             return 0.0;
         }
-        if moment.z_m > memory[0] {
-            memory[0] = moment.z_m;
+        if tip.z_m > state[0] {
+            state[0] = tip.z_m;
         }
-        let [deepest, r1, z1, r2, z2, r3, z3, _] = *memory;
+        let [deepest, r1, z1, r2, z2, r3, z3, _] = *state;
         self.rest(r1, z1, deepest) + self.rest(r2, z2, deepest) + self.rest(r3, z3, deepest)
     }
 }

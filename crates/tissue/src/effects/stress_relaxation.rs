@@ -1,12 +1,12 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, lag_weights, same_step};
+use super::parameters::Described;
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, lag_weights, same_step};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 use alloc::vec::Vec;
 
 /// One term of the Prony series.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct PronyTerm {
     /// Share of the elastic force that relaxes, `g_j`, 0 to 1.
     pub fraction: f64,
@@ -14,19 +14,18 @@ pub struct PronyTerm {
     pub time_constant_s: f64,
 }
 
-/// Elastic force that relaxes while the tissue is held: a Prony series on the elastic force `E` of
-/// the active layer, `f_K = E - sum_j q_j`, `q_j' = (g_j E - q_j)/tau_j`, `q_j = 0` at rupture.
+/// Relaxation of the elastic force `E` of the active layer, a Prony series: `f_K = E - sum_j q_j`,
+/// `q_j' = (g_j E - q_j)/tau_j`, `q_j = 0` at rupture.
 ///
-/// The step response is `1 - sum_j g_j (1 - exp(-t/tau_j))`. Integrated exactly for an `E` that is
-/// linear between samples, so that the relaxation is the same at every sampling rate.
+/// The step response is `1 - sum_j g_j (1 - exp(-t/tau_j))`. Integrated exactly for an `E` that is linear between samples,
+/// so that the relaxation is the same at every sampling rate.
 ///
-/// Source: relaxation of phantoms, measured with 0.3 s and 2.7 s. Signature: decay in time, not in
-/// depth, while the needle stands still.
+/// Inactive: no term, or all `g_j = 0`. Signature: decay in time, not in depth, while the needle stands still.
+/// Source: relaxation of phantoms, measured with 0.3 s and 2.7 s.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct StressRelaxation {
-    /// One or two terms, fractions adding up to at most 1. Neutral: no term, or only zero fractions.
+    /// One or two terms, fractions adding up to at most 1. Inactive: no term, or only zero fractions.
     pub terms: Vec<PronyTerm>,
 }
 
@@ -47,7 +46,6 @@ const ONE: EffectInfo = EffectInfo {
     signature: "Decay at v = 0, exponential in time and not in depth, independent of the last speed.",
     stage: ChainStage::Relaxation,
     parameters: &[FRACTION, TIME],
-    extended: None,
     proposal: Proposal::LinearColumns(&[
         &[&[0.05, 0.06]],
         &[&[0.05, 0.2]],
@@ -57,8 +55,7 @@ const ONE: EffectInfo = EffectInfo {
         &[&[0.05, 8.0]],
         &[&[0.05, 25.0]],
     ]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
 static TWO_TERMS: EffectInfo = EffectInfo {
@@ -129,35 +126,35 @@ impl Effect for StressRelaxation {
     fn info(&self) -> &'static EffectInfo {
         if self.terms.len() < 2 { &ONE_TERM } else { &TWO_TERMS }
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.terms.iter().all(|term| term.fraction == 0.0)
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    /// Memory: `q_1`, `q_2`, the `E` before, the time step, and two weights per term for it.
-    fn relax(&self, dt_s: f64, elastic_n: f64, memory: &mut EffectState) -> f64 {
-        let [q1, q2, before, ..] = *memory;
-        memory[2] = elastic_n;
+    /// State: `q_1`, `q_2`, the `E` before, the time step, and two weights per term for it.
+    fn relax(&self, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
+        let [q1, q2, before, ..] = *state;
+        state[2] = elastic_n;
         if dt_s <= 0.0 || (elastic_n == 0.0 && before == 0.0 && q1 == 0.0 && q2 == 0.0) {
             return elastic_n - q1 - q2;
         }
-        if !same_step(dt_s, memory[3]) {
-            memory[3] = dt_s;
-            for (term, weights) in self.terms.iter().zip(memory[4..].as_chunks_mut().0) {
+        if !same_step(dt_s, state[3]) {
+            state[3] = dt_s;
+            for (term, weights) in self.terms.iter().zip(state[4..].as_chunks_mut().0) {
                 *weights = lag_weights(dt_s, term.time_constant_s).into();
             }
         }
         let mut force = elastic_n;
         for (j, term) in self.terms.iter().take(2).enumerate() {
-            let (keep, ramp) = (memory[4 + 2 * j], memory[5 + 2 * j]);
+            let (keep, ramp) = (state[4 + 2 * j], state[5 + 2 * j]);
             let end = term.fraction * before;
-            memory[j] = end + keep * (memory[j] - end) + ramp * term.fraction * (elastic_n - before);
-            force -= memory[j];
+            state[j] = end + keep * (state[j] - end) + ramp * term.fraction * (elastic_n - before);
+            force -= state[j];
         }
         force
     }
-    fn on_rupture(&self, _released_n: f64, _z_m: f64, memory: &mut EffectState) {
-        memory[..3].fill(0.0);
+    fn on_rupture(&self, _released_n: f64, _z_m: f64, state: &mut EffectState) {
+        state[..3].fill(0.0);
     }
 }

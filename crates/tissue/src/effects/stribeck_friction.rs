@@ -1,26 +1,27 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState, sgn};
+use super::parameters::Described;
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 
-/// Dry friction that is larger at low speed:
-/// `f_B += sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)^2))`, `c_s >= c`.
+/// Dry friction that is larger at low speed: `f_B += sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)²))`, `c_s >= c`.
 ///
-/// Source: Stribeck curve, as in the LuGre model. Signature: more force at lower speed, a break-away
-/// peak after each stop. With `c_s = c` it is `coulomb_friction`.
+/// With `c_s = c` it is `coulomb_friction`.
+///
+/// Inactive: `c = c_s = 0`. Signature: larger force at lower speed, a break-away peak after each stop.
+/// Source: Stribeck curve, as in the LuGre model.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct StribeckFriction {
-    /// Friction per metre at high speed, `c` in N/m, 0 to 10 000. Neutral: 0.
+    /// Friction per metre at high speed, `c` in N/m, 0 to 10 000. Inactive: 0.
     pub c_n_per_m: f64,
-    /// Friction per metre at low speed, `c_s` in N/m, at least `c`. Neutral: 0.
+    /// Friction per metre at low speed, `c_s` in N/m, at least `c`. Inactive: 0.
     pub c_static_n_per_m: f64,
     /// Speed `v_s` of the transition in m/s, 1e-6 to 1.
     pub v_stribeck_mps: f64,
 }
 
 impl Default for StribeckFriction {
-    /// The neutral effect.
+    /// The inactive effect.
     fn default() -> Self {
         Self { c_n_per_m: 0.0, c_static_n_per_m: 0.0, v_stribeck_mps: 2e-3 }
     }
@@ -51,15 +52,13 @@ static INFO: EffectInfo = EffectInfo {
             .search(2e-3, 1e-4, 2e-2)
             .log(),
     ],
-    extended: None,
     proposal: Proposal::LinearColumns(&[
         &[&[1.0, 1.0, 3e-4], &[0.0, 1.0, 3e-4]],
         &[&[1.0, 1.0, 8e-4], &[0.0, 1.0, 8e-4]],
         &[&[1.0, 1.0, 2e-3], &[0.0, 1.0, 2e-3]],
         &[&[1.0, 1.0, 5e-3], &[0.0, 1.0, 5e-3]],
     ]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
 impl Described for StribeckFriction {
@@ -95,15 +94,15 @@ impl Effect for StribeckFriction {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.c_n_per_m == 0.0 && self.c_static_n_per_m == 0.0
     }
-    fn shaft_force(&self, moment: &TipState, inside_m: f64, _memory: &mut EffectState) -> f64 {
-        let sign = sgn(moment.v_mps);
+    fn shaft_force(&self, tip: &TipState, inside_m: f64, _state: &mut EffectState) -> f64 {
+        let sign = sgn(tip.v_mps);
         if sign == 0.0 || inside_m == 0.0 {
             return 0.0;
         }
-        let ratio = moment.v_mps / self.v_stribeck_mps;
+        let ratio = tip.v_mps / self.v_stribeck_mps;
         let extra = (self.c_static_n_per_m - self.c_n_per_m) * libm::exp(-ratio * ratio);
         sign * inside_m * (self.c_n_per_m + extra)
     }

@@ -1,16 +1,15 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect};
+use crate::chain_stage::ChainStage;
+use crate::effect::Effect;
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
-/// Mass of the tool beyond the sensor: `+ m a`.
+/// Inertia of the tool in front of the sensor: `+ m a`.
 ///
-/// Source: needle 0.068 kg, sensor 0.236 kg (laboratory software). Signature: spikes at start and
-/// stop, also in air, proportional to the acceleration.
+/// Inactive: `m = 0`. Signature: spikes at start and stop, also in air, in proportion to the acceleration.
+/// Source: needle 0.068 kg, sensor 0.236 kg (laboratory software).
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ToolInertia {
-    /// Mass in kg, 0 to 100. Neutral: 0.
+    /// Mass in kg, 0 to 100. Inactive: 0.
     pub mass_kg: f64,
 }
 
@@ -24,27 +23,17 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(0.0, 100.0)
         .search(0.1, 0.005, 5.0)
         .log()],
-    extended: None,
     proposal: Proposal::LinearColumns(&[&[&[0.1]]]),
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for ToolInertia {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![self.mass_kg]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [mass_kg] = *values else { return None };
-        Some(Self { mass_kg })
-    }
-}
+described!(ToolInertia { mass_kg });
 
 impl Effect for ToolInertia {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.mass_kg == 0.0
     }
     fn tool_force(&self, _v_mps: f64, a_mps2: f64) -> f64 {

@@ -1,38 +1,36 @@
-use super::Described;
-use crate::effect::{ChainStage, Effect, EffectState, TipState};
-use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+use super::parameters::{LAYER, layer_mut};
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState, TipState};
+use crate::effect_info::{EffectInfo, ParameterInfo};
 use crate::layer_geometry::Slab;
 
 /// Speed in m/s below which a layer holds with the friction of the last motion (0.1 mm/s).
 const REST_MPS: f64 = 1e-4;
 
-/// A punctured layer that clings to the shaft and is dragged along: a spring in series with friction,
-/// which creeps (one branch of a Maxwell-slip model).
+/// A punctured layer that adheres to the shaft and is dragged along: a spring in series with friction, which creeps
+/// (one branch of a Maxwell-slip model).
 ///
-/// With `S_i = b_i d_i abs(phi(v))` the sliding friction of the whole layer (`phi(v)` is `v`, or what
-/// `power_law_friction` and `asymmetric_friction` make of it), the branch holds the needle with
+/// With the sliding friction of the whole layer `S_i = b_i d_i abs(phi(v))` (`phi(v)` is `v`, or what
+/// `power_law_friction` and `asymmetric_friction` make of it) the branch exerts
 ///
-/// `w' = (share S_i/delta) v - w/tau`, retained_share within `-share S_i` and `share S_i`,
+/// `w' = (share S_i/delta) v - w/tau`, clipped to `-share S_i` and `share S_i`,
 ///
-/// from the puncture of the layer on: before it the shaft does not touch the layer. At the puncture
-/// `w` starts from `share retained_share f_K`, so that the layer releases no more than what friction cannot hold
-/// (`retained_share` 1) or than tears (`retained_share` below 1). When the speed changes, `S_i` follows over the travel
-/// `delta` in which the contact renews itself, and not at all below 0.1 mm/s. When the tip comes back to `release_m` beyond the layer's front face the layer lets go: `w = 0`.
+/// from the puncture of the layer on. At the puncture `w` starts from `share retained_share f_K`. When the speed changes,
+/// `S_i` follows over the travel `delta` in which the contact is renewed, and not at all below 0.1 mm/s. When the tip comes
+/// back to `release_m` beyond the layer's front face, the layer releases the shaft: `w = 0`.
 ///
-/// Branches of one layer add up; the shares of a layer that are left to no branch remain the base law's
-/// `b_i l_i phi(v)`. Integrated exactly for a velocity that is constant within the step.
+/// Branches of one layer add up; a share of the layer that no branch carries remains the base law's `b_i l_i phi(v)`.
+/// Integrated exactly for a velocity that is constant within the step.
 ///
-/// Source: Dahl 1968, and Al-Bender, Lampaert, Swevers 2005 (generalised Maxwell-slip), here with
-/// relaxation as in measured insertions into skin and muscle phantoms. Signature: after a reversal the
-/// force follows travel over several millimetres; part of it fades while the needle is held; a layer
-/// that is left behind on the way back lets go at once.
+/// Inactive: `share = 0`. Signature: after a reversal the force follows travel over several millimetres; part of it fades
+/// in a hold; in retraction it ends in a step. Source: Dahl 1968; Al-Bender, Lampaert, Swevers 2005 (generalised
+/// Maxwell-slip), with relaxation as measured in skin and muscle phantoms.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ViscoelasticPresliding {
     /// Layer `i`, 1-based; one that is not there changes nothing.
     pub layer: usize,
-    /// Share of the layer's friction that this branch carries, 0 to 1. Neutral: 0.
+    /// Share of the layer's friction that this branch carries, 0 to 1. Inactive: 0.
     pub share: f64,
     /// Travel `delta` in metres over which friction builds up from zero to sliding, 1e-6 to 0.1.
     pub delta_m: f64,
@@ -45,7 +43,7 @@ pub struct ViscoelasticPresliding {
 }
 
 impl Default for ViscoelasticPresliding {
-    /// The neutral effect.
+    /// The inactive effect.
     fn default() -> Self {
         Self {
             layer: 1,
@@ -75,11 +73,7 @@ static INFO: EffectInfo = EffectInfo {
     signature: "After a reversal the force follows travel over millimetres, part of it fades in a hold, and on the way back it ends in a step.",
     stage: ChainStage::Friction,
     parameters: &[
-        ParameterInfo::shape("layer", "", "layer, 1-based")
-            .allowed(1.0, 1000.0)
-            .inactive(1.0)
-            .search(1.0, 1.0, 10.0)
-            .integer(),
+        LAYER,
         ParameterInfo::strength("share", "", "share of the layer's friction that this branch carries")
             .allowed(0.0, 1.0)
             .search(1.0, 0.01, 1.0),
@@ -109,83 +103,68 @@ static INFO: EffectInfo = EffectInfo {
         .allowed(-0.1, 0.1)
         .search(0.0, -0.01, 0.01),
     ],
-    extended: None,
-    proposal: Proposal::PerLayer,
-    nested_in: &[],
-    absorbs_unmodelled: false,
+    ..EffectInfo::DEFAULTS
 };
 
-impl Described for ViscoelasticPresliding {
-    fn values(&self) -> alloc::vec::Vec<f64> {
-        alloc::vec![
-            self.layer as f64,
-            self.share,
-            self.delta_m,
-            self.retained_share,
-            self.time_constant_s,
-            self.release_m
-        ]
-    }
-    fn from_values(values: &[f64]) -> Option<Self> {
-        let [layer, share, delta_m, retained_share, time_constant_s, release_m] = *values else {
-            return None;
-        };
-        let layer = libm::round(layer) as usize; // saturates, and NaN is zero, which is no layer
-        Some(Self { layer, share, delta_m, retained_share: retained_share, time_constant_s, release_m })
-    }
-}
+described!(ViscoelasticPresliding { layer; share, delta_m, retained_share, time_constant_s, release_m });
 
 impl Effect for ViscoelasticPresliding {
     fn info(&self) -> &'static EffectInfo {
         &INFO
     }
-    fn is_neutral(&self) -> bool {
+    fn is_inactive(&self) -> bool {
         self.share == 0.0
     }
-    fn remembers(&self) -> bool {
+    fn has_state(&self) -> bool {
         true
     }
-    fn shape(&self, slabs: &mut [Slab]) {
-        if let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get_mut(i)) {
+    fn modify_layers(&self, slabs: &mut [Slab]) {
+        if let Some(slab) = layer_mut(slabs, self.layer) {
             slab.replaced_friction_share = (slab.replaced_friction_share + self.share).min(1.0);
         }
     }
-    fn on_layer_rupture(&self, layer: usize, released_n: f64, memory: &mut EffectState) {
+    fn on_layer_rupture(&self, layer: usize, released_n: f64, state: &mut EffectState) {
         if layer == self.layer {
-            memory[0] = self.share * self.retained_share * released_n;
+            state[0] = self.share * self.retained_share * released_n;
         }
     }
-    /// Memory: `w`, the limit `share S_i`, and the time step with its weights.
-    fn grip(&self, moment: &TipState, slabs: &[Slab], sliding_mps: f64, memory: &mut EffectState) -> f64 {
+    /// State: `w`, the limit `share S_i`, and the time step with its weights.
+    fn layer_friction(
+        &self,
+        tip: &TipState,
+        slabs: &[Slab],
+        sliding_mps: f64,
+        state: &mut EffectState,
+    ) -> f64 {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
-        let [mut w, mut limit, step, keep, ramp, ..] = *memory;
-        if limit == 0.0 || moment.v_mps.abs() >= REST_MPS {
+        let [mut w, mut limit, step, keep, ramp, ..] = *state;
+        if limit == 0.0 || tip.v_mps.abs() >= REST_MPS {
             let steady = self.share * slab.friction_ns_per_m2 * slab.thickness_m * sliding_mps.abs();
-            let fresh = limit == 0.0 || moment.ruptured < self.layer;
-            let renewed = if fresh { 1.0 } else { lost(moment.dz_m.abs() / self.delta_m) };
+            let fresh = limit == 0.0 || tip.ruptured < self.layer;
+            let renewed = if fresh { 1.0 } else { lost(tip.dz_m.abs() / self.delta_m) };
             limit += (steady - limit) * renewed;
-            memory[1] = limit;
+            state[1] = limit;
         }
-        if moment.ruptured < self.layer {
+        if tip.ruptured < self.layer {
             return 0.0;
         }
-        if moment.z_m < slab.front_m + self.release_m {
-            memory[0] = 0.0;
+        if tip.z_m < slab.front_m + self.release_m {
+            state[0] = 0.0;
             return 0.0;
         }
         let (mut keep, mut ramp) = (keep, ramp);
-        if step == 0.0 || !crate::effect::same_step(moment.dt_s, step) {
+        if step == 0.0 || !crate::effect::same_step(tip.dt_s, step) {
             // The spring's force after a step of constant velocity: w keep + k dz ramp.
-            let ratio = moment.dt_s / self.time_constant_s;
+            let ratio = tip.dt_s / self.time_constant_s;
             let faded = lost(ratio);
             keep = 1.0 - faded;
             ramp = if ratio > 0.0 { faded / ratio } else { 1.0 };
-            memory[2] = moment.dt_s;
-            memory[3] = keep;
-            memory[4] = ramp;
+            state[2] = tip.dt_s;
+            state[3] = keep;
+            state[4] = ramp;
         }
-        w = (w * keep + limit / self.delta_m * moment.dz_m * ramp).clamp(-limit, limit);
-        memory[0] = w;
+        w = (w * keep + limit / self.delta_m * tip.dz_m * ramp).clamp(-limit, limit);
+        state[0] = w;
         w
     }
 }
