@@ -1,8 +1,10 @@
-//! Numbers with their intervals.
+//! Confidence intervals of rates and means.
 
-use crate::{Z95, mean, normal, sd, student_t};
+use crate::moments::{mean, sd};
+use crate::normal::{self, Z95};
+use crate::student_t;
 
-/// A number with its 95 % interval.
+/// An estimate with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Interval {
@@ -14,14 +16,14 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Wilson's 95 % score interval of a rate: `hits` of `of` (Wilson 1927). Of none, the rate is `NaN` and the interval is
-/// everything, 0 to 1.
+/// Wilson's 95 % score interval of a rate, `hits` of `of` (Wilson 1927). For `of = 0` the rate is `NaN` and the interval is
+/// 0 to 1.
 #[must_use]
 pub fn wilson(hits: usize, of: usize) -> Interval {
     score_interval(hits as f64, of as f64, Z95)
 }
 
-/// Wilson's score interval of a rate at any confidence (0 to 1), also for counts that are weighted and thus not whole.
+/// Wilson's score interval of a rate at any confidence (0 to 1), also for weighted counts.
 #[must_use]
 pub fn wilson_at(hits: f64, of: f64, confidence: f64) -> Interval {
     score_interval(hits, of, normal::quantile(0.5 + confidence / 2.0))
@@ -34,13 +36,13 @@ fn score_interval(hits: f64, of: f64, z: f64) -> Interval {
     let (p, z2) = (hits / of, z * z);
     let middle = (p + z2 / (2.0 * of)) / (1.0 + z2 / of);
     let half = z / (1.0 + z2 / of) * (p * (1.0 - p) / of + z2 / (4.0 * of * of)).sqrt();
-    // Exact at the ends, where rounding would leave a speck.
+    // Exact at the ends, in spite of rounding.
     let low = if hits <= 0.0 { 0.0 } else { (middle - half).max(0.0) };
     let high = if hits >= of { 1.0 } else { (middle + half).min(1.0) };
     Interval { value: p, low, high }
 }
 
-/// The mean with its 95 % interval by Student's distribution. One value has an interval without ends; `None` of nothing.
+/// The mean with its 95 % interval by Student's distribution. Infinite for one value; `None` for an empty slice.
 #[must_use]
 pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     let value = if values.is_empty() { return None } else { mean(values) };
@@ -68,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_a_mean_is_as_wide_as_few_values_ask() {
+    fn the_interval_of_a_mean_has_the_student_width() {
         // Two values: one degree of freedom, 12.706 standard errors.
         let two = mean_interval(&[1.0, 3.0]).expect("values");
         assert!((two.high - (2.0 + 12.706_204_736)).abs() < 1e-8, "{two:?}");

@@ -1,7 +1,6 @@
-//! Values between samples.
+//! Linear interpolation.
 
-/// The value at `at` of samples `y` at increasing places `x`: on the line between its neighbours, constant beyond the ends; not a number
-/// when there are no samples.
+/// Linear interpolation of samples `y` at increasing abscissae `x`, constant beyond the ends; `NaN` without samples.
 #[must_use]
 pub fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     let after = x.partition_point(|x| *x < at);
@@ -20,7 +19,7 @@ mod tests {
     use super::interpolate;
 
     #[test]
-    fn a_value_lies_on_the_line_between_its_neighbours_and_is_constant_beyond_the_ends() {
+    fn interpolation_is_linear_and_constant_beyond_the_ends() {
         let (x, y) = ([0.0, 1.0, 3.0], [2.0, 4.0, 0.0]);
         for (at, wanted) in
             [(-1.0, 2.0), (0.0, 2.0), (0.25, 2.5), (1.0, 4.0), (2.0, 2.0), (3.0, 0.0), (9.0, 0.0)]
@@ -31,7 +30,7 @@ mod tests {
     }
 
     #[test]
-    fn at_a_step_the_left_value_counts() {
+    fn at_a_repeated_abscissa_the_left_value_counts() {
         assert_eq!(interpolate(&[0.0, 1.0, 1.0, 2.0], &[0.0, 1.0, 5.0, 5.0], 1.0), 1.0);
         assert_eq!(interpolate(&[-2.0, 6.0], &[10.0, -6.0], 1.5), 3.0);
         assert_eq!(interpolate(&[3.0], &[7.0], 3.0), 7.0);

@@ -1,24 +1,24 @@
-//! Statistics, each in one place.
+//! Statistics and small numerics.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | [`order`] | median, quantiles (one definition), MAD scale, interval of a quantile |
-//! | [`interval`] | Wilson interval of a rate, Student interval of a mean |
-//! | [`normal`], [`student`], [`tails`] | distributions: densities, tails, quantiles |
-//! | [`robust`] | Huber and Student losses, weights, M-estimate of location |
-//! | [`ar`] | autoregressive noise: fit, order, exact whitening, likelihood |
-//! | [`foretell`] | what the numbers of a row foretell of its first one, by robust least squares |
-//! | [`moments`] | sums in order, compensated; running mean and variance |
-//! | [`select`] | quantiles of more numbers than memory holds |
-//! | [`linear`] | small dense matrices: Cholesky, products |
-//! | [`spectrum`] | power of evenly sampled columns, its lines |
+//! | [`order_statistics`] | median, quantiles (one definition), MAD scale, interval of a quantile |
+//! | [`streaming_quantiles`] | exact quantiles of more values than fit into memory |
+//! | [`confidence_interval`] | Wilson interval of a rate, Student interval of a mean |
+//! | [`normal`], [`student_t`] | densities, tails, quantiles |
+//! | [`special_functions`] | incomplete gamma and beta functions, chi-square and F tails |
+//! | [`moments`] | compensated sum; mean, variance, RMS, running moments |
+//! | [`robust_loss`] | Huber and Student losses, weights, M-estimate of location |
+//! | [`autoregressive`] | autoregressive noise: fit, order selection, exact whitening, likelihood |
+//! | [`robust_linear_prediction`] | linear prediction by robust least squares |
+//! | [`linear_algebra`] | small dense matrices: Cholesky factor, scalar product |
+//! | [`spectrum`] | power spectrum of evenly sampled signals, detection of tones |
 //! | [`number_format`] | numbers as text: significant digits, per cent, p-values |
-//! | [`rank`] | ranks and Spearman's correlation |
+//! | [`interpolation`], [`rank_correlation`] | linear interpolation; ranks and Spearman's correlation |
 //!
-//! Everything is `f64`, deterministic (`libm`, sums in the order given: the same bits on every machine and for any
-//! number of threads), and held against SciPy in `tests/against_scipy.rs`.
-//!
-//! Undefined results are `NaN` (as in NumPy): the median of nothing, a quantile at a probability outside 0 to 1.
+//! All functions use `f64` and are deterministic (`libm`, sums in the order given: the same bits on every machine and for
+//! any number of threads); `tests/against_scipy.rs` compares them with SciPy. Undefined results are `NaN`, as in NumPy:
+//! the median of an empty slice, a quantile at a probability outside 0 to 1.
 
 pub mod autoregressive;
 pub mod confidence_interval;
@@ -39,7 +39,8 @@ pub mod student_t;
 pub use autoregressive::{Ar, Criterion};
 pub use confidence_interval::{Interval, mean_interval, wilson, wilson_at};
 pub use interpolation::interpolate;
-pub use moments::{Moments, Sum, mean, rms, sd, variance};
+pub use moments::{Moments, Sum, UNIFORM_SD, mean, rms, sd, variance};
+pub use normal::Z95;
 pub use order_statistics::{
     MAD_TO_SD, extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of,
     quantile_of_sorted, sorted, third_difference_sd,
@@ -47,9 +48,3 @@ pub use order_statistics::{
 pub use rank_correlation::spearman;
 pub use robust_loss::Loss;
 pub use streaming_quantiles::quantiles_of_stream;
-
-/// Standard deviation of a number spread evenly over one, to three digits.
-pub const UNIFORM_SD: f64 = 0.289;
-
-/// Half width of the two-sided 95 % interval of a normal distribution, in standard deviations.
-pub const Z95: f64 = 1.959_963_984_540_054;

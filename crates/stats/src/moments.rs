@@ -1,11 +1,13 @@
-//! Sums in the order given: the same numbers in the same order give the same bits.
+//! Sums and moments in the order of the values: the same values in the same order give the same bits.
 
-/// A running sum that carries the bits lost by rounding (Neumaier 1974): its error does not grow with the number of
-/// terms.
+/// Standard deviation of a uniform distribution of unit width, to three digits.
+pub const UNIFORM_SD: f64 = 0.289;
+
+/// A compensated sum (Neumaier 1974): its error does not grow with the number of terms.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sum {
     sum: f64,
-    lost: f64,
+    compensation: f64,
 }
 
 impl Sum {
@@ -13,7 +15,7 @@ impl Sum {
     #[inline]
     pub fn add(&mut self, term: f64) {
         let sum = self.sum + term;
-        self.lost +=
+        self.compensation +=
             if self.sum.abs() >= term.abs() { (self.sum - sum) + term } else { (term - sum) + self.sum };
         self.sum = sum;
     }
@@ -21,8 +23,8 @@ impl Sum {
     /// The sum so far.
     #[must_use]
     pub fn value(&self) -> f64 {
-        // An infinite term leaves NaN among the lost bits.
-        if self.sum.is_finite() { self.sum + self.lost } else { self.sum }
+        // An infinite term makes the compensation NaN.
+        if self.sum.is_finite() { self.sum + self.compensation } else { self.sum }
     }
 }
 
@@ -34,7 +36,7 @@ impl FromIterator<f64> for Sum {
     }
 }
 
-/// Running mean, variance and extremes of numbers that are not kept (Welford 1962).
+/// Running mean, variance and extremes (Welford 1962).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moments {
     count: usize,
@@ -51,7 +53,7 @@ impl Default for Moments {
 }
 
 impl Moments {
-    /// Takes a number in.
+    /// Adds a value.
     #[inline]
     pub fn add(&mut self, x: f64) {
         self.count += 1;
@@ -62,37 +64,37 @@ impl Moments {
         self.max = self.max.max(x);
     }
 
-    /// How many numbers.
+    /// Number of values.
     #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Their mean; `NaN` of nothing.
+    /// Their mean; `NaN` without values.
     #[must_use]
     pub fn mean(&self) -> f64 {
         if self.count == 0 { f64::NAN } else { self.mean }
     }
 
-    /// Their variance as a sample (divided by one less than their number); `NaN` of fewer than two.
+    /// Their variance as a sample (divided by one less than the count); `NaN` for fewer than two values.
     #[must_use]
     pub fn variance(&self) -> f64 {
         if self.count < 2 { f64::NAN } else { self.squares / (self.count - 1) as f64 }
     }
 
-    /// Their standard deviation as a sample; `NaN` of fewer than two.
+    /// Their standard deviation as a sample; `NaN` for fewer than two values.
     #[must_use]
     pub fn sd(&self) -> f64 {
         self.variance().sqrt()
     }
 
-    /// The smallest; `NaN` of nothing.
+    /// The smallest; `NaN` without values.
     #[must_use]
     pub fn min(&self) -> f64 {
         self.min
     }
 
-    /// The largest; `NaN` of nothing.
+    /// The largest; `NaN` without values.
     #[must_use]
     pub fn max(&self) -> f64 {
         self.max
@@ -107,13 +109,13 @@ impl FromIterator<f64> for Moments {
     }
 }
 
-/// The mean; `NaN` of nothing.
+/// The mean; `NaN` without values.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     if values.is_empty() { f64::NAN } else { values.iter().sum::<f64>() / values.len() as f64 }
 }
 
-/// The variance as a sample (divided by one less than the number); `NaN` of fewer than two.
+/// The variance as a sample (divided by one less than the count); `NaN` for fewer than two values.
 #[must_use]
 pub fn variance(values: &[f64]) -> f64 {
     if values.len() < 2 {
@@ -123,13 +125,13 @@ pub fn variance(values: &[f64]) -> f64 {
     values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (values.len() - 1) as f64
 }
 
-/// The standard deviation as a sample; `NaN` of fewer than two.
+/// The standard deviation as a sample; `NaN` for fewer than two values.
 #[must_use]
 pub fn sd(values: &[f64]) -> f64 {
     variance(values).sqrt()
 }
 
-/// Root mean square; `NaN` of nothing.
+/// Root mean square; `NaN` without values.
 #[must_use]
 pub fn rms(values: &[f64]) -> f64 {
     if values.is_empty() {
@@ -143,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_compensated_sum_keeps_what_rounding_would_lose() {
+    fn a_compensated_sum_keeps_the_rounding_error() {
         let terms = [1.0, 1e100, 1.0, -1e100];
         assert_eq!(terms.into_iter().collect::<Sum>().value(), 2.0);
         assert_eq!(terms.into_iter().sum::<f64>(), 0.0);
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn running_moments_are_those_of_the_slice_even_far_from_zero() {
+    fn running_moments_agree_with_those_of_the_slice_even_far_from_zero() {
         let values: Vec<f64> = (0..1000).map(|i| 1e9 + f64::from((i * 37) % 101)).collect();
         let running: Moments = values.iter().copied().collect();
         assert!((running.mean() - mean(&values)).abs() < 1e-6);
@@ -167,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn moments_of_few_numbers_are_those_by_hand_or_none() {
+    fn moments_of_few_values_agree_with_a_hand_calculation() {
         let three: Moments = [2.0, 7.0, 9.0].into_iter().collect();
         assert_eq!((three.mean(), three.variance(), three.sd()), (6.0, 13.0, 13f64.sqrt()));
         assert_eq!((mean(&[2.0, 7.0, 9.0]), variance(&[2.0, 7.0, 9.0])), (6.0, 13.0));

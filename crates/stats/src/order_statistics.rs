@@ -6,21 +6,22 @@
 //!
 //! Values are ordered by [`f64::total_cmp`], so that a `NaN` among them counts as the largest; leave them out beforehand.
 
-use crate::{Interval, Z95};
+use crate::confidence_interval::Interval;
+use crate::normal::Z95;
 
-/// The median. Reorders `values`; takes time proportional to their number. `NaN` of nothing.
+/// The median. Reorders `values`; takes time proportional to their number. `NaN` without values.
 #[must_use]
 pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// The median of numbers that are not kept. `NaN` of nothing.
+/// The median of an iterator. `NaN` without values.
 #[must_use]
 pub fn median_of(values: impl IntoIterator<Item = f64>) -> f64 {
     quantile_of(values, 0.5)
 }
 
-/// The quantile at `q` (0 to 1). Reorders `values`; takes time proportional to their number. `NaN` of nothing.
+/// The quantile at `q` (0 to 1). Reorders `values`; takes time proportional to their number. `NaN` without values.
 #[must_use]
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {
     let Some((below, share)) = interpolation_position(values.len(), q) else { return f64::NAN };
@@ -32,14 +33,14 @@ pub fn quantile(values: &mut [f64], q: f64) -> f64 {
     interpolate_between(low, high, share)
 }
 
-/// The quantile at `q` of numbers that are not kept. `NaN` of nothing.
+/// The quantile at `q` of an iterator. `NaN` without values.
 #[must_use]
 pub fn quantile_of(values: impl IntoIterator<Item = f64>, q: f64) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     quantile(&mut values, q)
 }
 
-/// The quantile at `q` (0 to 1) of values in ascending order: for many quantiles of the same values. `NaN` of nothing.
+/// The quantile at `q` (0 to 1) of values in ascending order: for many quantiles of the same values. `NaN` without values.
 #[must_use]
 pub fn quantile_of_sorted(sorted: &[f64], q: f64) -> f64 {
     let Some((below, share)) = interpolation_position(sorted.len(), q) else { return f64::NAN };
@@ -50,8 +51,8 @@ pub fn quantile_of_sorted(sorted: &[f64], q: f64) -> f64 {
 }
 
 /// The `q` quantile of values in ascending order with its distribution-free 95 % interval between order statistics: the
-/// numbers of values below the quantile are binomial, taken as normal. With too few values for an end, that end is the
-/// extreme of the sample. `None` of nothing.
+/// number of values below the quantile is binomial, approximated as normal. With too few values for an end, that end is
+/// the extreme of the sample. `None` without values.
 #[must_use]
 pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<Interval> {
     let last = sorted.len().checked_sub(1)?;
@@ -64,8 +65,8 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<Interval> {
     Some(Interval { value, low, high })
 }
 
-/// A standard deviation that outliers cannot move: the median absolute value times 1.4826, about zero, as for residuals
-/// (centre them first where needed). Reorders and overwrites `residuals`. `NaN` of nothing.
+/// Robust standard deviation: the median absolute value times 1.4826, about zero, as for residuals (centre them first where
+/// needed). Reorders and overwrites `residuals`. `NaN` without values.
 #[must_use]
 pub fn mad_scale(residuals: &mut [f64]) -> f64 {
     residuals.iter_mut().for_each(|r| *r = r.abs());
@@ -75,7 +76,7 @@ pub fn mad_scale(residuals: &mut [f64]) -> f64 {
 /// Standard deviation of a normal distribution whose median absolute value is one: `1 / normal::quantile(0.75)`.
 pub const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 
-/// Smallest and largest value, `NaN` left out; `(NaN, NaN)` of nothing.
+/// Smallest and largest value, `NaN` left out; `(NaN, NaN)` without values.
 #[must_use]
 pub fn extremes(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::NAN, f64::NAN), |(low, high), &value| (low.min(value), high.max(value)))
@@ -89,7 +90,7 @@ pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// Index below the quantile and the share of the way to the next; `None` where there is no quantile.
+/// Index below the quantile and the weight of the next value; `None` where there is no quantile.
 pub(crate) fn interpolation_position(count: usize, q: f64) -> Option<(usize, f64)> {
     let last = count.checked_sub(1)?;
     if !(0.0..=1.0).contains(&q) {
@@ -100,13 +101,13 @@ pub(crate) fn interpolation_position(count: usize, q: f64) -> Option<(usize, f64
     Some((below, if below == last { 0.0 } else { at - below as f64 }))
 }
 
-/// Between two values, also where their difference would overflow or one is infinite.
+/// Linear interpolation between two values, also of equal infinite ones.
 pub(crate) fn interpolate_between(low: f64, high: f64, share: f64) -> f64 {
     if low == high { low } else { low + share * (high - low) }
 }
 
-/// Standard deviation of columns about smooth courses, by their third differences (which of independent noise have twenty times its
-/// variance): the scaled median of all.
+/// Standard deviation of white noise on smooth columns: the scaled median of their third differences, whose variance is
+/// twenty times that of the noise.
 #[must_use]
 pub fn third_difference_sd<'a>(columns: impl IntoIterator<Item = &'a [f64]>) -> f64 {
     let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
@@ -127,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn all_ways_to_a_quantile_agree() {
+    fn all_quantile_functions_agree() {
         let values: Vec<f64> = (0..23).map(|i| f64::from((i * 7) % 23) * 1.3 - 4.0).collect();
         let sorted = sorted(values.iter().copied());
         for q in [0.0, 0.05, 0.31, 0.5, 0.77, 0.95, 1.0] {
@@ -151,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_quantile_lies_between_order_statistics() {
-        // Values that say their number, from 1. Conover 1999, section 3.2: of 100 values the 40th and the 61st hold the median.
+        // Values equal to their rank. Conover 1999, section 3.2: of 100 values the 40th and the 61st hold the median.
         let values: Vec<f64> = (1..=100).map(f64::from).collect();
         let median = quantile_interval(&values, 0.5).expect("values");
         assert_eq!((median.value, median.low, median.high), (50.5, 40.0, 61.0));
@@ -167,10 +168,10 @@ mod tests {
     }
 
     #[test]
-    fn extremes_and_order_leave_out_what_is_no_number() {
+    fn extremes_and_sorting_leave_out_nan() {
         assert_eq!(extremes(&[2.0, f64::NAN, -3.0, 7.5]), (-3.0, 7.5));
-        let nothing = extremes(&[f64::NAN]);
-        assert!(nothing.0.is_nan() && nothing.1.is_nan());
+        let none = extremes(&[f64::NAN]);
+        assert!(none.0.is_nan() && none.1.is_nan());
         assert_eq!(sorted([2.0, f64::NAN, -3.0, 7.5]), [-3.0, 2.0, 7.5]);
     }
 
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn roughness_is_what_third_differences_leave() {
+    fn third_differences_measure_noise_and_not_a_smooth_signal() {
         let parabola: Vec<f64> = (0..40).map(|k| f64::from(k * k) - 3.0 * f64::from(k)).collect();
         assert!(third_difference_sd([parabola.as_slice()]) < 1e-9);
         // Alternating by one to either side: third differences of eight.
@@ -195,7 +196,6 @@ mod tests {
             "{}",
             third_difference_sd([rough.as_slice()])
         );
-        // A step in two samples of forty is none.
         let cubic: Vec<f64> = (0..40).map(|k| f64::from(k).powi(3) / 6.0).collect();
         assert!((third_difference_sd([cubic.as_slice()]) - 1.4826 / 20.0_f64.sqrt()).abs() < 1e-3);
     }

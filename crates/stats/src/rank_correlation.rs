@@ -1,6 +1,6 @@
-//! Ranks and their correlation.
+//! Ranks and rank correlation.
 
-/// Ranks from 1; equal values share the mean of theirs.
+/// Ranks from 1; equal values share their mean rank.
 #[must_use]
 pub fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn the_p_value_is_about_the_share_of_all_orders_that_correlate_as_much() {
+    fn the_p_value_is_about_the_share_of_permutations_with_a_larger_correlation() {
         let x = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
         // Of all 40320 orders, counted; the approximation, by another program.
         for (y, rho, counted, approximate) in [

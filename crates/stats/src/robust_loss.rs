@@ -1,16 +1,15 @@
-//! Losses that one bad sample cannot dominate.
+//! Robust losses and the M-estimate of location.
 
 use crate::student_t;
 
-/// A loss of a residual `r` in units of its standard deviation, in nats: minus the logarithm of a density up to a
-/// constant, so that all losses are `r^2 / 2` for small `r` in the sense of their own scale.
+/// Loss of a residual `r` in units of its standard deviation, in nats: the negative logarithm of a density up to a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loss {
     /// `r^2 / 2`: normal noise.
     Squares,
     /// Quadratic up to `k`, linear beyond (Huber 1964). `k = 1.345` keeps 95 % of the efficiency on normal noise.
     Huber {
-        /// Where the line begins, in standard deviations.
+        /// Start of the linear part, in standard deviations.
         k: f64,
     },
     /// `(dof + 1)/2 ln(1 + r^2/dof)`: Student's distribution (Lange, Little and Taylor 1989). Small `dof`, heavy tails.
@@ -55,7 +54,7 @@ impl Loss {
         }
     }
 
-    /// Second derivative: the curvature that Newton's method asks for (negative far out for Student's).
+    /// Second derivative, for Newton's method (negative for large residuals of Student's loss).
     #[inline]
     #[must_use]
     pub fn curvature(self, r: f64) -> f64 {
@@ -66,8 +65,8 @@ impl Loss {
         }
     }
 
-    /// Minus the logarithm of the loss's density at zero (unit scale): add it to [`value`](Self::value) per sample, and
-    /// the logarithm of the scale, to compare losses or scales by likelihood.
+    /// Negative logarithm of the density at zero (unit scale). [`value`](Self::value) plus this and the logarithm of the scale
+    /// is the negative log-likelihood of a sample.
     #[must_use]
     pub fn normaliser(self) -> f64 {
         match self {
@@ -81,18 +80,18 @@ impl Loss {
     }
 }
 
-/// The place that minimises the summed loss of `values` about it, in units of `scale`: re-weighted means from the median
-/// on. Returns it with the sum of its weights. `NaN` of nothing.
+/// M-estimate of location: minimises the summed loss of `values` in units of `scale`, by reweighted means from the median on.
+/// Returns it with the sum of the weights. `NaN` without values.
 #[must_use]
 pub fn location(values: &[f64], scale: f64, loss: Loss) -> (f64, f64) {
-    /// Turns after which the place is taken as it is; a linear convergence by a third has 13 digits by then.
-    const TURNS: usize = 30;
-    let mut at = crate::median_of(values.iter().copied());
+    /// Iterations; linear convergence with a factor of a third has 13 digits by then.
+    const ITERATIONS: usize = 30;
+    let mut at = crate::order_statistics::median_of(values.iter().copied());
     let mut total = values.len() as f64;
     if values.is_empty() || scale.is_nan() || scale <= 0.0 {
         return (at, total);
     }
-    for _ in 0..TURNS {
+    for _ in 0..ITERATIONS {
         let (mut sum, mut weights) = (0.0, 0.0);
         for x in values {
             let weight = loss.weight((x - at) / scale);
@@ -153,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_is_zero_at_zero_and_continuous_where_huber_s_line_begins() {
+    fn a_loss_is_zero_at_zero_and_continuous_at_the_corner_of_huber_s_loss() {
         for loss in ALL {
             assert_eq!((loss.value(0.0), loss.influence(0.0)), (0.0, 0.0));
             for r in [0.3, 2.0, 9.0] {
@@ -189,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_weight_in_least_squares_is_the_slope_of_the_loss_over_the_deviate() {
+    fn the_weight_is_the_derivative_of_the_loss_over_the_residual() {
         let loss = Loss::Huber { k: 2.5 };
         for (w, value, weight) in
             [(1.3, 0.845, 1.0), (-2.4, 2.88, 1.0), (4.0, 6.875, 0.625), (-7.5, 15.625, 1.0 / 3.0)]

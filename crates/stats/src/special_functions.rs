@@ -1,12 +1,12 @@
-//! Incomplete gamma and beta functions, and the tails of chi-square and F that rest on them.
+//! Incomplete gamma and beta functions, and the chi-square and F tails that follow from them.
 //!
 //! Series and continued fractions (Lentz) as in Abramowitz and Stegun 6.5.29, 6.5.31, 26.5.8.
 
-/// Terms after which a series or fraction is given up; none within the tested range needs a tenth of them.
-const MOST_TERMS: usize = 10_000;
-/// Relative size of a term that changes nothing any more.
+/// Most terms of a series or continued fraction; the tested range needs less than a tenth.
+const MAX_TERMS: usize = 10_000;
+/// Relative size of a negligible term.
 const NEGLIGIBLE: f64 = 1e-16;
-/// Stands in for a vanishing denominator in Lentz's method.
+/// Replaces a vanishing denominator in Lentz's method.
 const TINY: f64 = 1e-300;
 
 /// Lower and upper regularised incomplete gamma function `(P(a, x), Q(a, x))`, `a > 0`, `x >= 0`; the smaller one keeps
@@ -25,7 +25,7 @@ pub fn regularised_gamma(a: f64, x: f64) -> (f64, f64) {
     let front = libm::exp(a * libm::log(x) - x - libm::lgamma(a));
     if x < a + 1.0 {
         let (mut term, mut sum) = (1.0 / a, 1.0 / a);
-        for n in 1..MOST_TERMS {
+        for n in 1..MAX_TERMS {
             term *= x / (a + n as f64);
             sum += term;
             if term < sum * NEGLIGIBLE {
@@ -38,7 +38,7 @@ pub fn regularised_gamma(a: f64, x: f64) -> (f64, f64) {
     let mut b = x + 1.0 - a;
     let (mut c, mut d) = (1.0 / TINY, 1.0 / b);
     let mut h = d;
-    for n in 1..MOST_TERMS {
+    for n in 1..MAX_TERMS {
         let n = n as f64;
         let an = -n * (n - a);
         b += 2.0;
@@ -62,7 +62,7 @@ pub fn regularised_beta(a: f64, b: f64, x: f64) -> f64 {
     regularised_beta_with_complement(a, b, x, 1.0 - x)
 }
 
-/// The same with `y = 1 - x` given, which keeps the accuracy where `x` is close to one.
+/// [`regularised_beta`] with `y = 1 - x` given, which keeps the accuracy for `x` close to one.
 pub(crate) fn regularised_beta_with_complement(a: f64, b: f64, x: f64, y: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
@@ -84,15 +84,15 @@ fn ln_of(x: f64, y: f64) -> f64 {
     if y < 0.5 { libm::log1p(-y) } else { libm::log(x) }
 }
 
-/// Logarithm of the beta function; no digits are lost where one argument is much larger than the other.
+/// Logarithm of the beta function, without cancellation where one argument is much larger than the other.
 pub(crate) fn ln_beta(a: f64, b: f64) -> f64 {
-    /// From here on five terms of Stirling's series have all digits.
+    /// Argument from which five terms of Stirling's series are exact to all digits.
     const LARGE: f64 = 20.0;
     let (large, small) = (a.max(b), a.min(b));
     if large < LARGE {
         return libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
     }
-    // What Stirling's formula leaves of ln gamma (Abramowitz and Stegun 6.1.41).
+    // Remainder of Stirling's formula for ln gamma (Abramowitz and Stegun 6.1.41).
     let rest = |x: f64| {
         let y = 1.0 / (x * x);
         (1.0 / 12.0 - y * (1.0 / 360.0 - y * (1.0 / 1260.0 - y * (1.0 / 1680.0 - y / 1188.0)))) / x
@@ -106,7 +106,7 @@ pub(crate) fn ln_beta(a: f64, b: f64) -> f64 {
 fn beta_fraction(a: f64, b: f64, x: f64) -> f64 {
     let (mut c, mut d) = (1.0, 1.0 / away_from_zero(1.0 - (a + b) * x / (a + 1.0)));
     let mut h = d;
-    for m in 1..MOST_TERMS {
+    for m in 1..MAX_TERMS {
         let m = m as f64;
         let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
         d = 1.0 / away_from_zero(1.0 + even * d);
@@ -127,7 +127,7 @@ fn away_from_zero(x: f64) -> f64 {
     if x.abs() < TINY { TINY } else { x }
 }
 
-/// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`: the p-value of twice a gain in nats.
+/// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`: the p-value of twice a log-likelihood ratio.
 #[must_use]
 pub fn chi_square_sf(x: f64, dof: f64) -> f64 {
     if x <= 0.0 { 1.0 } else { regularised_gamma(dof / 2.0, x / 2.0).1 }
@@ -152,13 +152,13 @@ pub fn chi_square_quantile(p: f64, dof: f64) -> f64 {
     if p == 0.0 || p == 1.0 {
         return if p == 0.0 { 0.0 } else { f64::INFINITY };
     }
-    // Wilson and Hilferty 1931 for the order of magnitude; then halving, which cannot fail.
+    // Wilson and Hilferty 1931 for the order of magnitude, then bisection.
     let guess = dof
         * libm::pow(
             (1.0 - 2.0 / (9.0 * dof) + crate::normal::quantile(p) * libm::sqrt(2.0 / (9.0 * dof))).max(0.05),
             3.0,
         );
-    // The smaller tail is compared, so that accuracy is relative on either side.
+    // Compares the smaller tail, so that accuracy is relative on both sides.
     let above = |x: f64| {
         let (low, high) = regularised_gamma(dof / 2.0, x / 2.0);
         if p < 0.5 { low > p } else { high < 1.0 - p }
@@ -166,7 +166,7 @@ pub fn chi_square_quantile(p: f64, dof: f64) -> f64 {
     invert(above, guess)
 }
 
-/// The positive place where `above` turns from false to true, to the last bit.
+/// The positive argument at which `above` changes from false to true, by bisection to the last bit.
 pub(crate) fn invert(above: impl Fn(f64) -> bool, guess: f64) -> f64 {
     let (mut low, mut high) = (guess, guess);
     while above(low) && low > f64::MIN_POSITIVE {
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tails_outside_their_range_are_certain_or_nothing() {
+    fn tails_outside_their_range_are_one_or_nan() {
         assert_eq!(chi_square_sf(-1.0, 3.0), 1.0);
         assert_eq!(f_sf(0.0, 2.0, 9.0), 1.0);
         assert!(regularised_gamma(-1.0, 1.0).0.is_nan() && regularised_beta(1.0, 1.0, 1.1).is_nan());
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn the_logarithm_of_the_beta_function_keeps_its_digits_between_large_and_small() {
+    fn ln_beta_keeps_its_digits_for_arguments_of_different_size() {
         for (a, b, wanted) in [
             (0.5, 0.5, 1.1447298858494002),
             (3.0, 4.5, -4.387480485356345),
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn gamma_and_beta_have_ends_and_nothing_beyond_them() {
+    fn incomplete_gamma_and_beta_have_their_limits_and_are_nan_beyond() {
         assert_eq!(regularised_gamma(2.0, 0.0), (0.0, 1.0));
         assert_eq!(regularised_gamma(2.0, f64::INFINITY), (1.0, 0.0));
         for (a, x) in [(0.0, 1.0), (0.0, 0.0), (-1.0, 1.0), (1.0, -0.1), (f64::NAN, 1.0), (1.0, f64::NAN)] {
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chi_square_quantile_leads_back_to_its_probability() {
+    fn chi_square_quantile_and_tail_are_inverse() {
         for dof in [0.2, 1.0, 5.0, 60.0, 1000.0] {
             for p in [1e-12, 0.003, 0.3, 0.4999, 0.5, 0.8, 0.999] {
                 let (low, high) = regularised_gamma(dof / 2.0, chi_square_quantile(p, dof) / 2.0);
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn an_inversion_is_exact_to_the_last_bit_wherever_it_begins() {
+    fn bisection_is_exact_to_the_last_bit_from_any_guess() {
         for guess in [1e-9, 0.7, 1.0, 1.5, 1e9] {
             let root = invert(|x| x * x > 2.0, guess);
             assert!((root - 2f64.sqrt()).abs() <= f64::EPSILON, "{guess}: {root}");

@@ -1,20 +1,19 @@
-//! Quantiles of more numbers than memory holds: exact, by going through them a few times.
+//! Exact quantiles of more values than fit into memory, in a few passes: radix selection on the bits of the values.
 
 use crate::order_statistics::{interpolate_between, interpolation_position, quantile};
 
-/// Numbers that are kept at hand; among so many the quantile is looked up as in [`crate::order`].
-const AT_HAND: usize = 1 << 19;
-/// Leading bits that one pass tells apart.
+/// Most values that are kept in memory, where [`crate::quantile`] applies.
+const MAX_IN_MEMORY: usize = 1 << 19;
+/// Bits that one pass resolves.
 const BITS: u32 = 18;
 
-/// The quantiles at each of `qs` (0 to 1), bit for bit those of [`crate::quantile`], of numbers that are not kept. `NaN` of
-/// nothing.
+/// The quantiles at each of `qs` (0 to 1), bit for bit those of [`crate::quantile`]. `NaN` without values.
 ///
-/// `pass` hands all numbers to what it is given; it is called one to five times and has to give the same numbers every time. Takes
-/// some ten megabytes, whatever their count.
+/// `pass` calls its argument with every value; it is called one to five times and must give the same values every time.
+/// Takes some ten megabytes of memory, whatever the value_of of values.
 ///
 /// # Errors
-/// What `pass` says.
+/// The error of `pass`.
 pub fn quantiles_of_stream<E>(
     qs: &[f64],
     mut pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>,
@@ -22,17 +21,17 @@ pub fn quantiles_of_stream<E>(
     let (mut count, mut few, mut first) = (0_usize, Vec::new(), Histogram::default());
     pass(&mut |x| {
         count += 1;
-        if count <= AT_HAND {
+        if count <= MAX_IN_MEMORY {
             few.push(x);
             return;
         }
-        if count == AT_HAND + 1 {
+        if count == MAX_IN_MEMORY + 1 {
             few.iter().for_each(|x| first.add(key(*x), 0));
             few = Vec::new();
         }
         first.add(key(x), 0);
     })?;
-    if count <= AT_HAND {
+    if count <= MAX_IN_MEMORY {
         return Ok(qs.iter().map(|q| quantile(&mut few, *q)).collect());
     }
     let places: Vec<_> = qs.iter().map(|q| interpolation_position(count, *q)).collect();
@@ -44,14 +43,14 @@ pub fn quantiles_of_stream<E>(
     drop(first);
     while !sought.open.is_empty() {
         let mut open = std::mem::take(&mut sought.open);
-        pass(&mut |x| open.iter_mut().for_each(|range| range.take(key(x))))?;
+        pass(&mut |x| open.iter_mut().for_each(|range| range.add(key(x))))?;
         for range in open {
             range.close(&mut sought);
         }
     }
     let at = |rank: usize| {
         let found = sought.found.iter().find(|(of, _)| *of == rank as u64);
-        found.map_or(f64::NAN, |(_, key)| number(*key))
+        found.map_or(f64::NAN, |(_, key)| value_of(*key))
     };
     let value = |place: &Option<(usize, f64)>| match *place {
         None => f64::NAN,
@@ -67,12 +66,12 @@ fn key(x: f64) -> u64 {
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
 }
 
-/// The number of a key.
-fn number(key: u64) -> f64 {
+/// The value of a key.
+fn value_of(key: u64) -> f64 {
     f64::from_bits(if key >> 63 == 1 { key & !(1 << 63) } else { !key })
 }
 
-/// How many keys there are for each value of the next bits.
+/// Counts of keys by their next bits.
 #[derive(Default)]
 struct Histogram(Vec<u64>);
 
@@ -83,12 +82,12 @@ impl Histogram {
         if self.0.is_empty() {
             self.0 = vec![0; 1 << BITS];
         }
-        // The last bits are fewer; the zeros that move in say nothing.
+        // In the last pass fewer bits remain; zeros are shifted in.
         self.0[((key << known) >> (64 - BITS)) as usize] += 1;
     }
 }
 
-/// Keys with the same first bits, among which ranks are sought.
+/// Keys with the same leading bits, which contain ranks that are sought.
 struct Range {
     first: u64,
     known: u32,
@@ -104,7 +103,7 @@ enum Within {
 
 impl Range {
     #[inline]
-    fn take(&mut self, key: u64) {
+    fn add(&mut self, key: u64) {
         if (key ^ self.first) >> (64 - self.known) == 0 {
             match &mut self.within {
                 Within::Many(histogram) => histogram.add(key, self.known),
@@ -137,7 +136,7 @@ struct Sought {
 }
 
 impl Sought {
-    /// Goes on in that part of a range that holds the rank, which is number `here` within it.
+    /// Narrows the search to the bin that contains the rank, which is the rank `here` within the range.
     fn narrow(&mut self, histogram: &Histogram, first: u64, known: u32, rank: u64, mut here: u64) {
         for (bin, count) in histogram.0.iter().enumerate() {
             if here >= *count {
@@ -151,7 +150,7 @@ impl Sought {
             } else if let Some(range) = self.open.iter_mut().find(|r| r.known == known && r.first == first) {
                 range.ranks.push((rank, here));
             } else {
-                let few = *count <= AT_HAND as u64 / 2;
+                let few = *count <= MAX_IN_MEMORY as u64 / 2;
                 let within = if few { Within::Few(Vec::new()) } else { Within::Many(Histogram::default()) };
                 self.open.push(Range { first, known, ranks: vec![(rank, here)], within });
             }
@@ -166,7 +165,7 @@ mod tests {
     use crate::order_statistics::quantile_of;
     use std::convert::Infallible;
 
-    fn held_against_order(values: &[f64]) {
+    fn compare_with_quantile_of(values: &[f64]) {
         let qs = [0.0, 0.02, 0.05, 0.5, 0.731, 0.95, 0.99, 1.0, 1.5];
         let found = quantiles_of_stream(&qs, |take| -> Result<(), Infallible> {
             values.iter().for_each(|x| take(*x));
@@ -184,7 +183,7 @@ mod tests {
         }
     }
 
-    /// Numbers in -0.5 to 0.5, the same every time.
+    /// Uniform numbers in -0.5 to 0.5 with a fixed seed.
     fn scatter(count: usize) -> Vec<f64> {
         let mut state: u64 = 7;
         let mut next = || {
@@ -195,16 +194,18 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_of_many_numbers_are_those_of_all_at_once_to_the_bit() {
-        let many = AT_HAND + 70_001;
-        held_against_order(&[]);
-        held_against_order(&scatter(101));
-        held_against_order(&scatter(many));
-        // Nearly all in one bin of the first pass, and of the second: intervals of an even clock.
-        held_against_order(&scatter(many).iter().map(|x| 0.005 + 1e-9 * x).collect::<Vec<_>>());
-        held_against_order(&scatter(many).iter().map(|x| 0.005 + 1e-17 * x).collect::<Vec<_>>());
+    fn quantiles_of_a_stream_are_bit_for_bit_those_of_a_slice() {
+        let many = MAX_IN_MEMORY + 70_001;
+        compare_with_quantile_of(&[]);
+        compare_with_quantile_of(&scatter(101));
+        compare_with_quantile_of(&scatter(many));
+        // Nearly all values in one bin of the first pass and of the second, like intervals of a regular clock.
+        compare_with_quantile_of(&scatter(many).iter().map(|x| 0.005 + 1e-9 * x).collect::<Vec<_>>());
+        compare_with_quantile_of(&scatter(many).iter().map(|x| 0.005 + 1e-17 * x).collect::<Vec<_>>());
         // Few values, both zeros, both signs, huge ones.
-        held_against_order(&scatter(many).iter().map(|x| (4.0 * x).round() * 1e300).collect::<Vec<_>>());
-        held_against_order(&vec![-0.0; many]);
+        compare_with_quantile_of(
+            &scatter(many).iter().map(|x| (4.0 * x).round() * 1e300).collect::<Vec<_>>(),
+        );
+        compare_with_quantile_of(&vec![-0.0; many]);
     }
 }

@@ -38,7 +38,7 @@ pub fn sf(x: f64, dof: f64) -> f64 {
     0.5 * special_functions::regularised_beta_with_complement(dof / 2.0, 0.5, dof / whole, x * x / whole)
 }
 
-/// The value below which a share `p` lies: `quantile(0.975, 1.0)` is 12.706. Infinite at 0 and 1, `NaN` outside.
+/// The quantile at probability `p`: `quantile(0.975, 1.0)` is 12.706. Infinite at 0 and 1, `NaN` outside.
 #[must_use]
 pub fn quantile(p: f64, dof: f64) -> f64 {
     if dof.is_nan() || dof <= 0.0 || !(0.0..=1.0).contains(&p) {
@@ -59,14 +59,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn few_degrees_of_freedom_are_as_in_the_tables() {
+    fn quantiles_agree_with_published_tables() {
         // Two-sided 95 %; any textbook.
         for (dof, t) in
             [(1.0, 12.706), (2.0, 4.303), (3.0, 3.182), (4.0, 2.776), (14.0, 2.145), (100.0, 1.984)]
         {
             assert!((quantile(0.975, dof) - t).abs() < 5e-4, "{dof}: {}", quantile(0.975, dof));
         }
-        assert!((quantile(0.975, f64::INFINITY) - crate::Z95).abs() < 1e-15);
+        assert!((quantile(0.975, f64::INFINITY) - normal::Z95).abs() < 1e-15);
         assert!(quantile(0.975, 0.0).is_nan() && cdf(1.0, -1.0).is_nan());
     }
 
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_its_range_there_is_nothing_and_at_the_ends_certainty() {
+    fn results_are_nan_outside_the_range_and_exact_at_its_ends() {
         for dof in [0.0, -1.0, f64::NAN] {
             assert!(sf(1.0, dof).is_nan() && quantile(0.3, dof).is_nan(), "{dof}");
         }

@@ -1,4 +1,4 @@
-//! Every function agrees with SciPy. The numbers are in `reference/reference.csv`, the script that made them beside it.
+//! Promise: every function agrees with SciPy. Reference values: `reference/reference.csv`, made by `reference/make.py`.
 
 #![allow(clippy::panic, reason = "a test may")]
 
@@ -8,7 +8,7 @@ use stylet_stats::{Ar, normal, quantile_of, spearman, special_functions, student
 /// Largest relative error against SciPy, per function (absolute where the reference is below one, for those named).
 fn allowed(name: &str) -> f64 {
     match name {
-        // The references themselves are no better (SciPy's own continued fractions, impulse responses cut off).
+        // Limited by the reference (SciPy's continued fractions, truncated impulse responses).
         "student_sf" | "student_ln_pdf" | "f_sf" | "chi_square_sf" | "chi_square_quantile" => 1e-10,
         "student_quantile" => 1e-9,
         "ar_ln_likelihood" | "ar_innovations_sd" => 1e-10,

@@ -1,5 +1,5 @@
-//! Promise: the base law is SPEC section 2, rupture by force or at the far face, friction only on
-//! the way back, and the instants of rupture are interpolated between the samples.
+//! Promise: the base law of docs/reference/model.md: rupture by force or at the far face, friction only in retraction,
+//! rupture times interpolated between the samples.
 
 use proptest::prelude::*;
 use stylet_tissue::{ForceLaw, ForceLawState, Layer, Rupture, Tissue, TissueForce, replay};
@@ -51,7 +51,7 @@ fn a_layer_ruptures_at_its_puncture_force_or_at_its_far_face_whichever_comes_fir
 }
 
 #[test]
-fn on_the_way_back_a_ruptured_layer_gives_friction_only() {
+fn in_retraction_a_ruptured_layer_gives_friction_only() {
     let mut motion = constant(0.0, 0.002, 100.0, 2000); // to 40 mm: the first layer is through
     let deepest = motion[motion.len() - 1].1;
     motion.extend((1..=1000).map(|k| (20.0 + f64::from(k) / 100.0, deepest - 2e-5 * f64::from(k), -0.002)));
@@ -62,7 +62,7 @@ fn on_the_way_back_a_ruptured_layer_gives_friction_only() {
     let z = deepest - 0.02;
     assert_eq!(last.elastic_n, 0.0);
     assert!((last.total_n - -0.002 * 9000.0 * z).abs() < 1e-9, "{last:?}");
-    assert!(last.tip_n.abs() < 1e-9, "nothing is left at the tip: {last:?}");
+    assert!(last.tip_n.abs() < 1e-9, "the tip force is zero: {last:?}");
 }
 
 #[test]
@@ -98,7 +98,7 @@ proptest! {
         }
     }
 
-    /// Total force is what the tip feels plus the cumulative friction, at every sample.
+    /// Total force is tip force plus cumulative friction, at every sample.
     #[test]
     fn tip_force_and_cumulative_friction_add_up(v in 1e-4f64..0.02, start in -0.01f64..0.0) {
         let motion = constant(start, v, 200.0, 3000);
@@ -109,9 +109,9 @@ proptest! {
         }
     }
 
-    /// Rupture instants do not depend on how finely the same constant motion is sampled.
+    /// Rupture times do not depend on how finely the same constant motion is sampled.
     #[test]
-    fn rupture_instants_do_not_depend_on_the_sampling(rate in 20.0f64..2000.0) {
+    fn rupture_times_do_not_depend_on_the_sampling(rate in 20.0f64..2000.0) {
         let samples = (48.0 * rate) as usize;
         let (_, coarse) = insert(&Tissue::three_gels(), &constant(-0.005, 0.0023, rate, samples));
         let (_, fine) = insert(&Tissue::three_gels(), &constant(-0.005, 0.0023, 1000.0, 48_000));
@@ -140,7 +140,7 @@ fn a_state_can_be_copied_and_continued() {
 }
 
 #[test]
-fn imposed_ruptures_at_the_law_s_own_instants_give_the_same_bits() {
+fn imposed_ruptures_at_the_times_of_the_force_law_give_the_same_bits() {
     let layer = |d: f64, k: f64, f: Option<f64>| stylet_tissue::Layer {
         name: String::new(),
         thickness_m: d,
@@ -159,23 +159,23 @@ fn imposed_ruptures_at_the_law_s_own_instants_give_the_same_bits() {
         ];
         let law = stylet_tissue::ForceLaw::new(&tissue, &effects).expect("two effects");
         let (mut free, mut imposed) = Default::default();
-        let mut strained = 0;
+        let mut met = 0;
         for i in 0..12_000 {
             let (t, v) = (f64::from(i) * 0.002, 0.002);
             let z = v * t - 0.001;
             let expected = law.step(&mut free, t, z, v, |_| {});
             let found = law.step_imposed(&mut imposed, t, z, v, free.ruptured(), |criterion| {
-                strained += usize::from(criterion.is_met());
+                met += usize::from(criterion.is_met());
             });
             assert_eq!(expected, found, "sample {i}");
         }
-        assert_eq!((free.ruptured(), strained), (3, 3));
+        assert_eq!((free.ruptured(), met), (3, 3));
     }
 }
 
 #[test]
 fn one_long_step_finds_every_rupture_where_short_ones_do() {
-    // The third layer is punctured, too; the springs hold 40 x 28.2 mm, 2.2 N and 1 N when they let go.
+    // The third layer is punctured, too; the springs hold 40 x 28.2 mm, 2.2 N and 1 N at the rupture.
     let mut tissue = Tissue::three_gels();
     tissue.layers[2].puncture_n = Some(1.0);
     let expected = [(0.0282, 40.0 * 0.0282), (0.0282 + 2.2 / 60.0, 2.2), (0.0659 + 1.0 / 80.0, 1.0)];
@@ -187,7 +187,7 @@ fn one_long_step_finds_every_rupture_where_short_ones_do() {
         let deepest = positions[positions.len() - 1];
         let rest = (1..=90).map(|k| deepest + 0.001 * f64::from(k));
         let motion: Vec<_> = positions.iter().copied().chain(rest).map(|z| (z / v, z, v)).collect();
-        // The same with an effect that has no say in it.
+        // The same with an effect that does not change ruptures.
         for effects in [vec![], vec![stylet_tissue::CoulombFriction { c_n_per_m: 1.0 }.into()] as Vec<_>] {
             let (law, mut ruptures) = (ForceLaw::new(&tissue, &effects).expect("few effects"), Vec::new());
             replay(&law, motion.iter().copied(), |r| ruptures.push(r), |_| {});
@@ -201,7 +201,7 @@ fn one_long_step_finds_every_rupture_where_short_ones_do() {
 }
 
 #[test]
-fn a_time_stamp_that_repeats_or_runs_back_is_a_step_of_no_length() {
+fn a_time_stamp_that_repeats_or_runs_backward_is_a_step_of_zero_length() {
     let tissue = Tissue::three_gels();
     for effects in [vec![], vec![stylet_tissue::CoulombFriction { c_n_per_m: 1.0 }.into()] as Vec<_>] {
         let law = ForceLaw::new(&tissue, &effects).expect("few effects");
@@ -214,7 +214,7 @@ fn a_time_stamp_that_repeats_or_runs_back_is_a_step_of_no_length() {
                 (ruptures[0].position_m - 0.0282).abs() < 1e-15
                     && (force.elastic_n - 60.0 * 0.0018).abs() < 1e-12
             );
-            // The clock goes on from the latest stamp.
+            // Time continues from the latest stamp.
             law.step(&mut state, 5.0, 0.0282 + 0.0377 + 0.0018, 0.0, |r| ruptures.push(r));
             let way = (2.2 / 60.0 - 0.0018) / 0.0377;
             assert!((ruptures[1].time_s - (3.0 + 2.0 * way)).abs() < 1e-12, "{ruptures:?}");
@@ -223,7 +223,7 @@ fn a_time_stamp_that_repeats_or_runs_back_is_a_step_of_no_length() {
 }
 
 #[test]
-fn many_samples_at_once_are_the_samples_one_by_one() {
+fn running_many_samples_equals_stepping_them_one_by_one() {
     let mut samples: Vec<[f64; 3]> =
         constant(-0.005, 0.0023, 50.0, 2500).into_iter().map(|(t, z, v)| [t, z, v]).collect();
     samples[700][1] = f64::NAN;
@@ -245,7 +245,7 @@ fn many_samples_at_once_are_the_samples_one_by_one() {
 }
 
 #[test]
-fn a_law_knows_whether_the_tip_is_where_the_base_is() {
+fn the_tip_follows_the_base_unless_an_effect_moves_it() {
     use stylet_tissue::{
         AnyEffect, CoulombFriction, CuttingForce, IncompleteRelease, NeedleCompliance, Respiration,
     };
@@ -267,7 +267,7 @@ fn a_law_knows_whether_the_tip_is_where_the_base_is() {
 }
 
 #[test]
-fn the_velocity_that_friction_feels_is_that_of_all_friction_effects() {
+fn the_viscous_velocity_includes_all_friction_effects() {
     use stylet_tissue::{AsymmetricFriction, PowerLawFriction};
     let effects = [PowerLawFriction { exponent: 0.5 }.into(), AsymmetricFriction { eps: 0.2 }.into()];
     for chosen in [&effects[..0], &effects[..1], &effects[1..], &effects[..]] {
@@ -282,7 +282,7 @@ fn the_velocity_that_friction_feels_is_that_of_all_friction_effects() {
 }
 
 #[test]
-fn dry_friction_goes_with_the_length_in_the_layers_passed() {
+fn dry_friction_is_shared_by_the_length_inside_the_layers() {
     let tissue =
         Tissue { surface_m: 0.0, layers: vec![layer(0.03, 0.0, 2000.0, None), layer(0.1, 0.0, 0.0, None)] };
     let law = ForceLaw::new(&tissue, &[stylet_tissue::CoulombFriction { c_n_per_m: 10.0 }.into()])
@@ -297,24 +297,24 @@ fn dry_friction_goes_with_the_length_in_the_layers_passed() {
         (passed.total_n - (v * 60.0 + 0.5)).abs() < 1e-12 && (passed.tip_n - 0.2).abs() < 1e-12,
         "{passed:?}"
     );
-    // In the air nothing rubs.
+    // No friction in the air.
     assert_eq!(law.step(&mut ForceLawState::default(), 0.0, -0.01, v, |_| {}).tip_n, 0.0);
 }
 
 #[test]
-fn ruptures_may_be_imposed_before_the_law_would_bring_them() {
+fn ruptures_may_be_imposed_before_the_criterion_is_met() {
     let law = ForceLaw::base(&Tissue::three_gels());
-    let (mut state, mut strains) = (ForceLawState::default(), Vec::new());
-    law.step_imposed(&mut state, 0.0, 0.01, 0.0, 0, |s| strains.push(s));
-    let force = law.step_imposed(&mut state, 1.0, 0.02, 0.0, 1, |s| strains.push(s));
-    // The first layer gives way at 20 mm although neither force nor face asks for it; the second is not reached yet.
+    let (mut state, mut criteria) = (ForceLawState::default(), Vec::new());
+    law.step_imposed(&mut state, 0.0, 0.01, 0.0, 0, |s| criteria.push(s));
+    let force = law.step_imposed(&mut state, 1.0, 0.02, 0.0, 1, |s| criteria.push(s));
+    // The first layer ruptures at 20 mm although the criterion is not met; the second is not reached yet.
     assert_eq!((force.total_n, force.active_layer, state.ruptured()), (0.0, 2, 1));
-    let seen: Vec<_> = strains.iter().map(|s| (s.layer, s.elastic_n, s.tip_m, s.is_met())).collect();
-    assert_eq!(seen, [(1, 0.4, 0.01, false), (1, 0.8, 0.02, false), (2, 0.0, 0.02, false)]);
-    assert_eq!((strains[1].puncture_n, strains[1].far_m), (f64::INFINITY, 0.0282));
-    // And it may hold longer than the law would: its criterion says so.
-    let later = law.step_imposed(&mut state, 2.0, 0.09, 0.0, 1, |s| strains.push(s));
-    assert!((later.elastic_n - 60.0 * (0.09 - 0.0282)).abs() < 1e-12 && strains[3].is_met());
+    let found: Vec<_> = criteria.iter().map(|s| (s.layer, s.elastic_n, s.tip_m, s.is_met())).collect();
+    assert_eq!(found, [(1, 0.4, 0.01, false), (1, 0.8, 0.02, false), (2, 0.0, 0.02, false)]);
+    assert_eq!((criteria[1].puncture_n, criteria[1].far_m), (f64::INFINITY, 0.0282));
+    // A layer may also stay intact although the criterion is met.
+    let later = law.step_imposed(&mut state, 2.0, 0.09, 0.0, 1, |s| criteria.push(s));
+    assert!((later.elastic_n - 60.0 * (0.09 - 0.0282)).abs() < 1e-12 && criteria[3].is_met());
 }
 
 #[test]

@@ -1,12 +1,12 @@
-//! Promise: the library describes every effect of SPEC section 6 completely and truly, a neutral
-//! effect leaves the base law bit for bit on any motion, and all of them together stay finite.
+//! Promise: the library describes every effect of docs/reference/model.md completely, an inactive effect leaves the base law
+//! bit for bit on any motion, and all effects together stay finite.
 
 mod common;
 use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;
 
-const SPEC_SECTION_6: [&str; 27] = [
+const GENERAL_EFFECTS: [&str; 27] = [
     "nonlinear_elasticity",
     "stress_relaxation",
     "coulomb_friction",
@@ -37,14 +37,14 @@ const SPEC_SECTION_6: [&str; 27] = [
 ];
 
 #[test]
-fn the_library_holds_every_row_of_the_specification_once_in_the_order_of_the_chain() {
+fn the_library_has_every_general_effect_once_in_the_order_of_the_chain() {
     let mut ids: Vec<&str> = general_effects().map(|info| info.id).collect();
     let places: Vec<ChainStage> = general_effects().map(|info| info.stage).collect();
     assert!(places.is_sorted(), "{places:?}");
-    let mut spec = SPEC_SECTION_6;
+    let mut expected = GENERAL_EFFECTS;
     ids.sort_unstable();
-    spec.sort_unstable();
-    assert_eq!(ids, spec);
+    expected.sort_unstable();
+    assert_eq!(ids, expected);
     assert!(effect_info("coulomb_friction").is_some() && effect_info("magic").is_none());
 }
 
@@ -78,7 +78,7 @@ fn every_parameter_has_a_typical_value_inside_its_search_range_inside_its_allowe
 }
 
 #[test]
-fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
+fn parameters_round_trip_and_inactive_values_make_an_effect_inactive() {
     for effect in typical_effects() {
         let info = effect.info();
         assert_eq!(effect.id(), info.id);
@@ -89,21 +89,21 @@ fn parameters_come_back_as_they_went_in_and_neutral_values_are_neutral() {
         assert_eq!(values.len(), info.parameters.len());
         assert_eq!(AnyEffect::from_parameters(info.id, &values), Some(effect.clone()));
         assert_eq!(AnyEffect::from_parameters(info.id, &[0.1; 9]), None);
-        // The strengths alone make it vanish, whatever the shape.
+        // The strengths alone make it vanish, whatever the shape parameters.
         let strengths_off: Vec<f64> =
             info.parameters.iter().map(|p| if p.strength { p.inactive } else { p.start }).collect();
         let all_off: Vec<f64> = info.parameters.iter().map(|p| p.inactive).collect();
         for values in [strengths_off, all_off] {
-            let neutral = AnyEffect::from_parameters(info.id, &values).expect("right number");
-            assert!(neutral.is_inactive(), "{neutral:?}");
-            neutral.check().expect("neutral values are allowed");
+            let inactive = AnyEffect::from_parameters(info.id, &values).expect("right number");
+            assert!(inactive.is_inactive(), "{inactive:?}");
+            inactive.check().expect("inactive values are allowed");
         }
     }
     assert_eq!(AnyEffect::from_parameters("magic", &[1.0]), None);
 }
 
 #[test]
-fn a_parameter_out_of_range_is_named_with_what_would_be_right() {
+fn a_parameter_out_of_range_is_named_with_its_valid_range() {
     let refuse = |effect: AnyEffect| effect.check().expect_err("out of range");
     let error = refuse(CoulombFriction { c_n_per_m: -1.0 }.into());
     assert_eq!((error.effect, error.path, error.value), ("coulomb_friction", "c_n_per_m", -1.0));
@@ -121,7 +121,7 @@ fn a_parameter_out_of_range_is_named_with_what_would_be_right() {
     assert_eq!(refuse(BoundaryShift { layer: 0, shift_m: 0.001 }.into()).path, "layer");
 }
 
-fn neutral_effects() -> Vec<AnyEffect> {
+fn inactive_effects() -> Vec<AnyEffect> {
     let off = |effect: AnyEffect| {
         let info = effect.info();
         let values: Vec<f64> =
@@ -151,14 +151,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn each_neutral_effect_leaves_the_base_law_bit_for_bit(motion in any_motion()) {
+    fn each_inactive_effect_leaves_the_base_law_bit_for_bit(motion in any_motion()) {
         let base = bits(&run(&three_gels(), &[], &motion).0);
-        for effect in neutral_effects() {
+        for effect in inactive_effects() {
             let with = bits(&run(&three_gels(), std::slice::from_ref(&effect), &motion).0);
             prop_assert!(base == with, "{:?}", effect);
         }
-        prop_assert_eq!(&base, &bits(&run(&three_gels(), &neutral_effects(), &motion).0));
-        let chain = MeasurementChain::new(&neutral_effects());
+        prop_assert_eq!(&base, &bits(&run(&three_gels(), &inactive_effects(), &motion).0));
+        let chain = MeasurementChain::new(&inactive_effects());
         prop_assert!(chain.is_plain());
         let mut state = chain.start(200.0);
         for (k, &(time_s, z, velocity_mps)) in motion.iter().enumerate() {
@@ -209,7 +209,7 @@ fn every_typical_effect_of_the_tissue_changes_the_force() {
 }
 
 #[test]
-fn a_sample_that_is_not_a_number_has_no_force_and_leaves_no_trace() {
+fn a_sample_that_is_not_finite_has_a_nan_force_and_leaves_the_state_unchanged() {
     let effects: Vec<AnyEffect> =
         typical_effects().into_iter().filter(|e| e.id() != "stress_relaxation").collect();
     let law = ForceLaw::new(&three_gels(), &effects).expect("few effects");
@@ -228,9 +228,9 @@ fn a_sample_that_is_not_a_number_has_no_force_and_leaves_no_trace() {
     assert_eq!(state.ruptured(), 2, "the motion went through layers");
 }
 
-/// Where a condition joins two numbers, their coordinates may go anywhere within the bounds of each: no step of a fit leaves the library.
+/// Where a condition links two parameters, their coordinates may be anywhere within the bounds of each.
 #[test]
-fn whatever_coordinates_a_fit_tries_the_effect_is_allowed() {
+fn any_coordinates_within_their_bounds_give_a_valid_effect() {
     for (id, ends) in [
         ("stribeck_friction", vec![[0.0, 40.0], [0.0, 60.0], [1e-4, 0.1]]),
         ("stress_relaxation", vec![[0.0, 1.0], [0.01, 100.0], [0.0, 1.0], [0.01, 100.0]]),
@@ -244,7 +244,7 @@ fn whatever_coordinates_a_fit_tries_the_effect_is_allowed() {
 }
 
 #[test]
-fn coordinates_lead_back_to_the_effect() {
+fn coordinates_round_trip() {
     for info in general_effects().chain(per_layer_effects()) {
         let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
         let effect = AnyEffect::from_parameters(info.id, &start).expect("its own parameters");
@@ -254,7 +254,7 @@ fn coordinates_lead_back_to_the_effect() {
             near(b, *a, 1e-15 * a.abs());
         }
         assert_eq!(coordinates.len(), start.len());
-        // Some effects know better ones than their parameters.
+        // Some effects have other coordinates than their parameters.
         if !["shaft_slip", "hidden_membrane", "stribeck_friction"].contains(&info.id) {
             assert_eq!(coordinates, start, "{}", info.id);
         }
@@ -264,20 +264,20 @@ fn coordinates_lead_back_to_the_effect() {
 }
 
 #[test]
-fn a_parameter_enters_a_fit_as_it_is_sought() {
+fn the_fit_scale_follows_strength_and_search() {
     let scale =
         |id: &str, path: &str| effect_info(id).and_then(|i| i.parameter(path)).expect("known").fit_scale();
     assert_eq!(scale("coulomb_friction", "c_n_per_m"), FitScale::Linear);
-    // A strength stays linear although its search goes in the logarithm: it may shrink to nothing.
+    // A strength stays linear although its search is logarithmic: it may shrink to zero.
     assert_eq!(scale("low_pass_lag", "time_constant_s"), FitScale::Linear);
     assert_eq!(scale("stress_relaxation", "terms.0.time_constant_s"), FitScale::Log);
     assert_eq!(scale("respiration", "phase_rad"), FitScale::Linear);
-    // What is rigid when neutral.
+    // Infinite when inactive.
     assert_eq!(scale("needle_compliance", "stiffness_n_per_m"), FitScale::Reciprocal);
 }
 
 #[test]
-fn the_description_of_a_parameter_is_the_one_of_its_file() {
+fn parameter_descriptions_are_those_of_the_effect_s_file() {
     let lag = effect_info("low_pass_lag").and_then(|i| i.parameter("time_constant_s")).expect("known");
     assert!(lag.strength && !lag.integer && lag.low == 0.0 && lag.inactive == 0.0, "{lag:?}");
     let phase = effect_info("respiration").and_then(|i| i.parameter("phase_rad")).expect("known");
@@ -287,7 +287,7 @@ fn the_description_of_a_parameter_is_the_one_of_its_file() {
     let exponent = effect_info("power_law_friction").and_then(|i| i.parameter("exponent")).expect("known");
     assert_eq!((exponent.low, exponent.high, exponent.inactive), (-0.9, 3.0, 1.0));
     assert_eq!((exponent.start, exponent.search), (0.7, (0.1, 2.0)));
-    // Where a layer lets go is another depth in every insertion; a law's number is not.
+    // The release depth differs between recordings, the exponent does not.
     let release_depth = effect_info("release_depth")
         .and_then(|i| i.parameters.iter().find(|p| p.between_recordings_sd > 0.0));
     assert_eq!(
@@ -298,7 +298,7 @@ fn the_description_of_a_parameter_is_the_one_of_its_file() {
 }
 
 #[test]
-fn a_bound_without_an_upper_end_is_told_as_one() {
+fn a_range_without_an_upper_end_is_reported_as_a_lower_bound() {
     let with =
         |high| ParameterError { effect: "magic", path: "x", value: -1.0, allowed: (0.0, high) }.to_string();
     assert_eq!(with(f64::INFINITY), "magic: x is -1; it must be at least 0");
@@ -306,7 +306,7 @@ fn a_bound_without_an_upper_end_is_told_as_one() {
 }
 
 #[test]
-fn sixteen_effects_act_at_once_and_no_more() {
+fn at_most_sixteen_effects_act_at_once() {
     let one: AnyEffect = CoulombFriction { c_n_per_m: 1.0 }.into();
     let many = |n: usize| ForceLaw::new(&three_gels(), &vec![one.clone(); n]);
     let law = many(MAX_EFFECTS).expect("as many as can");
@@ -316,7 +316,7 @@ fn sixteen_effects_act_at_once_and_no_more() {
         1e-12,
     );
     assert_eq!(many(MAX_EFFECTS + 1).err(), Some(TooManyEffects { asked: 17 }));
-    // Effects of the sensor and a needle that gives do not count.
+    // Sensor effects and a compliant needle do not count.
     let mut more = vec![one.clone(); MAX_EFFECTS];
     more.extend([ForceBias { force_n: 1.0 }.into(), NeedleCompliance { stiffness_n_per_m: 500.0 }.into()]);
     assert!(ForceLaw::new(&three_gels(), &more).is_ok());

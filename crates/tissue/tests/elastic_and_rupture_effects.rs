@@ -1,4 +1,4 @@
-//! Promise: the effects on elastic force, ruptures and the tip are their equations of SPEC section 6.
+//! Promise: the effects on elastic force, ruptures and the tip follow their equations in docs/reference/model.md.
 
 mod common;
 use common::*;
@@ -50,7 +50,7 @@ fn relaxation_of_a_ramp_is_exact_at_any_sampling_rate() {
 }
 
 #[test]
-fn relaxation_starts_anew_in_the_next_layer_and_its_force_ruptures() {
+fn relaxation_restarts_in_the_next_layer_and_its_force_ruptures() {
     let layers = [layer(0.05, 60.0, 0.0, Some(0.5)), layer(0.05, 60.0, 0.0, None)];
     let effect: AnyEffect =
         StressRelaxation { terms: vec![PronyTerm { fraction: 0.5, time_constant_s: 1.0 }] }.into();

@@ -1,4 +1,4 @@
-//! Promise: each friction is its equation of SPEC section 6, and the special cases in which one
+//! Promise: each friction effect follows its equation in docs/reference/model.md, and the special cases in which one
 //! friction becomes another hold.
 
 mod common;

@@ -1,5 +1,5 @@
-//! Promise: the referee's law, written from the page, and the library's law give the same force for every effect of SPEC
-//! section 6. Neither knows the other; where they differ, one of them misreads the page.
+//! Promise: the independent simulator (`stylet_examine::reality`) and the force law give the same force for every effect.
+//! Neither uses code of the other; where they differ, one of them does not follow docs/reference/model.md.
 
 use stylet_examine::simulator::effect::{Effect, IDS};
 use stylet_examine::simulator::force_sensor::SensorModel;
@@ -123,8 +123,8 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
     out
 }
 
-/// The referee's.
-fn referee(effect: Option<&Effect>) -> Vec<f64> {
+/// Force of the independent simulator.
+fn simulator(effect: Option<&Effect>) -> Vec<f64> {
     let made: Vec<Effect> = effect.into_iter().copied().collect();
     let instrument = SensorModel::new(&made, 0.0);
     let path = path();
@@ -136,13 +136,13 @@ fn referee(effect: Option<&Effect>) -> Vec<f64> {
 }
 
 #[test]
-fn every_effect_of_the_page_is_the_same_force_in_both_laws() {
+fn every_effect_has_the_same_force_in_both_implementations() {
     let all = effects();
     assert_eq!(all.iter().map(Effect::id).collect::<Vec<_>>(), IDS);
-    let base = referee(None);
+    let base = simulator(None);
     let mut worst = Vec::new();
     for effect in [None].into_iter().chain(all.iter().map(Some)) {
-        let (a, b) = (library(effect), referee(effect));
+        let (a, b) = (library(effect), simulator(effect));
         assert_eq!(a.len(), b.len());
         let largest = b.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
         // A jump may fall on the other side of a sample: a few samples are left out.

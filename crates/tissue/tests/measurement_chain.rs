@@ -1,5 +1,5 @@
-//! Promise: the recorded force is the tissue's force through tool and sensor in the order of SPEC
-//! section 6, at any sampling, without allocation per sample.
+//! Promise: the recorded force is the tissue's force through tool and sensor in the order of
+//! docs/reference/model.md (Measurement chain), at any sampling, without allocation per sample.
 
 mod common;
 use common::*;
@@ -99,7 +99,7 @@ fn a_delay_is_exact_for_a_force_that_is_linear_between_samples() {
 }
 
 #[test]
-fn the_order_is_the_specifications_whatever_the_order_of_the_list() {
+fn the_order_of_the_chain_does_not_depend_on_the_order_of_the_list() {
     let mut effects: Vec<AnyEffect> = vec![
         Quantisation { step_n: 0.5 }.into(),
         Saturation { limit_n: 4.2 }.into(),
@@ -150,7 +150,7 @@ proptest! {
 }
 
 #[test]
-fn the_mean_over_spans_is_that_of_many_readings() {
+fn the_mean_over_intervals_is_that_of_many_samples() {
     let effects: Vec<AnyEffect> = vec![
         ToolInertia { mass_kg: 0.3 }.into(),
         DriveFriction { force_n: 0.2 }.into(),
@@ -187,7 +187,7 @@ fn the_mean_over_spans_is_that_of_many_readings() {
 }
 
 #[test]
-fn a_chain_says_how_late_it_is_and_whether_it_smears_a_jump() {
+fn a_chain_reports_its_delay_and_whether_it_has_a_lag() {
     let two =
         MeasurementChain::new(&[TimeDelay { delay_s: 0.02 }.into(), TimeDelay { delay_s: 0.0137 }.into()]);
     near(two.delay_s(), 0.0337, 1e-17);
@@ -212,7 +212,7 @@ fn a_chain_says_how_late_it_is_and_whether_it_smears_a_jump() {
 }
 
 #[test]
-fn a_delay_remembers_as_much_as_its_sampling_asks_for_and_a_repeated_time_is_no_time() {
+fn the_delay_buffer_is_sized_by_the_rate_and_a_repeated_time_stamp_is_a_zero_step() {
     // 0.1 s at 100 Hz, exactly at a sample and between two; jumps are sharp to one sample.
     for (delay_s, at) in [(0.1, 60), (0.105, 61)] {
         let times = regular(100.0, 1.0);

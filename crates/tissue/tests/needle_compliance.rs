@@ -91,7 +91,7 @@ fn the_solution_converges_to_the_differential_equation_for_elastic_and_viscous_l
 
 #[test]
 fn after_a_rupture_between_samples_the_force_is_the_same_at_every_sampling_rate() {
-    // Force lets go of 1 N with 180 Ns/m around the shaft and 5 kN/m of needle: 36 ms, seven samples.
+    // The rupture releases 1 N with 180 Ns/m around the shaft and 5 kN/m of needle: 36 ms, seven samples.
     let tissue = tissue(&[layer(0.05, 50.0, 9000.0, Some(1.0)), layer(0.05, 50.0, 9000.0, None)]);
     let at = |rate: f64| {
         let (f, _, ruptures) = bend(&tissue, &[spring(5000.0)], &constant(0.003, rate, 9.0));
@@ -137,7 +137,7 @@ fn a_rupture_with_friction_that_stays_is_exact_at_every_sampling_rate() {
 }
 
 #[test]
-fn a_base_that_accelerates_as_it_says_is_followed_exactly_however_long_the_steps() {
+fn with_its_acceleration_given_an_accelerating_base_is_followed_exactly() {
     // D z_tip' = k_s (z - z_tip) with z = a t^2/2 from rest: z_tip = a (t^2/2 - tau t + tau^2 (1 - exp(-t/tau))).
     let (ks, d, a) = (500.0, 20.0, 0.02);
     let tau = d / ks;
@@ -157,7 +157,7 @@ fn a_base_that_accelerates_as_it_says_is_followed_exactly_however_long_the_steps
 }
 
 #[test]
-fn in_the_layer_that_it_is_in_all_the_friction_is_the_tip_s_stuck_or_sliding() {
+fn friction_in_the_active_layer_counts_as_tip_force_sticking_or_sliding() {
     let motion = ripple_hold_retract(0.005, 0.002, 0.004, 0.4, 200.0);
     let effects = [CoulombFriction { c_n_per_m: 20.0 }.into(), spring(1000.0)];
     let (f, tips, _) = bend(&block(30.0, 2000.0), &effects, &motion);
@@ -224,7 +224,7 @@ fn with_dry_friction_the_tip_sticks_at_a_reversal_until_the_spring_has_turned_ar
 }
 
 #[test]
-fn a_membrane_breaks_under_a_needle_that_gives_and_the_balance_holds_afterwards() {
+fn a_membrane_ruptures_under_a_compliant_needle_and_the_balance_holds_afterwards() {
     let membrane = HiddenMembrane { depth_m: 0.01, stiffness_n_per_m: 500.0, puncture_n: 0.5 };
     let motion = constant(0.002, 200.0, 12.0);
     let (f, tips, ruptures) = bend(&block(20.0, 0.0), &[membrane.into(), spring(200.0)], &motion);
@@ -260,7 +260,7 @@ fn a_needle_that_starts_inside_the_tissue_and_a_repeated_time_stamp_are_in_balan
 }
 
 #[test]
-fn what_a_tip_that_sticks_feels_is_free_of_the_friction_of_the_layers_passed() {
+fn the_tip_force_of_a_sticking_tip_excludes_the_friction_of_passed_layers() {
     // 40 mm in, held, and slowly back: the shaft rubs in 20 mm that are passed and in 20 mm of the layer that the tip is in.
     let (c, ks) = (20.0, 1000.0);
     let stack = tissue(&[layer(0.02, 0.0, 0.0, None), layer(1.0, 0.0, 0.0, None)]);
@@ -274,15 +274,15 @@ fn what_a_tip_that_sticks_feels_is_free_of_the_friction_of_the_layers_passed() {
         near(force.tip_n, force.friction_n * (tip - 0.02) / tip, 1e-9);
         near(force.friction_n, force.total_n, 1e-12);
     }
-    // In the air behind its only layer a tip feels nothing, stuck or not.
+    // In the air behind its only layer the tip force is zero, sticking or not.
     let (f, ..) = bend(&tissue(&[layer(0.02, 0.0, 0.0, None)]), &[dry, spring(ks)], &motion);
     assert!(f[1620].friction_n.abs() > 0.1);
     f.iter().skip(1000).for_each(|force| near(force.tip_n, 0.0, 1e-12));
 }
 
 #[test]
-fn a_tip_that_sticks_under_a_cutting_force_bears_it_at_the_tip() {
-    // Cutting stops when the tip does: on the way back the spring lets go of what the tip bears, between 0.5 N and nothing.
+fn a_cutting_force_that_holds_a_sticking_tip_is_tip_force() {
+    // Cutting stops with the tip: in retraction the spring releases the tip force, between 0.5 N and zero.
     let mut motion = constant(0.005, 200.0, 8.0);
     let (last_s, last_m, _) = motion[motion.len() - 1];
     motion.extend((1..=40).map(|k| (last_s + 0.005 * f64::from(k), last_m - 1e-5 * f64::from(k), -0.002)));
@@ -372,8 +372,8 @@ impl Hard {
 }
 
 #[test]
-fn a_tip_that_stands_at_a_face_before_which_the_force_jumps_is_held_there() {
-    // Before the face nothing is felt, behind it half a newton of cutting: the spring's 50 uN hold the tip in the jump.
+fn a_tip_at_a_face_with_a_force_jump_sticks_there() {
+    // In front of the face there is no force, behind it 0.5 N of cutting force: the spring's 50 uN hold the tip in the jump.
     let hard = Hard {
         log_ks: 2.1927527601298804,
         rate_hz: 1231.1370581036226,

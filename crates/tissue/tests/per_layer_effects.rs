@@ -1,4 +1,4 @@
-//! Promise: the effects that measured insertions asked for are their equations, neutral ones leave the
+//! Promise: the per-layer effects follow their equations, inactive ones leave the
 //! base law bit for bit, and the special cases in which they become older effects hold.
 
 mod common;
@@ -28,8 +28,8 @@ fn in_hold_out() -> Vec<Sample> {
 }
 
 #[test]
-fn neutral_effects_leave_the_base_law_bit_for_bit() {
-    let neutral: [AnyEffect; 9] = [
+fn inactive_effects_leave_the_base_law_bit_for_bit() {
+    let inactive: [AnyEffect; 9] = [
         ShaftSlip { exponent: 3.0, curvature_n_per_m2: 1e5, fractions: [0.5, 0.1], ..ShaftSlip::default() }
             .into(),
         ShaftSlip { layer: 9, push_n: 2.0, pull_n: 1.0, ..ShaftSlip::default() }.into(), // there is no such layer
@@ -42,7 +42,7 @@ fn neutral_effects_leave_the_base_law_bit_for_bit() {
         LayerStiffening { layer: 9, kappa_per_m: 50.0 }.into(), // there is no such layer
     ];
     let base = run(&three_gels(), &[], &usual_motion());
-    assert_eq!(run(&three_gels(), &neutral, &usual_motion()), base);
+    assert_eq!(run(&three_gels(), &inactive, &usual_motion()), base);
     for info in per_layer_effects() {
         let values: Vec<f64> = info.parameters.iter().map(|p| p.inactive).collect();
         let effect = AnyEffect::from_parameters(info.id, &values).expect("its own parameters");
@@ -54,7 +54,7 @@ fn neutral_effects_leave_the_base_law_bit_for_bit() {
 }
 
 #[test]
-fn a_layer_that_can_be_pushed_in_yields_to_force_behind_its_far_face() {
+fn a_deeply_indented_layer_ruptures_by_force_behind_its_far_face() {
     let mut soft = skin();
     soft.layers[0].puncture_n = Some(1.4); // reached 14 mm in, 4 mm behind the far face
     let (_, at_the_face) = run(&soft, &[], &in_hold_out());
@@ -79,7 +79,7 @@ fn stiffening_of_each_layer_adds_to_that_of_all() {
 }
 
 #[test]
-fn a_punctured_layer_holds_with_its_sliding_friction_follows_travel_after_the_reversal_and_lets_go() {
+fn a_punctured_layer_has_its_sliding_friction_presliding_after_reversal_and_a_release() {
     let motion = in_hold_out();
     let f = run(&skin(), &[holds(1.0, 0.004, 1e6)], &motion).0;
     let grip: Vec<f64> = f.iter().map(|f| f.friction_n).collect();
@@ -91,10 +91,10 @@ fn a_punctured_layer_holds_with_its_sliding_friction_follows_travel_after_the_re
     // Back by 4 mm: from 1 N to 0; by 8 mm: to -1 N, and there it slides.
     near(grip[1700], 0.0, 0.002);
     near(grip[1950], -1.0, 1e-12);
-    // Let go at the front face, 20 mm back, at once.
+    // Released at the front face, 20 mm further back, at once.
     near(grip[2480], -1.0, 1e-12);
     assert_eq!(grip[2510], 0.0);
-    // What the tip feels is free of it.
+    // It is no part of the tip force.
     near(f[900].tip_n, f[900].total_n - grip[900], 1e-12);
 }
 
@@ -116,17 +116,17 @@ fn a_creeping_branch_fades_in_the_hold_with_its_time_constant_and_is_the_same_at
 }
 
 #[test]
-fn a_tougher_layer_and_a_rougher_shaft_change_the_effects_that_hold_their_numbers() {
+fn scaling_friction_and_puncture_changes_the_effects_with_such_parameters() {
     let waits = |force_n| AnyEffect::from(DelayedPuncture { layer: 2, force_n, exponent: 3.0 });
     let mut tough = waits(2.0);
     tough.scale_puncture(1, 1.5);
     assert_eq!(tough, waits(2.0), "another layer");
     tough.scale_puncture(2, 1.5);
     assert_eq!(tough, waits(3.0));
-    let clings = |push_n, pull_n| AnyEffect::from(ShaftSlip { push_n, pull_n, ..ShaftSlip::default() });
-    let mut rough = clings(2.0, 1.0);
+    let slip = |push_n, pull_n| AnyEffect::from(ShaftSlip { push_n, pull_n, ..ShaftSlip::default() });
+    let mut rough = slip(2.0, 1.0);
     rough.scale_friction(1.5);
-    assert_eq!(rough, clings(3.0, 1.5));
+    assert_eq!(rough, slip(3.0, 1.5));
     // Others take what the layers hold.
     let mut other = holds(0.5, 0.004, 2.0);
     other.scale_friction(1.5);
@@ -135,7 +135,7 @@ fn a_tougher_layer_and_a_rougher_shaft_change_the_effects_that_hold_their_number
 }
 
 #[test]
-fn relaxing_shares_cannot_be_more_than_the_whole_and_the_error_says_what_is_left() {
+fn relaxing_shares_add_up_to_at_most_one_and_the_error_names_the_rest() {
     let relaxes = |fractions| AnyEffect::from(ShaftSlip { push_n: 1.0, fractions, ..ShaftSlip::default() });
     assert!(relaxes([0.75, 0.25]).check().is_ok());
     let error = relaxes([0.75, 0.5]).check().expect_err("more than the whole");
@@ -174,31 +174,31 @@ fn damage_grows_with_the_mean_power_of_the_force_whatever_the_step() {
 }
 
 #[test]
-fn a_puncture_passes_the_share_that_is_kept_into_the_branch_s_hold() {
-    // 0.8 N are released at 8 mm, the shaft stands still there: what is kept of them holds, and creeps away with its time constant.
+fn a_puncture_passes_the_retained_share_into_the_branch() {
+    // 0.8 N are released at 8 mm, the shaft stands still there: what is retained of them holds, and creeps away with its time constant.
     let motion: Vec<Sample> = (0..=1600)
         .map(|k| f64::from(k) * 0.005)
         .map(|t| if t <= 4.001 { (t, 0.002_000_1 * t, 0.002_000_1) } else { (t, 0.008_002, 0.0) })
         .collect();
-    for (share, kept) in [(0.5, 0.5), (1.0, 0.25), (0.8, 1.0)] {
+    for (share, retained) in [(0.5, 0.5), (1.0, 0.25), (0.8, 1.0)] {
         let delta_m = 0.05;
         let creeps = ViscoelasticPresliding {
             layer: 1,
             share,
             delta_m,
             time_constant_s: 2.0,
-            retained_share: kept,
+            retained_share: retained,
             release_m: 0.0,
         };
         let f = run(&skin(), &[creeps.into()], &motion).0;
         // Two steps of creep take 5 ms/2 s each, a little travel adds less.
-        near(f[801].friction_n, share * kept * 0.8, 0.005);
+        near(f[801].friction_n, share * retained * 0.8, 0.005);
         near(f[1201].friction_n / f[801].friction_n, (-1.0f64).exp(), 1e-9);
     }
 }
 
 #[test]
-fn a_hold_follows_travel_to_first_order_however_small() {
+fn branch_force_follows_travel_to_first_order_however_small() {
     // Steps of a nanometre, a micrometre and a tenth of a millimetre: the hold's limit follows by 1 - exp(-travel/delta).
     for steps in [10, 10_000, 1_000_000] {
         let way = 0.001;

@@ -1,13 +1,12 @@
-//! Promise: a layer that clings to the shaft (`shaft_slip`) is presliding far below its hold, steady sliding by a power of the speed at
-//! it, creep in a hold and dry friction for a large exponent; the answer does not depend on the step. A layer that waits
-//! (`delayed_puncture`), one that presses into the next (`layer_coupling`) and one that lets go (`release_depth`) are their equations.
+//! Promise: `shaft_slip` is presliding far below its holding force, steady sliding by a power of the speed, and power-law
+//! creep in a hold; `delayed_puncture`, `layer_coupling` and `release_depth` follow their equations.
 
 mod common;
 use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;
 
-/// 10 mm of 300 N/m that give way at 1.5 N, thick ground without stiffness behind.
+/// 10 mm of 300 N/m that rupture at 1.5 N, a thick layer without stiffness behind.
 fn skin() -> Tissue {
     tissue(&[layer(0.01, 300.0, 20_000.0, Some(1.5)), layer(0.2, 0.0, 0.0, None)])
 }
@@ -38,7 +37,7 @@ fn in_hold_out(depth_m: f64, speed_mps: f64, rate: f64) -> Vec<Sample> {
 }
 
 #[test]
-fn steady_sliding_takes_the_hold_times_the_root_of_the_speed() {
+fn steady_sliding_force_is_the_hold_times_a_power_of_the_speed() {
     for (exponent, speed) in [(1.0, 2e-3), (4.0, 3e-3), (10.0, 1e-3), (10.0, 4e-3), (60.0, 2e-3)] {
         let effect = ShaftSlip { rate: -0.2, ..slip(exponent) };
         let motion = in_hold_out(0.1, speed, 100.0);
@@ -52,7 +51,7 @@ fn steady_sliding_takes_the_hold_times_the_root_of_the_speed() {
 }
 
 #[test]
-fn far_below_its_hold_a_layer_is_a_spring() {
+fn far_below_its_holding_force_a_layer_is_a_spring() {
     // After a reversal the force follows the travel with the spring's stiffness, nearly without slip.
     let effect = ShaftSlip { curvature_n_per_m2: 0.0, ..slip(20.0) };
     let motion = in_hold_out(0.05, 2e-3, 200.0);
@@ -64,7 +63,7 @@ fn far_below_its_hold_a_layer_is_a_spring() {
 }
 
 #[test]
-fn in_a_hold_the_force_creeps_as_the_power_law_says() {
+fn in_a_hold_the_force_creeps_by_the_power_law() {
     // F' = -K v0 (F/L)^m: F^(1-m) grows with the time, linearly.
     let (k, m) = (300.0, 6.0);
     let effect = ShaftSlip { curvature_n_per_m2: 0.0, ..slip(m) };
@@ -92,7 +91,7 @@ fn a_large_exponent_is_dry_friction() {
 }
 
 #[test]
-fn the_rupture_falls_back_to_the_share_that_is_kept_and_wear_lowers_the_plateau() {
+fn a_rupture_leaves_the_retained_share_and_wear_lowers_the_plateau() {
     let motion = in_hold_out(0.05, 2e-3, 1000.0);
     let law = ForceLaw::new(&skin(), &[slip(10.0).into()]).expect("one effect");
     let (mut state, mut before, mut pair) = (ForceLawState::default(), 0.0, None);
@@ -115,7 +114,7 @@ fn the_rupture_falls_back_to_the_share_that_is_kept_and_wear_lowers_the_plateau(
 }
 
 #[test]
-fn relaxation_goes_on_through_the_rupture() {
+fn relaxation_continues_through_the_rupture() {
     // All of the force relaxes in a hold, pressed or dragged; with shares of zero the time constants mean nothing.
     let relaxing = |g| ShaftSlip { fractions: [g, 0.0], time_constants_s: [0.5, 9.0], ..slip(200.0) };
     for depth in [0.0035, 0.006] {
@@ -165,13 +164,13 @@ proptest! {
     fn the_force_is_finite_for_whatever_parameters_are_allowed(
         push in 0.0..1e4_f64,
         pull in 0.0..1e4_f64,
-        kept in 0.0..2.0_f64,
+        retained in 0.0..2.0_f64,
         exponent in 1.0..200.0_f64,
         wear in 0.0..1e4_f64,
         curve in 0.0..1e9_f64,
     ) {
         let effect = ShaftSlip {
-            push_n: push, pull_n: pull, retained_share: kept, exponent, wear_per_m: wear, curvature_n_per_m2: curve,
+            push_n: push, pull_n: pull, retained_share: retained, exponent, wear_per_m: wear, curvature_n_per_m2: curve,
             fractions: [0.5, 0.5], time_constants_s: [1e-3, 1e4], ..ShaftSlip::default()
         };
         for rate in [10.0, 300.0] {
@@ -182,7 +181,7 @@ proptest! {
 }
 
 #[test]
-fn a_layer_that_waits_breaks_in_a_hold_when_its_damage_is_full() {
+fn a_layer_with_delayed_puncture_ruptures_in_a_hold_at_full_damage() {
     let waits = |force_n, exponent| -> AnyEffect { DelayedPuncture { layer: 1, force_n, exponent }.into() };
     let motion = in_hold_out(0.004, 2e-3, 500.0); // 1.2 N in the hold: below the puncture force
     assert!(run(&skin(), &[], &motion).1.is_empty());
@@ -203,7 +202,7 @@ fn a_layer_that_waits_breaks_in_a_hold_when_its_damage_is_full() {
 }
 
 #[test]
-fn a_layer_on_soft_ground_is_indented_by_less_than_the_tip_travels() {
+fn a_layer_on_a_compliant_foundation_is_indented_by_less_than_the_travel() {
     let motion = in_hold_out(0.004, 2e-3, 100.0);
     let stiffness = |compliance_m_per_n, curvature_n_per_m2| {
         let soft = LayerCoupling { layer: 1, compliance_m_per_n };
@@ -219,7 +218,7 @@ fn a_layer_on_soft_ground_is_indented_by_less_than_the_tip_travels() {
 }
 
 #[test]
-fn a_layer_lets_go_where_it_says_on_the_way_back_only() {
+fn a_layer_is_released_at_its_release_depth_in_retraction_only() {
     let motion = in_hold_out(0.03, 2e-3, 500.0);
     for (effects, within) in [(vec![], 1e-9), (vec![AnyEffect::from(slip(10.0))], 2e-4)] {
         let mut all = effects;

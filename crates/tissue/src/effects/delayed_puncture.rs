@@ -17,9 +17,9 @@ use crate::layer_geometry::Slab;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct DelayedPuncture {
-    /// Layer, 1-based; one that is not there changes nothing.
+    /// Layer, 1-based; without such a layer the effect is inactive.
     pub layer: usize,
-    /// Elastic force `F_1` in N that the layer bears for one second, positive. Inactive: infinity.
+    /// Elastic force `F_1` in N that the layer carries for one second, positive. Inactive: infinity.
     pub force_n: f64,
     /// Exponent `n`, 1 to 200.
     pub exponent: f64,
@@ -36,11 +36,11 @@ static INFO: EffectInfo = EffectInfo {
     id: "delayed_puncture",
     equation: "rupture when the integral of (f_K/F_1)^n dt reaches 1 s",
     source: "Linear damage under a power law of the force (Zhurkov 1965); measured muscle phantom",
-    signature: "A rupture in a hold, or under a force that the layer had borne before.",
+    signature: "A rupture in a hold, or under a force that the layer carried before.",
     stage: ChainStage::Puncture,
     parameters: &[
         LAYER,
-        ParameterInfo::strength("force_n", "N", "elastic force that the layer bears for one second")
+        ParameterInfo::strength("force_n", "N", "elastic force that the layer carries for one second")
             .allowed(1e-3, f64::INFINITY)
             .inactive(f64::INFINITY)
             .search(3.0, 0.3, 30.0),
@@ -75,7 +75,7 @@ impl Effect for DelayedPuncture {
             slab.reach_m = f64::INFINITY;
         }
     }
-    /// State: the damage and the force before, relative to `F_1`.
+    /// State: the damage, and the previous force relative to `F_1`.
     fn puncture_force_after_load(
         &self,
         layer: usize,
@@ -92,7 +92,7 @@ impl Effect for DelayedPuncture {
         if dt_s > 0.0 && (now > 0.0 || before > 0.0) {
             let n = self.exponent;
             let most = now.max(before);
-            // In units of the larger force, which no power takes beyond 1.
+            // Relative to the larger force, so that no power exceeds 1.
             let share = now.min(before) / most;
             let mean = if share < 0.999_9 {
                 (1.0 - libm::pow(share, n + 1.0)) / ((n + 1.0) * (1.0 - share))

@@ -18,7 +18,7 @@ pub struct HiddenMembrane {
     pub depth_m: f64,
     /// Stiffness `K_m` in N/m, 0 to 1e6. Inactive: 0.
     pub stiffness_n_per_m: f64,
-    /// Force `F_m` in N at which it breaks, 0 to 100. Inactive: 0.
+    /// Force `F_m` in N at which it ruptures, 0 to 100. Inactive: 0.
     pub puncture_n: f64,
 }
 
@@ -38,7 +38,7 @@ static INFO: EffectInfo = EffectInfo {
             .allowed(0.0, 1e6)
             .search(100.0, 5.0, 5000.0)
             .log(),
-        ParameterInfo::strength("puncture_n", "N", "force at which it breaks")
+        ParameterInfo::strength("puncture_n", "N", "force at which it ruptures")
             .allowed(0.0, 100.0)
             .search(0.5, 0.02, 5.0)
             .log(),
@@ -55,7 +55,7 @@ impl Described for HiddenMembrane {
         let [depth_m, stiffness_n_per_m, puncture_n] = *values else { return None };
         Some(Self { depth_m, stiffness_n_per_m, puncture_n })
     }
-    /// The depth at which it breaks in place of the one at which it begins.
+    /// The depth of its rupture instead of its own depth.
     fn coordinates(&self) -> alloc::vec::Vec<f64> {
         alloc::vec![self.depth_m + self.stretch_m(), self.stiffness_n_per_m, self.puncture_n]
     }
@@ -76,7 +76,7 @@ impl Effect for HiddenMembrane {
     fn has_state(&self) -> bool {
         true
     }
-    /// State: 1 once broken.
+    /// State: 1 after the rupture.
     fn ruptures_membrane(&self, z_m: f64, slabs: &[Slab], state: &mut EffectState) -> bool {
         if state[0] != 0.0 || self.force(z_m, slabs) < self.puncture_n {
             return false;
@@ -93,12 +93,12 @@ impl Effect for HiddenMembrane {
 }
 
 impl HiddenMembrane {
-    /// How far it stretches before it breaks, in m.
+    /// Deflection at its rupture, in m.
     fn stretch_m(&self) -> f64 {
         if self.stiffness_n_per_m > 0.0 { self.puncture_n / self.stiffness_n_per_m } else { 0.0 }
     }
 
-    /// Its force in N with the tip at `z_m`, while whole.
+    /// Its force in N with the tip at `z_m`, before its rupture.
     fn force(&self, z_m: f64, slabs: &[Slab]) -> f64 {
         let surface = slabs.first().map_or(0.0, |slab| slab.front_m);
         self.stiffness_n_per_m * (z_m - surface - self.depth_m).max(0.0)

@@ -11,7 +11,7 @@ use crate::layer_geometry::Slab;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct IncompleteRelease {
-    /// Share that stays, `rho`, 0 to 1. Inactive: 0.
+    /// Retained share `rho`, 0 to 1. Inactive: 0.
     pub fraction: f64,
 }
 

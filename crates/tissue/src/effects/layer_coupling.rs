@@ -15,9 +15,9 @@ use crate::layer_geometry::Slab;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct LayerCoupling {
-    /// Layer, 1-based; one that is not there changes nothing.
+    /// Layer, 1-based; without such a layer the effect is inactive.
     pub layer: usize,
-    /// Compliance `c` of its ground in m/N, 0 to 1. Inactive: 0.
+    /// Compliance `c` of its foundation in m/N, 0 to 1. Inactive: 0.
     pub compliance_m_per_n: f64,
 }
 
@@ -36,7 +36,7 @@ static INFO: EffectInfo = EffectInfo {
     stage: ChainStage::Geometry,
     parameters: &[
         LAYER,
-        ParameterInfo::strength("compliance_m_per_n", "m/N", "compliance of the layer's ground")
+        ParameterInfo::strength("compliance_m_per_n", "m/N", "compliance of the layer's foundation")
             .allowed(0.0, 1.0)
             .search(1e-3, 1e-5, 1e-2),
     ],

@@ -13,7 +13,7 @@ use crate::layer_geometry::Slab;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct LayerStiffening {
-    /// Layer, 1-based; one that is not there changes nothing.
+    /// Layer, 1-based; without such a layer the effect is inactive.
     pub layer: usize,
     /// Stiffening `kappa_i` beyond that of all layers in 1/m, -2000 to 10 000. Inactive: 0.
     pub kappa_per_m: f64,

@@ -57,8 +57,8 @@ impl Effect for LowPassLag {
         state[1] = force_n;
         state[0]
     }
-    /// State: span and what of a step is through after it, output at the end of the span before, and whether started. With `x` the mean that comes in, the mean of
-    /// `y` follows from `tau y' = x - y` integrated over the span.
+    /// State: interval, decay over it, output at the end of the previous interval, whether started. With the mean input `x`
+    /// the mean output follows from `tau y' = x - y` integrated over the interval.
     fn mean_sensor_output(
         &self,
         _time_s: f64,

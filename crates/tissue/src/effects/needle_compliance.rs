@@ -24,7 +24,7 @@ impl Default for NeedleCompliance {
 
 static INFO: EffectInfo = EffectInfo {
     id: "needle_compliance",
-    equation: "z_tip = z - f/k_s (implicit); z and v in the law are the tip's",
+    equation: "z_tip = z - f/k_s (implicit); z and v in the force law are the tip's",
     source: "Series spring of needle and holder",
     signature: "Apparent stiffness k k_s/(k + k_s); the tip lags in proportion to the force and jumps at a rupture although the base does not.",
     stage: ChainStage::Kinematics,

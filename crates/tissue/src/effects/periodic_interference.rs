@@ -57,7 +57,7 @@ impl Effect for PeriodicInterference {
         let angle = core::f64::consts::TAU * self.frequency_hz * time_s + self.phase_rad;
         force_n + self.amplitude_n * libm::sin(angle)
     }
-    /// The mean of a line over evenly spaced samples (Dirichlet's kernel).
+    /// The mean of a tone over evenly spaced samples (Dirichlet kernel).
     fn mean_sensor_output(
         &self,
         time_s: f64,

@@ -16,7 +16,7 @@ use crate::layer_geometry::Slab;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ReleaseDepth {
-    /// Layer, 1-based; one that is not there changes nothing.
+    /// Layer, 1-based; without such a layer the effect is inactive.
     pub layer: usize,
     /// Depth in metres beyond the layer's front face, -0.1 to 0.1. Inactive: 0.
     pub depth_m: f64,
@@ -31,13 +31,13 @@ impl Default for ReleaseDepth {
 
 static INFO: EffectInfo = EffectInfo {
     id: "release_depth",
-    equation: "on the way back layer i touches the shaft while z > s_i + depth",
-    source: "Steps of the force on the way out of skin and muscle phantoms",
-    signature: "A sudden step of the force towards zero on the way back.",
+    equation: "in retraction layer i touches the shaft while z > s_i + depth",
+    source: "Force steps during retraction from skin and muscle phantoms",
+    signature: "A sudden step of the force towards zero in retraction.",
     stage: ChainStage::Geometry,
     parameters: &[
         LAYER,
-        ParameterInfo::strength("depth_m", "m", "where the layer lets go, beyond its front face")
+        ParameterInfo::strength("depth_m", "m", "release depth beyond the layer's front face")
             .allowed(-0.1, 0.1)
             .search(2e-3, -5e-3, 2e-2)
             .between_recordings_sd(5e-4),

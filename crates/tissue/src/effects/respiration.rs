@@ -20,7 +20,7 @@ pub struct Respiration {
 
 static INFO: EffectInfo = EffectInfo {
     id: "respiration",
-    equation: "s_i -> s_i + A sin(2 pi f t + phase); z and v in the law are relative to the tissue",
+    equation: "s_i -> s_i + A sin(2 pi f t + phase); z and v in the force law are relative to the tissue",
     source: "Respiratory motion of abdominal organs, 0.2-0.4 Hz",
     signature: "Periodic in time, also while the needle is held.",
     stage: ChainStage::Kinematics,
@@ -29,7 +29,7 @@ static INFO: EffectInfo = EffectInfo {
             .allowed(0.0, 0.1)
             .search(0.002, 1e-4, 0.02)
             .log(),
-        ParameterInfo::shape("frequency_hz", "Hz", "frequency of the breath")
+        ParameterInfo::shape("frequency_hz", "Hz", "frequency of the tissue's motion")
             .allowed(0.0, 20.0)
             .inactive(0.25)
             .search(0.25, 0.05, 2.0)

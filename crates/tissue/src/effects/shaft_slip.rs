@@ -6,22 +6,22 @@ use crate::layer_geometry::Slab;
 
 /// Reference speed `v0` of the slip in m/s (1 mm/s).
 const V0_MPS: f64 = 1e-3;
-/// Slower than this in m/s (0.1 mm/s) the contact is at rest.
+/// Speed in m/s below which the contact is at rest (0.1 mm/s).
 const REST_MPS: f64 = 1e-4;
-/// Travel in m over which the contact comes to know another speed (1 mm, a few widths of a shaft's contact: Dieterich 1979).
-const RENEWED_M: f64 = 1e-3;
-/// Travel in m within which the contact ends when the tip comes back to where the layer lets go (0.2 mm, a tip's edge).
+/// Travel in m over which the contact adapts to another speed (1 mm, a few contact widths: Dieterich 1979).
+const RENEWAL_M: f64 = 1e-3;
+/// Travel in m over which the contact ends at the release depth (0.2 mm, the edge of a tip).
 const EDGE_M: f64 = 2e-4;
 /// Longest travel in m of one implicit step: a tenth of the millimetres over which the contact loads.
 const SUBSTEP_M: f64 = 1.5e-4;
-/// Most implicit steps in a sample.
-const MOST_STEPS: f64 = 64.0;
-/// The contact keeps at least this share of its hold however far it has slipped.
-const LEAST_HOLD: f64 = 0.2;
-/// Smallest hold in N; less is none.
-const LEAST_N: f64 = 1e-3;
-/// Turns of the solver at most; it needs two or three.
-const TURNS: usize = 80;
+/// Most implicit steps per sample.
+const MAX_SUBSTEPS: f64 = 64.0;
+/// Least share of the holding force that wear leaves.
+const MIN_HOLD_SHARE: f64 = 0.2;
+/// Smallest holding force in N.
+const MIN_HOLD_N: f64 = 1e-3;
+/// Most Newton iterations; two or three are typical.
+const MAX_ITERATIONS: usize = 80;
 
 /// A layer that adheres to the shaft, deforms, relaxes and slips by a power of the force.
 ///
@@ -44,31 +44,31 @@ const TURNS: usize = 80;
 /// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation
 /// (`crates/tissue/tests/shaft_slip.rs`). `m`, `b`, `g_j`, `tau_j` have no effect without `C` and `S`.
 ///
-/// Inactive: `C = 0` and `S = 0`. Signature: after a stop the force falls fast and then stays; after a reversal it follows
+/// Inactive: `C = 0` and `S = 0`. Signature: after a stop the force falls speed_factor and then stays; after a reversal it follows
 /// travel over millimetres; the sliding plateau hardly depends on speed. Source: power-law creep of dragged contacts
 /// (Persson 2000, section 12; Norton's law) with Maxwell relaxation; fitted to insertions into skin and muscle phantoms.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ShaftSlip {
-    /// Layer `i`, 1-based; one that is not there changes nothing.
+    /// Layer `i`, 1-based; without such a layer the effect is inactive.
     pub layer: usize,
-    /// Hold `C` in N when pushed at 1 mm/s, zero or positive. Inactive: 0, with `pull_n` 0.
+    /// Holding force `C` in N when pushed at 1 mm/s, zero or positive. Inactive: 0, with `pull_n` 0.
     pub push_n: f64,
-    /// Hold `S` in N when pulled at 1 mm/s, zero or positive.
+    /// Holding force `S` in N when pulled at 1 mm/s, zero or positive.
     pub pull_n: f64,
-    /// Share `r` of `push_n` that the layer holds right after its rupture, 0 to 2.
+    /// Share `r` of `push_n` right after the rupture, 0 to 2.
     pub retained_share: f64,
     /// Exponent `m` of the slip, 1 (viscous) to 200 (dry).
     pub exponent: f64,
-    /// Loss `d` of hold per metre of slip, 0 to 1e4 1/m.
+    /// Wear `d`, relative loss of holding force per metre of slip, 0 to 1e4 1/m.
     pub wear_per_m: f64,
-    /// Exponent `a` of the speed in the holds, -2 to 2: below zero it weakens with speed.
+    /// Exponent `a` of the speed in the holding forces, -2 to 2; negative: weaker at higher speed.
     pub rate: f64,
     /// Curvature `b` of the spring in N/m², 0 to 1e9.
     pub curvature_n_per_m2: f64,
     /// Shares `g_j` of the spring's force that relax, each 0 to 1, together at most 1.
     pub fractions: [f64; 2],
-    /// Their time constants `tau_j` in s, 0.001 to 10 000.
+    /// Time constants of these shares, `tau_j` in s, 0.001 to 10 000.
     pub time_constants_s: [f64; 2],
 }
 
@@ -93,9 +93,10 @@ impl Default for ShaftSlip {
 const FRACTION: ParameterInfo = ParameterInfo::shape("fractions.0", "", "share of the force that relaxes")
     .allowed(0.0, 1.0)
     .search(0.2, 0.0, 0.9);
-/// The plateau of three needles in a phantom goes with the speed to the power of `rate + 1/exponent` = -0.13 to 0.14, exponents being 8 to 12.
-const RATE: (f64, f64) = (-0.1, 0.1);
-/// Place of the second relaxing share among the parameters.
+/// Prior of `rate`: the plateau of three needles in a phantom is a power of speed with `rate + 1/exponent` = -0.13 to 0.14,
+/// for exponents of 8 to 12.
+const RATE_PRIOR: (f64, f64) = (-0.1, 0.1);
+/// Index of the second relaxing share among the parameters.
 const SECOND: usize = 9;
 const TIME: ParameterInfo = ParameterInfo::shape("time_constants_s.0", "s", "its time constant")
     .allowed(1e-3, 1e4)
@@ -107,13 +108,13 @@ static INFO: EffectInfo = EffectInfo {
     id: "shaft_slip",
     equation: "F = E - q1 - q2, E = K w + b w|w|, w' = z' - v0 sgn(F) (|F|/L)^m once broken, w = z - s_i before; F = r C at the rupture",
     source: "Power-law creep of dragged contacts (Persson 2000) with Maxwell relaxation; measured skin and muscle phantoms",
-    signature: "A flat hold after a fast first fall, a reversal that takes millimetres, a plateau that hardly knows the speed.",
+    signature: "A flat hold after a speed_factor first fall, a reversal that takes millimetres, a plateau that hardly depends on speed.",
     stage: ChainStage::Friction,
     parameters: &[
         LAYER,
-        ParameterInfo::strength("push_n", "N", "hold when pushed at 1 mm/s").search(2.0, 0.05, 8.0),
-        ParameterInfo::strength("pull_n", "N", "hold when pulled at 1 mm/s").search(1.0, 0.05, 8.0),
-        ParameterInfo::shape("retained_share", "", "share of that hold right after the rupture")
+        ParameterInfo::strength("push_n", "N", "holding force when pushed at 1 mm/s").search(2.0, 0.05, 8.0),
+        ParameterInfo::strength("pull_n", "N", "holding force when pulled at 1 mm/s").search(1.0, 0.05, 8.0),
+        ParameterInfo::shape("retained_share", "", "share of the holding force right after the rupture")
             .allowed(0.0, 2.0)
             .inactive(1.0)
             .search(0.8, 0.0, 1.5),
@@ -122,13 +123,13 @@ static INFO: EffectInfo = EffectInfo {
             .inactive(10.0)
             .search(10.0, 2.0, 30.0)
             .log(),
-        ParameterInfo::shape("wear_per_m", "1/m", "loss of hold per metre of slip")
+        ParameterInfo::shape("wear_per_m", "1/m", "relative loss of holding force per metre of slip")
             .allowed(0.0, 1e4)
             .search(50.0, 0.0, 400.0),
-        ParameterInfo::shape("rate", "", "exponent of the speed in the holds")
+        ParameterInfo::shape("rate", "", "exponent of the speed in the holding forces")
             .allowed(-2.0, 2.0)
             .search(0.0, -0.5, 0.5)
-            .measured_prior(RATE.0, RATE.1),
+            .measured_prior(RATE_PRIOR.0, RATE_PRIOR.1),
         ParameterInfo::shape("curvature_n_per_m2", "N/m2", "curvature of the spring")
             .allowed(0.0, 1e9)
             .search(3e4, 0.0, 3e5),
@@ -191,7 +192,7 @@ impl Described for ShaftSlip {
             time_constants_s,
         })
     }
-    /// The second relaxing share as a share of what the first leaves: both in 0 to 1 are then allowed.
+    /// The second relaxing share relative to the rest after the first, so that both may be anywhere in 0 to 1.
     fn coordinates(&self) -> alloc::vec::Vec<f64> {
         let mut out = self.values();
         let left = 1.0 - self.fractions[0];
@@ -213,51 +214,51 @@ impl Described for ShaftSlip {
     }
 }
 
-/// Place of the speed in the state.
-const SPEED: usize = 7;
+/// Index of the speed in the state.
+const SPEED_INDEX: usize = 7;
 
-/// The speed that the contact knows follows the tip's over the travel in which the contact renews itself.
-fn renew(known_mps: &mut f64, tip: &TipState) {
+/// Lets the speed of the contact follow that of the tip over the travel [`RENEWAL_M`].
+fn follow_speed(contact_mps: &mut f64, tip: &TipState) {
     let now = tip.v_mps.abs();
-    if *known_mps <= 0.0 {
-        *known_mps = now;
+    if *contact_mps <= 0.0 {
+        *contact_mps = now;
     } else if now > REST_MPS {
-        let share = -libm::expm1(-tip.dz_m.abs() / RENEWED_M);
-        *known_mps *= libm::exp(share * libm::log(now / *known_mps));
+        let share = -libm::expm1(-tip.dz_m.abs() / RENEWAL_M);
+        *contact_mps *= libm::exp(share * libm::log(now / *contact_mps));
     }
 }
 
-/// What a layer remembers, in the order of [`Memory`].
+/// State of the contact, in the order of [`EffectState`].
 #[derive(Clone, Copy)]
 struct Contact {
     /// Displacement in m.
     w_m: f64,
-    /// Relaxed parts of the force in N.
+    /// Relaxed parts `q_j` of the force in N.
     q_n: [f64; 2],
-    /// The spring's force in N.
+    /// Spring force in N.
     spring_n: f64,
-    /// How far the shaft has slipped while pushed, in m.
+    /// Slipped travel while pushed, in m.
     slipped_m: f64,
-    /// Force in N to fall back to: the layer has just broken.
+    /// Force in N after the rupture.
     fall_n: f64,
-    /// Whether `fall_n` is to be taken.
-    broke: bool,
+    /// Whether the layer ruptured in this step, so that `fall_n` applies.
+    ruptured: bool,
     /// Speed of the last motion in m/s.
     speed_mps: f64,
 }
 
 impl Contact {
     fn of(state: &EffectState) -> Self {
-        let [w_m, q1, q2, spring_n, slipped_m, fall_n, broke, speed_mps] = *state;
-        Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, broke: broke != 0.0, speed_mps }
+        let [w_m, q1, q2, spring_n, slipped_m, fall_n, ruptured, speed_mps] = *state;
+        Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, ruptured: ruptured != 0.0, speed_mps }
     }
     fn keep(self, state: &mut EffectState) {
         *state = self.state();
     }
     fn state(self) -> EffectState {
-        let broke = if self.broke { 1.0 } else { 0.0 };
+        let ruptured = if self.ruptured { 1.0 } else { 0.0 };
         let [q1, q2] = self.q_n;
-        [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, broke, self.speed_mps]
+        [self.w_m, q1, q2, self.spring_n, self.slipped_m, self.fall_n, ruptured, self.speed_mps]
     }
 }
 
@@ -275,7 +276,7 @@ impl Spring {
     fn slope(self, w: f64) -> f64 {
         self.k_n_per_m + 2.0 * self.b_n_per_m2 * w.abs()
     }
-    /// The displacement at a force; zero without a spring.
+    /// Displacement at a force; zero without a spring.
     fn at(self, force_n: f64) -> f64 {
         let (k, b, f) = (self.k_n_per_m, self.b_n_per_m2, force_n.abs());
         let root = k + libm::sqrt(k * k + 4.0 * b * f);
@@ -284,8 +285,8 @@ impl Spring {
 }
 
 impl ShaftSlip {
-    /// The factor `(v/v0)^a` on the holds.
-    fn fast(&self, speed_mps: f64) -> f64 {
+    /// The factor `(v/v0)^a` on the holding forces.
+    fn speed_factor(&self, speed_mps: f64) -> f64 {
         libm::exp(self.rate * libm::log(speed_mps.max(REST_MPS) / V0_MPS))
     }
 
@@ -305,16 +306,17 @@ impl ShaftSlip {
         })
     }
 
-    /// One implicit step of a broken layer.
+    /// One implicit step after the rupture.
     fn drag(&self, c: &mut Contact, spring: Spring, dt_s: f64, dz_m: f64, weights: [(f64, f64); 2]) {
-        let fast = self.fast(c.speed_mps);
-        let push = (self.push_n * fast * (1.0 - self.wear_per_m * c.slipped_m).max(LEAST_HOLD)).max(LEAST_N);
-        let pull = (self.pull_n * fast).max(LEAST_N);
+        let speed_factor = self.speed_factor(c.speed_mps);
+        let push = (self.push_n * speed_factor * (1.0 - self.wear_per_m * c.slipped_m).max(MIN_HOLD_SHARE))
+            .max(MIN_HOLD_N);
+        let pull = (self.pull_n * speed_factor).max(MIN_HOLD_N);
         let at_rest = self.relaxed(c.q_n, weights, c.spring_n, 0.0);
         let rest = at_rest[0] + at_rest[1];
         // q_j at the end is linear in the spring's force there.
         let retained_share = 1.0 - weights[0].1 * self.fractions[0] - weights[1].1 * self.fractions[1];
-        // Slip in the step and its derivative by the force.
+        // Slip in the step and its derivative with respect to the force.
         let slip = |force: f64| {
             let hold = if force >= 0.0 { push } else { pull };
             let ratio = force.abs() / hold;
@@ -324,21 +326,21 @@ impl ShaftSlip {
             let size = dt_s * V0_MPS * libm::exp((self.exponent * libm::log(ratio)).min(300.0));
             (size.copysign(force), self.exponent * size / force.abs())
         };
-        // w - w0 - dz + slip(F(w)) rises with w: Newton inside a bracket.
+        // w - w0 - dz + slip(F(w)) increases with w: Newton's method inside a bracket.
         let goal = c.w_m + dz_m;
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut w = c.w_m;
         let mut slipped = 0.0;
-        for _ in 0..TURNS {
+        for _ in 0..MAX_ITERATIONS {
             let force = spring.force(w) * retained_share - rest;
             let (s, ds) = slip(force);
-            let surplus = w - goal + s;
+            let residual = w - goal + s;
             slipped = s;
-            let change = surplus / (1.0 + ds * spring.slope(w) * retained_share);
+            let change = residual / (1.0 + ds * spring.slope(w) * retained_share);
             if change.abs() <= 1e-15 + 1e-13 * w.abs() {
                 break;
             }
-            *(if surplus > 0.0 { &mut high } else { &mut low }) = w;
+            *(if residual > 0.0 { &mut high } else { &mut low }) = w;
             w -= change;
             if !(w > low && w < high) {
                 w = if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { goal };
@@ -371,7 +373,7 @@ impl Effect for ShaftSlip {
             slab.curvature_n_per_m2 += self.curvature_n_per_m2;
         }
     }
-    /// Pressed, the layer relaxes as it will when it is dragged.
+    /// Before the rupture the layer relaxes as after it.
     fn relax_layer(&self, layer: usize, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
         if layer != self.layer {
             return elastic_n;
@@ -387,8 +389,8 @@ impl Effect for ShaftSlip {
     fn on_layer_rupture(&self, layer: usize, released_n: f64, state: &mut EffectState) {
         if layer == self.layer {
             let c = Contact::of(state);
-            let fall_n = released_n.min(self.retained_share * self.push_n * self.fast(c.speed_mps));
-            Contact { fall_n, broke: true, slipped_m: 0.0, ..c }.keep(state);
+            let fall_n = released_n.min(self.retained_share * self.push_n * self.speed_factor(c.speed_mps));
+            Contact { fall_n, ruptured: true, slipped_m: 0.0, ..c }.keep(state);
         }
     }
     fn layer_friction(
@@ -399,7 +401,7 @@ impl Effect for ShaftSlip {
         state: &mut EffectState,
     ) -> f64 {
         let Some(slab) = self.layer.checked_sub(1).and_then(|i| slabs.get(i)) else { return 0.0 };
-        renew(&mut state[SPEED], tip);
+        follow_speed(&mut state[SPEED_INDEX], tip);
         if tip.ruptured < self.layer {
             return 0.0;
         }
@@ -407,17 +409,17 @@ impl Effect for ShaftSlip {
         let end_m = if tip.v_mps < 0.0 { slab.release_m } else { slab.release_m.min(0.0) };
         let held = ((tip.z_m - slab.front_m - end_m) / EDGE_M).clamp(0.0, 1.0);
         if held == 0.0 {
-            *state = Contact { speed_mps: state[SPEED], ..Contact::of(&[0.0; 8]) }.state();
+            *state = Contact { speed_mps: state[SPEED_INDEX], ..Contact::of(&[0.0; 8]) }.state();
             return 0.0;
         }
         let mut c = Contact::of(state);
-        if c.broke {
-            // The step in which it broke ends here.
-            c.broke = false;
+        if c.ruptured {
+            // End of the step of the rupture.
+            c.ruptured = false;
             c.w_m = spring.at(c.fall_n + c.q_n[0] + c.q_n[1]);
             c.spring_n = spring.force(c.w_m);
         } else if tip.dt_s > 0.0 || tip.dz_m != 0.0 {
-            let steps = libm::ceil(tip.dz_m.abs() / SUBSTEP_M).clamp(1.0, MOST_STEPS);
+            let steps = libm::ceil(tip.dz_m.abs() / SUBSTEP_M).clamp(1.0, MAX_SUBSTEPS);
             let (dt, dz) = (tip.dt_s / steps, tip.dz_m / steps);
             let weights = self.weights(dt);
             for _ in 0..steps as usize {
@@ -429,7 +431,6 @@ impl Effect for ShaftSlip {
     }
 }
 
-/// Speed exponent of the steady plateau: `F ~ v^(1/m)`.
 impl ShaftSlip {
     /// Force in N of steady sliding at `v_mps`, without relaxation and wear.
     #[must_use]

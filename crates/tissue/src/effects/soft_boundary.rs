@@ -43,10 +43,10 @@ impl Effect for SoftBoundary {
     fn has_state(&self) -> bool {
         true
     }
-    /// State: the deepest position, then up to three releases under way as (force, position).
+    /// State: the deepest position, then up to three unfinished releases as (force, position).
     fn on_rupture(&self, released_n: f64, z_m: f64, state: &mut EffectState) {
-        // The newest release goes first; a fourth one under way, with three layers inside one
-        // width, takes over what is left of the oldest.
+        // The newest release comes first; a fourth one, with three layers inside one width, includes the rest of the
+        // oldest.
         let deepest = state[0].max(z_m);
         let oldest = self.rest(state[5], state[6], deepest);
         state[0] = if state[7] == 0.0 { z_m } else { deepest };
@@ -68,7 +68,7 @@ impl Effect for SoftBoundary {
 }
 
 impl SoftBoundary {
-    /// What is left of a release of `force_n` at `at_m` with the deepest tip at `deepest_m`.
+    /// Remaining force of a release of `force_n` at `at_m` with the deepest tip position `deepest_m`.
     fn rest(&self, force_n: f64, at_m: f64, deepest_m: f64) -> f64 {
         if force_n == 0.0 {
             return 0.0;

@@ -65,7 +65,7 @@ static TWO_TERMS: EffectInfo = EffectInfo {
         ParameterInfo { path: "terms.1.fraction", ..FRACTION },
         ParameterInfo { path: "terms.1.time_constant_s", ..TIME }.search(3.0, 0.2, 120.0),
     ],
-    // What one term stands for may be two of its strength on both sides of its time, or a weak one far from it.
+    // One fitted term may be two of similar strength with time constants on both sides, or a weak one far from it.
     proposal: Proposal::SplitTerm(&[
         &[0.5, 0.1, 0.5, 1.5],
         &[0.5, 0.3, 0.5, 3.0],
@@ -77,7 +77,7 @@ static TWO_TERMS: EffectInfo = EffectInfo {
 
 static ONE_TERM: EffectInfo = EffectInfo { extended: Some(&TWO_TERMS), ..ONE };
 
-/// Place of the second share among the numbers.
+/// Index of the second share among the parameters.
 const SECOND: usize = 2;
 
 impl Described for StressRelaxation {
@@ -92,7 +92,7 @@ impl Described for StressRelaxation {
         let term = |&[fraction, time_constant_s]: &[f64; 2]| PronyTerm { fraction, time_constant_s };
         Some(Self { terms: pairs.iter().map(term).collect() })
     }
-    /// The second share as a share of what the first leaves: both in 0 to 1 are then allowed.
+    /// The second share relative to the rest after the first, so that both may be anywhere in 0 to 1.
     fn coordinates(&self) -> Vec<f64> {
         let mut out = self.values();
         if let [first, second] = &self.terms[..] {
@@ -132,7 +132,7 @@ impl Effect for StressRelaxation {
     fn has_state(&self) -> bool {
         true
     }
-    /// State: `q_1`, `q_2`, the `E` before, the time step, and two weights per term for it.
+    /// State: `q_1`, `q_2`, the previous `E`, the time step and its two weights per term.
     fn relax(&self, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
         let [q1, q2, before, ..] = *state;
         state[2] = elastic_n;

@@ -69,7 +69,7 @@ impl Described for StribeckFriction {
         let [c_n_per_m, c_static_n_per_m, v_stribeck_mps] = *values else { return None };
         Some(Self { c_n_per_m, c_static_n_per_m, v_stribeck_mps })
     }
-    /// The force at low speed beyond that at high speed in place of the whole, which may not be less.
+    /// The excess at low speed over that at high speed instead of the value at low speed, which may not be less.
     fn coordinates(&self) -> alloc::vec::Vec<f64> {
         alloc::vec![self.c_n_per_m, self.c_static_n_per_m - self.c_n_per_m, self.v_stribeck_mps]
     }

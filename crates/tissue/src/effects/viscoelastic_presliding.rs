@@ -4,7 +4,7 @@ use crate::effect::{Effect, EffectState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo};
 use crate::layer_geometry::Slab;
 
-/// Speed in m/s below which a layer holds with the friction of the last motion (0.1 mm/s).
+/// Speed in m/s below which a layer keeps the friction of the last motion (0.1 mm/s).
 const REST_MPS: f64 = 1e-4;
 
 /// A punctured layer that adheres to the shaft and is dragged along: a spring in series with friction, which creeps
@@ -28,7 +28,7 @@ const REST_MPS: f64 = 1e-4;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ViscoelasticPresliding {
-    /// Layer `i`, 1-based; one that is not there changes nothing.
+    /// Layer `i`, 1-based; without such a layer the effect is inactive.
     pub layer: usize,
     /// Share of the layer's friction that this branch carries, 0 to 1. Inactive: 0.
     pub share: f64,
@@ -36,9 +36,9 @@ pub struct ViscoelasticPresliding {
     pub delta_m: f64,
     /// Share of the elastic force at the puncture that passes into the branch, 0 to 1.
     pub retained_share: f64,
-    /// Time constant `tau` of the creep in seconds, 0.001 to 1e6; the longest stands for none.
+    /// Time constant `tau` of the creep in seconds, 0.001 to 1e6; the longest means no creep.
     pub time_constant_s: f64,
-    /// Where the layer lets go of the tip on the way back, in metres beyond its front face, -0.1 to 0.1.
+    /// Release depth in retraction, in metres beyond the layer's front face, -0.1 to 0.1.
     pub release_m: f64,
 }
 
@@ -57,7 +57,7 @@ impl Default for ViscoelasticPresliding {
 }
 
 /// `1 - exp(-x)` for `x >= 0`; below 0.1 by its series, to 1e-10 of the value.
-fn lost(x: f64) -> f64 {
+fn one_minus_exp(x: f64) -> f64 {
     if x < 0.1 {
         let series = 1.0 - x / 6.0 * (1.0 - x / 7.0);
         x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * series))))
@@ -70,7 +70,7 @@ static INFO: EffectInfo = EffectInfo {
     id: "viscoelastic_presliding",
     equation: "w' = (share S_i/delta) v - w/tau, abs(w) <= share S_i = share b_i d_i abs(phi(v)), from puncture to release",
     source: "Maxwell-slip friction (Al-Bender, Lampaert, Swevers 2005) with creep; measured skin and muscle phantoms",
-    signature: "After a reversal the force follows travel over millimetres, part of it fades in a hold, and on the way back it ends in a step.",
+    signature: "After a reversal the force follows travel over millimetres, part of it fades in a hold, and in retraction it ends in a step.",
     stage: ChainStage::Friction,
     parameters: &[
         LAYER,
@@ -95,13 +95,9 @@ static INFO: EffectInfo = EffectInfo {
             .inactive(1e6)
             .search(3.0, 0.1, 60.0)
             .log(),
-        ParameterInfo::shape(
-            "release_m",
-            "m",
-            "where the layer lets go on the way back, beyond its front face",
-        )
-        .allowed(-0.1, 0.1)
-        .search(0.0, -0.01, 0.01),
+        ParameterInfo::shape("release_m", "m", "release depth in retraction, beyond the layer's front face")
+            .allowed(-0.1, 0.1)
+            .search(0.0, -0.01, 0.01),
     ],
     ..EffectInfo::DEFAULTS
 };
@@ -141,7 +137,7 @@ impl Effect for ViscoelasticPresliding {
         if limit == 0.0 || tip.v_mps.abs() >= REST_MPS {
             let steady = self.share * slab.friction_ns_per_m2 * slab.thickness_m * sliding_mps.abs();
             let fresh = limit == 0.0 || tip.ruptured < self.layer;
-            let renewed = if fresh { 1.0 } else { lost(tip.dz_m.abs() / self.delta_m) };
+            let renewed = if fresh { 1.0 } else { one_minus_exp(tip.dz_m.abs() / self.delta_m) };
             limit += (steady - limit) * renewed;
             state[1] = limit;
         }
@@ -156,7 +152,7 @@ impl Effect for ViscoelasticPresliding {
         if step == 0.0 || !crate::effect::same_step(tip.dt_s, step) {
             // The spring's force after a step of constant velocity: w keep + k dz ramp.
             let ratio = tip.dt_s / self.time_constant_s;
-            let faded = lost(ratio);
+            let faded = one_minus_exp(ratio);
             keep = 1.0 - faded;
             ramp = if ratio > 0.0 { faded / ratio } else { 1.0 };
             state[2] = tip.dt_s;

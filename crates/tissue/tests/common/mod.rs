@@ -1,4 +1,4 @@
-//! What the tests of this crate share: tissues, motions, replays.
+//! Shared test helpers: tissues, motions, replays.
 #![allow(dead_code)] // each test file uses its own part
 
 use stylet_tissue::*;
@@ -95,7 +95,7 @@ pub fn typical_effects() -> Vec<AnyEffect> {
         let mut next = Some(entry);
         while let Some(info) = next {
             let start: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
-            out.push(AnyEffect::from_parameters(info.id, &start).expect("the library knows its own"));
+            out.push(AnyEffect::from_parameters(info.id, &start).expect("a library effect"));
             next = info.extended;
         }
     }

@@ -1,6 +1,6 @@
-//! Prints how long one sample of the law takes: the base law, each effect alone, three at once.
+//! Prints how long one sample of the force law takes: the base law, each effect alone, three at once.
 //!
-//! `cargo run --release -p stylet-tissue --example time_law`
+//! `cargo run --release -p stylet-tissue --example force_law_cost`
 
 use std::hint::black_box;
 use std::time::Instant;
