@@ -1,5 +1,5 @@
-//! Promise: wrong input ends with exit code 2 and a message that names file, place and remedy, and
-//! leaves no output folder behind; a folder that was there before keeps what it held.
+//! Promise: invalid input gives exit code 2 and a message with file, position and remedy, and writes no output; files in an
+//! existing output folder are kept.
 
 mod support;
 
@@ -7,26 +7,26 @@ use std::fs;
 use std::path::Path;
 use support::{Scratch, scenario, stderr_text, stylet};
 
-/// Asserts that a command is refused with all of `words` stderr_text and that nothing was written.
+/// Asserts that a command is refused with a message that contains all of `words`, and that nothing is written.
 fn refused(arguments: &[&str], out: &Path, words: &[&str]) {
     let output = stylet(arguments);
     let message = stderr_text(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     for word in words {
-        assert!(message.contains(word), "{arguments:?} must say {word:?}, and says: {message}");
+        assert!(message.contains(word), "{arguments:?}: {word:?} is missing in: {message}");
     }
     assert!(!message.contains("panicked"), "{message}");
     assert!(!out.exists(), "{arguments:?} left {} behind", out.display());
 }
 
-fn spoil(from: &str, to: &str) -> String {
+fn invalidate(from: &str, to: &str) -> String {
     let text = fs::read_to_string(scenario("three_layer_latex_constant")).expect("the scenario");
-    assert!(text.contains(from), "the scenario no longer holds {from:?}");
+    assert!(text.contains(from), "the scenario no longer contains {from:?}");
     text.replacen(from, to, 1)
 }
 
 #[test]
-fn a_wrong_scenario_is_refused_with_its_place_and_remedy() {
+fn an_invalid_scenario_is_refused_with_position_and_remedy() {
     let cases: [(&str, &str, &str, &[&str]); 13] = [
         ("unknown_field", "thickness_m: 0.0282", "thicknes_m: 0.0282", &["unknown field", "`thickness_m`"]),
         ("missing_field", "thickness_m: 0.0282, ", "", &["missing field", "thickness_m"]),
@@ -45,7 +45,7 @@ fn a_wrong_scenario_is_refused_with_its_place_and_remedy() {
     let scratch = Scratch::new("bad-scenario");
     let out = scratch.path().join("out");
     for (name, from, to, words) in cases {
-        let text = spoil(from, to);
+        let text = invalidate(from, to);
         let file = scratch.file(&format!("{name}.ron"), &text);
         let arguments = ["run", file.to_str().expect("a path"), "--out", out.to_str().expect("a path")];
         let place = format!("{name}.ron:");
@@ -69,7 +69,7 @@ fn a_scenario_without_layers_is_refused() {
 }
 
 #[test]
-fn what_is_not_a_scenario_file_is_refused() {
+fn files_that_are_no_scenario_are_refused() {
     let scratch = Scratch::new("not-a-file");
     let out = scratch.path().join("out");
     let cases = [
@@ -85,7 +85,7 @@ fn what_is_not_a_scenario_file_is_refused() {
 }
 
 #[test]
-fn a_wrong_recording_is_refused_with_its_line_and_column() {
+fn an_invalid_recording_is_refused_with_line_and_column() {
     let good = |rows: &str| format!("time_s,position_m,force_n\n0.00,0.000,0.1\n0.01,0.001,0.2\n{rows}");
     let cases: [(&str, Vec<u8>, &[&str]); 11] = [
         ("missing_column", b"time_s,position_m,forze_n\n0,0,0\n1,1,1\n".to_vec(), &["force_n", "forze_n"]),
@@ -112,7 +112,7 @@ fn a_wrong_recording_is_refused_with_its_line_and_column() {
 }
 
 #[test]
-fn a_wrong_configuration_or_column_map_is_refused() {
+fn an_invalid_configuration_or_column_map_is_refused() {
     let scratch = Scratch::new("bad-config");
     let out = scratch.path().join("out");
     let data =
@@ -140,7 +140,7 @@ fn a_wrong_configuration_or_column_map_is_refused() {
 }
 
 #[test]
-fn repair_drops_backward_and_repeated_rows_and_says_which() {
+fn repair_drops_backward_and_repeated_rows_and_reports_them() {
     let scratch = Scratch::new("repair");
     let rows: String =
         (0..200).map(|k| format!("{},{},{}\n", 0.01 * f64::from(k), 1e-4 * f64::from(k), 0.0)).collect();
@@ -156,7 +156,7 @@ fn repair_drops_backward_and_repeated_rows_and_says_which() {
 }
 
 #[test]
-fn an_output_folder_that_cannot_be_made_is_refused_and_one_with_other_files_keeps_them() {
+fn an_output_folder_that_cannot_be_created_is_refused_and_other_files_are_kept() {
     let scratch = Scratch::new("out");
     let file = scenario("three_layer_latex_constant");
     let blocked = scratch.file("a_file", "precious");

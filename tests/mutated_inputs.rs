@@ -1,12 +1,12 @@
-//! Promise: no input makes a parser panic or run away, and whatever a parser lets through is what it promises. A few hundred thousand
-//! mutations of a small corpus per run of the tests; `tests/mutate_for.sh SECONDS` goes on with other seeds and keeps what it finds,
-//! `STYLET_MUTATIONS_EACH=10000000` gives every parser of text as many.
+//! Promise: no input makes a parser panic or run away, and whatever a parser accepts is valid. Some hundred thousand mutations of a
+//! small corpus per test run; `tests/mutate_for.sh SECONDS` continues with other seeds and keeps what it finds,
+//! `STYLET_MUTATIONS_EACH=10000000` sets the number per text parser.
 
 #[path = "mutated/mutate.rs"]
 mod mutate;
 mod support;
 
-use mutate::{Dice, What, feed, hold};
+use mutate::{Random, Target, fuzz, fuzz_any};
 use std::path::Path;
 use std::str::from_utf8;
 use stylet::{Diagnosis, DiagnosisInputs, Limits, NamedRecording};
@@ -30,8 +30,8 @@ fn shipped(folder: &str, most: u64) -> Vec<Vec<u8>> {
     all.filter(|text| (text.len() as u64) < most).collect()
 }
 
-/// Parses, and draws the error as the command would.
-fn told<T>(result: Result<T, stylet_scenario::InputError>) -> Option<T> {
+/// The result; an error is rendered as the command would.
+fn accepted<T>(result: Result<T, stylet_scenario::InputError>) -> Option<T> {
     result
         .map_err(|error| {
             let drawn = format!("{:?}", miette::Report::new(error));
@@ -41,7 +41,7 @@ fn told<T>(result: Result<T, stylet_scenario::InputError>) -> Option<T> {
 }
 
 #[test]
-fn recordings_are_read_or_refused_and_what_is_read_keeps_its_promises() {
+fn recordings_are_read_or_refused_and_what_is_read_is_valid() {
     let rows = |delimiter: char, end: &str| {
         let mut text = format!("time_s{delimiter}position_m{delimiter}force_n{end}");
         for i in 0..70 {
@@ -60,10 +60,10 @@ fn recordings_are_read_or_refused_and_what_is_read_keeps_its_promises() {
     ];
     for repair in [false, true] {
         let options = ReadOptions { columns: None, repair };
-        hold(if repair { "repaired" } else { "recording" }, 20_000, &corpus, |bytes| {
+        fuzz(if repair { "repaired" } else { "recording" }, 20_000, &corpus, |bytes| {
             match read_csv_bytes(bytes, Path::new("a.csv"), &options) {
                 Ok((recording, notes)) => {
-                    recording.check().expect("what is read is checked");
+                    recording.check().expect("a recording that was read is valid");
                     assert!(notes.iter().chain(&assess(&recording)).all(|note| !note.message.is_empty()));
                     let _ = stylet_record::downsample(&recording);
                     true
@@ -78,42 +78,43 @@ fn recordings_are_read_or_refused_and_what_is_read_keeps_its_promises() {
 }
 
 #[test]
-fn scenarios_are_read_or_refused_with_their_place_and_what_is_read_can_be_simulated() {
+fn scenarios_are_read_or_refused_with_a_position_and_what_is_read_can_be_simulated() {
     let corpus = shipped("scenarios", 4000);
-    hold("scenario", 24_000, &corpus, |bytes| {
+    fuzz("scenario", 24_000, &corpus, |bytes| {
         let Ok(text) = std::str::from_utf8(bytes) else { return false };
-        let Some(scenario) = told(Scenario::parse("a.ron", text)) else { return false };
-        // What is accepted has a finite plan and can be written down again.
+        let Some(scenario) = accepted(Scenario::parse("a.ron", text)) else { return false };
+        // An accepted scenario has a finite plan and can be serialised.
         assert!(scenario.motion.plan().is_none_or(|plan| plan.duration_s().is_finite()));
-        let again = scenario.to_ron().expect("it can be written");
+        let again = scenario.to_ron().expect("it can be serialised");
         assert!(Scenario::parse("again.ron", &again).is_ok(), "{again}");
         true
     });
 }
 
 #[test]
-fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_their_place() {
+fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_a_position() {
     let base = Scenario::load(&root().join("scenarios/three_layer_latex_constant.ron")).expect("a scenario");
-    hold("sweep", 12_000, &shipped("scenarios/sweeps", 4000), |bytes| {
+    fuzz("sweep", 12_000, &shipped("scenarios/sweeps", 4000), |bytes| {
         let Ok(text) = std::str::from_utf8(bytes) else { return false };
-        let Some(file) = told(parse::<SweepFile>("a.ron", text)) else { return false };
+        let Some(file) = accepted(parse::<SweepFile>("a.ron", text)) else { return false };
         let sweep = Sweep::new("a".to_owned(), file, base.clone()).map_err(|p| p.in_file("a.ron", text));
-        told(sweep).is_some_and(|sweep| sweep.trials() > 0)
+        accepted(sweep).is_some_and(|sweep| sweep.trials() > 0)
     });
-    hold("gates", 6_000, &shipped("scenarios/gates", 9000), |bytes| {
-        std::str::from_utf8(bytes).is_ok_and(|text| told(parse::<GatesFile>("a.ron", text)).is_some())
+    fuzz("gates", 6_000, &shipped("scenarios/gates", 9000), |bytes| {
+        std::str::from_utf8(bytes).is_ok_and(|text| accepted(parse::<GatesFile>("a.ron", text)).is_some())
     });
     let enhance = [
         b"Enhance(cusum: (sigma_rupture_n: 0.3), model: KelvinVoigt, algorithm: Stylet)".to_vec(),
         b"Enhance(surface_m: 0.01, algorithm: Literal, model: MultiLayer)".to_vec(),
     ];
-    hold("enhance", 8_000, &enhance, |bytes| {
-        std::str::from_utf8(bytes).is_ok_and(|text| told(EnhancerConfigFile::parse("a.ron", text)).is_some())
+    fuzz("enhance", 8_000, &enhance, |bytes| {
+        std::str::from_utf8(bytes)
+            .is_ok_and(|text| accepted(EnhancerConfigFile::parse("a.ron", text)).is_some())
     });
     let maps = [b"Columns(time: (name: \"time\", scale: 1e-6), position: (name: \"pz\", scale: 1e-3), force: (name: \"fz\", offset: 0.1), velocity: (name: \"v\"))".to_vec()];
-    hold("columns", 8_000, &maps, |bytes| {
+    fuzz("columns", 8_000, &maps, |bytes| {
         let Ok(text) = std::str::from_utf8(bytes) else { return false };
-        let Some(map) = told(parse::<ColumnMap>("a.ron", text)) else { return false };
+        let Some(map) = accepted(parse::<ColumnMap>("a.ron", text)) else { return false };
         let fits = map.check().is_ok();
         let options = ReadOptions { columns: Some(map), repair: false };
         let csv = b"time,pz,fz,v\n0,0,0,0\n10000,1,1,1\n20000,2,2,1\n";
@@ -124,45 +125,46 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_their_pl
         b"0.02,0.002,0.3,0.1".to_vec(),
         br#"{"time_s":0.03,"position_m":0.003,"force_n":0.1}"#.to_vec(),
     ];
-    hold("live", 6_000, &samples, |bytes| {
+    fuzz("live", 6_000, &samples, |bytes| {
         let text = String::from_utf8_lossy(bytes);
         stylet_live::parse_line(1, &text).is_ok_and(|given| given.is_some())
     });
 }
 
-/// A scenario per effect of the library, with typical numbers: what a diagnosis writes as `extended.ron`.
+/// A scenario per effect of the library with typical parameters, as a diagnosis writes it as `extended.ron`.
 fn extended() -> Vec<Vec<u8>> {
     let base = Scenario::load(&root().join("scenarios/three_layer_latex_constant.ron")).expect("a scenario");
     general_effects()
         .map(|entry| {
             let typical: Vec<f64> = entry.parameters.iter().map(|p| p.start).collect();
             let effects = AnyEffect::from_parameters(entry.id, &typical).into_iter().collect();
-            Scenario { effects, ..base.clone() }.to_ron().expect("it can be written").into_bytes()
+            Scenario { effects, ..base.clone() }.to_ron().expect("it can be serialised").into_bytes()
         })
         .collect()
 }
 
 fn read_again(text: &str) -> Option<Scenario> {
-    told(Scenario::parse("extended.ron", text))
+    accepted(Scenario::parse("extended.ron", text))
 }
 
 #[test]
-fn extended_models_are_read_or_refused_and_their_law_steps_whatever_comes() {
+fn extended_models_are_read_or_refused_and_their_force_law_handles_any_sample() {
     let corpus = extended();
-    hold("extended", 6_000, &corpus, |bytes| from_utf8(bytes).ok().and_then(read_again).is_some());
-    let (laws, _) = feed("law", (4_000, What::Slow), &corpus, |bytes| {
+    fuzz("extended", 6_000, &corpus, |bytes| from_utf8(bytes).ok().and_then(read_again).is_some());
+    let (laws, _) = fuzz_any("law", (4_000, Target::Slow), &corpus, |bytes| {
         let Some(scenario) = from_utf8(bytes).ok().and_then(read_again) else { return false };
         let Ok(law) = ForceLaw::new(&scenario.tissue, &scenario.effects) else { return false };
-        let mut dice = Dice(bytes.iter().fold(7, |sum, b| sum * 31 % 1_000_003 + u64::from(*b)));
+        let mut random = Random(bytes.iter().fold(7, |sum, b| sum * 31 % 1_000_003 + u64::from(*b)));
         let (mut state, mut t, mut z) = (ForceLawState::default(), 0.0, -0.005);
         for _ in 0..200 {
             let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300, 1e-320, -1.0, 0.0];
-            let mut drawn = |usual: f64| if dice.below(40) == 0 { odd[dice.below(odd.len())] } else { usual };
+            let mut drawn =
+                |usual: f64| if random.below(40) == 0 { odd[random.below(odd.len())] } else { usual };
             let (time_s, place_m, v) = (drawn(t), drawn(z), drawn(0.01));
-            let felt = law.step(&mut state, time_s, place_m, v, |_| {});
-            let told = time_s.is_finite() && place_m.is_finite() && v.is_finite();
-            assert!(told || felt.total_n.is_nan(), "what is not a number gives none");
-            (t, z) = (t + 0.005, z + 0.002 * (dice.below(1000) as f64 / 1000.0 - 0.2));
+            let force = law.step(&mut state, time_s, place_m, v, |_| {});
+            let finite = time_s.is_finite() && place_m.is_finite() && v.is_finite();
+            assert!(finite || force.total_n.is_nan(), "a sample that is not finite has a NaN force");
+            (t, z) = (t + 0.005, z + 0.002 * (random.below(1000) as f64 / 1000.0 - 0.2));
         }
         true
     });
@@ -170,35 +172,35 @@ fn extended_models_are_read_or_refused_and_their_law_steps_whatever_comes() {
 }
 
 #[test]
-fn data_sets_limits_and_motions_are_read_or_refused_with_their_place() {
-    hold("data-set", 6_000, &shipped("scenarios/measured", 9000), |bytes| {
+fn data_sets_limits_and_motions_are_read_or_refused_with_a_position() {
+    fuzz("data-set", 6_000, &shipped("scenarios/measured", 9000), |bytes| {
         from_utf8(bytes).is_ok_and(|text| {
-            told(stylet_diagnose::repeated_insertions::dataset::Dataset::parse("a.ron", text))
+            accepted(stylet_diagnose::repeated_insertions::dataset::Dataset::parse("a.ron", text))
                 .is_some_and(|set| (1..=7).contains(&set.tissue.layers.len()))
         })
     });
     let limits =
         b"Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)"
             .to_vec();
-    hold("limits", 6_000, &[limits], |bytes| {
+    fuzz("limits", 6_000, &[limits], |bytes| {
         from_utf8(bytes)
-            .is_ok_and(|text| told(parse::<Limits>("a.ron", text)).is_some_and(|l| l.check().is_ok()))
+            .is_ok_and(|text| accepted(parse::<Limits>("a.ron", text)).is_some_and(|l| l.check().is_ok()))
     });
     let scenarios = shipped("scenarios/compare", 4000).into_iter().chain(shipped("scenarios", 4000));
     let scenarios: Vec<Scenario> = scenarios.filter_map(|s| read_again(from_utf8(&s).ok()?)).collect();
     let motions: Vec<Vec<u8>> =
         scenarios.iter().filter_map(|s| motion_to_ron(&s.motion).ok()).map(String::into_bytes).collect();
     let base = scenarios[0].clone();
-    hold("motion", 6_000, &motions, |bytes| {
+    fuzz("motion", 6_000, &motions, |bytes| {
         let Ok(text) = from_utf8(bytes) else { return false };
-        let Some(motion) = told(parse::<Motion>("a.ron", text)) else { return false };
+        let Some(motion) = accepted(parse::<Motion>("a.ron", text)) else { return false };
         let moved = Scenario { motion, ..base.clone() };
         moved.check().is_ok() && moved.motion.plan().is_none_or(|plan| plan.duration_s().is_finite())
     });
 }
 
 #[test]
-fn what_stylet_wrote_itself_is_read_again_or_refused() {
+fn files_written_by_stylet_are_read_again_or_refused() {
     let scratch = Scratch::in_memory("mutated");
     let scenario = Scenario::parse("gel.ron", GEL).expect("a scenario");
     let run = stylet::simulate(&scenario).expect("it can be simulated");
@@ -210,43 +212,43 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     let diagnosis =
         stylet::diagnose(&scenario, &evidence, |_| {}).and_then(|d| d.json()).expect("a diagnosis");
     let whole = [diagnosis];
-    hold("diagnosis", 6_000, &whole, |bytes| {
+    fuzz("diagnosis", 6_000, &whole, |bytes| {
         let text = String::from_utf8_lossy(bytes);
         serde_json::from_str::<Diagnosis>(&text).is_ok() | Answer::from_json(&text).is_ok()
     });
     let inputs =
         br#"{"scenario":"/a/gel.ron","data":["/a/1.csv","/a/2.csv"],"columns":null,"repair":false}"#.to_vec();
-    hold("inputs", 6_000, &[inputs], |bytes| serde_json::from_slice::<DiagnosisInputs>(bytes).is_ok());
+    fuzz("inputs", 6_000, &[inputs], |bytes| serde_json::from_slice::<DiagnosisInputs>(bytes).is_ok());
     let baseline = std::fs::read(root().join("scenarios/gates/ci.baseline.json")).expect("it is shipped");
-    hold("baseline", 6_000, &[baseline], |bytes| serde_json::from_slice::<Baseline>(bytes).is_ok());
+    fuzz("baseline", 6_000, &[baseline], |bytes| serde_json::from_slice::<Baseline>(bytes).is_ok());
     let cases = Plan { cases: 2, ..Plan::default() }.cases();
     let outcomes =
         stylet_examine::run_cases(&cases, None, &|_| Ok(Answer::none()), &|_, _| {}).expect("two cases");
     let lines: Vec<Vec<u8>> = outcomes.iter().filter_map(|o| serde_json::to_vec(o).ok()).collect();
-    hold("journal", 6_000, &lines, |bytes| serde_json::from_slice::<CaseOutcome>(bytes).is_ok());
+    fuzz("journal", 6_000, &lines, |bytes| serde_json::from_slice::<CaseOutcome>(bytes).is_ok());
     let key = AnswerKey { drawing: 1, cases: cases.iter().map(|id| (id.name(), *id)).collect() };
     let key = serde_json::to_vec_pretty(&key).expect("a key");
-    hold("key", 6_000, &[key], |bytes| serde_json::from_slice::<AnswerKey>(bytes).is_ok());
+    fuzz("key", 6_000, &[key], |bytes| serde_json::from_slice::<AnswerKey>(bytes).is_ok());
     let mut few = run.simulation.recording.clone();
     few.time_s.truncate(4);
     few.position_m.truncate(4);
     few.force_n.truncate(4);
     few.velocity_mps.truncate(4);
-    hold("recording.json", 6_000, &[serde_json::to_vec(&few).expect("a recording")], |bytes| {
+    fuzz("recording.json", 6_000, &[serde_json::to_vec(&few).expect("a recording")], |bytes| {
         serde_json::from_slice::<Recording>(bytes).is_ok_and(|r| r.check().is_ok())
     });
     let truth = serde_json::to_vec(&Truth::default()).expect("a truth");
-    feed("truth.json", (6_000, What::Text), &[truth], |bytes| {
+    fuzz_any("truth.json", (6_000, Target::Text), &[truth], |bytes| {
         serde_json::from_slice::<Truth>(bytes).is_ok_and(|t| t.check(0).is_ok())
     });
-    // From here on through files.
+    // The following parsers read files.
     let folder = scratch.path().join("set");
     let mut set = stylet::OutputFiles::default();
     set.add("a.csv", "1");
     set.write(&folder).expect("a set");
     let manifest = folder.join("manifest.json");
     let whole = [std::fs::read(&manifest).expect("it is there")];
-    feed("manifest", (2_000, What::Text), &whole, |bytes| {
+    fuzz_any("manifest", (2_000, Target::Text), &whole, |bytes| {
         std::fs::write(&manifest, bytes).is_ok()
             && stylet::output_folder::verify_manifest(&folder, &["a.csv"]).is_ok()
     });
@@ -258,7 +260,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
         let all: Vec<&str> = rows.iter().chain(&more).copied().collect();
         all.chunks(3).map(|row| row.join(delimiter) + "\n").collect::<String>().into_bytes()
     };
-    feed("holes", (2_000, What::Text), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
+    fuzz_any("holes", (2_000, Target::Text), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
         let options = ReadOptions { columns: None, repair: false };
         std::fs::write(&csv, bytes).is_ok()
             && read_csv_skip_nonfinite(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
@@ -273,7 +275,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
         two += &format!("{},{t:.3},{:.5},{:.4}\n", i / 60, 0.003 * t, 0.5 * t * t);
     }
     let csv = scratch.path().join("two.csv");
-    feed("specimens", (2_000, What::Text), &[two.into_bytes()], |bytes| {
+    fuzz_any("specimens", (2_000, Target::Text), &[two.into_bytes()], |bytes| {
         std::fs::write(&csv, bytes).is_ok() && set.load_recordings(std::slice::from_ref(&csv), 1).is_ok()
     });
     let file = "Sweep(scenario: \"gel.ron\", trials: 3, vary: [(path: \"sensor.noise_n\", with: Uniform(0.01, 0.02))])";
@@ -287,7 +289,7 @@ fn what_stylet_wrote_itself_is_read_again_or_refused() {
     let bits = |rows: &[stylet_sweep::TrialRow]| -> Vec<u64> {
         rows.iter().flat_map(|r| r.values.iter().map(|x| x.to_bits()).chain([r.trial, r.seed])).collect()
     };
-    feed("shard", (2_000, What::Text), &whole, |bytes| {
+    fuzz_any("shard", (2_000, Target::Text), &whole, |bytes| {
         let written = std::fs::write(&place, bytes).is_ok();
         let found = shard::read(&sweep, &columns, number, scratch.path());
         assert!(found.as_ref().is_ok_and(|found| bits(found) == bits(&rows)) || found.is_err(), "other rows");
@@ -308,9 +310,9 @@ fn short_recordings_are_diagnosed_or_refused() {
     let scenario = Scenario::parse("gel.ron", GEL).expect("a scenario");
     let run = stylet::simulate(&scenario).expect("it can be simulated");
     let mut csv = Vec::new();
-    stylet_record::write_csv(&run.simulation.recording, None, &[], &mut csv).expect("it can be written");
+    stylet_record::write_csv(&run.simulation.recording, None, &[], &mut csv).expect("it can be serialised");
     let options = ReadOptions { columns: None, repair: true };
-    let (found, of) = feed("diagnose", (1_000, What::Slow), &[csv], |bytes| {
+    let (found, of) = fuzz_any("diagnose", (1_000, Target::Slow), &[csv], |bytes| {
         let Ok((recording, notes)) = read_csv_bytes(bytes, Path::new("a.csv"), &options) else {
             return false;
         };

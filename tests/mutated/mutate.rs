@@ -1,14 +1,14 @@
-//! Mutations of a corpus, and what a parser may do with them.
+//! Mutation fuzzing of parsers with a seeded generator.
 
 use super::support::root;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-/// SplitMix64: the same mutations everywhere.
-pub struct Dice(pub u64);
+/// SplitMix64, for reproducible mutations.
+pub struct Random(pub u64);
 
-impl Dice {
-    pub fn roll(&mut self) -> u64 {
+impl Random {
+    pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -16,16 +16,16 @@ impl Dice {
     }
 
     pub fn below(&mut self, n: usize) -> usize {
-        (self.roll() % n.max(1) as u64) as usize
+        (self.next() % n.max(1) as u64) as usize
     }
 
-    pub fn of<'a, T: ?Sized>(&mut self, all: &[&'a T]) -> &'a T {
+    pub fn pick<'a, T: ?Sized>(&mut self, all: &[&'a T]) -> &'a T {
         all[self.below(all.len())]
     }
 }
 
-/// What breaks parsers: numbers at the ends of their range, brackets, quotation marks, separators, other scripts.
-const PIECES: [&[u8]; 32] = [
+/// Inserted tokens: numbers at the ends of their range, brackets, quotation marks, separators, other scripts.
+const TOKENS: [&[u8]; 32] = [
     b"NaN",
     b"-inf",
     b"1e400",
@@ -60,14 +60,14 @@ const PIECES: [&[u8]; 32] = [
     b"                                                                ",
 ];
 
-/// One to six changes: bytes flipped, cut out, repeated, exchanged, pieces put in.
-fn mutated(seed: &[u8], dice: &mut Dice) -> Vec<u8> {
+/// One to six random changes: bytes flipped, removed, repeated, exchanged, tokens inserted.
+fn mutated(seed: &[u8], random: &mut Random) -> Vec<u8> {
     let mut out = seed.to_vec();
-    for _ in 0..=dice.below(6) {
-        let at = dice.below(out.len() + 1);
-        let to = (at + dice.below(24)).min(out.len());
-        match dice.below(8) {
-            0 if at < out.len() => out[at] ^= 1 << dice.below(8),
+    for _ in 0..=random.below(6) {
+        let at = random.below(out.len() + 1);
+        let to = (at + random.below(24)).min(out.len());
+        match random.below(8) {
+            0 if at < out.len() => out[at] ^= 1 << random.below(8),
             1 => drop(out.drain(at..to)),
             2 => {
                 let again = out[at..to].to_vec();
@@ -75,50 +75,51 @@ fn mutated(seed: &[u8], dice: &mut Dice) -> Vec<u8> {
             }
             3 => out.truncate(at),
             4 => {
-                let there = dice.below(out.len() + 1);
+                let there = random.below(out.len() + 1);
                 let piece = out[at..to].to_vec();
                 out.splice(there..there, piece);
             }
-            // A whole number goes, another comes.
+            // Replaces a number.
             5 => {
                 let number = |b: &u8| b.is_ascii_digit() || *b == b'.' || *b == b'-';
                 let from = out[at..].iter().position(number).map_or(at, |k| at + k);
                 let end = out[from..].iter().position(|b| !number(b)).map_or(out.len(), |k| from + k);
-                out.splice(from..end, dice.of(&PIECES[..9]).iter().copied());
+                out.splice(from..end, random.pick(&TOKENS[..9]).iter().copied());
             }
-            _ => drop(out.splice(at..at, dice.of(&PIECES).iter().copied())),
+            _ => drop(out.splice(at..at, random.pick(&TOKENS).iter().copied())),
         }
     }
     out
 }
 
-/// How many mutations of a corpus, and from which seed: `of`, or so many percent of them as `STYLET_MUTATIONS` says, or for what parses
-/// text as many as `STYLET_MUTATIONS_EACH` says; where `STYLET_MUTATED` names parsers (`"gates shard"`), those alone so many.
-fn amount(name: &str, of: u64, what: What) -> (u64, u64) {
+/// Number of mutations and seed. The number is `of`, scaled by `STYLET_MUTATIONS` (in percent) or replaced for text parsers by
+/// `STYLET_MUTATIONS_EACH`; `STYLET_MUTATED` (`"gates shard"`) restricts the latter to some parsers.
+fn amount(name: &str, default: u64, target: Target) -> (u64, u64) {
     let set = |name: &str| std::env::var(name).ok().and_then(|x| x.parse::<u64>().ok());
-    let share = of * set("STYLET_MUTATIONS").unwrap_or(100) / 100;
-    let asked =
+    let share = default * set("STYLET_MUTATIONS").unwrap_or(100) / 100;
+    let selected =
         std::env::var("STYLET_MUTATED").map_or(true, |names| names.split_whitespace().any(|n| n == name));
-    let each = set("STYLET_MUTATIONS_EACH").filter(|_| what == What::Text && asked);
+    let each = set("STYLET_MUTATIONS_EACH").filter(|_| target == Target::Text && selected);
     (each.unwrap_or(share), set("STYLET_MUTATION_SEED").unwrap_or(1))
 }
 
-/// What is fed.
+/// Kind of target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum What {
+pub enum Target {
     /// A parser of text.
     Text,
-    /// What computes with what was read: not as many.
+    /// Computation with the parsed input; fewer mutations.
     Slow,
 }
 
-/// Longest that one input may take.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Most time per input.
+const MAX_DURATION: Duration = Duration::from_secs(5);
 
-/// Feeds mutations of the corpus to `parser`; what makes it panic or linger is kept in `target/mutated` and named.
-pub fn hold(name: &str, of: u64, corpus: &[Vec<u8>], parser: impl Fn(&[u8]) -> bool) {
-    let accepted = feed(name, (of, What::Text), corpus, parser);
-    // Mutations that all fail in the first line would test nothing.
+/// Runs `parser` on mutations of the corpus, some of which must be accepted. An input that panics or takes too long is stored
+/// in `target/mutated` and reported.
+pub fn fuzz(name: &str, default: u64, corpus: &[Vec<u8>], parser: impl Fn(&[u8]) -> bool) {
+    let accepted = fuzz_any(name, (default, Target::Text), corpus, parser);
+    // If all mutations failed, only the first line would be tested.
     assert!(
         accepted.0 * 200 > accepted.1 && accepted.0 < accepted.1,
         "{name}: {} of {} mutations are accepted",
@@ -127,27 +128,27 @@ pub fn hold(name: &str, of: u64, corpus: &[Vec<u8>], parser: impl Fn(&[u8]) -> b
     );
 }
 
-/// The same without asking how many are accepted; returns how many, and of how many.
-pub fn feed(
+/// [`fuzz`] without a condition on accepted mutations; returns their number and the total.
+pub fn fuzz_any(
     name: &str,
-    (of, what): (u64, What),
+    (default, target): (u64, Target),
     corpus: &[Vec<u8>],
     parser: impl Fn(&[u8]) -> bool,
 ) -> (u64, u64) {
-    let (count, seed) = amount(name, of, what);
-    for (k, whole) in corpus.iter().enumerate() {
-        assert!(parser(whole), "{name}: {k} of the corpus itself is accepted");
+    let (count, seed) = amount(name, default, target);
+    for (k, input) in corpus.iter().enumerate() {
+        assert!(parser(input), "{name}: {k} of the corpus itself is accepted");
     }
     let (mut accepted, mut longest, all) = (0_u64, (Duration::ZERO, 0), Instant::now());
     for k in 0..count {
-        let mut dice = Dice(seed.wrapping_mul(0x2545_F491_4F6C_DD1D).wrapping_add(k));
-        let from = &corpus[dice.below(corpus.len())];
-        let input = mutated(from, &mut dice);
+        let mut random = Random(seed.wrapping_mul(0x2545_F491_4F6C_DD1D).wrapping_add(k));
+        let from = &corpus[random.below(corpus.len())];
+        let input = mutated(from, &mut random);
         let begun = Instant::now();
         let outcome = catch_unwind(AssertUnwindSafe(|| parser(&input)));
         let took = begun.elapsed();
         longest = longest.max((took, k));
-        if outcome.is_err() || took > PATIENCE {
+        if outcome.is_err() || took > MAX_DURATION {
             let folder = root().join("target/mutated");
             let _ = std::fs::create_dir_all(&folder);
             let file = folder.join(format!("{name}-{seed}-{k}"));

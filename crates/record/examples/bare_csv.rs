@@ -1,6 +1,5 @@
-//! What reading a log costs on one core: the `csv` crate alone, its fields parsed as numbers and added up, against this crate's reading of
-//! the same columns of the same file piece by piece, without and with the checks. The ratios are of time on the processor where the
-//! system tells it (Linux), so that other work on the machine does not enter; samples per second are of the same time.
+//! Cost of reading a log on one core: the `csv` crate alone, with its fields parsed and added up, against this crate's reading
+//! of the same columns, without and with the quality checks. Times are processor times on Linux, wall-clock times elsewhere.
 //!
 //! `cargo run --release -p stylet-record --example bare_csv -- log.csv FOLDER`
 
@@ -9,10 +8,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 use stylet_record::{LongRecording, ReadOptions};
 
-/// Seconds on the processor, or on the clock.
+/// Processor time in s, or wall-clock time where the system does not report it.
 fn now_s(begin: Instant) -> f64 {
-    let told = std::fs::read_to_string("/proc/self/schedstat").ok();
-    let nanoseconds = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    let schedstat = std::fs::read_to_string("/proc/self/schedstat").ok();
+    let nanoseconds = schedstat.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     nanoseconds.map_or_else(|| begin.elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }
 
@@ -35,14 +34,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         rows += 1;
     }
     let bare_s = now_s(begin) - start_s;
-    let say = |what: &str, seconds: f64| {
+    let print_rate = |what: &str, seconds: f64| {
         println!(
             "{what:<28} {:6.2} million samples/s, {:.2} times bare csv",
             rows as f64 / seconds / 1e6,
             seconds / bare_s
         );
     };
-    say(&format!("bare csv (sum {sum:.3})"), bare_s);
+    print_rate(&format!("bare csv (sum {sum:.3})"), bare_s);
 
     let start_s = now_s(begin);
     let read = LongRecording::read(&path, &ReadOptions::default(), &folder)?.ok_or("not a plain CSV file")?;
@@ -50,9 +49,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     if read.len() as u64 != rows {
         return Err(format!("{} samples instead of {rows}", read.len()).into());
     }
-    say("read", read_s);
+    print_rate("read", read_s);
     let start_s = now_s(begin);
     let notes = read.assess()?;
-    say(&format!("read and checked ({} notes)", notes.len()), read_s + now_s(begin) - start_s);
+    print_rate(&format!("read and checked ({} notes)", notes.len()), read_s + now_s(begin) - start_s);
     Ok(())
 }

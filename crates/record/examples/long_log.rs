@@ -1,5 +1,5 @@
-//! Writes a log of any length for measurements: insertions of 20 s at 1 kHz, two layers that rupture, noise of 10 mN; time, position,
-//! velocity, force.
+//! Writes a log of any length for benchmarks: insertions of 20 s at 1 kHz into two layers that rupture, with noise of 10 mN; time,
+//! position, velocity, force.
 //!
 //! `cargo run --release -p stylet-record --example long_log -- 1e7 > log.csv`
 
@@ -17,14 +17,14 @@ fn main() -> std::io::Result<()> {
     for k in 0..samples {
         let t = k as f64 * 1e-3;
         let phase = (k % 20_000) as f64 * 1e-3;
-        // In at 5 mm/s for 12 s, a second's rest, out at 10 mm/s, rest.
+        // Insertion at 5 mm/s for 12 s, 1 s hold, retraction at 10 mm/s, rest.
         let (z, v) = match phase {
             p if p < 12.0 => (5e-3 * p, 5e-3),
             p if p < 13.0 => (0.06, 0.0),
             p if p < 19.0 => (0.06 - 0.01 * (p - 13.0), -0.01),
             _ => (0.0, 0.0),
         };
-        // Layers at 15, 30 and 45 mm; the friction of what is passed.
+        // Layers at 15, 30 and 45 mm, with friction behind their front.
         let inside = (z - 0.015).max(0.0);
         let tip = if v > 0.0 && inside > 0.0 { 60.0 * (inside % 0.015) } else { 0.0 };
         let noise: f64 = 0.02 * (uniform() + uniform() + uniform());

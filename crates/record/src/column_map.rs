@@ -1,4 +1,4 @@
-//! Column maps: names, units and signs of somebody else's log.
+//! Column maps: names, units and signs of the columns of another program's log.
 //!
 //! In RON (micrometres, newtons, microseconds; the sign of the force flipped):
 //! ```ron
@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::RecordError;
 
-/// Where one quantity stands in a file and how it becomes SI: `value = scale * raw + offset`.
+/// Column of one quantity and its conversion to SI: `value = scale * raw + offset`.
 ///
-/// The offset is added after scaling and so carries the SI unit of the quantity: a sensor that shows 0.3 N in the air
-/// needs `offset: -0.3`.
+/// The offset is added after scaling, in the SI unit of the quantity: a sensor that reads 0.3 N in air needs
+/// `offset: -0.3`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// Name in the header, without the spaces around it; upper and lower case differ.
+    /// Name in the header, without surrounding spaces; case-sensitive.
     pub name: String,
     /// SI units per unit of the file; finite, not zero. A negative scale flips the sign. Default 1.
     #[serde(default = "one")]
@@ -35,17 +35,17 @@ fn one() -> f64 {
 }
 
 impl Column {
-    /// The column of that name, already in SI units.
+    /// A column in SI units.
     pub fn si(name: impl Into<String>) -> Self {
         Self { name: name.into(), scale: 1.0, offset: 0.0 }
     }
 
-    /// The column of that name, to be multiplied by `scale`.
+    /// A column with a scale.
     pub fn scaled(name: impl Into<String>, scale: f64) -> Self {
         Self { name: name.into(), scale, offset: 0.0 }
     }
 
-    /// `scale * raw + offset`. Neutral numbers leave every bit alone (also the sign of a negative zero).
+    /// `scale * raw + offset`. A scale of 1 and an offset of 0 keep every bit, including the sign of zero.
     pub fn apply(&self, raw: f64) -> f64 {
         let scaled = if self.scale == 1.0 { raw } else { self.scale * raw };
         if self.offset == 0.0 { scaled } else { scaled + self.offset }
@@ -65,7 +65,7 @@ pub struct ColumnMap {
     pub position: Column,
     /// Axial force, to newtons, positive when it resists the insertion.
     pub force: Column,
-    /// Tip velocity, to m/s; the slope of the position stands in when absent.
+    /// Tip velocity, to m/s; when absent, the slope of the position is used.
     #[serde(default)]
     pub velocity: Option<Column>,
     /// Axial force of a virtual sensor, to newtons.
@@ -87,7 +87,7 @@ impl Default for ColumnMap {
 }
 
 impl ColumnMap {
-    /// Checks the numbers and names of the map; reading a file does it too.
+    /// Checks scales, offsets and names of the map; readers call it.
     ///
     /// # Errors
     /// [`RecordError::BadColumnMap`] when a scale is zero, NaN or infinite, when the scale of the time is negative or
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_form_in_the_manual_loads_with_its_defaults() -> Result<(), ron::error::SpannedError> {
+    fn the_documented_form_loads_with_its_defaults() -> Result<(), ron::error::SpannedError> {
         let map: ColumnMap = ron::from_str(
             r#"Columns(time: (name: "time", scale: 1e-6), position: (name: "pz", scale: 1e-3),
                force: (name: "fz", scale: 1.0, offset: 0.0), velocity: Some((name: "vz")))"#,
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_that_cannot_be_meant_is_refused_with_its_place() {
+    fn an_invalid_scale_is_refused_with_its_field() {
         for (scale, words) in [(0.0, "not zero"), (f64::NAN, "finite"), (f64::INFINITY, "finite")] {
             let map = ColumnMap { force: Column::scaled("fz", scale), ..ColumnMap::default() };
             let message = map.check().expect_err("a bad scale").to_string();

@@ -1,4 +1,4 @@
-//! Which column of a file is which: delimiter, header names, units.
+//! CSV header: delimiter, column names and their roles.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use crate::column_map::{Column, ColumnMap};
 use crate::error::RecordError;
 use crate::recording::JOINTS;
 
-/// Delimiters that are looked for; the header decides.
+/// Supported delimiters; the header decides.
 const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
 
-/// What a column of the file feeds.
+/// Quantity of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ColumnRole {
     Time,
@@ -20,7 +20,7 @@ pub(crate) enum ColumnRole {
     JointTorque(usize),
 }
 
-/// A column to be read: its role, its place in a row, its name and unit.
+/// A column to be read: its role, its index in a row, its name and unit.
 #[derive(Debug, Clone)]
 pub(crate) struct MappedColumn {
     pub role: ColumnRole,
@@ -28,7 +28,7 @@ pub(crate) struct MappedColumn {
     pub column: Column,
 }
 
-/// The shape of a file as its header tells it.
+/// Delimiter and columns of a CSV file, from its header.
 #[derive(Debug, Clone)]
 pub(crate) struct CsvLayout {
     pub delimiter: u8,
@@ -38,14 +38,14 @@ pub(crate) struct CsvLayout {
     pub columns: Vec<MappedColumn>,
 }
 
-/// A column that is wanted, and why, in words for the error message.
+/// A required column with its description for error messages.
 struct Wanted {
     role: ColumnRole,
     column: Column,
     what: &'static str,
 }
 
-/// Reads the header at the beginning of `text`; tries each delimiter and keeps the one that finds the columns.
+/// Reads the header at the beginning of `text` with the first delimiter, by frequency, that gives all required columns.
 pub(crate) fn read_layout(
     text: &[u8],
     path: &Path,
@@ -72,7 +72,7 @@ pub(crate) fn read_layout(
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }
-    // The most frequent delimiter was tried first: its complaint is the one that makes sense.
+    // The error of the most frequent delimiter, which was tried first.
     Err(first_error.unwrap_or_else(|| RecordError::EmptyFile { path: path.to_owned() }))
 }
 
@@ -131,22 +131,22 @@ fn wanted(names: &[String], map: Option<&ColumnMap>) -> Vec<Wanted> {
             })
             .collect();
     }
-    let own = |role, name: &str, what| Wanted { role, column: Column::si(name), what };
+    let si_column = |role, name: &str, what| Wanted { role, column: Column::si(name), what };
     let mut wanted = vec![
-        own(ColumnRole::Time, "time_s", "time in seconds"),
-        own(ColumnRole::Position, "position_m", "tip position in metres"),
-        own(ColumnRole::Force, "force_n", "axial force in newtons"),
+        si_column(ColumnRole::Time, "time_s", "time in seconds"),
+        si_column(ColumnRole::Position, "position_m", "tip position in metres"),
+        si_column(ColumnRole::Force, "force_n", "axial force in newtons"),
     ];
     let has = |name: &str| names.iter().any(|existing| existing == name);
     if has("velocity_mps") {
-        wanted.push(own(ColumnRole::Velocity, "velocity_mps", "tip velocity in m/s"));
+        wanted.push(si_column(ColumnRole::Velocity, "velocity_mps", "tip velocity in m/s"));
     }
     if has("force_virtual_n") {
-        wanted.push(own(ColumnRole::ForceVirtual, "force_virtual_n", "virtual force in newtons"));
+        wanted.push(si_column(ColumnRole::ForceVirtual, "force_virtual_n", "virtual force in newtons"));
     }
     if (0..JOINTS).any(|joint| has(&joint_torque_name(joint))) {
         for joint in 0..JOINTS {
-            wanted.push(own(
+            wanted.push(si_column(
                 ColumnRole::JointTorque(joint),
                 &joint_torque_name(joint),
                 "joint torque in N m: all seven joints or none",
@@ -161,11 +161,11 @@ pub(crate) fn joint_torque_name(joint: usize) -> String {
     format!("joint_torque_{}_nm", joint + 1)
 }
 
-/// The existing name that was probably meant, if any is near.
+/// The most similar existing name, if any is close.
 fn closest(wanted: &str, names: &[String]) -> Option<String> {
     let target = wanted.to_lowercase();
     let stem = target.rsplit_once('_').map_or(target.as_str(), |(stem, _unit)| stem);
-    let farthest = (target.chars().count() / 3).max(2);
+    let max_distance = (target.chars().count() / 3).max(2);
     names
         .iter()
         .filter(|name| !name.is_empty())
@@ -174,9 +174,9 @@ fn closest(wanted: &str, names: &[String]) -> Option<String> {
             let same_quantity =
                 candidate.starts_with(stem) || (candidate.len() >= 3 && stem.starts_with(&candidate));
             let distance = edit_distance(&target, &candidate).min(1 + edit_distance(stem, &candidate));
-            (if same_quantity { distance.min(farthest) } else { distance }, name)
+            (if same_quantity { distance.min(max_distance) } else { distance }, name)
         })
-        .filter(|(distance, _)| *distance <= farthest)
+        .filter(|(distance, _)| *distance <= max_distance)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name.clone())
 }
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_near_spelling_is_suggested_and_a_far_one_is_not() {
+    fn a_similar_name_is_suggested_and_a_different_one_is_not() {
         assert_eq!(closest("time_s", &names("Time_s,fz")), Some("Time_s".to_owned()));
         assert_eq!(closest("time_s", &names("timestamp_ns,fz")), Some("timestamp_ns".to_owned()));
         assert_eq!(closest("position_m", &names("t,pos,fz")), Some("pos".to_owned()));

@@ -1,4 +1,4 @@
-//! CSV in: numbers or a message that says what, where and what would be right.
+//! CSV reader: a recording, or an error with file, line, column and remedy.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -16,10 +16,10 @@ use crate::timestamp_repair::{retain_rows, rows_to_keep};
 /// How to read a CSV file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Names and units of somebody else's log; `None`: Stylet's own names, SI units.
+    /// Names and units of another program's log; `None`: Stylet's names, SI units.
     pub columns: Option<ColumnMap>,
-    /// Drop rows whose time stamps run backward or repeat (the fewest that leave time increasing), and say so in a
-    /// [`QualityNote`], instead of failing.
+    /// Drop the fewest rows that leave time increasing, with a [`QualityNote`], instead of refusing time stamps that run
+    /// backward or repeat.
     pub repair: bool,
 }
 
@@ -29,13 +29,13 @@ pub struct ReadOptions {
 /// `force_virtual_n` and `joint_torque_1_nm` to `joint_torque_7_nm` (all or none), or the names of the column map. Other columns are
 /// ignored. The delimiter is a comma, a semicolon, a tab or a `|`; a byte order mark, CRLF line ends, quotation marks, spaces
 /// around names and numbers, blank lines and a last line without its end are accepted. Without a velocity column the
-/// position is differentiated ([`mod@crate::differentiate`]). MCAP, MATLAB v7.3 and Parquet files are known by their first
+/// position is differentiated ([`mod@crate::differentiate`]). MCAP, MATLAB v7.3 and Parquet files are recognised by their first
 /// bytes ([`mod@crate::foreign`]).
 ///
 /// The notes are those of [`assess`], preceded by the repaired rows.
 ///
 /// # Errors
-/// Everything in [`RecordError`] that has a `path`, and [`RecordError::BadColumnMap`]: an error never passes as data.
+/// Every variant of [`RecordError`] with a `path`, and [`RecordError::BadColumnMap`].
 pub fn read_csv(
     path: impl AsRef<Path>,
     options: &ReadOptions,
@@ -69,22 +69,22 @@ pub fn read_csv_bytes(
     }
     check_text(bytes, path)?;
     let header = header_start(bytes).ok_or_else(|| RecordError::EmptyFile { path: path.to_owned() })?;
-    let place = SourceFile { text: TextSource::Bytes(bytes), path, header };
-    let layout = read_layout(&bytes[header..], path, place.line_of_row(header)?, options.columns.as_ref())?;
+    let file = SourceFile { text: TextSource::Bytes(bytes), path, header };
+    let layout = read_layout(&bytes[header..], path, file.line_of_row(header)?, options.columns.as_ref())?;
     let mut rows = Rows { columns: vec![Vec::new(); layout.columns.len()], offsets: Vec::new() };
-    read_rows(&place, &layout, !options.repair, |offset, row| {
+    read_rows(&file, &layout, !options.repair, |offset, row| {
         rows.columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
         rows.offsets.push(offset);
         Ok(())
     })?;
-    let dropped_lines = rows.repair(&place)?;
+    let dropped_lines = rows.repair(&file)?;
     let offsets = rows.offsets.clone();
-    let mut recording = rows.into_recording(&place, &layout)?;
+    let mut recording = rows.into_recording(&file, &layout)?;
     if !recording.velocity_measured {
         recording.velocity_mps =
             differentiate(&recording.time_s, &recording.position_m, DEFAULT_HALF_WIDTH_S);
         if let Some(row) = recording.velocity_mps.iter().position(|v| !v.is_finite()) {
-            let line = place.line_of_row(offsets.get(row).copied().unwrap_or(header))?;
+            let line = file.line_of_row(offsets.get(row).copied().unwrap_or(header))?;
             return Err(RecordError::VelocityNotFinite { path: path.to_owned(), line });
         }
     }
@@ -95,7 +95,7 @@ pub fn read_csv_bytes(
     Ok((recording, notes))
 }
 
-/// Where the header line begins: the first line that is not blank, behind a byte order mark.
+/// Offset of the header line: the first line that is not blank, after a byte order mark.
 pub(crate) fn header_start(bytes: &[u8]) -> Option<usize> {
     let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
     let header = start + bytes[start..].iter().position(|byte| !byte.is_ascii_whitespace())?;
@@ -104,14 +104,14 @@ pub(crate) fn header_start(bytes: &[u8]) -> Option<usize> {
     Some(line.map_or(start, |end| end + 1))
 }
 
-/// A text that is read more than once.
+/// A text that is read in several passes.
 pub(crate) enum TextSource<'a> {
     Bytes(&'a [u8]),
     File(&'a File),
 }
 
 impl TextSource<'_> {
-    /// The text from a byte on.
+    /// A reader from a byte offset on.
     pub(crate) fn reader_at(&self, byte: usize) -> io::Result<Box<dyn Read + '_>> {
         match self {
             Self::Bytes(bytes) => Ok(Box::new(bytes.get(byte..).unwrap_or_default())),
@@ -124,7 +124,7 @@ impl TextSource<'_> {
     }
 }
 
-/// A file and where its header begins; turns byte offsets into line numbers when somebody asks.
+/// A file and the offset of its header; converts byte offsets to line numbers for error messages.
 pub(crate) struct SourceFile<'a> {
     pub(crate) text: TextSource<'a>,
     pub(crate) path: &'a Path,
@@ -132,17 +132,17 @@ pub(crate) struct SourceFile<'a> {
 }
 
 impl SourceFile<'_> {
-    /// Line (1-based) of the row that begins at or, after blank lines, behind the byte.
+    /// Line (1-based) of the row that begins at the offset or after the blank lines there.
     pub(crate) fn line_of_row(&self, byte: usize) -> Result<u64, RecordError> {
         Ok(self.lines_of_offsets(std::iter::once(byte))?.first().copied().unwrap_or(1))
     }
 
-    /// Line of a byte, be it a line end.
+    /// Line of a byte, which may be a line end.
     fn line_of(&self, byte: usize) -> Result<u64, RecordError> {
         let unreadable = |source| self.unreadable(source);
         let mut before = self.text.reader_at(0).map_err(unreadable)?.take(byte as u64 + 1);
         let (mut line, mut left, mut after_return) = (1, byte, false);
-        let mut piece = vec![0; AT_ONCE];
+        let mut piece = vec![0; CHUNK_BYTES];
         loop {
             let count = before.read(&mut piece).map_err(unreadable)?;
             for &byte in &piece[..count] {
@@ -160,7 +160,7 @@ impl SourceFile<'_> {
         }
     }
 
-    /// The same for ascending offsets, in one pass.
+    /// [`SourceFile::line_of_row`] for ascending offsets, in one pass.
     pub(crate) fn lines_of_offsets(
         &self,
         offsets: impl Iterator<Item = usize>,
@@ -203,7 +203,7 @@ impl SourceFile<'_> {
     }
 }
 
-/// Bytes, one by one.
+/// Buffered reading of single bytes.
 struct Bytes<'a> {
     from: Box<dyn Read + 'a>,
     held: Vec<u8>,
@@ -214,7 +214,7 @@ impl Bytes<'_> {
     #[inline]
     fn next(&mut self) -> io::Result<Option<u8>> {
         if self.at == self.held.len() {
-            self.held.resize(AT_ONCE, 0);
+            self.held.resize(CHUNK_BYTES, 0);
             let count = self.from.read(&mut self.held)?;
             self.held.truncate(count);
             self.at = 0;
@@ -243,7 +243,7 @@ fn check_text(bytes: &[u8], path: &Path) -> Result<(), RecordError> {
     })
 }
 
-/// What makes a file no text in UTF-8, and where.
+/// Why and where a file is no text in UTF-8.
 #[derive(Debug)]
 pub(crate) struct NotText {
     byte: usize,
@@ -251,20 +251,20 @@ pub(crate) struct NotText {
 }
 
 impl NotText {
-    pub(crate) fn into_error(self, place: &SourceFile<'_>) -> RecordError {
-        match place.line_of(self.byte) {
-            Ok(line) => RecordError::NotText { path: place.path(), byte: self.byte, line, what: self.what },
+    pub(crate) fn into_error(self, file: &SourceFile<'_>) -> RecordError {
+        match file.line_of(self.byte) {
+            Ok(line) => RecordError::NotText { path: file.path(), byte: self.byte, line, what: self.what },
             Err(error) => error,
         }
     }
 }
 
-/// Whether bytes that come piece by piece are text.
+/// Check of a text in UTF-8, piece by piece.
 #[derive(Debug, Default)]
 pub(crate) struct Utf8Check {
-    /// Bytes that are known to be text.
+    /// Number of valid bytes so far.
     passed: usize,
-    /// The beginning of a character whose end is to come.
+    /// The beginning of a character that continues in the next piece.
     open: Vec<u8>,
     begun: bool,
 }
@@ -288,7 +288,7 @@ impl Utf8Check {
             joined = std::mem::take(&mut self.open);
             &joined
         };
-        // Zero bytes are valid UTF-8; whichever trouble comes first is named.
+        // Zero bytes are valid UTF-8; the first problem is reported.
         let zero = if bytes.contains(&0) { bytes.iter().position(|byte| *byte == 0) } else { None };
         match std::str::from_utf8(&bytes[..zero.unwrap_or(bytes.len())]) {
             Err(error) if zero.is_some() || error.error_len().is_some() => {
@@ -317,13 +317,13 @@ impl Utf8Check {
     }
 }
 
-/// Bytes that are taken from a file at once.
-const AT_ONCE: usize = 1 << 16;
+/// Size of a read in bytes.
+const CHUNK_BYTES: usize = 1 << 16;
 
-/// Hands over the rows of a file: where each begins, and its numbers in the order of the layout's sources (time first). With
-/// `in_order` time stamps that do not increase are errors.
+/// Calls `each` with every row: its byte offset, and its values in the order of the header columns (time first). With
+/// `in_order`, time stamps that do not increase are errors.
 pub(crate) fn read_rows(
-    place: &SourceFile<'_>,
+    file: &SourceFile<'_>,
     layout: &CsvLayout,
     in_order: bool,
     mut each: impl FnMut(usize, &[f64]) -> Result<(), RecordError>,
@@ -332,22 +332,22 @@ pub(crate) fn read_rows(
         .has_headers(false)
         .flexible(true)
         .delimiter(layout.delimiter)
-        .buffer_capacity(AT_ONCE)
-        .from_reader(place.text.reader_at(place.header).map_err(|source| place.unreadable(source))?);
+        .buffer_capacity(CHUNK_BYTES)
+        .from_reader(file.text.reader_at(file.header).map_err(|source| file.unreadable(source))?);
     let mut row = csv::ByteRecord::new();
     let mut numbers = vec![0.0; layout.columns.len()];
     let (mut rows, mut previous_s, mut previous_offset) = (0_u64, f64::NEG_INFINITY, 0);
     let mut header_passed = false;
     loop {
         let offset =
-            place.header + usize::try_from(reader.position().byte()).unwrap_or(usize::MAX - place.header);
+            file.header + usize::try_from(reader.position().byte()).unwrap_or(usize::MAX - file.header);
         let more = reader.read_byte_record(&mut row);
         let more = match more {
             Ok(more) => more,
             Err(error) => {
                 return Err(RecordError::BadTable {
-                    path: place.path(),
-                    line: place.line_of_row(offset)?,
+                    path: file.path(),
+                    line: file.line_of_row(offset)?,
                     message: error.to_string(),
                 });
             }
@@ -364,45 +364,45 @@ pub(crate) fn read_rows(
         }
         if row.len() != layout.width {
             return Err(RecordError::RaggedRow {
-                path: place.path(),
-                line: place.line_of_row(offset)?,
+                path: file.path(),
+                line: file.line_of_row(offset)?,
                 found: row.len(),
                 expected: layout.width,
                 remedy: remedy_for_row(&row, layout),
             });
         }
         for (value, source) in numbers.iter_mut().zip(&layout.columns) {
-            *value = number(place, offset, source, row.get(source.index).unwrap_or_default())?;
+            *value = number(file, offset, source, row.get(source.index).unwrap_or_default())?;
         }
         let time_s = numbers.first().copied().unwrap_or(f64::NAN);
         if in_order && rows > 0 && time_s <= previous_s {
             let column = &layout.columns[0].column;
-            return Err(out_of_order(place, column, (offset, time_s), (previous_offset, previous_s)));
+            return Err(out_of_order(file, column, (offset, time_s), (previous_offset, previous_s)));
         }
         (previous_s, previous_offset) = (time_s, offset);
         rows += 1;
         each(offset, &numbers)?;
     }
     if rows == 0 {
-        return Err(RecordError::HeaderOnly { path: place.path(), line: place.line_of_row(place.header)? });
+        return Err(RecordError::HeaderOnly { path: file.path(), line: file.line_of_row(file.header)? });
     }
     Ok(())
 }
 
-/// Fewer than two samples are no recording.
+/// Refuses fewer than two samples.
 pub(crate) fn check_sample_count(
-    place: &SourceFile<'_>,
+    file: &SourceFile<'_>,
     samples: usize,
     last_offset: Option<usize>,
 ) -> Result<(), RecordError> {
     if samples >= 2 {
         return Ok(());
     }
-    let line = place.line_of_row(last_offset.unwrap_or(place.header))?;
-    Err(RecordError::TooFewSamples { path: place.path(), line, samples })
+    let line = file.line_of_row(last_offset.unwrap_or(file.header))?;
+    Err(RecordError::TooFewSamples { path: file.path(), line, samples })
 }
 
-/// The numbers of a file, one column per source of the layout (time first), and where each row begins.
+/// The values of a file, one column per header column (time first), and the byte offset of each row.
 struct Rows {
     columns: Vec<Vec<f64>>,
     offsets: Vec<usize>,
@@ -410,12 +410,12 @@ struct Rows {
 
 impl Rows {
     /// Drops the rows whose time stamps do not increase; returns their lines.
-    fn repair(&mut self, place: &SourceFile<'_>) -> Result<Vec<u64>, RecordError> {
+    fn repair(&mut self, file: &SourceFile<'_>) -> Result<Vec<u64>, RecordError> {
         let Some(keep) = rows_to_keep(&self.columns[0]) else {
             return Ok(Vec::new());
         };
         let dropped: Vec<bool> = keep.iter().map(|keep| !keep).collect();
-        let lines = place.lines_of_offsets(retain_rows(&self.offsets, &dropped).into_iter())?;
+        let lines = file.lines_of_offsets(retain_rows(&self.offsets, &dropped).into_iter())?;
         for column in &mut self.columns {
             *column = retain_rows(column, &keep);
         }
@@ -424,9 +424,9 @@ impl Rows {
     }
 
     /// The columns under their names; the velocity stays empty when the file has none.
-    fn into_recording(self, place: &SourceFile<'_>, layout: &CsvLayout) -> Result<Recording, RecordError> {
+    fn into_recording(self, file: &SourceFile<'_>, layout: &CsvLayout) -> Result<Recording, RecordError> {
         let samples = self.offsets.len();
-        check_sample_count(place, samples, self.offsets.last().copied())?;
+        check_sample_count(file, samples, self.offsets.last().copied())?;
         let mut recording = Recording::default();
         for (source, values) in layout.columns.iter().zip(self.columns) {
             match source.role {
@@ -451,19 +451,18 @@ impl Rows {
 }
 
 fn number(
-    place: &SourceFile<'_>,
+    file: &SourceFile<'_>,
     offset: usize,
     source: &MappedColumn,
     field: &[u8],
 ) -> Result<f64, RecordError> {
     // The whole file was checked to be UTF-8; a delimiter cannot split a character.
     let text = std::str::from_utf8(field).unwrap_or_default();
-    // Spaces are rare.
     let Ok(raw) = text.parse::<f64>().or_else(|_| text.trim().parse()) else {
         let text = text.trim();
         return Err(RecordError::NotANumber {
-            path: place.path(),
-            line: place.line_of_row(offset)?,
+            path: file.path(),
+            line: file.line_of_row(offset)?,
             column: source.column.name.clone(),
             text: text.to_owned(),
             remedy: remedy(text),
@@ -474,18 +473,18 @@ fn number(
         return Ok(value);
     }
     Err(RecordError::NotFinite {
-        path: place.path(),
-        line: place.line_of_row(offset)?,
+        path: file.path(),
+        line: file.line_of_row(offset)?,
         column: source.column.name.clone(),
         text: text.trim().to_owned(),
     })
 }
 
-/// Why a row may have another number of fields than the header.
+/// Remedy for a row with another number of fields than the header.
 fn remedy_for_row(row: &csv::ByteRecord, layout: &CsvLayout) -> &'static str {
     let integer = |field: &[u8]| !field.is_empty() && field.iter().all(|b| b.is_ascii_digit() || *b == b'-');
     if row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r')) {
-        "a quotation mark that is left open takes the following lines along: close or remove it, or complete or remove the row"
+        "a quotation mark that is left open includes the following lines: close or remove it, or complete or remove the row"
     } else if layout.delimiter == b',' && row.len() > layout.width && row.iter().skip(1).any(integer) {
         "write decimal points instead of decimal commas, or put semicolons between the columns"
     } else {
@@ -497,7 +496,7 @@ fn remedy(text: &str) -> &'static str {
     if text.is_empty() {
         "fill in the value or remove the row"
     } else if text.contains(['\n', '\r']) {
-        "a quotation mark that is left open takes the following lines along: close or remove it"
+        "a quotation mark that is left open includes the following lines: close or remove it"
     } else if text.replace(',', ".").parse::<f64>().is_ok() {
         "write a decimal point instead of the decimal comma"
     } else {
@@ -505,15 +504,15 @@ fn remedy(text: &str) -> &'static str {
     }
 }
 
-/// A time stamp that is not later than the one before, each with where its row begins.
+/// Error of a time stamp that is not later than the previous one, each with the offset of its row.
 fn out_of_order(
-    place: &SourceFile<'_>,
+    file: &SourceFile<'_>,
     column: &Column,
     (offset, time_s): (usize, f64),
     (previous_offset, previous_s): (usize, f64),
 ) -> RecordError {
-    let (path, column) = (place.path(), column.name.clone());
-    let (previous_line, line) = match place.lines_of_offsets([previous_offset, offset].into_iter()) {
+    let (path, column) = (file.path(), column.name.clone());
+    let (previous_line, line) = match file.lines_of_offsets([previous_offset, offset].into_iter()) {
         Ok(lines) => (lines.first().copied().unwrap_or(1), lines.last().copied().unwrap_or(1)),
         Err(error) => return error,
     };

@@ -1,4 +1,4 @@
-//! CSV out: what [`crate::read_csv`] reads back bit for bit.
+//! CSV writer: [`crate::read_csv`] reads its files back bit for bit.
 
 use std::io::{self, BufWriter, Write};
 
@@ -11,14 +11,13 @@ use crate::recording::{JOINTS, Recording, check_length};
 /// `force_virtual_n`, `joint_torque_1_nm` to `joint_torque_7_nm`, the truth as `true_tip_force_n`, `true_elastic_n`, `true_friction_n`,
 /// `true_active_layer`, and the extra columns under their names.
 ///
-/// Numbers are decimal, the shortest that mean the same bits; reading gives the same [`Recording`] bit for bit. A velocity
-/// that was differentiated is not written: reading differentiates again, by the same rule. Extra columns are for
-/// people and plots (reading ignores them), so they may hold gaps: `NaN` is written as an empty field.
+/// Numbers have the shortest decimal form that reads back to the same bits. A differentiated velocity is not written: the
+/// reader differentiates again. Extra columns are ignored by the reader; `NaN` in them is written as an empty field.
 ///
 /// # Errors
-/// What [`Recording::check`] and [`Truth::check`] find, [`RecordError::LengthMismatch`] and
+/// Those of [`Recording::check`] and [`Truth::check`], [`RecordError::LengthMismatch`] and
 /// [`RecordError::BadColumnName`] for extra columns, and [`RecordError::Write`]. Nothing is written
-/// before the data are found to be in order.
+/// before these checks pass.
 pub fn write_csv(
     recording: &Recording,
     truth: Option<&Truth>,
@@ -38,7 +37,7 @@ pub fn write_csv(
     }
     let mut output = BufWriter::new(output);
     writeln!(output, "{}", names.join(","))?;
-    let columns = numbers(recording);
+    let columns = value_columns(recording);
     for index in 0..samples {
         // `{:?}` is the shortest text that reads back to the same bits; it takes an exponent where that is shorter.
         write!(output, "{:?}", recording.time_s[index])?;
@@ -67,33 +66,33 @@ pub fn write_csv(
     Ok(())
 }
 
-/// A table that is written row by row: numbers of a recording, numbers beside them, and a word.
+/// Row-by-row CSV writer: values of a recording, further values, and a word.
 #[derive(Debug)]
 pub struct RowWriter<W: Write> {
     output: BufWriter<W>,
 }
 
 impl<W: Write> RowWriter<W> {
-    /// Begins a table with the names of its columns.
+    /// Starts a table with its header.
     ///
     /// # Errors
-    /// What the destination says.
+    /// The error of the destination.
     pub fn new(names: &[String], output: W) -> io::Result<Self> {
         let mut output = BufWriter::with_capacity(1 << 16, output);
         writeln!(output, "{}", names.join(","))?;
         Ok(Self { output })
     }
 
-    /// Writes a row: numbers as [`write_csv`] writes them, those beside them empty where they are not numbers, and the word.
+    /// Writes a row: measured values, further values (empty where NaN), and a word.
     ///
     /// # Errors
-    /// What the destination says.
+    /// The error of the destination.
     #[inline]
-    pub fn write_row(&mut self, measured: &[f64], beside: &[f64], word: &str) -> io::Result<()> {
+    pub fn write_row(&mut self, measured: &[f64], further: &[f64], word: &str) -> io::Result<()> {
         for value in measured {
             write!(self.output, "{value:?},")?;
         }
-        for value in beside {
+        for value in further {
             if value.is_nan() {
                 self.output.write_all(b",")?;
             } else {
@@ -104,16 +103,16 @@ impl<W: Write> RowWriter<W> {
         self.output.write_all(b"\n")
     }
 
-    /// Ends the table.
+    /// Finishes the table.
     ///
     /// # Errors
-    /// What the destination says.
+    /// The error of the destination.
     pub fn finish(self) -> io::Result<W> {
         self.output.into_inner().map_err(io::IntoInnerError::into_error)
     }
 }
 
-/// Names of a recording's columns and of those of the truth, in the order in which they are written.
+/// Names of the columns of a recording and its truth, in the order of writing.
 pub fn column_names(recording: &Recording, truth: Option<&Truth>) -> Vec<String> {
     let mut names = vec!["time_s".to_owned(), "position_m".to_owned(), "force_n".to_owned()];
     if recording.velocity_measured {
@@ -133,7 +132,7 @@ pub fn column_names(recording: &Recording, truth: Option<&Truth>) -> Vec<String>
 }
 
 /// The columns after the time and before the torques, in the order of [`names`].
-fn numbers(recording: &Recording) -> Vec<&[f64]> {
+fn value_columns(recording: &Recording) -> Vec<&[f64]> {
     let mut columns: Vec<&[f64]> = vec![&recording.position_m, &recording.force_n];
     if recording.velocity_measured {
         columns.push(&recording.velocity_mps);
@@ -150,11 +149,11 @@ fn check_name(name: &str, taken: &[String]) -> Result<(), RecordError> {
         return bad("it is empty");
     }
     if name.trim() != name || name.contains([',', ';', '\t', '"', '\n', '\r', '\0']) {
-        return bad("it holds a delimiter, a quotation mark, a line end or spaces around it");
+        return bad("it contains a delimiter, a quotation mark, a line end or surrounding spaces");
     }
-    let reads_as_own =
+    let is_own_name =
         name == "velocity_mps" || name == "force_virtual_n" || name.starts_with("joint_torque_");
-    if reads_as_own || taken.iter().any(|existing| existing == name) {
+    if is_own_name || taken.iter().any(|existing| existing == name) {
         return bad("it is the name of another column of recordings");
     }
     Ok(())

@@ -1,10 +1,10 @@
 //! Velocity from position on irregular time stamps.
 //!
-//! At each sample the slope of a least-squares straight line through all samples within `+-h` (the half-width) of its
-//! time stamp. For evenly spaced samples this is the Savitzky-Golay derivative of order 1; on irregular time stamps it
-//! stays unbiased for straight motion, and nothing is resampled.
+//! The velocity at a sample is the slope of the least-squares line through all samples within `+-h` (half-width) of its time
+//! stamp. For evenly spaced samples this is the Savitzky-Golay derivative of order 1; on irregular time stamps it
+//! is unbiased for constant velocity.
 //!
-//! With `x = 2 pi f h`, a sinusoidal motion of frequency `f` comes out multiplied by `3 (sin x - x cos x) / x^3`, without
+//! With `x = 2 pi f h`, a sinusoidal motion of frequency `f` is multiplied by `3 (sin x - x cos x) / x^3`, without
 //! phase lag:
 //!
 //! | `h` | -1 % at | -3 dB at | velocity noise per position noise, 100 Hz | 200 Hz | 1 kHz |
@@ -13,24 +13,24 @@
 //! | **50 ms** (default) | 1.0 Hz | 5.8 Hz | 9.5 /s | 7.2 /s | 3.4 /s |
 //! | 100 ms | 0.5 Hz | 2.9 Hz | 3.6 /s | 2.6 /s | 1.2 /s |
 //!
-//! (`a_slow_sinusoid_keeps_its_velocity_and_a_fast_one_loses_it_as_documented`, `noise_passes_with_the_documented_gain`.)
+//! (`the_gain_of_sinusoids_is_as_documented`, `the_noise_gain_is_as_documented`.)
 //! For `n` samples at interval `T` within the window the noise gain is `1/sqrt(sum tau^2)`, about
-//! `sqrt(3 T / (2 h^3))`. 10 um of encoder noise at 200 Hz become 0.07 mm/s: 3 % of an insertion at 2.3 mm/s.
+//! `sqrt(3 T / (2 h^3))`. 10 um of encoder noise at 200 Hz give 0.07 mm/s: 3 % of an insertion at 2.3 mm/s.
 //!
-//! Limits. In the first and last `h` of a recording (and beside gaps) the window is one-sided and the slope belongs to the
-//! window's middle: it is off by up to `h/2` times the acceleration. Changes of speed are smeared over `+-h`. A window with fewer
-//! than three samples is widened to the neighbours on both sides, so that beside a gap the mean slope across it enters.
+//! Limits. In the first and last `h` of a recording (and next to gaps) the window is one-sided and the slope is that of its
+//! middle, with an error of up to `h/2` times the acceleration. Changes of speed are smeared over `+-h`. A window with fewer
+//! than three samples is extended by one neighbour on each side, across gaps if necessary.
 
 use std::collections::VecDeque;
 
-/// Half-width of the window when nobody chooses one (s).
+/// Default half-width of the window (s).
 ///
-/// Insertions are slow (a sinusoid of 0.0167 Hz, constant speeds, ripples of about 1 Hz), so that 5.8 Hz of bandwidth lose
-/// nothing, while friction estimates suffer directly from noise on the velocity.
+/// Insertions are slow (sinusoids of 0.0167 Hz, constant speeds, ripples of about 1 Hz), so that a bandwidth of 5.8 Hz is
+/// enough, while velocity noise directly increases the error of friction estimates.
 pub const DEFAULT_HALF_WIDTH_S: f64 = 0.05;
 
-/// Samples on the rim of the window count as inside although their time stamps are rounded (share of the half-width).
-const RIM: f64 = 1e-6;
+/// Tolerance of the window for rounded time stamps, as a share of the half-width.
+const EDGE_TOLERANCE: f64 = 1e-6;
 
 /// The slope of `position_m` over `time_s` at each sample (m/s), over windows of `+-half_width_s`; see the
 /// [module](self) for bandwidth and noise.
@@ -47,16 +47,16 @@ pub fn differentiate(time_s: &[f64], position_m: &[f64], half_width_s: f64) -> V
     velocity_mps
 }
 
-/// [`differentiate`] for samples that come one by one; remembers one window. The slope at a sample is told as soon as a sample
-/// behind its window has come.
+/// [`differentiate`] sample by sample, with one window in memory. The slope at a sample is emitted as soon as a sample after
+/// its window was added.
 #[derive(Debug, Clone)]
 pub(crate) struct SlopeFilter {
     reach_s: f64,
-    /// Samples from the window's first, or the one before its centre, to the newest.
-    at_hand: VecDeque<(f64, f64)>,
-    /// Number of the first sample at hand.
+    /// Samples from the first of the window, or the one before its centre, to the latest.
+    buffer: VecDeque<(f64, f64)>,
+    /// Index of the first buffered sample.
     from: usize,
-    /// The window, and the sample whose slope comes next.
+    /// The window, and the sample whose slope is next.
     first: usize,
     end: usize,
     centre: usize,
@@ -67,8 +67,8 @@ pub(crate) struct SlopeFilter {
 impl SlopeFilter {
     pub(crate) fn new(half_width_s: f64) -> Self {
         Self {
-            reach_s: half_width_s * (1.0 + RIM),
-            at_hand: VecDeque::new(),
+            reach_s: half_width_s * (1.0 + EDGE_TOLERANCE),
+            buffer: VecDeque::new(),
             from: 0,
             first: 0,
             end: 0,
@@ -78,35 +78,35 @@ impl SlopeFilter {
         }
     }
 
-    /// Takes the next sample; `tell` gets the slopes that are certain now.
+    /// Adds a sample; `emit` receives the slopes whose window is complete.
     #[inline]
-    pub(crate) fn push(&mut self, time_s: f64, position_m: f64, mut tell: impl FnMut(f64)) {
+    pub(crate) fn push(&mut self, time_s: f64, position_m: f64, mut emit: impl FnMut(f64)) {
         if self.end == 0 {
             self.sums = Sums::anchored_at(time_s, position_m);
         }
-        self.at_hand.push_back((time_s, position_m));
+        self.buffer.push_back((time_s, position_m));
         while self.end > self.centre && time_s - self.at(self.centre).0 > self.reach_s {
-            tell(self.slope());
+            emit(self.slope());
         }
         self.sums.add(time_s, position_m);
         self.end += 1;
     }
 
-    /// No more samples: the slopes that are left.
-    pub(crate) fn finish(mut self, mut tell: impl FnMut(f64)) {
+    /// Emits the remaining slopes.
+    pub(crate) fn finish(mut self, mut emit: impl FnMut(f64)) {
         if self.end == 1 {
-            return tell(0.0);
+            return emit(0.0);
         }
         while self.centre < self.end {
-            tell(self.slope());
+            emit(self.slope());
         }
     }
 
     fn at(&self, sample: usize) -> (f64, f64) {
-        self.at_hand[sample - self.from]
+        self.buffer[sample - self.from]
     }
 
-    /// The slope at the centre, whose window is complete; moves on.
+    /// The slope at the centre, whose window is complete; advances the centre.
     #[inline]
     fn slope(&mut self) -> f64 {
         let now_s = self.at(self.centre).0;
@@ -115,7 +115,7 @@ impl SlopeFilter {
             self.sums.remove(time_s, position_m);
             self.first += 1;
         }
-        // Running sums lose digits as the window leaves their anchor behind: start afresh every half window.
+        // Running sums lose accuracy as the window moves away from their anchor: recompute them every half window.
         self.steps_since_anchor += 1;
         if 2 * self.steps_since_anchor >= self.end - self.first {
             self.sums = self.sums_over(self.first, self.end);
@@ -124,13 +124,13 @@ impl SlopeFilter {
         let slope = if self.end - self.first >= 3 {
             self.sums.slope()
         } else {
-            let newest = self.from + self.at_hand.len();
+            let newest = self.from + self.buffer.len();
             self.sums_over(self.centre.saturating_sub(1), (self.centre + 2).min(newest)).slope()
         };
         self.centre += 1;
-        // The sample before the next centre stays, for windows that are widened.
+        // The sample before the next centre is kept for extended windows.
         while self.from < self.first.min(self.centre - 1) {
-            self.at_hand.pop_front();
+            self.buffer.pop_front();
             self.from += 1;
         }
         slope
@@ -139,7 +139,7 @@ impl SlopeFilter {
     fn sums_over(&self, first: usize, end: usize) -> Sums {
         let (anchor_s, anchor_m) = self.at(self.centre);
         let mut sums = Sums::anchored_at(anchor_s, anchor_m);
-        for (time_s, position_m) in self.at_hand.range(first - self.from..end - self.from) {
+        for (time_s, position_m) in self.buffer.range(first - self.from..end - self.from) {
             sums.add(*time_s, *position_m);
         }
         sums
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn straight_motion_has_its_speed_at_every_irregular_sample() {
+    fn constant_velocity_is_exact_at_irregular_samples() {
         let jitter = scatter(5000);
         let time_s: Vec<f64> =
             jitter.iter().enumerate().map(|(i, j)| 1e4 + 0.005 * (i as f64 + 0.9 * j)).collect();
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_sinusoid_keeps_its_velocity_and_a_fast_one_loses_it_as_documented() {
+    fn the_gain_of_sinusoids_is_as_documented() {
         for (half_width_s, one_percent_hz, half_power_hz) in
             [(0.02, 2.5, 14.4), (0.05, 1.0, 5.8), (0.1, 0.5, 2.9)]
         {
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_passes_with_the_documented_gain() {
+    fn the_noise_gain_is_as_documented() {
         let position_m = scatter(200_000);
         let sd = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
         for (half_width_s, gains) in
@@ -271,8 +271,8 @@ mod tests {
             time_s.iter().zip(&jitter).map(|(t, j)| 0.05 * (3.0 * t).sin() + 1e-4 * j).collect();
         let fast = differentiate(&time_s, &position_m, 0.05);
         for centre in 0..time_s.len() {
-            let first = time_s.partition_point(|&t| time_s[centre] - t > 0.05 * (1.0 + RIM));
-            let end = time_s.partition_point(|&t| t - time_s[centre] <= 0.05 * (1.0 + RIM));
+            let first = time_s.partition_point(|&t| time_s[centre] - t > 0.05 * (1.0 + EDGE_TOLERANCE));
+            let end = time_s.partition_point(|&t| t - time_s[centre] <= 0.05 * (1.0 + EDGE_TOLERANCE));
             let mut direct = Sums::anchored_at(time_s[centre], position_m[centre]);
             (first..end).for_each(|k| direct.add(time_s[k], position_m[k]));
             let direct = direct.slope();
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn sparse_samples_use_their_neighbours() {
+    fn sparse_windows_are_extended_to_their_neighbours() {
         let time_s = times(10, 1.0);
         let position_m: Vec<f64> = time_s.iter().map(|t| 0.001 * t).collect();
         assert!(differentiate(&time_s, &position_m, 0.05).iter().all(|v| (v - 0.001).abs() < 1e-15));

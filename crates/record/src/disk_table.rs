@@ -1,4 +1,4 @@
-//! Columns of numbers on disk, for what memory should not hold: written once, gone through often, gone with their owner.
+//! Tables of numbers in temporary files, and sorting on disk.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -7,23 +7,23 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How the names of files begin that only live while they are written.
+/// Prefix of the names of temporary files.
 pub const TEMP_FILE_PREFIX: &str = ".stylet-scratch-";
-/// Rows that are read and written together.
+/// Rows per block.
 pub const BLOCK_ROWS: usize = 1 << 14;
-/// Numbers that are sorted in memory.
-const SORTED_AT_ONCE: usize = 1 << 20;
-/// Numbers of each sorted stretch at hand while stretches are merged.
-const MERGED_AT_ONCE: usize = 1 << 11;
+/// Values per sorted run.
+const RUN_LENGTH: usize = 1 << 20;
+/// Buffered values per run while merging.
+const MERGE_BUFFER: usize = 1 << 11;
 
-/// A file that nobody else sees: where the system allows it has no name, so that not even a kill leaves it behind.
+/// A temporary file. On Unix it is unlinked at once, so that it disappears even when the process is killed.
 #[derive(Debug)]
-struct Hidden {
+struct TempFile {
     file: File,
     path: PathBuf,
 }
 
-impl Hidden {
+impl TempFile {
     fn new(folder: &Path) -> io::Result<Self> {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -53,7 +53,7 @@ impl Hidden {
     }
 }
 
-impl Drop for Hidden {
+impl Drop for TempFile {
     fn drop(&mut self) {
         if !cfg!(unix) {
             let _ = fs::remove_file(&self.path);
@@ -61,30 +61,30 @@ impl Drop for Hidden {
     }
 }
 
-/// A table of numbers on its way to the disk.
+/// Writer of a [`DiskTable`].
 #[derive(Debug)]
 pub struct DiskTableWriter {
-    hidden: Hidden,
-    /// The columns of the block that is filled.
+    file: TempFile,
+    /// Columns of the current block.
     block: Vec<Vec<f64>>,
     rows: usize,
     bytes: Vec<u8>,
 }
 
 impl DiskTableWriter {
-    /// An empty table with so many columns, in a file within the folder that is gone with the table.
+    /// An empty table in a temporary file in the folder, which is deleted with the table.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error of the system.
     pub fn new(folder: &Path, columns: usize) -> io::Result<Self> {
         let block = vec![Vec::with_capacity(BLOCK_ROWS); columns];
-        Ok(Self { hidden: Hidden::new(folder)?, block, rows: 0, bytes: Vec::new() })
+        Ok(Self { file: TempFile::new(folder)?, block, rows: 0, bytes: Vec::new() })
     }
 
-    /// Adds a row; what is missing in it is not a number, what is too much is left out.
+    /// Adds a row; missing values are NaN, surplus values are ignored.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error of the system.
     #[inline]
     pub fn push(&mut self, row: &[f64]) -> io::Result<()> {
         for (at, column) in self.block.iter_mut().enumerate() {
@@ -96,30 +96,30 @@ impl DiskTableWriter {
 
     fn flush(&mut self) -> io::Result<()> {
         for column in &mut self.block {
-            // All blocks are as long, so that each is found by its number.
+            // Blocks have equal length, so that offsets follow from block numbers.
             column.resize(BLOCK_ROWS, f64::NAN);
-            self.hidden.write(column, &mut self.bytes)?;
+            self.file.write(column, &mut self.bytes)?;
             column.clear();
         }
         Ok(())
     }
 
-    /// The table, to be read.
+    /// Finishes the table for reading.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error of the system.
     pub fn finish(mut self) -> io::Result<DiskTable> {
         if !self.rows.is_multiple_of(BLOCK_ROWS) {
             self.flush()?;
         }
-        Ok(DiskTable { hidden: self.hidden, columns: self.block.len(), rows: self.rows })
+        Ok(DiskTable { file: self.file, columns: self.block.len(), rows: self.rows })
     }
 }
 
 /// A table of numbers on disk, column by column in blocks of [`BLOCK`] rows.
 #[derive(Debug)]
 pub struct DiskTable {
-    hidden: Hidden,
+    file: TempFile,
     columns: usize,
     rows: usize,
 }
@@ -131,22 +131,22 @@ impl DiskTable {
         self.rows
     }
 
-    /// Hands over the rows, one by one.
+    /// Calls `each` with every row.
     ///
     /// # Errors
-    /// What the system or `each` says.
+    /// The system's or that of `each`.
     pub fn for_each_row<E: From<io::Error>>(
         &self,
         mut each: impl FnMut(&[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let mut held = vec![Vec::new(); self.columns];
+        let mut buffer = vec![Vec::new(); self.columns];
         let (mut bytes, mut row) = (Vec::new(), vec![0.0; self.columns]);
         for block in 0..self.block_count() {
-            for (column, held) in held.iter_mut().enumerate() {
-                self.read_block(block, column, held, &mut bytes)?;
+            for (column, buffer) in buffer.iter_mut().enumerate() {
+                self.read_block(block, column, buffer, &mut bytes)?;
             }
-            for at in 0..held.first().map_or(0, Vec::len) {
-                row.iter_mut().zip(&held).for_each(|(x, held)| *x = held[at]);
+            for at in 0..buffer.first().map_or(0, Vec::len) {
+                row.iter_mut().zip(&buffer).for_each(|(x, buffer)| *x = buffer[at]);
                 each(&row)?;
             }
         }
@@ -168,7 +168,7 @@ impl DiskTable {
     /// Reads one column of one block.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error of the system.
     pub fn read_block(
         &self,
         block: usize,
@@ -177,79 +177,79 @@ impl DiskTable {
         bytes: &mut Vec<u8>,
     ) -> io::Result<()> {
         into.resize(BLOCK_ROWS.min(self.rows.saturating_sub(block * BLOCK_ROWS)), 0.0);
-        self.hidden.read(((block * self.columns + column) * BLOCK_ROWS) as u64, into, bytes)
+        self.file.read(((block * self.columns + column) * BLOCK_ROWS) as u64, into, bytes)
     }
 
-    /// One number.
+    /// One value.
     ///
     /// # Errors
-    /// What the system says.
+    /// The error of the system.
     pub fn value(&self, column: usize, row: usize) -> io::Result<f64> {
         let mut found = [f64::NAN];
         let place = (row / BLOCK_ROWS * self.columns + column) * BLOCK_ROWS + row % BLOCK_ROWS;
-        self.hidden.read(place as u64, &mut found, &mut Vec::new())?;
+        self.file.read(place as u64, &mut found, &mut Vec::new())?;
         Ok(found[0])
     }
 }
 
-/// Numbers that are being sorted on disk: stretches in memory, then one merge.
+/// External merge sort: runs sorted in memory, then one merge.
 #[derive(Debug)]
 pub(crate) struct ExternalSort {
     folder: PathBuf,
-    stretches: Hidden,
+    runs: TempFile,
     lengths: Vec<usize>,
-    now: Vec<f64>,
+    current: Vec<f64>,
     bytes: Vec<u8>,
 }
 
 impl ExternalSort {
     pub(crate) fn new(folder: &Path) -> io::Result<Self> {
-        let stretches = Hidden::new(folder)?;
+        let runs = TempFile::new(folder)?;
         Ok(Self {
             folder: folder.to_owned(),
-            stretches,
+            runs,
             lengths: Vec::new(),
-            now: Vec::new(),
+            current: Vec::new(),
             bytes: Vec::new(),
         })
     }
 
     pub(crate) fn push(&mut self, x: f64) -> io::Result<()> {
-        self.now.push(x);
-        if self.now.len() < SORTED_AT_ONCE { Ok(()) } else { self.stretch() }
+        self.current.push(x);
+        if self.current.len() < RUN_LENGTH { Ok(()) } else { self.write_run() }
     }
 
-    fn stretch(&mut self) -> io::Result<()> {
-        self.now.sort_unstable_by(f64::total_cmp);
-        for part in self.now.chunks(BLOCK_ROWS) {
-            self.stretches.write(part, &mut self.bytes)?;
+    fn write_run(&mut self) -> io::Result<()> {
+        self.current.sort_unstable_by(f64::total_cmp);
+        for part in self.current.chunks(BLOCK_ROWS) {
+            self.runs.write(part, &mut self.bytes)?;
         }
-        self.lengths.push(self.now.len());
-        self.now.clear();
+        self.lengths.push(self.current.len());
+        self.current.clear();
         Ok(())
     }
 
-    /// All numbers in ascending order, as a table of one column.
+    /// All values in ascending order, as a table of one column.
     pub(crate) fn finish(mut self) -> io::Result<DiskTable> {
-        self.stretch()?;
-        self.now = Vec::new();
+        self.write_run()?;
+        self.current = Vec::new();
         let mut sorted = DiskTableWriter::new(&self.folder, 1)?;
         let mut from = 0;
-        let mut stretches: Vec<Stretch> = Vec::with_capacity(self.lengths.len());
+        let mut runs: Vec<SortedRun> = Vec::with_capacity(self.lengths.len());
         for length in &self.lengths {
-            stretches.push(Stretch { next: from, end: from + *length as u64, at: 0, held: Vec::new() });
+            runs.push(SortedRun { next: from, end: from + *length as u64, at: 0, buffer: Vec::new() });
             from += *length as u64;
         }
         let mut heads = BinaryHeap::new();
-        for (number, stretch) in stretches.iter_mut().enumerate() {
-            if let Some(x) = stretch.take(&self.stretches, &mut self.bytes)? {
+        for (number, run) in runs.iter_mut().enumerate() {
+            if let Some(x) = run.take(&self.runs, &mut self.bytes)? {
                 heads.push(Reverse((Ordered(x), number)));
             }
         }
         while let Some(mut head) = heads.peek_mut() {
             let Reverse((Ordered(x), number)) = *head;
             sorted.push(&[x])?;
-            match stretches[number].take(&self.stretches, &mut self.bytes)? {
+            match runs[number].take(&self.runs, &mut self.bytes)? {
                 Some(next) => *head = Reverse((Ordered(next), number)),
                 None => {
                     std::collections::binary_heap::PeekMut::pop(head);
@@ -260,33 +260,33 @@ impl ExternalSort {
     }
 }
 
-/// A sorted stretch that is being merged.
-struct Stretch {
+/// A sorted run during the merge.
+struct SortedRun {
     next: u64,
     end: u64,
     at: usize,
-    held: Vec<f64>,
+    buffer: Vec<f64>,
 }
 
-impl Stretch {
-    fn take(&mut self, from: &Hidden, bytes: &mut Vec<u8>) -> io::Result<Option<f64>> {
-        if self.at == self.held.len() {
-            let count = (self.end - self.next).min(MERGED_AT_ONCE as u64);
-            self.held.resize(count as usize, 0.0);
-            from.read(self.next, &mut self.held, bytes)?;
+impl SortedRun {
+    fn take(&mut self, from: &TempFile, bytes: &mut Vec<u8>) -> io::Result<Option<f64>> {
+        if self.at == self.buffer.len() {
+            let count = (self.end - self.next).min(MERGE_BUFFER as u64);
+            self.buffer.resize(count as usize, 0.0);
+            from.read(self.next, &mut self.buffer, bytes)?;
             self.next += count;
             self.at = 0;
         }
-        let x = self.held.get(self.at).copied();
+        let x = self.buffer.get(self.at).copied();
         self.at += 1;
         if x.is_none() {
-            self.at = self.held.len();
+            self.at = self.buffer.len();
         }
         Ok(x)
     }
 }
 
-/// A number ordered by [`f64::total_cmp`].
+/// A value ordered by [`f64::total_cmp`].
 struct Ordered(f64);
 
 impl PartialEq for Ordered {
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_gives_back_its_rows_over_several_blocks() -> io::Result<()> {
+    fn a_table_round_trips_over_several_blocks() -> io::Result<()> {
         let rows = 2 * BLOCK_ROWS + 77;
         let mut table = DiskTableWriter::new(&folder(), 2)?;
         for x in scatter(rows) {
@@ -349,8 +349,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_sorted_on_disk_are_those_sorted_in_memory() -> io::Result<()> {
-        for count in [0, 1, 1000, 2 * SORTED_AT_ONCE, 2 * SORTED_AT_ONCE + 12_345] {
+    fn sorting_on_disk_equals_sorting_in_memory() -> io::Result<()> {
+        for count in [0, 1, 1000, 2 * RUN_LENGTH, 2 * RUN_LENGTH + 12_345] {
             let mut sorting = ExternalSort::new(&folder())?;
             scatter(count).try_for_each(|x| sorting.push(x))?;
             let mut sorted = Vec::new();

@@ -1,19 +1,19 @@
-//! Recordings that are longer than a diagnosis can use: neighbouring samples become one.
+//! Downsampling of recordings that are too long for a diagnosis, by averaging.
 
 use crate::quality::{QualityKind, QualityNote};
 use crate::recording::Recording;
 
-/// More samples tell a diagnosis nothing more: at 200 Hz these are eight minutes.
+/// Most samples of a diagnosis: eight minutes at 200 Hz.
 pub const MAX_SAMPLES: usize = 100_000;
-/// Seconds that a diagnosis looks at together ...
-const TOGETHER_S: f64 = 0.02;
-/// ... and how many of them it can compare in minutes.
-const MOST_STRETCHES: f64 = 20_000.0;
-/// An interval over so many median intervals is a gap; samples on both sides stay apart.
+/// Block length of a diagnosis in seconds.
+const BLOCK_S: f64 = 0.02;
+/// Most blocks of a diagnosis, for a computing time of minutes.
+const MAX_BLOCKS: f64 = 20_000.0;
+/// Least length of a gap in median intervals; samples on both sides are not averaged.
 const GAP_INTERVALS: f64 = 5.0;
 
-/// The recording with neighbouring samples averaged (time, position, velocity and force alike), and the note that says so; `None`
-/// when it is not too long. Noise is averaged with the samples; what happens within the new interval is lost.
+/// The recording with consecutive samples averaged (time, position, velocity and force), and a note on it; `None` when it is
+/// short enough. Averaging reduces noise; changes within the new interval are lost.
 #[must_use]
 pub fn downsample(recording: &Recording) -> Option<(Recording, QualityNote)> {
     let n = recording.len();
@@ -21,9 +21,9 @@ pub fn downsample(recording: &Recording) -> Option<(Recording, QualityNote)> {
         return None;
     }
     let step_s = recording.median_interval_s();
-    let stretches = n as f64 * (step_s / TOGETHER_S).min(1.0);
-    // Samples nearer than what is looked at together cost little.
-    let left = if stretches > MOST_STRETCHES { MOST_STRETCHES } else { MAX_SAMPLES as f64 };
+    let blocks = n as f64 * (step_s / BLOCK_S).min(1.0);
+    // Several samples per block add little computing time.
+    let left = if blocks > MAX_BLOCKS { MAX_BLOCKS } else { MAX_SAMPLES as f64 };
     let together = (n as f64 / left).ceil() as usize;
     if together < 2 {
         return None;
@@ -47,8 +47,8 @@ pub fn downsample(recording: &Recording) -> Option<(Recording, QualityNote)> {
         start = end;
     }
     let message = format!(
-        "{n} samples are more than a diagnosis can use: each {together} were averaged to one, {} are left, {:.4} s apart; what is \
-         faster does not show: cut the recording to the insertion to keep it",
+        "{n} samples are too many for a diagnosis: each {together} were averaged to one, {} remain, {:.4} s apart; faster changes are \
+         lost: cut the recording to the insertion to keep them",
         out.len(),
         together as f64 * step_s
     );
@@ -69,29 +69,33 @@ mod tests {
     }
 
     #[test]
-    fn a_minute_is_left_alone_at_any_rate_and_hours_become_a_few_ten_thousand_samples()
+    fn a_minute_is_unchanged_at_any_rate_and_hours_become_a_few_ten_thousand_samples()
     -> Result<(), RecordError> {
         for hz in [50.0, 200.0, 1000.0] {
             assert!(downsample(&recorded((60.0 * hz) as u32, hz)?).is_none(), "{hz} Hz");
         }
         for (n, hz) in [(2_000_000, 200.0), (400_000, 20.0), (500_000, 10_000.0)] {
-            let (thinned, note) = downsample(&recorded(n, hz)?).expect("too long");
-            assert!(thinned.check().is_ok() && thinned.len() <= MAX_SAMPLES, "{} at {hz} Hz", thinned.len());
-            let stretches = thinned.duration_s() / thinned.median_interval_s().max(TOGETHER_S);
-            assert!(stretches <= 1.01 * MOST_STRETCHES, "{stretches} stretches at {hz} Hz");
+            let (downsampled, note) = downsample(&recorded(n, hz)?).expect("too long");
+            assert!(
+                downsampled.check().is_ok() && downsampled.len() <= MAX_SAMPLES,
+                "{} at {hz} Hz",
+                downsampled.len()
+            );
+            let blocks = downsampled.duration_s() / downsampled.median_interval_s().max(BLOCK_S);
+            assert!(blocks <= 1.01 * MAX_BLOCKS, "{blocks} blocks at {hz} Hz");
             assert!(note.message.contains(&format!("{n} samples")), "{}", note.message);
         }
         Ok(())
     }
 
     #[test]
-    fn the_mean_force_stays_and_a_gap_stays_a_gap() -> Result<(), RecordError> {
+    fn the_mean_force_and_gaps_are_preserved() -> Result<(), RecordError> {
         let mut recording = recorded(300_000, 1000.0)?;
         recording.time_s[150_000..].iter_mut().for_each(|t| *t += 60.0);
-        let (thinned, _) = downsample(&recording).expect("too long");
+        let (downsampled, _) = downsample(&recording).expect("too long");
         let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-        assert!((mean(&thinned.force_n) / mean(&recording.force_n) - 1.0).abs() < 1e-3);
-        let widest = thinned.time_s.windows(2).map(|p| p[1] - p[0]).fold(0.0, f64::max);
+        assert!((mean(&downsampled.force_n) / mean(&recording.force_n) - 1.0).abs() < 1e-3);
+        let widest = downsampled.time_s.windows(2).map(|p| p[1] - p[0]).fold(0.0, f64::max);
         assert!((59.9..60.1).contains(&widest), "{widest} s");
         Ok(())
     }

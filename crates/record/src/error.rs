@@ -1,4 +1,4 @@
-//! Everything that can be wrong with a recording: what, where, and what would be right.
+//! Errors of reading, checking and writing recordings.
 
 use std::io;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 #[allow(missing_docs)] // the message is the documentation of its fields
 pub enum RecordError {
-    /// The path leads nowhere.
+    /// The path does not exist.
     #[error("{}: no such file; check the path (it is relative to the current directory)", path.display())]
     NoSuchFile { path: PathBuf },
 
@@ -23,23 +23,23 @@ pub enum RecordError {
     #[error("{}: cannot be read ({source}); check that the file is readable by this user", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
 
-    /// No text at all.
+    /// The file is empty.
     #[error("{}: the file is empty; a recording has a header line and at least 2 rows of numbers", path.display())]
     EmptyFile { path: PathBuf },
 
-    /// A header without a single row.
+    /// A header without rows.
     #[error("{}: line {line} is a header and no row follows; a recording has at least 2 rows of numbers", path.display())]
     HeaderOnly { path: PathBuf, line: u64 },
 
-    /// Not UTF-8, or zero bytes in it.
+    /// Not UTF-8, or with zero bytes.
     #[error("{}: not a text file in UTF-8: {what} at byte {byte} (line {line}); export the data as CSV text in UTF-8", path.display())]
     NotText { path: PathBuf, byte: usize, line: u64, what: &'static str },
 
-    /// A file of another program.
+    /// A file of another program cannot be read.
     #[error("{}: {kind}: {what}", path.display())]
     Foreign { path: PathBuf, kind: &'static str, what: String },
 
-    /// A column is needed and the header has no such name.
+    /// A required column is missing in the header.
     #[error(
         "{}: line {line}: the header has no column \"{column}\" ({what}); it has {}{}; rename the column or give a column map",
         path.display(), list(available), did_you_mean(suggestion.as_deref())
@@ -53,28 +53,28 @@ pub enum RecordError {
         suggestion: Option<String>,
     },
 
-    /// Numbers where the names of the columns should stand.
+    /// Numbers instead of column names.
     #[error(
         "{}: line {line}: the header is missing: the first line holds the numbers {}; begin the file with a line of names such as time_s,position_m,force_n",
         path.display(), list(found)
     )]
     NoHeader { path: PathBuf, line: u64, found: Vec<String> },
 
-    /// A column that is read has a name that occurs more than once.
+    /// The name of a required column occurs more than once.
     #[error("{}: line {line}: the header names the column \"{column}\" twice; rename the one that is not meant", path.display())]
     AmbiguousColumn { path: PathBuf, line: u64, column: String },
 
-    /// A field that should be a number is not.
+    /// A field is not a number.
     #[error(
         "{}: line {line}, column \"{column}\": {} is not a number; {remedy}",
-        path.display(), shown(text)
+        path.display(), excerpt(text)
     )]
     NotANumber { path: PathBuf, line: u64, column: String, text: String, remedy: &'static str },
 
     /// NaN, infinity, or a number that overflows once scaled.
     #[error(
         "{}: line {line}, column \"{column}\": {} is not a finite number; remove the row or correct the value (and the column map's scale, if any)",
-        path.display(), shown(text)
+        path.display(), excerpt(text)
     )]
     NotFinite { path: PathBuf, line: u64, column: String, text: String },
 
@@ -85,9 +85,9 @@ pub enum RecordError {
     )]
     RaggedRow { path: PathBuf, line: u64, found: usize, expected: usize, remedy: &'static str },
 
-    /// The slope of the position overflows.
+    /// The differentiated velocity is not finite.
     #[error(
-        "{}: line {line}: the velocity, which is the slope of the position, is no finite number here: positions are too large or time stamps too close; correct the row, or the scales of time and position in the column map",
+        "{}: line {line}: the velocity, which is the slope of the position, is not finite here: positions are too large or time stamps too close; correct the row, or the scales of time and position in the column map",
         path.display()
     )]
     VelocityNotFinite { path: PathBuf, line: u64 },
@@ -117,11 +117,11 @@ pub enum RecordError {
     #[error("{}: {samples} sample(s) by line {line}; a recording needs at least 2 samples with different time stamps", path.display())]
     TooFewSamples { path: PathBuf, line: u64, samples: usize },
 
-    /// The table itself defeats the CSV reader.
+    /// The CSV syntax is invalid.
     #[error("{}: line {line}: {message}; correct the row (a quotation mark left open?)", path.display())]
     BadTable { path: PathBuf, line: u64, message: String },
 
-    /// A number in a column map is out of range.
+    /// A value in a column map is out of range.
     #[error("column map: {field} = {value} for the column \"{column}\"; it must be {must_be}")]
     BadColumnMap { field: &'static str, column: String, value: f64, must_be: &'static str },
 
@@ -149,45 +149,45 @@ pub enum RecordError {
     #[error("{samples} sample(s) given; a recording needs at least 2")]
     TooShort { samples: usize },
 
-    /// Recordings from which nothing can be concluded.
+    /// Recordings with blocking quality notes.
     #[error("{}{}", unusable(*of, wrong.len()), wrong.join("\n"))]
     Unusable { of: usize, wrong: Vec<String> },
 
-    /// An extra column's name cannot stand in a header.
+    /// An extra column has an invalid name.
     #[error("the extra column \"{name}\" cannot be written: {why}; choose another name")]
     BadColumnName { name: String, why: &'static str },
 
-    /// The disk does not take what a long log is worked on with.
+    /// The temporary files of a long log cannot be written.
     #[error(
-        "{}: a log this long is worked on beside its results, and the disk there says: {source}; make room for about 150 bytes per \
-         sample, or name a folder on another disk with --out",
+        "{}: the temporary files of this log cannot be written ({source}); free about 150 bytes per sample, or choose a folder on \
+         another disk with --out",
         path.display()
     )]
     TemporaryFile { path: PathBuf, source: io::Error },
 
-    /// Time stamps out of order over more rows than can be sorted out at once.
+    /// More rows out of time order than can be repaired together.
     #[error(
-        "{}: from line {line} on the time stamps of over {rows} rows are out of order together; cut the log there (a clock that was \
-         set?) and enhance the parts",
+        "{}: from line {line} on the time stamps of more than {rows} rows are out of order together; cut the log there (was the \
+         clock set?) and enhance the parts",
         path.display()
     )]
     DisorderTooLong { path: PathBuf, line: u64, rows: usize },
 
-    /// The destination refuses the text.
+    /// The destination cannot be written.
     #[error("the recording cannot be written ({0}); check that the destination exists and has room")]
     Write(#[from] io::Error),
 }
 
-/// What comes before the list of recordings that cannot be used; nothing when it is the only one.
+/// Introduction to the list of refused recordings; empty for a single one.
 fn unusable(of: usize, wrong: usize) -> String {
     if of == 1 {
         String::new()
     } else {
-        format!("{wrong} of {of} recordings cannot be used; nothing was concluded from any:\n")
+        format!("{wrong} of {of} recordings cannot be used; no diagnosis was made:\n")
     }
 }
 
-fn shown(text: &str) -> String {
+fn excerpt(text: &str) -> String {
     const LONGEST: usize = 40;
     if text.is_empty() {
         return "an empty field".to_owned();

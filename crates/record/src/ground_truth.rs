@@ -1,4 +1,4 @@
-//! What a simulation knows and a sensor does not.
+//! Ground truth of a simulated recording.
 
 use serde::{Deserialize, Serialize};
 
@@ -33,18 +33,18 @@ impl LayerTruth {
 pub struct TrueRupture {
     /// The layer that ruptured, 1-based.
     pub layer: usize,
-    /// Instant (s), interpolated between samples.
+    /// Time (s), interpolated between samples.
     pub time_s: f64,
-    /// Tip position at that instant (m).
+    /// Tip position at that time (m).
     pub position_m: f64,
-    /// Whether the layer's puncture force was reached (`true`), or the tip came to the layer's far side (`false`).
+    /// Whether the puncture force was reached; otherwise the tip reached the far face.
     pub by_force: bool,
 }
 
 /// Ground truth, one value per sample of the [`crate::Recording`] it belongs to.
 ///
-/// With the base law `f = f_K + f_B`, `f_B = v sum(b_i l_i)`: `tip_force_n` is `f - D v`, the part that belongs to the
-/// tip and the active layer and that force enhancement is after; `D v` is the friction of the ruptured layers.
+/// With the base law `f = f_K + f_B`, `f_B = v sum(b_i l_i)`: `tip_force_n` is `f - D v`, the force of tip and active layer,
+/// which force enhancement estimates; `D v` is the friction of the ruptured layers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
@@ -54,15 +54,15 @@ pub struct Truth {
     pub elastic_n: Vec<f64>,
     /// Friction over all layers (N), `f_B`.
     pub friction_n: Vec<f64>,
-    /// The whole force of the tissue on the needle (N): elastic, friction and whatever effects add; no sensor errors.
+    /// Total force of the tissue on the needle (N): elastic, friction and effects, without sensor effects.
     pub tissue_force_n: Vec<f64>,
     /// Cumulative friction `D` of the ruptured layers (N s/m).
     pub cumulative_friction_ns_per_m: Vec<f64>,
     /// Active layer, 1-based; one more than the number of layers after the last rupture.
     pub active_layer: Vec<usize>,
-    /// Instant of the first contact (s); `None` when the tip stays in the air.
+    /// Time of the first contact (s); `None` without contact.
     pub surface_contact_s: Option<f64>,
-    /// Ruptures in the order of time.
+    /// Ruptures in time order.
     pub ruptures: Vec<TrueRupture>,
 }
 

@@ -1,5 +1,5 @@
-//! Recordings of needle insertions: samples with units, their ground truth when they were simulated, CSV files
-//! with column maps, and remarks on the quality of the data.
+//! Recordings of needle insertions: samples with units, ground truth of simulated ones, CSV and other file formats with
+//! column maps, data quality.
 //!
 //! SI units everywhere; a public field carries its unit as a suffix. Signs: position is positive into the tissue, force
 //! is positive when it resists the insertion.
@@ -17,20 +17,20 @@
 //! # Ok::<(), stylet_record::RecordError>(())
 //! ```
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! |---|---|
 //! | [`recording`] | [`Recording`] and its [`Sample`]s |
-//! | [`truth`] | [`Truth`]: what a simulation knows and a sensor does not |
-//! | [`columns`] | [`ColumnMap`]: names, units and signs of somebody else's log |
-//! | [`read`], [`write`](mod@write) | CSV in and out, bit for bit |
-//! | [`long`] | recordings of any length, on disk |
-//! | [`foreign`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
-//! | `quality` | [`QualityNote`]s: dead, reversed, in air, mixed-up units, stuck, gaps, jitter, saturation, spikes, quantisation, unlike its repeats |
-//! | [`raw`] | samples that no law can be compared with: at the sensor's limit, spikes |
-//! | [`scratch`] | columns of numbers on disk |
-//! | [`thin`](mod@thin) | recordings of hours, thinned |
-//! | [`differentiate`](mod@differentiate) | velocity from position on irregular time stamps |
-//! | [`error`] | [`RecordError`]: what, where, and what would be right |
+//! | [`ground_truth`] | [`Truth`]: ground truth of a simulated recording |
+//! | [`column_map`] | [`ColumnMap`]: names, units and signs of the columns of another program's log |
+//! | [`csv_reader`], [`csv_writer`] | CSV in and out, bit for bit |
+//! | [`nonfinite_rows`] | reading CSV files with NaN or infinite values |
+//! | [`long_recording`], [`disk_table`] | recordings longer than memory, on disk |
+//! | [`file_formats`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
+//! | `quality` | [`QualityNote`]s on implausible, saturated, irregular or outlying data |
+//! | [`sensor_artefacts`] | samples that a force law cannot explain: sensor range, resolution, spikes |
+//! | [`mod@downsample`] | averaging of recordings that are too long for a diagnosis |
+//! | [`mod@differentiate`] | velocity from position on irregular time stamps |
+//! | [`error`] | [`RecordError`]: what is wrong, where, and the remedy |
 
 pub mod column_map;
 mod csv_header;
@@ -47,6 +47,8 @@ pub mod nonfinite_rows;
 mod quality;
 pub mod recording;
 mod sample_stream;
+#[cfg(test)]
+mod test_noise;
 mod timestamp_repair;
 
 pub use column_map::{Column, ColumnMap};
@@ -62,3 +64,8 @@ pub use quality::{
     MIN_SAMPLES, QualityKind, QualityNote, assess, check_usable, find_outlier_recordings, sensor_artefacts,
 };
 pub use recording::{JOINTS, Recording, Sample};
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

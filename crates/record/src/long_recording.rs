@@ -1,8 +1,7 @@
-//! Recordings of any length in little memory: the CSV file is read once, its numbers wait on disk in the folder that is named.
+//! Recordings longer than memory: the CSV file is read once into temporary files in a given folder.
 //!
-//! What is read, what is refused and what is said are those of [`read_csv`](crate::read_csv): rows, column map, repair, velocity and
-//! checks are the same code, which goes through blocks of samples. Disk: 8 bytes per sample and column, twice for a moment when rows
-//! are dropped; the files have no names and are gone with their owner.
+//! Results and errors are those of [`read_csv`](crate::read_csv): rows, column map, repair, velocity and checks are the same
+//! code, on blocks of samples. Disk space: 8 bytes per sample and column, twice that while rows are dropped.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -21,30 +20,30 @@ use crate::recording::Sample;
 use crate::sample_stream::{Quantity, SampleStream, SortedValues};
 use crate::timestamp_repair::rows_to_drop;
 
-/// The beginning of a file, in which its header has to end.
-const HEAD: u64 = 1 << 16;
-/// Rows whose time stamps may be out of order together: what `--repair` holds in memory.
-const MOST_DISORDER: usize = 1 << 20;
+/// Most bytes before the end of the header.
+const HEADER_BYTES: u64 = 1 << 16;
+/// Most consecutive rows out of time order that `--repair` handles, in memory.
+const MAX_DISORDER_ROWS: usize = 1 << 20;
 
 /// A recording on disk. Values are finite and time increases, as in [`Recording`](crate::Recording).
 #[derive(Debug)]
 pub struct LongRecording {
-    /// One column per role, then where each row begins in the file.
+    /// One column per role, then the byte offset of each row in the file.
     table: DiskTable,
     roles: Vec<ColumnRole>,
-    /// Differentiated, where none was measured.
+    /// Differentiated velocity, when none was measured.
     velocity: Option<DiskTable>,
     folder: PathBuf,
     /// Lines of rows whose time stamps did not increase.
     dropped_lines: Vec<u64>,
 }
 
-/// Reads a recording from a CSV file as [`read_csv`](crate::read_csv) does, into `folder` instead of memory. `None`: the file is not
-/// one that can be read piece by piece (no plain file, of another program, a header beyond 64 KB), and nothing was done.
+/// Reads a recording from a CSV file as [`read_csv`](crate::read_csv) does, into temporary files in `folder`. `None` when the
+/// file cannot be read in pieces (no regular file, another format, a header beyond 64 KB).
 ///
 /// # Errors
-/// Those of [`read_csv`](crate::read_csv), [`RecordError::Scratch`] when the folder does not take the numbers, and
-/// [`RecordError::DisorderTooLong`] when over 2^20 rows were to be repaired together.
+/// Those of [`read_csv`](crate::read_csv), [`RecordError::TemporaryFile`] when the folder cannot be written, and
+/// [`RecordError::DisorderTooLong`] when more than 2^20 rows are out of order together.
 pub fn read_long_csv(
     path: &Path,
     options: &ReadOptions,
@@ -55,31 +54,31 @@ pub fn read_long_csv(
     Ok(Some((recording, notes)))
 }
 
-/// Whether the header's line ends here and takes no following lines along.
-fn is_whole(text: &[u8]) -> bool {
+/// Whether the header line is complete and without an open quotation mark.
+fn header_is_complete(text: &[u8]) -> bool {
     let end = text.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
     end.is_some_and(|end| text[..end].iter().filter(|byte| **byte == b'"').count().is_multiple_of(2))
 }
 
-fn check_text_of(place: &SourceFile<'_>) -> Result<(), RecordError> {
-    let mut text = place.text.reader_at(0).map_err(|source| place.unreadable(source))?;
+fn check_utf8(file_source: &SourceFile<'_>) -> Result<(), RecordError> {
+    let mut text = file_source.text.reader_at(0).map_err(|source| file_source.unreadable(source))?;
     let mut check = Utf8Check::default();
     let mut chunk = vec![0; 1 << 18];
     loop {
-        match text.read(&mut chunk).map_err(|source| place.unreadable(source))? {
-            0 => return check.finish().map_err(|bad| bad.into_error(place)),
-            count => check.push(&chunk[..count]).map_err(|bad| bad.into_error(place))?,
+        match text.read(&mut chunk).map_err(|source| file_source.unreadable(source))? {
+            0 => return check.finish().map_err(|bad| bad.into_error(file_source)),
+            count => check.push(&chunk[..count]).map_err(|bad| bad.into_error(file_source))?,
         }
     }
 }
 
-/// The table without the rows whose time stamps do not increase, and their lines.
+/// The table without the rows whose time stamps do not increase, and the lines of these.
 fn repaired(
     table: DiskTable,
-    place: &SourceFile<'_>,
+    file_source: &SourceFile<'_>,
     folder: &Path,
 ) -> Result<(DiskTable, Vec<u64>), RecordError> {
-    let scratch = |source| RecordError::TemporaryFile { path: folder.to_owned(), source };
+    let temporary_file_error = |source| RecordError::TemporaryFile { path: folder.to_owned(), source };
     let offset_column = table.columns() - 1;
     let times = |take: &mut dyn FnMut(&[f64])| {
         let (mut block, mut bytes) = (Vec::new(), Vec::new());
@@ -89,15 +88,20 @@ fn repaired(
         }
         Ok(())
     };
-    let dropped = match rows_to_drop(times, MOST_DISORDER).map_err(scratch)? {
+    let dropped = match rows_to_drop(times, MAX_DISORDER_ROWS).map_err(temporary_file_error)? {
         Ok(dropped) if dropped.is_empty() => return Ok((table, Vec::new())),
         Ok(dropped) => dropped,
         Err(row) => {
-            let line = place.line_of_row(table.value(offset_column, row).map_err(scratch)? as usize)?;
-            return Err(RecordError::DisorderTooLong { path: place.path(), line, rows: MOST_DISORDER });
+            let line = file_source
+                .line_of_row(table.value(offset_column, row).map_err(temporary_file_error)? as usize)?;
+            return Err(RecordError::DisorderTooLong {
+                path: file_source.path(),
+                line,
+                rows: MAX_DISORDER_ROWS,
+            });
         }
     };
-    let mut left = DiskTableWriter::new(folder, table.columns()).map_err(scratch)?;
+    let mut left = DiskTableWriter::new(folder, table.columns()).map_err(temporary_file_error)?;
     let (mut row, mut next, mut offsets) = (0, dropped.iter().peekable(), Vec::new());
     let moved = table.for_each_row(|numbers| -> io::Result<()> {
         let drop = next.next_if(|dropped| **dropped == row).is_some();
@@ -108,13 +112,13 @@ fn repaired(
         }
         left.push(numbers)
     });
-    moved.map_err(scratch)?;
-    let lines = place.lines_of_offsets(offsets.into_iter())?;
-    Ok((left.finish().map_err(scratch)?, lines))
+    moved.map_err(temporary_file_error)?;
+    let lines = file_source.lines_of_offsets(offsets.into_iter())?;
+    Ok((left.finish().map_err(temporary_file_error)?, lines))
 }
 
 impl LongRecording {
-    /// The reading alone; [`LongRecording::assess`] tells what is remarkable.
+    /// Reads without the quality checks of [`LongRecording::assess`].
     ///
     /// # Errors
     /// Those of [`read_long_csv`].
@@ -128,8 +132,8 @@ impl LongRecording {
             return Ok(None);
         }
         let mut head = Vec::new();
-        (&file).take(HEAD).read_to_end(&mut head).map_err(unreadable)?;
-        let Some(header) = header_start(&head).filter(|header| is_whole(&head[*header..])) else {
+        (&file).take(HEADER_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+        let Some(header) = header_start(&head).filter(|header| header_is_complete(&head[*header..])) else {
             return Ok(None);
         };
         if FileFormat::detect(&head).is_some() {
@@ -138,33 +142,34 @@ impl LongRecording {
         if let Some(map) = &options.columns {
             map.check()?;
         }
-        let place = SourceFile { text: TextSource::File(&file), path, header };
-        check_text_of(&place)?;
+        let file_source = SourceFile { text: TextSource::File(&file), path, header };
+        check_utf8(&file_source)?;
         let layout =
-            read_layout(&head[header..], path, place.line_of_row(header)?, options.columns.as_ref())?;
+            read_layout(&head[header..], path, file_source.line_of_row(header)?, options.columns.as_ref())?;
         drop(head);
-        let scratch = |source| RecordError::TemporaryFile { path: folder.to_owned(), source };
-        let mut writer = DiskTableWriter::new(folder, layout.columns.len() + 1).map_err(scratch)?;
+        let temporary_file_error = |source| RecordError::TemporaryFile { path: folder.to_owned(), source };
+        let mut writer =
+            DiskTableWriter::new(folder, layout.columns.len() + 1).map_err(temporary_file_error)?;
         let mut row = Vec::new();
-        read_rows(&place, &layout, !options.repair, |offset, numbers| {
+        read_rows(&file_source, &layout, !options.repair, |offset, numbers| {
             row.clear();
             row.extend_from_slice(numbers);
-            // A double holds every offset below 2^53.
+            // An f64 is exact for offsets below 2^53.
             row.push(offset as f64);
-            writer.push(&row).map_err(scratch)
+            writer.push(&row).map_err(temporary_file_error)
         })?;
-        let table = writer.finish().map_err(scratch)?;
+        let table = writer.finish().map_err(temporary_file_error)?;
         let (table, dropped_lines) = match options.repair {
-            true => repaired(table, &place, folder)?,
+            true => repaired(table, &file_source, folder)?,
             false => (table, Vec::new()),
         };
-        Ok(Some(Self { dropped_lines, ..Self::new(table, &place, &layout, folder)? }))
+        Ok(Some(Self { dropped_lines, ..Self::new(table, &file_source, &layout, folder)? }))
     }
 
-    /// What is remarkable about the recording, as [`assess`](crate::assess) tells it, preceded by the repaired rows.
+    /// Quality notes as by [`assess`](crate::assess), preceded by the repaired rows.
     ///
     /// # Errors
-    /// [`RecordError::Scratch`].
+    /// [`RecordError::TemporaryFile`].
     pub fn assess(&self) -> Result<Vec<QualityNote>, RecordError> {
         let mut notes = assess_stream(self)?;
         if !self.dropped_lines.is_empty() {
@@ -175,7 +180,7 @@ impl LongRecording {
 
     fn new(
         table: DiskTable,
-        place: &SourceFile<'_>,
+        file_source: &SourceFile<'_>,
         layout: &CsvLayout,
         folder: &Path,
     ) -> Result<Self, RecordError> {
@@ -184,19 +189,23 @@ impl LongRecording {
         let mut recording =
             Self { table, roles, velocity: None, folder: folder.to_owned(), dropped_lines: Vec::new() };
         let last = match recording.table.rows().checked_sub(1) {
-            Some(last) => {
-                Some(recording.table.value(offset_column, last).map_err(|e| recording.scratch(e))? as usize)
-            }
+            Some(last) => Some(
+                recording.table.value(offset_column, last).map_err(|e| recording.temporary_file_error(e))?
+                    as usize,
+            ),
             None => None,
         };
-        check_sample_count(place, recording.len(), last)?;
+        check_sample_count(file_source, recording.len(), last)?;
         if !recording.velocity_measured() {
             let (velocity, bad) = recording.differentiated()?;
             if let Some(row) = bad {
-                let offset = recording.table.value(offset_column, row).map_err(|e| recording.scratch(e))?;
+                let offset = recording
+                    .table
+                    .value(offset_column, row)
+                    .map_err(|e| recording.temporary_file_error(e))?;
                 return Err(RecordError::VelocityNotFinite {
-                    path: place.path(),
-                    line: place.line_of_row(offset as usize)?,
+                    path: file_source.path(),
+                    line: file_source.line_of_row(offset as usize)?,
                 });
             }
             recording.velocity = Some(velocity);
@@ -204,9 +213,9 @@ impl LongRecording {
         Ok(recording)
     }
 
-    /// The slope of the position, and the first sample where it is no number.
+    /// The slope of the position, and the first sample where it is not finite.
     fn differentiated(&self) -> Result<(DiskTable, Option<usize>), RecordError> {
-        let mut writer = DiskTableWriter::new(&self.folder, 1).map_err(|e| self.scratch(e))?;
+        let mut writer = DiskTableWriter::new(&self.folder, 1).map_err(|e| self.temporary_file_error(e))?;
         let (mut sample, mut bad, mut written) = (0, None, Ok(()));
         let mut tell = |slope: f64| {
             if !slope.is_finite() {
@@ -225,7 +234,7 @@ impl LongRecording {
         })?;
         slopes.finish(tell);
         let finished = written.and_then(|()| writer.finish());
-        Ok((finished.map_err(|e| self.scratch(e))?, bad))
+        Ok((finished.map_err(|e| self.temporary_file_error(e))?, bad))
     }
 
     /// Number of samples.
@@ -240,10 +249,10 @@ impl LongRecording {
         self.len() == 0
     }
 
-    /// From the first to the last sample (s).
+    /// Time from the first to the last sample (s).
     ///
     /// # Errors
-    /// [`RecordError::Scratch`].
+    /// [`RecordError::TemporaryFile`].
     pub fn duration_s(&self) -> Result<f64, RecordError> {
         SampleStream::duration_s(self)
     }
@@ -251,7 +260,7 @@ impl LongRecording {
     /// Typical sampling rate (Hz): the inverse of the median interval.
     ///
     /// # Errors
-    /// [`RecordError::Scratch`].
+    /// [`RecordError::TemporaryFile`].
     pub fn sample_hz(&self) -> Result<f64, RecordError> {
         Ok(1.0 / self.median_interval_s()?)
     }
@@ -267,11 +276,11 @@ impl LongRecording {
             ColumnRole::ForceVirtual => "force_virtual_n".to_owned(),
             ColumnRole::JointTorque(joint) => joint_torque_name(joint),
         };
-        self.in_order().into_iter().map(|column| name(self.roles[column])).collect()
+        self.written_order().into_iter().map(|column| name(self.roles[column])).collect()
     }
 
-    /// The columns as they are written.
-    fn in_order(&self) -> Vec<usize> {
+    /// Table columns in the order of [`LongRecording::column_names`].
+    fn written_order(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.roles.len()).collect();
         order.sort_by_key(|column| match self.roles[*column] {
             ColumnRole::Time => 0,
@@ -284,24 +293,26 @@ impl LongRecording {
         order
     }
 
-    /// Hands over every sample, with its row under [`LongRecording::names`].
+    /// Calls `each` with every sample and its row in the order of [`LongRecording::column_names`].
     ///
     /// # Errors
-    /// [`RecordError::Scratch`], and what `each` says.
+    /// [`RecordError::TemporaryFile`], and the error of `each`.
     pub fn for_each_sample<E: From<RecordError>>(
         &self,
         mut each: impl FnMut(Sample, &[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let columns = self.in_order();
-        let mut held = vec![Vec::new(); columns.len()];
+        let columns = self.written_order();
+        let mut buffers = vec![Vec::new(); columns.len()];
         let (mut row, mut velocity_mps, mut bytes) = (vec![0.0; columns.len()], Vec::new(), Vec::new());
         for block in 0..self.table.block_count() {
-            for (held, column) in held.iter_mut().zip(&columns) {
-                self.table.read_block(block, *column, held, &mut bytes).map_err(|e| self.scratch(e))?;
+            for (buffers, column) in buffers.iter_mut().zip(&columns) {
+                self.table
+                    .read_block(block, *column, buffers, &mut bytes)
+                    .map_err(|e| self.temporary_file_error(e))?;
             }
             self.read_block(block, Quantity::Velocity, &mut velocity_mps, &mut bytes)?;
             for (at, velocity_mps) in velocity_mps.iter().enumerate() {
-                row.iter_mut().zip(&held).for_each(|(x, held)| *x = held[at]);
+                row.iter_mut().zip(&buffers).for_each(|(x, buffers)| *x = buffers[at]);
                 let [time_s, position_m, force_n, ..] = row[..] else { continue };
                 each(Sample { time_s, position_m, velocity_mps: *velocity_mps, force_n }, &row)?;
             }
@@ -309,10 +320,10 @@ impl LongRecording {
         Ok(())
     }
 
-    /// Time (s) of the first sample at this position or further in.
+    /// Time (s) of the first sample at or beyond this position.
     ///
     /// # Errors
-    /// [`RecordError::Scratch`].
+    /// [`RecordError::TemporaryFile`].
     pub fn first_time_beyond_s(&self, position_m: f64) -> Result<Option<f64>, RecordError> {
         let mut found = None;
         self.for_each_block([Quantity::Time, Quantity::Position], |[time_s, at_m]| {
@@ -323,17 +334,17 @@ impl LongRecording {
         Ok(found)
     }
 
-    /// The folder that the numbers are in.
+    /// Folder of the temporary files.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    fn scratch(&self, source: io::Error) -> RecordError {
+    fn temporary_file_error(&self, source: io::Error) -> RecordError {
         RecordError::TemporaryFile { path: self.folder.clone(), source }
     }
 
-    fn place_of(&self, which: Quantity) -> (&DiskTable, usize) {
+    fn locate(&self, which: Quantity) -> (&DiskTable, usize) {
         let role = match which {
             Quantity::Time => ColumnRole::Time,
             Quantity::Position => ColumnRole::Position,
@@ -342,7 +353,7 @@ impl LongRecording {
         };
         match (&self.velocity, which) {
             (Some(velocity), Quantity::Velocity) => (velocity, 0),
-            // Time, position and force are always there.
+            // Time, position and force always exist.
             _ => (&self.table, self.roles.iter().position(|r| *r == role).unwrap_or(0)),
         }
     }
@@ -354,14 +365,14 @@ impl LongRecording {
         into: &mut Vec<f64>,
         bytes: &mut Vec<u8>,
     ) -> Result<(), RecordError> {
-        let (table, column) = self.place_of(which);
-        table.read_block(block, column, into, bytes).map_err(|e| self.scratch(e))
+        let (table, column) = self.locate(which);
+        table.read_block(block, column, into, bytes).map_err(|e| self.temporary_file_error(e))
     }
 }
 
 impl SampleStream for LongRecording {
     type Error = RecordError;
-    type Sorted = KeptOnDisk;
+    type Sorted = SortedOnDisk;
 
     fn len(&self) -> usize {
         self.table.rows()
@@ -376,45 +387,45 @@ impl SampleStream for LongRecording {
         which: [Quantity; N],
         mut each: impl FnMut([&[f64]; N]),
     ) -> Result<(), RecordError> {
-        let mut held: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(BLOCK_ROWS));
+        let mut buffers: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(BLOCK_ROWS));
         let mut bytes = Vec::new();
         for block in 0..self.table.block_count() {
-            for (held, which) in held.iter_mut().zip(which) {
-                self.read_block(block, which, held, &mut bytes)?;
+            for (buffers, which) in buffers.iter_mut().zip(which) {
+                self.read_block(block, which, buffers, &mut bytes)?;
             }
-            each(std::array::from_fn(|at| held[at].as_slice()));
+            each(std::array::from_fn(|at| buffers[at].as_slice()));
         }
         Ok(())
     }
 
     fn at(&self, which: Quantity, sample: usize) -> Result<f64, RecordError> {
-        let (table, column) = self.place_of(which);
-        table.value(column, sample).map_err(|e| self.scratch(e))
+        let (table, column) = self.locate(which);
+        table.value(column, sample).map_err(|e| self.temporary_file_error(e))
     }
 
     fn sorted_values(
         &self,
         fill: impl FnOnce(&mut dyn FnMut(f64)) -> Result<(), RecordError>,
-    ) -> Result<KeptOnDisk, RecordError> {
-        let mut sorting = ExternalSort::new(&self.folder).map_err(|e| self.scratch(e))?;
+    ) -> Result<SortedOnDisk, RecordError> {
+        let mut sorting = ExternalSort::new(&self.folder).map_err(|e| self.temporary_file_error(e))?;
         let mut written = Ok(());
         fill(&mut |x| {
             if written.is_ok() {
                 written = sorting.push(x);
             }
         })?;
-        let table = written.and_then(|()| sorting.finish()).map_err(|e| self.scratch(e))?;
-        Ok(KeptOnDisk { table, folder: self.folder.clone() })
+        let table = written.and_then(|()| sorting.finish()).map_err(|e| self.temporary_file_error(e))?;
+        Ok(SortedOnDisk { table, folder: self.folder.clone() })
     }
 }
 
-/// Numbers in a table of one column.
-pub(crate) struct KeptOnDisk {
+/// Sorted values in a table of one column.
+pub(crate) struct SortedOnDisk {
     table: DiskTable,
     folder: PathBuf,
 }
 
-impl SortedValues for KeptOnDisk {
+impl SortedValues for SortedOnDisk {
     type Error = RecordError;
 
     fn len(&self) -> usize {

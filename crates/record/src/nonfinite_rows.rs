@@ -1,4 +1,4 @@
-//! Recordings with holes: rows whose values are no finite numbers are cut out and reported.
+//! Reading CSV files with NaN or infinite values: such rows are dropped and reported.
 
 use crate::csv_reader::{ReadOptions, read_csv, read_csv_bytes};
 use crate::error::RecordError;
@@ -7,10 +7,10 @@ use crate::quality::{QualityKind, QualityNote};
 use crate::recording::Recording;
 use std::path::Path;
 
-/// As [`crate::read_csv`]; rows with a value that is no finite number are cut out and reported.
+/// As [`crate::read_csv`]; rows with a value that is not finite are dropped and reported.
 ///
 /// # Errors
-/// As [`crate::read_csv`], but for values that are not finite: those only when hardly a row is left.
+/// As [`crate::read_csv`], except for values that are not finite: those only when fewer than three rows remain.
 pub fn read_csv_skip_nonfinite(
     path: &Path,
     options: &ReadOptions,
@@ -25,34 +25,30 @@ pub fn read_csv_skip_nonfinite(
         None => bytes,
     };
     let Ok(text) = String::from_utf8(bytes) else { return Err(error) };
-    let hole = |line: &&str| {
+    let is_nonfinite = |line: &&str| {
         line.split([',', ';', '\t', '|']).any(|x| {
             let x = x.trim().trim_matches('"');
             x.parse::<f64>().is_ok_and(|x| !x.is_finite())
         })
     };
-    let kept: Vec<&str> = text.lines().filter(|l| !hole(l)).collect();
+    let kept: Vec<&str> = text.lines().filter(|l| !is_nonfinite(l)).collect();
     let (all, left) = (text.lines().count(), kept.len());
     if left < 3 {
         return Err(error);
     }
     let (recording, mut notes) = read_csv_bytes((kept.join("\n") + "\n").as_bytes(), path, options)?;
-    let message =
-        format!("{} row(s) hold a value that is not a finite number: they were cut out", all - left);
+    let message = format!("{} row(s) with a value that is not a finite number were dropped", all - left);
     notes.insert(
         0,
         QualityNote {
-            kind: QualityKind::Gaps,
-            message,
-            numbers: [("count".to_owned(), (all - left) as f64)].into_iter().collect(),
             lines: text
                 .lines()
                 .enumerate()
-                .filter(|(_, l)| hole(l))
+                .filter(|(_, l)| is_nonfinite(l))
                 .take(100)
                 .map(|(k, _)| k as u64 + 1)
                 .collect(),
-            blocking: false,
+            ..QualityNote::new(QualityKind::Gaps, message, [("count", (all - left) as f64)])
         },
     );
     Ok((recording, notes))

@@ -1,4 +1,4 @@
-//! A recording: what a needle did and what the sensor said, one row per time stamp.
+//! A recording: motion of the needle and measured force, one sample per time stamp.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::error::RecordError;
 /// Joints of the arm whose torques a recording may hold.
 pub const JOINTS: usize = 7;
 
-/// One instant of a [`Recording`].
+/// One sample of a [`Recording`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// Time (s).
@@ -25,8 +25,7 @@ pub struct Sample {
 ///
 /// The fields are public because every consumer works on columns. [`Recording::new`],
 /// [`Recording::with_velocity`] and [`crate::read_csv`] return recordings whose values are finite and whose time stamps
-/// strictly increase; whoever fills the columns by hand can ask [`Recording::check`]. Sampling may be irregular; nothing
-/// in this crate resamples.
+/// strictly increase; for columns filled by hand there is [`Recording::check`]. Sampling may be irregular.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recording {
@@ -34,7 +33,7 @@ pub struct Recording {
     pub time_s: Vec<f64>,
     /// Tip position (m), positive into the tissue.
     pub position_m: Vec<f64>,
-    /// Axial force (N) as the force sensor gives it, positive when it resists the insertion.
+    /// Axial force (N) of the force sensor, positive when it resists the insertion.
     pub force_n: Vec<f64>,
     /// Tip velocity (m/s): measured, or the slope of the position ([`mod@crate::differentiate`]).
     pub velocity_mps: Vec<f64>,
@@ -54,7 +53,7 @@ impl Recording {
     /// # Errors
     /// As [`Recording::check`].
     pub fn new(time_s: Vec<f64>, position_m: Vec<f64>, force_n: Vec<f64>) -> Result<Self, RecordError> {
-        // Checked before differentiating, which asks for increasing time; the velocity's length is right by construction.
+        // Differentiation requires increasing time.
         let mut recording =
             Self { velocity_mps: vec![0.0; time_s.len()], time_s, position_m, force_n, ..Self::default() };
         recording.check()?;
@@ -96,7 +95,7 @@ impl Recording {
         }
     }
 
-    /// Checks the promises of the type: columns of one length, at least two samples, finite values, increasing time.
+    /// Checks the invariants of the type: columns of one length, at least two samples, finite values, increasing time.
     ///
     /// # Errors
     /// [`RecordError::TooShort`], [`RecordError::LengthMismatch`], [`RecordError::NotFiniteAt`] or
@@ -148,7 +147,7 @@ impl Recording {
         self.time_s.is_empty()
     }
 
-    /// The samples in the order of time.
+    /// The samples in time order.
     pub fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
         let motion = self.time_s.iter().zip(&self.position_m).zip(&self.velocity_mps);
         motion.zip(&self.force_n).map(|(((&time_s, &position_m), &velocity_mps), &force_n)| Sample {
@@ -159,7 +158,7 @@ impl Recording {
         })
     }
 
-    /// From the first to the last sample (s); 0 without samples.
+    /// Time from the first to the last sample (s); 0 without samples.
     pub fn duration_s(&self) -> f64 {
         match (self.time_s.first(), self.time_s.last()) {
             (Some(first), Some(last)) => last - first,
@@ -199,7 +198,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sampling_rate_is_the_typical_one_in_spite_of_a_gap() -> Result<(), RecordError> {
+    fn the_sampling_rate_is_the_median_one_in_spite_of_a_gap() -> Result<(), RecordError> {
         let mut time_s: Vec<f64> = (0..100).map(|i| f64::from(i) * 0.005).collect();
         time_s.extend((0..100).map(|i| 3.0 + f64::from(i) * 0.005));
         let recording = Recording::new(time_s, vec![0.0; 200], vec![0.0; 200])?;
@@ -209,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_pair_what_belongs_to_one_instant() -> Result<(), RecordError> {
+    fn samples_have_the_values_of_one_time_stamp() -> Result<(), RecordError> {
         let recording =
             Recording::with_velocity(vec![0.0, 1.0], vec![0.1, 0.2], vec![0.3, 0.4], vec![5.0, 6.0])?;
         let last = recording.samples().last();
@@ -220,18 +219,18 @@ mod tests {
 
     #[test]
     fn a_recording_built_in_memory_is_checked_like_one_from_a_file() {
-        let says = |result: Result<Recording, RecordError>, words: &str| {
+        let refuses = |result: Result<Recording, RecordError>, words: &str| {
             let message = result.map(|_| ()).expect_err("must be refused").to_string();
             assert!(message.contains(words), "{message}");
         };
-        says(Recording::new(vec![0.0], vec![0.0], vec![0.0]), "at least 2");
-        says(Recording::new(vec![0.0, 1.0], vec![0.0], vec![0.0; 2]), "position_m has 1 values");
-        says(
+        refuses(Recording::new(vec![0.0], vec![0.0], vec![0.0]), "at least 2");
+        refuses(Recording::new(vec![0.0, 1.0], vec![0.0], vec![0.0; 2]), "position_m has 1 values");
+        refuses(
             Recording::new(vec![0.0, 1.0], vec![0.0, f64::NAN], vec![0.0; 2]),
             "position_m: the value at index 1",
         );
-        says(Recording::new(vec![0.0, 0.0], vec![0.0; 2], vec![0.0; 2]), "time must increase");
-        says(
+        refuses(Recording::new(vec![0.0, 0.0], vec![0.0; 2], vec![0.0; 2]), "time must increase");
+        refuses(
             Recording::new(vec![0.0, 1e-300], vec![0.0, 1e300], vec![0.0; 2]),
             "velocity_mps (differentiated)",
         );

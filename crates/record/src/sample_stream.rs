@@ -1,10 +1,10 @@
-//! A recording as something to be gone through, as often as needed: in memory or on disk, the checks are the same.
+//! Samples of a recording in blocks, in memory or on disk, so that the checks of both are the same code.
 
 use crate::recording::Recording;
 use std::convert::Infallible;
 use stylet_stats::quantiles_of_stream;
 
-/// A quantity that every recording has.
+/// A column that every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Time in s.
@@ -17,11 +17,11 @@ pub enum Quantity {
     Force,
 }
 
-/// Samples in the order of time, in blocks.
+/// Samples in time order, in blocks, for any number of passes.
 pub(crate) trait SampleStream {
-    /// What can go wrong on the way.
+    /// Error of a pass.
     type Error;
-    /// Numbers that were worked out and are needed again.
+    /// Sorted values, in memory or on disk.
     type Sorted: SortedValues<Error = Self::Error>;
 
     /// Number of samples.
@@ -30,28 +30,28 @@ pub(crate) trait SampleStream {
     /// Whether the velocity was measured.
     fn velocity_measured(&self) -> bool;
 
-    /// Hands over all samples, block by block.
+    /// Calls `each` with all samples, block by block.
     fn for_each_block<const N: usize>(
         &self,
         which: [Quantity; N],
         each: impl FnMut([&[f64]; N]),
     ) -> Result<(), Self::Error>;
 
-    /// The quantity in one sample, counted from 0.
+    /// The quantity of one sample (0-based).
     fn at(&self, which: Quantity, sample: usize) -> Result<f64, Self::Error>;
 
-    /// Keeps the numbers that `fill` gives, in ascending order.
+    /// Stores the values that `fill` passes on, in ascending order.
     fn sorted_values(
         &self,
         fill: impl FnOnce(&mut dyn FnMut(f64)) -> Result<(), Self::Error>,
     ) -> Result<Self::Sorted, Self::Error>;
 
-    /// Hands over one quantity, sample by sample.
+    /// Calls `each` with one quantity, sample by sample.
     fn for_each_value(&self, which: Quantity, mut each: impl FnMut(f64)) -> Result<(), Self::Error> {
         self.for_each_block([which], |[block]| block.iter().for_each(|x| each(*x)))
     }
 
-    /// Hands over what every two neighbours have.
+    /// Calls `each` with one quantity of every two consecutive samples.
     fn for_each_pair(&self, which: Quantity, mut each: impl FnMut(f64, f64)) -> Result<(), Self::Error> {
         let mut before = None;
         self.for_each_value(which, |x| {
@@ -74,7 +74,7 @@ pub(crate) trait SampleStream {
         Ok(of.first().copied().unwrap_or(f64::NAN))
     }
 
-    /// From the first to the last sample (s).
+    /// Time from the first to the last sample (s).
     fn duration_s(&self) -> Result<f64, Self::Error> {
         match self.len() {
             0 => Ok(0.0),
@@ -83,15 +83,15 @@ pub(crate) trait SampleStream {
     }
 }
 
-/// Numbers that were kept.
+/// Values in ascending order.
 pub(crate) trait SortedValues {
-    /// What can go wrong on the way.
+    /// Error of a pass.
     type Error;
 
-    /// How many.
+    /// Number of values.
     fn len(&self) -> usize;
 
-    /// Hands them over.
+    /// Calls `each` with every value.
     fn for_each(&self, each: impl FnMut(f64)) -> Result<(), Self::Error>;
 }
 

@@ -1,10 +1,10 @@
-//! Time stamps that do not increase: the fewest rows to drop.
+//! Repair of time stamps that do not increase: which rows to drop.
 
-/// Which rows to keep so that time strictly increases and the fewest rows are lost; `None` when nothing is wrong.
+/// Rows to keep so that time strictly increases and the fewest rows are dropped; `None` when time increases already.
 ///
-/// Of several equally short sets of losses the earlier rows stay: the second of two equal time stamps goes, and so does
-/// a row that falls back behind its predecessor; but a single stamp that jumps far ahead goes alone instead of taking all
-/// rows after it along. (A longest strictly increasing subsequence, the earliest one; `O(n log n)`.)
+/// Of several smallest sets the later rows are dropped: the second of two equal time stamps, and a row that falls back behind
+/// its predecessor; but a single stamp that jumps far ahead is dropped alone. (The earliest longest strictly increasing
+/// subsequence, in `O(n log n)`.)
 pub(crate) fn rows_to_keep(time_s: &[f64]) -> Option<Vec<bool>> {
     if time_s.windows(2).all(|pair| pair[1] > pair[0]) {
         return None;
@@ -34,12 +34,13 @@ pub(crate) fn rows_to_keep(time_s: &[f64]) -> Option<Vec<bool>> {
     Some(keep.collect())
 }
 
-/// Which of many rows to drop, in ascending order: those that [`rows_to_keep`] would not keep. `pass` hands over all time stamps, block
-/// by block, whenever it is asked. Memory holds one block and the longest stretch of disorder, from a row that is later than one behind
-/// it to where all rows are later than all before.
+/// Rows to drop, in ascending order: those that [`rows_to_keep`] would not keep, for any number of rows.
+///
+/// `pass` calls its argument with all time stamps, block by block, and is called twice. Memory holds one block and the
+/// longest disorder, from a row that is later than a following one to the row where all are later than all before.
 ///
 /// # Errors
-/// What `pass` says. `Err` within: the row at which a disorder of over `most` rows begins.
+/// The error of `pass`. `Err` within: the first row of a disorder of more than `most` rows.
 pub(crate) fn rows_to_drop<E>(
     pass: impl Fn(&mut dyn FnMut(&[f64])) -> Result<(), E>,
     most: usize,
@@ -94,7 +95,7 @@ pub(crate) fn rows_to_drop<E>(
     Ok(too_long.map_or(Ok(dropped), Err))
 }
 
-/// The values of the rows that are kept.
+/// The values of the rows to keep.
 pub(crate) fn retain_rows<T: Copy>(values: &[T], keep: &[bool]) -> Vec<T> {
     values.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
 }
@@ -110,19 +111,19 @@ mod tests {
     }
 
     #[test]
-    fn a_repeated_stamp_and_a_step_back_lose_the_later_row() {
+    fn of_a_repeated_stamp_or_a_step_back_the_later_row_is_dropped() {
         assert_eq!(rows_to_keep(&[0.0, 1.0, 1.0, 2.0]), Some(vec![true, true, false, true]));
         assert_eq!(rows_to_keep(&[0.0, 1.0, 2.0, 1.5, 3.0]), Some(vec![true, true, true, false, true]));
         assert_eq!(rows_to_keep(&[0.0, 1.0, 2.0]), None);
     }
 
     #[test]
-    fn one_stamp_far_ahead_does_not_take_the_rest_of_the_run_along() {
+    fn one_stamp_far_ahead_is_dropped_alone() {
         assert_eq!(repaired(&[0.0, 1.0, 1e12, 2.0, 3.0]), [0.0, 1.0, 2.0, 3.0]);
     }
 
     #[test]
-    fn of_two_runs_in_one_file_the_longer_stays_and_of_equal_ones_the_first() {
+    fn of_two_recordings_in_one_file_the_longer_stays_and_of_equal_ones_the_first() {
         assert_eq!(rows_to_keep(&[0.0, 1.0, 0.0, 1.0]), Some(vec![true, true, false, false]));
         assert_eq!(rows_to_keep(&[5.0, 6.0, 0.0, 1.0, 2.0]), Some(vec![false, false, true, true, true]));
     }
@@ -144,7 +145,7 @@ mod tests {
         }
 
         #[test]
-        fn block_by_block_the_same_rows_are_dropped(
+        fn the_blockwise_repair_drops_the_same_rows(
             steps in prop::collection::vec(-3_i8..6, 1..60),
             block in 1_usize..20,
         ) {

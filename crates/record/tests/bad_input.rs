@@ -1,5 +1,4 @@
-//! Promise: an input that cannot be used is refused with a message that says what, where (file, line, column) and what would
-//! be right. Why: a wrong number that passes as data costs more than a refused file.
+//! Promise: invalid input is refused with a message that names file, line, column and remedy.
 
 use std::path::Path;
 
@@ -15,9 +14,9 @@ fn refusal(bytes: &[u8]) -> RecordError {
     refusal_with(bytes, &ReadOptions::default())
 }
 
-/// The message holds the file and all the words.
+/// The message contains the file and all the words.
 #[track_caller]
-fn says(error: &RecordError, words: &[&str]) {
+fn contains_all(error: &RecordError, words: &[&str]) {
     let message = error.to_string();
     for word in ["logs/run7.csv:"].iter().chain(words) {
         assert!(message.contains(word), "{word:?} is missing in: {message}");
@@ -25,7 +24,7 @@ fn says(error: &RecordError, words: &[&str]) {
 }
 
 #[test]
-fn a_path_to_nowhere_asks_to_check_the_path() {
+fn a_missing_file_is_refused() {
     let error = read_csv("no/such/recording.csv", &ReadOptions::default()).map(|_| ()).expect_err("no file");
     let message = error.to_string();
     assert!(matches!(error, RecordError::NoSuchFile { .. }), "{message}");
@@ -42,11 +41,11 @@ fn a_folder_is_not_a_recording() {
 }
 
 #[test]
-fn an_empty_file_is_told_what_a_recording_needs() {
-    for nothing in [&b""[..], b"\n\r\n  \n", b"\xEF\xBB\xBF"] {
-        let error = refusal(nothing);
+fn an_empty_file_is_refused_with_what_a_recording_needs() {
+    for empty in [&b""[..], b"\n\r\n  \n", b"\xEF\xBB\xBF"] {
+        let error = refusal(empty);
         assert!(matches!(error, RecordError::EmptyFile { .. }));
-        says(&error, &["the file is empty", "a header line and at least 2 rows"]);
+        contains_all(&error, &["the file is empty", "a header line and at least 2 rows"]);
     }
 }
 
@@ -54,36 +53,36 @@ fn an_empty_file_is_told_what_a_recording_needs() {
 fn a_header_without_rows_is_named_with_its_line() {
     let error = refusal(b"\n\ntime_s,position_m,force_n\n\n");
     assert!(matches!(error, RecordError::HeaderOnly { line: 3, .. }));
-    says(&error, &["line 3", "no row follows", "at least 2 rows"]);
+    contains_all(&error, &["line 3", "no row follows", "at least 2 rows"]);
 }
 
 #[test]
 fn a_single_sample_has_no_velocity() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n");
-    says(&error, &["1 sample(s) by line 2", "at least 2 samples"]);
+    contains_all(&error, &["1 sample(s) by line 2", "at least 2 samples"]);
     let repair = ReadOptions { repair: true, ..ReadOptions::default() };
     let error = refusal_with(b"time_s,position_m,force_n\n0,0,0\n0,0,0\n0,0,0\n", &repair);
     assert!(matches!(error, RecordError::TooFewSamples { samples: 1, .. }), "{error}");
 }
 
 #[test]
-fn a_binary_file_is_told_the_byte_where_text_ends() {
-    says(
+fn a_binary_file_is_refused_with_the_byte_where_text_ends() {
+    contains_all(
         &refusal(b"time_s,position_m,force_n\n0,0,\xC3\x28\n"),
         &["byte 30 (line 2)", "UTF-8", "export the data as CSV"],
     );
-    says(
+    contains_all(
         &refusal(b"time_s,position_m,force_n\n0,0,\0\n"),
         &["a zero byte at byte 30 (line 2)", "export the data as CSV"],
     );
-    says(&refusal(b"\xFF\xFEt\0i\0m\0e\0"), &["UTF-16 byte order mark at byte 0 (line 1)", "export"]);
-    says(&refusal(b"PK\x03\x04rest"), &["a spreadsheet?", "byte 0", "export"]);
+    contains_all(&refusal(b"\xFF\xFEt\0i\0m\0e\0"), &["UTF-16 byte order mark at byte 0 (line 1)", "export"]);
+    contains_all(&refusal(b"PK\x03\x04rest"), &["a spreadsheet?", "byte 0", "export"]);
 }
 
 #[test]
 fn a_missing_column_lists_those_that_exist_and_the_closest_spelling() {
     let error = refusal(b"time_s,posision_m,force_n\n0,0,0\n1,1,1\n");
-    says(
+    contains_all(
         &error,
         &[
             "line 1",
@@ -105,36 +104,39 @@ fn a_column_of_the_map_that_the_file_lacks_is_named_with_its_quantity() {
     };
     let options = ReadOptions { columns: Some(map), repair: false };
     let error = refusal_with(b"time;pz;fz\n0;0;0\n1;1;1\n", &options);
-    says(&error, &["\"Fz\" (the column map's force)", "\"time\", \"pz\", \"fz\"", "the closest is \"fz\""]);
+    contains_all(
+        &error,
+        &["\"Fz\" (the column map's force)", "\"time\", \"pz\", \"fz\"", "the closest is \"fz\""],
+    );
 }
 
 #[test]
 fn six_joint_torques_are_one_too_few() {
     let text = "time_s,position_m,force_n,joint_torque_1_nm,joint_torque_2_nm\n0,0,0,1,1\n1,1,1,1,1\n";
-    says(&refusal(text.as_bytes()), &["\"joint_torque_3_nm\"", "all seven joints or none"]);
+    contains_all(&refusal(text.as_bytes()), &["\"joint_torque_3_nm\"", "all seven joints or none"]);
 }
 
 #[test]
 fn two_columns_of_one_name_are_ambiguous() {
     let error = refusal(b"time_s,position_m,force_n,force_n\n0,0,0,0\n1,1,1,1\n");
-    says(&error, &["line 1", "\"force_n\" twice", "rename"]);
+    contains_all(&error, &["line 1", "\"force_n\" twice", "rename"]);
 }
 
 #[test]
 fn text_in_a_number_is_shown_with_line_column_and_remedy() {
     let row = |field: &str| refusal(format!("{HEADER}0,0,0\n\n1,{field},0\n").as_bytes());
-    says(
+    contains_all(
         &row("fast"),
         &["line 4, column \"position_m\"", "\"fast\" is not a number", "write a decimal number such as"],
     );
-    says(
+    contains_all(
         &row(""),
         &["line 4, column \"position_m\"", "an empty field", "fill in the value or remove the row"],
     );
-    says(&row("1_000"), &["line 4", "\"1_000\" is not a number"]);
-    says(&row(&"x".repeat(5000)), &["xxx\"... is not a number"]);
+    contains_all(&row("1_000"), &["line 4", "\"1_000\" is not a number"]);
+    contains_all(&row(&"x".repeat(5000)), &["xxx\"... is not a number"]);
     let decimal_comma = refusal(b"time_s;position_m;force_n\n0,01;0;0\n");
-    says(
+    contains_all(
         &decimal_comma,
         &["line 2, column \"time_s\"", "\"0,01\"", "decimal point instead of the decimal comma"],
     );
@@ -145,46 +147,46 @@ fn numbers_that_are_not_finite_are_refused() {
     for text in ["NaN", "nan", "inf", "-inf", "Infinity", "1e999"] {
         let error = refusal(format!("{HEADER}0,0,0\r\n1,0,{text}\r\n").as_bytes());
         assert!(matches!(error, RecordError::NotFinite { line: 3, .. }), "{error}");
-        says(&error, &["line 3, column \"force_n\"", text, "remove the row or correct the value"]);
+        contains_all(&error, &["line 3, column \"force_n\"", text, "remove the row or correct the value"]);
     }
     let huge = ColumnMap { force: Column::scaled("force_n", 1e300), ..ColumnMap::default() };
     let error = refusal_with(
         b"time_s,position_m,force_n\n0,0,1e300\n1,1,1\n",
         &ReadOptions { columns: Some(huge), repair: false },
     );
-    says(&error, &["line 2", "1e300", "the column map's scale"]);
+    contains_all(&error, &["line 2", "1e300", "the column map's scale"]);
 }
 
 #[test]
 fn a_row_cut_short_or_too_long_is_named_with_both_counts() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n1,0.0\n");
-    says(&error, &["line 3", "the row has 2 fields, the header has 3", "complete or remove the row"]);
+    contains_all(&error, &["line 3", "the row has 2 fields, the header has 3", "complete or remove the row"]);
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n1,0,0,0");
-    says(&error, &["line 3", "the row has 4 fields"]);
+    contains_all(&error, &["line 3", "the row has 4 fields"]);
 }
 
 #[test]
-fn an_open_quotation_mark_does_not_swallow_the_file_in_silence() {
+fn an_open_quotation_mark_is_reported_and_not_the_end_of_the_data() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n1,\"0,0\n2,0,0\n3,0,0\n");
-    says(&error, &["line 3", "complete or remove the row"]);
+    contains_all(&error, &["line 3", "complete or remove the row"]);
 }
 
 #[test]
 fn time_that_runs_backward_is_named_with_both_lines() {
     let error = refusal(b"time_s,position_m,force_n\n0,0,0\n0.2,0,0\n\n0.1,0,0\n");
     assert!(matches!(error, RecordError::BackwardTime { line: 5, previous_line: 3, .. }), "{error}");
-    says(&error, &["line 5, column \"time_s\"", "0.1 s after 0.2 s on line 3", "--repair"]);
+    contains_all(&error, &["line 5, column \"time_s\"", "0.1 s after 0.2 s on line 3", "--repair"]);
 }
 
 #[test]
 fn a_repeated_time_stamp_is_named_with_both_lines() {
     let error = refusal(b"time_s,position_m,force_n\r\n0,0,0\r\n0.2,0,0\r\n0.2,0,0\r\n");
     assert!(matches!(error, RecordError::RepeatedTime { line: 4, previous_line: 3, .. }), "{error}");
-    says(&error, &["line 4", "repeats that of line 3", "--repair"]);
+    contains_all(&error, &["line 4", "repeats that of line 3", "--repair"]);
 }
 
 #[test]
-fn a_scale_of_zero_is_refused_before_the_file_is_looked_at() {
+fn a_scale_of_zero_is_refused_before_the_file_is_read() {
     let map = ColumnMap { position: Column::scaled("pz", 0.0), ..ColumnMap::default() };
     let message = refusal_with(b"", &ReadOptions { columns: Some(map), repair: false }).to_string();
     assert!(

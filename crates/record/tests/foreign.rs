@@ -1,4 +1,4 @@
-//! Promise: files that other programs wrote are read like a CSV export of them, and what is broken is said with the place.
+//! Promise: files of other programs are read like their CSV export, and damaged files are refused with an error.
 #![cfg(feature = "formats")]
 
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ fn a_parquet_file_of_a_notebook_is_read() {
 }
 
 #[test]
-fn an_mcap_file_with_position_and_force_on_topics_of_their_own_is_read() {
+fn an_mcap_file_with_position_and_force_on_separate_topics_is_read() {
     // The topic has a dot itself. Poses end 30 ms before the last force: behind them nothing is made up.
     let options = mapped(
         Column::si("/ft.sensor.log_time"),
@@ -86,7 +86,7 @@ fn round_trips_keep_every_sample() {
 }
 
 #[test]
-fn a_column_that_is_not_there_is_named_with_those_that_are() {
+fn a_missing_column_is_reported_with_the_existing_ones() {
     let options = mapped(Column::si("time"), Column::si("pz"), Column::si("log.wrench"));
     let said = read_csv(file("matlab.mat"), &options).expect_err("no such column").to_string();
     assert!(said.contains("log.wrench.3") && said.contains("matlab.mat"), "{said}");
@@ -96,7 +96,7 @@ fn a_column_that_is_not_there_is_named_with_those_that_are() {
 
 /// Cut at many places and with bytes changed: an error that names the file, or a recording; never a panic.
 #[test]
-fn broken_files_are_refused_with_their_name_and_never_stop_the_program() {
+fn damaged_files_are_refused_without_a_panic() {
     let whole: Vec<(&str, ReadOptions)> = vec![
         (
             "matlab.mat",

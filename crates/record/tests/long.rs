@@ -1,5 +1,5 @@
-//! Promise: a recording read piece by piece, for which memory need not grow, is the one read at once: the same numbers to the bit, the
-//! same notes, the same errors with the same lines.
+//! Promise: reading a recording in pieces, with bounded memory, gives the same samples bit for bit, the same notes and the same
+//! errors as reading it at once.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -8,23 +8,23 @@ use stylet_record::{
     Column, ColumnMap, QualityNote, ReadOptions, RecordError, Recording, read_csv, read_long_csv, write_csv,
 };
 
-struct Scratch(PathBuf);
+struct TempFolder(PathBuf);
 
-impl Scratch {
+impl TempFolder {
     fn new(name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("stylet-long-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a scratch folder");
+        std::fs::create_dir_all(&folder).expect("a folder folder");
         Self(folder)
     }
 }
 
-impl Drop for Scratch {
+impl Drop for TempFolder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
-/// Uniform numbers in -0.5 to 0.5, the same every time.
+/// Uniform numbers in -0.5 to 0.5 with a fixed seed.
 fn scatter(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -62,8 +62,8 @@ fn text(rows: &[[f64; 4]], velocity: bool) -> String {
 
 type Read = Result<(Vec<u8>, Vec<[u64; 4]>, Vec<QualityNote>), String>;
 
-/// What a reader says, so that it can be compared: the table it would write, the samples' bits, the notes.
-fn at_once(path: &Path, options: &ReadOptions) -> Read {
+/// Results of a reader for comparison: the table it writes, the bits of the samples, the notes.
+fn read_at_once(path: &Path, options: &ReadOptions) -> Read {
     let (recording, notes) = read_csv(path, options).map_err(|e| e.to_string())?;
     let mut table = Vec::new();
     write_csv(&recording, None, &[], &mut table).map_err(|e| e.to_string())?;
@@ -76,29 +76,29 @@ fn bits(recording: &Recording) -> Vec<[u64; 4]> {
     recording.samples().map(bits).collect()
 }
 
-fn piece_by_piece(path: &Path, options: &ReadOptions, folder: &Path) -> Option<Read> {
+fn read_in_pieces(path: &Path, options: &ReadOptions, folder: &Path) -> Option<Read> {
     let (recording, notes) = match read_long_csv(path, options, folder) {
         Ok(read) => read?,
         Err(error) => return Some(Err(error.to_string())),
     };
     let mut table = recording.column_names().join(",") + "\n";
     let mut samples = Vec::new();
-    let gone_through = recording.for_each_sample(|s, row| -> Result<(), RecordError> {
+    let passed = recording.for_each_sample(|s, row| -> Result<(), RecordError> {
         samples.push([s.time_s, s.position_m, s.velocity_mps, s.force_n].map(f64::to_bits));
         table.push_str(&row.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(","));
         table.push('\n');
         Ok(())
     });
-    Some(gone_through.map(|()| (table.into_bytes(), samples, notes)).map_err(|e| e.to_string()))
+    Some(passed.map(|()| (table.into_bytes(), samples, notes)).map_err(|e| e.to_string()))
 }
 
-/// Both readers on one text; gives the kinds of the notes, or the message.
-fn alike(name: &str, text: &[u8], options: &ReadOptions) -> Result<Vec<String>, String> {
-    let scratch = Scratch::new(name);
-    let path = scratch.0.join("log.csv");
-    std::fs::write(&path, text).expect("a scratch file");
-    let read = piece_by_piece(&path, options, &scratch.0).expect("a plain file");
-    let expected = at_once(&path, options);
+/// Compares both readers on one text; returns the kinds of the notes, or the message.
+fn same_result(name: &str, text: &[u8], options: &ReadOptions) -> Result<Vec<String>, String> {
+    let folder = TempFolder::new(name);
+    let path = folder.0.join("log.csv");
+    std::fs::write(&path, text).expect("a folder file");
+    let read = read_in_pieces(&path, options, &folder.0).expect("a plain file");
+    let expected = read_at_once(&path, options);
     match (&read, &expected) {
         (Ok(read), Ok(expected)) => {
             assert_eq!(read.2, expected.2, "{name}: the notes");
@@ -111,26 +111,26 @@ fn alike(name: &str, text: &[u8], options: &ReadOptions) -> Result<Vec<String>, 
             "{name}"
         ),
     }
-    let left: Vec<_> = std::fs::read_dir(&scratch.0).expect("the folder").flatten().collect();
-    assert_eq!(left.len(), 1, "{name}: nothing is left beside the log: {left:?}");
+    let left: Vec<_> = std::fs::read_dir(&folder.0).expect("the folder").flatten().collect();
+    assert_eq!(left.len(), 1, "{name}: temporary files remain: {left:?}");
     read.map(|(_, _, notes)| notes.iter().map(|note| format!("{:?}", note.kind)).collect())
 }
 
 fn good(name: &str, text: &[u8], options: &ReadOptions, kinds: &[&str]) {
-    let found = alike(name, text, options).expect(name);
+    let found = same_result(name, text, options).expect(name);
     for kind in kinds {
         assert!(found.iter().any(|found| found == kind), "{name}: {found:?} lacks {kind}");
     }
 }
 
-/// A name, rows, the findings that have to be among those of the checks.
+/// Name, rows, and the notes that must be among the results.
 type Case = (&'static str, Vec<[f64; 4]>, &'static [&'static str]);
 
 const PLAIN: ReadOptions = ReadOptions { columns: None, repair: false };
 const REPAIR: ReadOptions = ReadOptions { columns: None, repair: true };
 
 #[test]
-fn every_finding_is_the_same_over_several_blocks() {
+fn all_notes_are_the_same_over_several_blocks() {
     let rows = insertions(40_000);
     let changed = |change: &dyn Fn(usize, &mut [f64; 4])| {
         let mut rows = rows.clone();
@@ -166,7 +166,7 @@ fn every_finding_is_the_same_over_several_blocks() {
 }
 
 #[test]
-fn dialects_extra_columns_and_maps_are_the_same() {
+fn dialects_extra_columns_and_maps_give_the_same_result() {
     let plain = text(&insertions(17_000), true);
     good("windows", format!("\u{feff}{}", plain.replace('\n', "\r\n")).as_bytes(), &PLAIN, &[]);
     good("old mac", plain.replace('\n', "\r").as_bytes(), &PLAIN, &[]);
@@ -195,7 +195,7 @@ fn dialects_extra_columns_and_maps_are_the_same() {
 }
 
 #[test]
-fn rows_out_of_order_are_repaired_or_refused_alike() {
+fn rows_out_of_order_are_repaired_or_refused_by_both_readers() {
     let mut rows = insertions(40_000);
     rows[16_383][0] = 1e6;
     rows[20_000][0] = rows[19_999][0];
@@ -203,16 +203,16 @@ fn rows_out_of_order_are_repaired_or_refused_alike() {
     rows[39_999][0] = -1.0;
     for velocity in [true, false] {
         good("repaired", text(&rows, velocity).as_bytes(), &REPAIR, &["RepairedRows"]);
-        assert!(alike("refused", text(&rows, velocity).as_bytes(), &PLAIN).is_err());
+        assert!(same_result("refused", text(&rows, velocity).as_bytes(), &PLAIN).is_err());
     }
     let twice: Vec<[f64; 4]> = [&insertions(20_000)[..], &insertions(17_000)[..]].concat();
     good("twice", text(&twice, true).as_bytes(), &REPAIR, &["RepairedRows"]);
     let still = vec![[1.0, 0.0, 0.0, 0.0]; 5];
-    assert!(alike("one time", text(&still, true).as_bytes(), &REPAIR).is_err());
+    assert!(same_result("one time", text(&still, true).as_bytes(), &REPAIR).is_err());
 }
 
 #[test]
-fn what_is_refused_is_refused_in_the_same_words() {
+fn errors_have_the_same_message() {
     let plain = text(&insertions(17_000), true);
     let at = |line: usize, new: &str| {
         let mut lines: Vec<&str> = plain.lines().collect();
@@ -254,21 +254,21 @@ fn what_is_refused_is_refused_in_the_same_words() {
         ("no slope", b"time_s,position_m,force_n\n0,0,0\n1e-300,1e300,0\n1,1,1\n".to_vec()),
     ];
     for (name, bytes) in cases {
-        assert!(alike(name, &bytes, &PLAIN).is_err(), "{name}");
+        assert!(same_result(name, &bytes, &PLAIN).is_err(), "{name}");
     }
 }
 
 #[test]
-fn what_cannot_be_read_piece_by_piece_is_left_to_the_other_reader() {
-    let scratch = Scratch::new("other");
+fn files_that_cannot_be_read_in_pieces_are_left_to_the_other_reader() {
+    let folder = TempFolder::new("other");
     let blank = "\n".repeat(70_000) + &text(&insertions(100), true);
     for (name, bytes) in
         [("empty", b"".to_vec()), ("far", blank.into_bytes()), ("parquet", b"PAR1 and so on\n".to_vec())]
     {
-        let path = scratch.0.join(name);
-        std::fs::write(&path, bytes).expect("a scratch file");
-        assert!(piece_by_piece(&path, &PLAIN, &scratch.0).is_none(), "{name}");
+        let path = folder.0.join(name);
+        std::fs::write(&path, bytes).expect("a folder file");
+        assert!(read_in_pieces(&path, &PLAIN, &folder.0).is_none(), "{name}");
     }
-    let missing = piece_by_piece(&scratch.0.join("missing"), &PLAIN, &scratch.0).expect("an error");
-    assert_eq!(missing.err(), at_once(&scratch.0.join("missing"), &PLAIN).err());
+    let missing = read_in_pieces(&folder.0.join("missing"), &PLAIN, &folder.0).expect("an error");
+    assert_eq!(missing.err(), read_at_once(&folder.0.join("missing"), &PLAIN).err());
 }

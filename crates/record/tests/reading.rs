@@ -1,5 +1,4 @@
-//! Promise: whatever a spreadsheet or a logger does to a CSV file that keeps its meaning, the numbers arrive; what was repaired
-//! or looks odd is said.
+//! Promise: all common CSV dialects give the same numbers, and repairs are reported.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -42,7 +41,7 @@ fn all_dialects_give_the_same_numbers() -> Result<(), RecordError> {
 }
 
 #[test]
-fn optional_columns_are_read_when_they_are_there() -> Result<(), RecordError> {
+fn optional_columns_are_read_when_present() -> Result<(), RecordError> {
     let mut text = String::from("time_s,position_m,force_n,velocity_mps,force_virtual_n");
     (1..=7).for_each(|joint| text.push_str(&format!(",joint_torque_{joint}_nm")));
     text.push_str("\n0,0,0,9,0.5,1,2,3,4,5,6,7\n1,1,1,9,0.6,1,2,3,4,5,6,7.5\n");
@@ -55,7 +54,7 @@ fn optional_columns_are_read_when_they_are_there() -> Result<(), RecordError> {
 }
 
 #[test]
-fn a_column_map_turns_a_foreign_log_into_si_units() -> Result<(), RecordError> {
+fn a_column_map_converts_a_foreign_log_to_si_units() -> Result<(), RecordError> {
     let map = ColumnMap {
         time: Column::scaled("time", 1e-6),
         position: Column { name: "pz".to_owned(), scale: -1e-3, offset: 0.25 },
@@ -89,7 +88,7 @@ fn repair_drops_bad_time_stamps_and_names_their_lines() -> Result<(), RecordErro
 }
 
 #[test]
-fn repair_leaves_a_sound_recording_alone() -> Result<(), RecordError> {
+fn repair_does_not_change_a_valid_recording() -> Result<(), RecordError> {
     let text = b"time_s,position_m,force_n\n0,0,1\n0.1,0,2\n0.2,0,3\n";
     let (recording, notes) = read_with(text, &ReadOptions { repair: true, ..ReadOptions::default() })?;
     assert_eq!((recording, notes), read_with(text, &ReadOptions::default())?);
@@ -97,7 +96,7 @@ fn repair_leaves_a_sound_recording_alone() -> Result<(), RecordError> {
 }
 
 #[test]
-fn a_million_rows_are_read_and_judged_in_seconds() -> Result<(), RecordError> {
+fn a_million_rows_are_read_and_assessed_in_seconds() -> Result<(), RecordError> {
     let mut text = String::from("time_s,position_m,force_n\n");
     for i in 0..1_000_000 {
         let time_s = f64::from(i) * 1e-4;
@@ -113,13 +112,13 @@ fn a_million_rows_are_read_and_judged_in_seconds() -> Result<(), RecordError> {
     let took = begin.elapsed();
     println!("1e6 rows, {} MB: {took:?}", text.len() / 1_000_000);
     assert_eq!(recording.len(), 1_000_000);
-    // Generous: machines under test are shared; a quadratic step would take hours.
+    // Generous, since test machines are shared; a quadratic step would take hours.
     assert!(took.as_secs() < 20, "{took:?}");
     Ok(())
 }
 
 #[test]
-fn a_million_rows_within_one_window_of_the_differentiator_are_no_trap() -> Result<(), RecordError> {
+fn a_million_rows_within_one_differentiation_window_take_linear_time() -> Result<(), RecordError> {
     let time_s: Vec<f64> = (0..1_000_000).map(|i| f64::from(i) * 1e-9).collect();
     let position_m = time_s.iter().map(|t| t * 0.01).collect();
     let begin = Instant::now();
@@ -138,7 +137,7 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_tables_are_read_or_refused_and_what_is_read_keeps_its_promises(
+    fn arbitrary_tables_are_read_or_refused_and_what_is_read_is_valid(
         body in "([-0-9.eE,;\t\" \r\nnaif]|,[0-9]|\n[0-9],){0,80}",
         repair: bool,
     ) {

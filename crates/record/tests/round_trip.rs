@@ -1,4 +1,4 @@
-//! Promise: `read(write(x)) == x`, bit for bit. Why: a simulated recording that is scored from its file must score as in memory.
+//! Promise: `read(write(x)) == x`, bit for bit. A simulated recording is scored from its file as in memory.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ fn finite() -> impl Strategy<Value = f64> {
 fn recordings() -> impl Strategy<Value = Recording> {
     let row = (finite(), finite(), finite(), finite(), finite(), prop::array::uniform7(finite()));
     (prop::collection::vec(row, 2..30), any::<[bool; 3]>()).prop_filter_map(
-        "two instants",
+        "two time stamps",
         |(mut rows, [measured, virtual_force, arm])| {
             rows.sort_by(|a, b| a.0.total_cmp(&b.0));
             rows.dedup_by(|a, b| a.0 == b.0);
@@ -40,9 +40,9 @@ fn recordings() -> impl Strategy<Value = Recording> {
                 let position_m = rows.iter().map(|row| row.1).collect();
                 Recording::with_velocity(time_s, position_m, rows.iter().map(|row| row.3).collect(), force_n)
             } else {
-                // Positions and instants of a size whose slope is finite.
-                let instants = (0..rows.len()).map(|i| i as f64 * 0.013).collect();
-                Recording::new(instants, rows.iter().map(|row| row.1.sin() * 0.1).collect(), force_n)
+                // Positions and time stamps with a finite slope.
+                let even_s = (0..rows.len()).map(|i| i as f64 * 0.013).collect();
+                Recording::new(even_s, rows.iter().map(|row| row.1.sin() * 0.1).collect(), force_n)
             };
             let mut recording = recording.ok()?;
             recording.force_virtual_n = virtual_force.then(|| rows.iter().map(|row| row.4).collect());
@@ -98,7 +98,7 @@ fn the_header_names_everything_that_was_given() -> Result<(), RecordError> {
 }
 
 #[test]
-fn nothing_is_written_of_data_that_are_not_in_order() -> Result<(), RecordError> {
+fn invalid_data_are_not_written() -> Result<(), RecordError> {
     let sound = Recording::new(vec![0.0, 0.1], vec![0.0, 0.1], vec![0.0, 1.0])?;
     let mut torn = sound.clone();
     torn.force_n.pop();

@@ -48,3 +48,8 @@ pub use order_statistics::{
 pub use rank_correlation::spearman;
 pub use robust_loss::Loss;
 pub use streaming_quantiles::quantiles_of_stream;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

@@ -127,8 +127,9 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     let sensor = match scenario.sensor.force_torque() {
         Some(sensor) => sensor,
         None => {
-            let beside =
-                |e: &AnyEffect| matches!(e.stage(), ChainStage::Tool | ChainStage::Sensor) && !e.is_inactive();
+            let beside = |e: &AnyEffect| {
+                matches!(e.stage(), ChainStage::Tool | ChainStage::Sensor) && !e.is_inactive()
+            };
             if scenario.effects.iter().any(beside) {
                 return Err(SimulateError::NotSupported {
                     what: "an effect of tool or force/torque sensor with `sensor: Virtual`",

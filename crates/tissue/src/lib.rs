@@ -52,3 +52,8 @@ pub use measurement_chain::{AveragingInterval, MeasurementChain, MeasurementStat
 pub use replay::replay;
 pub use rupture_policy::RuptureCriterion;
 pub use shaft_friction::ShaftFriction;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

@@ -1,4 +1,4 @@
-//! Columns of a foreign file as a CSV table.
+//! Conversion of named columns of a file to a CSV table.
 
 use crate::column_map::ColumnMap;
 use crate::csv_header::{ColumnRole, map_columns};
@@ -6,16 +6,16 @@ use crate::error::RecordError;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Named columns of numbers.
+/// A file with named columns of numbers.
 pub(super) trait NumericColumns {
-    /// All names, in the file's order.
+    /// All names, in the order of the file.
     fn column_names(&self) -> Vec<String>;
 
-    /// Some of the columns, all of one length; `main` is the one whose rows count where they are not common to all.
+    /// Some of the columns, with equal lengths; where columns have different rows, those of `main` are used.
     fn read_columns(&self, wanted: &[&str], main: &str) -> Result<Vec<Vec<f64>>, String>;
 }
 
-/// The columns that are read, as CSV.
+/// The required columns as CSV.
 pub(super) fn columns_to_csv(
     source: &dyn NumericColumns,
     path: &Path,
@@ -24,7 +24,7 @@ pub(super) fn columns_to_csv(
 ) -> Result<Vec<u8>, RecordError> {
     let names = source.column_names();
     if names.is_empty() {
-        return Err(foreign("no column of numbers was found in it".to_owned()));
+        return Err(foreign("it has no column of numbers".to_owned()));
     }
     let sources = map_columns(&names, path, 1, map)?;
     let wanted: Vec<&str> = sources.iter().map(|s| s.column.name.trim()).collect();
@@ -33,7 +33,7 @@ pub(super) fn columns_to_csv(
     let rows = columns.first().map_or(0, Vec::len);
     if let Some((name, other)) = wanted.iter().zip(&columns).find(|(_, c)| c.len() != rows) {
         return Err(foreign(format!(
-            "\"{}\" has {rows} values and \"{name}\" has {}; the columns of a recording are equally long",
+            "\"{}\" has {rows} values and \"{name}\" has {}; the columns of a recording have equal lengths",
             wanted[0],
             other.len()
         )));

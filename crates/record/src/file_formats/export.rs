@@ -1,4 +1,4 @@
-//! Recordings out: Parquet for notebooks, MCAP for viewers of robots' logs.
+//! Export of recordings: Parquet for notebooks, MCAP for viewers of robot logs.
 
 use crate::error::RecordError;
 use crate::recording::Recording;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// The topic of a recording in an MCAP file.
 const TOPIC: &str = "/insertion";
 
-/// The columns of a recording under Stylet's names.
+/// The columns of a recording with Stylet's names.
 fn columns(r: &Recording) -> Vec<(String, Vec<f64>)> {
     let mut out = vec![
         ("time_s".to_owned(), r.time_s.clone()),
@@ -45,7 +45,7 @@ fn failed(path: &Path, why: impl std::fmt::Display) -> RecordError {
 /// appears in messages.
 ///
 /// # Errors
-/// [`RecordError::Foreign`] with what the Parquet library says.
+/// [`RecordError::Foreign`] with the error of the Parquet library.
 pub fn to_parquet(recording: &Recording, path: &Path) -> Result<Vec<u8>, RecordError> {
     parquet_bytes(&columns(recording)).map_err(|e| failed(path, e))
 }
@@ -78,7 +78,7 @@ fn parquet_bytes(columns: &[(String, Vec<f64>)]) -> Result<Vec<u8>, parquet::err
 /// messages.
 ///
 /// # Errors
-/// [`RecordError::Foreign`] with what the MCAP library says.
+/// [`RecordError::Foreign`] with the error of the MCAP library.
 pub fn to_mcap(recording: &Recording, path: &Path) -> Result<Vec<u8>, RecordError> {
     let columns = columns(recording);
     let mut bytes = Vec::new();
@@ -94,7 +94,7 @@ fn mcap_bytes(columns: &[(String, Vec<f64>)], bytes: &mut Vec<u8>) -> mcap::Mcap
     let schema = writer.add_schema("stylet.Recording", "jsonschema", schema.as_bytes())?;
     let channel = writer.add_channel(schema, TOPIC, "json", &BTreeMap::new())?;
     let rows = columns.first().map_or(0, |(_, c)| c.len());
-    // Time stamps of a log are not negative.
+    // Log times are unsigned.
     let zero_s = columns.first().and_then(|(_, t)| t.first()).map_or(0.0, |t| t.min(0.0));
     for row in 0..rows {
         let fields: Vec<String> = columns.iter().map(|(n, c)| format!("\"{n}\":{}", c[row])).collect();

@@ -3,8 +3,8 @@
 use super::columns_to_csv::NumericColumns;
 use hdf5_pure::Group;
 
-/// Groups inside groups that are looked into.
-const DEEPEST: usize = 6;
+/// Most levels of nested groups.
+const MAX_DEPTH: usize = 6;
 
 /// An open file.
 pub(super) struct File {
@@ -16,7 +16,7 @@ pub(super) struct File {
 struct Column {
     name: String,
     path: String,
-    /// Of how many parts of equal length which one; MATLAB's columns follow each other.
+    /// Index and number of parts of equal length: a column of a matrix, which MATLAB stores by columns.
     part: Option<(usize, usize)>,
 }
 
@@ -24,7 +24,7 @@ impl File {
     pub(super) fn open(bytes: &[u8]) -> Result<Self, String> {
         let file = hdf5_pure::File::from_bytes(bytes.to_vec()).map_err(damaged)?;
         let mut columns = Vec::new();
-        walk(&file.root(), "", DEEPEST, &mut columns)?;
+        list_columns(&file.root(), "", MAX_DEPTH, &mut columns)?;
         Ok(Self { file, columns })
     }
 }
@@ -33,14 +33,14 @@ fn damaged(why: impl std::fmt::Display) -> String {
     format!("it cannot be read ({why}); is it complete?")
 }
 
-/// Notes every vector and every column of a matrix.
-fn walk(group: &Group, at: &str, left: usize, columns: &mut Vec<Column>) -> Result<(), String> {
+/// Lists every vector and every column of a matrix.
+fn list_columns(group: &Group, at: &str, left: usize, columns: &mut Vec<Column>) -> Result<(), String> {
     let below = |name: &str| if at.is_empty() { name.to_owned() } else { format!("{at}/{name}") };
     for name in group.datasets().map_err(damaged)? {
         let Ok(shape) = group.dataset(&name).and_then(|d| d.shape()) else { continue };
         let path = below(&name);
         let plain = path.replace('/', ".");
-        // MATLAB's rows and columns are the other way round in HDF5.
+        // MATLAB's rows and columns are exchanged in HDF5.
         match shape.as_slice() {
             [_] | [1, _] | [_, 1] => columns.push(Column { name: plain, path, part: None }),
             [parts, _] if *parts <= 64 => {
@@ -55,10 +55,10 @@ fn walk(group: &Group, at: &str, left: usize, columns: &mut Vec<Column>) -> Resu
     }
     if left > 0 {
         for name in group.groups().map_err(damaged)? {
-            // `#refs#` and `#subsystem#` are MATLAB's own.
+            // `#refs#` and `#subsystem#` are internal to MATLAB.
             if !name.starts_with('#') {
                 let inner = group.group(&name).map_err(damaged)?;
-                walk(&inner, &below(&name), left - 1, columns)?;
+                list_columns(&inner, &below(&name), left - 1, columns)?;
             }
         }
     }
@@ -76,7 +76,7 @@ impl NumericColumns for File {
                 self.columns.iter().find(|c| c.name == *name).ok_or_else(|| format!("no \"{name}\""))?;
             let dataset = self.file.dataset(&column.path).map_err(damaged)?;
             let values =
-                dataset.read_f64().map_err(|e| format!("\"{name}\" is no column of numbers ({e})"))?;
+                dataset.read_f64().map_err(|e| format!("\"{name}\" is not a column of numbers ({e})"))?;
             Ok(match column.part {
                 None => values,
                 Some((k, parts)) => {

@@ -9,44 +9,44 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
-/// The time at which a message was logged, as a field of every topic.
+/// Field of every topic with the log time of a message.
 const LOG_TIME: &str = "log_time";
 
-/// How the bodies of a topic are read.
-enum Body {
+/// Decoder of the messages of a topic.
+enum Decoder {
     Json,
     Ros(Definition),
-    /// Not at all, and why.
-    Closed(String),
+    /// Unsupported, with the reason.
+    Unsupported(String),
 }
 
-impl Body {
+impl Decoder {
     fn of(channel: &Channel) -> Self {
         let schema = channel.schema.as_ref();
         match (channel.message_encoding.as_str(), schema.map_or("", |s| s.encoding.as_str())) {
             ("json", _) => Self::Json,
             ("cdr", "ros2msg") => {
                 let made = schema.ok_or_else(String::new).and_then(|s| Definition::new(&s.name, &s.data));
-                made.map_or_else(Self::Closed, Self::Ros)
+                made.map_or_else(Self::Unsupported, Self::Ros)
             }
-            (encoding, schema) => Self::Closed(format!(
-                "messages in \"{encoding}\" by \"{schema}\" are not read; JSON and ROS 2 .msg in CDR are"
+            (encoding, schema) => Self::Unsupported(format!(
+                "messages in \"{encoding}\" by \"{schema}\" are not supported; JSON and ROS 2 .msg in CDR are"
             )),
         }
     }
 
-    /// The numbers of a message with their names.
-    fn numbers(&self, data: &[u8], out: &mut Vec<(String, f64)>) -> Result<(), String> {
+    /// The numeric fields of a message with their names.
+    fn decode(&self, data: &[u8], out: &mut Vec<(String, f64)>) -> Result<(), String> {
         out.clear();
         match self {
             Self::Json => {
                 let value: Value =
-                    serde_json::from_slice(data).map_err(|e| format!("a message is no JSON ({e})"))?;
+                    serde_json::from_slice(data).map_err(|e| format!("a message is not JSON ({e})"))?;
                 flatten(&value, "", out);
                 Ok(())
             }
             Self::Ros(definition) => definition.decode(data, out),
-            Self::Closed(why) => Err(why.clone()),
+            Self::Unsupported(why) => Err(why.clone()),
         }
     }
 }
@@ -70,9 +70,9 @@ fn flatten(value: &Value, at: &str, out: &mut Vec<(String, f64)>) {
     }
 }
 
-/// A topic with the names that its first message has.
+/// A topic with the fields of its first message.
 struct Topic {
-    body: Body,
+    decoder: Decoder,
     fields: Vec<String>,
 }
 
@@ -82,16 +82,16 @@ pub(super) struct File<'a> {
     topics: BTreeMap<String, Topic>,
 }
 
-/// The messages of a file. A chunk is checked before it is looked into, and none may be larger than is sensible for the file:
-/// a damaged one asks for any amount of memory.
+/// The messages of a file. Chunk checksums are verified, and records are limited in size, since a damaged length field may
+/// require any amount of memory.
 fn stream(bytes: &[u8]) -> MessageReader<Cursor<&[u8]>> {
-    const LEAST: usize = 1 << 24;
-    const MOST: usize = 1 << 30;
+    const MIN_LIMIT_BYTES: usize = 1 << 24;
+    const MAX_LIMIT_BYTES: usize = 1 << 30;
     let options = LinearReaderOptions {
-        // A log that was cut off ends without its footer.
+        // A truncated log has no footer.
         skip_end_magic: true,
         prevalidate_chunk_crcs: true,
-        record_length_limit: Some(bytes.len().saturating_mul(100).clamp(LEAST, MOST)),
+        record_length_limit: Some(bytes.len().saturating_mul(100).clamp(MIN_LIMIT_BYTES, MAX_LIMIT_BYTES)),
         ..LinearReaderOptions::default()
     };
     MessageReader::new_with_options(Cursor::new(bytes), options)
@@ -110,19 +110,19 @@ impl<'a> File<'a> {
             if topics.contains_key(&message.channel.topic) {
                 continue;
             }
-            let mut body = Body::of(&message.channel);
-            if let Err(why) = body.numbers(&message.data, &mut numbers) {
-                body = Body::Closed(why);
+            let mut decoder = Decoder::of(&message.channel);
+            if let Err(why) = decoder.decode(&message.data, &mut numbers) {
+                decoder = Decoder::Unsupported(why);
                 numbers.clear();
             }
             let mut fields: Vec<String> = numbers.drain(..).map(|(name, _)| name).collect();
             fields.push(LOG_TIME.to_owned());
-            topics.insert(message.channel.topic.clone(), Topic { body, fields });
+            topics.insert(message.channel.topic.clone(), Topic { decoder, fields });
         }
         Ok(Self { bytes, topics })
     }
 
-    /// Topic and field of a name: topics may have dots themselves.
+    /// Splits a name into topic and field; topics may contain dots.
     fn split<'b>(&self, name: &'b str) -> Option<(&'b str, &'b str)> {
         let dots = name.match_indices('.').map(|(at, _)| (&name[..at], &name[at + 1..]));
         dots.into_iter().find(|(topic, field)| {
@@ -131,7 +131,7 @@ impl<'a> File<'a> {
     }
 }
 
-/// What was logged of one wanted column.
+/// Logged values of one column.
 #[derive(Default)]
 struct Logged {
     at_s: Vec<f64>,
@@ -163,7 +163,7 @@ impl NumericColumns for File<'_> {
             if let Some(known) = self.topics.get(topic)
                 && parts.iter().any(|(t, field)| *t == topic && *field != LOG_TIME)
             {
-                known.body.numbers(&message.data, &mut numbers).map_err(failed)?;
+                known.decoder.decode(&message.data, &mut numbers).map_err(failed)?;
             }
             let at_s = seconds(message.log_time.saturating_sub(zero_s));
             for ((_, field), out) in parts.iter().zip(&mut logged).filter(|((t, _), _)| *t == topic) {
@@ -176,12 +176,12 @@ impl NumericColumns for File<'_> {
                 out.values.push(value.unwrap_or(f64::NAN));
             }
         }
-        Ok(joined(&parts, main_topic, logged))
+        Ok(resample_to_main(&parts, main_topic, logged))
     }
 }
 
-/// Columns at the times of the main topic's messages, from the first to the last instant that all topics have.
-fn joined(parts: &[(&str, &str)], main: &str, logged: Vec<Logged>) -> Vec<Vec<f64>> {
+/// Columns at the times of the main topic's messages, within the time range common to all topics.
+fn resample_to_main(parts: &[(&str, &str)], main: &str, logged: Vec<Logged>) -> Vec<Vec<f64>> {
     let Some(times) = parts.iter().zip(&logged).find(|((t, _), _)| *t == main).map(|(_, l)| l.at_s.clone())
     else {
         return Vec::new();

@@ -1,7 +1,7 @@
-//! Recordings in other programs' files: MCAP, MATLAB v7.3, Parquet.
+//! File formats of other programs: MCAP, MATLAB v7.3, Parquet.
 //!
-//! A foreign file becomes the table that its own program would export as CSV, and goes the way of every CSV file: column
-//! map, repair, checks. Messages count the lines of that table, its header being line 1.
+//! A file is converted to the CSV table that its program would export, and then read like any CSV file: column map, repair,
+//! checks. Line numbers in messages are those of that table, whose header is line 1.
 //!
 //! | file | names of columns |
 //! |---|---|
@@ -9,8 +9,8 @@
 //! | MATLAB v7.3, HDF5 | variables; fields of a struct, groups: `log.pz`; columns of a matrix: `log.wrench.3` (from 1) |
 //! | Parquet | its columns; nested ones with dots |
 //!
-//! Of an MCAP file the rows are the messages of the topic that the force comes from; numbers of other topics are
-//! interpolated to their times.
+//! The rows of an MCAP file are the messages of the topic of the force; values of other topics are interpolated to their
+//! times.
 
 use crate::column_map::ColumnMap;
 use crate::error::RecordError;
@@ -32,21 +32,21 @@ mod ros_messages;
 #[cfg(feature = "formats")]
 pub use export::{to_mcap, to_parquet};
 
-/// A kind of foreign file.
+/// A file format other than CSV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FileFormat {
     Mcap,
     Hdf5,
     Parquet,
-    /// MATLAB before v7.3: another format altogether.
+    /// MATLAB before v7.3, which is not HDF5 and not supported.
     LegacyMat,
 }
 
 impl FileFormat {
-    /// What the first bytes of a file tell.
+    /// The format by the first bytes of a file.
     pub(crate) fn detect(bytes: &[u8]) -> Option<Self> {
         const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
-        // MATLAB keeps a block of its own before the HDF5 part.
+        // MATLAB writes a block before the HDF5 part.
         let hdf5 =
             [0, 512, 1024, 2048].iter().any(|at| bytes.get(*at..).is_some_and(|b| b.starts_with(HDF5)));
         match bytes {
@@ -58,7 +58,7 @@ impl FileFormat {
         }
     }
 
-    /// Its name for people.
+    /// Name for messages.
     fn name(self) -> &'static str {
         match self {
             Self::Mcap => "an MCAP file",
@@ -69,7 +69,7 @@ impl FileFormat {
     }
 }
 
-/// The file as CSV.
+/// Converts the file to CSV.
 pub(crate) fn to_csv(
     kind: FileFormat,
     bytes: &[u8],
@@ -84,12 +84,12 @@ pub(crate) fn to_csv(
     {
         let _ = (bytes, map);
         Err(foreign(
-            "this build reads CSV alone: install with `cargo install --path . --features formats`, or export the file as CSV".to_owned(),
+            "this build reads only CSV: install with `cargo install --path . --features formats`, or export the file as CSV".to_owned(),
         ))
     }
     #[cfg(feature = "formats")]
     {
-        // The libraries give up on some damaged files: that is the file's fault, and no reason to stop.
+        // The libraries panic on some damaged files.
         std::panic::catch_unwind(|| {
             let source: Box<dyn columns_to_csv::NumericColumns> = match kind {
                 FileFormat::Mcap => Box::new(mcap::File::open(bytes).map_err(foreign)?),

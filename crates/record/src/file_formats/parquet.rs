@@ -22,29 +22,29 @@ fn damaged(why: impl std::fmt::Display) -> String {
     format!("it cannot be read ({why}); is it complete?")
 }
 
-/// Rows that are read at once.
-const BATCH: usize = 1 << 16;
+/// Rows per read.
+const BATCH_ROWS: usize = 1 << 16;
 
-/// All values of a column of one row group; NaN where there is none.
+/// All values of a column of one row group; NaN for nulls.
 fn read<T: DataType>(
     reader: &mut parquet::column::reader::ColumnReaderImpl<T>,
     optional: bool,
     out: &mut Vec<f64>,
     to: impl Fn(&T::T) -> f64,
 ) -> Result<(), String> {
-    let (mut values, mut there) = (Vec::new(), Vec::new());
+    let (mut values, mut levels_read) = (Vec::new(), Vec::new());
     loop {
         values.clear();
-        there.clear();
-        let levels = if optional { Some(&mut there) } else { None };
-        let (rows, _, _) = reader.read_records(BATCH, levels, None, &mut values).map_err(damaged)?;
+        levels_read.clear();
+        let levels = if optional { Some(&mut levels_read) } else { None };
+        let (rows, _, _) = reader.read_records(BATCH_ROWS, levels, None, &mut values).map_err(damaged)?;
         if rows == 0 {
             return Ok(());
         }
         if optional {
-            let most = there.iter().copied().max().unwrap_or(0).max(1);
+            let most = levels_read.iter().copied().max().unwrap_or(0).max(1);
             let mut next = values.iter();
-            for level in &there {
+            for level in &levels_read {
                 let value = if *level == most { next.next() } else { None };
                 out.push(value.map_or(f64::NAN, &to));
             }
@@ -67,9 +67,7 @@ impl NumericColumns for File {
             let index = names.iter().position(|n| n == name).ok_or_else(|| format!("no \"{name}\""))?;
             let optional = schema.column(index).max_def_level() > 0;
             if schema.column(index).max_rep_level() > 0 {
-                return Err(format!(
-                    "\"{name}\" holds lists; a column of a recording has one number per row"
-                ));
+                return Err(format!("\"{name}\" has lists; a column of a recording has one number per row"));
             }
             let mut out = Vec::new();
             for group in 0..self.reader.num_row_groups() {
@@ -88,7 +86,7 @@ impl NumericColumns for File {
                     ColumnReader::BoolColumnReader(mut r) => {
                         read(&mut r, optional, &mut out, |x| f64::from(u8::from(*x)))?;
                     }
-                    _ => return Err(format!("\"{name}\" is no column of numbers")),
+                    _ => return Err(format!("\"{name}\" is not a column of numbers")),
                 }
             }
             Ok(out)

@@ -1,4 +1,4 @@
-//! ROS 2 messages: a `.msg` definition, bodies in CDR.
+//! ROS 2 messages: `.msg` definitions and CDR decoding.
 
 use byteorder::{BigEndian, LittleEndian};
 use cdr_encoding::CdrDeserializer;
@@ -7,30 +7,30 @@ use re_ros_msg::deserialize::primitive_array::PrimitiveArray;
 use re_ros_msg::deserialize::{MapResolver, MessageSeed, Value};
 use serde::de::DeserializeSeed as _;
 
-/// Bytes before the body: how it is encoded.
-const HEAD: usize = 4;
-/// Numbers of an array that get a name.
+/// Bytes of the CDR encapsulation header.
+const HEADER_BYTES: usize = 4;
+/// Most array elements that become columns.
 pub(super) const MAX_ARRAY_LENGTH: usize = 64;
 
-/// The definition of a kind of message.
+/// The definition of a message type.
 pub(super) struct Definition {
     schema: MessageSchema,
 }
 
 impl Definition {
-    /// Reads a definition.
+    /// Parses a definition.
     pub(super) fn new(name: &str, text: &[u8]) -> Result<Self, String> {
         let text =
-            std::str::from_utf8(text).map_err(|e| format!("the definition of {name} is no text ({e})"))?;
+            std::str::from_utf8(text).map_err(|e| format!("the definition of {name} is not text ({e})"))?;
         let schema = MessageSchema::parse(name, text)
-            .map_err(|e| format!("the definition of {name} cannot be understood ({e})"))?;
+            .map_err(|e| format!("the definition of {name} cannot be parsed ({e})"))?;
         Ok(Self { schema })
     }
 
-    /// The numbers of a message with their names.
+    /// The numeric fields of a message with their names.
     pub(super) fn decode(&self, body: &[u8], out: &mut Vec<(String, f64)>) -> Result<(), String> {
-        let Some((head, rest)) = body.split_at_checked(HEAD) else {
-            return Err("a message is shorter than its head".to_owned());
+        let Some((head, rest)) = body.split_at_checked(HEADER_BYTES) else {
+            return Err("a message is shorter than its header".to_owned());
         };
         let known = self.schema.dependencies.iter().map(|d| (d.name.clone(), d));
         let resolver = MapResolver::new(known);

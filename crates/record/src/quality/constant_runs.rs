@@ -1,8 +1,8 @@
-//! Stretches in which the force stays at one value.
+//! Runs of samples with a constant force.
 
 use crate::sample_stream::{Quantity, SampleStream};
 
-/// Neighbouring samples with the same force.
+/// Consecutive samples with the same force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConstantForceRun {
     pub force_n: f64,
@@ -12,7 +12,7 @@ pub(super) struct ConstantForceRun {
     pub position_range_m: (f64, f64),
 }
 
-/// Hands over all stretches of equal force, however short.
+/// Calls `each` with every run, including those of one sample.
 pub(super) fn for_each_constant_run<A: SampleStream>(
     recording: &A,
     mut each: impl FnMut(&ConstantForceRun),

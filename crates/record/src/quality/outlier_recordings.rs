@@ -1,41 +1,45 @@
-//! One recording among its repeats: is it like the others?
+//! Outlying recordings among repeats, by their force over depth.
 
-use super::{QualityKind, QualityNote};
+use super::note::{QualityKind, QualityNote};
 use crate::recording::Recording;
 use stylet_stats::median_of;
 
-/// Fewest recordings among which one can be unlike the others.
-const FEWEST: usize = 3;
+/// Least number of recordings.
+const MIN_RECORDINGS: usize = 3;
 /// Depths at which the forces are compared.
 const DEPTHS: usize = 24;
-/// Scatter of repeats, as a share of the force, that is taken for granted.
-const USUAL: f64 = 0.15;
-/// Distance (root mean square of the deviations, each in robust standard deviations) from which a recording is unlike the others.
-const FAR: f64 = 5.0;
+/// Floor of the scatter between repeats, as a share of the force.
+const MIN_SCATTER_SHARE: f64 = 0.15;
+/// Distance of an outlier: RMS of its deviations in robust standard deviations.
+const MIN_DISTANCE_SD: f64 = 5.0;
 
-/// Per recording of a set of repeats a note when its force over depth is unlike the others'.
+/// For each recording of a set of repeats, a note when its force over depth is an outlier.
 ///
-/// The way in is cut into depths that most of the recordings reach; at each the median over the recordings and the scatter about it
-/// (median absolute deviation, at least 15 % of the force) say how far away each one is: up to half of them may be wrong.
+/// The advance is divided into depths that most of the recordings reach. At each depth the median over the recordings and
+/// the scatter about it (median absolute deviation, at least 15 % of the force) give the deviation of each recording; up to
+/// half of them may be outliers.
 #[must_use]
 pub fn find_outlier_recordings(recordings: &[&Recording]) -> Vec<Option<QualityNote>> {
-    if recordings.len() < FEWEST {
+    if recordings.len() < MIN_RECORDINGS {
         return vec![None; recordings.len()];
     }
-    let ways: Vec<(f64, f64)> = recordings.iter().map(|r| way_in(r)).collect();
-    let from_m = median_of(ways.iter().map(|way| way.0));
-    let to_m = median_of(ways.iter().map(|way| way.1));
+    let ranges: Vec<(f64, f64)> = recordings.iter().map(|r| depth_range(r)).collect();
+    let from_m = median_of(ranges.iter().map(|range| range.0));
+    let to_m = median_of(ranges.iter().map(|range| range.1));
     let profiles: Vec<Vec<Option<f64>>> = recordings.iter().map(|r| profile(r, from_m, to_m)).collect();
     let size_n = median_of(profiles.iter().flatten().flatten().map(|f| f.abs()));
     let mut squares = vec![(0.0, 0.0); recordings.len()];
     for k in 0..DEPTHS {
         let here: Vec<f64> = profiles.iter().filter_map(|p| p[k]).collect();
-        if here.len() < FEWEST {
+        if here.len() < MIN_RECORDINGS {
             continue;
         }
         let middle = median_of(here.iter().copied());
         let scatter = stylet_stats::MAD_TO_SD * median_of(here.iter().map(|f| (f - middle).abs()));
-        let scale = scatter.max(USUAL * middle.abs()).max(USUAL * size_n).max(f64::MIN_POSITIVE);
+        let scale = scatter
+            .max(MIN_SCATTER_SHARE * middle.abs())
+            .max(MIN_SCATTER_SHARE * size_n)
+            .max(f64::MIN_POSITIVE);
         for (sum, profile) in squares.iter_mut().zip(&profiles) {
             if let Some(f) = profile[k] {
                 sum.0 += ((f - middle) / scale).powi(2);
@@ -50,12 +54,12 @@ pub fn find_outlier_recordings(recordings: &[&Recording]) -> Vec<Option<QualityN
         .enumerate()
         .map(|(i, ((sum, count), own))| {
             let distance = f64::sqrt(sum / f64::max(*count, 1.0));
-            (distance > FAR).then(|| {
+            (distance > MIN_DISTANCE_SD).then(|| {
                 let others =
                     median_of(profiles.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, p)| typical(p)).filter(|f| f.is_finite()));
                 let message = format!(
-                    "it is not like the others: {:.2} N at a typical depth where the others have {others:.2} N ({distance:.0} times the \
-                     scatter among repeats); is it filed under the right tissue, needle and units? leave it out or put it right",
+                    "it is an outlier among its repeats: {:.2} N at a typical depth where the others have {others:.2} N ({distance:.0} times the \
+                     scatter among repeats); is it filed under the right tissue, needle and units? correct it or leave it out",
                     typical(own)
                 );
                 let numbers = [("distance", distance), ("typical_n", typical(own)), ("others_n", others)];
@@ -65,8 +69,8 @@ pub fn find_outlier_recordings(recordings: &[&Recording]) -> Vec<Option<QualityN
         .collect()
 }
 
-/// Where the needle comes from and how deep it goes (m).
-fn way_in(r: &Recording) -> (f64, f64) {
+/// Smallest position before the deepest one, and the deepest one (m).
+fn depth_range(r: &Recording) -> (f64, f64) {
     let (deepest, _) = deepest(r);
     (r.position_m[..=deepest].iter().copied().fold(f64::INFINITY, f64::min), r.position_m[deepest])
 }
@@ -81,7 +85,7 @@ fn deepest(r: &Recording) -> (usize, f64) {
     best
 }
 
-/// Mean force between neighbouring depths on the way in; none where the needle does not come.
+/// Mean force per depth bin while advancing; `None` in bins without samples.
 fn profile(r: &Recording, from_m: f64, to_m: f64) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0_u32); DEPTHS];
     let (last, _) = deepest(r);
@@ -100,7 +104,7 @@ mod tests {
     use super::*;
     use crate::error::RecordError;
 
-    /// An insertion at `speed` m/s of a tissue `gain` times as strong, with a wavering of 2 %.
+    /// An insertion at `speed` m/s into a tissue with forces times `gain`, with a ripple of 2 %.
     fn insertion(speed: f64, gain: f64, phase: f64) -> Result<Recording, RecordError> {
         let n = (0.02 / speed * 100.0) as u32;
         let time_s: Vec<f64> = (0..n).map(|i| f64::from(i) * 0.01).collect();
@@ -112,37 +116,40 @@ mod tests {
         Recording::new(time_s, position_m, force_n)
     }
 
-    fn told(all: &[Recording]) -> Vec<bool> {
+    fn is_outlier(all: &[Recording]) -> Vec<bool> {
         find_outlier_recordings(&all.iter().collect::<Vec<_>>()).iter().map(Option::is_some).collect()
     }
 
     #[test]
-    fn repeats_at_three_speeds_that_vary_by_a_fifth_are_like_each_other() -> Result<(), RecordError> {
+    fn repeats_at_three_speeds_with_twenty_percent_scatter_have_no_outlier() -> Result<(), RecordError> {
         let mut all = Vec::new();
         for (k, gain) in [0.8, 0.9, 1.0, 1.1, 1.2].into_iter().enumerate() {
             for speed in [0.002, 0.004, 0.008] {
                 all.push(insertion(speed, gain, k as f64)?);
             }
         }
-        assert_eq!(told(&all), vec![false; 15]);
+        assert_eq!(is_outlier(&all), vec![false; 15]);
         Ok(())
     }
 
     #[test]
-    fn one_recording_filed_wrongly_is_told_among_three_and_among_ten() -> Result<(), RecordError> {
+    fn one_outlier_is_found_among_three_and_among_ten_recordings() -> Result<(), RecordError> {
         for others in [2, 3, 9] {
             let mut all = vec![insertion(0.004, 3.0, 0.0)?];
             for k in 0..others {
                 all.push(insertion(0.004, 1.0 + 0.03 * f64::from(k % 3), f64::from(k))?);
             }
-            let told = told(&all);
-            assert!(told[0] && !told[1..].contains(&true), "among {others} others: {told:?}");
+            let is_outlier = is_outlier(&all);
+            assert!(
+                is_outlier[0] && !is_outlier[1..].contains(&true),
+                "among {others} others: {is_outlier:?}"
+            );
         }
         Ok(())
     }
 
     #[test]
-    fn the_note_says_what_the_others_have() -> Result<(), RecordError> {
+    fn the_note_compares_with_the_others() -> Result<(), RecordError> {
         let all = [
             insertion(0.004, 1.0, 0.0)?,
             insertion(0.004, 1.05, 1.0)?,
@@ -150,10 +157,10 @@ mod tests {
             insertion(0.004, 0.95, 3.0)?,
         ];
         let notes = find_outlier_recordings(&all.iter().collect::<Vec<_>>());
-        let note = notes[2].as_ref().expect("three times as strong");
+        let note = notes[2].as_ref().expect("three times the force");
         let ratio = note.numbers["typical_n"] / note.numbers["others_n"];
         assert!(
-            (2.7..3.3).contains(&ratio) && note.message.contains("not like the others"),
+            (2.7..3.3).contains(&ratio) && note.message.contains("an outlier among its repeats"),
             "{}",
             note.message
         );

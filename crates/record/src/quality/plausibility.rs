@@ -1,52 +1,52 @@
-//! Recordings from which no cause may be named: a dead or reversed sensor, a needle that stays in the air or does not move,
-//! too few samples.
+//! Implausible recordings: a dead or reversed sensor, no contact, no motion, too few samples, values out of range.
 
 use super::constant_runs::for_each_constant_run;
-use super::{Extent, QualityKind, QualityNote};
+use super::extent::Extent;
+use super::note::{QualityKind, QualityNote};
 use crate::sample_stream::{Quantity, SampleStream, SortedValues};
 use stylet_stats::quantiles_of_stream;
 
-/// Fewest samples from which anything about a tissue can be told.
+/// Least number of samples of a usable recording.
 pub const MIN_SAMPLES: usize = 50;
 
 pub(super) fn too_short(samples: usize) -> Option<QualityNote> {
     (samples < MIN_SAMPLES).then(|| {
         let message = format!("there are {samples} usable sample(s); a diagnosis needs at least {MIN_SAMPLES}: record the whole insertion");
-        QualityNote::blocking_note(QualityKind::TooShort, message, [("samples", samples as f64), ("least", MIN_SAMPLES as f64)])
+        QualityNote::blocking(QualityKind::TooShort, message, [("samples", samples as f64), ("least", MIN_SAMPLES as f64)])
     })
 }
 
-/// A force that varies by less than this share of itself (or than this many newtons) comes from no sensor that works.
-const NOTHING: f64 = 1e-9;
+/// Relative range (or range in N, if the force is below 1 N) below which the force is constant.
+const CONSTANT_TOLERANCE: f64 = 1e-9;
 
-pub(super) fn dead_sensor(samples: usize, facts: &Extent) -> Option<QualityNote> {
-    let (low, high) = facts.force_n;
-    (high - low <= NOTHING * high.abs().max(low.abs()).max(1.0)).then(|| {
+pub(super) fn dead_sensor(samples: usize, extent: &Extent) -> Option<QualityNote> {
+    let (low, high) = extent.force_n;
+    (high - low <= CONSTANT_TOLERANCE * high.abs().max(low.abs()).max(1.0)).then(|| {
         let message = format!(
             "the force stands at {high} N in all {samples} samples, without any noise: the sensor was off or not connected, or this is \
              another column; check the cable and the column map, and record again"
         );
-        QualityNote::blocking_note(QualityKind::Dead, message, [("value", high)])
+        QualityNote::blocking(QualityKind::Dead, message, [("value", high)])
     })
 }
 
-/// A needle that travels less than this (m) was not inserted.
-const STILL_M: f64 = 1e-6;
+/// Position range in m below which the needle does not move.
+const MIN_TRAVEL_M: f64 = 1e-6;
 
-pub(super) fn no_motion(facts: &Extent) -> Option<QualityNote> {
-    let (low, high) = facts.position_m;
-    (high - low < STILL_M).then(|| {
+pub(super) fn no_motion(extent: &Extent) -> Option<QualityNote> {
+    let (low, high) = extent.position_m;
+    (high - low < MIN_TRAVEL_M).then(|| {
         let message = format!(
             "the position stands at {high} m: the needle does not move, or this is another column; check the encoder and the column map"
         );
-        QualityNote::blocking_note(QualityKind::Stuck, message, [("value", high), ("travel_m", high - low)])
+        QualityNote::blocking(QualityKind::Stuck, message, [("value", high), ("travel_m", high - low)])
     })
 }
 
-/// No sensor gives such a number, in any unit.
-const UNMEASURABLE: f64 = 1e12;
+/// Value that no sensor gives, in any unit.
+const MAX_VALUE: f64 = 1e12;
 
-/// Values like 1e300, which finite arithmetic does not survive.
+/// Values such as 1e300, which would overflow in computations.
 pub(super) fn implausible_value<A: SampleStream>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
     let columns = [
         ("force_n", Quantity::Force),
@@ -56,82 +56,82 @@ pub(super) fn implausible_value<A: SampleStream>(recording: &A) -> Result<Option
     for (name, which) in columns {
         let (mut sample, mut first) = (0, None);
         recording.for_each_value(which, |x| {
-            if x.abs() > UNMEASURABLE && first.is_none() {
+            if x.abs() > MAX_VALUE && first.is_none() {
                 first = Some((sample, x));
             }
             sample += 1;
         })?;
         if let Some((at, value)) = first {
-            return Ok(Some(beyond_measure(name, value, at, recording.at(Quantity::Time, at)?)));
+            return Ok(Some(implausible_note(name, value, at, recording.at(Quantity::Time, at)?)));
         }
     }
     Ok(None)
 }
 
-fn beyond_measure(name: &str, value: f64, at: usize, time_s: f64) -> QualityNote {
+fn implausible_note(name: &str, value: f64, at: usize, time_s: f64) -> QualityNote {
     let message = format!(
-        "{name} is {value:e} in sample {} (t = {} s): no sensor gives that; remove the row or correct the value",
+        "{name} is {value:e} in sample {} (t = {} s): no sensor gives such a value; remove the row or correct the value",
         at + 1,
         time_s
     );
-    QualityNote::blocking_note(QualityKind::UnitMixUp, message, [("value", value), ("limit", UNMEASURABLE)])
+    QualityNote::blocking(QualityKind::UnitMixUp, message, [("value", value), ("limit", MAX_VALUE)])
 }
 
-/// Longest run of equal forces that passes while the needle moves.
-const LONGEST_RUN: usize = 20;
-/// ... by this share of its whole travel.
-const MOVED: f64 = 0.01;
-/// Below this share of distinct values the force is coarse, and equal neighbours mean nothing.
-const DISTINCT: f64 = 0.2;
+/// Longest run of equal forces that is accepted while the needle moves.
+const MAX_RUN_SAMPLES: usize = 20;
+/// Least motion during such a run, as a share of the total travel.
+const MIN_MOTION_SHARE: f64 = 0.01;
+/// Share of distinct values below which the force is quantised, so that equal neighbours are normal.
+const MIN_DISTINCT_SHARE: f64 = 0.2;
 
-/// A force that freezes at a value that is not its extreme (there it is saturation), and not zero (nothing touches the needle).
+/// A force that is constant at a value other than its extremes (saturation) and zero (no contact).
 pub(super) fn stuck_force<A: SampleStream>(
     recording: &A,
     sorted: &A::Sorted,
-    facts: &Extent,
+    extent: &Extent,
 ) -> Result<Option<QualityNote>, A::Error> {
     let (mut distinct, mut last) = (0_usize, None);
     sorted.for_each(|x| distinct += usize::from(last.replace(x) != Some(x)))?;
-    if (distinct as f64) < DISTINCT * recording.len() as f64 {
+    if (distinct as f64) < MIN_DISTINCT_SHARE * recording.len() as f64 {
         return Ok(None);
     }
-    let (least, most) = facts.force_n;
-    let travel_m = facts.position_m.1 - facts.position_m.0;
-    let (mut stretches, mut longest, mut at_s, mut value) = (0_u32, 0, 0.0, 0.0);
+    let (least, most) = extent.force_n;
+    let travel_m = extent.position_m.1 - extent.position_m.0;
+    let (mut intervals, mut longest, mut at_s, mut value) = (0_u32, 0, 0.0, 0.0);
     for_each_constant_run(recording, |run| {
         let inside = run.force_n != least && run.force_n != most && run.force_n != 0.0;
         let moved_m = run.position_range_m.1 - run.position_range_m.0;
-        if run.samples > LONGEST_RUN && inside && moved_m > MOVED * travel_m {
-            stretches += 1;
+        if run.samples > MAX_RUN_SAMPLES && inside && moved_m > MIN_MOTION_SHARE * travel_m {
+            intervals += 1;
             if run.samples > longest {
                 (longest, at_s, value) = (run.samples, run.start_s, run.force_n);
             }
         }
     })?;
-    Ok((stretches > 0).then(|| {
+    Ok((intervals > 0).then(|| {
         let message = format!(
-            "the force stands still at {value:.4} N for {longest} samples from t = {at_s:.4} s while the needle moves ({stretches} such \
-             stretch(es)): the logger probably repeated its last value; cut the stretch out or record again"
+            "the force stands still at {value:.4} N for {longest} samples from t = {at_s:.4} s while the needle moves ({intervals} such \
+             interval(s)): the logger probably repeated its last value; cut the interval out or record again"
         );
         let numbers =
-            [("runs", f64::from(stretches)), ("longest", longest as f64), ("at_s", at_s), ("value", value)];
+            [("runs", f64::from(intervals)), ("longest", longest as f64), ("at_s", at_s), ("value", value)];
         QualityNote::new(QualityKind::Stuck, message, numbers)
     }))
 }
 
-/// How far above its noise a force must go the wrong way.
-const ABOVE_NOISE: f64 = 8.0;
-/// ... and how far beyond what goes the right way.
-const BEYOND: f64 = 3.0;
-/// Correlation of force and depth on the way in below which the force runs the other way.
-const CORRELATED: f64 = -0.3;
+/// Least decrease of a reversed force in units of its noise.
+const MIN_DECREASE_SD: f64 = 8.0;
+/// Least decrease in units of the increase.
+const MIN_DECREASE_RATIO: f64 = 3.0;
+/// Most correlation of force and depth during advance.
+const MAX_CORRELATION: f64 = -0.3;
 /// Share of the samples at the beginning whose median is the force in air.
-const BEGIN: f64 = 0.02;
+const AIR_SHARE: f64 = 0.02;
 
-/// A force that grows in the negative direction while the needle goes in.
+/// A force that decreases while the needle advances.
 pub(super) fn reversed_force<A: SampleStream>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
     let samples = recording.len();
-    let first = ((BEGIN * samples as f64) as usize).clamp(5, samples.max(5));
+    let first = ((AIR_SHARE * samples as f64) as usize).clamp(5, samples.max(5));
     let rest_n = median(|take| {
         let mut left = first;
         recording.for_each_value(Quantity::Force, |force_n| {
@@ -142,32 +142,36 @@ pub(super) fn reversed_force<A: SampleStream>(recording: &A) -> Result<Option<Qu
         })
     })?;
     let mut count = 0_usize;
-    way_in(recording, |_, _| count += 1)?;
+    for_each_advancing(recording, |_, _| count += 1)?;
     if count < MIN_SAMPLES {
         return Ok(None);
     }
-    let of =
-        quantiles_of_stream(&[0.98, 0.02], |take| way_in(recording, |_, force_n| take(force_n - rest_n)))?;
+    let of = quantiles_of_stream(&[0.98, 0.02], |take| {
+        for_each_advancing(recording, |_, force_n| take(force_n - rest_n))
+    })?;
     let (right_n, wrong_n) = match of[..] {
         [most, least] => (most.max(0.0), -least),
         _ => return Ok(None),
     };
-    let middle_n = median(|take| way_in(recording, |_, force_n| take(force_n)))?;
-    let least_n = ABOVE_NOISE * noise_n(recording)?;
-    let other_way = wrong_n > least_n && wrong_n > BEYOND * right_n && middle_n < 0.0;
-    if !(other_way && correlation(recording, count as f64)? < CORRELATED) {
+    let middle_n = median(|take| for_each_advancing(recording, |_, force_n| take(force_n)))?;
+    let least_n = MIN_DECREASE_SD * noise_n(recording)?;
+    let is_reversed = wrong_n > least_n && wrong_n > MIN_DECREASE_RATIO * right_n && middle_n < 0.0;
+    if !(is_reversed && correlation(recording, count as f64)? < MAX_CORRELATION) {
         return Ok(None);
     }
     let message = format!(
-        "the force runs the other way: it falls by {wrong_n:.4} N while the needle goes in, and should be positive when it resists \
+        "the force has the wrong sign: it falls by {wrong_n:.4} N while the needle advances, and should be positive when it resists \
          the insertion; give a column map with `scale: -1` in its `force`"
     );
     let numbers = [("wrong_n", wrong_n), ("right_n", right_n)];
-    Ok(Some(QualityNote::blocking_note(QualityKind::Reversed, message, numbers)))
+    Ok(Some(QualityNote::blocking(QualityKind::Reversed, message, numbers)))
 }
 
-/// Position and force of the samples at which the needle has gone further in.
-fn way_in<A: SampleStream>(recording: &A, mut each: impl FnMut(f64, f64)) -> Result<(), A::Error> {
+/// Calls `each` with position and force of the samples at which the needle advances.
+fn for_each_advancing<A: SampleStream>(
+    recording: &A,
+    mut each: impl FnMut(f64, f64),
+) -> Result<(), A::Error> {
     let mut before_m = f64::NAN;
     recording.for_each_block([Quantity::Position, Quantity::Force], |[position_m, force_n]| {
         for (&position_m, &force_n) in position_m.iter().zip(force_n) {
@@ -183,23 +187,23 @@ fn median<E>(pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>) -> Result<f
     Ok(quantiles_of_stream(&[0.5], pass)?.first().copied().unwrap_or(f64::NAN))
 }
 
-/// Standard deviation of the noise from the differences of neighbours: motion and ruptures hardly show in their median.
+/// Standard deviation of the noise from differences of consecutive samples, whose median motion and ruptures hardly change.
 fn noise_n<A: SampleStream>(recording: &A) -> Result<f64, A::Error> {
     let step_n =
         median(|take| recording.for_each_pair(Quantity::Force, |before, now| take((now - before).abs())))?;
     Ok(step_n * stylet_stats::MAD_TO_SD / core::f64::consts::SQRT_2)
 }
 
-/// Correlation of position and force on the way in, which has so many samples.
+/// Correlation of position and force over the `n` advancing samples.
 fn correlation<A: SampleStream>(recording: &A, n: f64) -> Result<f64, A::Error> {
     let (mut sum_z, mut sum_f) = (0.0, 0.0);
-    way_in(recording, |z, f| {
+    for_each_advancing(recording, |z, f| {
         sum_z += z;
         sum_f += f;
     })?;
     let (mean_z, mean_f) = (sum_z / n, sum_f / n);
     let (mut zz, mut ff, mut zf) = (0.0, 0.0, 0.0);
-    way_in(recording, |z, f| {
+    for_each_advancing(recording, |z, f| {
         let (dz, df) = (z - mean_z, f - mean_f);
         zz += dz * dz;
         ff += df * df;
@@ -208,60 +212,61 @@ fn correlation<A: SampleStream>(recording: &A, n: f64) -> Result<f64, A::Error> 
     Ok(zf / (zz * ff).sqrt().max(f64::MIN_POSITIVE))
 }
 
-/// Shortest stretch (s) whose mean is looked at: slower noise is no contact.
-const STRETCH_S: f64 = 0.1;
-/// Fewest stretches that tell.
-const STRETCHES: usize = 24;
-/// Squared differences of neighbouring means over squared deviations from their mean: 2 for noise, near 0 for a force that goes
-/// up and down with the insertion; noise of 24 stretches comes below this once in a thousand recordings.
-const LIKE_NOISE: f64 = 1.0;
+/// Shortest averaging interval (s).
+const MIN_INTERVAL_S: f64 = 0.1;
+/// Least number of intervals.
+const MIN_INTERVALS: usize = 24;
+/// Von Neumann ratio, squared differences of consecutive means over squared deviations from their mean: 2 for noise, near 0 for a force that goes
+/// up and down with the insertion; noise in 24 intervals is below this in one of a thousand recordings.
+const MIN_NOISE_RATIO: f64 = 1.0;
 
-/// A force that is noise at every time scale: the needle touches nothing.
+/// A force that is noise at every time scale: no contact with tissue.
 pub(super) fn only_in_air<A: SampleStream>(
     recording: &A,
-    facts: &Extent,
+    extent: &Extent,
 ) -> Result<Option<QualityNote>, A::Error> {
-    let least = ((STRETCH_S / facts.median_interval_s).ceil().max(1.0) as usize).max(1);
-    let mut stretches = recording.len() / least;
-    if stretches < STRETCHES || recording.duration_s()? < STRETCH_S * STRETCHES as f64 {
+    let least = ((MIN_INTERVAL_S / extent.median_interval_s).ceil().max(1.0) as usize).max(1);
+    let mut intervals = recording.len() / least;
+    if intervals < MIN_INTERVALS || recording.duration_s()? < MIN_INTERVAL_S * MIN_INTERVALS as f64 {
         return Ok(None);
     }
-    // Stretches, pairs of stretches, pairs of pairs ...
+    // Intervals, pairs of intervals, pairs of pairs ...
     let mut levels = Vec::new();
-    while stretches >= STRETCHES {
-        levels.push(Neumann::default());
-        stretches /= 2;
+    while intervals >= MIN_INTERVALS {
+        levels.push(VonNeumannRatio::default());
+        intervals /= 2;
     }
-    stretch_means(recording, least, levels.len(), |level, mean| levels[level].first(mean))?;
-    stretch_means(recording, least, levels.len(), |level, mean| levels[level].second(mean))?;
-    if levels.iter().any(|level| level.ratio() < LIKE_NOISE) {
+    interval_means(recording, least, levels.len(), |level, mean| levels[level].first(mean))?;
+    interval_means(recording, least, levels.len(), |level, mean| levels[level].second(mean))?;
+    if levels.iter().any(|level| level.ratio() < MIN_NOISE_RATIO) {
         return Ok(None);
     }
     let of = quantiles_of_stream(&[0.05, 0.95], |take| recording.for_each_value(Quantity::Force, take))?;
     let [low, high] = of[..] else { return Ok(None) };
     let message = format!(
-        "the force stays within {low:.4} N and {high:.4} N and is nothing but noise, as in air: the needle touches nothing, or the \
-         sensor does not feel it; check that this is an insertion and that the force comes from its sensor"
+        "the force stays within {low:.4} N and {high:.4} N and is only noise, as in air: there is no contact, or the sensor \
+         does not measure it; check that this is an insertion and that the force comes from its sensor"
     );
     let numbers = [("low_n", low), ("high_n", high)];
-    Ok(Some(QualityNote::blocking_note(QualityKind::InAir, message, numbers)))
+    Ok(Some(QualityNote::blocking(QualityKind::InAir, message, numbers)))
 }
 
-/// Hands over the mean force of every stretch of `least` samples (level 0), of every two of them (level 1), and so on.
-fn stretch_means<A: SampleStream>(
+/// Calls `each` with the mean force of every interval of `samples` samples (level 0), of every two of them (level 1), and
+/// so on.
+fn interval_means<A: SampleStream>(
     recording: &A,
-    least: usize,
+    samples: usize,
     levels: usize,
     mut each: impl FnMut(usize, f64),
 ) -> Result<(), A::Error> {
     let (mut count, mut sum) = (0, 0.0);
-    // The first of two means, while the second is to come.
+    // The first of two means, until the second is complete.
     let mut halves: Vec<Option<f64>> = vec![None; levels];
     recording.for_each_value(Quantity::Force, |force_n| {
         sum += force_n;
         count += 1;
-        if count == least {
-            let mut mean = sum / least as f64;
+        if count == samples {
+            let mut mean = sum / samples as f64;
             (count, sum) = (0, 0.0);
             for (level, half) in halves.iter_mut().enumerate() {
                 each(level, mean);
@@ -277,9 +282,9 @@ fn stretch_means<A: SampleStream>(
     })
 }
 
-/// Von Neumann's ratio of numbers that come twice.
+/// Von Neumann ratio, computed in two passes.
 #[derive(Clone, Debug, Default)]
-struct Neumann {
+struct VonNeumannRatio {
     count: usize,
     sum: f64,
     before: Option<f64>,
@@ -287,7 +292,7 @@ struct Neumann {
     all: f64,
 }
 
-impl Neumann {
+impl VonNeumannRatio {
     fn first(&mut self, x: f64) {
         self.count += 1;
         self.sum += x;
@@ -312,14 +317,11 @@ mod tests {
     use super::*;
     use crate::error::RecordError;
     use crate::recording::Recording;
+    use crate::test_noise::uniform;
 
-    /// Numbers spread as noise, the same every time.
+    /// Normal noise, the same every time.
     fn noise(n: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut uniform = uniform(seed);
         (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>()).collect()
     }
 
@@ -343,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_good_insertion_is_grave_in_nothing_whatever_its_noise_bias_and_size() -> Result<(), RecordError> {
+    fn a_good_insertion_has_no_blocking_note_whatever_its_noise_bias_and_gain() -> Result<(), RecordError> {
         for sd in [0.0, 0.001, 0.02, 0.2] {
             for (bias, gain) in [(0.0, 1.0), (-3.0, 1.0), (2.0, 0.01), (-0.1, 20.0)] {
                 let recording = insertion(sd, |f| gain * f + bias)?;
@@ -354,20 +356,15 @@ mod tests {
     }
 
     #[test]
-    fn a_dead_a_reversed_and_a_millimetre_recording_have_one_name_and_one_remedy_each()
-    -> Result<(), RecordError> {
+    fn dead_reversed_and_millimetre_recordings_are_reported_with_a_remedy() -> Result<(), RecordError> {
         let dead = insertion(0.02, |_| 0.0)?;
         assert_eq!(kinds(&dead), [QualityKind::Dead]);
-        assert_eq!(
-            kinds(&insertion(0.02, |_| 1.25)?),
-            [QualityKind::Dead],
-            "a level that never changes is as dead"
-        );
+        assert_eq!(kinds(&insertion(0.02, |_| 1.25)?), [QualityKind::Dead], "a constant level is dead, too");
         let reversed = insertion(0.02, |f| -f)?;
         assert_eq!(kinds(&reversed), [QualityKind::Reversed]);
         assert_eq!(kinds(&insertion(0.02, |f| -2.0 - f)?), [QualityKind::Reversed], "with a bias");
         for recording in [dead, reversed] {
-            let note = assess(&recording).into_iter().find(|note| note.blocking).expect("it is grave");
+            let note = assess(&recording).into_iter().find(|note| note.blocking).expect("a blocking note");
             assert!(note.message.contains("column map"), "{}", note.message);
         }
         let good = insertion(0.02, |f| f)?;
@@ -379,17 +376,17 @@ mod tests {
     }
 
     #[test]
-    fn noise_alone_is_air_be_it_white_coloured_or_coarse() -> Result<(), RecordError> {
+    fn noise_alone_is_in_air_be_it_white_autocorrelated_or_quantised() -> Result<(), RecordError> {
         let still = insertion(0.0, |_| 0.0)?;
         let mut pole = 0.0;
-        let coloured = noise(2000, 3).into_iter().map(|e| {
+        let autocorrelated = noise(2000, 3).into_iter().map(|e| {
             pole = 0.6 * pole + 0.02 * e;
             pole
         });
         let coarse = noise(2000, 4).into_iter().map(|e| (e * 0.8).round() * 0.05);
         for (what, force_n) in [
             ("white", noise(2000, 2).into_iter().map(|e| 0.3 + 0.02 * e).collect::<Vec<f64>>()),
-            ("coloured", coloured.collect()),
+            ("autocorrelated", autocorrelated.collect()),
             ("coarse", coarse.collect()),
         ] {
             let air = Recording::new(still.time_s.clone(), still.position_m.clone(), force_n)?;
@@ -399,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn a_needle_at_rest_and_three_samples_are_told() -> Result<(), RecordError> {
+    fn a_needle_at_rest_and_three_samples_are_refused() -> Result<(), RecordError> {
         let good = insertion(0.02, |f| f)?;
         let rest = Recording::new(good.time_s.clone(), vec![0.01; good.len()], good.force_n.clone())?;
         assert_eq!(kinds(&rest), [QualityKind::Stuck]);
@@ -409,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn a_logger_that_repeats_its_last_value_is_told_and_stops_nothing() -> Result<(), RecordError> {
+    fn a_logger_that_repeats_its_last_value_is_reported_and_not_refused() -> Result<(), RecordError> {
         let mut recording = insertion(0.02, |f| f)?;
         let frozen = recording.force_n[700];
         recording.force_n[700..800].fill(frozen);
@@ -425,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_that_begins_in_the_tissue_and_lets_go_is_not_reversed() -> Result<(), RecordError> {
+    fn a_recording_that_starts_under_load_and_unloads_is_not_reversed() -> Result<(), RecordError> {
         // Under load from the start, one rupture after the other, no advance left at the end.
         let good = insertion(0.02, |f| f)?;
         let force_n =

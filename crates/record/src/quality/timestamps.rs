@@ -1,15 +1,16 @@
 //! Gaps and jitter of the time stamps.
 
-use super::{Extent, QualityKind, QualityNote};
+use super::extent::Extent;
+use super::note::{QualityKind, QualityNote};
 use crate::sample_stream::{Quantity, SampleStream};
 
-/// An interval over so many median intervals is a gap.
+/// Least length of a gap in median intervals.
 const GAP_INTERVALS: f64 = 5.0;
-/// Scatter of the intervals (standard deviation over median) from which it is worth a note.
-const JITTER: f64 = 0.05;
+/// Least scatter of the intervals (standard deviation over median) for a note.
+const MIN_JITTER: f64 = 0.05;
 
-pub(super) fn gaps<A: SampleStream>(recording: &A, facts: &Extent) -> Result<Option<QualityNote>, A::Error> {
-    let median_s = facts.median_interval_s;
+pub(super) fn gaps<A: SampleStream>(recording: &A, extent: &Extent) -> Result<Option<QualityNote>, A::Error> {
+    let median_s = extent.median_interval_s;
     let (mut count, mut largest_s, mut at_s) = (0_u32, 0.0, 0.0);
     recording.for_each_pair(Quantity::Time, |before, now| {
         if now - before > GAP_INTERVALS * median_s {
@@ -22,7 +23,7 @@ pub(super) fn gaps<A: SampleStream>(recording: &A, facts: &Extent) -> Result<Opt
     Ok((count > 0).then(|| {
         let message = format!(
             "{count} gap(s) of over five sampling intervals, the largest of {largest_s:.4} s after t = {at_s:.4} s \
-             (typical interval {median_s:.6} s); ruptures inside a gap cannot be seen"
+             (typical interval {median_s:.6} s); ruptures inside a gap are not recorded"
         );
         let numbers = [
             ("count", f64::from(count)),
@@ -36,9 +37,9 @@ pub(super) fn gaps<A: SampleStream>(recording: &A, facts: &Extent) -> Result<Opt
 
 pub(super) fn jitter<A: SampleStream>(
     recording: &A,
-    facts: &Extent,
+    extent: &Extent,
 ) -> Result<Option<QualityNote>, A::Error> {
-    let median_s = facts.median_interval_s;
+    let median_s = extent.median_interval_s;
     let intervals = |each: &mut dyn FnMut(f64)| {
         recording.for_each_pair(Quantity::Time, |before, now| {
             let interval = now - before;
@@ -57,10 +58,10 @@ pub(super) fn jitter<A: SampleStream>(
     let mean_s = sum / count;
     intervals(&mut |interval| squares += (interval - mean_s).powi(2))?;
     let sd_s = (squares / count).sqrt();
-    Ok((sd_s > JITTER * median_s).then(|| {
+    Ok((sd_s > MIN_JITTER * median_s).then(|| {
         let message = format!(
             "the sampling is irregular: intervals scatter by {:.1} % ({shortest_s:.6} s to {longest_s:.6} s, typically \
-             {median_s:.6} s); filters tuned for a fixed rate see a wandering one",
+             {median_s:.6} s); filters for a fixed rate are inaccurate",
             100.0 * sd_s / median_s
         );
         let numbers = [
@@ -98,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_of_two_gaps_is_named_with_its_place() -> Result<(), RecordError> {
+    fn the_largest_of_two_gaps_is_reported_with_its_time() -> Result<(), RecordError> {
         let late = |i: u32| if i > 60 { 0.4 } else { 0.0 } + if i > 30 { 0.1 } else { 0.0 };
         let recording = sampled_at((0..100).map(|i| f64::from(i) * 0.01 + late(i)).collect())?;
         let note = timing(&recording).0.expect("two gaps");
@@ -112,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn scattered_intervals_are_noted_from_five_percent() -> Result<(), RecordError> {
+    fn irregular_intervals_are_reported_from_five_percent() -> Result<(), RecordError> {
         let scattered =
             |share: f64| (0..300).map(|i| 0.01 * (f64::from(i) + share * f64::from(i % 2))).collect();
         // Alternating intervals 0.01 (1 +- share): the standard deviation is the share, over a median of 1 - share or more.

@@ -1,55 +1,56 @@
-//! Quantities that look as if they came in another unit.
+//! Quantities that look as if they had another unit.
 
-use super::{Extent, QualityKind, QualityNote};
+use super::extent::Extent;
+use super::note::{QualityKind, QualityNote};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, SlopeFilter};
 use crate::sample_stream::{Quantity, SampleStream};
 use std::collections::VecDeque;
 use stylet_stats::quantiles_of_stream;
 
-/// No needle travels so far (m).
-const FARTHEST_M: f64 = 2.0;
-/// No needle is so fast (m/s).
-const FASTEST_MPS: f64 = 1.0;
-/// No needle is pushed so hard (N).
-const STRONGEST_N: f64 = 500.0;
-/// No log is so slow (s).
-const SLOWEST_S: f64 = 1.0;
-/// A measured velocity so many times the slope of the position (or of the other sign) is in another unit; a noisy one is not.
-const GRAVE_FACTOR: f64 = 20.0;
-/// Single bad samples shall not look like a unit.
-const PERCENTILE: f64 = 0.99;
+/// Most position range (m).
+const MAX_RANGE_M: f64 = 2.0;
+/// Most speed (m/s).
+const MAX_SPEED_MPS: f64 = 1.0;
+/// Most force (N).
+const MAX_FORCE_N: f64 = 500.0;
+/// Most sampling interval (s).
+const MAX_INTERVAL_S: f64 = 1.0;
+/// Factor between measured velocity and slope of the position (or its inverse) above which the note is blocking.
+const BLOCKING_FACTOR: f64 = 20.0;
+/// Quantile of speed and force, so that single bad samples do not count.
+const QUANTILE: f64 = 0.99;
 
 pub(super) fn unit_mix_ups<A: SampleStream>(
     recording: &A,
-    facts: &Extent,
+    extent: &Extent,
 ) -> Result<Vec<QualityNote>, A::Error> {
     let typical = |which| -> Result<f64, A::Error> {
         let most =
-            quantiles_of_stream(&[PERCENTILE], |take| recording.for_each_value(which, |x| take(x.abs())))?;
+            quantiles_of_stream(&[QUANTILE], |take| recording.for_each_value(which, |x| take(x.abs())))?;
         Ok(most.first().copied().unwrap_or(f64::NAN))
     };
     let mut notes = Vec::new();
-    let mut beyond = |value: f64, limit: f64, grave: bool, message: String| {
+    let mut note_above = |value: f64, limit: f64, blocking: bool, message: String| {
         if value > limit {
             let note =
                 QualityNote::new(QualityKind::UnitMixUp, message, [("value", value), ("limit", limit)]);
-            notes.push(QualityNote { blocking: grave, ..note });
+            notes.push(QualityNote { blocking: blocking, ..note });
         }
     };
-    let (low, high) = facts.position_m;
+    let (low, high) = extent.position_m;
     let travel_m = high - low;
-    beyond(
+    note_above(
         travel_m,
-        FARTHEST_M,
+        MAX_RANGE_M,
         true,
         format!(
             "the position ranges over {travel_m:.4} m: it looks like millimetres; give a column map with position scale 1e-3"
         ),
     );
     let speed_mps = typical(Quantity::Velocity)?;
-    beyond(
+    note_above(
         speed_mps,
-        FASTEST_MPS,
+        MAX_SPEED_MPS,
         true,
         format!(
             "the needle moves at {speed_mps:.4} m/s: position or velocity look like millimetres: give a column map with scale 1e-3 \
@@ -57,18 +58,18 @@ pub(super) fn unit_mix_ups<A: SampleStream>(
         ),
     );
     let force_n = typical(Quantity::Force)?;
-    beyond(
+    note_above(
         force_n,
-        STRONGEST_N,
+        MAX_FORCE_N,
         true,
         format!(
             "the force reaches {force_n:.1} N: it looks like millinewtons; give a column map with force scale 1e-3"
         ),
     );
-    let interval_s = facts.median_interval_s;
-    beyond(
+    let interval_s = extent.median_interval_s;
+    note_above(
         interval_s,
-        SLOWEST_S,
+        MAX_INTERVAL_S,
         false,
         format!(
             "the typical sampling interval is {interval_s:.4} s: the time looks like milliseconds (scale 1e-3) or microseconds \
@@ -79,18 +80,18 @@ pub(super) fn unit_mix_ups<A: SampleStream>(
     Ok(notes)
 }
 
-/// A measured velocity should be the slope of the position: the factor between them (least squares) is near one.
+/// The note on a measured velocity whose factor to the slope of the position (least squares) is not near one.
 fn velocity_against_position<A: SampleStream>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
     if !recording.velocity_measured() {
         return Ok(None);
     }
-    let (mut together, mut alone) = (0.0, 0.0);
-    // Measured velocities that wait for the slope of their sample.
-    let mut waiting = VecDeque::new();
+    let (mut cross, mut square) = (0.0, 0.0);
+    // Measured velocities whose slope is not known yet.
+    let mut pending = VecDeque::new();
     let mut compare = |slope: f64, velocity: Option<f64>| {
         if let Some(velocity) = velocity {
-            together += slope * velocity;
-            alone += slope * slope;
+            cross += slope * velocity;
+            square += slope * slope;
         }
     };
     let mut slopes = SlopeFilter::new(DEFAULT_HALF_WIDTH_S);
@@ -98,20 +99,20 @@ fn velocity_against_position<A: SampleStream>(recording: &A) -> Result<Option<Qu
         [Quantity::Time, Quantity::Position, Quantity::Velocity],
         |[time_s, position_m, velocity_mps]| {
             for ((time_s, position_m), velocity_mps) in time_s.iter().zip(position_m).zip(velocity_mps) {
-                waiting.push_back(*velocity_mps);
-                slopes.push(*time_s, *position_m, |slope| compare(slope, waiting.pop_front()));
+                pending.push_back(*velocity_mps);
+                slopes.push(*time_s, *position_m, |slope| compare(slope, pending.pop_front()));
             }
         },
     )?;
-    slopes.finish(|slope| compare(slope, waiting.pop_front()));
-    let factor = together / alone;
-    Ok((alone > 0.0 && !(0.5..=2.0).contains(&factor)).then(|| {
+    slopes.finish(|slope| compare(slope, pending.pop_front()));
+    let factor = cross / square;
+    Ok((square > 0.0 && !(0.5..=2.0).contains(&factor)).then(|| {
         let message = format!(
             "the measured velocity is {factor:.4} times the slope of the position: check the units and signs of both, or leave the velocity out of the \
              column map"
         );
         let note = QualityNote::new(QualityKind::UnitMixUp, message, [("value", factor), ("limit", 2.0)]);
-        QualityNote { blocking: !(1.0 / GRAVE_FACTOR..=GRAVE_FACTOR).contains(&factor), ..note }
+        QualityNote { blocking: !(1.0 / BLOCKING_FACTOR..=BLOCKING_FACTOR).contains(&factor), ..note }
     }))
 }
 
@@ -129,40 +130,40 @@ mod tests {
         Recording::new(time_s.iter().map(|t| t * time).collect(), position_m, force_n)
     }
 
-    fn remarks(recording: &Recording) -> String {
+    fn messages(recording: &Recording) -> String {
         let notes = super::super::assess(recording).into_iter();
         notes.filter(|note| note.kind == QualityKind::UnitMixUp).map(|note| note.message + "\n").collect()
     }
 
     #[test]
-    fn an_insertion_in_si_units_raises_no_doubt() -> Result<(), RecordError> {
-        assert_eq!(remarks(&insertion(1.0, 1.0, 1.0)?), "");
+    fn an_insertion_in_si_units_has_no_note() -> Result<(), RecordError> {
+        assert_eq!(messages(&insertion(1.0, 1.0, 1.0)?), "");
         Ok(())
     }
 
     #[test]
-    fn millimetres_millinewtons_and_milliseconds_are_named() -> Result<(), RecordError> {
-        let millimetres = remarks(&insertion(1.0, 1e3, 1.0)?);
+    fn millimetres_millinewtons_and_milliseconds_are_reported() -> Result<(), RecordError> {
+        let millimetres = messages(&insertion(1.0, 1e3, 1.0)?);
         assert!(
             millimetres.contains("looks like millimetres") && millimetres.contains("m/s"),
             "{millimetres}"
         );
-        assert!(remarks(&insertion(1.0, 1.0, -1e3)?).contains("looks like millinewtons"));
-        assert!(remarks(&insertion(1e3, 1.0, 1.0)?).contains("looks like milliseconds"));
+        assert!(messages(&insertion(1.0, 1.0, -1e3)?).contains("looks like millinewtons"));
+        assert!(messages(&insertion(1e3, 1.0, 1.0)?).contains("looks like milliseconds"));
         Ok(())
     }
 
     #[test]
-    fn a_velocity_of_the_wrong_sign_or_unit_is_named_and_a_noisy_one_is_not() -> Result<(), RecordError> {
+    fn a_velocity_of_the_wrong_sign_or_unit_is_reported_and_a_noisy_one_is_not() -> Result<(), RecordError> {
         let si = insertion(1.0, 1.0, 1.0)?;
         let measured = |factor: f64| {
             let velocity_mps =
                 si.velocity_mps.iter().enumerate().map(|(i, v)| v * factor + 0.002 * ((i % 2) as f64 - 0.5));
             Recording { velocity_mps: velocity_mps.collect(), velocity_measured: true, ..si.clone() }
         };
-        assert_eq!(remarks(&measured(1.0)), "");
-        assert!(remarks(&measured(-1.0)).contains("-1.0"), "{}", remarks(&measured(-1.0)));
-        assert!(remarks(&measured(60.0)).contains("times the slope of the position"));
+        assert_eq!(messages(&measured(1.0)), "");
+        assert!(messages(&measured(-1.0)).contains("-1.0"), "{}", messages(&measured(-1.0)));
+        assert!(messages(&measured(60.0)).contains("times the slope of the position"));
         Ok(())
     }
 }

@@ -1,14 +1,15 @@
-//! The step on which all forces lie, and the level at which they stop.
+//! Resolution and range of a force sensor: the step of the force grid, and the level at which the force is clipped.
 
-use crate::{QualityKind, QualityNote, Recording};
-use stylet_stats::order_statistics::median;
+use crate::quality::note::{QualityKind, QualityNote};
+use crate::recording::Recording;
+use stylet_stats::median;
 
-/// Fewest equal extremes that make a saturation.
-const EXTREMES: usize = 6;
-/// With fewer levels than this up to the largest force, a limit must hold far more samples.
+/// Least number of equal extremes of a clipped force.
+const MIN_EXTREMES: usize = 6;
+/// With fewer levels than this up to the largest force, a limit needs more samples.
 const COARSE_LEVELS: f64 = 20.0;
 
-/// The step on which all forces lie.
+/// Step of the grid of all forces in N, from the quantisation notes of at least half of the recordings.
 pub(super) fn quantisation_step_n(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> Option<f64> {
     let mut steps: Vec<f64> = notes
         .iter()
@@ -21,7 +22,7 @@ pub(super) fn quantisation_step_n(recordings: &[&Recording], notes: &[Vec<Qualit
         return None;
     }
     let rough = median(&mut steps);
-    // The step from all levels at once: level number against value, by least squares through zero.
+    // Refined by least squares through zero: value against level number.
     let (mut nf, mut nn) = (0.0, 0.0);
     for f in recordings.iter().flat_map(|r| &r.force_n) {
         let n = (f / rough).round();
@@ -32,7 +33,7 @@ pub(super) fn quantisation_step_n(recordings: &[&Recording], notes: &[Vec<Qualit
     Some(if (fine / rough - 1.0).abs() < 0.02 { fine } else { rough })
 }
 
-/// The level at which the force stops.
+/// Level in N at which the force is clipped.
 pub(super) fn sensor_limit_n(recordings: &[&Recording], step: Option<f64>) -> Option<f64> {
     let all = || recordings.iter().flat_map(|r| &r.force_n);
     let most = all().fold(0.0_f64, |m, f| m.max(f.abs()));
@@ -42,15 +43,15 @@ pub(super) fn sensor_limit_n(recordings: &[&Recording], step: Option<f64>) -> Op
     let at = all().filter(|f| f.abs() >= most * (1.0 - 1e-9)).count();
     let expected = match step {
         None => 0,
-        // On a grid several samples share the last level; below the limit they thin out.
+        // On a grid several samples share the last level; below a true limit there are fewer.
         Some(step) => {
             let level = |k: f64| all().filter(|f| (f.abs() - (most - k * step)).abs() < 0.25 * step).count();
-            // A force that is held within one of few levels looks like a limit.
+            // On a coarse grid a constant force looks like a limit.
             let factor = if COARSE_LEVELS * step > most { 12 } else { 3 };
             factor * level(1.0).max(level(2.0)).max(2)
         }
     };
-    (at >= EXTREMES && at > expected).then_some(most)
+    (at >= MIN_EXTREMES && at > expected).then_some(most)
 }
 
 #[cfg(test)]
@@ -60,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_limit_holds_six_samples_or_three_times_what_a_grid_holds_near_it() {
+    fn a_limit_needs_six_samples_or_three_times_the_counts_of_the_levels_below() {
         let ramp = |at_limit: usize| {
             let mut f: Vec<f64> = (0..300).map(|k| 0.0101 * f64::from(k)).collect();
             f.iter_mut().rev().take(at_limit).for_each(|f| *f = -3.5);
@@ -81,9 +82,9 @@ mod tests {
         assert_eq!(grid(13, 4, 2), Some(3.5));
         assert_eq!(grid(13, 2, 5), None);
         assert_eq!(grid(16, 2, 5), Some(3.5));
-        // Two at least are expected.
+        // At least two are expected.
         assert_eq!((grid(6, 0, 0), grid(7, 1, 0)), (None, Some(3.5)));
-        // With fewer than twenty levels a limit holds twelve times as many.
+        // With fewer than twenty levels a limit needs twelve times the counts.
         let coarse = |at: usize, step: f64| {
             let mut f: Vec<f64> = (0..300).map(|k| step * f64::from(k % 5)).collect();
             f[..at].fill(3.8);
@@ -94,20 +95,19 @@ mod tests {
     }
 
     #[test]
-    fn the_step_is_that_of_all_levels_at_once() {
+    fn the_step_is_refined_from_all_levels() {
         let f: Vec<f64> = (0..500).map(|k| 0.0503 * f64::from((k * 37) % 61 - 20)).collect();
         let r = recording(f);
-        // Told roughly, found finely.
         let fine = quantisation_step_n(&[&r], &[vec![quantised(0.05)]]).expect("a step");
         assert!((fine - 0.0503).abs() < 1e-9, "{fine}");
-        // What is told and found differ by more than two per cent: what is told stands.
+        // If note and refinement differ by more than two per cent, the note's value is used.
         let two = recording((0..60).map(|k| if k % 3 == 0 { -0.0503 } else { 0.0503 }).collect());
         assert_eq!(quantisation_step_n(&[&two], &[vec![quantised(0.049)]]), Some(0.049));
         assert!(
             (quantisation_step_n(&[&two], &[vec![quantised(0.0495)]]).expect("a step") - 0.0503).abs() < 1e-9
         );
         assert_eq!(quantisation_step_n(&[&two], &[vec![quantised(0.052)]]), Some(0.052));
-        // Half of the recordings have to be on a grid; other remarks, and steps of nothing, do not count.
+        // At least half of the recordings have to be on a grid; other notes, and steps of zero, do not count.
         assert!(quantisation_step_n(&[&r, &r], &[vec![quantised(0.05)], Vec::new()]).is_some());
         assert_eq!(
             quantisation_step_n(&[&r, &r, &r], &[vec![quantised(0.05)], Vec::new(), Vec::new()]),
@@ -117,14 +117,14 @@ mod tests {
         let of_position = QualityNote { message: "position_m moves in steps".to_owned(), ..quantised(0.05) };
         let gaps = QualityNote { kind: QualityKind::Gaps, ..quantised(0.05) };
         assert_eq!(quantisation_step_n(&[&r], &[vec![of_position, gaps]]), None);
-        // Without any force the rough one is all there is.
+        // Without any force the note's value is used.
         assert_eq!(quantisation_step_n(&[&recording(vec![0.0; 20])], &[vec![quantised(0.05)]]), Some(0.05));
-        let raw = find_sensor_artefacts(&[&r], &[vec![quantised(0.05)]]);
-        assert!((raw.step_n.expect("a step") - 0.0503).abs() < 1e-9);
+        let artefacts = find_sensor_artefacts(&[&r], &[vec![quantised(0.05)]]);
+        assert!((artefacts.step_n.expect("a step") - 0.0503).abs() < 1e-9);
     }
 
     #[test]
-    fn half_of_the_recordings_tell_a_step_and_a_step_of_nothing_is_none() {
+    fn the_step_needs_half_of_the_recordings_and_is_not_zero() {
         let r = recording((0..50).map(|k| 0.25 * f64::from(k % 7)).collect());
         let notes = |steps: &[f64]| steps.iter().map(|s| vec![quantised(*s)]).collect::<Vec<_>>();
         assert_eq!(quantisation_step_n(&[&r, &r], &notes(&[0.25])), Some(0.25));
