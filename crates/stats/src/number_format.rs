@@ -1,4 +1,4 @@
-//! Numbers as text for people: few significant digits, the same on every machine.
+//! Number formatting for reports: significant digits, the same on every machine.
 
 /// `value` rounded to `digits` significant digits, in decimal or exponent form, whichever suits its size. A value that is not finite
 /// becomes an en dash.
