@@ -1,5 +1,5 @@
-//! Promise: `stylet listen` loses no sample, says what `stylet enhance`'s core says, and is not slowed by a reader that
-//! stalls. The long form (60 s at 1 kHz, a browser's connection that stalls for 10 s):
+//! Promise: `stylet listen` loses no sample, gives the outputs of the core, and is not slowed by a stalled subscriber. The long
+//! form (60 s at 1 kHz, a browser connection that stalls for 10 s):
 //! `cargo test --release --test listen -- --ignored --nocapture`.
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -33,7 +33,7 @@ fn listen(args: &[&str]) -> Child {
 }
 
 #[test]
-fn lines_from_standard_input_get_the_cores_answers() {
+fn lines_from_standard_input_give_the_outputs_of_the_core() {
     let mut child = listen(&["--stdin"]);
     let mut stdin = child.stdin.take().expect("a pipe");
     let feeder = std::thread::spawn(move || {
@@ -51,16 +51,16 @@ fn lines_from_standard_input_get_the_cores_answers() {
     let lines: Vec<serde_json::Value> =
         text.lines().map(|l| serde_json::from_str(l).expect("JSON")).collect();
     assert_eq!(lines.len(), 5000);
-    for (k, said) in lines.iter().enumerate() {
+    for (k, line) in lines.iter().enumerate() {
         let out = core.step(sample(k as u64));
-        assert_eq!(said["enhanced_n"].as_f64(), Some(out.enhanced_n), "sample {k}");
-        assert_eq!(said["state"].as_str(), Some(out.state.name()));
+        assert_eq!(line["enhanced_n"].as_f64(), Some(out.enhanced_n), "sample {k}");
+        assert_eq!(line["state"].as_str(), Some(out.state.name()));
     }
     let end = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(end.contains("line 5002: 2 field(s)") && end.contains("\"bad_lines\":1"), "{end}");
 }
 
-/// 1 kHz for so many seconds; a reader of the page that reads once and then stalls. Gives the summary.
+/// Sends samples at 1 kHz while a subscriber of the page stalls after its first read; returns the summary.
 fn over_loopback(seconds: u64, stall: Duration) -> serde_json::Value {
     let free = |s: std::io::Result<UdpSocket>| s.and_then(|s| s.local_addr()).expect("a port").port();
     let port = free(UdpSocket::bind("127.0.0.1:0"));
@@ -68,9 +68,9 @@ fn over_loopback(seconds: u64, stall: Duration) -> serde_json::Value {
     let to = forward.local_addr().expect("an address").to_string();
     let mut child = listen(&["--udp", &port.to_string(), "--page", "0", "--forward", &to, "--quiet"]);
     let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
-    let mut said = String::new();
-    stderr.read_line(&mut said).expect("the page's address");
-    let address = said.trim().trim_start_matches("live page: http://").trim_end_matches('/').to_owned();
+    let mut first_line = String::new();
+    stderr.read_line(&mut first_line).expect("the page's address");
+    let address = first_line.trim().trim_start_matches("live page: http://").trim_end_matches('/').to_owned();
     let mut page = TcpStream::connect(&address).expect("a page");
     write!(page, "GET / HTTP/1.1\r\n\r\n").expect("asked");
     let mut text = String::new();
@@ -124,7 +124,7 @@ fn no_sample_is_lost_at_one_kilohertz() {
 
 #[test]
 #[ignore = "a minute"]
-fn a_minute_at_one_kilohertz_with_a_reader_that_stalls_for_ten_seconds() {
+fn a_minute_at_one_kilohertz_with_a_subscriber_that_stalls_for_ten_seconds() {
     let counts = over_loopback(60, Duration::from_secs(10));
     assert_eq!((counts["samples"].as_u64(), counts["unused"].as_u64()), (Some(60_000), Some(0)));
 }

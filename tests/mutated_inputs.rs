@@ -127,7 +127,7 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_a_positi
     ];
     fuzz("live", 6_000, &samples, |bytes| {
         let text = String::from_utf8_lossy(bytes);
-        stylet_live::parse_line(1, &text).is_ok_and(|given| given.is_some())
+        stylet::live_stream::parse_line(1, &text).is_ok_and(|given| given.is_some())
     });
 }
 

@@ -10,42 +10,43 @@ use stylet_record::{read_csv, read_long_csv};
 use stylet_report::{plus_minus, significant};
 use stylet_scenario::EnhancerConfigFile;
 
-/// Ruptures and layers of a long recording that are said.
-const LISTED: usize = 100;
+/// Ruptures and layers of a long recording that are printed.
+const MAX_LISTED: usize = 100;
 
-/// The command.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
-    let law = args.model.as_deref().map(IdentifiedModel::load).transpose()?;
-    if let Some(law) = &law {
-        law.check_algorithm(&config.enhance)?;
+    let model = args.model.as_deref().map(IdentifiedModel::load).transpose()?;
+    if let Some(model) = &model {
+        model.check_algorithm(&config.enhance)?;
     }
     let options = read_options(args.columns.as_deref(), args.repair)?;
-    let models = match args.compare {
+    let regressors = match args.compare {
         true => vec![Model::MultiLayer, Model::KelvinVoigt],
         false => vec![config.enhance.model],
     };
     let source = ResultSource { data: &args.data, config: args.config.as_deref(), command: command(args) };
     let folder = args.results.output_folder(&args.data, "");
-    if let Some(need) = resource_estimate::estimate_long_enhance(&args.data, models.len()) {
-        args.limits.check(&args.data, &need, args.results.quiet)?;
-        let claim = OutputLock::new(&folder)?;
+    if let Some(estimate) = resource_estimate::estimate_long_enhance(&args.data, regressors.len()) {
+        args.limits.check(&args.data, &estimate, args.results.quiet)?;
+        let lock = OutputLock::new(&folder)?;
         if let Some((recording, notes)) = read_long_csv(&args.data, &options, &folder)? {
-            let heard = enhance_long_recording(&recording, notes, config, &models, law.as_ref(), &claim)?;
-            let said = summary(args, &heard);
-            return args.results.write_locked_and_print(&claim, &heard.output_files(&source)?, || said);
+            let result =
+                enhance_long_recording(&recording, notes, config, &regressors, model.as_ref(), &lock)?;
+            let summary = summary(args, &result);
+            return args.results.write_locked_and_print(&lock, &result.output_files(&source)?, || summary);
         }
     }
-    if let Some(need) = resource_estimate::estimate_enhance(&args.data, models.len()) {
-        args.limits.check(&args.data, &need, args.results.quiet)?;
+    if let Some(estimate) = resource_estimate::estimate_enhance(&args.data, regressors.len()) {
+        args.limits.check(&args.data, &estimate, args.results.quiet)?;
     }
     let (recording, notes) = read_csv(&args.data, &options)?;
-    let heard = enhance_recording(recording, notes, config, &models, law.as_ref())?;
-    let said = summary(args, &heard);
-    args.results.write_and_print(&folder, &heard.output_files(&source)?, || said)
+    let result = enhance_recording(recording, notes, config, &regressors, model.as_ref())?;
+    let summary = summary(args, &result);
+    args.results.write_and_print(&folder, &result.output_files(&source)?, || summary)
 }
 
 fn command(args: &EnhanceArgs) -> String {
@@ -63,9 +64,9 @@ fn command(args: &EnhanceArgs) -> String {
     command
 }
 
-fn summary(args: &EnhanceArgs, heard: &EnhancementResult) -> String {
-    let EnhancementResult { extent, notes, algorithm_runs: ran, hash, model: law, .. } = heard;
-    let listed = if heard.is_long() { LISTED } else { usize::MAX };
+fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
+    let EnhancementResult { extent, notes, algorithm_runs: runs, hash, model, .. } = result;
+    let listed = if result.is_long() { MAX_LISTED } else { usize::MAX };
     let mut out = String::new();
     let _ = writeln!(
         out,
@@ -78,16 +79,16 @@ fn summary(args: &EnhanceArgs, heard: &EnhancementResult) -> String {
     for note in notes {
         let _ = writeln!(out, "  note: {}", note.message);
     }
-    if let Some(note) = stylet_api::settings_note(ran) {
+    if let Some(note) = stylet_api::settings_note(runs) {
         let _ = writeln!(out, "  note: {note}");
     }
-    if let Some(law) = law {
-        let _ = writeln!(out, "  law: {}", law.summary());
-        for note in &law.notes {
+    if let Some(model) = model {
+        let _ = writeln!(out, "  model: {}", model.summary());
+        for note in &model.notes {
             let _ = writeln!(out, "  note: {note}");
         }
     }
-    for r in ran {
+    for r in runs {
         let unit = if r.config.model == Model::MultiLayer { "N s/m²" } else { "N s/m" };
         let _ = writeln!(out, "\n{}", r.name);
         match (r.trace.contact_m, r.trace.contact_s) {
@@ -95,18 +96,16 @@ fn summary(args: &EnhanceArgs, heard: &EnhancementResult) -> String {
                 let _ = writeln!(out, "  first contact at {:.2} mm, {t:.3} s", z * 1e3);
             }
             _ => {
-                // A finding about the recording says it better.
-                let grave = notes.iter().any(|n| n.blocking);
-                let why =
-                    if grave { "see the note" } else { "the force never stands out of its noise in air" };
-                let _ = writeln!(out, "  no contact found: {why}");
+                let blocking = notes.iter().any(|n| n.blocking);
+                let why = if blocking { "see the note" } else { "the force never exceeds its noise in air" };
+                let _ = writeln!(out, "  no contact detected: {why}");
             }
         }
         let _ = writeln!(out, "  {} rupture(s)", r.trace.detections.len());
         for d in r.trace.detections.iter().take(listed) {
             let _ = writeln!(
                 out,
-                "    at {:.3} s, {:.2} mm (traced back to {:.2} mm), by {}",
+                "    at {:.3} s, {:.2} mm (located at {:.2} mm), by {}",
                 d.time_s,
                 d.position_m * 1e3,
                 d.located_m * 1e3,
@@ -114,16 +113,16 @@ fn summary(args: &EnhanceArgs, heard: &EnhancementResult) -> String {
             );
         }
         for e in r.trace.estimates.iter().take(listed) {
-            let shown =
+            let interval =
                 |value: f64, sd: f64| plus_minus(value, (sd > 0.0).then_some(stylet_stats::Z95 * sd), 3);
             let _ = writeln!(
                 out,
                 "  layer {}: {:.2} mm, K {} N/m, b {} {unit}, drop {} N",
                 e.layer,
                 e.thickness_m * 1e3,
-                shown(e.stiffness_n_per_m, e.stiffness_sd),
-                shown(e.friction, e.friction_sd),
-                shown(e.drop_n, e.drop_sd_n),
+                interval(e.stiffness_n_per_m, e.stiffness_sd),
+                interval(e.friction, e.friction_sd),
+                interval(e.drop_n, e.drop_sd_n),
             );
         }
         if r.trace.detections.len().max(r.trace.estimates.len()) > listed {

@@ -3,7 +3,7 @@
 //! | function | input | result |
 //! |---|---|---|
 //! | [`simulate`](fn@simulate) | [`Scenario`] | [`Run`]: recording, truth, outputs of the online algorithm, scores |
-//! | [`enhance`](fn@enhance) | [`Recording`] | [`Enhanced`]: enhanced force, ruptures, layers |
+//! | [`enhance`](fn@enhance) | [`Recording`] | [`AlgorithmRun`]: enhanced force, ruptures, layers |
 //! | [`diagnose`](fn@diagnose) | assumed [`Scenario`] and recordings | [`DiagnosisReport`]: causes, re-fitted scenario |
 //! | [`predict_recordings`] | model and held-out recordings | errors, noise, coverage of the band |
 //! | [`sweep`](fn@sweep) | [`Sweep`] | [`SweepResult`]: one row per insertion, summary |
@@ -22,11 +22,10 @@ mod diagnose;
 pub mod diagnose_repeats;
 pub mod diagnose_specimens;
 mod diagnosis_inputs;
-mod enhance;
 pub mod enhancement;
 mod error;
 mod force_along_motion;
-mod identified_model;
+pub mod live_stream;
 pub mod output_files;
 pub mod output_folder;
 pub mod plan_insertion;
@@ -41,10 +40,9 @@ pub mod sweep_folder;
 
 pub use diagnose::{DiagnosisReport, diagnose, predict_recordings};
 pub use diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE, read_options, read_recordings, recording_name};
-pub use enhance::{Enhanced, enhance, enhance_as, enhance_with_model};
+pub use enhancement::{IdentifiedModel, enhance, enhance_as, enhance_with_model};
 pub use error::Error;
 pub use force_along_motion::force_along_motion;
-pub use identified_model::IdentifiedModel;
 pub use output_files::OutputFiles;
 pub use output_folder::OutputLock;
 pub use plan_insertion::{PlanReport, plan_after_recordings};

@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include <stylet.h>
 
-/* 4096 samples of a layer, in static memory: no allocation anywhere. Room for the core itself is asked for at start. */
+/* Static memory for the core and 4096 samples of a layer: no allocation. */
 static _Alignas(64) unsigned char memory[4096 * 32 + 16384];
 
 int main(void) {

@@ -3,7 +3,7 @@
 #ifndef STYLET_H
 #define STYLET_H
 
-/* Made from src/lib.rs by cbindgen; do not edit. `cargo test -p stylet-capi -- --ignored` writes it anew. */
+/* Generated from src/lib.rs by cbindgen; do not edit. `cargo test -p stylet-capi -- --ignored` regenerates it. */
 
 #include <stdarg.h>
 #include <stdbool.h>
@@ -11,19 +11,19 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// What a call says.
+// Status of a call.
 typedef enum StyletStatus {
-  // Done.
+  // Success.
   STYLET_OK = 0,
-  // The sample was passed over: not finite, out of range, or not later than the one before. The output repeats the last.
+  // The sample was ignored: not finite, out of range, or not later than the previous one. The output repeats the last one.
   STYLET_UNUSED = 1,
   // A pointer is null, or the memory is not aligned.
   STYLET_NULL = -1,
   // The memory is too small: `stylet_size(samples)` bytes are needed.
   STYLET_TOO_SMALL = -2,
-  // A number of the configuration is not finite or out of its range; `stylet_last_error` says which.
+  // A value of the configuration is not finite or out of range; the message of `stylet_init` names it.
   STYLET_BAD_CONFIG = -3,
-  // A bug of ours; the core must not be used any more.
+  // Internal error; the core must not be used any more.
   STYLET_INTERNAL = -4,
 } StyletStatus;
 
@@ -33,13 +33,13 @@ typedef enum StyletAlgorithm {
   STYLET_PAPER = 0,
   // The paper's to the letter.
   STYLET_LITERAL = 1,
-  // This project's. It knows the multi-layer model alone: with the Kelvin-Voigt model the paper's runs.
+  // Kalman filters (default). Multi-layer model only: with the Kelvin-Voigt model the paper's algorithm runs.
   STYLET_STYLET = 2,
 } StyletAlgorithm;
 
 // Tissue model.
 typedef enum StyletModel {
-  // Friction in proportion to the depth inside the layer.
+  // Friction proportional to the depth inside the layer.
   STYLET_MULTI_LAYER = 0,
   // A spring and a damper.
   STYLET_KELVIN_VOIGT = 1,
@@ -53,28 +53,28 @@ typedef enum StyletState {
   STYLET_EXPECTED_RUPTURE = 1,
   // A rupture has just been declared; lasts one sample.
   STYLET_DETECTED_RUPTURE = 2,
-  // Waiting for the drop to be over.
+  // Waiting for the end of the drop.
   STYLET_FORCE_DROP_MEASURING = 3,
   // The traversed layer is re-estimated and its friction compensated.
   STYLET_FORCE_COMPENSATION = 4,
-  // `Stylet` alone: the tip is in a gap or behind the last layer and feels nothing.
+  // `Stylet` only: the tip is in a gap or beyond the last layer, and no tissue acts on it.
   STYLET_FREE_TIP = 5,
 } StyletState;
 
-// The core. Its size is `stylet_size`.
+// The core; it occupies `stylet_size` bytes.
 typedef struct StyletCore StyletCore;
 
-// Configuration. Fill it by `stylet_default_config` and change what is to differ.
+// Configuration. Fill it with `stylet_default_config`, then change fields.
 typedef struct StyletConfig {
   // A `StyletAlgorithm`.
   int32_t algorithm;
   // A `StyletModel`.
   int32_t model;
-  // Not zero: the surface is where `surface_m` says. Zero: it is found in the force.
+  // Not zero: the surface is at `surface_m`. Zero: contact is detected in the force.
   int32_t contact_known;
   // Position of the surface in m, for `contact_known`.
   double surface_m;
-  // False alarms per hour of insertion that are accepted, above 0. What follows belongs to the paper's algorithm.
+  // Accepted false alarms per hour of insertion, above 0. The fields below apply to the paper's algorithm.
   double false_alarms_per_hour;
   // Forgetting factor of the recursive least squares, above 0 to 1.
   double forgetting;
@@ -92,29 +92,29 @@ typedef struct StyletConfig {
   double derivative_off_n_per_s;
 } StyletConfig;
 
-// What a step gives.
+// Output of a step.
 typedef struct StyletOutput {
-  // Enhanced force in N: the measured one less the friction of the passed layers.
+  // Enhanced force in N: measured force less the friction of the passed layers.
   double enhanced_n;
-  // Lower end of the band that holds the tip's force with 95 % probability, in N; not a number where the algorithm gives none.
+  // Lower end of the 95 % interval of the tip force in N; NaN where the algorithm provides none.
   double low_n;
-  // Its upper end in N.
+  // Upper end of that interval in N.
   double high_n;
   // Force predicted before this sample's update, in N.
   double reconstructed_n;
   // Innovation in N.
   double error_n;
-  // Stiffness estimate of the layer being traversed in N/m.
+  // Stiffness estimate of the active layer in N/m.
   double stiffness_n_per_m;
-  // Its friction estimate: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
+  // Friction estimate of the active layer: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
   double friction;
-  // CUSUM in N^2; for `StyletStylet` the largest of its sums as a share of its threshold.
+  // CUSUM in N^2; for `StyletStylet` the largest sum as a fraction of its threshold.
   double cusum_n2;
-  // Filtered force derivative in N/s; zero for `StyletStylet`, which needs none.
+  // Filtered force derivative in N/s; zero for `StyletStylet`.
   double derivative_n_per_s;
   // Cumulative friction in N s/m.
   double cumulative_friction_ns_per_m;
-  // Position of the first contact in m; not a number before.
+  // Position of the first contact in m; NaN before.
   double contact_m;
   // A `StyletState`.
   int32_t state;
@@ -122,13 +122,13 @@ typedef struct StyletOutput {
   uint32_t ruptures;
   // Not zero at the sample that declares a rupture.
   int32_t ruptured;
-  // Layer whose estimate became available at this sample, from 1; zero at all others.
+  // Layer whose estimate became available at this sample, from 1; otherwise zero.
   uint32_t estimated_layer;
-  // That layer's thickness in m.
+  // Thickness of that layer in m.
   double layer_thickness_m;
-  // That layer's stiffness in N/m.
+  // Stiffness of that layer in N/m.
   double layer_stiffness_n_per_m;
-  // That layer's friction in the model's unit.
+  // Friction of that layer in the model's unit.
   double layer_friction;
 } StyletOutput;
 
@@ -136,27 +136,27 @@ typedef struct StyletOutput {
 extern "C" {
 #endif // __cplusplus
 
-// Bytes that a core needs which keeps `samples` samples of a layer (16384: 80 s at 200 Hz).
+// Bytes of a core that stores `samples` samples of a layer (16384: 80 s at 200 Hz).
 size_t stylet_size(size_t samples);
 
-// Alignment of that memory in bytes; what `malloc` returns has it.
+// Alignment of that memory in bytes, at most that of `malloc`.
 size_t stylet_align(void);
 
-// Version of the library, a text that lives as long as the program.
+// Version of the library, a static string.
 const char *stylet_version(void);
 
-// The configuration that `stylet enhance` uses when nothing is said.
+// Sets the default configuration, that of `stylet enhance`.
 //
 // # Safety
 // `config` is null or points to a `StyletConfig`.
 enum StyletStatus stylet_default_config(struct StyletConfig *config);
 
-// Makes a core in the caller's `memory` of `bytes` bytes; as many samples are kept as fit behind it (at least one).
-// `config` may be null: the defaults. `*core` is then the handle; it lives in the memory and needs no freeing. `*why`, when
-// `why` is not null, is set to a sentence on an error.
+// Creates a core in the caller's `memory` of `bytes` bytes, which stores as many samples as fit behind it (at least one). `config`
+// may be null for the defaults. `*core` is the handle; it lives in the memory and needs no freeing. If `why` is not null, `*why` is
+// set to a static message, empty on success.
 //
 // # Safety
-// `memory` is null or points to `bytes` bytes that nobody else uses while the core lives; `config` is null or points to a
+// `memory` is null or points to `bytes` bytes that are used by nothing else while the core lives; `config` is null or points to a
 // `StyletConfig`; `core` is null or points to a pointer; so does `why`.
 enum StyletStatus stylet_init(void *memory,
                               size_t bytes,
@@ -164,11 +164,11 @@ enum StyletStatus stylet_init(void *memory,
                               struct StyletCore **core,
                               const char **why);
 
-// Takes one sample: time in s (increasing), tip position in m (positive into the tissue), tip velocity in m/s, axial force
+// Processes one sample: time in s (increasing), tip position in m (positive into the tissue), tip velocity in m/s, axial force
 // in N (positive resisting insertion). `out` may be null.
 //
 // # Safety
-// `core` is null or from `stylet_init`, and its memory is still there; `out` is null or points to a `StyletOutput`.
+// `core` is null or from `stylet_init`, and its memory is still valid; `out` is null or points to a `StyletOutput`.
 enum StyletStatus stylet_step(struct StyletCore *core,
                               double time_s,
                               double position_m,
@@ -176,10 +176,10 @@ enum StyletStatus stylet_step(struct StyletCore *core,
                               double force_n,
                               struct StyletOutput *out);
 
-// What the last call that did not end well had to say, empty before; a text that lives as long as the program.
+// Message of the last failed step, a static string; empty before.
 //
 // # Safety
-// `core` is null or from `stylet_init`, and its memory is still there.
+// `core` is null or from `stylet_init`, and its memory is still valid.
 const char *stylet_last_error(const struct StyletCore *core);
 
 #ifdef __cplusplus

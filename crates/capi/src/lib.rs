@@ -1,30 +1,30 @@
 //! The online core for C and C++ control loops.
 //!
-//! The caller gives the memory: [`stylet_size`] bytes, aligned to [`stylet_align`], hold the core and the samples of a
-//! layer. Nothing allocates; nothing unwinds across the border (a panic, which would be a bug of ours, makes the call
-//! return `STYLET_INTERNAL`). Not for use from two threads at once; two cores are independent.
+//! The caller provides the memory: [`stylet_size`] bytes, aligned to [`stylet_align`], hold the core and the samples of a layer.
+//! Nothing allocates, and panics do not unwind into C: a panic (a bug in this library) makes the call return `STYLET_INTERNAL`. A
+//! core must not be used from two threads at once; separate cores are independent.
 //!
-//! `include/stylet.h` is made from this file by cbindgen; `tests/header.rs` checks that it is up to date.
+//! `include/stylet.h` is generated from this file by cbindgen; `tests/header.rs` checks that it is up to date.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model};
 use stylet_core::{Enhancer, Output, Sample};
 
-/// What a call says.
+/// Status of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StyletStatus {
-    /// Done.
+    /// Success.
     StyletOk = 0,
-    /// The sample was passed over: not finite, out of range, or not later than the one before. The output repeats the last.
+    /// The sample was ignored: not finite, out of range, or not later than the previous one. The output repeats the last one.
     StyletUnused = 1,
     /// A pointer is null, or the memory is not aligned.
     StyletNull = -1,
     /// The memory is too small: `stylet_size(samples)` bytes are needed.
     StyletTooSmall = -2,
-    /// A number of the configuration is not finite or out of its range; `stylet_last_error` says which.
+    /// A value of the configuration is not finite or out of range; the message of `stylet_init` names it.
     StyletBadConfig = -3,
-    /// A bug of ours; the core must not be used any more.
+    /// Internal error; the core must not be used any more.
     StyletInternal = -4,
 }
 
@@ -36,7 +36,7 @@ pub enum StyletAlgorithm {
     StyletPaper = 0,
     /// The paper's to the letter.
     StyletLiteral = 1,
-    /// This project's. It knows the multi-layer model alone: with the Kelvin-Voigt model the paper's runs.
+    /// Kalman filters (default). Multi-layer model only: with the Kelvin-Voigt model the paper's algorithm runs.
     StyletStylet = 2,
 }
 
@@ -44,7 +44,7 @@ pub enum StyletAlgorithm {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StyletModel {
-    /// Friction in proportion to the depth inside the layer.
+    /// Friction proportional to the depth inside the layer.
     StyletMultiLayer = 0,
     /// A spring and a damper.
     StyletKelvinVoigt = 1,
@@ -60,15 +60,15 @@ pub enum StyletState {
     StyletExpectedRupture = 1,
     /// A rupture has just been declared; lasts one sample.
     StyletDetectedRupture = 2,
-    /// Waiting for the drop to be over.
+    /// Waiting for the end of the drop.
     StyletForceDropMeasuring = 3,
     /// The traversed layer is re-estimated and its friction compensated.
     StyletForceCompensation = 4,
-    /// `Stylet` alone: the tip is in a gap or behind the last layer and feels nothing.
+    /// `Stylet` only: the tip is in a gap or beyond the last layer, and no tissue acts on it.
     StyletFreeTip = 5,
 }
 
-/// Configuration. Fill it by `stylet_default_config` and change what is to differ.
+/// Configuration. Fill it with `stylet_default_config`, then change fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StyletConfig {
@@ -76,11 +76,11 @@ pub struct StyletConfig {
     pub algorithm: i32,
     /// A `StyletModel`.
     pub model: i32,
-    /// Not zero: the surface is where `surface_m` says. Zero: it is found in the force.
+    /// Not zero: the surface is at `surface_m`. Zero: contact is detected in the force.
     pub contact_known: i32,
     /// Position of the surface in m, for `contact_known`.
     pub surface_m: f64,
-    /// False alarms per hour of insertion that are accepted, above 0. What follows belongs to the paper's algorithm.
+    /// Accepted false alarms per hour of insertion, above 0. The fields below apply to the paper's algorithm.
     pub false_alarms_per_hour: f64,
     /// Forgetting factor of the recursive least squares, above 0 to 1.
     pub forgetting: f64,
@@ -98,31 +98,31 @@ pub struct StyletConfig {
     pub derivative_off_n_per_s: f64,
 }
 
-/// What a step gives.
+/// Output of a step.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StyletOutput {
-    /// Enhanced force in N: the measured one less the friction of the passed layers.
+    /// Enhanced force in N: measured force less the friction of the passed layers.
     pub enhanced_n: f64,
-    /// Lower end of the band that holds the tip's force with 95 % probability, in N; not a number where the algorithm gives none.
+    /// Lower end of the 95 % interval of the tip force in N; NaN where the algorithm provides none.
     pub low_n: f64,
-    /// Its upper end in N.
+    /// Upper end of that interval in N.
     pub high_n: f64,
     /// Force predicted before this sample's update, in N.
     pub reconstructed_n: f64,
     /// Innovation in N.
     pub error_n: f64,
-    /// Stiffness estimate of the layer being traversed in N/m.
+    /// Stiffness estimate of the active layer in N/m.
     pub stiffness_n_per_m: f64,
-    /// Its friction estimate: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
+    /// Friction estimate of the active layer: N s/m^2 (multi-layer), N s/m (Kelvin-Voigt).
     pub friction: f64,
-    /// CUSUM in N^2; for `StyletStylet` the largest of its sums as a share of its threshold.
+    /// CUSUM in N^2; for `StyletStylet` the largest sum as a fraction of its threshold.
     pub cusum_n2: f64,
-    /// Filtered force derivative in N/s; zero for `StyletStylet`, which needs none.
+    /// Filtered force derivative in N/s; zero for `StyletStylet`.
     pub derivative_n_per_s: f64,
     /// Cumulative friction in N s/m.
     pub cumulative_friction_ns_per_m: f64,
-    /// Position of the first contact in m; not a number before.
+    /// Position of the first contact in m; NaN before.
     pub contact_m: f64,
     /// A `StyletState`.
     pub state: i32,
@@ -130,17 +130,17 @@ pub struct StyletOutput {
     pub ruptures: u32,
     /// Not zero at the sample that declares a rupture.
     pub ruptured: i32,
-    /// Layer whose estimate became available at this sample, from 1; zero at all others.
+    /// Layer whose estimate became available at this sample, from 1; otherwise zero.
     pub estimated_layer: u32,
-    /// That layer's thickness in m.
+    /// Thickness of that layer in m.
     pub layer_thickness_m: f64,
-    /// That layer's stiffness in N/m.
+    /// Stiffness of that layer in N/m.
     pub layer_stiffness_n_per_m: f64,
-    /// That layer's friction in the model's unit.
+    /// Friction of that layer in the model's unit.
     pub layer_friction: f64,
 }
 
-/// The core. Its size is `stylet_size`.
+/// The core; it occupies `stylet_size` bytes.
 pub struct StyletCore {
     inner: Enhancer<Storage>,
     error: &'static std::ffi::CStr,
@@ -154,31 +154,31 @@ struct Storage {
 
 impl AsRef<[Sample]> for Storage {
     fn as_ref(&self) -> &[Sample] {
-        // SAFETY: `stylet_init` put `count` samples there, inside memory that the caller lends for as long as the core lives.
+        // SAFETY: `stylet_init` wrote `count` samples there, in memory that the caller provides for the lifetime of the core.
         unsafe { std::slice::from_raw_parts(self.first, self.count) }
     }
 }
 
 impl AsMut<[Sample]> for Storage {
     fn as_mut(&mut self) -> &mut [Sample] {
-        // SAFETY: as above; the core is the only one that knows the place.
+        // SAFETY: as above; only the core has this pointer.
         unsafe { std::slice::from_raw_parts_mut(self.first, self.count) }
     }
 }
 
-/// Both alignments divide it, so that the samples follow the core without a gap to reckon with.
+/// Offset of the samples, a multiple of both alignments.
 const fn samples_at() -> usize {
     let align = align_of::<Sample>();
     size_of::<StyletCore>().div_ceil(align) * align
 }
 
-/// Bytes that a core needs which keeps `samples` samples of a layer (16384: 80 s at 200 Hz).
+/// Bytes of a core that stores `samples` samples of a layer (16384: 80 s at 200 Hz).
 #[unsafe(no_mangle)]
 pub extern "C" fn stylet_size(samples: usize) -> usize {
     samples_at().saturating_add(samples.saturating_mul(size_of::<Sample>()))
 }
 
-/// Alignment of that memory in bytes; what `malloc` returns has it.
+/// Alignment of that memory in bytes, at most that of `malloc`.
 #[unsafe(no_mangle)]
 pub extern "C" fn stylet_align() -> usize {
     if align_of::<StyletCore>() > align_of::<Sample>() {
@@ -188,19 +188,19 @@ pub extern "C" fn stylet_align() -> usize {
     }
 }
 
-/// Version of the library, a text that lives as long as the program.
+/// Version of the library, a static string.
 #[unsafe(no_mangle)]
 pub extern "C" fn stylet_version() -> *const std::ffi::c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
 }
 
-/// The configuration that `stylet enhance` uses when nothing is said.
+/// Sets the default configuration, that of `stylet enhance`.
 ///
 /// # Safety
 /// `config` is null or points to a `StyletConfig`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn stylet_default_config(config: *mut StyletConfig) -> StyletStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let Some(config) = (unsafe { config.as_mut() }) else { return StyletStatus::StyletNull };
     let from = EnhanceConfig::default();
     *config = StyletConfig {
@@ -227,8 +227,8 @@ pub unsafe extern "C" fn stylet_default_config(config: *mut StyletConfig) -> Sty
     StyletStatus::StyletOk
 }
 
-/// The core's own configuration, or what is wrong with the caller's.
-fn checked(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CStr> {
+/// Validates a configuration; the error names the field.
+fn validate(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CStr> {
     let algorithm = match config.algorithm {
         a if a == StyletAlgorithm::StyletPaper as i32 => Algorithm::Paper,
         a if a == StyletAlgorithm::StyletLiteral as i32 => Algorithm::Literal,
@@ -275,12 +275,12 @@ fn checked(config: &StyletConfig) -> Result<EnhanceConfig, &'static std::ffi::CS
     Ok(core)
 }
 
-/// Makes a core in the caller's `memory` of `bytes` bytes; as many samples are kept as fit behind it (at least one).
-/// `config` may be null: the defaults. `*core` is then the handle; it lives in the memory and needs no freeing. `*why`, when
-/// `why` is not null, is set to a sentence on an error.
+/// Creates a core in the caller's `memory` of `bytes` bytes, which stores as many samples as fit behind it (at least one). `config`
+/// may be null for the defaults. `*core` is the handle; it lives in the memory and needs no freeing. If `why` is not null, `*why` is
+/// set to a static message, empty on success.
 ///
 /// # Safety
-/// `memory` is null or points to `bytes` bytes that nobody else uses while the core lives; `config` is null or points to a
+/// `memory` is null or points to `bytes` bytes that are used by nothing else while the core lives; `config` is null or points to a
 /// `StyletConfig`; `core` is null or points to a pointer; so does `why`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn stylet_init(
@@ -290,30 +290,30 @@ pub unsafe extern "C" fn stylet_init(
     core: *mut *mut StyletCore,
     why: *mut *const std::ffi::c_char,
 ) -> StyletStatus {
-    let say = |status: StyletStatus, text: &'static std::ffi::CStr| {
-        // SAFETY: the caller's promise.
+    let report = |status: StyletStatus, text: &'static std::ffi::CStr| {
+        // SAFETY: guaranteed by the caller.
         if let Some(why) = unsafe { why.as_mut() } {
             *why = text.as_ptr();
         }
         status
     };
     if memory.is_null() || core.is_null() {
-        return say(StyletStatus::StyletNull, c"memory or core is null");
+        return report(StyletStatus::StyletNull, c"memory or core is null");
     }
     if !(memory as usize).is_multiple_of(stylet_align()) {
-        return say(StyletStatus::StyletNull, c"memory is not aligned to stylet_align()");
+        return report(StyletStatus::StyletNull, c"memory is not aligned to stylet_align()");
     }
     if bytes < stylet_size(1) {
-        return say(StyletStatus::StyletTooSmall, c"the memory is smaller than stylet_size(1)");
+        return report(StyletStatus::StyletTooSmall, c"the memory is smaller than stylet_size(1)");
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let config = match unsafe { config.as_ref() } {
         None => Ok((EnhanceConfig::default(), 0.0)),
-        Some(config) => checked(config).map(|checked| (checked, config.surface_m)),
+        Some(config) => validate(config).map(|valid| (valid, config.surface_m)),
     };
     let (config, surface_m) = match config {
         Ok(config) => config,
-        Err(text) => return say(StyletStatus::StyletBadConfig, text),
+        Err(text) => return report(StyletStatus::StyletBadConfig, text),
     };
     let count = (bytes - samples_at()) / size_of::<Sample>();
     let made = catch_unwind(AssertUnwindSafe(|| {
@@ -330,16 +330,16 @@ pub unsafe extern "C" fn stylet_init(
         }
     }));
     match made {
-        Ok(()) => say(StyletStatus::StyletOk, c""),
-        Err(_) => say(StyletStatus::StyletInternal, c"internal error; please report it"),
+        Ok(()) => report(StyletStatus::StyletOk, c""),
+        Err(_) => report(StyletStatus::StyletInternal, c"internal error; please report it"),
     }
 }
 
-/// Takes one sample: time in s (increasing), tip position in m (positive into the tissue), tip velocity in m/s, axial force
+/// Processes one sample: time in s (increasing), tip position in m (positive into the tissue), tip velocity in m/s, axial force
 /// in N (positive resisting insertion). `out` may be null.
 ///
 /// # Safety
-/// `core` is null or from `stylet_init`, and its memory is still there; `out` is null or points to a `StyletOutput`.
+/// `core` is null or from `stylet_init`, and its memory is still valid; `out` is null or points to a `StyletOutput`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn stylet_step(
     core: *mut StyletCore,
@@ -349,25 +349,25 @@ pub unsafe extern "C" fn stylet_step(
     force_n: f64,
     out: *mut StyletOutput,
 ) -> StyletStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let Some(core) = (unsafe { core.as_mut() }) else { return StyletStatus::StyletNull };
     let sample = Sample { time_s, position_m, velocity_mps, force_n };
     let Ok(output) = catch_unwind(AssertUnwindSafe(|| core.inner.step(sample))) else {
         core.error = c"internal error; please report it";
         return StyletStatus::StyletInternal;
     };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     if let Some(out) = unsafe { out.as_mut() } {
-        *out = plain(&output);
+        *out = to_c_output(&output);
     }
     if output.used {
         return StyletStatus::StyletOk;
     }
-    core.error = c"the sample was passed over: not finite, out of range, or not later than the one before";
+    core.error = c"the sample was ignored: not finite, out of range, or not later than the previous one";
     StyletStatus::StyletUnused
 }
 
-fn plain(o: &Output) -> StyletOutput {
+fn to_c_output(o: &Output) -> StyletOutput {
     let estimate = o.estimate.unwrap_or_default();
     let [low_n, high_n] = o.band_n.unwrap_or([f64::NAN; 2]);
     StyletOutput {
@@ -392,13 +392,13 @@ fn plain(o: &Output) -> StyletOutput {
     }
 }
 
-/// What the last call that did not end well had to say, empty before; a text that lives as long as the program.
+/// Message of the last failed step, a static string; empty before.
 ///
 /// # Safety
-/// `core` is null or from `stylet_init`, and its memory is still there.
+/// `core` is null or from `stylet_init`, and its memory is still valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn stylet_last_error(core: *const StyletCore) -> *const std::ffi::c_char {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     match unsafe { core.as_ref() } {
         Some(core) => core.error.as_ptr(),
         None => c"core is null".as_ptr(),

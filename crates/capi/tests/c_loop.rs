@@ -1,5 +1,5 @@
-//! Promise: a loop in C, built with `cc` against the static library, gives the numbers of Rust bit for bit, and allocates
-//! nothing. How long its steps take is printed, not tested: `STYLET_C_STEPS=10000000 cargo test --release -p stylet-capi
+//! Promise: a C loop, built with `cc` against the static library, gives bitwise the results of Rust without allocation. The time per
+//! step is printed, not tested: `STYLET_C_STEPS=10000000 cargo test --release -p stylet-capi
 //! --test c_loop -- --nocapture`.
 
 use std::io::Write;
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 
-/// The static library that belongs to this test: built by cargo into the same folder.
+/// The static library of this test, built by cargo into the same folder.
 fn library() -> PathBuf {
     let deps = std::env::current_exe().expect("a path").parent().expect("a folder").to_owned();
-    // `cargo test` makes the library beside the folder of the test.
+    // `cargo test` does not build the library itself.
     let mut args = vec!["build", "-p", "stylet-capi", "--lib"];
     if !cfg!(debug_assertions) {
         args.push("--release");
@@ -35,11 +35,11 @@ fn program() -> PathBuf {
         .arg(&program)
         .status()
         .expect("a C compiler");
-    assert!(status.success(), "the example loop compiles without a warning");
+    assert!(status.success(), "compiles without warnings");
     program
 }
 
-/// Three layers with a little noise, by a small generator.
+/// Three layers with a little noise from a small generator.
 fn samples() -> Vec<Sample> {
     let mut state = 1u64;
     (0..60_000)
@@ -58,7 +58,7 @@ fn samples() -> Vec<Sample> {
 }
 
 #[test]
-fn a_loop_in_c_gives_the_bits_of_rust_and_allocates_nothing() {
+fn a_c_loop_gives_bitwise_the_results_of_rust_without_allocation() {
     let program = program();
     let samples = samples();
     let mut child =
@@ -84,11 +84,11 @@ fn a_loop_in_c_gives_the_bits_of_rust_and_allocates_nothing() {
         let rust = [out.enhanced_n, out.theta[0], out.state as i32 as f64].map(f64::to_bits);
         assert_eq!(rust, [c[0], c[1], c[2]], "sample {k}");
     }
-    assert!(ruptures >= 2, "the loop must have something to find");
+    assert!(ruptures >= 2, "ruptures must be detected");
 
     let steps = std::env::var("STYLET_C_STEPS").unwrap_or_else(|_| "200000".to_owned());
     let timed = Command::new(&program).arg(steps).output().expect("it runs");
-    let said = String::from_utf8_lossy(&timed.stdout);
-    println!("{said}");
-    assert!(timed.status.success() && said.contains("allocations 0 "), "{said}");
+    let report = String::from_utf8_lossy(&timed.stdout);
+    println!("{report}");
+    assert!(timed.status.success() && report.contains("allocations 0 "), "{report}");
 }

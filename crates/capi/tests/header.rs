@@ -1,8 +1,8 @@
-//! Promise: `include/stylet.h` says what the library does.
+//! Promise: `include/stylet.h` is up to date with the library.
 
 use std::path::Path;
 
-fn made() -> String {
+fn generated() -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("a configuration");
     let source = root.join("src/lib.rs");
@@ -16,7 +16,7 @@ fn made() -> String {
 fn the_committed_header_is_up_to_date() {
     let committed = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/stylet.h"));
     assert!(
-        committed.expect("a header") == made(),
+        committed.expect("a header") == generated(),
         "include/stylet.h is out of date: cargo test -p stylet-capi --test header -- --ignored"
     );
 }
@@ -24,5 +24,6 @@ fn the_committed_header_is_up_to_date() {
 #[test]
 #[ignore = "writes the header"]
 fn write_the_header() {
-    std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/stylet.h"), made()).expect("written");
+    std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/stylet.h"), generated())
+        .expect("written");
 }

@@ -1,5 +1,5 @@
-/* A control loop in C: replays samples given on standard input (binary: four doubles each), or, with a number N, N steps of
- * its own; counts allocations; writes enhanced forces (binary) or times. */
+/* A control loop in C: replays binary samples from standard input (four doubles each) and writes outputs, or, with an argument N,
+ * times N steps of its own; counts allocations. */
 #define _GNU_SOURCE
 #include "stylet.h"
 #include <math.h>
@@ -55,7 +55,7 @@ int main(int argc, char **argv) {
         }
         return 0;
     }
-    /* 1 kHz, 2.3 mm/s in, three layers of 20 mm that rupture, back, again and again. */
+    /* 1 kHz, repeated insertion at 2.3 mm/s through three layers of 20 mm. */
     size_t steps = strtoull(argv[1], NULL, 10);
     StyletCore *core = start(4096);
     double *took = calloc(steps, sizeof *took);

@@ -1,10 +1,10 @@
-//! What a sample costs: mean, median and percentiles of a tick, each timed alone over insertions at 200 Hz.
+//! Time per sample: mean over whole insertions, and percentiles of single steps, at 200 Hz.
 //!
 //! ```sh
 //! cargo run --release -p stylet-core --example speed
 //! cargo run --release -p stylet-core --example speed -- samples.bin    # the default algorithm over given samples
 //! ```
-//! `samples.bin`: four little-endian doubles a sample: s, m, m/s, N. `crates/python/speed.py` compares itself with that.
+//! `samples.bin`: four little-endian doubles a sample: s, m, m/s, N. Used by `crates/python/speed.py`.
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -13,8 +13,8 @@ use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 use stylet_tissue::{ForceLaw, ForceLawState, Tissue};
 
-/// Seconds per sample of whole insertions, the least of many.
-fn least(samples: &[Sample], mut one: impl FnMut(&mut Enhancer<Vec<Sample>>) -> f64) -> (f64, f64) {
+/// Seconds per sample: the minimum over many whole insertions.
+fn min_time_s(samples: &[Sample], mut one: impl FnMut(&mut Enhancer<Vec<Sample>>) -> f64) -> (f64, f64) {
     let (mut least, mut sum) = (f64::INFINITY, 0.0);
     for _ in 0..100 {
         let mut core = Enhancer::new(EnhanceConfig::default(), 0.0, vec![Sample::default(); 16_384]);
@@ -25,7 +25,7 @@ fn least(samples: &[Sample], mut one: impl FnMut(&mut Enhancer<Vec<Sample>>) -> 
     (least, sum)
 }
 
-fn given(path: &str) -> std::io::Result<()> {
+fn time_file(path: &str) -> std::io::Result<()> {
     let bytes = std::fs::read(path)?;
     let numbers: Vec<f64> =
         bytes.chunks_exact(8).filter_map(|b| b.try_into().ok().map(f64::from_le_bytes)).collect();
@@ -33,8 +33,8 @@ fn given(path: &str) -> std::io::Result<()> {
         .chunks_exact(4)
         .map(|n| Sample { time_s: n[0], position_m: n[1], velocity_mps: n[2], force_n: n[3] })
         .collect();
-    let (step, a) = least(&samples, |core| samples.iter().map(|s| core.step(*s).enhanced_n).sum());
-    let (run, b) = least(&samples, |core| {
+    let (step, a) = min_time_s(&samples, |core| samples.iter().map(|s| core.step(*s).enhanced_n).sum());
+    let (run, b) = min_time_s(&samples, |core| {
         let mut sum = 0.0;
         core.run(&samples, |out| sum += out.enhanced_n);
         sum
@@ -45,7 +45,7 @@ fn given(path: &str) -> std::io::Result<()> {
 
 fn main() -> std::io::Result<()> {
     if let Some(path) = std::env::args().nth(1) {
-        return given(&path);
+        return time_file(&path);
     }
     let law = ForceLaw::base(&Tissue::three_gels());
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -62,7 +62,7 @@ fn main() -> std::io::Result<()> {
     for algorithm in [Algorithm::Paper, Algorithm::Stylet] {
         let config = EnhanceConfig { algorithm, ..EnhanceConfig::default() };
         let new = || Enhancer::new(config.clone(), 0.0, vec![Sample::default(); 10_000]);
-        // Whole insertions: the mean without the clock's own cost. The least of many is what the others do not disturb.
+        // Whole insertions exclude the cost of the clock; the minimum excludes other load.
         let mut least = f64::INFINITY;
         let mut sum = 0.0;
         for _ in 0..100 {
@@ -73,19 +73,19 @@ fn main() -> std::io::Result<()> {
             }
             least = least.min(start.elapsed().as_secs_f64() / samples.len() as f64);
         }
-        let mut ticks: Vec<u128> = Vec::with_capacity(100 * samples.len());
+        let mut steps: Vec<u128> = Vec::with_capacity(100 * samples.len());
         for _ in 0..100 {
             let mut core = new();
             for s in &samples {
                 let start = Instant::now();
                 sum += core.step_brief(*s).enhanced_n;
-                ticks.push(start.elapsed().as_nanos());
+                steps.push(start.elapsed().as_nanos());
             }
         }
-        ticks.sort_unstable();
-        let q = |q: f64| ticks[((ticks.len() - 1) as f64 * q) as usize];
+        steps.sort_unstable();
+        let q = |q: f64| steps[((steps.len() - 1) as f64 * q) as usize];
         println!(
-            "{algorithm:?}: {:.0} ns per sample; a tick alone, clock included: median {} ns, p99 {} ns, p99.9 {} ns ({sum:.0})",
+            "{algorithm:?}: {:.0} ns per sample; single steps, clock included: median {} ns, p99 {} ns, p99.9 {} ns ({sum:.0})",
             1e9 * least,
             q(0.5),
             q(0.99),

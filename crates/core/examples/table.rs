@@ -1,5 +1,5 @@
-//! The table of `docs/enhancer.md` straight from the core and the law, without files: detection, delay, stiffness errors,
-//! enhancement, coverage of the 95 % intervals, false alarms per hour of insertion.
+//! The table of `docs/enhancer.md`: detection, delay, stiffness errors, enhancement, coverage of the 95 % intervals, and false
+//! alarms per hour of insertion, from the core and the tissue law.
 //!
 //! ```sh
 //! cargo run --release -p stylet-core --example table -- [SEEDS] [ROW] [FALSE ALARMS PER HOUR]
@@ -42,7 +42,7 @@ fn weak() -> Tissue {
     }
     t
 }
-/// Each gives way 6 to 9 mm before its far face.
+/// Each layer ruptures 6 to 9 mm before its far face.
 fn gaps() -> Tissue {
     let mut t = gels();
     for (l, n) in t.layers.iter_mut().zip([0.9, 1.7, 2.1]) {
@@ -139,11 +139,11 @@ fn run(row: &Row, seeds: u64, rate: f64) {
             ..EnhanceConfig::default()
         };
         let mut core = Enhancer::new(config, 0.0, []);
-        // A robot does not start with the sensor's clock: the first sample is taken somewhere within the first step of the motion.
+        // The start of the motion is drawn within a sampling interval.
         let mut clock = ChaCha8Rng::seed_from_u64(1000 + seed);
         clock.set_stream(1);
-        let late_s = clock.random::<f64>() * dt;
-        let mut z = -0.005 + 0.5 * ((row.v)(0.0) + (row.v)(late_s)) * late_s;
+        let offset_s = clock.random::<f64>() * dt;
+        let mut z = -0.005 + 0.5 * ((row.v)(0.0) + (row.v)(offset_s)) * offset_s;
         let mut noise: f64 = {
             let w: f64 = StandardNormal.sample(&mut rng);
             w * row.noise
@@ -153,7 +153,7 @@ fn run(row: &Row, seeds: u64, rate: f64) {
         let mut est: Vec<LayerEstimate> = vec![];
         let (mut miss2, mut tip2) = (0.0, 0.0);
         for k in 0..n {
-            let t = late_s + k as f64 * dt;
+            let t = offset_s + k as f64 * dt;
             let v = (row.v)(t);
             let mut now = vec![];
             let f = law.step(&mut state, t, z, v, |r| now.push((r.time_s, r.position_m)));

@@ -1,11 +1,11 @@
-//! Configuration of the online core: plain data with `Default`, every number with unit and source.
+//! Configuration of the online core: plain data with `Default`; every value has its unit and source.
 //!
 //! \[S\] is the supplement of Ferro, Gaz, Anzidei, Vendittelli 2021, \[L\] the tuning published with
 //! the authors' laboratory software (facts only), \[D\] a completion derived for this project.
 
 use alloc::vec::Vec;
 
-/// Which friction the regressor describes.
+/// Regressor of the friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Model {
@@ -16,7 +16,7 @@ pub enum Model {
     MultiLayer,
 }
 
-/// When the covariance goes back to its prior.
+/// When the covariance is reset to its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -41,26 +41,25 @@ impl Default for Reset {
     }
 }
 
-/// How the first contact is known.
+/// Source of the first contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Contact {
-    /// Found from the data (see [`ContactConfig`]).
+    /// Detected in the data, see [`ContactConfig`].
     #[default]
     Detected,
-    /// Known: the surface that the caller passes to the core.
+    /// At the surface position that the caller passes to the core.
     Known,
 }
 
-/// What is known of the layers' depths.
+/// Prior knowledge of the layers' depths.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Depths {
-    /// Nothing: a layer ends where a rupture is detected.
+    /// None: a layer ends where a rupture is detected.
     #[default]
     Unknown,
-    /// Thicknesses in metres from a model of the anatomy; a layer ends at the latest when the tip
-    /// passes its known far face.
+    /// Thicknesses in m from a model of the anatomy; a layer ends at the latest when the tip passes its far face.
     Known(Vec<f64>),
 }
 
@@ -69,11 +68,11 @@ pub enum Depths {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct CusumConfig {
-    /// Off: no alarm.
+    /// Off: no alarms.
     pub enabled: bool,
-    /// Standard deviation of the error in ordinary insertion, `s0` in N; 0.01 \[L\].
+    /// Standard deviation `s0` of the error during ordinary insertion in N; 0.01 \[L\].
     pub sigma_ordinary_n: f64,
-    /// Standard deviation of the error after a rupture, `s1` in N; 0.15, 0.03-0.15 \[L\].
+    /// Standard deviation `s1` of the error after a rupture in N; 0.15, range 0.03-0.15 \[L\].
     pub sigma_rupture_n: f64,
 }
 
@@ -99,7 +98,7 @@ impl CusumConfig {
     }
 }
 
-/// Which way the force must move for a rupture to be expected.
+/// Direction of the force change that makes a rupture expected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DerivativeSense {
@@ -117,17 +116,17 @@ pub enum DerivativeSense {
 pub struct DerivativeConfig {
     /// Off: the state ExpectedRupture is never entered.
     pub enabled: bool,
-    /// Loading or drop.
+    /// Sign of the derivative.
     pub sense: DerivativeSense,
-    /// Switches on above this, `beta` in N/s; 0.075, 0.05-0.15 \[L\].
+    /// Threshold `beta` that switches on, in N/s; 0.075, range 0.05-0.15 \[L\].
     pub on_n_per_s: f64,
-    /// Switches off below this, in N/s; -0.03 \[L\].
+    /// Threshold that switches off, in N/s; -0.03 \[L\].
     pub off_n_per_s: f64,
-    /// Time constant of the force's low-pass in s; `a_f = 0.01` at 200 Hz \[L\].
+    /// Time constant of the low-pass on the force in s; `a_f = 0.01` at 200 Hz \[L\].
     pub force_time_constant_s: f64,
-    /// Time constant of the derivative's low-pass in s; `a_d = 0.1` at 200 Hz \[L\].
+    /// Time constant of the low-pass on the derivative in s; `a_d = 0.1` at 200 Hz \[L\].
     pub derivative_time_constant_s: f64,
-    /// Whether switching off counts as a detection \[S sec. I; off in L\].
+    /// Switching off counts as a detection \[S sec. I; off in L\].
     pub trailing_edge: bool,
 }
 
@@ -146,44 +145,44 @@ impl Default for DerivativeConfig {
     }
 }
 
-/// How the force drop of a rupture is measured.
+/// Estimator of the force drop at a rupture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DropEstimator {
-    /// Straight lines over 1 mm either side, evaluated at the rupture \[D\]: less biased by noise.
+    /// Lines fitted over 1 mm on either side, evaluated at the rupture \[D\]: less biased by noise.
     #[default]
     Lines,
     /// Maximum of the window before, minimum of the window after \[L\].
     Extremes,
 }
 
-/// Force-drop measuring, re-weighting and compensation.
+/// Measurement of the force drop, re-weighting and compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct DropConfig {
-    /// Travel of ForceDropMeasuring in m; 0.005 \[L\].
+    /// Travel in the state ForceDropMeasuring in m; 0.005 \[L\].
     pub travel_m: f64,
-    /// Longest time in ForceDropMeasuring in s, not counting standstill; 5 \[L\].
+    /// Longest time in ForceDropMeasuring in s, without standstill; 5 \[L\].
     pub max_duration_s: f64,
-    /// Travel of ForceCompensation in m; half of the former.
+    /// Travel in the state ForceCompensation in m; half of `travel_m`.
     pub compensation_travel_m: f64,
-    /// ForceCompensation lasts at least this long after the cumulative friction has changed, in s, so
-    /// that the change itself is not taken for a rupture \[D\].
+    /// Shortest time in ForceCompensation after the cumulative friction has changed, in s, so that the change itself does not
+    /// count as a rupture \[D\].
     pub settle_s: f64,
-    /// Below this speed, in m/s, the needle counts as standing still; 0.05 mm/s.
+    /// Speed below which the needle stands still, in m/s; 0.05 mm/s.
     pub standstill_mps: f64,
-    /// How the drop is measured.
+    /// Estimator of the drop.
     pub estimator: DropEstimator,
     /// Off: the prior is not re-weighted by the drop (ablation of \[S Figs 13-15\]).
     pub reweight: bool,
-    /// Off: the layer's samples are not replayed; the online estimate at the rupture is kept.
+    /// Off: the online estimate at the rupture is kept instead of replaying the layer's samples.
     pub replay: bool,
     /// Off: nothing is added to the cumulative friction.
     pub compensate: bool,
-    /// Smallest and largest share of the drop, `kappa`; 0.01 and 0.99.
+    /// Limits on the elastic share `kappa`; 0.01 and 0.99.
     pub share_limits: [f64; 2],
-    /// Replayed samples per call: bounds the work of a tick.
+    /// Replayed samples per step: bounds its work.
     pub replay_per_tick: usize,
 }
 
@@ -205,23 +204,22 @@ impl Default for DropConfig {
     }
 }
 
-/// Finding the first contact in the data \[D\].
+/// Detection of the first contact in the data \[D\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct ContactConfig {
-    /// Low-pass on the force in s.
+    /// Time constant of the low-pass on the force in s.
     pub time_constant_s: f64,
     /// Threshold in standard deviations of the noise in air.
     pub noise_sds: f64,
-    /// Samples above the threshold in a row.
+    /// Consecutive samples above the threshold.
     pub samples: usize,
-    /// Noise sd in N that is assumed at least, so that noiseless data work.
+    /// Lower bound on the standard deviation of the noise in N, for data without noise.
     pub min_noise_n: f64,
-    /// Time in air, in s, from which bias and noise are learnt before contact can be declared.
+    /// Time in air, in s, for learning bias and noise before contact can be declared.
     pub learn_s: f64,
-    /// Travel after the declaration over which the loading line is fitted and extrapolated back
-    /// to zero force, in m.
+    /// Travel after the declaration over which the loading line is fitted, in m; it is extrapolated back to zero force.
     pub extrapolate_over_m: f64,
 }
 
@@ -238,23 +236,22 @@ impl Default for ContactConfig {
     }
 }
 
-/// What is not a rupture \[D\].
+/// Suppression of false ruptures \[D\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct GuardConfig {
-    /// No rupture within this travel after contact or after a rupture, in m.
+    /// Travel after contact or a rupture without detection, in m.
     pub blind_travel_m: f64,
-    /// Smoothing of the acceleration in s.
+    /// Time constant of the acceleration in s.
     pub acceleration_time_constant_s: f64,
-    /// A sudden change of speed: acceleration above this, in m/s².
+    /// Acceleration of a sudden change of speed, in m/s².
     pub sudden_mps2: f64,
-    /// Ground is old where the tip is this far above its deepest point, in m: more than the noise of
-    /// the position.
+    /// Distance above the deepest point from which the tip revisits tissue, in m; more than the position noise.
     pub revisit_margin_m: f64,
-    /// Detection rests this long after a sudden change, a reversal or a hold, in s.
+    /// Hold-off after a sudden change, a reversal or a hold, in s.
     pub rest_s: f64,
-    /// A trailing edge does not count while the speed falls faster than this share per second.
+    /// Relative deceleration per second above which a trailing edge does not count.
     pub slowing_per_s: f64,
 }
 
@@ -271,29 +268,29 @@ impl Default for GuardConfig {
     }
 }
 
-/// Which algorithm runs.
+/// Algorithm of the online core.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Algorithm {
-    /// The paper's, with the completions marked \[D\].
+    /// The paper's, with the completions \[D\].
     Paper,
-    /// The paper's to the letter: no blind travel after contact, no motion guards, drop by
-    /// extremes. For the record: at 20 mN of noise and with contact found from the data, nearly every insertion has a false
-    /// rupture right after it, and in the sinusoid from rest the first layer's K is off by half (`tests/detection_over_noise_seeds.rs`).
+    /// The paper's to the letter: no blind travel after contact, no motion guards, drop by extremes. At 20 mN of noise and
+    /// with contact detected in the data nearly every insertion has a false rupture right after contact, and with the sinusoid
+    /// from rest the first layer's `K` is off by half (`tests/detection_over_noise_seeds.rs`).
     Literal,
-    /// This project's: calibrated, one pass, with the uncertainty of everything it says (see [`StyletConfig`]). It knows the
-    /// multi-layer law alone and finds depths itself: with [`Model::KelvinVoigt`] or [`Depths::Known`] the paper's runs.
+    /// Kalman filters with calibrated intervals, see [`StyletConfig`]. It has the multi-layer model only and detects layers
+    /// itself: with [`Model::KelvinVoigt`] or [`Depths::Known`] the paper's algorithm runs instead.
     #[default]
     Stylet,
 }
 
-/// The law of the friction along the shaft that [`Algorithm::Stylet`] takes away, `D u`: `u` is what drives it, and the cumulative friction
-/// `D` (N s/m) is learned.
+/// Law of the shaft friction `D u` that [`Algorithm::Stylet`] subtracts: the drive `u`; the cumulative friction `D` (N s/m) is
+/// estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum FrictionLaw {
-    /// Found out on the way in: viscous as long as that predicts the force, else dry.
+    /// Selected during insertion: viscous as long as that predicts the force, then dry.
     #[default]
     Auto,
     /// The paper's: `u = v`.
@@ -303,7 +300,8 @@ pub enum FrictionLaw {
         /// Ratio of dry to viscous friction, `c/b` in m/s, 0 or more.
         dry_mps: f64,
     },
-    /// Dry friction that builds up over travel and stays in holds, and viscous: `u = v + dry_mps xi`, `xi' = (v/travel)(1 - xi sgn v)`.
+    /// Viscous, and dry friction that builds up over travel and persists in holds: `u = v + dry_mps xi`,
+    /// `xi' = (v/travel)(1 - xi sgn v)`.
     Presliding {
         /// Ratio of dry to viscous friction, `c/b` in m/s, 0 or more.
         dry_mps: f64,
@@ -312,19 +310,19 @@ pub enum FrictionLaw {
     },
 }
 
-/// What can be set for [`Algorithm::Stylet`]. Noise, friction law and drop sizes are learned on the way in.
+/// Settings of [`Algorithm::Stylet`]. Noise, friction and drop sizes are estimated during insertion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct StyletConfig {
-    /// False alarms per hour of insertion that are accepted, above 0.
+    /// Accepted false alarms per hour of insertion, above 0.
     pub false_alarms_per_hour: f64,
-    /// Where the tissue does not follow the law of layers, a fall counts as a rupture from this share of the largest
-    /// force so far, 0 to 1; smaller falls are texture.
+    /// Smallest drop that counts as a rupture where the base law does not hold, relative to the largest force so far, 0 to 1;
+    /// smaller drops are texture.
     pub min_drop_share: f64,
-    /// The friction along the shaft.
+    /// Law of the shaft friction.
     pub friction_law: FrictionLaw,
-    /// Whether slow changes of the force on the way back count as friction; off: only what the way in has taught.
+    /// Slow changes of the force during retraction count as friction; off: only what was estimated during insertion.
     pub track_retraction: bool,
 }
 
@@ -339,20 +337,20 @@ impl Default for StyletConfig {
     }
 }
 
-/// Everything that can be set. The numbers of the paper's algorithm are the paper's by default.
+/// Configuration of the core. The defaults of the paper's algorithm are the paper's.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct EnhanceConfig {
-    /// Which algorithm.
+    /// Algorithm.
     pub algorithm: Algorithm,
-    /// Which regressor.
+    /// Regressor.
     pub model: Model,
-    /// When the covariance is reset.
+    /// Covariance reset.
     pub reset: Reset,
-    /// How the first contact is known.
+    /// Source of the first contact.
     pub contact: Contact,
-    /// What is known of the layers' depths.
+    /// Prior knowledge of the layers' depths.
     pub depths: Depths,
     /// RLS forgetting factor `lambda`, 0 to 1; 1 \[S\].
     pub forgetting: f64,
@@ -364,24 +362,24 @@ pub struct EnhanceConfig {
     pub cusum: CusumConfig,
     /// Force derivative.
     pub derivative: DerivativeConfig,
-    /// Force-drop measuring, re-weighting and compensation.
+    /// Force drop, re-weighting and compensation.
     pub drop: DropConfig,
     /// First contact.
     pub contact_search: ContactConfig,
-    /// Guards against false ruptures.
+    /// Suppression of false ruptures.
     pub guard: GuardConfig,
-    /// What [`Algorithm::Stylet`] is set by.
+    /// Settings of [`Algorithm::Stylet`].
     pub stylet: StyletConfig,
 }
 
 impl EnhanceConfig {
-    /// The paper's algorithm with the paper's numbers.
+    /// The paper's algorithm with the paper's settings.
     #[must_use]
     pub fn paper() -> Self {
         Self { algorithm: Algorithm::Paper, ..Self::default() }
     }
 
-    /// The algorithm that runs: [`Algorithm::Stylet`] has no Kelvin-Voigt model and takes no known depths.
+    /// The algorithm that runs: [`Algorithm::Stylet`] has no Kelvin-Voigt model and uses no known depths.
     #[must_use]
     pub fn active_algorithm(&self) -> Algorithm {
         match self.algorithm {

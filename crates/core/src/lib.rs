@@ -1,11 +1,11 @@
-//! The online core: needle-tissue identification and force enhancement while the needle advances.
+//! The online core: identification of the needle-tissue interaction and force enhancement during insertion.
 //!
-//! Ferro, Gaz, Anzidei, Vendittelli, "Online needle-tissue interaction model identification for
-//! force feedback enhancement in robot-assisted interventional procedures" (2021): recursive least
-//! squares on a Kelvin-Voigt or multi-layer model, rupture detection by CUSUM and force derivative,
-//! a posteriori re-weighting of the covariance by the force drop, friction compensation.
+//! Ferro, Gaz, Anzidei, Vendittelli, "Online needle-tissue interaction model identification for force feedback enhancement in
+//! robot-assisted interventional procedures" (2021): recursive least squares on a Kelvin-Voigt or multi-layer model, rupture
+//! detection by CUSUM and force derivative, a posteriori re-weighting of the covariance by the force drop, friction
+//! compensation. The default algorithm, `Stylet`, replaces these by Kalman filters, see `docs/enhancer.md`.
 //!
-//! `no_std`; no allocation after construction; a bounded amount of work per sample.
+//! `no_std`; no allocation after construction; bounded work per sample.
 //!
 //! ```
 //! use stylet_core::{EnhanceConfig, Enhancer, Sample};
@@ -21,26 +21,18 @@
 extern crate alloc;
 
 pub mod config;
-mod contact_detection;
 mod enhancer;
-mod force_drop;
-mod friction_compensation;
-mod layer_replay;
-mod line_fit;
-mod low_pass;
-mod motion_guard;
-mod paper_enhancer;
-mod preprocessing;
-mod rls;
+mod kalman;
+mod paper;
 mod sample;
-mod sample_ring;
-mod state_machine;
-mod stylet;
 
 pub use config::EnhanceConfig;
 pub use enhancer::Enhancer;
-pub use friction_compensation::MAX_LAYERS;
+pub use paper::rls::Rls;
+pub use paper::state_machine::{TRANSITIONS, Transition, Trigger};
+pub use sample::{Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State};
 
-pub use rls::Rls;
-pub use sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
-pub use state_machine::{TRANSITIONS, Transition, Trigger};
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -1,22 +1,25 @@
-//! What goes into the core and what comes out, one value each per sample.
+//! Input and output of the core, one value per sample.
+
+/// Number of traversed layers kept apart for retraction. Friction of further layers is still compensated during insertion,
+/// but merged into the last one.
+pub const MAX_LAYERS: usize = 16;
 
 /// One measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Time in seconds, increasing.
+    /// Time in s, increasing.
     pub time_s: f64,
-    /// Tip position along the insertion axis in metres, positive into the tissue.
+    /// Tip position along the insertion axis in m, positive into the tissue.
     pub position_m: f64,
     /// Tip velocity in m/s.
     pub velocity_mps: f64,
-    /// Axial force at the needle's base in N, positive resisting insertion.
+    /// Axial force at the needle base in N, positive resisting insertion.
     pub force_n: f64,
 }
 
 impl Sample {
-    /// True when every field is a number that a needle can have: positions within a kilometre,
-    /// speeds below 1 km/s, forces below 1 MN. Anything else is a fault of the logging and would
-    /// spoil the estimates for good.
+    /// Every field is finite and physically possible: positions within a kilometre, speeds below 1 km/s, forces below 1 MN.
+    /// Anything else is a logging error and would spoil the estimates for good.
     #[must_use]
     #[inline]
     pub fn is_usable(&self) -> bool {
@@ -30,7 +33,7 @@ impl Sample {
     }
 }
 
-/// The states of the supplement's Fig. 1, and one of this project's own.
+/// The states of the supplement's Fig. 1, and one of `Stylet`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum State {
@@ -41,16 +44,16 @@ pub enum State {
     ExpectedRupture,
     /// A rupture has just been declared; lasts one sample.
     DetectedRupture,
-    /// Waiting for the drop to be over.
+    /// Waiting for the end of the drop.
     ForceDropMeasuring,
     /// The traversed layer is re-estimated and its friction compensated.
     ForceCompensation,
-    /// `Stylet` alone, not in the supplement: the tip is in a gap or behind the last layer and feels nothing.
+    /// `Stylet` only: the tip is in a gap or beyond the last layer, and no tissue acts on it.
     FreeTip,
 }
 
 impl State {
-    /// Every state of the paper's algorithm, in the order of the supplement's Fig. 1.
+    /// The states of the paper's algorithm, in the order of the supplement's Fig. 1.
     pub const ALL: [State; 5] = [
         State::NoRupture,
         State::ExpectedRupture,
@@ -59,7 +62,7 @@ impl State {
         State::ForceCompensation,
     ];
 
-    /// The name, that of the supplement's Fig. 1 without blanks where it is there.
+    /// The name in the supplement's Fig. 1, without blanks.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -73,7 +76,7 @@ impl State {
     }
 }
 
-/// What made the core declare a rupture.
+/// Test that declared a rupture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -87,7 +90,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Short name in plain words.
+    /// Short name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -98,95 +101,94 @@ impl Cause {
     }
 }
 
-/// A declared rupture.
+/// A declared rupture. Values that the algorithm does not provide are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// Layer that ruptured, 1-based, as the core counts.
+    /// Ruptured layer, counted from 1 in the order of detection.
     pub layer: usize,
-    /// Time of the declaration in seconds.
+    /// Time of the declaration in s.
     pub time_s: f64,
-    /// Tip position at the declaration in metres.
+    /// Tip position at the declaration in m.
     pub position_m: f64,
-    /// Time to which the drop was traced back, in seconds.
+    /// Estimated time of the rupture in s.
     pub located_s: f64,
-    /// Tip position to which the drop was traced back, in metres.
+    /// Estimated tip position at the rupture in m.
     pub located_m: f64,
-    /// What declared it.
+    /// Test that declared it.
     pub cause: Cause,
-    /// Fall of the force at the declaration in N, and its standard deviation; zero when the algorithm does not tell.
+    /// Fall of the force at the declaration in N (`Stylet`).
     pub drop_n: f64,
-    /// See `drop_n`.
+    /// Standard deviation of `drop_n` in N (`Stylet`).
     pub drop_sd_n: f64,
-    /// Probability that it is no false alarm, 0 to 1; zero when the algorithm does not tell.
+    /// Probability that it is no false alarm, 0 to 1 (`Stylet`).
     pub confidence: f64,
 }
 
-/// What the core holds of a traversed layer after compensation.
+/// Estimate of a traversed layer. Standard deviations are zero where the algorithm does not provide them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LayerEstimate {
-    /// Layer, 1-based, as the core counts.
+    /// Layer, counted from 1 in the order of detection.
     pub layer: usize,
-    /// Position where the layer started, in metres.
+    /// Start of the layer in m.
     pub start_m: f64,
-    /// Thickness `d_i` in metres: travel from start to rupture, or the known thickness.
+    /// Thickness `d_i` in m: travel from start to rupture, or the known thickness.
     pub thickness_m: f64,
     /// Stiffness `K_i` in N/m.
     pub stiffness_n_per_m: f64,
     /// Friction `b_i`: N s/m² for the multi-layer model, N s/m for Kelvin-Voigt.
     pub friction: f64,
-    /// Measured force drop in N.
+    /// Force drop in N.
     pub drop_n: f64,
     /// Elastic share `kappa` of the force at the rupture, 0 to 1.
     pub elastic_share: f64,
-    /// What the layer adds to the cumulative friction, in N s/m.
+    /// Friction that the layer adds to the cumulative friction, in N s/m.
     pub added_friction_ns_per_m: f64,
-    /// When the estimate became available, in seconds.
+    /// Time of the estimate in s.
     pub time_s: f64,
-    /// Standard deviation of the stiffness in N/m; zero when the algorithm does not tell.
+    /// Standard deviation of the stiffness in N/m.
     pub stiffness_sd: f64,
-    /// Standard deviation of the friction in its unit; zero when the algorithm does not tell.
+    /// Standard deviation of the friction in its unit.
     pub friction_sd: f64,
-    /// Standard deviation of the force drop in N; zero when the algorithm does not tell.
+    /// Standard deviation of the force drop in N.
     pub drop_sd_n: f64,
-    /// Cumulative friction `D` behind this layer in N s/m as it is known now; zero when the algorithm does not tell.
+    /// Cumulative friction `D` at the layer's rupture in N s/m (`Stylet`).
     pub cumulative_ns_per_m: f64,
-    /// Its standard deviation in N s/m; zero when the algorithm does not tell.
+    /// Standard deviation of `cumulative_ns_per_m` in N s/m.
     pub cumulative_sd: f64,
 }
 
-/// Result of one call.
+/// Result of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
-    /// Enhanced force, `f - D v` (while retracting `f - v sum b_i l_i(z)`), in N.
+    /// Enhanced force, `f - D v` (during retraction `f - v sum b_i l_i(z)`), in N.
     pub enhanced_n: f64,
     /// Force predicted before this sample's update, `phi'th + D v`, in N.
     pub reconstructed_n: f64,
-    /// Innovation `e`, in N; zero before contact.
+    /// Innovation `e` in N; zero before contact.
     pub error_n: f64,
-    /// Present estimate `[K, b]` of the layer being traversed.
+    /// Estimate `[K, b]` of the active layer.
     pub theta: [f64; 2],
-    /// CUSUM `g` in N².
+    /// CUSUM `g` in N²; for `Stylet` the largest sum as a fraction of its threshold.
     pub cusum_n2: f64,
     /// Filtered force derivative in N/s.
     pub derivative_n_per_s: f64,
     /// Cumulative friction `D` in N s/m.
     pub cumulative_friction_ns_per_m: f64,
-    /// Where the tip's force lies with 95 % probability, in N: around `enhanced_n`, the sensor's noise and what is not known of the friction
-    /// included. `None` when the algorithm does not tell.
+    /// 95 % interval of the tip force in N, around `enhanced_n`: sensor noise and uncertain friction. `None` where the
+    /// algorithm does not provide it.
     pub band_n: Option<[f64; 2]>,
-    /// Standard deviations of `theta` and of the cumulative friction; zero when the algorithm does not tell.
+    /// Standard deviations of `theta` and of the cumulative friction; zero where the algorithm does not provide them.
     pub sd: [f64; 3],
     /// State after this sample.
     pub state: State,
     /// Number of ruptures declared so far.
     pub ruptures: usize,
-    /// The first contact's position in metres, once it is settled.
+    /// Position of the first contact in m, once it is final.
     pub contact_m: Option<f64>,
-    /// The rupture declared at this sample.
+    /// Rupture declared at this sample.
     pub detection: Option<Detection>,
-    /// The layer whose estimate became available at this sample.
+    /// Layer estimate that became available at this sample.
     pub estimate: Option<LayerEstimate>,
-    /// False when the sample was not used (not usable, or not later than the one before): the
-    /// other fields then repeat the previous output.
+    /// False when the sample was ignored; the other fields then repeat the previous output.
     pub used: bool,
 }

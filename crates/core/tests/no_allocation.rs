@@ -1,5 +1,4 @@
-//! Promise: the core allocates nothing after construction, over a million steps with ruptures,
-//! re-runs and compensation among them.
+//! Promise: the core does not allocate after construction, over a million steps with ruptures, replays and compensation.
 
 #[path = "promises/support/mod.rs"]
 mod support;
@@ -26,5 +25,5 @@ fn a_million_steps_with_ruptures_allocate_nothing() {
     }
     println!("{steps} steps, {ruptures} ruptures, {estimates} re-estimated layers: 0 allocations");
     assert_eq!(steps, 1_000_000);
-    assert_eq!((ruptures, estimates), (300, 300), "the run must really have had its ruptures");
+    assert_eq!((ruptures, estimates), (300, 300), "the run must have ruptures");
 }

@@ -1,14 +1,10 @@
-//! The core on the measured insertions of `STYLET_MEASURED` (default `../shared/measured`): what it finds, what it leaves of
-//! the force where the tip feels nothing.
+//! The core on the measured insertions in the folder `STYLET_MEASURED`: detections, and the enhanced force where nothing acts at
+//! the tip.
 //!
 //! ```sh
 //! cargo run --release -p stylet-score --example measured_enhancer -- [--force-noise N] [--ar R] [--scale S] [--every K] [--warp W] [-v]
 //! ```
-#![allow(
-    clippy::unwrap_used,
-    clippy::needless_range_loop,
-    reason = "a table for developers: what it cannot read ends it"
-)]
+#![allow(clippy::unwrap_used, clippy::needless_range_loop, reason = "a table for developers")]
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -92,9 +88,9 @@ fn main() {
     let paper = args.iter().any(|a| a == "--paper");
     let verbose = args.iter().any(|a| a == "-v");
     let dump = args.iter().position(|a| a == "--dump").and_then(|i| args.get(i + 1)).cloned();
-    let folder = std::env::var("STYLET_MEASURED")
-        .map_or_else(|_| PathBuf::from("../shared/measured"), PathBuf::from)
-        .join("needle_phantom");
+    let measured =
+        std::env::var("STYLET_MEASURED").expect("STYLET_MEASURED names the folder of the measured data");
+    let folder = PathBuf::from(measured).join("needle_phantom");
     let mut files: Vec<_> = std::fs::read_dir(&folder)
         .expect("folder")
         .filter_map(|e| Some(e.ok()?.path()))
@@ -116,8 +112,8 @@ fn main() {
         algorithm: if paper { Algorithm::Paper } else { Algorithm::Stylet },
         ..EnhanceConfig::default()
     };
-    config.stylet.track_retraction = !args.iter().any(|a| a == "--taught");
-    let (mut n_falls, mut found, mut big, mut big_found, mut lesser, mut groundless, mut back) =
+    config.stylet.track_retraction = !args.iter().any(|a| a == "--untracked");
+    let (mut n_falls, mut found, mut big, mut big_found, mut smaller, mut groundless, mut retraction) =
         (0, 0, 0, 0, 0, 0, 0);
     let mut delays = vec![];
     let (mut alone, mut behind, mut muscles, mut pulses, mut steps) =
@@ -202,11 +198,11 @@ fn main() {
             let small =
                 less.iter().find(|f| d.time_s >= r.time_s[f.from] - 0.05 && d.time_s <= r.time_s[f.at] + 0.3);
             let what = if i > turn {
-                back += 1;
-                "on the way back"
+                retraction += 1;
+                "during retraction"
             } else if small.is_some() {
-                lesser += 1;
-                "lesser"
+                smaller += 1;
+                "smaller"
             } else {
                 groundless += 1;
                 "GROUNDLESS"
@@ -264,25 +260,25 @@ fn main() {
                 .collect::<Vec<_>>();
             muscle = Some((grid, mean));
         }
-        // A tip that is pulled: a half sine of -0.5 N over 2 mm, and a step.
+        // A pulled tip: a half sine of -0.5 N over 2 mm, and a step.
         if !args.iter().any(|a| a == "--no-tip") {
             for at in [0.004, 0.007, 0.012] {
                 let x = |i: usize| if i > turn { r.position_m[turn] - r.position_m[i] } else { 0.0 };
                 if x(r.len() - 1) < at + 0.003 {
                     continue;
                 }
-                let heard = |add: &dyn Fn(f64) -> f64| {
+                let enhanced_with = |add: &dyn Fn(f64) -> f64| {
                     let f: Vec<f64> = (0..r.len()).map(|i| noisy.force_n[i] + add(x(i))).collect();
                     Trace::run(&noisy, &f, &config, 0.0, |_, _| {}).enhanced_n
                 };
-                let pulsed = heard(&|x| {
+                let pulsed = enhanced_with(&|x| {
                     if x > at && x < at + 0.002 {
                         -0.5 * scale * (std::f64::consts::PI * (x - at) / 0.002).sin()
                     } else {
                         0.0
                     }
                 });
-                let stepped = heard(&|x| if x > at { -0.5 * scale } else { 0.0 });
+                let stepped = enhanced_with(&|x| if x > at { -0.5 * scale } else { 0.0 });
                 pulses.push(
                     (0..r.len()).map(|i| (pulsed[i] - trace.enhanced_n[i]).abs()).fold(0.0, f64::max)
                         / 0.5
@@ -309,7 +305,7 @@ fn main() {
         }
         if verbose || !line.is_empty() {
             println!(
-                "{name}: contact {:.2} mm, {} detections, back raw {raw:.3} enh {enh:.3} spike {spike:.2}{line}",
+                "{name}: contact {:.2} mm, {} detections, retraction raw {raw:.3} enh {enh:.3} spike {spike:.2}{line}",
                 1e3 * contact,
                 trace.detections.len()
             );
@@ -337,13 +333,13 @@ fn main() {
     delays.sort_by(f64::total_cmp);
     let q = |p: f64| delays.get(((delays.len().max(1) - 1) as f64 * p) as usize).copied().unwrap_or(f64::NAN);
     println!(
-        "falls {n_falls}: found {found}; of {big} large ones {big_found}; on lesser falls {lesser}, groundless {groundless}, on the way back {back}; delay median {:.0} p95 {:.0} ms",
+        "falls {n_falls}: found {found}; of {big} large ones {big_found}; on smaller falls {smaller}, groundless {groundless}, during retraction {retraction}; delay median {:.0} p95 {:.0} ms",
         q(0.5),
         q(0.95)
     );
     let root = |v: &[(f64, f64)], k: usize| rms(v.iter().map(|x| if k == 0 { x.0 } else { x.1 }));
     println!(
-        "  way in: behind the skin against muscle alone {:.3} (raw {:.3}); punctured skin with its hold {:.3} (raw {:.3})",
+        "  insertion: behind the skin against muscle alone {:.3} (raw {:.3}); punctured skin with its hold {:.3} (raw {:.3})",
         root(&behind, 0),
         root(&behind, 1),
         root(&alone, 0),
@@ -354,7 +350,7 @@ fn main() {
     let p =
         |v: &[f64], q: f64| v.get(((v.len().max(1) - 1) as f64 * q) as usize).copied().unwrap_or(f64::NAN);
     println!(
-        "  tip on the way back: a pulse keeps {:.2} (least {:.2}), a step after 1 mm {:.2} (least {:.2})",
+        "  tip during retraction: a pulse keeps {:.2} (least {:.2}), a step after 1 mm {:.2} (least {:.2})",
         p(&pulses, 0.5),
         p(&pulses, 0.0),
         p(&steps, 0.5),
@@ -362,6 +358,6 @@ fn main() {
     );
     for (set, raw, enh, spike) in &sets {
         let m = |v: &Vec<f64>| rms(v.iter().copied());
-        println!("  {set}: way back raw {:.3} enhanced {:.3} spike {spike:.2}", m(raw), m(enh));
+        println!("  {set}: retraction raw {:.3} enhanced {:.3} spike {spike:.2}", m(raw), m(enh));
     }
 }

@@ -1,5 +1,4 @@
-//! What the online core made of a recording: every output as a column, and the offline estimate
-//! beside it.
+//! Outputs of the online core over a recording, as columns.
 
 use crate::enhancer_with_model::{EnhancerWithModel, enhancer_for};
 use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
@@ -10,22 +9,22 @@ use stylet_core::{Detection, LayerEstimate, Sample, State};
 use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
 
-/// The core's outputs over a recording, one value per sample.
+/// Outputs of the core over a recording, one value per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Enhanced force in N.
     pub enhanced_n: Vec<f64>,
-    /// Lower and upper end of the 95 % band on the tip's force in N; not a number when the algorithm gives none.
+    /// Lower end of the 95 % band on the tip force in N; NaN where the algorithm provides none.
     pub low_n: Vec<f64>,
-    /// See `low_n`.
+    /// Upper end of that band.
     pub high_n: Vec<f64>,
     /// Reconstructed force in N.
     pub reconstructed_n: Vec<f64>,
     /// Innovation in N.
     pub error_n: Vec<f64>,
-    /// Stiffness estimate in N/m; not a number before contact.
+    /// Stiffness estimate in N/m; NaN before contact.
     pub stiffness_n_per_m: Vec<f64>,
-    /// Friction estimate in the model's unit; not a number before contact.
+    /// Friction estimate in the model's unit; NaN before contact.
     pub friction: Vec<f64>,
     /// Cumulative friction in N s/m.
     pub cumulative_friction_ns_per_m: Vec<f64>,
@@ -43,13 +42,12 @@ pub struct Trace {
     pub contact_m: Option<f64>,
     /// Time at which the needle was first at that position, in s.
     pub contact_s: Option<f64>,
-    /// Samples that the core passed over.
+    /// Samples that the core ignored.
     pub unused: usize,
 }
 
 impl Trace {
-    /// Runs a core over the columns of a recording; `force_n` is the sensor's column. `each` sees
-    /// every sample with the core's output.
+    /// Runs the core over a recording with the force of one sensor. `each` receives every sample index and output.
     #[must_use]
     pub fn run(
         recording: &Recording,
@@ -59,31 +57,32 @@ impl Trace {
         each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
         let core = enhancer_for(recording.len(), config, surface_m);
-        Self::hear(recording, force_n, EnhancerWithModel::new(core, None::<fn(&Sample, usize) -> f64>), each)
+        let core = EnhancerWithModel::new(core, None::<fn(&Sample, usize) -> f64>);
+        Self::collect(recording, force_n, core, each)
     }
 
-    /// [`Trace::record`] with the friction that a law fitted elsewhere says, which has its place in [`Hearing`].
+    /// As [`Trace::run`] with the shaft friction of an identified model, see [`EnhancerWithModel`].
     #[must_use]
     pub fn run_with_model(
         recording: &Recording,
         force_n: &[f64],
         config: &EnhanceConfig,
         surface_m: f64,
-        law: impl FnMut(&Sample, usize) -> f64,
+        model: impl FnMut(&Sample, usize) -> f64,
     ) -> Self {
         let core = enhancer_for(recording.len(), config, surface_m);
-        Self::hear(recording, force_n, EnhancerWithModel::new(core, Some(law)), |_, _| {})
+        Self::collect(recording, force_n, EnhancerWithModel::new(core, Some(model)), |_, _| {})
     }
 
-    fn hear<L: FnMut(&Sample, usize) -> f64>(
+    fn collect<M: FnMut(&Sample, usize) -> f64>(
         recording: &Recording,
         force_n: &[f64],
-        mut hearing: EnhancerWithModel<L>,
+        mut core: EnhancerWithModel<M>,
         mut each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
         let mut trace = Trace::default();
         for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
-            let out = hearing.step(Sample {
+            let out = core.step(Sample {
                 time_s: s.time_s,
                 position_m: s.position_m,
                 velocity_mps: s.velocity_mps,
@@ -98,7 +97,7 @@ impl Trace {
         trace
     }
 
-    /// Adds what the core says of a sample to the columns.
+    /// Appends the output of a sample to the columns.
     pub fn push(&mut self, out: &stylet_core::Output) {
         let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
         let [stiffness, friction] = coefficients(out);
@@ -115,11 +114,11 @@ impl Trace {
         self.state.push(out.state);
     }
 
-    /// Remembers what happened at a sample: ruptures, estimates, contact.
+    /// Records the ruptures, estimates and contact of a sample.
     pub fn record_events(&mut self, out: &stylet_core::Output) {
         self.detections.extend(out.detection);
         if let Some(estimate) = out.estimate {
-            // A later word on a layer replaces an earlier one; it is among the last.
+            // A later estimate of a layer replaces the earlier one, which is among the last.
             if let Some(earlier) = self.estimates.iter().rposition(|e| e.layer == estimate.layer) {
                 self.estimates.remove(earlier);
             }
@@ -129,9 +128,8 @@ impl Trace {
         self.unused += usize::from(!out.used);
     }
 
-    /// Offline estimate of the layer between `start_m` and `end_m`, whose samples are those before
-    /// `until_s`, given the cumulative friction of the layers before and the elastic share and mean
-    /// speed that decide the split when the data do not.
+    /// Offline estimate of the layer in the span `(start_m, end_m, until_s)`, given the cumulative friction of the previous layers.
+    /// The elastic share of the online estimate decides the split where the data do not.
     fn offline(
         recording: &Recording,
         force_n: &[f64],
@@ -157,12 +155,12 @@ impl Trace {
             }),
             ratio,
         );
-        // Without a measured drop nothing can split what the data do not separate.
+        // Without a measured drop an inseparable split is undetermined.
         found.filter(|f| f.separable || estimate.is_some())
     }
 }
 
-/// Stiffness in N/m and friction in the model's unit; not numbers before contact.
+/// Stiffness in N/m and friction in the model's unit; NaN before contact.
 #[must_use]
 pub fn coefficients(out: &stylet_core::Output) -> [f64; 2] {
     if out.theta == [0.0, 0.0] { [f64::NAN; 2] } else { out.theta }

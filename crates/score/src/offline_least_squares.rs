@@ -1,24 +1,20 @@
-//! The offline estimate: least squares over a whole layer at once.
-//!
-//! The batch counterpart of the recursive estimate (supplement sec. IV): all samples of the layer,
-//! `y = f - D v`, `phi = [dz, dz v]`. At constant velocity the two columns are collinear; the split
-//! between stiffness and friction is then that of the prior variances, exactly as online, and is
-//! reported as not separable.
+//! Offline estimate: least squares over all samples of a layer (supplement sec. IV), `y = f - D v`, `phi = [dz, dz v]`. At constant
+//! velocity the columns are collinear; the split between stiffness and friction is then that of the prior variances, as online,
+//! and is reported as not separable.
 
 use nalgebra::{Matrix2, Vector2};
 
-/// Below this reciprocal condition number of the scaled normal matrix the data do not tell the
-/// columns apart.
-const SEPARABLE: f64 = 1e-4;
+/// Smallest reciprocal condition number of the scaled normal matrix at which the columns are separable.
+const MIN_RECIPROCAL_CONDITION: f64 = 1e-4;
 
-/// A sample of a layer: depth in the layer (m), velocity (m/s), force less cumulative friction (N).
+/// A sample of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerSample {
     /// Depth below the layer's start, `dz`, in m.
     pub depth_m: f64,
     /// Velocity in m/s.
     pub velocity_mps: f64,
-    /// Force less the cumulative friction of the layers before, `y`, in N.
+    /// Force less the cumulative friction of the previous layers, `y`, in N.
     pub force_n: f64,
 }
 
@@ -29,21 +25,19 @@ pub struct OfflineEstimate {
     pub stiffness_n_per_m: f64,
     /// Friction `b` in N s/m².
     pub friction_ns_per_m2: f64,
-    /// Whether the data alone tell the two apart.
+    /// The data alone separate the two.
     pub separable: bool,
 }
 
-/// Least squares of the multi-layer model over `samples`, with `ratio` the ratio of the prior
-/// standard deviations, friction over stiffness (m/s)⁻¹: it decides the split when the data
-/// do not. `None` with fewer than two samples inside the layer.
+/// Least squares of the multi-layer model over `samples`. `ratio` is the ratio of the prior standard deviations, friction over
+/// stiffness in (m/s)⁻¹, and decides the split where the data do not. `None` with fewer than two samples inside the layer.
 #[must_use]
 pub fn fit_layer_offline(samples: impl Iterator<Item = LayerSample>, ratio: f64) -> Option<OfflineEstimate> {
     let mut normal = Matrix2::zeros();
     let mut right = Vector2::zeros();
     let mut count = 0usize;
     for s in samples.filter(|s| s.depth_m > 0.0) {
-        // The friction column is scaled by the ratio, so that the minimum-norm solution is the one
-        // that the prior prefers.
+        // Scaled by the ratio, so that the minimum-norm solution is that of the prior.
         let phi = Vector2::new(s.depth_m, s.depth_m * s.velocity_mps * ratio);
         normal += phi * phi.transpose();
         right += phi * s.force_n;
@@ -57,7 +51,7 @@ pub fn fit_layer_offline(samples: impl Iterator<Item = LayerSample>, ratio: f64)
     if large <= 0.0 {
         return None;
     }
-    let separable = small > SEPARABLE * large;
+    let separable = small > MIN_RECIPROCAL_CONDITION * large;
     let mut theta = Vector2::zeros();
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         if separable || *value == large {
@@ -82,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_varying_velocity_tells_stiffness_from_friction_whatever_the_prior() {
+    fn a_varying_velocity_separates_stiffness_from_friction_for_any_prior() {
         for ratio in [100.0, 1000.0] {
             let data = samples(|z| 0.002 + 0.1 * z);
             let found = fit_layer_offline(data.into_iter(), ratio).expect("enough samples");
@@ -93,9 +87,8 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_velocity_leaves_the_split_to_the_prior_and_says_so() {
-        // Elastic share kappa of the whole: 40/(40 + 9000 v); the drop's prior ratio is
-        // sqrt((1 - kappa)/(kappa v²)).
+    fn at_constant_velocity_the_prior_determines_the_split() {
+        // Elastic share kappa = 40/(40 + 9000 v), prior ratio sqrt((1 - kappa)/(kappa v²)).
         let v = 0.0023_f64;
         let kappa = 40.0 / (40.0 + 9000.0 * v);
         let ratio: f64 = ((1.0 - kappa) / (kappa * v * v)).sqrt();
@@ -111,13 +104,13 @@ mod tests {
         let at = |depth_m| LayerSample { depth_m, velocity_mps: 0.002, force_n: 1.0 };
         assert!(fit_layer_offline([at(-0.01), at(0.0), at(0.01)].into_iter(), 1.0).is_none());
         assert!(fit_layer_offline([at(0.01), at(0.02)].into_iter(), 1.0).is_some());
-        // Nor one whose numbers are none.
+        // Nor one with infinite values.
         let wild = LayerSample { velocity_mps: f64::INFINITY, ..at(0.01) };
         assert!(fit_layer_offline([at(0.01), at(0.02), wild].into_iter(), 1.0).is_none());
     }
 
     #[test]
-    fn what_lies_before_the_layer_does_not_count() {
+    fn samples_before_the_layer_do_not_count() {
         let inside = samples(|z| 0.002 + 0.1 * z);
         let before = inside.iter().map(|s| LayerSample { depth_m: -s.depth_m, force_n: 7.0, ..*s });
         let found = fit_layer_offline(before.chain(inside.clone()), 1000.0).expect("enough samples");
@@ -125,9 +118,9 @@ mod tests {
     }
 
     #[test]
-    fn a_velocity_that_hardly_changes_is_not_trusted_to_separate() {
-        // Columns with a ratio r = ratio x v of about one: the smaller eigenvalue of the normal matrix is a quarter of the relative
-        // variance of r times the larger, so that the bar of 1e-4 lies at velocities that differ by two hundredths.
+    fn a_nearly_constant_velocity_is_not_separable() {
+        // With ratio x v near one the ratio of the eigenvalues is a quarter of the relative variance of v: the limit of 1e-4 lies at
+        // velocities that differ by 2 %.
         for (spread, separable) in [(0.03, true), (0.015, false)] {
             let mut sign = 1.0;
             let alternating: Vec<LayerSample> = samples(|_| 0.002)
@@ -138,7 +131,7 @@ mod tests {
                     LayerSample { velocity_mps, force_n: s.depth_m * (40.0 + 9000.0 * velocity_mps), ..s }
                 })
                 .collect();
-            // The same whatever the size of the matrix: a layer a thousand times as deep.
+            // Independent of the scale: a layer a thousand times as deep.
             for scale in [1.0, 1000.0] {
                 let data = alternating.iter().map(|s| LayerSample { depth_m: s.depth_m * scale, ..*s });
                 let found = fit_layer_offline(data, 1.0 / 0.002).expect("enough samples");

@@ -1,38 +1,37 @@
-//! Which detection belongs to which rupture.
+//! Matching of detections to true ruptures.
 
 use serde::{Deserialize, Serialize};
 use stylet_core::Detection;
 use stylet_record::TrueRupture;
 
-/// A detection counts for a rupture from this much before it (s)...
+/// Earliest matching detection relative to the rupture, in s.
 pub const MATCH_EARLIEST_S: f64 = -0.05;
-/// ...to this much after it (s).
+/// Latest matching detection relative to the rupture, in s.
 pub const MATCH_LATEST_S: f64 = 1.0;
 
-/// One true rupture and what became of it.
+/// A true rupture and its detection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RuptureScore {
     /// Layer, 1-based.
     pub layer: usize,
-    /// True instant in seconds.
+    /// True time in s.
     pub true_s: f64,
-    /// True tip position in metres.
+    /// True tip position in m.
     pub true_m: f64,
-    /// Whether the puncture force was reached; otherwise the far face was.
+    /// The puncture force was reached; otherwise the far face.
     pub by_force: bool,
-    /// Time of the detection in seconds; `null` when missed.
+    /// Time of the detection in s; `null` when missed.
     pub detected_s: Option<f64>,
-    /// Detected minus true time in seconds.
+    /// Detected minus true time in s.
     pub delay_s: Option<f64>,
-    /// Travel of the tip between the true rupture and the detection in millimetres.
+    /// Travel of the tip between the true rupture and the detection in mm.
     pub delay_mm: Option<f64>,
-    /// Which of the core's detections it was, 1-based.
+    /// Number of the detection, 1-based.
     pub detection: Option<usize>,
 }
 
-/// Matches each true rupture, in order, to the first detection within
-/// [[`EARLIEST_S`], [`LATEST_S`]] that no earlier rupture has taken. Returns the ruptures' scores
-/// and which detections are false.
+/// Matches each true rupture, in order, to the first detection within [[`MATCH_EARLIEST_S`], [`MATCH_LATEST_S`]] that no
+/// earlier rupture has taken. Returns the scores of the ruptures and which detections are false.
 #[must_use]
 pub fn match_ruptures(truth: &[TrueRupture], detections: &[Detection]) -> (Vec<RuptureScore>, Vec<bool>) {
     let mut is_false = vec![true; detections.len()];

@@ -1,4 +1,4 @@
-//! Scoring as the samples come, so that a sweep needs no copy of the run.
+//! Streaming computation of a score, so that a sweep needs no copy of the run.
 
 use crate::rupture_matching::match_ruptures;
 use crate::score::{Coverage, EnhancementScore, EstimateError, LayerScore, Score};
@@ -6,27 +6,27 @@ use stylet_core::config::Model;
 use stylet_core::{Detection, LayerEstimate, Output};
 use stylet_record::{LayerTruth, TrueRupture};
 
-/// One sample of truth, beside what the core made of it.
+/// Ground truth of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueSample {
     /// True tip position in m.
     pub position_m: f64,
     /// Measured force in N.
     pub force_n: f64,
-    /// True tip force in N: the tissue's force less all friction of the passed layers.
+    /// True tip force in N: the tissue force less the friction of the passed layers.
     pub tip_n: f64,
     /// True force of the tissue on the needle in N.
     pub total_n: f64,
 }
 
-/// What the core made of a sample.
+/// Output of the core for one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnhancedSample {
     /// Enhanced force in N.
     pub enhanced_n: f64,
     /// Innovation in N.
     pub error_n: f64,
-    /// Where the core says that the tip's force lies, in N.
+    /// 95 % band on the tip force in N.
     pub band_n: Option<[f64; 2]>,
 }
 
@@ -37,7 +37,7 @@ impl From<&Output> for EnhancedSample {
     }
 }
 
-/// Sums that the scores are made of.
+/// Sums that the scores are computed from.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     samples: f64,
@@ -53,7 +53,7 @@ struct Sums {
     exit_force2: f64,
 }
 
-/// Collects one run.
+/// Collects the samples of one run.
 #[derive(Clone, Debug)]
 pub struct Scorer {
     layers: Vec<LayerTruth>,
@@ -67,12 +67,12 @@ pub struct Scorer {
     front_m: f64,
     far_m: f64,
     sums: Sums,
-    /// The sums at the deepest point, set aside when the needle turns back.
+    /// The sums at the deepest point, kept when the needle reverses.
     at_deepest: Option<Sums>,
 }
 
 impl Scorer {
-    /// A scorer for a stack of layers and the model that the core runs.
+    /// For a stack of layers and the model of the core.
     #[must_use]
     pub fn new(layers: Vec<LayerTruth>, model: Model) -> Self {
         Self {
@@ -90,71 +90,71 @@ impl Scorer {
         }
     }
 
-    /// A true rupture.
+    /// Adds a true rupture.
     pub fn add_rupture(&mut self, rupture: TrueRupture) {
         self.ruptures.push(rupture);
     }
 
-    /// What happened at a sample: a detection, a layer's estimate. Samples where nothing did may be left out.
+    /// Adds the detection and the layer estimate of a sample; samples without either may be omitted.
     pub fn add_event(&mut self, output: &Output) {
         self.detections.extend(output.detection);
         if let Some(estimate) = output.estimate {
-            // A later word on a layer replaces an earlier one.
+            // A later estimate of a layer replaces the earlier one.
             self.estimates.retain(|e| e.layer != estimate.layer);
             self.estimates.push(estimate);
         }
     }
 
-    /// The position in m at which the core has found contact, if it has.
+    /// Sets the position in m of the detected contact.
     pub fn set_contact(&mut self, contact_m: Option<f64>) {
         self.contact_m = contact_m;
     }
 
-    /// One sample and what the core made of it.
+    /// Adds a sample and its output.
     #[inline]
-    pub fn add_sample(&mut self, moment: &TrueSample, output: &EnhancedSample) {
-        let z = moment.position_m;
+    pub fn add_sample(&mut self, truth: &TrueSample, output: &EnhancedSample) {
+        let z = truth.position_m;
         if z < self.front_m {
             return;
         }
-        // The advance ends at the deepest point; what comes after is not scored.
+        // Insertion ends at the deepest point; retraction is not scored.
         if z >= self.deepest_m {
             self.deepest_m = z;
             self.at_deepest = None;
         } else if self.at_deepest.is_none() {
             self.at_deepest = Some(self.sums);
         }
-        let miss = output.enhanced_n - moment.tip_n;
+        let miss = output.enhanced_n - truth.tip_n;
         let sums = &mut self.sums;
         sums.samples += 1.0;
-        sums.tip2 += moment.tip_n * moment.tip_n;
+        sums.tip2 += truth.tip_n * truth.tip_n;
         sums.miss2 += miss * miss;
-        // Without the sensor's own error: true friction less estimated friction.
-        let friction = miss - (moment.force_n - moment.total_n);
+        // Without the sensor error: true less estimated friction.
+        let friction = miss - (truth.force_n - truth.total_n);
         sums.friction2 += friction * friction;
         if let Some([low, high]) = output.band_n {
             sums.banded += 1.0;
-            if moment.tip_n >= low && moment.tip_n <= high {
+            if truth.tip_n >= low && truth.tip_n <= high {
                 sums.in_band += 1.0;
             }
         }
         sums.error2 += output.error_n * output.error_n;
         if z < self.far_m {
-            sums.inside_tip2 += moment.tip_n * moment.tip_n;
+            sums.inside_tip2 += truth.tip_n * truth.tip_n;
             sums.inside_miss2 += miss * miss;
         } else {
             sums.exit_enhanced2 += output.enhanced_n * output.enhanced_n;
-            sums.exit_force2 += moment.force_n * moment.force_n;
+            sums.exit_force2 += truth.force_n * truth.force_n;
         }
     }
 
-    /// The core's detections so far.
+    /// Detections so far.
     #[must_use]
     pub fn detections(&self) -> &[Detection] {
         &self.detections
     }
 
-    /// The score of what was collected.
+    /// Computes the score.
     #[must_use]
     pub fn finish(self) -> Score {
         let (ruptures, is_false) = match_ruptures(&self.ruptures, &self.detections);
@@ -191,7 +191,7 @@ impl Scorer {
         }
     }
 
-    /// How many of the true values lie in the intervals that the core gives.
+    /// Coverage of the intervals.
     fn coverage(&self, ruptures: &[crate::rupture_matching::RuptureScore], sums: &Sums) -> Coverage {
         let mut coverage = Coverage { band: [sums.in_band, sums.banded], ..Coverage::default() };
         for rupture in ruptures {

@@ -1,4 +1,4 @@
-//! `enhanced.csv`: the recording beside what the first model made of it, a row per sample.
+//! `enhanced.csv`: the recording with the outputs of the first run, a row per sample.
 
 use crate::error::Error;
 use crate::run_report::AlgorithmRun;
@@ -6,28 +6,28 @@ use stylet_core::Output;
 use stylet_record::csv_writer::{RowWriter, column_names};
 use stylet_record::{RecordError, Recording};
 
-/// The columns beside the recording's.
-const BESIDE: [&str; 6] =
+/// Output columns, after those of the recording.
+const OUTPUT_COLUMNS: [&str; 6] =
     ["enhanced_n", "low_n", "high_n", "reconstructed_n", "estimated_cumulative_friction_ns_per_m", "state"];
 
-/// The header over a recording's own columns.
-pub(super) fn header(mut recorded: Vec<String>) -> Vec<String> {
-    recorded.extend(BESIDE.map(str::to_owned));
-    recorded
+/// Appends the output columns to those of a recording.
+pub(super) fn header(mut columns: Vec<String>) -> Vec<String> {
+    columns.extend(OUTPUT_COLUMNS.map(str::to_owned));
+    columns
 }
 
-/// The numbers beside a sample; its state is the last column.
+/// Output values of a sample, without its state.
 pub(super) fn enhanced_values(out: &Output) -> [f64; 5] {
     let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
     [out.enhanced_n, low, high, out.reconstructed_n, out.cumulative_friction_ns_per_m]
 }
 
 /// The table of a recording in memory.
-pub(super) fn enhanced_csv(recording: &Recording, ran: &[AlgorithmRun]) -> Result<Vec<u8>, Error> {
-    let Some(AlgorithmRun { trace, .. }) = ran.first() else { return Ok(Vec::new()) };
+pub(super) fn enhanced_csv(recording: &Recording, runs: &[AlgorithmRun]) -> Result<Vec<u8>, Error> {
+    let Some(AlgorithmRun { trace, .. }) = runs.first() else { return Ok(Vec::new()) };
     recording.check()?;
-    let written = |why: std::io::Error| RecordError::from(why);
-    let mut table = RowWriter::new(&header(column_names(recording, None)), Vec::new()).map_err(written)?;
+    let failed = |why: std::io::Error| RecordError::from(why);
+    let mut table = RowWriter::new(&header(column_names(recording, None)), Vec::new()).map_err(failed)?;
     let mut row = Vec::new();
     for (at, sample) in recording.samples().enumerate() {
         row.clear();
@@ -35,14 +35,14 @@ pub(super) fn enhanced_csv(recording: &Recording, ran: &[AlgorithmRun]) -> Resul
         row.extend(recording.velocity_measured.then_some(sample.velocity_mps));
         row.extend(recording.force_virtual_n.as_ref().and_then(|force_n| force_n.get(at)));
         row.extend(recording.joint_torque_nm.get(at).into_iter().flatten());
-        let beside = [
+        let outputs = [
             trace.enhanced_n[at],
             trace.low_n[at],
             trace.high_n[at],
             trace.reconstructed_n[at],
             trace.cumulative_friction_ns_per_m[at],
         ];
-        table.write_row(&row, &beside, trace.state[at].name()).map_err(written)?;
+        table.write_row(&row, &outputs, trace.state[at].name()).map_err(failed)?;
     }
-    Ok(table.finish().map_err(written)?)
+    Ok(table.finish().map_err(failed)?)
 }

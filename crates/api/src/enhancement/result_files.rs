@@ -1,4 +1,4 @@
-//! What was found as `enhance.json` and `events.json` have it, and the state as a column.
+//! Contents of `enhance.json` and `events.json`.
 
 use crate::run_report::AlgorithmRun;
 use serde::Serialize;
@@ -17,26 +17,26 @@ pub(super) struct EnhanceResult<'a> {
     pub sample_hz: f64,
     pub hash: &'a str,
     pub version: &'a str,
-    /// The law that the friction is taken from, where it is not the core's own.
+    /// File of the identified model that provided the friction.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<&'a str>,
-    pub found: Vec<FoundBy>,
+    pub identified_model: Option<&'a str>,
+    pub found: Vec<RunResult>,
     pub data_quality: &'a [QualityNote],
 }
 
-/// What the core found, per model.
+/// Results with one regressor.
 #[derive(Serialize)]
-pub(super) struct FoundBy {
+pub(super) struct RunResult {
     model: String,
     contact_m: Option<f64>,
     contact_s: Option<f64>,
-    ruptures: Vec<Found>,
+    ruptures: Vec<Rupture>,
     layers: Vec<Layer>,
 }
 
-/// A detection as `enhance.json` has it.
+/// A detection in `enhance.json`.
 #[derive(Serialize)]
-struct Found {
+struct Rupture {
     time_s: f64,
     position_m: f64,
     located_s: f64,
@@ -44,7 +44,7 @@ struct Found {
     cause: &'static str,
 }
 
-/// A layer as `enhance.json` has it.
+/// A layer in `enhance.json`.
 #[derive(Serialize)]
 struct Layer {
     layer: usize,
@@ -55,14 +55,14 @@ struct Layer {
     friction_unit: &'static str,
     drop_n: f64,
     cumulative_friction_added_ns_per_m: f64,
-    /// 95 % intervals, and friction along the shaft as the layer gave way; missing where the algorithm gives none.
+    /// 95 % intervals and cumulative friction, where the algorithm provides them.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    certain: Option<Certain>,
+    intervals: Option<Intervals>,
 }
 
-/// What an algorithm that knows its uncertainty says beside.
+/// 95 % intervals, and the cumulative friction at the layer's rupture.
 #[derive(Serialize)]
-struct Certain {
+struct Intervals {
     stiffness_interval: [f64; 2],
     friction_interval: [f64; 2],
     drop_interval: [f64; 2],
@@ -70,26 +70,26 @@ struct Certain {
     cumulative_friction_interval: [f64; 2],
 }
 
-impl Certain {
-    fn of(e: &LayerEstimate) -> Option<Self> {
+impl Intervals {
+    fn new(e: &LayerEstimate) -> Option<Self> {
         (e.stiffness_sd > 0.0).then(|| Self {
-            stiffness_interval: around(e.stiffness_n_per_m, e.stiffness_sd),
-            friction_interval: around(e.friction, e.friction_sd),
-            drop_interval: around(e.drop_n, e.drop_sd_n),
+            stiffness_interval: interval(e.stiffness_n_per_m, e.stiffness_sd),
+            friction_interval: interval(e.friction, e.friction_sd),
+            drop_interval: interval(e.drop_n, e.drop_sd_n),
             cumulative_friction_ns_per_m: e.cumulative_ns_per_m,
-            cumulative_friction_interval: around(e.cumulative_ns_per_m, e.cumulative_sd),
+            cumulative_friction_interval: interval(e.cumulative_ns_per_m, e.cumulative_sd),
         })
     }
 }
 
-/// The 95 % interval of a number with this standard deviation.
-fn around(value: f64, sd: f64) -> [f64; 2] {
+/// The 95 % interval.
+fn interval(value: f64, sd: f64) -> [f64; 2] {
     [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd]
 }
 
-/// What the core found with a model.
-pub(super) fn results_of_run(ran: &AlgorithmRun) -> FoundBy {
-    let friction_unit = match ran.config.model {
+/// Results of a run.
+pub(super) fn results_of_run(run: &AlgorithmRun) -> RunResult {
+    let friction_unit = match run.config.model {
         Model::MultiLayer => "N s/m2",
         Model::KelvinVoigt => "N s/m",
     };
@@ -102,17 +102,17 @@ pub(super) fn results_of_run(ran: &AlgorithmRun) -> FoundBy {
         friction_unit,
         drop_n: e.drop_n,
         cumulative_friction_added_ns_per_m: e.added_friction_ns_per_m,
-        certain: Certain::of(e),
+        intervals: Intervals::new(e),
     };
-    FoundBy {
-        model: ran.name.clone(),
-        contact_m: ran.trace.contact_m,
-        contact_s: ran.trace.contact_s,
-        ruptures: ran
+    RunResult {
+        model: run.name.clone(),
+        contact_m: run.trace.contact_m,
+        contact_s: run.trace.contact_s,
+        ruptures: run
             .trace
             .detections
             .iter()
-            .map(|d| Found {
+            .map(|d| Rupture {
                 time_s: d.time_s,
                 position_m: d.position_m,
                 located_s: d.located_s,
@@ -120,21 +120,21 @@ pub(super) fn results_of_run(ran: &AlgorithmRun) -> FoundBy {
                 cause: d.cause.name(),
             })
             .collect(),
-        layers: ran.trace.estimates.iter().map(layer).collect(),
+        layers: run.trace.estimates.iter().map(layer).collect(),
     }
 }
 
-/// A rupture as `events.json` has it.
+/// A rupture in `events.json`.
 #[derive(Serialize)]
 pub(super) struct Event {
     time_s: f64,
     position_m: f64,
     drop_n: DropSize,
-    /// Probability that it is no false alarm, 0 to 1; missing where the algorithm does not tell.
+    /// Probability that it is no false alarm, 0 to 1, where the algorithm provides it.
     confidence: Option<f64>,
 }
 
-/// A drop with its 95 % interval, in N; the interval is missing where the algorithm gives none.
+/// A drop with its 95 % interval in N, where the algorithm provides it.
 #[derive(Serialize)]
 struct DropSize {
     value: Option<f64>,
@@ -142,27 +142,27 @@ struct DropSize {
     high: Option<f64>,
 }
 
-/// The ruptures that the core found.
+/// Detected ruptures.
 pub(super) fn events(trace: &Trace) -> Vec<Event> {
-    let told = |x: f64| (x != 0.0).then_some(x);
+    let provided = |x: f64| (x != 0.0).then_some(x);
     let estimates: BTreeMap<usize, &LayerEstimate> = trace.estimates.iter().map(|e| (e.layer, e)).collect();
     trace
         .detections
         .iter()
         .map(|d| {
             let estimate = estimates.get(&d.layer).copied();
-            // What the samples around the drop say; without that, what the layer's estimate says.
-            let (value, sd) = match (told(d.drop_sd_n), estimate) {
+            // From the samples around the drop, or else from the layer estimate.
+            let (value, sd) = match (provided(d.drop_sd_n), estimate) {
                 (Some(sd), _) => (Some(d.drop_n), Some(sd)),
-                (None, Some(e)) => (Some(e.drop_n), told(e.drop_sd_n)),
+                (None, Some(e)) => (Some(e.drop_n), provided(e.drop_sd_n)),
                 (None, None) => (None, None),
             };
-            let interval = value.zip(sd).map(|(value, sd)| around(value, sd));
+            let interval = value.zip(sd).map(|(value, sd)| interval(value, sd));
             Event {
                 time_s: d.time_s,
                 position_m: d.position_m,
                 drop_n: DropSize { value, low: interval.map(|i| i[0]), high: interval.map(|i| i[1]) },
-                confidence: told(d.confidence),
+                confidence: provided(d.confidence),
             }
         })
         .collect()

@@ -1,7 +1,7 @@
-// The core as a ROS 2 node. Hears geometry_msgs/WrenchStamped on `wrench` (force along the axis: parameter `axis`, x, y or z)
-// and geometry_msgs/TwistStamped on `tip` (linear.x: depth in m, linear.y: speed in m/s), says the enhanced force on
-// `enhanced` (std_msgs/Float64, N) and ruptures on `ruptures` (std_msgs/UInt32, how many so far). Built only where ROS 2 is;
-// nothing allocates in the callback but ROS itself.
+// The core as a ROS 2 node. Subscribes to geometry_msgs/WrenchStamped on `wrench` (force along the axis: parameter `axis`, x, y or z)
+// and geometry_msgs/TwistStamped on `tip` (linear.x: depth in m, linear.y: velocity in m/s), publishes the enhanced force on
+// `enhanced` (std_msgs/Float64, N) and ruptures on `ruptures` (std_msgs/UInt32, number so far). Built only with ROS 2;
+// the callback allocates nothing apart from ROS.
 #include <cstdlib>
 #include <memory>
 #include <stdexcept>

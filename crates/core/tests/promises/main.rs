@@ -1,18 +1,18 @@
-//! The promises of the online core, one file each; one program, because linking takes longer than testing.
+//! Tests of the online core, one file per promise, in one binary because linking takes longer than testing.
 
-mod blocks;
-mod detection;
-mod estimation;
-mod not_a_rupture;
-mod paper_stays_bit_for_bit;
-mod robustness;
+mod batch_processing;
+mod paper_detection;
+mod paper_estimation;
+mod paper_false_ruptures;
+mod paper_golden_hashes;
+mod paper_robustness;
 mod state_machine;
-mod stylet_falls;
-mod stylet_finds;
-mod stylet_gaps;
-mod stylet_holds;
+mod stylet_detection;
+mod stylet_differentiated_velocity;
+mod stylet_drops;
+mod stylet_dry_friction;
+mod stylet_free_tip;
 mod stylet_intervals;
-mod stylet_late_logs;
-mod stylet_origins;
-mod stylet_without_a_law;
+mod stylet_numerical_validity;
+mod stylet_offsets;
 mod support;

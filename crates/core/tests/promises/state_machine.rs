@@ -1,5 +1,4 @@
-//! Promise: the table of transitions, from which the state machine is drawn, is what the core does: runs make
-//! no other transition, and every one of the table is made, for the reason that it gives.
+//! Promise: simulated runs make every transition of the table, for one of its triggers, and no other.
 
 use crate::support::{constant, enhance, insertion, sinusoid};
 use std::collections::BTreeSet;
@@ -11,8 +10,8 @@ fn number(state: State) -> usize {
     State::ALL.iter().position(|s| *s == state).expect("a state")
 }
 
-/// Runs that between them go everywhere: constant and sinusoidal, both models, known depths, holds, and a
-/// needle that turns back at the sample after a rupture.
+/// Runs that together make all transitions: constant and sinusoidal, both models, known depths, holds, and a reversal at the
+/// sample after a rupture.
 fn runs() -> Vec<Vec<Output>> {
     let mut runs = Vec::new();
     for model in [Model::MultiLayer, Model::KelvinVoigt] {
@@ -24,7 +23,7 @@ fn runs() -> Vec<Vec<Output>> {
         }
         let known = EnhanceConfig { depths: Depths::Known(vec![0.01, 0.02, 0.02]), ..config.clone() };
         runs.push(enhance(&known, &constant(0.02, 1).samples));
-        // A slope below the derivative's threshold: the CUSUM alone sees the drop.
+        // A slope below the threshold of the derivative: only the CUSUM detects the drop.
         let slow = |_| 0.0008;
         runs.push(enhance(
             &config,
@@ -49,21 +48,21 @@ fn runs() -> Vec<Vec<Output>> {
 }
 
 #[test]
-fn runs_make_the_transitions_of_the_table_and_no_others() {
+fn simulated_runs_make_exactly_the_transitions_of_the_table() {
     let table: BTreeSet<(usize, usize)> =
         TRANSITIONS.iter().map(|t| (number(t.from), number(t.to))).collect();
-    assert_eq!(table.len(), TRANSITIONS.len(), "an arrow stands in the table once");
-    let mut seen = BTreeSet::new();
+    assert_eq!(table.len(), TRANSITIONS.len(), "transitions are unique");
+    let mut made = BTreeSet::new();
     for run in runs() {
         let mut state = State::default();
         for out in run {
             if out.state != state {
-                seen.insert((number(state), number(out.state)));
+                made.insert((number(state), number(out.state)));
             }
             state = out.state;
         }
     }
-    assert_eq!(seen, table);
+    assert_eq!(made, table);
 }
 
 #[test]

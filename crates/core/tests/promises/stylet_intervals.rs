@@ -1,24 +1,24 @@
-//! What `algorithm: Stylet` promises of its intervals where a drop lasts or the noise is slow: they hold what is true as often as they say.
+//! Promise of `algorithm: Stylet` for its 95 % intervals with long drops or autocorrelated noise: they have their coverage.
 
 use crate::support::{Insertion, enhance, gels, insertion, last_estimates, lasting, stylet};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Of how many numbers (stiffness, friction and the friction behind, of three layers) the interval holds the truth, and the worst error in
-/// standard deviations.
-fn held(insertions: impl Iterator<Item = Insertion>) -> (u32, u32, f64) {
+/// Number of true values inside their intervals (stiffness, friction and cumulative friction of three layers), total, and the worst
+/// error in standard deviations.
+fn coverage(insertions: impl Iterator<Item = Insertion>) -> (u32, u32, f64) {
     let (mut inside, mut of, mut worst) = (0, 0, 0.0);
     for data in insertions {
         let layers = last_estimates(&enhance(&stylet(), &data.samples));
         assert_eq!(layers.len(), 3);
-        let mut behind = 0.0;
+        let mut cumulative = 0.0;
         for (e, layer) in layers.iter().zip(&gels().layers) {
-            behind += layer.friction_ns_per_m2 * layer.thickness_m;
+            cumulative += layer.friction_ns_per_m2 * layer.thickness_m;
             for (off, sd) in [
                 (e.stiffness_n_per_m - layer.stiffness_n_per_m, e.stiffness_sd),
                 (e.friction - layer.friction_ns_per_m2, e.friction_sd),
-                (e.cumulative_ns_per_m - behind, e.cumulative_sd),
+                (e.cumulative_ns_per_m - cumulative, e.cumulative_sd),
             ] {
                 inside += u32::from(off.abs() <= 1.96 * sd);
                 of += 1;
@@ -30,11 +30,11 @@ fn held(insertions: impl Iterator<Item = Insertion>) -> (u32, u32, f64) {
 }
 
 #[test]
-fn a_drop_that_lasts_is_dated_where_it_began() {
-    // What is told of the layers hangs on where each began: a tenth of a millimetre is an N s/m of friction.
+fn a_long_drop_is_located_at_its_onset() {
+    // An error of 0.1 mm in a layer's start is 1 N s/m of friction.
     for drop_s in [0.3, 0.9] {
         let (inside, of, worst) =
-            held((0..30).map(|seed| {
+            coverage((0..30).map(|seed| {
                 lasting(insertion(&gels(), -0.005, 50.0, 200.0, 0.02, seed, |_| 0.0023), drop_s)
             }));
         assert!(inside * 100 >= of * 92, "{drop_s} s: {inside} of {of}");
@@ -43,7 +43,7 @@ fn a_drop_that_lasts_is_dated_where_it_began() {
 }
 
 #[test]
-fn the_first_sample_behind_a_drop_says_no_more_than_slow_noise_lets_it() {
+fn the_first_sample_after_a_drop_is_weighted_by_the_slow_noise() {
     let slow = |seed: u64| {
         let mut data = insertion(&gels(), -0.005, 50.0, 200.0, 0.0, seed, |_| 0.0023);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -55,7 +55,7 @@ fn the_first_sample_behind_a_drop_says_no_more_than_slow_noise_lets_it() {
         }
         data
     };
-    let (inside, of, worst) = held((0..60).map(slow));
+    let (inside, of, worst) = coverage((0..60).map(slow));
     assert!(inside * 100 >= of * 93, "{inside} of {of}");
     assert!(worst < 6.0, "{worst} standard deviations");
 }

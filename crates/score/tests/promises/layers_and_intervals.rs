@@ -1,6 +1,6 @@
-//! Every ruptured layer is compared with what the core made of the detection that belongs to it, and with the core's own intervals.
+//! Every ruptured layer is compared with the estimate of its detection and with the intervals of the core.
 
-use crate::support::{LAYERS, declares, detection, knows, near, rupture};
+use crate::support::{LAYERS, detection, detection_output, estimate_output, near, rupture};
 use stylet_core::LayerEstimate;
 use stylet_core::config::Model;
 use stylet_score::{EstimateError, Score, Scorer};
@@ -31,23 +31,23 @@ const SECOND: LayerEstimate = LayerEstimate {
     ..FIRST
 };
 
-/// Both layers rupture, the second before its far face; the core declares at `detected` and knows `estimates`.
+/// Both layers rupture, the second before its far face; the core detects at `detected` and has these estimates.
 fn scored(model: Model, detected: &[f64], estimates: &[LayerEstimate]) -> Score {
     let mut scorer = Scorer::new(LAYERS.to_vec(), model);
     scorer.add_rupture(rupture(1, 5.0, 0.020));
     scorer.add_rupture(rupture(2, 8.0, 0.024));
     for (index, time_s) in detected.iter().enumerate() {
-        scorer.add_event(&declares(detection(index + 1, *time_s)));
+        scorer.add_event(&detection_output(detection(index + 1, *time_s)));
     }
     for estimate in estimates {
-        scorer.add_event(&knows(*estimate));
+        scorer.add_event(&estimate_output(*estimate));
     }
     scorer.set_contact(Some(0.0103));
     scorer.finish()
 }
 
 #[test]
-fn coefficients_stand_beside_their_truth() {
+fn coefficients_are_compared_with_the_truth() {
     let score = scored(Model::MultiLayer, &[5.2, 8.1], &[FIRST, SECOND]);
     let (first, second) = (&score.layers[0], &score.layers[1]);
     assert_eq!((first.layer, second.layer), (1, 2));
@@ -57,7 +57,7 @@ fn coefficients_stand_beside_their_truth() {
     near(first.thickness_m.relative_error, 0.2);
     near(second.stiffness_n_per_m.relative_error, 0.2);
     near(second.friction_ns_per_m2.estimated, 3300.0);
-    // Friction of the ruptured layers on the needle inside them: 2000 x 10 mm, and 3000 x 4 mm more.
+    // Friction of the ruptured layers: 2000 x 10 mm, and 3000 x 4 mm more.
     near(Some(first.cumulative_friction_ns_per_m.truth), 20.0);
     near(first.cumulative_friction_ns_per_m.estimated, 18.0);
     near(Some(second.cumulative_friction_ns_per_m.truth), 32.0);
@@ -71,7 +71,7 @@ fn coefficients_stand_beside_their_truth() {
 }
 
 #[test]
-fn the_friction_of_a_kelvin_voigt_model_is_per_metre_of_the_layer_it_was_found_in() {
+fn kelvin_voigt_friction_is_divided_by_the_thickness() {
     let voigt = LayerEstimate { friction: 12.0, ..FIRST };
     let score = scored(Model::KelvinVoigt, &[5.2], &[voigt]);
     near(score.layers[0].friction_ns_per_m2.estimated, 1500.0);
@@ -83,16 +83,16 @@ fn a_layer_is_compared_with_the_estimate_of_its_own_detection() {
     let score = scored(Model::MultiLayer, &[2.0, 5.2], &[FIRST, SECOND]);
     assert_eq!((score.missed, score.false_alarms, &score.false_s[..]), (1, 1, &[2.0][..]));
     near(score.layers[0].stiffness_n_per_m.estimated, 80.0);
-    // What the false layer added is still in the core's friction.
+    // The friction of the false layer is part of the sum.
     near(score.layers[0].cumulative_friction_ns_per_m.estimated, 35.0);
     assert_eq!(score.layers[1].stiffness_n_per_m, EstimateError::new(100.0, None));
     near(score.worst_stiffness_error(), 1.0);
 }
 
 #[test]
-fn the_core_s_last_word_on_a_layer_counts() {
-    let better = LayerEstimate { stiffness_n_per_m: 41.0, added_friction_ns_per_m: 19.0, ..FIRST };
-    let score = scored(Model::MultiLayer, &[5.2, 8.1], &[FIRST, SECOND, better]);
+fn the_last_estimate_of_a_layer_counts() {
+    let revised = LayerEstimate { stiffness_n_per_m: 41.0, added_friction_ns_per_m: 19.0, ..FIRST };
+    let score = scored(Model::MultiLayer, &[5.2, 8.1], &[FIRST, SECOND, revised]);
     near(score.layers[0].stiffness_n_per_m.estimated, 41.0);
     near(score.layers[1].stiffness_n_per_m.estimated, 80.0);
     near(score.layers[1].cumulative_friction_ns_per_m.estimated, 36.0);
@@ -109,20 +109,20 @@ fn hits_are_chance_with_more_false_alarms_than_ruptures() {
 fn a_run_without_ruptures_or_estimates_has_no_errors_and_no_delay() {
     let mut scorer = Scorer::new(LAYERS.to_vec(), Model::MultiLayer);
     assert!(scorer.detections().is_empty());
-    scorer.add_event(&declares(detection(1, 3.0)));
+    scorer.add_event(&detection_output(detection(1, 3.0)));
     assert_eq!(scorer.detections(), [detection(1, 3.0)]);
     let score = scorer.finish();
     assert_eq!((score.median_delay_s(), score.worst_stiffness_error()), (None, None));
     assert_eq!(score.worst_friction_error(), None);
     assert!(score.layers.is_empty() && score.hits_are_chance);
     assert_eq!(score.cumulative_friction_ns_per_m, EstimateError::new(0.0, None));
-    // A truth of zero has no relative error, and an estimate of zero a whole one.
+    // A true value of zero has no relative error, an estimate of zero an error of one.
     assert_eq!(EstimateError::new(0.0, Some(3.0)).relative_error, None);
     assert_eq!(EstimateError::new(-4.0, Some(0.0)).relative_error, Some(1.0));
 }
 
-/// The first layer known with standard deviations of 5 N/m, 300 N s/m² and 0.1 N s/m, off by so many of its own units.
-fn sure(stiffness: f64, friction: f64, cumulative: f64) -> LayerEstimate {
+/// Estimate of the first layer with these errors and standard deviations of 5 N/m, 300 N s/m² and 0.1 N s/m.
+fn with_error(stiffness: f64, friction: f64, cumulative: f64) -> LayerEstimate {
     LayerEstimate {
         stiffness_n_per_m: 40.0 + stiffness,
         stiffness_sd: 5.0,
@@ -137,11 +137,11 @@ fn sure(stiffness: f64, friction: f64, cumulative: f64) -> LayerEstimate {
 #[test]
 fn a_truth_within_1_96_standard_deviations_is_covered() {
     for (estimate, inside) in [
-        (sure(9.7, -580.0, 0.19), [1.0, 1.0, 1.0]),
-        (sure(-9.7, 580.0, -0.19), [1.0, 1.0, 1.0]),
-        (sure(9.9, 580.0, 0.19), [0.0, 1.0, 1.0]),
-        (sure(9.7, -600.0, 0.19), [1.0, 0.0, 1.0]),
-        (sure(-9.7, 580.0, -0.20), [1.0, 1.0, 0.0]),
+        (with_error(9.7, -580.0, 0.19), [1.0, 1.0, 1.0]),
+        (with_error(-9.7, 580.0, -0.19), [1.0, 1.0, 1.0]),
+        (with_error(9.9, 580.0, 0.19), [0.0, 1.0, 1.0]),
+        (with_error(9.7, -600.0, 0.19), [1.0, 0.0, 1.0]),
+        (with_error(-9.7, 580.0, -0.20), [1.0, 1.0, 0.0]),
     ] {
         let of = scored(Model::MultiLayer, &[5.2], &[estimate]).coverage;
         assert_eq!([of.stiffness, of.friction, of.cumulative], inside.map(|n| [n, 1.0]), "{estimate:?}");
@@ -149,21 +149,21 @@ fn a_truth_within_1_96_standard_deviations_is_covered() {
 }
 
 #[test]
-fn coverage_counts_the_layers_that_the_core_is_sure_of() {
+fn coverage_counts_the_layers_with_standard_deviations() {
     let second = LayerEstimate {
         layer: 2,
         stiffness_n_per_m: 100.0,
         friction: 3000.0,
         // 2000 x 10 mm and 3000 x 4 mm.
         cumulative_ns_per_m: 32.0,
-        ..sure(0.0, 0.0, 0.0)
+        ..with_error(0.0, 0.0, 0.0)
     };
-    let of = scored(Model::MultiLayer, &[5.2, 8.1], &[sure(20.0, 0.0, 0.0), second]).coverage;
+    let of = scored(Model::MultiLayer, &[5.2, 8.1], &[with_error(20.0, 0.0, 0.0), second]).coverage;
     assert_eq!([of.stiffness, of.friction, of.cumulative], [[1.0, 2.0], [2.0, 2.0], [2.0, 2.0]]);
-    // An algorithm that gives no standard deviations is not asked.
-    let silent = scored(Model::MultiLayer, &[5.2, 8.1], &[FIRST, SECOND]).coverage;
-    assert_eq!([silent.stiffness, silent.friction, silent.cumulative], [[0.0, 0.0]; 3]);
-    // Nor is a layer that it missed.
-    let one = scored(Model::MultiLayer, &[8.1], &[sure(0.0, 0.0, 0.0)]).coverage;
+    // An algorithm without standard deviations does not count.
+    let without = scored(Model::MultiLayer, &[5.2, 8.1], &[FIRST, SECOND]).coverage;
+    assert_eq!([without.stiffness, without.friction, without.cumulative], [[0.0, 0.0]; 3]);
+    // Nor does a missed layer.
+    let one = scored(Model::MultiLayer, &[8.1], &[with_error(0.0, 0.0, 0.0)]).coverage;
     assert_eq!(one.stiffness[1], 1.0);
 }

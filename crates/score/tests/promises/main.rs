@@ -1,8 +1,8 @@
-//! The promises of the scores, one file each; one program, because linking takes longer than testing.
+//! Tests of the scores, one file per promise, in one binary because linking takes longer than testing.
 
 mod enhancement;
+mod enhancement_trace;
 mod layers_and_intervals;
-mod measured_run;
-mod offline_beside_online;
+mod measured_recording;
+mod offline_estimates;
 mod support;
-mod trace_of_a_run;

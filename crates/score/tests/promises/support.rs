@@ -1,4 +1,4 @@
-//! A stack of two layers, and what a core could say of it.
+//! A stack of two layers and outputs of a core.
 
 use stylet_core::{Cause, Detection, LayerEstimate, Output};
 use stylet_record::TrueRupture;
@@ -28,13 +28,13 @@ pub fn detection(layer: usize, time_s: f64) -> Detection {
     }
 }
 
-/// What the core says when it declares a rupture.
-pub fn declares(detection: Detection) -> Output {
+/// Output with a detection.
+pub fn detection_output(detection: Detection) -> Output {
     Output { detection: Some(detection), used: true, ..Output::default() }
 }
 
-/// What the core says when it knows a layer.
-pub fn knows(estimate: LayerEstimate) -> Output {
+/// Output with a layer estimate.
+pub fn estimate_output(estimate: LayerEstimate) -> Output {
     Output { estimate: Some(estimate), used: true, ..Output::default() }
 }
 

@@ -1,4 +1,4 @@
-//! Insertions for the core's tests: the tissue law on an ideal motion with white noise.
+//! Insertions for the tests: the tissue law on an ideal motion with white noise.
 #![allow(dead_code)]
 
 use rand::SeedableRng;
@@ -8,7 +8,7 @@ use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture, Tissue, TissueForce};
 
-/// Samples of an insertion, with the true force and ruptures.
+/// Samples of an insertion with true forces and ruptures.
 pub struct Insertion {
     pub samples: Vec<Sample>,
     pub truth: Vec<TissueForce>,
@@ -48,12 +48,12 @@ pub fn insertion(
     out
 }
 
-/// The latex stack at the paper's constant 2.3 mm/s.
+/// The latex phantom at the paper's constant 2.3 mm/s.
 pub fn constant(noise_n: f64, seed: u64) -> Insertion {
     insertion(&Tissue::three_gels(), -0.005, 50.0, 200.0, noise_n, seed, |_| 0.0023)
 }
 
-/// What is released at a rupture is let go evenly over `drop_s`.
+/// Spreads the drop at each rupture linearly over `drop_s`.
 pub fn lasting(mut data: Insertion, drop_s: f64) -> Insertion {
     for rupture in &data.ruptures {
         for (sample, truth) in data.samples.iter_mut().zip(&mut data.truth) {
@@ -69,7 +69,7 @@ pub fn lasting(mut data: Insertion, drop_s: f64) -> Insertion {
     data
 }
 
-/// The latex stack with the paper's sinusoid from rest.
+/// The latex phantom with the paper's sinusoid from rest.
 pub fn sinusoid(noise_n: f64, seed: u64) -> Insertion {
     let omega = std::f64::consts::TAU * 0.0167;
     insertion(&Tissue::three_gels(), -0.005, 15.0, 200.0, noise_n, seed, move |t| {
@@ -88,7 +88,7 @@ pub fn detections(outputs: &[Output]) -> Vec<f64> {
     outputs.iter().filter_map(|o| o.detection).map(|d| d.time_s).collect()
 }
 
-/// This project's algorithm as it comes.
+/// The default configuration of `Stylet`.
 pub fn stylet() -> EnhanceConfig {
     EnhanceConfig { algorithm: Algorithm::Stylet, ..EnhanceConfig::default() }
 }
@@ -102,7 +102,7 @@ pub fn gels() -> Tissue {
     tissue
 }
 
-/// The last word on each layer.
+/// The last estimate of each layer.
 pub fn last_estimates(outputs: &[Output]) -> Vec<LayerEstimate> {
     let mut all: Vec<LayerEstimate> = Vec::new();
     for e in outputs.iter().filter_map(|o| o.estimate) {

@@ -1,0 +1,109 @@
+//! First contact: detection in air and its verification in the first layer.
+
+use super::cusum::CusumBank;
+use super::force_predictor::{self, ForcePredictor, MotionStep};
+use super::free_tip::{FreeTipDetector, OPERATIONS_PER_BEND_TEST};
+use super::layer_estimator::LayerEstimator;
+use super::rupture_detection::SURE_DROP_SDS;
+use super::state::{FAILED_MISFIT, KalmanEnhancer, MAX_STIFFNESS_N_PER_M};
+use crate::config::{Contact, EnhanceConfig};
+use crate::sample::Sample;
+
+/// Consecutive samples above the threshold that make a contact.
+const CONTACT_SAMPLES: u32 = 5;
+/// Multiplications and additions of a slope with its variance, and of the bend test.
+const OPERATIONS_PER_VERIFICATION: u32 = 10 + OPERATIONS_PER_BEND_TEST;
+
+impl KalmanEnhancer {
+    pub(super) fn detect_contact(
+        &mut self,
+        config: &EnhanceConfig,
+        surface_m: f64,
+        step: &MotionStep,
+        sample: &Sample,
+    ) {
+        self.deepest_m = self.deepest_m.max(sample.position_m);
+        let known = config.contact == Contact::Known;
+        if known && sample.position_m >= surface_m {
+            self.start_contact(config, step, sample, surface_m, 0.0, 0.0);
+            return;
+        }
+        self.noise.update_in_air(sample.force_n);
+        let search = &config.contact_search;
+        if !self.started {
+            self.low_passed_n = sample.force_n;
+        }
+        let gain = step.dt_s / (step.dt_s + search.time_constant_s);
+        self.low_passed_n += gain * (sample.force_n - self.low_passed_n);
+        if known || self.noise.air_sample_count() == 0.0 {
+            return;
+        }
+        let rise = self.low_passed_n - self.noise.bias_n();
+        let marginal = self.noise.marginal_variance();
+        let low_passed = self.noise.variance * self.noise.long_run_factor() * self.noise.interval_s
+            / (2.0 * search.time_constant_s);
+        let sd = libm::sqrt(low_passed.min(marginal) + self.noise.bias_variance().min(marginal));
+        if rise > search.noise_sds * sd
+            && sample.force_n > self.noise.bias_n()
+            && sample.velocity_mps > -config.drop.standstill_mps
+        {
+            self.samples_above_threshold += 1;
+        } else {
+            self.samples_above_threshold = 0;
+        }
+        if self.samples_above_threshold >= CONTACT_SAMPLES {
+            self.start_contact(config, step, sample, sample.position_m, rise, rise + 3.0 * sd);
+        }
+    }
+
+    /// Tests whether the contact was real: the force in air is flat until the tissue begins. `z` is the standardised
+    /// innovation of a sample in the first layer, `before` the estimator without it.
+    pub(super) fn verify_contact(
+        &mut self,
+        config: &EnhanceConfig,
+        step: &MotionStep,
+        sample: &Sample,
+        (z, before): (f64, &LayerEstimator),
+    ) {
+        self.operations += OPERATIONS_PER_VERIFICATION;
+        let (slope, sd) = self.estimator.slope_and_sd(self.steady_drive_mps, &self.noise);
+        // The force rises, and along a straight line.
+        self.estimator.layer_confirmed = slope > SURE_DROP_SDS * sd && self.free_tip.is_straight();
+        if !self.estimator.layer_confirmed && self.free_tip.bends_up(z, before, self.last_sample.position_m) {
+            let rise = self.predictor.level_n() - self.noise.bias_n();
+            let sd_n = rise.abs() + 3.0 * libm::sqrt(self.noise.marginal_variance());
+            self.start_contact(config, step, sample, sample.position_m, rise.max(0.0), sd_n);
+            self.misfit = FAILED_MISFIT;
+        }
+    }
+
+    /// Contact at `start_m`, with `force_n` acting at the sample, known to `sd_n`.
+    #[cold]
+    pub(super) fn start_contact(
+        &mut self,
+        config: &EnhanceConfig,
+        step: &MotionStep,
+        sample: &Sample,
+        start_m: f64,
+        force_n: f64,
+        sd_n: f64,
+    ) {
+        self.in_tissue = true;
+        self.contact_sample_m = sample.position_m;
+        let (per_hour, interval_s) = (config.stylet.false_alarms_per_hour, self.noise.interval_s);
+        self.cusum = CusumBank::new(per_hour, interval_s);
+        let drive = self.steady_drive_mps.max(1e-6);
+        self.estimator =
+            LayerEstimator::at_contact(start_m, force_n, sd_n, MAX_STIFFNESS_N_PER_M, drive, &self.noise);
+        self.snapshot = self.estimator;
+        self.snapshot_m = sample.position_m;
+        self.free_tip = FreeTipDetector::new(per_hour, interval_s, &self.estimator);
+        self.predictor = ForcePredictor::new(sample.force_n);
+        let scale_n = MAX_STIFFNESS_N_PER_M * force_predictor::MEMORY_M;
+        self.predictor.restart(sample.force_n, scale_n, &self.noise, step.speed_mps, true);
+        self.output.contact_m = Some(start_m);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,428 @@
+//! Layer parameters as one Gaussian state, updated with every sample since contact: the layer being traversed, the layer
+//! before it, and the cumulative friction of all layers passed.
+//!
+//! Unknowns `[D, K, b, K', b', f0]`. In a layer that starts at depth `s`, with `x = z - s` and the friction drive `u`,
+//!
+//! ```text
+//! f = f0 + D u + K x + b x u          D: friction of the passed layers
+//! f = f0 + p + q u + K x + b x u      first layer: p, q = K, b times the depth at which contact was detected
+//! ```
+//!
+//! (`p` and `q` take the places of `D` and `K'`.) `f0` is the sensor bias, with a prior from the samples in air. At a
+//! rupture after a travel `d` the friction becomes `D + b d` (`q + b d` in the first layer) and the ruptured layer's `K, b`
+//! become `K', b'`: a linear map of the state. Samples after the rupture therefore still inform the split of the ruptured
+//! layer into stiffness and friction, and samples before it inform `D`: the joint least-squares solution without a buffer.
+
+use super::force_predictor::MEMORY_M;
+use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO, at_least};
+use super::noise_estimator::NoiseEstimator;
+use crate::sample::MAX_LAYERS;
+
+pub(crate) const D: usize = 0;
+pub(crate) const K: usize = 1;
+pub(crate) const B: usize = 2;
+pub(crate) const K_PREV: usize = 3;
+pub(crate) const B_PREV: usize = 4;
+const BIAS: usize = 5;
+const N: usize = 6;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LayerEstimator {
+    pub(crate) belief: Gaussian<N>,
+    /// Start of the active layer in m.
+    pub(crate) start_m: f64,
+    /// Ruptures so far.
+    pub(crate) passed_count: usize,
+    pub(crate) previous_thickness_m: f64,
+    /// The tip is in a gap or beyond the last layer: what grows with travel is friction.
+    pub(super) tip_free: bool,
+    /// Log densities of the two free-tip hypotheses when the active layer began, see [`super::free_tip`].
+    pub(super) initial_log_densities: [f64; 2],
+    /// A layer has certainly begun.
+    pub(super) layer_confirmed: bool,
+    /// Place of the last rupture in m and its standard deviation.
+    pub(super) rupture_m: f64,
+    rupture_sd_m: f64,
+    /// Travel of the gap behind the previous layer, over which its friction kept growing, and its standard deviation.
+    pub(super) gap_m: f64,
+    gap_sd_m: f64,
+    /// Standard deviation of the start of the active layer and of the previous one, in m.
+    start_sd_m: f64,
+    pub(super) previous_start_sd_m: f64,
+    /// Prior scale of the active layer's slope in N/m.
+    slope_scale: f64,
+    contact_drive: f64,
+    /// Depth, drive and force of the previous sample.
+    last: Option<[f64; 3]>,
+}
+
+/// Start, end and friction per metre of the passed layers, each as it was known at the next rupture.
+pub(crate) type PassedLayers = [[f64; 3]; MAX_LAYERS];
+
+impl LayerEstimator {
+    /// Contact at `start_m`. A force `force_n` with standard deviation `sd_n` acts already; stiffness and friction are
+    /// unknown on the scale of `slope` N/m.
+    pub(crate) fn at_contact(
+        start_m: f64,
+        force_n: f64,
+        sd_n: f64,
+        slope: f64,
+        drive: f64,
+        noise: &NoiseEstimator,
+    ) -> Self {
+        let unit = 1.0 / noise.variance;
+        let sd_n = sd_n.min(libm::sqrt(MAX_VARIANCE_RATIO / unit));
+        let slope = slope.min(max_slope(unit));
+        let friction = slope / drive;
+        let half = 0.5 * force_n;
+        let variance = [
+            sd_n * sd_n * unit,
+            slope * slope * unit,
+            friction * friction * unit,
+            sd_n * sd_n / (drive * drive) * unit,
+            1.0,
+            noise.bias_variance() * unit,
+        ];
+        let mean = [half, 0.5 * slope, 0.5 * friction, half / drive, 0.0, noise.bias_n()];
+        Self {
+            belief: Gaussian::new(mean, variance),
+            start_m,
+            passed_count: 0,
+            previous_thickness_m: 0.0,
+            tip_free: false,
+            initial_log_densities: [0.0; 2],
+            layer_confirmed: false,
+            rupture_m: start_m,
+            rupture_sd_m: 0.0,
+            gap_m: 0.0,
+            gap_sd_m: 0.0,
+            start_sd_m: 0.0,
+            previous_start_sd_m: 0.0,
+            slope_scale: slope,
+            contact_drive: drive,
+            last: None,
+        }
+    }
+
+    /// The tip may be in a gap or still in air.
+    #[inline(always)]
+    pub(super) fn may_be_free(&self) -> bool {
+        !self.layer_confirmed
+    }
+
+    #[inline(always)]
+    fn regressor(&self, x: f64, drive: f64) -> [f64; N] {
+        let (a, q) = if self.passed_count > 0 { (drive, 0.0) } else { (1.0, drive) };
+        [a, x, x * drive, q, 0.0, 1.0]
+    }
+
+    /// Total friction per drive, that of the active layer included.
+    pub(crate) fn friction(&self, position_m: f64) -> f64 {
+        let passed = self.belief.x[if self.passed_count > 0 { D } else { K_PREV }];
+        passed + self.belief.x[B] * (position_m - self.start_m)
+    }
+
+    /// Force in N that the base law predicts.
+    #[inline(always)]
+    pub(crate) fn predict(&self, position_m: f64, drive: f64) -> f64 {
+        let w = self.regressor(position_m - self.start_m, drive);
+        w.iter().zip(&self.belief.x).map(|(w, x)| w * x).sum()
+    }
+
+    /// Takes a sample; returns the innovation in N and its variance in units of the noise variance.
+    #[inline(always)]
+    pub(crate) fn update(&mut self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> (f64, f64) {
+        let innovation = self.innovation(position_m, drive, force_n, rho);
+        self.apply(&innovation, position_m, drive, force_n)
+    }
+
+    /// Innovation of a sample, whitened with the previous one.
+    #[inline(always)]
+    pub(crate) fn innovation(&self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> Innovation<6> {
+        let x = position_m - self.start_m;
+        let (mut w, mut y, mut r) = (self.regressor(x, drive), force_n, 1.0);
+        if rho != 0.0 {
+            if let Some([x, drive, force_n]) = self.last {
+                for (w, before) in w.iter_mut().zip(self.regressor(x, drive)) {
+                    *w -= rho * before;
+                }
+                y -= rho * force_n;
+            } else {
+                r = 1.0 / (1.0 - rho * rho);
+            }
+        }
+        if self.passed_count > 0 {
+            self.belief.innovation([D, K, B, BIAS], [w[D], w[K], w[B], w[BIAS]], y, r)
+        } else {
+            self.belief.innovation([D, K, B, K_PREV, BIAS], [w[D], w[K], w[B], w[K_PREV], w[BIAS]], y, r)
+        }
+    }
+
+    /// Takes the sample of a [`LayerEstimator::innovation`].
+    #[inline(always)]
+    pub(crate) fn apply(
+        &mut self,
+        innovation: &Innovation<6>,
+        position_m: f64,
+        drive: f64,
+        force_n: f64,
+    ) -> (f64, f64) {
+        self.belief.update(innovation);
+        self.last = Some([position_m - self.start_m, drive, force_n]);
+        (innovation.e, innovation.s)
+    }
+
+    pub(crate) fn skip_sample(&mut self) {
+        self.last = None;
+    }
+
+    /// Slope of the force with travel in N/m.
+    pub(crate) fn slope(&self, drive: f64) -> f64 {
+        self.belief.x[K] + self.belief.x[B] * drive
+    }
+
+    /// Slope and its standard deviation.
+    pub(super) fn slope_and_sd(&self, drive: f64, noise: &NoiseEstimator) -> (f64, f64) {
+        let g = &self.belief;
+        let variance = g.p[K][K] + drive * (2.0 * g.cov(B, K) + drive * g.p[B][B]);
+        (self.slope(drive), libm::sqrt(at_least(0.0, variance) * noise.variance))
+    }
+
+    /// A rupture at `position_m` with standard deviation `sd_m`.
+    pub(crate) fn rupture(
+        &mut self,
+        position_m: f64,
+        sd_m: f64,
+        drive: f64,
+        noise: &NoiseEstimator,
+        passed_layers: &mut PassedLayers,
+    ) {
+        let unit = 1.0 / noise.variance;
+        let mut d = (position_m - self.start_m).max(1e-6);
+        let first = self.passed_count == 0;
+        let mut depth_at_contact = 0.0;
+        if first {
+            // Depth at which contact was detected: initial force over slope. It implies p = K depth.
+            let [p, k, b, q, ..] = self.belief.x;
+            let (force, slope) = (p + q * self.contact_drive, k + b * self.contact_drive);
+            if force > 0.0 && slope > 0.0 {
+                depth_at_contact = (force / slope).min(d);
+                let g = &self.belief.p;
+                let u0 = self.contact_drive;
+                let variance = (g[D][D] + 2.0 * u0 * g[K_PREV][D] + u0 * u0 * g[K_PREV][K_PREV]).max(1e-6);
+                let constraint = self.belief.innovation([D, K], [1.0, -depth_at_contact], 0.0, variance);
+                self.belief.update(&constraint);
+            }
+        }
+        let slope = if self.tip_free { self.slope_scale } else { self.slope(drive).abs().max(1.0) };
+        if self.tip_free {
+            self.reopen_split(drive, unit);
+        }
+        let slope = slope.min(max_slope(unit));
+        let ruptured_friction = self.belief.x[B_PREV].max(0.0);
+        let b = self.belief.x[B].clamp(-slope / drive, slope / drive);
+        let stiffness = self.stiffness_rms(slope, unit);
+        let mut map = [[0.0; N]; N];
+        map[D][if first { K_PREV } else { D }] = 1.0;
+        map[D][B] = d;
+        map[K_PREV][K] = 1.0;
+        map[B_PREV][B] = 1.0;
+        map[BIAS][BIAS] = 1.0;
+        self.belief = self.belief.transformed(&map);
+        if self.start_sd_m > 0.0 {
+            // A misplaced start of the ruptured layer looked like a change of the bias.
+            self.belief.reset_component(BIAS, noise.bias_n(), noise.bias_variance() * unit);
+        }
+        self.start_layer(slope, sd_m, (stiffness, b), drive, unit);
+        (self.previous_start_sd_m, self.start_sd_m, self.gap_m) = (self.start_sd_m, 0.0, 0.0);
+        self.gap_sd_m = 0.0;
+        d += depth_at_contact;
+        // The layer before the ruptured one gets no more information.
+        if let Some(before) = self.passed_count.checked_sub(1).and_then(|i| passed_layers.get_mut(i)) {
+            before[2] = ruptured_friction;
+        }
+        if let Some(slot) = passed_layers.get_mut(self.passed_count) {
+            *slot = [position_m - d, position_m, 0.0];
+        }
+        self.start_m = position_m;
+        (self.rupture_m, self.rupture_sd_m) = (position_m, sd_m);
+        self.previous_thickness_m = d;
+        self.passed_count += 1;
+        self.last = None;
+        self.initial_log_densities =
+            [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
+    }
+
+    /// A tip taken to be free has lost force, so that there was a layer: any part of the slope may have been elastic.
+    pub(super) fn reopen_split(&mut self, drive: f64, unit: f64) {
+        let widest = max_slope(unit);
+        let half = (0.5 * self.slope(drive)).clamp(-widest, widest);
+        let g = &mut self.belief;
+        (g.x[K], g.x[B]) = (g.x[K] + half, g.x[B] - half / drive);
+        let variance = half * half * unit;
+        g.p[K][K] += variance;
+        g.p[B][B] += variance / (drive * drive);
+        g.p[B][K] -= variance / drive;
+        self.tip_free = false;
+    }
+
+    /// Root mean square of the active layer's stiffness in N/m, at most `max`.
+    fn stiffness_rms(&self, max: f64, unit: f64) -> f64 {
+        let g = &self.belief;
+        libm::sqrt(g.x[K] * g.x[K] + g.p[K][K] / unit).min(max)
+    }
+
+    /// Starts a layer of unknown stiffness and friction at a place with standard deviation `sd_m`, where friction per drive
+    /// changes its growth by `friction` per metre.
+    fn start_layer(
+        &mut self,
+        scale: f64,
+        sd_m: f64,
+        (stiffness, friction): (f64, f64),
+        drive: f64,
+        unit: f64,
+    ) {
+        let wide = (3.0 * scale).min(max_slope(unit));
+        let g = &mut self.belief;
+        g.reset_component(K, 0.5 * scale, wide * wide * unit);
+        g.reset_component(B, 0.5 * scale / drive, wide * wide / (drive * drive) * unit);
+        // The uncertain place adds uncertain friction, and an uncertain elastic force that looks like a change of the bias.
+        let place = sd_m * sd_m * unit;
+        g.p[D][D] += friction * friction * place;
+        g.p[BIAS][BIAS] += stiffness * stiffness * place;
+        (self.tip_free, self.layer_confirmed, self.slope_scale) = (false, false, scale);
+    }
+
+    /// The force has bent at `position_m` while the tip was free: upwards where a layer begins, downwards where the previous
+    /// layer ends and friction stops growing.
+    pub(super) fn start_after_bend(
+        &mut self,
+        position_m: f64,
+        sd_m: f64,
+        up: bool,
+        drive: f64,
+        noise: &NoiseEstimator,
+        passed_layers: &mut PassedLayers,
+    ) {
+        let unit = 1.0 / noise.variance;
+        let travel = (position_m - self.start_m).max(0.0);
+        let b = self.belief.x[B];
+        let mut map = [[0.0; N]; N];
+        for (i, row) in map.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        map[D][B] = travel;
+        self.belief = self.belief.transformed(&map);
+        // The previous layer reaches to here if its friction kept growing.
+        if let Some(slot) = self.passed_count.checked_sub(1).and_then(|i| passed_layers.get_mut(i))
+            && b > 0.5 * self.belief.x[B_PREV]
+        {
+            slot[1] = position_m;
+            self.gap_m += travel;
+            self.gap_sd_m = sd_m;
+        }
+        if up {
+            self.start_sd_m = sd_m;
+            self.start_layer(self.slope_scale, sd_m, (self.slope_scale, b), drive, unit);
+        } else {
+            let g = &mut self.belief;
+            g.reset_component(B, 0.0, b * b * unit);
+            g.p[D][D] += b * b * sd_m * sd_m * unit;
+        }
+        self.start_m = position_m;
+        self.last = None;
+    }
+
+    /// Shaft friction per drive that does not act at the tip, with the tip at `position_m`, and its variance (N s/m and its
+    /// square for a viscous drive).
+    #[inline(always)]
+    pub(crate) fn shaft_friction(&self, position_m: f64, noise: &NoiseEstimator) -> (f64, f64) {
+        if self.passed_count == 0 {
+            return (0.0, 0.0);
+        }
+        let g = &self.belief;
+        let (mut friction, mut variance) = (g.x[D], g.p[D][D]);
+        if self.tip_free {
+            let x = at_least(0.0, position_m - self.start_m);
+            friction += g.x[B] * x;
+            variance += x * (2.0 * g.cov(B, D) + x * g.p[B][B]);
+        } else if self.start_sd_m > 0.0 {
+            // A layer that begins `e` later than estimated changes the bias to `f0 - K e` and the friction to `D - b e`.
+            let (k, sd_k) = (g.x[K], libm::sqrt(g.p[K][K] * noise.variance));
+            if k > 2.0 * sd_k {
+                let later_m = (noise.bias_n() - g.x[BIAS]) / k;
+                let bound_m = 2.0 * self.start_sd_m;
+                let per_bias = g.x[B] / k;
+                friction += g.x[B] * later_m.clamp(-bound_m, bound_m);
+                variance += per_bias * (per_bias * g.p[BIAS][BIAS] - 2.0 * g.cov(BIAS, D));
+            }
+        }
+        (friction, variance * noise.variance)
+    }
+
+    /// Friction per drive of the passed layers at the last rupture, and its variance.
+    pub(crate) fn friction_at_rupture(&self, noise: &NoiseEstimator) -> (f64, f64) {
+        let (g, gap) = (&self.belief, self.gap_m);
+        let place = g.x[B_PREV] * self.gap_sd_m;
+        // Friction of the active layer over its uncertain start is not separable from `D`.
+        let start = g.x[B] * self.rupture_sd_m;
+        let estimated = g.p[D][D] - gap * (2.0 * g.cov(B_PREV, D) - gap * g.p[B_PREV][B_PREV]);
+        let variance = estimated + (place * place + start * start) / noise.variance;
+        (g.x[D] - gap * g.x[B_PREV], variance * noise.variance)
+    }
+
+    /// Growth of friction with travel while the shaft enters the previous layer, in N/m.
+    pub(crate) fn friction_growth(&self, drive: f64) -> f64 {
+        (self.belief.x[B_PREV] * drive).abs()
+    }
+
+    /// Variances of `K'` and `b'`.
+    pub(crate) fn previous_variance(&self, noise: &NoiseEstimator) -> [f64; 2] {
+        [self.belief.p[K_PREV][K_PREV] * noise.variance, self.belief.p[B_PREV][B_PREV] * noise.variance]
+    }
+
+    /// Friction per drive during retraction with the tip at `z_m`, each passed layer's friction spread evenly over its
+    /// thickness.
+    pub(crate) fn friction_during_retraction(
+        &self,
+        passed_layers: &PassedLayers,
+        z_m: f64,
+        deepest_m: f64,
+        noise: &NoiseEstimator,
+    ) -> f64 {
+        let count = self.passed_count.min(MAX_LAYERS);
+        let (mut whole, mut inside) = (0.0, 0.0);
+        for (i, [start, end, b]) in passed_layers.iter().take(count).enumerate() {
+            let b = if i + 1 == self.passed_count { self.belief.x[B_PREV].max(0.0) } else { *b };
+            whole += b * (end - start);
+            inside += b * (z_m - start).clamp(0.0, end - start);
+        }
+        // The sum is known better than its parts.
+        let total = self.shaft_friction(deepest_m, noise).0.max(0.0);
+        let share = if whole > 0.0 { inside / whole } else { 1.0 };
+        total * share
+    }
+
+    /// Log density of the state, up to a constant, at `K = 0` and `b = b'` (`follows`) or `b = 0`.
+    pub(super) fn log_density_of_free(&self, follows: bool, noise: &NoiseEstimator) -> f64 {
+        let g = &self.belief;
+        let (mut b, mut vb, mut cov) = (g.x[B], g.p[B][B], g.cov(B, K));
+        if follows {
+            b -= g.x[B_PREV];
+            vb += g.p[B_PREV][B_PREV] - 2.0 * g.cov(B_PREV, B);
+            cov -= g.cov(B_PREV, K);
+        }
+        let (k, vk) = (g.x[K], g.p[K][K]);
+        let determinant = (vk * vb - cov * cov).max(1e-12 * vk * vb);
+        let square = (k * k * vb - 2.0 * k * b * cov + b * b * vk) / determinant;
+        -0.5 * (libm::log(determinant) + square / noise.variance)
+    }
+}
+
+/// Largest prior slope in N/m, with the noise precision `unit` in N⁻².
+fn max_slope(unit: f64) -> f64 {
+    libm::sqrt(MAX_VARIANCE_RATIO / unit) / MEMORY_M
+}
+
+#[cfg(test)]
+mod tests;

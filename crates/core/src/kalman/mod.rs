@@ -1,0 +1,71 @@
+//! [`Algorithm::Stylet`](crate::config::Algorithm::Stylet): Kalman filters for the next force and for the layers, CUSUM
+//! rupture alarm, one pass, bounded work per sample. Derivation: `docs/enhancer.md`.
+
+mod contact_detection;
+mod cusum;
+mod force_predictor;
+mod free_tip;
+mod gaussian;
+mod layer_estimator;
+mod motion;
+mod noise_estimator;
+mod output;
+mod retraction_tracker;
+mod rupture_detection;
+mod shaft_friction;
+mod state;
+mod tissue_update;
+mod velocity_estimator;
+
+#[cfg(test)]
+mod test_support;
+#[cfg(test)]
+mod tests;
+
+use crate::config::EnhanceConfig;
+use crate::sample::{Output, Sample};
+pub(crate) use state::KalmanEnhancer;
+
+/// Multiplications and additions of every sample outside the filters.
+const OPERATIONS_PER_SAMPLE: u32 = 60;
+/// Speeds in m/s and positions in m beyond these are logging errors.
+const MAX_SPEED_MPS: f64 = 2.0;
+const MAX_POSITION_M: f64 = 10.0;
+/// Samples closer than this fraction of the usual interval, within these limits in s, are duplicates.
+const DUPLICATE_INTERVAL_FRACTION: f64 = 0.02;
+const MIN_DUPLICATE_INTERVAL_S: f64 = 1e-6;
+const MAX_DUPLICATE_INTERVAL_S: f64 = 1e-4;
+
+impl KalmanEnhancer {
+    #[inline]
+    pub(crate) fn step(&mut self, config: &EnhanceConfig, surface_m: f64, sample: Sample) -> &Output {
+        self.output.detection = None;
+        self.output.estimate = None;
+        self.operations = OPERATIONS_PER_SAMPLE;
+        let in_range = sample.velocity_mps.abs() < MAX_SPEED_MPS && sample.position_m.abs() < MAX_POSITION_M;
+        // Two samples at almost the same time say nothing about the velocity.
+        let min_interval_s = (DUPLICATE_INTERVAL_FRACTION * self.noise.interval_s)
+            .clamp(MIN_DUPLICATE_INTERVAL_S, MAX_DUPLICATE_INTERVAL_S);
+        let later = sample.time_s - self.last_sample.time_s > min_interval_s;
+        self.output.used = sample.is_usable() && in_range && (!self.started || later);
+        if !self.output.used {
+            return &self.output;
+        }
+        let last = if self.started { self.last_sample } else { sample };
+        let (velocity_mps, sudden) =
+            self.velocity_estimator.update(&last, &sample, self.speed_mps, self.low_pass_gains[3]);
+        let (velocity_mps, sudden) = self.resolve_motion_start(&last, &sample, velocity_mps, sudden);
+        let sample = Sample { velocity_mps, ..sample };
+        let step = self.motion_step(config, &last, &sample, sudden);
+        self.update_friction_drive(config, &step, &sample);
+        if self.in_tissue {
+            self.update_in_tissue(config, &step, &sample);
+        } else {
+            self.detect_contact(config, surface_m, &step, &sample);
+        }
+        self.last_sample = sample;
+        self.started = true;
+        self.write_output(config, &sample);
+        &self.output
+    }
+}
