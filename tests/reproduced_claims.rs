@@ -222,14 +222,14 @@ fn every_number_on_the_page_has_its_source_class() {
     assert!(captions.len() > 80, "{} tables", captions.len());
     for caption in captions {
         assert!(
-            caption.ends_with("[computed]") || caption.ends_with("[source in the table]"),
+            caption.ends_with("[computed]") || caption.ends_with("[sources by row or column]"),
             "whose are the numbers of `{caption}`?"
         );
     }
     // In those that say it themselves every number has the class of its row or of its column.
     let mut numbers = 0;
     for table in html.split("<table").skip(1).filter_map(|t| t.split("</table>").next()) {
-        if !table.contains("[source in the table]") {
+        if !table.contains("[sources by row or column]") {
             continue;
         }
         let rows = rows_of(table);

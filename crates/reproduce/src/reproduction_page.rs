@@ -68,6 +68,7 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
         )
         .table(
             Sourced::named(Table {
+                title: "Claims and verdicts".to_owned(),
                 headers: [
                     "claim (the paper's)",
                     "verdict (computed)",

@@ -60,7 +60,7 @@ impl Sourced {
     pub fn into_table(self) -> Table {
         let mut table = self.table;
         let named: Vec<&str> = self.classes.iter().map(|c| c.words()).collect();
-        let note = if named.is_empty() { "source in the table".to_owned() } else { named.join(", ") };
+        let note = if named.is_empty() { "sources by row or column".to_owned() } else { named.join(", ") };
         table.title =
             if table.title.is_empty() { format!("[{note}]") } else { format!("{} [{note}]", table.title) };
         table
