@@ -283,7 +283,7 @@ fn list_results(answers: &mut AnswerLines, found: &DiagnosisResult) {
         for (k, l) in left.iter().enumerate() {
             let Some(l) = l else { continue };
             answers.column(&format!("{name}.{k}.e"), &l.residual_n);
-            answers.numbers(&format!("{name}.{k}.instants"), &l.rupture_times_s);
+            answers.numbers(&format!("{name}.{k}.rupture_times"), &l.rupture_times_s);
         }
     }
     for (k, c) in stylet_diagnose::report_curves::recording_curves(found).iter().enumerate() {
@@ -318,7 +318,7 @@ fn cause<'a>(found: &'a DiagnosisResult, effect: &str) -> &'a Cause {
 /// Asserts that the interval of an effect's parameter includes the truth.
 fn interval_includes(found: &DiagnosisResult, effect: &str, path: &str, truth: f64) {
     let e = cause(found, effect).parameters[path];
-    assert!(e.low <= truth && truth <= e.high, "{effect}.{path} is {truth}, said {e:?}");
+    assert!(e.low <= truth && truth <= e.high, "{effect}.{path} is {truth}, estimated {e:?}");
 }
 
 #[test]

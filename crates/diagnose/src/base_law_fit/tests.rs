@@ -1,16 +1,5 @@
-use super::{
-    FIRST_NOISE_SHARE, PreparedRecordings, coarse_refit, fit_base_law, fit_with_assigned_drops,
-    refit_from_prior, refit_with_random_effects, roughness,
-};
+use super::*;
 use crate::test_fixtures::{assumed_layers, blocks_of, fit_simulated, gel_tissue};
-use std::sync::Arc;
-use stylet_identify::block_averages::BlockAverages;
-use stylet_identify::fit::{Effort, Fit, fit};
-use stylet_identify::force_drops::ForceDrop;
-use stylet_identify::likelihood::{FitData, residuals};
-use stylet_identify::model::{EffectTerm, Model};
-use stylet_identify::noise::Noise;
-use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_tissue::{CoulombFriction, Effect};
 
 fn blocks(f: impl Fn(f64) -> f64) -> BlockAverages {

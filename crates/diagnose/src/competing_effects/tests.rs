@@ -1,8 +1,5 @@
-use super::{Search, competing_fits, find_competing_effects};
-use crate::model_comparison::bic_penalty;
+use super::*;
 use crate::test_fixtures::{fit_from_truth, recordings_with_added_force, search_stage};
-use stylet_identify::fit::{Effort, fit_if_below};
-use stylet_identify::model::EffectTerm;
 use stylet_tissue::{
     AnyEffect, AsymmetricFriction, CoulombFriction, CuttingForce, DriveFriction, Effect, ForceBias,
     ForceDrift, PeriodicInterference, PreslidingFriction, StribeckFriction, TimeDelay, ToolInertia,

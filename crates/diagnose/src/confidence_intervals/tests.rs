@@ -1,15 +1,13 @@
-use super::{CALIBRATION_FACTOR, Covariance, VARIANCE_INCREASE, release_unreached_punctures};
+use super::*;
 use crate::test_fixtures::{blocks_of, data_of};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
-use stylet_identify::fit::{Effort, Fit, Linearization, fit};
-use stylet_identify::likelihood::{FitData, ReplayCache, replay, residuals};
-use stylet_identify::model::{Assumptions, EffectTerm, Model, ParameterRole};
+use stylet_identify::fit::fit;
+use stylet_identify::likelihood::{ReplayCache, replay, residuals};
+use stylet_identify::model::{Assumptions, EffectTerm};
 use stylet_identify::noise::Noise;
-use stylet_stats::linear_algebra::SymmetricMatrix;
-use stylet_stats::student_t;
 use stylet_tissue::{Layer, Tissue};
 
 fn assumptions() -> Assumptions {

@@ -1,13 +1,10 @@
-use super::{autoregression, errors_per_recording, extended_scenario, random_effect_sd, search_step};
+use super::*;
 use crate::diagnosis_json::{Cause, Diagnosis, Verdict};
-use crate::held_out::FreeRunResidual;
-use crate::selection_state::Search;
-use crate::sensor_artefact_causes::sensor_artefact_causes;
 use crate::test_fixtures::{search_result, search_stage};
 use stylet_identify::model::FreeParameters;
 use stylet_identify::noise::Noise;
 use stylet_record::sensor_artefacts::SensorArtefacts;
-use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
+use stylet_tissue::{Effect, ForceBias, ForceDrift};
 
 fn drift() -> AnyEffect {
     ForceDrift { rate_n_per_s: 0.02 }.into()

@@ -1,27 +1,17 @@
-use crate::base_law_fit::PreparedRecordings;
-use crate::effect_start::EffectStart;
-use crate::effect_start_values::effect_starts;
-use crate::model_comparison::likelihood_gain;
-use crate::model_pruning::{
-    effect_at_bound, required_gain_nats, special_case_first, strengths_are_determined,
-};
+use super::*;
+use crate::model_pruning::{effect_at_bound, strengths_are_determined};
 use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::multistart_fit::SetFit;
-use crate::selection_restarts::is_new_effect;
-use crate::selection_state::Search;
 use crate::test_fixtures::{
     assumed_layers, blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force,
     search_stage,
 };
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use stylet_identify::fit::{Effort, Fit};
-use stylet_identify::likelihood::{FitData, residuals};
-use stylet_identify::model::{EffectTerm, Model, ParameterRole};
-use stylet_identify::score_test::ScoreTest;
+use stylet_identify::model::{EffectTerm, ParameterRole};
 use stylet_tissue::{
-    AnyEffect, AsymmetricFriction, ChainStage, CoulombFriction, Effect, ForceBias, ForceDrift,
-    HiddenMembrane, PeriodicInterference, PreslidingFriction, StribeckFriction,
+    AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, HiddenMembrane,
+    PeriodicInterference, PreslidingFriction, StribeckFriction,
 };
 
 fn data() -> FitData {
@@ -365,7 +355,7 @@ fn candidates_are_refitted_from_the_prior_when_the_leader_leaves_more_than_noise
 
 #[test]
 fn effect_stays_when_it_gains_four_nats_more_than_its_penalty() {
-    let mut seen = [0, 0];
+    let mut counts = [0, 0];
     for bias_n in [0.0, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3] {
         let bias: AnyEffect = ForceBias { force_n: 1e-4 }.into();
         let (mut search, _) = search_over(&[], &[drift(0.02), bias], |t| 0.02 * t + bias_n);
@@ -377,10 +367,10 @@ fn effect_stays_when_it_gains_four_nats_more_than_its_penalty() {
         let stays = search.best.model.effects.len() == 2;
         assert_eq!(stays, gained > wanted, "{gained} of {wanted}");
         if (gained - wanted).abs() < 2.7 {
-            seen[usize::from(stays)] += 1;
+            counts[usize::from(stays)] += 1;
         }
     }
-    assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
+    assert!(counts.iter().all(|n| *n > 0), "{counts:?}");
 }
 
 /// One step of a search and its start values; with the noise of the calm parts or of the whole residual.
@@ -403,7 +393,7 @@ fn grown(
 
 #[test]
 fn effect_is_fitted_when_its_first_order_gain_is_half_of_the_required() {
-    let mut seen = [0, 0];
+    let mut counts = [0, 0];
     for drift_n_per_s in [6e-4, 8e-4] {
         let (search, first) = grown(false, 0, &[], |t| drift_n_per_s * t);
         let tried = |s: &EffectStart| search.stages[0].candidates.iter().any(|r| r.0 == s.choice.info.id);
@@ -413,12 +403,12 @@ fn effect_is_fitted_when_its_first_order_gain_is_half_of_the_required() {
             assert!(s.gain_nats > 0.5 * needed || !tried(s), "{} of {needed}", s.gain_nats);
             if ["force_drift", "force_bias"].contains(&s.choice.info.id) {
                 assert_eq!(tried(s), s.gain_nats > 0.5 * needed, "{} of {needed}", s.gain_nats);
-                seen[usize::from(tried(s))] += 1;
+                counts[usize::from(tried(s))] += 1;
             }
         }
         assert!(search.stages[0].candidates.iter().any(|r| r.0 == "rate_dependent_puncture"));
     }
-    assert_eq!(seen, [1, 3]);
+    assert_eq!(counts, [1, 3]);
 }
 
 #[test]

@@ -1,17 +1,13 @@
-use super::{effect_starts, force_derivatives};
-use crate::base_law_fit::PreparedRecordings;
-use crate::effect_start::EffectStart;
+use super::*;
 use crate::repeated_insertions::multistart_fit::SetFit;
 use crate::test_fixtures::{
     assumed_layers, blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force,
 };
-use stylet_identify::fit::{Fit, JacobianColumn};
-use stylet_identify::force_drops::ForceDrop;
+use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::residuals;
-use stylet_identify::model::{EffectTerm, Model};
-use stylet_identify::score_test::{ScoreTest, ScoreTestResult};
+use stylet_identify::model::Model;
 use stylet_tissue::{
-    AnyEffect, CoulombFriction, EffectInfo, ForceDrift, HiddenMembrane, RateDependentPuncture, Respiration,
+    AnyEffect, CoulombFriction, ForceDrift, HiddenMembrane, RateDependentPuncture, Respiration,
 };
 
 /// Speeds (m/s) and surface shifts (m) of the insertions.

@@ -1,18 +1,13 @@
-use super::{
-    boundary_shift_models, fix_geometry, free_geometry, geometry_effects, passed_last_boundary,
-    pays_under_own_noise, penalised_nats, penalty_nats, with_fixed_geometry, with_scaled_coefficients,
-};
-use crate::base_law_fit::{PreparedRecordings, fit_base_law};
-use crate::selection_state::Search;
+use super::*;
+use crate::base_law_fit::fit_base_law;
 use crate::test_fixtures::{
     blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force, uniform_sequence,
 };
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use std::sync::Arc;
-use stylet_identify::fit::{Effort, fit};
-use stylet_identify::likelihood::{FitData, replay};
-use stylet_identify::model::{Assumptions, EffectTerm, FreeParameters, Model};
+use stylet_identify::likelihood::replay;
+use stylet_identify::model::Assumptions;
 use stylet_identify::noise::NoiseSource;
 use stylet_tissue::{
     AnyEffect, BoundaryShift, CoulombFriction, Effect, ForceDrift, ForceLaw, ForceLawState, Layer,
@@ -156,24 +151,25 @@ fn there_and_back() -> FitData {
 fn position_scale_is_equivalent_to_scaled_boundaries_and_coefficients() {
     let data = there_and_back();
     let scale = EffectTerm::new(PositionScale { eps: 0.05 }.info(), &[0.05]);
-    let mut faces = model(&[0.0, 0.0], &[]);
-    faces.tissue.surface_m = 1.05 * 0.003;
-    faces.tissue.layers.iter_mut().for_each(|l| l.thickness_m *= 1.05);
+    let mut scaled_layers = model(&[0.0, 0.0], &[]);
+    scaled_layers.tissue.surface_m = 1.05 * 0.003;
+    scaled_layers.tissue.layers.iter_mut().for_each(|l| l.thickness_m *= 1.05);
     let force = |m: &Model| replay(m, &data, 0).expect("a replay").force_n;
     let off = |m: Model| {
         let scaled = with_fixed_geometry(&m, FreeParameters::default()).with_effect(scale.clone());
-        let differ = force(&faces).iter().zip(force(&scaled)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        differ / force(&faces).into_iter().fold(0.0, f64::max)
+        let differ =
+            force(&scaled_layers).iter().zip(force(&scaled)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        differ / force(&scaled_layers).into_iter().fold(0.0, f64::max)
     };
     assert!(
-        off(with_scaled_coefficients(&faces, &scale)) < 1e-9,
+        off(with_scaled_coefficients(&scaled_layers, &scale)) < 1e-9,
         "{}",
-        off(with_scaled_coefficients(&faces, &scale))
+        off(with_scaled_coefficients(&scaled_layers, &scale))
     );
-    assert!(off(faces.clone()) > 0.04, "{}", off(faces.clone()));
+    assert!(off(scaled_layers.clone()) > 0.04, "{}", off(scaled_layers.clone()));
     // An effect that moves no position has no scale.
     let friction = EffectTerm::new(CoulombFriction { c_n_per_m: 1.0 }.info(), &[1.0]);
-    assert_eq!(with_scaled_coefficients(&faces, &friction).tissue, faces.tissue);
+    assert_eq!(with_scaled_coefficients(&scaled_layers, &friction).tissue, scaled_layers.tissue);
 }
 
 #[test]

@@ -1,12 +1,7 @@
-use super::{
-    FreeRunResidual, held_out_residuals, held_out_residuals_with_random_effects, jackknife_effects,
-    pooled_rms, predict_free_run, refit_without, sample_noise_sd_n,
-};
+use super::*;
 use crate::repeated_insertions::multistart_fit::SetFit;
 use crate::test_fixtures::{blocks_of, data_of, fit_simulated};
 use stylet_identify::block_averages::BlockAverages;
-use stylet_identify::fit::{Effort, fit};
-use stylet_identify::likelihood::ReplayCache;
 use stylet_tissue::{AnyEffect, CoulombFriction};
 
 /// Four samples per block that alternate by `within_n`.

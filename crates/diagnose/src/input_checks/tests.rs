@@ -1,9 +1,5 @@
-use super::{check_recordings, drop_non_finite, force_outlier_notes, non_finite_note};
-use crate::error::DiagnoseError;
-use crate::input_checks::NamedRecording;
-use stylet_record::Recording;
-use stylet_scenario::Scenario;
-use stylet_tissue::{ForceLaw, ForceLawState, Layer, Tissue};
+use super::*;
+use stylet_tissue::{ForceLawState, Layer, Tissue};
 
 const SURFACE_M: f64 = 0.01;
 

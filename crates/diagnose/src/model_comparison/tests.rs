@@ -1,7 +1,6 @@
-use super::{bic_penalty, likelihood_gain};
+use super::*;
 use crate::test_fixtures::fit_simulated;
-use stylet_identify::fit::{Effort, fit};
-use stylet_identify::noise::NoiseSource;
+use stylet_identify::fit::fit;
 use stylet_tissue::{AnyEffect, ForceBias, ForceDrift};
 
 #[test]

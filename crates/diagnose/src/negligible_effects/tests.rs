@@ -1,15 +1,10 @@
-use super::{acts_in_every_sample, is_uncertain, negligible_effects, unresolved};
-use crate::diagnosis_json::Cause;
-use crate::held_out::{
-    FreeRunResidual, held_out_residuals_with_random_effects, pooled_rms, sample_noise_sd_n,
-};
-use crate::selection_state::Search;
+use super::*;
 use crate::test_fixtures::{
     assumed_layers, blocks_of, fit_from_truth, fit_simulated, recordings_with_added_force, search_stage,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::{FitData, Residuals};
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_identify::noise::Noise;
@@ -75,7 +70,7 @@ fn cause_is_uncertain_when_its_interval_gives_less_than_the_required_gain() {
 
 #[test]
 fn effects_at_ruptures_boundaries_and_breaks_do_not_act_in_every_sample() {
-    let shows = |id: &str| acts_in_every_sample(stylet_tissue::effect_info(id).expect("in the library"));
+    let acts = |id: &str| acts_in_every_sample(stylet_tissue::effect_info(id).expect("in the library"));
     for id in [
         "coulomb_friction",
         "force_drift",
@@ -84,7 +79,7 @@ fn effects_at_ruptures_boundaries_and_breaks_do_not_act_in_every_sample() {
         "position_scale",
         "stress_relaxation",
     ] {
-        assert!(shows(id), "{id}");
+        assert!(acts(id), "{id}");
     }
     for id in [
         "rate_dependent_puncture",
@@ -94,7 +89,7 @@ fn effects_at_ruptures_boundaries_and_breaks_do_not_act_in_every_sample() {
         "force_spikes",
         "saturation",
     ] {
-        assert!(!shows(id), "{id}");
+        assert!(!acts(id), "{id}");
     }
 }
 
@@ -160,13 +155,13 @@ fn result_with_held_out(bias_n: f64, with_n: impl Fn(f64, f64) -> f64) -> Option
 
 #[test]
 fn weak_cause_must_improve_held_out_predictions() {
-    let pays = |share: f64| result_with_held_out(3e-3, |residual_n, noise| residual_n - share * noise);
-    assert_eq!(pays(-0.1).as_deref(), Some("does not improve the prediction of held-out recordings"));
+    let reason = |share: f64| result_with_held_out(3e-3, |residual_n, noise| residual_n - share * noise);
+    assert_eq!(reason(-0.1).as_deref(), Some("does not improve the prediction of held-out recordings"));
     assert_eq!(
-        pays(0.0015).as_deref(),
+        reason(0.0015).as_deref(),
         Some("changes the prediction of held-out recordings by less than 0.2 % of the noise")
     );
-    assert_eq!((pays(0.0025), pays(0.02)), (None, None));
+    assert_eq!((reason(0.0025), reason(0.02)), (None, None));
     // A strong cause needs no held-out gain.
     assert_eq!(result_with_held_out(0.05, |residual_n, _| 2.0 * residual_n), None);
 }

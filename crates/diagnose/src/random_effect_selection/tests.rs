@@ -1,11 +1,8 @@
-use super::{penalty_nats, select_random_effects, with_random_effects};
+use super::*;
 use crate::test_fixtures::{assumed_layers, fit_simulated};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
-use stylet_identify::fit::{Effort, fit};
-use stylet_identify::likelihood::FitData;
-use stylet_identify::model::{FreeParameters, Model, RecordingParameters};
-use stylet_identify::noise::{Noise, NoiseSource};
+use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 
 #[test]

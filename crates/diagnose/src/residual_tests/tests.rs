@@ -1,11 +1,7 @@
-use super::{
-    FEATURES, MAX_BINS, Part, Structure, bins, coloured_moments, covariance, lags, parts, skewed_tail,
-    statistic, structure, summarise, tail,
-};
+use super::*;
 use crate::test_fixtures::{blocks_of, data_of};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use stylet_identify::likelihood::FitData;
 
 /// Four insertions with holds, at different speeds.
 fn insertions() -> FitData {

@@ -1,6 +1,5 @@
-use super::{HALF_WINDOW_S, fit_reweighted, local_residual_sd};
+use super::*;
 use crate::test_fixtures::fit_simulated;
-use stylet_identify::fit::{Effort, fit};
 use stylet_tissue::{AnyEffect, ForceDrift};
 
 const RUNS: [[f64; 2]; 3] = [[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]];

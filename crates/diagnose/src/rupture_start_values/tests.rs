@@ -1,7 +1,6 @@
-use super::{LayerEvents, MAX_EVENT_NATS};
+use super::*;
 use crate::test_fixtures::assumed_layers;
-use stylet_identify::model::{Assumptions, Model, Scatter};
-use stylet_identify::rupture_likelihood::{RuptureEvent, evaluate_rupture};
+use stylet_identify::model::Assumptions;
 
 /// A rupture at a relative force excess of `force`, well before the end of the layer.
 fn rupture(force: f64) -> RuptureEvent {

@@ -1,8 +1,7 @@
-use super::{detect_tones, remove_tones, residual_spectrum, with_noise_without_tones};
+use super::*;
 use crate::test_fixtures::{assumed_layers, blocks_of, data_of};
 use stylet_identify::block_averages::BlockAverages;
-use stylet_identify::fit::Fit;
-use stylet_identify::likelihood::{FitData, residuals};
+use stylet_identify::likelihood::residuals;
 use stylet_identify::model::Model;
 
 const HZ: f64 = 100.0;

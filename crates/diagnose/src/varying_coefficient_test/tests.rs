@@ -1,7 +1,6 @@
-use super::{VaryingCoefficient, features, interaction_column, varying_coefficient_test};
+use super::*;
 use crate::test_fixtures::fit_simulated;
 use stylet_identify::fit::{Effort, fit};
-use stylet_identify::score_test::ScoreTest;
 use stylet_tissue::{AnyEffect, ForceBias, ForceDrift};
 
 #[test]

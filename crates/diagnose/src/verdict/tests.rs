@@ -1,15 +1,7 @@
-use super::{assess_search, base_parameters, excess, find_imitation, is_kept, move_negligible, tone_p_value};
-use crate::competing_effects::CompetingEffect;
-use crate::confidence_intervals::Covariance;
-use crate::held_out::JackknifeResult;
-use crate::negligible_effects::Negligible;
+use super::*;
 use crate::test_fixtures::{blocks_of, data_of, search_result, search_stage};
-use rand::SeedableRng;
-use rand::rngs::ChaCha8Rng;
 use std::sync::Arc;
-use stylet_identify::fit::{Effort, Fit, fit};
-use stylet_identify::likelihood::residuals;
-use stylet_identify::model::{EffectTerm, ParameterRole};
+use stylet_identify::model::EffectTerm;
 use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift, Respiration};
 
 /// `m (1 + x)^(1 - m)` for a tone `x` times all others among `m` frequencies, half the number of blocks.
