@@ -45,7 +45,7 @@ fn two_layers() -> Scenario {
         puncture_n: f,
     };
     Scenario {
-        name: "three gel layers, as believed".to_owned(),
+        name: "three gel layers, as assumed".to_owned(),
         source: "drawn".to_owned(),
         tissue: Tissue {
             surface_m: 0.0,
