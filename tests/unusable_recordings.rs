@@ -65,7 +65,7 @@ fn one_unusable_recording_is_reported_with_the_same_message_by_every_command() {
         |change: &dyn Fn(usize, Row) -> Row| csv(rows.iter().enumerate().map(|(i, row)| change(i, *row)));
     let cases: [(&str, String, &[&str]); 7] = [
         ("dead.csv", with(&|_, [t, z, _]| [t, z, 0.0]), &["the force stands at 0 N", "check the cable"]),
-        ("reversed.csv", with(&|_, [t, z, f]| [t, z, -f]), &["the force runs the other way", "scale: -1"]),
+        ("reversed.csv", with(&|_, [t, z, f]| [t, z, -f]), &["the force has the wrong sign", "scale: -1"]),
         ("millimetres.csv", with(&|_, [t, z, f]| [t, 1e3 * z, f]), &["look like millimetres", "column map"]),
         (
             "millinewtons.csv",
@@ -75,7 +75,7 @@ fn one_unusable_recording_is_reported_with_the_same_message_by_every_command() {
         (
             "air.csv",
             with(&|i, [t, z, _]| [t, z, air(i)]),
-            &["nothing but noise", "check that this is an insertion"],
+            &["is only noise", "check that this is an insertion"],
         ),
         (
             "short.csv",
@@ -171,9 +171,9 @@ fn repeats_are_repaired_on_request_and_report_the_outlier() {
     let repaired = stylet(&[&command[..], &["--repair"]].concat());
     let stderr_text = flat(&repaired);
     assert!(repaired.status.success(), "{stderr_text}");
-    assert!(stderr_text.contains("run4.csv: it is not like the others"), "{stderr_text}");
+    assert!(stderr_text.contains("run4.csv: it is an outlier among its repeats"), "{stderr_text}");
     for good in ["run1.csv", "run2.csv", "run3.csv"] {
-        assert!(!stderr_text.contains(&format!("{good}: it is not like")), "{stderr_text}");
+        assert!(!stderr_text.contains(&format!("{good}: it is an outlier")), "{stderr_text}");
     }
     let json = fs::read_to_string(Path::new(&folder).join("diagnosis.json")).expect("results");
     assert!(json.contains("\"repaired_rows\"") && json.contains("\"outlier_recording\""));
@@ -264,7 +264,7 @@ fn a_recording_that_is_too_long_is_downsampled_with_a_note() {
     let stderr_text = flat(&output);
     assert!(output.status.success(), "{stderr_text}");
     assert!(
-        stderr_text.contains("139900 samples are more than a diagnosis can use: each 2 were averaged"),
+        stderr_text.contains("139900 samples are too many for a diagnosis: each 2 were averaged"),
         "{stderr_text}"
     );
 }

@@ -116,7 +116,7 @@ fn effects() {
     ];
     all_refused(&cases, |effect| scenario(CONSTANT, &format!("effects: [{effect}],")));
     let many = scenario(CONSTANT, &format!("effects: [{}],", "CoulombFriction(c_n_per_m: 1.0), ".repeat(17)));
-    assert!(said(&many, "[Coulomb", "[").contains("17 effects act on the tissue at once; at most 16 can"));
+    assert!(said(&many, "[Coulomb", "[").contains("17 effects act on the tissue at once; at most 16 are possible"));
 }
 
 #[test]
