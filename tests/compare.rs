@@ -62,7 +62,7 @@ fn stylet_detects_every_rupture_of_every_row_and_the_paper_algorithm_does_not() 
 #[test]
 fn a_row_has_errors_delays_and_estimates_with_intervals() {
     let scratch = Scratch::new("compare-fields");
-    let table = compare(&scratch, "fields", &[&row("03_constant_loud.ron"), "--seeds", "6"]);
+    let table = compare(&scratch, "fields", &[&row("03_constant_high_noise.ron"), "--seeds", "6"]);
     for r in &table {
         assert_eq!(r["scenario"], "constant, 0.1 N");
         let [value, low, high] = [0, 1, 2].map(|i| r["errors_per_rupture"][i].as_f64().expect("a number"));
@@ -90,7 +90,7 @@ fn one_two_and_three_threads_give_the_same_bytes() {
     let files = |threads: &str| {
         let folder = scratch.path().join(threads);
         let output = Command::new(env!("CARGO_BIN_EXE_stylet"))
-            .args(["compare", &row("08_weak_drops_loud.ron"), "--world", "rich", "--hide", "one"])
+            .args(["compare", &row("08_weak_drops_high_noise.ron"), "--world", "rich", "--hide", "one"])
             .args(["--seeds", "5", "--quiet", "--out"])
             .arg(&folder)
             .env("RAYON_NUM_THREADS", threads)

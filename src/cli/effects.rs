@@ -6,43 +6,67 @@ use crate::cli::terminal_output::print;
 use std::fmt::Write as _;
 use stylet_api::reference_insertion::{ReferenceInsertion, reference_insertion};
 use stylet_report::significant;
+use stylet_scenario::{closest_name, effect_line, renamed_ron_name};
 use stylet_tissue::{EffectInfo, effect_info, general_effects, per_layer_effects};
 
-/// The command.
+/// Lists the effects, or shows one.
 ///
 /// # Errors
 /// [`Failure::Check`] for an effect that is not in the library.
 pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
-    match &args.name {
-        None => {
-            let mut text = String::new();
-            for entry in general_effects().chain(per_layer_effects()) {
-                let _ =
-                    writeln!(text, "{:<26} {}\n{:<26} {}\n", entry.id, entry.equation, "", entry.signature);
-            }
-            text += "`stylet effects NAME` describes one: parameters, source, and its influence on a reference insertion.\n";
-            print(&text)
+    let library = || general_effects().chain(per_layer_effects());
+    let Some(name) = &args.name else {
+        let mut text = String::new();
+        for effect in library() {
+            let _ =
+                writeln!(text, "{:<26} {}\n{:<26} {}\n", effect.id, effect.equation, "", effect.signature);
         }
-        Some(name) => match effect_info(name) {
-            Some(entry) => print(&description(entry)),
-            None => {
-                let known: Vec<&str> = general_effects().chain(per_layer_effects()).map(|e| e.id).collect();
-                let hint = stylet_scenario::closest_name(name, &known)
-                    .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-                Err(Failure::Check(format!("there is no effect `{name}`{hint}; `stylet effects` lists them")))
-            }
-        },
+        text += "stylet effects NAME shows one: parameters, source, a line to paste, the force of a reference insertion.\n";
+        return print(&text);
+    };
+    let id = snake_case(name);
+    match effect_info(&id) {
+        Some(effect) => print(&describe(effect)),
+        None => {
+            let known: Vec<&str> = library().map(|e| e.id).collect();
+            let hint = renamed_ron_name(&id, &known)
+                .map(|renamed| format!(": {renamed}"))
+                .or_else(|| Some(format!("; did you mean `{}`?", closest_id(&id, &known)?)))
+                .unwrap_or_default();
+            Err(Failure::Check(format!("there is no effect `{name}`{hint}; `stylet effects` lists them")))
+        }
     }
 }
 
-fn description(entry: &EffectInfo) -> String {
+/// `CoulombFriction`, as scenarios write it, as an id.
+fn snake_case(name: &str) -> String {
+    let mut id = String::new();
+    for c in name.chars() {
+        if c.is_ascii_uppercase() && !id.is_empty() {
+            id.push('_');
+        }
+        id.push(c.to_ascii_lowercase());
+    }
+    id
+}
+
+/// The id that was probably meant: the closest whole id, or the one with the closest word.
+fn closest_id<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
+    let words: Vec<&str> = known.iter().flat_map(|id| id.split('_')).collect();
+    closest_name(wrong, known).or_else(|| known.iter().find(|id| id.contains(wrong)).copied()).or_else(|| {
+        let word = closest_name(wrong, &words)?;
+        known.iter().find(|id| id.split('_').any(|w| w == word)).copied()
+    })
+}
+
+fn describe(effect: &EffectInfo) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
         "{}\n\n  {}\n\n  source     {}\n  signature  {}\n",
-        entry.id, entry.equation, entry.source, entry.signature
+        effect.id, effect.equation, effect.source, effect.signature
     );
-    for p in entry.parameters {
+    for p in effect.parameters {
         let unit = if p.unit.is_empty() { "-" } else { p.unit };
         let _ = writeln!(
             out,
@@ -56,7 +80,8 @@ fn description(entry: &EffectInfo) -> String {
             significant(p.start, 3)
         );
     }
-    out.push_str(&reference_plot(entry));
+    let _ = writeln!(out, "\n  in a scenario: effects: [{}]", effect_line(effect).trim_end_matches(','));
+    out.push_str(&reference_plot(effect));
     out
 }
 

@@ -23,13 +23,33 @@ mod terminal_output;
 
 use args::{Cli, Command};
 use clap::Parser;
+use clap::error::{ContextKind, ContextValue};
 use exit_codes::Failure;
 use std::process::ExitCode;
+
+/// The parsed arguments. Ends the process on wrong ones; a name of an earlier version is refused with the new one.
+fn arguments() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let renamed = [ContextKind::InvalidArg, ContextKind::InvalidSubcommand].into_iter().find_map(
+            |kind| match error.get(kind) {
+                Some(ContextValue::String(name)) => stylet_scenario::renamed_flag(name),
+                _ => None,
+            },
+        );
+        match renamed {
+            Some(message) => {
+                terminal_output::print_error(&format!("error: {message}\n"));
+                std::process::exit(i32::from(exit_codes::INPUT_WRONG));
+            }
+            None => error.exit(),
+        }
+    })
+}
 
 /// Runs the command line and returns the exit code (see [`exit_codes`]).
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = arguments();
     // A panic is a bug: it ends with the exit code of internal errors.
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),

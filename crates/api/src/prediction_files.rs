@@ -1,4 +1,4 @@
-//! Inputs and files of `stylet predict`: the origin of a model, and the report of a prediction.
+//! A model against recordings that took no part in making it.
 
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
@@ -8,40 +8,41 @@ use stylet_diagnose::Diagnosis;
 use stylet_diagnose::prediction::PredictionResult;
 use stylet_scenario::Scenario;
 
-/// Origin of a model, read from its folder.
+/// Where a model came from, as the folder in which it lies tells.
 #[derive(Clone, Debug, Default)]
 pub struct ModelOrigin {
-    /// The diagnosis that gave the model.
+    /// The diagnosis that made it.
     pub diagnosis: Option<Diagnosis>,
-    /// The scenario assumed before the diagnosis.
+    /// What was believed before.
     pub assumed: Option<Scenario>,
 }
 
 impl ModelOrigin {
-    /// Reads the origin of a model from `diagnosis.json` and `inputs.json` in its folder; `assumed` replaces the scenario named there. A scenario
-    /// that no longer exists is ignored.
+    /// What lies beside a model; `believed` is what was believed before, where the folder is not to tell. A scenario that is gone since
+    /// the diagnosis is nobody's error.
     ///
     /// # Errors
-    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `assumed` is invalid.
-    pub fn of_model_file(model: &Path, assumed: Option<&Path>) -> Result<Self, Error> {
-        let folder = model.parent().unwrap_or(Path::new("."));
-        let diagnosis = diagnosis(&folder.join("diagnosis.json"))?;
-        let assumed = match assumed {
+    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `believed` is wrong.
+    pub fn of_model_file(model: &Path, believed: Option<&Path>) -> Result<Self, Error> {
+        let beside = model.parent().unwrap_or(Path::new("."));
+        let diagnosis = diagnosis(&beside.join("diagnosis.json"))?;
+        let believed = match believed {
             Some(path) => Some(Scenario::load(path)?),
-            None => DiagnosisInputs::from_folder(folder)
+            None => DiagnosisInputs::from_folder(beside)
                 .ok()
                 .and_then(|inputs| Scenario::load(&inputs.scenario).ok()),
         };
-        Ok(Self { diagnosis, assumed })
+        Ok(Self { diagnosis, assumed: believed })
     }
 }
 
-/// Reads `diagnosis.json`, if it exists.
+/// The diagnosis that a model came from, if it lies beside it.
 fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
     let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
-    serde_json::from_str(&text)
-        .map(Some)
-        .map_err(|e| Error::Request(format!("{}: {e}; repeat the diagnosis", path.display())))
+    serde_json::from_str(&text).map(Some).map_err(|e| {
+        let cause = stylet_scenario::renamed_json_key(&text).unwrap_or_else(|| e.to_string());
+        Error::Request(format!("{}: {cause}; repeat the diagnosis", path.display()))
+    })
 }
 
 /// All files that `stylet predict` writes; `model` was read from `file`.

@@ -1,4 +1,4 @@
-//! What an arm is made of: plain data, built in code, checked once.
+//! Model of an arm: links, limits, flange and tool.
 
 use crate::error::{Error, check};
 use crate::pose::Pose;
@@ -7,17 +7,17 @@ use crate::rigid_body::RigidBody;
 /// Range of a joint. Velocity and torque limits hold in both directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
-    /// Least angle.
+    /// Smallest angle.
     pub lower_rad: f64,
-    /// Greatest angle.
+    /// Largest angle.
     pub upper_rad: f64,
-    /// Greatest rate.
+    /// Largest rate.
     pub velocity_radps: f64,
-    /// Greatest torque.
+    /// Largest torque.
     pub torque_nm: f64,
 }
 
-/// One link and the joint that carries it.
+/// One link and its joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Link {
     /// The link's frame in the frame of the link before it (or the base) at joint angle zero. The joint turns
@@ -29,7 +29,7 @@ pub struct Link {
     pub limits: JointLimits,
 }
 
-/// What is bolted to the flange.
+/// Tool on the flange.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tool {
     /// The tool's frame in the flange's.

@@ -1,4 +1,4 @@
-//! A checked arm, and the arm in one posture: the starting point of every algorithm here.
+//! A checked arm, and the arm at given joint angles.
 
 use crate::arm_model::{ArmModel, JointLimits};
 use crate::error::Error;
@@ -40,8 +40,7 @@ impl<const N: usize> Arm<N> {
         self.model.links.map(|link| link.limits)
     }
 
-    /// The arm at joint angles `q_rad`: computes the joints' sines and cosines once for all that is asked of
-    /// it.
+    /// The arm at joint angles `q_rad`: computes sines and cosines once for everything derived from it.
     pub fn at(&self, q_rad: &JointVector<N>) -> Posture<'_, N> {
         let mut rotations = [Matrix3::zeros(); N];
         for (i, rotation) in rotations.iter_mut().enumerate() {

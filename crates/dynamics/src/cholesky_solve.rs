@@ -1,4 +1,4 @@
-//! The one linear solver: symmetric positive definite, fixed size, no branches on the data.
+//! Linear solver for symmetric positive definite matrices of fixed size, without branches on the data.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,4 +1,4 @@
-//! What can be wrong with an arm, a pose or a parameter, in words that say what would be right.
+//! Errors of arms, poses and parameters; each message says what is expected.
 
 use std::fmt;
 
@@ -36,7 +36,7 @@ pub enum Error {
         joint: Option<usize>,
         /// The offending value.
         value: f64,
-        /// What would be right.
+        /// The expected value.
         expected: &'static str,
     },
     /// A joint is outside its limits.
@@ -52,11 +52,11 @@ pub enum Error {
         /// Upper limit.
         upper: f64,
     },
-    /// The arm is in, or too near, a pose in which the tip cannot be moved (or felt) in some direction.
+    /// The arm is in, or close to, a pose in which the tip cannot be moved in some direction.
     Singular {
         /// Of the tip Jacobian (m and rad as units).
         smallest_singular_value: f64,
-        /// The least value allowed.
+        /// The smallest allowed value.
         threshold: f64,
     },
     /// No joint angles within the limits bring the tip to the pose.

@@ -1,4 +1,4 @@
-//! Checks before a run: joint ranges, singular poses, lines that the tip cannot follow.
+//! Feasibility of a straight line of the tip: joint limits, singular poses, jumps.
 
 use crate::arm_posture::{Arm, JointVector, Posture};
 use crate::error::{Error, JointQuantity, check, check_finite_joints};
@@ -53,19 +53,19 @@ pub fn check_not_singular<const N: usize>(at: &Posture<'_, N>, threshold: f64) -
     }
 }
 
-/// What a line must fulfil.
+/// Requirements of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineConfig {
     /// Distance between checked points.
     pub spacing_m: f64,
-    /// Least singular value of the tip Jacobian on the way; 0.02 leaves joint rates of at most 50 rad per
+    /// Smallest allowed singular value of the tip Jacobian; 0.02 leaves joint rates of at most 50 rad per
     /// metre of tip travel.
     pub min_singular_value: f64,
     /// Speed of the tip, for the joints' velocity limits.
     pub speed_mps: f64,
-    /// Greatest change of a joint angle from one point to the next.
+    /// Largest change of a joint angle from one point to the next.
     pub max_jump_rad: f64,
-    /// At the first point; further points start from the point before and are not allowed restarts.
+    /// Inverse kinematics at the first point; further points start from the previous one, without restarts.
     pub ik: IkConfig,
 }
 
@@ -86,11 +86,11 @@ impl Default for LineConfig {
 pub struct FeasibleLine<const N: usize> {
     /// Joint angles at its start.
     pub start_rad: JointVector<N>,
-    /// Joint angles at its end, without a jump in between.
+    /// Joint angles at its end, reached without a jump.
     pub end_rad: JointVector<N>,
-    /// Of the tip Jacobian, on the way.
+    /// Smallest singular value of the tip Jacobian along the line.
     pub min_singular_value: f64,
-    /// Least distance of a joint from a limit, on the way.
+    /// Smallest distance of a joint from a limit along the line.
     pub min_margin_rad: f64,
 }
 

@@ -1,11 +1,9 @@
-//! Joint friction: the torque between motor and link that no rigid-body model contains.
+//! Joint friction: torque between motor and link, not part of the rigid-body model.
 //!
-//! Sign: `M qdd + C qd + g = tau - friction(qd) + J^T F`; friction is positive at positive rate. An observer
-//! that does not know of it sees `-friction(qd)` as external. There are two ways to put it into a simulation:
-//! take `friction(qd)` off the torque that drives the links (the motion feels it; stiff, see
-//! [`SmoothSign::width_radps`]), or let the links have the commanded torque and add `friction(qd)` to the
-//! torque that the observer is told (a motor whose inner loop overcomes its friction, and an observer that
-//! sees the motor's current). The observer's residual is the same for the same motion.
+//! Sign: `M qdd + C qd + g = tau - friction(qd) + J^T F`; friction is positive at positive rate. An observer without a friction model reports
+//! `-friction(qd)` as external torque. A simulation can subtract `friction(qd)` from the torque on the links (it then acts on the motion; stiff, see
+//! [`SmoothSign::width_radps`]), or apply the commanded torque to the links and add `friction(qd)` to the measured torque (a motor whose inner loop
+//! compensates friction). The residual of the observer is the same for the same motion.
 
 use crate::arm_posture::JointVector;
 use crate::error::{Error, check};
@@ -13,9 +11,9 @@ use crate::error::{Error, check};
 /// Coulomb and viscous friction in one direction of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DirectionalFriction {
-    /// Torque at the slightest motion.
+    /// Coulomb torque.
     pub coulomb_nm: f64,
-    /// Rise with the rate.
+    /// Viscous coefficient.
     pub viscous_nms_per_rad: f64,
 }
 
@@ -68,7 +66,7 @@ impl FrictionLaw {
         Self::Sigmoid { offset_nm, amplitude_nm, steepness_s_per_rad, shift_radps }
     }
 
-    /// All torques multiplied; for studies of how much friction a method bears.
+    /// All torques multiplied by a factor.
     pub fn scaled(self, factor: f64) -> Self {
         let direction = |d: DirectionalFriction| DirectionalFriction {
             coulomb_nm: d.coulomb_nm * factor,
@@ -137,7 +135,7 @@ impl FrictionLaw {
 /// Sign of a rate: zero within the dead band, `tanh((|x| - dead_band)/width)` beyond it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SmoothSign {
-    /// No Coulomb friction up to this rate.
+    /// No Coulomb friction below this rate.
     pub dead_band_radps: f64,
     /// Rate over which it then comes up to 76 %; zero for a hard step. A simulation that applies the torque
     /// explicitly over steps of `dt` needs at least `coulomb dt/(2 inertia)` to stay stable: 0.03 rad/s for
@@ -146,8 +144,7 @@ pub struct SmoothSign {
 }
 
 impl Default for SmoothSign {
-    /// Dead band 0.01 mm/s seen over half a metre; width a tenth of the joint rates of an insertion at 2.3
-    /// mm/s.
+    /// Dead band: 0.01 mm/s at half a metre. Width: a tenth of the joint rates of an insertion at 2.3 mm/s.
     fn default() -> Self {
         Self { dead_band_radps: 2e-5, width_radps: 5e-4 }
     }
@@ -188,12 +185,12 @@ impl<const N: usize> JointFriction<N> {
         JointVector::from_fn(|i, _| self.joints[i].torque(qd_radps[i], &self.sign))
     }
 
-    /// All torques multiplied.
+    /// All torques multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         Self { joints: self.joints.map(|law| law.scaled(factor)), sign: self.sign }
     }
 
-    /// `Ok` if every coefficient is finite and none pushes the joint along.
+    /// `Ok` if every coefficient is finite and friction opposes the motion.
     pub fn validate(&self) -> Result<(), Error> {
         for (i, law) in self.joints.iter().enumerate() {
             law.validate(Some(i + 1))?;

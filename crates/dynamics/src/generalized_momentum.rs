@@ -1,9 +1,9 @@
-//! Generalised momentum and the torques that change it: the model side of the momentum observer.
+//! Generalised momentum, Coriolis and gravity terms of the momentum observer.
 
 use crate::arm_posture::{JointVector, Posture};
 use nalgebra::Vector3;
 
-/// Everything the momentum observer asks of the model, at one posture and joint rate.
+/// Model terms of the momentum observer at one posture and joint rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MomentumTerms<const N: usize> {
     /// `p = M(q) qd` (N m s).

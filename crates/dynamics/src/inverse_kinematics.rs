@@ -1,4 +1,4 @@
-//! Joint angles for a pose of the tip, within the joints' limits.
+//! Inverse kinematics within the joint limits.
 
 use crate::arm_posture::{Arm, JointVector};
 use crate::error::{Error, check, check_finite_joints};
@@ -6,7 +6,7 @@ use crate::kinematics::damped_inverse;
 use crate::pose::Pose;
 use nalgebra::Vector6;
 
-/// When inverse kinematics is content and when it gives up.
+/// Tolerances and effort of inverse kinematics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IkConfig {
     /// Largest distance of the tip from its target.
@@ -17,8 +17,7 @@ pub struct IkConfig {
     pub max_iterations: u32,
     /// Largest change of a joint angle per step.
     pub max_step_rad: f64,
-    /// Further starts, spread over the joints' ranges, when the given start leads nowhere. Zero keeps the
-    /// solution near the start.
+    /// Further starts, spread over the joint ranges, when the given start fails. Zero keeps the solution near the start.
     pub restarts: u32,
 }
 
@@ -43,7 +42,7 @@ impl IkConfig {
     }
 }
 
-/// Where one start ended.
+/// Result of one start.
 struct Attempt<const N: usize> {
     q: JointVector<N>,
     position_error_m: f64,
@@ -55,10 +54,9 @@ impl<const N: usize> Arm<N> {
     /// `start_rad`.
     ///
     /// Gauss-Newton on the pose error with Levenberg-Marquardt damping proportional to the squared error
-    /// (Sugihara, IEEE T-RO 2011), so that far targets do not throw the arm about and near ones converge
-    /// quadratically. A joint that a step would carry across a limit stays on it and the others make up for
-    /// it (Flacco, De Luca and Khatib, ICRA 2012). If that leads nowhere, further starts are tried in a fixed
-    /// order; the error reports the best of all.
+    /// (Sugihara, IEEE T-RO 2011), so that steps to far targets are limited and near ones converge
+    /// quadratically. A joint that would cross a limit stays on it and the others compensate (Flacco, De Luca and Khatib, ICRA 2012). If that
+    /// fails, further starts are tried in a fixed order; the error reports the best of all.
     pub fn inverse_kinematics(
         &self,
         target: &Pose,

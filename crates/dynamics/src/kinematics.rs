@@ -1,4 +1,4 @@
-//! Where the tip is and how it moves.
+//! Link poses, tip pose, Jacobian, tip acceleration and inverse velocity kinematics.
 
 use crate::arm_posture::{JointVector, Posture};
 use crate::cholesky_solve::solve_spd;
@@ -30,7 +30,7 @@ impl<const N: usize> Posture<'_, N> {
         self.tip_and_jacobian().1
     }
 
-    /// Both in one pass outwards.
+    /// Tip pose and Jacobian in one pass.
     pub fn tip_and_jacobian(&self) -> (Pose, Jacobian<N>) {
         let links = self.link_poses();
         let tip = links.last().unwrap_or(&Pose::IDENTITY).compose(&self.arm.tip);
@@ -65,7 +65,7 @@ impl<const N: usize> Posture<'_, N> {
         Vector6::new(a.x, a.y, a.z, dw.x, dw.y, dw.z)
     }
 
-    /// Least joint rates that give the tip a velocity: `J^T (J J^T + damping^2 1)^-1 twist`, linear on top of
+    /// Smallest joint rates that give the tip a velocity: `J^T (J J^T + damping^2 1)^-1 twist`, linear on top of
     /// angular.
     pub fn joint_rates(&self, twist: &Vector6<f64>, damping: f64) -> JointVector<N> {
         damped_inverse(&self.jacobian(), twist, damping * damping)

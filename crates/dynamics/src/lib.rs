@@ -1,46 +1,25 @@
-//! Rigid-body dynamics of a serial arm that carries a needle, and the force the arm feels through its joints.
-//!
-//! ```
-//! use stylet_dynamics::{panda, Arm, Gain, JointVector, ObserverConfig, ObserverState, EARTH_GRAVITY_MPS2};
-//!
-//! # fn main() -> Result<(), stylet_dynamics::Error> {
-//! let arm = Arm::new(&panda::with_needle())?;
-//! let observer = ObserverConfig { gain_per_s: Gain::Same(5.0) }.build()?;
-//! let mut state = ObserverState::default();
-//!
-//! let at = arm.at(&panda::READY_RAD); // everything below shares the joints' sines and cosines
-//! let qd = JointVector::<7>::zeros();
-//! let holding = at.gravity_torques(&EARTH_GRAVITY_MPS2);
-//! for _ in 0..2000 {
-//!     observer.step(&mut state, &at.momentum_terms(&qd, &EARTH_GRAVITY_MPS2), &holding, 0.001)?;
-//! }
-//! let felt = at.tip_wrench(&state.residual_nm(), 1e-3);
-//! assert!(felt.along(&at.tip().rotation.column(2).into()).abs() < 1e-9); // nothing touches the tip
-//! # Ok(())
-//! # }
-//! ```
+#![doc = include_str!("../README.md")]
 //!
 //! # Frames and signs
 //! - SI units; angles in rad. All rotations map coordinates of the child frame into the parent's.
-//! - *Base frame*: the arm's foot (`panda_link0`), z up when the arm stands on a table; gravity is then
+//! - *Base frame*: base of the arm (`panda_link0`), z up when the arm stands on a table; gravity is then
 //!   [`EARTH_GRAVITY_MPS2`].
 //! - *Link frame* `i`: moves with link `i`, origin on joint `i`, z along the joint's axis. Joint angles turn
 //!   right-handed about z.
 //! - *Flange*: fixed to the last link (`panda_link8`), z out of the arm. The *tool frame* sits on it, the
 //!   *tip frame* in the tool frame; with [`panda::needle_and_sensor`] the tip's z is the needle's axis,
 //!   pointing into the tissue.
-//! - A [`Wrench`] is what the surroundings do to the arm: force on the tip and moment about the tip's origin,
-//!   both in base coordinates. The Jacobian maps joint rates to the tip's velocity (rows 0-2, m/s) and
-//!   angular velocity (rows 3-5, rad/s), also in base coordinates.
+//! - A [`Wrench`] acts on the arm: force on the tip and moment about the tip's origin, both in base coordinates. The
+//!   Jacobian maps joint rates to the tip's velocity (rows 0-2, m/s) and angular velocity (rows 3-5, rad/s), also in base coordinates.
 //! - Equation of motion: `M(q) qd' + C(q, qd) qd + g(q) = tau - tau_friction + J^T F`. The observer's
 //!   residual tends to `J^T F - tau_friction`. Tissue that resists an insertion along the unit vector `u`
-//!   pushes with `F = -f u`: the axial force of the rest of the project is `f = -wrench.along(u)`.
+//!   pushes with `F = -f u`: the axial force of the rest of the project is `f = -wrench.component_along(u)`.
 //!
 //! # Accuracy and cost
-//! `tests/promises/reference.rs` holds torques, mass matrix, Jacobian and momentum terms against Pinocchio and MuJoCo
+//! `tests/promises/reference.rs` compares torques, mass matrix, Jacobian and momentum terms with Pinocchio and MuJoCo
 //! at 1000 random states; `examples/time_observer.rs` prints the cost of one observer step;
 //! `tests/no_allocation.rs` counts allocations (only the error of a failing line check makes one). Sines and
-//! exponentials come from `libm` and all matrices have fixed sizes, so that results do not hang on the
+//! exponentials come from `libm` and all matrices have fixed sizes, so that results do not depend on the
 //! platform's maths library or CPU features.
 //!
 //! # Sources

@@ -1,8 +1,6 @@
-//! The joint-space mass matrix, and the motion that torques cause.
+//! Joint-space mass matrix.
 
-use crate::arm_posture::{JointVector, Posture};
-use crate::cholesky_solve::solve_spd;
-use crate::wrench::Wrench;
+use crate::arm_posture::Posture;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 impl<const N: usize> Posture<'_, N> {
@@ -28,7 +26,7 @@ impl<const N: usize> Posture<'_, N> {
                 matrix[(i, j)] = n.z;
                 matrix[(j, i)] = n.z;
             }
-            // The composite body as seen from the link before.
+            // The composite body in the frame of the previous link.
             let (r, o) = (&self.rotations[j], self.origin(j));
             let turned = r * first;
             first = turned + o * mass;
@@ -37,18 +35,5 @@ impl<const N: usize> Posture<'_, N> {
                 - (cross + cross.transpose()) * 0.5;
         }
         matrix
-    }
-
-    /// Joint accelerations (rad/s^2) under joint torques and a wrench on the tip: `M^-1 (tau - C qd - g + J^T
-    /// F)`.
-    pub fn forward_dynamics(
-        &self,
-        qd_radps: &JointVector<N>,
-        torque_nm: &JointVector<N>,
-        gravity_mps2: &Vector3<f64>,
-        tip: &Wrench,
-    ) -> JointVector<N> {
-        let bias = self.inverse_dynamics(qd_radps, &JointVector::zeros(), gravity_mps2, tip);
-        solve_spd(self.mass_matrix(), torque_nm - bias)
     }
 }

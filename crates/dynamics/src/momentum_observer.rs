@@ -8,7 +8,7 @@ use crate::generalized_momentum::MomentumTerms;
 /// Observer gain (1/s): the inverse of the time constant with which the residual follows an external torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum JointGain<const N: usize> {
-    /// All joints alike.
+    /// The same for all joints.
     Uniform(f64),
     /// From the base outwards.
     PerJoint([f64; N]),
@@ -18,8 +18,8 @@ pub enum JointGain<const N: usize> {
 ///
 /// `r = G (p - p(0) - int(tau + C^T(q, qd) qd - g(q) + r) ds)` with `p = M(q) qd` (De Luca and Mattone, ICRA
 /// 2005; Haddadin et al., T-RO 2017), which is `dr/dt = G (tau_ext - r)`: each residual is its joint's
-/// external torque behind a first-order low-pass of time constant `1/G`. An external wrench `F` on the tip
-/// gives `r -> J^T F`; joint friction, and whatever the model does not know, enter `tau_ext` too.
+/// external torque after a first-order low-pass of time constant `1/G`. An external wrench `F` on the tip
+/// gives `r -> J^T F`; joint friction and model errors enter `tau_ext`, too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObserverConfig<const N: usize> {
     /// Gain; 5 /s in the laboratory software of the paper.
@@ -47,7 +47,7 @@ impl<const N: usize> ObserverConfig<N> {
     }
 }
 
-/// What the observer remembers from one sample to the next.
+/// State of the observer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverState<const N: usize> {
     raw_nm: JointVector<N>,
@@ -73,25 +73,13 @@ impl<const N: usize> ObserverState<N> {
         self.raw_nm - self.offset_nm
     }
 
-    /// External joint torques as observed (N m).
-    pub fn raw_residual_nm(&self) -> JointVector<N> {
-        self.raw_nm
-    }
-
-    /// What is taken as zero (N m).
-    pub fn offset_nm(&self) -> JointVector<N> {
-        self.offset_nm
-    }
-
-    /// From the next step on, average the residual, to be taken as zero by [`ObserverState::finish_offset`].
-    /// Start when the residual has settled (a few time constants into steady motion) and end before the tip
-    /// touches anything.
+    /// Starts averaging the residual for [`ObserverState::finish_offset`]. Start a few time constants into steady motion and end before contact.
     pub fn begin_offset(&mut self) {
         self.averaging = Some((JointVector::zeros(), 0));
     }
 
-    /// Takes the average since [`ObserverState::begin_offset`] as zero and returns it (N m). Without samples
-    /// in between this is an error and the offset stays what it was.
+    /// Uses the average since [`ObserverState::begin_offset`] as offset and returns it (N m). An error, without change, when there was no step in
+    /// between.
     pub fn finish_offset(&mut self) -> Result<JointVector<N>, Error> {
         match self.averaging.take() {
             Some((sum, count)) if count > 0 => {
@@ -108,7 +96,7 @@ impl<const N: usize> ObserverState<N> {
     }
 }
 
-/// A checked observer. Immutable; its memory is an [`ObserverState`].
+/// A checked observer; its state is an [`ObserverState`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observer<const N: usize> {
     gains_per_s: [f64; N],
@@ -119,11 +107,9 @@ impl<const N: usize> Observer<N> {
     /// time since then. Returns the residual less the offset (N m). The first call sets `p(0)`. On an error
     /// the state is unchanged.
     ///
-    /// Over the interval `dt`, `C^T qd - g` is integrated by the trapezoidal rule, and the mean external
-    /// torque is what is missing in the change of momentum: `tau_ext = (p - p_previous)/dt - tau - (C^T qd -
-    /// g)`. The residual then follows it exactly as the continuous observer does for a torque constant over
-    /// the interval: `r += (1 - exp(-G dt)) (tau_ext - r)`. Stable at any gain and sampling time, and no
-    /// integral grows with the length of the run.
+    /// Over the interval `dt`, `C^T qd - g` is integrated by the trapezoidal rule, and the mean external torque is the rest of the change of
+    /// momentum: `tau_ext = (p - p_previous)/dt - tau - (C^T qd - g)`. The residual then follows it exactly as the continuous observer does for a
+    /// torque constant over the interval: `r += (1 - exp(-G dt)) (tau_ext - r)`. Stable at any gain and sampling time; no integral grows with time.
     pub fn step(
         &self,
         state: &mut ObserverState<N>,

@@ -28,7 +28,7 @@ pub const READY_RAD: JointVector<7> = JointVector::<7>::from_array_storage(Array
     FRAC_PI_4,
 ]]));
 
-/// Needle: mass, length, centre of mass from its base (SPEC section 4, laboratory software of the paper).
+/// Needle: mass, length, centre of mass from its base (laboratory software of the paper).
 pub const NEEDLE_MASS_KG: f64 = 0.068;
 /// See [`NEEDLE_MASS_KG`].
 pub const NEEDLE_LENGTH_M: f64 = 0.153;
@@ -43,7 +43,7 @@ pub const SENSOR_RADIUS_M: f64 = 0.0225;
 /// Radius of the homogeneous rod that gives the needle and its holder their inertia (assumed).
 pub const NEEDLE_RADIUS_M: f64 = 0.003;
 
-/// The arm with a bare flange.
+/// The arm without a tool.
 pub fn without_tool() -> ArmModel<7> {
     let large =
         |lower_rad, upper_rad| JointLimits { lower_rad, upper_rad, velocity_radps: 2.175, torque_nm: 87.0 };
@@ -61,7 +61,7 @@ pub fn without_tool() -> ArmModel<7> {
                 limits: large(-2.8973, 2.8973),
             },
             Link {
-                placement: turned_back([0.0, 0.0, 0.0]),
+                placement: rotated_back([0.0, 0.0, 0.0]),
                 body: body(
                     0.646926,
                     [-0.003141, -0.02872, 0.003495],
@@ -70,7 +70,7 @@ pub fn without_tool() -> ArmModel<7> {
                 limits: large(-1.7628, 1.7628),
             },
             Link {
-                placement: turned([0.0, -0.316, 0.0]),
+                placement: rotated([0.0, -0.316, 0.0]),
                 body: body(
                     3.228604,
                     [0.027518, 0.039252, -0.066502],
@@ -79,7 +79,7 @@ pub fn without_tool() -> ArmModel<7> {
                 limits: large(-2.8973, 2.8973),
             },
             Link {
-                placement: turned([0.0825, 0.0, 0.0]),
+                placement: rotated([0.0825, 0.0, 0.0]),
                 body: body(
                     3.587895,
                     [-0.05317, 0.104419, 0.027454],
@@ -88,7 +88,7 @@ pub fn without_tool() -> ArmModel<7> {
                 limits: large(-3.0718, -0.0698),
             },
             Link {
-                placement: turned_back([-0.0825, 0.384, 0.0]),
+                placement: rotated_back([-0.0825, 0.384, 0.0]),
                 body: body(
                     1.225946,
                     [-0.011953, 0.041065, -0.038437],
@@ -97,7 +97,7 @@ pub fn without_tool() -> ArmModel<7> {
                 limits: small(-2.8973, 2.8973),
             },
             Link {
-                placement: turned([0.0, 0.0, 0.0]),
+                placement: rotated([0.0, 0.0, 0.0]),
                 body: body(
                     1.666555,
                     [0.060149, -0.014117, -0.010517],
@@ -106,7 +106,7 @@ pub fn without_tool() -> ArmModel<7> {
                 limits: small(-0.0175, 3.7525),
             },
             Link {
-                placement: turned([0.088, 0.0, 0.0]),
+                placement: rotated([0.088, 0.0, 0.0]),
                 body: body(
                     0.735522,
                     [0.010517, -0.004252, 0.061597],
@@ -141,7 +141,7 @@ pub fn needle_and_sensor() -> Tool {
     }
 }
 
-/// [`bare`] with [`needle_and_sensor`].
+/// [`without_tool`] with [`needle_and_sensor`].
 pub fn with_needle() -> ArmModel<7> {
     without_tool().with_tool(needle_and_sensor())
 }
@@ -177,16 +177,16 @@ pub fn directional_friction() -> JointFriction<7> {
     JointFriction { joints, sign: SmoothSign::default() }
 }
 
-/// Turned by +90 degrees about x (exactly).
-fn turned(position_m: [f64; 3]) -> Pose {
+/// Rotated by +90 degrees about x (exactly).
+fn rotated(position_m: [f64; 3]) -> Pose {
     Pose {
         rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0),
         position_m: Vector3::from(position_m),
     }
 }
 
-/// Turned by -90 degrees about x (exactly).
-fn turned_back(position_m: [f64; 3]) -> Pose {
+/// Rotated by -90 degrees about x (exactly).
+fn rotated_back(position_m: [f64; 3]) -> Pose {
     Pose {
         rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
         position_m: Vector3::from(position_m),

@@ -1,4 +1,4 @@
-//! Where one frame stands in another.
+//! Pose of a frame in another.
 
 use crate::error::{Error, check};
 use nalgebra::{Matrix3, Vector3};
@@ -30,27 +30,9 @@ impl Pose {
         Self { rotation: Self::IDENTITY.rotation, position_m: Vector3::new(x_m, y_m, z_m) }
     }
 
-    /// URDF convention: turn about the parent's x by `roll`, then its y by `pitch`, then its z by `yaw`;
-    /// origin at `position_m`.
-    pub fn from_rpy(position_m: Vector3<f64>, roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> Self {
-        let (sr, cr) = libm::sincos(roll_rad);
-        let (sp, cp) = libm::sincos(pitch_rad);
-        let (sy, cy) = libm::sincos(yaw_rad);
-        let x = Matrix3::new(1.0, 0.0, 0.0, 0.0, cr, -sr, 0.0, sr, cr);
-        let y = Matrix3::new(cp, 0.0, sp, 0.0, 1.0, 0.0, -sp, 0.0, cp);
-        let z = Matrix3::new(cy, -sy, 0.0, sy, cy, 0.0, 0.0, 0.0, 1.0);
-        Self { rotation: z * y * x, position_m }
-    }
-
     /// The grandchild's pose in this frame's parent.
     pub fn compose(&self, child: &Self) -> Self {
         Self { rotation: self.rotation * child.rotation, position_m: self.transform_point(&child.position_m) }
-    }
-
-    /// The parent's pose in the child.
-    pub fn inverse(&self) -> Self {
-        let rotation = self.rotation.transpose();
-        Self { rotation, position_m: -(rotation * self.position_m) }
     }
 
     /// A point given in child coordinates, in parent coordinates.
@@ -58,7 +40,7 @@ impl Pose {
         self.rotation * child_m + self.position_m
     }
 
-    /// Turn from this orientation to `target` as a rotation vector in parent coordinates (rad; length 0 to
+    /// Rotation from this orientation to `target` as a rotation vector in parent coordinates (rad; length 0 to
     /// pi).
     pub fn rotation_vector_to(&self, target: &Self) -> Vector3<f64> {
         rotation_vector(&(target.rotation * self.rotation.transpose()))

@@ -22,7 +22,7 @@ impl Default for RigidBody {
 }
 
 impl RigidBody {
-    /// No mass at all.
+    /// A body without mass.
     pub const MASSLESS: Self = Self {
         mass_kg: 0.0,
         com_m: Vector3::new(0.0, 0.0, 0.0),
@@ -45,7 +45,7 @@ impl RigidBody {
         }
     }
 
-    /// Both bodies, given in the same frame, fixed to each other.
+    /// Both bodies, given in the same frame, rigidly connected.
     pub fn combined(&self, other: &Self) -> Self {
         let mass_kg = self.mass_kg + other.mass_kg;
         if mass_kg == 0.0 {

@@ -1,4 +1,4 @@
-//! Inverse dynamics: the joint torques that a motion takes.
+//! Inverse dynamics and gravity torques by the recursive Newton-Euler algorithm.
 
 use crate::arm_posture::{JointVector, Posture};
 use crate::wrench::Wrench;
@@ -8,8 +8,7 @@ impl<const N: usize> Posture<'_, N> {
     /// `tau = M(q) qdd + C(q, qd) qd + g(q) - J^T F` (N m), without joint friction.
     ///
     /// Recursive Newton-Euler algorithm in link frames (Luh, Walker and Paul 1980; RBDA table 5.1). Gravity
-    /// enters as an upward acceleration of the base. `gravity_mps2` and `tip` (what the surroundings do to
-    /// the tip) in base coordinates.
+    /// enters as an upward acceleration of the base. `gravity_mps2` and `tip` (wrench on the tip) in base coordinates.
     pub fn inverse_dynamics(
         &self,
         qd_radps: &JointVector<N>,
@@ -50,11 +49,6 @@ impl<const N: usize> Posture<'_, N> {
             n = self.rotations[i] * n + self.origin(i).cross(&f);
         }
         tau
-    }
-
-    /// Coriolis, centrifugal and gravity torques `C(q, qd) qd + g(q)` (N m).
-    pub fn bias_torques(&self, qd_radps: &JointVector<N>, gravity_mps2: &Vector3<f64>) -> JointVector<N> {
-        self.inverse_dynamics(qd_radps, &JointVector::zeros(), gravity_mps2, &Wrench::default())
     }
 
     /// `g(q)` (N m): the torques that hold the arm still. A single backward pass over the first moments of

@@ -1,4 +1,4 @@
-//! How far the arm is from a pose in which its tip is stuck (or numb) in some direction.
+//! Singular values of the tip Jacobian: distance from singular poses.
 
 use crate::arm_posture::Posture;
 use nalgebra::SVector;
@@ -12,19 +12,9 @@ pub struct SingularValues {
 }
 
 impl SingularValues {
-    /// The smallest one the arm can have: of six, or of as many as there are joints.
+    /// The smallest of six, or of as many as there are joints.
     pub fn smallest(&self) -> f64 {
         self.sorted[self.rank - 1]
-    }
-
-    /// Largest over smallest.
-    pub fn condition(&self) -> f64 {
-        self.sorted[0] / self.smallest()
-    }
-
-    /// `sqrt(det(J J^T))` (Yoshikawa 1985).
-    pub fn manipulability(&self) -> f64 {
-        self.sorted.iter().product()
     }
 }
 

@@ -1,4 +1,4 @@
-//! The wrench on the tip that explains given joint torques.
+//! Wrench on the tip from external joint torques, and back.
 
 use crate::arm_posture::{JointVector, Posture};
 use crate::cholesky_solve::solve_spd;
@@ -21,8 +21,8 @@ impl<const N: usize> Posture<'_, N> {
         Wrench::from_vector(&solve_spd(normal, j * residual_nm))
     }
 
-    /// The same with the knowledge that no moment acts about the tip's origin: three unknowns instead of six,
-    /// so that errors of the joint torques (friction) spread less. Damping in metres.
+    /// The same under the assumption that no moment acts about the tip's origin: three unknowns instead of six, less sensitive to errors of the joint
+    /// torques. Damping in metres.
     pub fn tip_point_force(&self, residual_nm: &JointVector<N>, damping_m: f64) -> Vector3<f64> {
         let j = self.jacobian();
         let j = j.fixed_rows::<3>(0);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector3, Vector6};
 
-/// What the surroundings do to the tip: base coordinates, moment about the tip's origin.
+/// Wrench on the tip in base coordinates, moment about the tip's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
     /// Force on the tip.

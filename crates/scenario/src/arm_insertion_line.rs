@@ -1,5 +1,4 @@
-//! The arm's way along the insertion: start pose, line, approach, and when the virtual sensor is
-//! zeroed; everything that can be checked before a run.
+//! Insertion line of the arm: start pose, direction, approach and zeroing window of the virtual sensor, checked before a simulation.
 
 use crate::load_ron::FieldError;
 use crate::motion::MotionPoint;
@@ -10,12 +9,12 @@ use nalgebra::{Matrix3, Vector3};
 use stylet_dynamics::feasibility::{self, LineConfig};
 use stylet_dynamics::{Arm, Error, JointVector, Pose};
 
-/// Time constants of the slowest observer that pass before a residual counts as settled.
-const SETTLED: f64 = 6.0;
+/// Time constants of the slowest observer after which a residual counts as settled.
+const SETTLING_TIME_CONSTANTS: f64 = 6.0;
 /// Shortest approach, s: the disturbance observer of the arm's control settles in it.
-const LEAST_APPROACH_S: f64 = 0.5;
+const MIN_APPROACH_S: f64 = 0.5;
 
-/// Where and how the arm carries the needle.
+/// Line along which the arm inserts the needle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmInsertionLine {
     /// Joint angles with the tip at the motion's start, rad.
@@ -24,13 +23,13 @@ pub struct ArmInsertionLine {
     pub start: Pose,
     /// Insertion direction, base frame, unit vector.
     pub direction: Vector3<f64>,
-    /// What happens before time zero.
+    /// Motion before time zero.
     pub approach: Approach,
-    /// From when until when the residual is averaged to be taken as zero, s; negative in the approach.
+    /// Start and end of the window in which the residual is averaged, s; negative times lie in the approach.
     pub zero_window_s: Option<(f64, f64)>,
 }
 
-/// The arm's motion before time zero, in the air.
+/// Motion of the arm in air, before time zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
     /// Duration in s.
@@ -40,7 +39,7 @@ pub struct Approach {
 }
 
 impl ArmInsertionLine {
-    /// Where the tip is to be at `time_s`, which may be before time zero.
+    /// Commanded point at `time_s`, which may be negative.
     #[inline]
     #[must_use]
     pub fn commanded_at(&self, plan: &MotionPlan, time_s: f64) -> MotionPoint {
@@ -54,12 +53,11 @@ impl ArmInsertionLine {
 }
 
 impl ArmConfig {
-    /// The way for a motion: start pose and the whole line are within the joints' limits, without a
-    /// jump and away from singular poses. `surface_m` is where the tissue begins, `sample_hz` how
-    /// finely the motion is looked at.
+    /// Line for a motion. Start pose and line are within the joint limits, without jumps and away from singular poses. The tissue starts at
+    /// `surface_m`; the motion is sampled at `sample_hz`.
     ///
     /// # Errors
-    /// A [`Problem`] with the path of the field that is to be changed.
+    /// A [`FieldError`] with the path of the field to change.
     pub fn insertion_line(
         &self,
         plan: &MotionPlan,
@@ -85,7 +83,7 @@ impl ArmConfig {
         }
         let config = LineConfig { speed_mps: speed, ..LineConfig::default() };
         let at = |z: f64| start.position_m + direction * (z - first.position_m);
-        let follow = |to_m: f64, near: &JointVector<7>, way: &str| {
+        let follow = |to_m: f64, near: &JointVector<7>, part: &str| {
             feasibility::follow_line(&arm, &start, &at(to_m), near, &config).map_err(|error| {
                 let remedy = match root(&error) {
                     Error::Singular { .. } | Error::Jump { .. } => "start from other joint angles",
@@ -93,14 +91,14 @@ impl ArmConfig {
                     _ => "start nearer to the middle of the arm's reach, or move less far",
                 };
                 FieldError::new(
-                    self.blame(),
-                    format!("the arm cannot carry the needle {way}: {error}; {remedy}"),
+                    self.field_to_change(),
+                    format!("the arm cannot carry the needle {part}: {error}; {remedy}"),
                 )
             })
         };
         let forward = follow(high, &near, "to the end of the motion")?;
         follow(low, &forward.start_rad, "along the approach")?;
-        // What the joint angles really make of it, so that the run starts without an error.
+        // The pose of these joint angles, so that the simulation starts without an error.
         start = arm.at(&forward.start_rad).tip();
         direction = start.rotation.column(2).into_owned();
         Ok(ArmInsertionLine {
@@ -112,7 +110,7 @@ impl ArmConfig {
         })
     }
 
-    /// Pose of the tip at the motion's start and the insertion direction, as asked for.
+    /// Requested pose of the tip at the start of the motion, and insertion direction.
     fn start_pose(&self, arm: &Arm<7>) -> Result<(Pose, Vector3<f64>), FieldError> {
         let near = JointVector::<7>::from(self.start_rad);
         feasibility::check_joint_positions(arm, &near).map_err(|error| match &error {
@@ -140,12 +138,12 @@ impl ArmConfig {
                 way / length
             }
         };
-        pose.rotation = turn(&axis, &direction) * pose.rotation;
+        pose.rotation = rotation_between(&axis, &direction) * pose.rotation;
         Ok((pose, direction))
     }
 
-    /// The field that most likely has to be changed when the line fails.
-    fn blame(&self) -> &'static str {
+    /// The field that most likely has to be changed when the line is not feasible.
+    fn field_to_change(&self) -> &'static str {
         match (self.tip_m, self.direction) {
             (Some(_), _) => "robot.tip_m",
             (None, Some(_)) => "robot.direction",
@@ -161,7 +159,7 @@ fn root(error: &Error) -> &Error {
     }
 }
 
-/// When the planned motion first comes to the surface, s; zero when it starts there or beyond.
+/// Time at which the commanded motion reaches the surface, s.
 fn contact_s(plan: &MotionPlan, surface_m: f64, sample_hz: f64) -> f64 {
     let samples = (plan.duration_s() * sample_hz).round() as usize;
     (0..=samples)
@@ -170,38 +168,38 @@ fn contact_s(plan: &MotionPlan, surface_m: f64, sample_hz: f64) -> f64 {
         .unwrap_or_else(|| plan.duration_s())
 }
 
-/// The approach and the window in which the virtual sensor is zeroed.
+/// Approach and zeroing window of the virtual sensor.
 fn approach(
     first: &MotionPoint,
     contact_s: f64,
     sensor: Option<&VirtualSensor>,
 ) -> (Approach, Option<(f64, f64)>) {
     let moving = first.velocity_mps.max(0.0);
-    let still = Approach { duration_s: LEAST_APPROACH_S, velocity_mps: moving };
+    let still = Approach { duration_s: MIN_APPROACH_S, velocity_mps: moving };
     let Some(sensor) = sensor else { return (still, None) };
-    let settle_s = SETTLED / sensor.gain_per_s.smallest();
+    let settle_s = SETTLING_TIME_CONSTANTS / sensor.gain_per_s.smallest();
     match sensor.zero {
         ZeroWindow::BeforeContact { lead_s, average_s } => {
             let until_s = contact_s - lead_s;
             let from_s = until_s - average_s;
-            let duration_s = LEAST_APPROACH_S.max(settle_s - from_s);
+            let duration_s = MIN_APPROACH_S.max(settle_s - from_s);
             (Approach { duration_s, ..still }, Some((from_s, until_s)))
         }
         ZeroWindow::AtRest { average_s } => {
-            let duration_s = LEAST_APPROACH_S.max(settle_s + average_s);
+            let duration_s = MIN_APPROACH_S.max(settle_s + average_s);
             (Approach { duration_s, velocity_mps: 0.0 }, Some((-average_s, 0.0)))
         }
-        ZeroWindow::Never => (Approach { duration_s: LEAST_APPROACH_S.max(settle_s), ..still }, None),
+        ZeroWindow::Never => (Approach { duration_s: MIN_APPROACH_S.max(settle_s), ..still }, None),
     }
 }
 
-/// The least rotation that turns the unit vector `from` into `to`.
-fn turn(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
+/// The smallest rotation that maps the unit vector `from` to `to`.
+fn rotation_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
     let (axis, cosine) = (from.cross(to), from.dot(to));
     if cosine < -1.0 + 1e-12 {
-        // Half a turn about any axis across.
-        let across = if from.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-        let n = (across - from * from.dot(&across)).normalize();
+        // Half a turn about any perpendicular axis.
+        let perpendicular = if from.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+        let n = (perpendicular - from * from.dot(&perpendicular)).normalize();
         return n * n.transpose() * 2.0 - Matrix3::identity();
     }
     let k = axis.cross_matrix();
@@ -213,10 +211,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_turn_brings_one_axis_onto_the_other_and_stays_a_rotation() {
+    fn the_rotation_maps_one_axis_to_the_other() {
         let z = Vector3::new(0.0, 0.0, -1.0);
         for to in [z, -z, Vector3::x(), Vector3::new(0.3, -0.5, 0.2).normalize()] {
-            let r = turn(&z, &to);
+            let r = rotation_between(&z, &to);
             assert!((r * z - to).norm() < 1e-12);
             assert!((r.transpose() * r - Matrix3::identity()).amax() < 1e-12);
             assert!((r.determinant() - 1.0).abs() < 1e-12);

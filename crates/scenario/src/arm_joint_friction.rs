@@ -1,12 +1,11 @@
-//! Joint friction of the arm, as a scenario writes it.
+//! Joint friction of the arm, as in scenarios.
 
 use serde::{Deserialize, Serialize};
 use stylet_dynamics::friction::{FrictionLaw, JointFriction, SmoothSign};
 use stylet_dynamics::panda;
 
-/// Joint friction, positive at positive rate. The motors' inner loops overcome it, so that the arm
-/// moves as if it were not there; the measured joint torques contain it, so that the virtual sensor
-/// takes it for an external force.
+/// Joint friction, positive at positive rate. The inner loops of the motors compensate it: it does not act on the motion, but the measured joint
+/// torques contain it, and the virtual sensor reports it as external force.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum ArmFriction {
@@ -35,9 +34,9 @@ pub enum ArmFriction {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CoulombViscous {
-    /// Torque at the slightest motion, N m.
+    /// Coulomb torque, N m.
     pub coulomb_nm: f64,
-    /// Rise with the rate, N m s/rad.
+    /// Viscous coefficient, N m s/rad.
     pub viscous_nms_per_rad: f64,
 }
 
@@ -54,7 +53,7 @@ pub struct Sigmoid {
 }
 
 impl ArmFriction {
-    /// The laws of all joints, multiplied by `scale`.
+    /// The friction of all joints, multiplied by `scale`.
     #[must_use]
     pub fn friction_models(&self, scale: f64) -> JointFriction<7> {
         let sign = SmoothSign::default();

@@ -1,11 +1,11 @@
-//! The configuration of `stylet enhance`: how the core is set for measured data.
+//! The settings file of `stylet enhance --config`.
 
 use crate::input_error::InputError;
 use crate::load_ron::{parse, read_text};
+use crate::range_checks::finite;
 use crate::ron_outline::RonOutline;
 use crate::scenario::Scenario;
 use crate::validate_enhancer::enhance;
-use crate::validate_scenario::finite;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_core::EnhanceConfig;
@@ -15,9 +15,9 @@ use stylet_core::config::{
 };
 use stylet_tissue::{AnyEffect, Tissue};
 
-/// Where the surface is, and the core's configuration.
+/// Surface position and settings of the online algorithm.
 ///
-/// In a file it is written flat, `Enhance(surface_m: 0.01, contact: Known, model: MultiLayer)`; a
+/// In a file the fields are flat, `Enhance(surface_m: 0.01, contact: Known, model: MultiLayer)`; a
 /// scenario file serves as well.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Flat", into = "Flat")]
@@ -57,8 +57,8 @@ impl EnhancerConfigFile {
     }
 }
 
-/// The friction law that a scenario's effects describe, as `extended.ron` of a diagnosis has them: dry friction relative to the mean viscous
-/// friction of the layers. `Auto` without dry friction, or when nothing is viscous.
+/// The friction law of a scenario's effects: dry friction relative to the mean viscous friction of the layers. `Auto` without dry or without viscous
+/// friction.
 fn friction_law(tissue: &Tissue, effects: &[AnyEffect]) -> FrictionLaw {
     let (mut dry, mut travel_m) = (0.0, 0.0f64);
     for effect in effects {
@@ -85,14 +85,14 @@ fn friction_law(tissue: &Tissue, effects: &[AnyEffect]) -> FrictionLaw {
     }
 }
 
-/// By its name, or by the fields that only a scenario has.
+/// Recognised by its name, or by fields of scenarios only.
 fn is_scenario(text: &str) -> bool {
     let outline = RonOutline::new(text);
     let named = outline.entries.first().is_some_and(|whole| text[whole.start..].starts_with("Scenario"));
     named || ["tissue", "motion"].into_iter().any(|field| outline.locate(field).is_some())
 }
 
-/// The form in the file: the fields of [`EnhanceConfig`] and the surface side by side.
+/// Form in the file: the fields of [`EnhanceConfig`] and the surface.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Enhance", default, deny_unknown_fields)]
 struct Flat {
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_an_enhance_file_is_said_with_its_place() {
+    fn errors_of_a_settings_file_name_their_location() {
         for (text, expected) in [
             (
                 "Enhance(forgetting: 1.5)",
@@ -194,8 +194,8 @@ mod tests {
             ),
             ("Enhanc()", "e.ron:1:1: this is a `Enhanc`, where a `Enhance` is expected"),
         ] {
-            let said = EnhancerConfigFile::parse("e.ron", text).expect_err(text).to_string();
-            assert!(said.starts_with(expected), "{said}");
+            let message = EnhancerConfigFile::parse("e.ron", text).expect_err(text).to_string();
+            assert!(message.starts_with(expected), "{message}");
         }
     }
 }

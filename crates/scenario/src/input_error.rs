@@ -1,17 +1,16 @@
-//! What is wrong with an input file, where, and what would be right.
+//! Errors of input files: location, cause and remedy.
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use std::sync::Arc;
 
-/// An input file that cannot be used. The message names file, line and column, what is wrong and
-/// what would be right; rendered by `miette` it shows the place in the source.
+/// An input file that cannot be used. The message names file, line, column, cause and remedy; rendered by `miette` it shows the source line.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 #[error("{location}: {message}")]
 #[diagnostic(code(stylet::input))]
 pub struct InputError {
     /// File, and line and column when they are known: `name.ron:12:5`.
     pub location: String,
-    /// What is wrong and what would be right.
+    /// Cause and remedy.
     pub message: String,
     /// Line and column, from 1.
     pub position: Option<(usize, usize)>,
@@ -53,16 +52,16 @@ impl InputError {
     }
 }
 
-/// Longest line, in bytes, that is shown with an error: a label in column 70 000 helps nobody, and what draws it gives up there.
-const LONGEST_LINE: usize = 1000;
-/// Lines around the place that are shown too.
-const AROUND: usize = 1;
+/// Longest line, in bytes, that is shown with an error; `miette` cannot render longer ones.
+const MAX_SHOWN_LINE_BYTES: usize = 1000;
+/// Lines shown before and after the location.
+const CONTEXT_LINES: usize = 1;
 
-/// Whether the lines about the bytes `start..end` are short enough to be shown; without them line and column stand in the message.
+/// Whether the lines around the bytes `start..end` are short enough to be shown.
 fn fits_a_screen(text: &str, start: usize, end: usize) -> bool {
-    let first = text[..start].matches('\n').count().saturating_sub(AROUND);
-    let last = text[..end].matches('\n').count() + AROUND;
-    text.split('\n').take(last + 1).skip(first).all(|line| line.len() <= LONGEST_LINE)
+    let first = text[..start].matches('\n').count().saturating_sub(CONTEXT_LINES);
+    let last = text[..end].matches('\n').count() + CONTEXT_LINES;
+    text.split('\n').take(last + 1).skip(first).all(|line| line.len() <= MAX_SHOWN_LINE_BYTES)
 }
 
 fn floor_char_boundary(text: &str, index: usize) -> usize {
@@ -80,8 +79,7 @@ pub(crate) fn offset(text: &str, line: usize, column: usize) -> usize {
     start + rest.char_indices().nth(column.saturating_sub(1)).map_or(rest.len(), |(i, _)| i)
 }
 
-/// The known name closest to a misspelt one, when it is close enough to be meant: few letters
-/// differ, or one is the other without its unit.
+/// The known name closest to a misspelt one: few letters differ, or one is the beginning of the other.
 #[must_use]
 pub fn closest_name<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
     let lower = wrong.to_lowercase();

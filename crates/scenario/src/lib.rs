@@ -1,15 +1,4 @@
-//! The scenario: what is inserted into what, how, and what listens (SPEC section 8).
-//!
-//! ```
-//! let text = r#"Scenario(
-//!     name: "one gel",
-//!     tissue: (layers: [(thickness_m: 0.03, stiffness_n_per_m: 40.0, friction_ns_per_m2: 9000.0)]),
-//!     motion: Constant(start_m: -0.005, velocity_mps: 0.0023, duration_s: 20.0),
-//! )"#;
-//! let scenario = stylet_scenario::Scenario::parse("gel.ron", text)?;
-//! assert_eq!(scenario.sample_hz, 200.0);
-//! # Ok::<(), stylet_scenario::InputError>(())
-//! ```
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod arm_insertion_line;
@@ -21,6 +10,8 @@ mod motion;
 mod motion_plan;
 mod observer_gain;
 mod parse_error_message;
+mod range_checks;
+mod renamed_names;
 mod robot_config;
 mod ron_outline;
 mod ron_tokens;
@@ -42,8 +33,9 @@ pub use load_ron::{FieldError, load, motion_to_ron, parse, read_text, ron_option
 pub use motion::{Motion, MotionPoint, PHASE_FROM_REST_RAD, Segment};
 pub use motion_plan::MotionPlan;
 pub use observer_gain::ObserverGain;
+pub use renamed_names::{renamed_flag, renamed_json_key, renamed_path, renamed_ron_name};
 pub use robot_config::{ArmConfig, ArmController, Robot};
 pub use scenario::Scenario;
-pub use scenario_reference::scenario_reference;
+pub use scenario_reference::{effect_line, effects_page, effects_table, scenario_page};
 pub use sensor_config::{ForceTorque, Sensor, VirtualSensor, WrenchEstimate, ZeroWindow};
 pub use unused_settings::unused_settings;

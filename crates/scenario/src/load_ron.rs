@@ -1,4 +1,4 @@
-//! Reading RON files: every failure becomes an [`InputError`] with its place.
+//! Reading RON files. Every failure is an [`InputError`] with its location.
 
 use crate::input_error::InputError;
 use crate::parse_error_message::explain_parse_error;
@@ -8,44 +8,42 @@ use serde::de::DeserializeOwned;
 use std::io::Read;
 use std::path::Path;
 
-/// Longer files, in bytes, are not read.
-const LONGEST: u64 = 4 << 20;
+/// Longest file that is read, in bytes.
+const MAX_FILE_BYTES: u64 = 4 << 20;
 
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-/// The RON dialect of Stylet's files: `Some` may be left out, effects and sensors are written with
-/// one pair of brackets.
+/// The RON dialect of all files: `Some` may be left out, effects and sensors take one pair of brackets.
 #[must_use]
 pub fn ron_options() -> ron::Options {
     ron::Options::default()
         .with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
 }
 
-/// A number or list that parses but is out of range: the path of the field and what would be right.
+/// A value that parses but is out of range: path of the field, cause and remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FieldError {
     /// Path such as `tissue.layers[1].thickness_m`.
     pub path: String,
-    /// Another field that is part of the problem, shown when the first is a default.
+    /// Another field involved, shown when the first is a default.
     pub related_path: Option<String>,
-    /// What is wrong and what would be right.
+    /// Cause and remedy.
     pub message: String,
 }
 
 impl FieldError {
-    /// A problem with the field at `path`.
+    /// An error of the field at `path`.
     pub fn new(path: impl Into<String>, what: impl Into<String>) -> Self {
         Self { path: path.into(), related_path: None, message: what.into() }
     }
 
-    /// The problem lies as much with the field at `path`.
+    /// The field at `path` is involved, too.
     #[must_use]
     pub fn with_related(self, path: impl Into<String>) -> Self {
         Self { related_path: Some(path.into()), ..self }
     }
 
-    /// The problem as an error that shows its place in `text`; only the path when the text does not
-    /// hold the field.
+    /// The error with its location in `text`; the path alone when the text does not contain the field.
     #[must_use]
     pub fn in_file(&self, file: &str, text: &str) -> InputError {
         let outline = RonOutline::new(text);
@@ -70,7 +68,7 @@ impl core::fmt::Display for FieldError {
 
 impl core::error::Error for FieldError {}
 
-/// Reads a text file, refusing what is not one.
+/// Reads a text file.
 ///
 /// # Errors
 /// [`InputError`] when the file is missing, a directory, empty, or not UTF-8 text.
@@ -93,9 +91,9 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
     };
     let opened = std::fs::File::open(path).map_err(|e| unreadable(&e))?;
     let mut bytes = Vec::new();
-    opened.take(LONGEST + 1).read_to_end(&mut bytes).map_err(|e| unreadable(&e))?;
-    if bytes.len() as u64 > LONGEST {
-        let what = format!("is longer than {} MB; RON files here are a few kB of text", LONGEST >> 20);
+    opened.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| unreadable(&e))?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        let what = format!("is longer than {} MB; RON files here are a few kB of text", MAX_FILE_BYTES >> 20);
         return Err(InputError::file(&file, what));
     }
     text(&file, bytes)
@@ -135,7 +133,7 @@ pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputErro
     ron_options().from_str(text).map_err(|error| explain_parse_error(file, text, &error))
 }
 
-/// A motion as RON in the dialect of scenarios: a file that [`load`] reads again.
+/// A motion as RON, readable by [`load`].
 ///
 /// # Errors
 /// When a value cannot be written as RON.

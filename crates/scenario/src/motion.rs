@@ -1,6 +1,5 @@
-//! Motions of the needle as a scenario writes them.
+//! Commanded motions of the needle, as in scenarios.
 
-use crate::motion_plan::MotionPlan;
 use serde::{Deserialize, Serialize};
 
 /// Default phase of a sinusoid in radians: -90 degrees, from rest.
@@ -10,11 +9,11 @@ fn from_rest() -> f64 {
     PHASE_FROM_REST_RAD
 }
 
-/// A motion along the insertion axis (SPEC sections 3 and 8).
+/// A motion along the insertion axis (`docs/reference/model.md`, *Motions*).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Motion {
-    /// One speed throughout.
+    /// Constant velocity.
     Constant {
         /// Tip position at time zero in m.
         start_m: f64,
@@ -23,7 +22,7 @@ pub enum Motion {
         /// Duration in s.
         duration_s: f64,
     },
-    /// `z = start + A (sin(2 pi f t + phase) - sin phase)`.
+    /// `z = start + A (sin(2 pi f t + phase) - sin phase)`; with the default phase the tip travels `2 A` between its turning points.
     Sinusoidal {
         /// Tip position at time zero in m.
         start_m: f64,
@@ -48,24 +47,23 @@ pub enum Motion {
     Recorded,
 }
 
-/// A piece of a program.
+/// A segment of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Segment {
-    /// One speed; a negative one retracts.
+    /// Constant velocity; negative retracts.
     Move {
         /// Speed in m/s.
         velocity_mps: f64,
         /// Duration in s.
         duration_s: f64,
     },
-    /// Standing still.
+    /// Standstill.
     Hold {
         /// Duration in s.
         duration_s: f64,
     },
-    /// A mean speed with a sinusoid on it: `v = velocity + amplitude sin(2 pi f t)` from the
-    /// segment's start.
+    /// Mean velocity plus sinusoid, `v = velocity + amplitude sin(2 pi f t)` from the start of the segment.
     Ripple {
         /// Mean speed in m/s.
         velocity_mps: f64,
@@ -108,7 +106,7 @@ impl Segment {
         }
     }
 
-    /// Deepest displacement from the segment's start in m, the start included.
+    /// Largest displacement from the start of the segment in m, at least zero.
     pub(crate) fn furthest_m(&self) -> f64 {
         let end = self.duration_s();
         let deepest = self.at(end).position_m.max(0.0);
@@ -132,7 +130,7 @@ impl Segment {
     }
 }
 
-/// Where the tip is and how it moves at one instant.
+/// Position, velocity and acceleration of the tip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionPoint {
     /// Position in m.
@@ -141,12 +139,4 @@ pub struct MotionPoint {
     pub velocity_mps: f64,
     /// Acceleration in m/s².
     pub acceleration_mps2: f64,
-}
-
-impl Motion {
-    /// The plan of the motion; `None` for [`Motion::Recorded`], which has none of its own.
-    #[must_use]
-    pub fn plan(&self) -> Option<MotionPlan> {
-        MotionPlan::new(self)
-    }
 }

@@ -9,7 +9,7 @@ use stylet_dynamics::JointGain;
 /// outwards. The residual follows an external torque with the time constant `1/gain`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ObserverGain {
-    /// All joints alike.
+    /// The same for all joints.
     Uniform(f64),
     /// From the base outwards.
     PerJoint([f64; 7]),
@@ -95,7 +95,7 @@ mod tests {
     use crate::load_ron::ron_options;
 
     #[test]
-    fn a_number_or_seven_are_read_and_written_back_alike() {
+    fn one_number_or_seven_are_read_and_written_back() {
         for (text, gain) in [
             ("5.0", ObserverGain::Uniform(5.0)),
             ("50", ObserverGain::Uniform(50.0)),

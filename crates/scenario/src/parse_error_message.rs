@@ -1,16 +1,17 @@
-//! What RON's parser says, in words that name the field and what would be right.
+//! Messages for RON syntax errors that name the field and the remedy.
 
 use crate::input_error::{InputError, closest_name, offset};
+use crate::renamed_names::renamed_ron_name;
 use crate::ron_outline::RonOutline;
 use crate::ron_tokens::{TokenKind, tokenize};
 use ron::error::{Error, SpannedError};
 
-/// The error with its place in the text.
+/// The error with its location and message.
 pub(crate) fn explain_parse_error(file: &str, text: &str, error: &SpannedError) -> InputError {
     let outline = RonOutline::new(text);
     let start = offset(text, error.span.start.line, error.span.start.col);
     let end = offset(text, error.span.end.line, error.span.end.col);
-    let place = Place { text, outline: &outline, start, end };
+    let place = ErrorLocation { text, outline: &outline, start, end };
     let (start, end, what) = place.explain(&error.code);
     InputError::at(file, text, start, end, what)
 }
@@ -21,13 +22,16 @@ fn list(names: &[&str]) -> String {
 
 fn suggestion(found: &str, expected: &[&str]) -> String {
     let known = list(expected);
+    if let Some(renamed) = renamed_ron_name(found, expected) {
+        return renamed;
+    }
     match closest_name(found, expected) {
         Some(near) => format!("did you mean `{near}`? Known: {known}"),
         None => format!("known: {known}"),
     }
 }
 
-/// ` of `Layer``, or nothing; the list of effects goes by the name it has in a scenario.
+/// ` of `Layer``, or nothing; effects are named as in scenarios.
 fn within(outer: Option<&String>) -> String {
     match outer.map(String::as_str) {
         None => String::new(),
@@ -36,14 +40,14 @@ fn within(outer: Option<&String>) -> String {
     }
 }
 
-struct Place<'a> {
+struct ErrorLocation<'a> {
     text: &'a str,
     outline: &'a RonOutline,
     start: usize,
     end: usize,
 }
 
-impl Place<'_> {
+impl ErrorLocation<'_> {
     /// Bytes to underline, and the message.
     fn explain(&self, code: &Error) -> (usize, usize, String) {
         let here = |what: String| (self.start, self.end, what);
@@ -130,7 +134,7 @@ impl Place<'_> {
         }
     }
 
-    /// A value of the wrong kind.
+    /// A value of the wrong type.
     fn wrong(&self, expected: &str) -> (usize, usize, String) {
         // The parser may still stand on the blank before the value.
         let on = |at: usize| self.outline.enclosing_entry(at).filter(|e| !e.path.is_empty() && e.start <= at);
@@ -145,7 +149,7 @@ impl Place<'_> {
         }
     }
 
-    /// A name that needs brackets, or something that is not a bracket at all.
+    /// A name without its brackets, or another token where brackets are expected.
     fn no_bracket(&self) -> (usize, usize, String) {
         let before = self.start.saturating_sub(1);
         let name = tokenize(self.text).into_iter().find(|t| t.start <= before && before < t.end);
@@ -167,7 +171,7 @@ impl Place<'_> {
         }
     }
 
-    /// A closing bracket where a value is expected: the one before it is missing.
+    /// A closing bracket where a value is expected.
     fn stray_bracket(&self) -> Option<(usize, usize, String)> {
         let (start, end) = self.next_token();
         let found = self.text.get(start..end).filter(|t| matches!(*t, ")" | "]" | "}"))?;

@@ -1,4 +1,4 @@
-//! What carries the needle.
+//! Robots that move the needle.
 
 use crate::arm_joint_friction::ArmFriction;
 use serde::{Deserialize, Serialize};
@@ -26,8 +26,7 @@ pub enum Robot {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmConfig {
-    /// Joint angles near which the start pose is looked for, rad. Without `tip_m` and `direction`
-    /// they are the start pose.
+    /// Joint angles near which the start pose is searched, rad. Without `tip_m` and `direction` they are the start pose.
     pub start_rad: [f64; 7],
     /// Tip at the motion's start, in the arm's base frame (z up), m; where `start_rad` puts it when
     /// left out.
@@ -37,17 +36,15 @@ pub struct ArmConfig {
     /// left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<[f64; 3]>,
-    /// How the arm is held on the line.
+    /// Controller.
     pub controller: ArmController,
-    /// Torque between motor and link that no rigid-body model contains.
+    /// Joint friction in the measured torques.
     pub joint_friction: ArmFriction,
     /// Multiplies `joint_friction`; zero or positive.
     pub friction_scale: f64,
-    /// What the virtual sensor believes the payload (sensor and needle) to weigh beyond its true
-    /// mass, kg.
+    /// Error of the payload mass (sensor and needle) assumed by the virtual sensor, kg.
     pub payload_error_kg: f64,
-    /// What the virtual sensor believes the links to weigh beyond their true masses, relative: 0.03
-    /// is three per cent too heavy. Inertias likewise.
+    /// Relative error of the link masses and inertias assumed by the virtual sensor: 0.03 is three per cent too heavy.
     pub link_mass_error: f64,
 }
 
@@ -73,7 +70,7 @@ impl ArmConfig {
         panda::with_needle()
     }
 
-    /// The arm as the virtual sensor believes it to be.
+    /// The model assumed by the virtual sensor.
     #[must_use]
     pub fn assumed_model(&self) -> ArmModel<7> {
         if self.payload_error_kg == 0.0 && self.link_mass_error == 0.0 {

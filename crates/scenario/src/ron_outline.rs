@@ -1,29 +1,27 @@
-//! From the path of a field to its place in the RON text and back, so that a number out of range can
-//! be underlined and a syntax error can name the field it stands in.
+//! Maps field paths to locations in RON text and back, for error messages.
 //!
-//! RON's parser gives places for syntax errors only, and no paths. The outline knows just enough of
-//! the grammar for both: names, brackets, commas, strings and comments. It makes something of any
-//! text, also of one that RON refuses.
+//! RON's parser reports locations of syntax errors only, and no paths. The outline parses names, brackets, commas, strings and comments. It accepts
+//! any text, also invalid RON.
 
 use crate::ron_tokens::{Token, TokenKind, tokenize};
 
-/// Values nested deeper than this have no path; RON itself stops at 128.
-const DEEPEST: usize = 64;
+/// Values nested deeper than this have no path; the limit of RON is 128.
+const MAX_DEPTH: usize = 64;
 
 /// One value of the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct OutlineEntry {
     /// Path such as `tissue.layers[1].thickness_m`; empty for the whole.
     pub(crate) path: String,
-    /// Where its field name begins, or the value when it has none.
+    /// Start of the field name, or of the value when it has none.
     pub(crate) from: usize,
     /// The value's first byte.
     pub(crate) start: usize,
-    /// Behind the value's last byte.
+    /// End of the value.
     pub(crate) end: usize,
 }
 
-/// The values of a text in the order in which they begin.
+/// The values of a text in the order of their start.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RonOutline {
     pub(crate) entries: Vec<OutlineEntry>,
@@ -36,7 +34,7 @@ struct Frame {
     path: String,
     /// Place of the bracket; none for the whole text.
     bracket: Option<usize>,
-    /// A name stands before the bracket and the bracket is round: `Some(...)`, `Known(...)`.
+    /// A name precedes the round bracket: `Some(...)`, `Known(...)`.
     named: bool,
     index: usize,
     label: Option<(usize, usize)>,
@@ -48,7 +46,7 @@ impl Frame {
         Self { path, bracket, named, index: 0, label: None, entry: None }
     }
 
-    /// Path of the value that begins now.
+    /// Path of the value that starts here.
     fn child(&self, text: &str) -> String {
         match self.label {
             Some((start, end)) => {
@@ -112,11 +110,11 @@ impl RonOutline {
         outline
     }
 
-    /// Begins a value with this token, or takes it into the value that has begun.
+    /// Starts a value with this token, or adds it to the present value.
     fn extend(&mut self, text: &str, frame: &mut Frame, depth: usize, token: &Token) {
         if let Some(entry) = frame.entry.and_then(|e| self.entries.get_mut(e)) {
             entry.end = token.end;
-        } else if depth <= DEEPEST && token.kind != TokenKind::Close {
+        } else if depth <= MAX_DEPTH && token.kind != TokenKind::Close {
             frame.entry = Some(self.entries.len());
             self.entries.push(OutlineEntry {
                 path: frame.child(text),
@@ -127,7 +125,7 @@ impl RonOutline {
         }
     }
 
-    /// The value at a path, `Some(...)` included; `None` when the text does not hold it (a default).
+    /// The value at a path, `Some(...)` included; `None` when the text does not contain it.
     pub(crate) fn locate(&self, path: &str) -> Option<&OutlineEntry> {
         self.entries.iter().find(|entry| entry.path == path)
     }
@@ -206,7 +204,7 @@ Scenario(
     fn deep_nesting_costs_neither_stack_nor_memory() {
         let outline = RonOutline::new(&"(".repeat(200_000));
         assert_eq!(outline.open_brackets.len(), 200_000);
-        assert!(outline.entries.len() <= DEEPEST);
+        assert!(outline.entries.len() <= MAX_DEPTH);
     }
 
     proptest! {

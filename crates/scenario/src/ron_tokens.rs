@@ -5,7 +5,7 @@
 pub(crate) enum TokenKind {
     /// A name or a number.
     Word,
-    /// A string, raw or not, also one that never ends.
+    /// A string, raw or not, possibly unterminated.
     Text,
     /// An opening bracket.
     Open(u8),

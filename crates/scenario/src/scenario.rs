@@ -1,35 +1,33 @@
-//! The scenario as one value.
+//! The scenario.
 
 use crate::input_error::InputError;
-use crate::load_ron::{FieldError, parse, read_text};
+use crate::load_ron::{parse, read_text};
 use crate::motion::Motion;
 use crate::robot_config::Robot;
 use crate::sensor_config::Sensor;
-use crate::validate_scenario;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::Model;
 use stylet_tissue::{AnyEffect, Tissue};
 
-/// Everything that makes an insertion (SPEC section 8). Only `name`, `tissue` and `motion` have to be
-/// given.
+/// A simulated insertion (`docs/reference/scenario.md`). Only `name`, `tissue` and `motion` are required.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// What it is, for people.
+    /// Title.
     pub name: String,
-    /// Paper and figure, or where the numbers come from.
+    /// Where the values come from.
     #[serde(default)]
     pub source: String,
     /// The layers.
     pub tissue: Tissue,
-    /// How reality departs from the base law.
+    /// Departures from the base law.
     #[serde(default)]
     pub effects: Vec<AnyEffect>,
     /// The motion.
     pub motion: Motion,
-    /// What carries the needle.
+    /// What moves the needle.
     #[serde(default)]
     pub robot: Robot,
     /// What records the force.
@@ -38,8 +36,7 @@ pub struct Scenario {
     /// The online algorithm.
     #[serde(default)]
     pub enhance: EnhanceConfig,
-    /// The online algorithm on the virtual sensor's force, whose lag smears what happens at a rupture;
-    /// as `enhance` when left out. Its model is that of `enhance`.
+    /// Settings for the force of the virtual sensor; as `enhance` when left out. `model` is that of `enhance`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub enhance_virtual: Option<EnhanceConfig>,
     /// Further models that are run on the same data.
@@ -51,13 +48,13 @@ pub struct Scenario {
     /// Physics steps per second; rounded up to a whole multiple of `sample_hz`.
     #[serde(default = "physics_hz")]
     pub physics_hz: f64,
-    /// How far the tissue's numbers may be off, relative, 0 to 1: bounds for the diagnosis.
+    /// Relative uncertainty of stiffness, friction and puncture force, 0 to 1: bounds of a diagnosis.
     #[serde(default = "tolerance")]
     pub tolerance: f64,
-    /// The same for thicknesses.
+    /// Relative uncertainty of thicknesses.
     #[serde(default = "thickness_tolerance")]
     pub thickness_tolerance: f64,
-    /// How far the surface may be off, in m.
+    /// Uncertainty of the surface position, in m.
     #[serde(default = "surface_tolerance_m")]
     pub surface_tolerance_m: f64,
     /// Seed of every random number.
@@ -121,14 +118,6 @@ impl Scenario {
         let scenario: Self = parse(file, text)?;
         scenario.check().map_err(|problem| problem.in_file(file, text))?;
         Ok(scenario)
-    }
-
-    /// Checks every number's range.
-    ///
-    /// # Errors
-    /// The first [`Problem`], with the field's path.
-    pub fn check(&self) -> Result<(), FieldError> {
-        validate_scenario::scenario(self)
     }
 
     /// The scenario with every default written out.

@@ -1,4 +1,4 @@
-//! Sensors: what a scenario says of them.
+//! Sensors, as in scenarios.
 
 use crate::observer_gain::ObserverGain;
 use serde::{Deserialize, Serialize};
@@ -15,9 +15,9 @@ pub struct ForceTorque {
     pub bias_n: f64,
     /// Drift in N/s.
     pub drift_n_per_s: f64,
-    /// Smallest step in N; 0 is none.
+    /// Resolution in N; 0: none.
     pub quantisation_n: f64,
-    /// Readings end at plus and minus this, in N.
+    /// Readings are clamped to plus and minus this, in N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_n: Option<f64>,
 }
@@ -40,7 +40,7 @@ pub struct VirtualSensor {
     /// Standard deviation of the white noise on each measured joint torque in N m, drawn at every
     /// physics step. Assumed: no source gives it for this arm.
     pub torque_noise_nm: f64,
-    /// When the residual is taken as zero.
+    /// When the residual is zeroed.
     pub zero: ZeroWindow,
     /// How the force at the tip is found from the joint torques.
     pub wrench: WrenchEstimate,
@@ -57,12 +57,10 @@ impl Default for VirtualSensor {
     }
 }
 
-/// The residual of the joint torques is averaged in the air and taken as zero: model errors and the
-/// friction of a steady motion go with it. A motion that starts too close to the tissue (or in it) is
-/// preceded by an approach in the air at the motion's first speed.
+/// The residual of the joint torques is averaged in air and subtracted, with model errors and the friction of a steady motion. A motion that starts
+/// too close to the tissue is preceded by an approach in air at its first speed.
 ///
-/// The recorded force is zeroed from its beginning; an online algorithm listens from the end of the
-/// window on.
+/// The recorded force is zeroed from its start; online algorithms run from the end of the window on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum ZeroWindow {
@@ -94,7 +92,7 @@ pub enum WrenchEstimate {
     /// Force and moment, `pinv(J^T) r`, slightly damped: as in the paper.
     #[default]
     Full,
-    /// Force alone, with the knowledge that no moment acts about the tip: joint friction spreads less.
+    /// Force alone, assuming no moment about the tip: less sensitive to joint friction.
     Point,
 }
 

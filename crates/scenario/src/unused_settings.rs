@@ -1,11 +1,11 @@
-//! Settings that the algorithm in force does not look at: they belong to the other one.
+//! Changed settings that the selected online algorithm does not use.
 
 use stylet_core::config::{Algorithm, EnhanceConfig};
 
-/// The settings of `enhance` that were changed and have no effect, because the algorithm that runs has no such thing.
+/// Names of the settings in `enhance` that differ from their defaults and have no effect on the algorithm that runs.
 #[must_use]
 pub fn unused_settings(enhance: &EnhanceConfig) -> Vec<&'static str> {
-    let usual = EnhanceConfig::default();
+    let default = EnhanceConfig::default();
     let mut changed = Vec::new();
     let mut note = |name: &'static str, differs: bool| {
         if differs {
@@ -13,23 +13,23 @@ pub fn unused_settings(enhance: &EnhanceConfig) -> Vec<&'static str> {
         }
     };
     if enhance.active_algorithm() != Algorithm::Stylet {
-        note("stylet", enhance.stylet != usual.stylet);
+        note("stylet", enhance.stylet != default.stylet);
         return changed;
     }
-    note("reset", enhance.reset != usual.reset);
-    note("forgetting", enhance.forgetting != usual.forgetting);
-    note("prior_stiffness", enhance.prior_stiffness != usual.prior_stiffness);
-    note("prior_friction", enhance.prior_friction != usual.prior_friction);
-    note("cusum", enhance.cusum != usual.cusum);
-    note("derivative", enhance.derivative != usual.derivative);
+    note("reset", enhance.reset != default.reset);
+    note("forgetting", enhance.forgetting != default.forgetting);
+    note("prior_stiffness", enhance.prior_stiffness != default.prior_stiffness);
+    note("prior_friction", enhance.prior_friction != default.prior_friction);
+    note("cusum", enhance.cusum != default.cusum);
+    note("derivative", enhance.derivative != default.derivative);
     // Of these a part is common to both.
     let mut drop = enhance.drop;
-    drop.standstill_mps = usual.drop.standstill_mps;
-    note("drop", drop != usual.drop);
+    drop.standstill_mps = default.drop.standstill_mps;
+    note("drop", drop != default.drop);
     let mut guard = enhance.guard;
     (guard.revisit_margin_m, guard.blind_travel_m) =
-        (usual.guard.revisit_margin_m, usual.guard.blind_travel_m);
-    note("guard", guard != usual.guard);
+        (default.guard.revisit_margin_m, default.guard.blind_travel_m);
+    note("guard", guard != default.guard);
     changed
 }
 
@@ -38,21 +38,21 @@ mod tests {
     use super::*;
     use crate::EnhancerConfigFile;
 
-    fn found(text: &str) -> Vec<&'static str> {
+    fn unused(text: &str) -> Vec<&'static str> {
         unused_settings(&EnhancerConfigFile::parse("e.ron", text).expect("it is right").enhance)
     }
 
     #[test]
-    fn what_the_other_algorithm_alone_looks_at_is_named() {
-        assert!(found("Enhance()").is_empty() && found("Enhance(algorithm: Paper)").is_empty());
+    fn settings_of_the_other_algorithm_are_named() {
+        assert!(unused("Enhance()").is_empty() && unused("Enhance(algorithm: Paper)").is_empty());
         assert_eq!(
-            found("Enhance(forgetting: 0.99, cusum: (sigma_rupture_n: 0.05))"),
+            unused("Enhance(forgetting: 0.99, cusum: (sigma_rupture_n: 0.05))"),
             ["forgetting", "cusum"]
         );
-        assert!(found("Enhance(algorithm: Paper, cusum: (sigma_rupture_n: 0.05))").is_empty());
-        assert_eq!(found("Enhance(algorithm: Paper, stylet: (min_drop_share: 0.2))"), ["stylet"]);
-        // Both know how slow a standing needle is; the paper's runs where a Kelvin-Voigt model is asked for.
-        assert!(found("Enhance(drop: (standstill_mps: 2e-5), guard: (blind_travel_m: 0.001))").is_empty());
-        assert!(found("Enhance(model: KelvinVoigt, forgetting: 0.99)").is_empty());
+        assert!(unused("Enhance(algorithm: Paper, cusum: (sigma_rupture_n: 0.05))").is_empty());
+        assert_eq!(unused("Enhance(algorithm: Paper, stylet: (min_drop_share: 0.2))"), ["stylet"]);
+        // Both use the standstill speed; a Kelvin-Voigt model runs the paper's algorithm.
+        assert!(unused("Enhance(drop: (standstill_mps: 2e-5), guard: (blind_travel_m: 0.001))").is_empty());
+        assert!(unused("Enhance(model: KelvinVoigt, forgetting: 0.99)").is_empty());
     }
 }

@@ -1,16 +1,16 @@
-//! Ranges of the arm and of the virtual sensor; the arm's way is tried out.
+//! Ranges of arm and virtual sensor; feasibility of the insertion line.
 
 use crate::arm_joint_friction::ArmFriction;
 use crate::load_ron::FieldError;
+use crate::range_checks::{CheckResult, check, finite, not_negative, positive};
 use crate::robot_config::{ArmConfig, Robot};
 use crate::scenario::Scenario;
 use crate::sensor_config::{VirtualSensor, ZeroWindow};
-use crate::validate_scenario::{CheckResult, check, finite, not_negative, positive};
 
-/// Slowest observer in 1/s: it settles within a minute.
-const SLOWEST_PER_S: f64 = 0.1;
+/// Smallest observer gain in 1/s: it settles within a minute.
+const MIN_OBSERVER_GAIN_PER_S: f64 = 0.1;
 
-/// Checks robot and virtual sensor together; the tissue and the motion have been checked before.
+/// Checks robot and virtual sensor; tissue and motion were checked before.
 pub(crate) fn robot(s: &Scenario) -> CheckResult {
     let sensor = s.sensor.virtual_sensor();
     let Robot::Arm(arm) = &s.robot else {
@@ -18,7 +18,7 @@ pub(crate) fn robot(s: &Scenario) -> CheckResult {
             None => Ok(()),
             Some(_) => Err(FieldError::new(
                 "sensor",
-                "is a virtual sensor, which listens to joint torques, and the robot has no joints; \
+                "is a virtual sensor, which requires joint torques, and the robot has no joints; \
                  write robot: Arm(), or sensor: ForceTorque(...)",
             )),
         };
@@ -102,7 +102,7 @@ fn friction(friction: &ArmFriction) -> CheckResult {
         .map_err(|error| FieldError::new("robot.joint_friction", error.to_string()))
 }
 
-/// Checks a virtual sensor whose fields stand at `at`.
+/// Checks a virtual sensor with the path `at`.
 pub(crate) fn virtual_sensor(at: &str, c: &VirtualSensor, physics_hz: f64) -> CheckResult {
     let same = matches!(c.gain_per_s, crate::ObserverGain::Uniform(_));
     for (i, gain) in c.gain_per_s.per_joint().into_iter().enumerate() {
@@ -110,8 +110,8 @@ pub(crate) fn virtual_sensor(at: &str, c: &VirtualSensor, physics_hz: f64) -> Ch
         check(
             path,
             gain,
-            gain >= SLOWEST_PER_S,
-            &format!("it must be at least {SLOWEST_PER_S} /s; 5.0 is a lag of 0.2 s"),
+            gain >= MIN_OBSERVER_GAIN_PER_S,
+            &format!("it must be at least {MIN_OBSERVER_GAIN_PER_S} /s; 5.0 is a lag of 0.2 s"),
         )?;
     }
     not_negative(format!("{at}.torque_noise_nm"), c.torque_noise_nm, "N m")?;

@@ -1,8 +1,8 @@
-//! Ranges of the effects' parameters, as the library of effects states them.
+//! Ranges of effect parameters, from the library of effects.
 
 use crate::load_ron::FieldError;
+use crate::range_checks::CheckResult;
 use crate::scenario::Scenario;
-use crate::validate_scenario::CheckResult;
 use stylet_tissue::{AnyEffect, Effect, ForceLaw, ParameterError};
 
 /// Checks the effects of a scenario.
@@ -33,7 +33,7 @@ pub(crate) fn effects(s: &Scenario) -> CheckResult {
         .map_err(|e| FieldError::new("effects", format!("{e}; leave some out")))
 }
 
-/// The library's `terms.0.fraction` as it stands in the file: `terms[0].fraction`.
+/// The library's path `terms.0.fraction` as written in files: `terms[0].fraction`.
 fn path(at: &str, path: &str) -> String {
     let mut written = at.to_owned();
     for part in path.split('.') {
@@ -52,7 +52,7 @@ fn unit(effect: &AnyEffect, parameter: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
-/// Ranges that are open to above let infinity pass.
+/// Ranges without an upper limit do not exclude infinity.
 fn finite(at: &str, effect: &AnyEffect) -> CheckResult {
     for (parameter, value) in effect.info().parameters.iter().zip(effect.parameters()) {
         if !value.is_finite() {

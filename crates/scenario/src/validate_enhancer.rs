@@ -1,10 +1,10 @@
-//! Ranges of the online algorithm's configuration.
+//! Ranges of the settings of the online algorithm.
 
 use crate::load_ron::FieldError;
-use crate::validate_scenario::{CheckResult, check, not_negative, positive};
+use crate::range_checks::{CheckResult, check, not_negative, positive};
 use stylet_core::config::{Depths, EnhanceConfig, FrictionLaw, Reset};
 
-/// Checks a configuration whose fields stand at `at` in the file; an empty `at` is the top.
+/// Checks settings with the path `at`; empty at the top of a file.
 pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> CheckResult {
     let path = |field: &str| if at.is_empty() { field.to_owned() } else { format!("{at}.{field}") };
     match c.reset {
@@ -31,11 +31,11 @@ pub(crate) fn enhance(at: &str, c: &EnhanceConfig) -> CheckResult {
     match c.stylet.friction_law {
         FrictionLaw::Auto | FrictionLaw::Viscous => {}
         FrictionLaw::CoulombViscous { dry_mps } => {
-            crate::validate_scenario::not_negative(path("stylet.law.dry_mps"), dry_mps, "m/s")?;
+            not_negative(path("stylet.friction_law.dry_mps"), dry_mps, "m/s")?;
         }
         FrictionLaw::Presliding { dry_mps, travel_m } => {
-            crate::validate_scenario::not_negative(path("stylet.law.dry_mps"), dry_mps, "m/s")?;
-            positive(path("stylet.law.travel_m"), travel_m, "metres")?;
+            not_negative(path("stylet.friction_law.dry_mps"), dry_mps, "m/s")?;
+            positive(path("stylet.friction_law.travel_m"), travel_m, "metres")?;
         }
     }
     if let Depths::Known(thicknesses) = &c.depths {

@@ -1,18 +1,18 @@
-//! Ranges of a motion, and whether it comes to the tissue.
+//! Ranges of a motion; it has to reach the tissue.
 
 use crate::load_ron::FieldError;
 use crate::motion::{Motion, Segment};
+use crate::range_checks::{CheckResult, check, finite, positive};
 use crate::scenario::Scenario;
-use crate::validate_scenario::{CheckResult, check, finite, positive};
 
-/// More samples, or a thousand times more physics steps, are refused: a mistyped rate or duration.
-const MOST_SAMPLES: f64 = 5e7;
-const MOST_STEPS: f64 = 1e9;
-/// Steps shorter than 10 us tell nothing more of a needle's motion and take minutes per second.
-const FASTEST_PHYSICS_HZ: f64 = 1e5;
+/// Larger numbers of samples or physics steps are refused as typing errors.
+const MAX_SAMPLES: f64 = 5e7;
+const MAX_PHYSICS_STEPS: f64 = 1e9;
+/// Steps shorter than 10 us do not improve the simulation.
+const MAX_PHYSICS_HZ: f64 = 1e5;
 
-/// Speeds above this, in m/s, are taken for mm/s.
-const FASTEST_MPS: f64 = 1.0;
+/// Larger speeds are taken for mm/s.
+const MAX_SPEED_MPS: f64 = 1.0;
 
 pub(crate) fn motion(s: &Scenario) -> CheckResult {
     match &s.motion {
@@ -28,10 +28,10 @@ pub(crate) fn motion(s: &Scenario) -> CheckResult {
             finite("motion.phase_rad", *phase_rad, "radians")?;
             positive("motion.duration_s", *duration_s, "seconds")?;
             let fastest_mps = amplitude_m * frequency_hz * core::f64::consts::TAU;
-            if fastest_mps > FASTEST_MPS {
+            if fastest_mps > MAX_SPEED_MPS {
                 let what = format!(
                     "is {amplitude_m}, which at {frequency_hz} Hz makes {fastest_mps:.3} m/s; speeds are at most \
-                     {FASTEST_MPS} m/s; is this in millimetres?"
+                     {MAX_SPEED_MPS} m/s; is this in millimetres?"
                 );
                 return Err(FieldError::new("motion.amplitude_m", what));
             }
@@ -66,8 +66,8 @@ fn one_segment(at: &str, segment: &Segment, sample_hz: f64) -> CheckResult {
 }
 
 fn speed(path: impl Into<String>, value: f64) -> CheckResult {
-    let right = format!("speeds are at most {FASTEST_MPS} m/s; is this in mm/s?");
-    check(path, value, value.abs() <= FASTEST_MPS, &right)
+    let right = format!("speeds are at most {MAX_SPEED_MPS} m/s; is this in mm/s?");
+    check(path, value, value.abs() <= MAX_SPEED_MPS, &right)
 }
 
 fn frequency(path: String, value: f64, sample_hz: f64) -> CheckResult {
@@ -75,15 +75,15 @@ fn frequency(path: String, value: f64, sample_hz: f64) -> CheckResult {
     check(path, value, value > 0.0 && value < sample_hz / 2.0, &right)
 }
 
-/// The motion must be short enough to store and must come to the tissue.
+/// The motion must fit into memory and reach the tissue.
 fn reaches(s: &Scenario) -> CheckResult {
     let Some(plan) = s.motion.plan() else {
         return Ok(());
     };
     let (seconds, samples) = (plan.duration_s(), plan.duration_s() * s.sample_hz);
-    if samples > MOST_SAMPLES {
+    if samples > MAX_SAMPLES {
         let what = format!(
-            "makes {samples:.3e} samples in {seconds} s at {} Hz; at most {MOST_SAMPLES:.0e} are simulated: \
+            "makes {samples:.3e} samples in {seconds} s at {} Hz; at most {MAX_SAMPLES:.0e} are simulated: \
              shorten it or lower sample_hz",
             s.sample_hz
         );
@@ -93,9 +93,9 @@ fn reaches(s: &Scenario) -> CheckResult {
         let what = format!("lasts {seconds} s, less than two samples at {} Hz; make it longer", s.sample_hz);
         return Err(FieldError::new("motion", what));
     }
-    if seconds * s.physics_hz > MOST_STEPS {
+    if seconds * s.physics_hz > MAX_PHYSICS_STEPS {
         let what = format!(
-            "is {}, which makes {:.3e} steps in {seconds} s; at most {MOST_STEPS:.0e} are simulated: lower it",
+            "is {}, which makes {:.3e} steps in {seconds} s; at most {MAX_PHYSICS_STEPS:.0e} are simulated: lower it",
             s.physics_hz,
             seconds * s.physics_hz
         );
@@ -104,9 +104,9 @@ fn reaches(s: &Scenario) -> CheckResult {
     check(
         "physics_hz",
         s.physics_hz,
-        s.physics_hz <= FASTEST_PHYSICS_HZ,
+        s.physics_hz <= MAX_PHYSICS_HZ,
         &format!(
-            "steps of less than 10 us tell nothing more: at most {FASTEST_PHYSICS_HZ:.0e} Hz, for example 1000.0"
+            "steps of less than 10 us do not improve the simulation: at most {MAX_PHYSICS_HZ:.0e} Hz, for example 1000.0"
         ),
     )?;
     let (furthest_m, surface_m) = (plan.deepest_m(), s.tissue.surface_m);

@@ -1,7 +1,7 @@
-//! Ranges: what a scenario must satisfy beyond its syntax. RON reads `NaN`, `-inf` and turns `1e400`
-//! into infinity, so every number is checked.
+//! Ranges of a scenario's values.
 
 use crate::load_ron::FieldError;
+use crate::range_checks::{CheckResult, check, finite, not_negative, positive};
 use crate::scenario::Scenario;
 use crate::sensor_config::{ForceTorque, Sensor};
 use crate::validate_arm;
@@ -9,26 +9,17 @@ use crate::validate_effects::effects;
 use crate::validate_enhancer::enhance;
 use crate::validate_motion::motion;
 
-pub(crate) type CheckResult = Result<(), FieldError>;
-
-pub(crate) fn check(path: impl Into<String>, value: f64, ok: bool, right: &str) -> CheckResult {
-    if ok && value.is_finite() { Ok(()) } else { Err(FieldError::new(path, format!("is {value}; {right}"))) }
+impl Scenario {
+    /// Checks the range of every value.
+    ///
+    /// # Errors
+    /// The first [`FieldError`], with the path of the field.
+    pub fn check(&self) -> Result<(), FieldError> {
+        scenario(self)
+    }
 }
 
-pub(crate) fn positive(path: impl Into<String>, value: f64, unit: &str) -> CheckResult {
-    check(path, value, value > 0.0, &format!("it must be a positive number of {unit}"))
-}
-
-pub(crate) fn not_negative(path: impl Into<String>, value: f64, unit: &str) -> CheckResult {
-    check(path, value, value >= 0.0, &format!("it must be zero or a positive number of {unit}"))
-}
-
-pub(crate) fn finite(path: impl Into<String>, value: f64, unit: &str) -> CheckResult {
-    check(path, value, true, &format!("it must be a finite number of {unit}"))
-}
-
-/// Checks a scenario; the first problem found.
-pub(crate) fn scenario(s: &Scenario) -> CheckResult {
+fn scenario(s: &Scenario) -> CheckResult {
     if s.name.trim().is_empty() {
         return Err(FieldError::new("name", "is empty; say what the scenario is"));
     }

@@ -289,6 +289,9 @@ fn list(names: &[String]) -> String {
 fn unknown(found: &str, so_far: &str, known: &[String]) -> String {
     let names: Vec<&str> = known.iter().map(String::as_str).collect();
     let within = if so_far.is_empty() { "the scenario".to_owned() } else { format!("`{so_far}`") };
+    if let Some(renamed) = stylet_scenario::renamed_path(found) {
+        return format!("{within} has no field `{found}`: {renamed}");
+    }
     let near = closest_name(found, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     format!("{within} has no field `{found}`{near} Known: {}", list(known)).replace("` Known", "`; known")
 }

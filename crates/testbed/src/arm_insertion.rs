@@ -1,4 +1,4 @@
-//! An insertion carried out by the arm.
+//! An insertion by the arm: approach, zeroing of the virtual sensor, recording.
 
 use crate::arm_simulation::{ArmError, ArmSimulation};
 use crate::slide_insertion::{InsertionSample, SampleRates};
@@ -11,30 +11,29 @@ use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 pub struct ArmSetup<'a> {
     /// The arm.
     pub config: &'a ArmConfig,
-    /// Its way, as [`ArmConfig::line`] found it.
+    /// Its checked line.
     pub line: &'a ArmInsertionLine,
     /// The virtual sensor, if it records.
     pub sensor: Option<&'a VirtualSensor>,
-    /// Seed of the joint torques' noise.
+    /// Seed of the torque noise.
     pub seed: u64,
 }
 
-/// What the arm recorded, one value per sample.
+/// Recorded columns of the arm, one value per sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ArmRecording {
     /// Measured joint torques, N m.
     pub joint_torque_nm: Vec<[f64; 7]>,
     /// Axial force of the virtual sensor, N; empty without one.
     pub virtual_force_n: Vec<f64>,
-    /// From when on the virtual sensor is zeroed, s: an online algorithm listens from then on.
+    /// Time from which the virtual sensor is zeroed, s; online algorithms start there.
     pub zeroed_s: f64,
     /// Largest distance of the tip from the line, m.
     pub lateral_deviation_m: f64,
 }
 
-/// The arm: rapier carries it, the law is stepped with every physics step on the tip's actual position
-/// and velocity, and its force acts on the tip. The virtual sensor's observer runs at physics rate
-/// from the beginning of the approach.
+/// Insertion by the arm. The force law is evaluated at every physics step at the tip's actual position and velocity; its force acts on the tip. The
+/// observer of the virtual sensor runs at the physics rate from the start of the approach.
 ///
 /// # Errors
 /// [`ArmError`] when the arm leaves its limits.
@@ -57,54 +56,54 @@ pub fn simulate_on_arm(
     let mut zero = Zeroing::new(line.zero_window_s, physics_hz);
     let mut record = ArmRecording { zeroed_s: zero.until_s(physics_hz), ..ArmRecording::default() };
     let mut state = ForceLawState::default();
-    let mut before_mps = first.velocity_mps;
+    let mut previous_mps = first.velocity_mps;
     for k in -before..rates.samples as i64 * steps {
         let time_s = k as f64 / physics_hz;
-        let on_the_way = |reason: Error| ArmError::DuringMotion { time_s, reason };
+        let during_motion = |reason: Error| ArmError::DuringMotion { time_s, reason };
         let sampled = k >= 0 && k % steps == 0;
         let mut force = None;
-        let moment = rig
+        let arm_step = rig
             .step(&line.commanded_at(plan, time_s), sampled, |position_m, velocity_mps| {
                 if k < 0 {
                     return 0.0;
                 }
-                let felt = law.step(&mut state, time_s, position_m, velocity_mps, &mut on_rupture);
-                force = Some(felt);
-                felt.total_n
+                let tissue = law.step(&mut state, time_s, position_m, velocity_mps, &mut on_rupture);
+                force = Some(tissue);
+                tissue.total_n
             })
-            .map_err(on_the_way)?;
+            .map_err(during_motion)?;
         if let (true, Some(force)) = (sampled, force) {
-            record.joint_torque_nm.push(moment.joint_torque_nm.into());
-            record.virtual_force_n.extend(moment.virtual_force_n);
-            record.lateral_deviation_m = record.lateral_deviation_m.max(moment.lateral_deviation_m);
-            zero.keep(&moment.q_rad);
+            record.joint_torque_nm.push(arm_step.joint_torque_nm.into());
+            record.virtual_force_n.extend(arm_step.virtual_force_n);
+            record.lateral_deviation_m = record.lateral_deviation_m.max(arm_step.lateral_deviation_m);
+            zero.keep(&arm_step.q_rad);
             sink(&InsertionSample {
                 time_s: (k / steps) as f64 / rates.sample_hz,
-                position_m: moment.position_m,
-                velocity_mps: moment.velocity_mps,
-                acceleration_mps2: (moment.velocity_mps - before_mps) * physics_hz,
+                position_m: arm_step.position_m,
+                velocity_mps: arm_step.velocity_mps,
+                acceleration_mps2: (arm_step.velocity_mps - previous_mps) * physics_hz,
                 force,
             });
         }
-        before_mps = moment.velocity_mps;
-        zero.step(k, &mut rig, &mut record.virtual_force_n).map_err(on_the_way)?;
+        previous_mps = arm_step.velocity_mps;
+        zero.step(k, &mut rig, &mut record.virtual_force_n).map_err(during_motion)?;
     }
     Ok(record)
 }
 
-/// Averages the residual over a window and takes it as zero, from the beginning of the recording on.
+/// Averages the residual over a window and subtracts it from all samples, those recorded before included.
 struct Zeroing {
     /// First and last step of the window.
     window: Option<(i64, i64)>,
-    /// Joint angles of the samples that were recorded before the zero was known.
-    waiting: Vec<JointVector<7>>,
+    /// Joint angles of the samples recorded before the end of the window.
+    pending: Vec<JointVector<7>>,
 }
 
 impl Zeroing {
     fn new(zero_s: Option<(f64, f64)>, physics_hz: f64) -> Self {
         let step = |t: f64| (t * physics_hz).round() as i64;
         let window = zero_s.map(|(from, until)| (step(from), step(until).max(step(from) + 1)));
-        Self { window, waiting: Vec::new() }
+        Self { window, pending: Vec::new() }
     }
 
     fn until_s(&self, physics_hz: f64) -> f64 {
@@ -113,7 +112,7 @@ impl Zeroing {
 
     fn keep(&mut self, q_rad: &JointVector<7>) {
         if self.window.is_some() {
-            self.waiting.push(*q_rad);
+            self.pending.push(*q_rad);
         }
     }
 
@@ -128,7 +127,7 @@ impl Zeroing {
         if k == until {
             self.window = None;
             let zero = rig.observer_mut().map(|observer| observer.finish_zeroing()).transpose()?;
-            for (value, q) in recorded_n.iter_mut().zip(self.waiting.drain(..)) {
+            for (value, q) in recorded_n.iter_mut().zip(self.pending.drain(..)) {
                 *value -= zero.map_or(0.0, |zero| rig.axial_force_n(&q, &zero));
             }
         }

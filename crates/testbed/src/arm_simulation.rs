@@ -1,4 +1,4 @@
-//! Arm, control and virtual sensor stepped together.
+//! One physics step of arm, controller and virtual sensor.
 
 use crate::computed_torque_control::LineController;
 use crate::rapier_arm::{ArmChainError, RapierArm};
@@ -8,21 +8,21 @@ use stylet_dynamics::feasibility;
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, Error, JointVector};
 use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPoint, VirtualSensor};
 
-/// Why the arm cannot go on.
+/// Why the arm stops.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArmError {
     /// The arm cannot be set up.
     #[error("the arm cannot be set up: {0}")]
     Setup(#[from] Error),
-    /// The arm is not a chain for rapier.
+    /// rapier refuses the arm.
     #[error(transparent)]
     Chain(#[from] ArmChainError),
-    /// Something went wrong on the way: limits left, numbers not finite.
+    /// A limit was exceeded, or a value is not finite, during the motion.
     #[error("the arm stops at {time_s:.3} s: {reason}")]
     DuringMotion {
-        /// When.
+        /// Time in s.
         time_s: f64,
-        /// Why.
+        /// Reason.
         reason: Error,
     },
 }
@@ -32,36 +32,35 @@ pub enum ArmError {
 pub struct ArmStep {
     /// Joint angles, rad.
     pub q_rad: JointVector<7>,
-    /// Tip along the insertion axis, m.
+    /// Axial position of the tip, m.
     pub position_m: f64,
     /// Its velocity, m/s.
     pub velocity_mps: f64,
     /// Distance of the tip from the line, m.
     pub lateral_deviation_m: f64,
-    /// Joint torques as measured over the step that begins here, N m.
+    /// Measured joint torques over the step that begins here, N m.
     pub joint_torque_nm: JointVector<7>,
-    /// Axial force of the virtual sensor, N; when asked for.
+    /// Axial force of the virtual sensor, N, when requested.
     pub virtual_force_n: Option<f64>,
 }
 
-/// The arm on its line.
+/// The arm during an insertion.
 pub struct ArmSimulation {
     arm: Arm<7>,
     body: RapierArm,
     control: LineController,
     sensors: JointTorqueSensors,
     observer: Option<AxialForceObserver>,
-    /// What has driven the links in the last step, and what the sensors have read.
+    /// Driving and measured joint torques of the last step, N m.
     last: (JointVector<7>, JointVector<7>),
     dt_s: f64,
 }
 
 impl ArmSimulation {
-    /// The arm at the beginning of its approach, moving. `first` is where the plan has the tip then,
-    /// `start_m` the position of the line's start along the insertion axis.
+    /// The arm at the start of its approach. `first` is the commanded point there, `start_m` the axial position at which the line starts.
     ///
     /// # Errors
-    /// [`ArmError`] when something is out of range that a checked scenario does not hold.
+    /// [`ArmError`] when a value is out of range, which a checked scenario excludes.
     pub fn new(
         config: &ArmConfig,
         sensor: Option<&VirtualSensor>,
@@ -96,11 +95,11 @@ impl ArmSimulation {
         })
     }
 
-    /// One physics step. `tissue` is asked for the force (N) that resists at a position (m) and velocity
-    /// (m/s) of the tip; `sense` asks for the virtual sensor's force.
+    /// One physics step. `tissue` returns the resisting force (N) at a position (m) and velocity (m/s) of the tip; `sense` requests the force of the
+    /// virtual sensor.
     ///
     /// # Errors
-    /// When a joint leaves its range of angles or torques, or a number is not finite.
+    /// When a joint leaves its range of angles or torques, or a value is not finite.
     pub fn step(
         &mut self,
         plan: &MotionPoint,
@@ -147,7 +146,7 @@ impl ArmSimulation {
         self.observer.as_mut()
     }
 
-    /// What external joint torques (N m) at joint angles `q_rad` mean as axial force (N).
+    /// Axial force (N) of external joint torques (N m) at joint angles `q_rad`.
     #[must_use]
     pub fn axial_force_n(&self, q_rad: &JointVector<7>, torque_nm: &JointVector<7>) -> f64 {
         self.observer.as_ref().map_or(0.0, |observer| {

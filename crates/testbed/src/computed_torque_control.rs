@@ -1,4 +1,4 @@
-//! Computed torque: the joint torques that carry the needle's tip along its line.
+//! Computed-torque control of the needle's tip along a line.
 
 use nalgebra::{Vector3, Vector6};
 use stylet_dynamics::{
@@ -7,29 +7,28 @@ use stylet_dynamics::{
 };
 use stylet_scenario::{ArmController, ArmInsertionLine, MotionPoint};
 
-/// Keeps the tip on a line, `tau = M qdd + C qd + g - r`:
+/// Controller of the tip, `tau = M qdd + C qd + g - r`:
 ///
 /// `qdd = J^+ (a - dJ/dt qd + k J qd) - k qd` with `a = a_plan + 2 w (v_plan - v) + w² (x_plan - x)` for the
-/// tip's position and likewise (towards rest) for its orientation, `k` the damping of the elbow, and
-/// `r` the external joint torques as a momentum observer sees them (Khatib 1987; De Luca and Mattone
-/// 2005). Without `r` the tip would stand back by `f/(Lambda w²)` under a force `f`. The observer
-/// listens to the torque that drives the links: the motors' inner loops know their friction.
+/// position of the tip and likewise for its orientation, `k` the damping of the null-space motion, and `r` the external joint torques of a momentum
+/// observer (Khatib 1987; De Luca and Mattone 2005). Without `r` the tip would deviate by `f/(Lambda w²)` under a force `f`. The observer uses the
+/// torque that drives the links: the inner loops of the motors compensate their friction.
 #[derive(Debug)]
 pub struct LineController {
     config: ArmController,
     start: Pose,
     direction: Vector3<f64>,
-    /// Along the line where `start` is, m.
+    /// Axial position of `start`, m.
     start_m: f64,
     observer: Option<Observer<7>>,
     state: ObserverState<7>,
 }
 
-/// Damping of the inverse Jacobian: the line has been checked to stay away from singular poses.
+/// Damping of the inverse Jacobian. The line was checked to stay away from singular poses.
 const DAMPING: f64 = 1e-6;
 
 impl LineController {
-    /// Control of a line whose start is at `start_m` of the motion.
+    /// Controller of a line that starts at the axial position `start_m`.
     ///
     /// # Errors
     /// When the gain of the disturbance observer is not a positive number (zero: no feed-forward).
@@ -76,12 +75,11 @@ impl LineController {
         (away - self.direction * self.direction.dot(&away)).norm()
     }
 
-    /// The torques (N m) that are to drive the links. `terms` are the momentum terms at the present
-    /// state, `last_torque_nm` what has driven the links over the step of `dt_s` that led here, `twist`
-    /// the tip's velocity and angular velocity.
+    /// Joint torques (N m) to apply. `terms` are the momentum terms at the present state, `last` the torque and duration (s) of the previous step,
+    /// `twist` the velocity and angular velocity of the tip.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// When a value is not finite.
     #[allow(clippy::too_many_arguments)]
     pub fn torque_nm(
         &mut self,
@@ -98,16 +96,16 @@ impl LineController {
             None => JointVector::zeros(),
         };
         let w = self.config.natural_frequency_radps;
-        let wanted_m = self.start.position_m + self.direction * (plan.position_m - self.start_m);
+        let target_m = self.start.position_m + self.direction * (plan.position_m - self.start_m);
         let (v, turning) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
         let forward = self.direction * plan.acceleration_mps2
             + (self.direction * plan.velocity_mps - v) * (2.0 * w)
-            + (wanted_m - tip.position_m) * (w * w);
+            + (target_m - tip.position_m) * (w * w);
         let turn = tip.rotation_vector_to(&self.start) * (w * w) - turning * (2.0 * w);
         let k = self.config.elbow_damping_per_s;
-        let wanted = Vector6::new(forward.x, forward.y, forward.z, turn.x, turn.y, turn.z) + twist * k
+        let twist_rate = Vector6::new(forward.x, forward.y, forward.z, turn.x, turn.y, turn.z) + twist * k
             - at.tip_acceleration(qd_radps, &JointVector::zeros());
-        let qdd = at.joint_rates(&wanted, DAMPING) - qd_radps * k;
+        let qdd = at.joint_rates(&twist_rate, DAMPING) - qd_radps * k;
         Ok(at.inverse_dynamics(qd_radps, &qdd, &EARTH_GRAVITY_MPS2, &Wrench::default()) - external)
     }
 }

@@ -1,6 +1,4 @@
-//! The force/torque sensor: from the force at the needle's base to the number that is recorded.
-//!
-//! The chain of SPEC section 6 is `stylet_tissue::Measurement`; what is random is drawn here.
+//! The force/torque sensor: measurement chain of `stylet_tissue::MeasurementChain` with random noise and spikes.
 
 use crate::slide_insertion::InsertionSample;
 use rand::rngs::ChaCha8Rng;
@@ -12,21 +10,20 @@ use stylet_tissue::{
     SensorInput,
 };
 
-/// Stream of the generator from which the force/torque sensor draws.
+/// Generator stream of the noise.
 const NOISE_STREAM: u64 = 1;
-/// First of the streams from which spikes are drawn.
+/// First of the generator streams of spikes.
 const SPIKES_STREAM: u64 = 1000;
 
-/// Values drawn at once: the states of generator and recursion stay in registers, and a sample then
-/// costs a look-up.
-const BLOCK: usize = 64;
+/// Values drawn at once, for speed.
+const BLOCK_SAMPLES: usize = 64;
 
 /// White or first-order autoregressive Gaussian noise with a given marginal standard deviation.
 #[derive(Debug)]
 pub struct SensorNoise {
     generator: ChaCha8Rng,
-    /// Drawn ahead, in N.
-    values_n: [f64; BLOCK],
+    /// Values drawn ahead, in N.
+    values_n: [f64; BLOCK_SAMPLES],
     used: usize,
     sd_n: f64,
     pole: f64,
@@ -44,8 +41,8 @@ impl SensorNoise {
         generator.set_stream(stream);
         Self {
             generator,
-            values_n: [0.0; BLOCK],
-            used: BLOCK,
+            values_n: [0.0; BLOCK_SAMPLES],
+            used: BLOCK_SAMPLES,
             sd_n,
             pole,
             innovation: libm::sqrt(1.0 - pole * pole),
@@ -57,7 +54,7 @@ impl SensorNoise {
     /// The next value in N.
     #[inline]
     pub fn draw(&mut self) -> f64 {
-        if self.used >= BLOCK {
+        if self.used >= BLOCK_SAMPLES {
             self.refill();
         }
         let value_n = self.values_n[self.used];
@@ -87,39 +84,36 @@ impl SensorNoise {
     }
 }
 
-/// Isolated outlying samples: at each sample, with the effect's rate, a spike of its size and of
-/// either sign.
+/// Isolated outliers: at each sample a spike of either sign with the probability `rate_hz / sample_hz`.
 #[derive(Debug)]
 struct Spikes {
     generator: ChaCha8Rng,
-    chance: f64,
+    probability: f64,
     size_n: f64,
 }
 
 impl Spikes {
     fn draw(&mut self) -> f64 {
-        let hit = self.generator.random::<f64>() < self.chance;
+        let spike = self.generator.random::<f64>() < self.probability;
         let sign = if self.generator.random::<bool>() { 1.0 } else { -1.0 };
-        if hit { sign * self.size_n } else { 0.0 }
+        if spike { sign * self.size_n } else { 0.0 }
     }
 }
 
-/// The measuring end of an insertion: what arm and tool add, then the force/torque sensor with its
-/// effects, noise and limits, in the order of SPEC section 6.
+/// Tool and force/torque sensor (`docs/reference/model.md`, *Measurement chain*).
 #[derive(Debug)]
 pub struct ForceSensor {
     chain: MeasurementChain,
     state: MeasurementState,
     noise: SensorNoise,
     spikes: Vec<Spikes>,
-    /// Nothing but noise.
+    /// The chain consists of noise only.
     plain: bool,
 }
 
 impl ForceSensor {
-    /// The tool, sensor and position effects of a scenario together with the sensor's own bias,
-    /// drift, noise, range and quantisation. Noise and spikes are drawn from `seed`, for samples at
-    /// `sample_hz`.
+    /// Tool, sensor and position effects of a scenario, with bias, drift, noise, range and quantisation of the sensor. Noise and spikes are drawn
+    /// from `seed`, for samples at `sample_hz`.
     #[must_use]
     pub fn new(effects: &[AnyEffect], sensor: &ForceTorque, seed: u64, sample_hz: f64) -> Self {
         let mut chain: Vec<AnyEffect> = vec![
@@ -139,7 +133,7 @@ impl ForceSensor {
             .map(|(spikes, stream)| {
                 let mut generator = ChaCha8Rng::seed_from_u64(seed);
                 generator.set_stream(stream);
-                Spikes { generator, chance: spikes.rate_hz / sample_hz, size_n: spikes.size_n }
+                Spikes { generator, probability: spikes.rate_hz / sample_hz, size_n: spikes.size_n }
             })
             .collect();
         Self {
@@ -151,7 +145,7 @@ impl ForceSensor {
         }
     }
 
-    /// The reading for one sample, in N.
+    /// The recorded force (N) of one sample.
     #[inline]
     pub fn measure(&mut self, sample: &InsertionSample) -> f64 {
         let InsertionSample { time_s, position_m, velocity_mps, acceleration_mps2, .. } = *sample;
@@ -159,7 +153,7 @@ impl ForceSensor {
         self.measure_force(time_s, &at, sample.force.total_n)
     }
 
-    /// The reading, in N, of the tissue's force `tissue_n` (N) at `time_s` with the needle at `at`.
+    /// The recorded force (N) for the tissue force `tissue_n` (N) at `time_s`, with the needle at `at`.
     #[inline]
     pub fn measure_force(&mut self, time_s: f64, at: &MotionPoint, tissue_n: f64) -> f64 {
         if self.plain {

@@ -1,8 +1,4 @@
-//! The testbed: from a scenario to a recording with its ground truth.
-//!
-//! A motion is carried out by a robot (the rapier [`Slide`], the seven-joint arm of [`ArmRig`], or the
-//! kinematic replay), the tissue law of `stylet-tissue` makes the force, a force/torque sensor at the
-//! needle's base or a virtual sensor on the arm's joint torques ([`AxialObserver`]) records it.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod arm_insertion;

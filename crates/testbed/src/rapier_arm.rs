@@ -1,21 +1,18 @@
-//! The arm as rapier multibody: seven revolute joints, the links of `stylet-dynamics`, force/torque
-//! sensor and needle fixed to the last one.
+//! The arm as a rapier multibody: seven revolute joints, the links of `stylet-dynamics`, force/torque sensor and needle fixed to the last one.
 //!
-//! rapier has no input for joint torques: each is applied as a pair of opposite torques on the link
-//! and the one before it. There are no colliders and no joint limits in the simulation; a run that
-//! leaves the limits is stopped by [`crate::ArmError`]. The joint damping of 0.1 N m s/rad that rapier
-//! adds by default is taken out, and there is one solver iteration per step: several would be
-//! substeps under a constant torque, with a mass matrix of their own each. Steps are semi-implicit:
+//! rapier has no input for joint torques: each is applied as a pair of opposite torques on a link and its parent. There are no colliders and no
+//! joint limits; an insertion that leaves the limits ends with [`crate::ArmError`]. rapier's default joint damping of 0.1 N m s/rad is removed. One
+//! solver iteration per step: several would be substeps with a mass matrix each. Steps are semi-implicit:
 //! `qd += dt M^-1 (tau - C qd - g + J^T F)`, then `q += dt qd`.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rapier3d_f64::prelude::*;
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, Pose as Frame, RigidBody as Body};
 
-/// Index of the free coordinate of a joint about its z among rapier's six.
+/// Index of the free coordinate (rotation about z) of a joint among rapier's six.
 const ABOUT_Z: usize = 5;
 
-/// Why rapier cannot hold the arm.
+/// rapier refuses a joint of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("rapier refuses the arm's joint {joint}")]
 pub struct ArmChainError {
@@ -29,7 +26,7 @@ pub struct RapierArm {
     links: [RigidBodyHandle; 7],
     /// Centre of mass of the last link with all that it carries, in its frame, m.
     last_com_m: Vector3<f64>,
-    /// Of the last joint; leads to the whole chain.
+    /// Handle of the last joint, from which the chain is found.
     last: MultibodyJointHandle,
 }
 
@@ -37,7 +34,7 @@ impl RapierArm {
     /// The arm at given joint angles (rad) and rates (rad/s), stepped every `dt_s`.
     ///
     /// # Errors
-    /// [`NotAChain`], which no model leads to.
+    /// [`ArmChainError`]; no checked model causes it.
     pub fn new(
         arm: &Arm<7>,
         q_rad: &JointVector<7>,
@@ -76,15 +73,15 @@ impl RapierArm {
             last_com_m = body.com_m;
         }
         let last = last.ok_or(ArmChainError { joint: 7 })?;
-        let mut placed = Self { world, links, last_com_m, last };
-        placed.place(q_rad, qd_radps);
-        Ok(placed)
+        let mut arm_body = Self { world, links, last_com_m, last };
+        arm_body.place(q_rad, qd_radps);
+        Ok(arm_body)
     }
 
     fn place(&mut self, q_rad: &JointVector<7>, qd_radps: &JointVector<7>) {
         let bodies = &mut self.world.bodies;
         if let Some((chain, _)) = self.world.multibody_joints.get_mut(self.last) {
-            // Finds out that the base is fixed; only then are there seven coordinates.
+            // Only after this does rapier treat the base as fixed and use seven coordinates.
             chain.forward_kinematics(bodies, true);
             chain.damping_mut().fill(0.0);
             chain.apply_displacements(q_rad.as_slice());
@@ -117,28 +114,27 @@ impl RapierArm {
         tip_m: &Vector3<f64>,
         tip_force_n: &Vector3<f64>,
     ) {
-        let mut onward = Vector3::zeros();
+        let mut outboard = Vector3::zeros();
         for i in (0..7).rev() {
-            let about: Vector3<f64> = frames[i].rotation.column(2) * torque_nm[i];
+            let torque: Vector3<f64> = frames[i].rotation.column(2) * torque_nm[i];
             if let Some(link) = self.world.bodies.get_mut(self.links[i]) {
                 link.reset_forces(false);
                 link.reset_torques(false);
-                let mut turning = about - onward;
+                let mut link_torque = torque - outboard;
                 if i == 6 {
-                    // `add_force_at_point` would use a centre of mass that rapier does not know before
-                    // its first step.
+                    // `add_force_at_point` uses a centre of mass that rapier computes in its first step.
                     let lever = tip_m - frames[i].transform_point(&self.last_com_m);
-                    turning += lever.cross(tip_force_n);
+                    link_torque += lever.cross(tip_force_n);
                     link.add_force(vector(tip_force_n), false);
                 }
-                link.add_torque(vector(&turning), false);
+                link.add_torque(vector(&link_torque), false);
             }
-            onward = about;
+            outboard = torque;
         }
         self.world.step();
     }
 
-    /// Inverse of the mass matrix that rapier's last step has used, 1/(kg m²).
+    /// Inverse of the mass matrix of the last step, 1/(kg m²).
     #[must_use]
     pub fn inverse_mass_matrix(&self) -> Option<SMatrix<f64, 7, 7>> {
         let (chain, _) = self.world.multibody_joints.get(self.last)?;

@@ -1,13 +1,11 @@
-//! The slide: the needle as a rigid body on an axial slide, driven by a stiff motor, the tissue's
-//! force acting on it (rapier, double precision).
+//! The needle as a rigid body on an axial slide (rapier, double precision).
 //!
-//! The joint's motor follows position and velocity of the commanded motion; with one solver
-//! iteration its impulse over the step is the force at the needle's base. There are no colliders:
-//! the tissue law is applied as an external force.
+//! A stiff joint motor follows position and velocity of the commanded motion. With one solver iteration its impulse over the step is the force at
+//! the needle's base. There are no colliders: the tissue force is an external force.
 
 use rapier3d_f64::prelude::*;
 
-/// Mass of the needle in kg (tuning published with the authors' laboratory software).
+/// Mass of the needle in kg (published with the laboratory software).
 pub const NEEDLE_MASS_KG: f64 = 0.068;
 /// Length of the needle in metres (same source).
 pub const NEEDLE_LENGTH_M: f64 = 0.153;

@@ -1,4 +1,4 @@
-//! A whole scenario: motion, robot, tissue and sensors make a recording with its ground truth.
+//! Simulates a whole scenario: motion, robot, tissue and sensors.
 
 use crate::arm_insertion::{ArmRecording, ArmSetup, simulate_on_arm};
 use crate::arm_simulation::ArmError;
@@ -12,21 +12,21 @@ use stylet_tissue::{AnyEffect, ChainStage, Effect, ForceLaw, Rupture, Slab, TooM
 /// Why a scenario cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
-    /// `motion: Recorded` brings no motion of its own.
+    /// `motion: Recorded` has no motion of its own.
     #[error(
         "the motion is `Recorded`: it comes with measured data; give the scenario a motion to simulate it"
     )]
     NoMotion,
-    /// Too many effects at once.
+    /// More effects act on the tissue than the law holds.
     #[error(transparent)]
     Effects(#[from] TooManyEffects),
-    /// The scenario's numbers do not fit; a checked scenario has none of these.
+    /// A value is out of range; scenarios that were checked have none.
     #[error("{}: {}", .0.path, .0.message)]
     InvalidScenario(FieldError),
-    /// The arm cannot carry the needle.
+    /// The arm cannot execute the motion.
     #[error(transparent)]
     Arm(#[from] ArmError),
-    /// A part of the scenario that this version cannot simulate.
+    /// A combination that cannot be simulated.
     #[error("{what} cannot be simulated by this version; {remedy}")]
     NotSupported {
         /// What is not supported.
@@ -36,41 +36,41 @@ pub enum SimulateError {
     },
 }
 
-/// What a simulation gives.
+/// Result of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
-    /// What the sensors recorded.
+    /// The recording of the sensors.
     pub recording: Recording,
-    /// What really happened, one row per sample of the recording.
+    /// Ground truth, one value per sample.
     pub truth: Truth,
-    /// The layers as the law placed them.
+    /// The layers, after geometric effects.
     pub slabs: Vec<Slab>,
-    /// The sensors that recorded, force/torque first.
+    /// Force of each sensor, force/torque first.
     pub readings: Vec<SensorReadings>,
-    /// How far the virtual sensor is off, and how late.
+    /// Error and lag of the virtual sensor.
     pub virtual_sensor_accuracy: Option<VirtualSensorAccuracy>,
-    /// How the needle really moved, one row per sample of the recording.
+    /// True motion of the needle, one value per sample.
     pub motion: Vec<MotionPoint>,
     /// Effects, sensor and sampling rate (Hz) of the force/torque sensor.
     sensor: Option<(Vec<AnyEffect>, ForceTorque, f64)>,
 }
 
 impl Simulation {
-    /// The layers as the law placed them, as the scores want them.
+    /// Ground truth of the layers, for the scores.
     #[must_use]
     pub fn true_layers(&self) -> Vec<LayerTruth> {
         true_layers(&self.slabs)
     }
 
-    /// The same insertion as the force/torque sensor records it with the noise of another seed (N, one value per sample):
-    /// its noise moves nothing, so that the motion need not be simulated again. `None` without such a sensor.
+    /// Recorded force (N, one value per sample) of the same insertion with the noise of another seed. Noise does not act on the motion, which is not
+    /// simulated again. `None` without a force/torque sensor.
     #[must_use]
     pub fn measured_with_seed(&self, seed: u64) -> Option<Vec<f64>> {
         let (effects, sensor, sample_hz) = self.sensor.as_ref()?;
         Some(self.measured_by(effects, sensor, *sample_hz, seed))
     }
 
-    /// The same insertion as another force/torque sensor records it (N, one value per sample).
+    /// Recorded force (N, one value per sample) of the same insertion with another force/torque sensor.
     #[must_use]
     pub fn measured_by(
         &self,
@@ -79,13 +79,13 @@ impl Simulation {
         sample_hz: f64,
         seed: u64,
     ) -> Vec<f64> {
-        let mut measuring = ForceSensor::new(effects, sensor, seed, sample_hz);
-        let moments = self.recording.time_s.iter().zip(&self.motion).zip(&self.truth.tissue_force_n);
-        moments.map(|((time_s, at), tissue_n)| measuring.measure_force(*time_s, at, *tissue_n)).collect()
+        let mut force_sensor = ForceSensor::new(effects, sensor, seed, sample_hz);
+        let samples = self.recording.time_s.iter().zip(&self.motion).zip(&self.truth.tissue_force_n);
+        samples.map(|((time_s, at), tissue_n)| force_sensor.measure_force(*time_s, at, *tissue_n)).collect()
     }
 }
 
-/// What is true of layers that the law placed.
+/// Ground truth of placed layers.
 #[must_use]
 pub fn true_layers(slabs: &[Slab]) -> Vec<LayerTruth> {
     let truth = |slab: &Slab| LayerTruth {
@@ -97,16 +97,16 @@ pub fn true_layers(slabs: &[Slab]) -> Vec<LayerTruth> {
     slabs.iter().map(truth).collect()
 }
 
-/// The force of one sensor, as an online algorithm hears it.
+/// Recorded force of one sensor, the input of an online algorithm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorReadings {
     /// `force_torque` or `virtual`.
     pub sensor: &'static str,
-    /// Axial force in N, one value per sample; not a number as long as the sensor is not zeroed.
+    /// Axial force in N, one value per sample; NaN until the sensor is zeroed.
     pub force_n: Vec<f64>,
 }
 
-/// How a scenario is sampled.
+/// Sampling of a scenario.
 #[must_use]
 pub fn sample_rates(scenario: &Scenario, duration_s: f64) -> SampleRates {
     SampleRates {
@@ -119,27 +119,27 @@ pub fn sample_rates(scenario: &Scenario, duration_s: f64) -> SampleRates {
 /// Simulates a scenario with the noise of `seed`. The same scenario and seed give the same bits.
 ///
 /// # Errors
-/// [`SimulateError`] when the scenario has no motion of its own or asks for what cannot be simulated.
+/// [`SimulateError`] when the scenario has no motion of its own or cannot be simulated.
 pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
     let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;
-    let without = ForceTorque { noise_n: 0.0, ..ForceTorque::default() };
+    let ideal = ForceTorque { noise_n: 0.0, ..ForceTorque::default() };
     let sensor = match scenario.sensor.force_torque() {
         Some(sensor) => sensor,
         None => {
-            let beside = |e: &AnyEffect| {
+            let in_chain = |e: &AnyEffect| {
                 matches!(e.stage(), ChainStage::Tool | ChainStage::Sensor) && !e.is_inactive()
             };
-            if scenario.effects.iter().any(beside) {
+            if scenario.effects.iter().any(in_chain) {
                 return Err(SimulateError::NotSupported {
                     what: "an effect of tool or force/torque sensor with `sensor: Virtual`",
                     remedy: "use sensor: Both(...), or give the arm friction and model errors instead",
                 });
             }
-            &without
+            &ideal
         }
     };
-    let mut measuring = ForceSensor::new(&scenario.effects, sensor, seed, scenario.sample_hz);
+    let mut force_sensor = ForceSensor::new(&scenario.effects, sensor, seed, scenario.sample_hz);
     let rates = sample_rates(scenario, plan.duration_s());
     let mut ruptures = Vec::new();
     let mut columns = Columns::with_capacity(rates.samples, scenario.tissue.surface_m);
@@ -151,7 +151,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
             by_force: r.by_force,
         });
     };
-    let sink = |s: &InsertionSample| columns.push(s, &mut measuring);
+    let sink = |s: &InsertionSample| columns.push(s, &mut force_sensor);
     let mut arm = None;
     match &scenario.robot {
         Robot::Arm(config) => {
@@ -171,7 +171,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         Robot::Slide => simulate_on_slide(&plan, &law, &rates, on_rupture, sink),
         Robot::Replay => simulate_replay(&plan, &law, &rates, on_rupture, sink),
     }
-    // Where the needle was recorded at that instant: the law's own position is relative to the tissue.
+    // The force law reports positions relative to the tissue; the recorded position is the truth.
     for rupture in &mut ruptures {
         rupture.position_m = columns.recorded_m(rupture.time_s).unwrap_or(rupture.position_m);
     }
@@ -179,7 +179,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     let mut recording = columns.recording;
     let zeroed_s = arm.as_ref().map_or(0.0, |arm| arm.zeroed_s);
     let readings = readings(&mut recording, arm, &scenario.sensor);
-    let virtual_error = VirtualSensorAccuracy::compare(&recording, &columns.truth, zeroed_s);
+    let virtual_sensor_accuracy = VirtualSensorAccuracy::compare(&recording, &columns.truth, zeroed_s);
     let slabs = law.slabs().to_vec();
     let sensor = scenario.sensor.force_torque().cloned();
     Ok(Simulation {
@@ -187,13 +187,13 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         truth: columns.truth,
         slabs,
         readings,
-        virtual_sensor_accuracy: virtual_error,
+        virtual_sensor_accuracy,
         motion: columns.motion,
         sensor: sensor.map(|sensor| (scenario.effects.clone(), sensor, scenario.sample_hz)),
     })
 }
 
-/// Puts what the arm recorded into the recording, and lists what the sensors say.
+/// Moves the columns of the arm into the recording and returns the force of each sensor.
 fn readings(recording: &mut Recording, arm: Option<ArmRecording>, sensor: &Sensor) -> Vec<SensorReadings> {
     let mut readings = Vec::new();
     if sensor.force_torque().is_some() {
@@ -202,8 +202,8 @@ fn readings(recording: &mut Recording, arm: Option<ArmRecording>, sensor: &Senso
     let Some(arm) = arm else { return readings };
     recording.joint_torque_nm = arm.joint_torque_nm;
     if sensor.virtual_sensor().is_some() {
-        let heard = recording.time_s.iter().zip(&arm.virtual_force_n);
-        let force_n = heard.map(|(t, f)| if *t < arm.zeroed_s - 1e-9 { f64::NAN } else { *f }).collect();
+        let samples = recording.time_s.iter().zip(&arm.virtual_force_n);
+        let force_n = samples.map(|(t, f)| if *t < arm.zeroed_s - 1e-9 { f64::NAN } else { *f }).collect();
         readings.push(SensorReadings { sensor: "virtual", force_n });
         if sensor.force_torque().is_none() {
             recording.force_n.clone_from(&arm.virtual_force_n);
@@ -213,7 +213,7 @@ fn readings(recording: &mut Recording, arm: Option<ArmRecording>, sensor: &Senso
     readings
 }
 
-/// Recording and truth as they grow.
+/// Recording and truth, extended sample by sample.
 struct Columns {
     recording: Recording,
     truth: Truth,
@@ -235,7 +235,7 @@ impl Columns {
         Self { recording, truth: Truth::default(), motion: Vec::with_capacity(samples), surface_m }
     }
 
-    /// Recorded position at an instant, in m, interpolated between the samples around it.
+    /// Recorded position (m) at a time, interpolated between samples.
     fn recorded_m(&self, time_s: f64) -> Option<f64> {
         let (times, positions) = (&self.recording.time_s, &self.recording.position_m);
         let after = times.partition_point(|t| *t < time_s);
@@ -247,11 +247,11 @@ impl Columns {
         Some(z0 + (z1 - z0) * (time_s - t0) / (t1 - t0))
     }
 
-    fn push(&mut self, s: &InsertionSample, measuring: &mut ForceSensor) {
+    fn push(&mut self, s: &InsertionSample, force_sensor: &mut ForceSensor) {
         self.recording.time_s.push(s.time_s);
-        self.recording.position_m.push(measuring.position(s.position_m));
-        self.recording.velocity_mps.push(measuring.position(s.velocity_mps));
-        self.recording.force_n.push(measuring.measure(s));
+        self.recording.position_m.push(force_sensor.position(s.position_m));
+        self.recording.velocity_mps.push(force_sensor.position(s.velocity_mps));
+        self.recording.force_n.push(force_sensor.measure(s));
         self.motion.push(MotionPoint {
             position_m: s.position_m,
             velocity_mps: s.velocity_mps,

@@ -1,11 +1,10 @@
-//! One insertion, sample by sample: the commanded motion carried out by a robot, the tissue law
-//! making the force.
+//! One insertion, sample by sample, on the slide or as kinematic replay.
 
 use crate::rapier_slide::Slide;
 use stylet_scenario::{MotionPlan, MotionPoint};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture, TissueForce};
 
-/// The needle and the tissue at one sampling instant.
+/// Needle and tissue at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InsertionSample {
     /// Time in seconds.
@@ -16,11 +15,11 @@ pub struct InsertionSample {
     pub velocity_mps: f64,
     /// Its acceleration in m/s².
     pub acceleration_mps2: f64,
-    /// The tissue's force with its ground truth.
+    /// Tissue force with its ground truth.
     pub force: TissueForce,
 }
 
-/// How an insertion is sampled.
+/// Sampling of an insertion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleRates {
     /// Samples per second.
@@ -31,8 +30,7 @@ pub struct SampleRates {
     pub samples: usize,
 }
 
-/// The kinematic replay: the needle is exactly where the motion commands it, no rigid bodies. The
-/// law is stepped once per sample.
+/// Kinematic replay: the needle follows the commanded motion exactly. The force law is evaluated once per sample.
 pub fn simulate_replay(
     plan: &MotionPlan,
     law: &ForceLaw,
@@ -49,8 +47,8 @@ pub fn simulate_replay(
     }
 }
 
-/// The slide: rapier carries the needle, the law is stepped with every physics step on the needle's
-/// actual position and velocity, and its force acts on the needle.
+/// Slide: rapier moves the needle. The force law is evaluated at every physics step at the needle's actual position and velocity; its force acts
+/// on the needle.
 pub fn simulate_on_slide(
     plan: &MotionPlan,
     law: &ForceLaw,
@@ -63,7 +61,7 @@ pub fn simulate_on_slide(
     let start = plan.at(0.0);
     let mut slide = Slide::new(start.position_m, start.velocity_mps, 1.0 / physics_hz);
     let mut state = ForceLawState::default();
-    let mut before_mps = start.velocity_mps;
+    let mut previous_mps = start.velocity_mps;
     for k in 0..rates.samples * steps {
         let time_s = k as f64 / physics_hz;
         let (position_m, velocity_mps) = slide.tip();
@@ -73,11 +71,11 @@ pub fn simulate_on_slide(
                 time_s: (k / steps) as f64 / rates.sample_hz,
                 position_m,
                 velocity_mps,
-                acceleration_mps2: (velocity_mps - before_mps) * physics_hz,
+                acceleration_mps2: (velocity_mps - previous_mps) * physics_hz,
                 force,
             });
         }
-        before_mps = velocity_mps;
+        previous_mps = velocity_mps;
         let next = plan.at((k + 1) as f64 / physics_hz);
         slide.step(next.position_m, next.velocity_mps, force.total_n);
     }

@@ -1,4 +1,4 @@
-//! The virtual sensor: the force at the needle's tip from the arm's joint torques.
+//! The virtual sensor: force at the needle's tip from the joint torques of the arm.
 
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -11,17 +11,15 @@ use stylet_dynamics::{
 };
 use stylet_scenario::{ArmConfig, VirtualSensor, WrenchEstimate};
 
-/// Stream of the generator from which the joint torques' noise is drawn.
+/// Generator stream of the torque noise.
 const NOISE_STREAM: u64 = 2;
-/// Damping of the pseudo-inverse: costs a millionth of a force.
+/// Damping of the pseudo-inverse; its effect on the force is about 1e-6.
 const DAMPING: f64 = 1e-3;
 
 /// Joint torques as the arm measures them.
 ///
-/// The motors' inner loops overcome the joints' friction: the links are driven by the commanded
-/// torque alone and the motors give `friction(qd)` more, which the torque sensors contain. For the
-/// same motion the residual of an observer is the same as if the friction acted on the links and the
-/// motors gave the commanded torque; but friction applied to the links at 1 kHz is stiff (see
+/// The inner loops of the motors compensate joint friction: the commanded torque drives the links, and the measured torque contains `friction(qd)` in
+/// addition. For the same motion the residual of an observer is the same as with friction on the links, which is stiff at 1 kHz (see
 /// `stylet_dynamics::friction::SmoothSign::width_radps`).
 #[derive(Debug)]
 pub struct JointTorqueSensors {
@@ -39,7 +37,7 @@ impl JointTorqueSensors {
         Self { friction: arm.joint_friction.friction_models(arm.friction_scale), noise_nm, generator }
     }
 
-    /// What they read (N m) while `driving_nm` drives the links at joint rates `qd_radps`.
+    /// Measured torques (N m) while `driving_nm` drives the links at joint rates `qd_radps`.
     #[inline]
     pub fn read(&mut self, driving_nm: &JointVector<7>, qd_radps: &JointVector<7>) -> JointVector<7> {
         let mut reading = driving_nm + self.friction.torques(qd_radps);
@@ -53,14 +51,14 @@ impl JointTorqueSensors {
     }
 }
 
-/// A momentum observer with the model that it believes, and the direction in which its force counts.
+/// Momentum observer with its assumed model of the arm, reporting the axial force.
 ///
 /// `r = G (p - p(0) - int(tau + C^T qd - g + r) ds)` once per physics step; wrench `= pinv(J^T) r`, less
-/// the value of `r` in the air; axial force `f = -F . u` (SPEC section 4; `stylet_dynamics::Observer`).
+/// the value of `r` in the air; axial force `f = -F . u` (`docs/reference/model.md`, *Sensors*; `stylet_dynamics::Observer`).
 #[derive(Debug)]
 pub struct AxialForceObserver {
-    /// When it differs from the arm as it is.
-    believed: Option<Arm<7>>,
+    /// When it differs from the true model.
+    assumed: Option<Arm<7>>,
     observer: Observer<7>,
     state: ObserverState<7>,
     wrench: WrenchEstimate,
@@ -70,22 +68,21 @@ impl AxialForceObserver {
     /// An observer for an arm.
     ///
     /// # Errors
-    /// When a gain or the believed model is out of range.
+    /// When a gain or the assumed model is out of range.
     pub fn new(arm: &ArmConfig, sensor: &VirtualSensor) -> Result<Self, Error> {
-        let wrong = arm.payload_error_kg != 0.0 || arm.link_mass_error != 0.0;
+        let differs = arm.payload_error_kg != 0.0 || arm.link_mass_error != 0.0;
         Ok(Self {
-            believed: if wrong { Some(Arm::new(&arm.assumed_model())?) } else { None },
+            assumed: if differs { Some(Arm::new(&arm.assumed_model())?) } else { None },
             observer: ObserverConfig { gain_per_s: sensor.gain_per_s.into() }.build()?,
             state: ObserverState::default(),
             wrench: sensor.wrench,
         })
     }
 
-    /// One physics step: `terms` of the arm as it is at the present state, joint torques (N m) read over
-    /// the step of `dt_s` that led here.
+    /// One physics step: `terms` of the true arm at the present state, joint torques (N m) measured over the previous step of `dt_s`.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// When a value is not finite.
     #[inline]
     pub fn step(
         &mut self,
@@ -94,7 +91,7 @@ impl AxialForceObserver {
         torque_nm: &JointVector<7>,
         dt_s: f64,
     ) -> Result<(), Error> {
-        let terms = match &self.believed {
+        let terms = match &self.assumed {
             None => *terms,
             Some(arm) => arm.at(q_rad).momentum_terms(qd_radps, &EARTH_GRAVITY_MPS2),
         };
@@ -102,26 +99,26 @@ impl AxialForceObserver {
         Ok(())
     }
 
-    /// From now on the residual is averaged...
+    /// Starts averaging the residual.
     pub fn begin_zeroing(&mut self) {
         self.state.begin_offset();
     }
 
-    /// ...and the average is taken as zero; what that means in joint torques (N m).
+    /// Subtracts the average from now on and returns it, in joint torques (N m).
     ///
     /// # Errors
-    /// When nothing was averaged.
+    /// When there is nothing to average.
     pub fn finish_zeroing(&mut self) -> Result<JointVector<7>, Error> {
         self.state.finish_offset()
     }
 
-    /// Axial force (N) along `direction`, positive when it resists the insertion, of the residual.
+    /// Axial force (N) of the residual along `direction`, positive when it resists the insertion.
     #[must_use]
     pub fn axial_force_n(&self, at: &Posture<'_, 7>, direction: &Vector3<f64>) -> f64 {
         self.axial_force_of_torques_n(at, direction, &self.state.residual_nm())
     }
 
-    /// The same of given external joint torques (N m).
+    /// The same for given external joint torques (N m).
     #[must_use]
     pub fn axial_force_of_torques_n(
         &self,

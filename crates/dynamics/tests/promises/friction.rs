@@ -1,4 +1,4 @@
-//! Promise: joint friction opposes motion, has the measured size, and wrong coefficients are refused by name.
+//! Joint friction opposes motion, has the measured size, and wrong coefficients are refused by name.
 
 use stylet_dynamics::{
     Error, JointVector,

@@ -1,4 +1,4 @@
-//! The promises of the arm's dynamics, one file each; one program, because linking takes longer than testing.
+//! Tests of the dynamics, one file per promise; one program, because linking takes longer than testing.
 
 mod common;
 mod friction;

@@ -1,8 +1,8 @@
-//! Promise: what mechanics says must hold for any arm holds for this code, at the committed random states:
+//! Properties of any rigid arm, at the committed random states:
 //! the mass matrix is symmetric and positive definite, `dM/dt = C + C^T`, momentum and power balance, and the
 //! algorithms agree with each other.
 
-use crate::common::states;
+use crate::common::{bias_torques, states};
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 use stylet_dynamics::{
     Arm, ArmModel, EARTH_GRAVITY_MPS2, JointLimits, JointVector, Link, Pose, RigidBody, Tool, Wrench, panda,
@@ -26,7 +26,7 @@ where
 /// Christoffel form of the Coriolis matrix, from Newton-Euler by polarisation.
 fn coriolis(arm: &Arm<7>, q: &JointVector<7>, qd: &JointVector<7>) -> Matrix7 {
     let at = arm.at(q);
-    let bias = |x: &JointVector<7>| at.bias_torques(x, &Vector3::zeros());
+    let bias = |x: &JointVector<7>| bias_torques(&at, x, &Vector3::zeros());
     let mut c = Matrix7::zeros();
     for j in 0..7 {
         let mut unit = JointVector::<7>::zeros();
@@ -116,20 +116,9 @@ fn the_single_pass_agrees_with_mass_matrix_and_inverse_dynamics() {
         let at = arm.at(&s.q);
         let terms = at.momentum_terms(&s.qd, &EARTH_GRAVITY_MPS2);
         assert!((terms.momentum_nms - at.mass_matrix() * s.qd).amax() < 1e-13);
-        let still = at.bias_torques(&JointVector::zeros(), &EARTH_GRAVITY_MPS2);
+        let still = bias_torques(&at, &JointVector::zeros(), &EARTH_GRAVITY_MPS2);
         assert!((terms.gravity_nm - still).amax() < 1e-13);
         assert!((at.gravity_torques(&EARTH_GRAVITY_MPS2) - still).amax() < 1e-13);
-    }
-}
-
-#[test]
-fn forward_dynamics_undoes_inverse_dynamics() {
-    let arm = arm();
-    for s in states() {
-        let at = arm.at(&s.q);
-        let tau = at.inverse_dynamics(&s.qd, &s.qdd, &EARTH_GRAVITY_MPS2, &s.wrench);
-        let back = at.forward_dynamics(&s.qd, &tau, &EARTH_GRAVITY_MPS2, &s.wrench);
-        assert!((back - s.qdd).amax() < 1e-9, "{:e}", (back - s.qdd).amax());
     }
 }
 
@@ -152,13 +141,13 @@ fn jacobian_and_tip_acceleration_are_derivatives_of_the_tip_pose() {
 #[test]
 fn the_wrench_comes_back_from_its_joint_torques() {
     let arm = arm();
-    let mut seen = 0;
+    let mut checked = 0;
     for s in states() {
         let at = arm.at(&s.q);
         if at.singular_values().smallest() < 0.05 {
             continue;
         }
-        seen += 1;
+        checked += 1;
         let torque = at.joint_torques(&s.wrench);
         assert!((at.tip_wrench(&torque, 0.0).to_vector() - s.wrench.to_vector()).amax() < 1e-10);
         let force = Wrench::pure_force(s.wrench.force_n);
@@ -170,7 +159,7 @@ fn the_wrench_comes_back_from_its_joint_torques() {
                 < 4.1e-4 * force.force_n.norm()
         );
     }
-    assert!(seen > 500, "{seen}");
+    assert!(checked > 500, "{checked}");
 }
 
 #[test]
@@ -184,7 +173,6 @@ fn singular_values_are_those_of_the_jacobian() {
             assert!((ours.sorted[k] - theirs[k]).abs() < 1e-13);
         }
         assert_eq!(ours.smallest(), ours.sorted[5]);
-        assert!((ours.manipulability() - theirs.product()).abs() < 1e-13);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Promise: what the arm cannot do is found before the run, with the place and the reason.
+//! Infeasible poses and lines are detected before a simulation, with location and reason.
 
 #![allow(clippy::panic)] // how a test fails
 

@@ -1,5 +1,4 @@
-//! Promise: an arm that cannot carry the needle, friction that would push, and a virtual sensor
-//! without joints are refused before the run starts, with the field and what would be right.
+//! An unreachable line, friction of the wrong sign, and a virtual sensor without joints are refused before a simulation, with field and remedy.
 
 use stylet_scenario::Scenario;
 
@@ -17,11 +16,11 @@ fn refused(robot: &str, sensor: &str) -> String {
     Scenario::parse("gel.ron", &text).expect_err("must be refused").to_string()
 }
 
-fn says(robot: &str, sensor: &str, words: &[&str]) {
+fn assert_message(robot: &str, sensor: &str, parts: &[&str]) {
     let message = refused(robot, sensor);
     println!("{message}");
-    for word in words {
-        assert!(message.contains(word), "`{word}` is missing in: {message}");
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is missing in: {message}");
     }
 }
 
@@ -44,8 +43,8 @@ fn the_plain_arm_and_the_papers_virtual_sensor_are_accepted() {
 #[test]
 fn joint_angles_outside_their_limits_are_named() {
     let robot = "Arm(start_rad: (0.0, -0.785, 0.0, 0.5, 0.0, 1.57, 0.785))";
-    says(robot, VIRTUAL, &["gel.ron:5", "robot.start_rad[3]", "joint 4", "0.5", "-0.0698"]);
-    says(
+    assert_message(robot, VIRTUAL, &["gel.ron:5", "robot.start_rad[3]", "joint 4", "0.5", "-0.0698"]);
+    assert_message(
         "Arm(start_rad: (inf, 0.0, 0.0, -1.0, 0.0, 1.57, 0.785))",
         VIRTUAL,
         &["robot.start_rad[0]", "finite"],
@@ -54,17 +53,17 @@ fn joint_angles_outside_their_limits_are_named() {
 
 #[test]
 fn a_line_out_of_reach_is_named_with_the_place_where_it_fails() {
-    says("Arm(tip_m: (1.2, 0.0, 0.4))", VIRTUAL, &["robot.tip_m", "cannot carry the needle", "mm"]);
-    says("Arm(direction: (0.0, 0.0, 0.0))", VIRTUAL, &["robot.direction", "not a direction"]);
+    assert_message("Arm(tip_m: (1.2, 0.0, 0.4))", VIRTUAL, &["robot.tip_m", "cannot carry the needle", "mm"]);
+    assert_message("Arm(direction: (0.0, 0.0, 0.0))", VIRTUAL, &["robot.direction", "not a direction"]);
     // Reachable at the start, not at the end.
-    says("Arm(tip_m: (0.6, 0.0, -0.42))", VIRTUAL, &["robot.tip_m", "straight line fails"]);
+    assert_message("Arm(tip_m: (0.6, 0.0, -0.42))", VIRTUAL, &["robot.tip_m", "straight line fails"]);
 }
 
 #[test]
 fn a_singular_pose_is_refused() {
     // Upper arm upright and the elbow turned by a right angle: the wrist cannot leave a plane.
     let robot = "Arm(start_rad: (0.0, 0.0, 1.5708, -1.5, 0.0, 1.5, 0.0))";
-    says(robot, VIRTUAL, &["robot.start_rad", "singular"]);
+    assert_message(robot, VIRTUAL, &["robot.start_rad", "singular"]);
 }
 
 #[test]
@@ -73,38 +72,46 @@ fn friction_that_would_push_the_joint_is_refused() {
     let wrong = format!(
         "Arm(joint_friction: PerJoint(joints: ({joint}, {joint}, (coulomb_nm: -0.3), {joint}, {joint}, {joint}, {joint})))"
     );
-    says(&wrong, VIRTUAL, &["robot.joint_friction.joints[2].coulomb_nm", "-0.3", "opposes"]);
+    assert_message(&wrong, VIRTUAL, &["robot.joint_friction.joints[2].coulomb_nm", "-0.3", "opposes"]);
     let sigmoid = "(amplitude_nm: 0.6, steepness_s_per_rad: 100.0, shift_radps: 0.0)";
     let bad = "(amplitude_nm: -0.6, steepness_s_per_rad: 100.0, shift_radps: 0.0)";
     let wrong = format!(
         "Arm(joint_friction: Sigmoid(joints: ({bad}, {sigmoid}, {sigmoid}, {sigmoid}, {sigmoid}, {sigmoid}, {sigmoid})))"
     );
-    says(&wrong, VIRTUAL, &["joints[0].amplitude_nm", "opposes"]);
-    says("Arm(joint_friction: Measured, friction_scale: -1.0)", VIRTUAL, &["robot.friction_scale", "-1"]);
+    assert_message(&wrong, VIRTUAL, &["joints[0].amplitude_nm", "opposes"]);
+    assert_message(
+        "Arm(joint_friction: Measured, friction_scale: -1.0)",
+        VIRTUAL,
+        &["robot.friction_scale", "-1"],
+    );
 }
 
 #[test]
 fn a_virtual_sensor_needs_an_arm() {
-    says("Slide", VIRTUAL, &["sensor", "joint torques", "robot: Arm()"]);
-    says("Replay", "Both()", &["robot: Arm()"]);
+    assert_message("Slide", VIRTUAL, &["sensor", "joint torques", "robot: Arm()"]);
+    assert_message("Replay", "Both()", &["robot: Arm()"]);
 }
 
 #[test]
 fn gains_noise_windows_and_model_errors_out_of_range_are_named() {
-    says("Arm()", "Virtual(gain_per_s: -5.0)", &["sensor.gain_per_s", "-5"]);
-    says("Arm()", "Virtual(gain_per_s: [5,5,0,5,5,5,5])", &["sensor.gain_per_s[2]"]);
-    says(
+    assert_message("Arm()", "Virtual(gain_per_s: -5.0)", &["sensor.gain_per_s", "-5"]);
+    assert_message("Arm()", "Virtual(gain_per_s: [5,5,0,5,5,5,5])", &["sensor.gain_per_s[2]"]);
+    assert_message(
         "Arm()",
         "Both(virtual_sensor: (torque_noise_nm: -0.1))",
         &["sensor.virtual_sensor.torque_noise_nm"],
     );
-    says("Arm()", "Virtual(zero: BeforeContact(lead_s: 0.5, average_s: 0.0))", &["sensor.zero.average_s"]);
-    says("Arm(link_mass_error: 3.0)", VIRTUAL, &["robot.link_mass_error", "per cent"]);
-    says("Arm(payload_error_kg: -1.0)", VIRTUAL, &["robot.payload_error_kg"]);
-    says(
+    assert_message(
+        "Arm()",
+        "Virtual(zero: BeforeContact(lead_s: 0.5, average_s: 0.0))",
+        &["sensor.zero.average_s"],
+    );
+    assert_message("Arm(link_mass_error: 3.0)", VIRTUAL, &["robot.link_mass_error", "per cent"]);
+    assert_message("Arm(payload_error_kg: -1.0)", VIRTUAL, &["robot.payload_error_kg"]);
+    assert_message(
         "Arm(controller: (natural_frequency_radps: 900.0))",
         VIRTUAL,
         &["natural_frequency_radps", "stable"],
     );
-    says("Arm(payload: 0.1)", VIRTUAL, &["unknown field `payload`"]);
+    assert_message("Arm(payload: 0.1)", VIRTUAL, &["unknown field `payload`"]);
 }

@@ -1,5 +1,4 @@
-//! The ways of writing that a scenario file allows: `Some` or not, the outer name or not, RON's own
-//! headers, one pair of brackets for effects, robots and sensors.
+//! Optional syntax of scenario files: `Some`, the outer name, RON headers, one pair of brackets for effects, robots and sensors.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use stylet_scenario::{ArmConfig, ForceTorque, Robot, Scenario, Sensor, VirtualSensor};

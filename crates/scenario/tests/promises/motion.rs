@@ -1,6 +1,5 @@
-//! A motion's velocity is the derivative of its position and its acceleration that of its velocity, at
-//! every instant and across the segments of a program: the law, the sensor's inertia and the online
-//! algorithm each read another of the three.
+//! The velocity of a motion is the derivative of its position, and the acceleration that of its velocity, at every time and across the segments of a
+//! program.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use core::f64::consts::TAU;
@@ -130,18 +129,18 @@ proptest! {
     ) {
         let plan = motion.plan().unwrap();
         let n = 20_000;
-        let seen = (0..=n)
+        let sampled = (0..=n)
             .map(|k| plan.at(plan.duration_s() * f64::from(k) / f64::from(n)).position_m)
             .fold(f64::NEG_INFINITY, f64::max);
-        // Between two of the instants, at 0.7 m/s at most.
+        // Between two samples, at 0.7 m/s at most.
         let between = 0.7 * plan.duration_s() / f64::from(n);
         let deepest = plan.deepest_m();
-        prop_assert!(deepest >= seen - 1e-12 && deepest <= seen + between, "{deepest} against {seen}");
+        prop_assert!(deepest >= sampled - 1e-12 && deepest <= sampled + between, "{deepest} against {sampled}");
     }
 }
 
 #[test]
-fn the_default_sinusoid_starts_from_rest_and_goes_the_papers_way() {
+fn the_default_sinusoid_starts_from_rest_and_moves_twice_its_amplitude() {
     let text = r#"Scenario(
         name: "sinusoid",
         tissue: (layers: [(thickness_m: 0.03, stiffness_n_per_m: 40.0, friction_ns_per_m2: 9000.0)]),

@@ -1,5 +1,4 @@
-//! Every number of a scenario has a range, and a number outside it is refused at its place with the
-//! range: motions, effects, the online algorithm, and the sizes of what is to be simulated.
+//! Every value of a scenario has a range; a value outside is refused with its location and the range.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use proptest::prelude::*;
@@ -15,8 +14,8 @@ fn scenario(motion: &str, rest: &str) -> String {
     )
 }
 
-/// What is said of a text, which must be refused at the first place in `written` where `at` stands.
-fn said(text: &str, written: &str, at: &str) -> String {
+/// The message for a text that must be refused at the first occurrence of `at` in `written`.
+fn message_for(text: &str, written: &str, at: &str) -> String {
     let Err(error) = Scenario::parse("gel.ron", text) else { panic!("accepted:\n{text}") };
     let message = error.to_string();
     let from = text.find(written).unwrap_or_else(|| panic!("no `{written}`"));
@@ -27,11 +26,11 @@ fn said(text: &str, written: &str, at: &str) -> String {
     message
 }
 
-/// Cases of (what is written, where it is refused, what is said).
+/// Cases of text, location and message.
 fn all_refused(cases: &[(&str, &str, &str)], text: impl Fn(&str) -> String) {
     for (written, at, expected) in cases {
-        let message = said(&text(written), written, at);
-        assert!(message.contains(expected), "`{expected}` is not said: {message}");
+        let message = message_for(&text(written), written, at);
+        assert!(message.contains(expected), "`{expected}` is missing in: {message}");
     }
 }
 
@@ -116,7 +115,10 @@ fn effects() {
     ];
     all_refused(&cases, |effect| scenario(CONSTANT, &format!("effects: [{effect}],")));
     let many = scenario(CONSTANT, &format!("effects: [{}],", "CoulombFriction(c_n_per_m: 1.0), ".repeat(17)));
-    assert!(said(&many, "[Coulomb", "[").contains("17 effects act on the tissue at once; at most 16 are possible"));
+    assert!(
+        message_for(&many, "[Coulomb", "[")
+            .contains("17 effects act on the tissue at once; at most 16 are possible")
+    );
 }
 
 #[test]
@@ -186,7 +188,7 @@ fn a_file_that_is_far_too_long_is_not_read() {
 
 proptest! {
     #[test]
-    fn a_spoilt_text_is_refused_with_a_message_and_never_a_panic(
+    fn a_corrupted_text_is_refused_with_a_message_without_panic(
         at in 0usize..500,
         gone in 0usize..6,
         put in "[(){}\\[\\]:,\"\\\\/*#.é\n0-9a-c -]{0,4}",

@@ -1,6 +1,4 @@
-//! A scenario written out with every default (`scenario.ron` of an output folder, `extended.ron` of a
-//! diagnosis) is the same scenario when it is read again, to the last bit: otherwise a run could not be
-//! repeated from its own output.
+//! A scenario written with every default (`scenario.ron`, `extended.ron`) reads back as the same scenario, bit for bit.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use proptest::prelude::*;
@@ -122,7 +120,7 @@ fn robot() -> impl Strategy<Value = Robot> {
     prop_oneof![Just(Robot::Slide), Just(Robot::Replay), Just(Robot::Arm(ArmConfig::default()))]
 }
 
-/// Sensors with the robots that can carry them: the virtual one listens to an arm.
+/// Sensors with suitable robots: the virtual one needs an arm.
 fn robot_and_sensor() -> impl Strategy<Value = (Robot, Sensor)> {
     let virtual_sensor = || {
         (0.5..50.0).prop_map(|gain| VirtualSensor {

@@ -1,13 +1,11 @@
-//! The scenario files that come with Stylet load, reach the tissue, and hold the ruptures and forces
-//! that their comments and `scenarios/README.md` tell: otherwise the first thing a newcomer reads is
-//! not what the first command shows.
+//! The shipped scenarios load, reach the tissue, and have the ruptures and forces stated in their comments and in `scenarios/README.md`.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::{Path, PathBuf};
 use stylet_scenario::{Motion, Scenario};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 
-/// File; instant in s of each true rupture and the elastic force in N that it releases; largest force in N.
+/// File; time (s) and released elastic force (N) of each true rupture; largest force (N).
 type Expected = (&'static str, &'static [(f64, f64)], f64);
 
 const SHIPPED: [Expected; 10] = [
@@ -63,8 +61,8 @@ fn insert(s: &Scenario) -> Insertion {
     result
 }
 
-fn near(value: f64, told: f64) -> bool {
-    (value - told).abs() <= 0.006 * told.abs() + 0.0005
+fn near(value: f64, stated: f64) -> bool {
+    (value - stated).abs() <= 0.006 * stated.abs() + 0.0005
 }
 
 /// Every scenario file of the folder, also those that are not in the table above.
@@ -89,14 +87,14 @@ fn the_scenarios_of_the_paper_are_all_there() {
 }
 
 #[test]
-fn every_scenario_says_what_it_is_and_where_its_numbers_come_from() {
+fn every_scenario_states_title_source_and_what_it_shows() {
     let readme = std::fs::read_to_string(folder().join("README.md")).unwrap();
     for (name, ..) in SHIPPED {
         let scenario = load(name);
         assert!(!scenario.name.is_empty() && !scenario.source.is_empty(), "{name}");
         assert!(readme.contains(&format!("`{name}`")), "{name} is not in the README");
         let text = std::fs::read_to_string(folder().join(format!("{name}.ron"))).unwrap();
-        assert!(text.starts_with("// You see: "), "{name} does not begin with what one will see");
+        assert!(text.starts_with("// Shows: "), "{name} does not begin with what it shows");
         assert!(text.lines().nth(1).is_some_and(|l| l.starts_with("// ")), "{name}");
     }
 }
@@ -112,13 +110,13 @@ fn every_scenario_begins_in_air_and_reaches_the_tissue() {
 }
 
 #[test]
-fn every_scenario_holds_the_ruptures_and_the_peak_force_that_it_tells() {
-    for (name, told, peak_n) in SHIPPED {
+fn every_scenario_has_its_stated_ruptures_and_peak_force() {
+    for (name, stated, peak_n) in SHIPPED {
         let got = insert(&load(name));
         let ruptures: Vec<_> = got.ruptures.iter().map(|r| (r.time_s, r.released_n)).collect();
-        assert_eq!(ruptures.len(), told.len(), "{name}: {ruptures:?}");
-        for ((time_s, released_n), (told_s, told_n)) in ruptures.iter().zip(told) {
-            assert!(near(*time_s, *told_s) && near(*released_n, *told_n), "{name}: {ruptures:?}");
+        assert_eq!(ruptures.len(), stated.len(), "{name}: {ruptures:?}");
+        for ((time_s, released_n), (stated_s, stated_n)) in ruptures.iter().zip(stated) {
+            assert!(near(*time_s, *stated_s) && near(*released_n, *stated_n), "{name}: {ruptures:?}");
         }
         assert!(near(got.peak_n, peak_n), "{name}: {} N", got.peak_n);
     }
@@ -156,7 +154,7 @@ fn the_isinglass_gels_are_nine_tenths_friction_and_grow_with_concentration() {
         let friction = scenario.tissue.layers[0].friction_ns_per_m2;
         assert!(friction > before, "{concentration} %");
         before = friction;
-        // From contact to exit, as the supplement tells.
+        // From contact to exit, as in the supplement.
         if let Some(exit_s) = exit_s {
             let contact_s = 0.005 / 0.0023;
             assert!((got.ruptures[0].time_s - contact_s - exit_s).abs() < 1e-6, "{concentration} %");
@@ -168,7 +166,7 @@ fn the_isinglass_gels_are_nine_tenths_friction_and_grow_with_concentration() {
 }
 
 #[test]
-fn the_two_stacks_are_one_and_the_latex_breaks_by_force() {
+fn both_stacks_have_the_same_layers_and_the_latex_ruptures_by_force() {
     let constant = load("three_layer_latex_constant");
     assert_eq!(constant.tissue, load("three_layer_latex_sinusoidal").tissue);
     let by_force: Vec<bool> = insert(&constant).ruptures.iter().map(|r| r.by_force).collect();
@@ -176,7 +174,7 @@ fn the_two_stacks_are_one_and_the_latex_breaks_by_force() {
 }
 
 #[test]
-fn the_stack_at_constant_velocity_is_the_specifications_example() {
+fn fields_left_out_have_the_defaults_written_in_the_file() {
     let text = std::fs::read_to_string(folder().join("three_layer_latex_constant.ron")).unwrap();
     let without_defaults = r#"Scenario(
         name: "three gel layers, latex around the second, constant velocity",
@@ -207,7 +205,7 @@ fn the_sinusoids_are_the_published_one_from_rest() {
 }
 
 #[test]
-fn the_livers_capsules_break_by_force_and_the_needle_ends_behind_them() {
+fn the_capsules_of_the_liver_rupture_by_force_and_the_needle_ends_behind_them() {
     let scenario = load("bovine_liver_constant");
     let got = insert(&scenario);
     assert!(got.ruptures.iter().all(|r| r.by_force));

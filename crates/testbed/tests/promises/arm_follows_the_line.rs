@@ -1,5 +1,4 @@
-//! Promise: the arm keeps the needle's tip on its line, within 50 um RMS of where the motion commands
-//! it, through air, tissue and ruptures; in any direction that it can reach.
+//! The arm keeps the tip on its line, within 50 um RMS of the commanded position, in air, tissue and at ruptures, in any reachable direction.
 
 use crate::common::{FILES, noiseless, with_arm};
 use stylet_scenario::{ArmConfig, ArmController};

@@ -1,5 +1,4 @@
-//! Promise: the kinematic replay and the arm give the same tissue force for the same position and
-//! velocity, bit for bit: what the arm adds is motion, never force.
+//! Kinematic replay and arm give the same tissue force for the same position and velocity, bit for bit.
 
 use stylet_scenario::{ArmConfig, MotionPlan, Scenario};
 use stylet_testbed::ArmSimulation;

@@ -1,10 +1,10 @@
-//! The promises of the testbed, one file each; one program, because linking takes longer than testing.
+//! Tests of the testbed, one file per promise; one program, because linking takes longer than testing.
 
 mod arm_follows_the_line;
 mod arm_force_equals_replay;
 mod common;
+mod force_sensor;
+mod measured_with_another_seed;
 mod rapier_arm_equals_dynamics;
-mod remeasured;
 mod replay_equals_rapier;
-mod sensor;
-mod virtual_sensor_feels_the_tissue;
+mod virtual_sensor_measures_tissue_force;

@@ -1,6 +1,5 @@
-//! Promise: the arm that rapier carries is the arm that `stylet-dynamics` computes with: same mass
-//! matrix, same accelerations under joint torques, gravity and a force at the tip. The virtual sensor
-//! and the control rest on it.
+//! The arm in rapier is the arm of `stylet-dynamics`: same mass matrix, same accelerations under joint torques, gravity and a force at the tip.
+//! Virtual sensor and controller rely on it.
 
 use nalgebra::{SMatrix, Vector3};
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, Wrench, panda};
@@ -49,7 +48,13 @@ fn rapier_gives_the_accelerations_of_the_dynamics_crate_under_torques_gravity_an
             let at = arm.at(&q);
             body.step(&at.link_poses(), &torque, &at.tip().position_m, &push);
             let (q_after, qd_after) = body.joints();
-            let expected = at.forward_dynamics(&qd, &torque, &EARTH_GRAVITY_MPS2, &Wrench::pure_force(push));
+            let bias = at.inverse_dynamics(
+                &qd,
+                &JointVector::zeros(),
+                &EARTH_GRAVITY_MPS2,
+                &Wrench::pure_force(push),
+            );
+            let expected = at.mass_matrix().cholesky().expect("positive definite").solve(&(torque - bias));
             worst = worst.max(((qd_after - qd) / dt - expected).amax());
             size = size.max(expected.amax());
             assert!((q_after - q - qd_after * dt).amax() < 1e-12, "semi-implicit step");

@@ -1,5 +1,5 @@
-//! Promise: the kinematic replay and the rapier run give the same tissue force for the same position
-//! and velocity, and the slide follows its command and feels the tissue.
+//! The kinematic replay and the rapier simulation give the same tissue force for the same position and velocity, and the slide follows its command
+//! under load.
 
 use stylet_scenario::{Motion, Segment};
 use stylet_testbed::{
@@ -57,23 +57,26 @@ fn replay_and_rapier_give_the_same_force_for_the_same_motion_bit_for_bit() {
         ],
     };
     let plan = program.plan().expect("a motion of its own");
-    // Every physics step is a sample, so that the replay can be given all that the law was given.
+    // Every physics step is a sample, so that the replay sees the same motion as the law.
     let rates = SampleRates { sample_hz: 1000.0, steps_per_sample: 1, samples: 52_000 };
     let mut ruptures = 0;
-    let mut carried: Vec<InsertionSample> = Vec::new();
-    simulate_on_slide(&plan, &law, &rates, |_| ruptures += 1, |s| carried.push(*s));
+    let mut on_slide: Vec<InsertionSample> = Vec::new();
+    simulate_on_slide(&plan, &law, &rates, |_| ruptures += 1, |s| on_slide.push(*s));
     let mut forces = Vec::new();
     replay(
         &law,
-        carried.iter().map(|s| (s.time_s, s.position_m, s.velocity_mps)),
+        on_slide.iter().map(|s| (s.time_s, s.position_m, s.velocity_mps)),
         |_| {},
         |f| forces.push(f),
     );
-    assert!(carried.iter().map(|s| s.force).eq(forces.iter().copied()));
-    assert_eq!(ruptures, 3, "the run must really have had its ruptures");
-    assert!(forces.iter().any(|f| f.total_n < -1.0), "the run must really have been pulled back");
-    let commanded = carried.iter().filter(|s| s.position_m == plan.at(s.time_s).position_m).count();
-    assert!(commanded < carried.len() / 2, "the slide must really move under load, not where it is told to");
+    assert!(on_slide.iter().map(|s| s.force).eq(forces.iter().copied()));
+    assert_eq!(ruptures, 3, "every layer has ruptured");
+    assert!(forces.iter().any(|f| f.total_n < -1.0), "the needle has been retracted");
+    let commanded = on_slide.iter().filter(|s| s.position_m == plan.at(s.time_s).position_m).count();
+    assert!(
+        commanded < on_slide.len() / 2,
+        "the slide must really move under load, not exactly as commanded"
+    );
 }
 
 #[test]
@@ -83,7 +86,7 @@ fn the_kinematic_replay_is_where_the_motion_commands_it_and_close_to_the_slide()
         .plan()
         .expect("a motion");
     let rates = SampleRates { sample_hz: 200.0, steps_per_sample: 5, samples: 9200 };
-    let (mut ideal, mut carried) = (Vec::new(), Vec::new());
+    let (mut ideal, mut on_slide) = (Vec::new(), Vec::new());
     simulate_replay(
         &plan,
         &law,
@@ -91,10 +94,10 @@ fn the_kinematic_replay_is_where_the_motion_commands_it_and_close_to_the_slide()
         |r| ideal.push(r.time_s),
         |s| assert_eq!(s.position_m, plan.at(s.time_s).position_m),
     );
-    simulate_on_slide(&plan, &law, &rates, |r| carried.push(r.time_s), |_| {});
-    assert_eq!((ideal.len(), carried.len()), (3, 3));
-    for (a, b) in ideal.iter().zip(&carried) {
-        assert!((a - b).abs() < 0.02, "ruptures by replay {ideal:?}, on the slide {carried:?}");
+    simulate_on_slide(&plan, &law, &rates, |r| on_slide.push(r.time_s), |_| {});
+    assert_eq!((ideal.len(), on_slide.len()), (3, 3));
+    for (a, b) in ideal.iter().zip(&on_slide) {
+        assert!((a - b).abs() < 0.02, "ruptures by replay {ideal:?}, on the slide {on_slide:?}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! The committed random states, see `reference/make_reference.py`.
 #![allow(dead_code)]
 
-use stylet_dynamics::{JointVector, Wrench};
+use stylet_dynamics::{EARTH_GRAVITY_MPS2, JointVector, Posture, Wrench};
 
 pub const STATES: usize = 1000;
 
@@ -42,4 +42,24 @@ pub fn rows(bytes: &[u8], width: usize) -> Vec<Vec<f64>> {
         .chunks_exact(width * 8)
         .map(|row| row.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("8 bytes"))).collect())
         .collect()
+}
+
+/// Torques of Coriolis, centrifugal and gravity forces (N m).
+pub fn bias_torques(
+    at: &Posture<'_, 7>,
+    qd: &JointVector<7>,
+    gravity: &nalgebra::Vector3<f64>,
+) -> JointVector<7> {
+    at.inverse_dynamics(qd, &JointVector::zeros(), gravity, &Wrench::default())
+}
+
+/// Joint accelerations under joint torques and a wrench on the tip: `M^-1 (tau - C qd - g + J^T F)`.
+pub fn forward_dynamics(
+    at: &Posture<'_, 7>,
+    qd: &JointVector<7>,
+    torque: &JointVector<7>,
+    tip: &Wrench,
+) -> JointVector<7> {
+    let bias = at.inverse_dynamics(qd, &JointVector::zeros(), &EARTH_GRAVITY_MPS2, tip);
+    at.mass_matrix().cholesky().expect("positive definite").solve(&(torque - bias))
 }

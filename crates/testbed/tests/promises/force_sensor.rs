@@ -1,5 +1,5 @@
-//! Promise: the sensor's noise has the size and colour that the scenario says, its limits hold, the
-//! effects of tool, sensor and position act, and the same seed gives the same readings.
+//! The noise has the standard deviation and autocorrelation of the scenario, limits hold, effects of tool, sensor and position act, and the same
+//! seed gives the same readings.
 
 use stylet_scenario::ForceTorque;
 use stylet_testbed::{ForceSensor, InsertionSample};
@@ -8,11 +8,11 @@ use stylet_tissue::*;
 const HZ: f64 = 200.0;
 
 fn read(effects: &[AnyEffect], sensor: &ForceTorque, seed: u64, force_n: impl Fn(f64) -> f64) -> Vec<f64> {
-    let mut measuring = ForceSensor::new(effects, sensor, seed, HZ);
+    let mut force_sensor = ForceSensor::new(effects, sensor, seed, HZ);
     (0..40_000)
         .map(|k| {
             let time_s = f64::from(k) / HZ;
-            measuring.measure(&InsertionSample {
+            force_sensor.measure(&InsertionSample {
                 time_s,
                 position_m: 0.0,
                 velocity_mps: 0.002,
@@ -37,7 +37,7 @@ fn lag_one(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn noise_has_its_marginal_size_and_its_colour() {
+fn noise_has_its_standard_deviation_and_autocorrelation() {
     for ar1 in [0.0, 0.5, 0.9] {
         let noise = read(&[], &ForceTorque { noise_n: 0.05, ar1, ..ForceTorque::default() }, 3, |_| 0.0);
         assert!((sd(&noise) / 0.05 - 1.0).abs() < 0.05, "ar1 {ar1}: sd {}", sd(&noise));
@@ -88,6 +88,6 @@ fn spikes_come_at_their_rate_with_their_size_and_leave_the_noise_alone() {
 
 #[test]
 fn a_wrong_position_scale_stretches_the_recorded_position() {
-    let measuring = ForceSensor::new(&[PositionScale { eps: 0.02 }.into()], &still(), 1, HZ);
-    assert!((measuring.position(0.05) - 0.051).abs() < 1e-15);
+    let force_sensor = ForceSensor::new(&[PositionScale { eps: 0.02 }.into()], &still(), 1, HZ);
+    assert!((force_sensor.position(0.05) - 0.051).abs() < 1e-15);
 }

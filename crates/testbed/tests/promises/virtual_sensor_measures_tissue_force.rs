@@ -1,9 +1,9 @@
-//! Promise: with an exact model the virtual sensor is the tissue's force behind a first-order lag of
-//! `1/G`, to 20 mN RMS at 50 /s; with the paper's 5 /s the lag of 0.2 s is there and is reported.
+//! With an exact model the virtual sensor reports the tissue force after a first-order lag of `1/G`, to 20 mN RMS at 50 /s; with the paper's 5 /s
+//! the lag of 0.2 s is reported.
 //!
 //! A lag is an error, too: a drop `D` within `T` seconds alone leaves `D sqrt(1/(2 G T))` RMS against
-//! the raw truth, 42 mN for the liver's 2.3 N in 30 s at 50 /s. No observer of that gain comes below it;
-//! so the bar is held against the truth behind the lag, and against the raw truth away from the ruptures.
+//! the raw truth, 42 mN for the liver's 2.3 N in 30 s at 50 /s. No observer of that gain comes below it. Compared are
+//! the lagged truth, and the raw truth away from the ruptures.
 
 use crate::common::{FILES, noiseless, with_arm};
 use stylet_scenario::{ArmConfig, ArmFriction, VirtualSensor, ZeroWindow};
@@ -17,14 +17,14 @@ fn run(file: &str, arm: ArmConfig, sensor: VirtualSensor) -> (Simulation, Virtua
 
 /// RMS (N) against the raw truth without `around_s` after each rupture.
 fn away_from_ruptures(run: &Simulation, around_s: f64) -> f64 {
-    let felt = run.recording.force_virtual_n.as_ref().expect("a virtual sensor");
+    let sensed = run.recording.force_virtual_n.as_ref().expect("a virtual sensor");
     let squares: Vec<f64> = run
         .recording
         .time_s
         .iter()
-        .zip(felt.iter().zip(&run.truth.tissue_force_n))
+        .zip(sensed.iter().zip(&run.truth.tissue_force_n))
         .filter(|(t, _)| !run.truth.ruptures.iter().any(|r| (0.0..around_s).contains(&(**t - r.time_s))))
-        .map(|(_, (felt, real))| (felt - real) * (felt - real))
+        .map(|(_, (sensed, real))| (sensed - real) * (sensed - real))
         .collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
@@ -38,7 +38,7 @@ fn at_fifty_per_second_the_axial_force_is_within_twenty_millinewtons_rms_of_the_
             let away_n = away_from_ruptures(&run, 0.2);
             println!(
                 "{file}, joint torque noise {noise} N m: {:.1} mN rms against the raw truth, {:.1} mN without 0.2 s \
-                 after each rupture, {:.1} mN against the truth behind a lag of {:.4} s",
+                 after each rupture, {:.1} mN against the truth lagged by {:.4} s",
                 error.rms_n * 1e3,
                 away_n * 1e3,
                 error.lag_corrected_rms_n * 1e3,
@@ -53,7 +53,7 @@ fn at_fifty_per_second_the_axial_force_is_within_twenty_millinewtons_rms_of_the_
 }
 
 #[test]
-fn at_the_papers_five_per_second_the_force_comes_a_fifth_of_a_second_late() {
+fn at_five_per_second_the_force_lags_by_a_fifth_of_a_second() {
     for file in FILES {
         let (_, error) = run(file, ArmConfig::default(), VirtualSensor::default());
         println!("{file}: {error:?}");
@@ -64,7 +64,7 @@ fn at_the_papers_five_per_second_the_force_comes_a_fifth_of_a_second_late() {
 }
 
 #[test]
-fn joint_friction_and_a_wrong_payload_show_unless_the_residual_is_zeroed() {
+fn joint_friction_and_a_payload_error_appear_unless_the_residual_is_zeroed() {
     let wrong = ArmConfig {
         joint_friction: ArmFriction::Measured,
         payload_error_kg: 0.05,
@@ -83,13 +83,13 @@ fn joint_friction_and_a_wrong_payload_show_unless_the_residual_is_zeroed() {
 }
 
 #[test]
-fn friction_and_sensors_leave_the_motion_and_the_force_torque_sensor_alone() {
+fn joint_friction_does_not_act_on_the_motion_or_the_force_torque_sensor() {
     let (plain, _) = run(FILES[1], ArmConfig::default(), VirtualSensor::default());
-    let rough = ArmConfig { joint_friction: ArmFriction::MeasuredDirectional, ..ArmConfig::default() };
-    let (rubbed, _) = run(FILES[1], rough, VirtualSensor::default());
-    assert_eq!(plain.recording.position_m, rubbed.recording.position_m);
-    assert_eq!(plain.recording.force_n, rubbed.recording.force_n);
-    assert_ne!(plain.recording.force_virtual_n, rubbed.recording.force_virtual_n);
+    let friction = ArmConfig { joint_friction: ArmFriction::MeasuredDirectional, ..ArmConfig::default() };
+    let (with_friction, _) = run(FILES[1], friction, VirtualSensor::default());
+    assert_eq!(plain.recording.position_m, with_friction.recording.position_m);
+    assert_eq!(plain.recording.force_n, with_friction.recording.force_n);
+    assert_ne!(plain.recording.force_virtual_n, with_friction.recording.force_virtual_n);
     assert_eq!(plain.recording.joint_torque_nm.len(), plain.recording.len());
     plain.recording.check().expect("a recording like any other");
 }
@@ -105,5 +105,5 @@ fn the_same_seed_gives_the_same_bits_and_another_seed_others() {
     let other = simulate(&scenario, 8).expect("simulated");
     assert_ne!(once.recording.force_virtual_n, other.recording.force_virtual_n);
     assert_ne!(once.recording.joint_torque_nm, other.recording.joint_torque_nm);
-    assert_eq!(once.recording.position_m, other.recording.position_m, "the noise is the sensors' own");
+    assert_eq!(once.recording.position_m, other.recording.position_m, "noise belongs to the sensors");
 }

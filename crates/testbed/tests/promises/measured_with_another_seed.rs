@@ -1,5 +1,4 @@
-//! Promise: measuring an insertion again with other noise gives the bits of simulating it again, whatever effects sit in
-//! tool and sensor: a tool's inertia needs the needle's acceleration, a wrong position scale must not act twice.
+//! Measuring an insertion with other noise gives the same bits as simulating it with that seed, for all effects of tool and sensor.
 
 use stylet_scenario::{ForceTorque, Robot, Scenario, Sensor};
 use stylet_testbed::simulate;
@@ -38,7 +37,7 @@ fn another_seed_is_the_same_insertion_measured_again() {
 }
 
 #[test]
-fn the_inertia_of_the_tool_is_felt_again() {
+fn the_inertia_of_the_tool_is_measured_too() {
     let with = simulate(&scenario(Robot::Slide, effects()), 1).expect("simulated");
     let without = simulate(&scenario(Robot::Slide, effects()[1..].to_vec()), 1).expect("simulated");
     let heavy = with.measured_with_seed(3).expect("a sensor");
